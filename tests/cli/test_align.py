@@ -63,7 +63,7 @@ def test_what_is_written(aligned):
     attitude = read_raw(folder / "out" / "attitude.csv").columns
     assert np.allclose(np.diff(attitude["time_s"]), 0.1)
     page = (folder / "out" / "report.html").read_text()
-    assert "Readiness: alignment time against accuracy" in page
+    assert "Readiness: accuracy against alignment time" in page
     assert (folder / "out" / "figures" / "readiness.svg").is_file()
     assert "heading" in done.out
     assert max(map(len, done.out.splitlines())) < 400

@@ -35,9 +35,9 @@ def tried(drive, run_cli):
 def test_a_sensor_is_told_in_words_and_numbers(tmp_path, run_cli):
     done = run_cli("coast", "adis16470", "--speed", "15", "--out", tmp_path / "out")
     assert done.code == 0, done.err
-    assert "95 % are within" in done.out
+    assert "95 % of drifts are within" in done.out
     assert "The largest share" in done.out
-    assert "all together" in done.out
+    assert "total" in done.out
     names = {p.name for p in (tmp_path / "out").iterdir()}
     assert names == {
         "budget.csv",
@@ -76,7 +76,7 @@ def test_drifts_that_came_are_laid_over_the_forecast(tried):
     # Ten overlapping outages of one drive are as good as a few: of a forecast of half the size
     # exp(-0.25 * 3.0) = 47 % of all drifts would be outside.
     assert inside.mean() > 0.7
-    assert "of 10 ends" in done.out
+    assert "of 10 final drifts" in done.out
     drifts = read_raw(folder / "drifts.csv").columns
     assert len(drifts["time_s"]) == sum(one["fixes"] for one in told["drifts"])
     assert {p.stem for p in (folder / "figures").glob("*.svg")} == {

@@ -46,7 +46,7 @@ def test_an_open_case_is_refused_with_the_same_lines(run_cli, record, tmp_path):
     done = run_cli("init", "crash", record, "--out", out)
     with pytest.raises(ConfigError) as caught:
         CaseSpec.read(out)
-    asked = done.out.partition("Is this so?")[0]
+    asked = done.out.partition("Check; correct it in")[0]
     told = [line.split()[1] for line in asked.splitlines() if line.startswith("  line ")]
     for line in told:
         assert f"line {line}, " in str(caught.value)

@@ -172,8 +172,8 @@ def test_fixes_are_kept_back_to_score_by(run_cli, tmp_path, undrawn_here):
     write_drive(tmp_path, file=lambda text: text + withhold)
     done = run_cli("navigate", tmp_path / "navigate.toml", "--out", tmp_path / "out", "--json")
     assert done.code == 0, done.err
-    found = json.loads(done.out)["withheld"]
-    assert [(w["aid"], w["from_s"], w["to_s"]) for w in found] == [
+    found = json.loads(done.out)["gnss_outage_tests"]
+    assert [(w["measurement"], w["from_s"], w["to_s"]) for w in found] == [
         ("rtk", 45.0, 55.0),
         ("rtk", 30.0, 35.0),
     ]

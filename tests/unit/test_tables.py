@@ -57,9 +57,13 @@ def test_a_table_from_elsewhere_is_checked():
 
 
 def test_increments_must_not_overlap():
-    with pytest.raises(DataError, match="row 2, dt"):
+    with pytest.raises(
+        DataError, check=coded("tables.step-ending-not-positive-or", row=2, quantity="dt")
+    ):
         tables.increments_table([0.1, 0.2], [0.1, 0.15], np.zeros((2, 3)))
-    with pytest.raises(DataError, match="row 1, dt"):
+    with pytest.raises(
+        DataError, check=coded("tables.step-ending-not-positive-or", row=1, quantity="dt")
+    ):
         tables.increments_table([0.1, 0.2], [0.0, 0.1], np.zeros((2, 3)))
     tables.increments_table([0.1, 0.4], [0.1, 0.1], np.zeros((2, 3)))  # a gap is no overlap
 
@@ -104,7 +108,7 @@ def test_errors_and_standard_deviations_of_a_trajectory():
     tables.check_trajectory_error(table.assign(further=np.nan))
     with pytest.raises(DataError, check=coded("tables.missing-columns")):
         tables.check_trajectory_error(table.drop(columns="down"))
-    with pytest.raises(DataError, match="row 3, east: not a finite number"):
+    with pytest.raises(DataError, check=coded("tables.not-finite-number", row=3, quantity="east")):
         tables.trajectory_error_table(TIME, spoiled(RATE, (2, 1), np.nan), RATE, RATE)
     with pytest.raises(DataError, check=coded("tables.arrays-different-lengths")):
         tables.trajectory_error_table(TIME, RATE[:2], RATE, RATE)

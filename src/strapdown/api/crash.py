@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 from html import escape
 from pathlib import Path
 from types import MappingProxyType
@@ -195,7 +195,5 @@ def reconstruct(
             return run_case(given, None, part)
         return run_case(CaseSpec.read(Path(given)), Path(given), part)
 
-    own = {f.name for f in fields(CaseResult)}
-    results = [run(number) for number in range(len(cases))]
-    first, *rest = (CrashRun(**{name: getattr(r, name) for name in own}) for r in results)
-    return replace(first, others=tuple(rest))
+    first, *rest = (vars(run(number)) for number in range(len(cases)))
+    return CrashRun(**first, others=tuple(CrashRun(**one) for one in rest))

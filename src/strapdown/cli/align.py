@@ -92,8 +92,8 @@ def align(
         Path,
         typer.Argument(
             metavar="LOG|CONFIG.toml",
-            help="A log of gyros and accelerometers of a body that stays at its place, or the "
-            "file of an alignment.",
+            help="A log of gyros and accelerometers of a stationary body, or the file of an "
+            "alignment.",
         ),
     ],
     flags: AlignFlags,

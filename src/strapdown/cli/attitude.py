@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from strapdown.cli.shared_options import (
-    OUT_PANEL,
-    RUN_PANEL,
     LogFlags,
     OutFlags,
     folder_to_make,
+    running,
     spread,
+    writing,
 )
 
 if TYPE_CHECKING:
@@ -38,108 +38,86 @@ class ComparisonFlags:
 
     algorithms: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAMES",
-            help="Names joined by blanks or commas, with options after a colon: 'naive "
+        running(
+            "NAMES",
+            "Names joined by blanks or commas, with options after a colon: 'naive "
             "euler:step=rk4 dcm:order=3 rotvec:samples=3'; or all, with variants. One of each "
             "(strapdown modules) if not given.",
-            rich_help_panel=RUN_PANEL,
         ),
     ] = None
     rates: Annotated[
         str | None,
-        typer.Option(
-            metavar="HZ,HZ,…",
-            help="Lower rates to try: '100 50 20 10'; the full rate and its halves if not given.",
-            rich_help_panel=RUN_PANEL,
+        running(
+            "HZ,HZ,…",
+            "Lower rates to try: '100 50 20 10'; the full rate and its halves if not given.",
         ),
     ] = None
     tolerance_deg: Annotated[
         float,
-        typer.Option(
-            metavar="DEG",
-            help="Tolerance: the largest acceptable error (1).",
-            show_default=False,
-            rich_help_panel=RUN_PANEL,
-        ),
+        running("DEG", "Tolerance: the largest acceptable error (1).", show_default=False),
     ] = 1.0
     interpolation: Annotated[
         str,
-        typer.Option(
-            metavar="KIND",
-            help="How rates run between their stamps: linear (the trapezoid), or cubic (linear).",
+        running(
+            "KIND",
+            "How rates run between their stamps: linear (the trapezoid), or cubic (linear).",
             show_default=False,
-            rich_help_panel=RUN_PANEL,
         ),
     ] = "linear"
     trials: Annotated[
         int,
-        typer.Option(
-            metavar="N",
-            help="Of a scenario: so many seeds (1).",
-            show_default=False,
-            rich_help_panel=RUN_PANEL,
-        ),
+        running("N", "Of a scenario: so many seeds (1).", show_default=False),
     ] = 1
     reference: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="WORDS|FILE",
-            help="Known parts of the motion, repeatable: 'end same as start', 'end 2 turns about z "
+        running(
+            "WORDS|FILE",
+            "Known parts of the motion, repeatable: 'end same as start', 'end 2 turns about z "
             "since start', '12.5 roll 0 pitch 0 heading 90', '8 same place as 2', rests (gravity "
             "at every rest), a file of such lines (.txt .toml .csv), or an attitude truth.",
-            rich_help_panel=RUN_PANEL,
         ),
     ] = None
     reference_log: Annotated[
         Path | None,
-        typer.Option(
-            metavar="LOG",
-            help="Log of a second, better sensor on the same body, to be taken for the truth.",
-            rich_help_panel=RUN_PANEL,
+        running(
+            "LOG", "Log of a second, better sensor on the same body, to be taken for the truth."
         ),
     ] = None
     initial: Annotated[
         str,
-        typer.Option(
-            metavar="ATTITUDE",
-            help="auto, truth, level, zero, or roll,pitch,heading in deg (auto).",
+        running(
+            "ATTITUDE",
+            "auto, truth, level, zero, or roll,pitch,heading in deg (auto).",
             show_default=False,
-            rich_help_panel=RUN_PANEL,
         ),
     ] = "auto"
     gyro_bias: Annotated[
         str,
-        typer.Option(
-            metavar="BIAS",
-            help="none; rest (mean of the first stationary stretch); rests (interpolated between "
+        running(
+            "BIAS",
+            "none; rest (mean of the first stationary stretch); rests (interpolated between "
             "all of these); 'x,y,z deg/s' about forward, right, down; or a log of the stationary "
             "sensor (none).",
             show_default=False,
-            rich_help_panel=RUN_PANEL,
         ),
     ] = "none"
     peers: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAMES",
-            help="Other libraries to lay beside: vqf, imufusion, ahrs, or all (the extra 'peers').",
-            rich_help_panel=RUN_PANEL,
+        running(
+            "NAMES",
+            "Other libraries to lay beside: vqf, imufusion, ahrs, or all (the extra 'peers').",
         ),
     ] = None
     seed: Annotated[
         int | None,
-        typer.Option(
-            metavar="N", help="Of a scenario's simulated errors (0).", rich_help_panel=RUN_PANEL
-        ),
+        running("N", "Of a scenario's simulated errors (0)."),
     ] = None
     sensor: Annotated[
         str | None,
-        typer.Option(
-            metavar="NAME|FILE",
-            help="Of a scenario: its errors are those of a unit of this sensor of the catalogue "
+        running(
+            "NAME|FILE",
+            "Of a scenario: its errors are those of a unit of this sensor of the catalogue "
             "(strapdown modules), or of a .toml file of your own.",
-            rich_help_panel=RUN_PANEL,
         ),
     ] = None
 
@@ -150,24 +128,21 @@ class FileFlags:
 
     export_c: Annotated[
         Path | None,
-        typer.Option(
-            metavar="FILE.c",
-            help="Write the algorithm that the answer chose (or the only one named) as C99, with "
+        writing(
+            "FILE.c",
+            "Write the algorithm that the answer chose (or the only one named) as C99, with "
             "a test vector of this log.",
-            rich_help_panel=OUT_PANEL,
         ),
     ] = None
     timing: Annotated[
         bool,
-        typer.Option(
+        writing(
+            None,
+            "Print how long a sample takes on this machine (it is in timing.json, too).",
             "--timing",
-            help="Print how long a sample takes on this machine (it is in timing.json, too).",
-            rich_help_panel=OUT_PANEL,
         ),
     ] = False
-    png: Annotated[
-        bool, typer.Option("--png", help="Draw the figures as PNG, too.", rich_help_panel=OUT_PANEL)
-    ] = False
+    png: Annotated[bool, writing(None, "Draw the figures as PNG, too.", "--png")] = False
 
 
 @spread
@@ -287,8 +262,6 @@ def print_comparison(bench: AttitudeComparison) -> None:
     """Print the input of the run, its tables, and the answer last, where it is visible."""
     from strapdown.cli.console import console, print_table
     from strapdown.report import attitude_tables as tables
-    from strapdown.report import attitude_tables as words
-    from strapdown.report.attitude_tables import offer_lines, place_table
 
     page = console()
     if bench.trials is not None:
@@ -299,36 +272,36 @@ def print_comparison(bench: AttitudeComparison) -> None:
         page.print("Read as:")
         print_table(
             ["column", "taken as", "unit", "first value"],
-            [[r.source, r.quantity, r.unit, words.first_value(r)] for r in bench.readings],
+            [[r.source, r.quantity, r.unit, tables.first_value(r)] for r in bench.readings],
         )
-    for name, text in words.facts(bench):
+    for name, text in tables.facts(bench):
         page.print(f"{name}: {text}")
     shown = [
         *tables.result_tables(bench),
         *tables.sweep_tables(bench),
         tables.trial_table(bench),
-        place_table(bench),
+        tables.place_table(bench),
         tables.peer_table(bench),
     ]
     for table in shown:
         if table is not None:
             _print_table(table, page)
-    points = words.reference_lines(bench)
+    points = tables.reference_lines(bench)
     for point in points[:MOST_LINES]:
         page.print(point)
     if len(points) > MOST_LINES:
         page.print(f"and {len(points) - MOST_LINES} more reference points, in the report")
     page.print(bench.answer.sentence, style="bold")
-    page.print(words.standing(bench))
+    page.print(tables.standing(bench))
     for title, lines in (("Why", bench.answer.why), ("What would help", bench.answer.helps)):
         if lines:
             page.print(f"{title}:")
         for line in lines:
             page.print(f"  - {line}")
     if not bench.scores:
-        page.print(words.HOW_TO_REFERENCE)
-    if offers := offer_lines(bench):
-        page.print("These rests look alike, and could be reference points:")
+        page.print(tables.HOW_TO_REFERENCE)
+    if offers := tables.offer_lines(bench):
+        page.print("Rests of similar attitude, possible reference points:")
     for line in offers:
         page.print(f"  {line}")
 

@@ -65,16 +65,16 @@ FLAGS = {
 class MotionFlags:
     """Motion of a sensor, by key of its table."""
 
-    speed_m_per_s: Annotated[
-        float | None, moving("M/S", "It goes so fast (0: it stands).", "--speed")
-    ] = None
+    speed_m_per_s: Annotated[float | None, moving("M/S", "Speed (0: stationary).", "--speed")] = (
+        None
+    )
     to_speed_m_per_s: Annotated[
-        float | None, moving("M/S", "To which it comes over the outage.", "--to-speed")
+        float | None, moving("M/S", "Speed at the end of the outage.", "--to-speed")
     ] = None
     turn_rate_deg_per_s: Annotated[
-        float | None, moving("DEG/S", "It turns, to the right.", "--turn-rate")
+        float | None, moving("DEG/S", "Turn rate, positive to the right.", "--turn-rate")
     ] = None
-    heading_deg: Annotated[float | None, moving("DEG", "Where it goes (45).", "--heading")] = None
+    heading_deg: Annotated[float | None, moving("DEG", "Heading (45).", "--heading")] = None
     lat_deg: Annotated[float | None, moving("DEG", "Latitude (45).", "--lat")] = None
 
 
@@ -86,22 +86,22 @@ class StartFlags:
         float | None,
         starting(
             "S",
-            "So long a drive with fixes before it (600); 0: what an alignment leaves.",
+            "Duration of the drive with fixes before the outage (600); 0: after an alignment.",
             "--aided",
         ),
     ] = None
     fix_position_sd_m: Annotated[
-        float | None, starting("M", "Of these fixes, one a second (1.5).", "--fix-sd")
+        float | None, starting("M", "Of these fixes, at 1 Hz (1.5).", "--fix-sd")
     ] = None
     position_sd_m: Annotated[
         float | None,
         starting(
-            "M", "In place of what that leaves, each axis; so the following.", "--position-sd"
+            "M", "Position, each axis, instead of that after the drive; so below.", "--position-sd"
         ),
     ] = None
-    velocity_sd_m_per_s: Annotated[float | None, starting("M/S", "Each axis.", "--velocity-sd")] = (
-        None
-    )
+    velocity_sd_m_per_s: Annotated[
+        float | None, starting("M/S", "Velocity, each axis.", "--velocity-sd")
+    ] = None
     tilt_sd_deg: Annotated[float | None, starting("DEG", "Roll and pitch.", "--tilt-sd")] = None
     heading_sd_deg: Annotated[float | None, starting("DEG", "Heading.", "--heading-sd")] = None
     gyro_bias_sd_deg_per_h: Annotated[
@@ -119,11 +119,9 @@ class OutageFlags:
 
     at_s: Annotated[
         float | None,
-        during(
-            "S", "The outage begins at this stamp of the log; even places, if not given.", "--at"
-        ),
+        during("S", "Begin of the outage, a stamp of the log; evenly spaced if not given.", "--at"),
     ] = None
-    places: Annotated[int | None, during("N", "So many outages, evenly (10).")] = None
+    places: Annotated[int | None, during("N", "Number of evenly spaced outages (10).")] = None
     from_s: Annotated[
         float | None, during("S", BEGIN.format("where the filter has settled"), "--from")
     ] = None
@@ -138,21 +136,21 @@ def coast(
         typer.Argument(
             metavar="SENSOR|BUNDLE",
             help="A sensor of the catalogue (strapdown modules) or a .toml file of your own; or a "
-            "folder that strapdown navigate wrote, or the file of such a run, whose receivers are "
-            "then taken away.",
+            "folder written by strapdown navigate, or the file of such a run, whose GNSS fixes are "
+            "then withheld.",
         ),
     ],
     *,
     outage: Annotated[
-        float, running("S", "How long nothing aids it (60).", show_default=False)
+        float, running("S", "Duration of the outage (60).", show_default=False)
     ] = 60.0,
     motion: MotionFlags,
     keep: Annotated[
         list[str] | None,
         moving(
-            "AID",
-            "An aid that stays, with options after a colon: no_slip, odometer, "
-            "zero_velocity, zero_rate:sd_deg_per_s=0.1; again for another.",
+            "KIND",
+            "A measurement that remains, with options after a colon: no_slip, odometer, "
+            "zero_velocity, zero_rate:sd_deg_per_s=0.1; repeatable.",
             "--with",
         ),
     ] = None,
@@ -265,7 +263,7 @@ def print_coast(result: OutageRun) -> None:
     out.print(spaced(f"{result.name}: {result.what}; {words.motion_words(result)}"))
     out.print(spaced(f"At the start: {words.start_words(result)}"))
     if result.stays:
-        out.print(f"Aids that stay: {', '.join(result.stays)}")
+        out.print(f"Remaining measurements: {', '.join(result.stays)}")
     for block in (time_table(result), budget_table(result), drift_table(result)):
         if block is not None:
             print_block(block)

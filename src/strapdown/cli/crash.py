@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from strapdown.cli.shared_options import OutFlags, folder_to_make, spread
+
+if TYPE_CHECKING:
+    from strapdown.crash.case import CaseResult
 
 EPILOG = "Example: strapdown crash case.toml (strapdown init crash RECORD writes one)"
 
@@ -36,7 +39,6 @@ def crash(
         print_seal,
         progress,
     )
-    from strapdown.cli.crash_tables import print_crash
     from strapdown.cli.result_folder import default_folder, refuse_result
 
     refuse_result(case, "case")
@@ -58,3 +60,22 @@ def crash(
     print_crash(result)
     print_findings(result.findings)
     print_seal(seal, "report.html")
+
+
+def print_crash(result: CaseResult) -> None:
+    """Print the results of a case, and their limits."""
+    from strapdown.cli.console import console, print_block
+    from strapdown.report.crash_tables import answers_table, comparison_table, path_table
+    from strapdown.report.crash_words import headline, limitations
+    from strapdown.report.values import spaced
+
+    out = console()
+    for block in (answers_table(result), path_table(result), comparison_table(result)):
+        if block is not None and block.rows:
+            print_block(block)
+    out.print(spaced(headline(result)), style="bold")
+    found = limitations(result)
+    if found:
+        out.print("\nLimitations (details in the report):")
+        for _, head, _ in found:
+            out.print(f"  - {spaced(head)}")

@@ -20,7 +20,7 @@ EPILOG = "Example: strapdown demo --out demo"
 _PAGE = "index.html"
 _TURNS = "mpu6050_turns"
 _TURN = "rotate-360ccw-around-z-pointing-up"
-_VERDICT = (("report.html", "The report"), ("verdict.html", "The verdict"))
+_VERDICT = (("report.html", "Report"), ("verdict.html", "Integrity"))
 _OUTAGE = 30.0  # s
 _RECORDING = "phone-recording"
 
@@ -177,7 +177,7 @@ def demo_runs(out: Path, data: Path) -> list[DemoRun]:
                 "of such fixes are correlated over minutes, which the filter does not model: its "
                 "bound of the height is too small, as the comparison shows.",
                 f"strapdown navigate {out / 'phone.toml'} \\\n  --out {out / 'phone'}",
-                ("plan", "heading-light"),
+                ("plan", "heading-integrity"),
                 _VERDICT,
             ),
             _navigation("phone", data),
@@ -189,10 +189,10 @@ def demo_runs(out: Path, data: Path) -> list[DemoRun]:
                 "A",
                 "tunnel",
                 "A drive with half a minute in a tunnel",
-                "A simulation: fixes with outliers, none in the tunnel; smoothed at the end. Below "
-                "the path: the heading status.",
+                "A simulation: fixes with outliers, none in the tunnel; smoothed. Below the path: "
+                "heading integrity.",
                 f"strapdown navigate {out / 'tunnel.toml'} \\\n  --out {out / 'tunnel'}",
-                ("plan", "heading-light"),
+                ("plan", "heading-integrity"),
                 _VERDICT,
             ),
             _navigation("tunnel", data),
@@ -203,7 +203,7 @@ def demo_runs(out: Path, data: Path) -> list[DemoRun]:
             Shown(
                 "A",
                 "cone",
-                "How far would it have drifted?",
+                "Drift during a GNSS outage",
                 f"The same drive with a GNSS outage of {_OUTAGE:g} s at each of ten instants: the "
                 "predicted drift, its sources, and the drift that occurred.",
                 f"strapdown coast {out / 'tunnel'} --outage {_OUTAGE:g} \\\n  --out {out / 'cone'}",
@@ -218,10 +218,10 @@ def demo_runs(out: Path, data: Path) -> list[DemoRun]:
                 "A",
                 "car",
                 "A real car",
-                "A recording: a small unit with vibration, and an RTK receiver; fixes are withheld "
-                "at times, to compare the result with them.",
+                "A recording: a small unit with vibration, and an RTK receiver, with GNSS outage "
+                "tests.",
                 f"strapdown navigate {out / 'car.toml'} \\\n  --out {out / 'car'}",
-                ("plan", "heading-light"),
+                ("plan", "heading-integrity"),
                 _VERDICT,
             ),
             _navigation("car", data),
@@ -233,8 +233,9 @@ def demo_runs(out: Path, data: Path) -> list[DemoRun]:
             Shown(
                 "A",
                 "walk",
-                "A real walk, without satellites",
-                "A recording: a unit on a shoe, which is stationary at each step.",
+                "A real walk, without GNSS",
+                "A recording: foot-mounted pedestrian dead reckoning with zero velocity updates "
+                "(ZUPT).",
                 f"strapdown navigate {out / 'walk.toml'} \\\n  --out {out / 'walk'}",
                 ("plan",),
                 _VERDICT,
@@ -262,7 +263,8 @@ def demo_runs(out: Path, data: Path) -> list[DemoRun]:
                 "B",
                 "turn",
                 "A cheap sensor, turned twice by hand",
-                "A recording. Known: two full turns about the vertical end in the first attitude.",
+                "A recording. Reference: two full turns about the vertical end in the initial "
+                "attitude.",
                 f"strapdown attitude {turns / _TURN} \\\n"
                 "  --reference 'end 2 turns about up since start' \\\n"
                 f"  --gyro-bias {turns / 'unmoved-10min'} \\\n  --out {out / 'turn'}",
@@ -282,7 +284,7 @@ def demo_runs(out: Path, data: Path) -> list[DemoRun]:
                 f"strapdown simulate pole --out {out / 'pole-records'}\n"
                 f"strapdown crash {out / 'pole-records' / 'case.toml'} \\\n  --out {out / 'pole'}",
                 ("path",),
-                (("report.html", "The report"), ("report.pdf", "as PDF")),
+                (("report.html", "Report"), ("report.pdf", "PDF")),
                 "pole-records",
             ),
             pole,

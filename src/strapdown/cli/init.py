@@ -50,7 +50,7 @@ def _file_to_write(name: str) -> Any:
     return writing("FILE", f"File to write ({name}).", show_default=False)
 
 
-Force = Annotated[bool, writing(None, "Replace a file that is there.", "--force")]
+Force = Annotated[bool, writing(None, "Overwrite an existing file.", "--force")]
 
 
 @app.callback(epilog=EPILOG)
@@ -86,7 +86,7 @@ def crash(
         report("looking through", 0.5)
         return draft_case(there, folder=folder)
 
-    question = f"Is this so? If not, correct it in {out}:"
+    question = f"Check; correct it in {out} if wrong:"
     _propose("crash", records, draft, question, out, force=force, quiet=quiet)
 
 
@@ -133,7 +133,7 @@ def navigate(
         with_what("NAME|FILE", f"{SENSOR[:-1]}; the nearest by noise, if not given."),
     ] = None,
     foot: Annotated[
-        bool, running(None, "It is of a unit on a shoe: zero velocity at its stances.", "--foot")
+        bool, running(None, "Foot-mounted unit: zero velocity at each stance.", "--foot")
     ] = False,
     *,
     flags: LogFlags,
@@ -153,7 +153,7 @@ def navigate(
             _table(log, flags), folder=folder, axes=flags.axes, gnss=gnss, sensor=sensor, foot=foot
         )
 
-    question = f"Assumed; if it is not so, correct it in {out}:"
+    question = f"Assumed; correct it in {out} if wrong:"
     _propose("navigate", [log], draft, question, out, force=force, quiet=quiet)
 
 
@@ -205,11 +205,11 @@ def _propose(
         if len(left_out) > SHOWN:
             page.print(f"  and {len(left_out) - SHOWN} more: at the end of {out}")
     page.print(f"\nWrote {out}")
-    _list(page, f'Only you know; put it in place of each "?" in {out}:', made.asked)
+    _list(page, f'To be filled in; replace each "?" in {out}:', made.asked)
     if question:
         _list(page, question, made.to_check)
     if command == "crash":
-        page.print("\nLook at the lines that say 'assumed', too.")
+        page.print("\nCheck the lines marked 'assumed' as well.")
     page.print(f"\nThen   strapdown {command} {out}")
 
 

@@ -154,10 +154,9 @@ def _reader_gone() -> NoReturn:
 def _keep_interrupts() -> None:
     """Deliver an interrupt again where Python drops it.
 
-    A signal handler runs between any two steps of the program, and so at times within a callback
-    of a weak reference or a finalizer, whose exceptions Python reports and ignores: the program
-    would continue to its end. While matplotlib draws, one interrupt of twelve is lost in this way.
-    It is sent again until it is raised elsewhere.
+    A signal handler may run within a callback of a weak reference or a finalizer, whose exceptions
+    Python reports and ignores: the program would continue to its end. The signal is sent again
+    until it is raised elsewhere.
     """
     before = sys.unraisablehook
 

@@ -107,7 +107,7 @@ def _literal() -> tuple[Listed, ...]:
         *(_slot(name, slot) for name, slot in slots.items()),
         Listed(
             "standstill_detectors",
-            "Detectors of a standstill (detector = … of an aid that watches)",
+            "Detectors of a standstill (detector = … of a measurement)",
             _summaries(STANDSTILL_DETECTORS),
         ),
         Listed(

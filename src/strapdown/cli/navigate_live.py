@@ -93,7 +93,7 @@ def _sealed(
             write_timing(seal, report.seconds)
             write_latency(seal, live.told())
     except StrapdownError:
-        typer.echo(f"what was received is in {received}", err=True)
+        typer.echo(f"received data: {received}", err=True)
         raise
     except BaseException:
         shutil.rmtree(received, ignore_errors=True)

@@ -67,9 +67,9 @@ def print_navigation(
     trajectory = result.record.trajectory
     time = trajectory.index
     duration = duration_words(float(time[-1] - time[0]))
-    way = length_words(distance_over_ground(trajectory))
+    distance = length_words(distance_over_ground(trajectory))
     name = f"{result.source.name}: {result.source.what}"
-    out.print(spaced(f"{name}, {duration}, {way}, {len(time)} samples"))
+    out.print(spaced(f"{name}, {duration}, {distance}, {len(time)} samples"))
     tables: list[TableBlock | None]
     if verbose:
         tables = [end_table(found), error_table(found), point_table(found)]
@@ -112,7 +112,7 @@ def _end(found: NavigationEvaluation) -> TableBlock:
     rows = []
     for name, *cells in block.rows:
         shown = of.get(SCORES.get(name, ""), ("",) * 6)
-        if name == "place":
+        if name == "position":
             # The height has a row of its own.
             name = "latitude, longitude"
             ends = found.record.trajectory[["lat", "lon"]].iloc[[0, -1]].to_numpy()

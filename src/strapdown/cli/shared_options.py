@@ -18,11 +18,6 @@ import typer
 
 from strapdown.errors import ConfigError
 
-LOG_PANEL = "How to read the log"
-RUN_PANEL = "What to run"
-WITH_PANEL = "Where, and with what"
-OUT_PANEL = "What to write"
-
 
 def options(panel: str) -> Callable[..., Any]:
     """Return a maker of the options that the help lists together."""
@@ -33,12 +28,15 @@ def options(panel: str) -> Callable[..., Any]:
     return option
 
 
-reading, running, with_what, writing = map(options, (LOG_PANEL, RUN_PANEL, WITH_PANEL, OUT_PANEL))
+reading = options("How to read the log")
+running = options("What to run")
+with_what = options("Where, and with what")
+writing = options("What to write")
 BEGIN = "Begin at this stamp; {}, if not given."
 END = "End at this stamp; the last, if not given."
 LENGTH = "Length of the part to use, instead of --to."
 SENSOR = (
-    "How good the sensors are: a sensor of the catalogue (strapdown modules), or a .toml file of "
+    "Sensor error model: a sensor of the catalogue (strapdown modules), or a .toml file of "
     "your own."
 )
 
@@ -99,7 +97,7 @@ class LogFlags:
         bool,
         reading(
             None,
-            "Leave out rows that cannot be used, undo a wrapped clock, and say so.",
+            "Drop rows that cannot be used, unwrap the clock, and report both.",
             "--repair",
         ),
     ] = False
@@ -155,7 +153,7 @@ def log_level(level: int) -> Callable[[bool], bool]:
 
 Quiet = Annotated[
     bool,
-    writing(None, "Print nothing but errors.", "--quiet", "-q", callback=log_level(logging.ERROR)),
+    writing(None, "Print errors only.", "--quiet", "-q", callback=log_level(logging.ERROR)),
 ]
 Verbose = Annotated[
     bool,

@@ -38,7 +38,7 @@ from strapdown.navigation.filter_options import DAMPINGS, Correction, FilterOpti
 from strapdown.navigation.measurements import AIDS
 from strapdown.navigation.measurements.measurement import Measurement
 from strapdown.navigation.recorder import RECORDERS, Recorder
-from strapdown.navigation.smoother import SMOOTHERS, Smoother
+from strapdown.navigation.smoother import SMOOTHERS, RauchTungStriebel
 from strapdown.plugins import WithPlugins
 from strapdown.prefilter import PREFILTERS, Prefilter
 
@@ -85,7 +85,7 @@ SLOTS: dict[str, Slot] = {
         Slot("influence", "Influence functions", Influence, INFLUENCES),
         Slot("aiding", "Aids", Measurement, WithPlugins(AIDS, "measurement", Measurement)),
         Slot("damping", "Dampings", Correction, DAMPINGS),
-        Slot("smoother", "Smoothers", Smoother, SMOOTHERS),
+        Slot("smoother", "Smoothers", RauchTungStriebel, SMOOTHERS),
         Slot("recorder", "Recorders", Recorder, RECORDERS),
     )
 }

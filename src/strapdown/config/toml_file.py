@@ -7,6 +7,7 @@ import tomllib
 from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -35,19 +36,16 @@ LONG = 500
 
 @dataclass(frozen=True)
 class TomlFile:
-    """Content of a file, with the lines of its keys.
-
-    Attributes
-    ----------
-    path : Path
-    table : dict
-    lines : dict
-        As `toml_lines.key_lines`.
-    """
+    """Content of a file; the lines of its keys are searched for a message."""
 
     path: Path
     table: dict[str, Any]
-    lines: Mapping[KeyPath, list[int]] = field(repr=False)
+    text: str = field(repr=False)
+
+    @cached_property
+    def lines(self) -> dict[KeyPath, list[int]]:
+        """As `key_lines`."""
+        return key_lines(self.text)
 
     def line(self, path: KeyPath) -> int | None:
         """Line of a key, or of the nearest enclosing one."""
@@ -66,15 +64,25 @@ def read_toml(path: Path) -> TomlFile:
     """
     text = _text(path)
     try:
-        # Lines first: this detects excessive nesting quickly, before the slow parse.
-        lines = key_lines(text)
-        if max(map(len, lines), default=0) > DEEPEST:
+        if any(line.count(".") > DEEPEST for line in text.split("\n")):
+            key_lines(text)  # refuses a key of many parts, which tomllib parses slowly
+        table = tomllib.loads(text)
+        if _depth(table) > DEEPEST:
             raise RecursionError
-        return TomlFile(path, tomllib.loads(text), lines)
+        return TomlFile(path, table, text)
     except RecursionError:
         raise ConfigError("config.nested-too-deep", file=path.name) from None
     except ValueError as error:
         raise _no_toml(path, text, str(error)) from None
+
+
+def _depth(node: Any) -> int:
+    """Length of the longest path of keys and elements."""
+    if not isinstance(node, dict | list):
+        return 0
+    return max(
+        (1 + _depth(one) for one in (node.values() if isinstance(node, dict) else node)), default=0
+    )
 
 
 def _text(path: Path) -> str:

@@ -27,7 +27,10 @@ class VelocityIncrements:
 
     `values`, (m, 3), m/s, and `turned`, (m, 3), rad, between `edges`, (m + 1,), s; the effect of
     one standard deviation of each of p unknowns on them, (3 m, p); `lever`, (3 m, 3), 1/s: effect
-    of a position error (true minus stated) on the values.
+    of a position error (true minus stated) on the values. `force_noise`, (3 m, 3 m), (m/s)²:
+    covariance from accelerometer noise. `arm_noise`, m/s, and `turned_noise`, rad, (3 m, q): effect
+    of one standard deviation of each of q independent numbers, the gyro noise, on the values
+    through the lever arm and on the rotation. Units that borrow a `gyro` have the same numbers.
     """
 
     edges: Array
@@ -37,8 +40,11 @@ class VelocityIncrements:
     contributors: tuple[str, ...]
     effects: Array
     turned_effects: Array
-    noise: NoiseOfSums
     lever: Array
+    force_noise: Array
+    arm_noise: Array
+    turned_noise: Array
+    gyro: str
 
     def of_pieces(self, kept: NDArray[np.bool_]) -> VelocityIncrements:
         """Select some of the intervals, (m,); the edges remain those of all."""
@@ -51,13 +57,15 @@ class VelocityIncrements:
             turned=self.turned[kept],
             effects=self.effects[rows],
             turned_effects=self.turned_effects[rows],
-            noise=self.noise.of_rows(rows),
             lever=self.lever[rows],
+            force_noise=self.force_noise[np.ix_(rows, rows)],
+            arm_noise=self.arm_noise[rows],
+            turned_noise=self.turned_noise[rows],
         )
 
     def borrows(self, other: VelocityIncrements) -> bool:
         """Whether both share one gyro, so that their rates agree by construction."""
-        return self.noise.gyro == other.noise.gyro
+        return self.gyro == other.gyro
 
 
 def joint_covariance(
@@ -75,7 +83,7 @@ def joint_covariance(
         for name, contributor in zip(unit.names, unit.contributors, strict=True):
             if contributor not in without:
                 columns.setdefault(name, len(columns))
-        gyros.setdefault((unit.noise.gyro, unit.noise.turned.shape[1]), []).append(k)
+        gyros.setdefault((unit.gyro, unit.turned_noise.shape[1]), []).append(k)
     size = increments[0].values.size
     spread = np.zeros((len(increments), size, len(columns)))
     out = np.zeros((len(increments), size, len(increments), size))
@@ -84,15 +92,15 @@ def joint_covariance(
         given = unit.effects if of == "force" else unit.turned_effects
         spread[k][:, [columns[unit.names[i]] for i in kept]] = given[:, kept]
         if of == "force":
-            out[k, :, k] += unit.noise.of_force
+            out[k, :, k] += unit.force_noise
     for of_one in gyros.values():
         for i in of_one:
             for j in of_one:
-                one, other = increments[i].noise, increments[j].noise
+                one, other = increments[i], increments[j]
                 if of == "force":
-                    out[i, :, j] += one.through_arm @ other.through_arm.T
+                    out[i, :, j] += one.arm_noise @ other.arm_noise.T
                 else:
-                    out[i, :, j] += one.turned @ other.turned.T
+                    out[i, :, j] += one.turned_noise @ other.turned_noise.T
     whole = len(increments) * size
     flat = spread.reshape(whole, -1)
     return np.asarray(out.reshape(whole, whole) + flat @ flat.T)
@@ -189,51 +197,20 @@ def velocity_increments(unit: PointKinematics, edges: Array) -> VelocityIncremen
         effects.contributors,
         np.einsum("an,pni->aip", few, effects.force[:, within], optimize=True).reshape(size, -1),
         np.einsum("an,pni->aip", few, effects.rate[:, within], optimize=True).reshape(size, -1),
-        noise_of_sums(unit, weights),
         lever,
+        *_noise(unit, weights),
+        unit.gyro,
     )
 
 
-def chi_square_tail(chi_square: float, freedom: int) -> float:
-    """Probability of a chi-square at least this large; `freedom` may be zero."""
-    from scipy.stats import chi2
-
-    return float(chi2.sf(chi_square, freedom)) if freedom else 1.0
-
-
-# Effect of the sample noise of a unit on weighted sums of samples.
-
-
-@dataclass(frozen=True, eq=False)
-class NoiseOfSums:
-    """Noise of m weighted sums of specific force and rates; rows by sum, then axis.
-
-    `of_force`, (3 m, 3 m), (m/s)²: covariance from accelerometer noise. `through_arm`, m/s, and
-    `turned`, rad, (3 m, q): effect of one standard deviation of each of q independent numbers, the
-    gyro noise, on the sums of force through the lever arm and on those of the rates. Units that
-    borrow a `gyro` have the same numbers.
-    """
-
-    of_force: Array
-    through_arm: Array
-    turned: Array
-    gyro: str
-
-    def of_rows(self, rows: NDArray[np.bool_]) -> NoiseOfSums:
-        """Some of the rows, (3 m,)."""
-        return NoiseOfSums(
-            self.of_force[np.ix_(rows, rows)], self.through_arm[rows], self.turned[rows], self.gyro
-        )
-
-
-def noise_of_sums(at_point: PointKinematics, weights: Array) -> NoiseOfSums:
-    """Compute the effect of the sample noise on sums of samples with weights, (m, n), s.
+def _noise(unit: PointKinematics, weights: Array) -> tuple[Array, Array, Array]:
+    """Effect of the sample noise on sums with weights, (m, n), s: the three of the increments.
 
     Gyro noise through the lever arm keeps its correlation from sample to sample: it nearly cancels
     in a change of velocity.
     """
     m = len(weights)
-    prepared, moved, effects = at_point.prepared, at_point.moved, at_point.effects
+    prepared, moved, effects = unit.prepared, unit.moved, unit.effects
     # Samples with weight in a sum, and those used for their angular acceleration.
     used = np.flatnonzero(weights.any(axis=0))
     wide = 0 if moved is None else moved.slope.slope.shape[1]
@@ -254,7 +231,7 @@ def noise_of_sums(at_point: PointKinematics, weights: Array) -> NoiseOfSums:
     else:
         by_rate = moved.of_rates_in_sums(weights)[:, within]
         arm = np.einsum("anij,njk->aink", by_rate, turning).reshape(3 * m, -1)
-    return NoiseOfSums(blocks.reshape(3 * m, 3 * m), arm, turned, at_point.gyro)
+    return blocks.reshape(3 * m, 3 * m), arm, turned
 
 
 def _diagonal(sd: Array) -> Array:
@@ -265,6 +242,13 @@ def _root(covariances: Array) -> Array:
     """Matrices whose product with their transpose is the covariance of each sample."""
     values, vectors = np.linalg.eigh(covariances)
     return np.asarray(vectors * np.sqrt(np.maximum(values, 0.0))[:, None, :])
+
+
+def chi_square_tail(chi_square: float, freedom: int) -> float:
+    """Probability of a chi-square at least this large; `freedom` may be zero."""
+    from scipy.stats import chi2
+
+    return float(chi2.sf(chi_square, freedom)) if freedom else 1.0
 
 
 # Relative mounting of two units on one vehicle: rotation, lever arm, swapped axes.

@@ -56,12 +56,6 @@ class RollRecord:
     start_deg: float = 0.0
     start_sd_deg: float = 0.0
 
-    def until(self, end: float) -> RollRecord:
-        """The samples up to an instant, s."""
-        stamps = np.asarray(self.time, dtype=np.float64)
-        own = stamps <= end
-        return replace(self, time=stamps[own], rate=np.asarray(self.rate)[own])
-
 
 @dataclass(frozen=True)
 class TippingBody:
@@ -280,12 +274,13 @@ def classify_crashes(
             count_2=len(events),
         )
     ends = [event.time_zero for event in events[1:]] + [math.inf]
-    return tuple(
-        classify_crash(
-            changes[k],
-            None if covariances is None else covariances[k],
-            roll=None if roll is None else roll.until(ends[k]),
-            since=event.time_zero,
-        )
-        for k, event in enumerate(events)
-    )
+    types = []
+    for k, event in enumerate(events):
+        own = roll
+        if roll is not None:
+            stamps = np.asarray(roll.time, dtype=np.float64)
+            within = stamps <= ends[k]
+            own = replace(roll, time=stamps[within], rate=np.asarray(roll.rate)[within])
+        covariance = None if covariances is None else covariances[k]
+        types.append(classify_crash(changes[k], covariance, roll=own, since=event.time_zero))
+    return tuple(types)

@@ -419,24 +419,25 @@ WINDOWS = (0.010, 0.020, 0.030, 0.040, 0.050, 0.075, 0.100, 0.125, 0.150)
 SHIFTS = (-0.010, -0.005, -0.002, -0.001, 0.0, 0.001, 0.002, 0.005, 0.010)
 
 
-def _row(acceleration: Acceleration, start: float, end: float, heading_deg: float) -> list[float]:
-    change = delta_v(acceleration, start, end, across_gaps=True)
-    if not change.vector.any():
-        return [*change.vector.tolist(), math.nan, math.nan]
-    if acceleration.frame == "ned":
-        over_ground = ned_pdof(change, heading_deg)
-        return [*change.vector.tolist(), over_ground.relative_deg, over_ground.vertical_deg]
-    angles = pdof(change)
-    return [*change.vector.tolist(), angles.horizontal_deg, angles.vertical_deg]
-
-
-def _table(rows: list[list[float]], name: str, at: Sequence[float]) -> pd.DataFrame:
+def _table(
+    acceleration: Acceleration,
+    spans: Sequence[tuple[float, float]],
+    heading_deg: float,
+    index: pd.Index,
+) -> pd.DataFrame:
+    """Change of velocity and direction of force of each span."""
+    rows = []
+    for start, end in spans:
+        change = delta_v(acceleration, start, end, across_gaps=True)
+        angles = (math.nan, math.nan)
+        if change.vector.any() and acceleration.frame == "ned":
+            over_ground = ned_pdof(change, heading_deg)
+            angles = over_ground.relative_deg, over_ground.vertical_deg
+        elif change.vector.any():
+            angles = _angles(vector_of(change, ("body", "impact")))
+        rows.append([*change.vector.tolist(), *angles])
     columns = ["dv_x", "dv_y", "dv_z", "horizontal_deg", "vertical_deg"]
-    return pd.DataFrame(
-        np.array(rows, dtype=np.float64).reshape(-1, 5),
-        index=pd.Index(list(at), name=name, dtype=np.float64),
-        columns=columns,
-    )
+    return pd.DataFrame(rows, index=index, columns=columns, dtype=np.float64)
 
 
 def pdof_by_window(
@@ -471,8 +472,8 @@ def pdof_by_window(
     fit = [w for w in windows if w > 0.0 and _fits(acceleration, time_zero, time_zero + w)]
     if not fit:
         raise _no_window(acceleration, time_zero, windows)
-    rows = [_row(acceleration, time_zero, time_zero + w, heading_deg) for w in fit]
-    return _table(rows, "window", fit)
+    spans = [(time_zero, time_zero + w) for w in fit]
+    return _table(acceleration, spans, heading_deg, pd.Index(fit, name="window", dtype=np.float64))
 
 
 def pdof_by_shift(
@@ -513,8 +514,8 @@ def pdof_by_shift(
     fit = [(s, a, b) for s, a, b in pairs if b > a and _fits(acceleration, a, b)]
     if not fit:
         raise _no_window(acceleration, time_zero, [end - time_zero])
-    rows = [_row(acceleration, a, b, heading_deg) for _, a, b in fit]
-    return _table(rows, "shift", [s for s, _, _ in fit])
+    index = pd.Index([s for s, _, _ in fit], name="shift", dtype=np.float64)
+    return _table(acceleration, [(a, b) for _, a, b in fit], heading_deg, index)
 
 
 def _fits(acceleration: Acceleration, start: float, end: float) -> bool:

@@ -164,7 +164,20 @@ def prepare_unit(unit: CrashUnit, options: Preparation = Preparation()) -> Prepa
         for y, limit, s, t in zip(data.accelerometers, limits, noise, triads, strict=True)
     ]
 
-    own = _find_rest(unit, data, options, noise[0], gyro_noise)
+    lowest = imu_table(
+        data.time, data.gyro, data.accelerometers[0], sampling=data.sampling, source=unit.name
+    )
+    # In sensor axes.
+    if not isinstance(options.rest, str):
+        own: RestStretch | None = rest_between(lowest, *options.rest)
+    else:
+        own = find_pre_crash_rest(
+            lowest,
+            impact=options.impact,
+            moving_at_impact=options.moving_at_impact,
+            accel_noise=float(np.median(noise[0], axis=0).max()),
+            gyro_noise=float(np.median(gyro_noise, axis=0).max()),
+        )
     findings += rest_findings(unit, data.time, own, options)
     unknown = steady_acceleration if own is not None and own.grade == "steady" else 0.0
     turn = gyro_bias_from(own, gyro.axis("bias"), steady_rate=options.steady_rate)
@@ -231,28 +244,6 @@ def prepare_unit(unit: CrashUnit, options: Preparation = Preparation()) -> Prepa
         gravity_matched=matched,
         gravity_correction=correction,
         findings=tuple(findings),
-    )
-
-
-def _find_rest(
-    unit: CrashUnit,
-    data: UnitArrays,
-    options: Preparation,
-    noise: Array,
-    gyro_noise: Array,
-) -> RestStretch | None:
-    """Find the stationary interval, in sensor axes."""
-    table = imu_table(
-        data.time, data.gyro, data.accelerometers[0], sampling=data.sampling, source=unit.name
-    )
-    if not isinstance(options.rest, str):
-        return rest_between(table, *options.rest)
-    return find_pre_crash_rest(
-        table,
-        impact=options.impact,
-        moving_at_impact=options.moving_at_impact,
-        accel_noise=float(np.median(noise, axis=0).max()),
-        gyro_noise=float(np.median(gyro_noise, axis=0).max()),
     )
 
 

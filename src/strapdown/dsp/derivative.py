@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -47,24 +46,18 @@ def fitted_weights(time: Array, at: Array, degree: int) -> tuple[Array, Array]:
     )
 
 
-def slope_response(weights: Array, offset: Array, frequency: Array) -> NDArray[np.complex128]:
-    """Compute the response of slope weights relative to the true derivative of a sine.
+def _bandwidth(weights: Array, offset: Array, highest: float, parts: int) -> float:
+    """Find the frequency, Hz, up to which slope weights are within 1 - 1/√2 of the true derivative.
 
     `weights` ((w,), 1/s). `offset` ((w,), s): stamp of each sample minus the stamp of the slope.
-    `frequency` ((k,), Hz): above zero. Returns (k,).
+    `highest` (Hz): Nyquist frequency of the samples. `parts`: number of steps of the search grid.
     """
-    omega = 2.0 * np.pi * frequency
-    return np.asarray(np.exp(1j * np.outer(omega, offset)) @ weights / (1j * omega))
 
+    def response(frequency: Array) -> NDArray[np.complex128]:
+        omega = 2.0 * np.pi * frequency
+        return np.asarray(np.exp(1j * np.outer(omega, offset)) @ weights / (1j * omega))
 
-def bandwidth(
-    response: Callable[[Array], NDArray[np.complex128]], highest: float, parts: int, loss: float
-) -> float:
-    """Find the frequency up to which the magnitude of a response is within a loss of 1.
-
-    `response`: response at frequencies (k,), Hz. `highest` (Hz): Nyquist frequency of the samples.
-    `parts`: number of steps of the search grid.
-    """
+    loss = 1.0 - math.sqrt(0.5)
     grid = np.linspace(0.0, highest, parts)[1:]
     over = np.abs(1.0 - np.abs(response(grid))) > loss
     k = int(np.argmax(over)) if over.any() else len(grid) - 1
@@ -175,11 +168,7 @@ def local_slope(time: Array, *, window: float | None = None, delay: float = 0.0)
     middle = n // 2
     at = time[first[middle] + np.arange(width)] - time[middle] - delay
     span = float(time[min(n - 1, int(first[middle]) + width - 1)] - time[first[middle]])
-
-    def response(frequency: Array) -> NDArray[np.complex128]:
-        return slope_response(slope[middle], at, frequency)
-
-    band = bandwidth(response, 0.5 / step, 64 * width, 1.0 - math.sqrt(0.5))
+    band = _bandwidth(slope[middle], at, 0.5 / step, 64 * width)
     return LocalSlope(first, slope, value, band, span)
 
 

@@ -103,20 +103,15 @@ class ErrorFilter:
         )
 
     def compensated(self, state: FilterState, rows: Array) -> Array:
-        """Return rows of motion increments with the estimated errors subtracted, (k, 10)."""
-        out = np.empty_like(rows)
-        of_gyros, of_accels = self.errors_of_sensors(state)
-        compensate(rows, of_gyros, of_accels, out)
-        return out
+        """Return rows of motion increments with the estimated errors subtracted, (k, 10).
 
-    def errors_of_sensors(self, state: FilterState) -> Array:
-        """Return the estimated errors of the readings, (2, 7, 3): gyros, accelerometers.
-
-        A constant part, and parts per rate x, y, z and per force x, y, z.
+        The errors of a triad are a constant part, and parts per rate and per force x, y, z.
         """
-        stacked, out = self.model.stacked, np.empty((2, 7, 3))
-        errors_of_states(stacked.gyro_terms, state.sensors, out[0])
-        errors_of_states(stacked.accel_terms, state.sensors, out[1])
+        stacked, errors = self.model.stacked, np.empty((2, 7, 3))
+        errors_of_states(stacked.gyro_terms, state.sensors, errors[0])
+        errors_of_states(stacked.accel_terms, state.sensors, errors[1])
+        out = np.empty_like(rows)
+        compensate(rows, errors[0], errors[1], out)
         return out
 
     def advance_compensated(
@@ -242,7 +237,10 @@ class ErrorFilter:
             np.concatenate([one.R for one in observations]),
             self.rule if rules is None else rules_of_components(rules, observations),
         )
-        return replace(state, covariance=covariance), x, split_innovations(seen, observations)
+        cuts = np.cumsum([one.z.size for one in observations])[:-1]
+        parts = (np.split(values, cuts) for values in (seen.nu, seen.s, seen.weight))
+        each = [Innovations(*one) for one in zip(*parts, strict=True)]
+        return replace(state, covariance=covariance), x, each
 
     def widened(self, state: FilterState, Q: Array) -> FilterState:
         """Return a state with its covariance inflated by a covariance of the states, (n, n)."""
@@ -355,16 +353,6 @@ def rules_of_components(
     for rule, one in zip(rules, observations, strict=True):
         out += rule if isinstance(rule, Sequence) else [rule or FullUpdate()] * one.z.size
     return out
-
-
-def split_innovations(seen: Innovations, observations: Sequence[Observation]) -> list[Innovations]:
-    """Split the innovations of a joint update by observation.
-
-    `seen`: of all components, one observation after the other.
-    """
-    cuts = np.cumsum([one.z.size for one in observations])[:-1]
-    parts = (np.split(values, cuts) for values in (seen.nu, seen.s, seen.weight))
-    return [Innovations(*one) for one in zip(*parts, strict=True)]
 
 
 # Error propagation for a body known to be stationary (`ErrorFilter.rests`).

@@ -468,9 +468,9 @@ def seen_rests(
     memories = [aid.begin() for aid in aids]
     seen: list[Array] = []
     span = record.trajectory.index
-    for steps in steps_of(chain.intake, imu, float(span[0]), float(span[-1])):
+    for ends, rows in steps_of(chain.intake, imu, float(span[0]), float(span[-1])):
         for k, aid in enumerate(aids):
-            memories[k], epochs = aid.watch(memories[k], steps.time, steps.rows)
+            memories[k], epochs = aid.watch(memories[k], ends, rows)
             seen.append(epochs.time)
     time = np.unique(np.concatenate(seen)) if seen else np.empty(0)
     speed = np.linalg.norm(values_of(record.trajectory, VELOCITY), axis=1)

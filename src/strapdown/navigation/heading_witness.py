@@ -44,7 +44,7 @@ from strapdown.navigation.measurements.heading import Heading
 from strapdown.navigation.navigator import Navigator, NavigatorState
 from strapdown.navigation.pipeline import NavigationPipeline
 from strapdown.navigation.preprocessing import NEAR as NEAR_FIXES
-from strapdown.navigation.preprocessing import JoinedSteps, joined_steps
+from strapdown.navigation.preprocessing import joined_steps
 from strapdown.navigation.record import (
     CovarianceSnapshot,
     NavigationChunk,
@@ -337,8 +337,7 @@ def witnesses_of(
     if not receivers:
         return None
     span = record.trajectory.index
-    steps = joined_steps(chain.intake, imu, float(span[0]), float(span[-1]))
-    time, rows = steps.time, steps.rows
+    time, rows = joined_steps(chain.intake, imu, float(span[0]), float(span[-1]))
     if len(time) < 2:
         return None
     robust = filter_.rule is not None or any(_robust(aid, consistency) for aid in receivers)
@@ -412,7 +411,7 @@ GAP = 0.5
 def carry_headings(
     compasses: Sequence[Compass],
     doubts: Sequence[float],
-    steps: JoinedSteps,
+    steps: tuple[Array, Array],
     record: NavigationRecord,
     sensors: ImuUncertainty,
     ellipsoid: Ellipsoid,
@@ -425,8 +424,8 @@ def carry_headings(
         In order of time.
     doubts : sequence of float, s
         Instants at which a gyro change was detected; headings are not carried beyond them.
-    steps : JoinedSteps
-        From the first of the compasses on.
+    steps : tuple of ndarray
+        As `joined_steps`, from the first of the compasses on.
     record : NavigationRecord
         Run that gives the position: a kilometer turns north by less than 0.02 deg.
 
@@ -437,7 +436,7 @@ def carry_headings(
     of the rest, the noise, the residual bias and the scale factors since, and the effect of a gyro
     change by `UNSEEN` standard deviations, which only another rest could reveal.
     """
-    if not compasses or not len(steps.time):
+    if not compasses or not len(steps[0]):
         return []
     rows = record.trajectory
     seconds = seconds_of(record)
@@ -475,19 +474,20 @@ class _Carried:
     def __init__(
         self,
         compass: Compass,
-        steps: JoinedSteps,
+        steps: tuple[Array, Array],
         rows: pd.DataFrame,
         ellipsoid: Ellipsoid,
         sensors: ImuUncertainty,
     ) -> None:
         self.compass, self.sensors = compass, sensors
         # A rest that ends within a step: the body is stationary there.
-        after = int(np.searchsorted(steps.time, compass.time + 1e-6))
-        dt = np.ascontiguousarray(steps.rows[after:, 0])
-        turns = np.ascontiguousarray(steps.rows[after:, 1:4] - dt[:, None] * compass.gyro_bias)
+        time, increments = steps
+        after = int(np.searchsorted(time, compass.time + 1e-6))
+        dt = np.ascontiguousarray(increments[after:, 0])
+        turns = np.ascontiguousarray(increments[after:, 1:4] - dt[:, None] * compass.gyro_bias)
         turned = np.empty((len(dt), 4))
         quaternion_advance(np.array([1.0, 0.0, 0.0, 0.0]), dt, turns, turns, turned, 0.0, 1.0)
-        self.time = np.concatenate([[compass.time], steps.time[after:]])
+        self.time = np.concatenate([[compass.time], time[after:]])
         # No heading is carried through a gap.
         gaps = np.flatnonzero((dt > GAP) | (np.diff(self.time) > dt + GAP))
         self.unbroken = float(self.time[gaps[0]]) if len(gaps) else math.inf

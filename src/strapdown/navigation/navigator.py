@@ -46,7 +46,7 @@ from strapdown.navigation.measurements.measurement import (
 from strapdown.navigation.record import CovarianceSnapshot, InnovationRecord, NavigationChunk
 
 if TYPE_CHECKING:
-    from strapdown.navigation.smoother import Smoother
+    from strapdown.navigation.smoother import RauchTungStriebel
 
 __all__ = ["EpochLoop", "Navigator", "NavigatorState", "with_states"]
 
@@ -73,7 +73,7 @@ class Navigator:
         Longest time between two marks of the covariance.
     damping : Damping
         Whether the estimated errors are fed back (closed-loop correction).
-    smoother : Smoother, optional
+    smoother : RauchTungStriebel, optional
         If given, the chunks hold the smoother history, too; the filter's result is the same to
         the last bit.
 
@@ -87,7 +87,7 @@ class Navigator:
     aids: tuple[Measurement, ...] = ()
     mark_interval: float = 1.0
     damping: Correction = field(default_factory=ClosedLoop)
-    smoother: Smoother | None = None
+    smoother: RauchTungStriebel | None = None
 
     def __post_init__(self) -> None:
         names = [aid.name for aid in self.aids]

@@ -34,7 +34,6 @@ __all__ = [
     "ImuIncrements",
     "ImuPreprocessor",
     "ImuPreprocessorState",
-    "JoinedSteps",
     "RangeEnds",
     "RangeState",
     "ends_of",
@@ -56,26 +55,10 @@ AT_ONCE = 60.0
 NEAR = 1e-6
 
 
-@dataclass(frozen=True, eq=False)
-class JoinedSteps:
-    """Motion increments of some steps.
-
-    Attributes
-    ----------
-    time : ndarray, (n,), s
-        Ends of the steps.
-    rows : ndarray, (n, 10)
-        Motion increments.
-    """
-
-    time: Array
-    rows: Array
-
-
 def steps_of(
     intake: ImuPreprocessor, imu: pd.DataFrame, begin: float, end: float
-) -> Iterator[JoinedSteps]:
-    """Yield the motion increments within a span, a minute at a time."""
+) -> Iterator[tuple[Array, Array]]:
+    """Yield the motion increments within a span, a minute at a time: ends, s, and rows, (n, 10)."""
     time, values = index_of(imu), values_of(imu, [*GYRO, *ACCEL])
     state = intake.begin(imu.attrs["sampling"], None)
     cuts = np.searchsorted(
@@ -87,29 +70,22 @@ def steps_of(
         at = cut
         used = (steps.time > begin + NEAR) & (steps.time <= end + NEAR)
         if used.any():
-            yield JoinedSteps(steps.time[used], np.ascontiguousarray(steps.rows[used]))
+            yield steps.time[used], np.ascontiguousarray(steps.rows[used])
 
 
 def joined_steps(
     intake: ImuPreprocessor, imu: pd.DataFrame, begin: float, end: float
-) -> JoinedSteps:
-    """Return the motion increments within a span, joined to a tenth of a second.
-
-    Parameters
-    ----------
-    imu : DataFrame
-        Imu table.
-    begin, end : float, s
-    """
+) -> tuple[Array, Array]:
+    """Return the motion increments within a span, as `steps_of`, joined to a tenth of a second."""
     ends, joined = [np.empty(0)], [np.empty((0, 10))]
-    for steps in steps_of(intake, imu, begin, end):
-        dt = np.ascontiguousarray(steps.rows[:, 0])
-        last, out = np.empty(len(dt), dtype=np.int64), np.empty_like(steps.rows)
+    for time, rows in steps_of(intake, imu, begin, end):
+        dt = np.ascontiguousarray(rows[:, 0])
+        last, out = np.empty(len(dt), dtype=np.int64), np.empty_like(rows)
         samples = max(1, round(JOINED / float(np.median(dt))))
-        count = int(join_blocks(dt, samples, steps.rows, last, out))
-        ends.append(steps.time[last[:count]])
+        count = int(join_blocks(dt, samples, rows, last, out))
+        ends.append(time[last[:count]])
         joined.append(out[:count].copy())
-    return JoinedSteps(np.concatenate(ends), np.concatenate(joined))
+    return np.concatenate(ends), np.concatenate(joined)
 
 
 # Pre-filter of a pipeline: drifting stamps on its even grid, lost samples interpolated.
@@ -484,14 +460,6 @@ class ImuIncrements:
     cut_off: tuple[Hole, ...] = ()
 
 
-def _no_time() -> Array:
-    return np.empty(0)
-
-
-def _no_values() -> Array:
-    return np.empty((0, 6))
-
-
 @dataclass(frozen=True, eq=False)
 class ImuPreprocessorState:
     """State between chunks.
@@ -532,8 +500,8 @@ class ImuPreprocessorState:
     stream: IncrementStreamState | None = None
     own: bool = False
     first: tuple[float, Array] | None = None
-    waiting_time: Array = field(default_factory=_no_time)
-    waiting: Array = field(default_factory=_no_values)
+    waiting_time: Array = field(default_factory=lambda: np.empty(0))
+    waiting: Array = field(default_factory=lambda: np.empty((0, 6)))
     ranges: RangeState = field(default_factory=RangeState)
 
 
@@ -719,7 +687,7 @@ class ImuPreprocessor:
         return state, ImuIncrements(ends, values[:n], rows, opening, found.holes, found.cut_off)
 
 
-_NOTHING = ImuIncrements(_no_time(), _no_values(), np.empty((0, 10)), None, ())
+_NOTHING = ImuIncrements(np.empty(0), np.empty((0, 6)), np.empty((0, 10)), None, ())
 
 
 def _check(state: ImuPreprocessorState, time: Array, values: Array) -> None:

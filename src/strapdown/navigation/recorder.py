@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pandas as pd
@@ -23,10 +23,12 @@ from strapdown.navigation.record import (
     NavigationRecord,
     Span,
 )
-from strapdown.navigation.smoother import Smoothing
 from strapdown.rotation import euler_sd
 from strapdown.tables import EULER, trajectory_error_table
 from strapdown.tables.checks import is_number
+
+if TYPE_CHECKING:
+    from strapdown.navigation.smoother import Smoothing
 
 __all__ = ["RECORDERS", "FullRecorder", "IntervalRecorder", "Recorder", "Tape", "record_of"]
 
@@ -100,14 +102,6 @@ RECORDERS: dict[str, type[Recorder]] = {"full": FullRecorder, "interval": Interv
 
 
 @dataclass
-class _Observed:
-    """Observations of one name: time, innovations, variances, weights."""
-
-    labels: tuple[str, ...]
-    rows: GrowingRows
-
-
-@dataclass
 class Tape:
     """Recorded output of a run so far.
 
@@ -124,7 +118,9 @@ class Tape:
     rate: float = math.inf
     _states: GrowingRows = field(init=False, repr=False)
     _marks: GrowingRows = field(init=False, repr=False)
-    _seen: dict[str, _Observed] = field(init=False, repr=False, default_factory=dict)
+    #: Labels by name of the observation; and its time, innovations, variances, weights.
+    _labels: dict[str, tuple[str, ...]] = field(init=False, repr=False, default_factory=dict)
+    _seen: dict[str, GrowingRows] = field(init=False, repr=False, default_factory=dict)
     _state_cell: float = field(init=False, repr=False, default=-math.inf)
     _mark_cell: float = field(init=False, repr=False, default=-math.inf)
     _newest_mark: Array | None = field(init=False, repr=False, default=None)
@@ -205,7 +201,9 @@ class Tape:
             sensors=pd.DataFrame(marks[:, 82 : 82 + count].copy(), index=time, columns=labels),
             sensors_sd=pd.DataFrame(marks[:, 82 + count :].copy(), index=time, columns=labels),
             units=dict(zip(labels, units, strict=True)),
-            innovations={name: _table(one) for name, one in self._seen.items()},
+            innovations={
+                name: _table(rows.rows, self._labels[name]) for name, rows in self._seen.items()
+            },
             events=events,
             modes=modes,
             outages=dict(outages or {}),
@@ -232,13 +230,12 @@ class Tape:
             self._newest_mark = row
 
     def _observed(self, one: InnovationRecord) -> None:
-        known = self._seen.get(one.name)
-        if known is None:
-            known = _Observed(one.labels, GrowingRows.of(1 + 3 * len(one.labels)))
-            self._seen[one.name] = known
+        if one.name not in self._seen:
+            self._labels[one.name] = one.labels
+            self._seen[one.name] = GrowingRows.of(1 + 3 * len(one.labels))
         seen = one.innovations
         row = np.concatenate([[one.time], seen.nu, seen.s, seen.weight])
-        known.rows = known.rows.and_then(row[None, :])
+        self._seen[one.name] = self._seen[one.name].and_then(row[None, :])
 
 
 def record_of(
@@ -259,10 +256,9 @@ def record_of(
     return tape.record(source)
 
 
-def _table(one: _Observed) -> pd.DataFrame:
-    rows = one.rows.rows
+def _table(rows: Array, labels: tuple[str, ...]) -> pd.DataFrame:
     return pd.DataFrame(
         rows[:, 1:].copy(),
         index=pd.Index(rows[:, 0].copy(), name="time"),
-        columns=[f"{part} {label}" for part in ("nu", "s", "weight") for label in one.labels],
+        columns=[f"{part} {label}" for part in ("nu", "s", "weight") for label in labels],
     )

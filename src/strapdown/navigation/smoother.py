@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import tempfile
 import weakref
-from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -22,7 +21,7 @@ from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.record import NavigationChunk
 from strapdown.tables.checks import is_number
 
-__all__ = ["SMOOTHERS", "RauchTungStriebel", "Smoothed", "Smoother", "Smoothing", "SmoothingTape"]
+__all__ = ["SMOOTHERS", "RauchTungStriebel", "Smoothed", "Smoothing", "SmoothingTape"]
 
 
 Array = NDArray[np.float64]
@@ -32,20 +31,7 @@ SAME_MARK = 1.5e-6
 
 
 @dataclass(frozen=True)
-class Smoother(ABC):
-    """A smoothing method; stateless."""
-
-    name: ClassVar[str]
-    summary: ClassVar[str]
-    source: ClassVar[str]
-
-    @abstractmethod
-    def begin(self, navigator: Navigator) -> Smoothing:
-        """Return an empty smoother history for a navigator with this smoother."""
-
-
-@dataclass(frozen=True)
-class RauchTungStriebel(Smoother):
+class RauchTungStriebel:
     """Fixed-interval smoother of the filter: for any error model, form, rule and aid.
 
     The smoother history holds the covariance, the transition and the correction of each
@@ -87,7 +73,7 @@ class RauchTungStriebel(Smoother):
 
 
 #: A new smoother is a class and a line here.
-SMOOTHERS: dict[str, type[Smoother]] = {"rts": RauchTungStriebel}
+SMOOTHERS: dict[str, type[RauchTungStriebel]] = {"rts": RauchTungStriebel}
 
 
 class Smoothing:

@@ -133,7 +133,7 @@ def alignment_json(result: AlignmentRun) -> dict[str, Any]:
                 {"time_s": t, "finding": finding_json(f)} for t, f in result.readiness.refused
             ],
         },
-        "what_a_turn_would_tell": [
+        "after_a_turn": [
             {
                 "turn": one.name,
                 "rest_s": one.rest,
@@ -176,7 +176,7 @@ def _fine(result: AlignmentRun) -> dict[str, Any]:
                 ("accel_bias_sd_m_per_s2", end.accel_bias_sd),
             )
         },
-        "standing": {
+        "stationary": {
             "position_sd_m": result.fine.standing.position.tolist(),
             "velocity_sd_m_per_s": result.fine.standing.velocity.tolist(),
             "turn_sd_rad": result.fine.standing.turn.tolist(),

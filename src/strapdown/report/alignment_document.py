@@ -38,12 +38,12 @@ from strapdown.report.document import (
     Paragraph,
     TableBlock,
     Trust,
+    assumed,
     blocks,
     findings_list,
     reason,
     run_again,
     section,
-    taken_for_given,
 )
 from strapdown.report.values import GAP, about, force_words, plain, rate_words, small
 from strapdown.report.values import stamp as instant
@@ -188,20 +188,17 @@ _TIME = "time, s"
 _NAMES = ("x, forward", "y, right", "z, down")
 #: Smallest difference drawn, as a share of the smallest bound.
 LEAST = 0.02
-BEGUN = (
-    " The fine one begins at the coarse attitude and is near it in its first seconds; its bound "
-    "there takes none of that for granted."
-)
+BEGUN = " The fine alignment starts from the coarse attitude with a wider covariance."
 _OFF = {
     "truth": "error",
-    "reference": "off the reference",
-    "answer": "off the final answer",
+    "reference": "difference from the reference",
+    "answer": "difference from the final attitude",
 }
 _OFF_WORDS = {
-    "truth": "Dots and the thin line: the error against the truth of the simulation.",
-    "reference": "Dots and the thin line: the difference from the reference that is stated.",
-    "answer": "Dots and the thin line: how far each is from the answer of the whole record, which "
-    "is no truth, and which they come to by themselves.",
+    "truth": "Dots and thin line: error against the simulated truth.",
+    "reference": "Dots and thin line: difference from the stated reference.",
+    "answer": "Dots and thin line: difference from the attitude over the whole record, which is an "
+    "estimate, not the truth.",
 }
 
 
@@ -251,9 +248,9 @@ def readiness_chart(result: AlignmentRun) -> Chart:
     begun = "" if result.fine is None else BEGUN
     return Chart(
         "readiness",
-        "Readiness: alignment time against accuracy",
-        "Bounds hold 95 % (1.96 standard deviations); of roll and pitch the larger one. The coarse "
-        f"alignment was run anew over each length. {_OFF_WORDS[found.against]}{begun}",
+        "Readiness: accuracy against alignment time",
+        "95 % bounds; of roll and pitch the larger one. The coarse alignment was repeated over "
+        f"each length. {_OFF_WORDS[found.against]}{begun}",
         "time since the start, s",
         tuple(panels),
         () if length is None or result.fine is None else (Mark(length, "fine alignment begins"),),
@@ -274,13 +271,14 @@ def signal_chart(result: AlignmentRun) -> Chart:
                 lines.append(_signal("pre-filtered", result.imu, column, factor, SKY, 1.0))
             lines.append(_means(result.imu, column, factor))
             panels.append(Panel(label, tuple(lines), title=_NAMES[k]))
-    told = "The thin curves are single samples, the black ones means over a second"
+    told = "Thin: samples; black: means over 1 s"
     if result.prefilter is not None:
         told += f", after the pre-filter '{result.prefilter.name}'"
     return Chart(
         "signals",
         "Signals in body axes",
-        f"{told}. At rest the rate is the Earth's, and the force is gravity's reaction.",
+        f"{told}. At rest the rate is the Earth rate and the specific force the reaction to "
+        "gravity.",
         _TIME,
         tuple(panels),
     )
@@ -330,11 +328,10 @@ def attitude_chart(result: AlignmentRun) -> Chart:
     return Chart(
         "attitude",
         "Attitude over the record",
-        "The answer, carried to every sample by the gyros, with its bound of 95 %; what rocks here "
-        "is the body."
+        "The aligned attitude propagated to every sample by the gyros, with its 95 % bound."
         if carried
-        else f"The answer holds at {instant(result.end.time)} alone. These gyros cannot carry it "
-        "to the start, where nothing is known of it: what turns here may be their bias.",
+        else f"The attitude is known at {instant(result.end.time)} only: propagated to the start "
+        "by these gyros it is unknown, and the rotation drawn may be their bias.",
         _TIME,
         tuple(panels),
     )
@@ -348,8 +345,8 @@ def bias_charts(result: AlignmentRun) -> tuple[Chart, ...]:
     time = history.index.to_numpy(dtype=np.float64)
     out = []
     for sensor, factor, unit, what in (
-        ("gyro", DEG_PER_HOUR, "deg/h", "Drifts of the gyros"),
-        ("accel", MICRO_G, "µg", "Biases of the accelerometers"),
+        ("gyro", DEG_PER_HOUR, "deg/h", "Gyro biases"),
+        ("accel", MICRO_G, "µg", "Accelerometer biases"),
     ):
         panels = []
         for k, axis in enumerate("xyz"):
@@ -367,10 +364,9 @@ def bias_charts(result: AlignmentRun) -> tuple[Chart, ...]:
         out.append(
             Chart(
                 f"{sensor}-biases",
-                f"{what}: estimates with their bounds",
-                "A band that does not narrow belongs to a bias that this rest cannot tell from "
-                "an attitude: a horizontal accelerometer bias from a tilt, an east drift from the "
-                "heading.",
+                f"{what}: estimates with 95 % bounds",
+                "A bias whose bound does not decrease is not separable from the attitude at rest: "
+                "a horizontal accelerometer bias from tilt, an east gyro bias from heading.",
                 _TIME,
                 tuple(panels),
             )
@@ -395,8 +391,8 @@ def innovation_chart(result: AlignmentRun) -> Chart | None:
     return Chart(
         "innovations",
         "Innovations of the fine alignment",
-        "Observed less expected, in the standard deviation that was expected; 95 of 100 belong "
-        "between the levels.",
+        "Measured − predicted, in predicted standard deviations; 95 % are expected between the "
+        "levels.",
         _TIME,
         tuple(panels),
     )
@@ -406,7 +402,7 @@ def innovation_chart(result: AlignmentRun) -> Chart | None:
 ANY = (180.0, 90.0, 180.0)
 
 
-NOT_KNOWN = "not known"
+NOT_KNOWN = "unknown"
 
 
 def angle_bound(alignment: Alignment, which: int) -> str:
@@ -427,13 +423,9 @@ CONVENTIONS = (
     ("Body axes", "forward, right, down; local level: north, east, down"),
     ("Attitude", "roll, pitch, heading (3-2-1): right side down, nose up, clockwise are positive"),
     ("Heading", "from true north, clockwise seen from above"),
-    ("Specific force", "what an accelerometer feels: −9.8 m/s² downward at rest"),
-    ("Bias", "reading less truth; so the truth is the reading less the bias"),
-    (
-        "Bounds",
-        "hold the truth in 95 of 100 cases (1.96 standard deviations) where what is stated "
-        "of the sensors is right",
-    ),
+    ("Specific force", "as an accelerometer measures: −9.8 m/s² downward at rest"),
+    ("Bias", "measured − true"),
+    ("Bounds", "95 % (1.96 standard deviations), if sensor errors are as stated"),
     ("Time", "s, on the record's own clock"),
 )
 
@@ -451,22 +443,20 @@ def alignment_document(result: AlignmentRun, name: str) -> Document:
             "The answer",
             answer_table(result),
             *found.blocks,
-            Paragraph("What limits it:"),
+            Paragraph("Limited by:"),
             Items(limits(result)),
         ),
         section("attitude", "Attitude over the record", attitude_chart(result)),
-        section(
-            "sensors", "Drifts and biases", biases, *bias_charts(result), innovation_chart(result)
-        ),
+        section("sensors", "Sensor biases", biases, *bias_charts(result), innovation_chart(result)),
         section(
             "more",
-            "What would make more known",
+            "Effect of a turn",
             None
             if turns is None
             else Paragraph(
-                "A body that only stands cannot tell a horizontal accelerometer bias from a tilt, "
-                "nor an east gyro drift from the heading. A turn can: the bias goes with the body, "
-                "and the tilt does not."
+                "At one attitude a horizontal accelerometer bias is not separable from tilt, nor "
+                "an east gyro bias from heading. A turn separates them: the bias turns with the "
+                "body, the tilt does not."
             ),
             turns,
         ),
@@ -491,10 +481,10 @@ def alignment_document(result: AlignmentRun, name: str) -> Document:
             "method",
             "Method and assumptions",
             Facts(method_rows(result)),
-            *taken_for_given(
-                "The body stays at its place; it may rock and sway about it as far as the coarse "
-                "alignment allows.",
-                "The errors of the sensors are as stated: every bound rests on them.",
+            *assumed(
+                "The body is stationary; it may rock and sway as far as the coarse alignment "
+                "allows.",
+                "Sensor errors are as stated. Every bound depends on this.",
                 "Normal gravity of the ellipsoid: a deflection of the vertical of 5 arc seconds is "
                 "0.0014° of tilt, and is not in the bounds.",
             ),
@@ -508,9 +498,9 @@ def alignment_document(result: AlignmentRun, name: str) -> Document:
         headline(result),
         (
             ("Record", f"{result.source.name}, {result.source.what}"),
-            ("Place", f"{site.lat_deg:.6f}°, {site.lon_deg:.6f}°, {site.alt:g} m"),
+            ("Position", f"{site.lat_deg:.6f}°, {site.lon_deg:.6f}°, {site.alt:g} m"),
             ("Sensors", _sensors(result)),
-            ("Made with", f"strapdown {__version__}"),
+            ("Software", f"strapdown {__version__}"),
         ),
         blocks(
             KeyFigures(key_figures(result)),
@@ -535,9 +525,9 @@ def headline(result: AlignmentRun) -> str:
     """Return the answer in one sentence."""
     end = result.end
     angles = ", ".join(f"{EULER[k]} {angle_bound(end, k)}" for k in ORDER)
-    bounds = "bounds of 95 %"
+    bounds = "95 % bounds"
     if not bounds_hold(result):
-        bounds += ", which do not hold here: the record contradicts them"
+        bounds += ", which the record contradicts"
     return f"{angles[0].upper()}{angles[1:]} at {instant(end.time)} ({bounds})."
 
 
@@ -550,7 +540,7 @@ def key_figures(result: AlignmentRun) -> tuple[KeyFigure, ...]:
             KeyFigure(
                 EULER[k].capitalize(),
                 said,
-                f"any of them: no bound of 95{GAP}%" if said == NOT_KNOWN else _bound_of(result, k),
+                f"no 95{GAP}% bound" if said == NOT_KNOWN else _bound_of(result, k),
                 f"at the end; at the start {angle_bound(result.start, k)}",
             )
         )
@@ -559,7 +549,7 @@ def key_figures(result: AlignmentRun) -> tuple[KeyFigure, ...]:
 
 def _bound_of(result: AlignmentRun, which: int) -> str:
     if not bounds_hold(result):
-        return "its bound does not hold: the record contradicts it"
+        return f"the record contradicts the 95{GAP}% bound"
     sd = float(result.end.sd_deg[which])
     return f"95{GAP}% bound; standard deviation {plain(sd, _places(TWO_SIDED_95 * sd))}°"
 
@@ -579,10 +569,9 @@ def limits(result: AlignmentRun) -> tuple[tuple[str, str], ...]:
     tilt = float(np.linalg.norm(level, axis=1).max())
     out.append(
         (
-            "The bias of the accelerometers limits roll and pitch",
-            f"{force_words(tilt)} too much, one standard deviation of bias, scale and "
-            f"misalignment, are {small(math.degrees(tilt / g))}° of tilt; at one attitude they "
-            "are not separable.",
+            "Accelerometer bias limits roll and pitch",
+            f"one standard deviation of bias, scale factor and misalignment, {force_words(tilt)}, "
+            f"is {small(math.degrees(tilt / g))}° of tilt; at one attitude they are not separable.",
         )
     )
     return tuple(out)
@@ -593,36 +582,36 @@ def _heading_limit(result: AlignmentRun, east: float) -> tuple[str, str]:
     coarse, heading = result.coarse, float(result.end.sd_deg[2])
     across = float(np.linalg.norm(result.site.earth_rate[:2]))
     hidden = (
-        f"the horizontal rate of the Earth is {small(across * DEG_PER_HOUR)} deg/h here, and the "
-        f"gyros may read {rate_words(east)} too much (one standard deviation)"
+        f"the horizontal Earth rate is {small(across * DEG_PER_HOUR)} deg/h, and one standard "
+        f"deviation of the gyro errors {rate_words(east)}"
     )
     if coarse.method == "levelling":
         return (
-            "The heading was not sought",
-            f"levelling finds roll and pitch alone; {hidden}: state the heading (known_heading), "
+            "The heading was not determined",
+            f"leveling gives roll and pitch only; {hidden}: state the heading (known_heading), "
             + (
-                "or find it by these gyros (inertial_frame)."
+                "or determine it by these gyros (inertial_frame)."
                 if across > east
-                else "or take it from satellite fixes while driving (gnss_course)."
+                else "or take it from GNSS fixes while driving (gnss_course)."
             ),
         )
     if coarse.heading_given and not across > east:
-        told = "satellite course" if coarse.method == "gnss_course" else "stated heading"
+        told = "GNSS course" if coarse.method == "gnss_course" else "stated heading"
         return (
             f"The heading is as good as the {told}",
-            f"{hidden}: they cannot find north themselves.",
+            f"{hidden}: the gyros cannot find north.",
         )
     part = math.degrees(east / across) if across > 0 else math.inf
     told = (
-        f"{small(east * DEG_PER_HOUR)} deg/h too much about east, one standard deviation of bias, "
-        f"scale and misalignment, are {small(part)}° of heading at this latitude; all of the "
+        f"one standard deviation of bias, scale factor and misalignment about east, "
+        f"{small(east * DEG_PER_HOUR)} deg/h, is {small(part)}° of heading at this latitude; the "
         f"heading's standard deviation is {small(heading)}°"
     )
     if coarse.heading_given and heading < 0.7 * part:
-        return ("The stated heading limits it", f"{told}: state it better.")
+        return ("The stated heading limits it", f"{told}: state it more accurately.")
     if part > 0.7 * heading:
         why = "longer alignment at the same attitude does not help; better or calibrated gyros do"
-        return ("The bias of the gyros limits the heading", f"{told}: {why}.")
+        return ("Gyro bias limits the heading", f"{told}: {why}.")
     return ("Noise and motion limit the heading", f"{told}: a longer or quieter alignment helps.")
 
 
@@ -649,7 +638,7 @@ def answer_table(result: AlignmentRun) -> TableBlock:
     known = answer_error(result)
     columns = ["", "start", "end", "coarse alone"]
     if known is not None:
-        columns.append(f"end less {known[0]}")
+        columns.append(f"end − {known[0]}")
     rows = []
     for k in ORDER:
         row = [
@@ -693,10 +682,10 @@ def bias_table(result: AlignmentRun) -> TableBlock | None:
                 )
             )
     return TableBlock(
-        ("sensor", "estimate", "before", "found by this rest"),
+        ("sensor", "estimate", "before", "observable"),
         tuple(rows),
         text=(0, 3),
-        caption="Bounds of 95 %. What this rest does not find, another attitude would.",
+        caption="95 % bounds. Another attitude would make the others observable.",
     )
 
 
@@ -709,7 +698,7 @@ def _half(half: float, unit: str) -> str:
 def _found(share: float) -> str:
     if share < 0.1:
         return "no"
-    return "yes" if share > 0.7 else "in part"
+    return "yes" if share > 0.7 else "partly"
 
 
 def readiness_table(result: AlignmentRun) -> TableBlock:
@@ -764,7 +753,7 @@ def turn_table(result: AlignmentRun) -> TableBlock | None:
         )
     columns = ("first", "heading ±", "level ±", "worst gyro ±", "worst accelerometer ±")
     rest = result.manoeuvres[0].rest
-    caption = f"Forecast of the bounds of 95 % after a further rest of {rest:.0f} s."
+    caption = f"Predicted 95 % bounds after a further rest of {rest:.0f} s."
     return TableBlock(columns, tuple(rows), text=(0,), caption=caption, strong=(0,))
 
 
@@ -787,6 +776,6 @@ def method_rows(result: AlignmentRun) -> tuple[tuple[str, str], ...]:
             for key in ("mechanization", "error_model", "covariance", "update_rule")
             if (value := getattr(spec.fine, key, None)) is not None
         ]
-        over = "over the whole record" if length is None else "after the coarse one"
+        over = "over the whole record" if length is None else "after the coarse alignment"
         rows.append(("Fine alignment", f"{spec.fine.kind}, {over}: {', '.join(chosen)}"))
     return tuple(rows)

@@ -149,7 +149,7 @@ def _error(bench: AttitudeComparison) -> Chart:
     return Chart(
         "error",
         "Error against the truth",
-        "Rotation angle between the computed and the true attitude, where the truth counts. "
+        "Rotation angle between computed and true attitude. "
         f"Drawn at {LEAST_WORDS} where it is less.",
         _TIME,
         (Panel("error, deg", tuple(lines), log=True),),
@@ -194,8 +194,8 @@ def _difference(bench: AttitudeComparison) -> Chart:
     return Chart(
         "difference",
         f"Difference from {base.algorithm}",
-        "Rotation angle between the algorithms on the same samples: what the choice of the "
-        f"algorithm makes, whatever the sensor did. Drawn at {LEAST_WORDS} where it is less.",
+        "Rotation angle between the algorithms on the same samples. "
+        f"Drawn at {LEAST_WORDS} where it is less.",
         _TIME,
         (Panel("difference, deg", tuple(lines), log=True),),
     )
@@ -232,7 +232,7 @@ def _cost(bench: AttitudeComparison) -> Chart:
     if len(front) > 1:
         steps_x = np.repeat(cycles[front], 2)[1:]
         steps_y = np.repeat(total[front], 2)[:-1]
-        lines.append(Line("nothing is cheaper and better", steps_x, steps_y, GREY, "dot", 1.4))
+        lines.append(Line("Pareto front", steps_x, steps_y, GREY, "dot", 1.4))
     judged = any(share.sensor_deg is not None for share in bench.shares) or bool(bench.scores)
     if judged:
         stems = np.column_stack([own, total, np.full(len(own), np.nan)]).ravel()
@@ -265,7 +265,7 @@ def _cost(bench: AttitudeComparison) -> Chart:
         if judged:
             lines.append(
                 Line(
-                    f"{name}, its own error",
+                    f"{name}, algorithm error",
                     at,
                     own[k : k + 1],
                     style["colour"],
@@ -280,13 +280,12 @@ def _cost(bench: AttitudeComparison) -> Chart:
         "cost",
         "Cost against error",
         (
-            "Filled: the whole error, by which the answer judges. Hollow: the algorithm's own part "
-            "of it. "
+            "Filled: total error, which the answer uses. Hollow: algorithm error. "
             if judged
-            else "The algorithm's own error: nothing is known of the attitude. "
+            else "Algorithm error, without a reference. "
         )
-        + "Largest rotation angle at the log's own rate. Cost: counted operations of a sample, "
-        f"weighed as a Cortex-M4F takes them. Drawn at {LEAST_WORDS} where it is less.",
+        + "Largest rotation angle at the log's own rate. Cost: operations per sample, weighted by "
+        f"their duration on a Cortex-M4F. Drawn at {LEAST_WORDS} where it is less.",
         "cost, Cortex-M4F cycles per sample",
         (
             Panel(
@@ -323,7 +322,7 @@ def _sweep(bench: AttitudeComparison) -> Chart:
             if judged:
                 lines.append(
                     Line(
-                        f"{run.algorithm}, its own error",
+                        f"{run.algorithm}, algorithm error",
                         rate,
                         _shown(rows["own_deg"]),
                         style["colour"],
@@ -371,12 +370,12 @@ def _sweep(bench: AttitudeComparison) -> Chart:
         "sweep",
         "Error against rate",
         (
-            "Thick: the whole error; thin: the algorithm's own, with that of the rate. "
+            "Thick: total error; thin: algorithm error at that rate. "
             if judged
-            else "The algorithm's own error, with that of the rate. "
+            else "Algorithm error at that rate. "
         )
-        + "Left out: as if the sensor were read less often. Summed: as if it integrated in "
-        f"between. Drawn at {LEAST_WORDS} where it is less.",
+        + "Left out: as if the sensor were read less often (aliased). Summed: as if it integrated "
+        f"between samples. Drawn at {LEAST_WORDS} where it is less.",
         "rate, Hz",
         tuple(panels),
         log_x=True,
@@ -388,7 +387,7 @@ def _share(bench: AttitudeComparison) -> Chart:
     names = tuple(share.algorithm for share in bench.shares)
     rows = np.arange(len(names), dtype=np.float64)
     parts = [
-        ("its own, with the rate's", [s.own_deg[2] for s in bench.shares], BLUE, "circle"),
+        ("of the algorithm at this rate", [s.own_deg[2] for s in bench.shares], BLUE, "circle"),
         ("of single precision", [s.single_deg[2] for s in bench.shares], GREEN, "diamond"),
     ]
     sensor = [np.nan if s.sensor_deg is None else s.sensor_deg[2] for s in bench.shares]
@@ -400,8 +399,8 @@ def _share(bench: AttitudeComparison) -> Chart:
     )
     return Chart(
         "share",
-        "Whose error it is",
-        "The largest rotation angle that each part makes. "
+        "Parts of the error",
+        "Largest rotation angle due to each part. "
         + share_basis(bench)
         + f" Drawn at {LEAST_WORDS} where it is less.",
         "error, deg",
@@ -422,7 +421,7 @@ def _trials(bench: AttitudeComparison) -> Chart:
     )
     lines = (
         Line(
-            "one trial",
+            "trial",
             _shown(errors["error_deg"].to_numpy()),
             at,
             GREY,
@@ -446,7 +445,7 @@ def _trials(bench: AttitudeComparison) -> Chart:
     return Chart(
         "trials",
         f"Over {len(trials.names)} trials",
-        "The error by which the answer judges, best on top.",
+        "The error that the answer uses, best on top.",
         "error, deg",
         (Panel("", lines, categories=names),),
         (Mark(max(bench.answer.tolerance_deg, LEAST_ERROR), _tolerance(bench)),),
@@ -460,12 +459,12 @@ def _peers(bench: AttitudeComparison) -> Chart:
     own = [(name, error, BLUE, "circle") for name, error in errors.items()]
     panels = [_peer_panel("Gyro alone", own + _rows(alone))]
     if aided:
-        panels.append(_peer_panel("Aided: another task", _rows(aided, named=True)))
+        panels.append(_peer_panel("Aided", _rows(aided, named=True)))
     return Chart(
         "peers",
         "Other libraries on the same log",
-        "The largest error against what is known. Blue: strapdown's algorithms. What an "
-        "accelerometer or a magnetometer corrects is another task and stands apart.",
+        "Largest error against the known attitude. Blue: strapdown's algorithms. Filters that also "
+        "use an accelerometer or a magnetometer are apart.",
         "error, deg",
         tuple(panels),
         (Mark(max(bench.answer.tolerance_deg, LEAST_ERROR), _tolerance(bench)),),

@@ -102,7 +102,7 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
         section("conventions", "Conventions", Facts(tables.CONVENTIONS)),
         section(
             "again",
-            "Run it again",
+            "Verification",
             Paragraph(
                 "This folder is sealed: manifest.json holds the configuration and the SHA-256 of "
                 "every input and output."
@@ -112,8 +112,8 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
     )
     return Document(
         bench.source,
-        "Attitude bench",
-        (("Made with", f"strapdown {__version__}"),),
+        "Comparison of attitude algorithms",
+        (("Software", f"strapdown {__version__}"),),
         blocks(
             _key_figures(bench),
             Paragraph(answer.sentence, "lead"),
@@ -122,7 +122,7 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
             *_named_items("What would help:", answer.helps),
             None if bench.scores else Paragraph(tables.HOW_TO_REFERENCE),
             *_named_items(
-                "These rests look alike, and could be reference points:", tables.offer_lines(bench)
+                "Rests of similar attitude, possible reference points:", tables.offer_lines(bench)
             ),
         ),
         tuple(s for s in sections if s.blocks),
@@ -147,7 +147,7 @@ def _key_figures(bench: AttitudeComparison) -> KeyFigures | None:
             error = float(errors.get(answer.algorithm, math.nan))
     if math.isnan(error):
         error = full_rate_errors(bench).get(answer.algorithm, math.nan)
-    whose = "its own error, without a reference" if answer.verdict == "own" else "largest error"
+    whose = "algorithm error, without a reference" if answer.verdict == "own" else "largest error"
     bound = f"tolerance {answer.tolerance_deg:g}°"
     figures.append(KeyFigure(whose.capitalize(), tables.degrees(error), bound))
     return KeyFigures(tuple(figures))
@@ -219,17 +219,17 @@ def body_animation(bench: AttitudeComparison) -> Animation:
 
 def _caption(bench: AttitudeComparison, time: Array) -> str:
     text = (
-        f"The attitude that {chosen_run(bench).algorithm} says: dark the upper side, orange the "
-        "front. Drag to look from elsewhere."
+        f"Attitude by {chosen_run(bench).algorithm}; dark: upper side, orange: front. Drag to turn "
+        "the view."
     )
     if bench.truth is not None:
-        text += " Wireframe: the truth, where it is known."
+        text += " Wireframe: truth."
     span = float(time[-1] - time[0])
     faster = 1000.0 * span / (_frame_length(time) * (len(time) - 1))
     if faster > 1.05:
         text += (
-            f" Played {faster:.3g} times as fast as it was, "
-            f"one pose every {time[1] - time[0]:.3g} s."
+            f" Played {faster:.3g} times as fast as recorded, one pose every "
+            f"{time[1] - time[0]:.3g} s."
         )
     return text
 

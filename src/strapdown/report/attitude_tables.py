@@ -31,8 +31,8 @@ CONVENTIONS = (
     ("Earth rate", "neglected, as in Alexiev (2021): 15°/h"),
 )
 HOW_TO_REFERENCE = (
-    "Nothing was given to compare with. Give an attitude that you know: "
-    "--reference 'end same as start' (put back in its place), "
+    "No reference. Give a known attitude: "
+    "--reference 'end same as start' (returned to its initial attitude), "
     "--reference 'end 2 turns about z since start', "
     "--reference '12.5 roll 0 pitch 0 heading 90', or --reference TRUTH.csv."
 )
@@ -71,7 +71,7 @@ def standing(bench: AttitudeComparison) -> str:
     elif bench.scores:
         last = len(bench.references)
         scores = [s for s in bench.scores if s.reference == last]
-        answer = f"At reference point R{last}, {_ranked(bench, scores, 'off')}."
+        answer = f"At reference point R{last}, {_ranked(bench, scores, 'from it')}."
     elif len(bench.runs) > 1:
         table = bench.differences_deg.to_numpy()
         a, b = (bench.runs[k].algorithm for k in divmod(int(table.argmax()), len(table)))
@@ -126,8 +126,8 @@ def _whose_error(bench: AttitudeComparison, scores: list[Score]) -> str:
         # They agree but share the error of an axis that turns within the step.
         return ""
     return (
-        " Direction cosines and quaternion agree with each other to rounding: what is left comes "
-        "from the sensor, its rate, its bias or the reference, and not from arithmetic."
+        " Direction cosines and quaternion agree to rounding: the remaining error is due to the "
+        "sensor, its rate, its bias or the reference, not to arithmetic."
     )
 
 
@@ -160,7 +160,7 @@ def reference_lines(bench: AttitudeComparison) -> list[str]:
             share = score.turned_deg / score.expected_deg - 1.0
             text += (
                 f"; the gyro turned {score.turned_deg:.1f}° of {score.expected_deg:.1f}° "
-                f"({100 * share:+.2f} %: scale factor, bias and the hand)"
+                f"({100 * share:+.2f} %: scale factor, bias and handling)"
             )
         if score is not None and score.sd_deg is not None:
             text += f"; known to {score.sd_deg:g}° (1σ)"
@@ -187,14 +187,14 @@ def facts(bench: AttitudeComparison) -> list[tuple[str, str]]:
     if bench.sampling_error_deg is not None:
         final, most = bench.sampling_error_deg
         how = (
-            "what noise-free samples at this rate lose, with exact arithmetic"
+            "error of exact arithmetic on noise-free samples at this rate"
             if bench.specification["source"]["kind"] == "scenario"
-            else "an estimate: rates that run along chords between their stamps, against cubics"
+            else "estimate: rates interpolated linearly between their stamps, against cubically"
         )
         found.append(
             (
                 "Sampling error",
-                f"{degrees(final)} at the end, up to {degrees(most)} on the way: {how}",
+                f"{degrees(final)} at the end, {degrees(most)} at most: {how}",
             )
         )
     if bench.rests:
@@ -243,9 +243,9 @@ def second_words(second: SecondLog) -> str:
     return (
         f"its clock is {second.offset:.4f} s ahead (1σ {second.offset_sd:.2g} s) and runs "
         f"{second.drift_ppm:+.3g} ppm (1σ {second.drift_sd_ppm:.2g}); mounted at roll {roll:.2f}°, "
-        f"pitch {pitch:.2f}°, heading {heading:.2f}° (1σ up to {sd:.2g}°); scale of this over that "
-        f"{second.scale:.5f} (1σ {second.scale_sd:.2g}); the two share "
-        f"{100 * second.correlation:.1f} % of their rates"
+        f"pitch {pitch:.2f}°, heading {heading:.2f}° (1σ up to {sd:.2g}°); ratio of scale factors "
+        f"{second.scale:.5f} (1σ {second.scale_sd:.2g}); correlation of the rates "
+        f"{100 * second.correlation:.1f} %"
     )
 
 
@@ -331,17 +331,14 @@ def like_with_like(bench: AttitudeComparison) -> tuple[list[PeerRun], list[PeerR
 def share_basis(bench: AttitudeComparison) -> str:
     """Return whether the shares are exact or estimates."""
     if bench.specification["source"]["kind"] == "scenario":
-        return (
-            "Exact: simulated, so that each algorithm also ran on samples without the sensor's "
-            "errors."
-        )
+        return "Exact: each algorithm also ran on simulated samples without sensor errors."
     own = (
-        "Estimate: the algorithm's own part is its difference from the most accurate algorithm "
-        "on the same samples"
+        "Estimate: the algorithm error is the difference from the most accurate algorithm on the "
+        "same samples"
     )
     if any(share.sensor_deg is not None for share in bench.shares):
-        return own + ", and the sensor's is what that one differs from the truth."
-    return own + "; the sensor's is not known without a truth."
+        return own + ", the sensor error that one's error against the truth."
+    return own + "; the sensor error is unknown without a truth."
 
 
 # Tables of the attitude bench, shared by terminal and page.
@@ -416,14 +413,14 @@ def _parts(bench: AttitudeComparison) -> tuple[list[str], dict[str, dict[str, st
     """Columns of the error contributions and costs, and their cells by algorithm."""
     cells: dict[str, dict[str, str]] = {}
     if bench.shares:
-        cells["own"] = {s.algorithm: degrees(s.own_deg[2]) for s in bench.shares}
+        cells["alg. error"] = {s.algorithm: degrees(s.own_deg[2]) for s in bench.shares}
         if any(s.sensor_deg is not None for s in bench.shares):
             cells["sensor"] = {
                 s.algorithm: degrees(None if s.sensor_deg is None else s.sensor_deg[2])
                 for s in bench.shares
             }
         if len(bench.sweep):
-            cells[f"own ≤ {bench.answer.tolerance_deg:g}° to"] = {
+            cells[f"≤ {bench.answer.tolerance_deg:g}° to"] = {
                 s.algorithm: _lowest_rate(bench, s.algorithm) for s in bench.shares
             }
         cells["float32"] = {s.algorithm: degrees(s.single_deg[2]) for s in bench.shares}
@@ -447,11 +444,11 @@ def _part_note(bench: AttitudeComparison) -> str:
         return ""
     sensor = any(share.sensor_deg is not None for share in bench.shares)
     return (
-        "own, "
+        "alg. error, "
         + ("sensor, " if sensor else "")
-        + "float32: the largest that the algorithm with the rate, "
-        + ("the sensor " if sensor else "")
-        + f"and single precision make. {share_basis(bench)} cycles: of a Cortex-M4F, one sample; "
+        + "float32: largest error due to the algorithm at this rate, "
+        + ("to the sensor, " if sensor else "")
+        + f"and to single precision. {share_basis(bench)} cycles: of a Cortex-M4F per sample; "
         "memory: numbers kept between samples."
     )
 
@@ -466,7 +463,7 @@ def source_of(run: AttitudeRun) -> str:
 def condition_table(bench: AttitudeComparison) -> TableBlock:
     """Return the source and the diagnostics of each algorithm."""
     rows = tuple((r.algorithm, source_of(r), condition(r.diagnostics)) for r in bench.runs)
-    columns = ("algorithm", "source", "own condition")
+    columns = ("algorithm", "source", "diagnostics")
     return TableBlock(columns, rows, (0, 1, 2), strong=_named(bench), title="The algorithms")
 
 
@@ -485,11 +482,11 @@ def cost_table(bench: AttitudeComparison) -> TableBlock | None:
     return TableBlock(
         ("algorithm", "add", "multiply", "divide", "root", "sin, cos", "cycles", "memory"),
         rows,
-        caption="Operations counted on the kernel itself, in steps of 0.01 rad; cycles: the "
-        "same weighed as a Cortex-M4F's floating-point unit takes them, for ranking; memory: "
-        "numbers kept between samples.",
+        caption="Operations counted in the kernel, in steps of 0.01 rad; cycles: weighted by "
+        "their duration on a Cortex-M4F's floating-point unit, for ranking; memory: numbers kept "
+        "between samples.",
         strong=_named(bench),
-        title="Cost of a sample",
+        title="Cost per sample",
     )
 
 
@@ -554,8 +551,8 @@ def luck_words(luck: float) -> str:
     if not math.isfinite(luck):
         return _NONE
     if luck < 0.05:
-        return f"not luck ({luck:.2g})"
-    return f"may be luck ({luck:.2g})"
+        return f"significant ({luck:.2g})"
+    return f"not significant ({luck:.2g})"
 
 
 def trial_table(bench: AttitudeComparison) -> TableBlock | None:
@@ -574,11 +571,10 @@ def trial_table(bench: AttitudeComparison) -> TableBlock | None:
     names = [row[0] for row in rows]
     answer = bench.answer.algorithm
     return TableBlock(
-        ("algorithm", "mean error", "95 % interval", "its rank above the next is"),
+        ("algorithm", "mean error", "95 % interval", "difference from the next"),
         rows,
         text=(0, 3),
-        caption="In brackets: the probability that the next one is no worse, from paired "
-        "differences.",
+        caption="In brackets: probability that the next one is no worse, from paired differences.",
         strong=(names.index(answer),) if answer in names else (),
         title=f"Over {len(bench.trials.names)} trials",
     )
@@ -609,12 +605,12 @@ def peer_table(bench: AttitudeComparison) -> TableBlock | None:
     rows += [(p.peer, _peer_error(p), "", p.aiding) for p in alone]
     rows += [(p.peer, "", _peer_error(p), p.aiding) for p in aided]
     return TableBlock(
-        ("who", "gyro alone", "aided", "uses"),
+        ("library", "gyro alone", "aided", "uses"),
         tuple(rows),
         text=(0, 3),
-        caption="Largest error against what is known. An aided filter corrects what gyros alone "
-        "cannot: its column is not to be compared with the other. These libraries take each "
-        "row for the mean of its step; ours for the rate at its stamp, unless --sampling mean.",
+        caption="Largest error against the known attitude. An aided filter also uses other "
+        "sensors: do not compare its column with the other. These libraries take each row as the "
+        "mean over its step; strapdown as the rate at its stamp, unless --sampling mean.",
         strong=_named(bench),
         title="Other libraries on the same log",
     )
@@ -653,15 +649,15 @@ def place_table(bench: AttitudeComparison) -> TableBlock | None:
     legs = max(place.legs for place in bench.places)
     return TableBlock(
         (
-            *("algorithm", "known", "error, m", "1σ, m", "stopped, m", "1σ, m"),
-            "left at the rest, m/s",
+            *("algorithm", "reference", "error, m", "1σ, m", "zero velocity, m", "1σ, m"),
+            "final velocity, m/s",
         ),
         rows,
         text=(0, 1),
-        caption=f"Over at most {legs} stretch{'es' if legs > 1 else ''} between rests. Stopped: "
-        "with the velocity at the end of each brought to zero. The 1σ is what assumed biases, tilt "
-        "and noise of a consumer sensor lead to; scale factors are not in it.",
-        title="Places, dead-reckoned between rests",
+        caption=f"Over at most {legs} stretch{'es' if legs > 1 else ''} between rests. Zero "
+        "velocity: corrected for zero velocity at the end of each. 1σ: from assumed biases, tilt "
+        "and noise of a consumer sensor, without scale factors.",
+        title="Positions, dead-reckoned between rests",
     )
 
 
@@ -677,7 +673,7 @@ def offer_lines(bench: AttitudeComparison) -> list[str]:
 def places_json(bench: AttitudeComparison) -> dict[str, Any]:
     """Positions, proposed reference points and the second log as plain data."""
     return {
-        "places": [asdict(place) for place in bench.places],
+        "positions": [asdict(place) for place in bench.places],
         "offered_references": [asdict(offer) for offer in bench.offers],
         "second_log": None if bench.second is None else _second_json(bench.second),
     }

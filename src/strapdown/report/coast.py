@@ -164,7 +164,7 @@ def coast_json(result: OutageRun) -> dict[str, Any]:
         "outage_s": result.spec.outage_s,
         "start": spaced(start_words(result)),
         "begin_s": found.begin,
-        "aids_that_stay": list(result.stays),
+        "remaining_measurements": list(result.stays),
         "at_the_end": {
             "horizontal_95_m": end_bound(result),
             **{SHOWN[q][0]: SHOWN[q][1] * math.sqrt(max(v, 0.0)) for q, v in whole.items()},
@@ -185,11 +185,11 @@ def coast_json(result: OutageRun) -> dict[str, Any]:
                 }
                 for one in found.shares
             ],
-            "aids": {
+            "measurements": {
                 q: float(v[-1] / _positive(found.variance(q)[-1])) for q, v in found.aids.items()
             },
         },
-        "tried": spaced(inside_words(result)),
+        "measured": spaced(inside_words(result)),
         "drifts": [
             {
                 "begin_s": d.span.begin,
@@ -199,7 +199,7 @@ def coast_json(result: OutageRun) -> dict[str, Any]:
                 "along_m": float(d.along[-1]),
                 "across_m": float(d.across[-1]),
                 "down_m": float(d.down[-1]),
-                "foretold_95_m": float(d.bound[-1]),
+                "predicted_95_m": float(d.bound[-1]),
                 "inside_95": float(d.inside.mean()),
             }
             for d in drifts_of(result)
@@ -216,14 +216,14 @@ def write_coast_tables(result: OutageRun, folder: Path) -> None:
     folder : Path
         ``cone.csv``, ``budget.csv``, and ``drifts.csv`` if there were fixes.
     """
-    told = {"coasting": result.name, "outage_s": f"{result.spec.outage_s:g}"}
+    told = {"outage_of": result.name, "outage_s": f"{result.spec.outage_s:g}"}
     time, bound, variances = course(result)
     sds = {SHOWN[q][0]: SHOWN[q][1] * np.sqrt(np.maximum(v, 0.0)) for q, v in variances.items()}
     csv.write(folder / "cone.csv", {"time_s": time, "horizontal_95_m": bound, **sds}, told)
     found = result.forecast
     parts = {f"{_column(one.source.name)}_m2": one.variance["horizontal"] for one in found.shares}
     if found.aids:
-        parts["aids_m2"] = found.aids["horizontal"]
+        parts["measurements_m2"] = found.aids["horizontal"]
     parts["all_m2"] = found.variance("horizontal")
     of = {**told, "of": "variance of the horizontal drift", "outage_from_s": f"{found.begin:.9g}"}
     csv.write(folder / "budget.csv", {"time_s": found.time, **parts}, of)
@@ -237,7 +237,7 @@ def write_coast_tables(result: OutageRun, folder: Path) -> None:
             "down_m": np.concatenate([d.down for d in drifts]),
             "inside_95": np.concatenate([d.inside.astype(np.float64) for d in drifts]),
         }
-        csv.write(folder / "drifts.csv", columns, {**told, "sign": "computed less fix"})
+        csv.write(folder / "drifts.csv", columns, {**told, "sign": "computed minus fix"})
 
 
 def _column(name: str) -> str:

@@ -31,11 +31,11 @@ from strapdown.report.document import (
     KeyFigures,
     Paragraph,
     TableBlock,
+    assumed,
     blocks,
     paragraph,
     run_again,
     section,
-    taken_for_given,
 )
 from strapdown.report.plan import ellipse
 from strapdown.report.values import (
@@ -68,18 +68,18 @@ _WORDS = {
     "g_sensitivity": "gyro g-sensitivity",
 }
 _REMEDIES = {
-    "position": "the drift is hardly more than what is not known of the place where it "
-    "begins: a better place there would help",
-    "velocity": "velocities by Doppler, or more fixes, before the outage would help; so would an "
-    "odometer that stays",
+    "position": "the drift hardly exceeds the uncertainty of the initial position: a better "
+    "initial position would help",
+    "velocity": "Doppler velocities, or more fixes, before the outage would help; so would an "
+    "odometer during it",
     "tilt": "a drive with turns and changes of speed, or a standstill, shortly before the outage "
     "separates tilt from accelerometer bias; a less biased accelerometer would help more",
     "heading": "turns or changes of speed before the outage make the heading known; a second "
     "antenna or a better gyro would help more",
-    "gyro_noise": "no calibration takes white noise off: a gyro with less angle random walk would "
-    "help, or an aid that stays",
-    "accel_noise": "no calibration takes white noise off: an accelerometer with less noise "
-    "would help, or an aid that stays",
+    "gyro_noise": "no calibration removes white noise: a gyro with less angle random walk would "
+    "help, or a measurement that remains",
+    "accel_noise": "no calibration removes white noise: an accelerometer with less noise "
+    "would help, or a measurement that remains",
     "gyro_bias": "a standstill before the outage determines the gyro biases; else a gyro with "
     "a more stable bias would help",
     "accel_bias": "turns and changes of speed before the outage separate accelerometer biases "
@@ -90,11 +90,11 @@ _REMEDIES = {
     "accelerometer with a more stable bias would help",
     "gyro_scale": "turns to both sides before the outage, or a calibration, would determine it",
     "accel_scale": "changes of speed before the outage, or a calibration, would determine it",
-    "gyro_misalignment": "a calibration of the axes would take it off",
-    "accel_misalignment": "a calibration of the axes would take it off",
-    "g_sensitivity": "a calibration of the gyros under tilt would take it off",
+    "gyro_misalignment": "a calibration of the axes would remove it",
+    "accel_misalignment": "a calibration of the axes would remove it",
+    "g_sensitivity": "a calibration of the gyros under tilt would remove it",
 }
-aids_name = "noise of the aids that stay"
+aids_name = "noise of the remaining measurements"
 
 
 def source_words(name: str) -> str:
@@ -165,7 +165,7 @@ def motion_words(result: OutageRun) -> str:
     if to is not None and to != speed:
         return f"from {_speed(speed)} to {_speed(to)}"
     if not speed:
-        return "standing"
+        return "stationary"
     if asked.turn_rate_deg_per_s:
         side = "right" if asked.turn_rate_deg_per_s > 0.0 else "left"
         rate = plain(abs(asked.turn_rate_deg_per_s), 1)
@@ -180,7 +180,7 @@ def _speed(value: float) -> str:
 def start_words(result: OutageRun) -> str:
     """Knowledge of the state at the start of the outage, and its origin."""
     if result.recorded is not None:
-        return "what its filter knew at each outage, with all that binds its errors"
+        return "the filter's covariance at each outage"
     start, begin = result.spec.start, result.forecast.begin
     stated = [
         name.partition("_sd_")[0].replace("_", " ")
@@ -188,10 +188,10 @@ def start_words(result: OutageRun) -> str:
         if "_sd_" in name and not name.startswith("fix") and getattr(start, name) is not None
     ]
     if not begin:
-        text = "what an alignment leaves, and the data sheet"
+        text = "the covariance after an alignment, and the data sheet"
     else:
         text = (
-            f"what a filter knows after {duration_words(begin)} of driving with fixes of "
+            f"the covariance after {duration_words(begin)} of driving with fixes of "
             f"{start.fix_position_sd_m:g}{GAP}m and {start.fix_velocity_sd_m_per_s:g}{GAP}m/s "
             "each second"
         )
@@ -208,7 +208,8 @@ def headline(result: OutageRun) -> str:
     """Return the answer in a sentence."""
     outage = outage_words(result)
     said = (
-        f"after {outage} {motion_words(result)}, 95 % are within {length_words(end_bound(result))}"
+        f"after {outage} {motion_words(result)}, 95 % of drifts are within "
+        f"{length_words(end_bound(result))}"
     )
     if result.stays:
         said += f", with {', '.join(result.stays)}"
@@ -224,10 +225,10 @@ def remedy(result: OutageRun) -> str:
     if found.aids and float(found.aids["horizontal"][-1]) / whole > share:
         share = float(found.aids["horizontal"][-1]) / whole
         return (
-            f"The largest share, {share_words(share)} of the variance, is {aids_name}: what they "
-            "say is what limits it."
+            f"The largest share, {share_words(share)} of the variance, is {aids_name}: they limit "
+            "the drift."
         )
-    words = _REMEDIES.get(first.source.name, "what states it better would help")
+    words = _REMEDIES.get(first.source.name, "a more accurate value would help")
     return (
         f"The largest share, {share_words(float(share))} of the variance, is "
         f"{source_words(first.source.name)} ({at_start(first, result)}): {words}."
@@ -244,10 +245,10 @@ def inside_words(result: OutageRun) -> str:
     middle = float(np.median([d.horizontal[-1] for d in drifts]))
     worst = max(float(d.horizontal[-1]) for d in drifts)
     return (
-        f"Tried at {len(drifts)} {'places' if len(drifts) > 1 else 'place'}: the drift at the end "
-        f"was {length_words(middle)} in the median and {length_words(worst)} at worst; "
-        f"{sum(ends)} of {len(ends)} ends and {share_words(float(fixes.mean()))} of "
-        f"{len(fixes)} fixes are within their 95 %."
+        f"Measured in {len(drifts)} {'outages' if len(drifts) > 1 else 'outage'}: the final drift "
+        f"is {length_words(middle)} in the median and {length_words(worst)} at most; {sum(ends)} "
+        f"of {len(ends)} final drifts and {share_words(float(fixes.mean()))} of {len(fixes)} fixes "
+        "are within their 95 % bounds."
     )
 
 
@@ -261,8 +262,8 @@ def key_figures(result: OutageRun) -> tuple[KeyFigure, ...]:
 
     figures = [
         KeyFigure("Horizontal", length_words(end_bound(result)), said),
-        KeyFigure("Along the way", f"±{GAP}{length_words(half(sd('along')))}", said),
-        KeyFigure("Across it", f"±{GAP}{length_words(half(sd('across')))}", said),
+        KeyFigure("Along track", f"±{GAP}{length_words(half(sd('along')))}", said),
+        KeyFigure("Cross track", f"±{GAP}{length_words(half(sd('across')))}", said),
         KeyFigure("Vertical", f"±{GAP}{length_words(half(sd('vertical')))}", said),
         KeyFigure("Heading", f"±{GAP}{_three(math.degrees(half(sd('heading'))))}°", said),
     ]
@@ -271,7 +272,7 @@ def key_figures(result: OutageRun) -> tuple[KeyFigure, ...]:
         fixes = np.concatenate([d.inside for d in drifts])
         figures.append(
             KeyFigure(
-                "Inside 95 %",
+                "Within 95 % bounds",
                 share_words(float(fixes.mean())),
                 f"of {len(fixes)} fixes in {len(drifts)} outages",
             )
@@ -287,17 +288,17 @@ def coast_document(result: OutageRun, name: str) -> Document:
     sections = (
         section("over-time", "Over the outage", time_table(result), parts_chart(result)),
         section("budget", "Error budget of the drift", budget_table(result), budget_chart(result)),
-        section("tried", "Actual drift", drift_table(result)),
+        section("measured", "Measured drift", drift_table(result)),
         section("plane", "From above", plane_chart(result)),
         section(
             "method",
             "Method and assumptions",
-            *taken_for_given(*_assumptions(result)),
+            *assumed(*_assumptions(result)),
             Facts(CONVENTIONS),
             *run_again(name),
         ),
     )
-    title = f"Coasting of {result.name} for {outage_words(result)}"
+    title = f"Drift of {result.name} over an outage of {outage_words(result)}"
     return Document(
         title,
         headline(result),
@@ -305,8 +306,8 @@ def coast_document(result: OutageRun, name: str) -> Document:
             ("Sensor" if result.navigation is None else "Record", f"{result.name}: {result.what}"),
             ("Motion", motion_words(result)),
             ("Start", start_words(result)),
-            ("Aids that stay", ", ".join(result.stays) or "none"),
-            ("Made with", f"strapdown {__version__}"),
+            ("Remaining measurements", ", ".join(result.stays) or "none"),
+            ("Software", f"strapdown {__version__}"),
         ),
         blocks(
             KeyFigures(key_figures(result)),
@@ -320,27 +321,26 @@ def coast_document(result: OutageRun, name: str) -> Document:
 
 
 CONVENTIONS = (
-    ("Horizontal, 95 %", "longer half axis of the ellipse that holds 95 % of places"),
+    ("Horizontal, 95 %", "semi-major axis of the 95 % ellipse of the position"),
     ("Horizontal, 1 sd", "root of the sum of both variances"),
-    ("Along, across", "along the velocity; along the heading where it stands"),
-    ("Sign of a drift", "computed less true, or less the fix"),
+    ("Along, across", "along the velocity; along the heading where stationary"),
+    ("Sign of a drift", "computed − true, or computed − fix"),
 )
 
 
 def _assumptions(result: OutageRun) -> list[str]:
     taken = [
-        "The covariance of the filter itself, run over the outage; no formula of its own. What "
-        "each source adds is how that covariance answers to its size, by runs in which it is "
-        "larger and smaller.",
-        "Errors are small and normal, and the sensors as their data sheet or configuration "
-        "states: noise, bias, its instability, scale factors and misalignments where they are "
-        "known. Shaking beyond it is not in the forecast.",
-        "Normal gravity: a deflection of the vertical is not in it.",
+        "The drift is the filter's own covariance, propagated over the outage. The share of a "
+        "source follows from runs in which it is enlarged and reduced.",
+        "Errors are small and normal, and sensors as their data sheet or configuration states: "
+        "noise, bias, bias instability, and scale factors and misalignments where stated. "
+        "Vibration beyond the data sheet is not included.",
+        "Normal gravity: a deflection of the vertical is not included.",
     ]
     if result.navigation is None:
         taken.append(
-            "Before the outage a car goes round blocks to both sides, with changes of speed. A "
-            "drive without turns leaves more unknown, and a standstill less."
+            "Before the outage a car drives round blocks to both sides, with changes of speed. "
+            "Without turns the initial uncertainty is larger, after a standstill smaller."
         )
     return taken
 
@@ -380,7 +380,7 @@ def time_table(result: OutageRun) -> TableBlock:
     said = (
         ""
         if recorded is None or len(recorded.drifts) < 2
-        else (f" Of {len(recorded.drifts)} outages, the root of the mean square.")
+        else f" Root mean square over {len(recorded.drifts)} outages."
     )
     return TableBlock(
         (
@@ -395,8 +395,8 @@ def time_table(result: OutageRun) -> TableBlock:
         ),
         tuple(rows),
         text=(0,),
-        caption="Horizontal: the root of both variances, and the longer half axis of the ellipse "
-        f"that holds 95 %. Others: 95 %, 1.96 standard deviations.{said}",
+        caption="Horizontal: root of both variances, and semi-major axis of the 95 % ellipse. "
+        f"Others: 95 %, 1.96 standard deviations.{said}",
         strong=(len(rows) - 1,),
     )
 
@@ -426,15 +426,15 @@ def budget_table(result: OutageRun) -> TableBlock:
     told = [(name, size, alone, *_part(part)) for part, name, size, alone in rows]
     if abs(rest) >= 5e-5:
         told.append(("all others", "", "", *_part(rest)))
-    told.append(("all together", "", length_words(math.sqrt(whole)), f"100{GAP}%", ""))
+    told.append(("total", "", length_words(math.sqrt(whole)), f"100{GAP}%", ""))
     return TableBlock(
         ("source", "1 sd at the start", "alone", "share of the variance", ""),
         tuple(told),
         text=(0, 1, 4),
-        caption="Of the horizontal drift at the end, 1 standard deviation. Alone: were there no "
-        "other source. Shares add up to the whole; where errors of the start are bound to each "
-        "other, as tilt and accelerometer bias are, they cancel, and a share may be small or "
-        "below zero although the source alone would be large.",
+        caption="Horizontal drift at the end, 1 standard deviation. Alone: without the other "
+        "sources. Shares add up to 100 %; initial errors that are correlated, such as tilt and "
+        "accelerometer bias, cancel, so a share can be small or negative although the source "
+        "alone is large.",
         strong=(len(told) - 1,),
     )
 
@@ -462,11 +462,11 @@ def drift_table(result: OutageRun) -> TableBlock | None:
         for d in drifts
     ]
     return TableBlock(
-        ("outage from", "drift", "along", "across", "down", "foretold, 95 %", "fixes inside"),
+        ("outage from", "drift", "along", "across", "down", "predicted, 95 %", "fixes within"),
         tuple(rows),
         text=(),
-        caption="Drift at the last fix of each outage: computed less fix. Inside: the share of "
-        "its fixes within their ellipses of 95 %, the noise of the fixes with them.",
+        caption="Drift at the last fix of each outage, computed − fix, and the share of its fixes "
+        "within their 95 % ellipses, which include the noise of the fixes.",
     )
 
 
@@ -481,7 +481,7 @@ _LEAST_PART = 0.005
 #: Fractions of the outage at which the plan has an ellipse.
 _RINGS = (0.25, 0.5, 0.75, 1.0)
 _CORNERS = 90
-_INSIDE, _OUTSIDE = "a drift that came, within its 95 %", "outside of it"
+_INSIDE, _OUTSIDE = "measured drift, within its 95 % bound", "beyond its 95 % bound"
 
 
 def cone_chart(result: OutageRun) -> Chart:
@@ -492,27 +492,27 @@ def cone_chart(result: OutageRun) -> Chart:
     lines = [
         *_came(result, lambda d: d.horizontal),
         Line("1 standard deviation", time, sd, BLUE, "dash", 1.6),
-        Line("95 % are within", time, bound, BLUE, "solid", 2.2),
+        Line("95 % bound", time, bound, BLUE, "solid", 2.2),
     ]
     cone = Panel(
         "horizontal drift, m",
         tuple(lines),
-        fills=(Fill("95 % are within", time, np.zeros_like(time), bound, BLUE, 0.13),),
+        fills=(Fill("95 % bound", time, np.zeros_like(time), bound, BLUE, 0.13),),
         height=1.4,
     )
     fills, note = _stack(result)
     stack = Panel(
         "1 standard deviation, m",
-        (Line("all together", found.time, found.sd("horizontal"), BLACK, "solid", 1.6),),
+        (Line("total", found.time, found.sd("horizontal"), BLACK, "solid", 1.6),),
         fills=fills,
         title="Shares of the drift",
     )
     tried = "" if recorded is None else _tried(recorded.drifts)
     return Chart(
         "cone",
-        "How far it drifts",
-        f"Above: horizontal drift.{tried} Below: its standard deviation, each band as high as its "
-        f"share of the variance.{note}",
+        "Horizontal drift over the outage",
+        f"Above: horizontal drift.{tried} Below: its standard deviation, divided by shares of the "
+        f"variance.{note}",
         TIME,
         (cone, stack),
     )
@@ -523,8 +523,8 @@ def _tried(drifts: Sequence[Drift]) -> str:
     if many < 2:
         return ""
     return (
-        f" The cone is the root mean square of those foretold for {many} outages; each drift is "
-        "judged by its own."
+        f" The bound is the root mean square of the predictions for {many} outages; each drift is "
+        "compared with its own."
     )
 
 
@@ -576,9 +576,9 @@ def _stack(result: OutageRun) -> tuple[tuple[Fill, ...], str]:
         fills.append(Fill(name, found.time, below, above, colour, 0.55))
         below = above
     cancels = any(float(np.min(v)) < -_LEAST_PART for _, v in signed)
-    note = " Shares below zero, of errors that cancel, are not drawn." if cancels else ""
+    note = " Negative shares, of errors that cancel, are not drawn." if cancels else ""
     if result.recorded is not None and len(result.recorded.drifts) > 1:
-        note += f" Of the outage from {result.forecast.begin:.1f} s, the middle one by its bound."
+        note += f" Outage from {result.forecast.begin:.1f} s, the median one by its bound."
     return tuple(fills), note
 
 
@@ -617,16 +617,15 @@ def plane_chart(result: OutageRun) -> Chart:
         )
     for d in drifts_of(result):
         lines.append(Line(_INSIDE, d.across, d.along, GREY, "solid", 1.0))
-        name, colour = ("its end", GREY) if d.inside[-1] else (_OUTSIDE, VERMILLION)
+        name, colour = ("final drift", GREY) if d.inside[-1] else (_OUTSIDE, VERMILLION)
         ends = d.across[-1:], d.along[-1:]
         lines.append(Line(name, *ends, colour, points=True, symbol="circle", size=7.0))
-    panel = Panel("along the way, m", tuple(lines), x_label="across it, to the right, m")
+    panel = Panel("along track, m", tuple(lines), x_label="cross track, to the right, m")
     return Chart(
         "plane",
-        "The drift from above",
-        "Computed place relative to the true one, along and across the way. Ellipses hold 95 % "
-        "of the places.",
-        "across it, to the right, m",
+        "Drift from above",
+        "Computed position relative to the true one, along and cross track, with 95 % ellipses.",
+        "cross track, to the right, m",
         (panel,),
     )
 
@@ -648,11 +647,11 @@ def parts_chart(result: OutageRun) -> Chart:
     heading = (Line("heading", time, bound("heading", math.degrees(1.0)), BLACK, "dash", 1.6),)
     return Chart(
         "parts",
-        "Along, across, up and down; velocity and heading",
-        "Bounds of 95 %: 1.96 standard deviations.",
+        "Position, velocity and heading drift",
+        "95 % bounds (1.96 standard deviations).",
         TIME,
         (
-            Panel("place ±, m", place),
+            Panel("position ±, m", place),
             Panel("velocity ±, m/s", speed),
             Panel("heading ±, deg", heading),
         ),
@@ -686,7 +685,7 @@ def budget_chart(result: OutageRun) -> Chart:
         "budget",
         "Error budget of the drift",
         "Shares of the variance of the horizontal drift at the end of the outage. They add up to "
-        "100 %; below zero is what cancels others.",
+        "100 %; negative shares cancel others.",
         "share of the variance, %",
         (Panel("", (), categories=tuple(n for n, _ in kept), bars=(bars,)),),
     )

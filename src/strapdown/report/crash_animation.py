@@ -99,18 +99,18 @@ def path_animation(
     )
     slower = 1e-3 * _FRAME * len(rows) / max(float(path.time[-1] - path.time[0]), 1e-3)
     caption = (
-        f"The vehicle on its path, seen in space; {names[0]}, {names[1]} and down in m from the "
-        "reference point's place at the entry, to one scale on all axes. Orange: the front. Its "
-        "length and width are the vehicle's, its height is for the eye alone; the ground is drawn "
-        "half a metre below the vehicle's origin at the entry."
+        f"The vehicle on its path; {names[0]}, {names[1]} and down in m from the position of the "
+        "reference point at the entry, one scale for all axes. Orange: front. Length and width are "
+        "the vehicle's, the height is illustrative; the ground is drawn half a meter below the "
+        "vehicle's origin at the entry."
     )
     return Animation(
         "motion",
-        "The motion in space",
+        "Motion in 3D",
         caption,
         scene,
         crash_stills(path, body, events=events, point=point, ground=ground),
-        f"Played {slower:.2g} times slower than it was; drag to look from elsewhere.",
+        f"Played {slower:.2g} times slower; drag to turn the view.",
     )
 
 
@@ -229,12 +229,12 @@ def crash_stills(
     return Picture(
         "motion",
         out.svg(),
-        "The motion in space",
+        "Motion in 3D",
         "The vehicle at instants of its path, in parallel projection from the right, ahead and "
-        "above of how it stood at the entry; one scale for all. Orange: the front. Blue: the path "
-        "of the reference point up to then, put down on the ground; dashed: the whole of it. "
-        f"Lines on the ground are {_step(places, corners):g} m apart. The height of the vehicle is "
-        "for the eye alone.",
+        "above of its attitude at the entry; one scale. Orange: front. Blue: path of the reference "
+        "point up to that instant, projected onto the ground; dashed: the whole path. Lines on the "
+        f"ground are {_step(places, corners):g} m apart. The height of the vehicle is "
+        "illustrative.",
         out.alt,
     )
 

@@ -126,7 +126,7 @@ def crash_json(result: CaseResult) -> dict[str, Any]:
         "severity": [_severity(s) for s in result.severity],
         "references": [_reference(r) for r in result.references],
         "assumptions": _pairs(crash_words.assumptions(result)),
-        "limitations": _pairs(crash_words.limitations(result)),
+        "limitations": _pairs([one[1:] for one in crash_words.limitations(result)]),
         "findings": [finding_json(f) for f in result.findings],
         "case": _named(result.spec.model_dump(mode="json", exclude_none=True)),
     }
@@ -155,7 +155,7 @@ def _named(value: Any, key: str = "") -> Any:
     return value
 
 
-def _pairs(rows: tuple[tuple[str, str], ...]) -> list[dict[str, str]]:
+def _pairs(rows: Sequence[tuple[str, str]]) -> list[dict[str, str]]:
     return [{"what": spaced(head), "text": spaced(text)} for head, text in rows]
 
 

@@ -219,11 +219,11 @@ def delta_v_chart(
 
 def _caption(stated: bool) -> str:
     return (
-        "Change of the velocity of the reference point since time zero, integrated along the "
-        "turning axes of the vehicle, gravity as it was felt at rest taken off; forward, right, "
-        "down are positive, so that braking counts negative; 1 m/s = 3.6 km/h. Shaded: 95 % at "
-        "an exact time; the bar at the end of the event has the uncertainty of that end as well."
-        + (" Symbols with bars: what others state, with their 95 %." if stated else "")
+        "Change of velocity of the reference point since time zero, integrated in the axes of the "
+        "vehicle, less the specific force at rest; forward, right, down are positive, so braking "
+        "is negative; 1 m/s = 3.6 km/h. Shaded: 95 % at an exact time; the bar at the end of the "
+        "event includes the uncertainty of that end."
+        + (" Symbols with bars: stated by others, with their 95 % bounds." if stated else "")
     )
 
 
@@ -246,7 +246,7 @@ def _stated_lines(stated: Sequence[ReferenceAnswer]) -> list[Line]:
 # Error budget of delta-V and of the end position.
 
 
-_SUM = "all together"
+_SUM = "total"
 # Smallest share of the largest sum with its own bar; smaller ones are joined.
 _LEAST = 0.01
 _REST = "others"
@@ -277,9 +277,9 @@ def delta_v_budget_chart(change: VelocityChange) -> Chart:
     return _chart(
         "budget-delta-v",
         "Sources of the uncertainty of delta-V",
-        "Standard deviation that each contributor adds to the change of velocity of the main "
-        "event, forward and right; their squares add up to that of the bar at the top, and 1.96 "
-        "of it are the 95 % bound. Contributors below 1 % of the sum are joined.",
+        "Standard deviation of the delta-V of the main event, forward and right, due to each "
+        "contributor; squares add up to that of the total, and the 95 % bound is 1.96 times it. "
+        "Contributors below 1 % are joined.",
         table,
         "m/s",
     )
@@ -297,11 +297,11 @@ def place_budget_chart(path: CrashPath, names: tuple[str, str] = ("forward", "ri
     table = pd.DataFrame(np.sqrt(found.to_numpy()), index=found.index, columns=list(names))
     at = 1e3 * float(path.time[-1])
     return _chart(
-        "budget-place",
-        "Sources of the uncertainty of the end of the path",
-        f"Standard deviation that each contributor adds to the place of the reference point at "
-        f"{at:.0f} ms, {names[0]} and {names[1]}; their squares add up to that of the bar at the "
-        "top, and 1.96 of it are the 95 % bound. Contributors below 1 % of the sum are joined.",
+        "budget-position",
+        "Sources of the uncertainty of the final position",
+        f"Standard deviation of the position of the reference point at {at:.0f} ms, {names[0]} and "
+        f"{names[1]}, due to each contributor; squares add up to that of the total, and the 95 % "
+        "bound is 1.96 times it. Contributors below 1 % are joined.",
         table,
         "m",
     )
@@ -357,8 +357,8 @@ def _joined(table: pd.DataFrame, most: float) -> pd.DataFrame:
 
 _LABEL = "direction of force, deg"
 _SIGN = (
-    "Where the force came from along the turning axes, 0 the front, positive clockwise from above "
-    "(from the right)"
+    "Principal direction of force in the axes of the vehicle, 0 the front, positive clockwise from "
+    "above (from the right)"
 )
 _STEADY = 0.02
 
@@ -395,8 +395,8 @@ def pdof_by_window_chart(
     return Chart(
         "pdof-by-window",
         "Direction of force against the length of the window",
-        f"{_SIGN}, from the change of velocity in windows that begin at time zero. The bar: the "
-        "answer, from the whole event, with its 95 % interval.",
+        f"{_SIGN}, from the delta-V over windows from time zero. Bar: the answer, from the whole "
+        "event, with its 95 % interval.",
         "length of the window from time zero, ms",
         (Panel(_LABEL, tuple(lines), steady=_STEADY),),
         marks=(Mark(1e3 * length, "the whole event"),),
@@ -427,15 +427,15 @@ def pdof_by_shift_chart(
         return pdof_by_shift(unit.acceleration, whole.start, whole.end, SHIFTS)
 
     lines = _lines(units, combined, event, table)
-    lines += _chosen(main, event, 0.0, "time zero as found, 95 %")
+    lines += _chosen(main, event, 0.0, "detected time zero, 95 %")
     return Chart(
         "pdof-by-time-zero",
         "Direction of force against time zero",
-        f"{_SIGN}, from windows that begin earlier (negative) or later than the time zero that was "
-        "found, and end with the event. The bar: the answer with its 95 % interval.",
+        f"{_SIGN}, from windows that begin earlier (negative) or later than the detected time zero "
+        "and end with the event. Bar: the answer with its 95 % interval.",
         "shift of time zero, ms",
         (Panel(_LABEL, tuple(lines), steady=_STEADY),),
-        marks=(Mark(0.0, "as found"),),
+        marks=(Mark(0.0, "detected"),),
     )
 
 
@@ -526,15 +526,14 @@ def differences_chart(comparison: UnitComparison, names: Sequence[str]) -> Chart
             panels.append(Panel(f"{axis}, m/s", tuple(lines), fills=tuple(fills), height=0.9))
     if not panels:
         return None
-    said = "agree within" if comparison.agree else "do NOT agree within"
+    said = "consistent" if comparison.agree else "NOT consistent"
     return Chart(
         "units",
-        "Recorders against each other",
-        "Change of velocity at the reference point by each recorder less that of their best "
-        "weighted mean, vehicle axes, since the first instant shown. Dotted, in its colour: what "
-        "holds 95 % of such a difference, as stated of the recorders; what a recorder shares with "
-        "the mean is taken into account. "
-        f"Together they {said} their bounds (chi-square {comparison.chi_square:.4g} of "
+        "Differences between recorders",
+        "Delta-V at the reference point by each recorder minus that of the weighted mean, vehicle "
+        "axes, since the first instant shown. Dotted, in its color: 95 % bound of the difference "
+        "by the stated uncertainties, with the recorder's share in the mean. "
+        f"Together they are {said} with their bounds (chi-square {comparison.chi_square:.4g} of "
         f"{comparison.freedom} degrees of freedom, probability {comparison.probability:.2g}).",
         _X,
         tuple(panels),
@@ -571,8 +570,8 @@ def accelerations_chart(
     return Chart(
         "accelerations",
         "Acceleration of the reference point by every recorder",
-        "Along the turning axes of the vehicle, forward, right, down, what was felt at rest taken "
-        f"off, {how}; 1 g = 9.80665 m/s². Shaded: the event.",
+        "In the axes of the vehicle, forward, right, down, less the specific force at rest, "
+        f"{how}; 1 g = 9.80665 m/s². Shaded: the event.",
         _X,
         tuple(Panel(f"{axis}, g", tuple(rows[k]), height=0.9) for k, axis in enumerate(_AXES)),
         marks=event_marks(events, *span),
@@ -642,9 +641,9 @@ def risk_chart(
     return Chart(
         "severity",
         "Risk of injury against the change of velocity",
-        "Published logistic models, each drawn within the range that it is valid in; marked: this "
-        "crash with the 95 % bound of its change of velocity and what that makes of the risk. The "
-        "bound has nothing of the model's own uncertainty.",
+        "Published logistic models, each within its range of validity; marked: this crash with the "
+        "95 % bound of its delta-V, and the resulting bound of the risk. The uncertainty of the "
+        "model is not included.",
         "change of velocity (resultant of the main event), km/h",
         (Panel("probability, %", tuple(lines)),),
     )

@@ -37,8 +37,8 @@ from strapdown.report.crash_signals import (
 )
 from strapdown.report.crash_words import (
     CONVENTIONS,
+    GRAVE,
     assumptions,
-    grave_limitations,
     headline,
     how_to_verify,
     key_figures,
@@ -62,11 +62,11 @@ from strapdown.report.values import GAP, axis_names, plain
 from strapdown.tables import NED
 
 SIGNALS = (
-    "Specific force is what an accelerometer feels: −1 g downward at rest, 1 g = 9.80665 m/s². It "
-    "is drawn along the axes of the vehicle (forward, right, down), and rates about them; as "
-    "recorded, each range at its own rate, and as used: at the stamps that all recorders share, "
-    "ranges merged, biases taken off. Triangles mark a range at its end, dashed levels the ends of "
-    "ranges that were come near."
+    "Specific force, as an accelerometer measures: −1 g downward at rest, 1 g = 9.80665 m/s²; in "
+    "the axes of the vehicle (forward, right, down), with rates about them. As recorded: each "
+    "range at its own rate. As processed: at the common stamps, ranges merged, less bias. "
+    "Triangles mark samples at the end of a range, dashed levels the ends of ranges nearly "
+    "reached."
 )
 
 
@@ -96,6 +96,7 @@ def crash_document(result: CaseResult, name: str) -> Document:
     directions = _directions(main, which)
     happened = any(unit.body for unit in found.answers)
     described = [Paragraph(text) for text in spec.description.split("\n\n") if text.strip()]
+    limits = limitations(result)
     sections = (
         section(
             "case", "The case", *described, crash_tables.records_table(result), *_records(result)
@@ -136,13 +137,13 @@ def crash_document(result: CaseResult, name: str) -> Document:
             velocity_chart(path, names, **sampled),
             attitude_chart(path, **sampled),
         ),
-        section("agreement", "Sensors against each other", *_agreement(result)),
+        section("agreement", "Consistency of the recorders", *_agreement(result)),
         section(
             "budget",
             "Error budget",
             Paragraph(
-                "What makes the bounds: every unknown was carried through the whole "
-                "computation, and those of one kind are added up here."
+                "Each unknown was propagated through the whole computation; those of one kind are "
+                "summed here."
             ),
             None if which is None else delta_v_budget_chart(main.body[which].event),
             place_budget_chart(path, names),
@@ -164,7 +165,7 @@ def crash_document(result: CaseResult, name: str) -> Document:
             "assumptions",
             "Method and assumptions",
             Items(tuple(("", step) for step in method(result)), numbered=True),
-            Paragraph("Taken for given:"),
+            Paragraph("Assumptions:"),
             Items(assumptions(result)),
         ),
         section(
@@ -187,13 +188,13 @@ def crash_document(result: CaseResult, name: str) -> Document:
         section(
             "limitations",
             "Limitations",
-            Paragraph("Written from what happened in this case; the gravest first."),
-            Items(limitations(result)),
+            Paragraph("Those that apply to this case, most serious first."),
+            Items(tuple((head, text) for _, head, text in limits)),
         ),
         section("findings", "Notes on the records", *_findings(result)),
         section(
             "verify",
-            "How to verify",
+            "Verification",
             Items(how_to_verify()),
             Paragraph(f"strapdown verify {name}", "mono"),
             crash_tables.inputs_table(result),
@@ -205,10 +206,10 @@ def crash_document(result: CaseResult, name: str) -> Document:
         ("Reference point", spec.point.name + _place(spec.point.position_m)),
         ("Recorders", ", ".join(u.name for u in result.units)),
         ("Author", spec.author),
-        ("Made with", f"strapdown {__version__}"),
+        ("Software", f"strapdown {__version__}"),
     )
     dial = pdof_dial(outline, directions, point=point, point_name=spec.point.name, small=True)
-    grave = grave_limitations(result)
+    grave = [head for code, head, _ in limits if code in GRAVE]
     return Document(
         title=spec.title,
         subtitle="Crash reconstruction from inertial records",
@@ -219,7 +220,9 @@ def crash_document(result: CaseResult, name: str) -> Document:
                 (*((dial,) if directions else ()), path_plan(path, outline, small=True, **seen)),
             ),
             Paragraph(lead(result), "lead"),
-            Paragraph(f"Mind: {'; '.join(grave)} (see Limitations).", "warning") if grave else None,
+            Paragraph(f"Caution: {'; '.join(grave)} (see Limitations).", "warning")
+            if grave
+            else None,
         ),
         sections=sections,
         footer=spec.number or spec.title,
@@ -253,7 +256,7 @@ def _records(result: CaseResult) -> Iterator[Block]:
     for record in result.records.values():
         rows = record_facts(record)
         if rows:
-            yield Paragraph(f"What {record.path.name} says of itself:")
+            yield Paragraph(f"Metadata of {record.path.name}:")
             yield Facts(rows)
 
 
@@ -261,7 +264,7 @@ def _agreement(result: CaseResult) -> tuple[Block | None, ...]:
     found = result.reconstruction
     comparison = found.comparison
     if comparison is None:
-        return (Paragraph("There is one recorder, and nothing to hold it against."),)
+        return (Paragraph("One recorder: no comparison."),)
     words = notes(comparison.findings, result, remedies=False)
     remedies = dict.fromkeys(text for f in comparison.findings if (text := f.advice("file")))
     return (
@@ -269,7 +272,7 @@ def _agreement(result: CaseResult) -> tuple[Block | None, ...]:
         differences_chart(comparison, [u.name for u in found.units]),
         accelerations_chart(found.units, found.combined, found.main.events.events),
         Items(words) if words else None,
-        Paragraph(f"What can be done: {'; '.join(remedies)}.") if remedies else None,
+        Paragraph(f"Remedies: {'; '.join(remedies)}.") if remedies else None,
     )
 
 
@@ -304,12 +307,12 @@ def _findings(result: CaseResult) -> tuple[Block, ...]:
     told = () if comparison is None else comparison.findings
     rows = notes([f for f in result.findings if f not in told], result)
     if not rows:
-        return (Paragraph("Nothing was noticed in the records that a reader should know."),)
-    more = (Paragraph("What recorders differ in stands under Sensors against each other."),)
+        return (Paragraph("No findings on the records."),)
+    more = (Paragraph("Differences between recorders are under Consistency of the recorders."),)
     return (
         Paragraph(
-            "What was noticed while the records were read and worked through, in this order, and "
-            "what can be done about it. What weighs on the answers stands under Limitations."
+            "Findings from reading and processing the records, in this order, with remedies. "
+            "Those that affect the answers are under Limitations."
         ),
         Items(rows),
         *(more if told else ()),

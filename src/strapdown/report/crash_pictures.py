@@ -20,7 +20,7 @@ _CAR = 0.53  # distance of the vehicle's farthest corner, as a share of the dial
 _RING = 0.86  # inner edge of the interval ring, as a share of the dial's radius
 Point = tuple[float, float]
 _SOFT = "#4a525c"
-_SMALL_CAPTION = "Where the force came from, seen from above: 0° the front, clockwise; wedge: 95 %."
+_SMALL_CAPTION = "Principal direction of force from above: 0° the front, clockwise; wedge: 95 %."
 # Smallest interval drawn, deg, to keep the stroke visible.
 _LEAST_WEDGE = 1.0
 

@@ -31,7 +31,7 @@ _LOOKS = (
     *(("#882255", "solid"), ("#7f6000", "dash")),
 )
 _ARROW = 44.0  # pixels
-_SMALL_CAPTION = "The vehicle at the instants named, in m from its place at the entry."
+_SMALL_CAPTION = "The vehicle at the named instants, in m from its position at the entry."
 _SLOW, _EVERY = 0.05, 0.1  # m/s, slower entries have no arrow; s between dots
 
 
@@ -110,7 +110,7 @@ def path_plan(
     end = path.table[NED].iloc[-1]
     alt = (
         f"Path of the reference point from above: it ends {plain(float(end['north']), 2)} m "
-        f"{names[0]}, {plain(float(end['east']), 2)} m {names[1]} of its place at the entry"
+        f"{names[0]}, {plain(float(end['east']), 2)} m {names[1]} of its position at the entry"
     )
     out = Drawing(whole, bottom + 17.0 * len(legend) + 4.0, alt)
     view.draw_grid(out)
@@ -156,16 +156,13 @@ def path_plan(
 
 def _caption(names: tuple[str, str], short: bool) -> str:
     axes = (
-        "north up"
-        if names[0] == "north"
-        else "axes forward and right as the vehicle stood at the entry"
+        "north up" if names[0] == "north" else "axes forward and right of the vehicle at the entry"
     )
     return (
-        f"Path of the reference point seen from above, {axes}, in m from its place at the entry; "
-        "both axes to one scale. Shaded: the ellipses that hold 95 % of the error at each instant, "
-        "which grow from the entry, where the place is zero by definition. Outlines: the vehicle "
-        "at the instants named, turned by its heading alone. Dots every 100 ms."
-        + (" Right: the path alone, enlarged." if short else "")
+        f"Path of the reference point from above, {axes}, in m from its position at the entry; "
+        "equal scales. Shaded: 95 % ellipses along the path; they grow from the entry, where the "
+        "position is zero by definition. Outlines: the vehicle at the named instants, turned by "
+        "its heading. Dots every 100 ms." + (" Right: the path alone, enlarged." if short else "")
     )
 
 
@@ -246,7 +243,7 @@ def _legend_rows(
     told = f"{plain(speed, 1)} m/s ({plain(3.6 * speed, 1)} km/h)" if speed >= _SLOW else "at rest"
     entries = [
         ("path", INK, "path of the reference point"),
-        ("band", _BAND_EDGE, "within this with 95 %"),
+        ("band", _BAND_EDGE, "95 % bound"),
         ("arrow", VERMILLION, f"entry {told}"),
     ]
     if plan.reference is not None:

@@ -117,9 +117,7 @@ def _about_the_crash(
     inside = (time >= span[0]) & (time <= span[1])
     cut = flags_in_vehicle_axes(np.asarray(prepared.clipped), C) & inside[:, None]
     look = unit_look(number)
-    name = (
-        "merged, biases taken off" if len(recorded.accelerometers) > 1 else "at the common stamps"
-    )
+    name = "merged, less bias" if len(recorded.accelerometers) > 1 else "at the common stamps"
     assumed = assumed_axes(unit)
     for k in range(3):
         if _AXES[k] in assumed:
@@ -128,12 +126,12 @@ def _about_the_crash(
         if cut[:, k].any():
             x, y = 1e3 * time[cut[:, k]], force[cut[:, k], k]
             rows[k].append(
-                Line("cut off in every range", x, y, VERMILLION, points=True, symbol="x", size=10.0)
+                Line("clipped in every range", x, y, VERMILLION, points=True, symbol="x", size=10.0)
             )
     return Chart(
         f"signals-{number + 1}",
         f"{unit.name}: specific force about the crash",
-        "Specific force at the recorder's own place. Thin: as recorded; strong: as it was used. "
+        "Specific force at the recorder. Thin: as recorded; thick: as processed. "
         "Shaded: the event." + _told([axis for axis in _AXES if axis in assumed]),
         "time from the trigger, ms",
         tuple(
@@ -153,7 +151,7 @@ def _told(assumed: Sequence[str]) -> str:
     """Caption text on the axes that are not drawn."""
     if not assumed:
         return ""
-    return f" Not recorded but assumed, and not drawn: {', '.join(assumed)}."
+    return f" Assumed instead of recorded, and not drawn: {', '.join(assumed)}."
 
 
 def _once(lines: list[Line]) -> list[Line]:
@@ -184,9 +182,7 @@ def _rates(
     rate = prepared.imu[GYRO].to_numpy(dtype=np.float64) / degree
     for k in range(3):
         colour = unit_look(number)["colour"]
-        rows[k].append(
-            curve("bias taken off", 1e3 * time[inside], rate[inside, k], colour, width=2.0)
-        )
+        rows[k].append(curve("less bias", 1e3 * time[inside], rate[inside, k], colour, width=2.0))
     return Chart(
         f"rates-{number + 1}",
         f"{unit.name}: rates about the crash",
@@ -224,10 +220,9 @@ def _overview(unit: UnitReconstruction, number: int, events: Sequence[CrashEvent
     if rest is not None:
         bands.append(Band(rest.start, rest.end, "rest"))
     said = (
-        "no rest was found"
+        "no rest detected"
         if rest is None
-        else f"rest before the crash, {rest.start:.3g} to {rest.end:.3g} s, from which biases and "
-        "attitude are"
+        else f"rest before the crash, {rest.start:.3g} to {rest.end:.3g} s, for biases and attitude"
     )
     return Chart(
         f"overview-{number + 1}",
@@ -370,10 +365,10 @@ def place_chart(
             line = curve(reference_name, at, y, VERMILLION, "dash", 1.6)
             panels[k] = replace(panels[k], lines=(*panels[k].lines, line))
     return _chart(
-        "place",
-        "Place over time",
-        f"Place of the reference point, {names[0]}, {names[1]}, down, from where it was at the "
-        "entry, which is without error by definition.",
+        "position",
+        "Position over time",
+        f"Position of the reference point, {names[0]}, {names[1]}, down, from that at the entry, "
+        "which is exact by definition.",
         panels,
         (path, events),
         samples,
@@ -411,7 +406,7 @@ def attitude_chart(
         "attitude",
         "Attitude over time",
         "Roll (right side down is positive), pitch (nose up) and heading (clockwise from above), "
-        "3-2-1 angles of the vehicle against the axes of the path; the heading runs on beyond a "
+        "3-2-1 angles of the vehicle against the axes of the path; the heading continues beyond a "
         "full turn.",
         _panels(path, EULER, [f"{a}, deg" for a in EULER], _sampled_angles(path, samples)),
         (path, events),
@@ -448,8 +443,8 @@ def reference_chart(
     return Chart(
         f"reference-{number}",
         f"Path against {name}",
-        f"Place by the reconstruction less that by {name}, moved so that both agree at the entry. "
-        "Shaded: what holds 95 % of such differences, from the bounds of both; "
+        f"Reconstructed position − position by {name}, shifted to agree at the entry. "
+        "Shaded: 95 % bound of the difference, from both; "
         + ("they are consistent" if comparison.consistent else "they are NOT consistent")
         + f" at the last instant (chi-square {comparison.chi_square:.3g}, limit "
         f"{comparison.chi_square_95:.3g}).",
@@ -517,7 +512,7 @@ def _chart(
     named = [(at, name) for name, at in path_moments(path, events) if name not in ("begin", "end")]
     said = " Shaded: 95 % by the linear covariance"
     if samples is not None:
-        said += f"; dashed: the middle 95 % of {len(samples.errors)} runs of the Monte Carlo"
+        said += f"; dashed: central 95 % of {len(samples.errors)} Monte Carlo runs"
     return Chart(
         slug,
         title,

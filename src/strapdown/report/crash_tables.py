@@ -31,7 +31,7 @@ from strapdown.tables import NED
 ANGLES = ("roll, deg", "pitch, deg", "heading, deg")
 OVER_GROUND = "Axes: over ground."
 FROM_THE_ENTRY = (
-    "Axes: forward and right as the vehicle stood at the entry; the heading counts from there."
+    "Axes: forward and right of the vehicle at the entry; heading relative to that at the entry."
 )
 
 
@@ -75,9 +75,8 @@ def answers_table(result: CaseResult) -> TableBlock | None:
         ),
         tuple(rows),
         text=(0, 1, 2),
-        caption="Change of velocity along the turning axes of the vehicle, at the "
-        f"{result.spec.point.name}; bounds hold 95 %. What changed: a frontal crash has a "
-        "negative forward part.",
+        caption=f"Delta-V of the {result.spec.point.name} in the axes of the vehicle, with 95 % "
+        "bounds; a frontal crash has a negative forward component.",
         strong=tuple(strong),
     )
 
@@ -112,9 +111,9 @@ def direction_table(result: CaseResult) -> TableBlock | None:
         return None
     axes = "over ground, azimuth" if ground else "against the entry"
     told = (
-        "the same over ground, from north"
+        "over ground, from north"
         if ground
-        else "the same in axes that do not turn with it, from where it pointed at the entry"
+        else "in axes that do not turn with the vehicle, from its heading at the entry"
     )
     ms = 1e3 * result.spec.options.peak_window_s
     return TableBlock(
@@ -124,9 +123,9 @@ def direction_table(result: CaseResult) -> TableBlock | None:
         ),
         tuple(rows),
         text=(0, 1, 2),
-        caption="Where the force came from, over the event and over the "
-        f"{ms:.3g} ms of the largest change. Horizontal: from the front of the vehicle clockwise, "
-        f"seen from above; vertical: positive from above; {axes}: {told}.",
+        caption="Principal direction of force over the event, and over the "
+        f"{ms:.3g} ms of the largest change. Horizontal: from the front of the vehicle, clockwise "
+        f"from above; vertical: positive from above; {axes}: {told}.",
     )
 
 
@@ -169,8 +168,8 @@ def path_table(result: CaseResult) -> TableBlock:
         ("recorder", "at", *(f"{name}, m" for name in axis_names(result)), *ANGLES),
         tuple(rows),
         text=(0,),
-        caption="Place of the reference point from that at the entry, and attitude; bounds hold "
-        "95 %. " + (OVER_GROUND if over_ground(result) else FROM_THE_ENTRY),
+        caption="Position of the reference point from that at the entry, and attitude, with 95 % "
+        "bounds. " + (OVER_GROUND if over_ground(result) else FROM_THE_ENTRY),
     )
 
 
@@ -203,9 +202,9 @@ def budget_table(result: CaseResult) -> TableBlock | None:
             "delta-V right, km/h",
             *(f"{name} at the end, m" for name in axis_names(result)),
         ),
-        (*lines, ("all together", *_sizes(np.sqrt(sums)))),
-        caption=f"{recorder(unit, result)}: one standard deviation; their squares add "
-        "up to that of the last line. The 95 % bounds are 1.96 times it.",
+        (*lines, ("total", *_sizes(np.sqrt(sums)))),
+        caption=f"{recorder(unit, result)}: one standard deviation; squares add up to that of the "
+        "total. The 95 % bound is 1.96 times it.",
         strong=(len(lines),),
     )
 
@@ -228,7 +227,7 @@ def comparison_table(result: CaseResult) -> TableBlock | None:
         difference, sd = pair.difference[-1], pair.sd[-1]
         rows.append(
             (
-                f"{pair.first} less {pair.second}",
+                f"{pair.first} − {pair.second}",
                 *(
                     about(KMH * float(d), KMH * TWO_SIDED_95 * float(s), "")
                     if math.isfinite(float(d))
@@ -249,14 +248,13 @@ def comparison_table(result: CaseResult) -> TableBlock | None:
             "down, km/h",
             "chi-square per degree of freedom",
             "probability",
-            "agree",
+            "consistent",
         ),
         tuple(rows),
         text=(0, 6),
-        caption="Difference of what two recorders say of the velocity at the "
-        f"{result.spec.point.name}, {instant(start)} to {instant(end)}, beside the 95 % bound of "
-        "such a difference. Probability: of differences as large or larger where everything that "
-        "is stated is right.",
+        caption=f"Difference of the delta-V of two recorders at the {result.spec.point.name}, "
+        f"{instant(start)} to {instant(end)}, with its 95 % bound. Probability of a difference as "
+        "large or larger by the stated uncertainties.",
     )
 
 
@@ -280,13 +278,13 @@ def severity_table(result: CaseResult) -> TableBlock | None:
         )
     return TableBlock(
         (
-            *("outcome", "probability", "by the bound of delta-V"),
+            *("outcome", "probability", "by the bounds of delta-V"),
             *(("source",) if len(sources) > 1 else ()),
         ),
         tuple(rows),
         text=(0, 2, 3),
-        caption="Probability that an occupant is hurt at least so, by published models; the bound "
-        "is that of the delta-V alone and not of the model."
+        caption="Probability of at least this injury, by published models; the bounds are due to "
+        "delta-V and do not include the model's uncertainty."
         + (f" Source: {sources[0]}" if len(sources) == 1 else ""),
     )
 
@@ -315,21 +313,21 @@ def reference_tables(result: CaseResult) -> tuple[TableBlock, ...]:
     names = axis_names(result)
     tables = (
         TableBlock(
-            ("reference", "recorder", "delta-V", "this report", "reference", "within 95 %"),
+            ("reference", "recorder", "delta-V", "this report", "reference", "consistent"),
             tuple(changes),
             text=(0, 1, 2, 5),
-            caption="Changes of velocity beside those that are known otherwise; bounds hold 95 %.",
+            caption="Delta-V of this report and of references, with 95 % bounds.",
         ),
         TableBlock(
             (
                 *("reference", "recorder"),
                 *(f"{name}, RMS" for name in names),
                 *(f"{name}, largest" for name in names),
-                "within 95 %",
+                "consistent",
             ),
             tuple(paths),
             text=(0, 1, 8),
-            caption="Errors of the path, m: this report less the reference.",
+            caption="Errors of the path, m: this report − reference.",
         ),
     )
     return tuple(table for table in tables if table.rows)
@@ -359,8 +357,7 @@ def records_table(result: CaseResult) -> TableBlock:
         ("recorder", "sensors", "record", "format", "channels", "samples", "rate, Hz", "from, to"),
         tuple(rows),
         text=(0, 1, 2, 3, 4, 7),
-        caption="What was taken from each record; channels along the axes x, y, z of the recorder. "
-        "Times are those of its own clock.",
+        caption="Channels of each record along the axes x, y, z of the recorder, on its own clock.",
     )
 
 
@@ -419,8 +416,8 @@ def units_table(result: CaseResult) -> TableBlock:
         ),
         tuple(rows),
         text=(0, 1, 2, 5, 6),
-        caption="Mounting points from the vehicle's origin; angles turn vehicle axes into the "
-        "recorder's. Bounds hold 95 %.",
+        caption="Mounting positions from the vehicle's origin; angles turn vehicle axes into the "
+        "recorder's. 95 % bounds.",
     )
 
 
@@ -446,8 +443,8 @@ def sensors_table(result: CaseResult) -> TableBlock:
         ),
         tuple(rows),
         text=(0, 1, 2),
-        caption="Standard deviations as stated in the case or its sensors' data sheets, before a "
-        "rest has told more; the largest of the three axes.",
+        caption="Standard deviations as stated in the case or by data sheets, before calibration "
+        "at rest; the largest of the three axes.",
     )
 
 
@@ -480,5 +477,5 @@ def inputs_table(result: CaseResult) -> TableBlock:
         ("role", "file", "SHA-256"),
         tuple(rows),
         text=(0, 1, 2),
-        caption="Copies stand in the folder of the report under inputs/.",
+        caption="Copies are in the folder of the report under inputs/.",
     )

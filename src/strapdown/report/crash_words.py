@@ -39,7 +39,7 @@ TYPES = {
     "rear": "an impact from behind",
     "left": "an impact from the left",
     "rollover": "a rollover",
-    "undetermined": "of a type that the bounds leave open",
+    "undetermined": "type not determined",
 }
 
 
@@ -52,8 +52,8 @@ def headline(result: CaseResult) -> str:
     if number is None:
         size, axis = unit.events.largest_change, unit.events.largest_axis
         return (
-            f"There is no event after 49 CFR 563 in the record: the {axis} velocity changed by "
-            f"{plain(KMH * size, 1)} km/h at most within 150 ms, where 8 km/h make one."
+            f"No event by 49 CFR 563: the {axis} velocity changed by {plain(KMH * size, 1)} km/h "
+            "at most within 150 ms; an event requires 8 km/h."
         )
     whole = unit.body[number].event
     return (
@@ -108,21 +108,21 @@ def key_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
                 "Direction of force",
                 value,
                 angle_range(across),
-                "where the force came from: 0° the front, clockwise seen from above",
+                "0° the front, clockwise from above",
             )
         )
     place, half = _end(unit)
     figures.append(
         KeyFigure(
-            f"Place at the end{of}",
+            f"Final position{of}",
             f"{plain(math.hypot(place[0], place[1]), 2)} m",
             ", ".join(
                 f"{name}{GAP}{about(p, h, 'm')}"
                 for name, p, h in zip(axis_names(result), place, half, strict=True)
             )
             + f" with 95{GAP}%",
-            f"from the place at {instant(unit.path.entry.time)} to that at "
-            f"{instant(unit.path.time[-1])}, {_axes(result)}",
+            f"from {instant(unit.path.entry.time)} to {instant(unit.path.time[-1])}, "
+            f"{_axes(result)}",
         )
     )
     return tuple(figures)
@@ -134,7 +134,7 @@ def lead(result: CaseResult) -> str:
     number = main_event(unit)
     parts = []
     if apart(result):
-        parts.append(f"{apart_headline(result)} What follows is of {unit.name}.")
+        parts.append(f"{apart_headline(result)} The following is by {unit.name}.")
     if number is None:
         parts.append(headline(result))
     else:
@@ -144,12 +144,12 @@ def lead(result: CaseResult) -> str:
         forward, right = float(whole.delta_v.vector[0]), float(whole.delta_v.vector[1])
         length = 1e3 * (event.end - event.time_zero)
         parts.append(
-            f"Within {length:.0f} ms from {moment(event.time_zero)} on, the velocity of the "
+            f"Within {length:.0f} ms from {moment(event.time_zero)}, the velocity of the "
             f"{result.spec.point.name} changed by "
             f"{speed(whole.resultant, whole.resultant_bound)} ("
-            f"{about(whole.resultant, whole.resultant_bound, 'm/s')}; all bounds hold 95 %), "
-            f"{side_words(forward, right)}. The force came from "
-            f"{direction(unit, number)}: {TYPES[unit.types[number].name]}."
+            f"{about(whole.resultant, whole.resultant_bound, 'm/s')}; all bounds are 95 %), "
+            f"{side_words(forward, right)}. Direction of force: "
+            f"{direction(unit, number)}; {TYPES[unit.types[number].name]}."
         )
         others = len(unit.body) - 1
         if others:
@@ -168,21 +168,18 @@ def entry_words(result: CaseResult) -> str:
     """Return the entry speed and its source."""
     entry = result.spec.entry
     if entry.kind == "standstill":
-        return "The vehicle stood still when the record began."
+        return "The vehicle was stationary when the record began."
     if entry.kind == "gnss":
         at = result.reconstruction.main.path.entry
         size = float(np.linalg.norm(at.velocity))
         return (
-            f"At {instant(at.time)} it moved at {plain(KMH * size, 1)} km/h, found from the fixes "
-            "of a satellite receiver before the impact."
+            f"At {instant(at.time)} it moved at {plain(KMH * size, 1)} km/h, by GNSS fixes before "
+            "the impact."
         )
     assert entry.speed_m_per_s is not None and entry.speed_sd_m_per_s is not None
     half = TWO_SIDED_95 * entry.speed_sd_m_per_s
     source = f" ({entry.source})" if entry.source else ""
-    return (
-        f"It entered at {speed(entry.speed_m_per_s, half)}{source}, which is stated and not found "
-        "from the record."
-    )
+    return f"Entry speed: {speed(entry.speed_m_per_s, half)}{source}, stated, not from the record."
 
 
 def path_words(result: CaseResult) -> str:
@@ -192,8 +189,8 @@ def path_words(result: CaseResult) -> str:
     (ahead, aside, _), (first, second, _) = (axis_names(result), place)
     return (
         f"{instant(unit.path.time[-1])} after the trigger the {result.spec.point.name} was "
-        f"{about(first, half[0], 'm')} {ahead} and {about(second, half[1], 'm')} {aside} of where "
-        f"it entered, {_axes(result)}."
+        f"{about(first, half[0], 'm')} {ahead} and {about(second, half[1], 'm')} {aside} of its "
+        f"position at the entry, {_axes(result)}."
     )
 
 
@@ -202,12 +199,12 @@ def units_words(result: CaseResult) -> str:
     made = result.reconstruction
     names = [u.name for u in made.units]
     if len(names) == 1:
-        return f"All of this rests on one recorder, {names[0]}, without a second one to compare."
+        return f"The result is by one recorder, {names[0]}, without a second one to compare."
     assert made.comparison is not None
-    told = "agree within what is stated of them" if made.comparison.agree else "DO NOT AGREE"
+    told = "are consistent" if made.comparison.agree else "ARE NOT CONSISTENT"
     mean = "the weighted mean of" if made.combined is not None else f"{made.main.name}, one of"
     return (
-        f"All this is {mean} {len(names)} recorders ({', '.join(names)}), which {told} "
+        f"The result is {mean} {len(names)} recorders ({', '.join(names)}), which {told} "
         f"(probability {_probability(made.comparison.probability)} of differences as large or "
         "larger)."
     )
@@ -262,13 +259,13 @@ def apart_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
             "Delta-V",
             value,
             "; ".join(f"{unit.name} {_change(unit)}" for unit in units),
-            "the recorders do not agree: the span of their 95 % bounds, and no mean",
+            "the recorders disagree: span of their 95 % bounds, no mean",
         ),
         KeyFigure(
             "Direction of force",
             _directions(units),
             "; ".join(f"{unit.name} {_direction(unit)}" for unit in units),
-            "where the force came from: 0° the front, clockwise seen from above",
+            "0° the front, clockwise from above",
         ),
     )
 
@@ -390,7 +387,7 @@ def _words(data: object) -> object:
 def _places(files: Sequence[str]) -> str:
     named = list(dict.fromkeys(f for f in files if f))
     if len(named) > 1 and named[-1] == MEAN:
-        return f"{MEAN}, and each by itself"
+        return f"{MEAN}, and each recorder"
     return ", ".join(named)
 
 
@@ -434,30 +431,15 @@ GRAVE = frozenset(
         "event-before-record",
         "direction-undetermined",
         "recorders-disagree",
-        "clipped",
+        "clipped-accelerometer",
+        "clipped-gyro",
         "assumed",
     )
 )
 
 
-def limitations(result: CaseResult) -> tuple[tuple[str, str], ...]:
-    """Return the limitations that a reader must know before relying on the answers.
-
-    Returns
-    -------
-    tuple of (head, text)
-        Only those that apply to this case.
-    """
-    return tuple((head, text) for _, head, text in _all(result))
-
-
-def grave_limitations(result: CaseResult) -> tuple[str, ...]:
-    """Return the heads of the limitations that make an answer wrong, not only less precise."""
-    return tuple(head for code, head, _ in _all(result) if code in GRAVE)
-
-
-def _all(result: CaseResult) -> tuple[tuple[str, str, str], ...]:
-    """Return code, head and text of each limitation."""
+def limitations(result: CaseResult) -> tuple[tuple[str, str, str], ...]:
+    """Return code, head and text of each limitation that applies to a case."""
     return (
         *_event(result),
         *clipping(result),
@@ -480,13 +462,13 @@ def _event(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     if number is None:
         others = [u.name for u in result.reconstruction.units if main_event(u) is not None]
         alone = (
-            f" There is one by {' and '.join(others)} alone: see Delta-V, and whether the record "
-            "of another begins late or ends early."
+            f" {' and '.join(others)} alone recorded one: see Delta-V, and check whether another "
+            "record begins late or ends early."
         )
         yield (
             "no-event",
             "No event",
-            "The record holds no event after 49 CFR 563. Delta-V and direction of force are not "
+            "The record has no event by 49 CFR 563. Delta-V and direction of force are not "
             f"defined; the path is reported.{alone if others else ''}",
         )
         return
@@ -494,24 +476,23 @@ def _event(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     if event.lasts_beyond_record:
         yield (
             "event-beyond-record",
-            "The event lasts beyond the record",
+            "The event continues beyond the record",
             f"The record ends at {instant(event.end)} while the velocity still changes: the "
-            "delta-V is that up to there, and the whole one is larger or smaller.",
+            "delta-V is that up to there; the complete one is larger or smaller.",
         )
     if event.starts_before_record:
         yield (
             "event-before-record",
             "The event begins before the record",
-            f"The record begins at {instant(event.time_zero)}, within the event: what changed "
-            "before is missing.",
+            f"The record begins at {instant(event.time_zero)}, within the event: the change before "
+            "is missing.",
         )
     whole = unit.body[number].event
     if whole.interval.horizontal.undetermined:
         yield (
             "direction-undetermined",
             "The direction of force is not determined",
-            "The bound of the change of velocity holds zero in the horizontal plane, so that no "
-            "direction is excluded.",
+            "The bound of the horizontal delta-V contains zero, so no direction is excluded.",
         )
     if unit.ned[number] is None:
         yield (
@@ -531,19 +512,18 @@ def _disagreement(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     if len(pairs) == len(comparison.pairs) > 1:
         pairs = ["No two of them agree"]
     mean = (
-        "The weighted mean lies between them, and its bound is too narrow: it takes each at its "
-        "word. "
+        "The weighted mean is between them, and its bound is too narrow. "
         if made.combined is not None
         else ""
     )
     yield (
         "recorders-disagree",
         "The recorders do not agree",
-        f"{'; '.join(pairs) or 'All together'}: they differ by more than what is stated of them "
-        f"allows with 95 %. {mean}At least one of them has an error that is not stated: a wrong "
-        "axis, mounting point, angle, scale or clock, a sensor at the end of its range, or a place "
-        "that was deformed or rang. Do not rely on the answers before it is found; see Sensors "
-        "against each other.",
+        f"{'; '.join(pairs) or 'All together'}: the difference exceeds the 95 % bound by the "
+        f"stated uncertainties. {mean}At least one recorder has an error that is not stated: a "
+        "wrong axis, mounting position, angle, scale or clock, a sensor at the end of its range, "
+        "or a mounting that was deformed or rang. Do not rely on the answers before the cause is "
+        "found; see Consistency of the recorders.",
     )
 
 
@@ -551,9 +531,9 @@ def _alone(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     if len(result.units) == 1:
         yield (
             "one-recorder",
-            "One recorder alone",
+            "Only one recorder",
             "An error that is not stated, such as an axis with a wrong sign, a wrong mounting "
-            "point or a loose bracket, would not show.",
+            "position or a loose bracket, cannot be detected.",
         )
 
 
@@ -565,10 +545,10 @@ def _levers(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     if longest > 0.0:
         yield (
             "rigid-vehicle",
-            "The vehicle is taken as rigid",
-            f"That holds between each recorder and the {result.spec.point.name}, up to "
-            f"{plain(longest, 2)} m ({name}). A floor or pillar that folded in between moved "
-            "otherwise.",
+            "The vehicle is assumed to be rigid",
+            f"This applies between each recorder and the {result.spec.point.name}, up to "
+            f"{plain(longest, 2)} m ({name}). A floor or pillar that deformed in between moved "
+            "differently.",
         )
 
 
@@ -577,20 +557,21 @@ def _entry(result: CaseResult) -> Iterator[tuple[str, str, str]]:
         yield (
             "entry-speed-stated",
             "The entry speed is not from these records",
-            "It shifts every velocity and the path as a whole; delta-V and direction of force do "
-            "not depend on it.",
+            "It shifts all velocities and the path; delta-V and direction of force do not depend "
+            "on it.",
         )
 
 
 def _contradicted(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     for answer in result.references:
         if answer.unit == result.reconstruction.main.name and not answer.consistent:
-            source = f" That is known from: {answer.spec.source}." if answer.spec.source else ""
+            source = (
+                f" Source of the reference: {answer.spec.source}." if answer.spec.source else ""
+            )
             yield (
                 "reference-contradicts",
-                f"Not within the bounds of what else is known: {answer.spec.name}",
-                "The difference is larger than the bounds of both together allow with 95 %; see "
-                f"Reference comparison.{source}",
+                f"Inconsistent with the reference {answer.spec.name}",
+                f"The difference exceeds the 95 % bound of both; see Reference comparison.{source}",
             )
 
 
@@ -598,8 +579,8 @@ def _no_reference(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     if not result.references:
         yield (
             "no-reference",
-            "Nothing to compare with",
-            "No film, no survey and no other measurement of the crash was given.",
+            "No reference",
+            "No film, survey or other measurement of the crash was given.",
         )
 
 
@@ -641,17 +622,16 @@ def clipping(result: CaseResult) -> Iterator[tuple[str, str, str]]:
         if not found:
             continue
         follows, then = (
-            ("the true delta-V is larger", "every place after it is off by what is missing")
+            ("the true delta-V is larger", "every later position has this error")
             if what == "accelerometer"
-            else ("the vehicle turned more", "what is resolved with its attitude is off")
+            else ("the vehicle turned more", "everything resolved with its attitude has this error")
         )
         yield (
-            "clipped",
+            f"clipped-{what}",
             f"{', '.join(name for name, _ in found)}: the {what} was at the end of its range, and "
             f"{follows}",
-            f"{'; '.join(said for _, said in found)}; no wider range stands behind it. What was "
-            f"cut off is missing, and no bound here knows how much: along that axis {follows} than "
-            f"what is told here, and {then}.",
+            f"{'; '.join(said for _, said in found)}; there is no wider range. The clipped part is "
+            f"missing and not in the bounds: along that axis {follows} than reported, and {then}.",
         )
 
 
@@ -665,7 +645,7 @@ def assumed(result: CaseResult) -> Iterator[tuple[str, str, str]]:
         span = f"between {instant(given.over_s[0])} and {instant(given.over_s[1])}"
         if given.turn_sd_deg is not None:
             parts.append(
-                "There is no gyro: the vehicle is taken not to have turned, with a standard "
+                "No gyro: the rotation of the vehicle is assumed to be zero with a standard "
                 f"deviation of {_each(given.turn_sd_deg, '°', 'roll, pitch and heading')} {span}."
             )
         if given.delta_v_sd_m_per_s is not None:
@@ -675,16 +655,16 @@ def assumed(result: CaseResult) -> Iterator[tuple[str, str, str]]:
                 if all(column not in t.channels for t in spec.accelerometers)
             ]
             parts.append(
-                f"There is no accelerometer along {' and '.join(missing) or 'an axis'}: nothing is "
-                "taken to have changed there, with a standard deviation of "
+                f"No accelerometer along {' and '.join(missing) or 'an axis'}: delta-V there is "
+                "assumed to be zero with a standard deviation of "
                 f"{_each(given.delta_v_sd_m_per_s, ' m/s', 'x, y and z')} {span}."
             )
-        parts.append("The bounds have it; they are wrong where the assumption is.")
+        parts.append("The bounds include this; they are wrong if the assumption is.")
         if given.because:
             parts.append(f"Reason stated: {given.because.rstrip('.')}.")
         told.setdefault(" ".join(parts), []).append(spec.name)
     for text, names in told.items():
-        yield "assumed", f"{', '.join(names)}: not everything was measured", text
+        yield "assumed", f"{', '.join(names)}: some axes were not measured", text
 
 
 def _each(sd: float | tuple[float, float, float], unit: str, names: str) -> str:
@@ -696,12 +676,13 @@ def _each(sd: float | tuple[float, float, float], unit: str, names: str) -> str:
 
 def rest(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     """Return the shortcomings of the stationary stretch before the crash."""
-    told: dict[tuple[str, str], list[str]] = {}
+    told: dict[tuple[str, str, str], list[str]] = {}
     for unit, prepared in _prepared(result):
         still, level = prepared.rest, prepared.levelling
         if still is None:
             half = TWO_SIDED_95 * level.sd_deg
             said = (
+                "no-rest",
                 "no stationary stretch before the crash",
                 f"Roll and pitch are stated, {about(level.roll_deg, half, '°')} and "
                 f"{about(level.pitch_deg, half, '°')}, or carried over from another recorder; "
@@ -709,22 +690,24 @@ def rest(result: CaseResult) -> Iterator[tuple[str, str, str]]:
             )
         elif still.grade == "steady":
             said = (
-                "quiet before the crash, but perhaps at speed",
-                f"The stretch from {instant(still.start)} to {instant(still.end)} may have been "
-                "driven; acceleration and turning over it are taken as zero with a bound.",
+                "steady-rest",
+                "steady before the crash, but possibly moving",
+                f"The vehicle may have moved from {instant(still.start)} to {instant(still.end)}; "
+                "acceleration and rotation over it are assumed to be zero with a bound.",
             )
         elif still.end - still.start < SHORT_REST:
             said = (
+                "short-rest",
                 "a short stationary stretch",
                 f"{instant(still.end - still.start)} before the crash, from "
-                f"{instant(still.start)}: biases and levelling are known the less the "
-                "shorter it is, and the bounds are so much wider.",
+                f"{instant(still.start)}: biases and leveling are less accurate, and the bounds "
+                "wider.",
             )
         else:
             continue
         told.setdefault(said, []).append(unit.name)
-    for (head, text), names in told.items():
-        yield "rest", f"{', '.join(names)}: {head}", text
+    for (code, head, text), names in told.items():
+        yield code, f"{', '.join(names)}: {head}", text
 
 
 def borrowed(result: CaseResult) -> Iterator[tuple[str, str, str]]:
@@ -737,8 +720,8 @@ def borrowed(result: CaseResult) -> Iterator[tuple[str, str, str]]:
         yield (
             "borrowed-gyro",
             f"{', '.join(names)}: no gyro",
-            f"The turning is that of {lender}: a rigid vehicle turns everywhere alike. An error of "
-            "that gyro is in all of them, and the comparison of recorders does not show it.",
+            f"The rotation is that of {lender}, as of a rigid vehicle. An error of that gyro "
+            "affects all of them, and the comparison of recorders does not show it.",
         )
 
 
@@ -755,11 +738,11 @@ def ringing(result: CaseResult) -> Iterator[tuple[str, str, str]]:
         which = ", ".join(f"{name} ({rate:.4g} Hz)" for name, rate in slow)
         yield (
             "ringing",
-            "Ringing of the structure is not seen at this rate",
-            f"{which}: what swings faster than a quarter of the rate cannot be integrated from "
-            "samples. Ringing of 10 g at 195 Hz that decays in 30 ms moves the path by 1 m within "
-            "750 ms at 200 Hz, and is not in the bounds. Another recorder at 1 kHz or more that "
-            "agrees excludes it.",
+            "Structural ringing is not resolved at this rate",
+            f"{which}: vibration above a quarter of the rate cannot be integrated from samples. "
+            "Ringing of 10 g at 195 Hz that decays in 30 ms shifts the path by 1 m within 750 ms "
+            "at 200 Hz, and is not in the bounds. Another consistent recorder at 1 kHz or more "
+            "excludes it.",
         )
 
 
@@ -767,23 +750,23 @@ def ringing(result: CaseResult) -> Iterator[tuple[str, str, str]]:
 
 
 CONVENTIONS = (
-    ("Vehicle axes", "forward, right, down, turning with the vehicle"),
-    ("Time", "s from the trigger; a recorder's own clock may show anything"),
+    ("Vehicle axes", "forward, right, down, fixed in the vehicle"),
+    ("Time", "s from the trigger"),
     (
         "Path",
-        "north, east, down from the place of the reference point at the entry; where no heading "
-        "is stated, forward and right of the vehicle at the entry take the place of north and east",
+        "north, east, down from the position of the reference point at the entry; without a stated "
+        "heading, forward and right of the vehicle at the entry instead of north and east",
     ),
     ("Attitude", "roll, pitch, heading (3-2-1): right side down, nose up, clockwise are positive"),
     (
         "Delta-V",
-        "the change of velocity, so that a frontal crash has a negative forward part; along the "
-        "turning axes of the vehicle, as recorders integrate it, where nothing else is said",
+        "change of velocity; a frontal crash has a negative forward component; in the axes of the "
+        "vehicle, as recorders integrate it, unless stated otherwise",
     ),
     (
         "Direction of force (PDOF)",
-        "where the force came from: atan2(−ΔV right, −ΔV forward); 0° the front, positive "
-        "clockwise seen from above, 90° the right side; on the clock 12 is the front",
+        "atan2(−ΔV right, −ΔV forward): 0° the front, positive clockwise from above, 90° the right "
+        "side; on the clock 12 is the front",
     ),
     (
         "Event, time zero, end",
@@ -792,8 +775,8 @@ CONVENTIONS = (
     ),
     (
         "Bounds",
-        "hold the truth in 95 of 100 cases (1.96 standard deviations) where everything that is "
-        "stated and assumed here is right; of a direction, Fieller's interval",
+        "95 % (1.96 standard deviations), if the stated and assumed values are right; of a "
+        "direction, Fieller's interval",
     ),
     ("Units", "SI, with km/h for changes of velocity and g = 9.80665 m/s² for accelerations"),
 )
@@ -806,33 +789,33 @@ def assumptions(result: CaseResult) -> tuple[tuple[str, str], ...]:
     found = [
         (
             "Rigid vehicle",
-            "Between each recorder and the reference point the vehicle keeps its shape.",
+            "The vehicle does not deform between the recorders and the reference point.",
         ),
         (
             "Errors of the sensors",
-            "are normal, of mean zero, and independent from recorder to recorder, with the "
-            "standard deviations of the table under Sensors; within the record they do not drift.",
+            "are normal with zero mean, independent between recorders, and constant within the "
+            "record, with the standard deviations of the table under Sensors.",
         ),
         (
             "Gravity",
-            f"is {options.gravity_m_per_s2:g} m/s² and vertical throughout; the turning of the "
-            "Earth over the record is computed and not assumed away.",
+            f"is {options.gravity_m_per_s2:g} m/s² and vertical throughout; the Earth rate is "
+            "taken into account.",
         ),
         (
             "Samples",
-            f"The records are brought to {options.rate_hz:g} Hz as "
+            f"The records are resampled to {options.rate_hz:g} Hz as "
             + (
-                "true means over each step."
+                "means over each step."
                 if options.sampling == "mean"
-                else "values of a band-limited signal; each low-pass is taken to be late by its "
-                "time constant."
+                else "values of a band-limited signal; the delay of each low-pass is its time "
+                "constant."
             ),
         ),
         (
             "Clocks",
-            "are tied by each recorder's trigger, as well as it is stated."
+            "are synchronized by each recorder's trigger with its stated uncertainty."
             if options.clock == "trigger"
-            else "are tied by what the recorders felt, laid over each other.",
+            else "are synchronized by correlation of the recorded signals.",
         ),
     ]
     if entry.kind == "speed":
@@ -844,19 +827,19 @@ def assumptions(result: CaseResult) -> tuple[tuple[str, str], ...]:
                 "Entry",
                 f"At {instant(entry.time_s)} the vehicle moved at "
                 f"{speed(entry.speed_m_per_s, half)}, {entry.slip_deg:g} ± {direction:.2g}° "
-                f"clockwise of where it pointed, and horizontally within "
+                f"clockwise of its heading, and level within "
                 f"{TWO_SIDED_95 * entry.climb_sd_m_per_s:.2g} m/s. Source: "
                 f"{entry.source or 'not stated'}.",
             )
         )
     elif entry.kind == "standstill":
-        found.append(("Entry", "The vehicle stood still when the record began."))
+        found.append(("Entry", "The vehicle was stationary when the record began."))
     else:
         found.append(
             (
                 "Entry",
-                "The fixes are believed as far as they say, never beyond 50 m/s² or 20 m/s³, nor "
-                "from the impact on.",
+                "GNSS fixes have their stated uncertainty; they are not used beyond 50 m/s² or "
+                "20 m/s³, nor from the impact on.",
             )
         )
     reasons: dict[str, list[str]] = {}
@@ -864,28 +847,28 @@ def assumptions(result: CaseResult) -> tuple[tuple[str, str], ...]:
         if unit.assumed is not None and unit.assumed.because:
             reasons.setdefault(unit.assumed.because, []).append(unit.name)
     for because, names in reasons.items():
-        found.append((", ".join(names), f"What was not measured is assumed because: {because}"))
+        found.append((", ".join(names), f"Reason for the assumed axes: {because}"))
     return tuple(found)
 
 
 def method(result: CaseResult) -> tuple[str, ...]:
     """Return the processing steps from the records to the answers, in order."""
     steps = [
-        "The clocks of the recorders are tied to the trigger, and all channels are brought to "
-        "common stamps without aliasing; the delay of each low-pass is taken off.",
-        "The stationary stretch before the crash tells the bias of the gyro, that of a high "
-        "range against a low one, and roll and pitch; where there is none, what is stated is used.",
-        "Ranges are merged: the low one while it is clear of its end, the high one beyond.",
-        "Each recorder is turned into vehicle axes and moved to the reference point.",
-        "Events are found, and their changes of velocity integrated along the turning axes and, "
-        "with gravity taken off, over ground.",
-        "The path runs from the entry, forward and backward, by strapdown navigation.",
-        "Every unknown of the sensors, mounting, clocks and entry is carried through all of this, "
+        "The recorders are synchronized to the trigger, and all channels are resampled to common "
+        "stamps without aliasing; the delay of each low-pass is removed.",
+        "The stationary stretch before the crash gives the gyro bias, the bias of a high range "
+        "relative to a low one, and roll and pitch; without one, stated values are used.",
+        "Ranges are merged: the low one below its end, the high one beyond.",
+        "Each recorder is rotated into vehicle axes and transferred to the reference point.",
+        "Events are detected, and delta-V is integrated in the axes of the vehicle and, with "
+        "gravity removed, over ground.",
+        "The path is computed from the entry, forward and backward, by strapdown navigation.",
+        "Every unknown of the sensors, mounting, clocks and entry is propagated through all steps, "
         "linearly"
         + (
             "."
             if result.samples is None
-            else f", and by {len(result.samples.errors)} complete runs with drawn errors."
+            else f", and by {len(result.samples.errors)} Monte Carlo runs."
         ),
     ]
     if len(result.units) > 1:
@@ -904,21 +887,20 @@ def how_to_verify() -> tuple[tuple[str, str], ...]:
     """Return ways to check the report, besides the command."""
     return (
         (
-            "Run it again",
-            "Install strapdown in the version named on page one (pip install strapdown) and give "
-            "the command below. It checks every file against the seal, runs the whole case again "
-            "from the records, and compares each byte; it names every file and every option that "
-            "was changed.",
+            "Repeat the run",
+            "Install the version of strapdown on page one (pip install strapdown) and run the "
+            "command below. It checks every file against the seal, repeats the case from the "
+            "records, compares each byte, and names every changed file and option.",
         ),
         (
             "The seal",
-            "is the SHA-256 of manifest.json, which holds that of every file of the folder. It was "
-            "printed when the report was made: write it into the file of the case, apart from the "
-            "folder, since who changes a file and the manifest too would not be found otherwise.",
+            "is the SHA-256 of manifest.json, which has that of every file of the folder. It was "
+            "printed with the report: keep it apart from the folder, so that a change of a file "
+            "together with the manifest is detected.",
         ),
         (
-            "By other means",
-            "The records stand under inputs/, the path in trajectory.csv and all numbers in "
+            "Independently",
+            "The records are in inputs/, the path in trajectory.csv and all numbers in "
             "crash.json, with their units in the names.",
         ),
     )

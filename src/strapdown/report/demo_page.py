@@ -25,9 +25,9 @@ from strapdown.report.values import plain
 _MS_TO_KMH = 3.6
 _SMALL_DEG = 1e-3
 _PARTS = (
-    ("A", "Navigation", "Where was it, and how well is that known?"),
-    ("B", "Attitude", "Which algorithm, at what rate?"),
-    ("C", "Crash", "What happened in this crash?"),
+    ("A", "Navigation", "position, velocity and attitude, with 95 % bounds"),
+    ("B", "Attitude", "the simplest algorithm and lowest rate of sufficient accuracy"),
+    ("C", "Crash", "delta-V, direction of force and path, with 95 % bounds"),
 )
 
 
@@ -57,7 +57,7 @@ class Shown:
     question: str
     command: str
     figures: tuple[str, ...]
-    pages: tuple[tuple[str, str], ...] = (("report.html", "The report"),)
+    pages: tuple[tuple[str, str], ...] = (("report.html", "Report"),)
     records: str | None = None
 
 
@@ -99,7 +99,7 @@ def shown_truth(bundle: Path, records: Path | None = None) -> str | None:
     if kind == "crash":
         return None if records is None else _crash_truth(_json(records / "scenario.json"))
     if kind == "coast":
-        return str(told["tried"]) if told["tried"] else None
+        return str(told["measured"]) if told["measured"] else None
     return _navigation_truth(told)
 
 
@@ -119,8 +119,8 @@ def demo_page(shown: Sequence[Shown], folder: Path, missing: str | None = None) 
         HTML that needs no network; identical for the same bundles.
     """
     document = Document(
-        "Inertial sensors, and answers that you can check",
-        "Three questions, each answered with its bound, and the truth beside it where it is known.",
+        "Results of strapdown, with bounds and references",
+        "Three systems: each result with its bound, and its error where the truth is known.",
         (),
         (
             Items(tuple((f"{part} · {system}", text) for part, system, text in _PARTS)),
@@ -130,8 +130,8 @@ def demo_page(shown: Sequence[Shown], folder: Path, missing: str | None = None) 
             Section(run.slug, f"{run.part} · {run.title}", tuple(_blocks(run, folder)))
             for run in shown
         ),
-        "Written by strapdown demo from what the runs wrote. Every folder is sealed: strapdown "
-        "verify FOLDER runs it again, to the last bit.",
+        "Written by strapdown demo. Every folder is sealed: strapdown verify FOLDER repeats the "
+        "run and compares it to the last bit.",
     )
     return document_page(document)
 
@@ -142,7 +142,7 @@ def _blocks(run: Shown, folder: Path) -> Iterator[Block]:
     yield Paragraph(shown_answer(bundle), "lead")
     truth = shown_truth(bundle, None if run.records is None else folder / run.records)
     if truth:
-        yield Items((("The truth beside it", truth),))
+        yield Items((("Against the truth", truth),))
     yield Links(tuple((f"{quote(run.slug)}/{page}", words) for page, words in run.pages))
     for figure in run.figures:
         drawn = (bundle / "figures" / f"{figure}.svg").read_text(encoding="utf-8")
@@ -162,10 +162,10 @@ def _attitude_truth(told: dict[str, Any]) -> str | None:
     if not full:
         return None
     exact = any(s["max_deg"] is not None for s in told["sweep"])
-    known = "The attitude is known exactly" if exact else "The attitude at the end is known"
+    known = "True attitude known" if exact else "Final attitude known"
     rate = max(s["rate_hz"] for s in told["sweep"])
     errors = ", ".join(f"{name} {_degrees(error)}" for name, error in full.items())
-    return f"{known}: at {plain(rate, 0)} Hz the algorithms are off by: {errors}."
+    return f"{known}. Errors at {plain(rate, 0)} Hz: {errors}."
 
 
 def _degrees(value: float) -> str:
@@ -179,7 +179,7 @@ def _crash_truth(scenario: dict[str, Any]) -> str:
     # The report states both along the axes of the vehicle, which turns meanwhile.
     change = math.hypot(*impact["delta_v_along_turning_axes_m_per_s"]) * _MS_TO_KMH
     return (
-        f"Simulated: the change of velocity is {plain(change, 2)} km/h, the force comes from "
+        f"Simulated: delta-V {plain(change, 2)} km/h, direction of force "
         f"{plain(impact['pdof_along_turning_axes_deg'], 1)}°."
     )
 
@@ -188,26 +188,26 @@ def _navigation_truth(told: dict[str, Any]) -> str | None:
     if told["control_points"]:
         points = told["control_points"]
         return (
-            f"{points['points']} control points, after the origin and heading that fit best: off "
-            f"by {plain(points['rms_m'], 2)} m (root mean square), {plain(points['largest_m'], 2)} "
-            f"m at most, over {plain(points['way_m'], 1)} m: "
-            f"{plain(100.0 * points['rms_m'] / points['way_m'], 2)} %."
+            f"{points['points']} control points, after a fit of origin and heading: error "
+            f"{plain(points['rms_m'], 2)} m (RMS), {plain(points['largest_m'], 2)} m at most, over "
+            f"{plain(points['path_length_m'], 1)} m: "
+            f"{plain(100.0 * points['rms_m'] / points['path_length_m'], 2)} %."
         )
     if told["against"]:
         errors = told["against"]["errors"]
-        sides = (("horizontal", "the horizontal position"), ("down", "the height"))
+        sides = (("horizontal", "horizontal position"), ("down", "height"))
         return (
             f"Against {told['against']['name']} "
             + "; ".join(
-                f"{name} is off by {plain(errors[key]['rms_m'], 3)} m (root mean square), "
-                f"{plain(errors[key]['largest_m'], 3)} m at most, and within its 95 % bound for "
+                f"{name}: error {plain(errors[key]['rms_m'], 3)} m (RMS), "
+                f"{plain(errors[key]['largest_m'], 3)} m at most, within its 95 % bound for "
                 f"{plain(100.0 * errors[key]['share_within_bound'], 1)} % of the time"
                 for key, name in sides
             )
             + "."
         )
-    if told["withheld"]:
-        return _withheld_truth(told["withheld"])
+    if told["gnss_outage_tests"]:
+        return _withheld_truth(told["gnss_outage_tests"])
     return None
 
 
@@ -222,8 +222,8 @@ def _withheld_truth(withheld: list[dict[str, Any]]) -> str:
         else f" (before smoothing by {', '.join(plain(error, 1) for error in forward)} m)"
     )
     return (
-        f"Fixes withheld for {length} s, {len(tried)} times: off by {errors} m at most"
-        f"{before}, within the 95 % bound {sum(w['inside'] for w in tried)} of {len(tried)} times."
+        f"{len(tried)} GNSS outage tests of {length} s: error {errors} m at most{before}, within "
+        f"the 95 % bound in {sum(w['inside'] for w in tried)} of {len(tried)}."
     )
 
 

@@ -9,6 +9,7 @@ import re
 import unicodedata
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
+from functools import cache, cached_property
 from importlib.resources import files
 from itertools import count
 from pathlib import Path
@@ -185,15 +186,25 @@ class Document:
     footer: str = ""
     links: tuple[tuple[str, str], ...] = ()
 
+    @cached_property
+    def plain(self) -> Document:
+        """The document with every text as `plain_text`, idempotent.
+
+        Paragraphs, items and captions have up to 4000 characters, facts and cells 1000, titles and
+        notes of a key figure 300, its value 40, other words 160; slugs 80 letters, digits, ``_``
+        and ``-``.
+        """
+        return _plain(self, _LABEL)
+
 
 def paragraph(text: str | None, kind: str = "plain") -> Paragraph | None:
     """Make a paragraph if there is a text."""
     return Paragraph(text, kind) if text else None
 
 
-def taken_for_given(*texts: str) -> tuple[Block, ...]:
+def assumed(*texts: str) -> tuple[Block, ...]:
     """Return the assumptions of a report."""
-    return Paragraph("Taken for given:"), Items(tuple(("", text) for text in texts))
+    return Paragraph("Assumptions:"), Items(tuple(("", text) for text in texts))
 
 
 def run_again(name: str) -> tuple[Block, ...]:
@@ -201,7 +212,7 @@ def run_again(name: str) -> tuple[Block, ...]:
     if not name:
         return ()
     return (
-        Paragraph("To run it again and compare every byte:"),
+        Paragraph("To repeat the run and compare every byte:"),
         Paragraph(f"strapdown verify {name}", "mono"),
     )
 
@@ -232,9 +243,9 @@ def finding_json(finding: Finding, words: Words = "file") -> dict[str, Any]:
 
 MOST_SAID = 2  # reasons against an answer in one sentence
 WORDS = {
-    "trusted": "It can be trusted",
+    "trusted": "The result can be trusted",
     "reserve": "Use with caution",
-    "distrusted": "It should not be trusted",
+    "distrusted": "Do not trust the result",
 }
 
 
@@ -288,12 +299,12 @@ class Trust:
     def blocks(self) -> tuple[Block, ...]:
         """Every reason, for and against."""
         said = tuple(
-            ("For it" if one.severity == "note" else "Against it", f"{one.sentence()}.")
+            ("For" if one.severity == "note" else "Against", f"{one.sentence()}.")
             for one in self.reasons
         )
         if not said:
             return ()
-        return Paragraph("What speaks for the answer, and what against it:"), Items(said)
+        return Paragraph("Evidence for and against the answer:"), Items(said)
 
     def json(self) -> dict[str, Any]:
         """Return the verdict for programs."""
@@ -330,20 +341,6 @@ _MARKED = len("[U+10FFFF]")
 _SLUG = re.compile(r"[^A-Za-z0-9_-]+")
 
 T = TypeVar("T")
-
-
-def plain_document(document: Document) -> Document:
-    """Return a document in which every text is plain and of bounded length.
-
-    Returns
-    -------
-    Document
-        Texts as `plain_text`: paragraphs, items and captions to 4000 characters, facts and cells to
-        1000, titles and the notes of a key figure to 300, its value to 40, other words to 160;
-        slugs to 80 letters, digits, ``_`` and ``-``. The page and the PDF call this themselves;
-        call it before writing charts to separate files. The operation is idempotent.
-    """
-    return _plain(document, _LABEL)
 
 
 def _plain(value: T, limit: int) -> T:
@@ -450,11 +447,7 @@ def draw_stills(document: Document) -> tuple[str, ...]:
     tuple of str
         One SVG per chart, in document order.
     """
-    return tuple(still(chart) for chart in _charts(plain_document(document)))
-
-
-def _charts(document: Document) -> list[Chart]:
-    return [block for block in drawings(document) if isinstance(block, Chart)]
+    return tuple(still(c) for c in drawings(document.plain) if isinstance(c, Chart))
 
 
 def document_data(
@@ -485,7 +478,7 @@ def document_data(
     ValueError
         If a row of a table does not have as many cells as there are columns.
     """
-    plain = plain_document(document)
+    plain = document.plain
     writer = _Writer(iter(stills), place, alive)
     return {
         "title": plain.title,
@@ -673,7 +666,7 @@ def document_page(document: Document, *, stills: Sequence[str] | None = None) ->
     Parameters
     ----------
     document : Document
-        Texts are made plain by `plain_document`, then escaped.
+        Its texts are made plain, then escaped.
     stills : sequence of str, optional
         Drawn charts from `draw_stills`, if already made.
 
@@ -685,7 +678,6 @@ def document_page(document: Document, *, stills: Sequence[str] | None = None) ->
         which cannot run scripts or fetch resources. A content policy in the page allows its own
         script and no other.
     """
-    from jinja2 import Environment, PackageLoader, StrictUndefined
     from markupsafe import Markup
 
     drawn = draw_stills(document) if stills is None else stills
@@ -703,6 +695,18 @@ def document_page(document: Document, *, stills: Sequence[str] | None = None) ->
             continue
         alive = True
     script = files("strapdown.report").joinpath("templates", "document.js").read_text("utf-8")
+    page: str = _template().render(
+        document=data,
+        script=Markup(script) if alive else "",
+        policy=_digest(script) if alive else "'none'",
+    )
+    return page
+
+
+@cache
+def _template() -> Any:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
     environment = Environment(
         loader=PackageLoader("strapdown.report"),
         autoescape=True,
@@ -710,11 +714,7 @@ def document_page(document: Document, *, stills: Sequence[str] | None = None) ->
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.get_template("document.html").render(
-        document=data,
-        script=Markup(script) if alive else "",
-        policy=_digest(script) if alive else "'none'",
-    )
+    return environment.get_template("document.html")
 
 
 def _image(svg: str) -> str:

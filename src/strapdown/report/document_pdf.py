@@ -23,7 +23,7 @@ def write_pdf(document: Document, path: Path, *, stills: Sequence[str] | None = 
     Parameters
     ----------
     document : Document
-        Texts are made plain by `plain_document`, and reach typst as values only.
+        Its texts are made plain, and reach typst as values only.
     stills : sequence of str, optional
         Drawn charts from `draw_stills`, if already made.
 

@@ -55,13 +55,14 @@ from strapdown.report.report_bundle import (
     write_report,
 )
 from strapdown.report.verdict import (
+    STATUS,
     answer,
+    check_words,
     first_words,
-    light_section,
+    integrity_section,
     promise,
     repeated_words,
     verdict_document,
-    witness_words,
 )
 from strapdown.systems.navigation_run import NavigationRun, run_navigation
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
@@ -84,7 +85,7 @@ def _write_all(
     write_navigation_files(result, folder)
     if report:
         write_verdict(result, name, folder)
-        document = navigation_document(found, name, light_section(result))
+        document = navigation_document(found, name, integrity_section(result))
         write_report(document, folder, progress, figures=result.spec.output.figures)
 
 
@@ -192,9 +193,9 @@ def navigation_json(
         "smoothing": _smoothing(found),
         "observations": {one.name: _innovations(one) for one in found.agreements},
         "outages": _outages(record),
-        "withheld": [
+        "gnss_outage_tests": [
             {
-                "aid": w.aid,
+                "measurement": w.aid,
                 "from_s": w.begin,
                 "to_s": w.end,
                 "largest_horizontal_error_m": json_number(w.error_m),
@@ -269,7 +270,7 @@ def _points(found: NavigationEvaluation) -> dict[str, Any] | None:
     return {
         "points": len(score.time),
         "points_given": score.given,
-        "way_m": score.way,
+        "path_length_m": score.way,
         "rms_m": score.rms,
         "median_m": score.median,
         "largest_m": score.largest,
@@ -287,7 +288,7 @@ def _outages(record: NavigationRecord) -> list[dict[str, Any]]:
             bound = None if worst is None else json_number(worst[0])
             out.append(
                 {
-                    "aid": aid,
+                    "measurement": aid,
                     "from_s": span.begin,
                     "to_s": span.end,
                     "largest_horizontal_bound_95_m": bound,
@@ -416,13 +417,13 @@ def write_navigation_files(result: NavigationRun, folder: Path) -> None:
             "north_error_m": score.error[:, 0],
             "east_error_m": score.error[:, 1],
         }
-        told_points = {**told, "sign": "computed less the point, turned and shifted onto the path"}
+        told_points = {**told, "sign": "computed minus point, after the fit of origin and heading"}
         csv.write(folder / "control_points.csv", columns, told_points)
     if result.differences is not None:
         errors = result.differences.rename(
             columns={c: f"{c}_{UNITS.get(str(c), 'deg')}" for c in result.differences.columns}
         )
-        against = {**told, "against": result.source.truth_name, "sign": "computed less truth"}
+        against = {**told, "against": result.source.truth_name, "sign": "computed minus truth"}
         _write(folder / "errors.csv", errors, against)
 
 
@@ -467,7 +468,7 @@ def _write(path: Path, table: pd.DataFrame, told: dict[str, str]) -> None:
 
 
 def write_verdict(result: NavigationRun, name: str, folder: Path) -> None:
-    """Write ``verdict.html``, ``verdict.json`` and ``heading_light.csv``.
+    """Write ``verdict.html``, ``verdict.json`` and ``heading_integrity.csv``.
 
     Parameters
     ----------
@@ -477,25 +478,25 @@ def write_verdict(result: NavigationRun, name: str, folder: Path) -> None:
     write_text(folder / "verdict.html", document_page(verdict_document(result, name)))
     write_text(folder / "verdict.json", to_json(verdict_json(result)))
     table = result.trust.light.table
-    light = table["light"].to_numpy(dtype=np.int64)
+    status = [STATUS[COLOURS[k]] for k in table["light"].to_numpy(dtype=np.int64)]
     csv.write(
-        folder / "heading_light.csv",
+        folder / "heading_integrity.csv",
         {
             "time_s": table.index.to_numpy(dtype=np.float64),
-            "light": np.array([COLOURS[k] for k in light], dtype=np.str_),
+            "status": np.array(status, dtype=np.str_),
             "reason": np.array([str(r) for r in table["reason"]], dtype=np.str_),
             "bound_95_deg": table["bound"].to_numpy(dtype=np.float64),
-            "borne_out_99_deg": table["carried"].to_numpy(dtype=np.float64),
-            "witness": np.array([str(w) for w in table["witness"]], dtype=np.str_),
-            "witness_difference_deg": table["difference"].to_numpy(dtype=np.float64),
-            "witness_sd_deg": table["witness_sd"].to_numpy(dtype=np.float64),
-            "witness_since_s": table["witness_since"].to_numpy(dtype=np.float64),
+            "confirmed_99_deg": table["carried"].to_numpy(dtype=np.float64),
+            "check": np.array([str(w) for w in table["witness"]], dtype=np.str_),
+            "check_difference_deg": table["difference"].to_numpy(dtype=np.float64),
+            "check_sd_deg": table["witness_sd"].to_numpy(dtype=np.float64),
+            "check_since_s": table["witness_since"].to_numpy(dtype=np.float64),
             "innovation_scatter": table["scatter"].to_numpy(dtype=np.float64),
         },
         {
             "run": result.source.name,
-            "green_below_deg": f"{result.trust.light.green:g}",
-            "red_beyond_deg": f"{result.trust.light.red:g}",
+            "trusted_below_deg": f"{result.trust.light.green:g}",
+            "rejected_beyond_deg": f"{result.trust.light.red:g}",
         },
     )
 
@@ -507,25 +508,27 @@ def verdict_json(result: NavigationRun) -> dict[str, Any]:
     spans = light.spans
     return {
         "answer": _plain(answer(result)),
-        "place": {
+        "position": {
             "bound_95_at_end_m": json_number(bounds[-1]),
             "largest_bound_95_m": json_number(bounds.max()),
-            "borne_out": bool(trust.consistency) and trust.against_bounds is None,
+            "confirmed": bool(trust.consistency) and trust.against_bounds is None,
         },
         "heading": {
-            "meaning": {k.lower(): _plain(v) for k, v in promise(trust)},
-            "green_below_deg": light.green,
-            "red_beyond_deg": light.red,
-            "borne_out": not trust.unwitnessed,
+            "meaning": {
+                STATUS[c]: _plain(v) for c, (_, v) in zip(COLOURS, promise(trust), strict=True)
+            },
+            "trusted_below_deg": light.green,
+            "rejected_beyond_deg": light.red,
+            "confirmed": not trust.unwitnessed,
             "why_not": [finding_json(f) for f in trust.unwitnessed],
-            "borne_out_by": witness_words(trust) or None,
-            "share": {c: light.share(c) for c in COLOURS},
-            "at_end": spans[-1].colour if spans else None,
+            "confirmed_by": check_words(trust) or None,
+            "share": {STATUS[c]: light.share(c) for c in COLOURS},
+            "at_end": STATUS[spans[-1].colour] if spans else None,
             "spans": [
                 {
                     "from_s": s.begin,
                     "to_s": s.end,
-                    "light": s.colour,
+                    "status": STATUS[s.colour],
                     "reason": s.reason,
                     "why": REASONS[s.reason],
                 }
@@ -534,7 +537,7 @@ def verdict_json(result: NavigationRun) -> dict[str, Any]:
             "advice": [
                 {
                     "time_s": a.time,
-                    "light": a.span.colour,
+                    "status": STATUS[a.span.colour],
                     "sd_deg": json_number(a.sd),
                     "manoeuvres": [
                         {
@@ -568,8 +571,8 @@ def _repeated(repeated: Repeated, result: NavigationRun) -> dict[str, Any]:
         table = repeated.differences
         place = np.hypot(table["north"].to_numpy(), table["east"].to_numpy())
         turn = np.abs(table["heading"].to_numpy(dtype=np.float64))
-        for name, unit, values in (("place", "m", place), ("heading", "deg", turn)):
-            out[f"{name}_apart"] = {
+        for name, unit, values in (("position", "m", place), ("heading", "deg", turn)):
+            out[f"{name}_difference"] = {
                 f"median_{unit}": json_number(np.median(values)),
                 f"largest_{unit}": json_number(values.max()),
                 f"at_end_{unit}": json_number(values[-1]),
@@ -580,7 +583,7 @@ def _repeated(repeated: Repeated, result: NavigationRun) -> dict[str, Any]:
 def _doubt(one: Inconsistency) -> dict[str, Any]:
     return {
         "observation": one.name,
-        "aid": one.aid,
+        "measurement": one.aid,
         "component": one.component,
         "kind": one.kind,
         "since_s": one.since,

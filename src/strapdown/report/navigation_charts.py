@@ -38,7 +38,6 @@ from strapdown.report.navigation_evaluation import (
     NavigationEvaluation,
     ShownStates,
     at_marks,
-    blocks_of,
     chi_square_far,
     heading_shown,
     unwrapped,
@@ -47,7 +46,7 @@ from strapdown.tables import EULER, NED, VELOCITY
 
 TIME = "time, s"
 BOUND = "95 % bound"
-SHADED = "Shaded: times without an aid."
+SHADED = "Shaded: outages."
 #: Bounds that vary by a larger factor have a logarithmic axis; else it has at most one label.
 WIDE = 3.0
 
@@ -75,7 +74,7 @@ def bound_chart(found: NavigationEvaluation) -> Chart:
     time = record.sd.index.to_numpy(dtype=np.float64)
     groups = (
         (
-            "Place",
+            "Position",
             "m",
             (
                 ("horizontal", plane_bound(record.covariance), BLUE),
@@ -101,9 +100,9 @@ def bound_chart(found: NavigationEvaluation) -> Chart:
         panels.append(Panel(f"{title.lower()}, {unit}", tuple(lines), log=log))
     return over_time(
         "bounds",
-        "How well it was known",
-        "Bounds of 95 %: 1.96 standard deviations; of the horizontal place the longer half axis "
-        "of its ellipse.",
+        "95 % bounds",
+        "1.96 standard deviations; of the horizontal position the semi-major axis of its 95 % "
+        "ellipse.",
         tuple(panels),
         record,
     )
@@ -122,7 +121,7 @@ def height_chart(found: NavigationEvaluation) -> Chart:
     return over_time(
         "height",
         "Height",
-        f"Over the ellipsoid ({found.ellipsoid.name}).",
+        f"Above the ellipsoid ({found.ellipsoid.name}).",
         (panel,),
         found.record,
     )
@@ -192,9 +191,9 @@ def _true(found: NavigationEvaluation, column: str, navigated: Array) -> Line:
     return curve("truth", stamps, values, BLACK, "dot", 1.1, buckets=BUCKETS)
 
 
-def state_charts(record: NavigationRecord) -> tuple[Chart, ...]:
+def state_charts(found: NavigationEvaluation) -> tuple[Chart, ...]:
     """Estimated sensor and measurement errors, with their bounds."""
-    return tuple(_block_chart(record, block) for block in blocks_of(record))
+    return tuple(_block_chart(found.filtered, block) for block in found.states)
 
 
 def _block_chart(record: NavigationRecord, block: ShownStates) -> Chart:
@@ -213,8 +212,8 @@ def _block_chart(record: NavigationRecord, block: ShownStates) -> Chart:
     return over_time(
         f"state-{block.slug}",
         f"{block.name[0].upper()}{block.name[1:]}",
-        "Reading less truth, or what was assumed less the truth; a band that does not narrow is "
-        "not observable in this motion.",
+        "Measured or assumed − true. A state whose bound does not decrease is not observable in "
+        "this motion.",
         tuple(panels),
         record,
     )
@@ -416,9 +415,9 @@ def error_charts(found: NavigationEvaluation) -> tuple[Chart, ...]:
         return ()
     out = []
     for slug, title, columns, unit in (
-        ("errors-place", "Errors of place", NED, "m"),
-        ("errors-velocity", "Errors of velocity", VELOCITY, "m/s"),
-        ("errors-attitude", "Errors of attitude", EULER, "deg"),
+        ("errors-position", "Position errors", NED, "m"),
+        ("errors-velocity", "Velocity errors", VELOCITY, "m/s"),
+        ("errors-attitude", "Attitude errors", EULER, "deg"),
     ):
         panels = []
         for k, column in enumerate(columns):
@@ -431,7 +430,7 @@ def error_charts(found: NavigationEvaluation) -> tuple[Chart, ...]:
                     height=0.8,
                 )
             )
-        caption = f"Navigated less {found.truth_name}, within what the run itself claims."
+        caption = f"Computed − {found.truth_name}, with the run's 95 % bounds."
         out.append(over_time(slug, title, caption, tuple(panels), found.record))
     return tuple(out)
 
@@ -444,17 +443,16 @@ def nees_chart(found: NavigationEvaluation) -> Chart | None:
     low, high = bounds(errors.freedom)
     nees = np.maximum(errors.nees, _LEAST)
     panel = Panel(
-        "error squared",
-        (curve("place, velocity and attitude", errors.time, nees, BLUE, buckets=BUCKETS),),
+        "NEES",
+        (curve("position, velocity and attitude", errors.time, nees, BLUE, buckets=BUCKETS),),
         log=True,
         levels=(Level(low, "2.5 %"), Level(high, "97.5 %")),
     )
     return over_time(
         "nees",
-        "Normalised errors squared",
-        f"By the covariance of these errors; {errors.freedom} is expected, and 95 of 100 runs "
-        "belong between the levels at an instant. The errors of one run are alike from instant to "
-        "instant: one that stays outside for a while says less than many runs would.",
+        "Normalized estimation error squared (NEES)",
+        f"Expected value {errors.freedom}; at one instant 95 % of many runs lie between the "
+        "levels. The errors of one run are correlated in time.",
         (panel,),
         found.record,
     )
@@ -495,18 +493,15 @@ def innovation_chart(record: NavigationRecord, agreement: Agreement) -> Chart:
         for up, symbol in ((True, "triangle-up"), (False, "triangle-down")):
             some = out & ((nu > 0.0) == up)
             at = np.full(nu.size, edge if up else -edge)
-            lines += _points("beyond the picture", agreement.time, at, some, BLACK, symbol, 6.0)
+            lines += _points("beyond the axis", agreement.time, at, some, BLACK, symbol, 6.0)
         panels.append(Panel(label, tuple(lines), fills=(fill,), height=0.7))
-    more = f" {beyond} lie beyond the edge, and are drawn at it." if beyond else ""
+    more = f" {beyond} are beyond the axis and drawn at its end." if beyond else ""
     if step > 1:
-        more += (
-            f" Of those within {_FAR:g} standard deviations one in {step} is drawn, of the others "
-            "each that can be told apart."
-        )
+        more += f" Of those within {_FAR:g} standard deviations one in {step} is drawn."
     return over_time(
         f"innovations-{agreement.name.replace('.', '-').replace('_', '-')}",
         f"Innovations of {agreement.name}",
-        f"Observed less expected; 95 of 100 belong in the band.{more}",
+        f"Measured − predicted; 95 % are expected in the band.{more}",
         tuple(panels),
         record,
     )
@@ -549,7 +544,7 @@ def nis_chart(record: NavigationRecord, found: tuple[Agreement, ...]) -> Chart |
         colour = AXIS_COLOURS[(2 + k) % 3]
         step = max(1, one.epochs // _POINTS)
         drawn = (np.arange(one.epochs) % step == 0) | (one.nis > chi_square_far(one.freedom))
-        lines = _points("an epoch", one.time, nis, one.used & drawn, colour, "circle", 3.2)
+        lines = _points("epoch", one.time, nis, one.used & drawn, colour, "circle", 3.2)
         lines += _points("rejected", one.time, nis, ~one.used, VERMILLION, "x", 6.0)
         lines += _mean(one)
         levels = (Level(low, "2.5 %"), Level(high, "97.5 %"))
@@ -558,14 +553,10 @@ def nis_chart(record: NavigationRecord, found: tuple[Agreement, ...]) -> Chart |
         return None
     return over_time(
         "nis",
-        "Normalised innovations squared",
-        "By their expected variance; 95 of 100 belong between the levels. The line is the mean "
-        f"of {_WINDOW} epochs that were used."
-        + (
-            " Where there are many, the points are a part of them, and all of the largest."
-            if thin
-            else ""
-        ),
+        "Normalized innovations squared (NIS)",
+        "95 % are expected between the levels. Line: mean of "
+        f"{_WINDOW} processed epochs."
+        + (" Points are thinned, except the largest." if thin else ""),
         tuple(panels),
         record,
     )

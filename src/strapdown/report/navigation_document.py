@@ -24,13 +24,13 @@ from strapdown.report.document import (
     Paragraph,
     Section,
     TableBlock,
+    assumed,
     blocks,
     capital,
     findings_list,
     paragraph,
     run_again,
     section,
-    taken_for_given,
 )
 from strapdown.report.navigation_charts import (
     error_charts,
@@ -41,7 +41,6 @@ from strapdown.report.navigation_charts import (
 )
 from strapdown.report.navigation_evaluation import (
     NavigationEvaluation,
-    blocks_of,
     distance_over_ground,
     trust,
     worst_within,
@@ -70,14 +69,13 @@ def headline(found: NavigationEvaluation) -> str:
     """Return the end position, the distance traveled, and the bounds."""
     record = found.record
     return (
-        f"Ended at {place_words(found)} after {duration_words(_duration(found))} and "
-        f"{length_words(distance_over_ground(record.trajectory))}; the place is known to "
-        f"{length_words(float(plane_bound(record.covariance)[-1]))}, the heading {_heading(found)} "
-        "(bounds of 95 %)."
+        f"Ended at {position_words(found)} after {duration_words(_duration(found))} and "
+        f"{length_words(distance_over_ground(record.trajectory))}; 95 % bounds: position "
+        f"{length_words(float(plane_bound(record.covariance)[-1]))}, heading {_heading(found)}."
     )
 
 
-def place_words(found: NavigationEvaluation, row: int = -1) -> str:
+def position_words(found: NavigationEvaluation, row: int = -1) -> str:
     """Latitude, longitude and height of a row: ``40.096627°, −105.147448°, 1601.5 m``."""
     last = found.record.trajectory.iloc[row]
     lon = float(within_half_turn(last["lon"]))
@@ -95,21 +93,21 @@ def key_figures(found: NavigationEvaluation) -> tuple[KeyFigure, ...]:
     heading = half(sd["heading"])
     out = [
         KeyFigure(
-            "Way and time",
+            "Distance and time",
             length_words(distance_over_ground(record.trajectory)),
             f"in {duration_words(_duration(found))}",
             f"from {instant(float(record.trajectory.index[0]))} to "
             f"{instant(float(record.trajectory.index[-1]))}",
         ),
         KeyFigure(
-            "Place at the end",
+            "Final position",
             f"±{GAP}{length_words(plane)}",
             f"horizontal, 95{GAP}%; height {about(float(last['alt']), half(sd['down']), 'm')}",
-            place_words(found),
+            position_words(found),
         ),
         KeyFigure(
-            "Heading at the end",
-            "not known"
+            "Final heading",
+            "unknown"
             if heading >= _NO_HEADING
             else about(float(last["heading"]) % 360.0, heading, "°"),
             f"95{GAP}% bound",
@@ -129,7 +127,7 @@ def _known(found: NavigationEvaluation) -> KeyFigure:
         return KeyFigure(
             f"Error against {found.truth_name}",
             length_words(score.rms),
-            f"horizontal, root mean square; at most {length_words(score.largest)}",
+            f"horizontal, RMS; at most {length_words(score.largest)}",
             f"height {length_words(up.rms)}, at most {length_words(up.largest)}",
         )
     outages = longest_outages(found)
@@ -197,8 +195,8 @@ def _ended_without(found: NavigationEvaluation) -> list[tuple[str, str]]:
     return [
         (
             f"It ended without {aid}",
-            f"the last {duration_words(span.end - span.begin)}; the end is by the inertial "
-            "sensors alone; a fix would correct it.",
+            f"the last {duration_words(span.end - span.begin)} are by the inertial sensors alone; "
+            "a fix would correct them.",
         )
         for aid, span in late
     ]
@@ -208,13 +206,13 @@ def _heading_caution(found: NavigationEvaluation) -> list[tuple[str, str]]:
     bound = half(found.record.sd["heading"].iloc[-1])
     if bound < 2.0:
         return []
-    how = "is not known" if bound >= _NO_HEADING else f"is known to {plain(bound, 1)}° alone"
+    how = "is unknown" if bound >= _NO_HEADING else f"has a 95 % bound of {plain(bound, 1)}°"
     return [
         (
             f"The heading {how}",
             "without fixes the cross-track error grows by "
             f"{plain(min(100.0, 100.0 * math.radians(min(bound, 90.0))), 1)}{GAP}% of the "
-            "distance. Acceleration and turns with fixes determine it, or two antennas.",
+            "distance. Acceleration and turns with fixes determine the heading, or two antennas.",
         )
     ]
 
@@ -229,7 +227,7 @@ def _memory(found: NavigationEvaluation) -> list[tuple[str, str]]:
                     f"lag 1: {plain(one.correlation, 2)}; 95 % limit "
                     f"{plain(one.correlation_bound, 2)}. Its errors are time-correlated, and the "
                     "bounds are too small. Look for a time offset, a lever arm, "
-                    "or noise of the sensors that is stated too small.",
+                    "or sensor noise that is stated too small.",
                 )
             )
     return out
@@ -243,7 +241,7 @@ def _refused(found: NavigationEvaluation) -> list[tuple[str, str]]:
     ]
     if not rows:
         return []
-    return [("Some observations were rejected", f"{', '.join(rows)}; shown as crosses.")]
+    return [("Rejected", f"{', '.join(rows)}; shown as crosses.")]
 
 
 def _not_told(found: NavigationEvaluation) -> list[tuple[str, str]]:
@@ -252,7 +250,7 @@ def _not_told(found: NavigationEvaluation) -> list[tuple[str, str]]:
     if len(sd) < 2:
         return []
     names = []
-    for block in blocks_of(found.filtered):
+    for block in found.states:
         first = sd[list(block.columns)].iloc[0].to_numpy()
         last = sd[list(block.columns)].iloc[-1].to_numpy()
         some = [
@@ -274,11 +272,7 @@ def _not_told(found: NavigationEvaluation) -> list[tuple[str, str]]:
 
 def _heading(found: NavigationEvaluation) -> str:
     bound = half(found.record.sd["heading"].iloc[-1])
-    return (
-        "not at all"
-        if bound >= _NO_HEADING
-        else f"to {about(0.0, bound, '°').split('±')[1].strip()}"
-    )
+    return "unknown" if bound >= _NO_HEADING else about(0.0, bound, "°").split("±")[1].strip()
 
 
 def _duration(found: NavigationEvaluation) -> float:
@@ -316,7 +310,8 @@ def smoothing_chart(found: NavigationEvaluation) -> Chart | None:
     return over_time(
         "smoothing",
         "Filter and smoother",
-        "Bounds of 95 %: of the filter, by what came before; smoothed, by what came after, too.",
+        "95 % bounds: of the filter, from the measurements up to each instant; smoothed, from all "
+        "measurements.",
         tuple(panels),
         record,
     )
@@ -342,17 +337,16 @@ def smoothing_table(found: NavigationEvaluation) -> TableBlock | None:
         )
     return TableBlock(
         (
-            *("", "filter", "smoothed", "times less"),
+            *("", "filter", "smoothed", "ratio"),
             *(() if found.errors is None else ("error of filter", "smoothed")),
-            "agree",
+            "consistent",
         ),
         tuple(rows),
         text=(0,),
-        caption="Bounds of 95 %, medians over the run"
-        + ("" if found.errors is None else "; errors against the truth, root mean square")
-        + "; and how often the two are within three of "
-        "the standard deviations that their covariances leave for the difference (99.7 % where "
-        "the model is right).",
+        caption="95 % bounds, medians over the run"
+        + ("" if found.errors is None else "; RMS errors against the truth")
+        + ". Consistent: share of the differences within three standard deviations by both "
+        "covariances (99.7 % for a correct model).",
         strong=tuple(k for k in range(len(rows)) if _apart(agreement, k)),
     )
 
@@ -372,9 +366,9 @@ def smoothing_words(found: NavigationEvaluation) -> str | None:
     before, after = (float(np.median(_plane(one))) for one in (forward, found.record))
     heading = [float(np.median(_bound(one, "heading"))) for one in (forward, found.record)]
     return (
-        "Smoothed: every state is by all observations, later ones too. In the median the bound of "
-        f"the place is {_figure(after)} m where the filter had {_figure(before)} m, that of the "
-        f"heading {_figure(heading[1])}° where it had {_figure(heading[0])}°."
+        "Smoothed: every state is estimated from all measurements. Median 95 % bounds, filter and "
+        f"smoothed: position {_figure(before)} m and {_figure(after)} m, heading "
+        f"{_figure(heading[0])}° and {_figure(heading[1])}°."
     )
 
 
@@ -390,11 +384,11 @@ def agreement_words(found: NavigationEvaluation) -> tuple[tuple[str, str], ...]:
     named = ", ".join(agreement.columns[k] for k in apart)
     return (
         (
-            "Filter and smoother do not agree",
-            f"in {named}: of {agreement.columns[worst]} {share_words(agreement.share[worst])} of "
-            "the differences are within three of the standard deviations that are expected of "
-            "them. Later observations speak against the model: look for errors of the sensors "
-            "that last or change and are not stated ([sensors], [states.NAME]).",
+            "Filter and smoother are inconsistent",
+            f"in {named}: {share_words(agreement.share[worst])} of the differences of "
+            f"{agreement.columns[worst]} are within three standard deviations. Later measurements "
+            "contradict the model: look for time-correlated sensor errors that are not stated "
+            "([sensors], [states.NAME]).",
         ),
     )
 
@@ -428,7 +422,7 @@ def end_table(found: NavigationEvaluation) -> TableBlock:
     record = found.record
     rows = [
         ("time", *(instant(float(record.trajectory.index[k])) for k in (0, -1))),
-        ("place", place_words(found, 0), place_words(found, -1)),
+        ("position", position_words(found, 0), position_words(found, -1)),
     ]
     plane = plane_bound(record.covariance)
     rows.append(("horizontal ±", *(length_words(float(plane[k])) for k in (0, -1))))
@@ -447,7 +441,7 @@ def end_table(found: NavigationEvaluation) -> TableBlock:
             cells.append(about(value, half(record.sd[sd].iloc[k]), unit))
         rows.append((name, *cells))
     return TableBlock(
-        ("", "start", "end"), tuple(rows), text=(0,), caption="Start and end, with bounds of 95 %."
+        ("", "start", "end"), tuple(rows), text=(0,), caption="Start and end, with 95 % bounds."
     )
 
 
@@ -457,7 +451,7 @@ def state_table(found: NavigationEvaluation) -> TableBlock | None:
     if record.sensors.empty or not len(record.sensors.columns):
         return None
     rows = []
-    for block in blocks_of(record):
+    for block in found.states:
         for column, label in zip(block.columns, block.labels, strict=True):
             value = block.factor * float(record.sensors[column].iloc[-1])
             first, last = (block.factor * half(record.sensors_sd[column].iloc[k]) for k in (0, -1))
@@ -472,10 +466,10 @@ def state_table(found: NavigationEvaluation) -> TableBlock | None:
                 )
             )
     return TableBlock(
-        ("error of", "estimate at the end", "bound at the start", "bound fell by"),
+        ("state", "final estimate", "initial bound", "bound reduced by"),
         tuple(rows),
         text=(0,),
-        caption="Bounds of 95 %.",
+        caption="Estimated sensor and measurement errors, with 95 % bounds.",
     )
 
 
@@ -505,20 +499,20 @@ def observation_table(found: NavigationEvaluation) -> TableBlock | None:
         return None
     return TableBlock(
         (
-            "observation",
+            "measurement",
             "epochs",
             "rejected",
             "weakened",
             "rms, sd",
             "mean NIS",
             "expected, 95 %",
-            "memory",
+            "correlation",
         ),
         tuple(rows),
         text=(0,),
-        caption="Innovations that were used: root mean square in the standard deviations that were "
-        "expected, mean of the normalised innovation squared (NIS) and where it belongs, and the "
-        "largest correlation of a component with itself an epoch later, beside what chance makes.",
+        caption="Processed innovations: RMS in predicted standard deviations, mean normalized "
+        "innovation squared (NIS) with its 95 % interval, and the largest lag-1 autocorrelation "
+        "of a component with its 95 % limit.",
     )
 
 
@@ -536,10 +530,10 @@ def outage_table(found: NavigationEvaluation) -> TableBlock | None:
     if not rows:
         return None
     return TableBlock(
-        ("aid", "from", "for", "largest bound"),
+        ("measurement", "from", "for", "largest bound"),
         tuple(rows),
         text=(0,),
-        caption="Outages, and the largest horizontal bound of 95 % in each: at its last mark.",
+        caption="Outages, with the largest horizontal 95 % bound in each.",
     )
 
 
@@ -562,13 +556,14 @@ def withheld_table(found: NavigationEvaluation) -> TableBlock | None:
     smoothed = found.forward is not None
     return TableBlock(
         (
-            *("withheld", "from", "for", "largest error", "bound then", "inside"),
+            *("GNSS outage test", "from", "for", "largest error", "95 % bound", "within bound"),
             *(("filter alone",) if smoothed else ()),
         ),
         tuple(rows),
         text=(0, 5),
-        caption="Aids withheld on purpose: the largest horizontal error, and the run's own bound "
-        "of 95 % at that instant" + ("; smoothed, and of the filter alone." if smoothed else "."),
+        caption="Measurements withheld on purpose: the largest horizontal error, and the run's "
+        "95 % bound at that instant"
+        + ("; smoothed, and by the filter alone." if smoothed else "."),
         strong=tuple(k for k, w in enumerate(found.withheld) if not w.inside),
     )
 
@@ -588,11 +583,10 @@ def point_table(found: NavigationEvaluation) -> TableBlock | None:
         f"{plain(100.0 * score.rms / score.way, 2)} %",
     )
     return TableBlock(
-        ("control points", "way", "rms", "median", "largest", "at", "rms of the way"),
+        ("control points", "path length", "rms", "median", "largest", "at", "rms / path length"),
         (row,),
-        caption="Horizontal distance from the control points, after the one origin and heading "
-        "that fit best (no scale): the run's heading less theirs is "
-        f"{plain(score.turn_deg, 2)} deg.",
+        caption="Horizontal distance from the control points, after a fit of origin and heading "
+        f"(no scale): the run's heading minus theirs is {plain(score.turn_deg, 2)} deg.",
     )
 
 
@@ -616,7 +610,7 @@ def error_table(found: NavigationEvaluation) -> TableBlock | None:
             )
         )
     return TableBlock(
-        ("error", "rms", "largest", "at", "95 % bound, rms", "inside"),
+        ("error", "rms", "largest", "at", "95 % bound, rms", "within bound"),
         tuple(rows),
         text=(0,),
         caption=f"Errors against {found.truth_name}, at {len(found.errors.time)} instants.",
@@ -637,12 +631,12 @@ def event_table(found: NavigationEvaluation) -> TableBlock | None:
         return None
     shown = events[:_MOST_EVENTS]
     rest = len(events) - len(shown)
-    more = f"; {rest} more stand in navigation.json" if rest else ""
+    more = f"; {rest} more are in navigation.json" if rest else ""
     return TableBlock(
-        ("at", "event", "what"),
+        ("at", "event", "description"),
         tuple((instant(e.time), e.kind, e.finding.what) for e in shown),
         text=(0, 1, 2),
-        caption=f"What happened, in the order of time{more}.",
+        caption=f"Events in order of time{more}.",
     )
 
 
@@ -650,7 +644,7 @@ def event_table(found: NavigationEvaluation) -> TableBlock | None:
 
 
 def navigation_document(
-    found: NavigationEvaluation, name: str, light: Section | None = None
+    found: NavigationEvaluation, name: str, integrity: Section | None = None
 ) -> Document:
     """Return the report of a navigation run.
 
@@ -658,7 +652,7 @@ def navigation_document(
     ----------
     name : str
         Folder name, for the verification command; no command if empty.
-    light : Section, optional
+    integrity : Section, optional
         Integrity section, for a run whose verdict is on a separate page.
     """
     verdict = trust(found)
@@ -669,7 +663,7 @@ def navigation_document(
     )
     sections = (
         section("answer", "The answer", end_table(found), *verdict.blocks),
-        *(() if light is None else (light,)),
+        *(() if integrity is None else (integrity,)),
         section(
             "state",
             "Height, velocity, attitude",
@@ -694,11 +688,11 @@ def navigation_document(
         ),
         section(
             "sensors",
-            "Errors of the sensors and the aids",
+            "Sensor and measurement errors",
             state_table(found),
-            *charts.state_charts(found.filtered),
+            *charts.state_charts(found),
         ),
-        section("observations", "Observations", *_observations(found)),
+        section("observations", "Innovations", *_observations(found)),
         section("outages", "Outages", withheld_table(found), outage_table(found)),
         section("events", "Events", event_table(found)),
         section("findings", "Findings", findings_list(found.all_findings)),
@@ -706,10 +700,9 @@ def navigation_document(
             "method",
             "Method and assumptions",
             Facts(found.chain) if found.chain else None,
-            *taken_for_given(
-                "The errors of the sensors and of the aids are as stated, without bias that is not "
-                "among the states, and those of the aids without memory: every bound rests on "
-                "them.",
+            *assumed(
+                "Sensor and measurement errors are as stated. Biases that are not among the states "
+                "are zero, and measurement errors are white. Every bound depends on this.",
                 "Normal gravity of the ellipsoid: a deflection of the vertical is not in the "
                 "bounds.",
             ),
@@ -723,35 +716,35 @@ def navigation_document(
         headline(found),
         (
             ("Record", ", ".join(t for t in (found.name, found.what) if t)),
-            ("Start", place_words(found, 0)),
-            ("Aids", ", ".join(aids) or "none"),
-            ("Made with", f"strapdown {__version__}"),
+            ("Start", position_words(found, 0)),
+            ("Measurements", ", ".join(aids) or "none"),
+            ("Software", f"strapdown {__version__}"),
         ),
         blocks(
             KeyFigures(key_figures(found)),
             verdict.paragraph,
             Items(said) if said else None,
-            Paragraph(f"It did not move from {place_words(found, 0)}.") if plan is None else None,
+            Paragraph(f"Stationary at {position_words(found, 0)}.") if plan is None else None,
             plan,
             charts.bound_chart(found),
         ),
         tuple(s for s in sections if s.blocks),
         title,
-        links=() if light is None else (("verdict.html", "Can it be trusted? The verdict"),),
+        links=() if integrity is None else (("verdict.html", "Integrity"),),
     )
 
 
 def _observations(found: NavigationEvaluation) -> tuple[Block | None, ...]:
     if not found.agreements:
-        return (Paragraph("Nothing was observed: the inertial sensors were alone."),)
+        return (Paragraph("No measurement was processed: inertial sensors alone."),)
     rows: list[tuple[str, str]] = []
     for one in found.agreements:
         for kind in dict.fromkeys(v.kind for v in one.consistency.verdicts):
             alike = [v for v in one.consistency.verdicts if v.kind == kind]
             said = "; ".join(v.finding.what for v in alike)
             rows.append((one.name, f"{said}. {capital(alike[0].finding.remedy or '')}."))
-    against = "What in them is not by chance, and what it may mean:"
-    agree = "Nothing in them speaks against what was stated of sensors and aids."
+    against = "Inconsistencies that exceed chance, and their possible causes:"
+    agree = "The innovations are consistent with the stated sensor and measurement errors."
     return (
         observation_table(found),
         Paragraph(against if rows else agree),
@@ -767,23 +760,26 @@ def _observations(found: NavigationEvaluation) -> tuple[Block | None, ...]:
 CONVENTIONS = (
     ("Body axes", "forward, right, down; local level: north, east, down"),
     (
-        "Place",
-        "geodetic latitude north and longitude east in deg, height over the ellipsoid in m, of the "
-        "inertial sensors",
+        "Position",
+        "of the inertial sensors: geodetic latitude north and longitude east in deg, height over "
+        "the ellipsoid in m",
     ),
     ("Velocity", "relative to the Earth, in m/s: north, east, down"),
     ("Attitude", "roll, pitch, heading (3-2-1): right side down, nose up, clockwise are positive"),
     ("Heading", "from true north, clockwise seen from above"),
-    ("Errors", "computed or measured less true; so the truth is the reading less the bias"),
+    ("Errors", "error = computed − true; sensor error = measured − true"),
     (
         "Rotation errors",
         "vector psi about north, east, down: C_computed = exp([psi x]) C_true",
     ),
-    ("Innovations", "observed less expected, after what was observed before at the same instant"),
+    (
+        "Innovations",
+        "measured − predicted; components of one epoch are processed one after the other",
+    ),
     (
         "Bounds",
-        "hold the truth in 95 of 100 cases (1.96 standard deviations; of an ellipse in a plane "
-        "2.45) where what is stated of the sensors and the aids is right",
+        "95 % bounds: 1.96 standard deviations, 2.45 for an ellipse in a plane, if sensor and "
+        "measurement errors are as stated",
     ),
     ("Time", "s, on the record's own clock"),
 )

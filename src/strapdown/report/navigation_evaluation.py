@@ -88,6 +88,11 @@ class NavigationEvaluation:
         return self.forward or self.record
 
     @cached_property
+    def states(self) -> tuple[ShownStates, ...]:
+        """Sensor and measurement error states of the filter, for display."""
+        return blocks_of(self.filtered)
+
+    @cached_property
     def agreements(self) -> tuple[Agreement, ...]:
         """Consistency of each observation that has innovations."""
         return agreements(self.record, self.lasting)
@@ -475,7 +480,7 @@ class Withheld:
         return self.error_m <= self.bound_m
 
 
-NO_RULE = "none: every observation counts in full, however far off it is"
+NO_RULE = "none: every measurement has full weight"
 
 
 def evaluation_of(result: NavigationRun) -> NavigationEvaluation:
@@ -491,7 +496,7 @@ def evaluation_of(result: NavigationRun) -> NavigationEvaluation:
         ("Error model", _kind(spec.filter, "error_model")),
         ("Update rule", _kind(spec.filter, "update_rule") or NO_RULE),
         ("Smoother", "" if result.forward is None else spec.smoother.kind),
-        *((f"Aid {name}", _of_aid(aid)) for name, aid in spec.aiding.items()),
+        *((f"Measurement {name}", _of_aid(aid)) for name, aid in spec.aiding.items()),
         ("States", ", ".join(dict.fromkeys(_block(c) for c in result.record.sensors.columns))),
     ]
     return NavigationEvaluation(
@@ -616,7 +621,7 @@ def heading_shown(record: NavigationRecord) -> tuple[Array, Array, str]:
     values = unwrapped(record.trajectory["heading"].to_numpy(dtype=np.float64))
     marks = np.interp(record.sd.index.to_numpy(dtype=np.float64), time, values)
     if np.ptp(values) <= MOST_TURN:
-        return values, marks, "The heading goes on over north, so that no turn breaks it."
+        return values, marks, "The heading continues through north without a jump."
     return (
         break_jumps(values % 360.0),
         break_jumps(marks % 360.0),

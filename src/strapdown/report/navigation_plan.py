@@ -71,7 +71,7 @@ def plan_chart(found: NavigationEvaluation) -> Chart | None:
     ]
     return Chart(
         "plan",
-        "Where it went",
+        "Path",
         " ".join(w for w in words if w),
         "",
         (
@@ -197,7 +197,7 @@ def _fixes(plane: Plane, view: View) -> tuple[list[Line], str]:
             )
     if not beyond:
         return out, ""
-    return out, f"{beyond} {'fix lies' if beyond == 1 else 'fixes lie'} outside of the picture."
+    return out, f"{beyond} {'fix is' if beyond == 1 else 'fixes are'} outside of the plan."
 
 
 def _rejected(record: NavigationRecord, aid: str) -> Array:
@@ -345,7 +345,7 @@ def ellipses(plane: Plane, view: View) -> tuple[list[Line], str, list[tuple[int,
     count = len(along)
     times = f"{factor:,.0f}".replace(",", GAP)
     named = "" if factor == 1.0 else f" × {times}"
-    drawn = "" if factor == 1.0 else f", drawn {times} times as large"
+    drawn = "" if factor == 1.0 else f", enlarged {times} times"
     for name, colour, part in (
         (f"95{GAP}% ellipse{named}", BLUE, slice(0, count)),
         (f"95{GAP}% ellipse{named} at the end of an outage", VERMILLION, slice(count, None)),
@@ -360,8 +360,7 @@ def ellipses(plane: Plane, view: View) -> tuple[list[Line], str, list[tuple[int,
             rings.append(np.vstack([ring, ring[:1], [[np.nan, np.nan]]]))
         ned = np.vstack(rings)[:-1]
         out.append(Line(name, ned[:, 1], ned[:, 0], colour, width=1.4, inside=0.16))
-    said = f"The place is within an ellipse in 95 of 100 cases{drawn}."
-    return out, said if factor == 1.0 else f"{said[:-1]} than they are.", ends
+    return out, f"Ellipses: 95 % of the horizontal position{drawn}.", ends
 
 
 def centres(plane: Plane, rows: list[int]) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from xml.sax.saxutils import escape, quoteattr
@@ -20,6 +21,8 @@ INK = "#1b1f24"
 SMALL = 9.5
 # Dash names of charts, in widths of a thin line.
 _DASHES = {"dash": "6 4", "dot": "1.5 3", "dashdot": "7 3 1.5 3", "longdash": "11 4"}
+# Zero before a decimal point.
+_ZERO = re.compile(r"(?<!\d)0\.")
 # Letter widths over the font size, of DejaVu Sans, the widest of the usual fonts.
 _NARROW, _WIDE = frozenset("iIjl.,:;'|!()[] /tfr°′·"), frozenset("mwMWO@%Q—→←")
 _LINE = 1.18
@@ -338,14 +341,9 @@ def _steps(points: Array) -> str:
     """Format a curve as its start and its steps, which are shorter than its points."""
     rounded = np.rint(100.0 * points).astype(np.int64)
     start = np.asarray(0.01 * rounded[:1], dtype=np.float64)
-    steps = [_short(v) for v in np.diff(rounded, axis=0).ravel().tolist()]
-    pairs = " ".join(f"{x},{y}" for x, y in zip(steps[::2], steps[1::2], strict=True))
-    return f"M{_hundredths(start)}l{pairs}"
-
-
-def _short(hundredths: int) -> str:
-    text = f"{abs(hundredths) / 100:g}".removeprefix("0") or "0"
-    return f"-{text}" if hundredths < 0 else text
+    steps = (np.diff(rounded, axis=0) / 100).ravel().tolist()
+    pairs = " ".join(["%g,%g"] * (len(steps) // 2)) % tuple(steps)
+    return f"M{_hundredths(start)}l{_ZERO.sub('.', pairs)}"
 
 
 def _attributes(values: Mapping[str, str]) -> str:

@@ -53,18 +53,22 @@ from strapdown.systems.navigation_run import NavigationRun
 _KINDS = {
     "change": "changes within the run",
     "understated": "scatters more than stated",
-    "bias": "is off by a constant",
-    "correlated": "follows itself from epoch to epoch",
+    "bias": "has a constant error",
+    "correlated": "is correlated in time",
     "gross": "has gross errors",
 }
 
 
+#: Heading status of each color.
+STATUS = {"green": "trusted", "amber": "unverified", "red": "rejected"}
+
+
 def answer(result: NavigationRun) -> str:
     """Return the first sentence of a verdict."""
-    return f"{place_words(result)} {heading_words(result.trust)}"
+    return f"{position_words(result)} {heading_words(result.trust)}"
 
 
-def place_words(result: NavigationRun) -> str:
+def position_words(result: NavigationRun) -> str:
     """Return the 95 % bound of the position, at the end and at its worst."""
     bounds = plane_bound(result.record.covariance)
     end, worst = float(bounds[-1]), int(np.argmax(bounds))
@@ -72,19 +76,19 @@ def place_words(result: NavigationRun) -> str:
     # A run whose bound is largest at the end needs only one number.
     same = most <= 1.1 * end
     sized = f"{length_words(end)} at the end" + (
-        "" if same else f" and to {length_words(most)} at its worst ({_at(result, worst)})"
+        "" if same else f", {length_words(most)} at most ({_at(result, worst)})"
     )
     first = result.trust.against_bounds
     if not result.trust.consistency:
         return (
-            f"The place is known to {sized}, 95{GAP}%, if the sensor errors are as "
-            "stated: no measurement confirms it."
+            f"Position bound, 95{GAP}%: {sized}, if the sensor errors are as stated. No "
+            "measurement confirms it."
         )
     if first is None:
-        return f"You can trust the place to {sized}, 95{GAP}%."
+        return f"Position bound, 95{GAP}%: {sized}. The measurements confirm it."
     return (
-        f"By its own bounds the place is known to {sized}, 95{GAP}%, but not all "
-        f"measurements are consistent: {first.name} {_KINDS[first.kind]}."
+        f"Position bound, 95{GAP}%: {sized}. The measurements contradict it: {first.name} "
+        f"{_KINDS[first.kind]}."
     )
 
 
@@ -94,20 +98,19 @@ def heading_words(trust: IntegrityReport) -> str:
     if not len(light.table):
         return "The run is too short to judge its heading."
     shares = [(c, light.share(c)) for c in ("green", "amber", "red")]
-    said = ", ".join(f"{c} {share_words(s)}" for c, s in shares if s > 0.0)
+    said = ", ".join(f"{STATUS[c]} {share_words(s)}" for c, s in shares if s > 0.0)
     last = light.spans[-1]
-    now = "at the end it is " + (
-        "green." if last.colour == "green" else f"{last.colour}: {REASONS[last.reason]}."
-    )
-    witness = witness_words(trust)
-    if witness and last.colour == "green":
-        now = f"{now[:-1]}, confirmed by {witness}."
+    now = f"final status: {STATUS[last.colour]}"
+    if last.colour != "green":
+        now += f" ({REASONS[last.reason]})"
+    elif check := check_words(trust):
+        now += f", confirmed by {check}"
     if trust.unwitnessed:
-        now += f" Nothing could confirm it: {unwitnessed_words(trust)}."
-    return f"Heading: {said} of the time; {now}"
+        now += f". No independent check: {unconfirmed_words(trust)}"
+    return f"Heading: {said} of the time; {now}."
 
 
-def unwitnessed_words(trust: IntegrityReport) -> str:
+def unconfirmed_words(trust: IntegrityReport) -> str:
     """Return the reasons why no independent check could confirm the heading."""
     return "; ".join(one.sentence() for one in trust.unwitnessed)
 
@@ -121,26 +124,24 @@ def promise(trust: IntegrityReport) -> tuple[tuple[str, str], ...]:
     green, red = plain(trust.light.green, 1), plain(trust.light.red, 1)
     return (
         (
-            "Green",
-            f"the heading is within {green}°. Two reckonings say so that share no assumption of "
-            f"it: the run's own bound of 95{GAP}% is below {green}°, and a witness puts the run "
-            f"within {green}° with 99{GAP}%: a second reckoning that began with no heading at all "
-            "and was told fixes alone (now, or within the last minute with what the gyros may have "
-            "added since); or north as the gyros found it at rest, where the rest itself shows "
-            "how good they are, with what they may have added since; or two sources that share "
-            "nothing. And what was observed scatters as it should.",
+            "Trusted (green)",
+            f"the heading error is below {green}°. Required: the run's 95{GAP}% bound is below "
+            f"{green}°; an independent check bounds the error below {green}° with 99{GAP}%; and "
+            "innovations scatter by at most twice the expected value. The check is a second "
+            "navigator driven by fixes that began without a heading (now, or up to a minute ago "
+            "plus the growth since); or gyrocompassing at rest, propagated by the gyros; or two "
+            "independent heading measurements.",
         ),
         (
-            "Amber",
-            f"unverified: its own bound is below {green}° and rests "
-            "on the start, on an alignment that does not show how good it is, or on one aid; or "
-            "that bound is beyond "
-            f"{green}°; or observations scatter more than twice as much as they should.",
+            "Unverified (amber)",
+            "the heading depends on the stated start, on an alignment without a test of its own, "
+            f"or on one measurement; or its 95{GAP}% bound exceeds {green}°; or innovations "
+            "scatter by more than twice the expected value.",
         ),
         (
-            "Red",
-            f"do not use it: its bound is beyond {red}°, a witness contradicts it, or "
-            "observations scatter more than three times as much as they should.",
+            "Rejected (red)",
+            f"do not use the heading: its bound exceeds {red}°, an independent check contradicts "
+            "it, or innovations scatter by more than three times the expected value.",
         ),
     )
 
@@ -159,7 +160,7 @@ def advice_words(advice: Advice, trust: IntegrityReport) -> str:
         return _without_fixes(trust)
     best, sd = advice.options[0]
     text = (
-        f"{best.what} with fixes would bring its standard deviation from "
+        f"{best.what} with fixes would reduce its standard deviation from "
         f"{degrees_words(advice.sd)} to {degrees_words(sd)}"
     )
     others = [f"{one.what} to {degrees_words(after)}" for one, after in advice.options[1:]]
@@ -168,22 +169,22 @@ def advice_words(advice: Advice, trust: IntegrityReport) -> str:
 
 def _without_fixes(trust: IntegrityReport) -> str:
     """Return the measures that would confirm a heading without fixes."""
-    north = f"these gyros find north to ±{GAP}{degrees_words(trust.north_sd)} (one sd)"
+    north = f"these gyros find north to {degrees_words(trust.north_sd)} (1 standard deviation)"
     if trust.north_sd >= NO_NORTH:
-        north = "these gyros find no north"
+        north = "these gyros cannot find north"
     if SURE * trust.north_sd <= trust.light.green:
         return (
-            f"{north}: a fine alignment, or a stop of some minutes that an aid sees (kind = "
-            '"zero_velocity"), would confirm it; so would GNSS fixes, over a '
-            "change of speed or a turn"
+            f"{north}: a fine alignment, or a stop of some minutes with zero velocity updates "
+            '(kind = "zero_velocity"), would confirm it; so would GNSS fixes with a change of '
+            "speed or a turn"
         )
     return (
-        f"{north}, so that no rest confirms it: GNSS fixes would, over a change of speed or a "
-        "turn, or a second independent source, such as a compass beside two antennas"
+        f"{north}. GNSS fixes with a change of speed or a turn would confirm it, or a second "
+        "independent heading measurement, such as a compass beside two antennas"
     )
 
 
-def witness_words(trust: IntegrityReport) -> str:
+def check_words(trust: IntegrityReport) -> str:
     """Independent heading checks that confirmed it while green, longest first; empty if none."""
     table = trust.light.table
     green = table[(table["light"] == 0) & (table["witness"] != "")]
@@ -200,21 +201,18 @@ def first_words(trust: IntegrityReport) -> str:
     """The first inconsistent measurement, as a sentence."""
     one = trust.first
     if not trust.consistency:
-        return "Nothing was observed, and so nothing could speak against the run."
+        return "No measurement was processed, so no inconsistency can be found."
     if one is None:
-        return (
-            "Everything that was observed is as it was expected to be, or off by too little to "
-            "matter."
-        )
+        return "All innovations are consistent, or their inconsistency is too small to matter."
     when = (
-        f"from the first epoch on, at {instant(one.since)}"
+        f"from the first epoch, at {instant(one.since)}"
         if one.throughout
         else f"at {instant(one.since)}"
     )
     where = one.component.partition(",")[0]
     meaning = one.finding.remedy or ""
     return (
-        f"The first that does not agree is {one.name}, component {where}, {when}: "
+        f"First inconsistency: {one.name}, component {where}, {when}: "
         f"{one.finding.what}. "
         f"{meaning[:1].upper()}{meaning[1:]}."
     )
@@ -227,19 +225,19 @@ def repeated_words(result: NavigationRun) -> str:
     if repeated is None:
         if trust.first is None:
             return ""
-        return "It was not repeated without it: repeat is false in [trust]."
+        return "Not re-run without it: repeat is false in [trust]."
     if repeated.record is None or repeated.differences is None:
-        return f"Repeated {repeated.change.what}, the run fails: {_failed(repeated)}"
+        return f"Re-run {repeated.change.what}, the run fails: {_failed(repeated)}"
     table = repeated.differences
     place = np.hypot(table["north"].to_numpy(), table["east"].to_numpy())
     turn = np.abs(table["heading"].to_numpy(dtype=np.float64))
     before, after = len(trust.inconsistencies), len(repeated.left)
     rest = (
-        "everything that is left is then consistent"
+        "all remaining measurements are consistent"
         if not after
-        else f"of {before} {_plural('doubt', before)} {after} {_plural('remains', after, 'remain')}"
+        else f"{after} of {before} inconsistencies remain"
         if after < before
-        else "what is left is no more consistent than before"
+        else "the remaining measurements are no more consistent"
     )
     beyond = _beyond(
         table.index.to_numpy(dtype=np.float64),
@@ -251,10 +249,9 @@ def repeated_words(result: NavigationRun) -> str:
     usual, most, last = (length_words(float(x)) for x in (np.median(place), max(place), place[-1]))
     turned = [degrees_words(float(x)) for x in (np.median(turn), max(turn), turn[-1])]
     return (
-        f"Repeated {repeated.change.what}, the place differs by {usual} in the middle and {most} "
-        f"at most ({beyond}), at the end by {last}; the heading by {turned[0]} in the middle and "
-        f"{turned[1]} at most, at the end by {turned[2]} where its bound is "
-        f"{degrees_words(bound)}; {rest}."
+        f"Re-run {repeated.change.what}: position differs by {usual} (median), {most} at most "
+        f"({beyond}), {last} at the end; heading by {turned[0]} (median), {turned[1]} at most, "
+        f"{turned[2]} at the end, where its bound is {degrees_words(bound)}; {rest}."
     )
 
 
@@ -265,7 +262,7 @@ def terminal_lines(result: NavigationRun, *, brief: bool = False) -> list[tuple[
     if trust.first is not None:
         first = trust.first
         since = "throughout" if first.throughout else f"first at {instant(first.since)}"
-        lines.append((f"First doubt: {first.name} {kind_words(first)}, {since}.", "yellow"))
+        lines.append((f"First inconsistency: {first.name} {kind_words(first)}, {since}.", "yellow"))
         said = repeated_words(result)
         if said:
             lines.append((said, ""))
@@ -284,8 +281,8 @@ def _beyond(time: np.ndarray, apart: np.ndarray, marks: np.ndarray, bound: np.nd
     # The run with more information differs from the other by at most that one's error (Kalman).
     share = float(np.mean(apart > np.interp(time, marks, bound)))
     if share == 0.0:
-        return f"always within the repeated run's bound of 95{GAP}%"
-    return f"beyond the repeated run's bound of 95{GAP}% for {share_words(share)} of the time"
+        return f"always within the re-run's 95{GAP}% bound"
+    return f"beyond the re-run's 95{GAP}% bound for {share_words(share)} of the time"
 
 
 def _at(result: NavigationRun, mark: int) -> str:
@@ -323,33 +320,33 @@ def verdict_document(result: NavigationRun, name: str) -> Document:
     seen = len(trust.light.table) > 0
     sound = trust.first is None and seen and trust.light.spans[-1].colour == "green"
     sections = (
-        Section("heading", "Is the heading to be trusted?", _heading(result)),
-        Section("innovations", "Does what was observed agree?", _innovations(result)),
-        Section("first", "What is the first that does not, and does it matter?", _first(result)),
-        Section("meaning", "Meaning of the colors", (Items(promise(trust)), _limits())),
+        Section("heading", "Heading integrity", _heading(result)),
+        Section("innovations", "Innovations", _innovations(result)),
+        Section("first", "First inconsistency, and the re-run without it", _first(result)),
+        Section("meaning", "Meaning of the status", (Items(promise(trust)), _limits())),
     )
     return Document(
-        "Can it be trusted?",
-        result.spec.title or f"Verdict on the navigation of {result.source.name}",
+        "Integrity",
+        result.spec.title or f"Integrity of the navigation of {result.source.name}",
         (
             ("Record", f"{result.source.name}, {result.source.what}"),
-            ("Made with", f"strapdown {__version__}"),
+            ("Software", f"strapdown {__version__}"),
         ),
         (
             KeyFigures(_keys(result)),
             Paragraph(answer(result), "lead" if sound else "warning"),
-            *((light_chart(result),) if seen else ()),
+            *((heading_chart(result),) if seen else ()),
         ),
         sections,
-        f"Verdict on {name}",
-        links=(("report.html", "The whole report"),),
+        f"Integrity of {name}",
+        links=(("report.html", "Report"),),
     )
 
 
-def light_section(result: NavigationRun) -> Section:
+def integrity_section(result: NavigationRun) -> Section:
     """Heading integrity, as a section of the report."""
     said = Paragraph(answer(result))
-    return Section("trust", "Can it be trusted?", (said, light_chart(result), *_of_filter(result)))
+    return Section("integrity", "Integrity", (said, heading_chart(result), *_of_filter(result)))
 
 
 def _of_filter(result: NavigationRun) -> tuple[Block, ...]:
@@ -358,8 +355,8 @@ def _of_filter(result: NavigationRun) -> tuple[Block, ...]:
         return ()
     return (
         Paragraph(
-            "The light, and the repeated run, are of the filter alone: of what was known at each "
-            "second then. Smoothed, the heading is known by what came later, too.",
+            "The heading status and the re-run are those of the filter, from the measurements up "
+            "to each second, not of the smoothed run.",
             "note",
         ),
     )
@@ -372,31 +369,32 @@ def _keys(result: NavigationRun) -> tuple[KeyFigure, ...]:
     spans = light.spans
     last = spans[-1].colour if spans else "unknown"
     since = next((s.begin for s in reversed(spans) if s.colour != last), None)
-    begun = "all of the run" if since is None else f"for the last {_since(result, last)}"
+    begun = "throughout" if since is None else f"for the last {_since(result, last)}"
     first = trust.first
     return (
         KeyFigure(
-            "Heading at the end",
-            last,
-            f"{begun}; own bound {degrees_words(heading)}",
+            "Final heading status",
+            STATUS.get(last, last),
+            f"{begun}; 95{GAP}% bound {degrees_words(heading)}",
             REASONS[spans[-1].reason] if spans else "",
         ),
         KeyFigure(
-            "Heading is green",
+            "Heading trusted",
             share_words(light.share("green")),
-            f"of the time: within {plain(light.green, 1)}°",
-            f"amber {share_words(light.share('amber'))}, red {share_words(light.share('red'))}",
+            f"of the time: error below {plain(light.green, 1)}°",
+            f"unverified {share_words(light.share('amber'))}, "
+            f"rejected {share_words(light.share('red'))}",
         ),
         KeyFigure(
-            "Place at the end",
+            "Final position",
             f"±{GAP}{length_words(float(bounds[-1]))}",
             f"horizontal, 95{GAP}%",
-            f"at its worst {length_words(float(bounds.max()))}",
+            f"{length_words(float(bounds.max()))} at most",
         ),
         KeyFigure(
-            "Observations",
+            "Innovations",
             _agrees(result),
-            _looked_at(len(trust.consistency))
+            f"{len(trust.consistency)} {_plural('measurement', len(trust.consistency))} tested"
             if first is None
             else f"{first.name} {kind_words(first)}",
             "" if first is None else f"since {instant(first.since)}",
@@ -407,13 +405,13 @@ def _keys(result: NavigationRun) -> tuple[KeyFigure, ...]:
 def _agrees(result: NavigationRun) -> str:
     trust = result.trust
     if not trust.consistency:
-        return "nothing"
+        return "none"
     if trust.first is None:
-        return "agrees"
+        return "consistent"
     # Single outliers are not inconsistencies of the filter.
     if trust.against_bounds is None:
-        return "agrees, mostly"
-    return "does not agree"
+        return "consistent but for outliers"
+    return "inconsistent"
 
 
 def _since(result: NavigationRun, colour: str) -> str:
@@ -433,30 +431,30 @@ def _heading(result: NavigationRun) -> tuple[Block, ...]:
     if trust.unwitnessed:
         blocks.append(
             Paragraph(
-                f"Nothing could confirm the heading: {unwitnessed_words(trust)}. It rests on its "
-                "start, or on one source alone, and is not green at any time.",
+                f"No independent heading check: {unconfirmed_words(trust)}. The heading depends on "
+                "its start or on one measurement, and is never trusted.",
                 "warning",
             )
         )
     if any(a.options for a in trust.advice):
         rows = tuple(
             (
-                f"{a.span.colour.capitalize()}, {span_words(a.span)}",
+                f"{STATUS[a.span.colour].capitalize()}, {span_words(a.span)}",
                 capital(advice_words(a, trust)),
             )
             for a in trust.advice
         )
         blocks += [
             Paragraph(
-                "What would have helped, at the end of the longest stretches that were not green "
-                "(by the covariance of the filter, taken over the manoeuvre, without what was "
-                "assumed of the heading):"
+                "Maneuvers that would have helped, at the end of the longest periods that are not "
+                "trusted (filter covariance propagated through the maneuver, without the assumed "
+                "heading):"
             ),
             Items(rows),
         ]
     elif trust.advice:
         said = advice_words(trust.advice[-1], trust)
-        blocks.append(Paragraph(f"What would have helped: {said}."))
+        blocks.append(Paragraph(f"What would help: {said}."))
     table = _against_truth(result)
     return (*blocks, *(() if table is None else (table,)))
 
@@ -469,11 +467,11 @@ def _reasons(result: NavigationRun) -> TableBlock:
         for reason, count in those["reason"].value_counts().items():
             share = share_words(count / len(table))
             why = REASONS[str(reason)]
-            if colour == "green" and witness_words(result.trust):
-                why = f"{why}: the run, and {witness_words(result.trust)}"
-            rows.append((colour, why, f"{count}", share))
+            if colour == "green" and check_words(result.trust):
+                why = f"{why}: {check_words(result.trust)}"
+            rows.append((STATUS[colour], why, f"{count}", share))
     return TableBlock(
-        ("light", "why", "seconds", "of the time"), tuple(rows), (0, 1), "The light, and why"
+        ("status", "reason", "seconds", "of the time"), tuple(rows), (0, 1), "Heading status"
     )
 
 
@@ -491,36 +489,42 @@ def _against_truth(result: NavigationRun) -> TableBlock | None:
             within = share_words(float(np.mean(those <= light.green)))
             largest, rms = float(those.max()), math.sqrt(float(np.mean(those**2)))
             rows.append(
-                (colour, f"{len(those)}", within, f"{plain(rms, 3)}", f"{plain(largest, 3)}")
+                (
+                    STATUS[colour],
+                    f"{len(those)}",
+                    within,
+                    f"{plain(rms, 3)}",
+                    f"{plain(largest, 3)}",
+                )
             )
     if not rows:
         return None
     return TableBlock(
-        ("light", "seconds", f"within {plain(light.green, 1)}°", "rms, deg", "largest, deg"),
+        ("status", "seconds", f"within {plain(light.green, 1)}°", "rms, deg", "largest, deg"),
         tuple(rows),
         (0,),
-        f"The heading against {result.source.truth_name}, by what the light showed",
+        f"Heading error against {result.source.truth_name}, by status",
     )
 
 
 def _innovations(result: NavigationRun) -> tuple[Block, ...]:
     trust = result.trust
     if not trust.consistency:
-        return (Paragraph("Nothing was observed."),)
+        return (Paragraph("No measurement was processed."),)
     rows = []
     for name, one in trust.consistency.items():
         doubts = [i for i in trust.inconsistencies if i.name == name]
-        kinds = ", ".join(dict.fromkeys(kind_words(i) for i in doubts)) or "agrees"
+        kinds = ", ".join(dict.fromkeys(kind_words(i) for i in doubts)) or "consistent"
         scales = [c.scale for c in one.components if math.isfinite(c.scale)]
         worst = max(scales, key=lambda x: abs(math.log(max(x, 1e-9))), default=math.nan)
         gross = sum(c.gross for c in one.components)
         rows.append((name, kinds, f"{len(one.nis)}", plain(worst, 2), f"{gross}"))
     blocks: list[Block] = [
         TableBlock(
-            ("observation", "verdict", "epochs", "scatter, sd", "gross errors"),
+            ("measurement", "verdict", "epochs", "scatter, sd", "gross errors"),
             tuple(rows),
             (0, 1),
-            "Observed against expected innovations; a scatter of 1 is as stated",
+            "Innovations in predicted standard deviations; a scatter of 1 is as predicted",
         )
     ]
     small = [
@@ -535,7 +539,7 @@ def _innovations(result: NavigationRun) -> tuple[Block, ...]:
     ]
     if small:
         blocks += [
-            Paragraph("More than chance, but too little to matter, or on the safe side:"),
+            Paragraph("Significant, but too small to matter, or conservative:"),
             Items(tuple((name, f"{what}.") for name, what in small[:_MOST])),
         ]
     return tuple(blocks)
@@ -551,11 +555,11 @@ def _first(result: NavigationRun) -> tuple[Block, ...]:
         )
         blocks.append(
             TableBlock(
-                ("since", "observation", "component", "what"),
+                ("since", "measurement", "component", "inconsistency"),
                 rows,
                 (0, 1, 2, 3),
-                "All doubts in the order in which they count: what holds throughout has no begin, "
-                "and comes after gross errors of its aid, which may be its cause",
+                "Inconsistencies, first by time; those that hold throughout come after gross "
+                "errors of the same measurement, which may cause them",
             )
         )
     said = repeated_words(result)
@@ -569,29 +573,24 @@ def _first(result: NavigationRun) -> tuple[Block, ...]:
         rows_left = tuple(
             (i.name, f"{kind_words(i)}: {i.finding.what}.") for i in repeated.left[:_MOST]
         )
-        blocks += [Paragraph("What does not agree in the repeated run:"), Items(rows_left)]
+        blocks += [Paragraph("Inconsistencies of the re-run:"), Items(rows_left)]
     return tuple(blocks)
 
 
 def _limits() -> Block:
     return Paragraph(
-        "Not detectable: a record whose fixes are all wrong in the same way, as of a "
-        "receiver that is led astray with a motion of its own, agrees with itself. And a gyro that "
-        f"changes by more than {UNSEEN:g} standard deviations of its bias after the last rest, in "
-        "a run without fixes, is seen by nothing before the next one.",
+        "Not detectable: fixes that are all wrong consistently, as of a spoofed receiver; and, in "
+        f"a run without fixes, a gyro that changes by more than {UNSEEN:g} standard deviations of "
+        "its bias after the last rest, until the next one.",
         "note",
     )
-
-
-def _looked_at(number: int) -> str:
-    return "one observation looked at" if number == 1 else f"{number} observations looked at"
 
 
 # Charts of a verdict: heading integrity over time, and the run against its re-run.
 
 
 #: Colors of the heading status, and the half height of its bar, which shows it without color.
-LIGHTS = {"green": (GREEN, 0.45), "amber": (ORANGE, 0.3), "red": (VERMILLION, 0.18)}
+COLOURS = {"green": (GREEN, 0.45), "amber": (ORANGE, 0.3), "red": (VERMILLION, 0.18)}
 BUCKETS = 500
 
 
@@ -605,7 +604,7 @@ def heading_error(result: NavigationRun, time: Array) -> Array | None:
     return np.asarray(np.interp(time, known, error, left=np.nan, right=np.nan))
 
 
-def light_chart(result: NavigationRun) -> Chart:
+def heading_chart(result: NavigationRun) -> Chart:
     """Heading integrity of each second, with the bounds that determine it."""
     light = result.trust.light
     table = light.table
@@ -618,15 +617,15 @@ def light_chart(result: NavigationRun) -> Chart:
             spans.append(Span(one.colour, one.begin, one.end))
     whole = Span("", float(time[0]), max(float(time[-1]) + 1.0, float(time[0]) + 2.0))
     fills = []
-    for name, (colour, half_height) in LIGHTS.items():
+    for name, (colour, half_height) in COLOURS.items():
         those = tuple(one for one in spans if one.name == name)
         if those:
-            fills.append(bar(name, those, 0.0, half_height, colour))
+            fills.append(bar(STATUS[name], those, 0.0, half_height, colour))
     ends = Line("", np.array([whole.begin, whole.end]), np.full(2, np.nan), GREY, legend=False)
     strip = Panel(
         "",
-        (ends, *span_names(tuple(spans), whole)),
-        categories=("light",),
+        (ends, *span_names(tuple(replace(s, name=STATUS[s.name]) for s in spans), whole)),
+        categories=("status",),
         height=0.22,
         fills=tuple(fills),
     )
@@ -635,8 +634,8 @@ def light_chart(result: NavigationRun) -> Chart:
     # Decades from below the smallest bound up to a practically unknown heading.
     known = min(float(np.nanmin(bound)), light.green) if np.isfinite(bound).any() else light.green
     shown = [
-        ("bound of the run itself (95 %)", bound, BLUE, "solid", 1.6),
-        ("bound confirmed by a check (99 %)", carried, BLACK, "solid", 2.0),
+        ("bound of the run (95 %)", bound, BLUE, "solid", 1.6),
+        ("bound by an independent check (99 %)", carried, BLACK, "solid", 2.0),
     ]
     error = heading_error(result, time)
     if error is not None:
@@ -652,10 +651,10 @@ def light_chart(result: NavigationRun) -> Chart:
     )
     green = f"{plain(light.green, 1)}°"
     return Chart(
-        "heading-light",
-        "The heading, second by second",
-        f"Above: the light. Below: what it goes by. Green needs both curves below {green} (the "
-        "dashed line); what is at the top is unknown there. The scale is one of decades.",
+        "heading-integrity",
+        "Heading integrity",
+        f"Above: status. Below: its bounds; trusted requires both below {green} (dashed). A curve "
+        "at the top is unknown.",
         "time, s",
         (strip, Panel("heading, deg", lines, log=True, levels=(Level(light.green, green),))),
     )
@@ -675,7 +674,7 @@ def repeated_chart(result: NavigationRun) -> Chart | None:
     both = (result.filtered, repeated.record)
     panels = []
     for label, difference, bounds in (
-        ("place, m", place, [plane_bound(r.covariance) for r in both]),
+        ("position, m", place, [plane_bound(r.covariance) for r in both]),
         (
             "heading, deg",
             turn,
@@ -686,7 +685,7 @@ def repeated_chart(result: NavigationRun) -> Chart | None:
         tall = 0.0
         for name, record, values, look in (
             ("bound of the run (95 %)", both[0], bounds[0], (BLUE, "solid", 1.6)),
-            ("bound of the repeated run (95 %)", both[1], bounds[1], (GREY, "dash", 1.4)),
+            ("bound of the re-run (95 %)", both[1], bounds[1], (GREY, "dash", 1.4)),
         ):
             at = record.sd.index.to_numpy(dtype=np.float64)
             within = (at >= time[0]) & (at <= time[-1])
@@ -695,7 +694,7 @@ def repeated_chart(result: NavigationRun) -> Chart | None:
             tall = max(tall, float(np.quantile(finite, 0.98)) if finite.size else 0.0)
         # The bounds of a start, and those of an outage, would hide the rest.
         most = max(1.15 * tall, 1.02 * float(np.nanmax(difference)), 1e-6)
-        lines.append(("run and repeated run apart", time, difference, (VERMILLION, "solid", 2.0)))
+        lines.append(("difference", time, difference, (VERMILLION, "solid", 2.0)))
         zero = Line("", time[[0, -1]], np.zeros(2), GREY, points=True, size=0.0, legend=False)
         drawn = [
             curve(name, at, np.minimum(values, most), *look, buckets=BUCKETS)
@@ -704,8 +703,8 @@ def repeated_chart(result: NavigationRun) -> Chart | None:
         panels.append(Panel(label, (zero, *drawn)))
     return Chart(
         "repeated",
-        "The run and its repetition",
-        f"How far the run is from the same run {repeated.change.what}, beside the bounds of both.",
+        "Run and re-run",
+        f"Difference between the run and its re-run {repeated.change.what}, with both bounds.",
         "time, s",
         tuple(panels),
     )

@@ -167,7 +167,7 @@ def _compare(root: Path, again: Path, manifest: dict[str, Any], digest: str) -> 
             continue
         difference = _difference(root / name, again / name)
         if difference is None:
-            details.append(f"{name}: drawn differently; its numbers stand in the JSON")
+            details.append(f"{name}: drawn differently; its numbers are in the JSON")
             continue
         within = max(within, difference)
         changed |= not difference <= EQUAL

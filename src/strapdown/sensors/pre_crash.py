@@ -86,25 +86,22 @@ def find_pre_crash_rest(
         span
         for start, end in candidates
         for span in _parts(before[(stamps >= start) & (stamps <= end)], LONG_BLOCK, floors)
-        if _length(span) >= LEAST_LENGTH
+        if span[1] - span[0] >= LEAST_LENGTH
     ]
     still = [s for s in spans if s[1] < impact - LAST_STOP or not moving_at_impact]
     if still:
         recent = [s for s in still if s[1] >= impact - RECENT]
-        best = max(recent, key=_length) if recent else max(still, key=lambda s: s[1])
+        # The longest of the recent ones, else the latest.
+        best = max(recent or still, key=lambda s: s[1] - s[0] if recent else s[1])
         return rest_between(before, *best, grade="still")
     if not spans:
         late = before[stamps >= impact - SHORT_REACH]
-        spans = [s for s in _parts(late, SHORT_BLOCK, floors) if _length(s) >= LEAST_STEADY]
+        spans = [s for s in _parts(late, SHORT_BLOCK, floors) if s[1] - s[0] >= LEAST_STEADY]
     if not spans:
         return None
-    best = max(spans, key=_length)
+    best = max(spans, key=lambda s: s[1] - s[0])
     standing = not moving_at_impact
     return rest_between(before, *best, grade="still" if standing else "steady")
-
-
-def _length(span: tuple[float, float]) -> float:
-    return span[1] - span[0]
 
 
 def _parts(

@@ -223,18 +223,14 @@ def regress_range(higher: Array, lower: Array) -> tuple[Array, Array]:
     freedom = max(len(x) - 4, 1)
     variance = (left**2).sum(axis=0) / freedom
     # Filters and quantization correlate the residuals; this is the number of independent ones.
-    hangs = _correlation(left)
+    power = (left**2).sum(axis=0)
+    lag = (left[1:] * left[:-1]).sum(axis=0) / np.maximum(power, 1e-300)
+    hangs = np.clip(lag, 0.0, 0.99)
     variance = variance * (1.0 + hangs) / (1.0 - hangs)
     sd = np.sqrt(np.maximum(variance, 1e-300)[:, None] * np.diag(inverse)[None, :])
     unseen = (vectors[:, ~seen] ** 2).sum(axis=1) > 1e-6
     sd[:, unseen] = np.inf
     return matrix, sd
-
-
-def _correlation(left: Array) -> Array:
-    power = (left**2).sum(axis=0)
-    lag = (left[1:] * left[:-1]).sum(axis=0) / np.maximum(power, 1e-300)
-    return np.asarray(np.clip(lag, 0.0, 0.99), dtype=np.float64)
 
 
 def agreement_findings(unit: CrashUnit, ranges: Sequence[Range]) -> list[Finding]:

@@ -111,7 +111,9 @@ def _flat_extreme(time: Array, y: Array, full: float, longest: float) -> Mask | 
     usual = float(np.median(y))
     if top <= 0.0 or top == usual:
         return None
-    step, scatter = _least_step(y), _scatter(y)
+    # Smallest difference of two values that occur: the quantization step, or rounding.
+    values = np.diff(np.unique(y))
+    step, scatter = float(values.min()) if values.size else 0.0, _scatter(y)
     low = top <= floor
     if low and top - usual < OFF_REST * step:
         return None
@@ -130,12 +132,6 @@ def _flat_extreme(time: Array, y: Array, full: float, longest: float) -> Mask | 
         if enough and short and jump >= least:
             return np.asarray(at, dtype=np.bool_)
     return None
-
-
-def _least_step(y: Array) -> float:
-    """Smallest difference of two values that occur: the quantization step, or rounding."""
-    gaps = np.diff(np.unique(y))
-    return float(gaps.min()) if gaps.size else 0.0
 
 
 def _scatter(y: Array) -> float:

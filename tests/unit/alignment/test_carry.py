@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.stats import chi2
+from tests.coded import coded
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -72,10 +73,26 @@ def test_what_is_known_besides_goes_along():
 def test_an_instant_outside_of_the_record():
     imu, truth = ideal(rocking(600.0), 50.0)
     with pytest.raises(
-        DataError, match=r"log\.csv, time: 601 s is outside the record, 0 to 600 s: the attitude"
+        DataError,
+        check=coded(
+            "alignment.instant-outside-record",
+            file="log.csv",
+            quantity="time",
+            time=601.0,
+            stamps=0.0,
+            stamps_2=600.0,
+        ),
     ):
         carry(imu, true_at(truth, 0), 601.0, SITE)
     with pytest.raises(
-        DataError, match=r"log\.csv, time: -5 s is outside the record, 0 to 600 s: the attitude"
+        DataError,
+        check=coded(
+            "alignment.instant-outside-record",
+            file="log.csv",
+            quantity="time",
+            time=-5.0,
+            stamps=0.0,
+            stamps_2=600.0,
+        ),
     ):
         carry(imu, replace(true_at(truth, 0), time=-5.0), 10.0, SITE)

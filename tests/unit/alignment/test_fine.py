@@ -174,12 +174,15 @@ def test_a_body_that_is_pushed_about_is_found_out(rest):
 
 
 def test_what_cannot_be_done_is_refused(rest):
-    with pytest.raises(DataError, match="epochs of 1 s"):
+    with pytest.raises(DataError, check=coded("alignment.too-few-epochs", interval=1.0)):
         FineAlignment().align(rest.imu.iloc[:300], SITE, UNCERTAINTY, roughly(rest))
     middle = roughly(rest)
     middle = type(middle)(middle.method, 100.0, middle.q_nb, middle.covariance)
     with pytest.raises(
-        DataError, match="time: the coarse alignment is valid at 100 s, and the record covers 0"
+        DataError,
+        check=coded(
+            "alignment.coarse-alignment-at-other-instant", quantity="time", time=100.0, begin=0.0
+        ),
     ):
         FineAlignment().align(rest.imu, SITE, UNCERTAINTY, middle)
     for options, word in (

@@ -251,7 +251,10 @@ def test_bad_input_is_refused_with_its_row():
     time = stamps(1000.0)
     values = FRONT.accel(time)
     values[17, 1] = np.nan
-    with pytest.raises(DataError, match="unit 4, row 18, accel_y"):
+    with pytest.raises(
+        DataError,
+        check=coded("tables.not-finite-number", row=18, file="unit 4", quantity="accel_y"),
+    ):
         Acceleration(time, values, source="unit 4")
     with pytest.raises(DataError, check=coded("crash.sample-change-velocity-needs-least")):
         Acceleration(time[:1], values[:1])

@@ -144,7 +144,10 @@ def test_an_entry_between_samples_is_carried_to_the_nearest(case, at, attitude):
 def test_an_entry_outside_of_the_record_is_named_and_no_window(case):
     _, imu, unit, effects, *_ = case
     with pytest.raises(
-        DataError, match="entry: the entry at 9 s is outside the record, -2 s to 1 s"
+        DataError,
+        check=coded(
+            "crash.entry-not-within-record", quantity="entry", at=9.0, time=-2.0, time_2=1.0
+        ),
     ):
         reconstruct_path(imu, effects, unit.levelling, -0.1, Entry.from_speed(7.1, 0.05, time=9.0))
 

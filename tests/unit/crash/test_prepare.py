@@ -147,7 +147,10 @@ def test_a_steady_stretch_says_so_and_is_graded():
 
 def test_a_record_that_starts_in_the_crash():
     made, _, _ = unit(start=0.01)
-    with pytest.raises(DataError, match=r"IMU1, rest: the record starts at 0.01 s, within"):
+    with pytest.raises(
+        DataError,
+        check=coded("crash.record-starts-in-crash", file="IMU1", quantity="rest", begin=0.01),
+    ):
         prepare_unit(made)
     out = prepare_unit(made, Preparation(levelling=(0.0, 0.0, 1.5)))
     assert out.rest is None

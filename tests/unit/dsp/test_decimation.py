@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown.dsp.decimation import decimate, low_pass_design, mean_samples
 from strapdown.errors import ConfigError, DataError
@@ -164,7 +165,7 @@ def test_bad_records_are_refused():
         DataError, check=lambda refused: refused.finding.code == "dsp.lies-outside-record-goes"
     ):
         decimate(np.zeros(10001), 0.0, STEP, [0.5, 1.1], design)
-    with pytest.raises(DataError, match="nan at sample 3"):
+    with pytest.raises(DataError, check=coded("dsp.channel-sample-such-all-would", at_row=3)):
         decimate(np.where(np.arange(10001) == 3, np.nan, 0.0), 0.0, STEP, [0.5], design)
     with pytest.raises(
         DataError, check=lambda refused: refused.finding.code == "dsp.lies-outside-record-goes"

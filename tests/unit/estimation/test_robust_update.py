@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown.errors import ConfigError
 from strapdown.estimation.covariance import COVARIANCES, BiermanThornton
@@ -217,7 +218,9 @@ def test_scale_multiplies_the_standard_deviation():
     for rule in (RobustUpdate, PaperUpdate):
         one, three = rule(Huber()), rule(Huber(), scale=3.0)
         assert three.step(30.0, 9.0, 1.0).weight == pytest.approx(one.step(10.0, 1.0, 1.0).weight)
-        with pytest.raises(ConfigError, match="scale of the update is 0"):
+        with pytest.raises(
+            ConfigError, check=coded("estimation.scale-update", quantity="scale", scale=0)
+        ):
             rule(Huber(), scale=0)
 
 

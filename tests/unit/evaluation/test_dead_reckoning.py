@@ -243,7 +243,10 @@ def test_files_may_hold_places(tmp_path):
         "end same as start",
     ]
     (tmp_path / "b.txt").write_text("12.5 moved 1 2 ft since 3\n")
-    with pytest.raises(DataError, match=r"b.txt, row 1, reference: .* not understood"):
+    with pytest.raises(
+        DataError,
+        check=coded("evaluation.not-understood", row=1, file="b.txt", quantity="reference"),
+    ):
         read_reference_words(tmp_path / "b.txt")
 
 

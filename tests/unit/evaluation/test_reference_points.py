@@ -189,7 +189,10 @@ def test_a_truth_of_a_part_of_the_log_is_told_as_that(tmp_path):
 
 def test_every_line_of_a_file_counts_and_a_bad_one_is_named(tmp_path):
     (tmp_path / "points.txt").write_text("# ours\nend same as start\n3 roll 1, pitch 2\n")
-    with pytest.raises(DataError, match=r"points.txt, row 3, reference: .* not understood"):
+    with pytest.raises(
+        DataError,
+        check=coded("evaluation.not-understood-2", row=3, file="points.txt", quantity="reference"),
+    ):
         read_reference_words(tmp_path / "points.txt")
 
 

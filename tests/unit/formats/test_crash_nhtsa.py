@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown.errors import DataError
 from strapdown.formats.crash_records import read_crash_record
@@ -73,7 +74,8 @@ def test_channels_say_what_the_header_says(folder):
 def test_a_folder_without_a_header_or_with_two(folder, tmp_path):
     (folder / "v2.EV5").write_text(HEADER)
     with pytest.raises(
-        DataError, match="test_a_folder_without_a_header0: the folder has 2 headers:"
+        DataError,
+        check=coded("io.folder-holds-headers", file="test_a_folder_without_a_header0", count=2),
     ):
         read_crash_record(folder)
     empty = tmp_path / "empty"

@@ -210,7 +210,10 @@ def test_a_rate_in_place_of_stamps(read):
     ) as error:
         triad_of_channels(record, {"x": "ax [g]"}, quantity="acceleration")
     assert (error.value.finding.row, "rate_hz" in error.value.finding.remedy) == (3, True)
-    with pytest.raises(ConfigError, match="rate_hz = 500 is stated"):
+    with pytest.raises(
+        ConfigError,
+        check=coded("io.rate-hz-stated-stamps-record", quantity="rate_hz", rate_hz=500.0),
+    ):
         triad_of_channels(record, {"x": "ax [g]"}, quantity="acceleration", rate_hz=500.0)
     # 39 steps in 19 ms are 2.6 % off 2 kHz; a longer record agrees.
     rows = [f"{k // 2},{k}" for k in range(400)]

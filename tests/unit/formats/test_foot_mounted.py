@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.io import savemat
+from tests.coded import coded
 
 from strapdown.errors import DataError
 from strapdown.formats import read_log
@@ -61,7 +62,9 @@ def test_a_table_of_points_may_have_units(tmp_path):
 def test_one_point_is_refused(tmp_path):
     path = tmp_path / "points.csv"
     path.write_text("time_s,north_m,east_m\n1.0,2.0,3.0\n")
-    with pytest.raises(DataError, match="1 control point") as refused:
+    with pytest.raises(
+        DataError, check=coded("io.control-point-origin-heading-fit", count=1)
+    ) as refused:
         read_control_points(path)
     assert refused.value.finding.remedy
 

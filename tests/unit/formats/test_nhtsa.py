@@ -232,5 +232,5 @@ def test_six_channels_make_an_imu_table_with_gravity_put_back(make):
     np.testing.assert_allclose(imu["accel_z"], 9.80665 * (np.arange(-2, 4) + 0.5), rtol=1e-12)
     with pytest.raises(DataError, check=coded("io.needed-2")):
         imu_of(test, (4, 5, 6), (1, 2, 3))
-    with pytest.raises(DataError, match="1 samples before"):
+    with pytest.raises(DataError, check=coded("io.samples-before", before=1)):
         imu_of(test, (1, 2, 3), (4, 5, 6), until=-0.00015)

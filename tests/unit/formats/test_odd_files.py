@@ -71,12 +71,14 @@ def test_a_last_line_that_was_cut_is_left_out(tmp_path, end):
 
 def test_rows_are_counted_as_an_editor_does(tmp_path):
     lines = ["# made by hand", "", HEAD, *ROWS[:5], "", "0.06,0.1,x,1", *ROWS[8:]]
-    with pytest.raises(DataError, match=r"row 10, gyro_y: 'x'"):
+    with pytest.raises(
+        DataError, check=coded("io.value-not-a-number", row=10, quantity="gyro_y", values="x")
+    ):
         read_log(written(tmp_path / "log.csv", "\n".join(lines)))
 
 
 def test_hexadecimal_is_no_number(tmp_path):
-    with pytest.raises(DataError, match="'0xFFF0' is not a number"):
+    with pytest.raises(DataError, check=coded("io.value-not-a-number", values="0xFFF0")):
         read_log(written(tmp_path / "log.csv", "\n".join([HEAD, *ROWS, "0.30,0xFFF0,0,0", ""])))
 
 

@@ -82,7 +82,10 @@ def test_parquet_missing_values_are_missing(tmp_path):
     columns["gx"] = pa.array([None if k == 5 else 7 for k in range(N)], pa.int64())
     path = tmp_path / "log.parquet"
     pq.write_table(table(columns), path)
-    with pytest.raises(DataError, match=r"log\.parquet, row 6, gyro_x: nan"):
+    with pytest.raises(
+        DataError,
+        check=coded("io.not-finite-in-rows", row=6, file="log.parquet", quantity="gyro_x"),
+    ):
         read_log(path, ReadOptions(gyro_unit="rad/s"))
 
 

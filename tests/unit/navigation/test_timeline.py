@@ -163,7 +163,10 @@ def test_a_command_in_navigation_is_past():
 
 
 def test_samples_that_end_before_navigation_say_so():
-    with pytest.raises(DataError, match=r"rest.csv.*end at 8 s in mode coarse"):
+    with pytest.raises(
+        DataError,
+        check=coded("navigation.samples-end-mode-before-navigation", file="rest.csv", time=8.0),
+    ):
         run_batch(standing((LEVEL, Navigation())), rest(8.0))
 
 
@@ -183,7 +186,14 @@ def test_a_known_state_begins_with_its_sample():
     assert run.record.modes[0].begin == pytest.approx(5.0)
     late = NavState.from_degrees(*HERE, time=-3.0)
     with pytest.raises(
-        DataError, match=r"rest\.csv, start: the state is of -3 s, and the samples begin at 0 s"
+        DataError,
+        check=coded(
+            "navigation.state-known-samples-begin",
+            file="rest.csv",
+            quantity="start",
+            time=-3.0,
+            time_2=0.0,
+        ),
     ):
         run_batch(NavigationPipeline(navigator(), start=KnownStart(late, *sd)), imu)
     first = NavigationPipeline(navigator(), start=KnownStart(late, *sd, at_first_sample=True))

@@ -177,13 +177,13 @@ def test_the_files_say_what_was_judged(sound, tmp_path):
     NAVIGATION.write(sound, tmp_path / "out")
     told = json.loads((tmp_path / "out" / "verdict.json").read_text(encoding="utf-8"))
     light = sound.trust.light
-    assert told["heading"]["share"]["green"] == light.share("green")
-    assert told["answer"].startswith("You can trust the place to ")
-    table = pd.read_csv(tmp_path / "out" / "heading_light.csv", comment="#")
+    assert told["heading"]["share"]["trusted"] == light.share("green")
+    assert told["answer"].startswith("Position bound, ")
+    table = pd.read_csv(tmp_path / "out" / "heading_integrity.csv", comment="#")
     assert len(table) == len(light.table)
-    assert (table["light"] == "green").mean() == light.share("green")
+    assert (table["status"] == "trusted").mean() == light.share("green")
     page = (tmp_path / "out" / "verdict.html").read_text(encoding="utf-8")
     assert 'href="report.html"' in page
-    assert f"{len(sound.trust.consistency)} observations looked at" in page
+    assert f"{len(sound.trust.consistency)} measurements tested" in page
     report = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert 'href="verdict.html"' in report

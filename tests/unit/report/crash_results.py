@@ -146,12 +146,12 @@ def figures_in(document):
         overview=by.get("overview-1"),
         pdof_by_window=by.get("pdof-by-window"),
         pdof_by_time_zero=by.get("pdof-by-time-zero"),
-        place=by["place"],
+        place=by["position"],
         attitude=by["attitude"],
         units=by.get("units"),
         accelerations=by.get("accelerations"),
         delta_v_budget=by.get("budget-delta-v"),
-        place_budget=by["budget-place"],
+        place_budget=by["budget-position"],
         severity=by.get("severity"),
     )
 

@@ -106,7 +106,7 @@ def test_signals_are_as_recorded_and_marked_where_a_range_ends():
     stamps = low.table.index.to_numpy() - offset
     there = np.interp(1e-3 * raw.x, stamps, low.table["accel_x"] / STANDARD_GRAVITY)
     np.testing.assert_allclose(raw.y, there, atol=1e-9)
-    merged = line(panel, "merged, biases taken off")
+    merged = line(panel, "merged, less bias")
     assert merged.y.min() < -10.0  # 12 g ahead
     held = line(panel, f"{low.name} at the end of its range")
     # ±2 g: at its end, but for the delay of its low-pass.
@@ -114,7 +114,7 @@ def test_signals_are_as_recorded_and_marked_where_a_range_ends():
     clipped = result.reconstruction.synchronised.units[0].accelerometers[0].clipped[:, 0]
     assert len(held.x) == int(clipped.sum())
     assert any(level.y == pytest.approx(-2.0, abs=0.01) for level in panel.levels)
-    down = line(figures.signals.panels[2], "merged, biases taken off")
+    down = line(figures.signals.panels[2], "merged, less bias")
     assert down.y[0] == pytest.approx(-1.0, abs=0.05)
     zero, end = unit.events.events[0].time_zero, unit.events.events[0].end
     assert merged.x[0] >= 1e3 * (zero - 0.05) - 1e-6
@@ -214,7 +214,7 @@ def test_a_budget_adds_up_and_is_sorted():
         size = 0.0
         for panel, total in zip(chart.panels, totals, strict=True):
             top, parts = panel.bars
-            assert panel.categories[0] == "all together" and top.at[0] == 0
+            assert panel.categories[0] == "total" and top.at[0] == 0
             assert top.values[0] == pytest.approx(total)
             assert math.sqrt((parts.values**2).sum()) == pytest.approx(total)
             size = size + parts.values**2

@@ -22,7 +22,6 @@ from strapdown.report.document import (
     Picture,
     document_page,
     draw_stills,
-    plain_document,
 )
 
 sys.path.insert(0, str(Path(__file__).parent))
@@ -147,8 +146,8 @@ def test_a_document_without_charts_has_no_script():
 
 
 def test_a_second_cleaning_does_nothing(document):
-    once = plain_document(document)
-    again = plain_document(once)
+    once = document.plain
+    again = once.plain
     assert (again.title, again.facts) == (once.title, once.facts)
     for a, b in zip(again.sections, once.sections, strict=True):
         for one, other in zip(a.blocks, b.blocks, strict=True):

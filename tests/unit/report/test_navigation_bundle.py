@@ -80,7 +80,7 @@ def test_the_json_is_the_record(result, found):
     assert told["end"]["heading_sd_deg"] == float(record.sd["heading"].iloc[-1])
     assert told["end"]["horizontal_bound_95_m"] == float(plane_bound(record.covariance)[-1])
     (outage,) = told["outages"]
-    assert outage["aid"] == "rtk"
+    assert outage["measurement"] == "rtk"
     assert 11.0 <= outage["from_s"] <= 12.0
     assert 20.0 <= outage["to_s"] <= 21.0
     inside = (record.sd.index >= outage["from_s"]) & (record.sd.index <= outage["to_s"])
@@ -115,7 +115,7 @@ def test_numbers_in_the_json_have_units_in_their_keys(result, found):
 def test_the_json_states_its_conventions_and_no_clock(result, found):
     told = navigation_json(result, found)
     assert "north, east, down" in told["conventions"]["body_axes"]
-    assert told["conventions"]["errors"].startswith("computed or measured less true")
+    assert told["conventions"]["errors"].startswith("error = computed − true")
     assert told == navigation_json(result)
     assert json.loads(json.dumps(told, allow_nan=False)) == told
     assert "\u00a0" not in json.dumps(told, ensure_ascii=False)
@@ -126,7 +126,7 @@ def test_each_drawing_is_a_file(result, found, tmp_path):
     write_drawings(document, draw_stills(document), tmp_path / "figures")
     names = sorted(p.stem for p in (tmp_path / "figures").iterdir())
     assert names == sorted(chart.slug for chart in drawings(document))
-    assert {"plan", "bounds", "errors-place", "nees", "innovations-rtk-position"} <= set(names)
+    assert {"plan", "bounds", "errors-position", "nees", "innovations-rtk-position"} <= set(names)
 
 
 def test_the_terminal_says_what_the_page_says(result, capsys):

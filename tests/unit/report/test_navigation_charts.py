@@ -135,7 +135,7 @@ def test_fixes_outside_of_the_picture_do_not_widen_it():
     fixes = given.fixes["rtk"].copy()
     fixes.iloc[3, fixes.columns.get_loc("lat")] += 1.0
     far = told(made, fixes={"rtk": fixes})
-    assert "1 fix lies outside" in plan_chart(far).panels[0].title + plan_chart(far).caption
+    assert "1 fix is outside" in plan_chart(far).panels[0].title + plan_chart(far).caption
     assert plan_chart(far).panels[0].height == plan_chart(given).panels[0].height
 
 
@@ -197,7 +197,7 @@ def test_bounds_are_of_95_percent():
 
 
 def test_states_are_in_units_that_people_use():
-    gyro, offset = charts.state_charts(record())
+    gyro, offset = charts.state_charts(told(record()))
     assert gyro.panels[1].y_label == "x, deg/h"
     assert gyro.panels[1].lines[0].y[0] == pytest.approx(np.degrees(2e-6) * 3600.0)
     assert offset.title == "Rtk: time offset"
@@ -251,7 +251,7 @@ def test_innovations_far_off_are_drawn_at_the_edge():
     (edge,) = named(panel, "beyond")
     assert edge.x.tolist() == [21.0]
     assert edge.symbol == "triangle-up"
-    assert "3 lie beyond the edge" in chart.caption  # one a component
+    assert "3 are beyond the axis" in chart.caption  # one a component
     # 1.96 standard deviations of 2 m.
     assert np.nanmax(panel.fills[0].high) == pytest.approx(3.919928)
     assert np.isnan(panel.fills[0].high).any()
@@ -275,7 +275,7 @@ def test_normalised_squares_are_those_of_the_record():
     (one,) = agreements(made)
     table = made.innovations["rtk.position"]
     squares = sum(table[f"nu {x}"] ** 2 / table[f"s {x}"] for x in one.labels)
-    (points,) = named(nis_chart(made, (one,)).panels[1], "an epoch")
+    (points,) = named(nis_chart(made, (one,)).panels[1], "epoch")
     assert points.y == pytest.approx(squares.to_numpy())
     assert one.mean_nis == pytest.approx(squares.mean())
     low, high = one.band
@@ -310,7 +310,7 @@ def test_short_and_lonely_runs_are_drawn(make):
         charts.height_chart(given),
         charts.velocity_chart(given),
         charts.attitude_chart(given),
-        *charts.state_charts(given.record),
+        *charts.state_charts(given),
     ]
     drawn += [innovation_chart(given.record, one) for one in agreements(given.record)]
     for chart in drawn:

@@ -51,8 +51,8 @@ def test_the_headline_is_the_end_of_the_record():
     said = plain(headline(found))
     assert f"{last['lat']:.6f}°, {last['lon']:.6f}°" in said
     assert "after 120 s and 959 m" in said  # 8 m/s over 119.9 s
-    assert "known to 7.34 m" in said  # 2.4477 * 3 m
-    assert "heading to 0.98°" in said  # 1.96 * 0.5 deg
+    assert "position 7.34 m" in said  # 2.4477 * 3 m
+    assert "heading 0.98°" in said  # 1.96 * 0.5 deg
 
 
 def test_the_end_stands_in_the_table():
@@ -61,8 +61,8 @@ def test_the_end_stands_in_the_table():
     assert table["heading"] == ["200.00 ± 0.98°"] * 2
     assert table["horizontal ±"] == ["7.34 m"] * 2
     assert table["velocity north"][1] == "−7.52 ± 0.20 m/s"  # 8 cos 200
-    assert table["place"][0].startswith("−33.75")
-    assert "−70.60" in table["place"][0]
+    assert table["position"][0].startswith("−33.75")
+    assert "−70.60" in table["position"][0]
 
 
 def test_longitudes_that_went_on_are_told_within_half_a_turn():
@@ -256,7 +256,7 @@ def test_what_was_withheld_is_scored():
 def test_events_beyond_what_can_be_read_are_in_the_json():
     made = record()
     many = replace(made, events=made.events * 50)
-    assert "10 more stand in navigation.json" in event_table(told(many)).caption
+    assert "10 more are in navigation.json" in event_table(told(many)).caption
 
 
 def test_numbers_are_said_as_people_say_them():

@@ -152,7 +152,9 @@ def test_what_is_no_number_is_refused_with_its_row():
     time, truth = pulse(30.0)
     values, limits = two_ranges(time, truth)
     values[1][7, 1] = np.nan
-    with pytest.raises(DataError, match="row 8, range 1 y"):
+    with pytest.raises(
+        DataError, check=coded("tables.not-finite-number", row=8, quantity="range 1 y")
+    ):
         merge_ranges(time, [Range(v, end, truth) for v, end in zip(values, limits, strict=True)])
     one = [Range(truth, limits[0], truth)]
     with pytest.raises(DataError, check=coded("tables.time-does-not-advance-followed")):

@@ -382,6 +382,8 @@ def test_what_is_refused():
         inject_faults(tables["A"], [DropOut("gyro_x", 50.0)]),
         inject_faults(tables["B"], [DropOut("gyro_x", 60.0)]),
     )
-    with pytest.raises(DataError, match="4 healthy axes") as error:
+    with pytest.raises(
+        DataError, check=coded("sensors.healthy-axes-left-they-do", used=4)
+    ) as error:
         vote_units(mounted, {"A": gone[0], "B": gone[1]})
     assert error.value.finding.row == 6001

@@ -235,7 +235,12 @@ def test_what_is_not_seen_is_told():
     tracks = filmed(pair)
     with pytest.raises(DataError, check=coded("simulation.camera-no-marker", quantity="marker")):
         path_from_cameras(*tracks, pair, marker="mask")
-    with pytest.raises(DataError, match="marker 'mark' is outside the central 1 px"):
+    with pytest.raises(
+        DataError,
+        check=coded(
+            "simulation.camera-does-not-see-marker", quantity="marker", marker="mark", central=1.0
+        ),
+    ):
         path_from_cameras(*tracks, pair, marker="mark", central=1.0)
     late = filmed(pair, start=2.3)[1]
     early = filmed(pair, end=2.2)[0]
