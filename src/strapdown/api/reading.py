@@ -9,6 +9,7 @@ restores each number bitwise.
 from __future__ import annotations
 
 import hashlib
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -322,6 +323,10 @@ def read_gnss(
         velocity_sd=velocity_sd_m_per_s,
         repair=repair,
     )
+    return _gnss(path, options)
+
+
+def _gnss(path: str | Path, options: GnssOptions) -> GnssFixes:
     table = read_gnss_table(path, options)
     fixes = GnssFixes(table)
     fixes.attrs = dict(table.attrs)
@@ -350,28 +355,36 @@ def read(path: str | Path) -> Streams:
     from strapdown.formats.trajectory_readers import read_trajectory
     from strapdown.tables import attitude_table
 
+    def fixes(path: str | Path) -> pd.DataFrame:
+        return _gnss(path, GnssOptions(unstated_position_sd=math.inf))
+
     tables: dict[str, pd.DataFrame] = {}
-    refused: StrapdownError | None = None
-    for stream, table_of in (
-        ("imu", read_imu),
-        ("gnss", read_gnss),
-        ("reference", read_trajectory),
-    ):
-        if stream == "reference" and "reference" in tables:
+    refused: list[StrapdownError] = []
+    for stream, table_of in (("imu", read_imu), ("gnss", fixes), ("reference", read_trajectory)):
+        if stream in tables:
             continue
         try:
             tables[stream] = table_of(path)
         except StrapdownError as error:
-            # A recording need not have every stream; if it has none, report why it is not a log.
-            refused = refused or error
+            refused.append(error)
             continue
         if "reference" in tables[stream].attrs:
             q_nb, stamps = tables[stream].attrs["reference"]
             tables["reference"] = attitude_table(stamps, q_nb)
     if not tables:
-        assert refused is not None  # each of them failed
-        raise refused
+        # A file without a stream is no fault: report that of a stream that it has.
+        raise next((e for e in refused if e.finding.code not in _LACKS), refused[0])
     return Streams(tables, Path(path).name)
+
+
+#: Codes that say that a recording does not have a stream.
+_LACKS = {
+    "io.no-stream",
+    "io.no-gyro-columns",
+    "io.no-gyro-columns-left-out",
+    "io.missing-columns-2",
+    "io.missing-columns-3",
+}
 
 
 def imu_input(source: Any) -> ImuFile | pd.DataFrame:

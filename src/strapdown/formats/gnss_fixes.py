@@ -119,6 +119,15 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
     asked, taken = options.position_sd, {}
     if fixes.position_sd is None and asked is None and options.unstated_position_sd is not None:
         asked = taken["position_sd_taken"] = options.unstated_position_sd
+        if np.isinf(asked).all():
+            fixes.findings.append(
+                Finding(
+                    "io.position-sd-not-stated",
+                    severity="warning",
+                    file=fixes.name,
+                    quantity=", ".join(POSITION_SD),
+                )
+            )
     position_sd = _sd(fixes, "position", asked, count)
     asked = options.velocity_sd
     unstated = fixes.velocity is not None and fixes.velocity_sd is None and asked is None
