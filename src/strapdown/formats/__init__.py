@@ -22,6 +22,7 @@ from strapdown.formats import (
     gnss_nmea,
     gnss_pos,
     hdf5,
+    inertial_explorer,
     join,
     kf_gins,
     kitti,
@@ -190,6 +191,9 @@ READERS: dict[str, Reader] = {
         "folder or zip of one text table a sensor",
         sensor_folder.detect,
         {"imu": sensor_folder.read},
+    ),
+    "inertial-explorer": Reader(
+        inertial_explorer.TITLE, inertial_explorer.detect, {"reference": inertial_explorer.read}
     ),
     "rtklib": Reader("solution of RTKLIB (.pos)", gnss_pos.detect, {"gnss": gnss_pos.read}),
     "nmea": Reader(

@@ -57,12 +57,18 @@ def turned(time: Array, own: Array, q: Array) -> Array:
 
 
 def solution(
-    path: Path, columns: Sequence[Array], clock: Clock, findings: Sequence[Finding] = ()
+    path: Path,
+    columns: Sequence[Array],
+    clock: Clock,
+    findings: Sequence[Finding] = (),
+    *,
+    of_recorder: bool = True,
 ) -> pd.DataFrame:
-    """Make a Trajectory of the solution that a recorder computed itself.
+    """Make a Trajectory of a solution.
 
     `columns`: time (s), position, velocity and attitude, (n,) and three of (n, 3); rows with a
-    value that is not a number are left out. DataError: no row is left, or as `trajectory_table`.
+    value that is not a number are left out. `of_recorder`: whether the recorder computed it.
+    DataError: no row is left, or as `trajectory_table`.
     """
     everything = np.column_stack(columns)
     use = np.isfinite(everything).all(axis=1)
@@ -72,13 +78,9 @@ def solution(
     kept = everything[use]
     table = trajectory_table(kept[:, 0], kept[:, 1:4], kept[:, 4:7], kept[:, 7:], source=path.name)
     table.attrs["ellipsoid"] = "wgs84"
-    own = Finding(
-        "io.reference-own-solution",
-        file=path.name,
-        quantity="reference",
-        severity="note",
-        count=int(use.sum()),
-        size=use.size,
-    )
-    table.attrs["findings"] = (own, *findings)
+    code = "io.reference-own-solution" if of_recorder else "io.reference-rows"
+    count = {"count": int(use.sum()), "size": use.size}
+    note = Finding(code, file=path.name, quantity="reference", severity="note", data=count)
+    told = of_recorder or not use.all()
+    table.attrs["findings"] = (*([note] if told else []), *findings)
     return with_clock(table, clock)

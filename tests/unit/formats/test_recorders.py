@@ -883,6 +883,61 @@ def test_sbet_recorded(recordings):
     assert table["VD"].mean() == pytest.approx(0.0306, rel=0.01)
 
 
+# Inertial Explorer
+
+PREAMBLE = """Project:     drive
+Program:     Inertial Explorer Version 8.90.6611
+Profile:     own
+Datum:       WGS84, (processing datum)
+Master 1:    Name base, Status ENABLED
+             Position 30 27 23.39873, -114 23 49.23157, 77.631 m (WGS84, Ellipsoidal hgt)
+
+"""
+
+
+def test_inertial_explorer_degrees_and_velocity_of_the_body(tmp_path):
+    names = "UTCDate Week GPSTime Latitude Longitude H-Ell VelBdyX VelBdyY VelBdyZ "
+    names += "Roll Pitch Heading Q"
+    units = "(MDY) (weeks) (sec) (+/-D M S) (+/-D M S) (m) (m/s) (m/s) (m/s) (deg) (deg) (deg)   "
+    rows = "04/03/2019 2254 604799.00 30 30 36.0 -0 30 36.0 12.5 0.5 10 -0.25 0.0 0.0 270.0 1\n"
+    rows += "04/03/2019 2255 0.00  30 30 36.0  -0 30 37.0  12.5  0.5 10.0 -0.25  0.0 0.0 90.0 1\n"
+    path = tmp_path / "truth.txt"
+    path.write_text(PREAMBLE + names + "\n" + units + "(-)\n" + rows + "\nEnd of file\n")
+    assert kind(path) == "inertial-explorer"
+    table = read_trajectory(path)
+    assert table.index.tolist() == [604799.0, 604800.0]
+    assert table.attrs["gps_week"] == 2254
+    np.testing.assert_allclose(table["lat"], 30.51)
+    np.testing.assert_allclose(table["lon"], [-0.51, -0.51 - 1 / 3600], rtol=1e-12)
+    assert table["alt"].tolist() == [12.5, 12.5]
+    # Heading west: forward is west, right is north; up is -0.25.
+    np.testing.assert_allclose(table[["VN", "VE", "VD"]].iloc[0], [0.5, -10.0, 0.25], atol=1e-9)
+    np.testing.assert_allclose(table[["VN", "VE", "VD"]].iloc[1], [-0.5, 10.0, 0.25], atol=1e-9)
+    assert table["heading"].tolist() == pytest.approx([-90.0, 90.0])
+
+
+def test_inertial_explorer_faults_are_named(tmp_path):
+    names = "GPSTime Latitude Longitude H-Ell VNorth VEast VUp Roll Pitch Heading\n"
+    units = "(sec) (deg) (deg) (m) (m/s) (m/s) (m/s) (deg) (deg) (deg)\n"
+    row = "10.0 47.0 8.0 500.0 1.0 2.0 3.0 4.0 5.0 6.0\n"
+    path = tmp_path / "truth.txt"
+    path.write_text(PREAMBLE + names + units + row + row.replace("10.0", "11.0"))
+    table = read_trajectory(path)
+    assert table.iloc[1].tolist() == [47.0, 8.0, 500.0, 1.0, 2.0, -3.0, 4.0, 5.0, 6.0]
+    path.write_text(PREAMBLE + names + units + row + row[:-5] + "\n")
+    with pytest.raises(DataError, check=coded("io.inertial-explorer-row", row=11)):
+        read_trajectory(path)
+    path.write_text(PREAMBLE + names + units.replace("(m/s)", "(knots)") + row)
+    with pytest.raises(DataError, check=coded("io.inertial-explorer-unit", quantity="vnorth")):
+        read_trajectory(path)
+    path.write_text(PREAMBLE + names.replace("VNorth", "COG") + units + row)
+    with pytest.raises(DataError, check=coded("io.missing-columns-3", missing=("vnorth",))):
+        read_trajectory(path)
+    path.write_text(PREAMBLE + row)
+    with pytest.raises(DataError, check=coded("io.inertial-explorer-header")):
+        read_trajectory(path)
+
+
 # Damage, missing libraries, foreign formats
 
 
@@ -905,8 +960,8 @@ def test_a_cut_or_overwritten_file_is_refused_or_read_in_part(tmp_path):
     random = np.random.default_rng(4)
     for path, module in everything(tmp_path):
         data = path.read_bytes()
-        cuts = [data[:n] for n in (1, 7, 12, 40, len(data) // 3, len(data) // 2, len(data) - 3)]
-        for _ in range(6):
+        cuts = [data[:n] for n in (7, 40, len(data) // 2, len(data) - 3)]
+        for _ in range(3):
             noise = bytearray(data)
             at = int(random.integers(20, len(data) - 30))
             noise[at : at + 20] = random.bytes(20)
