@@ -136,6 +136,7 @@ READERS: dict[str, Reader] = {
             "magnetometer": ros.read_magnetometer,
             "barometer": ros.read_barometer,
         },
+        ros.files_of,
     ),
     "novatel": Reader(
         novatel.TITLE,

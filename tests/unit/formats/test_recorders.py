@@ -119,6 +119,20 @@ def test_px4_body_axes_means_and_microseconds(tmp_path):
     np.testing.assert_allclose(imu.iloc[0], [0.1, 0.2, 0.3, 1.0, 2.0, -G], rtol=1e-6)
 
 
+def test_px4_increments_of_vehicle_imu(tmp_path):
+    fields = [("timestamp", "uint64_t"), ("timestamp_sample", "uint64_t")]
+    fields += [("delta_angle", "float[3]"), ("delta_velocity", "float[3]")]
+    fields += [("delta_angle_dt", "uint32_t"), ("delta_velocity_dt", "uint32_t")]
+    rows = [
+        (5000 * k + 90, 5000 * k, 5e-4, 0.0, 1e-3, 0.0, 5e-3, -G * 0.004, 5000, 4000)
+        for k in range(1, 9)
+    ]
+    imu = read_log(written(tmp_path / "imu.ulg", ulog([("vehicle_imu", fields, rows)]))).imu
+    np.testing.assert_allclose(imu.iloc[0], [0.1, 0.0, 0.2, 0.0, 1.25, -G], rtol=1e-6)
+    assert imu.attrs["sampling"] == "mean"
+    assert imu.index[0] == pytest.approx(0.005)
+
+
 def test_px4_accelerometer_on_its_own_stamps_is_interpolated(tmp_path):
     raw = px4.read(flight(tmp_path, late=-2000))
     # Half a sample later than written: between two values 0.01 apart.
@@ -322,6 +336,7 @@ def test_ros_header_stamps_open_axes_and_velocity_of_the_fixes(tmp_path, version
         assert kind(file) == "ros"
         raw = ros.read(file)
         assert raw.axes is None
+        assert all(f.is_file() for f in raw.files)
         assert raw.columns["time"].tolist() == [T0 * 10**9 + 10_000_000 * k for k in range(9)]
         np.testing.assert_allclose(raw.columns["gyro_z"], 0.1 * np.arange(9))
         table = read_gnss(file)
@@ -694,6 +709,18 @@ def test_ubx_fixes_in_gps_time(tmp_path):
     np.testing.assert_allclose(first[["VD_sd", "down_sd"]], [0.2, 2.5])
     assert first["quality"] == 4
     assert table.attrs["findings"][0].code == "io.fixes-without-position-left-out"
+
+
+def test_ubx_the_finer_position_of_the_same_instant(tmp_path):
+    fine = (136_154_000, 80_000_000, 470_000_000, 500_000, 450_000, 12, -34, 5, 6, 123, 456)
+    frame = ubx_frame(1, 0x14, struct.pack("<B2xBIiiiibbbbII", 0, 0, *fine))
+    path = written(tmp_path / "rtk.ubx", nav_pvt(1) + frame + nav_pvt(2))
+    table = read_gnss(path)
+    np.testing.assert_allclose(
+        table.iloc[0][["lat", "lon", "alt"]], [47.0 - 34e-9, 8.0 + 12e-9, 500.0005], rtol=1e-14
+    )
+    assert table["down_sd"].tolist() == pytest.approx([0.0456, 2.5])
+    assert table["alt"].iloc[1] == 500.0
 
 
 def test_ubx_sensors_in_ms_of_the_receiver(tmp_path):
