@@ -46,7 +46,7 @@ from strapdown.formats import (
     xsens,
 )
 from strapdown.formats.assemble import assemble
-from strapdown.formats.binary import first_bytes
+from strapdown.formats.binary import first_bytes, or_sentences
 from strapdown.formats.columns import read_name
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.recording import NoStreamError, RawLog, ReadOptions, Recording
@@ -141,15 +141,19 @@ READERS: dict[str, Reader] = {
     "novatel": Reader(
         novatel.TITLE,
         novatel.detect,
-        {"imu": novatel.read, "gnss": novatel.read_fixes, "reference": novatel.read_reference},
+        {
+            "imu": novatel.read,
+            "gnss": or_sentences(novatel.read_fixes),
+            "reference": novatel.read_reference,
+        },
     ),
-    "sbf": Reader(sbf.TITLE, sbf.detect, {"imu": sbf.read, "gnss": sbf.read_fixes}),
+    "sbf": Reader(sbf.TITLE, sbf.detect, {"imu": sbf.read, "gnss": or_sentences(sbf.read_fixes)}),
     "ubx": Reader(
         ubx.TITLE,
         ubx.detect,
         {
             "imu": ubx.read,
-            "gnss": ubx.read_fixes,
+            "gnss": or_sentences(ubx.read_fixes),
             "reference": ubx.read_reference,
             "wheel": ubx.read_wheel,
         },

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import re
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -13,14 +15,28 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.errors import DataError, Finding, StrapdownError
+from strapdown.formats import gnss_nmea
 from strapdown.formats.clocks import Clock, with_clock
+from strapdown.formats.gnss_fixes import Fixes
+from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.tables import trajectory_table
 
-__all__ = ["Quantities", "damage", "first_bytes", "interpolated", "solution", "turned"]
+__all__ = [
+    "Quantities",
+    "damage",
+    "first_bytes",
+    "interpolated",
+    "or_sentences",
+    "solution",
+    "turned",
+]
 
 Array = NDArray[np.float64]
 #: Argument of `RawLog.of`.
 Quantities = dict[str, tuple[NDArray[Any], str | None]]
+
+
+_SENTENCE = re.compile(rb"\$[A-Z]{5},[ -#%-)+-~]*\*[0-9A-Fa-f]{2}")
 
 
 def first_bytes(path: Path, count: int) -> bytes:
@@ -84,3 +100,24 @@ def solution(
     told = of_recorder or not use.all()
     table.attrs["findings"] = (*([note] if told else []), *findings)
     return with_clock(table, clock)
+
+
+def or_sentences(read: Callable[[Path], RawLog]) -> Callable[[Path], RawLog | Fixes]:
+    """Make a reader of fixes that takes NMEA sentences of the stream if it has no own fixes."""
+
+    def either(path: Path) -> RawLog | Fixes:
+        try:
+            return read(path)
+        except NoStreamError:
+            found = _SENTENCE.findall(path.read_bytes())
+            if not any(sentence[3:6] == b"GGA" for sentence in found):
+                raise
+        with tempfile.TemporaryDirectory() as folder:
+            lines = Path(folder) / path.name
+            lines.write_bytes(b"\n".join(found))
+            fixes = gnss_nmea.read(lines)
+        note = Finding("io.fixes-of-sentences", file=path.name, severity="note", count=len(found))
+        fixes.findings.append(note)
+        return fixes
+
+    return either

@@ -27,7 +27,7 @@ from strapdown.formats import (
     sbf,
     ubx,
 )
-from strapdown.formats.gnss_files import read_gnss
+from strapdown.formats.gnss_files import GnssOptions, read_gnss
 from strapdown.formats.trajectory_readers import read_trajectory
 
 G = 9.80665
@@ -742,6 +742,24 @@ def test_ubx_raw_alone_is_refused(tmp_path):
     path = written(tmp_path / "raw.ubx", ubx_frame(16, 3, bytes(12)) * 3)
     with pytest.raises(DataError, check=coded("io.ubx-raw-only")):
         open_stream(path, "imu")
+
+
+def test_sentences_of_a_stream_without_own_fixes(tmp_path):
+    out = b""
+    for k in range(5):
+        body = f"GNGGA,12{k:02d}00.00,4730.0,N,00830.0,E,4,12,0.8,500.0,M,47.0,M,,"
+        total = 0
+        for octet in body.encode():
+            total ^= octet
+        out += ubx_frame(2, 0x15, b"$\xff\0" * 40) + f"${body}*{total:02X}\r\n".encode()
+    path = written(tmp_path / "raw.ubx", out)
+    assert kind(path) == "ubx"
+    table = read_gnss(path, GnssOptions(position_sd=1.0))
+    assert len(table) == 5
+    assert table.iloc[0][["lat", "lon", "alt"]].tolist() == [47.5, 8.5, 547.0]
+    assert table.attrs["findings"][-1].code == "io.fixes-of-sentences"
+    with pytest.raises(NoStreamError):
+        open_stream(written(tmp_path / "none.ubx", ubx_frame(2, 0x15, bytes(40))), "gnss")
 
 
 def test_ubx_recorded(recordings):
