@@ -32,6 +32,7 @@ from strapdown.formats import (
     gpx,
     gsdc,
     hdf5,
+    inertial_explorer,
     join,
     json_objects,
     kf_gins,
@@ -65,6 +66,8 @@ from strapdown.formats import (
 from strapdown.formats.assemble import assemble
 from strapdown.formats.binary import first_bytes
 from strapdown.formats.find_columns import names_of_quantities
+from strapdown.formats.binary import first_bytes, or_sentences
+from strapdown.formats.columns import read_name
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.recording import NoStreamError, RawLog, ReadOptions, Recording
 from strapdown.plugins import plugin, plugins
@@ -153,19 +156,24 @@ READERS: dict[str, Reader] = {
             "magnetometer": ros.read_magnetometer,
             "barometer": ros.read_barometer,
         },
+        ros.files_of,
     ),
     "novatel": Reader(
         novatel.TITLE,
         novatel.detect,
-        {"imu": novatel.read, "gnss": novatel.read_fixes, "reference": novatel.read_reference},
+        {
+            "imu": novatel.read,
+            "gnss": or_sentences(novatel.read_fixes),
+            "reference": novatel.read_reference,
+        },
     ),
-    "sbf": Reader(sbf.TITLE, sbf.detect, {"imu": sbf.read, "gnss": sbf.read_fixes}),
+    "sbf": Reader(sbf.TITLE, sbf.detect, {"imu": sbf.read, "gnss": or_sentences(sbf.read_fixes)}),
     "ubx": Reader(
         ubx.TITLE,
         ubx.detect,
         {
             "imu": ubx.read,
-            "gnss": ubx.read_fixes,
+            "gnss": or_sentences(ubx.read_fixes),
             "reference": ubx.read_reference,
             "wheel": ubx.read_wheel,
         },
@@ -296,6 +304,9 @@ READERS: dict[str, Reader] = {
     ),
     "json": Reader("JSON of samples: lines, list", json_objects.detect, {TABLE: json_objects.read}),
     "excel": Reader("Excel workbook (.xlsx)", excel.detect, {TABLE: excel.read}),
+    "inertial-explorer": Reader(
+        inertial_explorer.TITLE, inertial_explorer.detect, {"reference": inertial_explorer.read}
+    ),
     "rtklib": Reader("solution of RTKLIB (.pos)", gnss_pos.detect, {"gnss": gnss_pos.read}),
     "nmea": Reader(
         "NMEA 0183: GGA, RMC, VTG, ZDA, GST", gnss_nmea.detect, {"gnss": gnss_nmea.read}

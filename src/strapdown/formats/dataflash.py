@@ -6,8 +6,8 @@ type; a record FMT gives each type its length, name, letters of the fields' form
 Letters c, C, e, E stand for hundredths and L for 1e-7 deg. Records FMTU and UNIT name the units.
 ``TimeUS`` counts µs since the start of the autopilot. IMU: rad/s and m/s² of specific force,
 forward, right, down. GPS: ``Alt`` is over the sea; GPA has accuracies, and ``AEl``, the height over
-the ellipsoid, or before 4.7 ``Und``, the geoid undulation with its sign reversed (pull request
-29904). MAG: milligauss. XKF1 or NKF1 and POS: the solution of the autopilot.
+the ellipsoid, or in older logs ``Und``, the geoid undulation with its sign reversed (pull request
+29904 of ArduPilot). MAG: milligauss. XKF1 or NKF1 and POS: the solution of the autopilot.
 """
 
 from __future__ import annotations

@@ -62,6 +62,11 @@ def _suffix(path: Path) -> str | None:
     return next((suffix for magic, suffix in MAGIC.items() if head.startswith(magic)), None)
 
 
+def files_of(path: Path) -> tuple[Path, ...]:
+    """List the files of a bag: itself, or those of its folder."""
+    return tuple(sorted(p for p in path.iterdir() if p.is_file())) if path.is_dir() else (path,)
+
+
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
     """Open a bag; the library goes by the ending, which a file may have lost."""
@@ -129,6 +134,12 @@ def _topic(
     return str(picked[0])
 
 
+def _log(path: Path, out: Quantities, clock: str, findings: list[Finding]) -> RawLog:
+    raw = RawLog.of(path, out, clock=clock, findings=findings)
+    raw.files = files_of(path)
+    return raw
+
+
 def _vector(prefix: str, v: Any) -> dict[str, float]:
     return {f"{prefix}_x": v.x, f"{prefix}_y": v.y, f"{prefix}_z": v.z}
 
@@ -158,7 +169,7 @@ def read(path: Path) -> RawLog:
             )
             continue
         out |= part
-    return RawLog.of(path, out, clock=clock, findings=findings)
+    return _log(path, out, clock, findings)
 
 
 def read_fixes(path: Path) -> RawLog:
@@ -179,7 +190,7 @@ def read_fixes(path: Path) -> RawLog:
     if np.isfinite(sd).any():
         out |= {f"{n}_sd": (sd[:, k], "m") for k, n in enumerate(("north", "east", "down"))}
     velocity = _velocity(path, columns, findings)
-    return RawLog.of(path, out | velocity, clock=clock, findings=findings)
+    return _log(path, out | velocity, clock, findings)
 
 
 def _velocity(path: Path, fixes: Columns, findings: list[Finding]) -> dict[str, Any]:
@@ -237,7 +248,7 @@ def read_magnetometer(path: Path) -> RawLog:
     )
     units = {"time": "ns"} | {f"mag_{a}": "T" for a in "xyz"}
     out: Quantities = {q: (columns[q], u) for q, u in units.items()}
-    return RawLog.of(path, out, clock=clock, findings=findings)
+    return _log(path, out, clock, findings)
 
 
 def read_barometer(path: Path) -> RawLog:
@@ -246,4 +257,4 @@ def read_barometer(path: Path) -> RawLog:
         path, "barometer", PRESSURE, lambda m: {"pressure": m.fluid_pressure}
     )
     out: Quantities = {"time": (columns["time"], "ns"), "pressure": (columns["pressure"], "Pa")}
-    return RawLog.of(path, out, clock=clock, findings=findings)
+    return _log(path, out, clock, findings)

@@ -74,7 +74,7 @@ def read(path: Path) -> pd.DataFrame:
     euler = np.degrees(np.column_stack([values[:, 7], values[:, 8], values[:, 9] - wander]))
     euler[:, 2] = (euler[:, 2] + 180.0) % 360.0 - 180.0
     clock = GPS if time.max() <= WEEK + 1.0 else RELATIVE
-    return solution(path, (time, place, ned, euler), Clock(clock), findings)
+    return solution(path, (time, place, ned, euler), Clock(clock), findings, of_recorder=False)
 
 
 def _moved(time: Array, place: Array) -> Array:

@@ -2,11 +2,12 @@
 
 Messages: interface descriptions of u-blox M8, F9 and M10, for example UBX-19056845. A frame is
 B5 62, class, number, length, payload and two bytes of checksum. Fixes are NAV-PVT, or NAV-PVAT of a
-receiver with an inertial unit: deg, mm over the ellipsoid, mm/s, and ``iTOW``, ms of the GPS week.
-NAV-PVAT also has roll, pitch and heading of the vehicle (forward, right, down). ESF-MEAS has one
-sensor a field: deg/s in steps of 2^-12, m/s² in steps of 2^-10, the speed of a wheel in mm/s, in
-axes of the unit on its board, at time tags in ms of the receiver's own clock. ESF-RAW has time tags
-of an undocumented unit, and is not read.
+receiver with an inertial unit: deg, mm over the ellipsoid, mm/s, and ``iTOW``, ms of the GPS week;
+NAV-HPPOSLLH of the same instant has the position in steps of 0.1 mm. NAV-PVAT also has roll, pitch
+and heading of the vehicle (forward, right, down). ESF-MEAS has one sensor a field: deg/s in steps
+of 2^-12, m/s² in steps of 2^-10, the speed of a wheel in mm/s, in axes of the unit on its board, at
+time tags in ms of the receiver's own clock. ESF-RAW has time tags of an undocumented unit, and is
+not read.
 """
 
 from __future__ import annotations
@@ -31,7 +32,14 @@ TITLE = "u-blox UBX stream"
 SYNC, MOST_PAYLOAD = b"\xb5\x62", 8192
 LEAST_FRAMES = 3  # of a stream that begins with something else
 PVT, PVAT, MEAS, RAW = b"\x01\x07", b"\x01\x17", b"\x10\x02", b"\x10\x03"
-NAMES = {"gnss": (PVT, PVAT), "reference": (PVAT,), "imu": (MEAS,), "wheel": (MEAS,)}
+PRECISE = b"\x01\x14"  # NAV-HPPOSLLH
+NAMES = {
+    "precise": (PRECISE,),
+    "gnss": (PVT, PVAT),
+    "reference": (PVAT,),
+    "imu": (MEAS,),
+    "wheel": (MEAS,),
+}
 GYRO, ACCEL, SPEED = (14, 13, 5), (16, 17, 18), 11  # types of data, x y z
 SCALES = {**dict.fromkeys(GYRO, 2.0**-12), **dict.fromkeys(ACCEL, 2.0**-10), SPEED: 1e-3}
 
@@ -74,7 +82,10 @@ def _messages(path: Path, stream: str) -> list[Any]:
         if kind is None:
             if stream == "imu" and RAW in frames:
                 raise DataError("io.ubx-raw-only", file=path.name, quantity="imu")
+            if stream == "precise":
+                return []
             has = [s for s, kinds in NAMES.items() if any(k in frames for k in kinds)]
+            has = [s for s in has if s != "precise"]
             raise NoStreamError(path.name, stream, TITLE, has or ["other messages"])
         return [ubx.UBXReader.parse(frame) for frame in frames[kind]]
 
@@ -121,9 +132,12 @@ def read_fixes(path: Path) -> RawLog:
     """Read the fixes, at GPS seconds of week."""
     fixed, out, findings = _solved(path, "gnss")
     with damage(path):
+        precise = {m.iTOW: m for m in _messages(path, "precise") if not m.invalidLlh}
 
         def values(name: str) -> Any:
-            return np.array([getattr(m, name) for m in fixed], dtype=np.float64)
+            finer = name in ("lat", "lon", "height", "hAcc", "vAcc")
+            chosen = [precise.get(m.iTOW, m) if finer else m for m in fixed]
+            return np.array([getattr(m, name) for m in chosen], dtype=np.float64)
 
         out |= {"lat": (values("lat"), "deg"), "lon": (values("lon"), "deg")}
         out |= {"alt": (values("height"), "mm"), "horizontal_accuracy": (values("hAcc"), "mm")}

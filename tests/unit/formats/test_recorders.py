@@ -27,7 +27,7 @@ from strapdown.formats import (
     sbf,
     ubx,
 )
-from strapdown.formats.gnss_files import read_gnss
+from strapdown.formats.gnss_files import GnssOptions, read_gnss
 from strapdown.formats.trajectory_readers import read_trajectory
 
 G = 9.80665
@@ -117,6 +117,20 @@ def test_px4_body_axes_means_and_microseconds(tmp_path):
     imu = read_log(path).imu
     assert imu.index[1] - imu.index[0] == pytest.approx(0.004)
     np.testing.assert_allclose(imu.iloc[0], [0.1, 0.2, 0.3, 1.0, 2.0, -G], rtol=1e-6)
+
+
+def test_px4_increments_of_vehicle_imu(tmp_path):
+    fields = [("timestamp", "uint64_t"), ("timestamp_sample", "uint64_t")]
+    fields += [("delta_angle", "float[3]"), ("delta_velocity", "float[3]")]
+    fields += [("delta_angle_dt", "uint32_t"), ("delta_velocity_dt", "uint32_t")]
+    rows = [
+        (5000 * k + 90, 5000 * k, 5e-4, 0.0, 1e-3, 0.0, 5e-3, -G * 0.004, 5000, 4000)
+        for k in range(1, 9)
+    ]
+    imu = read_log(written(tmp_path / "imu.ulg", ulog([("vehicle_imu", fields, rows)]))).imu
+    np.testing.assert_allclose(imu.iloc[0], [0.1, 0.0, 0.2, 0.0, 1.25, -G], rtol=1e-6)
+    assert imu.attrs["sampling"] == "mean"
+    assert imu.index[0] == pytest.approx(0.005)
 
 
 def test_px4_accelerometer_on_its_own_stamps_is_interpolated(tmp_path):
@@ -322,6 +336,7 @@ def test_ros_header_stamps_open_axes_and_velocity_of_the_fixes(tmp_path, version
         assert kind(file) == "ros"
         raw = ros.read(file)
         assert raw.axes is None
+        assert all(f.is_file() for f in raw.files)
         assert raw.columns["time"].tolist() == [T0 * 10**9 + 10_000_000 * k for k in range(9)]
         np.testing.assert_allclose(raw.columns["gyro_z"], 0.1 * np.arange(9))
         table = read_gnss(file)
@@ -696,6 +711,18 @@ def test_ubx_fixes_in_gps_time(tmp_path):
     assert table.attrs["findings"][0].code == "io.fixes-without-position-left-out"
 
 
+def test_ubx_the_finer_position_of_the_same_instant(tmp_path):
+    fine = (136_154_000, 80_000_000, 470_000_000, 500_000, 450_000, 12, -34, 5, 6, 123, 456)
+    frame = ubx_frame(1, 0x14, struct.pack("<B2xBIiiiibbbbII", 0, 0, *fine))
+    path = written(tmp_path / "rtk.ubx", nav_pvt(1) + frame + nav_pvt(2))
+    table = read_gnss(path)
+    np.testing.assert_allclose(
+        table.iloc[0][["lat", "lon", "alt"]], [47.0 - 34e-9, 8.0 + 12e-9, 500.0005], rtol=1e-14
+    )
+    assert table["down_sd"].tolist() == pytest.approx([0.0456, 2.5])
+    assert table["alt"].iloc[1] == 500.0
+
+
 def test_ubx_sensors_in_ms_of_the_receiver(tmp_path):
     path = drive(tmp_path)
     raw = ubx.read(path)
@@ -715,6 +742,24 @@ def test_ubx_raw_alone_is_refused(tmp_path):
     path = written(tmp_path / "raw.ubx", ubx_frame(16, 3, bytes(12)) * 3)
     with pytest.raises(DataError, check=coded("io.ubx-raw-only")):
         open_stream(path, "imu")
+
+
+def test_sentences_of_a_stream_without_own_fixes(tmp_path):
+    out = b""
+    for k in range(5):
+        body = f"GNGGA,12{k:02d}00.00,4730.0,N,00830.0,E,4,12,0.8,500.0,M,47.0,M,,"
+        total = 0
+        for octet in body.encode():
+            total ^= octet
+        out += ubx_frame(2, 0x15, b"$\xff\0" * 40) + f"${body}*{total:02X}\r\n".encode()
+    path = written(tmp_path / "raw.ubx", out)
+    assert kind(path) == "ubx"
+    table = read_gnss(path, GnssOptions(position_sd=1.0))
+    assert len(table) == 5
+    assert table.iloc[0][["lat", "lon", "alt"]].tolist() == [47.5, 8.5, 547.0]
+    assert table.attrs["findings"][-1].code == "io.fixes-of-sentences"
+    with pytest.raises(NoStreamError):
+        open_stream(written(tmp_path / "none.ubx", ubx_frame(2, 0x15, bytes(40))), "gnss")
 
 
 def test_ubx_recorded(recordings):
@@ -883,6 +928,61 @@ def test_sbet_recorded(recordings):
     assert table["VD"].mean() == pytest.approx(0.0306, rel=0.01)
 
 
+# Inertial Explorer
+
+PREAMBLE = """Project:     drive
+Program:     Inertial Explorer Version 8.90.6611
+Profile:     own
+Datum:       WGS84, (processing datum)
+Master 1:    Name base, Status ENABLED
+             Position 30 27 23.39873, -114 23 49.23157, 77.631 m (WGS84, Ellipsoidal hgt)
+
+"""
+
+
+def test_inertial_explorer_degrees_and_velocity_of_the_body(tmp_path):
+    names = "UTCDate Week GPSTime Latitude Longitude H-Ell VelBdyX VelBdyY VelBdyZ "
+    names += "Roll Pitch Heading Q"
+    units = "(MDY) (weeks) (sec) (+/-D M S) (+/-D M S) (m) (m/s) (m/s) (m/s) (deg) (deg) (deg)   "
+    rows = "04/03/2019 2254 604799.00 30 30 36.0 -0 30 36.0 12.5 0.5 10 -0.25 0.0 0.0 270.0 1\n"
+    rows += "04/03/2019 2255 0.00  30 30 36.0  -0 30 37.0  12.5  0.5 10.0 -0.25  0.0 0.0 90.0 1\n"
+    path = tmp_path / "truth.txt"
+    path.write_text(PREAMBLE + names + "\n" + units + "(-)\n" + rows + "\nEnd of file\n")
+    assert kind(path) == "inertial-explorer"
+    table = read_trajectory(path)
+    assert table.index.tolist() == [604799.0, 604800.0]
+    assert table.attrs["gps_week"] == 2254
+    np.testing.assert_allclose(table["lat"], 30.51)
+    np.testing.assert_allclose(table["lon"], [-0.51, -0.51 - 1 / 3600], rtol=1e-12)
+    assert table["alt"].tolist() == [12.5, 12.5]
+    # Heading west: forward is west, right is north; up is -0.25.
+    np.testing.assert_allclose(table[["VN", "VE", "VD"]].iloc[0], [0.5, -10.0, 0.25], atol=1e-9)
+    np.testing.assert_allclose(table[["VN", "VE", "VD"]].iloc[1], [-0.5, 10.0, 0.25], atol=1e-9)
+    assert table["heading"].tolist() == pytest.approx([-90.0, 90.0])
+
+
+def test_inertial_explorer_faults_are_named(tmp_path):
+    names = "GPSTime Latitude Longitude H-Ell VNorth VEast VUp Roll Pitch Heading\n"
+    units = "(sec) (deg) (deg) (m) (m/s) (m/s) (m/s) (deg) (deg) (deg)\n"
+    row = "10.0 47.0 8.0 500.0 1.0 2.0 3.0 4.0 5.0 6.0\n"
+    path = tmp_path / "truth.txt"
+    path.write_text(PREAMBLE + names + units + row + row.replace("10.0", "11.0"))
+    table = read_trajectory(path)
+    assert table.iloc[1].tolist() == [47.0, 8.0, 500.0, 1.0, 2.0, -3.0, 4.0, 5.0, 6.0]
+    path.write_text(PREAMBLE + names + units + row + row[:-5] + "\n")
+    with pytest.raises(DataError, check=coded("io.inertial-explorer-row", row=11)):
+        read_trajectory(path)
+    path.write_text(PREAMBLE + names + units.replace("(m/s)", "(knots)") + row)
+    with pytest.raises(DataError, check=coded("io.inertial-explorer-unit", quantity="vnorth")):
+        read_trajectory(path)
+    path.write_text(PREAMBLE + names.replace("VNorth", "COG") + units + row)
+    with pytest.raises(DataError, check=coded("io.missing-columns-3", missing=("vnorth",))):
+        read_trajectory(path)
+    path.write_text(PREAMBLE + row)
+    with pytest.raises(DataError, check=coded("io.inertial-explorer-header")):
+        read_trajectory(path)
+
+
 # Damage, missing libraries, foreign formats
 
 
@@ -905,8 +1005,8 @@ def test_a_cut_or_overwritten_file_is_refused_or_read_in_part(tmp_path):
     random = np.random.default_rng(4)
     for path, module in everything(tmp_path):
         data = path.read_bytes()
-        cuts = [data[:n] for n in (1, 7, 12, 40, len(data) // 3, len(data) // 2, len(data) - 3)]
-        for _ in range(6):
+        cuts = [data[:n] for n in (7, 40, len(data) // 2, len(data) - 3)]
+        for _ in range(3):
             noise = bytearray(data)
             at = int(random.integers(20, len(data) - 30))
             noise[at : at + 20] = random.bytes(20)
