@@ -246,9 +246,9 @@ def test_a_recording_is_shown_with_what_is_known_of_it(slug, recordings, tmp_pat
     assert shown_answer(tmp_path / slug)
     truth = shown_truth(tmp_path / slug) or ""
     if slug == "turn":
-        assert truth.startswith("The attitude at the end is known")
+        assert truth.startswith("Final attitude known")
     elif slug == "car":
-        assert "within the 95 % bound 3 of 3 times" in truth
+        assert "within the 95 % bound in 3 of 3" in truth
     else:
         share = re.search(r": ([\d.]+) %\.$", truth)
         # A walk on foot is known to two percent of the way at the least.

@@ -25,7 +25,7 @@ from strapdown.report.document import drawings
 from strapdown.report.navigation_document import navigation_document
 from strapdown.report.navigation_evaluation import evaluation_of
 from strapdown.report.simulation import simulation_chart
-from strapdown.report.verdict import light_chart
+from strapdown.report.verdict import heading_chart
 from strapdown.systems.navigation_draft import draft_navigation
 from strapdown.systems.navigation_run import run_navigation
 from strapdown.systems.trajectory_source import make_motion
@@ -129,7 +129,7 @@ def test_the_drive_of_the_readme_is_what_is_drawn_now(driven, tmp_path):
 
 @pytest.mark.slow
 def test_the_light_of_the_manual_is_what_is_drawn_now(driven, tmp_path):
-    compare_chart(light_chart(driven), "trust_light.svg", tmp_path)
+    compare_chart(heading_chart(driven), "trust_light.svg", tmp_path)
 
 
 def test_the_walk_of_the_manual_is_what_is_drawn_now(recordings, tmp_path):

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.crash.acceleration import window_weights
 from strapdown.crash.measuring_point import LEVER_ARM, MOUNTING, PointKinematics
+from strapdown.dsp.chi_square import chi_square_above
 from strapdown.errors import ConfigError, DataError, Finding
 
 Array = NDArray[np.float64]
@@ -246,9 +247,7 @@ def _root(covariances: Array) -> Array:
 
 def chi_square_tail(chi_square: float, freedom: int) -> float:
     """Probability of a chi-square at least this large; `freedom` may be zero."""
-    from scipy.stats import chi2
-
-    return float(chi2.sf(chi_square, freedom)) if freedom else 1.0
+    return float(chi_square_above(max(chi_square, 0.0), freedom)) if freedom else 1.0
 
 
 # Relative mounting of two units on one vehicle: rotation, lever arm, swapped axes.

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.crash.entry import ACCEL_BIAS, GYRO_BIAS, STATES, biases_off, rotated
+from strapdown.dsp.chi_square import chi_square_exceeded
 from strapdown.dsp.running_integral import running_integral
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError, DivergenceError, Finding
@@ -774,13 +775,11 @@ def weigh(problem: Problem, adjustment: Adjustment, weights: Array) -> tuple[Arr
     quantiles as k0 and k1. A group still at full weight loses weight only if no other has a much
     larger misfit, so that a false fix does not take its neighbors with it.
     """
-    from scipy.stats import chi2
-
     more = problem.variance * extra_noise(problem.groups, weights)
     misfits = np.full(weights.shape, np.nan)
     wanted = np.ones(weights.shape)
     sizes = np.array([1, 2, 3])
-    kept, dropped = (np.sqrt(chi2.isf(q, sizes)) for q in (KEPT, DROPPED))
+    kept, dropped = (np.sqrt(chi_square_exceeded(q, sizes)) for q in (KEPT, DROPPED))
     excess = np.zeros(weights.shape)
     for k, g in np.ndindex(*weights.shape):
         rows = np.flatnonzero((problem.groups == g) & problem.there[k])

@@ -27,6 +27,7 @@ from strapdown.crash.entry_estimate import (
     record_of_fixes,
 )
 from strapdown.crash.measuring_point import PointKinematics
+from strapdown.dsp.chi_square import chi_square_above
 from strapdown.ellipsoids import WGS84
 from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.evaluation.control_points import rigid_fit
@@ -622,6 +623,6 @@ def findings(
 
 def unlikely(chi_square: float, degrees_of_freedom: int) -> bool:
     """Whether the probability of a misfit this large is below `UNLIKELY`."""
-    from scipy.stats import chi2
-
-    return bool(chi2.sf(chi_square, degrees_of_freedom) < UNLIKELY)
+    if degrees_of_freedom <= 0:
+        return False
+    return bool(chi_square_above(max(chi_square, 0.0), degrees_of_freedom) < UNLIKELY)

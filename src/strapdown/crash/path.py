@@ -22,6 +22,7 @@ from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.acceleration import NOISE, by_contributor, window_weights
 from strapdown.crash.entry import Entry, angles_sd
 from strapdown.crash.measuring_point import SampleEffects
+from strapdown.dsp.chi_square import chi_square_quantile
 from strapdown.earth import earth_rate
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError, DataError, DivergenceError
@@ -896,8 +897,6 @@ def compare_with_reference(path: CrashPath, reference: pd.DataFrame) -> PathComp
     covariance = rows.reshape(-1, 3, 3) + np.einsum("ni,ij->nij", own_noise, np.eye(3))
     bound = TWO_SIDED_95 * np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
     largest = difference[np.abs(difference).argmax(axis=0), range(3)]
-    from scipy.stats import chi2
-
     index = pd.Index(time[inside], name="time")
     return PathComparison(
         pd.DataFrame(difference, index=index, columns=NED),
@@ -906,7 +905,7 @@ def compare_with_reference(path: CrashPath, reference: pd.DataFrame) -> PathComp
         triad_of(largest),
         triad_of((np.abs(difference) <= bound).mean(axis=0)),
         float(difference[-1] @ np.linalg.pinv(covariance[-1]) @ difference[-1]),
-        float(chi2.ppf(0.95, 3)),
+        chi_square_quantile(0.95, 3),
     )
 
 

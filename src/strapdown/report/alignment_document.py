@@ -45,7 +45,7 @@ from strapdown.report.document import (
     run_again,
     section,
 )
-from strapdown.report.values import GAP, about, force_words, plain, rate_words, small
+from strapdown.report.values import GAP, about, force_words, plain, plus_minus, rate_words, small
 from strapdown.report.values import stamp as instant
 from strapdown.rotation import within_half_turn
 from strapdown.systems.alignment_run import AlignmentRun, reference_offset
@@ -677,7 +677,7 @@ def bias_table(result: AlignmentRun) -> TableBlock | None:
                 (
                     f"{name} {axis}",
                     about(factor * float(bias[k]), TWO_SIDED_95 * factor * float(sd[k]), unit),
-                    _half(TWO_SIDED_95 * factor * float(prior[k]), unit),
+                    plus_minus(TWO_SIDED_95 * factor * float(prior[k]), unit),
                     _found(known),
                 )
             )
@@ -687,12 +687,6 @@ def bias_table(result: AlignmentRun) -> TableBlock | None:
         text=(0, 3),
         caption="95 % bounds. Another attitude would make the others observable.",
     )
-
-
-def _half(half: float, unit: str) -> str:
-    """Format a half width alone: ``± 0.02 deg/h``."""
-    text = about(0.0, half, unit)
-    return text[text.index("±") :]
 
 
 def _found(share: float) -> str:

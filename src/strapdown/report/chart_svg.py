@@ -656,17 +656,13 @@ def _around(drawing: Drawing, chart: Chart, frame: Frame) -> None:
         at = (0.5 * (left + right), bottom + LONG + TICK + 6.0 + 0.5 * _LINE)
         drawing.text(at, name, AXIS, anchor="middle")
     widest = max((text_width(t.text, TICK) for t in frame.y_ticks), default=0.0)
+    lines = _folded(panel.y_label, bottom - top + 2.0 * _BETWEEN, AXIS)
     x = left - LONG - 3.0 - (widest if frame.y_named else 0.0) - 4.0
     if not chart.beside:
-        x = _EDGE + _LINE * max(1, len(_folded(panel.y_label, _tall(frame), AXIS)))
-    lines = _folded(panel.y_label, _tall(frame), AXIS)
+        x = _EDGE + _LINE * max(1, len(lines))
     for j, line in enumerate(lines):
         place = (x - _LINE * (len(lines) - j - 0.5), 0.5 * (top + bottom))
         drawing.text(place, line, AXIS, anchor="middle", turn=-90.0)
-
-
-def _tall(frame: Frame) -> float:
-    return frame.box[3] - frame.box[1] + 2.0 * _BETWEEN
 
 
 def _write_marks(drawing: Drawing, chart: Chart, frame: Frame, above: float) -> float:

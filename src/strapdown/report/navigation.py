@@ -54,6 +54,7 @@ from strapdown.report.report_bundle import (
     with_file,
     write_report,
 )
+from strapdown.report.values import spaced
 from strapdown.report.verdict import (
     STATUS,
     answer,
@@ -158,9 +159,9 @@ def navigation_json(
     found = evaluation_of(result) if found is None else found
     return {
         "conventions": {key.lower().replace(" ", "_"): text for key, text in CONVENTIONS},
-        "answer": _plain(headline(found)),
+        "answer": spaced(headline(found)),
         "trust": trust(found).json(),
-        "cautions": [_plain(f"{head}: {text}") for head, text in cautions(found)],
+        "cautions": [spaced(f"{head}: {text}") for head, text in cautions(found)],
         "record": {
             "name": source.name,
             "what": source.what,
@@ -362,10 +363,6 @@ def _rms(values: Array) -> float:
     return math.sqrt(float(np.square(values).mean())) if values.size else math.nan
 
 
-def _plain(text: str) -> str:
-    return text.replace("\u00a0", " ")
-
-
 # Files of a navigation run beside its report: tables over time, and paths for maps.
 
 
@@ -507,7 +504,7 @@ def verdict_json(result: NavigationRun) -> dict[str, Any]:
     bounds = plane_bound(result.record.covariance)
     spans = light.spans
     return {
-        "answer": _plain(answer(result)),
+        "answer": spaced(answer(result)),
         "position": {
             "bound_95_at_end_m": json_number(bounds[-1]),
             "largest_bound_95_m": json_number(bounds.max()),
@@ -515,7 +512,7 @@ def verdict_json(result: NavigationRun) -> dict[str, Any]:
         },
         "heading": {
             "meaning": {
-                STATUS[c]: _plain(v) for c, (_, v) in zip(COLOURS, promise(trust), strict=True)
+                STATUS[c]: spaced(v) for c, (_, v) in zip(COLOURS, promise(trust), strict=True)
             },
             "trusted_below_deg": light.green,
             "rejected_beyond_deg": light.red,
@@ -555,7 +552,7 @@ def verdict_json(result: NavigationRun) -> dict[str, Any]:
         },
         "innovations": {name: one.consistent for name, one in trust.consistency.items()},
         "inconsistencies": [_doubt(i) for i in trust.inconsistencies],
-        "first": _plain(first_words(trust)),
+        "first": spaced(first_words(trust)),
         "repeated": None if trust.repeated is None else _repeated(trust.repeated, result),
     }
 
@@ -563,7 +560,7 @@ def verdict_json(result: NavigationRun) -> dict[str, Any]:
 def _repeated(repeated: Repeated, result: NavigationRun) -> dict[str, Any]:
     out: dict[str, Any] = {
         "without": repeated.change.what,
-        "answer": _plain(repeated_words(result)),
+        "answer": spaced(repeated_words(result)),
         "failed": None if repeated.failed is None else finding_json(repeated.failed),
         "left": [_doubt(i) for i in repeated.left],
     }

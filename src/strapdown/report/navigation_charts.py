@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.constants import TWO_SIDED_95
@@ -40,6 +41,7 @@ from strapdown.report.navigation_evaluation import (
     at_marks,
     chi_square_far,
     heading_shown,
+    rejected_times,
     unwrapped,
 )
 from strapdown.tables import EULER, NED, VELOCITY
@@ -297,22 +299,19 @@ def _aids(record: NavigationRecord) -> list[str]:
     return list(dict.fromkeys([*record.outages, *seen]))
 
 
-def _of_aid(record: NavigationRecord, aid: str) -> list[str]:
-    return [n for n in record.innovations if (n.rpartition(".")[0] or n) == aid]
+def _tables(record: NavigationRecord, aid: str) -> list[pd.DataFrame]:
+    """Innovations of a measurement source."""
+    return [t for n, t in record.innovations.items() if (n.rpartition(".")[0] or n) == aid]
 
 
 def _epochs(record: NavigationRecord, aid: str) -> Array:
-    found = [record.innovations[n].index.to_numpy(dtype=np.float64) for n in _of_aid(record, aid)]
+    found = [table.index.to_numpy(dtype=np.float64) for table in _tables(record, aid)]
     return np.unique(np.concatenate(found)) if found else np.empty(0)
 
 
 def _rejected(record: NavigationRecord, aid: str, whole: Span) -> Array:
     """Times of rejected epochs, thinned to as many as can be distinguished."""
-    found = []
-    for name in _of_aid(record, aid):
-        table = record.innovations[name]
-        weights = table[[c for c in table.columns if str(c).startswith("weight ")]].to_numpy()
-        found.append(table.index.to_numpy(dtype=np.float64)[(weights <= 0.0).any(axis=1)])
+    found = [rejected_times(table) for table in _tables(record, aid)]
     times = np.unique(np.concatenate(found)) if found else np.empty(0)
     cell = (whole.end - whole.begin) / _MOST_MARKS
     if times.size <= _MOST_MARKS or cell <= 0.0:

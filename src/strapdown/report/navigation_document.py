@@ -53,6 +53,7 @@ from strapdown.report.values import (
     half,
     length_words,
     plain,
+    plus_minus,
     share_words,
 )
 from strapdown.report.values import stamp as instant
@@ -272,7 +273,7 @@ def _not_told(found: NavigationEvaluation) -> list[tuple[str, str]]:
 
 def _heading(found: NavigationEvaluation) -> str:
     bound = half(found.record.sd["heading"].iloc[-1])
-    return "unknown" if bound >= _NO_HEADING else about(0.0, bound, "°").split("±")[1].strip()
+    return "unknown" if bound >= _NO_HEADING else plus_minus(bound, "°").removeprefix(f"±{GAP}")
 
 
 def _duration(found: NavigationEvaluation) -> float:
@@ -294,13 +295,20 @@ def smoothing_chart(found: NavigationEvaluation) -> Chart | None:
     if forward is None:
         return None
     panels = []
-    for label, of in (
-        ("horizontal, m", _plane),
-        ("height, m", lambda one: _bound(one, "down")),
-        ("heading, deg", lambda one: _bound(one, "heading")),
+    for column, label in (
+        ("horizontal", "horizontal, m"),
+        ("down", "height, m"),
+        ("heading", "heading, deg"),
     ):
         lines = tuple(
-            curve(name, one.sd.index.to_numpy(), of(one), colour, "solid", width, buckets=BUCKETS)
+            curve(
+                name,
+                one.sd.index.to_numpy(),
+                _bound(one, column),
+                colour,
+                width=width,
+                buckets=BUCKETS,
+            )
             for name, one, colour, width in (
                 ("filter", forward, GREY, 1.2),
                 ("smoothed", record, BLUE, 1.6),
@@ -363,7 +371,9 @@ def smoothing_words(found: NavigationEvaluation) -> str | None:
     forward = found.forward
     if forward is None:
         return None
-    before, after = (float(np.median(_plane(one))) for one in (forward, found.record))
+    before, after = (
+        float(np.median(plane_bound(one.covariance))) for one in (forward, found.record)
+    )
     heading = [float(np.median(_bound(one, "heading"))) for one in (forward, found.record)]
     return (
         "Smoothed: every state is estimated from all measurements. Median 95 % bounds, filter and "
@@ -398,13 +408,10 @@ def _apart(agreement: SmootherConsistency, k: int) -> bool:
 
 
 def _bound(record: NavigationRecord, column: str) -> Array:
-    """95 % bound of a component at the covariance marks."""
+    """95 % bound of a component, or of the horizontal position, at the covariance marks."""
+    if column == "horizontal":
+        return plane_bound(record.covariance)
     return TWO_SIDED_95 * record.sd[column].to_numpy(dtype=np.float64)
-
-
-def _plane(record: NavigationRecord) -> Array:
-    """95 % bound of the horizontal position at the covariance marks."""
-    return plane_bound(record.covariance)
 
 
 def _figure(value: float) -> str:
@@ -456,12 +463,11 @@ def state_table(found: NavigationEvaluation) -> TableBlock | None:
             value = block.factor * float(record.sensors[column].iloc[-1])
             first, last = (block.factor * half(record.sensors_sd[column].iloc[k]) for k in (0, -1))
             name = f"{block.name} {label}" if len(block.columns) > 1 else block.name
-            before = about(0.0, first, block.unit)
             rows.append(
                 (
                     name,
                     about(value, last, block.unit),
-                    before[before.index("±") :],
+                    plus_minus(first, block.unit),
                     share_words(1.0 - last / first) if first > 0.0 and last <= first else "–",
                 )
             )

@@ -117,7 +117,7 @@ class NavigationEvaluation:
     @property
     def all_findings(self) -> tuple[Finding, ...]:
         """Findings of the run and of its comparison with the truth."""
-        return (*self.findings, *(() if self.errors is None else self.errors.findings))
+        return (*self.findings, *(() if self.errors is None else self.errors.comparison.findings))
 
     def _errors(self, record: NavigationRecord) -> NavigationErrors | None:
         if self.truth is None:
@@ -375,11 +375,6 @@ class NavigationErrors:
         return self.comparison.time
 
     @property
-    def findings(self) -> tuple[Finding, ...]:
-        """Findings of the comparison."""
-        return self.comparison.findings
-
-    @property
     def nees(self) -> Array:
         """Normalized error squared (NEES) of position, velocity and attitude, (n,)."""
         if not self.freedom:
@@ -497,7 +492,7 @@ def evaluation_of(result: NavigationRun) -> NavigationEvaluation:
         ("Update rule", _kind(spec.filter, "update_rule") or NO_RULE),
         ("Smoother", "" if result.forward is None else spec.smoother.kind),
         *((f"Measurement {name}", _of_aid(aid)) for name, aid in spec.aiding.items()),
-        ("States", ", ".join(dict.fromkeys(_block(c) for c in result.record.sensors.columns))),
+        ("States", ", ".join(dict.fromkeys(_grouped(result.record)))),
     ]
     return NavigationEvaluation(
         record=result.record,
@@ -544,10 +539,6 @@ def withheld_of(aid: str, scores: Sequence[WithheldScores]) -> tuple[Withheld, .
     return tuple(out)
 
 
-def _block(column: object) -> str:
-    return str(column).rpartition("_")[0] or str(column)
-
-
 #: A heading that turns by more is drawn within 0 to 360 deg.
 MOST_TURN = 900.0
 
@@ -576,13 +567,18 @@ class ShownStates:
     factor: float
 
 
+def _grouped(record: NavigationRecord) -> dict[str, list[str]]:
+    """Columns of the states of each kind."""
+    groups: dict[str, list[str]] = {}
+    for column in map(str, record.sensors.columns):
+        groups.setdefault(column.rpartition("_")[0] or column, []).append(column)
+    return groups
+
+
 def blocks_of(record: NavigationRecord) -> tuple[ShownStates, ...]:
     """Return the blocks of sensor and measurement error states, in their order."""
-    groups: dict[str, list[str]] = {}
-    for column in record.sensors.columns:
-        groups.setdefault(str(column).rpartition("_")[0] or str(column), []).append(str(column))
     out = []
-    for name, columns in groups.items():
+    for name, columns in _grouped(record).items():
         labels = [c.removeprefix(name).lstrip("_") for c in columns]
         # The unit must suit both the estimates and their standard deviations.
         sizes = [record.sensors[columns].to_numpy(), record.sensors_sd[columns].to_numpy()]
@@ -634,6 +630,12 @@ def at_marks(record: NavigationRecord, column: str) -> Array:
     time = record.trajectory.index.to_numpy(dtype=np.float64)
     values = record.trajectory[column].to_numpy(dtype=np.float64)
     return np.asarray(np.interp(record.sd.index.to_numpy(dtype=np.float64), time, values))
+
+
+def rejected_times(table: pd.DataFrame) -> Array:
+    """Times of the epochs with a rejected component in a table of innovations."""
+    weights = table[[c for c in table.columns if str(c).startswith("weight ")]].to_numpy()
+    return table.index.to_numpy(dtype=np.float64)[(weights <= 0.0).any(axis=1)]
 
 
 def worst_within(record: NavigationRecord, span: Span) -> tuple[float, float] | None:

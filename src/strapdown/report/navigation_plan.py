@@ -17,7 +17,7 @@ from strapdown.frames import ned_from_geodetic
 from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.report.chart import BLACK, BLUE, GREY, PURPLE, VERMILLION, Array, Chart, Line, Panel
 from strapdown.report.navigation_charts import mode_colour
-from strapdown.report.navigation_evaluation import NavigationEvaluation
+from strapdown.report.navigation_evaluation import NavigationEvaluation, rejected_times
 from strapdown.report.plan import View, ellipse, nice_step, path_marks, place_labels
 from strapdown.report.values import GAP, duration_words, length_words, plain
 from strapdown.tables import places_of
@@ -53,7 +53,9 @@ def plan_chart(found: NavigationEvaluation) -> Chart | None:
     plane = Plane(origin, found, *(("km", 1e-3) if reach >= _FAR else ("m", 1.0)))
     path = (plane.scale * ned[:, 1], plane.scale * ned[:, 0])
     time = kept.index.to_numpy(dtype=np.float64)
-    view = _with_margin(View.of([path, *_around(plane)], most=_TALL))
+    tight = View.of([path, *_around(plane)], most=_TALL)
+    margin = 0.04 * (tight.high - tight.low)
+    view = View(tight.low - margin, tight.high + margin)
     fixes, beyond = _fixes(plane, view)
     lines = [*fixes, *_truth(plane), *_path(record, time, path), *_points(plane)]
     round_, said, obstacles = ellipses(plane, view)
@@ -100,11 +102,6 @@ def _course(table: pd.DataFrame, found: NavigationEvaluation) -> NDArray[np.intp
     step = max(1, len(table) // MOST_SAMPLES)
     rows = step * thin(table.iloc[::step], MOST_POINTS, found.ellipsoid).rows
     return np.append(rows, len(table) - 1) if rows[-1] < len(table) - 1 else rows
-
-
-def _with_margin(view: View) -> View:
-    room = 0.04 * (view.high - view.low)
-    return View(view.low - room, view.high + room)
 
 
 def _around(plane: Plane) -> list[tuple[Array, Array]]:
@@ -168,7 +165,9 @@ def _fixes(plane: Plane, view: View) -> tuple[list[Line], str]:
         inside = (east >= view.low[0]) & (east <= view.high[0])
         inside &= (north >= view.low[1]) & (north <= view.high[1])
         beyond += int((~inside).sum())
-        lost = np.isin(np.round(time, 6), np.round(_rejected(plane.found.record, aid), 6))
+        innovations = plane.found.record.innovations.get(f"{aid}.position")
+        rejected = np.empty(0) if innovations is None else rejected_times(innovations)
+        lost = np.isin(np.round(time, 6), np.round(rejected, 6))
         some = np.flatnonzero(inside & ~lost)
         some = some[:: max(1, -(-some.size // MOST_FIXES))]
         out.append(
@@ -198,14 +197,6 @@ def _fixes(plane: Plane, view: View) -> tuple[list[Line], str]:
     if not beyond:
         return out, ""
     return out, f"{beyond} {'fix is' if beyond == 1 else 'fixes are'} outside of the plan."
-
-
-def _rejected(record: NavigationRecord, aid: str) -> Array:
-    table = record.innovations.get(f"{aid}.position")
-    if table is None:
-        return np.empty(0)
-    weights = table[[c for c in table.columns if str(c).startswith("weight ")]].to_numpy()
-    return table.index.to_numpy(dtype=np.float64)[(weights <= 0.0).any(axis=1)]
 
 
 def _truth(plane: Plane) -> list[Line]:

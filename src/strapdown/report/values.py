@@ -65,6 +65,12 @@ def about(value: float, half: float, unit: str) -> str:
     return both + (unit if unit == "°" else GAP + unit if unit else "")
 
 
+def plus_minus(half: float, unit: str) -> str:
+    """Format the half width of a bound alone: ``± 0.27 m/s``."""
+    text = about(0.0, half, unit)
+    return text[text.index("±") :]
+
+
 def speed(value: float, half: float) -> str:
     """Format a speed in m/s with its bound, in km/h."""
     return about(KMH * value, KMH * half, "km/h")

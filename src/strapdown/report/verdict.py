@@ -10,15 +10,13 @@ import numpy as np
 from strapdown import __version__
 from strapdown.constants import TWO_SIDED_95
 from strapdown.evaluation.plane_bound import plane_bound
-from strapdown.navigation.consistency import Inconsistency
 from strapdown.navigation.heading_integrity import (
     REASONS,
     SURE,
     WITNESSES,
-    LightSpan,
 )
 from strapdown.navigation.heading_witness import UNSEEN
-from strapdown.navigation.integrity import NO_NORTH, Advice, IntegrityReport, Repeated
+from strapdown.navigation.integrity import NO_NORTH, Advice, IntegrityReport
 from strapdown.navigation.record import Span
 from strapdown.report.chart import (
     BLACK,
@@ -72,11 +70,11 @@ def position_words(result: NavigationRun) -> str:
     """Return the 95 % bound of the position, at the end and at its worst."""
     bounds = plane_bound(result.record.covariance)
     end, worst = float(bounds[-1]), int(np.argmax(bounds))
-    most = float(bounds[worst])
+    most, at = float(bounds[worst]), float(result.record.sd.index[worst])
     # A run whose bound is largest at the end needs only one number.
     same = most <= 1.1 * end
     sized = f"{length_words(end)} at the end" + (
-        "" if same else f", {length_words(most)} at most ({_at(result, worst)})"
+        "" if same else f", {length_words(most)} at most (at {instant(at)})"
     )
     first = result.trust.against_bounds
     if not result.trust.consistency:
@@ -115,10 +113,6 @@ def unconfirmed_words(trust: IntegrityReport) -> str:
     return "; ".join(one.sentence() for one in trust.unwitnessed)
 
 
-def _failed(repeated: Repeated) -> str:
-    return "" if repeated.failed is None else repeated.failed.text()
-
-
 def promise(trust: IntegrityReport) -> tuple[tuple[str, str], ...]:
     """Return the definition of each status color, in words and numbers."""
     green, red = plain(trust.light.green, 1), plain(trust.light.red, 1)
@@ -143,14 +137,6 @@ def promise(trust: IntegrityReport) -> tuple[tuple[str, str], ...]:
             f"do not use the heading: its bound exceeds {red}°, an independent check contradicts "
             "it, or innovations scatter by more than three times the expected value.",
         ),
-    )
-
-
-def span_words(span: LightSpan) -> str:
-    """A stretch of one color, in words."""
-    return (
-        f"{instant(span.begin)} to {instant(span.end)} ({duration_words(span.end - span.begin)}): "
-        f"{REASONS[span.reason]}"
     )
 
 
@@ -192,11 +178,6 @@ def check_words(trust: IntegrityReport) -> str:
     return "; ".join(WITNESSES[str(kind)] for kind in kinds)
 
 
-def kind_words(one: Inconsistency) -> str:
-    """Return the kind of an inconsistency in a few words."""
-    return _KINDS[one.kind]
-
-
 def first_words(trust: IntegrityReport) -> str:
     """The first inconsistent measurement, as a sentence."""
     one = trust.first
@@ -227,7 +208,8 @@ def repeated_words(result: NavigationRun) -> str:
             return ""
         return "Not re-run without it: repeat is false in [trust]."
     if repeated.record is None or repeated.differences is None:
-        return f"Re-run {repeated.change.what}, the run fails: {_failed(repeated)}"
+        failed = "" if repeated.failed is None else repeated.failed.text()
+        return f"Re-run {repeated.change.what}, the run fails: {failed}"
     table = repeated.differences
     place = np.hypot(table["north"].to_numpy(), table["east"].to_numpy())
     turn = np.abs(table["heading"].to_numpy(dtype=np.float64))
@@ -258,23 +240,21 @@ def repeated_words(result: NavigationRun) -> str:
 def terminal_lines(result: NavigationRun, *, brief: bool = False) -> list[tuple[str, str]]:
     """Up to four lines for the terminal, each with its style; brief, without the position."""
     trust = result.trust
-    lines = [(heading_words(trust) if brief else answer(result), _style(trust))]
+    last = trust.light.spans[-1].colour if trust.light.spans else "red"
+    style = "yellow" if last == "amber" else last
+    lines = [(heading_words(trust) if brief else answer(result), style)]
     if trust.first is not None:
         first = trust.first
         since = "throughout" if first.throughout else f"first at {instant(first.since)}"
-        lines.append((f"First inconsistency: {first.name} {kind_words(first)}, {since}.", "yellow"))
+        lines.append(
+            (f"First inconsistency: {first.name} {_KINDS[first.kind]}, {since}.", "yellow")
+        )
         said = repeated_words(result)
         if said:
             lines.append((said, ""))
     elif trust.advice and trust.light.spans[-1].colour != "green":
         lines.append((f"For the heading: {advice_words(trust.advice[-1], trust)}.", ""))
     return lines
-
-
-def _style(trust: IntegrityReport) -> str:
-    spans = trust.light.spans
-    last = spans[-1].colour if spans else "red"
-    return {"green": "green", "amber": "yellow", "red": "red"}[last]
 
 
 def _beyond(time: np.ndarray, apart: np.ndarray, marks: np.ndarray, bound: np.ndarray) -> str:
@@ -285,10 +265,6 @@ def _beyond(time: np.ndarray, apart: np.ndarray, marks: np.ndarray, bound: np.nd
     return f"beyond the re-run's 95{GAP}% bound for {share_words(share)} of the time"
 
 
-def _at(result: NavigationRun, mark: int) -> str:
-    return f"at {instant(float(result.record.sd.index[mark]))}"
-
-
 def degrees_words(value: float) -> str:
     """Format an angle to two or three digits: ``12.4°``, ``0.049°``."""
     if not math.isfinite(value):
@@ -297,8 +273,8 @@ def degrees_words(value: float) -> str:
     return f"{plain(value, places)}°"
 
 
-def _plural(word: str, count: int, many: str | None = None) -> str:
-    return word if count == 1 else many or f"{word}s"
+def _plural(word: str, count: int) -> str:
+    return word if count == 1 else f"{word}s"
 
 
 # Verdict page of a run: whether it can be trusted, and the evidence against it.
@@ -396,7 +372,7 @@ def _keys(result: NavigationRun) -> tuple[KeyFigure, ...]:
             _agrees(result),
             f"{len(trust.consistency)} {_plural('measurement', len(trust.consistency))} tested"
             if first is None
-            else f"{first.name} {kind_words(first)}",
+            else f"{first.name} {_KINDS[first.kind]}",
             "" if first is None else f"since {instant(first.since)}",
         ),
     )
@@ -439,7 +415,9 @@ def _heading(result: NavigationRun) -> tuple[Block, ...]:
     if any(a.options for a in trust.advice):
         rows = tuple(
             (
-                f"{STATUS[a.span.colour].capitalize()}, {span_words(a.span)}",
+                f"{STATUS[a.span.colour].capitalize()}, {instant(a.span.begin)} to "
+                f"{instant(a.span.end)} ({duration_words(a.span.end - a.span.begin)}): "
+                f"{REASONS[a.span.reason]}",
                 capital(advice_words(a, trust)),
             )
             for a in trust.advice
@@ -514,7 +492,7 @@ def _innovations(result: NavigationRun) -> tuple[Block, ...]:
     rows = []
     for name, one in trust.consistency.items():
         doubts = [i for i in trust.inconsistencies if i.name == name]
-        kinds = ", ".join(dict.fromkeys(kind_words(i) for i in doubts)) or "consistent"
+        kinds = ", ".join(dict.fromkeys(_KINDS[i.kind] for i in doubts)) or "consistent"
         scales = [c.scale for c in one.components if math.isfinite(c.scale)]
         worst = max(scales, key=lambda x: abs(math.log(max(x, 1e-9))), default=math.nan)
         gross = sum(c.gross for c in one.components)
@@ -550,7 +528,7 @@ def _first(result: NavigationRun) -> tuple[Block, ...]:
     blocks: list[Block] = [Paragraph(first_words(trust))]
     if len(trust.inconsistencies) > 1:
         rows = tuple(
-            (instant(i.since), i.name, i.component.partition(",")[0], kind_words(i))
+            (instant(i.since), i.name, i.component.partition(",")[0], _KINDS[i.kind])
             for i in trust.inconsistencies[:_MOST]
         )
         blocks.append(
@@ -571,7 +549,7 @@ def _first(result: NavigationRun) -> tuple[Block, ...]:
     repeated = trust.repeated
     if repeated is not None and repeated.left:
         rows_left = tuple(
-            (i.name, f"{kind_words(i)}: {i.finding.what}.") for i in repeated.left[:_MOST]
+            (i.name, f"{_KINDS[i.kind]}: {i.finding.what}.") for i in repeated.left[:_MOST]
         )
         blocks += [Paragraph("Inconsistencies of the re-run:"), Items(rows_left)]
     return tuple(blocks)
