@@ -64,10 +64,8 @@ from strapdown.formats import (
     xsens,
 )
 from strapdown.formats.assemble import assemble
-from strapdown.formats.binary import first_bytes
-from strapdown.formats.find_columns import names_of_quantities
 from strapdown.formats.binary import first_bytes, or_sentences
-from strapdown.formats.columns import read_name
+from strapdown.formats.find_columns import names_of_quantities
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.recording import NoStreamError, RawLog, ReadOptions, Recording
 from strapdown.plugins import plugin, plugins

@@ -10,9 +10,10 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from tests.coded import coded
 
 import strapdown as sd
-from strapdown.errors import ConfigError
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats import read_raw
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.simulation import Origin, StationaryMotion, simulate_imu
@@ -119,12 +120,27 @@ def test_a_measurement_from_outside_aids_a_run_that_is_verified(installed, tmp_p
     assert sd.verify(tmp_path / "out").verdict == "identical"
 
 
+def test_a_log_is_read_by_a_reader_from_outside(installed, tmp_path):
+    counts = np.tile(np.array([100, -50, 0, 0, 0, -2000], dtype="<i2"), (40, 1))
+    path = tmp_path / "bench.bin"
+    path.write_bytes(b"TWOBYTE 200 0.001 0.0049\n" + counts.tobytes())
+    imu = sd.read_imu(path)
+    assert imu.attrs["sampling"] == "mean"
+    assert imu.iloc[3].tolist() == pytest.approx([0.1, -0.05, 0.0, 0.0, 0.0, -9.8])
+    assert np.diff(imu.index) == pytest.approx(np.full(39, 0.005))
+    assert list(sd.read(path)) == ["imu"]
+    path.write_bytes(path.read_bytes()[:-1])
+    with pytest.raises(DataError, check=coded("io.not-of-format")):
+        sd.read_imu(path)
+
+
 def test_modules_lists_them(installed, run_cli):
     done = run_cli("modules", "--json")
     assert done.code == 0, done.err
     lists = json.loads(done.out)
     assert "first_order" in [row["name"] for row in lists["attitude_algorithms"]]
     assert "surveyed_height" in [row["name"] for row in lists["aiding"]]
+    assert "two_byte" in [row["name"] for row in lists["formats"]]
 
 
 @pytest.mark.parametrize(
