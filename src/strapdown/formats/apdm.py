@@ -70,6 +70,9 @@ def _csv(path: Path) -> RawLog:
                 stated[name] = (f"{triad}_{axis.lower()}", unit_of(said[name].replace("^", "")))
     raw.columns = {n: c for n, c in raw.columns.items() if not n.startswith("unnamed ")}
     raw.stated = stated
+    raw.units = {
+        n: u for n, said_unit in said.items() if (u := unit_of(said_unit.replace("^", "")))
+    }
     return _told(raw, monitors)
 
 

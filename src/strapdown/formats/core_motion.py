@@ -69,7 +69,9 @@ def read(path: Path) -> RawLog:
     units = {"-g": 1.0, "m/s2 or -m/s2": STANDARD_GRAVITY}
     unit = next((u for u, g in units.items() if abs(length / g - 1.0) < 0.02), None)
     held: dict[str, tuple[NDArray[Any], str | None]] = {}
-    times = {n: s for n in raw.columns if (s := read_name(n)).quantity == "time"}
+    # As in timestamp(unix).
+    said = {n: (read_name(n), read_name(n.partition("(")[0])) for n in raw.columns}
+    times = {n: s for n, both in said.items() for s in both if s.quantity == "time"}
     if times:
         best = next((n for n, s in times.items() if s.unit), next(iter(times)))
         held["time"] = (raw.columns[best], times[best].unit)
