@@ -21,7 +21,7 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import Finding
 from strapdown.formats import csv
 from strapdown.formats.columns import read_name
-from strapdown.formats.known_text import column, head, stated_by, under
+from strapdown.formats.known_text import column, names_of, stated_by, under
 from strapdown.formats.phones import AXES
 from strapdown.formats.recording import RawLog
 
@@ -34,10 +34,7 @@ WORDS = {
 
 def detect(path: Path) -> bool:
     """Detect by the names of the three vectors."""
-    if not csv.detect(path):
-        return False
-    line = head(path).partition("\n")[0]
-    return len(_named(csv.fields_of(line, csv.separator_of(line)))) == 9
+    return csv.detect(path) and len(_named(names_of(path))) == 9
 
 
 def _named(names: list[str]) -> dict[str, str]:

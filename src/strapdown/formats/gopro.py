@@ -4,7 +4,8 @@ GPMF (https://github.com/gopro/gpmf-parser, README): key, type, size and count i
 big-endian values padded to four bytes; type 0 nests. ``DEVC`` is a payload of about a second with a
 ``STRM`` for each sensor; ``SCAL`` divides what follows it. ``GYRO`` (rad/s) and ``ACCL`` (m/s²,
 specific force) name the axis of each channel in ``ORIN``, small letters reversed (``YxZ``: y, -x,
-z), older cameras in the name of the stream (``Accelerometer (z,x,y)``). ``GPS5`` has latitude,
+z), older cameras in the name of the stream (``Accelerometer (z,x,y)``; up/down, right/left and
+forward/back are z, x, y). ``GPS5`` has latitude,
 longitude, height, speed over ground and in space, ``GPS9`` also days since 2000, seconds of the
 day, dilution and kind of fix; the height is over the sea if ``GPSA`` says MSLV, else over the
 ellipsoid of WGS 84. ``STMP`` counts µs at the first sample of a payload; without it the stamps of
@@ -49,6 +50,8 @@ TYPES = {
 SENSORS = {"GYRO": "gyro", "ACCL": "accel", "MAGN": "mag"}
 DAYS_2000 = 946_684_800.0  # 2000-01-01 in seconds since 1970
 _BRACKETS = re.compile(r"\(\s*([xyz])\s*,\s*([xyz])\s*,\s*([xyz])\s*\)", re.I)
+# The order of HERO5, as its streams are named.
+_WORDS = {"up/down": "z", "right/left": "x", "forward/back": "y"}
 Array = NDArray[np.float64]
 
 
@@ -132,7 +135,10 @@ def _held(streams: dict[str, Stream]) -> list[str]:
 def _sensor(path: Path, key: str, one: Stream) -> RawLog:
     """Return one sensor about the axes of the camera."""
     triad, values = SENSORS[key], np.concatenate(one.values)
-    named = _BRACKETS.search(str(one.said.get("STNM", "")))
+    name = str(one.said.get("STNM", ""))
+    for words, axis in _WORDS.items():
+        name = name.replace(words, axis)
+    named = _BRACKETS.search(name)
     order = str(one.said.get("ORIN", "")) or ("".join(named.groups()).upper() if named else "")
     if sorted(order.upper()) != ["X", "Y", "Z"] or values.shape[1] != 3:
         raise DataError("io.gopro-order-of-axes", file=path.name, quantity=triad, order=order)

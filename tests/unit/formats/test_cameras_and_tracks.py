@@ -233,9 +233,10 @@ def test_an_unknown_order_of_axes_is_refused(tmp_path, name):
         open_stream(path, "imu")
 
 
-def test_the_order_may_stand_in_the_name(tmp_path):
+@pytest.mark.parametrize("order", [b"(z,x,y)", b"(up/down, right/left, forward/back)"])
+def test_the_order_may_stand_in_the_name(tmp_path, order):
     path = tmp_path / "one.raw"
-    path.write_bytes(b"".join(payloads(order=None, name=b"Gyroscope (z,x,y)")))
+    path.write_bytes(b"".join(payloads(order=None, name=b"Gyroscope " + order)))
     found = columns(open_stream(path, "imu"))
     np.testing.assert_allclose(found["gyro_z"][0], np.arange(len(found["gyro_z"][0])))
     np.testing.assert_allclose(found["gyro_x"][0], -2.0)
