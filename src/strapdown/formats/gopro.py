@@ -231,7 +231,9 @@ def _payload(data: bytes, count: int, streams: dict[str, Stream], path: Path) ->
                 text = content.rstrip(b"\0").decode("latin-1")
                 said[name] = _utc(text) if name == "GPSU" else text
             elif kind[0] in TYPES:
-                raw = np.frombuffer(content, TYPES[kind[0]])
+                layout = np.dtype(TYPES[kind[0]])
+                whole = len(content) // layout.itemsize * layout.itemsize
+                raw = np.frombuffer(content[:whole], layout)
                 said[name] = raw.astype(np.float64) if name == "SCAL" else raw[0] if raw.size else 0
 
 
