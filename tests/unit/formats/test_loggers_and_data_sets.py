@@ -142,6 +142,8 @@ def test_the_folder_of_the_simulator(recordings):
     np.testing.assert_allclose(imu[GYRO].to_numpy(), np.radians(gyro))
     assert imu["accel_z"].mean() == pytest.approx(-9.8, abs=0.02)
     assert len(read_trajectory(folder)) == len(imu) == 1000
+    # One of its tables stands for the folder.
+    assert len(read_log(folder / "gyro-0.csv").imu) == 1000
 
 
 # --- NaveGo -----------------------------------------------------------------------------
