@@ -25,7 +25,7 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.columns import read_name
 from strapdown.formats.join import join
-from strapdown.formats.known_text import head
+from strapdown.formats.known_text import head, split
 from strapdown.formats.phones import force_of, sensor_log
 from strapdown.formats.recording import RawLog
 
@@ -62,7 +62,7 @@ def _layout(text: str) -> tuple[int, int, str | None] | None:
     if len(lines) < 3:
         return None
     separator = csv.separator_of(lines[1])
-    rows = [csv.fields_of(line, separator) for line in lines]
+    rows = [split(line, separator) for line in lines]
     unit = read_name(rows[0][0]).unit or (read_name(rows[0][1]).unit if rows[0][1:] else None)
     body = [r for r in rows[1:-1] if len(r) >= 5]
     if len(body) < 0.9 * (len(rows) - 2):
@@ -100,7 +100,7 @@ def read(path: Path) -> RawLog:
         if not line.strip() or csv.is_comment(line):
             continue
         separator = separator or csv.separator_of(line)
-        fields = csv.fields_of(line, separator)
+        fields = split(line, separator)
         which = kind_of(fields[kind]) if len(fields) > kind else None
         if which is None:
             unknown.add(fields[kind] if len(fields) > kind else line)

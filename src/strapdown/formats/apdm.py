@@ -17,11 +17,10 @@ from typing import Any
 import numpy as np
 
 from strapdown.errors import DataError, Finding
-from strapdown.formats import csv
 from strapdown.formats.clocks import UNIX
 from strapdown.formats.columns import unit_of
 from strapdown.formats.hdf5 import SIGNATURE, read_arrays
-from strapdown.formats.known_text import column, head, lacking, under
+from strapdown.formats.known_text import column, head, lacking, split, under
 from strapdown.formats.recording import RawLog
 
 TITLE = "APDM Opal"
@@ -55,9 +54,9 @@ def _csv(path: Path) -> RawLog:
     top = next((k for k, line in enumerate(lines) if line.startswith("Time,")), None)
     if top is None or len(lines) < top + 3:
         raise DataError("io.csv-without-rows", file=path.name, row=len(lines))
-    names, units = (csv.fields_of(lines[top + k], ",") for k in (0, 1))
+    names, units = (split(lines[top + k], ",") for k in (0, 1))
     # Rows may end in a comma, which the names do not.
-    more = csv.fields_of(lines[top + 2], ",")[len(names) :]
+    more = split(lines[top + 2], ",")[len(names) :]
     header = ",".join([*names, *(f"unnamed {k}" for k in range(len(more)))])
     raw = under(path, top, header=header, drop=1)
     said = dict(zip(names, units, strict=False))
@@ -70,6 +69,9 @@ def _csv(path: Path) -> RawLog:
                 stated[name] = (f"{triad}_{axis.lower()}", unit_of(said[name].replace("^", "")))
     raw.columns = {n: c for n, c in raw.columns.items() if not n.startswith("unnamed ")}
     raw.stated = stated
+    raw.units = {
+        n: u for n, said_unit in said.items() if (u := unit_of(said_unit.replace("^", "")))
+    }
     return _told(raw, monitors)
 
 

@@ -21,7 +21,7 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import Finding
 from strapdown.formats import csv
 from strapdown.formats.columns import read_name
-from strapdown.formats.known_text import column, head, stated_by, under
+from strapdown.formats.known_text import column, names_of, stated_by, under
 from strapdown.formats.phones import AXES
 from strapdown.formats.recording import RawLog
 
@@ -34,10 +34,7 @@ WORDS = {
 
 def detect(path: Path) -> bool:
     """Detect by the names of the three vectors."""
-    if not csv.detect(path):
-        return False
-    line = head(path).partition("\n")[0]
-    return len(_named(csv.fields_of(line, csv.separator_of(line)))) == 9
+    return csv.detect(path) and len(_named(names_of(path))) == 9
 
 
 def _named(names: list[str]) -> dict[str, str]:
@@ -69,7 +66,9 @@ def read(path: Path) -> RawLog:
     units = {"-g": 1.0, "m/s2 or -m/s2": STANDARD_GRAVITY}
     unit = next((u for u, g in units.items() if abs(length / g - 1.0) < 0.02), None)
     held: dict[str, tuple[NDArray[Any], str | None]] = {}
-    times = {n: s for n in raw.columns if (s := read_name(n)).quantity == "time"}
+    # As in timestamp(unix).
+    said = {n: (read_name(n), read_name(n.partition("(")[0])) for n in raw.columns}
+    times = {n: s for n, both in said.items() for s in both if s.quantity == "time"}
     if times:
         best = next((n for n, s in times.items() if s.unit), next(iter(times)))
         held["time"] = (raw.columns[best], times[best].unit)

@@ -65,12 +65,15 @@ def read(path: Path) -> RawLog:
 def read_fixes(path: Path) -> RawLog:
     """Read the positions of the records."""
     messages = _messages(path)
-    records = [m for m in messages["record"] if m.get("position_lat") is not None]
+    records = [m for m in messages["record"] if isinstance(m.get("position_lat"), int)]
     if not records:
         raise lacking(path, "gnss", TITLE, _streams(messages))
 
     def values(*names: str) -> NDArray[np.float64]:
-        said = [next((m[n] for n in names if m.get(n) is not None), np.nan) for m in records]
+        said = [
+            next((m[n] for n in names if isinstance(m.get(n), int | float)), np.nan)
+            for m in records
+        ]
         return np.array(said, dtype=np.float64)
 
     time, clock = _stamps(records)
@@ -164,7 +167,7 @@ def _sensor(path: Path, messages: defaultdict[str, list[Message]], triad: str) -
         samples.append(np.column_stack(axes))
     values = np.concatenate(samples)
     if not calibrated:
-        applied = _calibrated(messages, sensor, values)
+        applied = _calibrated(path, messages, sensor, values)
         values, unit = (values, None) if applied is None else (applied, unit)
     held: dict[str, tuple[NDArray[Any], str | None]] = {"time": (np.concatenate(times), "s")}
     held |= {f"{triad}_{a}": (values[:, k], unit) for k, a in enumerate("xyz")}
@@ -174,7 +177,7 @@ def _sensor(path: Path, messages: defaultdict[str, list[Message]], triad: str) -
 
 
 def _calibrated(
-    messages: defaultdict[str, list[Message]], sensor: str, counts: NDArray[np.float64]
+    path: Path, messages: defaultdict[str, list[Message]], sensor: str, counts: NDArray[np.float64]
 ) -> NDArray[np.float64] | None:
     """Convert counts by the first calibration of their sensor; None if there is none."""
     for one in messages["three_d_sensor_calibration"]:
@@ -186,6 +189,15 @@ def _calibrated(
             continue
         offset = np.array(one.get("offset_cal") or (0, 0, 0), dtype=np.float64)
         matrix = np.array(one.get("orientation_matrix") or np.eye(3).ravel(), dtype=np.float64)
+        if offset.size != 3 or matrix.size != 9:
+            raise DataError(
+                "io.fit-samples-and-offsets",
+                file=path.name,
+                row=one["#"],
+                quantity=sensor,
+                count=offset.size,
+                counts=[matrix.size],
+            )
         shifted = counts - float(one.get("level_shift") or 0) - offset
         return np.asarray(shifted * (factor / divisor) @ matrix.reshape(3, 3).T)
     return None

@@ -12,6 +12,7 @@ inertial frame (``ref_pos_x (m)``) there is no place on the Earth.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -28,18 +29,27 @@ from strapdown.rotation import dcm_from_euler
 from strapdown.tables import trajectory_table
 
 TITLE = "folder of gnss-ins-sim"
+_TABLES = re.compile(r"(gyro|accel|mag|gps)-\d+\.csv|ref_\w+\.csv|(gps_)?time\.csv")
 NED = {"vN": "VN", "vE": "VE", "vD": "VD"}
 
 
 def detect(path: Path) -> bool:
     """Detect by the stamps and a table named after a sensor or the reference."""
-    return path.is_dir() and (path / "time.csv").is_file() and bool(_streams(path))
+    folder = _folder(path)
+    stamps = head(folder / "time.csv", 64)
+    return stamps.startswith("time (sec)") and bool(_streams(folder))
+
+
+def _folder(path: Path) -> Path:
+    """Return the folder of a simulation: it, or that of one of its tables."""
+    return path.parent if path.is_file() and _TABLES.fullmatch(path.name) else path
 
 
 def files_of(path: Path) -> tuple[Path, ...]:
     """List the tables that are read; none if this is no such folder."""
     if not detect(path):
         return ()
+    path = _folder(path)
     names = [t.name for k in ("gyro", "accel", "mag", "gps") if (t := _table(path, k))]
     names += ["time.csv", "gps_time.csv", "ref_pos.csv", "ref_vel.csv", "ref_att_euler.csv"]
     return tuple(path / name for name in names if (path / name).is_file())
@@ -53,6 +63,7 @@ def read(path: Path) -> RawLog:
     DataError
         A table is missing or damaged, or has another number of rows than the stamps.
     """
+    path = _folder(path)
     findings: list[Finding] = []
     time = _columns(path, path / "time.csv", findings)
     held: dict[str, tuple[NDArray[Any], str | None]] = {"time": (time["time"][0], "s")}
@@ -67,6 +78,7 @@ def read(path: Path) -> RawLog:
 
 def read_fixes(path: Path) -> RawLog:
     """Read the fixes of the first run: latitude, longitude, height, velocity."""
+    path = _folder(path)
     findings: list[Finding] = []
     table = _first(path, "gps", findings)
     if table is None or not (path / "gps_time.csv").is_file():
@@ -84,6 +96,7 @@ def read_fixes(path: Path) -> RawLog:
 
 def read_reference(path: Path) -> pd.DataFrame:
     """Read the trajectory of the simulation."""
+    path = _folder(path)
     name = path.resolve().name
     findings: list[Finding] = []
     tables = [path / f"ref_{kind}.csv" for kind in ("pos", "vel", "att_euler")]

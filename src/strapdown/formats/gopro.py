@@ -4,7 +4,8 @@ GPMF (https://github.com/gopro/gpmf-parser, README): key, type, size and count i
 big-endian values padded to four bytes; type 0 nests. ``DEVC`` is a payload of about a second with a
 ``STRM`` for each sensor; ``SCAL`` divides what follows it. ``GYRO`` (rad/s) and ``ACCL`` (m/s²,
 specific force) name the axis of each channel in ``ORIN``, small letters reversed (``YxZ``: y, -x,
-z), older cameras in the name of the stream (``Accelerometer (z,x,y)``). ``GPS5`` has latitude,
+z), older cameras in the name of the stream (``Accelerometer (z,x,y)``; up/down, right/left and
+forward/back are z, x, y). ``GPS5`` has latitude,
 longitude, height, speed over ground and in space, ``GPS9`` also days since 2000, seconds of the
 day, dilution and kind of fix; the height is over the sea if ``GPSA`` says MSLV, else over the
 ellipsoid of WGS 84. ``STMP`` counts µs at the first sample of a payload; without it the stamps of
@@ -31,6 +32,7 @@ from strapdown.formats.clocks import RELATIVE, UNIX
 from strapdown.formats.columns import unit_of
 from strapdown.formats.join import join
 from strapdown.formats.known_text import from_json, head, lacking
+from strapdown.formats.mp4_telemetry import telemetry_of
 from strapdown.formats.recording import RawLog
 
 TITLE = "GoPro telemetry"
@@ -49,6 +51,8 @@ TYPES = {
 SENSORS = {"GYRO": "gyro", "ACCL": "accel", "MAGN": "mag"}
 DAYS_2000 = 946_684_800.0  # 2000-01-01 in seconds since 1970
 _BRACKETS = re.compile(r"\(\s*([xyz])\s*,\s*([xyz])\s*,\s*([xyz])\s*\)", re.I)
+# The order of HERO5, as its streams are named.
+_WORDS = {"up/down": "z", "right/left": "x", "forward/back": "y"}
 Array = NDArray[np.float64]
 
 
@@ -72,7 +76,7 @@ def detect(path: Path) -> bool:
     with path.open("rb") as stream:
         first = stream.read(12)
     if first[:4] == b"DEVC" or first[4:8] == b"ftyp":
-        return first[:4] == b"DEVC" or _payloads_of_mp4(path) is not None
+        return first[:4] == b"DEVC" or telemetry_of(path) is not None
     text = head(path, 4096) if path.suffix.lower() == ".json" else ""
     return text.lstrip().startswith("{") and '"streams"' in text and '"samples"' in text
 
@@ -132,7 +136,10 @@ def _held(streams: dict[str, Stream]) -> list[str]:
 def _sensor(path: Path, key: str, one: Stream) -> RawLog:
     """Return one sensor about the axes of the camera."""
     triad, values = SENSORS[key], np.concatenate(one.values)
-    named = _BRACKETS.search(str(one.said.get("STNM", "")))
+    name = str(one.said.get("STNM", ""))
+    for words, axis in _WORDS.items():
+        name = name.replace(words, axis)
+    named = _BRACKETS.search(name)
     order = str(one.said.get("ORIN", "")) or ("".join(named.groups()).upper() if named else "")
     if sorted(order.upper()) != ["X", "Y", "Z"] or values.shape[1] != 3:
         raise DataError("io.gopro-order-of-axes", file=path.name, quantity=triad, order=order)
@@ -157,7 +164,7 @@ def _streams(path: Path) -> tuple[dict[str, Stream], str]:
     if first == b"DEVC":
         payloads = [path.read_bytes()]
     else:
-        payloads, starts = _payloads_of_mp4(path) or ([], None)
+        payloads, starts = telemetry_of(path) or ([], None)
     streams: dict[str, Stream] = {}
     count = 0
     for data in payloads:
@@ -225,7 +232,9 @@ def _payload(data: bytes, count: int, streams: dict[str, Stream], path: Path) ->
                 text = content.rstrip(b"\0").decode("latin-1")
                 said[name] = _utc(text) if name == "GPSU" else text
             elif kind[0] in TYPES:
-                raw = np.frombuffer(content, TYPES[kind[0]])
+                layout = np.dtype(TYPES[kind[0]])
+                whole = len(content) // layout.itemsize * layout.itemsize
+                raw = np.frombuffer(content[:whole], layout)
                 said[name] = raw.astype(np.float64) if name == "SCAL" else raw[0] if raw.size else 0
 
 
@@ -311,94 +320,3 @@ def _from_json(path: Path) -> dict[str, Stream]:
         held = np.array(fixed)[np.maximum.accumulate(known)]
         one.fixed = [np.where(np.isnan(held), 3.0, held)]
     return streams
-
-
-def _payloads_of_mp4(path: Path) -> tuple[list[bytes], Array] | None:
-    """Return the payloads of the ``gpmd`` track and their starts and end in s; None without one."""
-    try:
-        with path.open("rb") as stream:
-            moov = _box(stream, path.stat().st_size, b"moov")
-            for trak in _boxes(moov, b"trak"):
-                mdia = next(_boxes(trak, b"mdia"))
-                table = next(_boxes(next(_boxes(mdia, b"minf")), b"stbl"))
-                if next(_boxes(table, b"stsd"))[12:16] != b"gpmd":
-                    continue
-                mdhd = next(_boxes(mdia, b"mdhd"))
-                ticks = struct.unpack_from(">I", mdhd, 20 if mdhd[0] else 12)[0]
-                sizes, places, steps = _samples(table)
-                data = []
-                for size, place in zip(sizes, places, strict=True):
-                    stream.seek(place)
-                    data.append(stream.read(size))
-                return data, np.concatenate([[0.0], np.cumsum(steps)]) / ticks
-    except (
-        OSError,
-        struct.error,
-        StopIteration,
-        ValueError,
-        IndexError,
-        ZeroDivisionError,
-        RuntimeError,
-    ):
-        return None
-    return None
-
-
-def _samples(table: bytes) -> tuple[list[int], list[int], Array]:
-    """Return sizes, places and durations of the samples of a track."""
-    stsz, stsc, stts = (next(_boxes(table, k)) for k in (b"stsz", b"stsc", b"stts"))
-    size, count = struct.unpack_from(">II", stsz, 4)
-    sizes = [size] * count if size else list(struct.unpack_from(f">{count}I", stsz, 12))
-    wide = next(_boxes(table, b"co64"), None)
-    chunks = wide if wide is not None else next(_boxes(table, b"stco"))
-    number = struct.unpack_from(">I", chunks, 4)[0]
-    offsets = struct.unpack_from(f">{number}{'Q' if wide is not None else 'I'}", chunks, 8)
-    runs = [
-        struct.unpack_from(">III", stsc, 8 + 12 * k)
-        for k in range(struct.unpack_from(">I", stsc, 4)[0])
-    ]
-    places: list[int] = []
-    for chunk, offset in enumerate(offsets, 1):
-        per = [r[1] for r in runs if r[0] <= chunk][-1]
-        for _ in range(per):
-            if len(places) < count:
-                places.append(offset)
-                offset += sizes[len(places) - 1]
-    pairs = [
-        struct.unpack_from(">II", stts, 8 + 8 * k)
-        for k in range(struct.unpack_from(">I", stts, 4)[0])
-    ]
-    return sizes, places, np.repeat([p[1] for p in pairs], [p[0] for p in pairs]).astype(np.float64)
-
-
-def _boxes(data: bytes, kind: bytes) -> Iterator[bytes]:
-    at = 0
-    while at + 8 <= len(data):
-        size, name = struct.unpack_from(">I4s", data, at)
-        start = 8
-        if size == 1:
-            size, start = struct.unpack_from(">Q", data, at + 8)[0], 16
-        if size < start:
-            return
-        if name == kind:
-            yield data[at + start : at + size]
-        at += size
-
-
-def _box(stream: Any, end: int, kind: bytes) -> bytes:
-    """Return the content of a box of the file, without reading the pictures before it."""
-    at = 0
-    while at + 8 <= end:
-        stream.seek(at)
-        size, name = struct.unpack(">I4s", stream.read(8))
-        start = 8
-        if size == 1:
-            size, start = struct.unpack(">Q", stream.read(8))[0], 16
-        size = size or end - at
-        if size < start:
-            break
-        if name == kind:
-            stream.seek(at + start)
-            return bytes(stream.read(size - start))
-        at += size
-    raise ValueError(kind)

@@ -20,10 +20,11 @@ __all__ = [
     "column",
     "from_json",
     "head",
-    "header_with",
     "lacking",
+    "names_of",
     "optional",
     "selected",
+    "split",
     "stated_by",
     "under",
 ]
@@ -113,18 +114,19 @@ def from_json(path: Path) -> Any:
         raise DataError("io.no-json", file=path.name, msg=str(error)) from None
 
 
-def header_with(text: str, *names: str) -> int | None:
-    """Return the first line, from 0, that has all names as fields; None if no line has."""
-    wanted = {name.lower() for name in names}
-    for k, line in enumerate(text.splitlines()):
-        if wanted <= _fields(line):
-            return k
-    return None
+def names_of(path: Path) -> list[str]:
+    """Return the names in the first line, for format detection."""
+    lines = head(path).splitlines()
+    return split(lines[0]) if lines else []
 
 
-def _fields(line: str) -> set[str]:
-    fields: Iterable[str] = csv.fields_of(line, csv.separator_of(line))
-    return {field.lower() for field in fields}
+def split(line: str, separator: str | None = "") -> list[str]:
+    """Split a line into fields, by its own separator; quotes that do not close are text."""
+    by = csv.separator_of(line) if separator == "" else separator
+    try:
+        return csv.fields_of(line, by)
+    except Exception:  # of the standard library: a quote that does not close, a long field
+        return [field.strip() for field in line.split(by)]
 
 
 def lacking(path: Path, stream: str, title: str, streams: Iterable[str]) -> DataError:

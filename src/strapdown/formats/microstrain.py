@@ -54,13 +54,16 @@ def _top(path: Path) -> int | None:
 def read(path: Path) -> RawLog:
     """Read rates and specific force, or increments where the file has those alone."""
     raw = under(path, _top(path) or 0)
-    time, clock = _time(raw)
     for fields in (FIELDS, {**FIELDS, **SUMS}):
-        held = time | _of(raw, fields)
-        if all(f"gyro_{a}" in held for a in "xyz"):
-            return stated_by(
-                raw, held, clock=clock, sampling="mean" if fields is not FIELDS else None
-            )
+        stated = _stated(raw, fields)
+        if {f"gyro_{a}" for a in "xyz"} <= {quantity for quantity, _ in stated.values()}:
+            time, raw.clock = _time(raw)
+            for name in stated:
+                column(raw, name)
+            raw.columns["time"], unit = time["time"]
+            raw.stated = {"time": ("time", unit), **stated}
+            raw.sampling = None if fields is FIELDS else "mean"
+            return raw
     raise lacking(path, "imu", TITLE, ["barometer"] if _pressure(raw) else [])
 
 
@@ -69,7 +72,7 @@ def read_barometer(path: Path) -> RawLog:
     raw = under(path, _top(path) or 0)
     time, clock = _time(raw)
     if (name := _pressure(raw)) is None:
-        raise lacking(path, "barometer", TITLE, ["imu"] if _of(raw, FIELDS) else [])
+        raise lacking(path, "barometer", TITLE, ["imu"] if _stated(raw, FIELDS) else [])
     return stated_by(raw, time | {"pressure": (column(raw, name), "mbar")}, clock=clock)
 
 
@@ -77,15 +80,16 @@ def _pressure(raw: RawLog) -> str | None:
     return next((name for name in raw.columns if PRESSURE.fullmatch(name)), None)
 
 
-def _of(raw: RawLog, fields: dict[str, Any]) -> dict[str, tuple[NDArray[Any], str | None]]:
-    held = {}
+def _stated(raw: RawLog, fields: dict[str, Any]) -> dict[str, tuple[str, str | None]]:
+    """Return the columns of the sensors; their names tell increments from rates."""
+    stated: dict[str, tuple[str, str | None]] = {}
     for name in raw.columns:
         for triad, (pattern, unit) in fields.items():
-            if match := pattern.fullmatch(name):
-                axis = next((g for g in match.groups() if g), None)
-                if axis is not None:
-                    held[f"{triad}_{axis.lower()}"] = (column(raw, name), unit)
-    return held
+            match = pattern.fullmatch(name)
+            axis = next((g for g in match.groups() if g), None) if match else None
+            if axis is not None:
+                stated[name] = (f"{triad}_{axis.lower()}", unit)
+    return stated
 
 
 def _time(raw: RawLog) -> tuple[dict[str, tuple[NDArray[Any], str | None]], str]:

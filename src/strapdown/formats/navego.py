@@ -37,9 +37,14 @@ def detect(path: Path) -> bool:
     """Detect by the fields of the structures."""
     if not path.is_file() or path.suffix.lower() != ".mat":
         return False
+    from scipy.io import whosmat
+
     try:
+        # Reading a file is dear; most have no structure.
+        if not hdf5.detect(path) and all(kind != "struct" for _, _, kind in whosmat(path)):
+            return False
         return bool(_kinds(_structures(path)))
-    except DataError:
+    except Exception:  # damaged, or of another version
         return False
 
 

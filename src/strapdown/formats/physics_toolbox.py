@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.clocks import RELATIVE
-from strapdown.formats.known_text import column, head, lacking, optional, stated_by, under
+from strapdown.formats.known_text import column, lacking, names_of, optional, stated_by, under
 from strapdown.formats.phones import AXES
 from strapdown.formats.recording import RawLog
 
@@ -31,8 +31,7 @@ def detect(path: Path) -> bool:
     """Detect by ``time`` and the names of the g-force, which no other application has."""
     if not csv.detect(path):
         return False
-    line = head(path, 4096).partition("\n")[0]
-    names = csv.fields_of(line, csv.separator_of(line))
+    names = names_of(path)
     return names[:1] == ["time"] and {"gFx", "gFy", "gFz"} <= set(names)
 
 

@@ -15,10 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError
-from strapdown.formats import csv
 from strapdown.formats.clocks import UNIX
 from strapdown.formats.join import join
-from strapdown.formats.known_text import column, head, lacking, selected, stated_by, under
+from strapdown.formats.known_text import column, head, lacking, selected, split, stated_by, under
 from strapdown.formats.recording import RawLog
 
 TITLE = "RaceChrono CSV"
@@ -69,7 +68,7 @@ def _table(path: Path) -> tuple[RawLog, dict[str, str]]:
     top = next((k for k, line in enumerate(lines) if line.startswith("timestamp,")), None)
     if top is None or len(lines) < top + 3 or not lines[top + 1].startswith("unix time"):
         raise DataError("io.racechrono-header", file=path.name, row=(top or 0) + 1)
-    names, units, sources = (csv.fields_of(lines[top + k], ",") for k in range(3))
+    names, units, sources = (split(lines[top + k], ",") for k in range(3))
     if not len(names) == len(units) == len(sources):
         raise DataError("io.racechrono-header", file=path.name, row=top + 1)
     full = [
