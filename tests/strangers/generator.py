@@ -13,7 +13,6 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
-
 from tests.strangers.motion import G, Motion, as_counts, simulate
 
 DEG = np.pi / 180
@@ -60,6 +59,11 @@ class Column:
     unit: str
     cells: list[str]
     role: str = "extra"
+
+
+#: A phone's axes are right, up its face, out of its face; forward is up its face.
+PHONE = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+ROOT = 20240229
 
 
 # --------------------------------------------------------------------------------------- names
@@ -160,9 +164,7 @@ ACCEL_DECIMALS = {"m/s2": (2, 7), "g": (3, 7), "mg": (0, 3)}
 def _names(pattern: str) -> list[str]:
     if " " in pattern and "{" not in pattern:
         return pattern.split()
-    return [
-        pattern.format(x="xyz"[k], X="XYZ"[k], i=k, j=k + 1) for k in range(3)
-    ]
+    return [pattern.format(x="xyz"[k], X="XYZ"[k], i=k, j=k + 1) for k in range(3)]
 
 
 def _text(values: np.ndarray, decimals: int, how: str = "f") -> list[str]:
@@ -174,7 +176,7 @@ def _text(values: np.ndarray, decimals: int, how: str = "f") -> list[str]:
 class Draw(np.random.Generator):
     """Random choices with shorter names."""
 
-    def one(self, of: Sequence, weights: Sequence[float] | None = None):  # noqa: ANN201
+    def one(self, of: Sequence, weights: Sequence[float] | None = None):
         """One of these."""
         p = None if weights is None else np.array(weights) / sum(weights)
         return of[int(self.choice(len(of), p=p))]
@@ -188,7 +190,10 @@ class Draw(np.random.Generator):
 def sample(d: Draw, rate: float | None = None) -> tuple[Motion, float, list[str]]:
     """A motion at stamps with what loggers do to stamps; the rate; what was done."""
     rate = rate or float(
-        d.one([10, 20, 25, 50, 52, 60, 100, 104, 119, 200, 400, 500, 1000], [3, 3, 3, 8, 2, 2, 10, 2, 1, 4, 1, 1, 1])
+        d.one(
+            [10, 20, 25, 50, 52, 60, 100, 104, 119, 200, 400, 500, 1000],
+            [3, 3, 3, 8, 2, 2, 10, 2, 1, 4, 1, 1, 1],
+        )
     )
     seconds = float(np.exp(d.uniform(np.log(5), np.log(120))))
     seconds = min(seconds, 12000 / rate)
@@ -252,16 +257,44 @@ def _dates(start: datetime, t: np.ndarray, form: str, digits: int) -> list[str]:
 def clock(d: Draw, t: np.ndarray, rate: float, unit_way: str, kind: str | None = None) -> Clock:
     """The time of a log in one of the ways that people write it."""
     kind = kind or d.one(
-        ["s", "ms", "us", "ns", "epoch s", "epoch ms", "epoch us", "epoch ns", "iso", "time of day",
-         "gps", "wrap", "number", "excel", "two", "date and time", "bursts", "boot s", "minutes"],
+        [
+            "s",
+            "ms",
+            "us",
+            "ns",
+            "epoch s",
+            "epoch ms",
+            "epoch us",
+            "epoch ns",
+            "iso",
+            "time of day",
+            "gps",
+            "wrap",
+            "number",
+            "excel",
+            "two",
+            "date and time",
+            "bursts",
+            "boot s",
+            "minutes",
+        ],
         [26, 20, 8, 3, 6, 9, 3, 4, 7, 4, 2, 2, 5, 2, 4, 2, 2, 4, 0.5],
-    )  # fmt: skip
-    start = datetime(2019 + int(d.integers(7)), int(d.integers(1, 13)), int(d.integers(1, 28)),
-                     int(d.integers(6, 22)), int(d.integers(60)), int(d.integers(60)),
-                     int(d.integers(1000)) * 1000, tzinfo=UTC)  # fmt: skip
+    )
+    start = datetime(
+        2019 + int(d.integers(7)),
+        int(d.integers(1, 13)),
+        int(d.integers(1, 28)),
+        int(d.integers(6, 22)),
+        int(d.integers(60)),
+        int(d.integers(60)),
+        int(d.integers(1000)) * 1000,
+        tzinfo=UTC,
+    )
     epoch = start.timestamp()
-    names = d.one(["time", "Time", "t", "timestamp", "Timestamp", "TIME", "ts", "elapsed", "time_stamp"],
-                  [10, 6, 5, 10, 5, 1, 3, 1, 1])  # fmt: skip
+    names = d.one(
+        ["time", "Time", "t", "timestamp", "Timestamp", "TIME", "ts", "elapsed", "time_stamp"],
+        [10, 6, 5, 10, 5, 1, 3, 1, 1],
+    )
     tol = 0.6 / rate if rate < 100 else 0.3 / rate
 
     def column(name: str, unit: str, cells: list[str]) -> Column:
@@ -298,12 +331,23 @@ def clock(d: Draw, t: np.ndarray, rate: float, unit_way: str, kind: str | None =
         return Clock([column(name, d.one(["", unit]), cells)], t, 1.01 * step + 1e-6, kind, False)
     if kind in ("iso", "date and time"):
         digits = int(d.one([3, 3, 6]))
-        iso = d.one(["%Y-%m-%dT%H:%M:%S.FFFZ", "%Y-%m-%d %H:%M:%S.FFF", "%Y-%m-%dT%H:%M:%S.FFF+02:00",
-                     "%d.%m.%Y %H:%M:%S.FFF", "%Y/%m/%d %H:%M:%S.FFF", "%Y-%m-%d %H:%M:%S:FFF",
-                     "%d/%m/%Y %H:%M:%S.FFF"], [5, 5, 1, 1, 2, 1, 1])  # fmt: skip
+        iso = d.one(
+            [
+                "%Y-%m-%dT%H:%M:%S.FFFZ",
+                "%Y-%m-%d %H:%M:%S.FFF",
+                "%Y-%m-%dT%H:%M:%S.FFF+02:00",
+                "%d.%m.%Y %H:%M:%S.FFF",
+                "%Y/%m/%d %H:%M:%S.FFF",
+                "%Y-%m-%d %H:%M:%S:FFF",
+                "%d/%m/%Y %H:%M:%S.FFF",
+            ],
+            [5, 5, 1, 1, 2, 1, 1],
+        )
         tol = 1.01 * 10.0**-digits
         if kind == "iso":
-            name = d.one([names, "datetime", "DateTime", "date", "Timestamp (UTC)"], [5, 1, 1, 1, 1])
+            name = d.one(
+                [names, "datetime", "DateTime", "date", "Timestamp (UTC)"], [5, 1, 1, 1, 1]
+            )
             return Clock([column(name, "", _dates(start, t, iso, digits))], t, tol, kind)
         form = d.one(["%d.%m.%Y", "%Y-%m-%d", "%m/%d/%Y"])
         one = column("Date", "", _dates(start, t, form, 1))
@@ -325,7 +369,9 @@ def clock(d: Draw, t: np.ndarray, rate: float, unit_way: str, kind: str | None =
         first = 2**bits - int(d.uniform(0.2, 0.8) * min(t[-1], 60) * k)
         cells = [str(int(v)) for v in (np.rint(t * k).astype(np.int64) + first) % 2**bits]
         unit = what[:2]
-        return Clock([column(f"{d.one(['time', 't', 'timestamp'])}_{unit}", "", cells)], t, 1.01 / k, kind)
+        return Clock(
+            [column(f"{d.one(['time', 't', 'timestamp'])}_{unit}", "", cells)], t, 1.01 / k, kind
+        )
     if kind == "number":
         # A lost packet is a lost number.
         number = np.rint(t * rate).astype(np.int64)
@@ -333,21 +379,42 @@ def clock(d: Draw, t: np.ndarray, rate: float, unit_way: str, kind: str | None =
             number[i] = max(number[i], number[i - 1] + 1)
         wraps = d.odds(0.25)
         cells = [str(int(v)) for v in (number % 256 if wraps else number + int(d.one([0, 1])))]
-        name = d.one(["sample", "PacketCounter", "index", "n", "Sample", "packet", "seq", "#", "No."])
-        say = d.one([
-            f"Sample rate: {rate:g} Hz", f"SampleRate={rate:g}", f"fs = {rate:g} Hz",
-            f"Sampling frequency (Hz): {rate:g}", f"Update Rate: {rate:.1f}Hz", f"ODR {rate:g} Hz",
-        ])  # fmt: skip
+        name = d.one(
+            ["sample", "PacketCounter", "index", "n", "Sample", "packet", "seq", "#", "No."]
+        )
+        say = d.one(
+            [
+                f"Sample rate: {rate:g} Hz",
+                f"SampleRate={rate:g}",
+                f"fs = {rate:g} Hz",
+                f"Sampling frequency (Hz): {rate:g}",
+                f"Update Rate: {rate:.1f}Hz",
+                f"ODR {rate:g} Hz",
+            ]
+        )
         stated = d.odds(0.75)
-        return Clock([column(name, "", cells)], number / rate - number[0] / rate, tol, kind, stated,
-                     [say] if stated else [], decidable=stated)  # fmt: skip
+        return Clock(
+            [column(name, "", cells)],
+            number / rate - number[0] / rate,
+            tol,
+            kind,
+            stated,
+            [say] if stated else [],
+            decidable=stated,
+        )
     if kind == "two":
         other = t + np.abs(d.normal(0, 0.15, len(t))) / rate
         other = np.maximum.accumulate(other)
-        mine = column(d.one(["sensor_time_us", "device_time_us", "SampleTimeFine_us"]), "",
-                      [str(round(v)) for v in (t + 12.5) * 1e6])  # fmt: skip
-        host = column(d.one(["timestamp", "host_time", "pc_time", "received_at", "UnixTime"]), "",
-                      _text(other + epoch, 6))  # fmt: skip
+        mine = column(
+            d.one(["sensor_time_us", "device_time_us", "SampleTimeFine_us"]),
+            "",
+            [str(round(v)) for v in (t + 12.5) * 1e6],
+        )
+        host = column(
+            d.one(["timestamp", "host_time", "pc_time", "received_at", "UnixTime"]),
+            "",
+            _text(other + epoch, 6),
+        )
         both = [mine, host] if d.odds(0.5) else [host, mine]
         return Clock(both, t, 2e-3 + 1.0 / rate, kind, clocks=[other - other[0]])
     # bursts: a radio delivers several samples at once, stamped when they arrived
@@ -355,8 +422,12 @@ def clock(d: Draw, t: np.ndarray, rate: float, unit_way: str, kind: str | None =
     n = len(t)
     arrived = t[np.minimum((np.arange(n) // size + 1) * size - 1, n - 1)]
     cells = [str(round(epoch * 1e3 + v)) for v in arrived * 1e3]
-    out = Clock([column(d.one(["timestamp", "time_ms", "epoch (ms)"]), "", cells)], t,
-                1.2 * size / rate, "bursts")  # fmt: skip
+    out = Clock(
+        [column(d.one(["timestamp", "time_ms", "epoch (ms)"]), "", cells)],
+        t,
+        1.2 * size / rate,
+        "bursts",
+    )
     out.decidable = False
     return out
 
@@ -393,20 +464,39 @@ def _with_unit(name: str, unit: str, code: str, way: str) -> str:
     }.get(way, name)
 
 
-def triads(d: Draw, m: Motion, unit_way: str | None = None, style: tuple | None = None,
-           gyro_unit: str | None = None, accel_unit: str | None = None) -> Triads:  # fmt: skip
+def triads(
+    d: Draw,
+    m: Motion,
+    unit_way: str | None = None,
+    style: tuple | None = None,
+    gyro_unit: str | None = None,
+    accel_unit: str | None = None,
+) -> Triads:
     """Columns of both triads in a style, a unit, and a way to state the unit."""
     style = style or d.one(STYLES)
     way = unit_way or d.one(
-        ["none", "parentheses", "tight parentheses", "brackets", "tight brackets", "suffix",
-         "units line", "preamble", "in", "slash", "blank"],
+        [
+            "none",
+            "parentheses",
+            "tight parentheses",
+            "brackets",
+            "tight brackets",
+            "suffix",
+            "units line",
+            "preamble",
+            "in",
+            "slash",
+            "blank",
+        ],
         [36, 14, 6, 8, 4, 10, 8, 9, 1, 1, 1],
-    )  # fmt: skip
+    )
+    if way == "suffix" and any(c in style[0] for c in "[/-"):
+        way = "none"
+    elif way == "suffix" and " " in style[0] and "{" in style[0]:
+        way = "parentheses"
     named = NAMED_UNITS.get(style[0])
     gu = gyro_unit or d.one(["deg/s", "rad/s", "mdps", "counts"], [44, 38, 4, 14])
-    au = accel_unit or (
-        "counts" if gu == "counts" else d.one(["m/s2", "g", "mg"], [50, 40, 6])
-    )
+    au = accel_unit or ("counts" if gu == "counts" else d.one(["m/s2", "g", "mg"], [50, 40, 6]))
     if gu == "mdps" and accel_unit is None:
         au = "mg"
     if named:
@@ -419,18 +509,27 @@ def triads(d: Draw, m: Motion, unit_way: str | None = None, style: tuple | None 
         fs = next((k for k in (250, 500, 1000, 2000) if k > top), 2000)
         if d.odds(0.25):
             fs = 2000
-        gk = DEG / (32768 / fs) if d.odds(0.5) else DEG / {250: 131, 500: 65.5, 1000: 32.8, 2000: 16.4}[fs]
+        gk = (
+            DEG / (32768 / fs)
+            if d.odds(0.5)
+            else DEG / {250: 131, 500: 65.5, 1000: 32.8, 2000: 16.4}[fs]
+        )
         high = np.abs(m.accel).max() / G
         afs = next((k for k in (2, 4, 8, 16) if k > high), 16)
         ak = G / (32768 / afs)
         said = d.odds(0.55)
         if said:
-            preamble = [d.one([
-                f"MPU-6050, gyro ±{fs} deg/s, accel ±{afs} g, raw counts (16 bit)",
-                f"raw LSB; gyro sensitivity {32768 / fs:.1f} LSB/(deg/s); accel sensitivity {32768 // afs} LSB/g",
-                f"GYRO_FS_{fs} ACCEL_FS_{afs} raw int16",
-                f"Gyro scale: {32768 / fs:.1f} LSB/dps, Accel scale: {32768 // afs} LSB/g",
-            ])]  # fmt: skip
+            preamble = [
+                d.one(
+                    [
+                        f"MPU-6050, gyro ±{fs} deg/s, accel ±{afs} g, raw counts (16 bit)",
+                        f"raw LSB; gyro sensitivity {32768 / fs:.1f} LSB/(deg/s); "
+                        f"accel sensitivity {32768 // afs} LSB/g",
+                        f"GYRO_FS_{fs} ACCEL_FS_{afs} raw int16",
+                        f"Gyro scale: {32768 / fs:.1f} LSB/dps, Accel scale: {32768 // afs} LSB/g",
+                    ]
+                )
+            ]
         decidable = said or m.turned
         gc, gt = as_counts(m.gyro, gk)
         ac, at = as_counts(m.accel, ak)
@@ -463,12 +562,16 @@ def triads(d: Draw, m: Motion, unit_way: str | None = None, style: tuple | None 
             big = np.abs(gt).max() / gk
             decidable = m.turned or (gu != "rad/s" and big > 60)
         if way == "preamble":
-            preamble = [d.one([
-                f"gyro: {gtext}, accel: {atext}",
-                f"Units: angular rate in {gtext}; acceleration in {atext}",
-                f"Gyroscope unit = {gtext}\nAccelerometer unit = {atext}",
-                f"acceleration {atext}, angular velocity {gtext}, magnetic field uT",
-            ])]  # fmt: skip
+            preamble = [
+                d.one(
+                    [
+                        f"gyro: {gtext}, accel: {atext}",
+                        f"Units: angular rate in {gtext}; acceleration in {atext}",
+                        f"Gyroscope unit = {gtext}\nAccelerometer unit = {atext}",
+                        f"acceleration {atext}, angular velocity {gtext}, magnetic field uT",
+                    ]
+                )
+            ]
     gname = [_with_unit(x, gtext, gcode, way) if gtext else x for x in _names(style[0])]
     aname = [_with_unit(x, atext, acode, way) if atext else x for x in _names(style[1])]
     gcol = [Column(a, gtext, b, "gyro") for a, b in zip(gname, gcells, strict=True)]
@@ -486,7 +589,9 @@ def extras(d: Draw, m: Motion, mag_style: str, way: str) -> tuple[list[Column], 
     shown = "parentheses" if said and way == "units line" else way
     if d.odds(0.25):
         name = d.one(["temp", "Temperature", "temperature", "Tmp", "T"])
-        after.append(Column(name, "°C" if said else "", _text(24 + 0.01 * t + 0.02 * d.normal(size=n), 2)))
+        after.append(
+            Column(name, "°C" if said else "", _text(24 + 0.01 * t + 0.02 * d.normal(size=n), 2))
+        )
     if d.odds(0.3):
         field_enu = np.array([2.0, 21.0, -43.0])
         mag = m.attitude.inv().apply(field_enu) + d.normal(0, 0.5, (n, 3))
@@ -496,13 +601,24 @@ def extras(d: Draw, m: Motion, mag_style: str, way: str) -> tuple[list[Column], 
     if d.odds(0.2):
         # A cheap filter: yaw, pitch and roll wander by a degree.
         ypr = m.attitude.as_euler("ZYX", degrees=True) + np.cumsum(d.normal(0, 0.01, (n, 3)), 0)
-        names = d.one([("yaw", "pitch", "roll"), ("Yaw", "Pitch", "Roll"), ("heading", "pitch", "roll"),
-                       ("Euler_Z", "Euler_Y", "Euler_X")])  # fmt: skip
+        names = d.one(
+            [
+                ("yaw", "pitch", "roll"),
+                ("Yaw", "Pitch", "Roll"),
+                ("heading", "pitch", "roll"),
+                ("Euler_Z", "Euler_Y", "Euler_X"),
+            ]
+        )
         after += [Column(x, "deg", _text(ypr[:, k], 2)) for k, x in enumerate(names)]
     if d.odds(0.12):
         q = m.attitude.as_quat()
-        names = d.one([("qx", "qy", "qz", "qw"), ("quat_x", "quat_y", "quat_z", "quat_w"),
-                       ("orientation.x", "orientation.y", "orientation.z", "orientation.w")])  # fmt: skip
+        names = d.one(
+            [
+                ("qx", "qy", "qz", "qw"),
+                ("quat_x", "quat_y", "quat_z", "quat_w"),
+                ("orientation.x", "orientation.y", "orientation.z", "orientation.w"),
+            ]
+        )
         after += [Column(x, "", _text(q[:, k], 5)) for k, x in enumerate(names)]
     if d.odds(0.1):
         after.append(Column(d.one(["battery", "Vbat", "batt_V"]), "V", _text(3.9 - t * 1e-4, 2)))
@@ -510,13 +626,23 @@ def extras(d: Draw, m: Motion, mag_style: str, way: str) -> tuple[list[Column], 
         for name, at, dec in (("latitude", 48.137, 6), ("longitude", 11.575, 6), ("speed", 1.2, 2)):
             after.append(Column(name, "", _text(at + 1e-6 * np.floor(t), dec)))
     if d.odds(0.12):
-        after.append(Column(d.one(["label", "activity", "state"]), "", [str(d.one(["walk", "idle"]))] * n))
+        after.append(
+            Column(d.one(["label", "activity", "state"]), "", [str(d.one(["walk", "idle"]))] * n)
+        )
     if d.odds(0.08):
         before.append(Column(d.one(["device", "id", "Sensor", "name"]), "", ["imu01"] * n))
     if d.odds(0.1):
-        before.append(Column(d.one(["", "index", "Unnamed: 0", "idx"]), "", [str(k) for k in range(n)]))
+        before.append(
+            Column(d.one(["", "index", "Unnamed: 0", "idx"]), "", [str(k) for k in range(n)])
+        )
     if d.odds(0.06):
-        after.append(Column(d.one(["baro", "pressure_hPa", "alt"]), "", _text(953.2 + 0.01 * d.normal(size=n), 2)))
+        after.append(
+            Column(
+                d.one(["baro", "pressure_hPa", "alt"]),
+                "",
+                _text(953.2 + 0.01 * d.normal(size=n), 2),
+            )
+        )
     return before, after
 
 
@@ -566,14 +692,22 @@ def write(d: Draw, path: Path, columns: list[Column], how: Layout, damage: list[
     n = len(columns[0].cells)
 
     def cell(text: str) -> str:
-        if how.decimal != "." and text and text.replace(".", "", 1).replace("-", "").replace("e", "").replace("+", "").isdigit():
+        if (
+            how.decimal != "."
+            and text
+            and text.replace(".", "", 1)
+            .replace("-", "")
+            .replace("e", "")
+            .replace("+", "")
+            .isdigit()
+        ):
             return text.replace(".", how.decimal)
         return text
 
     def name(text: str) -> str:
         if how.sep.strip() == "" and how.sep != "\t":
             text = text.replace(" ", "_")
-        if how.quoted or how.sep.strip() in text and how.sep.strip():
+        if how.quoted or (how.sep.strip() in text and how.sep.strip()):
             return f'"{text}"'
         return text
 
@@ -599,18 +733,35 @@ def write(d: Draw, path: Path, columns: list[Column], how: Layout, damage: list[
             heads.append(row(groups))
         heads.append(row([name(c.name) for c in columns]))
         if how.units_line:
-            heads.append(row([name(c.unit) if how.sep.strip() == "" and how.sep != "\t" and c.unit
-                              else c.unit or ("-" if how.sep == " " else "")
-                              for c in columns]))  # fmt: skip
+            heads.append(
+                row(
+                    [
+                        name(c.unit)
+                        if how.sep.strip() == "" and how.sep != "\t" and c.unit
+                        else c.unit or ("-" if how.sep == " " else "")
+                        for c in columns
+                    ]
+                )
+            )
         if how.comment_header:
             heads = [how.comment + x for x in heads]
     lines += heads
     whole: list[int] = []
     table = list(zip(*(map(cell, c.cells) for c in columns), strict=True))
-    again = set(d.choice(n, max(1, n // 100), replace=False).tolist()) if "doubled rows" in damage else set()
-    texts = set(d.choice(np.arange(2, n - 2), 2, replace=False).tolist()) if "text between" in damage else set()
+    again = (
+        set(d.choice(n, max(1, n // 100), replace=False).tolist())
+        if "doubled rows" in damage
+        else set()
+    )
+    texts = (
+        set(d.choice(np.arange(2, n - 2), 2, replace=False).tolist())
+        if "text between" in damage
+        else set()
+    )
     repeat = int(d.integers(5, n - 3)) if "repeated header" in damage else -1
-    say = d.one(["# button pressed", "Calibrating...", "--- pause ---", "WARNING: buffer overflow", ""])
+    say = d.one(
+        ["# button pressed", "Calibrating...", "--- pause ---", "WARNING: buffer overflow", ""]
+    )
     for i, cells in enumerate(table):
         if i in texts:
             lines.append(say)
@@ -637,7 +788,13 @@ def d_all(how: Layout) -> bool:
 
 def damages(d: Draw) -> list[str]:
     """What went wrong with the log."""
-    kinds = {"doubled rows": 0.03, "text between": 0.03, "repeated header": 0.02, "truncated": 0.06, "nan": 0.04}
+    kinds = {
+        "doubled rows": 0.03,
+        "text between": 0.03,
+        "repeated header": 0.02,
+        "truncated": 0.06,
+        "nan": 0.04,
+    }
     return [k for k, p in kinds.items() if d.odds(p)]
 
 
@@ -658,8 +815,13 @@ def _truth(c: Clock, tr: Triads, rate: float) -> Truth:
 
 def _rows(truth: Truth, rows: list[int]) -> Truth:
     accel = None if truth.accel is None else truth.accel[rows]
-    return replace(truth, t=truth.t[rows] - truth.t[rows[0]], gyro=truth.gyro[rows], accel=accel,
-                   clocks=[x[rows] - x[rows[0]] for x in truth.clocks])  # fmt: skip
+    return replace(
+        truth,
+        t=truth.t[rows] - truth.t[rows[0]],
+        gyro=truth.gyro[rows],
+        accel=accel,
+        clocks=[x[rows] - x[rows[0]] for x in truth.clocks],
+    )
 
 
 def _nan(d: Draw, tr: Triads, truth: Truth) -> None:
@@ -677,10 +839,18 @@ def _nan(d: Draw, tr: Triads, truth: Truth) -> None:
 
 
 PREAMBLES = (
-    "Device: IMU logger v1.2", "Firmware 0.9.3", "Recorded with DataLogger Pro", "Subject: 03",
-    "Serial number: 00B4-117", "Start: 2023-04-11 10:22:31", "Comment: second run, on the table",
-    "Logger started", "Author: lab", "Calibration: none", "File version 2",
-)  # fmt: skip
+    "Device: IMU logger v1.2",
+    "Firmware 0.9.3",
+    "Recorded with DataLogger Pro",
+    "Subject: 03",
+    "Serial number: 00B4-117",
+    "Start: 2023-04-11 10:22:31",
+    "Comment: second run, on the table",
+    "Logger started",
+    "Author: lab",
+    "Calibration: none",
+    "File version 2",
+)
 
 
 def table(d: Draw, path: Path) -> Made:
@@ -697,14 +867,26 @@ def table(d: Draw, path: Path) -> Made:
     decidable = tr.decidable and c.decidable
 
     # Acceleration without gravity, and gravity, beside the whole; or in its place.
-    if d.odds(0.08):
-        k = ACCEL_UNITS[tr.units[1]][0] if tr.units[1] in ACCEL_UNITS else tr.accel_quantum / 0.55
-        lin, grav = d.one([("linear_acc_{x}", "gravity_{x}"), ("LinAcc{X}", "Grav{X}"),
-                           ("userAcceleration.{x}", "gravity.{x}"), ("lin_a{x}", "g_vec_{x}")])  # fmt: skip
+    if d.odds(0.08) and tr.units[1] in ACCEL_UNITS:
+        k = ACCEL_UNITS[tr.units[1]][0]
+        lin, grav = d.one(
+            [
+                ("linear_acc_{x}", "gravity_{x}"),
+                ("LinAcc{X}", "Grav{X}"),
+                ("userAcceleration.{x}", "gravity.{x}"),
+                ("lin_a{x}", "g_vec_{x}"),
+            ]
+        )
         gravity = m.accel - m.linear
-        more = [Column(x, tr.accel[0].unit, _text(m.linear[:, i] / k, 5)) for i, x in enumerate(_names(lin))]
+        more = [
+            Column(x, tr.accel[0].unit, _text(m.linear[:, i] / k, 5))
+            for i, x in enumerate(_names(lin))
+        ]
         if d.odds(0.6):
-            more += [Column(x, tr.accel[0].unit, _text(gravity[:, i] / k, 5)) for i, x in enumerate(_names(grav))]
+            more += [
+                Column(x, tr.accel[0].unit, _text(gravity[:, i] / k, 5))
+                for i, x in enumerate(_names(grav))
+            ]
             if not {x.name for x in more} & {x.name for x in tr.accel}:
                 after = more + after
                 kind.append("with linear and gravity")
@@ -737,7 +919,15 @@ def table(d: Draw, path: Path) -> Made:
         cols = [*before, *core, *after, *c.columns]
         kind.append("time last")
 
-    if tr.unit_way in ("parentheses", "tight parentheses", "brackets", "tight brackets", "in", "slash", "blank"):
+    if tr.unit_way in (
+        "parentheses",
+        "tight parentheses",
+        "brackets",
+        "tight brackets",
+        "in",
+        "slash",
+        "blank",
+    ):
         for x in (*c.columns, *after):
             if x.unit and x.name and not any(s in x.name for s in "([_"):
                 x.name = _with_unit(x.name, x.unit, x.unit, tr.unit_way)
@@ -749,12 +939,16 @@ def table(d: Draw, path: Path) -> Made:
         how.units_line = True
         for x in c.columns:
             if not x.unit:
-                x.unit = {"ms": "ms", "us": "us", "ns": "ns", "number": "", "wrap": ""}.get(c.kind, "")
+                x.unit = {"ms": "ms", "us": "us", "ns": "ns", "number": "", "wrap": ""}.get(
+                    c.kind, ""
+                )
     lines = [*tr.preamble, *c.preamble]
     if d.odds(0.15):
         lines = [str(x) for x in d.choice(PREAMBLES, int(d.integers(1, 4)), replace=False)] + lines
     if d.odds(0.04) and m.upright:
-        lines.append(d.one(["Axes: x forward, y left, z up", "sensor frame: X forward, Y left, Z up (FLU)"]))
+        lines.append(
+            d.one(["Axes: x forward, y left, z up", "sensor frame: X forward, Y left, Z up (FLU)"])
+        )
         truth.to_frd = np.diag([1.0, -1.0, -1.0])
         kind.append("axes stated")
     elif d.odds(0.02) and m.upright:
@@ -784,7 +978,16 @@ def table(d: Draw, path: Path) -> Made:
         how.decimal = "."
     rows = write(d, path, cols, how, damage)
     kind += damage
-    kind.append({",": "comma", ";": "semicolon", "\t": "tab", " ": "blanks", ", ": "comma blank", "|": "bar"}[how.sep])
+    kind.append(
+        {
+            ",": "comma",
+            ";": "semicolon",
+            "\t": "tab",
+            " ": "blanks",
+            ", ": "comma blank",
+            "|": "bar",
+        }[how.sep]
+    )
     if how.decimal == ",":
         kind.append("decimal comma")
     if how.encoding != "utf-8":
@@ -792,8 +995,17 @@ def table(d: Draw, path: Path) -> Made:
     return Made(path, _rows(truth, rows), ", ".join(kind), decidable)
 
 
-def _plain(d: Draw, path: Path, kind: str, tr: Triads, c: Clock, cols: list[Column], how: Layout,
-           rate: float, decidable: bool = True) -> Made:  # fmt: skip
+def _plain(
+    d: Draw,
+    path: Path,
+    kind: str,
+    tr: Triads,
+    c: Clock,
+    cols: list[Column],
+    how: Layout,
+    rate: float,
+    decidable: bool = True,
+) -> Made:
     truth = _truth(c, tr, rate)
     damage = [x for x in damages(d) if x != "nan"]
     rows = write(d, path, cols, how, damage)
@@ -804,8 +1016,15 @@ def arduino(d: Draw, path: Path) -> Made:
     """What a sketch prints to the serial monitor."""
     m, rate, _ = sample(d, float(d.one([20, 50, 100, 200])))
     unit = d.one(["counts", "deg/s", "rad/s"], [5, 4, 2])
-    style = d.one([("g{x}", "a{x}", "m{x}"), ("Gy{X}", "Ac{X}", "Ma{X}"), ("gyro{X}", "accel{X}", "mag{X}"),
-                   ("G{x}", "A{x}", "M{x}"), ("GyroX GyroY GyroZ", "AccX AccY AccZ", "MagX MagY MagZ")])  # fmt: skip
+    style = d.one(
+        [
+            ("g{x}", "a{x}", "m{x}"),
+            ("Gy{X}", "Ac{X}", "Ma{X}"),
+            ("gyro{X}", "accel{X}", "mag{X}"),
+            ("G{x}", "A{x}", "M{x}"),
+            ("GyroX GyroY GyroZ", "AccX AccY AccZ", "MagX MagY MagZ"),
+        ]
+    )
     accel = None if unit == "counts" else d.one(["g", "m/s2"])
     tr = triads(d, m, "none", style, unit, accel)
     way = d.one(["millis", "stamped", "labels", "teapot"], [4, 3, 3, 2])
@@ -815,10 +1034,21 @@ def arduino(d: Draw, path: Path) -> Made:
         if d.odds(0.6):
             c.columns[0].name = {"ms": "millis", "us": "micros"}[c.kind]
         cols = [*c.columns, *tr.accel, *tr.gyro]
-        how = layout(d, sep=d.one([",", "\t", ", ", " "]), decimal=".", fixed=False, quoted=False,
-                     preamble=["Initializing I2C devices...", "MPU6050 connection successful", *tr.preamble]
-                     if d.odds(0.4) else tr.preamble, comment="", comment_header=False)  # fmt: skip
-        return _plain(d, path, f"arduino, {'/'.join(tr.units)}", tr, c, cols, how, rate, tr.decidable)
+        how = layout(
+            d,
+            sep=d.one([",", "\t", ", ", " "]),
+            decimal=".",
+            fixed=False,
+            quoted=False,
+            preamble=["Initializing I2C devices...", "MPU6050 connection successful", *tr.preamble]
+            if d.odds(0.4)
+            else tr.preamble,
+            comment="",
+            comment_header=False,
+        )
+        return _plain(
+            d, path, f"arduino, {'/'.join(tr.units)}", tr, c, cols, how, rate, tr.decidable
+        )
     # Stamps of the serial monitor are times of arrival to a millisecond.
     stamps = _dates(start, m.t, "%H:%M:%S.FFF", 3)
     lines = list(tr.preamble)
@@ -846,7 +1076,9 @@ def arduino(d: Draw, path: Path) -> Made:
 
 def phone(d: Draw, path: Path) -> Made:
     """The apps of phones, each with its own habits."""
-    app = d.one(["physics", "andro", "ios", "sensorlog", "matlab", "wide", "phyphox"], [3, 3, 3, 3, 1, 3, 2])
+    app = d.one(
+        ["physics", "andro", "ios", "sensorlog", "matlab", "wide", "phyphox"], [3, 3, 3, 3, 1, 3, 2]
+    )
     rate = float(d.one([50, 100, 10, 200]))
     m, rate, _ = sample(d, rate)
     how = Layout(newline=d.one(["\n", "\r\n"]))
@@ -857,10 +1089,22 @@ def phone(d: Draw, path: Path) -> Made:
         if d.odds(0.4):
             how.sep, how.decimal = ";", ","
         gf = np.linalg.norm(m.accel, axis=1) / G
-        cols = [*c.columns, *tr.accel, *([Column("TgF", "", _text(gf, 3))] if d.odds(0.5) else []), *tr.gyro]
+        cols = [
+            *c.columns,
+            *tr.accel,
+            *([Column("TgF", "", _text(gf, 3))] if d.odds(0.5) else []),
+            *tr.gyro,
+        ]
         return _plain(d, path, "phone: gFx and wx", tr, c, cols, how, rate)
     if app == "andro":
-        tr = triads(d, m, "none", ("GYROSCOPE {X}", "ACCELEROMETER {X}", "MAGNETIC FIELD {X}"), "rad/s", "m/s2")
+        tr = triads(
+            d,
+            m,
+            "none",
+            ("GYROSCOPE {X}", "ACCELEROMETER {X}", "MAGNETIC FIELD {X}"),
+            "rad/s",
+            "m/s2",
+        )
         for x in tr.gyro:
             x.name += " (rad/s)"
         for x in tr.accel:
@@ -869,19 +1113,35 @@ def phone(d: Draw, path: Path) -> Made:
         c.columns[0].name = "Time since start in ms "
         grav = m.accel - m.linear
         more = [Column(f"GRAVITY {'XYZ'[k]} (m/s²)", "", _text(grav[:, k], 4)) for k in range(3)]
-        more += [Column(f"LINEAR ACCELERATION {'XYZ'[k]} (m/s²)", "", _text(m.linear[:, k], 4)) for k in range(3)]
-        dates = Column("YYYY-MO-DD HH-MI-SS_SSS", "",
-                       _dates(datetime(2021, 3, 5, 9, 12, tzinfo=UTC), m.t, "%Y-%m-%d %H-%M-%S_FFF", 3))  # fmt: skip
+        more += [
+            Column(f"LINEAR ACCELERATION {'XYZ'[k]} (m/s²)", "", _text(m.linear[:, k], 4))
+            for k in range(3)
+        ]
+        dates = Column(
+            "YYYY-MO-DD HH-MI-SS_SSS",
+            "",
+            _dates(datetime(2021, 3, 5, 9, 12, tzinfo=UTC), m.t, "%Y-%m-%d %H-%M-%S_FFF", 3),
+        )
         how.sep = d.one([";", ","])
-        return _plain(d, path, "phone: capitals with gravity and linear", tr, c,
-                      [*tr.accel, *more, *tr.gyro, *c.columns, dates], how, rate)  # fmt: skip
+        return _plain(
+            d,
+            path,
+            "phone: capitals with gravity and linear",
+            tr,
+            c,
+            [*tr.accel, *more, *tr.gyro, *c.columns, dates],
+            how,
+            rate,
+        )
     if app == "ios":
         # The phone's own convention: a face that is up reads minus one g.
-        style = d.one([
-            ("gyroRotationX(rad/s)", "accelerometerAccelerationX(G)"),
-            ("motionRotationRateX(rad/s)", "accelerometerAccelerationX(G)"),
-            ("motionRotationRateX(rad/s)", ""),
-        ])  # fmt: skip
+        style = d.one(
+            [
+                ("gyroRotationX(rad/s)", "accelerometerAccelerationX(G)"),
+                ("motionRotationRateX(rad/s)", "accelerometerAccelerationX(G)"),
+                ("motionRotationRateX(rad/s)", ""),
+            ]
+        )
         tr = triads(d, m, "none", STYLES[0], "rad/s", "g")
         gname = [style[0].replace("X(", f"{x}(") for x in "XYZ"]
         for x, name in zip(tr.gyro, gname, strict=True):
@@ -890,9 +1150,12 @@ def phone(d: Draw, path: Path) -> Made:
         when = Column("loggingTime(txt)", "", _dates(start, m.t, "%Y-%m-%d %H:%M:%S.FFF +0200", 3))
         since = Column("motionTimestamp_sinceReboot(s)", "", _text(m.t + 81234.5, 6), "time")
         c = Clock([since], m.t, 2e-3, "two", clocks=[m.t])
-        grav = (m.accel - m.linear) / G
+        grav = (tr.accel_true - m.linear) / G
         parts = [Column(f"motionGravity{'XYZ'[k]}(G)", "", _text(-grav[:, k], 6)) for k in range(3)]
-        user = [Column(f"motionUserAcceleration{'XYZ'[k]}(G)", "", _text(-m.linear[:, k] / G, 6)) for k in range(3)]
+        user = [
+            Column(f"motionUserAcceleration{'XYZ'[k]}(G)", "", _text(-m.linear[:, k] / G, 6))
+            for k in range(3)
+        ]
         head = [when, Column("loggingSample(N)", "", [str(k + 1) for k in range(len(m.t))])]
         if style[1]:
             for k, x in enumerate(tr.accel):
@@ -900,56 +1163,116 @@ def phone(d: Draw, path: Path) -> Made:
                 x.cells = _text(-tr.accel_true[:, k] / G, 6)
             cols = [*head, *tr.accel, since, *tr.gyro, *(user + parts if d.odds(0.6) else [])]
             made = _plain(d, path, "iOS: sign of gravity turned round", tr, c, cols, how, rate)
-            made.truth.accel_quantum = 1e-5
+            made.truth.accel_quantum = 3e-5
+            made.truth.to_frd = PHONE
             return made
         cols = [*head, since, *tr.gyro, *user, *parts]
-        made = _plain(d, path, "iOS: user acceleration and gravity, no whole", tr, c, cols, how, rate)
+        made = _plain(
+            d, path, "iOS: user acceleration and gravity, no whole", tr, c, cols, how, rate
+        )
         made.truth.accel_quantum = 3e-5
+        made.truth.to_frd = PHONE
         made.truth.accel_optional = True
         made.truth.accel_names = tuple(x.name for x in (*user, *parts))
         return made
     if app == "sensorlog":
         tr = triads(d, m, "none", ("gyroscope_{x}", "accelerometer_{x}", "m{x}"), "rad/s", "m/s2")
         for x in (*tr.gyro, *tr.accel):
-            x.name = x.name.replace("accelerometer_", "Accelerometer_").replace("gyroscope_", "Gyroscope_")
+            x.name = x.name.replace("accelerometer_", "Accelerometer_").replace(
+                "gyroscope_", "Gyroscope_"
+            )
         c = clock(d, m.t, rate, "none", "epoch ns")
         c.columns[0].name = "time"
         since = Column("seconds_elapsed", "", _text(m.t + 0.0613, 6))
         cols = [*c.columns, since, *tr.gyro[::-1], *tr.accel[::-1]]
         return _plain(d, path, "phone: epoch ns, seconds elapsed, z y x", tr, c, cols, how, rate)
     if app == "matlab":
-        tr = triads(d, m, "none", ("AngularVelocity_{X}", "Acceleration_{X}", "MagneticField_{X}"), "rad/s", "m/s2")
+        tr = triads(
+            d,
+            m,
+            "none",
+            ("AngularVelocity_{X}", "Acceleration_{X}", "MagneticField_{X}"),
+            "rad/s",
+            "m/s2",
+        )
         c = clock(d, m.t, rate, "none", "iso")
         c.columns[0].name = "Timestamp"
-        return _plain(d, path, "phone: timetable written by MATLAB", tr, c,
-                      [*c.columns, *tr.accel, *tr.gyro], how, rate, tr.decidable)  # fmt: skip
+        return _plain(
+            d,
+            path,
+            "phone: timetable written by MATLAB",
+            tr,
+            c,
+            [*c.columns, *tr.accel, *tr.gyro],
+            how,
+            rate,
+            tr.decidable,
+        )
     if app == "phyphox":
-        tr = triads(d, m, "parentheses", ("Gyroscope {x}", "Acceleration {x}", "Magnetic field {x}"), "rad/s", "m/s2")
+        tr = triads(
+            d,
+            m,
+            "parentheses",
+            ("Gyroscope {x}", "Acceleration {x}", "Magnetic field {x}"),
+            "rad/s",
+            "m/s2",
+        )
         c = clock(d, m.t, rate, "none", "s")
         c.columns[0].name = "Time (s)"
         how.quoted = True
         how.sep = d.one([",", ";", "\t"])
-        return _plain(d, path, "phone: quoted names with units", tr, c, [*c.columns, *tr.accel, *tr.gyro], how, rate)
+        return _plain(
+            d,
+            path,
+            "phone: quoted names with units",
+            tr,
+            c,
+            [*c.columns, *tr.accel, *tr.gyro],
+            how,
+            rate,
+        )
     tr = triads(d, m, "none", ("gyro_{x}", "acc_{x}", "mag_{x}"), "rad/s", "m/s2")
     c = clock(d, m.t, rate, "none", "epoch ms")
     lin = [Column(f"linear_acc_{x}", "", _text(m.linear[:, k], 5)) for k, x in enumerate("xyz")]
-    grav = [Column(f"gravity_{x}", "", _text((m.accel - m.linear)[:, k], 5)) for k, x in enumerate("xyz")]
+    grav = [
+        Column(f"gravity_{x}", "", _text((m.accel - m.linear)[:, k], 5))
+        for k, x in enumerate("xyz")
+    ]
     names = [("linear first", [*lin, *grav, *tr.accel]), ("whole first", [*tr.accel, *lin, *grav])]
     word, block = d.one(names)
-    return _plain(d, path, f"phone: linear, gravity and whole, {word}", tr, c,
-                  [*c.columns, *block, *tr.gyro], how, rate, tr.decidable)  # fmt: skip
+    return _plain(
+        d,
+        path,
+        f"phone: linear, gravity and whole, {word}",
+        tr,
+        c,
+        [*c.columns, *block, *tr.gyro],
+        how,
+        rate,
+        tr.decidable,
+    )
 
 
 def mixed(d: Draw, path: Path) -> Made:
     """Rows of several sensors with a column or a word that says which."""
     rate = float(d.one([50, 100, 200]))
     m, rate, _ = sample(d, rate)
-    gyro_words, accel_words, mag_words = d.one([
-        ("GYR", "ACC", "MAG"), ("gyro", "accel", "mag"), ("Gyroscope", "Accelerometer", "Magnetometer"),
-        ("G", "A", "M"), ("TYPE_GYROSCOPE", "TYPE_ACCELEROMETER", "TYPE_MAGNETIC_FIELD"),
-        ("android.sensor.gyroscope", "android.sensor.accelerometer", "android.sensor.magnetic_field"),
-        ("4", "1", "2"),
-    ], [3, 3, 2, 1, 1, 2, 1])  # fmt: skip
+    gyro_words, accel_words, mag_words = d.one(
+        [
+            ("GYR", "ACC", "MAG"),
+            ("gyro", "accel", "mag"),
+            ("Gyroscope", "Accelerometer", "Magnetometer"),
+            ("G", "A", "M"),
+            ("TYPE_GYROSCOPE", "TYPE_ACCELEROMETER", "TYPE_MAGNETIC_FIELD"),
+            (
+                "android.sensor.gyroscope",
+                "android.sensor.accelerometer",
+                "android.sensor.magnetic_field",
+            ),
+            ("4", "1", "2"),
+        ],
+        [3, 3, 2, 1, 1, 2, 1],
+    )
     gu, au = d.one([("rad/s", "m/s2"), ("deg/s", "g"), ("deg/s", "m/s2")], [5, 2, 1])
     tr = triads(d, m, "none", STYLES[0], gu, au)
     shift = d.uniform(0, 0.8) / rate
@@ -958,7 +1281,12 @@ def mixed(d: Draw, path: Path) -> Made:
     accel = np.column_stack([np.interp(own, m.t, m.accel[:, k]) for k in range(3)])
     ak = ACCEL_UNITS[au][0]
     unit = d.one(["ms", "ns", "s", "epoch ms"])
-    k, base = {"ms": (1e3, 0), "ns": (1e9, 7 * 10**12), "s": (1.0, 0), "epoch ms": (1e3, 1_660_000_000_000)}[unit]
+    k, base = {
+        "ms": (1e3, 0),
+        "ns": (1e9, 7 * 10**12),
+        "s": (1.0, 0),
+        "epoch ms": (1e3, 1_660_000_000_000),
+    }[unit]
 
     def stamp(s: float) -> str:
         return f"{s:.6f}" if unit == "s" else str(base + round(s * k))
@@ -967,13 +1295,20 @@ def mixed(d: Draw, path: Path) -> Made:
     rows += [(s, accel_words, [f"{v / ak:.5f}" for v in accel[i]]) for i, s in enumerate(own)]
     if d.odds(0.5):
         mag = m.attitude.inv().apply([2.0, 21.0, -43.0])
-        rows += [(m.t[i] + 0.4 / rate, mag_words, [f"{v:.2f}" for v in mag[i]]) for i in range(0, len(m.t), 5)]
+        rows += [
+            (m.t[i] + 0.4 / rate, mag_words, [f"{v:.2f}" for v in mag[i]])
+            for i in range(0, len(m.t), 5)
+        ]
     rows.sort(key=lambda r: r[0])
     first = d.odds(0.5)
     head = d.odds(0.75)
     name = d.one(["sensor", "type", "Sensor", "sensorType"])
     when = "timestamp" + (d.one(["_", " "]) + unit.split()[-1] if d.odds(0.4) else "")
-    lines = [",".join([name, when, "x", "y", "z"] if first else [when, name, "x", "y", "z"])] if head else []
+    lines = (
+        [",".join([name, when, "x", "y", "z"] if first else [when, name, "x", "y", "z"])]
+        if head
+        else []
+    )
     for s, word, values in rows:
         lines.append(",".join([word, stamp(s), *values] if first else [stamp(s), word, *values]))
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -998,7 +1333,9 @@ def wide(d: Draw, path: Path) -> Made:
     empty = d.one(["", "", "NaN"])
     truth = _truth(Clock([], m.t, 3.0 / rate, "s"), tr, rate)
     truth.own_rates = True
-    baro = Column("pressure", "", [f"{950 + 0.001 * i:.2f}" if i % 10 == 0 else empty for i in range(n)])
+    baro = Column(
+        "pressure", "", [f"{950 + 0.001 * i:.2f}" if i % 10 == 0 else empty for i in range(n)]
+    )
     if same:
         # The accelerometer at every second row.
         for x in tr.accel:
@@ -1024,9 +1361,15 @@ def wide(d: Draw, path: Path) -> Made:
         for x in c.columns:
             if x.unit and "(" not in x.name and "[" not in x.name:
                 x.name = _with_unit(x.name, x.unit, x.unit, tr.unit_way)
-    how = Layout(sep=d.one([",", ";"]), preamble=tr.preamble, comment="# ", units_line=tr.unit_way == "units line")
+    how = Layout(
+        sep=d.one([",", ";"]),
+        preamble=tr.preamble,
+        comment="# ",
+        units_line=tr.unit_way == "units line",
+    )
     write(d, path, cols, how, [])
-    kind = f"wide, empty cells, {'every second row' if same else 'rows of one sensor'}, {'/'.join(tr.units)}, {tr.unit_way}, {c.kind}"
+    how_far = "every second row" if same else "rows of one sensor"
+    kind = f"wide, empty cells, {how_far}, {'/'.join(tr.units)}, {tr.unit_way}, {c.kind}"
     return Made(path, truth, kind, tr.decidable)
 
 
@@ -1037,7 +1380,9 @@ def ros(d: Draw, path: Path) -> Made:
     sep = "."
     n = len(m.t)
     q = m.attitude.as_quat()
-    pre = {"echo": "field.", "plot": d.one(["/imu/", "/imu/data/", "/camera/imu/"]), "bagpy": ""}[tool]
+    pre = {"echo": "field.", "plot": d.one(["/imu/", "/imu/data/", "/camera/imu/"]), "bagpy": ""}[
+        tool
+    ]
     sep = {"echo": ".", "plot": "/", "bagpy": "."}[tool]
     style = (f"{pre}angular_velocity{sep}{{x}}", f"{pre}linear_acceleration{sep}{{x}}", "m{x}")
     tr = triads(d, m, "none", style, "rad/s", "m/s2")
@@ -1045,25 +1390,58 @@ def ros(d: Draw, path: Path) -> Made:
     ns = [str(epoch * 10**9 + round((s + 0.123456789) * 1e9)) for s in m.t]
     late = np.maximum.accumulate(m.t + np.abs(d.normal(0, 0.1 / rate, n)))
     rns = [str(epoch * 10**9 + round((s + 0.1241) * 1e9)) for s in late]
-    quat = [Column(f"{pre}orientation{sep}{a}", "", _text(q[:, k], 8)) for k, a in enumerate("xyzw")]
+    quat = [
+        Column(f"{pre}orientation{sep}{a}", "", _text(q[:, k], 8)) for k, a in enumerate("xyzw")
+    ]
 
     def cov(of: str) -> list[Column]:
-        return [Column(f"{pre}{of}_covariance{i}" if tool == "echo" else f"{pre}{of}_covariance{sep}{i}" if tool == "plot"
-                       else f"{of}_covariance_{i}", "", ["0.0004" if i % 4 == 0 else "0.0"] * n) for i in range(9)]  # fmt: skip
+        return [
+            Column(
+                f"{pre}{of}_covariance{i}"
+                if tool == "echo"
+                else f"{pre}{of}_covariance{sep}{i}"
+                if tool == "plot"
+                else f"{of}_covariance_{i}",
+                "",
+                ["0.0004" if i % 4 == 0 else "0.0"] * n,
+            )
+            for i in range(9)
+        ]
 
-    body = [*quat, *cov("orientation"), *tr.gyro, *cov("angular_velocity"), *tr.accel, *cov("linear_acceleration")]
+    body = [
+        *quat,
+        *cov("orientation"),
+        *tr.gyro,
+        *cov("angular_velocity"),
+        *tr.accel,
+        *cov("linear_acceleration"),
+    ]
     seq = [str(10 + k) for k in range(n)]
     c = Clock([], m.t, 2e-3 + 1.0 / rate, "ros", clocks=[late - late[0]])
     if tool == "echo":
-        cols = [Column("%time", "", rns), Column("field.header.seq", "", seq), Column("field.header.stamp", "", ns),
-                Column("field.header.frame_id", "", ["imu_link"] * n), *body]  # fmt: skip
+        cols = [
+            Column("%time", "", rns),
+            Column("field.header.seq", "", seq),
+            Column("field.header.stamp", "", ns),
+            Column("field.header.frame_id", "", ["imu_link"] * n),
+            *body,
+        ]
     elif tool == "plot":
-        cols = [Column("__time", "", _text(late + epoch, 6)), Column(f"{pre}header/seq", "", seq),
-                Column(f"{pre}header/stamp", "", _text(m.t + epoch, 6)), *body]  # fmt: skip
+        cols = [
+            Column("__time", "", _text(late + epoch, 6)),
+            Column(f"{pre}header/seq", "", seq),
+            Column(f"{pre}header/stamp", "", _text(m.t + epoch, 6)),
+            *body,
+        ]
     else:
-        cols = [Column("Time", "", _text(late + epoch, 6)), Column("header.seq", "", seq),
-                Column("header.stamp.secs", "", [x[:10] for x in ns]), Column("header.stamp.nsecs", "", [str(int(x[10:])) for x in ns]),
-                Column("header.frame_id", "", ["imu_link"] * n), *body]  # fmt: skip
+        cols = [
+            Column("Time", "", _text(late + epoch, 6)),
+            Column("header.seq", "", seq),
+            Column("header.stamp.secs", "", [x[:10] for x in ns]),
+            Column("header.stamp.nsecs", "", [str(int(x[10:])) for x in ns]),
+            Column("header.frame_id", "", ["imu_link"] * n),
+            *body,
+        ]
     made = _plain(d, path, f"ROS table ({tool})", tr, c, cols, Layout(), rate)
     made.truth.to_frd = np.diag([1.0, -1.0, -1.0])
     return made
@@ -1076,10 +1454,24 @@ def jsonl(d: Draw, path: Path) -> Made:
     gu, au = d.one([("rad/s", "m/s2"), ("deg/s", "g"), ("deg/s", "m/s2")], [5, 3, 2])
     tr = triads(d, m, "none", STYLES[0], gu, au)
     shape = d.one(["flat", "nested", "arrays", "rows"])
-    when = d.one([("ts", 1e3, 1_690_000_000_000), ("timestamp", 1e3, 0), ("t", 1.0, 0.0), ("time_us", 1e6, 0),
-                  ("timestamp", 1.0, 1_690_000_000.0)])  # fmt: skip
-    gw, aw = d.one([("gyro", "accel"), ("gyroscope", "accelerometer"), ("angular_velocity", "linear_acceleration"),
-                    ("gyr", "acc"), ("rotationRate", "accelerationIncludingGravity")])  # fmt: skip
+    when = d.one(
+        [
+            ("ts", 1e3, 1_690_000_000_000),
+            ("timestamp", 1e3, 0),
+            ("t", 1.0, 0.0),
+            ("time_us", 1e6, 0),
+            ("timestamp", 1.0, 1_690_000_000.0),
+        ]
+    )
+    gw, aw = d.one(
+        [
+            ("gyro", "accel"),
+            ("gyroscope", "accelerometer"),
+            ("angular_velocity", "linear_acceleration"),
+            ("gyr", "acc"),
+            ("rotationRate", "accelerationIncludingGravity"),
+        ]
+    )
     said = d.odds(0.3)
     lines = []
     truth = _truth(Clock([], m.t, max(1.01 / when[1], 2e-6), "json"), tr, rate)
@@ -1100,7 +1492,10 @@ def jsonl(d: Draw, path: Path) -> Made:
             out |= {f"{gw}_{x}{suffix_g}": v for x, v in zip(letters, gv, strict=True)}
             out |= {f"{aw}_{x}{suffix_a}": v for x, v in zip(letters, av, strict=True)}
         elif shape == "nested":
-            out |= {gw + suffix_g: dict(zip(letters, gv, strict=True)), aw + suffix_a: dict(zip(letters, av, strict=True))}
+            out |= {
+                gw + suffix_g: dict(zip(letters, gv, strict=True)),
+                aw + suffix_a: dict(zip(letters, av, strict=True)),
+            }
         elif shape == "arrays":
             out |= {gw + suffix_g: gv, aw + suffix_a: av}
         else:
@@ -1123,24 +1518,44 @@ def jsonl(d: Draw, path: Path) -> Made:
 def labview(d: Draw, path: Path) -> Made:
     """The measurement file of LabVIEW."""
     m, rate, _ = sample(d, float(d.one([100, 200, 500])))
-    tr = triads(d, m, "none", d.one([("Gyro {X}", "Acc {X}", "M"), ("Gyro_{x}", "Accel_{x}", "M")]),
-                d.one(["deg/s", "rad/s"]), d.one(["g", "m/s2"]))  # fmt: skip
+    tr = triads(
+        d,
+        m,
+        "none",
+        d.one([("Gyro {X}", "Acc {X}", "M"), ("Gyro_{x}", "Accel_{x}", "M")]),
+        d.one(["deg/s", "rad/s"]),
+        d.one(["g", "m/s2"]),
+    )
     c = clock(d, m.t, rate, "none", "s")
     n = 6
     gtext, atext = tr.gyro[0].unit, tr.accel[0].unit
     comma = d.odds(0.3)
     tab = "\t"
     head = [
-        "LabVIEW Measurement\t", "Writer_Version\t2", "Reader_Version\t2", "Separator\tTab",
-        f"Decimal_Separator\t{',' if comma else '.'}", "Multi_Headings\tNo", "X_Columns\tOne", "Time_Pref\tRelative",
-        "Operator\tlab", "Date\t2018/06/12", "Time\t13:05:22,4471", "***End_of_Header***\t", "\t",
-        f"Channels\t{n}" + tab * n, "Samples" + (tab + str(len(m.t))) * n,
-        "Date" + "\t2018/06/12" * n, "Time" + "\t13:05:22,51" * n,
+        "LabVIEW Measurement\t",
+        "Writer_Version\t2",
+        "Reader_Version\t2",
+        "Separator\tTab",
+        f"Decimal_Separator\t{',' if comma else '.'}",
+        "Multi_Headings\tNo",
+        "X_Columns\tOne",
+        "Time_Pref\tRelative",
+        "Operator\tlab",
+        "Date\t2018/06/12",
+        "Time\t13:05:22,4471",
+        "***End_of_Header***\t",
+        "\t",
+        f"Channels\t{n}" + tab * n,
+        "Samples" + (tab + str(len(m.t))) * n,
+        "Date" + "\t2018/06/12" * n,
+        "Time" + "\t13:05:22,51" * n,
         "Y_Unit_Label\t" + tab.join([atext] * 3 + [gtext] * 3),
-        "X_Dimension" + "\tTime" * n, "X0" + "\t0,0" * n, f"Delta_X{(tab + format(1 / rate, '.6f')) * n}",
+        "X_Dimension" + "\tTime" * n,
+        "X0" + "\t0,0" * n,
+        f"Delta_X{(tab + format(1 / rate, '.6f')) * n}",
         "***End_of_Header***" + tab * n,
         "X_Value\t" + tab.join(x.name for x in (*tr.accel, *tr.gyro)) + "\tComment",
-    ]  # fmt: skip
+    ]
     said = d.odds(0.6)
     if not said:
         head = [x for x in head if not x.startswith("Y_Unit")]
@@ -1149,7 +1564,11 @@ def labview(d: Draw, path: Path) -> Made:
     if comma:
         lines = [x.replace(".", ",") for x in lines]
     path.write_bytes(("\r\n".join(head + lines) + "\r\n").encode("cp1252", errors="replace"))
-    kind = f"LabVIEW, {'/'.join(tr.units)}" + (", units stated" if said else "") + (", decimal comma" if comma else "")
+    kind = (
+        f"LabVIEW, {'/'.join(tr.units)}"
+        + (", units stated" if said else "")
+        + (", decimal comma" if comma else "")
+    )
     return Made(path, _truth(c, tr, rate), kind, said or tr.decidable)
 
 
@@ -1163,17 +1582,45 @@ def logger(d: Draw, path: Path) -> Made:
         for i in range(1, len(number)):
             number[i] = max(number[i], number[i - 1] + 1)
         fine = number * int(10000 / rate) + 4711
-        cols = [Column("PacketCounter", "", [str(int(v + 65500) % 65536) for v in number]),
-                Column("SampleTimeFine", "", [str(int(v)) for v in fine]), *tr.accel, *tr.gyro]  # fmt: skip
-        how = Layout(sep="\t", comment="// ", newline="\r\n",
-                     preamble=["Start Time: Unknown", f"Update Rate: {rate:.1f}Hz", "Filter Profile: human (46.1)", "Firmware Version: 4.3.1"])  # fmt: skip
+        cols = [
+            Column("PacketCounter", "", [str(int(v + 65500) % 65536) for v in number]),
+            Column("SampleTimeFine", "", [str(int(v)) for v in fine]),
+            *tr.accel,
+            *tr.gyro,
+        ]
+        how = Layout(
+            sep="\t",
+            comment="// ",
+            newline="\r\n",
+            preamble=[
+                "Start Time: Unknown",
+                f"Update Rate: {rate:.1f}Hz",
+                "Filter Profile: human (46.1)",
+                "Firmware Version: 4.3.1",
+            ],
+        )
         t = (number - number[0]) / rate
-        return _plain(d, path, "logger: packet counter, rate in the preamble", tr, Clock([], t, 0.2 / rate, "number"), cols, how, rate, tr.decidable)
+        return _plain(
+            d,
+            path,
+            "logger: packet counter, rate in the preamble",
+            tr,
+            Clock([], t, 0.2 / rate, "number"),
+            cols,
+            how,
+            rate,
+            tr.decidable,
+        )
     if what == "dataflash":
         tr = triads(d, m, "none", ("Gyr{X}", "Acc{X}", "Mag{X}"), "rad/s", "m/s2")
-        fmt = "FMT, 163, 48, IMU, QffffffIIfBBHH, TimeUS,GyrX,GyrY,GyrZ,AccX,AccY,AccZ,EG,EA,T,GH,AH,GHz,AHz"
-        lines = ["FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns", fmt,
-                 "FMT, 129, 40, ATT, QccccCC, TimeUS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw", "PARM, 123, SYSID_THISMAV, 1"]  # fmt: skip
+        fmt = "FMT, 163, 48, IMU, QffffffIIfBBHH, TimeUS,GyrX,GyrY,GyrZ,AccX,AccY,AccZ,"
+        fmt += "EG,EA,T,GH,AH,GHz,AHz"
+        lines = [
+            "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns",
+            fmt,
+            "FMT, 129, 40, ATT, QccccCC, TimeUS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw",
+            "PARM, 123, SYSID_THISMAV, 1",
+        ]
         for i, s in enumerate(m.t):
             us = round((s + 33.2) * 1e6)
             values = ", ".join(x.cells[i] for x in (*tr.gyro, *tr.accel))
@@ -1185,30 +1632,80 @@ def logger(d: Draw, path: Path) -> Made:
         truth.to_frd = np.eye(3)
         return Made(path, truth, "logger: messages of an autopilot as text", True)
     if what == "xio":
-        tr = triads(d, m, "parentheses", ("Gyroscope {X}", "Accelerometer {X}", "Magnetometer {X}"), "deg/s", "g")
+        tr = triads(
+            d,
+            m,
+            "parentheses",
+            ("Gyroscope {X}", "Accelerometer {X}", "Magnetometer {X}"),
+            "deg/s",
+            "g",
+        )
         c = clock(d, m.t, rate, "none", d.one(["s", "us"]))
         c.columns[0].name = {"s": "Time (s)", "us": "Timestamp (us)"}[c.kind]
-        return _plain(d, path, "logger: names with units", tr, c, [*c.columns, *tr.gyro, *tr.accel], Layout(), rate)
+        return _plain(
+            d,
+            path,
+            "logger: names with units",
+            tr,
+            c,
+            [*c.columns, *tr.gyro, *tr.accel],
+            Layout(),
+            rate,
+        )
     if what == "px4":
-        tr = triads(d, m, "none", ("gyro_rad[{i}]", "accelerometer_m_s2[{i}]", "m"), "rad/s", "m/s2")
+        tr = triads(
+            d, m, "none", ("gyro_rad[{i}]", "accelerometer_m_s2[{i}]", "m"), "rad/s", "m/s2"
+        )
         c = clock(d, m.t, rate, "none", "us")
         c.columns[0].name = "timestamp"
-        more = [Column("gyro_integral_dt", "", [str(round(1e6 / rate))] * len(m.t)),
-                Column("accelerometer_timestamp_relative", "", ["0"] * len(m.t)),
-                Column("accelerometer_integral_dt", "", [str(round(1e6 / rate))] * len(m.t))]  # fmt: skip
-        made = _plain(d, path, "logger: topic of an autopilot", tr, c,
-                      [*c.columns, *tr.gyro, more[0], more[1], *tr.accel, more[2]], Layout(), rate)  # fmt: skip
+        more = [
+            Column("gyro_integral_dt", "", [str(round(1e6 / rate))] * len(m.t)),
+            Column("accelerometer_timestamp_relative", "", ["0"] * len(m.t)),
+            Column("accelerometer_integral_dt", "", [str(round(1e6 / rate))] * len(m.t)),
+        ]
+        made = _plain(
+            d,
+            path,
+            "logger: topic of an autopilot",
+            tr,
+            c,
+            [*c.columns, *tr.gyro, more[0], more[1], *tr.accel, more[2]],
+            Layout(),
+            rate,
+        )
         made.truth.to_frd = np.eye(3)
         return made
-    tr = triads(d, m, "none", ("wx(deg/s) wy(deg/s) wz(deg/s)", "ax(g) ay(g) az(g)", "hx hy hz"), "deg/s", "g")
-    stamp = Column("Time(s)", "", _dates(datetime(2021, 11, 4, 15, 0, tzinfo=UTC), m.t, "%Y-%m-%d %H:%M:%S.FFF", 3), "time")
+    tr = triads(
+        d,
+        m,
+        "none",
+        ("wx(deg/s) wy(deg/s) wz(deg/s)", "ax(g) ay(g) az(g)", "hx hy hz"),
+        "deg/s",
+        "g",
+    )
+    stamp = Column(
+        "Time(s)",
+        "",
+        _dates(datetime(2021, 11, 4, 15, 0, tzinfo=UTC), m.t, "%Y-%m-%d %H:%M:%S.FFF", 3),
+        "time",
+    )
     zone = [Column("address", "", ["0x50"] * len(m.t)), stamp]
     ypr = m.attitude.as_euler("ZYX", degrees=True)
     angle = [Column(f"Angle{'XYZ'[k]}(deg)", "", _text(ypr[:, 2 - k], 3)) for k in range(3)]
     temp = Column("T(°)", "", ["31.2500"] * len(m.t))
-    how = Layout(sep="\t", newline="\r\n", preamble=["StartTime: 2021-11-04 15:00:00.000"], comment="")
-    return _plain(d, path, "logger: dates under Time(s), angles, T(°)", tr, Clock([stamp], m.t, 1.01e-3, "iso"),
-                  [*zone, *tr.accel, *tr.gyro, *angle, temp], how, rate)  # fmt: skip
+    how = Layout(
+        sep="\t", newline="\r\n", preamble=["StartTime: 2021-11-04 15:00:00.000"], comment=""
+    )
+    return _plain(
+        d,
+        path,
+        "logger: dates under Time(s), angles, T(°)",
+        tr,
+        Clock([stamp], m.t, 1.01e-3, "iso"),
+        [*zone, *tr.accel, *tr.gyro, *angle, temp],
+        how,
+        rate,
+    )
 
 
 def simulator(d: Draw, path: Path) -> Made:
@@ -1216,13 +1713,22 @@ def simulator(d: Draw, path: Path) -> Made:
     m, rate, _ = sample(d, float(d.one([50, 60, 100])))
     what = d.one(["sim", "matlab", "xplane", "game"])
     gu = d.one(["rad/s", "deg/s"], [3, 1])
-    tr = triads(d, m, "none", d.one([("p q r", "ax ay az", "m"), ("P Q R", "Ax Ay Az", "m"), ("p q r", "fx fy fz", "m")]), gu, "m/s2")
+    tr = triads(
+        d,
+        m,
+        "none",
+        d.one([("p q r", "ax ay az", "m"), ("P Q R", "Ax Ay Az", "m"), ("p q r", "fx fy fz", "m")]),
+        gu,
+        "m/s2",
+    )
     c = clock(d, m.t, rate, "none", "s")
     c.columns[0].name = d.one(["time", "t", "Time"])
     n = len(m.t)
     rpy = m.attitude.as_euler("ZYX")
     states = [Column(x, "", _text(rpy[:, 2 - k], 5)) for k, x in enumerate(("phi", "theta", "psi"))]
-    states += [Column(x, "", _text(np.cumsum(m.linear[:, k]) / rate, 4)) for k, x in enumerate("uvw")]
+    states += [
+        Column(x, "", _text(np.cumsum(m.linear[:, k]) / rate, 4)) for k, x in enumerate("uvw")
+    ]
     if what == "matlab":
         # save -ascii: no names at all
         cols = [*c.columns, *tr.gyro, *tr.accel]
@@ -1235,24 +1741,67 @@ def simulator(d: Draw, path: Path) -> Made:
         made.truth.time_tolerance += 1e-4
         return made
     if what == "xplane":
-        tr = triads(d, m, "none", ("P,rad/s Q,rad/s R,rad/s", "fx,m/s2 fy,m/s2 fz,m/s2", "m"), "rad/s", "m/s2")
+        tr = triads(
+            d,
+            m,
+            "none",
+            ("P,rad/s Q,rad/s R,rad/s", "fx,m/s2 fy,m/s2 fz,m/s2", "m"),
+            "rad/s",
+            "m/s2",
+        )
         c.columns[0].name = "_totl,_time"
-        return _plain(d, path, "simulator, bars, commas in names", tr, c, [*c.columns, *tr.gyro, *tr.accel],
-                      Layout(sep=" | ", trailing=True), rate)  # fmt: skip
+        return _plain(
+            d,
+            path,
+            "simulator, bars, commas in names",
+            tr,
+            c,
+            [*c.columns, *tr.gyro, *tr.accel],
+            Layout(sep=" | ", trailing=True),
+            rate,
+        )
     if what == "game":
-        pose = [Column(f"pos_{x}", "", _text(np.cumsum(m.linear[:, k]) / rate**2, 4)) for k, x in enumerate("xyz")]
-        vel = [Column(f"vel_{x}", "", _text(np.cumsum(m.linear[:, k]) / rate, 4)) for k, x in enumerate("xyz")]
+        pose = [
+            Column(f"pos_{x}", "", _text(np.cumsum(m.linear[:, k]) / rate**2, 4))
+            for k, x in enumerate("xyz")
+        ]
+        vel = [
+            Column(f"vel_{x}", "", _text(np.cumsum(m.linear[:, k]) / rate, 4))
+            for k, x in enumerate("xyz")
+        ]
         for x, name in zip(tr.gyro, _names("angVel_{x}"), strict=True):
             x.name = name
         for x, name in zip(tr.accel, _names("imu_acc_{x}"), strict=True):
             x.name = name
         frame = Column("frame", "", [str(k) for k in range(n)])
-        return _plain(d, path, f"game: position, velocity, angVel, {gu}", tr, c,
-                      [frame, *c.columns, *pose, *vel, *tr.gyro, *tr.accel], Layout(sep=d.one([",", ";"])), rate, tr.decidable)  # fmt: skip
-    how = Layout(sep=d.one([",", "\t"]), preamble=[f"simulation output, dt = {1 / rate:g} s"] if d.odds(0.5) else [],
-                 comment=d.one(["% ", "# "]), comment_header=d.odds(0.3))  # fmt: skip
-    return _plain(d, path, f"simulator: p q r, u v w, phi theta psi, {gu}", tr, c,
-                  [*c.columns, *tr.gyro, *tr.accel, *states], how, rate, tr.decidable)  # fmt: skip
+        return _plain(
+            d,
+            path,
+            f"game: position, velocity, angVel, {gu}",
+            tr,
+            c,
+            [frame, *c.columns, *pose, *vel, *tr.gyro, *tr.accel],
+            Layout(sep=d.one([",", ";"])),
+            rate,
+            tr.decidable,
+        )
+    how = Layout(
+        sep=d.one([",", "\t"]),
+        preamble=[f"simulation output, dt = {1 / rate:g} s"] if d.odds(0.5) else [],
+        comment=d.one(["% ", "# "]),
+        comment_header=d.odds(0.3),
+    )
+    return _plain(
+        d,
+        path,
+        f"simulator: p q r, u v w, phi theta psi, {gu}",
+        tr,
+        c,
+        [*c.columns, *tr.gyro, *tr.accel, *states],
+        how,
+        rate,
+        tr.decidable,
+    )
 
 
 KINDS: dict[Callable[[Draw, Path], Made], float] = {
@@ -1271,9 +1820,11 @@ KINDS: dict[Callable[[Draw, Path], Made], float] = {
 
 def make(seed: int, folder: Path) -> Made:
     """Write the log of this seed into the folder."""
-    d = Draw(np.random.PCG64(np.random.SeedSequence([20240229, seed])))
+    d = Draw(np.random.PCG64(np.random.SeedSequence([ROOT, seed])))
     maker = d.one(list(KINDS), list(KINDS.values()))
-    ending = {jsonl: ".jsonl", labview: ".lvm"}.get(maker) or d.one([".csv", ".txt", ".log", ".dat", ".tsv"], [70, 20, 5, 2, 0])
+    ending = {jsonl: ".jsonl", labview: ".lvm"}.get(maker) or d.one(
+        [".csv", ".txt", ".log", ".dat", ".tsv"], [70, 20, 5, 2, 0]
+    )
     if maker in (arduino, mixed, logger):
-        ending = d.one([".csv", ".txt", ".log"])
+        ending = d.one([".csv", ".txt", ".log"], [55, 35, 10])
     return maker(d, Path(folder) / f"log{seed:05d}{ending}")

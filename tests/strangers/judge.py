@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 import itertools
-import os
 import shlex
 import sys
 import tempfile
@@ -22,15 +21,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from tests.strangers.generator import Made, Truth, make
 
 import strapdown as sd
 from strapdown.errors import Finding, StrapdownError
-from tests.strangers.generator import Made, Truth, make
 
 RELATIVE = 3e-3  # of the value: nominal and exact scales of counts differ by less
 #: Words of a warning's code that name a doubt about unit, sign, order or time.
 DOUBTS = ("unit", "sign", "order", "axes", "gravity", "scale", "time", "clock", "stamp", "gyro",
-          "accel", "force", "contradict", "linear", "interval")  # fmt: skip
+          "accel", "force", "contradict", "linear", "interval", "rate", "absurd")  # fmt: skip
 FACTORS = {
     "of deg/s taken as rad/s": 180 / np.pi,
     "of rad/s taken as deg/s": np.pi / 180,
@@ -105,7 +104,15 @@ def arguments(flags: str) -> dict[str, Any]:
     return out
 
 
-_OPTIONS = ("--gyro-unit", "--accel-unit", "--time-unit", "--columns", "--rate", "--axes", "--sampling")
+_OPTIONS = (
+    "--gyro-unit",
+    "--accel-unit",
+    "--time-unit",
+    "--columns",
+    "--rate",
+    "--axes",
+    "--sampling",
+)
 
 
 def _mentions(finding: Finding, words: tuple[str, ...]) -> bool:
@@ -152,7 +159,12 @@ def _describe(read: np.ndarray, true: np.ndarray) -> str:
             best = off
             order = "".join(("-" if s[j] < 0 else "") + "xyz"[p[j]] for j in range(3))
             what = " ".join(
-                x for x in (f"factor {name}" if name else "", f"axes {order}" if order != "xyz" else "") if x
+                x
+                for x in (
+                    f"factor {name}" if name else "",
+                    f"axes {order}" if order != "xyz" else "",
+                )
+                if x
             )
     if what:
         return what
@@ -160,7 +172,8 @@ def _describe(read: np.ndarray, true: np.ndarray) -> str:
     off = np.sqrt(((true * k - read) ** 2).sum()) / (size * abs(k) + 1e-12)
     if off < 0.1:
         return f"factor {k:.4g}"
-    return f"other numbers (first {np.round(read[0], 4).tolist()}, true {np.round(true[0], 4).tolist()})"
+    first, wanted = np.round(read[0], 4).tolist(), np.round(true[0], 4).tolist()
+    return f"other numbers (first {first}, true {wanted})"
 
 
 def _beside(t: np.ndarray, n: int, truth_t: np.ndarray) -> np.ndarray:
@@ -175,7 +188,9 @@ def _at(t: np.ndarray, own: np.ndarray, values: np.ndarray) -> np.ndarray:
     return np.column_stack([np.interp(t, own, values[:, k]) for k in range(values.shape[1])])
 
 
-def _loose(read: np.ndarray, t: np.ndarray, own: np.ndarray, values: np.ndarray, step: float) -> bool:
+def _loose(
+    read: np.ndarray, t: np.ndarray, own: np.ndarray, values: np.ndarray, step: float
+) -> bool:
     """Interpolated rows agree, within the noise and the change between samples."""
     inside = (t >= own[0]) & (t <= own[-1]) & np.isfinite(read).all(axis=1)
     if inside.sum() < 0.5 * len(t):
@@ -215,10 +230,11 @@ def compare(imu: Any, truth: Truth) -> tuple[list[tuple[str, str]], bool]:
             if not _loose(gyro, t, truth.t, g, step):
                 rows = _beside(t, len(gyro), truth.t)
                 faults.append(("gyro", _describe(gyro, g[rows])))
-            if accel is not None and a is not None and truth.accel_t is not None:
-                if not _loose(accel, t, truth.accel_t - truth.t[0], a, step):
-                    rows = _beside(t, len(accel), truth.accel_t)
-                    faults.append(("accel", _describe(accel, a[rows])))
+            own = truth.accel_t
+            both = accel is not None and a is not None and own is not None
+            if both and not _loose(accel, t, own - truth.t[0], a, step):
+                rows = _beside(t, len(accel), truth.accel_t)
+                faults.append(("accel", _describe(accel, a[rows])))
             span = t[-1] / truth.t[-1] if truth.t[-1] else 1.0
             if abs(span - 1) > 0.02 + 3 * truth.time_tolerance / truth.t[-1]:
                 faults.append(("time", f"span {t[-1]:.4g} s instead of {truth.t[-1]:.4g} s"))
@@ -237,7 +253,13 @@ def compare(imu: Any, truth: Truth) -> tuple[list[tuple[str, str]], bool]:
                 holes = int((~np.isfinite(g)).any(axis=1).sum())
                 if known.sum() > holes:
                     which = np.flatnonzero(~good)
-                    faults.append(("gyro", f"{int(known.sum())} rows are not of the log, first row {which[0]} of {len(t)}"))
+                    faults.append(
+                        (
+                            "gyro",
+                            f"{int(known.sum())} rows are not of the log, "
+                            f"first row {which[0]} of {len(t)}",
+                        )
+                    )
                 lost = len(truth.t) - len(set(rows.tolist()))
                 if lost - holes > 0.02 * len(truth.t) + 2:
                     faults.append(("rows", f"{lost} rows of {len(truth.t)} lost"))
@@ -251,9 +273,17 @@ def compare(imu: Any, truth: Truth) -> tuple[list[tuple[str, str]], bool]:
             for own in clocks:
                 off = np.abs((t[use] - t[use][0]) - (own[rows] - own[rows[0]]))
                 offs.append(float(np.quantile(off, 0.98)))
-            if min(offs) > truth.time_tolerance + 1e-6 + 2e-4 * truth.t[-1] * (truth.time_tolerance > 0.003):
+            if min(offs) > truth.time_tolerance + 1e-6 + 2e-4 * truth.t[-1] * (
+                truth.time_tolerance > 0.003
+            ):
                 scale = t[use][-1] / max(truth.t[rows[-1]] - truth.t[rows[0]], 1e-9)
-                faults.append(("time", f"stamps differ by {min(offs):.4g} s; span {scale:.6g} of the true one, {truth.t[-1]:.4g} s"))
+                faults.append(
+                    (
+                        "time",
+                        f"stamps differ by {min(offs):.4g} s; "
+                        f"span {scale:.6g} of the true one, {truth.t[-1]:.4g} s",
+                    )
+                )
         if accel is not None and a is None:
             faults.append(("accel", "a specific force from a file without one"))
         if not faults:
@@ -280,7 +310,9 @@ def judge(seed: int, folder: Path) -> Verdict:
                 try:
                     given = arguments(asked)
                 except (ValueError, IndexError) as fault:
-                    return Verdict(seed, made, "wrong", [f"options not understood: {asked} ({fault})"], what)
+                    return Verdict(
+                        seed, made, "wrong", [f"options not understood: {asked} ({fault})"], what
+                    )
                 continue
             return Verdict(seed, made, "abstained", [], what, asked)
         except Exception as error:
@@ -299,9 +331,13 @@ def judge(seed: int, folder: Path) -> Verdict:
         else:
             faults.append(("accel", "left out without a word"))
     if not faults:
-        return Verdict(seed, made, "right after one refusal" if refused else "right", [], said, asked)
+        return Verdict(
+            seed, made, "right after one refusal" if refused else "right", [], said, asked
+        )
     text = [f"{a}: {b}" for a, b in faults]
-    doubts = [f for f in imu.findings if f.severity == "warning" and any(w in f.code for w in DOUBTS)]
+    doubts = [
+        f for f in imu.findings if f.severity == "warning" and any(w in f.code for w in DOUBTS)
+    ]
     named = all(
         any(f.quantity is None or what in str(f.quantity) or what in f.code for f in doubts)
         for what, _ in faults
@@ -330,7 +366,7 @@ def main() -> int:
             one = judge(seed, folder)
             verdicts.append(one)
             if given.folder is None:
-                os.unlink(one.made.path)
+                one.made.path.unlink()
             if given.all or one.outcome in ("wrong", "crashed", "warned"):
                 show(one)
     counts = Counter(v.outcome for v in verdicts)
