@@ -363,10 +363,10 @@ _SIGN = (
 _STEADY = 0.02
 
 
-def pdof_by_window_chart(
+def pdof_charts(
     units: Sequence[UnitReconstruction], combined: UnitReconstruction | None, event: int = 0
-) -> Chart | None:
-    """Chart the direction of force against the window length from time zero.
+) -> tuple[Chart, Chart]:
+    """Chart the direction of force against the window length, and against an error of time zero.
 
     Parameters
     ----------
@@ -374,68 +374,50 @@ def pdof_by_window_chart(
         Mean of the units, whose event it is; if None, the first unit.
     event : int
         From 0.
-
-    Returns
-    -------
-    Chart or None
-        None if the event does not exist.
     """
     main = units[0] if combined is None else combined
-    if not 0 <= event < len(main.body):
-        return None
-    found = main.events.events[event]
-    length = main.body[event].event.delta_v.end - found.time_zero
+    whole = main.body[event].event.delta_v
+    zero = main.events.events[event].time_zero
+    length = whole.end - zero
     windows = sorted({*WINDOWS, length})
 
-    def table(unit: UnitReconstruction) -> pd.DataFrame:
-        return pdof_by_window(unit.acceleration, found.time_zero, windows)
+    def chart(
+        slug: str,
+        title: str,
+        how: str,
+        x_label: str,
+        table: Callable[[UnitReconstruction], pd.DataFrame],
+        answer: tuple[float, str, str],
+    ) -> Chart:
+        at, name, mark = answer
+        lines = (*_lines(units, combined, event, table), *_chosen(main, event, at, name))
+        return Chart(
+            slug,
+            f"Direction of force against {title}",
+            f"{_SIGN}, from {how}. Bar: the answer with its 95 % interval.",
+            x_label,
+            (Panel(_LABEL, lines, steady=_STEADY),),
+            marks=(Mark(1e3 * at, mark),),
+        )
 
-    lines = _lines(units, combined, event, table)
-    lines += _chosen(main, event, length, "the event's own window, 95 %")
-    return Chart(
-        "pdof-by-window",
-        "Direction of force against the length of the window",
-        f"{_SIGN}, from the delta-V over windows from time zero. Bar: the answer, from the whole "
-        "event, with its 95 % interval.",
-        "length of the window from time zero, ms",
-        (Panel(_LABEL, tuple(lines), steady=_STEADY),),
-        marks=(Mark(1e3 * length, "the whole event"),),
-    )
-
-
-def pdof_by_shift_chart(
-    units: Sequence[UnitReconstruction], combined: UnitReconstruction | None, event: int = 0
-) -> Chart | None:
-    """Chart the direction of force against an error of time zero.
-
-    Parameters
-    ----------
-    units, combined, event
-        As `pdof_by_window_chart`.
-
-    Returns
-    -------
-    Chart or None
-        None if the event does not exist.
-    """
-    main = units[0] if combined is None else combined
-    if not 0 <= event < len(main.body):
-        return None
-    whole = main.body[event].event.delta_v
-
-    def table(unit: UnitReconstruction) -> pd.DataFrame:
-        return pdof_by_shift(unit.acceleration, whole.start, whole.end, SHIFTS)
-
-    lines = _lines(units, combined, event, table)
-    lines += _chosen(main, event, 0.0, "detected time zero, 95 %")
-    return Chart(
-        "pdof-by-time-zero",
-        "Direction of force against time zero",
-        f"{_SIGN}, from windows that begin earlier (negative) or later than the detected time zero "
-        "and end with the event. Bar: the answer with its 95 % interval.",
-        "shift of time zero, ms",
-        (Panel(_LABEL, tuple(lines), steady=_STEADY),),
-        marks=(Mark(0.0, "detected"),),
+    return (
+        chart(
+            "pdof-by-window",
+            "the length of the window",
+            "the delta-V over windows from time zero",
+            "length of the window from time zero, ms",
+            lambda unit: pdof_by_window(unit.acceleration, zero, windows),
+            (length, "the event's own window, 95 %", "the whole event"),
+        ),
+        chart(
+            "pdof-by-time-zero",
+            "time zero",
+            "windows that begin earlier (negative) or later than the detected time zero and end "
+            "with the event",
+            "shift of time zero, ms",
+            lambda unit: pdof_by_shift(unit.acceleration, whole.start, whole.end, SHIFTS),
+            (0.0, "detected time zero, 95 %", "detected"),
+        ),
     )
 
 

@@ -20,8 +20,7 @@ from strapdown.report.crash_charts import (
     delta_v_budget_chart,
     delta_v_chart,
     differences_chart,
-    pdof_by_shift_chart,
-    pdof_by_window_chart,
+    pdof_charts,
     place_budget_chart,
     risk_chart,
 )
@@ -121,8 +120,7 @@ def crash_document(result: CaseResult, name: str) -> Document:
             "direction",
             "Direction of force",
             crash_tables.direction_table(result),
-            None if which is None else pdof_by_window_chart(*units, which),
-            None if which is None else pdof_by_shift_chart(*units, which),
+            *(() if which is None else pdof_charts(*units, which)),
             None
             if happened
             else Paragraph("Without an event the direction of force is not defined."),
