@@ -22,6 +22,7 @@ from strapdown.formats.join import join
 from strapdown.formats.judge import SUMS, UNITS, intervals, sampling_of_sums
 from strapdown.formats.recording import Origin, Questions, RawLog, Reading, ReadOptions, Recording
 from strapdown.formats.triad_units import (
+    LIKELY,
     Axes,
     axes_matrix,
     body_axes,
@@ -69,16 +70,29 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     questions = Questions(raw.name)
     units = units_of_triads(raw, found, options, values, said, findings, questions)
     values = {t: values[t] for t in units}
-    finite = finite_rows(raw, found, ticks, values, options, findings)
+    try:
+        finite = finite_rows(raw, found, ticks, values, options, findings)
+    except DataError as error:
+        if error.finding.code not in REPAIRABLE:
+            raise
+        questions.ask(error.finding, repair="true")
+        questions.refuse()
+        raise
     try:
         stamps = stamps_of_log(raw, found, ticks, dated, options, finite, said, findings)
     except DataError as error:
-        if error.finding.code not in ("io.time-unit-undecided", "io.time-column-missing"):
+        code, choices = error.finding.code, error.finding.data.get("choices")
+        if code in REPAIRABLE:
+            questions.ask(error.finding, repair="true")
+        elif code == "io.time-unit-undecided" and choices:
+            best = choices[0].data
+            unit = str(best["unit"]) if best["share"] >= LIKELY else "UNIT"
+            questions.ask(error.finding, time_unit=unit)
+        elif code == "io.time-column-missing":
+            questions.ask(error.finding)
+        else:
             questions.refuse()
             raise
-        choices = error.finding.data.get("choices")
-        likely = {"time_unit": str(choices[0].data["unit"])} if choices else {}
-        questions.ask(error.finding, **likely)
     questions.refuse()
     kept = np.flatnonzero(finite)[stamps.keep]
     time = stamps.seconds[stamps.keep]
@@ -129,6 +143,15 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
         findings=tuple(findings),
         start=raw.start,
     )
+
+
+#: Faults of rows that `ReadOptions.repair` leaves out.
+REPAIRABLE = {
+    "io.not-finite-in-rows",
+    "io.stamp-repeated",
+    "io.time-goes-back",
+    "io.time-counter-wraps",
+}
 
 
 def _unused(raw: RawLog, found: dict[str, Column]) -> list[Finding]:

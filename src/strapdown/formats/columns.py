@@ -68,6 +68,8 @@ TRIADS = {
         "linacc",
         "linaccel",
         "accl",
+        "gforce",
+        "gf",
         "imuacc",
         "imuaccel",
         "specificforce",
@@ -173,7 +175,7 @@ _DIRECTIONS = {
 }
 _AXES_BY_INDEX = {"0": "x", "1": "y", "2": "z"}
 # Words of a name: split at signs, and where capitals begin or end.
-_HUMPS = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-zµμ°]+|\d+|[²]")
+_HUMPS = re.compile(r"[A-Z]+(?![a-z])\d*|[A-Z]?[a-zµμ°]+\d*|\d+|²")
 # Words that do not tell quantities apart.
 _NOISE = {
     *("raw", "field", "imu", "sensor", "sensors", "data", "body", "device", "phone", "watch"),

@@ -54,8 +54,18 @@ _ODD = (b"\0", b"\x0b", b"\x0c", b"\x1c", b"\x1d", b"\x1e")
 
 
 def detect(path: Path) -> bool:
-    """Whether the file name is that of a text table."""
-    return path.is_file() and path.suffix.lower() in SUFFIXES
+    """Whether the name is that of a text table, or the first lines are."""
+    if not path.is_file() or path.suffix.lower() in SUFFIXES:
+        return path.is_file()
+    with path.open("rb") as stream:
+        head = stream.read(HEAD)
+    if b"\0" in head or not head.strip():
+        return False
+    numbered, _ = _numbered(head[: head.rfind(b"\n") + 1].decode("utf-8", "replace"))
+    rows = [fields_of(line, separator_of(line)) for _, line in numbered[-20:]]
+    return len(rows) > 2 and all(
+        len(row) > 2 and 2 * sum(map(is_data, row)) >= len(row) for row in rows
+    )
 
 
 def read(path: Path) -> RawLog:

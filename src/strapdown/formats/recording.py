@@ -286,13 +286,16 @@ def as_stated(answers: Mapping[str, str]) -> dict[str, str]:
 
     `answers`: `ReadOptions` that end in ``_unit``, and quantities with their columns.
     """
-    columns = {q: c for q, c in answers.items() if not q.endswith("_unit")}
+    columns = {q: c for q, c in answers.items() if not q.endswith("_unit") and q != "repair"}
     units = {q: u for q, u in answers.items() if q.endswith("_unit")}
     flags = [f"--{q.replace('_', '-')} {shlex.quote(u)}" for q, u in units.items()]
     keys = [f'{q} = "{u}"' for q, u in units.items()]
     if columns:
         flags.append("--columns " + shlex.quote(",".join(f"{q}={c}" for q, c in columns.items())))
         keys.append("columns = {" + ", ".join(f'{q} = "{c}"' for q, c in columns.items()) + "}")
+    if "repair" in answers:
+        flags.append("--repair")
+        keys.append("repair = true")
     return {"flags": " ".join(flags), "keys": "; ".join(keys)}
 
 

@@ -69,6 +69,10 @@ def told_by_numbers(
     return {i.quantity: i for i in infer_signals(signals)}
 
 
+#: Least probability of an answer that is proposed.
+LIKELY = 0.9
+
+
 def units_of_triads(
     raw: RawLog,
     found: dict[str, Column],
@@ -101,11 +105,12 @@ def units_of_triads(
                 findings.append(left_out(raw, triad, error))
                 continue
             likely = said.get("gyro_unit")
-            unit = str(likely.value) if likely is not None and likely.value else "rad/s"
+            sure = likely is not None and likely.value and likely.confidence >= LIKELY
+            unit = str(likely.value) if likely is not None and sure else "UNIT"
             if error.finding.code == "io.unit-not-stated-of-increments":
                 unit = str(error.finding.data["sum_of"]).split(" or ")[0]
             questions.ask(error.finding, gyro_unit=unit)
-            units[triad] = unit, "asked"
+            units[triad] = "rad/s" if unit == "UNIT" else unit, "asked"
     mirror = options.axes is not None and mirrored(*parse_axes(options.axes))
     plain = {t: u for t, (u, _) in units.items()}
     report_contradictions(said, plain, asked, mirror, raw.name, findings, questions)
