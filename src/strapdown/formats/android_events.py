@@ -3,15 +3,17 @@
 ``kind, timestamp, x, y, z`` or ``timestamp, kind, x, y, z``, further fields unused; with or without
 a header. A kind is the number of a SensorEvent (1 accelerometer, 2 magnetic field, 4 gyroscope, 16
 gyroscope uncalibrated, 35 accelerometer uncalibrated), its string type
-(``android.sensor.gyroscope``), or a short name (``gyro``, ``ACC``). Units, axes and the sign of
-gravity are those of Android: rad/s, m/s² with gravity, µT, x right, y up, z out of the screen
-(developer.android.com/reference/android/hardware/SensorEvent). Linear acceleration and gravity are
-used only where there is no accelerometer: their sum. The unit of the stamps is inferred unless the
-header states it; Android's own are ns.
+(``android.sensor.gyroscope``), or a short name (``gyro``, ``ACC``). Under the first two, units,
+axes and the sign of gravity are those of Android: rad/s, m/s² with gravity, µT, x right, y up, z
+out of the screen (developer.android.com/reference/android/hardware/SensorEvent). Linear
+acceleration and gravity are used only where there is no accelerometer: their sum. Short names are
+also those of other loggers, so that units and axes under them are left open. The unit of the stamps
+is inferred unless the header states it; Android's own are ns.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections import Counter
 from collections.abc import Mapping
@@ -95,6 +97,7 @@ def read(path: Path) -> RawLog:
     separator = None
     events: dict[str, list[tuple[Any, ...]]] = {}
     unknown: set[str] = set()
+    android = False
     lines = text.splitlines()
     for row, line in enumerate(lines, 1):
         if not line.strip() or csv.is_comment(line):
@@ -114,13 +117,22 @@ def read(path: Path) -> RawLog:
             raise DataError(
                 "io.fields-expected", file=path.name, row=row, count=len(fields), width=5
             )
+        word = fields[kind].strip(" \"'").lower()
+        android |= word.isdigit() or word.startswith(("android.sensor.", "type_"))
         events.setdefault(which, []).append((row, fields[stamp], *fields[2:5]))
     others = sorted(u for u in unknown if u and not read_name(u).quantity)[:6]
     if others:
         findings.append(
             Finding("io.events-not-used", file=path.name, severity="note", kinds=others)
         )
-    return joined(path, {k: _columns(path, k, rows) for k, rows in events.items()}, unit, findings)
+    out = joined(path, {k: _columns(path, k, rows) for k, rows in events.items()}, unit, findings)
+    if android:
+        return out
+    stated = {
+        column: (quantity, u if quantity == "time" else None)
+        for column, (quantity, u) in out.stated.items()
+    }
+    return dataclasses.replace(out, stated=stated, axes=None)
 
 
 def _columns(path: Path, kind: str, rows: list[tuple[Any, ...]]) -> dict[str, NDArray[Any]]:
