@@ -125,14 +125,8 @@ def read(path: Path) -> RawLog:
         findings.append(
             Finding("io.events-not-used", file=path.name, severity="note", kinds=others)
         )
-    out = joined(path, {k: _columns(path, k, rows) for k, rows in events.items()}, unit, findings)
-    if android:
-        return out
-    stated = {
-        column: (quantity, u if quantity == "time" else None)
-        for column, (quantity, u) in out.stated.items()
-    }
-    return dataclasses.replace(out, stated=stated, axes=None)
+    columns = {k: _columns(path, k, rows) for k, rows in events.items()}
+    return joined(path, columns, unit, findings, android=android)
 
 
 def _columns(path: Path, kind: str, rows: list[tuple[Any, ...]]) -> dict[str, NDArray[Any]]:
@@ -162,8 +156,13 @@ def joined(
     events: Mapping[str, dict[str, NDArray[Any]]],
     unit: str | None,
     findings: list[Finding],
+    *,
+    android: bool,
 ) -> RawLog:
-    """Join the events of each kind on the stamps of the gyro."""
+    """Join the events of each kind on the stamps of the gyro.
+
+    `android`: units and axes are those of Android; otherwise they are left open.
+    """
 
     def log(kind: str, triad: str) -> RawLog:
         held = {n: events[kind][n] for n in ("time", "x", "y", "z")}
@@ -198,4 +197,7 @@ def joined(
         one.stated = {c: (q, u or None) for c, (q, u) in one.stated.items()}
     out = join(logs, path.name, (path,))
     out.findings[:0] = findings
-    return out
+    if android:
+        return out
+    stated = {c: (q, u if q == "time" else None) for c, (q, u) in out.stated.items()}
+    return dataclasses.replace(out, stated=stated, axes=None)

@@ -142,4 +142,4 @@ def _events(
         k: {n: np.array([e[j] for e in es]) for j, n in enumerate(("row", "time", "x", "y", "z"))}
         for k, es in events.items()
     }
-    return joined(path, held, unit, findings)
+    return joined(path, held, unit, findings, android=False)

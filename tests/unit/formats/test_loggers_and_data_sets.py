@@ -15,7 +15,7 @@ from scipy.io import savemat
 from tests.coded import coded
 
 from strapdown.errors import DataError
-from strapdown.formats import READERS, NoStreamError, ReadOptions, open_stream, read_log
+from strapdown.formats import READERS, NoStreamError, open_stream, read_log
 from strapdown.formats.clocks import unix_from_gps
 from strapdown.formats.gnss_files import GnssOptions, fixes_of_columns, read_gnss
 from strapdown.formats.recording import ReadOptions
