@@ -32,15 +32,15 @@ RENAMED = [
     (r"/verdict\.json/", "rejected_beyond_deg", "red_beyond_deg"),
     (r"/verdict\.json/", "position_difference", "place_apart"),
     (r"/verdict\.json/", "heading_difference", "heading_apart"),
-    (r"/(verdict|navigation)\.json/", "measurement", "aid"),
-    (r"/navigation\.json/", "gnss_outage_tests", "withheld"),
-    (r"/navigation\.json/", "path_length_m", "way_m"),
-    (r"/coast\.json/", "measurements", "aids"),
-    (r"/coast\.json/", "predicted_95_m", "foretold_95_m"),
+    (r"/(verdict\.json|navigation\.json|stdout)/", "measurement", "aid"),
+    (r"/(navigation\.json|stdout)/", "gnss_outage_tests", "withheld"),
+    (r"/(navigation\.json|stdout)/", "path_length_m", "way_m"),
+    (r"/(coast\.json|stdout)/", "measurements", "aids"),
+    (r"/(coast\.json|stdout)/", "predicted_95_m", "foretold_95_m"),
     (r"/budget\.csv/", "measurements_m2", "aids_m2"),
-    (r"/align\.json/", "after_a_turn", "what_a_turn_would_tell"),
-    (r"/align\.json/", "stationary", "standing"),
-    (r"/attitude\.json/", "positions", "places"),
+    (r"/(align\.json|stdout)/", "after_a_turn", "what_a_turn_would_tell"),
+    (r"/(align\.json|stdout)/", "stationary", "standing"),
+    (r"/(attitude\.json|stdout)/", "positions", "places"),
 ]
 UNIT_OF = {label: unit for unit, labels in UNITS.items() for label in labels}
 
