@@ -12,8 +12,9 @@ from typer.main import get_command
 
 from strapdown.cli.main import app
 from strapdown.cli.result_folder import default_folder
-from strapdown.cli.shared_options import LOG_PANEL, OUT_PANEL, LogFlags
+from strapdown.cli.shared_options import LogFlags
 
+LOG_PANEL, OUT_PANEL = "How to read the log", "What to write"
 ROOT = get_command(app)
 COMMANDS = {
     **{name: ROOT.get_command(None, name) for name in ROOT.list_commands(None) if name != "init"},
@@ -23,7 +24,7 @@ READS_A_LOG = ("attitude", "align", "navigate", "init align", "init navigate")
 TABULAR = {"attitude", "align", "navigate", "coast", "crash", "simulate", "verify", "modules"}
 #: What one word says of two things: of a scenario beside a log, of a start beside a place.
 OF_ITS_OWN = {
-    *(("simulate", flag) for flag in ("--rate", "--sampling", "--sensor", "--seed")),
+    *(("simulate", flag) for flag in ("--rate", "--sampling", "--sensor", "--seed", "--format")),
     *(("attitude", flag) for flag in ("--sensor", "--seed")),
     *(("coast", flag) for flag in ("--lat", "--heading", "--from")),
     *(("navigate", flag) for flag in ("--lat",)),

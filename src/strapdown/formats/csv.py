@@ -188,29 +188,54 @@ SEARCHED = 400
 def _first_row(numbered: list[tuple[int, str]]) -> tuple[int, str | None, int]:
     """Return the first of rows of numbers, their separator, and their number of fields.
 
-    They are the most frequent form, and two of the first three have it.
+    They are the most frequent form, and two of the first three have it. Where every line above has
+    as many fields, the first names the columns.
     """
-    forms = []
+    forms: list[tuple[str | None, int]] = []
+    data: list[bool] = []
     for _, line in numbered[:SEARCHED]:
         separator = separator_of(line)
         fields = fields_of(line, separator)
-        if len(fields) > 1 and not fields[-1]:
-            fields = fields[:-1]
-        full = [f for f in fields if f]
-        data = bool(full) and 2 * sum(is_data(f) for f in full) >= len(full)
-        forms.append((separator, len(fields)) if data else None)
+        forms.append((separator, len(fields)))
+        data.append(_are_data(fields))
     # Numbers in a preamble are fewer than the rows.
-    usual = Counter(f for f in forms if f is not None).most_common(1)
-    for k, form in enumerate(forms):
-        after = forms[k + 1 : k + 3]
-        if usual and form == usual[0][0] and (not after or form in after or len(forms) < 4):
-            if k != 1:
-                return k, form[0], form[1]
+    usual = Counter(f for f, d in zip(forms, data, strict=True) if d).most_common(1)
+    like = [bool(usual) and d and f == usual[0][0] for f, d in zip(forms, data, strict=True)]
+    for k in np.flatnonzero(like).tolist():
+        after = like[k + 1 : k + 3]
+        if k == 1:
             break
+        if after and not any(after) and len(like) > 3:
+            continue
+        separator, width = forms[k]
+        if k > 1 and all(form == forms[k] for form in forms[:k]):
+            top = [fields_of(line, separator) for _, line in numbered[:k]]
+            first = 1 + _are_groups(top[0])
+            if _units(numbered[first][1], separator, width):
+                first += 1
+            return min(first, k), separator, width
+        return k, separator, width - _ends_empty(numbered, forms[k], k)
     # A single line above is that of the names, and decides how many fields a row has.
     separator = separator_of(numbered[0][1])
     names = fields_of(numbered[0][1], separator)
     return 1, separator, len(names) - (len(names) > 1 and not names[-1])
+
+
+def _are_data(fields: list[str]) -> bool:
+    """Whether half of the fields that are there are data."""
+    full = [f for f in fields if f]
+    return bool(full) and 2 * sum(map(is_data, full)) >= len(full)
+
+
+def _ends_empty(numbered: list[tuple[int, str]], form: tuple[str | None, int], first: int) -> bool:
+    """Whether every row ends with a separator, and the names have no field for it."""
+    separator, width = form
+    if width < 2 or (first and len(fields_of(numbered[first - 1][1], separator)) == width):
+        above = fields_of(numbered[first - 1][1], separator) if first else [""]
+        if above[-1]:
+            return False
+    rows = [fields_of(line, separator) for _, line in numbered[first:SEARCHED]]
+    return all(len(row) != width or not row[-1] for row in rows)
 
 
 def _named(line: str, separator: str | None, width: int) -> list[str] | None:
@@ -352,6 +377,7 @@ def _whole_lines(
     """Return rows and lines of one width; drop a truncated last line."""
     rows, lines = [], []
     amid: list[tuple[int, str]] = []
+    numeric = _are_data(fields_of(numbered[0][1], separator))
     ended = text.endswith(("\n", "\r"))
     for k, (row, line) in enumerate(numbered):
         last = k == len(numbered) - 1
@@ -364,7 +390,7 @@ def _whole_lines(
         if count == width + 1 and separator and line.rstrip().endswith(separator):
             line, count = line.rstrip()[:-1], width
         odd = count != width
-        if odd or line.lstrip()[:1].isalpha():
+        if odd or (numeric and line.lstrip()[:1].isalpha()):
             fields = fields_of(line, separator)
             if (odd and is_comment(line)) or not any(is_data(f) for f in fields if f):
                 amid.append((row, line))

@@ -31,6 +31,7 @@ FLAGS = (
     "to_s",
     *("duration", "rate", "sampling", "columns", "gyro_unit", "accel_unit", "time_unit", "axes"),
     "repair",
+    "format",
 )
 
 
