@@ -160,7 +160,7 @@ def propose(
     if place is not None:
         table["site"] = dict(zip(("lat_deg", "lon_deg", "alt_m"), place, strict=True))
     rest, drives = _motion(imu, fixes)
-    chosen, how = _alignment(named, rest, drives, heading_deg)
+    chosen, how = _alignment(named, rest, drives, heading_deg, float(imu.index[-1] - imu.index[0]))
     table |= chosen
     if fixes is not None:
         assert gnss is not None  # whence the fixes are
@@ -289,12 +289,16 @@ def _clock(fixes: pd.DataFrame, imu: pd.DataFrame, drives: bool) -> dict[str, fl
 
 
 def _alignment(
-    sensor: str | None, rest: float, drives: bool, heading_deg: float | None
+    sensor: str | None, rest: float, drives: bool, heading_deg: float | None, span: float
 ) -> tuple[dict[str, Any], str]:
-    """Coarse and fine alignment for such a record, and why."""
+    """Coarse and fine alignment for such a record of `span` seconds, and why.
+
+    Levelling takes at most half of the record: navigation needs the rest.
+    """
+    most = round(min(10.0, 0.5 * span), 3)
     if heading_deg is not None:
         coarse = {"kind": "known_heading", "heading_deg": heading_deg, "sd_deg": 2.0}
-        length = min(max(rest, 1.0), 10.0)
+        length = min(max(rest, 1.0), most)
         return (
             {"coarse": {**coarse, "duration_s": length}, "fine": {"kind": "none"}},
             f"levelled by {length:g} s, with the heading that is stated",
@@ -323,7 +327,7 @@ def _alignment(
             "by its course, once it drives: its forward axis is taken to point where it goes",
         )
     return (
-        {"coarse": {"kind": "known_heading", "duration_s": 10.0}, "fine": {"kind": "none"}},
+        {"coarse": {"kind": "known_heading", "duration_s": most}, "fine": {"kind": "none"}},
         "neither a rest with gyros that find north, nor a drive with fixes: the heading is asked",
     )
 
