@@ -396,6 +396,7 @@ def _whole_lines(
                 amid.append((row, line))
                 continue
         if odd:
+            _refuse_kinds(numbered, separator, name)
             doubled = separator == "," and count >= 2 * width - 1 > 1
             raise DataError(
                 "io.csv-decimal-commas" if doubled else "io.csv-field-count",
@@ -419,6 +420,30 @@ def _whole_lines(
             )
         )
     return rows, lines
+
+
+#: Most kinds of rows that a message lists.
+KINDS = 8
+
+
+def _refuse_kinds(numbered: list[tuple[int, str]], separator: str | None, name: str) -> None:
+    """Refuse rows whose first field says of which kind they are, each kind with its own width."""
+    widths: dict[str, set[int]] = {}
+    rows: Counter[str] = Counter()
+    for _, line in numbered:
+        kind = fields_of(line, separator)[0]
+        widths.setdefault(kind, set()).add(_count(line, separator))
+        rows[kind] += 1
+        if len(widths) > KINDS:
+            return
+    if len(widths) > 1 and all(len(counts) == 1 for counts in widths.values()):
+        raise DataError(
+            "io.csv-rows-of-kinds",
+            file=name,
+            kinds=[
+                f"{kind!r} ({rows[kind]} rows of {min(widths[kind])} fields)" for kind in widths
+            ],
+        )
 
 
 def _count(line: str, separator: str | None) -> int:

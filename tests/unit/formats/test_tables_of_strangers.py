@@ -206,3 +206,16 @@ def test_a_log_with_fixes_in_its_rows_gives_both(tmp_path):
     assert streams["gnss"].index.tolist() == pytest.approx([0.5, 1.0, 2.0, 3.0])
     assert has_fixes(path)
     check(read_log(path), 400)
+
+
+def test_rows_of_several_kinds_are_named(tmp_path):
+    lines = []
+    for k in range(20):
+        lines.append(f"0,{0.01 * k},0.1,0.2,0.3,0,0,-9.8")
+        lines += ["1,45.0,7.0,150.0"] if k % 5 == 4 else []
+    with pytest.raises(DataError, check=coded("io.csv-rows-of-kinds")) as refused:
+        read(tmp_path, lines)
+    assert refused.value.finding.data["kinds"] == (
+        "'0' (20 rows of 8 fields)",
+        "'1' (4 rows of 4 fields)",
+    )
