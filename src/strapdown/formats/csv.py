@@ -436,7 +436,8 @@ def _refuse_kinds(numbered: list[tuple[int, str]], separator: str | None, name: 
         rows[kind] += 1
         if len(widths) > KINDS:
             return
-    if len(widths) > 1 and all(len(counts) == 1 for counts in widths.values()):
+    repeated = len(numbered) >= 3 * len(widths)  # stamps are not
+    if repeated and len(widths) > 1 and all(len(counts) == 1 for counts in widths.values()):
         raise DataError(
             "io.csv-rows-of-kinds",
             file=name,
