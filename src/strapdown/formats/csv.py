@@ -230,10 +230,9 @@ def _are_data(fields: list[str]) -> bool:
 def _ends_empty(numbered: list[tuple[int, str]], form: tuple[str | None, int], first: int) -> bool:
     """Whether every row ends with a separator, and the names have no field for it."""
     separator, width = form
-    if width < 2 or (first and len(fields_of(numbered[first - 1][1], separator)) == width):
-        above = fields_of(numbered[first - 1][1], separator) if first else [""]
-        if above[-1]:
-            return False
+    above = fields_of(numbered[first - 1][1], separator) if first else []
+    if len(above) == width and above[-1]:
+        return False
     rows = [fields_of(line, separator) for _, line in numbered[first:SEARCHED]]
     return all(len(row) != width or not row[-1] for row in rows)
 
