@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.formats.columns import read_name
 from strapdown.formats.find_columns import Column
-from strapdown.formats.recording import RawLog
-from strapdown.tables import SAMPLINGS
+from strapdown.formats.recording import RawLog, stated_by
 
 __all__ = ["told_by_file_rows"]
 
@@ -63,16 +62,14 @@ def raw_log(
     samples = _samples(columns)
     findings = _left_out(columns, samples, path.name)
     columns = {n: c for n, c in columns.items() if c.size == samples}
-    sampling, axes = _text(meta.get("sampling")), _text(meta.get("axes"))
     return RawLog(
         name=path.name,
         files=(path,),
         columns=columns,
         units={n: units[b] for n in columns if (b := n.partition("[")[0]) in units},
         rate=_rate(meta),
-        sampling=sampling if sampling in SAMPLINGS else None,
-        axes="x,y,z" if axes == "forward-right-down" else None,
         findings=findings,
+        **stated_by({key: _text(value) for key, value in meta.items()}),
     )
 
 

@@ -335,7 +335,7 @@ def clock_of_log(raw: RawLog, found: dict[str, Column], stamps: Stamps, dated: b
     """Return the clock of a log's stamps."""
     if "time" not in found:
         return Clock(RELATIVE)
-    origin = float(stamps.origin.stamp) * TIME_UNITS[stamps.origin.unit]
+    origin = raw.epoch + float(stamps.origin.stamp) * TIME_UNITS[stamps.origin.unit]
     first = origin + float(stamps.seconds[0])
     name = raw.clock or clock_of_name(found["time"].source, first, dated=dated)
     return Clock(name, origin)

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.formats.columns import unit_of
-from strapdown.formats.recording import RawLog
-from strapdown.tables import SAMPLINGS
+from strapdown.formats.recording import RawLog, stated_by
 
 __all__ = [
     "NULLS",
@@ -272,7 +271,6 @@ def _log(
 ) -> RawLog:
     meta = {m[1]: m[2] for c in top.above if (m := _META.match(c))}
     rates = [float(m[1]) for line in top.above if (m := _RATE.search(line))]
-    sampling, axes = meta.get("sampling"), meta.get("axes")
     return RawLog(
         name=name,
         files=files,
@@ -280,9 +278,8 @@ def _log(
         rows=rows,
         units=top.units,
         rate=rates[0] if rates and rates[0] > 0.0 else None,
-        sampling=sampling if sampling in SAMPLINGS else None,
-        axes="x,y,z" if axes == "forward-right-down" else None,
         findings=findings,
+        **stated_by(meta),
     )
 
 

@@ -15,12 +15,15 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import check_choice
-from strapdown.formats import csv, hdf5, numpy_files
-from strapdown.tables import ACCEL, EULER, GYRO, QUATERNION
+from strapdown.formats import csv, hdf5, numpy_files, parquet
+from strapdown.formats.clocks import GPS, UNIX, clock_of
+from strapdown.tables import ACCEL, EULER, GYRO, MAG, QUATERNION
 
 __all__ = [
     "LOG_WRITERS",
+    "imu_columns",
     "log_formats",
+    "table_columns",
     "write_attitude_csv",
 ]
 
@@ -34,16 +37,21 @@ def _arrays(imu: pd.DataFrame, truth: pd.DataFrame | None) -> dict[str, NDArray[
     }
     if set(ACCEL) <= set(imu.columns):
         arrays["accel"] = imu[ACCEL].to_numpy(dtype=np.float64)
+    if set(MAG) <= set(imu.columns):
+        arrays["mag"] = imu[MAG].to_numpy(dtype=np.float64)
     if truth is not None:
         arrays |= {q: truth[q].to_numpy(dtype=np.float64) for q in QUATERNION}
     return arrays
 
 
-_UNITS = {"time": "s", "gyro": "rad/s", "accel": "m/s2"}
-_SUFFIX = {"time": "_s", "gyro": "_rad_s", "accel": "_m_s2"}
+_UNITS = {"time": "s", "gyro": "rad/s", "accel": "m/s2", "mag": "uT"}
+_SUFFIX = {"time": "_s", "gyro": "_rad_s", "accel": "_m_s2", "mag": "_uT"}
 
 
-def _write_csv(path: Path, imu: pd.DataFrame, truth: pd.DataFrame | None) -> None:
+def imu_columns(
+    imu: pd.DataFrame, truth: pd.DataFrame | None
+) -> tuple[dict[str, NDArray[Any]], dict[str, str]]:
+    """Return the columns of a table, named with their units, and what the file states beside."""
     columns: dict[str, NDArray[Any]] = {}
     for name, array in _arrays(imu, truth).items():
         if array.ndim == 2:
@@ -51,7 +59,15 @@ def _write_csv(path: Path, imu: pd.DataFrame, truth: pd.DataFrame | None) -> Non
                 columns[f"{name}_{axis}{_SUFFIX[name]}"] = array[:, k]
         else:
             columns[name + _SUFFIX.get(name, "")] = array
-    csv.write(path, columns, {"sampling": imu.attrs["sampling"], "axes": _AXES})
+    return columns, {"sampling": imu.attrs["sampling"], "axes": _AXES}
+
+
+def _write_csv(path: Path, imu: pd.DataFrame, truth: pd.DataFrame | None) -> None:
+    csv.write(path, *imu_columns(imu, truth))
+
+
+def _write_parquet(path: Path, imu: pd.DataFrame, truth: pd.DataFrame | None) -> None:
+    parquet.write(path, *imu_columns(imu, truth))
 
 
 def _write_npz(path: Path, imu: pd.DataFrame, truth: pd.DataFrame | None) -> None:
@@ -76,6 +92,7 @@ LogWriter = Callable[[Path, pd.DataFrame, pd.DataFrame | None], None]
 #: Suffix to writer. The truth, if given, has one row per sample.
 LOG_WRITERS: dict[str, LogWriter] = {
     "csv": _write_csv,
+    "parquet": _write_parquet,
     "npz": _write_npz,
     "h5": _write_hdf5,
     "mat": _write_mat,
@@ -91,6 +108,27 @@ def log_formats(names: Sequence[str]) -> tuple[str, ...]:
     for name in names:
         check_choice("io.unknown-writer", (*LOG_WRITERS, "all"), quantity="--format", name=name)
     return tuple(LOG_WRITERS) if "all" in names else tuple(names)
+
+
+def table_columns(table: pd.DataFrame) -> dict[str, NDArray[Any]]:
+    """Return the columns of a table by time, named after its clock and with their units."""
+    clock = clock_of(table).name
+    name = {GPS: "gps_sow_s", UNIX: "unix_time_s"}.get(clock, "time_s")
+    columns = {name: table.index.to_numpy(dtype=np.float64)}
+    week = table.attrs.get("gps_week")
+    if clock == GPS and week is not None:
+        columns["week"] = np.full(len(table), float(week))
+    for column in table.columns:
+        unit = _OF_TABLES.get(str(column).removesuffix("_sd"), "")
+        columns[f"{column}{unit}"] = table[column].to_numpy(dtype=np.float64)
+    return columns
+
+
+_OF_TABLES = {
+    **dict.fromkeys(("lat", "lon", "roll", "pitch", "heading"), "_deg"),
+    **dict.fromkeys(("alt", "north", "east", "down", "height"), "_m"),
+    **dict.fromkeys(("VN", "VE", "VD", "speed", "vx", "vy", "vz"), "_m_s"),
+}
 
 
 def write_attitude_csv(path: Path, attitude: pd.DataFrame) -> None:

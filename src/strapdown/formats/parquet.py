@@ -117,5 +117,20 @@ def _rows(column: Any) -> NDArray[Any] | None:
     return np.array([empty if row is None else row for row in lists], dtype=np.float64)
 
 
+def write(path: Path, columns: dict[str, NDArray[Any]], meta: dict[str, str]) -> None:
+    """Write columns exactly. `columns` ((n,)): names with their unit. `meta`: of the file."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    table = pa.table({name: pa.array(values) for name, values in columns.items()})
+    pq.write_table(
+        table.replace_schema_metadata(meta),
+        path,
+        compression="zstd",
+        use_dictionary=False,
+        use_byte_stream_split=True,
+    )
+
+
 def _text(value: bytes) -> str:
     return value.decode("utf-8", "replace")

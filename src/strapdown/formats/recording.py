@@ -14,6 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
+from strapdown.tables import SAMPLINGS
 
 Array = NDArray[np.float64]
 
@@ -165,6 +166,11 @@ class RawLog:
         If the file states one.
     clock : str or None
         Clock of its stamps (`clocks`), if the format defines it.
+    epoch : float, s
+        Seconds on that clock at stamp zero.
+    checked : bool
+        Whether `strapdown doctor` wrote it: its statements were checked against the numbers, or
+        were decided by a person.
     """
 
     name: str
@@ -180,6 +186,8 @@ class RawLog:
     findings: list[Finding] = field(default_factory=list)
     start: StatedStart | None = None
     clock: str | None = None
+    epoch: float = 0.0
+    checked: bool = False
 
     @classmethod
     def of(
@@ -281,8 +289,10 @@ class Questions:
         raise DataError("io.questions", file=self._file, questions=self._open, **said)
 
 
-def as_stated(answers: Mapping[str, str]) -> dict[str, str]:
+def as_stated(answers: Mapping[str, str]) -> dict[str, Any]:
     """Return answers as options of the command line, ``flags``, and as ``keys`` of a configuration.
+
+    ``answers`` has them in pairs.
 
     `answers`: `ReadOptions` that end in ``_unit``, and quantities with their columns.
     """
@@ -296,7 +306,26 @@ def as_stated(answers: Mapping[str, str]) -> dict[str, str]:
     if "repair" in answers:
         flags.append("--repair")
         keys.append("repair = true")
-    return {"flags": " ".join(flags), "keys": "; ".join(keys)}
+    return {"flags": " ".join(flags), "keys": "; ".join(keys), "answers": tuple(answers.items())}
+
+
+#: In the metadata of a file that `strapdown doctor` wrote, by the key ``checked``.
+CHECKED = "strapdown doctor"
+
+
+def stated_by(meta: Mapping[str, Any]) -> dict[str, Any]:
+    """Return attributes of a `RawLog` from the metadata or comments of a file.
+
+    `meta`: text by key: ``sampling``, ``axes``, ``clock``, ``clock_origin_s``, ``checked``.
+    """
+    sampling, checked = meta.get("sampling"), meta.get("checked") == CHECKED
+    stated = {
+        "sampling": sampling if sampling in SAMPLINGS else None,
+        "axes": "x,y,z" if meta.get("axes") == "forward-right-down" else None,
+    }
+    if checked:
+        stated |= {"clock": meta.get("clock"), "epoch": float(meta.get("clock_origin_s", 0.0))}
+    return {**stated, "checked": checked}
 
 
 def library(module: str, path: Path, extra: str = "logs") -> Any:

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.evaluation.trajectory_differences import ROTATION_ERROR
-from strapdown.formats import csv
+from strapdown.formats import csv, parquet
 from strapdown.formats.clocks import clock_of
 from strapdown.formats.trajectory_options import TrajectoryFileOptions
 from strapdown.tables import (
@@ -186,9 +186,6 @@ def write_parquet(
     names. `options`: ellipsoid and epoch are written to the file's metadata, like the comments of
     the CSV. DataError: the table is not valid.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
     chosen = options or TrajectoryFileOptions()
     check_trajectory(trajectory)
     columns = named_columns(trajectory, TRAJECTORY)
@@ -201,11 +198,4 @@ def write_parquet(
     told: dict[str, Any] = told_of(name, chosen)
     told |= {"clock": clock.name, "clock_origin_s": repr(clock.origin)}
     told |= {} if clock.week is None else {"gps_week": str(clock.week)}
-    table = pa.table({n: pa.array(v) for n, v in columns.items()})
-    pq.write_table(
-        table.replace_schema_metadata(told),
-        path,
-        compression="zstd",
-        use_dictionary=False,
-        use_byte_stream_split=True,
-    )
+    parquet.write(path, columns, told)

@@ -94,7 +94,7 @@ def units_of_triads(
             findings.append(_not_used(raw, triad, "io.left-out-linear-acceleration"))
             continue
         stated = _stated_unit(found, triad, options)
-        if stated is None or _asked_unit(triad, options):
+        if stated is None or raw.checked or _asked_unit(triad, options):
             asked.add(triad)
         try:
             if stated is None:

@@ -18,7 +18,6 @@ from strapdown.bundle.configuration_paths import with_paths
 from strapdown.bundle.seal import InputFiles, Seal, check_destination, input_files
 from strapdown.config.reading import FileSpec
 from strapdown.errors import ConfigError, Finding
-from strapdown.formats.clocks import GPS, UNIX, clock_of
 from strapdown.progress import Progress, silent
 
 __all__ = [
@@ -147,7 +146,8 @@ class Memory:
         if not self.tables:
             yield NOWHERE
             return
-        from strapdown.formats.log_writers import LOG_WRITERS
+        from strapdown.formats import csv
+        from strapdown.formats.log_writers import LOG_WRITERS, table_columns
 
         with tempfile.TemporaryDirectory(prefix="strapdown-") as name:
             folder = Path(name).resolve()
@@ -155,31 +155,8 @@ class Memory:
                 if file.endswith(".npz"):
                     LOG_WRITERS["npz"](folder / file, table, None)
                 else:
-                    _write_csv(folder / file, table)
+                    csv.write(folder / file, table_columns(table), {})
             yield folder
-
-
-def _write_csv(path: Path, table: pd.DataFrame) -> None:
-    """Write the named columns, with the unit that their quantity has in a table."""
-    from strapdown.formats import csv
-
-    clock = clock_of(table).name
-    name = {GPS: "gps_sow_s", UNIX: "unix_time_s"}.get(clock, "time_s")
-    columns = {name: table.index.to_numpy(dtype=np.float64)}
-    week = table.attrs.get("gps_week")
-    if clock == GPS and week is not None:
-        columns["week"] = np.full(len(table), float(week))
-    for column in table.columns:
-        unit = _UNITS.get(str(column).removesuffix("_sd"), "")
-        columns[f"{column}{unit}"] = table[column].to_numpy(dtype=np.float64)
-    csv.write(path, columns, {})
-
-
-_UNITS = {
-    **dict.fromkeys(("lat", "lon", "roll", "pitch", "heading"), "_deg"),
-    **dict.fromkeys(("alt", "north", "east", "down", "height"), "_m"),
-    **dict.fromkeys(("VN", "VE", "VD", "speed", "vx", "vy", "vz"), "_m_s"),
-}
 
 
 def _moved_inputs(inputs: Iterable[InputFiles], old: Path, new: Path) -> tuple[InputFiles, ...]:
