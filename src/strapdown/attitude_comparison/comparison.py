@@ -61,18 +61,17 @@ from strapdown.attitude_comparison.sweep import (
 )
 from strapdown.bundle.seal import InputFiles, Seal, check_destination, input_files
 from strapdown.config import LogSpec
-from strapdown.constants import GYRO_SUMS, GYRO_UNITS
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.evaluation.differences import known_at, largest_differences
 from strapdown.evaluation.reference_points import SamePose, Score, score_references
 from strapdown.formats import read_log
-from strapdown.formats.columns import factor_of, parse_unit
 from strapdown.formats.recording import Reading
 from strapdown.increments import increments_from_imu
 from strapdown.progress import Progress, silent
 from strapdown.sensors.rest import RestStretch, find_rests, gyro_bias_from_rests, without_gyro_bias
 from strapdown.systems.inputs import part_of_log
 from strapdown.tables import GYRO
+from strapdown.units import GYRO_SUMS, GYRO_UNITS, factor_of, parse_unit
 
 if TYPE_CHECKING:
     from strapdown.evaluation.position_references import PositionScore

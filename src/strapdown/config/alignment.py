@@ -32,11 +32,12 @@ from strapdown.config.spec import (
 )
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.error_filter import ErrorFilter
-from strapdown.formats.columns import parse_axes, parse_unit
+from strapdown.formats.columns import parse_axes
 from strapdown.formats.gnss_fixes import GnssOptions
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.triad_errors import NAMED_AXES, check_axes_matrix
 from strapdown.sensors.uncertainty import ImuUncertainty, stated_imu
+from strapdown.units import parse_unit
 
 Matrix = tuple[Triple, Triple, Triple]
 #: An hour at 4 kHz.

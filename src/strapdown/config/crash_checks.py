@@ -9,14 +9,13 @@ from typing import Any
 from strapdown.config.crash_case import AssumedSpec, CaseSpec, TriadSpec, UnitSpec, VehicleSpec
 from strapdown.config.spec import At, Fault, missing
 from strapdown.config.toml_file import KeyPath
-from strapdown.constants import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS
 from strapdown.crash.severity import SEVERITY_MODELS
 from strapdown.errors import Finding, StrapdownError
-from strapdown.formats.columns import unit_of
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.crash_unit import LONGEST as LONGEST_ASSUMED
 from strapdown.sensors.crash_unit import MOST_CHANGE, MOST_TURN
 from strapdown.sensors.uncertainty import STATED_KEYS
+from strapdown.units import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS, unit_of
 
 fault = Fault.of
 

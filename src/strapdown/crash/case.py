@@ -39,11 +39,11 @@ from strapdown.crash.severity import (
 )
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats import files_of
+from strapdown.formats.aid_table import read_reference_path
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.crash_records import read_crash_record
 from strapdown.formats.crash_triad import triad_of_channels
 from strapdown.formats.gnss_files import read_gnss
-from strapdown.formats.named_columns import read_reference_path
 from strapdown.progress import Progress, silent
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad

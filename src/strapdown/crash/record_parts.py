@@ -11,11 +11,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.constants import ACCEL_UNITS, GYRO_UNITS, STANDARD_GRAVITY, TIME_UNITS
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.formats.aid_table import read_reference_path
 from strapdown.formats.clocks import EPOCH
-from strapdown.formats.columns import read_name, unit_of
-from strapdown.formats.crash_record import FACTORS, CrashChannel, CrashRecord, crash_factor
+from strapdown.formats.columns import read_name
+from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.formats.crash_samples import last_midnight, mean_accelerations_of
 from strapdown.formats.inference.conclusion import (
     THRESHOLD,
@@ -25,8 +26,8 @@ from strapdown.formats.inference.conclusion import (
     posterior,
 )
 from strapdown.formats.inference.rotation_rate import infer_gyro
-from strapdown.formats.named_columns import read_reference_path
 from strapdown.sensors.saturation import find_limits
+from strapdown.units import ACCEL_UNITS, FACTORS, GYRO_UNITS, OF_LOGS, SPEEDS, TIME_UNITS, unit_of
 
 Array = NDArray[np.float64]
 Left = list[tuple[str, str]]
@@ -144,7 +145,6 @@ _AXES = {
 # Rotation words used in compounds: Gierrate, Nickwinkel.
 _TURNS = {"wank": "x", "roll": "x", "nick": "y", "pitch": "y", "gier": "z", "yaw": "z"}
 _NO_AXIS = ("hz", "khz", "mhz", "max", "idx", "index", "mux", "aux", "fix")
-_UNITS = {"grad/s": "deg/s", "km/h": "km/h", "kmh": "km/h", "kph": "km/h", "mph": "mph"}
 _BRACKET = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]")
 _WORD = re.compile(r"[^\W\d_]+|\d+")
 
@@ -173,7 +173,7 @@ def read_heading(name: str) -> Heading:
     named = read_name(name)
     bracket = _BRACKET.search(name)
     text = bracket.group(1).lower().replace(" ", "") if bracket else ""
-    unit = named.unit or (unit_of(text) or _UNITS.get(text, "") if bracket else "")
+    unit = named.unit or (unit_of(text, (*OF_LOGS, "velocity")) or "" if bracket else "")
     words = _WORD.findall(_BRACKET.sub(" ", name).lower())
     quantity = axis = ""
     if named.quantity == "time":
@@ -283,7 +283,7 @@ def table_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skippe
         if raw.dtype.kind in "iu" and raw.size and abs(int(raw[0])) > FAR:
             origins[name] = float(raw[0])
             raw = raw.astype(np.int64) - np.int64(raw[0])
-        factor = crash_factor(channel.quantity, channel.unit)
+        factor = FACTORS.get(channel.quantity, {}).get(channel.unit)
         columns[name] = raw.astype(np.float64)
         if factor is not None and channel.quantity != "time":
             columns[name] /= factor
@@ -879,7 +879,7 @@ def _timed(part: Part) -> Part:
     return replace(part, clock=clock, time=part.time * (factor / was))
 
 
-_TABLES = {"acceleration": ACCEL_UNITS, "rate": GYRO_UNITS, "velocity": FACTORS["velocity"]}
+_TABLES = {"acceleration": ACCEL_UNITS, "rate": GYRO_UNITS, "velocity": SPEEDS}
 
 
 def _stated(part: Part) -> Part | None:
@@ -971,12 +971,16 @@ def _scaled(part: Part, kind: str, unit: str, why: str) -> Part:
     )
 
 
+#: Units that no recorder of a crash has.
+UNLIKELY = ("mrad/s", "mdeg/s", "deg/h", "cm/s", "kn")
+
+
 def _asked(part: Part, kind: str, unit: str, why: str = "") -> Part:
     """In the likeliest unit, with what each possible unit would mean."""
     words: dict[str, Callable[[Part, float], str]]
     words = {"acceleration": _accelerations, "rate": _rates, "velocity": _speeds}
     table = _TABLES[kind]
-    units = [u for u in table if table[u] > 0.0 and u not in ("mrad/s", "mdeg/s", "deg/h")]
+    units = [u for u in table if table[u] > 0.0 and u not in UNLIKELY]
     return replace(
         part,
         kind=kind,

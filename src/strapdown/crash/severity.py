@@ -10,9 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from strapdown.errors import ConfigError, DataError, Finding, check_choice
+from strapdown.units import SPEEDS as ALL_SPEEDS
 
 #: Units of speed, in m/s. Inputs with these units are given in m/s; others in their stated unit.
-SPEEDS: dict[str, float] = {"m/s": 1.0, "km/h": 1.0 / 3.6, "mph": 0.44704}
+SPEEDS: dict[str, float] = {unit: ALL_SPEEDS[unit] for unit in ("m/s", "km/h", "mph")}
 TRANSFORMS = ("identity", "log", "square")
 OUTSIDE = ("refuse", "tell")
 

@@ -30,7 +30,7 @@ from strapdown.config.toml_text import (
     plain,
     string,
 )
-from strapdown.constants import GYRO_UNITS, STANDARD_GRAVITY
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.events import KMH, PART_563, EventDetector
 from strapdown.crash.pdof import pdof
 from strapdown.crash.record_parts import (
@@ -46,13 +46,14 @@ from strapdown.crash.record_parts import (
     table_parts,
 )
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.formats.crash_record import FACTORS, CrashRecord
+from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.crash_records import read_crash_record
 from strapdown.rotation import within_half_turn
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.pre_crash import find_pre_crash_rest
 from strapdown.sensors.saturation import find_limits
 from strapdown.tables import ACCEL, GYRO
+from strapdown.units import GYRO_UNITS, SPEEDS
 
 Array = NDArray[np.float64]
 
@@ -209,7 +210,7 @@ def _filled(
         far_apart=len(sure) > 1 and max(sizes) > FAR_APART * min(sizes),
         rate=rate,
         same_trigger=all(u.impact.at_zero for u in units),
-        all_velocities=all(p.unit in FACTORS["velocity"] for u in units for p in u.accelerometers),
+        all_velocities=all(p.unit in SPEEDS for u in units for p in u.accelerometers),
         rings=rate >= FAST and all(u.gyro is None for u in units),
         turning=_turning,
         error_model=error_model,
@@ -356,7 +357,7 @@ class Unit:
         """
         part = self.accelerometers[0]
         before = float(part.time[0]) - self.impact.trigger
-        if not part.zeroed or part.unit in FACTORS["velocity"] or before > -LEAST_REST:
+        if not part.zeroed or part.unit in SPEEDS or before > -LEAST_REST:
             return None
         return max(before, -LONGEST_REST)
 

@@ -9,26 +9,25 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.constants import TIME_UNITS
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.formats import csv, foot_mounted, parquet
+from strapdown.formats import csv, foot_mounted, parquet, read_raw
 from strapdown.formats.arrays import numbers, ticks_of
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, clock_of_name, unrolled, with_clock
 from strapdown.formats.columns import CLOCKS, TIMES
 from strapdown.formats.find_columns import Column
-from strapdown.formats.quantity_columns import (
-    ANGLES,
-    LENGTHS,
-    PRESSURES,
-    RATES,
-    SPEEDS,
-    Found,
-    Quantity,
-    find_quantities,
-)
+from strapdown.formats.quantity_columns import Found, Quantity, find_quantities
 from strapdown.formats.recording import RawLog
+from strapdown.tables import NED, POSITION_SD
+from strapdown.units import ANGLES, GYRO_UNITS, LENGTHS, PRESSURES, SPEEDS, TIME_UNITS
 
-__all__ = ["POINT", "SYNONYMS", "UNITS", "read_aid_table", "read_control_points"]
+__all__ = [
+    "POINT",
+    "SYNONYMS",
+    "UNITS",
+    "read_aid_table",
+    "read_control_points",
+    "read_reference_path",
+]
 
 
 Array = NDArray[np.float64]
@@ -38,7 +37,7 @@ UNITS: dict[str, Mapping[str, float]] = {
     "m": LENGTHS,
     "m/s": SPEEDS,
     "deg": ANGLES,
-    "rad/s": RATES,
+    "rad/s": GYRO_UNITS,
     "Pa": PRESSURES,
 }
 #: Synonyms of a column, without blanks and underscores. Those of opposite sign are excluded.
@@ -122,14 +121,45 @@ def read_aid_table(
 def _raw(path: Path) -> RawLog:
     if not path.exists():
         raise ConfigError("io.no-such-file", file=str(path))
-    if path.is_dir() or not (csv.detect(path) or parquet.detect(path)):
+    if path.is_dir():
         raise DataError(
-            "io.folder" if path.is_dir() else "io.aid-file-ending",
+            "io.folder",
             file=path.resolve().name,
             suffixes=(*csv.SUFFIXES, *parquet.SUFFIXES),
             suffix=path.suffix,
         )
-    return parquet.read(path) if parquet.detect(path) else csv.read(path)
+    if parquet.detect(path) or csv.detect(path):
+        return parquet.read(path) if parquet.detect(path) else csv.read(path)
+    try:
+        return read_raw(path)
+    except DataError:
+        raise DataError(
+            "io.aid-file-ending",
+            file=path.name,
+            suffixes=(*csv.SUFFIXES, *parquet.SUFFIXES),
+            suffix=path.suffix,
+        ) from None
+
+
+def read_reference_path(path: str | Path) -> pd.DataFrame:
+    """Read the path of a point from cameras or a survey.
+
+    `path`: a table with the columns ``time north east down`` and, if not exact, ``north_sd east_sd
+    down_sd``; s and m, unless a column states another unit. Returns indexed by time in s, positions
+    in m. ConfigError: the file does not exist. DataError: as `read_aid_table`, or a standard
+    deviation is missing beside another.
+    """
+    columns = dict.fromkeys([*NED, *POSITION_SD], "m")
+    table = read_aid_table(path, columns, optional=POSITION_SD)
+    has_sd = [name for name in POSITION_SD if name in table]
+    if has_sd and len(has_sd) < len(POSITION_SD):
+        missing = next(name for name in POSITION_SD if name not in table)
+        raise DataError(
+            "io.missing-while-another-standard-deviation",
+            file=table.attrs["source"],
+            quantity=missing,
+        )
+    return table[[*NED, *has_sd]]
 
 
 def _words(name: str) -> tuple[str, ...]:

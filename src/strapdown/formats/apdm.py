@@ -18,10 +18,10 @@ import numpy as np
 
 from strapdown.errors import DataError, Finding
 from strapdown.formats.clocks import UNIX
-from strapdown.formats.columns import unit_of
 from strapdown.formats.hdf5 import SIGNATURE, read_arrays
 from strapdown.formats.known_text import column, head, lacking, split, under
 from strapdown.formats.recording import RawLog
+from strapdown.units import unit_of
 
 TITLE = "APDM Opal"
 TRIADS = {"Angular Velocity": "gyro", "Acceleration": "accel", "Magnetic Field": "mag"}

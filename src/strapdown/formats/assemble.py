@@ -11,11 +11,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.constants import TIME_UNITS
 from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.formats.arrays import numbers, ticks_of
 from strapdown.formats.clocks import RELATIVE, Clock, Stamps, clock_of_name, read_stamps, with_clock
-from strapdown.formats.columns import EULERS, QUATERNIONS, factor_of, parse_axes, parse_unit
+from strapdown.formats.columns import EULERS, QUATERNIONS, parse_axes
 from strapdown.formats.find_columns import AXES, Column, find_columns, require_gyro
 from strapdown.formats.inference import Inference
 from strapdown.formats.join import join
@@ -32,6 +31,7 @@ from strapdown.formats.triad_units import (
     values_of_triads,
 )
 from strapdown.tables import ACCEL, SAMPLINGS, attitude_table, find_gaps, imu_table
+from strapdown.units import TIME_UNITS, factor_of, parse_unit
 
 __all__ = [
     "assemble",

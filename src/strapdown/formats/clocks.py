@@ -22,10 +22,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.constants import TIME_UNITS
 from strapdown.errors import DataError, Finding
 from strapdown.formats.inference.conclusion import THRESHOLD, infer_time_unit, wrap_bits
 from strapdown.formats.recording import Origin
+from strapdown.units import TIME_UNITS
 
 __all__ = [
     "GPS",

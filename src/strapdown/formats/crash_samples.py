@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.constants import TIME_UNITS
 from strapdown.errors import DataError, Finding
 from strapdown.formats.clocks import EPOCH
 from strapdown.formats.crash_record import CrashChannel
 from strapdown.formats.inference.conclusion import infer_time_unit
 from strapdown.formats.judge import what_numbers_say
+from strapdown.units import TIME_UNITS
 
 __all__ = ["Clock", "last_midnight", "mean_acceleration", "mean_accelerations_of", "seconds_of"]
 

@@ -25,14 +25,13 @@ from strapdown.formats.crash_record import (
     attributes_of,
     check_attributes,
     clean,
-    crash_factor,
-    crash_unit,
     unique,
 )
 from strapdown.formats.crash_samples import ONE_STEP, Clock, seconds_of
 from strapdown.formats.csv import day_nanoseconds
 from strapdown.formats.find_columns import Column
 from strapdown.formats.recording import RawLog
+from strapdown.units import FACTORS, OF_CRASHES, find_unit
 
 __all__ = [
     "NOTE",
@@ -248,7 +247,7 @@ def _channel(
     said = names[source]
     if _begins_from_rest(raw, source, said, clock):
         said = replace(said, change=True)
-    factor = crash_factor(said.quantity, said.unit) if said.unit else None
+    factor = FACTORS.get(said.quantity, {}).get(said.unit) if said.unit else None
     samples = _samples(raw, source, said, factor)
     stamps = _stamps(raw, clock, names[clock].unit if clock else "")
     remarks = []
@@ -414,9 +413,9 @@ def read_channel_name(name: str, unit: str = "") -> ChannelName:
     bracket = _BRACKETS.search(text)
     if bracket:
         unit, text = unit or bracket.group(1), text[: bracket.start()]
-    known = crash_unit(unit) if unit else None
+    known = find_unit(unit, OF_CRASHES) if unit else None
     if not unit and said.unit:
-        known = crash_unit(said.unit)
+        known = find_unit(said.unit, OF_CRASHES)
     words = _words(text)
     change = _says_change(words)
     spoken = _quantity(words, said.quantity, change)
@@ -628,7 +627,7 @@ def _above(
     at, fields = whole[-1]
     # A cell above the table may hold only a unit: a row of units has one in every cell.
     plain = [f.strip("[](){} ") for f in fields]
-    known = [crash_unit(p) is not None for p in plain if p.lower() not in _NO_UNIT]
+    known = [find_unit(p, OF_CRASHES) is not None for p in plain if p.lower() not in _NO_UNIT]
     if len(whole) > 1 and whole[-2] == said[-2] and known and all(known):
         units = ["" if p.lower() in _NO_UNIT else p for p in plain]
         return whole[-2][0], at, units

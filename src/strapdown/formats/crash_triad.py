@@ -12,23 +12,17 @@ from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.formats.clocks import EPOCH
-from strapdown.formats.crash_record import (
-    FACTORS,
-    QUANTITIES,
-    CrashChannel,
-    CrashRecord,
-    crash_factor,
-    state_unit,
-)
+from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord
 from strapdown.formats.crash_samples import Clock, last_midnight, seconds_of
 from strapdown.formats.inference import Signals, infer_signals
 from strapdown.formats.judge import what_numbers_say
 from strapdown.tables import ACCEL, GYRO, SAMPLINGS
+from strapdown.units import FACTORS, OF_CRASHES, TIME_UNITS, find_unit
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["triad_factor", "triad_of_channels", "triad_stamps"]
+__all__ = ["state_unit", "triad_factor", "triad_of_channels", "triad_stamps"]
 
 
 Array = NDArray[np.float64]
@@ -441,8 +435,6 @@ def _even(
 
 def _ends(clock: Clock, ends: Array, rate_hz: float, count: int) -> Array:
     """Return first and last stamp in s; without a unit, in the one that fits the rate."""
-    from strapdown.constants import TIME_UNITS
-
     if not np.isfinite(ends).all():
         raise DataError(
             "io.first-or-last-stamp-missing",
@@ -550,7 +542,7 @@ def triad_factor(
 
 def _known(channel: CrashChannel) -> bool:
     """Whether the values are in SI units already."""
-    return crash_factor(channel.quantity, channel.unit) is not None
+    return FACTORS.get(channel.quantity, {}).get(channel.unit) is not None
 
 
 def _evident(
@@ -607,3 +599,25 @@ def _choices(block: list[Array], quantity: str) -> list[Finding]:
         )
         for unit in units
     ]
+
+
+def state_unit(text: str, quantity: str, key: str = "unit") -> str:
+    """Check a unit stated in a case.
+
+    `quantity`: a key of `FACTORS`. `key`: key of the case, for the message. Returns in the spelling
+    of this package. ConfigError: the quantity does not have this unit.
+    """
+    known = FACTORS[quantity]
+    if text in known:
+        return text
+    found = find_unit(text, OF_CRASHES)
+    if found is None or found[0] != quantity:
+        raise ConfigError(
+            "io.crash-unit-of-other-quantity" if found else "io.crash-unit-unknown",
+            quantity=key,
+            is_of=found[0] if found else None,
+            needed=quantity,
+            word=text,
+            known=known,
+        )
+    return found[1]

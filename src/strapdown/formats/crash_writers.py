@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.constants import GYRO_UNITS
 from strapdown.errors import DataError
 from strapdown.formats import csv
 from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord, clean
@@ -24,6 +23,7 @@ from strapdown.formats.mme_reader import (
     even_stamps,
 )
 from strapdown.tables import ACCEL, EULER, GYRO, NED, POSITION_SD, VELOCITY
+from strapdown.units import GYRO_UNITS
 
 __all__ = [
     "ACCEL_HEADINGS",

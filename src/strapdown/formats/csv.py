@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
-from strapdown.formats.columns import unit_of
 from strapdown.formats.recording import RawLog, stated_by
+from strapdown.units import unit_of
 
 __all__ = [
     "NULLS",

@@ -15,9 +15,9 @@ from strapdown.formats.columns import (
     TRIADS,
     read_name,
     says_increment,
-    unit_of,
 )
 from strapdown.formats.recording import RawLog, ReadOptions, as_stated
+from strapdown.units import unit_of
 
 AXES = "xyz"
 

@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.constants import TIME_UNITS
 from strapdown.errors import DataError, Finding, StrapdownError
 from strapdown.formats import comma2k19, open_stream
 from strapdown.formats.arrays import numbers, ticks_of
@@ -25,17 +24,10 @@ from strapdown.formats.gnss_fixes import (
     table_of_fixes,
 )
 from strapdown.formats.gnss_pos import QUALITY
-from strapdown.formats.quantity_columns import (
-    ANGLES,
-    GEODETIC_QUANTITIES,
-    LENGTHS,
-    SPEEDS,
-    Found,
-    Quantity,
-    quantities_of,
-)
+from strapdown.formats.quantity_columns import GEODETIC_QUANTITIES, Found, Quantity, quantities_of
 from strapdown.formats.recording import RawLog
 from strapdown.tables.checks import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
+from strapdown.units import ANGLES, LENGTHS, SPEEDS, TIME_UNITS
 
 __all__ = [
     "QUANTITIES",

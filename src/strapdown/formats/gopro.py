@@ -29,11 +29,11 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError
 from strapdown.formats.clocks import RELATIVE, UNIX
-from strapdown.formats.columns import unit_of
 from strapdown.formats.join import join
 from strapdown.formats.known_text import from_json, head, lacking
 from strapdown.formats.mp4_telemetry import telemetry_of
 from strapdown.formats.recording import RawLog
+from strapdown.units import unit_of
 
 TITLE = "GoPro telemetry"
 TYPES = {

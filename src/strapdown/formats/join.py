@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.constants import TIME_UNITS
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.arrays import numbers, ticks_of
 from strapdown.formats.columns import QUANTITIES
 from strapdown.formats.find_columns import Column, find_columns
 from strapdown.formats.recording import RawLog, ReadOptions
 from strapdown.tables import find_gaps
+from strapdown.units import TIME_UNITS
 
 __all__ = ["at_stamps", "clock_of", "in_seconds", "join", "known_only", "with_columns"]
 

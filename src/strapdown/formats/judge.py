@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.constants import ACCEL_SUMS, ACCEL_UNITS, GYRO_SUMS, GYRO_UNITS, MAG_UNITS
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.inference import THRESHOLD, Inference
 from strapdown.formats.recording import Questions
+from strapdown.units import ACCEL_SUMS, ACCEL_UNITS, GYRO_SUMS, GYRO_UNITS, MAG_UNITS
 
 __all__ = ["OPEN", "SUMS", "intervals", "sampling_of_sums", "sum_of"]
 

@@ -11,7 +11,6 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.constants import TIME_UNITS
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.crash_record import (
@@ -19,12 +18,11 @@ from strapdown.formats.crash_record import (
     CrashChannel,
     CrashRecord,
     clean,
-    crash_factor,
-    crash_unit,
     unique,
 )
 from strapdown.formats.mme_codes import DIMENSIONS, NO_CLASS, MmeCode, decode_mme
 from strapdown.tables import SAMPLINGS
+from strapdown.units import FACTORS, OF_CRASHES, TIME_UNITS, find_unit
 
 __all__ = [
     "MmeFile",
@@ -359,7 +357,7 @@ def stamps_of(
 
         def recorded(count: int) -> Array:
             text = held.header.text("unit")
-            unit = crash_unit(text) if text else ("time", "s")
+            unit = find_unit(text, OF_CRASHES) if text else ("time", "s")
             if unit is None or unit[0] != "time":
                 raise DataError(
                     "io.holds-stamps-unit",
@@ -488,7 +486,7 @@ def channel_of(file: MmeFile, name: str, others: Mapping[str, tuple[str, MmeFile
 def _unit(file: MmeFile, text: str) -> tuple[str, str, float | None, str]:
     """Return quantity, unit, factor, and the part of the code that contradicts the unit."""
     said = file.known.quantity if file.known else "other"
-    found = crash_unit(text) if text else None
+    found = find_unit(text, OF_CRASHES) if text else None
     if found is None:
         # Without a known unit the values are as recorded.
         return said, clean(text, LONGEST_NAME), None, ""
@@ -498,9 +496,9 @@ def _unit(file: MmeFile, text: str) -> tuple[str, str, float | None, str]:
         plain = file.known is not None and file.code[12:14].upper() in DIMENSIONS
         if said == "other" and plain and file.code[12:14] != "00":
             return "other", unit, None, ""
-        return quantity, unit, crash_factor(quantity, unit), ""
+        return quantity, unit, FACTORS.get(quantity, {}).get(unit), ""
     against = f"its code says {said}, and its unit is one of {quantity}"
-    return quantity, unit, crash_factor(quantity, unit), against
+    return quantity, unit, FACTORS.get(quantity, {}).get(unit), against
 
 
 def _note(notes: list[str], key: str, known: tuple[str, ...] = ()) -> str:

@@ -16,8 +16,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.constants import ACCEL_UNITS, GYRO_UNITS
 from strapdown.errors import DataError, Finding
+from strapdown.units import ACCEL_UNITS, GYRO_UNITS
 
 __all__ = ["Channel", "CrashTest", "Vehicle", "header_of", "read_nhtsa"]
 

@@ -6,21 +6,13 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
-from strapdown.constants import TIME_UNITS
 from strapdown.errors import ConfigError, DataError, check_choice
-from strapdown.formats.columns import CLOCKS, unit_of
-from strapdown.formats.columns import UNIT_OF as UNITS_OF_LOGS
+from strapdown.formats.columns import CLOCKS
 from strapdown.formats.recording import RawLog
+from strapdown.units import ANGLES, LENGTHS, OF_TABLES, SPEEDS, unit_of, unit_words
 
 __all__ = [
-    "ANGLES",
     "GEODETIC_QUANTITIES",
-    "LENGTHS",
-    "PRESSURES",
-    "RATES",
-    "SPEEDS",
     "Found",
     "Quantity",
     "find_quantities",
@@ -28,29 +20,6 @@ __all__ = [
 ]
 
 
-ANGLES = {"deg": 1.0, "rad": float(np.degrees(1.0))}
-LENGTHS = {"m": 1.0, "km": 1000.0, "cm": 0.01, "mm": 0.001, "ft": 0.3048}
-SPEEDS = {"m/s": 1.0, "km/h": 1.0 / 3.6, "kn": 1852.0 / 3600.0, "cm/s": 0.01, "mm/s": 0.001}
-SPEEDS |= {"mph": 0.44704}
-PRESSURES = {"Pa": 1.0, "hPa": 100.0, "kPa": 1000.0, "mbar": 100.0, "bar": 1e5}
-RATES = {"rad/s": 1.0, "deg/s": float(np.radians(1.0))}
-#: Spellings of units, with the parts of a name joined by underscores.
-SPELLINGS = {
-    **{s: u for s, u in UNITS_OF_LOGS.items() if u in TIME_UNITS or u in ANGLES or u in RATES},
-    **{u: u for u in LENGTHS},
-    "meters": "m",
-    "metres": "m",
-    **{u: u for u in SPEEDS},
-    **{u.replace("/", "_"): u for u in SPEEDS},
-    **{u.replace("/", "_per_"): u for u in SPEEDS},
-    "mps": "m/s",
-    "kmh": "km/h",
-    "kph": "km/h",
-    "knots": "kn",
-    "kt": "kn",
-    "kts": "kn",
-    **{u.lower(): u for u in PRESSURES},
-}
 _BRACKETS = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]\s*$")
 
 
@@ -181,11 +150,8 @@ def read_words(name: str, known: Mapping[str, Quantity]) -> tuple[str, str | Non
     whole = "".join(words)
     if any(whole in k.words or whole in k.negative for k in known.values()):
         return whole, None
-    for take in (3, 2, 1):
-        spelled = "_".join(words[-take:])
-        if len(words) > take and spelled in SPELLINGS:
-            return "".join(words[:-take]), spelled
-    return whole, None
+    bare, its = unit_words(words, OF_TABLES)
+    return "".join(bare), its or None
 
 
 def _factor(
@@ -194,7 +160,7 @@ def _factor(
     if unit is None:
         # The word millis of a clock states its unit.
         return known.units[CLOCKS[word]] if word in CLOCKS and CLOCKS[word] in known.units else 1.0
-    spelled = SPELLINGS.get(unit) or unit_of(unit) or unit
+    spelled = unit_of(unit, OF_TABLES) or unit
     if spelled not in known.units:
         raise DataError(
             "io.unit-of-other-quantity",

@@ -75,7 +75,7 @@ class ReadOptions:
         Quantity (``time``, ``gyro_x`` …, or ``gyro``, ``accel`` for a group of three) to the
         name of the column in the file, or its number, from 1.
     gyro_unit, accel_unit, time_unit : str, optional
-        Keys of `constants.GYRO_UNITS`, `ACCEL_UNITS`, `TIME_UNITS`; or of `GYRO_SUMS`,
+        Keys of `units.GYRO_UNITS`, `ACCEL_UNITS`, `TIME_UNITS`; or of `GYRO_SUMS`,
         `ACCEL_SUMS` for increments per sample.
     axes : str, optional
         Which sensor axis points forward, right, down: ``x,-y,-z`` for a sensor whose axes

@@ -10,7 +10,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.constants import TIME_UNITS
 from strapdown.dsp.running_integral import running_integral
 from strapdown.errors import DataError, Finding
 from strapdown.formats import open_stream
@@ -18,16 +17,11 @@ from strapdown.formats.arrays import numbers, ticks_of, told_by_file_rows
 from strapdown.formats.clocks import Clock, clock_of_name, with_clock
 from strapdown.formats.columns import CLOCKS, EULERS, TIMES
 from strapdown.formats.find_columns import Column
-from strapdown.formats.quantity_columns import (
-    ANGLES,
-    GEODETIC_QUANTITIES,
-    Found,
-    Quantity,
-    find_quantities,
-)
+from strapdown.formats.quantity_columns import GEODETIC_QUANTITIES, Found, Quantity, find_quantities
 from strapdown.formats.recording import RawLog
 from strapdown.rotation import within_half_turn
 from strapdown.tables import EULER, VELOCITY, trajectory_table
+from strapdown.units import ANGLES, TIME_UNITS
 
 __all__ = [
     "QUANTITIES",

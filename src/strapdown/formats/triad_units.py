@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.formats.arrays import numbers
-from strapdown.formats.columns import parse_axes, parse_unit, says_increment, says_linear
+from strapdown.formats.columns import parse_axes, says_increment, says_linear
 from strapdown.formats.find_columns import AXES, Column
 from strapdown.formats.inference import Inference, Signals, infer_signals
 from strapdown.formats.judge import (
@@ -23,6 +23,7 @@ from strapdown.formats.judge import (
     report_upside_down,
 )
 from strapdown.formats.recording import Questions, RawLog, ReadOptions
+from strapdown.units import parse_unit
 
 __all__ = [
     "Axes",

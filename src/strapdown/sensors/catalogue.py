@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from strapdown.constants import GYRO_UNITS, STANDARD_GRAVITY
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError
 from strapdown.sensors.error_chain import child
 from strapdown.sensors.triad_errors import ImuErrors, Triad, TriadErrors, matrix_of, triad_of
+from strapdown.units import GYRO_UNITS
 
 FOLDER = Path(__file__).with_suffix("")
 #: Names of the sensors supplied with strapdown; listing them reads no file content.

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.constants import GYRO_UNITS
 from strapdown.errors import ConfigError
 from strapdown.sensors.catalogue import KEYS, Key, Sensor
 from strapdown.sensors.error_chain import Seed, child
 from strapdown.sensors.triad_errors import Triad, TriadErrors, TriadLike, matrix_of, triad_of
 from strapdown.tables.checks import is_number
+from strapdown.units import GYRO_UNITS
 
 Array = NDArray[np.float64]
 

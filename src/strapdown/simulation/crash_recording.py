@@ -14,7 +14,6 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
-from strapdown.constants import GYRO_UNITS
 from strapdown.errors import ConfigError
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
@@ -24,6 +23,7 @@ from strapdown.sensors.uncertainty import TriadUncertainty, draw_errors, uncerta
 from strapdown.simulation.imu import mean_over, sample_accelerometer, sample_gyro
 from strapdown.simulation.motion import Motion, check_numbers
 from strapdown.tables import ACCEL, GYRO, SAMPLINGS
+from strapdown.units import GYRO_UNITS
 
 Array = NDArray[np.float64]
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from strapdown.constants import ACCEL_UNITS, GYRO_UNITS, MAG_UNITS, TIME_UNITS
 from strapdown.formats.inference import Inference, Signals
+from strapdown.units import ACCEL_UNITS, GYRO_UNITS, MAG_UNITS, TIME_UNITS
 
 GRAVITY = 9.81
 MOTIONS = (

@@ -9,10 +9,12 @@ import pytest
 from tests.coded import coded
 
 from strapdown.errors import ConfigError, DataError
-from strapdown.formats.crash_record import FACTORS, clean, crash_unit, state_unit, unique
+from strapdown.formats.crash_record import clean, unique
 from strapdown.formats.crash_records import CRASH_READERS, read_crash_record
 from strapdown.formats.crash_samples import mean_acceleration, mean_accelerations_of
 from strapdown.formats.crash_table import read_channel_name
+from strapdown.formats.crash_triad import state_unit
+from strapdown.units import FACTORS, OF_CRASHES, find_unit
 
 EDR = """\
 Event data recorder, most recent event
@@ -84,14 +86,14 @@ def test_a_name_against_its_unit_is_told():
     ],
 )
 def test_units_by_their_definitions(text, quantity, si):
-    found = crash_unit(text)
+    found = find_unit(text, OF_CRASHES)
     assert found is not None
     assert found[0] == quantity
     assert FACTORS[quantity][found[1]] == pytest.approx(si, rel=1e-15)
 
 
 def test_a_unit_of_something_else_is_refused():
-    assert crash_unit("furlong") is None
+    assert find_unit("furlong", OF_CRASHES) is None
     with pytest.raises(
         ConfigError,
         match="'deg/s' is a unit of rate",

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from tests.coded import coded
 
-from strapdown.constants import ACCEL_UNITS, GYRO_UNITS
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import read_log
-from strapdown.formats.columns import factor_of, parse_unit, read_name, unit_of
+from strapdown.formats.columns import read_name
 from strapdown.formats.recording import ReadOptions
 from strapdown.tables import ACCEL, GYRO
+from strapdown.units import ACCEL_UNITS, GYRO_UNITS, factor_of, parse_unit, unit_of
 
 N = 50
 ROWS = np.column_stack([np.arange(N) * 0.01, *(0.5 + 0.01 * k * np.arange(N) for k in range(6))])

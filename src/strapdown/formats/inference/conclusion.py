@@ -9,8 +9,9 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.constants import MAD_TO_SD, STANDARD_GRAVITY, TIME_UNITS
+from strapdown.constants import MAD_TO_SD, STANDARD_GRAVITY
 from strapdown.errors import Finding
+from strapdown.units import TIME_UNITS
 
 __all__ = ["THRESHOLD", "Inference", "conclude", "evidence", "posterior"]
 
@@ -147,7 +148,7 @@ COUNTER_BITS = (16, 24, 31, 32)
 def time_unit_probabilities(stamps: NDArray[Any]) -> dict[str, float]:
     """Compute the probability of each unit of time, from the mean step and the first stamp.
 
-    `stamps` ((n,)): finite, as in the log. Returns keys of `constants.TIME_UNITS`, the most
+    `stamps` ((n,)): finite, as in the log. Returns keys of `units.TIME_UNITS`, the most
     probable first; empty if time does not advance.
     """
     step = mean_step(stamps)

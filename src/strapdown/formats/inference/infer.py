@@ -8,10 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.constants import MAG_UNITS, TIME_UNITS
 from strapdown.errors import DataError
 from strapdown.formats.arrays import numbers, ticks_of
-from strapdown.formats.columns import parse_unit
 from strapdown.formats.find_columns import AXES, Column, find_columns
 from strapdown.formats.inference.conclusion import (
     Inference,
@@ -28,6 +26,7 @@ from strapdown.formats.inference.conclusion import (
 )
 from strapdown.formats.inference.rotation_rate import infer_gyro
 from strapdown.formats.recording import RawLog, ReadOptions
+from strapdown.units import MAG_UNITS, TIME_UNITS, parse_unit
 
 Array = NDArray[np.float64]
 # Longer logs are sampled in parts with this many rows in total.

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.constants import GYRO_UNITS, TIME_UNITS
 from strapdown.dsp.running_integral import running_integral
 from strapdown.errors import Finding
 from strapdown.formats.inference.conclusion import (
@@ -18,6 +17,7 @@ from strapdown.formats.inference.conclusion import (
     mean_step,
     posterior,
 )
+from strapdown.units import GYRO_UNITS, TIME_UNITS
 
 Array = NDArray[np.float64]
 

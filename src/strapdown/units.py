@@ -1,0 +1,305 @@
+"""Units: factors with sources, spellings as people write them, and units of raw counts.
+
+A value in SI is ``value * factor``. Magnetic fields are in µT; angles in radians, or in degrees
+where a table has degrees (`ANGLES`).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.errors import ConfigError
+
+__all__ = [
+    "ACCEL_SUMS",
+    "ACCEL_UNITS",
+    "ANGLES",
+    "FACTORS",
+    "FORCES",
+    "GYRO_SUMS",
+    "GYRO_UNITS",
+    "LENGTHS",
+    "MAG_UNITS",
+    "OF_CRASHES",
+    "OF_LOGS",
+    "OF_TABLES",
+    "PRESSURES",
+    "SPEEDS",
+    "TIME_UNITS",
+    "factor_of",
+    "find_unit",
+    "parse_unit",
+    "unit_of",
+    "unit_words",
+]
+
+_DEGREE = math.pi / 180.0
+
+#: Factors to rad/s.
+GYRO_UNITS: dict[str, float] = {
+    "rad/s": 1.0,
+    "mrad/s": 1e-3,
+    "deg/s": _DEGREE,
+    "mdeg/s": 1e-3 * _DEGREE,
+    "deg/h": _DEGREE / 3600.0,
+}
+
+#: Factors to m/s².
+ACCEL_UNITS: dict[str, float] = {
+    "m/s2": 1.0,
+    "g": STANDARD_GRAVITY,
+    "mg": 1e-3 * STANDARD_GRAVITY,
+    # Sensors that report gravity instead of specific force, as iOS does.
+    "-m/s2": -1.0,
+    "-g": -STANDARD_GRAVITY,
+}
+
+#: Factors to rad and to m/s, of the increments of sensors that sum over each sample.
+GYRO_SUMS: dict[str, float] = {"rad": 1.0, "deg": _DEGREE}
+ACCEL_SUMS: dict[str, float] = {"m/s": 1.0, "g*s": STANDARD_GRAVITY}
+
+#: Factors to µT.
+MAG_UNITS: dict[str, float] = {"uT": 1.0, "nT": 1e-3, "gauss": 100.0, "mG": 0.1, "T": 1e6}
+
+#: Factors to s.
+TIME_UNITS: dict[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
+
+#: Factors to degrees, the unit of angles in tables.
+ANGLES: dict[str, float] = {"deg": 1.0, "rad": math.degrees(1.0)}
+
+# Mile, foot, inch and pound are those of the international agreement of 1959: 0.3048 m per foot,
+# 0.45359237 kg per pound. A nautical mile is 1852 m (International Hydrographic Bureau, 1929).
+#: Factors to m/s.
+SPEEDS: dict[str, float] = {
+    "m/s": 1.0,
+    "km/h": 1.0 / 3.6,
+    "mph": 0.44704,
+    "ft/s": 0.3048,
+    "cm/s": 1e-2,
+    "mm/s": 1e-3,
+    "kn": 1852.0 / 3600.0,
+}
+
+#: Factors to m.
+LENGTHS: dict[str, float] = {
+    "m": 1.0,
+    "cm": 1e-2,
+    "mm": 1e-3,
+    "in": 0.0254,
+    "ft": 0.3048,
+    "km": 1e3,
+}
+
+#: Factors to N, and to Pa.
+FORCES: dict[str, float] = {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605}
+PRESSURES: dict[str, float] = {"Pa": 1.0, "hPa": 100.0, "kPa": 1000.0, "mbar": 100.0, "bar": 1e5}
+
+#: Units of each quantity, with their factors.
+FACTORS: dict[str, dict[str, float]] = {
+    "acceleration": ACCEL_UNITS,
+    "rate": GYRO_UNITS,
+    "angle": ANGLES,
+    "change of velocity": ACCEL_SUMS,
+    "magnetic field": MAG_UNITS,
+    "time": TIME_UNITS,
+    "velocity": SPEEDS,
+    "displacement": LENGTHS,
+    "force": FORCES,
+    "pressure": PRESSURES,
+}
+#: Quantities whose units a log, a table of positions and a crash record may state. Where two have
+#: the same spelling, the first decides: kn is knots in a table, and kilonewtons in a crash record.
+OF_LOGS = ("rate", "acceleration", "change of velocity", "magnetic field", "time", "angle")
+OF_TABLES = ("time", "angle", "rate", "displacement", "velocity", "pressure")
+OF_CRASHES = ("acceleration", "rate", "force", "velocity", "displacement", "time")
+
+# Spellings without blanks and in lower case, by unit. A division in a name of a column is an
+# underscore, with or without "per": `_forms` adds these.
+_SPELLINGS = {
+    "rad/s": "rad/s rads radps rad/sec rads/s rads/sec radian/s radians/s radians/sec rad·s-1 "
+    "rad*s^-1 rad.s-1 1/s*rad",
+    "mrad/s": "mrad/s",
+    "deg/s": "deg/s deg/sec degs degps dps °/s °/sec º/s º/sec degree/s degree/sec degrees/s "
+    "degrees/sec deg/second grad/s",
+    "mdeg/s": "mdeg/s mdps",
+    "deg/h": "deg/h deg/hr °/h °/hr",
+    "m/s2": "m/s2 m/s^2 m/s² m/s**2 m/s/s m/sec2 m/sec^2 m/(s*s) m/(s^2) m/s*s m/ss ms2 ms^2 ms-2 "
+    "mps2 m_per_s_2 m·s-2 m*s^-2 meters/sec/sec meters/s2 meters/s^2",
+    "g": "g g0 gs g's g`s g-force gn g_n",
+    "mg": "mg milli-g",
+    "m/s": "m/s m/sec mps m·s-1 meter/s meters/s meters/second metres/s metres/second",
+    "g*s": "g*s g·s g_s",
+    "km/h": "km/h km/hr kph kmh kmph km·h-1",
+    "mph": "mph mi/h mi/hr mile/h miles/h miles/hour",
+    "ft/s": "ft/s ft/sec fps feet/s",
+    "cm/s": "cm/s",
+    "mm/s": "mm/s",
+    "kn": "kn kt kts knot knots",
+    "uT": "ut µt μt microtesla",
+    "nT": "nt nanotesla",
+    "gauss": "gauss ga",
+    "mG": "mgauss milligauss mga",
+    "T": "tesla",
+    "s": "s sec secs second seconds",
+    "ms": "ms msec msecs millis millisecond milliseconds",
+    "us": "us µs μs usec usecs micros microsecond microseconds",
+    "ns": "ns nsec nsecs nanos nanosecond nanoseconds",
+    "min": "min minutes",
+    "deg": "deg ° degree degrees",
+    "rad": "rad radian radians",
+    "m": "m meter metre meters metres",
+    "km": "km",
+    "cm": "cm",
+    "mm": "mm millimeter millimetre millimeters millimetres",
+    "in": "in inch inches",
+    "ft": "ft feet foot",
+    "N": "n newton newtons nwt",
+    "kN": "kn kilonewton kilonewtons",
+    "lbf": "lbf lbs",
+    "Pa": "pa",
+    "hPa": "hpa",
+    "kPa": "kpa",
+    "mbar": "mbar",
+    "bar": "bar",
+}
+# Powers of a second, with any separator of the factors: rad s^-1, m·s⁻².
+_POWERS = {
+    "rads-1": "rad/s",
+    "mrads-1": "mrad/s",
+    "degs-1": "deg/s",
+    "°s-1": "deg/s",
+    "ms-2": "m/s2",
+    "ms-1": "m/s",
+}
+_RAISED = str.maketrans({"⁻": "-", "−": "-", "¹": "1", "²": "2"})
+
+
+def _forms(spelling: str) -> Iterable[str]:
+    yield spelling
+    if "/" in spelling and spelling[0] != "1":
+        yield spelling.replace("/", "_")
+        yield spelling.replace("/", "_per_")
+
+
+_UNIT_OF: dict[str, dict[str, str]] = {
+    quantity: {
+        form: unit
+        for unit in units
+        for spelling in _SPELLINGS.get(unit, "").split()
+        for form in _forms(spelling)
+    }
+    for quantity, units in FACTORS.items()
+}
+
+
+def find_unit(text: str, among: Sequence[str] = OF_LOGS) -> tuple[str, str] | None:
+    """Parse the spelling of a unit.
+
+    `text`: as ``rad/s``, ``[deg/s]``, ``m s^-2``, ``G's``, in any case. `among`: quantities that it
+    may be of, of `FACTORS`; the first that has the spelling decides. Returns (str, str) or None,
+    the quantity and the unit, in the spelling of this package.
+    """
+    plain = re.sub(r"\s+", "", text.strip().strip("[]").lower())
+    bare = plain.strip("()")
+    power = _POWERS.get(re.sub(r"[·*.^]", "", bare.translate(_RAISED)))
+    for word in (plain, bare):
+        for quantity in among:
+            if unit := _UNIT_OF[quantity].get(word):
+                return quantity, unit
+    return next(((q, power) for q in among if power in FACTORS[q]), None) if power else None
+
+
+def unit_of(text: str, among: Sequence[str] = OF_LOGS) -> str | None:
+    """Parse the spelling of a unit (`find_unit`). Returns in the spelling of this package."""
+    found = find_unit(text, among)
+    return found[1] if found else None
+
+
+def unit_words(words: Sequence[str], among: Sequence[str] = OF_LOGS) -> tuple[list[str], str]:
+    """Split a unit off the end of the words of a name, the longest first: ``m s2``, ``rad s``.
+
+    `words`: in lower case. Returns the words before it, and the unit; empty if there is none.
+    """
+    for take in (4, 3, 2, 1):
+        if len(words) > take:
+            spelled = "_".join(words[-take:])
+            for quantity in among:
+                if unit := _UNIT_OF[quantity].get(spelled):
+                    return list(words[:-take]), unit
+    return list(words), ""
+
+
+# Units of raw counts, and units stated by the user.
+
+
+_NUMBER = r"\d+(?:\.\d*)?(?:[eE][+-]?\d+)?"
+# Counts per unit, as in deg/s/131; or units per count, as in 1/131 deg/s.
+_PARTS = re.compile(rf"(?P<unit>.*\D)/\s*(?P<counts>{_NUMBER})")
+_TIMES = re.compile(rf"(?P<up>{_NUMBER})(?:\s*/\s*(?P<down>{_NUMBER}))?\s*[ *·]\s*(?P<unit>\D.*)")
+
+
+def parse_unit(text: str, kind: str) -> str:
+    """Check a unit that the user stated.
+
+    `text`: a unit; for a gyro or an accelerometer also one of raw counts, as ``deg/s/131`` or
+    ``g/16384`` (counts per unit), or ``1/131 deg/s`` or ``0.061 deg/s`` (units per count). `kind`
+    ({'gyro', 'accel', 'mag', 'time'}). Returns in the spelling of this package; `factor_of` has its
+    factor. ConfigError: the text is not a unit of that kind.
+    """
+    known = {
+        "gyro": {**GYRO_UNITS, **GYRO_SUMS},
+        "accel": {**ACCEL_UNITS, **ACCEL_SUMS},
+        "mag": MAG_UNITS,
+        "time": TIME_UNITS,
+    }[kind]
+    unit = _word(text)
+    if unit in known:
+        return unit
+    counted = kind in ("gyro", "accel")
+    scale, of = _taken_apart(text) if counted else (None, "")
+    if scale is None or (unit := _word(of)) not in known:
+        raise ConfigError(
+            "io.unknown-unit-or-counts" if counted else "io.unknown-unit",
+            quantity=f"--{kind}-unit",
+            word=text,
+            known=known,
+            example="deg/s/131" if kind == "gyro" else "g/16384",
+        )
+    counts = f"{1.0 / scale:g}"
+    exact = math.isclose(float(counts) * scale, 1.0, rel_tol=1e-12)
+    return f"{unit}/{counts}" if exact else f"{scale!r} {unit}"
+
+
+def factor_of(unit: str, known: Mapping[str, float]) -> float:
+    """Return the factor from a unit to SI.
+
+    `unit`: as returned by `parse_unit`. `known`: factors of plain units.
+    """
+    if unit in known:
+        return known[unit]
+    scale, of = _taken_apart(unit)
+    return float(scale or 1.0) * known[of]
+
+
+def _word(text: str) -> str:
+    """Return the unit of a text, or the text; for accelerometers also with the sign of iOS."""
+    bare = text.strip()
+    if bare.startswith("-") and (unit := unit_of(bare[1:])):
+        return f"-{unit}"
+    return unit_of(bare) or bare
+
+
+def _taken_apart(text: str) -> tuple[float | None, str]:
+    """Parse how much of which unit a count is; None if the text has no such form."""
+    bare = text.strip()
+    if match := _PARTS.fullmatch(bare):
+        up, down, unit = 1.0, float(match["counts"]), match["unit"]
+    elif match := _TIMES.fullmatch(bare):
+        up, down, unit = float(match["up"]), float(match["down"] or 1.0), match["unit"]
+    else:
+        return None, ""
+    scale = up / down if down > 0.0 else math.inf
+    return (scale if 0.0 < scale < math.inf else None), unit
