@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapdown.config.alignment import LogTable
+from strapdown.config.alignment import FixesTable, LogTable
 from strapdown.config.navigation import NavigationSpec
 from strapdown.frames import place_difference
 from strapdown.navigation.truth_comparison import smoother_consistency
@@ -32,7 +32,7 @@ def result(request, recordings):
     folder = recordings("car_rtk")
     made = propose(
         LogTable(path=str(folder / "part1_imu_frd_si.csv")),
-        gnss=folder / "part1_gnss_rtk.csv",
+        gnss=FixesTable(path=str(folder / "part1_gnss_rtk.csv")),
         sensor=request.param,
     )
     table = {"name": "drive", **made.table, "smoother": "rts"}

@@ -10,12 +10,15 @@ from typing import Any
 import pandas as pd
 
 from strapdown.api.reading import GnssFile, ImuFile, imu_input, keys_in, log_in, table_input
+from strapdown.config.alignment import FixesTable
 from strapdown.config.navigation import NavigationSpec
-from strapdown.errors import ConfigError
+from strapdown.config.spec import specify
+from strapdown.errors import ConfigError, Finding
 from strapdown.formats.clocks import on_clock_of
+from strapdown.formats.gnss_fixes import POSITION_SDS
 from strapdown.progress import Progress, silent
 from strapdown.systems.inputs import NOWHERE, Memory
-from strapdown.systems.navigation_proposal import CODE_RECEIVER, propose
+from strapdown.systems.navigation_proposal import Proposal, propose
 from strapdown.systems.navigation_run import NavigationRun, run_navigation
 
 __all__ = [
@@ -274,50 +277,86 @@ def specify_navigation(
     proposal = propose(
         log.log,
         axes=log.axes,
-        gnss=Path(fixes["path"]) if fixes else None,
+        gnss=_fixes_table(fixes) if fixes else None,
         sensor=None if sensor is None else str(sensor),
         site=site,
         heading_deg=known.get("heading_deg"),
-        fixes_as=replace(
-            CODE_RECEIVER,
-            columns=dict(fixes.get("columns", {})),
-            position_sd=fixes.get("position_sd_m"),
-            velocity_sd=fixes.get("velocity_sd_m_per_s"),
-            repair=bool(fixes.get("repair", False)),
-        ),
     )
-    if sensor is None:
-        near = proposal.table.get("sensors", {}).get("sensor")
-        code = "api.no-sensor-near-one" if near else "api.no-sensor-for-navigation"
-        raise ConfigError(code, quantity=called("sensor"), near=near)
+    _ask(proposal, fixes, sensor, called)
     whole: dict[str, Any] = {"name": Path(log.log.path).resolve().stem, **proposal.table}
     proposed = whole.pop("aiding", {}).get("gnss", {})
-    if "position_sd_m" in proposed:
-        raise ConfigError(
-            "api.fixes-without-sd", file=Path(str(fixes["path"])).name, quantity=called("gnss")
-        )
-    coarse = whole["coarse"]
-    if coarse["kind"] == "known_heading" and "heading_deg" not in coarse:
-        raise ConfigError(
-            "api.no-heading",
-            quantity=called("heading"),
-            called=called("heading"),
-            called_2=called("gnss"),
-        )
-    if "site" not in whole and proposal.gnss is None:
-        raise ConfigError(
-            "api.no-initial-position",
-            quantity=called("lat"),
-            called=called("lat"),
-            called_2=called("lon"),
-            called_3=called("alt"),
-            called_4=called("gnss"),
-        )
     if aids:
         whole["aiding"] = {
             name: {**(proposed if name == receiver else {}), **aid} for name, aid in aids.items()
         }
     return NavigationSpec.checked({**whole, **(options or {})})
+
+
+def _ask(
+    proposal: Proposal,
+    fixes: Mapping[str, Any],
+    sensor: str | Path | None,
+    called: Callable[[str], str],
+) -> None:
+    """Ask for everything that neither the user nor the files state, in one refusal."""
+    open_: list[Finding] = []
+    answers: list[str | None] = []
+    name = Path(proposal.recording.name).name
+    if sensor is None:
+        near = proposal.table.get("sensors", {}).get("sensor")
+        code = "api.no-sensor-near-one" if near else "api.no-sensor-for-navigation"
+        open_.append(Finding(code, severity="error", quantity=called("sensor"), near=near))
+        answers.append(near and f"--sensor {near}")
+    aid = proposal.table.get("aiding", {}).get("gnss", {})
+    taken = aid.get("position_sd_m") if fixes and fixes.get("position_sd_m") is None else None
+    if taken is not None:
+        file = Path(aid["path"]).name
+        open_.append(
+            Finding(
+                "api.fixes-without-sd",
+                severity="error",
+                file=file,
+                quantity=called("gnss"),
+                typical=POSITION_SDS,
+            )
+        )
+        answers.append(f"--gnss-position-sd {taken:g}")
+    coarse = proposal.table["coarse"]
+    if coarse["kind"] == "known_heading" and "heading_deg" not in coarse:
+        open_.append(
+            Finding(
+                "api.no-heading",
+                severity="error",
+                quantity=called("heading"),
+                called=called("heading"),
+                called_2=called("gnss"),
+            )
+        )
+        answers.append(None)
+    if "site" not in proposal.table and proposal.gnss is None:
+        open_.append(
+            Finding(
+                "api.no-initial-position",
+                severity="error",
+                quantity=called("lat"),
+                called=called("lat"),
+                called_2=called("lon"),
+                called_3=called("alt"),
+                called_4=called("gnss"),
+            )
+        )
+        answers.append(None)
+    if not open_:
+        return
+    # A command that leaves a question open would only be refused again.
+    flags = {"flags": " ".join(map(str, answers))} if all(answers) else {}
+    if len(open_) == 1:
+        raise ConfigError(open_[0], **flags)
+    raise ConfigError("api.open-questions", file=name, questions=open_, **flags)
+
+
+def _fixes_table(aid: Mapping[str, Any]) -> FixesTable:
+    return specify(FixesTable, **{k: v for k, v in aid.items() if k in FixesTable.model_fields})
 
 
 def _site(

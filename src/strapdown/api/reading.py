@@ -95,6 +95,9 @@ class GnssFile:
         told = {
             "format": self.options.format,
             "columns": dict(self.options.columns) or None,
+            "units": dict(self.options.units) or None,
+            "datum_height_m": self.options.datum_height,
+            "origin": self.options.origin,
             "position_sd_m": self.options.position_sd,
             "velocity_sd_m_per_s": self.options.velocity_sd,
             "repair": self.options.repair or None,
@@ -286,6 +289,9 @@ def read_gnss(
     *,
     format: str | None = None,  # noqa: A002 (the name of the option and of the key)
     columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    datum_height_m: float | None = None,
+    origin: tuple[float, float, float] | None = None,
     position_sd_m: float | tuple[float, float, float] | None = None,
     velocity_sd_m_per_s: float | tuple[float, float, float] | None = None,
     repair: bool = False,
@@ -301,6 +307,14 @@ def read_gnss(
         A format of `strapdown modules`; by default found by the content.
     columns : mapping of str to str, optional
         Quantity (``time``, ``lat`` …) to the name of its column, or its number counted from 1.
+        Beside geodetic positions: ``ecef_x ecef_y ecef_z``, and local ``north east up``.
+    units : mapping of str to str, optional
+        Quantity to the unit of its column, if not stated in the file: ``{"time": "ms"}``.
+    datum_height_m : float, optional
+        Height over the ellipsoid of the level from which the file counts its heights: that of
+        the geoid, or of the point of take-off.
+    origin : tuple of float, optional
+        Latitude in deg, longitude in deg and height in m of the origin of local positions.
     position_sd_m, velocity_sd_m_per_s : float or tuple of float, optional
         Standard deviations north, east, down of each fix, replacing those of the file.
     repair : bool
@@ -319,6 +333,9 @@ def read_gnss(
     options = GnssOptions(
         format=format,
         columns=dict(columns or {}),
+        units=dict(units or {}),
+        datum_height=datum_height_m,
+        origin=origin,
         position_sd=position_sd_m,
         velocity_sd=velocity_sd_m_per_s,
         repair=repair,
@@ -382,6 +399,8 @@ _LACKS = {
     "io.no-stream",
     "io.no-gyro-columns",
     "io.no-gyro-columns-left-out",
+    "io.table-of-positions",
+    "io.table-of-attitudes",
     "io.missing-columns-2",
     "io.missing-columns-3",
 }

@@ -11,12 +11,15 @@ import typer
 
 from strapdown.cli.shared_options import (
     LOG_FLAGS,
+    FixFlags,
     Height,
     LogFlags,
     Longitude,
     OutFlags,
     Sensor,
     as_flag,
+    fix_flags,
+    fix_keys,
     folder_to_make,
     log_keys,
     module_of_flag,
@@ -83,6 +86,7 @@ FLAGS = {
     "coarse, kind": "--method",
     "prefilter, kind": "--prefilter",
     **LOG_FLAGS,
+    **fix_flags("gnss"),
 }
 
 
@@ -99,6 +103,7 @@ def align(
     flags: AlignFlags,
     *,
     log: LogFlags,
+    fixes: FixFlags,
     out: Annotated[Path | None, folder_to_make("LOG-align")] = None,
     write: OutFlags,
 ) -> None:
@@ -124,6 +129,7 @@ def align(
         "coarse_only": flags.coarse_only or None,
         "prefilter": None if flags.prefilter == "none" else flags.prefilter,
         **log.given(),
+        **fixes.given(),
     }
     refuse_result(source, "log")
     own = source.suffix.lower() == ".toml"
@@ -157,7 +163,7 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
     from strapdown.config.spec import specify
 
     site = {"lat_deg": given["lat"], "lon_deg": given["lon"], "alt_m": given["alt"]}
-    keys = log_keys(given)
+    keys, fixes = log_keys(given), fix_keys(given, given["gnss"])
     try:
         table = specify(LogTable, path=str(log), **keys)
         return specify_alignment(
@@ -166,7 +172,7 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
             sensor=given["sensor"],
             coarse=module_of_flag(given["method"] or "inertial_frame"),
             fine=not given["coarse_only"],
-            gnss=None if given["gnss"] is None else {"path": str(given["gnss"])},
+            gnss={"path": str(log), **fixes} if fixes else None,
             prefilter=module_of_flag(given["prefilter"] or "none"),
             called=lambda argument: f"--{argument}",
         )

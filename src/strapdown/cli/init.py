@@ -13,9 +13,11 @@ import typer
 
 from strapdown.cli.shared_options import (
     SENSOR,
+    FixFlags,
     LogFlags,
     Quiet,
     Verbose,
+    fix_keys,
     log_keys,
     running,
     spread,
@@ -137,6 +139,7 @@ def navigate(
     ] = False,
     *,
     flags: LogFlags,
+    fixes: FixFlags,
     out: Annotated[Path, _file_to_write("navigate.toml")] = Path("navigate.toml"),
     force: Force = False,
     quiet: Quiet = False,
@@ -146,11 +149,20 @@ def navigate(
 
     Then: strapdown navigate navigate.toml
     """
+    from strapdown.config.alignment import FixesTable
+    from strapdown.config.spec import specify
     from strapdown.systems.navigation_draft import draft_navigation
 
     def draft(folder: Path, _: Progress) -> Any:
+        keys = fix_keys(fixes.given(), gnss)
+        receiver = specify(FixesTable, **{"path": str(log), **keys}) if keys else None
         return draft_navigation(
-            _table(log, flags), folder=folder, axes=flags.axes, gnss=gnss, sensor=sensor, foot=foot
+            _table(log, flags),
+            folder=folder,
+            axes=flags.axes,
+            gnss=receiver,
+            sensor=sensor,
+            foot=foot,
         )
 
     question = f"Assumed; correct it in {out} if wrong:"

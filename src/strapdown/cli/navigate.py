@@ -11,12 +11,15 @@ import typer
 
 from strapdown.cli.shared_options import (
     LOG_FLAGS,
+    FixFlags,
     Height,
     LogFlags,
     Longitude,
     OutFlags,
     Sensor,
     as_flag,
+    fix_flags,
+    fix_keys,
     flag_of,
     folder_to_make,
     log_keys,
@@ -51,6 +54,7 @@ FLAGS = {
     "control_points, path": "--points",
     "smoother, kind": "--smooth",
     **LOG_FLAGS,
+    **fix_flags("aiding, gnss"),
 }
 
 
@@ -124,6 +128,7 @@ def navigate(
     flags: NavigateFlags,
     *,
     log: LogFlags,
+    fixes: FixFlags,
     out: Annotated[Path | None, folder_to_make("LOG-navigate")] = None,
     write: OutFlags,
 ) -> None:
@@ -145,7 +150,8 @@ def navigate(
         from strapdown.live.replay import Replay, parse_pace
 
         played = Replay(parse_pace(flags.pace))
-    given: dict[str, Any] = {**asdict(flags), "smooth": flags.smooth or None, **log.given()}
+    given: dict[str, Any] = {**asdict(flags), "smooth": flags.smooth or None}
+    given |= {**log.given(), **fixes.given()}
     pace, live = given.pop("pace"), given.pop("live")
     every, lines = given.pop("every"), given.pop("lines")
     own = source.suffix.lower() == ".toml"
@@ -200,11 +206,13 @@ def navigation_of_flags(log: Path, given: Mapping[str, Any]) -> NavigationSpec:
     from strapdown.api.reading import ImuFile
     from strapdown.config.alignment import LogTable
     from strapdown.config.spec import specify
+    from strapdown.formats.gnss_files import has_fixes
 
     aids: dict[str, dict[str, Any]] = {}
-    if given["gnss"] is not None:
+    fixes = fix_keys(given, given["gnss"])
+    if fixes or has_fixes(log):
         arm = given["lever_arm"]
-        aids["gnss"] = {"kind": "gnss", "path": str(given["gnss"])}
+        aids["gnss"] = {"kind": "gnss", "path": str(log), **fixes}
         aids["gnss"] |= {} if arm is None else {"lever_arm_m": _arm(arm)}
     elif given["lever_arm"] is not None:
         raise ConfigError("cli.lever-arm-without-receiver", quantity="--lever-arm")

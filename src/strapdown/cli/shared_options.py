@@ -29,6 +29,7 @@ def options(panel: str) -> Callable[..., Any]:
 
 
 reading = options("How to read the log")
+fixes = options("How to read the fixes")
 running = options("What to run")
 with_what = options("Where, and with what")
 writing = options("What to write")
@@ -105,6 +106,89 @@ class LogFlags:
     def given(self) -> dict[str, Any]:
         """By name of the flag, None where not given."""
         return {**asdict(self), "repair": self.repair or None}
+
+
+@dataclass(frozen=True)
+class FixFlags:
+    """How to read the fixes: of their own file, or of the log that has them."""
+
+    gnss_format: Annotated[
+        str | None, fixes("FORMAT", "Format of the fixes (strapdown modules), if it is not found.")
+    ] = None
+    gnss_columns: Annotated[
+        list[str] | None,
+        fixes(
+            "Q=NAME",
+            "time=t,lat=y,lon=x,alt=h,VN=… ; a number counts columns from 1; local positions are "
+            "north, east, up, those of the Earth ecef_x, ecef_y, ecef_z.",
+        ),
+    ] = None
+    gnss_units: Annotated[
+        list[str] | None, fixes("Q=UNIT", "Units of columns: time=ms,lat=rad,alt=ft,speed=km/h.")
+    ] = None
+    gnss_datum_height: Annotated[
+        float | None,
+        fixes(
+            "M",
+            "Height over the ellipsoid of the level that heights are counted from: the geoid "
+            "(heights over the sea), or the point of take-off.",
+        ),
+    ] = None
+    gnss_origin: Annotated[
+        str | None,
+        fixes("LAT,LON,HEIGHT", "Origin of local positions, deg, deg, m over the ellipsoid."),
+    ] = None
+
+    gnss_position_sd: Annotated[
+        float | None,
+        fixes("M", "Standard deviation of each position, in place of those of the file."),
+    ] = None
+    gnss_velocity_sd: Annotated[
+        float | None,
+        fixes("M/S", "Standard deviation of each velocity, in place of those of the file."),
+    ] = None
+
+    def given(self) -> dict[str, Any]:
+        """By name of the flag, None where not given."""
+        return asdict(self)
+
+
+def fix_keys(given: Mapping[str, Any], path: Path | None) -> dict[str, Any]:
+    """Keys of a table of fixes by the flags, without those not given; empty without any.
+
+    `given`: as `FixFlags.given`; other entries are ignored. `path`: of the fixes. ConfigError: an
+    option has another form.
+    """
+    columns, units = (_pairs(given[name], flag_of(name)) for name in ("gnss_columns", "gnss_units"))
+    keys = {
+        "path": None if path is None else str(path),
+        "format": given["gnss_format"],
+        "columns": columns or None,
+        "units": units or None,
+        "datum_height_m": given["gnss_datum_height"],
+        "origin": None if given["gnss_origin"] is None else _origin(given["gnss_origin"]),
+        "position_sd_m": given["gnss_position_sd"],
+        "velocity_sd_m_per_s": given["gnss_velocity_sd"],
+    }
+    return {key: value for key, value in keys.items() if value is not None}
+
+
+def _pairs(items: list[str] | None, flag: str) -> dict[str, str]:
+    out: dict[str, str] = {}
+    for item in (part for text in items or [] for part in text.split(",") if part.strip()):
+        quantity, equals, value = (piece.strip() for piece in item.partition("="))
+        if not equals or not value:
+            raise ConfigError("io.no-form-understood", quantity=flag, item=item)
+        out[quantity] = value
+    return out
+
+
+def _origin(text: str) -> tuple[float, float, float]:
+    try:
+        lat, lon, height = (float(part) for part in text.split(","))
+    except ValueError:
+        raise ConfigError("cli.bad-origin", quantity="--gnss-origin", text=text) from None
+    return lat, lon, height
 
 
 def log_keys(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -242,6 +326,19 @@ LOG_FLAGS = {
     "log, accel_unit": "--accel-unit",
     "log, time_unit": "--time-unit",
 }
+
+
+def fix_flags(table: str) -> dict[str, str]:
+    """Flags of the fixes by key path, under the table that has them."""
+    return {
+        f"{table}, format": "--gnss-format",
+        f"{table}, columns": "--gnss-columns",
+        f"{table}, units": "--gnss-units",
+        f"{table}, datum_height_m": "--gnss-datum-height",
+        f"{table}, origin": "--gnss-origin",
+        f"{table}, position_sd_m": "--gnss-position-sd",
+        f"{table}, velocity_sd_m_per_s": "--gnss-velocity-sd",
+    }
 
 
 def refuse_beside_file(

@@ -96,6 +96,12 @@ class FixesTable(Spec):
     format: Word | None = None
     #: Column name by quantity, where it differs.
     columns: dict[Word, Word] = Field(default_factory=dict)
+    #: Unit of its column by quantity.
+    units: dict[Word, Word] = Field(default_factory=dict)
+    #: Height over the ellipsoid of the level of the file's heights: the geoid, or the take-off.
+    datum_height_m: Annotated[Number, Field(ge=-500.0, le=9000.0)] | None = None
+    #: Latitude, longitude (deg) and height (m) of the origin of local positions.
+    origin: Triple | None = None
     #: Standard deviations, replacing those of the file.
     position_sd_m: OneOrThree | None = None
     velocity_sd_m_per_s: OneOrThree | None = None
@@ -107,6 +113,9 @@ class FixesTable(Spec):
         return GnssOptions(
             format=self.format,
             columns=self.columns,
+            units=self.units,
+            datum_height=self.datum_height_m,
+            origin=self.origin,
             position_sd=self.position_sd_m,
             velocity_sd=self.velocity_sd_m_per_s,
             repair=self.repair,

@@ -475,8 +475,8 @@ class NavigationSpec(FileSpec):
             yield Fault((*path, "path"), "config.aid-takes-no-file", {"kind": aid.kind})
         if takes and aid.path is None and name not in self.receivers and self.live is None:
             yield Fault((*path, "path"), "config.aid-file-missing", {"kind": aid.kind})
-        for key in ("position_sd_m", "velocity_sd_m_per_s"):
-            if getattr(aid, key) is not None and aid.kind != "gnss":
+        for key in ("position_sd_m", "velocity_sd_m_per_s", "units", "datum_height_m", "origin"):
+            if getattr(aid, key) and aid.kind != "gnss":
                 yield Fault((*path, key), "config.fix-sd-of-other-aid", {"kind": aid.kind})
         if aid.kind == "barometer" and getattr(self.mechanization, "height", None) == "held":
             yield Fault((*path, "kind"), "config.height-aid-with-held-height")

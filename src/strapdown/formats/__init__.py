@@ -67,6 +67,7 @@ from strapdown.formats.assemble import assemble
 from strapdown.formats.binary import first_bytes, or_sentences
 from strapdown.formats.find_columns import names_of_quantities
 from strapdown.formats.gnss_fixes import Fixes
+from strapdown.formats.quantity_columns import GEODETIC_QUANTITIES, read_words
 from strapdown.formats.recording import NoStreamError, RawLog, ReadOptions, Recording
 from strapdown.plugins import plugin, plugins
 
@@ -583,4 +584,21 @@ def read_log(path: str | Path, options: ReadOptions | None = None) -> Recording:
         The log cannot be used; the message names file, row, quantity and remedy.
     """
     asked = options or ReadOptions()
-    return assemble(read_raw(Path(path), asked.format), asked)
+    raw = read_raw(Path(path), asked.format)
+    if not any(q.startswith("gyro") for q in (*asked.columns, *names_of_quantities(raw))):
+        _refuse_other_table(raw)
+    return assemble(raw, asked)
+
+
+def _refuse_other_table(raw: RawLog) -> None:
+    """Refuse a table without a gyro that has positions or attitudes; it has another use."""
+    words = {read_words(name, GEODETIC_QUANTITIES)[0] for name in raw.columns}
+    lat, lon = (set(GEODETIC_QUANTITIES[q].words) & words for q in ("lat", "lon"))
+    known = names_of_quantities(raw)
+    if lat and lon:
+        code = "io.table-of-positions"
+    elif {"roll", "pitch", "heading"} <= known or {"q_w", "q_x", "q_y", "q_z"} <= known:
+        code = "io.table-of-attitudes"
+    else:
+        return
+    raise DataError(code, file=raw.name, columns=list(raw.columns), name=raw.name)

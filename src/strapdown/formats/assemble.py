@@ -207,10 +207,17 @@ def require_accel(recording: Recording) -> None:
     """
     found = {f.code: f for f in recording.findings}
     if ACCEL[0] not in recording.imu.columns:
-        left_out = [f for f in recording.findings if f.code.startswith("io.left-out")]
+        left_out = [
+            f
+            for f in recording.findings
+            if f.code.startswith("io.left-out") or f.code == "io.force-without-gravity"
+        ]
         unused = found.get("io.columns-not-used")
+        code = "io.no-accelerometer-left-out" if left_out else "io.no-accelerometer"
+        if not left_out and unused is None:
+            code = "io.no-accelerometer-in-file"
         raise DataError(
-            "io.no-accelerometer-left-out" if left_out else "io.no-accelerometer",
+            code,
             file=recording.name,
             quantity="accel",
             left_out=left_out,

@@ -7,7 +7,9 @@ Two families, as in the samples of https://github.com/JuanIrache/DJI_SRT_Parser 
   ``rel_alt`` over the place of take-off;
 - ``GPS (13.37, 52.50, 15) … H 85.80m``: longitude, latitude, and a third number that is a count of
   satellites or a height, depending on the drone, and is not used; ``H`` and ``BAROMETER`` are
-  heights over the place of take-off, so the file has no height of the drone.
+  heights over the point of take-off.
+
+Of both families the height over the sea is read if it is there, else that over the take-off.
 
 Stamps are those of the subtitles, from the start of the video; the printed date has no time zone.
 """
@@ -30,6 +32,7 @@ _NUMBER = r"\s*([+-]?\d+(?:\.\d+)?)\s*"
 _LAT = re.compile(r"\[\s*latitude\s*:" + _NUMBER, re.I)
 _LON = re.compile(r"\[\s*long?t?itude\s*:" + _NUMBER, re.I)
 _ALT = re.compile(r"\b(?:abs_alt|altitude)\s*:" + _NUMBER, re.I)
+_UP = re.compile(r"\b(?:rel_alt\s*:|H(?=\s)|BAROMETER\s*:)" + _NUMBER, re.I)
 _PAIR = re.compile(r"\bGPS\s*\(" + _NUMBER + "," + _NUMBER + ",")
 
 
@@ -45,8 +48,7 @@ def read(path: Path) -> RawLog:
     Raises
     ------
     DataError
-        No subtitle has a position; the heights are over the place of take-off alone; or the
-        angles may be in radians.
+        No subtitle has a position, or the angles may be in radians.
     """
     text, findings = csv.decoded(path.read_bytes(), path.name)
     starts = list(_TIME.finditer(text))
@@ -57,21 +59,18 @@ def read(path: Path) -> RawLog:
         hours, minutes, seconds, rest = (int(g) for g in start.groups())
         time = 3600 * hours + 60 * minutes + seconds + int(f"{rest:03d}") * 1e-3
         pair, lat, lon = _PAIR.search(block), _LAT.search(block), _LON.search(block)
-        alt = _ALT.search(block)
+        alt, up = _ALT.search(block), _UP.search(block)
         place = (pair[2], pair[1]) if pair else (lat[1], lon[1]) if lat and lon else None
         if place is None:
             lost += 1
             continue
         rows.append(text.count("\n", 0, start.start()) + 1)
-        values.append((time, float(place[0]), float(place[1]), float(alt[1]) if alt else np.nan))
+        heights = (float(one[1]) if one else np.nan for one in (alt, up))
+        values.append((time, float(place[0]), float(place[1]), *heights))
     if not values:
         raise DataError("io.srt-without-places", file=path.name, quantity="lat, lon")
-    time, lats, lons, alts = np.array(values).T
+    time, lats, lons, alts, ups = np.array(values).T
     none = (lats == 0.0) & (lons == 0.0)
-    if np.isnan(alts).all():
-        raise DataError(
-            "io.heights-over-take-off", file=path.name, row=rows[0], quantity="alt", count=len(rows)
-        )
     if np.abs(lats).max() <= np.pi / 2 and np.abs(lons).max() <= np.pi and not none.all():
         raise DataError(
             "io.srt-degrees-or-radians",
@@ -94,7 +93,7 @@ def read(path: Path) -> RawLog:
         "time": (time, "s"),
         "lat": (lats, "deg"),
         "lon": (lons, "deg"),
-        "alt_msl": (alts, "m"),
+        **({"alt_take_off": (ups, "m")} if np.isnan(alts).all() else {"alt_msl": (alts, "m")}),
         "quality": (np.where(none, 0.0, 1.0), None),
     }
     return RawLog.of(path, held, rows=np.array(rows), clock=RELATIVE, findings=findings)

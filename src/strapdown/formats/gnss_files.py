@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+import re
+import shlex
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding, StrapdownError
+from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
 from strapdown.formats import comma2k19, open_stream
 from strapdown.formats.arrays import numbers, ticks_of
 from strapdown.formats.clocks import GPS, RELATIVE, UNIX, WEEK, Clock, clock_of_name
@@ -26,8 +28,9 @@ from strapdown.formats.gnss_fixes import (
 from strapdown.formats.gnss_pos import QUALITY
 from strapdown.formats.quantity_columns import GEODETIC_QUANTITIES, Found, Quantity, quantities_of
 from strapdown.formats.recording import RawLog
-from strapdown.tables.checks import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
-from strapdown.units import ANGLES, LENGTHS, SPEEDS, TIME_UNITS
+from strapdown.frames import geodetic_from_ecef, geodetic_from_ned
+from strapdown.tables.checks import POSITION_SD, VELOCITY, VELOCITY_SD
+from strapdown.units import ANGLES, LENGTHS, OF_TABLES, SPEEDS, TIME_UNITS, unit_of
 
 __all__ = [
     "QUANTITIES",
@@ -76,6 +79,24 @@ QUANTITIES: dict[str, Quantity] = {
         ("geoid", "undulation", "geoidsep", "geoidseparation", "geoidheight", "geoidundulation"),
         LENGTHS,
     ),
+    "alt_take_off": Quantity(
+        (
+            "relalt",
+            "relativealt",
+            "relativealtitude",
+            "heightabovetakeoff",
+            "altitudeabovetakeoff",
+            "heighttakeoff",
+        ),
+        LENGTHS,
+    ),
+    "north": Quantity(("north", "posn", "positionnorth", "northposition"), LENGTHS),
+    "east": Quantity(("east", "pose", "positioneast", "eastposition"), LENGTHS),
+    "up": Quantity(("up", "posu", "positionup"), LENGTHS, ("down", "posd", "positiondown")),
+    **{
+        f"ecef_{axis}": Quantity((f"ecef{axis}", f"{axis}ecef", f"positionecef{axis}"), LENGTHS)
+        for axis in "xyz"
+    },
     "north_sd": Quantity(_sds("n", "north", "lat", "latitude"), LENGTHS),
     "east_sd": Quantity(_sds("e", "east", "lon", "longitude"), LENGTHS),
     "down_sd": Quantity(
@@ -127,36 +148,20 @@ QUANTITIES: dict[str, Quantity] = {
     "quality": Quantity(("quality", "fixquality", "gpsquality", "gnssquality"), {}),
     "Q": Quantity(("q",), {}),
 }
-_NEEDED = ("time", *GEODETIC)
 
 
 def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
     """Convert named columns to fixes.
 
     Names may carry a unit, as ``lat_deg``, ``vN [km/h]``, ``sdU_m``; the default units are those of
-    a Gnss table. A column ``Q`` has the codes of RTKLIB, ``quality`` those of NMEA. DataError: time
-    or the position is missing, two columns fit one quantity, a unit is unknown, or the only height
-    is above the geoid.
+    a Gnss table; `options.units` precede them. A column ``Q`` has the codes of RTKLIB,
+    ``quality`` those of NMEA. A position is geodetic, Earth-centered Earth-fixed (ECEF), or local:
+    north, east, up of an origin that the user states. DataError: time or the position is missing,
+    two columns fit one quantity, or a unit is unknown.
     """
-    found = quantities_of(raw, QUANTITIES, options.columns)
+    found = _in_units(raw, quantities_of(raw, QUANTITIES, options.columns), options.units)
     raw = _rows_of_fixes(raw, found)
-    over_sea = "alt" not in found and "alt_msl" in found
-    missing = [q for q in _NEEDED if q not in found and not (q == "alt" and over_sea)]
-    if missing:
-        raise DataError(
-            "io.missing-columns-2",
-            file=raw.name,
-            missing=missing,
-            columns=list(raw.columns),
-            missing_2=missing[0],
-        )
-    if over_sea and "geoid" not in found:
-        raise DataError(
-            "io.height-over-sea-column",
-            file=raw.name,
-            quantity="alt",
-            source=found["alt_msl"].source,
-        )
+    _refuse_missing(raw, found)
 
     def values(quantity: str) -> Array:
         column = found[quantity]
@@ -176,7 +181,7 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
             )
         return np.column_stack([values(name) for name in names]) if there else None
 
-    place = np.column_stack([values("lat"), values("lon"), _height(found, values, raw)])
+    place, datum = _place(raw, found, values, options)
     time, clock = _time(raw, found["time"])
     if "week" in found and clock.name == RELATIVE:
         clock = Clock(GPS)
@@ -198,13 +203,118 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
         position_sd=_accuracy(raw, found, values) if position_sd is None else position_sd,
         velocity_sd=velocity_sd,
         quality=_quality(raw, found, values),
+        heights_from={"alt_msl": "sea", "alt_take_off": "take-off"}.get(datum, ""),
+        height_source=found[datum].source if datum in found else "",
         findings=raw.findings,
     )
 
 
+def _in_units(raw: RawLog, found: dict[str, Found], units: Mapping[str, str]) -> dict[str, Found]:
+    """Replace the units of columns by those that the user states."""
+    stated = {}
+    for quantity, unit in units.items():
+        if quantity not in found:
+            raise ConfigError(
+                "io.unit-of-missing-column", file=raw.name, quantity="units", of_what=quantity
+            )
+        known = QUANTITIES[quantity].units
+        spelled = unit_of(unit, OF_TABLES) or unit
+        check_choice("io.unknown-unit", known, quantity=f"units {quantity}", unit=spelled)
+        sign = -1.0 if found[quantity].factor < 0.0 else 1.0
+        stated[quantity] = Found(found[quantity].source, sign * known[spelled], True)
+    return found | stated
+
+
+#: Columns of a position, each set with its order; heights of a geodetic position, the first counts.
+_GEODETIC, _ECEF, _LOCAL = ("lat", "lon"), ("ecef_x", "ecef_y", "ecef_z"), ("north", "east")
+_HEIGHTS = ("alt", "alt_msl", "alt_take_off")
+
+
+def _refuse_missing(raw: RawLog, found: dict[str, Found]) -> None:
+    """Refuse a table without time or position; ask what nameless coordinates are."""
+    missing = [q for q in ("time",) if q not in found]
+    if not any(set(one) <= found.keys() for one in (_GEODETIC, _ECEF, _LOCAL)):
+        if not missing and (axes := _bare_axes(raw)):
+            x, y, z = axes
+            xyz = np.column_stack([numbers(raw, Column(c, None, ""), c) for c in axes])
+            far = np.nanmedian(np.linalg.norm(np.asarray(xyz, dtype=np.float64), axis=1))
+            if _NEAR_EARTH[0] < far < _NEAR_EARTH[1]:
+                columns = f"ecef_x={x},ecef_y={y},ecef_z={z}"
+                raise DataError(
+                    "io.positions-likely-ecef",
+                    file=raw.name,
+                    quantity=", ".join(axes),
+                    distance=far,
+                    flags=f"--gnss-columns {shlex.quote(columns)}",
+                    keys=f'columns = {{ecef_x = "{x}", ecef_y = "{y}", ecef_z = "{z}"}}',
+                )
+            raise DataError(
+                "io.positions-without-origin",
+                file=raw.name,
+                quantity=", ".join(axes),
+                x=x,
+                y=y,
+                z=z,
+            )
+        missing += [q for q in _GEODETIC if q not in found]
+    if set(_GEODETIC) <= found.keys() and not set(_HEIGHTS) & found.keys():
+        missing.append("alt")
+    if missing:
+        raise DataError(
+            "io.missing-columns-2",
+            file=raw.name,
+            missing=missing,
+            columns=list(raw.columns),
+            missing_2=missing[0],
+        )
+
+
+#: Distances from the center of the Earth that a position on it, or near it, may have, m.
+_NEAR_EARTH = (6.3e6, 6.5e6)
+_AXIS = re.compile(r"(?:p|pos|position)?[\s_.]*([xyz])\b[\s_.]*(?:[\[(]?m[\])]?)?", re.I)
+
+
+def _bare_axes(raw: RawLog) -> list[str]:
+    """Return columns that are called x, y, z and may be coordinates; none unless all three."""
+    named = {m[1].lower(): name for name in raw.columns if (m := _AXIS.fullmatch(name.strip()))}
+    return [named[axis] for axis in "xyz"] if len(named) == 3 else []
+
+
+def _place(
+    raw: RawLog, found: dict[str, Found], values: Callable[[str], Array], options: GnssOptions
+) -> tuple[Array, str]:
+    """Return geodetic positions, and the quantity of their heights."""
+    local = not set(_GEODETIC) <= found.keys() and not set(_ECEF) <= found.keys()
+    if options.origin is not None and not local:
+        raise ConfigError("io.origin-beside-positions", file=raw.name, quantity="origin")
+    if set(_GEODETIC) <= found.keys():
+        kind = next(q for q in _HEIGHTS if q in found)
+        if "alt_msl" in found and "geoid" in found:
+            kind = "alt"
+        return np.column_stack([values("lat"), values("lon"), _height(found, values, raw)]), kind
+    if not local:
+        return geodetic_from_ecef(np.column_stack([values(q) for q in _ECEF])), "alt"
+    if options.origin is None:
+        raise DataError(
+            "io.local-positions-origin-open",
+            file=raw.name,
+            quantity=", ".join(found[q].source for q in _LOCAL),
+        )
+    if "up" not in found:
+        raise DataError(
+            "io.missing-columns-2",
+            file=raw.name,
+            missing=["up"],
+            columns=list(raw.columns),
+            missing_2="up",
+        )
+    ned = np.column_stack([values("north"), values("east"), -values("up")])
+    return geodetic_from_ned(ned, options.origin), "alt"
+
+
 def _height(found: dict[str, Found], values: Callable[[str], Array], raw: RawLog) -> Array:
     if "alt_msl" not in found or "geoid" not in found:
-        return values("alt")
+        return values(next(q for q in _HEIGHTS if q in found))
     raw.findings.append(
         Finding(
             "io.height-over-ellipsoid-over-sea",
@@ -224,7 +334,7 @@ def _rows_of_fixes(raw: RawLog, found: dict[str, Found]) -> RawLog:
         return raw
     place = [
         np.asarray(numbers(raw, Column(found[q].source, None, ""), q), dtype=np.float64)
-        for q in ("lat", "lon", "alt", "alt_msl", "speed", "course", *VELOCITY)
+        for q in ("lat", "lon", *_HEIGHTS, "speed", "course", *VELOCITY)
         if q in found
     ]
     known = np.isfinite(place[0]) & np.isfinite(place[1])
@@ -309,6 +419,10 @@ def _accuracy(raw: RawLog, found: dict[str, Found], values: Callable[[str], Arra
     return np.column_stack([horizontal, horizontal, vertical])
 
 
+#: Seconds since 1970 of 2000 and 2045: dates of a receiver's fixes.
+_DATES = (9.467e8, 2.367e9)
+
+
 def _time(raw: RawLog, found: Found) -> tuple[Array, Clock]:
     ticks, dated = ticks_of(raw, Column(found.source, None, ""))
     time = np.asarray(ticks * (1e-9 if dated else found.factor), dtype=np.float64)
@@ -317,6 +431,24 @@ def _time(raw: RawLog, found: Found) -> tuple[Array, Clock]:
     if raw.clock:
         return time, Clock(name)
     if name == UNIX and not dated and not found.stated and first > 1e11:
+        step = float(np.median(np.abs(np.diff(time)))) if time.size > 1 else np.nan
+        # A receiver gives 100 fixes a second to one in two minutes: this, not the stamp, tells a
+        # clock of 1970 in ms from one in ns that counts from the start of a phone.
+        fits = [u for u in ("ms", "us", "ns") if 0.005 <= step * TIME_UNITS[u] <= 120.0]
+        unit = fits[0] if fits else "ms"
+        if len(fits) == 1 and _DATES[0] < first * TIME_UNITS[unit] < _DATES[1]:
+            raw.findings.append(
+                Finding(
+                    "io.time-unit-by-date",
+                    severity="note",
+                    file=raw.name,
+                    quantity="time",
+                    unit=unit,
+                    year=1970.0 + np.floor(first * TIME_UNITS[unit] / 31556952.0),
+                    step=step * TIME_UNITS[unit],
+                )
+            )
+            return time * TIME_UNITS[unit], Clock(name)
         raise DataError(
             "io.stamp-no-date-clock-tells",
             file=raw.name,
@@ -324,6 +456,8 @@ def _time(raw: RawLog, found: Found) -> tuple[Array, Clock]:
             quantity="time",
             first=first,
             source=found.source,
+            flags=f"--gnss-units time={unit}",
+            keys=f'units = {{time = "{unit}"}}',
         )
     return time, Clock(name)
 

@@ -41,6 +41,13 @@ class GnssOptions:
     columns : dict of str to str
         Quantity (``time``, ``lat`` …, as in a Gnss table) to the name of its column, or its
         number, from 1.
+    units : dict of str to str
+        Quantity to the unit of its column: ``time`` in ``ms``, ``lat`` in ``rad``.
+    datum_height : float, optional, m
+        Height over the ellipsoid of the level from which the file counts its heights: that of
+        the geoid, or of the point of take-off.
+    origin : tuple of float, optional, deg, deg, m
+        Latitude, longitude and height of the origin of local positions (``north east up``).
     position_sd, velocity_sd : float or tuple of float, optional, m and m/s
         Standard deviations north, east, down, or one for all three, for each fix; they replace
         those of the file.
@@ -53,6 +60,9 @@ class GnssOptions:
 
     format: str | None = None
     columns: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+    datum_height: float | None = None
+    origin: tuple[float, float, float] | None = None
     position_sd: Sd | None = None
     velocity_sd: Sd | None = None
     unstated_position_sd: float | None = None
@@ -92,6 +102,10 @@ class Fixes:
         As field 6 of NMEA 0183 GGA.
     zero_is_unknown : bool
         A standard deviation of zero means unknown.
+    heights_from : {'sea', 'take-off', ''}
+        Level from which heights are counted; empty: from the ellipsoid.
+    height_source : str
+        Column or field of the heights, for messages.
     findings : list of Finding
     """
 
@@ -105,6 +119,8 @@ class Fixes:
     velocity_sd: Array | None = None
     quality: Array | None = None
     zero_is_unknown: bool = False
+    heights_from: str = ""
+    height_source: str = ""
     findings: list[Finding] = field(default_factory=list)
 
 
@@ -116,6 +132,7 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
     not stated, or as `gnss_table`.
     """
     count = fixes.time.size
+    place = _over_ellipsoid(fixes, options)
     asked, taken = options.position_sd, {}
     if fixes.position_sd is None and asked is None and options.unstated_position_sd is not None:
         asked = taken["position_sd_taken"] = options.unstated_position_sd
@@ -144,7 +161,7 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
     with told_by_file_rows(fixes.name, lambda row: int(fixes.rows[at[row]])):
         table = gnss_table(
             time[at],
-            fixes.place[at],
+            place[at],
             velocity[at],
             position_sd[at],
             velocity_sd[at],
@@ -156,6 +173,38 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
     table.attrs.update(taken)
     table.attrs["first_row"] = first_of(fixes.rows[at])
     return table
+
+
+def _over_ellipsoid(fixes: Fixes, options: GnssOptions) -> Array:
+    """Return positions with the height over the ellipsoid, or ask for the level of the file's."""
+    if not fixes.heights_from:
+        if options.datum_height is not None:
+            raise ConfigError(
+                "io.heights-over-ellipsoid-already", file=fixes.name, quantity="datum_height_m"
+            )
+        return fixes.place
+    sea = fixes.heights_from == "sea"
+    if options.datum_height is None:
+        raise DataError(
+            "io.height-over-sea-column" if sea else "io.heights-over-take-off",
+            file=fixes.name,
+            quantity="alt",
+            source=fixes.height_source,
+            # Heights that stay over the sea change gravity by 35 µg at most; over a take-off on a
+            # mountain they would change it by more, so that no value is proposed.
+            **({"flags": "--gnss-datum-height 0", "keys": "datum_height_m = 0.0"} if sea else {}),
+        )
+    fixes.findings.append(
+        Finding(
+            "io.heights-with-datum" if options.datum_height else "io.heights-stay-over-datum",
+            severity="note",
+            file=fixes.name,
+            quantity="alt",
+            source=fixes.height_source,
+            datum_height=options.datum_height,
+        )
+    )
+    return np.asarray(fixes.place + np.array([0.0, 0.0, options.datum_height]))
 
 
 def first_of(rows: NDArray[np.int64]) -> int | None:

@@ -49,6 +49,7 @@ class _Epoch:
     sd: tuple[float, float, float] = _NAN3
     velocity: tuple[float, float, float] = _NAN3
     quality: float = np.nan
+    over_sea: bool = False
     day: float | None = None
 
 
@@ -64,7 +65,7 @@ def read(path: Path) -> Fixes:
     Raises
     ------
     DataError
-        The file has no GGA, a field is not a number, or a GGA lacks the geoid undulation.
+        The file has no GGA, a field is not a number, or some GGA lack the geoid undulation.
     """
     text, findings = csv.decoded(path.read_bytes(), path.name)
     epochs: list[_Epoch] = []
@@ -93,6 +94,15 @@ def read(path: Path) -> Fixes:
         )
     time, clock = _times(fixed)
     sd = np.array([e.sd for e in fixed])
+    placed = [e for e in fixed if np.isfinite(e.place[2])]
+    over_sea = [e for e in placed if e.over_sea]
+    if over_sea and len(over_sea) < len(placed):
+        raise DataError(
+            "io.height-over-sea-geoid-not",
+            file=path.name,
+            row=over_sea[0].row,
+            quantity="GGA height of the geoid",
+        )
     velocity = np.array([e.velocity for e in fixed])
     return Fixes(
         name=path.name,
@@ -104,6 +114,8 @@ def read(path: Path) -> Fixes:
         position_sd=sd if np.isfinite(sd).any() else None,
         quality=np.array([e.quality for e in fixed]),
         zero_is_unknown=True,
+        heights_from="sea" if over_sea else "",
+        height_source="GGA, field 9",
         findings=findings,
     )
 
@@ -154,15 +166,9 @@ def _take(epochs: list[_Epoch], kind: str, fields: list[str], row: int, file: st
             epoch.place = (
                 _angle(number(1, "latitude"), fields[2], "S"),
                 _angle(number(3, "longitude"), fields[4], "W"),
-                number(8, "height") + number(10, "height of the geoid"),
+                number(8, "height") + (number(10, "height of the geoid") if fields[10] else 0.0),
             )
-            if np.isnan(epoch.place[2]) and fields[8]:
-                raise DataError(
-                    "io.height-over-sea-geoid-not",
-                    file=file,
-                    row=row,
-                    quantity="GGA height of the geoid",
-                )
+            epoch.over_sea = not fields[10]
     elif kind == "GST":
         epoch.sd = (number(5, "latitude"), number(6, "longitude"), number(7, "height"))
     elif kind == "RMC":

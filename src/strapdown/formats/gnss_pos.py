@@ -63,6 +63,7 @@ class _Layout:
     names: list[str]
     separator: str
     row: int
+    over_sea: bool = False
 
 
 def read(path: Path) -> Fixes:
@@ -77,8 +78,8 @@ def read(path: Path) -> Fixes:
     Raises
     ------
     DataError
-        No line names the columns, the solution is a baseline, heights are above the geoid, the
-        datum is another, or a row is damaged.
+        No line names the columns, the solution is a baseline, the datum is another, or a row is
+        damaged.
     """
     text, findings = _decoded(path)
     lines = text.splitlines()
@@ -110,6 +111,8 @@ def read(path: Path) -> Fixes:
         velocity_sd=velocity_sd,
         quality=np.array([QUALITY[int(q)] for q in quality], dtype=np.float64),
         zero_is_unknown=True,
+        heights_from="sea" if layout.over_sea else "",
+        height_source="height(m), geodetic",
         findings=findings,
     )
 
@@ -136,8 +139,6 @@ def _layout(lines: list[str], file: str, findings: list[Finding]) -> _Layout:
     told = re.search(r"lat/lon/height=(\w+)/(\w+)", top)
     if told and told[1] != "WGS84":
         raise DataError("io.places-refer-datum", file=file, quantity="lat, lon", told=told[1])
-    if told and told[2] == "geodetic":
-        raise DataError("io.heights-over-geoid-header-says", file=file, quantity="alt")
     if "e-baseline(" in match[2]:
         raise DataError("io.holds-way-base-station-no", file=file, row=row, quantity="lat, lon")
     separator = next((s for s in ",;\t" if s in match[2]), " ")
@@ -153,7 +154,8 @@ def _layout(lines: list[str], file: str, findings: list[Finding]) -> _Layout:
             quantity=", ".join(missing) or None,
             names=names,
         )
-    return _Layout(match[1].upper(), names, separator, row)
+    over_sea = bool(told and told[2] == "geodetic")
+    return _Layout(match[1].upper(), names, separator, row, over_sea)
 
 
 def _columns(

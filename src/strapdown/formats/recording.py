@@ -37,7 +37,13 @@ class NoStreamError(DataError):
     """
 
     def __init__(self, file: str, stream: str, title: str, streams: Sequence[str]) -> None:
-        super().__init__("io.no-stream", file=file, stream=stream, title=title, streams=streams)
+        held = next((s for s in ("imu", "gnss", "reference") if s in streams and s != stream), "")
+        way = Finding(f"io.way-of-{held}" if held else "io.way-of-others", stream=stream, file=file)
+        # The sentence of a finding has its data alone.
+        way = way.replace(name=file)
+        super().__init__(
+            "io.no-stream", file=file, stream=stream, title=title, streams=streams, way=way
+        )
 
 
 @dataclass(frozen=True)

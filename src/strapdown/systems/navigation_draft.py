@@ -12,10 +12,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.config.alignment import LogTable
+from strapdown.config.alignment import FixesTable, LogTable
 from strapdown.config.choice import SLOTS, Slot, options_of
 from strapdown.config.navigation import STAGES
-from strapdown.config.toml_text import ASK, Page, named_from, string
+from strapdown.config.toml_text import ASK, Page, inline, named_from, string
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError, Finding
 from strapdown.estimation.sensor_blocks import STATED_STATES, resting_sd, states_that_are_stated
@@ -31,7 +31,7 @@ from strapdown.systems.alignment_draft import (
     stage,
     toml_value,
 )
-from strapdown.systems.navigation_proposal import Proposal, propose
+from strapdown.systems.navigation_proposal import TAKEN, Proposal, propose
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import index_of, source_of, values_of
 
@@ -47,7 +47,7 @@ def draft_navigation(
     *,
     folder: Path,
     axes: str | None = None,
-    gnss: Path | None = None,
+    gnss: FixesTable | None = None,
     sensor: str | None = None,
     foot: bool = False,
 ) -> Draft:
@@ -224,12 +224,23 @@ def _aids(page: Page, made: Proposal, folder: Path, foot: bool) -> list[str]:
         page.key("kind", string(aid["kind"]))
         if "path" in aid:
             page.key("path", string(named_from(Path(aid["path"]), folder)))
+            for key in ("columns", "units"):
+                if key in aid:
+                    page.key(key, inline(aid[key]))
+            for key in ("format", "datum_height_m", "origin"):
+                if key in aid:
+                    page.key(key, toml_value(aid[key]) or "")
             _with_remarks(page)
         for key, what, usual in (
             ("position_sd_m", "place, m", POSITION_SDS),
             ("velocity_sd_m_per_s", "velocity, m/s", VELOCITY_SDS),
         ):
-            if key in aid:
+            if key not in aid:
+                continue
+            assert made.gnss is not None
+            if not any(made.gnss.attrs.get(taken) for taken, k in TAKEN.items() if k == key):
+                page.key(key, toml_value(aid[key]) or "")
+            else:
                 page.key(
                     key,
                     repr(aid[key]),

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.config.alignment import AxesTable, LogTable
+from strapdown.config.alignment import AxesTable, FixesTable, LogTable
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, Finding
 from strapdown.formats.assemble import require_accel
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import has_fixes, read_gnss
-from strapdown.formats.gnss_fixes import GnssOptions
 from strapdown.formats.recording import Recording
 from strapdown.navigation.measurements.gnss_clock import time_offset, velocity_delay
 from strapdown.sensors.catalogue import SENSORS, load_sensor
@@ -27,7 +25,7 @@ from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
 from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
 from strapdown.tables.checks import index_of, values_of
 
-__all__ = ["CODE_RECEIVER", "Proposal", "propose"]
+__all__ = ["TAKEN", "Proposal", "propose"]
 
 
 Array = NDArray[np.float64]
@@ -55,8 +53,8 @@ WELL = 3.0
 #: cannot reject for ever. Time-correlated errors make innovations small, which does not show a
 #: receiver better than stated.
 RULE = {"kind": "adaptive", "influence": "igg3", "scale": {"lowest": 1.0}}
-#: Fixes without stated standard deviations: a code receiver without corrections.
-CODE_RECEIVER = GnssOptions(unstated_position_sd=5.0, unstated_velocity_sd=0.3)
+#: Fixes without stated standard deviations: a code receiver without corrections, m and m/s.
+CODE_POSITION_SD, CODE_VELOCITY_SD = 5.0, 0.3
 #: Standard deviation of the offset between receiver stamps and sensor clock, s: search range.
 OFFSET_SD = 0.2
 #: Estimates of clocks from the motion are used beyond these standard deviations, and a delay
@@ -111,11 +109,10 @@ def propose(
     log: LogTable,
     *,
     axes: str | None = None,
-    gnss: Path | None = None,
+    gnss: FixesTable | None = None,
     sensor: str | None = None,
     site: tuple[float, float, float] | None = None,
     heading_deg: float | None = None,
-    fixes_as: GnssOptions | None = None,
 ) -> Proposal:
     """Propose how to navigate with a log and its fixes.
 
@@ -125,25 +122,29 @@ def propose(
         With a path that can be opened.
     axes : str, optional
         Orientation of the sensor's axes, as `AxesTable.axes`.
-    gnss : Path, optional
-        By default the log itself, if it has fixes.
+    gnss : FixesTable, optional
+        The fixes, and statements about them; by default the log itself, if it has fixes. Where
+        standard deviations are not stated, those of a code receiver are taken.
     sensor : str, optional
         A sensor of the catalogue, or a file; the one with the nearest noise, if not given.
     site : tuple of float, optional
         Latitude and longitude in deg, height in m; that of the fixes, or of the log, if not given.
     heading_deg : float, optional
         Heading of the body at the start.
-    fixes_as : GnssOptions, optional
-        How to read the fixes; as those of a code receiver, if not given.
     """
     recording, imu, findings = body_record(log, AxesTable(axes=axes))
     require_accel(recording)
     table: dict[str, Any] = {"log": log.model_dump(exclude_none=True), "axes": {"axes": axes}}
     fixes = None
     if gnss is None and has_fixes(log.path):
-        gnss = Path(log.path)
+        gnss = FixesTable(path=log.path)
     if gnss is not None:
-        fixes, shifted = on_clock_of(read_gnss(gnss, fixes_as or CODE_RECEIVER), recording.imu)
+        asked = replace(
+            gnss.options(),
+            unstated_position_sd=CODE_POSITION_SD,
+            unstated_velocity_sd=CODE_VELOCITY_SD,
+        )
+        fixes, shifted = on_clock_of(read_gnss(gnss.path, asked), recording.imu)
         findings = (*findings, *fixes.attrs["findings"], *([shifted] if shifted else []))
     scatter = _scatter(imu)
     # Engine vibration differs between axes; the quietest axis identifies the sensor.
@@ -167,7 +168,7 @@ def propose(
         table["aiding"] = {
             "gnss": {
                 "kind": "gnss",
-                "path": str(gnss),
+                **gnss.model_dump(exclude_defaults=True),
                 "lever_arm_m": (0.0, 0.0, 0.0),
                 "update_rule": RULE,
                 **{k: fixes.attrs[taken] for taken, k in TAKEN.items() if taken in fixes.attrs},

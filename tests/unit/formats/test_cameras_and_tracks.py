@@ -586,7 +586,10 @@ def subtitles(lines):
 def test_heights_over_the_take_off_are_refused(recordings):
     path = recordings("zoo/dji/p4_rtk.SRT")
     with pytest.raises(DataError, check=coded("io.heights-over-take-off")):
-        open_stream(path, "gnss")
+        read_gnss(path, GnssOptions(position_sd=2.0))
+    fixes = read_gnss(path, GnssOptions(position_sd=2.0, datum_height=30.0))
+    # The first two subtitles: H 85.80m, H 85.83m.
+    assert fixes["alt"].iloc[:2].to_list() == [115.8, 115.83]
 
 
 def test_subtitles_with_an_absolute_height(tmp_path):

@@ -88,8 +88,8 @@ def test_no_fix_and_a_line_that_is_spoiled(tmp_path):
     [
         ([rmc("000000.50", "160124")], "the file has no complete GGA sentence"),
         (
-            [gga("000000.50", geoid="")],
-            "row 1, GGA height of the geoid: the height is over the sea",
+            [gga("000000.50"), gga("000001.50", geoid="")],
+            "row 2, GGA height of the geoid: the height is over the sea",
         ),
         ([gga("000000.50", lat="x")], "row 1, GGA latitude: 'x' is not a number"),
         ([sentence("GNGGA,000000.50,1,N")], "row 1, GGA: a GGA of 3 fields"),

@@ -137,7 +137,7 @@ def test_zero_means_unknown(tmp_path):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"note": NOTE.replace("ellipsoidal", "geodetic")}, "alt: the header states heights"),
+        ({"note": NOTE.replace("ellipsoidal", "geodetic")}, "alt: heights are over the sea"),
         ({"note": NOTE.replace("WGS84", "Tokyo")}, "lat, lon: the positions refer to the datum"),
         (
             {

@@ -1,0 +1,203 @@
+"""Statements about a file of fixes: columns, units, time, heights, origin; in Python and typed."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import tomllib
+
+import numpy as np
+import pandas as pd
+import pytest
+from tests.coded import coded
+
+import strapdown as sd
+from strapdown.errors import ConfigError, DataError
+from strapdown.formats.gnss_files import GnssOptions, read_gnss
+from strapdown.frames import ecef_from_geodetic, geodetic_from_ned
+
+PLACE = np.array([47.0, 8.5, 450.0])
+SD = 2.0
+
+
+def written(path, columns):
+    names, values = list(columns), np.column_stack(list(columns.values()))
+    rows = [",".join(repr(float(v)) for v in row) for row in values]
+    path.write_text("\n".join([",".join(names), *rows]) + "\n", encoding="utf-8")
+    return path
+
+
+def geodetic(**other):
+    n = len(next(iter(other.values()))) if other else 4
+    lat, lon, alt = (np.full(n, v) + np.arange(n) * 1e-5 for v in PLACE)
+    return {"time": np.arange(n, dtype=float), "lat": lat, "lon": lon, "alt": alt} | other
+
+
+def test_units_of_columns(tmp_path):
+    table = geodetic(speed=np.full(4, 36.0), course=np.full(4, 90.0))
+    plain = {**table, "lat": np.radians(table["lat"]), "lon": np.radians(table["lon"])}
+    path = written(
+        tmp_path / "a.csv", {**plain, "alt": table["alt"] / 0.3048, "time": table["time"] * 1e3}
+    )
+    units = {"lat": "rad", "lon": "rad", "alt": "ft", "time": "ms", "speed": "km/h"}
+    fixes = sd.read_gnss(path, units=units, position_sd_m=SD, velocity_sd_m_per_s=0.1)
+    # A degree through radians and feet through meters: four roundings of 2⁻⁵³.
+    np.testing.assert_allclose(
+        fixes[["lat", "lon", "alt"]],
+        np.column_stack([table["lat"], table["lon"], table["alt"]]),
+        rtol=5e-16,
+    )
+    np.testing.assert_allclose(fixes.index, table["time"], rtol=5e-16)
+    np.testing.assert_allclose(fixes["VE"], 10.0, rtol=5e-16)
+    with pytest.raises(ConfigError, check=coded("io.unit-of-missing-column")):
+        sd.read_gnss(path, units={"VN": "km/h"}, position_sd_m=SD)
+    with pytest.raises(ConfigError, check=coded("io.unknown-unit")):
+        sd.read_gnss(path, units={"lat": "km/h"}, position_sd_m=SD)
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("ms", 1e3), ("us", 1e6), ("ns", 1e9)])
+def test_the_unit_of_a_stamp_of_1970_follows_from_date_and_step(tmp_path, unit, factor):
+    stamps = 1.7e9 + np.arange(4.0)
+    path = written(tmp_path / "a.csv", geodetic(time=stamps * factor))
+    fixes = read_gnss(path, GnssOptions(position_sd=SD))
+    # Stamps of 1970 in ns have a step of 2⁸ in a double.
+    np.testing.assert_allclose(fixes.index, stamps, atol=256e-9)
+    said = [f for f in fixes.attrs["findings"] if f.code == "io.time-unit-by-date"]
+    assert [f.data["unit"] for f in said] == [unit]
+
+
+def test_a_phone_s_clock_in_ns_is_no_date_in_ms(tmp_path):
+    """28 minutes after its start it counts 1.7e12, as a clock of 1970 in ms does."""
+    path = written(tmp_path / "a.csv", geodetic(time=1.7e12 + 1e9 * np.arange(4.0)))
+    with pytest.raises(DataError, check=coded("io.stamp-no-date-clock-tells")) as error:
+        read_gnss(path, GnssOptions(position_sd=SD))
+    assert error.value.finding.data["flags"] == "--gnss-units time=ns"
+    fixes = read_gnss(path, GnssOptions(position_sd=SD, units={"time": "ns"}))
+    np.testing.assert_allclose(np.diff(fixes.index), 1.0, rtol=1e-9)
+
+
+def test_heights_over_the_sea(tmp_path):
+    table = geodetic()
+    table["altitude_msl"] = table.pop("alt")
+    path = written(tmp_path / "a.csv", table)
+    with pytest.raises(DataError, check=coded("io.height-over-sea-column")) as error:
+        sd.read_gnss(path, position_sd_m=SD)
+    assert error.value.finding.data["flags"] == "--gnss-datum-height 0"
+    for height, code in ((0.0, "io.heights-stay-over-datum"), (48.5, "io.heights-with-datum")):
+        fixes = sd.read_gnss(path, position_sd_m=SD, datum_height_m=height)
+        np.testing.assert_array_equal(fixes["alt"], table["altitude_msl"] + height)
+        assert code in [f.code for f in fixes.findings]
+
+
+def test_a_height_over_the_ellipsoid_takes_no_datum(tmp_path):
+    path = written(tmp_path / "a.csv", geodetic())
+    with pytest.raises(ConfigError, check=coded("io.heights-over-ellipsoid-already")):
+        sd.read_gnss(path, position_sd_m=SD, datum_height_m=48.5)
+    with pytest.raises(ConfigError, check=coded("io.origin-beside-positions")):
+        sd.read_gnss(path, position_sd_m=SD, origin=tuple(PLACE))
+
+
+def test_local_positions_need_an_origin(tmp_path):
+    ned = np.array([[0.0, 0.0, 0.0], [10.0, -20.0, 3.0], [1000.0, 2000.0, -30.0]])
+    table = {"Time": np.arange(3.0), "X": ned[:, 1], "Y": ned[:, 0], "Z": -ned[:, 2]}
+    path = written(tmp_path / "a.csv", table)
+    with pytest.raises(DataError, check=coded("io.positions-without-origin")):
+        sd.read_gnss(path, position_sd_m=SD)
+    columns = {"east": "X", "north": "Y", "up": "Z"}
+    with pytest.raises(DataError, check=coded("io.local-positions-origin-open")):
+        sd.read_gnss(path, columns=columns, position_sd_m=SD)
+    fixes = sd.read_gnss(path, columns=columns, origin=tuple(PLACE), position_sd_m=SD)
+    wanted = geodetic_from_ned(ned, PLACE)
+    np.testing.assert_array_equal(fixes[["lat", "lon", "alt"]], wanted)
+
+
+def test_positions_of_the_earth_are_proposed(tmp_path):
+    places = np.tile(PLACE, (3, 1)) + np.arange(3)[:, None] * [1e-5, 1e-5, 1.0]
+    xyz = ecef_from_geodetic(places)
+    table = {"t": np.arange(3.0), "pos_x": xyz[:, 0], "pos_y": xyz[:, 1], "pos_z": xyz[:, 2]}
+    path = written(tmp_path / "a.csv", table)
+    with pytest.raises(DataError, check=coded("io.positions-likely-ecef")) as error:
+        sd.read_gnss(path, position_sd_m=SD)
+    typed = error.value.finding.data["flags"].split()[1]
+    columns = dict(part.split("=") for part in typed.split(","))
+    fixes = sd.read_gnss(path, columns=columns, position_sd_m=SD)
+    # 1e-8 deg is a millimeter; a double of 6.4e6 m resolves a nanometer.
+    np.testing.assert_allclose(fixes[["lat", "lon"]], places[:, :2], atol=1e-12)
+    np.testing.assert_allclose(fixes["alt"], places[:, 2], atol=1e-8)
+
+
+# --- typed ------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def drive(tmp_path):
+    """A log of an hour's rest in short, and fixes over the sea whose names nobody knows."""
+    rng = np.random.default_rng(5)
+    time = np.arange(0.0, 20.0, 0.01)
+    log = {"time_s": time}
+    log |= {f"gyro_{a}_rad_s": 1e-3 * rng.normal(size=time.size) for a in "xyz"}
+    force = (0.0, 0.0, -9.80665)
+    log |= {
+        f"accel_{a}_m_s2": f + 1e-2 * rng.normal(size=time.size)
+        for a, f in zip("xyz", force, strict=True)
+    }
+    written(tmp_path / "log.csv", log)
+    fixes = geodetic(north_sd=np.full(20, 1.0), east_sd=np.full(20, 1.0), down_sd=np.full(20, 2.0))
+    names = {"time": "tick", "lat": "breite", "lon": "laenge", "alt": "hmsl"}
+    table = {names.get(name, name): values for name, values in fixes.items()}
+    table["tick"] = table["tick"] * 1e3
+    written(tmp_path / "fixes.csv", table)
+    return tmp_path
+
+
+def pasted(run_cli, done):
+    """Run the command that a refusal proposes."""
+    line = re.search(r"As inferred: strapdown (.*)", done.err)
+    assert line, done.err
+    return run_cli(*shlex.split(line[1]))
+
+
+def test_the_draft_keeps_what_was_typed(run_cli, drive, monkeypatch):
+    monkeypatch.chdir(drive)
+    columns = ("--gnss-columns", "time=tick,lat=breite", "--gnss-columns", "lon=laenge")
+    asked = (
+        "init",
+        "navigate",
+        "log.csv",
+        "--gnss",
+        "fixes.csv",
+        *columns,
+        "--gnss-units",
+        "time=ms",
+    )
+    refused = run_cli(*asked)
+    assert refused.code == 3
+    done = pasted(run_cli, refused)
+    assert done.code == 0, done.err
+    assert "20 of 20 fixes within the log" in done.out
+    aid = tomllib.loads((drive / "navigate.toml").read_text(encoding="utf-8"))["aiding"]["gnss"]
+    assert aid["columns"] == {"time": "tick", "lat": "breite", "lon": "laenge"}
+    assert aid["units"] == {"time": "ms"} and aid["datum_height_m"] == 0.0
+
+
+def test_a_run_asks_everything_at_once_and_uses_the_flags(run_cli, drive, monkeypatch):
+    monkeypatch.chdir(drive)
+    columns = "time=tick,lat=breite,lon=laenge"
+    asked = ("navigate", "log.csv", "--gnss", "fixes.csv", "--gnss-columns", columns)
+    asked += ("--gnss-units", "time=ms", "--gnss-datum-height", "48.5")
+    refused = run_cli(*asked)
+    assert refused.code == 4
+    for flag in ("--sensor", "--heading"):
+        assert flag in refused.err
+    done = run_cli(*asked, "--sensor", "mpu-6050", "--heading", "90", "--quiet")
+    assert done.code == 0, done.err
+    rows = pd.read_csv(drive / "log-navigate" / "trajectory.csv", comment="#")
+    name = next(n for n in rows.columns if n.startswith("alt"))
+    assert abs(rows[name].iloc[-1] - 498.5) < 3.0  # one and a half standard deviations of a fix
+
+
+def test_a_form_that_cannot_be_read(run_cli, drive):
+    base = ("navigate", drive / "log.csv", "--gnss", drive / "fixes.csv")
+    for flag, text in (("--gnss-origin", "1,2"), ("--gnss-columns", "lat"), ("--gnss-units", "x=")):
+        done = run_cli(*base, flag, text)
+        assert done.code == 4 and flag in done.err
