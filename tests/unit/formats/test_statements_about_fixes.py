@@ -29,7 +29,7 @@ def written(path, columns):
 
 def geodetic(**other):
     n = len(next(iter(other.values()))) if other else 4
-    lat, lon, alt = (np.full(n, v) + np.arange(n) * 1e-5 for v in PLACE)
+    lat, lon, alt = (np.full(n, v) + np.arange(n) * 1e-9 for v in PLACE)
     return {"time": np.arange(n, dtype=float), "lat": lat, "lon": lon, "alt": alt} | other
 
 
@@ -142,7 +142,7 @@ def drive(tmp_path):
         for a, f in zip("xyz", force, strict=True)
     }
     written(tmp_path / "log.csv", log)
-    fixes = geodetic(north_sd=np.full(20, 1.0), east_sd=np.full(20, 1.0), down_sd=np.full(20, 2.0))
+    fixes = geodetic(north_sd=np.full(20, 0.1), east_sd=np.full(20, 0.1), down_sd=np.full(20, 0.1))
     names = {"time": "tick", "lat": "breite", "lon": "laenge", "alt": "hmsl"}
     table = {names.get(name, name): values for name, values in fixes.items()}
     table["tick"] = table["tick"] * 1e3
@@ -193,7 +193,7 @@ def test_a_run_asks_everything_at_once_and_uses_the_flags(run_cli, drive, monkey
     assert done.code == 0, done.err
     rows = pd.read_csv(drive / "log-navigate" / "trajectory.csv", comment="#")
     name = next(n for n in rows.columns if n.startswith("alt"))
-    assert abs(rows[name].iloc[-1] - 498.5) < 3.0  # one and a half standard deviations of a fix
+    assert abs(rows[name].iloc[-1] - 498.5) < 0.3  # three standard deviations of a fix
 
 
 def test_a_form_that_cannot_be_read(run_cli, drive):
