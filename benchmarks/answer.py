@@ -13,7 +13,7 @@ RATE = 200.0
 
 def ratios() -> Iterator[Ratio]:
     from strapdown.api.attitude import compare_attitude
-    from strapdown.formats.log_writers import LOG_WRITERS
+    from strapdown.formats.writers import WRITERS
     from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
     from strapdown.tables import GYRO
 
@@ -21,7 +21,7 @@ def ratios() -> Iterator[Ratio]:
     imu, truth = simulate_imu(find_scenario("handling").motion, ImuErrors(), rate=RATE)
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "log.csv"
-        LOG_WRITERS["csv"](log, imu, truth)
+        WRITERS["csv"].write(log, {"imu": imu, "reference": truth})
 
         def answer() -> None:
             compare_attitude(log, algorithms="all")

@@ -71,7 +71,7 @@ if TYPE_CHECKING:
     from strapdown.formats.crash_records import read_crash_record
     from strapdown.formats.nhtsa import read_nhtsa
     from strapdown.formats.trajectory_readers import read_trajectory
-    from strapdown.formats.trajectory_writers import write_trajectory
+    from strapdown.formats.writers import write_trajectory
     from strapdown.increments import motion_increments
     from strapdown.mechanization import NavTracker, NorthEastDown, WanderAzimuth, run_mechanization
     from strapdown.nav_state import NavState
@@ -169,7 +169,7 @@ load_on_first_use(
         "formats.crash_records": "read_crash_record",
         "formats.nhtsa": "read_nhtsa",
         "formats.trajectory_readers": "read_trajectory",
-        "formats.trajectory_writers": "write_trajectory",
+        "formats.writers": "write_trajectory",
         "increments": "motion_increments",
         "mechanization": "NavTracker NorthEastDown WanderAzimuth run_mechanization",
         "nav_state": "NavState",

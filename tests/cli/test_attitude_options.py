@@ -7,7 +7,7 @@ import json
 import pytest
 
 from strapdown import simulate
-from strapdown.formats.log_writers import LOG_WRITERS
+from strapdown.formats.writers import WRITERS
 from strapdown.simulation import ImuErrors, simulate_imu
 from strapdown.simulation.attitude_motions import Handling
 
@@ -133,7 +133,7 @@ def test_a_log_is_not_drawn_again(here, run_cli, logs):
 
 def test_a_second_log_of_another_motion(here, run_cli, logs):
     other, _ = simulate_imu(Handling(duration=30.0, seed=77), ImuErrors(), rate=100.0)
-    LOG_WRITERS["csv"](here / "other.csv", other, None)
+    WRITERS["csv"].write(here / "other.csv", {"imu": other})
     found = run_cli("attitude", logs["a"], "--reference-log", "other.csv")
     assert found.code == 3
     assert "Traceback" not in found.err

@@ -12,7 +12,7 @@ from tests.cli.test_navigate_live import inside, written
 from tests.contracts.test_chain_cuts import drive
 
 from strapdown.formats import csv
-from strapdown.formats.log_writers import LOG_WRITERS
+from strapdown.formats.writers import WRITERS
 
 SOURCE = Path(__file__).parents[2] / "src" / "strapdown"
 
@@ -31,7 +31,7 @@ def test_no_kernel_is_compiled_with_relaxed_arithmetic():
 @pytest.mark.slow
 @pytest.mark.parametrize("form", ["joseph", "wd"])
 def test_a_run_that_compiles_its_kernels_equals_one_that_loads_them(tmp_path, form):
-    LOG_WRITERS["csv"](tmp_path / "log.csv", drive(), None)
+    WRITERS["csv"].write(tmp_path / "log.csv", {"imu": drive()})
     table = inside()
     columns = {"time_s": table.index.to_numpy()}
     values = {str(c): table[c].to_numpy() for c in table.columns}

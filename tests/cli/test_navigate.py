@@ -83,7 +83,7 @@ def navigated(tmp_path_factory, run_cli):
     """The drive by its file, with its truth beside it."""
     folder = tmp_path_factory.mktemp("navigated")
     write_drive(folder, file=lambda text: text + '\n[truth]\npath = "truth.csv"\n')
-    from strapdown.formats.trajectory_writers import write_trajectory
+    from strapdown.formats.writers import write_trajectory
 
     write_trajectory(folder / "truth.csv", drive()[2])
     with pytest.MonkeyPatch.context() as patch:

@@ -16,7 +16,7 @@ from tests.town_drive import fixes, motion
 
 from strapdown.bundle import read_manifest, unsealed_changes
 from strapdown.formats import csv
-from strapdown.formats.log_writers import LOG_WRITERS
+from strapdown.formats.writers import WRITERS
 
 START = """
 [start]
@@ -98,7 +98,7 @@ def test_standard_input_to_its_end_is_the_batch_run(live, run_cli):
     # The same from files, at once.
     other = live / "batch"
     other.mkdir()
-    LOG_WRITERS["csv"](other / "log.csv", drive(), None)
+    WRITERS["csv"].write(other / "log.csv", {"imu": drive()})
     table = inside()
     columns = {"time_s": table.index.to_numpy()}
     csv.write(other / "fix.csv", columns | {str(c): table[c].to_numpy() for c in table.columns}, {})
@@ -186,7 +186,7 @@ def test_what_cannot_be_asked(live, run_cli, options, what):
 
 
 def test_a_pace_writes_what_each_sample_took_outside_the_seal(tmp_path, run_cli):
-    LOG_WRITERS["csv"](tmp_path / "log.csv", drive(), None)
+    WRITERS["csv"].write(tmp_path / "log.csv", {"imu": drive()})
     path = written(tmp_path, '[log]\npath = "log.csv"\n').rename(tmp_path / "run.toml")
     text = path.read_text().replace("[aiding.gnss]\nlever_arm_m = [1.0, -0.4, -1.2]\n", "")
     path.write_text(text)

@@ -5,7 +5,7 @@ import pytest
 
 from strapdown import simulate
 from strapdown.evaluation.trajectory_differences import trajectory_differences
-from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS
+from strapdown.formats.writers import TRAJECTORY_FORMATS, WRITERS
 from strapdown.nav_state import NavState
 from strapdown.simulation import ImuErrors, Origin, SplineMotion, car, simulate_imu
 from strapdown.simulation.vehicles import Straight
@@ -41,8 +41,8 @@ def test_over_a_full_turn_it_is_where_it_would_be_before_it(lon_deg, heading_deg
         NavState.from_trajectory(plain, -1).lon, abs=2e-15
     )
     assert SplineMotion.from_trajectory(over).duration == 5.0
-    for name, write in TRAJECTORY_WRITERS.items():
-        write(tmp_path / f"drive.{name}", over)
+    for name in TRAJECTORY_FORMATS:
+        WRITERS[name].write(tmp_path / f"drive.{name}", {"reference": over})
 
 
 def test_within_a_full_turn_no_digit_changes():

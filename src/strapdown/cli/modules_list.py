@@ -13,8 +13,7 @@ from strapdown.ellipsoids import ELLIPSOIDS
 from strapdown.errors import Finding
 from strapdown.formats import READERS, Reader
 from strapdown.formats.crash_records import CRASH_READERS
-from strapdown.formats.log_writers import LOG_WRITERS
-from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS
+from strapdown.formats.writers import WRITERS
 from strapdown.mechanization import MECHANIZATIONS, Mechanization
 from strapdown.navigation.measurements.measurement import Measurement
 from strapdown.navigation.measurements.standstill import STANDSTILL_DETECTORS, STANDSTILL_THRESHOLDS
@@ -144,14 +143,18 @@ def _literal() -> tuple[Listed, ...]:
         Listed("formats", "Formats that are read", _formats(READERS)),
         Listed("crash_formats", "Formats of crash records that are read", _titles(CRASH_READERS)),
         Listed(
-            "log_writers",
-            "Formats that logs are written in",
-            tuple({"name": name} for name in LOG_WRITERS),
-        ),
-        Listed(
-            "trajectory_writers",
-            "Formats that trajectories are written in",
-            tuple({"name": name} for name in TRAJECTORY_WRITERS),
+            "writers",
+            "Formats that are written",
+            tuple(
+                {
+                    "name": name,
+                    "streams": list(one.streams),
+                    "ending": list(one.endings) or ["folder"],
+                    "read as": one.reader,
+                    "summary": one.title,
+                }
+                for name, one in WRITERS.items()
+            ),
         ),
     )
 
@@ -268,7 +271,12 @@ def _summaries(entries: Mapping[str, Any]) -> tuple[Mapping[str, Any], ...]:
 
 def _formats(readers: Mapping[str, Reader]) -> tuple[Mapping[str, Any], ...]:
     return tuple(
-        {"name": name, "streams": list(one.streams), "summary": one.title}
+        {
+            "name": name,
+            "streams": list(one.streams),
+            "written as": next((n for n, w in WRITERS.items() if w.reader == name), None),
+            "summary": one.title,
+        }
         for name, one in readers.items()
     )
 

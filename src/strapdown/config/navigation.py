@@ -53,7 +53,7 @@ from strapdown.estimation.sensor_blocks import (
     stated_states,
     with_processes,
 )
-from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS
+from strapdown.formats.writers import TRAJECTORY_FORMATS
 from strapdown.nav_state import NavState
 from strapdown.navigation.measurements.measurement import Measurement, TabulatedMeasurement
 from strapdown.navigation.navigator import with_states
@@ -427,8 +427,8 @@ class NavigationSpec(FileSpec):
                 data = {"word": named, "known": self.fixes}
                 yield Fault(("withhold", "aid"), "config.unknown-aid-to-withhold", data)
         for form in self.output.files:
-            if form not in TRAJECTORY_WRITERS:
-                known = {"form": form, "known": TRAJECTORY_WRITERS}
+            if form not in TRAJECTORY_FORMATS:
+                known = {"form": form, "known": TRAJECTORY_FORMATS}
                 yield Fault(("output", "files"), "config.unknown-trajectory-form", known)
         yield from self._filter_faults()
 

@@ -59,6 +59,7 @@ from strapdown.formats import (
     sensorlog,
     sensorstream,
     smartloc,
+    tum,
     ubx,
     xio,
     xsens,
@@ -306,6 +307,7 @@ READERS: dict[str, Reader] = {
     "inertial-explorer": Reader(
         inertial_explorer.TITLE, inertial_explorer.detect, {"reference": inertial_explorer.read}
     ),
+    "tum": Reader(tum.TITLE, tum.detect, {"reference": tum.read}),
     "rtklib": Reader("solution of RTKLIB (.pos)", gnss_pos.detect, {"gnss": gnss_pos.read}),
     "nmea": Reader(
         "NMEA 0183: GGA, RMC, VTG, ZDA, GST", gnss_nmea.detect, {"gnss": gnss_nmea.read}
@@ -322,6 +324,16 @@ READERS: dict[str, Reader] = {
         "KF-GINS trajectory, eleven columns (.nav)",
         kf_gins.detect_trajectory,
         {"reference": kf_gins.read_trajectory},
+    ),
+    "kf-gins-folder": Reader(
+        kf_gins.FOLDER_TITLE,
+        kf_gins.detect_folder,
+        {
+            "imu": kf_gins.read_folder,
+            "gnss": kf_gins.read_folder_fixes,
+            "reference": kf_gins.read_folder_trajectory,
+        },
+        kf_gins.files_of_folder,
     ),
     "psins": Reader("PSINS increments (.imu)", psins.detect, {"imu": psins.read}),
     "npy-folder": Reader(

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +24,21 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
 from strapdown.formats.columns import read_name
+from strapdown.formats.file_options import FileOptions
 from strapdown.formats.find_columns import Column
 from strapdown.formats.recording import RawLog, TruthInSensorAxes
 from strapdown.formats.sensor_folder import file_member, first_line
+from strapdown.formats.tum import poses
+from strapdown.formats.writing import (
+    Tables,
+    accel_needed,
+    imu_not_held,
+    is_trajectory,
+    unix_ns,
+    write_numbers,
+)
+from strapdown.tables import ACCEL, EULER, GYRO, QUATERNION, VELOCITY, places_of
+from strapdown.tables.checks import values_of
 
 Array = NDArray[np.float64]
 
@@ -48,7 +61,7 @@ MOST_TILT = 15.0  # deg
 def detect(path: Path) -> bool:
     """Detect by the header of the table, or of the inertial sensor's table in a folder."""
     if path.is_dir():
-        return _imu_of(path) is not None
+        return _imu_of(path) is not None or _truth_of(path) is not None
     return path.suffix.lower() == ".csv" and (_is_imu(path) or _is_truth(path))
 
 
@@ -80,6 +93,13 @@ def _imu_of(folder: Path) -> Path | None:
     """Find the table of the inertial sensor, from any of the folders around it."""
     tables = (folder / DATA, folder / IMU / DATA, folder / "mav0" / IMU / DATA)
     return next((t for t in tables if t.is_file() and _is_imu(t)), None)
+
+
+def _truth_of(folder: Path) -> Path | None:
+    """Find the table of a ground truth, from any of the folders around it."""
+    around = (folder, folder / "mav0")
+    tables = (folder / DATA, *(a / name / DATA for a in around for name in TRUTHS))
+    return next((t for t in tables if _is_truth(t)), None)
 
 
 def _names(path: Path) -> set[str]:
@@ -133,14 +153,15 @@ def _truth_table(path: Path, name: str) -> RawLog:
 
 def _folder(path: Path) -> RawLog:
     table = _imu_of(path)
+    if table is None and (truth := _truth_of(path)) is not None:
+        return _truth_table(truth, path.resolve().name)
     if table is None:
         raise DataError("io.no-imu-data-csv", file=path.resolve().name)
     whole = path.resolve().name
     raw = dataclasses.replace(_imu_table(table, f"{table.parent.name}/{DATA}"), name=whole)
     around = table.parent.parent
-    truth = next((t for n in TRUTHS if _is_truth(t := around / n / DATA)), None)
     # A bundle names every file by its path within the given folder.
-    if truth is None or table.parent == path:
+    if table.parent == path or (truth := _truth_of(around)) is None:
         return raw
     known = _truth_table(truth, f"{truth.parent.name}/{DATA}")
     q_ns = _at_samples(_seconds(raw, known), _seconds(known, known), known)
@@ -222,3 +243,87 @@ def _with(raw: RawLog, q_ns: Array, known: RawLog) -> RawLog:
         files=(*raw.files, *known.files),
         findings=findings,
     )
+
+
+# Writing: the sensor S has the body axes forward, right, down, and R has x north, y west, z up.
+
+_HEADS = {
+    "gyro": [f"w_RS_S_{a} [rad s^-1]" for a in "xyz"],
+    "accel": [f"a_RS_S_{a} [m s^-2]" for a in "xyz"],
+    "position": [f"p_RS_R_{a} [m]" for a in "xyz"],
+    "attitude": [f"q_RS_{a} []" for a in "wxyz"],
+    "velocity": [f"v_RS_R_{a} [m s^-1]" for a in "xyz"],
+}
+_STAMP = "#timestamp [ns]"
+_NWU = np.array([1.0, -1.0, -1.0])  # of north, east, down
+_YAML = """%YAML:1.0
+sensor_type: {kind}
+comment: {comment}
+T_BS:
+  cols: 4
+  rows: 4
+  data: [1.0, 0.0, 0.0, 0.0,
+         0.0, 1.0, 0.0, 0.0,
+         0.0, 0.0, 1.0, 0.0,
+         0.0, 0.0, 0.0, 1.0]
+"""
+
+
+def write(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
+    """Write a folder ``mav0`` with the tables ``imu0`` and ``state_groundtruth_estimate0``.
+
+    Stamps are whole ns since 1970, or of the recording's own clock with a warning; numbers have
+    the fewest digits that reproduce each. An attitude without positions has columns of the
+    attitude alone. ``sensor.yaml`` states axes and origin; biases and noise are not stated.
+    """
+    findings: list[Finding] = []
+    if "imu" in tables:
+        imu = tables["imu"]
+        accel_needed(imu, "EuRoC")
+        stamps, said = unix_ns(imu, options)
+        findings += [*said, *imu_not_held("EuRoC", imu)]
+        columns = [stamps, *values_of(imu, [*GYRO, *ACCEL]).T]
+        step = float(np.median(np.diff(stamps))) * 1e-9
+        _write(path / "mav0" / IMU, "imu", "body axes: forward, right, down", step)
+        _table(path / "mav0" / IMU, ("gyro", "accel"), columns)
+    if "reference" in tables:
+        truth = tables["reference"]
+        stamps, said = unix_ns(truth, options)
+        folder = path / "mav0" / TRUTHS[0]
+        comment = "R: north, west, up; S: forward, right, down"
+        names: tuple[str, ...] = ("attitude",)
+        if is_trajectory(truth):
+            names = ("position", "attitude", "velocity")
+            chosen = dataclasses.replace(options, tum_frame="ned")
+            position, q_ws = poses(truth, chosen)
+            first = places_of(truth.iloc[:1])[0] if options.origin is None else options.origin
+            lat, lon, alt = (float(v) for v in first)
+            comment += f"; origin lat lon deg, height m: {lat!r} {lon!r} {alt!r}"
+            # The world does not turn with the local level, to which velocities refer.
+            q_ns = rotation.quaternion_from_euler(values_of(truth, EULER))
+            q_wn = rotation.compose(q_ws, rotation.conjugate(q_ns))
+            velocity = rotation.rotate(q_wn, values_of(truth, VELOCITY))
+            blocks = [_NWU * position, _in_world(q_ws), _NWU * velocity]
+        else:
+            blocks = [_in_world(values_of(truth, QUATERNION))]
+        findings += said
+        step = float(np.median(np.diff(stamps))) * 1e-9 if len(stamps) > 1 else 0.0
+        _write(folder, "visual-inertial", comment, step)
+        _table(folder, names, [stamps, *np.column_stack(blocks).T])
+    return findings
+
+
+def _in_world(q_ns: Array) -> Array:
+    return rotation.compose(rotation.conjugate(Q_NR), q_ns)
+
+
+def _write(folder: Path, kind: str, comment: str, step: float) -> None:
+    folder.mkdir(parents=True)
+    rate = f"rate_hz: {1.0 / step:.6g}\n" if step > 0.0 else ""
+    text = _YAML.format(kind=kind, comment=comment) + rate
+    (folder / "sensor.yaml").write_text(text, encoding="utf-8", newline="\n")
+
+
+def _table(folder: Path, names: tuple[str, ...], columns: list[NDArray[Any]]) -> None:
+    head = ",".join([_STAMP, *(h for name in names for h in _HEADS[name])]) + "\n"
+    write_numbers(folder / DATA, columns, head)

@@ -129,6 +129,8 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
         source=raw.name,
     )
     with_clock(imu, clock_of_log(raw, found, stamps, dated))
+    if raw.epoch == 0.0:
+        imu.attrs["clock_origin_stamp"] = (stamps.origin.stamp, stamps.origin.unit)
     first, last = raw.row(int(kept[0])), raw.row(int(kept[-1]))
     imu.attrs["first_row"] = first if last - first == len(kept) - 1 else None
     truth, scored = truth_of_log(raw, found, time, kept, (axes.axis, axes.sign), readings, findings)

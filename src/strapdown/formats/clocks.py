@@ -7,6 +7,9 @@
     ``relative`` (from an instant that the file does not state).
 ``clock_origin``
     Seconds on that clock at the table's time zero; 0 where time is as in the file.
+``clock_origin_stamp``
+    The same as stamp and unit of the file, where it is a whole number: a double of seconds resolves
+    a clock of 1970 to only 0.2 µs.
 ``gps_week``
     Week of the first row, counted from 1980-01-06; None if unknown.
 """
@@ -38,6 +41,8 @@ __all__ = [
     "gps_from_unix",
     "leap_seconds",
     "on_clock_of",
+    "own_ns",
+    "time_column",
     "unix_from_gps",
     "unrolled",
     "with_clock",
@@ -103,6 +108,48 @@ def with_clock(table: pd.DataFrame, clock: Clock) -> pd.DataFrame:
     """Write a clock to the ``attrs`` of a new table; return the same table."""
     table.attrs |= {"clock": clock.name, "clock_origin": clock.origin, "gps_week": clock.week}
     return table
+
+
+#: Nanoseconds of a unit of whole stamps.
+_NS = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1000, "ns": 1}
+
+
+def own_ns(table: pd.DataFrame) -> NDArray[np.int64]:
+    """Return a table's stamps on its own clock, (n,), ns.
+
+    Exact where they count from a whole stamp of the file; otherwise the shortest decimal that is
+    the same double.
+    """
+    time = table.index.to_numpy(dtype=np.float64)
+    stamp, unit = table.attrs.get("clock_origin_stamp") or (clock_of(table).origin, "s")
+    if isinstance(stamp, int) and unit in _NS:
+        return np.asarray(stamp * _NS[unit] + np.rint(time * 1e9).astype(np.int64))
+    return _nearest_ns(time + float(stamp) * TIME_UNITS[unit])
+
+
+def _nearest_ns(seconds: Array) -> NDArray[np.int64]:
+    whole = np.floor(seconds)
+    rest = seconds - whole
+    ns = np.rint(rest * 1e9)
+    open_ = np.ones(seconds.size, dtype=bool)
+    for digits in range(9):
+        part = np.rint(rest * 10.0**digits) / 10.0**digits
+        same = open_ & (whole + part == seconds)
+        ns[same] = np.rint(part[same] * 1e9)
+        open_ &= ~same
+    return np.asarray(whole.astype(np.int64) * 1_000_000_000 + ns.astype(np.int64))
+
+
+def time_column(table: pd.DataFrame) -> dict[str, NDArray[Any]]:
+    """Return a table's stamps under a name that says clock and unit, as the readers take them.
+
+    Seconds as in the table; whole nanoseconds if its time is counted from another origin.
+    """
+    clock = clock_of(table)
+    name = {GPS: "gps_sow", UNIX: "unix_time"}.get(clock.name, "time")
+    if clock.origin == 0.0:
+        return {f"{name}_s": table.index.to_numpy(dtype=np.float64)}
+    return {f"{name}_ns": own_ns(table)}
 
 
 def clock_of_name(name: str, first: float, *, dated: bool = False) -> str:
@@ -204,6 +251,7 @@ def on_clock_of(
     out = table.copy()
     out.index = pd.Index(time + shift, name=table.index.name)
     out.attrs = {**table.attrs, "clock": other.name, "clock_origin": other.origin}
+    out.attrs["clock_origin_stamp"] = imu.attrs.get("clock_origin_stamp")
     out.attrs["gps_week"] = other.week
     return out, Finding(
         code,

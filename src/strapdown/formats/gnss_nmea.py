@@ -20,9 +20,20 @@ import numpy as np
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.clocks import RELATIVE, UNIX, Clock
+from strapdown.formats.file_options import FileOptions
 from strapdown.formats.gnss_fixes import Fixes
+from strapdown.formats.writing import (
+    Tables,
+    dates,
+    fixes_not_held,
+    fixes_of,
+    heights_of,
+    iso_dates,
+    over_ground,
+)
+from strapdown.tables.checks import POSITION_SD, values_of
 
-__all__ = ["detect", "read"]
+__all__ = ["detect", "read", "write"]
 
 _SENTENCE = re.compile(r"\$([A-Z]{2})([A-Z]{3}),([^*]*)\*([0-9A-Fa-f]{2})\s*$")
 _DAY = 86400.0
@@ -213,3 +224,59 @@ def _times(fixed: list[_Epoch]) -> tuple[np.ndarray, Clock]:
         return time + _DAY * days, Clock(RELATIVE)
     first = fixed[dated].day or 0.0
     return time + first + _DAY * (days - days[dated]), Clock(UNIX)
+
+
+# Writing.
+
+# Decimals of minutes (0.1 mm), of heights and their standard deviations, of knots and degrees.
+_MINUTES, _HEIGHT, _SD, _SPEED = 7, 4, 6, 5
+
+
+def write(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
+    """Write GGA, RMC and, with known standard deviations, GST of each fix or position.
+
+    Angles have seven decimals of a minute, 0.1 mm; times of day microseconds; heights 0.1 mm, over
+    the sea by the stated height of the geoid; without one they are those over the ellipsoid, with a
+    height of the geoid of 0 and a warning. RMC has the date.
+
+    DataError: the clock is not related to UTC, or there are neither fixes nor a trajectory.
+    """
+    options.require_wgs84("NMEA 0183")
+    gnss, findings = fixes_of(tables, "NMEA 0183")
+    stamps, said = dates(gnss, options, "NMEA 0183")
+    over_sea, geoid, warned = heights_of(gnss, options)
+    findings += [*said, *warned, *fixes_not_held("NMEA 0183", gnss, position_sd=True)]
+    speed, course = over_ground(gnss)
+    quality = values_of(gnss, ["quality"])[:, 0].astype(int).tolist()
+    lat, lon = values_of(gnss, ["lat", "lon"]).T.tolist()
+    sd = values_of(gnss, POSITION_SD)
+    lines = []
+    for k, date in enumerate(iso_dates(stamps)):
+        time = date[11:-1].replace(":", "")
+        day = date[8:10] + date[5:7] + date[2:4]
+        place = f"{_minutes(lat[k], 2, 'NS')},{_minutes(lon[k], 3, 'EW')}"
+        height = f"{over_sea[k]:.{_HEIGHT}f},M,{geoid:.{_HEIGHT}f},M"
+        lines.append(_sentence(f"GPGGA,{time},{place},{quality[k]},,,{height},,"))
+        moves = ","
+        if np.isfinite(speed[k]):
+            moves = f"{speed[k] / _KNOT:.{_SPEED}f},{course[k]:.{_SPEED}f}"
+        state = "A" if quality[k] else "V"
+        lines.append(_sentence(f"GPRMC,{time},{state},{place},{moves},{day},,"))
+        if np.isfinite(sd[k]).any():
+            fields = ",".join(f"{v:.{_SD}f}" if np.isfinite(v) else "" for v in sd[k].tolist())
+            lines.append(_sentence(f"GPGST,{time},,,,,{fields}"))
+    path.write_bytes("".join(lines).encode())
+    return findings
+
+
+def _minutes(angle: float, width: int, letters: str) -> str:
+    """Return degrees and minutes with the letter of the half; never 60 minutes."""
+    ticks = round(abs(angle) * 60 * 10**_MINUTES)
+    degrees, rest = divmod(ticks, 60 * 10**_MINUTES)
+    whole, part = divmod(rest, 10**_MINUTES)
+    letter = letters[1] if angle < 0.0 else letters[0]
+    return f"{degrees:0{width}d}{whole:02d}.{part:0{_MINUTES}d},{letter}"
+
+
+def _sentence(body: str) -> str:
+    return f"${body}*{reduce(xor, body.encode(), 0):02X}\r\n"

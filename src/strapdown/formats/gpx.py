@@ -10,13 +10,26 @@ from __future__ import annotations
 
 from datetime import UTC
 from pathlib import Path
+from xml.sax.saxutils import escape
 
 import numpy as np
 
 from strapdown.errors import DataError, Finding
 from strapdown.formats.clocks import UNIX
+from strapdown.formats.file_options import FileOptions
 from strapdown.formats.known_text import head, selected
 from strapdown.formats.recording import RawLog, library
+from strapdown.formats.trajectory_csv import one_line
+from strapdown.formats.writing import (
+    Tables,
+    dates,
+    fixes_not_held,
+    fixes_of,
+    heights_of,
+    iso_dates,
+    over_ground,
+)
+from strapdown.tables.checks import values_of
 
 QUALITY = {"none": 0.0, "dgps": 2.0, "pps": 3.0}
 
@@ -74,3 +87,44 @@ def read(path: Path) -> RawLog:
             )
         )
     return log
+
+
+# Writing: GPX 1.0 (https://www.topografix.com/GPX/1/0/), which has speed and course; 1.1 has not.
+
+_FIX = {1: "3d", 2: "dgps", 3: "pps", 4: "dgps", 5: "dgps"}
+_BEGIN = """<?xml version="1.0" encoding="UTF-8"?>
+<gpx version="1.0" creator="strapdown" xmlns="http://www.topografix.com/GPX/1/0">
+<trk><name>{name}</name><trkseg>
+"""
+
+
+def write(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
+    """Write one track of the fixes, or of the positions of a trajectory.
+
+    Latitude and longitude have the fewest digits that reproduce each; dates microseconds, as far
+    as readers go. ``ele`` is over the sea by the stated height of the geoid; without one it is that
+    over the ellipsoid, with ``geoidheight`` 0 and a warning.
+
+    DataError: the clock is not related to UTC, or there are neither fixes nor a trajectory.
+    """
+    options.require_wgs84("GPX")
+    gnss, findings = fixes_of(tables, "GPX")
+    stamps, said = dates(gnss, options, "GPX")
+    over_sea, geoid, warned = heights_of(gnss, options)
+    findings += [*said, *warned, *fixes_not_held("GPX", gnss, position_sd=False)]
+    speed, course = (v.tolist() for v in over_ground(gnss))
+    lines = [_BEGIN.format(name=escape(one_line(options.name)))]
+    quality = values_of(gnss, ["quality"])[:, 0].astype(int).tolist()
+    places = zip(*values_of(gnss, ["lat", "lon"]).T.tolist(), over_sea.tolist(), strict=True)
+    for k, ((lat, lon, ele), date) in enumerate(zip(places, iso_dates(stamps), strict=True)):
+        moves = ""
+        if np.isfinite(speed[k]):
+            moves = f"<course>{course[k]!r}</course><speed>{speed[k]!r}</speed>"
+        fix = f"<fix>{_FIX[quality[k]]}</fix>" if quality[k] in _FIX else ""
+        lines.append(
+            f'<trkpt lat="{lat!r}" lon="{lon!r}"><ele>{ele!r}</ele><time>{date}</time>{moves}'
+            f"<geoidheight>{geoid!r}</geoidheight>{fix}</trkpt>\n"
+        )
+    lines.append("</trkseg></trk>\n</gpx>\n")
+    path.write_bytes("".join(lines).encode())
+    return findings

@@ -6,6 +6,7 @@ forward, right, down; an increment belongs to the interval that ends at its stam
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,22 +17,41 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.arrays import numbers, told_by_file_rows
 from strapdown.formats.clocks import GPS, WEEK, Clock, clock_of, unrolled, with_clock
+from strapdown.formats.file_options import FileOptions
 from strapdown.formats.find_columns import Column
 from strapdown.formats.gnss_fixes import Fixes
-from strapdown.formats.recording import RawLog
+from strapdown.formats.judge import intervals
+from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.trajectory_csv import write_decimals
-from strapdown.formats.trajectory_options import TrajectoryFileOptions
-from strapdown.tables import TRAJECTORY, check_trajectory, trajectory_table
-from strapdown.tables.checks import index_of, values_of
+from strapdown.formats.writing import (
+    SECOND,
+    Tables,
+    accel_needed,
+    gps_ns,
+    is_trajectory,
+    not_held,
+    stream_not_held,
+    write_numbers,
+)
+from strapdown.tables import ACCEL, GYRO, TRAJECTORY, check_trajectory, trajectory_table
+from strapdown.tables.checks import MAG, POSITION_SD, VELOCITY_SD, index_of, values_of
 
 __all__ = [
     "COLUMNS",
+    "FOLDER_TITLE",
     "detect",
     "detect_fixes",
+    "detect_folder",
     "detect_trajectory",
+    "files_of_folder",
     "read",
     "read_fixes",
+    "read_folder",
+    "read_folder_fixes",
+    "read_folder_trajectory",
     "read_trajectory",
+    "write",
+    "write_dated_nav",
     "write_nav",
 ]
 
@@ -39,6 +59,9 @@ __all__ = [
 Array = NDArray[np.float64]
 COLUMNS = ["time", *(f"dtheta_{a}" for a in "xyz"), *(f"dv_{a}" for a in "xyz")]
 SUFFIXES = (*csv.SUFFIXES, ".imu")
+FOLDER_TITLE = "folder of KF-GINS: increments, fixes, trajectory"
+#: Most files of a folder that are looked into.
+MOST_FILES = 50
 _KINDS = [("time", "s"), *((f"gyro_{a}", "rad") for a in "xyz")]
 _KINDS += [(f"accel_{a}", "m/s") for a in "xyz"]
 # Norm of the median specific force of a vehicle on the road, in flight or stationary.
@@ -295,17 +318,11 @@ def read_trajectory(path: Path) -> pd.DataFrame:
     return table
 
 
-def write_nav(
-    path: Path,
-    trajectory: pd.DataFrame,
-    *,
-    name: str = "trajectory",
-    options: TrajectoryFileOptions | None = None,
-) -> None:
+def write_nav(path: Path, trajectory: pd.DataFrame, options: FileOptions | None = None) -> None:
     """Write a trajectory for KF-GINS and its evaluation tools.
 
     `trajectory`: a Trajectory table. Its ``attrs`` may state the GPS week (`clocks`); otherwise it
-    is 0. `name`: not written: the format has no field for it. `options`: not used. DataError: the
+    is 0. `options`: not used. DataError: the
     table is not valid.
 
     Numbers are rounded to `DECIMALS`: positions to a micrometer, times to 10 ns.
@@ -321,3 +338,139 @@ def write_nav(
     values = values_of(trajectory, TRAJECTORY)
     columns = [week, seconds, *values[:, :8].T, np.mod(values[:, 8], 360.0)]
     write_decimals(path, columns, DECIMALS)
+
+
+# Folders of all three, as KF-GINS takes them.
+
+IMU_FILE, FIX_FILE, TRUTH_FILE = "imu.txt", "gnss.txt", "truth.nav"
+
+
+def detect_folder(path: Path) -> bool:
+    """Detect a folder with a text of increments of KF-GINS; there may be fixes and a trajectory."""
+    return path.is_dir() and _member(path, detect) is not None
+
+
+def _member(folder: Path, is_one: Callable[[Path], bool]) -> Path | None:
+    """Return the only file of a kind, or None."""
+    files = [p for p in sorted(folder.iterdir())[:MOST_FILES] if p.is_file()]
+    found = [p for p in files if is_one(p)]
+    return found[0] if len(found) == 1 else None
+
+
+def _of_folder(path: Path, stream: str, is_one: Callable[[Path], bool]) -> Path:
+    found = _member(path, is_one)
+    if found is None:
+        raise NoStreamError(path.resolve().name, stream, FOLDER_TITLE, ["imu"])
+    return found
+
+
+def _are_fixes(path: Path) -> bool:
+    """Whether a text has fixes, and not increments, which have seven columns, too."""
+    return detect_fixes(path) and not detect(path)
+
+
+def read_folder(path: Path) -> RawLog:
+    """Read the increments of a folder."""
+    return read(_of_folder(path, "imu", detect))
+
+
+def read_folder_fixes(path: Path) -> Fixes:
+    """Read the fixes of a folder."""
+    return read_fixes(_of_folder(path, "gnss", _are_fixes))
+
+
+def read_folder_trajectory(path: Path) -> pd.DataFrame:
+    """Read the trajectory of a folder."""
+    return read_trajectory(_of_folder(path, "reference", detect_trajectory))
+
+
+def files_of_folder(path: Path) -> tuple[Path, ...]:
+    """List the files of a folder that are read."""
+    found = (_member(path, is_one) for is_one in (detect, _are_fixes, detect_trajectory))
+    return tuple(file for file in found if file is not None)
+
+
+def write(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
+    """Write a folder of increments, fixes and a trajectory: imu.txt, gnss.txt, truth.nav.
+
+    Seconds of the GPS week of each stream's first row; only the trajectory has the week. Means
+    over the interval that ends at a stamp become increments by its length, the first that of the
+    usual interval. Instantaneous samples become the integral of the straight line between two, and
+    the first has none. Fixes without standard deviations are left out, for the format has no word
+    for unknown.
+
+    DataError: there is no specific force, the clock counts beyond a week, or no fix can be written.
+    """
+    path.mkdir()
+    findings: list[Finding] = []
+    if "imu" in tables:
+        findings += _write_increments(path / IMU_FILE, tables["imu"], options)
+    if "gnss" in tables:
+        findings += _write_fixes(path / FIX_FILE, tables["gnss"], options)
+    if "reference" in tables:
+        truth = tables["reference"]
+        if is_trajectory(truth):
+            findings += write_dated_nav(path / TRUTH_FILE, truth, options)
+        else:
+            findings.append(stream_not_held("KF-GINS", "reference", truth))
+    return findings
+
+
+def write_dated_nav(path: Path, truth: pd.DataFrame, options: FileOptions) -> list[Finding]:
+    """Write a trajectory on the clock of GPS, as `write_nav` does."""
+    stamps, week, findings = gps_ns(truth, options, "KF-GINS")
+    moved = truth.set_axis(pd.Index(stamps / 1e9, name="time"))
+    write_nav(path, with_clock(moved, Clock(GPS, 0.0, week)), options)
+    return findings
+
+
+def _seconds_of_week(
+    table: pd.DataFrame, options: FileOptions
+) -> tuple[NDArray[np.int64], list[Finding]]:
+    """Return ns of the week, beginning again with each, and findings."""
+    stamps, week, findings = gps_ns(table, options, "KF-GINS")
+    if week is not None:
+        source = table.attrs.get("source")
+        findings.append(Finding("io.written-without-week", file=source, severity="note", week=week))
+    return stamps % int(WEEK * SECOND), findings
+
+
+def _write_increments(path: Path, imu: pd.DataFrame, options: FileOptions) -> list[Finding]:
+    accel_needed(imu, "KF-GINS")
+    stamps, findings = _seconds_of_week(imu, options)
+    values = values_of(imu, [*GYRO, *ACCEL])
+    time = index_of(imu)
+    if imu.attrs.get("sampling") == "mean":
+        sums = values * intervals(time, np.arange(time.size))
+    else:
+        sums = 0.5 * (values[1:] + values[:-1]) * np.diff(time)[:, None]
+        stamps = stamps[1:]
+        source = imu.attrs.get("source")
+        findings.append(Finding("io.written-increments-of-line", file=source, severity="note"))
+    if MAG[0] in imu.columns:
+        findings.append(not_held("KF-GINS", "imu", "the magnetic field", imu))
+    write_numbers(path, [stamps / 1e9, *sums.T], separator=" ")
+    return findings
+
+
+def _write_fixes(path: Path, gnss: pd.DataFrame, options: FileOptions) -> list[Finding]:
+    stamps, findings = _seconds_of_week(gnss, options)
+    source = gnss.attrs.get("source")
+    sd = values_of(gnss, POSITION_SD)
+    keep = (np.isfinite(sd) & (sd > 0.0)).all(axis=1)
+    if not keep.any():
+        raise DataError("io.written-needs-position-sd", file=source, form="KF-GINS")
+    if not keep.all():
+        data = {"count": int((~keep).sum()), "rows": keep.size}
+        findings.append(Finding("io.written-fixes-without-sd", file=source, data=data))
+    velocity_sd = values_of(gnss, VELOCITY_SD)[keep]
+    names = list(WITH_VELOCITY[1:])
+    if not (np.isfinite(velocity_sd) & (velocity_sd > 0.0)).all():
+        names = list(NAMES[1:])
+        if np.isfinite(velocity_sd).any():
+            lost = "velocities, not all of which have a standard deviation"
+            findings.append(not_held("KF-GINS", "gnss", lost, gnss))
+    findings.append(not_held("KF-GINS", "gnss", "the quality of the fixes", gnss))
+    columns = [stamps[keep] / 1e9, *values_of(gnss, names)[keep].T]
+    write_numbers(path, columns, separator=" ")
+    return findings

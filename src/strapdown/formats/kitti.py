@@ -5,9 +5,10 @@
 1231-1237; dataformat.txt of its development kit): latitude and longitude in deg, height in m; roll,
 pitch and yaw in rad; velocity north, east, forward, left, up; acceleration with gravity about x, y,
 z and forward, left, up; rates likewise; accuracies of position and velocity in m and m/s; then
-states of the receiver. x points forward, y left, z up. Roll is positive with the left side up,
-pitch with the front down, and yaw counts from east to north: Rz(yaw) Ry(pitch) Rx(roll) rotates
-x, y, z to east, north, up. Rows of the folder are counted from 1.
+states of the receiver. A number that is not measured is nan. x points forward, y left, z up. Roll
+is positive with the left side up, pitch with the front down, and yaw counts from east to north:
+Rz(yaw) Ry(pitch) Rx(roll) rotates x, y, z to east, north, up. Rows of the folder are counted
+from 1.
 """
 
 from __future__ import annotations
@@ -21,13 +22,28 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.errors import DataError, Finding
+from strapdown.evaluation.trajectory_differences import trajectory_at
 from strapdown.formats.clocks import UNIX, Clock, with_clock
+from strapdown.formats.file_options import FileOptions
 from strapdown.formats.gnss_fixes import Fixes
-from strapdown.formats.recording import RawLog, TruthInSensorAxes
-from strapdown.tables import trajectory_table
+from strapdown.formats.recording import NoStreamError, RawLog, TruthInSensorAxes
+from strapdown.formats.writing import (
+    FLU,
+    SECOND,
+    Tables,
+    accel_needed,
+    dates,
+    imu_not_held,
+    is_trajectory,
+    stream_not_held,
+)
+from strapdown.tables import ACCEL, GYRO, VELOCITY, places_of, trajectory_table
+from strapdown.tables import EULER as ANGLES
+from strapdown.tables.checks import values_of
 
 Array = NDArray[np.float64]
 
+TITLE = "KITTI raw, folder oxts"
 FIELDS = 30
 PLACE, EULER, NORTH_EAST, UP = slice(0, 3), slice(3, 6), slice(6, 8), 10
 FORCE, RATE, ACCURACY = slice(11, 14), slice(17, 20), slice(23, 25)
@@ -60,6 +76,8 @@ def read(path: Path) -> RawLog:
         A file is missing or damaged.
     """
     time, values, files = _values(path)
+    if np.isnan(values[:, RATE]).all():
+        raise NoStreamError(path.resolve().name, "imu", TITLE, ["gnss", "reference"])
     columns = {"timestamp": time}
     stated: dict[str, tuple[str, str | None]] = {"timestamp": ("time", "ns")}
     for triad, part, unit, letter in (("gyro", RATE, "rad/s", "w"), ("accel", FORCE, "m/s2", "a")):
@@ -192,7 +210,7 @@ def _numbers(file: Path) -> Array:
         values = np.array(fields, dtype=np.float64)
     except ValueError:
         values = np.empty(0)
-    if values.size != FIELDS or not np.isfinite(values).all():
+    if values.size != FIELDS or not np.isfinite(values[: UP + 1]).all():
         raise DataError(
             "io.fields-numbers-expected",
             file=f"oxts/data/{file.name}",
@@ -210,3 +228,98 @@ def _euler(values: Array) -> Array:
 
 def _velocity(values: Array) -> Array:
     return np.column_stack([values[:, NORTH_EAST], -values[:, UP]])
+
+
+# Writing.
+
+# Trajectories with gaps longer than this are not interpolated over them.
+LONGEST_STEP = 1.0  # s
+_UNKNOWN = ["-1"] * 5  # navigation state, satellites, and modes of the receiver
+
+
+def write(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
+    """Write a folder ``oxts``: one row has the samples and the solution of one instant.
+
+    Rows are the samples of the Imu table within the trajectory, which is interpolated to them as
+    `trajectory_at` does; without samples, the rows of the trajectory, with rates and forces of nan.
+    Accuracies are nan, states of the receiver -1: unknown. Numbers have the fewest digits that
+    reproduce each, dates nine decimals.
+
+    DataError: there is no trajectory, the clock is not related to UTC, or the two do not overlap.
+    """
+    track, imu = tables.get("reference"), tables.get("imu")
+    if track is None or not is_trajectory(track):
+        raise DataError("io.written-needs-stream", form="KITTI", needed=["a trajectory"])
+    stamps, findings = dates(track, options, "KITTI")
+    if imu is not None:
+        accel_needed(imu, "KITTI")
+        own, said = dates(imu, options, "KITTI")
+        inside = _within(own, stamps)
+        findings += [*said, *imu_not_held("KITTI", imu), *_left_out(imu, inside)]
+        if not inside.any():
+            raise DataError("io.written-no-overlap", file=imu.attrs.get("source"), form="KITTI")
+        # Doubles of seconds since 1970 are too coarse to interpolate by.
+        moved = track.set_axis(pd.Index((stamps - stamps[0]) * 1e-9, name="time"))
+        same = np.isin(own[inside], stamps)
+        findings += _interpolated(imu, same)
+        at = (own[inside] - stamps[0]) * 1e-9
+        track, stamps, imu = trajectory_at(moved, at, options.ellipsoid), own[inside], imu[inside]
+    if "gnss" in tables:
+        findings.append(stream_not_held("KITTI", "gnss", tables["gnss"]))
+    rows = _rows(track, imu)
+    data = path / "oxts" / "data"
+    data.mkdir(parents=True)
+    for k, row in enumerate(rows.tolist()):
+        fields = [*(repr(v) for v in row), *_UNKNOWN]
+        (data / f"{k:010d}.txt").write_text(" ".join(fields) + "\n", encoding="ascii", newline="\n")
+    days = (stamps // SECOND).astype("datetime64[s]")
+    lines = [
+        f"{str(day).replace('T', ' ')}.{ns:09d}\n"
+        for day, ns in zip(days, (stamps % SECOND).tolist(), strict=True)
+    ]
+    (path / "oxts" / "timestamps.txt").write_text("".join(lines), encoding="ascii", newline="\n")
+    return findings
+
+
+def _within(own: NDArray[np.int64], stamps: NDArray[np.int64]) -> NDArray[np.bool_]:
+    """Select the stamps within a trajectory, and not within its gaps."""
+    after = np.searchsorted(stamps, own)
+    inside = (after > 0) & (after < stamps.size)
+    after = np.clip(after, 1, stamps.size - 1)
+    inside &= stamps[after] - stamps[after - 1] <= LONGEST_STEP * SECOND
+    return np.asarray(inside | np.isin(own, stamps))
+
+
+def _left_out(imu: pd.DataFrame, inside: NDArray[np.bool_]) -> list[Finding]:
+    if inside.all():
+        return []
+    data = {"count": int((~inside).sum()), "rows": inside.size}
+    return [Finding("io.written-samples-left-out", file=imu.attrs.get("source"), data=data)]
+
+
+def _interpolated(imu: pd.DataFrame, same: NDArray[np.bool_]) -> list[Finding]:
+    if same.all():
+        return []
+    data = {"count": int((~same).sum()), "rows": same.size}
+    source = imu.attrs.get("source")
+    return [Finding("io.written-interpolated", file=source, severity="note", data=data)]
+
+
+def _rows(track: pd.DataFrame, imu: pd.DataFrame | None) -> Array:
+    """Return the twenty-five numbers of each row that are not states of the receiver."""
+    n = len(track)
+    roll, pitch, heading = np.radians(values_of(track, ANGLES)).T
+    north, east, down = values_of(track, VELOCITY).T
+    yaw = np.radians((90.0 - track["heading"].to_numpy(dtype=np.float64) + 180.0) % 360.0 - 180.0)
+    forward = north * np.cos(heading) + east * np.sin(heading)
+    left = north * np.sin(heading) - east * np.cos(heading)
+    blocks = [places_of(track), np.column_stack([roll, -pitch, yaw, north, east, forward, left])]
+    blocks.append(-down[:, None] + 0.0)
+    if imu is None:
+        return np.hstack([*blocks, np.full((n, 14), np.nan)])
+    level = np.column_stack([values_of(track, ANGLES)[:, :2], np.zeros(n)])
+    q_lb = rotation.quaternion_from_euler(level)
+    for names in (ACCEL, GYRO):
+        body = values_of(imu, names)
+        blocks += [FLU * body, FLU * rotation.rotate(q_lb, body)]
+    return np.hstack([*blocks, np.full((n, 2), np.nan)])

@@ -61,7 +61,8 @@ def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo, file: str) -> NDArr
 
 def write(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
     """Write arrays; equal input gives identical bytes."""
-    np.savez(path, allow_pickle=False, **arrays)
+    with path.open("wb") as stream:  # by a name NumPy would append an ending
+        np.savez(stream, allow_pickle=False, **arrays)
 
 
 # Single NumPy arrays, from files or archives; their content is never executed.

@@ -11,6 +11,8 @@ headers, in ns. The reference is INSPVAX or INSPVA of novatel_oem7_msgs.
 
 from __future__ import annotations
 
+import heapq
+import shutil
 import sqlite3
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
@@ -25,7 +27,19 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.formats.binary import Quantities, damage, first_bytes, solution
 from strapdown.formats.clocks import RELATIVE, UNIX, Clock
+from strapdown.formats.file_options import FileOptions
 from strapdown.formats.recording import NoStreamError, RawLog, library
+from strapdown.formats.writing import (
+    FLU,
+    SECOND,
+    Tables,
+    imu_not_held,
+    not_held,
+    stream_not_held,
+    unix_ns,
+)
+from strapdown.tables import ACCEL, GYRO
+from strapdown.tables.checks import GEODETIC, MAG, POSITION_SD, VELOCITY, VELOCITY_SD, values_of
 
 TITLE = "bag of ROS 1 or ROS 2 (.bag .db3 .mcap, folder)"
 MAGIC = {b"#ROSBAG V2.0": ".bag", b"\x89MCAP0\r\n": ".mcap", b"SQLite format 3\0": ".db3"}
@@ -258,3 +272,154 @@ def read_barometer(path: Path) -> RawLog:
     )
     out: Quantities = {"time": (columns["time"], "ns"), "pressure": (columns["pressure"], "Pa")}
     return _log(path, out, clock, findings)
+
+
+# Writing: one file of MCAP with the messages of ROS 2, in the order of their stamps.
+
+#: Frame of the body: x forward, y left, z up (REP 103), and its name (REP 105).
+BASE, RECEIVER = "base_link", "gnss"
+STATUS = {0: -1, 1: 0, 2: 2}  # quality of NMEA GGA to status of NavSatFix; 4 and 5 are as 2
+_MICRO = 1e-6  # T
+Messages = Iterator[tuple[int, str, str, Any]]
+
+
+def write(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
+    """Write a file of MCAP: Imu, NavSatFix with its velocity, MagneticField, FluidPressure.
+
+    Body axes forward, left, up in the frame ``base_link``; stamps in ns since 1970, or of the
+    recording's own clock with a warning. What is not measured has the covariance of REP 145: -1 for
+    orientation and specific force, 0 for accuracies that are not known.
+
+    DataError: the library is missing, or a stamp lies before zero.
+    """
+    bags, types = library("rosbags.rosbag2", path), library("rosbags.typesys", path)
+    store = types.get_typestore(types.Stores.LATEST)
+    findings: list[Finding] = []
+    topics: list[Messages] = []
+    for stream, makers in _MESSAGES.items():
+        if stream not in tables:
+            continue
+        stamps, said = unix_ns(tables[stream], options)
+        if stamps[0] < 0:
+            source = tables[stream].attrs.get("source")
+            raise DataError("io.written-stamp-below-zero", file=source, quantity="time", form="ROS")
+        findings += [*said, *_lost(stream, tables[stream])]
+        topics += [make(tables[stream], stamps.tolist(), store.types) for make in makers]
+    if "reference" in tables:
+        findings.append(stream_not_held("MCAP", "reference", tables["reference"]))
+    with tempfile.TemporaryDirectory() as folder:
+        bag = Path(folder) / "bag"
+        with bags.Writer(bag, version=9, storage_plugin=bags.StoragePlugin.MCAP) as writer:
+            connections: dict[str, Any] = {}
+            for at, topic, kind, message in heapq.merge(*topics, key=lambda one: one[0]):
+                if topic not in connections:
+                    connections[topic] = writer.add_connection(topic, kind, typestore=store)
+                writer.write(connections[topic], at, store.serialize_cdr(message, kind))
+        shutil.copyfile(next(bag.glob("*.mcap")), path)
+    return findings
+
+
+def _lost(stream: str, table: pd.DataFrame) -> list[Finding]:
+    if stream == "imu":
+        return imu_not_held("MCAP", table, mag=True)
+    if stream == "gnss" and not np.isin(values_of(table, ["quality"]), list(STATUS)).all():
+        return [not_held("MCAP", "gnss", "the kind of carrier-phase solution", table)]
+    return []
+
+
+def _header(types: Any, at: int, frame: str) -> Any:
+    time = types["builtin_interfaces/msg/Time"](sec=at // SECOND, nanosec=at % SECOND)
+    return types["std_msgs/msg/Header"](stamp=time, frame_id=frame)
+
+
+def _point(types: Any, values: Sequence[float]) -> Any:
+    x, y, z = values
+    return types["geometry_msgs/msg/Vector3"](x=x, y=y, z=z)
+
+
+def _imu_messages(imu: pd.DataFrame, stamps: list[int], types: Any) -> Messages:
+    none = np.zeros(9)
+    unknown = np.r_[-1.0, np.zeros(8)]
+    has = ACCEL[0] in imu.columns
+    gyro = (FLU * values_of(imu, GYRO)).tolist()
+    accel = (FLU * values_of(imu, ACCEL)).tolist() if has else [[0.0] * 3] * len(stamps)
+    level = types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)
+    for at, rate, force in zip(stamps, gyro, accel, strict=True):
+        message = types[IMU[0]](
+            header=_header(types, at, BASE),
+            orientation=level,
+            orientation_covariance=unknown,
+            angular_velocity=_point(types, rate),
+            angular_velocity_covariance=none,
+            linear_acceleration=_point(types, force),
+            linear_acceleration_covariance=none if has else unknown,
+        )
+        yield at, "/imu/data_raw", IMU[0], message
+
+
+def _mag_messages(table: pd.DataFrame, stamps: list[int], types: Any) -> Messages:
+    if MAG[0] not in table.columns:
+        return
+    field = (_MICRO * FLU * values_of(table, MAG)).tolist()
+    for at, values in zip(stamps, field, strict=True):
+        message = types[FIELD[0]](
+            header=_header(types, at, BASE),
+            magnetic_field=_point(types, values),
+            magnetic_field_covariance=np.zeros(9),
+        )
+        yield at, "/imu/mag", FIELD[0], message
+
+
+def _variance(sd: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Variances east, north, up of standard deviations north, east, down; 0 where not known."""
+    return np.where(np.isfinite(sd), sd, 0.0)[:, [1, 0, 2]] ** 2
+
+
+def _fix_messages(gnss: pd.DataFrame, stamps: list[int], types: Any) -> Messages:
+    variance = _variance(values_of(gnss, POSITION_SD))
+    quality = values_of(gnss, ["quality"])[:, 0].astype(int).tolist()
+    service = types["sensor_msgs/msg/NavSatStatus"].SERVICE_GPS
+    for k, place in enumerate(values_of(gnss, GEODETIC).tolist()):
+        known = variance[k].all()
+        state = STATUS.get(quality[k], 2 if quality[k] in (4, 5) else 0)
+        message = types[FIX[0]](
+            header=_header(types, stamps[k], RECEIVER),
+            status=types["sensor_msgs/msg/NavSatStatus"](status=state, service=service),
+            latitude=place[0],
+            longitude=place[1],
+            altitude=place[2],
+            position_covariance=np.diag(variance[k]).ravel(),
+            position_covariance_type=2 if known else int(variance[k].any()),
+        )
+        yield stamps[k], "/gnss/fix", FIX[0], message
+
+
+def _velocity_messages(gnss: pd.DataFrame, stamps: list[int], types: Any) -> Messages:
+    sd = values_of(gnss, VELOCITY_SD)
+    variance = _variance(sd)
+    for k, (north, east, down) in enumerate(values_of(gnss, VELOCITY).tolist()):
+        if not np.isfinite(sd[k]).any():
+            continue
+        twist = types["geometry_msgs/msg/Twist"](
+            linear=_point(types, (east, north, -down)), angular=_point(types, (0.0, 0.0, 0.0))
+        )
+        covariance = np.diag([*variance[k], 0.0, 0.0, 0.0]).ravel()
+        with_sd = types["geometry_msgs/msg/TwistWithCovariance"](twist=twist, covariance=covariance)
+        header = _header(types, stamps[k], RECEIVER)
+        yield stamps[k], "/gnss/vel", TWISTS[0], types[TWISTS[0]](header=header, twist=with_sd)
+
+
+def _pressure_messages(table: pd.DataFrame, stamps: list[int], types: Any) -> Messages:
+    for at, pressure in zip(stamps, table["pressure"].tolist(), strict=True):
+        message = types[PRESSURE[0]](
+            header=_header(types, at, BASE), fluid_pressure=pressure, variance=0.0
+        )
+        yield at, "/air_pressure", PRESSURE[0], message
+
+
+_MESSAGES: dict[str, tuple[Callable[[pd.DataFrame, list[int], Any], Messages], ...]] = {
+    "imu": (_imu_messages, _mag_messages),
+    "gnss": (_fix_messages, _velocity_messages),
+    "magnetometer": (_mag_messages,),
+    "barometer": (_pressure_messages,),
+}

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from strapdown.evaluation.trajectory_differences import ROTATION_ERROR
 from strapdown.formats import csv, parquet
-from strapdown.formats.clocks import clock_of
-from strapdown.formats.trajectory_options import TrajectoryFileOptions
+from strapdown.formats.clocks import clock_of, time_column
+from strapdown.formats.file_options import FileOptions
 from strapdown.tables import (
     EULER,
     NED,
@@ -51,16 +51,17 @@ def one_line(text: str) -> str:
     return "".join(c for c in " ".join(text.split()) if c.isprintable())
 
 
-def named_columns(table: pd.DataFrame, columns: list[str]) -> dict[str, NDArray[np.float64]]:
-    """Return time and columns of a table under names with their units."""
-    named = {"time_s": table.index.to_numpy(dtype=np.float64)}
-    return named | {c + _SUFFIX[c]: table[c].to_numpy(dtype=np.float64) for c in columns}
+def named_columns(table: pd.DataFrame, columns: list[str]) -> dict[str, NDArray[Any]]:
+    """Return time and columns of a table under names with their units, and of its clock."""
+    return time_column(table) | {
+        c + _SUFFIX[c]: table[c].to_numpy(dtype=np.float64) for c in columns
+    }
 
 
-def told_of(name: str, options: TrajectoryFileOptions) -> dict[str, str]:
+def told_of(options: FileOptions) -> dict[str, str]:
     """Return the statements of a file on its trajectory: name, ellipsoid, axes, epoch."""
     told = {
-        "trajectory": one_line(name),
+        "trajectory": one_line(options.name),
         "ellipsoid": options.ellipsoid.name,
         "place": "geodetic, height over the ellipsoid",
         "velocity": "relative to the Earth, north east down",
@@ -69,21 +70,14 @@ def told_of(name: str, options: TrajectoryFileOptions) -> dict[str, str]:
     return told if options.epoch is None else {**told, "epoch": options.date(0.0)}
 
 
-def write_csv(
-    path: Path,
-    trajectory: pd.DataFrame,
-    *,
-    name: str = "trajectory",
-    options: TrajectoryFileOptions | None = None,
-) -> None:
+def write_csv(path: Path, trajectory: pd.DataFrame, options: FileOptions | None = None) -> None:
     """Write a Trajectory table as text.
 
     Parameters
     ----------
     path : Path
     trajectory : DataFrame
-    name : str
-    options : TrajectoryFileOptions, optional
+    options : FileOptions, optional
         Ellipsoid and epoch are written to the comments at the top. Of its `digits`, ``exact``
         writes the fewest that reproduce each number, and ``fixed`` rounds to `DECIMALS`: a
         micrometer, 10 nm/s, 1e-9 deg of attitude, 1 ns; twice as fast.
@@ -93,10 +87,10 @@ def write_csv(
     DataError
         The table is not valid.
     """
-    chosen = options or TrajectoryFileOptions()
+    chosen = options or FileOptions()
     check_trajectory(trajectory)
     columns = named_columns(trajectory, TRAJECTORY)
-    comments = told_of(name, chosen)
+    comments = told_of(chosen)
     if chosen.digits == "exact":
         csv.write(path, columns, comments)
         return
@@ -173,20 +167,14 @@ def write_decimals(
                 stream.write(text[:written].data)
 
 
-def write_parquet(
-    path: Path,
-    trajectory: pd.DataFrame,
-    *,
-    name: str = "trajectory",
-    options: TrajectoryFileOptions | None = None,
-) -> None:
+def write_parquet(path: Path, trajectory: pd.DataFrame, options: FileOptions | None = None) -> None:
     """Write a Trajectory table as Parquet.
 
     `trajectory`: further numeric columns, such as standard deviations, are written under their own
     names. `options`: ellipsoid and epoch are written to the file's metadata, like the comments of
     the CSV. DataError: the table is not valid.
     """
-    chosen = options or TrajectoryFileOptions()
+    chosen = options or FileOptions()
     check_trajectory(trajectory)
     columns = named_columns(trajectory, TRAJECTORY)
     columns |= {
@@ -195,7 +183,7 @@ def write_parquet(
         if c not in TRAJECTORY and trajectory[c].dtype.kind in "iuf"
     }
     clock = clock_of(trajectory)
-    told: dict[str, Any] = told_of(name, chosen)
+    told: dict[str, Any] = told_of(chosen)
     told |= {"clock": clock.name, "clock_origin_s": repr(clock.origin)}
     told |= {} if clock.week is None else {"gps_week": str(clock.week)}
     parquet.write(path, columns, told)

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import DataError
+from strapdown.formats.file_options import FileOptions
 from strapdown.formats.trajectory_csv import one_line
-from strapdown.formats.trajectory_options import TrajectoryFileOptions
 from strapdown.frames import ecef_from_geodetic
 from strapdown.rotation import within_half_turn
 from strapdown.tables import EULER, VELOCITY, check_trajectory, places_of
@@ -28,13 +28,7 @@ __all__ = ["Thinned", "cut_at_date_line", "thin", "write_geojson", "write_kml"]
 Array = NDArray[np.float64]
 
 
-def write_geojson(
-    path: Path,
-    trajectory: pd.DataFrame,
-    *,
-    name: str = "trajectory",
-    options: TrajectoryFileOptions | None = None,
-) -> None:
+def write_geojson(path: Path, trajectory: pd.DataFrame, options: FileOptions | None = None) -> None:
     """Write a trajectory as a FeatureCollection: the path, its start and its end.
 
     Parameters
@@ -42,8 +36,7 @@ def write_geojson(
     path : Path
     trajectory : DataFrame
         A Trajectory table of one row or more, on WGS 84.
-    name : str
-    options : TrajectoryFileOptions, optional
+    options : FileOptions, optional
         With `epoch`, dates are added to the times. More than `most_points` rows are thinned to
         those that preserve the path best (`thin`).
 
@@ -61,13 +54,13 @@ def write_geojson(
     position, in lists like the coordinates, because RFC 7946 discourages times in positions.
     Longitudes and latitudes have nine decimals (0.1 mm), heights four.
     """
-    chosen = options or TrajectoryFileOptions()
+    chosen = options or FileOptions()
     chosen.require_wgs84("GeoJSON")
     check_trajectory(trajectory)
     if trajectory.empty:
         raise DataError("io.trajectory-no-rows")
     thinned = thin(trajectory, chosen.most_points)
-    title = one_line(name)
+    title = one_line(chosen.name)
     features = [_end(trajectory, 0, "start", title, chosen)]
     if len(trajectory) > 1:
         features = [
@@ -88,7 +81,7 @@ def _position(point: Array) -> list[float]:
 
 
 def _path_feature(
-    trajectory: pd.DataFrame, thinned: Thinned, name: str, options: TrajectoryFileOptions
+    trajectory: pd.DataFrame, thinned: Thinned, name: str, options: FileOptions
 ) -> dict[str, Any]:
     kept = trajectory.iloc[thinned.rows]
     time = kept.index.to_numpy(dtype=np.float64)
@@ -123,12 +116,12 @@ def _mean(time: Array, values: Array) -> float:
     return float(np.trapezoid(values, time) / (time[-1] - time[0]))
 
 
-def _dates(options: TrajectoryFileOptions, times: dict[str, float]) -> dict[str, str]:
+def _dates(options: FileOptions, times: dict[str, float]) -> dict[str, str]:
     return {} if options.epoch is None else {k: options.date(t) for k, t in times.items()}
 
 
 def _end(
-    trajectory: pd.DataFrame, row: int, part: str, name: str, options: TrajectoryFileOptions
+    trajectory: pd.DataFrame, row: int, part: str, name: str, options: FileOptions
 ) -> dict[str, Any]:
     at = trajectory.iloc[row]
     time = float(trajectory.index[row])
@@ -157,13 +150,7 @@ _HEAD = (
 _STYLE = '<Style id="path"><LineStyle><color>ff2d6fd9</color><width>3</width></LineStyle></Style>'
 
 
-def write_kml(
-    path: Path,
-    trajectory: pd.DataFrame,
-    *,
-    name: str = "trajectory",
-    options: TrajectoryFileOptions | None = None,
-) -> None:
+def write_kml(path: Path, trajectory: pd.DataFrame, options: FileOptions | None = None) -> None:
     """Write a trajectory as OGC KML 2.2: the path, its start and its end.
 
     Parameters
@@ -171,8 +158,7 @@ def write_kml(
     path : Path
     trajectory : DataFrame
         A Trajectory table of one row or more, on WGS 84.
-    name : str
-    options : TrajectoryFileOptions, optional
+    options : FileOptions, optional
         With `epoch`, a track with dates (``gx:Track``, Google's extension) is written in
         addition to the path. More than `most_points` rows are thinned to those that preserve
         the path best (`thin`).
@@ -191,7 +177,7 @@ def write_kml(
     `geoid_undulation`; otherwise the file states that it is not. Longitudes and latitudes have nine
     decimals (0.1 mm), heights four.
     """
-    chosen = options or TrajectoryFileOptions()
+    chosen = options or FileOptions()
     chosen.require_wgs84("KML")
     check_trajectory(trajectory)
     if trajectory.empty:
@@ -205,7 +191,7 @@ def write_kml(
     lines = [
         _HEAD,
         "<Document>",
-        f"<name>{escape(one_line(name))}</name>",
+        f"<name>{escape(one_line(chosen.name))}</name>",
         f"<description>{escape(_description(thinned, chosen))}</description>",
         _STYLE,
     ]
@@ -225,7 +211,7 @@ def write_kml(
     path.write_bytes(("\n".join(lines) + "\n").encode())
 
 
-def _description(thinned: Thinned, options: TrajectoryFileOptions) -> str:
+def _description(thinned: Thinned, options: FileOptions) -> str:
     heights = (
         "Heights are over the WGS 84 ellipsoid, and KML counts them from the EGM96 geoid: what "
         "is shown is too high by the height of the geoid over the ellipsoid there, -110 to 90 m."

@@ -20,7 +20,7 @@ from strapdown.config.navigation import CommandTable, LiveTable, NavigationSpec
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.formats.clocks import EPOCH
 from strapdown.formats.columns import parse_axes
-from strapdown.formats.log_writers import LOG_WRITERS
+from strapdown.formats.writers import WRITERS
 from strapdown.live.lines import (
     END,
     AidRows,
@@ -255,7 +255,7 @@ def write_received(spec: NavigationSpec, got: Reception, folder: Path) -> Naviga
     samples = got.samples
     imu = pd.DataFrame(samples[:, 1:], index=samples[:, 0], columns=[*GYRO, *ACCEL])
     imu.attrs["sampling"] = got.sampling
-    LOG_WRITERS["csv"](folder / SAMPLES, imu, None)
+    WRITERS["csv"].write(folder / SAMPLES, {"imu": imu})
     # Without properties that the reader infers from the numbers: they are known.
     whole["log"] = {
         "path": str(folder / SAMPLES),

@@ -18,8 +18,8 @@ from strapdown.config.navigation import STAGES, NavigationSpec
 from strapdown.errors import ConfigError
 from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.formats import csv
-from strapdown.formats.trajectory_options import TrajectoryFileOptions
-from strapdown.formats.trajectory_writers import write_trajectory
+from strapdown.formats.file_options import FileOptions
+from strapdown.formats.writers import write_trajectory
 from strapdown.navigation.consistency import Inconsistency
 from strapdown.navigation.heading_integrity import COLOURS, REASONS
 from strapdown.navigation.integrity import Repeated
@@ -428,7 +428,7 @@ def _write_states(
     result: NavigationRun, record: NavigationRecord, folder: Path, told: dict[str, str]
 ) -> None:
     """Write a trajectory, its standard deviations, and the estimated sensor errors."""
-    options = TrajectoryFileOptions(ellipsoid=result.ellipsoid, most_points=MOST_POINTS)
+    options = FileOptions(ellipsoid=result.ellipsoid, most_points=MOST_POINTS)
     for form in result.spec.output.files:
         path = folder / f"trajectory.{form}"
         write_trajectory(path, record.trajectory, name=result.source.name, options=options)

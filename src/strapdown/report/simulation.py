@@ -15,10 +15,15 @@ from strapdown.bundle.writing import write_bundle
 from strapdown.config import SimulateSpec, TrajectorySpec
 from strapdown.ellipsoids import WGS84, Ellipsoid, find_ellipsoid
 from strapdown.errors import check_choice
-from strapdown.formats.log_writers import LOG_WRITERS, log_formats, write_attitude_csv
 from strapdown.formats.trajectory_csv import one_line
 from strapdown.formats.trajectory_maps import thin
-from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS, TrajectoryFileOptions
+from strapdown.formats.writers import (
+    TRAJECTORY_FORMATS,
+    WRITERS,
+    FileOptions,
+    log_formats,
+    write_attitude_csv,
+)
 from strapdown.frames import ned_from_geodetic
 from strapdown.report.chart import BLUE, ORANGE, Array, Chart, Line, Panel, break_jumps, curve
 from strapdown.report.chart_svg import ChartFigure
@@ -72,7 +77,7 @@ def write_simulation(
         seals=seals,
     ) as folder:
         for name in formats:
-            LOG_WRITERS[name](folder / f"log.{name}", imu, truth)
+            WRITERS[name].write(folder / f"log.{name}", {"imu": imu, "reference": truth})
         write_attitude_csv(folder / "truth.csv", truth)
         final = truth.iloc[-1]
         description = {
@@ -176,7 +181,7 @@ def write_trajectory_simulation(
     for name in spec.trajectory_formats:
         check_choice(
             "report.no-writer",
-            TRAJECTORY_WRITERS,
+            TRAJECTORY_FORMATS,
             quantity="trajectory_formats",
             file=f"{spec.name}.toml",
             name=name,
@@ -193,11 +198,11 @@ def write_trajectory_simulation(
         seals=seals,
     ) as folder:
         for name in formats:
-            LOG_WRITERS[name](folder / f"log.{name}", imu, attitude)
-        options = TrajectoryFileOptions(ellipsoid=motion.ellipsoid)
+            WRITERS[name].write(folder / f"log.{name}", {"imu": imu, "reference": attitude})
+        options = FileOptions(name=spec.name, ellipsoid=motion.ellipsoid)
         for name in dict.fromkeys(("csv", *spec.trajectory_formats)):
             path = folder / f"trajectory.{name}"
-            TRAJECTORY_WRITERS[name](path, trajectory, name=spec.name, options=options)
+            WRITERS[name].write(path, {"reference": trajectory}, options)
         ChartFigure(simulation_chart(spec, trajectory)).save(
             folder / "trajectory.svg", caption=True
         )

@@ -147,13 +147,13 @@ class Memory:
             yield NOWHERE
             return
         from strapdown.formats import csv
-        from strapdown.formats.log_writers import LOG_WRITERS, table_columns
+        from strapdown.formats.writers import WRITERS, table_columns
 
         with tempfile.TemporaryDirectory(prefix="strapdown-") as name:
             folder = Path(name).resolve()
             for file, table in self.tables.items():
                 if file.endswith(".npz"):
-                    LOG_WRITERS["npz"](folder / file, table, None)
+                    WRITERS["npz"].write(folder / file, {"imu": table})
                 else:
                     csv.write(folder / file, table_columns(table), {})
             yield folder

@@ -8,7 +8,7 @@ import pytest
 from strapdown import rotation
 from strapdown.api.attitude import compare_attitude
 from strapdown.errors import DataError
-from strapdown.formats.log_writers import LOG_WRITERS
+from strapdown.formats.writers import WRITERS
 from strapdown.rotation import level
 from strapdown.tables import imu_table
 
@@ -44,7 +44,7 @@ def tilted_log(path, roll, pitch):
     gyro = np.zeros((1200, 3))
     gyro[1000:, 2] = 0.5
     imu = imu_table(time, gyro, np.tile(force(roll, pitch), (1200, 1)))
-    LOG_WRITERS["csv"](path, imu, None)
+    WRITERS["csv"].write(path, {"imu": imu})
     return path
 
 

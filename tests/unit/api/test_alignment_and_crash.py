@@ -13,7 +13,7 @@ import strapdown as sd
 from strapdown.config.crash_case import CaseSpec
 from strapdown.crash.case import run_case
 from strapdown.errors import ConfigError, DataError
-from strapdown.formats.log_writers import LOG_WRITERS
+from strapdown.formats.writers import WRITERS
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.simulation import Origin, PathMotion, StationaryMotion, simulate_imu
 from strapdown.simulation.motion import Track
@@ -30,7 +30,7 @@ def rest():
 
 
 def test_an_alignment_of_a_table_is_that_of_its_file_and_is_verified(rest, tmp_path):
-    LOG_WRITERS["npz"](tmp_path / "imu.npz", rest, None)
+    WRITERS["npz"].write(tmp_path / "imu.npz", {"imu": rest})
     before = rest.copy()
     ask = {"site": SITE, "sensor": SENSOR, "fine": False}
     one, two = sd.align(rest, **ask), sd.align(tmp_path / "imu.npz", **ask)
@@ -61,7 +61,7 @@ def test_an_alignment_reads_fixes_as_they_were_read(tmp_path):
         turn_rate=Track((0.0,), (4.0,)),
     )
     imu, _ = simulate_imu(drive, load_sensor("icm-42688-p").draw(7), rate=50.0, seed=7)
-    LOG_WRITERS["npz"](tmp_path / "imu.npz", imu, None)
+    WRITERS["npz"].write(tmp_path / "imu.npz", {"imu": imu})
     time = np.arange(0.0, 30.0, 0.5)
     rows = drive.trajectory(time)[["lat", "lon", "alt", "VN", "VE", "VD"]].round(9)
     rows.columns = ["breite", "lon_deg", "alt_m", "VN_m_s", "VE_m_s", "VD_m_s"]
@@ -181,7 +181,7 @@ def test_several_vehicles_are_numbered_in_the_order_of_their_cases(tmp_path, run
 
 
 def test_streams_of_a_file_by_name(tmp_path, rest):
-    LOG_WRITERS["csv"](tmp_path / "log.csv", rest, None)
+    WRITERS["csv"].write(tmp_path / "log.csv", {"imu": rest})
     streams = sd.read(tmp_path / "log.csv")
     assert list(streams) == ["imu"]
     assert np.array_equal(streams["imu"].to_numpy(), rest.to_numpy())

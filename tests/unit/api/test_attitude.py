@@ -15,7 +15,7 @@ from tests.coded import coded
 import strapdown as sd
 from strapdown.attitude_algorithms import make_algorithm, run_attitude
 from strapdown.errors import ConfigError, DataError
-from strapdown.formats.log_writers import LOG_WRITERS
+from strapdown.formats.writers import WRITERS
 from strapdown.increments import increments_from_imu
 from strapdown.rotation import level
 from strapdown.tables import QUATERNION, imu_table
@@ -39,7 +39,7 @@ def test_arrays_tables_and_files_give_the_same_bits(tmp_path):
     plain.attrs = {}
     before = plain.copy()
     for form in ("csv", "npz"):
-        LOG_WRITERS[form](tmp_path / f"log.{form}", table, None)
+        WRITERS[form].write(tmp_path / f"log.{form}", {"imu": table})
     found = [
         sd.attitude(t, gyro, accel),
         sd.attitude(plain),
@@ -122,7 +122,7 @@ def test_a_filter_refuses_what_it_cannot_take_and_stays_as_it_was():
 def test_algorithms_are_compared_on_a_table_as_on_its_file(tmp_path):
     t, gyro, accel = samples(800)
     table = imu_table(t, gyro, accel)
-    LOG_WRITERS["npz"](tmp_path / "imu.npz", table, None)
+    WRITERS["npz"].write(tmp_path / "imu.npz", {"imu": table})
     ask = {"rates_hz": [50, 25], "algorithms": ["naive", "quaternion"]}
     of_table = sd.compare_attitude(table, **ask)
     of_file = sd.compare_attitude(tmp_path / "imu.npz", **ask)

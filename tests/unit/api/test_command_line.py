@@ -9,14 +9,14 @@ import shutil
 import numpy as np
 
 from strapdown.bundle import writing as environment
-from strapdown.formats.log_writers import LOG_WRITERS
+from strapdown.formats.writers import WRITERS
 from strapdown.tables import imu_table
 
 
 def write_log(folder):
     t = np.arange(300) / 100.0
     gyro = np.column_stack([np.sin(t), np.cos(t), 0.1 * t])
-    LOG_WRITERS["npz"](folder / "log.npz", imu_table(t, gyro), None)
+    WRITERS["npz"].write(folder / "log.npz", {"imu": imu_table(t, gyro)})
     return folder / "log.npz"
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from strapdown.attitude_algorithms import make_algorithm, run_attitude
 from strapdown.formats import read_log
-from strapdown.formats.log_writers import LOG_WRITERS, write_attitude_csv
 from strapdown.formats.references import read_truth
+from strapdown.formats.writers import LOG_FORMATS, WRITERS, write_attitude_csv
 from strapdown.increments import increments_from_imu
 from strapdown.tables import QUATERNION, imu_table
 
@@ -29,11 +29,11 @@ def tables(sampling: str, *, accel: bool):
 
 @pytest.mark.parametrize("accel", [False, True])
 @pytest.mark.parametrize("sampling", ["instantaneous", "mean"])
-@pytest.mark.parametrize("suffix", LOG_WRITERS)
+@pytest.mark.parametrize("suffix", LOG_FORMATS)
 def test_a_log_and_its_truth_come_back_as_they_were(tmp_path, suffix, sampling, accel):
     imu, truth = tables(sampling, accel=accel)
     path = tmp_path / f"log.{suffix}"
-    LOG_WRITERS[suffix](path, imu, truth)
+    WRITERS[suffix].write(path, {"imu": imu, "reference": truth})
     back = read_log(path)
     assert np.array_equal(back.imu.to_numpy(), imu.to_numpy())
     assert np.array_equal(back.imu.index, imu.index)
@@ -43,19 +43,19 @@ def test_a_log_and_its_truth_come_back_as_they_were(tmp_path, suffix, sampling, 
     assert back.findings == ()  # our own files leave nothing to guess
 
 
-@pytest.mark.parametrize("suffix", LOG_WRITERS)
+@pytest.mark.parametrize("suffix", LOG_FORMATS)
 def test_without_truth_there_is_none(tmp_path, suffix):
     imu, _ = tables("mean", accel=False)
-    LOG_WRITERS[suffix](tmp_path / f"log.{suffix}", imu, None)
+    WRITERS[suffix].write(tmp_path / f"log.{suffix}", {"imu": imu})
     assert read_log(tmp_path / f"log.{suffix}").truth is None
 
 
-@pytest.mark.parametrize("suffix", LOG_WRITERS)
+@pytest.mark.parametrize("suffix", LOG_FORMATS)
 def test_the_same_log_gives_the_same_bytes(tmp_path, suffix):
     imu, truth = tables("mean", accel=True)
     for name in ("a", "b"):
         (tmp_path / name).mkdir()
-        LOG_WRITERS[suffix](tmp_path / name / f"log.{suffix}", imu, truth)
+        WRITERS[suffix].write(tmp_path / name / f"log.{suffix}", {"imu": imu, "reference": truth})
     a, b = ((tmp_path / n / f"log.{suffix}").read_bytes() for n in ("a", "b"))
     assert a == b
 

@@ -11,7 +11,7 @@ from strapdown.formats import ReadOptions, read_log
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, clock_of, with_clock
 from strapdown.formats.trajectory_csv import write_decimals
 from strapdown.formats.trajectory_readers import read_trajectory
-from strapdown.formats.trajectory_writers import TrajectoryFileOptions, write_trajectory
+from strapdown.formats.writers import FileOptions, write_trajectory
 from strapdown.tables import ACCEL, GYRO, TRAJECTORY, trajectory_table
 
 ROWS = [
@@ -91,7 +91,7 @@ def test_nav_goes_round(tmp_path):
 
 def test_csv_of_fixed_decimals_goes_round(tmp_path):
     table = drive()
-    options = TrajectoryFileOptions(digits="fixed")
+    options = FileOptions(digits="fixed")
     write_trajectory(tmp_path / "a.csv", table, options=options)
     write_trajectory(tmp_path / "b.csv", table)
     a, b = (tmp_path / f"{n}.csv" for n in "ab")
@@ -104,7 +104,7 @@ def test_csv_of_fixed_decimals_goes_round(tmp_path):
     with pytest.raises(
         ConfigError, check=lambda refused: refused.finding.code == "io.digits-unknown"
     ):
-        TrajectoryFileOptions(digits="few")
+        FileOptions(digits="few")
 
 
 def test_parquet_goes_round(tmp_path):

@@ -12,7 +12,7 @@ from tests.coded import coded
 from strapdown.ellipsoids import ELLIPSOIDS
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats.trajectory_readers import read_trajectory
-from strapdown.formats.trajectory_writers import TRAJECTORY_WRITERS, TrajectoryFileOptions
+from strapdown.formats.writers import WRITERS, FileOptions
 from strapdown.tables import TRAJECTORY
 
 _spec = importlib.util.spec_from_file_location(
@@ -47,8 +47,8 @@ def save(path, rows, head=HEAD, comments=()):
 def test_our_own_files_come_back_to_the_bit(tmp_path):
     track = made.weaving(np.arange(0.0, 20.0, 0.1))
     path = tmp_path / "track.csv"
-    options = TrajectoryFileOptions(ellipsoid=ELLIPSOIDS["pz90.11"])
-    TRAJECTORY_WRITERS["csv"](path, track, name="drive", options=options)
+    options = FileOptions(ellipsoid=ELLIPSOIDS["pz90.11"])
+    WRITERS["csv"].write(path, {"reference": track}, options)
     back = read_trajectory(path)
     assert np.array_equal(back.to_numpy(), track.to_numpy())
     assert np.array_equal(back.index, track.index)
@@ -66,7 +66,7 @@ def test_our_own_files_come_back_to_the_bit(tmp_path):
 def test_random_numbers_come_back_to_the_bit(tmp_path):
     # No vehicle moves like that, and a finding says so.
     track = made.random_trajectory(2)
-    TRAJECTORY_WRITERS["csv"](tmp_path / "a.csv", track)
+    WRITERS["csv"].write(tmp_path / "a.csv", {"reference": track})
     back = read_trajectory(tmp_path / "a.csv")
     assert np.array_equal(back.to_numpy(), track.to_numpy())
     (finding,) = back.attrs["findings"]

@@ -20,9 +20,10 @@ from strapdown.errors import ConfigError, DataError
 from strapdown.evaluation.trajectory_differences import trajectory_differences
 from strapdown.formats.trajectory_csv import write_error_csv
 from strapdown.formats.trajectory_maps import cut_at_date_line, thin
-from strapdown.formats.trajectory_writers import (
-    TRAJECTORY_WRITERS,
-    TrajectoryFileOptions,
+from strapdown.formats.writers import (
+    TRAJECTORY_FORMATS,
+    WRITERS,
+    FileOptions,
     write_trajectory,
 )
 from strapdown.frames import ecef_from_geodetic
@@ -47,14 +48,14 @@ def table(place, time=None, velocity=(0, 0, 0), euler=(0, 0, 0)):
 
 
 def write(form, path, trajectory, name="trajectory", **options):
-    TRAJECTORY_WRITERS[form](path, trajectory, name=name, options=TrajectoryFileOptions(**options))
+    WRITERS[form].write(path, {"reference": trajectory}, FileOptions(name=name, **options))
     return path
 
 
 # --- all ---------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("form", TRAJECTORY_WRITERS)
+@pytest.mark.parametrize("form", TRAJECTORY_FORMATS)
 def test_the_same_trajectory_gives_the_same_bytes(tmp_path, form):
     track = made.random_trajectory(1)
     before = track.copy(deep=True)
@@ -67,7 +68,7 @@ def test_the_same_trajectory_gives_the_same_bytes(tmp_path, form):
     assert track.equals(before)
 
 
-@pytest.mark.parametrize("form", TRAJECTORY_WRITERS)
+@pytest.mark.parametrize("form", TRAJECTORY_FORMATS)
 def test_a_hostile_name_stays_a_name(tmp_path, form):
     name = 'a\n<b>&"\x00]]>\ud800 ü,'
     path = write(form, tmp_path / f"a.{form}", made.random_trajectory(1, 5), name=name)
@@ -87,7 +88,7 @@ def test_a_hostile_name_stays_a_name(tmp_path, form):
         assert text.splitlines()[0] == '# trajectory: a <b>&"]]> ü,'
 
 
-@pytest.mark.parametrize("form", TRAJECTORY_WRITERS)
+@pytest.mark.parametrize("form", TRAJECTORY_FORMATS)
 def test_a_table_that_is_none_is_refused(tmp_path, form):
     track = made.random_trajectory(1, 5)
     with pytest.raises(DataError, check=coded("tables.missing-columns")):
@@ -130,7 +131,7 @@ def test_maps_know_wgs84_alone(tmp_path, form):
 )
 def test_choices_that_are_none(options, message):
     with pytest.raises(ConfigError, match=message):
-        TrajectoryFileOptions(**options)
+        FileOptions(**options)
 
 
 def test_a_date_that_is_none(tmp_path):
@@ -474,7 +475,7 @@ def test_differences_are_written_with_their_sign(tmp_path):
 )
 def test_options_of_a_wrong_kind_are_refused(options, quantity):
     with pytest.raises(ConfigError) as caught:
-        TrajectoryFileOptions(**options)
+        FileOptions(**options)
     assert caught.value.finding.quantity == quantity
 
 
@@ -485,9 +486,9 @@ def level(count=3):
     )
 
 
-@pytest.mark.parametrize("form", sorted(TRAJECTORY_WRITERS))
+@pytest.mark.parametrize("form", sorted(TRAJECTORY_FORMATS))
 def test_the_ending_says_the_form(form, tmp_path):
-    TRAJECTORY_WRITERS[form](tmp_path / "by_name", level(), name="drive")
+    WRITERS[form].write(tmp_path / "by_name", {"reference": level()}, FileOptions(name="drive"))
     write_trajectory(str(tmp_path / f"drive.{form.upper()}"), level())
     written = (tmp_path / f"drive.{form.upper()}").read_bytes()
     assert written == (tmp_path / "by_name").read_bytes()

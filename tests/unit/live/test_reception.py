@@ -14,7 +14,7 @@ from tests.town_drive import ARM, fixes, motion
 from strapdown.config.alignment import sensors_of
 from strapdown.config.navigation import NavigationSpec
 from strapdown.errors import ConfigError
-from strapdown.formats.log_writers import LOG_WRITERS
+from strapdown.formats.writers import WRITERS
 from strapdown.live.replay import MachineClock
 from strapdown.live.run import live_spec, receive, result_of, write_received
 from strapdown.live.sources import LineSource, open_source
@@ -255,7 +255,7 @@ def test_whoever_read_the_lines_has_gone():
 
 
 def test_of_a_record_the_same_with_lines(tmp_path):
-    LOG_WRITERS["csv"](tmp_path / "log.csv", drive(), None)
+    WRITERS["csv"].write(tmp_path / "log.csv", {"imu": drive()})
     (tmp_path / "fix.csv").write_text("time_s,lat,lon,alt,sdn,sde,sdd\n")
     whole = table()
     whole["live"] = None

@@ -12,7 +12,7 @@ from strapdown.api.attitude import compare_attitude
 from strapdown.attitude_algorithms import make_algorithm
 from strapdown.attitude_algorithms.cost import count_cost
 from strapdown.attitude_comparison.answer import Evidence, choices, find_answer
-from strapdown.formats.log_writers import LOG_WRITERS
+from strapdown.formats.writers import WRITERS
 from strapdown.simulation import SCENARIOS, ImuErrors, find_scenario, simulate_imu
 from strapdown.tables import imu_table
 
@@ -306,7 +306,7 @@ def turned(tmp_path_factory):
     """A log of a scenario without its truth."""
     imu, _ = simulate_imu(find_scenario("alexiev-fig2c").motion, ImuErrors(), rate=50.0)
     path = tmp_path_factory.mktemp("logs") / "turned.csv"
-    LOG_WRITERS["csv"](path, imu, None)
+    WRITERS["csv"].write(path, {"imu": imu})
     return path
 
 
@@ -326,7 +326,7 @@ def test_a_log_that_turns_faster_than_it_is_sampled(tmp_path):
     """Ten turns a second about axes that change, at 15 Hz, of which nothing is known."""
     time = np.arange(60) / 15.0
     gyro = 20.0 * np.column_stack([np.sin(9 * time), np.cos(7 * time), np.sin(5 * time + 1)])
-    LOG_WRITERS["csv"](tmp_path / "fast.csv", imu_table(time, gyro), None)
+    WRITERS["csv"].write(tmp_path / "fast.csv", {"imu": imu_table(time, gyro)})
     bench = compare_attitude(tmp_path / "fast.csv", algorithms=["naive", "quaternion"])
     assert bench.answer.verdict == "rate"
     assert bench.answer.algorithm is None

@@ -10,7 +10,7 @@ from strapdown.api.attitude import compare_attitude
 from strapdown.attitude_algorithms import Quaternion, run_attitude
 from strapdown.errors import ConfigError, DataError
 from strapdown.evaluation.differences import Known, attitude_at, known_at
-from strapdown.formats.log_writers import LOG_WRITERS
+from strapdown.formats.writers import WRITERS
 from strapdown.increments import increments_from_imu
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
@@ -48,9 +48,9 @@ def logs(first, tmp_path_factory):
     """The same minute by a cheap sensor, and by a better one with and without its attitude."""
     folder = tmp_path_factory.mktemp("two")
     second, attitude = second_sensor(200.0)
-    LOG_WRITERS["csv"](folder / "first.csv", first[0], None)
-    LOG_WRITERS["csv"](folder / "second.csv", second, None)
-    LOG_WRITERS["csv"](folder / "optical.csv", second, attitude)
+    WRITERS["csv"].write(folder / "first.csv", {"imu": first[0]})
+    WRITERS["csv"].write(folder / "second.csv", {"imu": second})
+    WRITERS["csv"].write(folder / "optical.csv", {"imu": second, "reference": attitude})
     return folder
 
 
@@ -129,7 +129,7 @@ def test_a_second_log_with_an_attitude_tells_where_the_run_starts(logs, first):
 
 
 def test_two_truths_are_refused(logs, first):
-    LOG_WRITERS["csv"](logs / "truth.csv", first[0], first[1])
+    WRITERS["csv"].write(logs / "truth.csv", {"imu": first[0], "reference": first[1]})
     with pytest.raises(
         ConfigError, match="--reference-log: an attitude reference is given as well"
     ):
@@ -142,7 +142,7 @@ def test_two_truths_are_refused(logs, first):
 
 def test_a_second_log_of_another_motion_is_refused(logs):
     other, _ = simulate_imu(Handling(duration=60.0, seed=99), ImuErrors(), rate=100.0)
-    LOG_WRITERS["csv"](logs / "other.csv", other, None)
+    WRITERS["csv"].write(logs / "other.csv", {"imu": other})
     with pytest.raises(DataError):
         compare_attitude(logs / "first.csv", reference_log=logs / "other.csv")
 
@@ -151,7 +151,7 @@ def test_a_second_log_is_no_exact_truth_of_a_scenario(logs, tmp_path):
     """Own errors are then an estimate, and are not measured against what the second log says."""
     second, _ = simulate_imu(find_scenario("gestures").motion, ImuErrors(), rate=200.0)
     turned = imu_table(second.index, 1.02 * second[GYRO].to_numpy(), second[ACCEL].to_numpy())
-    LOG_WRITERS["csv"](tmp_path / "second.csv", turned, None)
+    WRITERS["csv"].write(tmp_path / "second.csv", {"imu": turned})
     bench = compare_attitude(
         "gestures",
         reference_log=tmp_path / "second.csv",
@@ -193,7 +193,7 @@ def test_gravity_at_rests_is_a_reference(logs, first):
 def test_rests_without_any_are_refused(tmp_path):
     time = np.arange(300) * 0.01
     gyro = np.column_stack([np.sin(9 * time), np.cos(7 * time), np.sin(5 * time)])
-    LOG_WRITERS["csv"](tmp_path / "log.csv", imu_table(time, gyro), None)
+    WRITERS["csv"].write(tmp_path / "log.csv", {"imu": imu_table(time, gyro)})
     with pytest.raises(
         ConfigError, match=r"log\.csv, --reference rests: no stationary interval with acceleration"
     ):
@@ -210,7 +210,7 @@ def test_the_course_of_a_trend_is_taken_off(tmp_path):
     trend = (5e-5, -3e-5, 4e-5)
     errors = ImuErrors(TriadErrors(noise_density=1e-4, trend=trend))
     imu, truth = simulate_imu(MOTION, errors, rate=100.0, seed=1)
-    LOG_WRITERS["csv"](tmp_path / "log.csv", imu, truth)
+    WRITERS["csv"].write(tmp_path / "log.csv", {"imu": imu, "reference": truth})
     asked = {"algorithms": ["quaternion"], "rates_hz": [100]}
     plain = compare_attitude(tmp_path / "log.csv", **asked)
     course = compare_attitude(tmp_path / "log.csv", gyro_bias="rests", **asked)

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from strapdown import simulate
 from strapdown.api.attitude import compare_attitude
 from strapdown.attitude_algorithms import RotationVector, attitude_history, make_algorithm
-from strapdown.formats.log_writers import LOG_WRITERS
+from strapdown.formats.writers import WRITERS
 from strapdown.increments import increments_from_imu
 from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
 from strapdown.tables import QUATERNION, imu_table
@@ -138,7 +138,7 @@ def test_on_a_log_without_a_truth_nothing_is_the_sensors(log):
 def turning(steps: int, rate: float, path):
     """About all axes, at a constant rate, which every step rounds alike."""
     gyro = np.tile(rate * np.array([0.6, -0.48, 0.64]), (steps + 1, 1))
-    LOG_WRITERS["csv"](path, imu_table(np.arange(steps + 1) * 0.01, gyro), None)
+    WRITERS["csv"].write(path, {"imu": imu_table(np.arange(steps + 1) * 0.01, gyro)})
     return path
 
 

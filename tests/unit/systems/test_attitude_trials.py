@@ -13,7 +13,7 @@ from strapdown.api.attitude import compare_attitude
 from strapdown.attitude_comparison.sweep import rank, trial_names, worst_sweep
 from strapdown.config import LogSpec, ScenarioSpec
 from strapdown.errors import ConfigError
-from strapdown.formats.log_writers import LOG_WRITERS
+from strapdown.formats.writers import WRITERS
 from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
 
 ALGORITHMS = ["naive", "quaternion"]
@@ -202,7 +202,7 @@ def test_rates_without_a_partner_are_left_out():
 
 def test_a_log_of_which_nothing_is_known_among_others(logs, tmp_path):
     imu, _ = simulate_imu(find_scenario("alexiev-fig2c").motion, ImuErrors(), rate=50.0)
-    LOG_WRITERS["csv"](tmp_path / "unknown.csv", imu, None)
+    WRITERS["csv"].write(tmp_path / "unknown.csv", {"imu": imu})
     for order in ([logs[0], tmp_path / "unknown.csv"], [tmp_path / "unknown.csv", logs[0]]):
         bench = compare_attitude(order, algorithms=ALGORITHMS, rates_hz=[50])
         assert bench.answer.verdict == "enough"

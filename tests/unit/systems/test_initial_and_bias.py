@@ -10,7 +10,7 @@ from tests.coded import coded
 
 from strapdown.api.attitude import compare_attitude
 from strapdown.errors import ConfigError, DataError
-from strapdown.formats.log_writers import LOG_WRITERS
+from strapdown.formats.writers import WRITERS
 from strapdown.tables import GYRO, imu_table
 
 BIAS = np.array([0.02, -0.03, 0.01])
@@ -22,7 +22,7 @@ def log(tmp_path) -> Path:
     time = np.arange(1500) * 0.01
     gyro = np.tile(BIAS, (1500, 1))
     gyro[600:900, 2] += 0.5
-    LOG_WRITERS["csv"](tmp_path / "log.csv", imu_table(time, gyro), None)
+    WRITERS["csv"].write(tmp_path / "log.csv", {"imu": imu_table(time, gyro)})
     return tmp_path / "log.csv"
 
 
@@ -113,7 +113,7 @@ def test_turns_on_a_log_of_means(tmp_path):
     time = np.arange(101) * 0.1
     gyro = np.zeros((101, 3))
     gyro[1:51, 2] = 2 * np.pi / 5.0
-    LOG_WRITERS["csv"](tmp_path / "log.csv", imu_table(time, gyro, sampling="mean"), None)
+    WRITERS["csv"].write(tmp_path / "log.csv", {"imu": imu_table(time, gyro, sampling="mean")})
     bench = compare_attitude(
         tmp_path / "log.csv",
         algorithms=["naive", "euler", "dcm", "quaternion"],

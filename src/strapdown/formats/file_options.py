@@ -1,4 +1,4 @@
-"""Options of trajectory files."""
+"""Options of the files that are written."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ import math
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 
+import numpy as np
+
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import ConfigError, DataError, check_choice
 
-__all__ = ["TUM_FRAMES", "TrajectoryFileOptions"]
+__all__ = ["TUM_FRAMES", "FileOptions"]
 
 #: Axes of a TUM file: name to (world axes, body axes).
 TUM_FRAMES = {
@@ -22,22 +24,27 @@ DIGITS = ("exact", "fixed")
 
 
 @dataclass(frozen=True)
-class TrajectoryFileOptions:
-    """Options of trajectory files; each format uses those that apply to it.
+class FileOptions:
+    """Options of files; each format uses those that apply to it.
 
     Attributes
     ----------
+    name : str
+        Title for people who open the file.
     ellipsoid : Ellipsoid
         Reference of the positions. KML and GeoJSON only support WGS 84.
     epoch : datetime, optional
-        With time zone: the instant of the trajectory's time zero. Without it no dates are
-        written.
+        With time zone: the instant of time zero of a clock that does not say so. Without it no
+        dates are written.
     geoid_undulation : float, optional, m
-        Height of the geoid above the ellipsoid, subtracted from the heights of a KML file.
+        Height of the geoid above the ellipsoid, for formats with heights over the sea.
     most_points : int
         Most points of a KML or GeoJSON file; a longer trajectory is thinned.
     tum_frame : {'enu', 'ned', 'ecef'}
         Axes of a TUM file.
+    origin : tuple of float, optional
+        Latitude and longitude in deg, height over the ellipsoid in m: origin of local axes; by
+        default the first position.
     digits : {'exact', 'fixed'}
         For CSV: the fewest that reproduce each number, or a fixed number of decimals, which is
         faster.
@@ -48,11 +55,13 @@ class TrajectoryFileOptions:
         An option is out of its range.
     """
 
+    name: str = "trajectory"
     ellipsoid: Ellipsoid = WGS84
     epoch: datetime | None = None
     geoid_undulation: float | None = None
     most_points: int = 10_000
     tum_frame: str = "enu"
+    origin: tuple[float, float, float] | None = None
     digits: str = "exact"
 
     def __post_init__(self) -> None:
@@ -78,6 +87,10 @@ class TrajectoryFileOptions:
         check_choice(
             "io.no-frame-tum-file", TUM_FRAMES, quantity="tum_frame", tum_frame=self.tum_frame
         )
+        if self.origin is not None and not (
+            len(self.origin) == 3 and np.isfinite(self.origin).all() and abs(self.origin[0]) <= 90.0
+        ):
+            raise ConfigError("io.no-origin", quantity="origin", origin=list(self.origin))
         check_choice("io.digits-unknown", DIGITS, quantity="digits", digits=self.digits)
 
     def require_wgs84(self, form: str) -> None:
