@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -184,11 +184,16 @@ class Streams(Mapping[str, pd.DataFrame]):
     tables : mapping of str to DataFrame
     source : str
         Name of the recording.
+    left_out : sequence of Finding
+        Streams that the recording has and that could not be read, each with the reason.
     """
 
-    def __init__(self, tables: Mapping[str, pd.DataFrame], source: str) -> None:
+    def __init__(
+        self, tables: Mapping[str, pd.DataFrame], source: str, left_out: Sequence[Finding] = ()
+    ) -> None:
         self._tables = dict(tables)
         self.source = source
+        self.left_out = tuple(left_out)
 
     def __getitem__(self, name: str) -> pd.DataFrame:
         if name not in self._tables:
@@ -210,8 +215,9 @@ class Streams(Mapping[str, pd.DataFrame]):
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """Findings of all streams."""
-        return tuple(f for t in self._tables.values() for f in t.attrs.get("findings", ()))
+        """Findings of all streams, and of those left out."""
+        said = (f for t in self._tables.values() for f in t.attrs.get("findings", ()))
+        return (*self.left_out, *said)
 
 
 def read_imu(
@@ -376,22 +382,34 @@ def read(path: str | Path) -> Streams:
         return _gnss(path, GnssOptions(unstated_position_sd=math.inf))
 
     tables: dict[str, pd.DataFrame] = {}
-    refused: list[StrapdownError] = []
+    refused: dict[str, StrapdownError] = {}
     for stream, table_of in (("imu", read_imu), ("gnss", fixes), ("reference", read_trajectory)):
         if stream in tables:
             continue
         try:
             tables[stream] = table_of(path)
         except StrapdownError as error:
-            refused.append(error)
+            refused[stream] = error
             continue
         if "reference" in tables[stream].attrs:
             q_nb, stamps = tables[stream].attrs["reference"]
             tables["reference"] = attitude_table(stamps, q_nb)
     if not tables:
         # A file without a stream is no fault: report that of a stream that it has.
-        raise next((e for e in refused if e.finding.code not in _LACKS), refused[0])
-    return Streams(tables, Path(path).name)
+        raised = refused.values()
+        raise next((e for e in raised if e.finding.code not in _LACKS), next(iter(raised)))
+    left_out = [
+        Finding(
+            "api.stream-left-out",
+            severity="warning",
+            file=Path(path).name,
+            quantity=stream,
+            reason=error.finding,
+        )
+        for stream, error in refused.items()
+        if stream not in tables and error.finding.code not in _LACKS
+    ]
+    return Streams(tables, Path(path).name, left_out)
 
 
 #: Codes that say that a recording does not have a stream.

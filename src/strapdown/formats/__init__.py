@@ -394,7 +394,10 @@ def open_stream(path: str | Path, stream: str, form: str | None = None) -> Raw:
         if key in reader.streams:
             _log.info("%s: read as %s (%s)", path.name, form, reader.title)
             try:
-                return reader.streams[key](path)
+                raw = reader.streams[key](path)
+                if isinstance(raw, RawLog) and reader.files is not None:
+                    raw.files = reader.files(path) or raw.files
+                return raw
             except (ArithmeticError, LookupError, TypeError, ValueError) as error:
                 # What is in the file of a stranger can break any reader.
                 _log.debug("%s", path.name, exc_info=True)

@@ -103,6 +103,17 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
             quantity="time",
             size=time.size,
         )
+    slow = float(np.median(np.diff(time)))
+    if slow > SLOWEST and options.time_unit is None and options.rate is None:
+        raise DataError(
+            "io.too-slow-for-a-gyro",
+            file=raw.name,
+            quantity="time",
+            size=time.size,
+            length=time[-1] - time[0],
+            step=slow,
+            unit=stamps.unit,
+        )
     readings = [time_reading(raw, found, stamps, int(kept[0]))]
     body: dict[str, Array] = {}
     summed = {t for t, (unit, _) in units.items() if unit in SUMS[t]}
@@ -154,6 +165,11 @@ REPAIRABLE = {
     "io.time-goes-back",
     "io.time-counter-wraps",
 }
+
+
+#: Longest usual step of a log with a gyro, s. Between samples that are farther apart any turn may
+#: be hidden; such rows are of another sensor's rate, or of another unit of time.
+SLOWEST = 2.0
 
 
 def _unused(raw: RawLog, found: dict[str, Column]) -> list[Finding]:

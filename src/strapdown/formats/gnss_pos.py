@@ -78,8 +78,8 @@ def read(path: Path) -> Fixes:
     Raises
     ------
     DataError
-        No line names the columns, the solution is a baseline, the datum is another, or a row is
-        damaged.
+        No line names the columns, and the rows are not as RTKLIB writes them; the solution is a
+        baseline, the datum is another, or a row is damaged.
     """
     text, findings = _decoded(path)
     lines = text.splitlines()
@@ -134,7 +134,7 @@ def _layout(lines: list[str], file: str, findings: list[Finding]) -> _Layout:
     )
     row, match = next(headers, (0, None))
     if match is None:
-        raise DataError("io.no-line-names-columns-gpst", file=file)
+        return _without_header(lines, file, findings)
     top = " ".join(line for line in lines[:row] if line.startswith("%"))
     told = re.search(r"lat/lon/height=(\w+)/(\w+)", top)
     if told and told[1] != "WGS84":
@@ -156,6 +156,48 @@ def _layout(lines: list[str], file: str, findings: list[Finding]) -> _Layout:
         )
     over_sea = bool(told and told[2] == "geodetic")
     return _Layout(match[1].upper(), names, separator, row, over_sea)
+
+
+def _without_header(lines: list[str], file: str, findings: list[Finding]) -> _Layout:
+    """Find the layout by the first row; RTKLIB writes its columns in one order.
+
+    The decimals tell what a position is: nine of degrees, four of meters. What the header would
+    say of the time system and the heights is taken as RTKLIB has it by default.
+    """
+    row, first = next(
+        ((k, line) for k, line in enumerate(lines, 1) if line.strip() and line[0] not in "%#"),
+        (0, ""),
+    )
+    separator = next((s for s in ",;\t" if s in first), " ")
+    fields = [f for f in re.split(r"[\s,;]+", first.strip()) if f]
+    dated = len(fields) > 1 and "/" in fields[0] and ":" in fields[1]
+    weeks = len(fields) > 1 and fields[0].isdecimal() and "." in fields[1]
+    rest = fields[2:] if dated or weeks else []
+    if len(rest) in (_PLAIN, _PLAIN + len(_VELOCITY)) and re.fullmatch(r"[0-7]", rest[3]):
+        xyz = np.array([float(f) if _FLOAT.fullmatch(f) else np.nan for f in rest[:3]])
+        decimals = [len(f.partition(".")[2]) for f in rest[:2]]
+        level = min(decimals) >= 7 and abs(xyz[0]) <= 90.0
+        if level or 6.3e6 < np.linalg.norm(xyz) < 6.5e6:
+            names = [*(_LEVEL_NAMES if level else _ECEF_NAMES), "age(s)", "ratio"]
+            names[3:3] = ["Q", "ns"]
+            if len(rest) > _PLAIN:
+                names += _VELOCITY if level else _ECEF_VELOCITY
+            findings.append(Finding("io.pos-without-header", file=file, row=row))
+            return _Layout("GPST", names, separator, row)
+    places = [f for f in fields[:2] if _FLOAT.fullmatch(f) and "." in f and abs(float(f)) <= 180.0]
+    code = "io.list-of-stations" if len(places) == 2 else "io.no-line-names-columns-gpst"
+    raise DataError(code, file=file, row=row or None, first=" ".join(fields[:6]))
+
+
+_FLOAT = re.compile(r"[+-]?\d+\.?\d*")
+#: Columns behind the time as RTKLIB writes them (manual, appendix B.1), and without velocity.
+_LEVEL_NAMES = ["latitude(deg)", "longitude(deg)", "height(m)"]
+_LEVEL_NAMES += ["sdn(m)", "sde(m)", "sdu(m)", "sdne(m)", "sdeu(m)", "sdun(m)"]
+_ECEF_NAMES = [*_XYZ, "sdx(m)", "sdy(m)", "sdz(m)", "sdxy(m)", "sdyz(m)", "sdzx(m)"]
+_VELOCITY = ["vn(m/s)", "ve(m/s)", "vu(m/s)", "sdvn", "sdve", "sdvu", "sdvne", "sdveu", "sdvun"]
+_ECEF_VELOCITY = ["vx(m/s)", "vy(m/s)", "vz(m/s)", "sdvx", "sdvy", "sdvz"]
+_ECEF_VELOCITY += ["sdvxy", "sdvyz", "sdvzx"]
+_PLAIN = 13
 
 
 def _columns(

@@ -6,7 +6,8 @@ receiver with an inertial unit: deg, mm over the ellipsoid, mm/s, and ``iTOW``, 
 NAV-HPPOSLLH of the same instant has the position in steps of 0.1 mm. NAV-PVAT also has roll, pitch
 and heading of the vehicle (forward, right, down). ESF-MEAS has one sensor a field: deg/s in steps
 of 2^-12, m/s² in steps of 2^-10, the speed of a wheel in mm/s, in axes of the unit on its board, at
-time tags in ms of the receiver's own clock. ESF-RAW has time tags of an undocumented unit, and is
+time tags in ms of the receiver's own clock, which the order of the messages relates to GPS time, to
+the time that the receiver needs for a fix. ESF-RAW has time tags of an undocumented unit, and is
 not read.
 """
 
@@ -192,7 +193,9 @@ def _measured(path: Path, stream: str, kinds: tuple[int, ...]) -> tuple[Any, Any
 
 def read(path: Path) -> RawLog:
     """Read rates and specific force, each on its own time tags, on those of the gyro."""
-    findings = [Finding("io.ubx-own-clock", file=path.name, quantity="time", severity="note")]
+    lag = _lag(path)
+    code = "io.ubx-own-clock" if lag is None else "io.ubx-clock-by-order"
+    findings = [Finding(code, file=path.name, quantity="time", severity="note")]
     logs = []
     for triad, kinds, unit in (("gyro", GYRO, "deg/s"), ("accel", ACCEL, "m/s2")):
         tags, values = _measured(path, "imu", kinds)
@@ -200,13 +203,34 @@ def read(path: Path) -> RawLog:
             if triad == "gyro":
                 raise NoStreamError(path.name, "imu", TITLE, ["wheel"])
             continue
-        out: Quantities = {"time": (tags, "ms")}
+        out: Quantities = {"time": (tags - (lag or 0), "ms")}
         out |= {f"{triad}_{a}": (values[:, k], unit) for k, a in enumerate("xyz")}
         logs.append(RawLog.of(path, out, findings=findings))
         findings = []
     raw = join(logs, path.name, (path,)) if len(logs) > 1 else logs[0]
-    raw.clock = RELATIVE
+    raw.clock = RELATIVE if lag is None else GPS
     return raw
+
+
+def _lag(path: Path) -> int | None:
+    """Return what time tags of the gyro are ahead of GPS seconds of week, ms; None without fixes.
+
+    By the order of the messages: a fix is written after the last sample before it, by the time
+    that the receiver needs for it.
+    """
+    ubx, tag, lags = library("pyubx2", path), None, []
+    with damage(path):
+        for frame in _frames(path.read_bytes()):
+            if frame[2:4] == MEAS:
+                count = struct.unpack_from("<H", frame, 10)[0] >> 11
+                words = struct.unpack_from(f"<{count}I", frame, 14)
+                if {w >> 24 & 63 for w in words} >= set(GYRO):
+                    tag = struct.unpack_from("<I", frame, 6)[0]
+            elif frame[2:4] in (PVT, PVAT) and tag is not None:
+                message = ubx.UBXReader.parse(frame)
+                if _ok(message):
+                    lags.append(tag - int(message.iTOW))
+    return int(np.median(lags)) if lags else None
 
 
 def read_wheel(path: Path) -> RawLog:

@@ -726,8 +726,15 @@ def test_ubx_the_finer_position_of_the_same_instant(tmp_path):
 def test_ubx_sensors_in_ms_of_the_receiver(tmp_path):
     path = drive(tmp_path)
     raw = ubx.read(path)
-    assert (raw.axes, raw.clock) == (None, "relative")
-    assert "io.ubx-own-clock" in [f.code for f in raw.findings]
+    assert (raw.axes, raw.clock) == (None, "gps-seconds-of-week")
+    assert "io.ubx-clock-by-order" in [f.code for f in raw.findings]
+    # The fix at 136 154 s follows the sample with the tag 5900, each further one a second later.
+    assert read_log(path).imu.index[0] == pytest.approx(136_154.0 - 0.9, abs=1e-9)
+    alone = written(
+        tmp_path / "alone.ubx", b"".join(esf_meas(k, [(14, 0), (13, 0), (5, 9)]) for k in range(9))
+    )
+    assert ubx.read(alone).clock == "relative"
+    assert "io.ubx-own-clock" in [f.code for f in ubx.read(alone).findings]
     imu = read_log(path).imu
     np.testing.assert_allclose(imu.iloc[1, :3], np.radians([1.0, -2.0, 0.5]))
     np.testing.assert_allclose(imu.iloc[1, 3:6], [0.5, -1.0, G], atol=1e-3)
