@@ -241,7 +241,7 @@ def test_a_draft_of_foreign_columns_and_of_fixes_without_standard_deviations(run
     assert "\nposition_sd_m = 5.0\n" in path.read_text()
     flags = ("navigate", tmp_path / "odd.csv", "--gnss", fixes, "--columns", columns, *units)
     refused = run_cli(*flags, "--sensor", "mpu-6050", "--out", tmp_path / "out")
-    assert refused.code == 4 and "strapdown init navigate" in refused.err
+    assert refused.code == 4 and "--gnss-position-sd 5" in refused.err
 
 
 def test_the_car_is_navigated_from_its_raw_files(recordings, run_cli, tmp_path, undrawn_here):

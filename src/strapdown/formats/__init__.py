@@ -114,12 +114,17 @@ class Reader:
         raises `NoStreamError` if this file lacks the stream.
     files : callable, optional
         Every file that is read for a path; the path itself by default.
+    parts : bool
+        Whether one file may hold several streams of a name, of which the user chooses one by
+        ``NAME:PART`` as format (a topic of a bag); the readers then take a second argument, the
+        part or None.
     """
 
     title: str
     detect: Callable[[Path], bool]
-    streams: Mapping[str, Callable[[Path], Raw]]
+    streams: Mapping[str, Callable[..., Raw]]
     files: Callable[[Path], tuple[Path, ...]] | None = None
+    parts: bool = False
 
 
 #: In the order of detection: formats of known recordings first, general formats last.
@@ -157,6 +162,7 @@ READERS: dict[str, Reader] = {
             "barometer": ros.read_barometer,
         },
         ros.files_of,
+        parts=True,
     ),
     "novatel": Reader(
         novatel.TITLE,
@@ -371,10 +377,10 @@ def open_stream(path: str | Path, stream: str, form: str | None = None) -> Raw:
     """Read one stream of a recording as it is in the file.
 
     `path`: a file, or the folder of a known recording. `stream`: of `STREAMS`. `form`: a key of
-    `READERS`; detected if not given. Returns the stream, or the columns of a table, whose names
-    decide. ConfigError: the file does not exist, or the format is unknown. NoStreamError: the
-    format is known and holds other streams. DataError: the format is not recognized, or the file
-    is damaged.
+    `READERS`, with the part behind a colon if there are several; detected if not given. Returns the
+    stream, or the columns of a table, whose names decide. ConfigError: the file does not exist, or
+    the format is unknown. NoStreamError: the format is known and holds other streams. DataError:
+    the format is not recognized, or the file is damaged.
     """
     path = Path(path)
     if not path.exists():
@@ -382,19 +388,23 @@ def open_stream(path: str | Path, stream: str, form: str | None = None) -> Raw:
         raise ConfigError(code, file=str(path))
     if path.is_file() and path.stat().st_size == 0:
         raise DataError("io.file-empty", file=path.name)
+    part = ""
     if form is None:
         form, reader = next(readers_of(path), ("", None))
     else:
+        form, _, part = form.partition(":")
         reader = READERS.get(form) or plugin("reader", form, Reader)
         if reader is None:
             check_choice("io.unknown-format-of-log", READERS, quantity="format", form=form)
+        elif part and not reader.parts:
+            raise ConfigError("io.format-without-parts", quantity="format", form=form, part=part)
     if reader is None:
         raise _not_recognized(path)
     for key in (stream, TABLE):
         if key in reader.streams:
             _log.info("%s: read as %s (%s)", path.name, form, reader.title)
             try:
-                raw = reader.streams[key](path)
+                raw = reader.streams[key](path, *([part or None] if reader.parts else []))
                 if isinstance(raw, RawLog) and reader.files is not None:
                     raw.files = reader.files(path) or raw.files
                 return raw

@@ -173,6 +173,8 @@ def _without_header(lines: list[str], file: str, findings: list[Finding]) -> _La
     dated = len(fields) > 1 and "/" in fields[0] and ":" in fields[1]
     weeks = len(fields) > 1 and fields[0].isdecimal() and "." in fields[1]
     rest = fields[2:] if dated or weeks else []
+    if any(_HEAD.match(line.strip()) for line in lines[:row]):
+        rest = []  # a header that names other columns
     if len(rest) in (_PLAIN, _PLAIN + len(_VELOCITY)) and re.fullmatch(r"[0-7]", rest[3]):
         xyz = np.array([float(f) if _FLOAT.fullmatch(f) else np.nan for f in rest[:3]])
         decimals = [len(f.partition(".")[2]) for f in rest[:2]]

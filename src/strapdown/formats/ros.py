@@ -12,6 +12,7 @@ headers, in ns. The reference is INSPVAX or INSPVA of novatel_oem7_msgs.
 from __future__ import annotations
 
 import heapq
+import shlex
 import shutil
 import sqlite3
 import tempfile
@@ -24,7 +25,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import DataError, Finding, check_choice
 from strapdown.formats.binary import Quantities, damage, first_bytes, solution
 from strapdown.formats.clocks import RELATIVE, UNIX, Clock
 from strapdown.formats.file_options import FileOptions
@@ -107,8 +108,15 @@ def _read(
     samples: dict[str, list[Any]] = {"time": [], "record": []}
     with _opened(path) as bag:
         found = [c for c in bag.connections if c.msgcount > 0]
-        topic = topic or _topic(path, stream, found, kinds, findings)
-        chosen = [c for c in found if c.topic == topic]
+        chosen = [c for c in found if c.topic == topic and c.msgtype in kinds]
+        if not chosen:
+            there = sorted({c.topic for c in found if c.msgtype in kinds})
+            if topic is not None and there:
+                check_choice(
+                    "io.unknown-topic", there, file=path.name, quantity="format", topic=topic
+                )
+            topic = _topic(path, stream, found, kinds, findings)
+            chosen = [c for c in found if c.topic == topic]
         for one, record, data in bag.messages(connections=chosen):
             message = bag.deserialize(data, one.msgtype)
             stamp = message.header.stamp
@@ -139,8 +147,18 @@ def _topic(
     raw = [t for t in left if "raw" in t.lower().rpartition("/")[2]]
     picked = next((some for some in (topics, left, raw) if len(some) == 1), None)
     if picked is None:
+        # The driver's own topic has at least as many messages as one that is made from it.
+        count = {t: sum(c.msgcount for c in found if c.topic == t) for t in topics}
+        most = max(topics, key=lambda topic: count[topic])
+        flag = "--gnss-format" if stream == "gnss" else "--format"
         raise DataError(
-            "io.ros-topics-of-one-kind", file=path.name, kind=kind, topics=topics, first=topics[0]
+            "io.ros-topics-of-one-kind",
+            file=path.name,
+            kind=kind,
+            topics=topics,
+            first=most,
+            flags=f"{flag} {shlex.quote(f'ros:{most}')}",
+            keys=f'format = "ros:{most}"',
         )
     if len(topics) > 1:
         note = {"topic": picked[0], "others": [t for t in topics if t != picked[0]]}
@@ -158,7 +176,7 @@ def _vector(prefix: str, v: Any) -> dict[str, float]:
     return {f"{prefix}_x": v.x, f"{prefix}_y": v.y, f"{prefix}_z": v.z}
 
 
-def read(path: Path) -> RawLog:
+def read(path: Path, topic: str | None = None) -> RawLog:
     """Read rates and specific force of the topic of type Imu; its orientation is not used."""
 
     def take(m: Any) -> dict[str, Any]:
@@ -166,7 +184,7 @@ def read(path: Path) -> RawLog:
         values["gyro_none"] = m.angular_velocity_covariance[0] == -1.0
         return values | {"accel_none": m.linear_acceleration_covariance[0] == -1.0}
 
-    columns, findings, clock = _read(path, "imu", IMU, take)
+    columns, findings, clock = _read(path, "imu", IMU, take, topic)
     out: Quantities = {"time": (columns["time"], "ns")}
     for triad, unit in (("gyro", "rad/s"), ("accel", "m/s2")):
         part = {f"{triad}_{a}": (columns[f"{triad}_{a}"], unit) for a in "xyz"}
@@ -186,7 +204,7 @@ def read(path: Path) -> RawLog:
     return _log(path, out, clock, findings)
 
 
-def read_fixes(path: Path) -> RawLog:
+def read_fixes(path: Path, topic: str | None = None) -> RawLog:
     """Read the topic of type NavSatFix, with the velocity of the same device if there is one."""
 
     def take(m: Any) -> dict[str, Any]:
@@ -195,7 +213,7 @@ def read_fixes(path: Path) -> RawLog:
         values = {"lat": m.latitude, "lon": m.longitude, "alt": m.altitude, "variance": variance}
         return values | {"status": m.status.status, "frame": m.header.frame_id}
 
-    columns, findings, clock = _read(path, "gnss", FIX, take)
+    columns, findings, clock = _read(path, "gnss", FIX, take, topic)
     units = {"time": "ns", "lat": "deg", "lon": "deg", "alt": "m"}
     out: Quantities = {q: (columns[q], u) for q, u in units.items()}
     quality = [QUALITY.get(int(s), 0) for s in columns["status"]]
@@ -238,7 +256,7 @@ def _velocity(path: Path, fixes: Columns, findings: list[Finding]) -> dict[str, 
     return {}
 
 
-def read_reference(path: Path) -> pd.DataFrame:
+def read_reference(path: Path, topic: str | None = None) -> pd.DataFrame:
     """Read the solution of a SPAN system: roll, pitch and azimuth are those of its vehicle."""
 
     def take(m: Any) -> dict[str, Any]:
@@ -249,26 +267,26 @@ def read_reference(path: Path) -> pd.DataFrame:
         values = [*place, *velocity, m.roll, m.pitch, m.azimuth]
         return {"values": values if status.status in SOLVED else [np.nan] * 9}
 
-    columns, findings, clock = _read(path, "reference", SOLUTIONS, take)
+    columns, findings, clock = _read(path, "reference", SOLUTIONS, take, topic)
     values, time = columns["values"], columns["time"] * 1e-9
     parts = (time, values[:, :3], values[:, 3:6], values[:, 6:])
     return solution(path, parts, Clock(clock), findings)
 
 
-def read_magnetometer(path: Path) -> RawLog:
+def read_magnetometer(path: Path, topic: str | None = None) -> RawLog:
     """Read the topic of type MagneticField."""
     columns, findings, clock = _read(
-        path, "magnetometer", FIELD, lambda m: _vector("mag", m.magnetic_field)
+        path, "magnetometer", FIELD, lambda m: _vector("mag", m.magnetic_field), topic
     )
     units = {"time": "ns"} | {f"mag_{a}": "T" for a in "xyz"}
     out: Quantities = {q: (columns[q], u) for q, u in units.items()}
     return _log(path, out, clock, findings)
 
 
-def read_barometer(path: Path) -> RawLog:
+def read_barometer(path: Path, topic: str | None = None) -> RawLog:
     """Read the topic of type FluidPressure."""
     columns, findings, clock = _read(
-        path, "barometer", PRESSURE, lambda m: {"pressure": m.fluid_pressure}
+        path, "barometer", PRESSURE, lambda m: {"pressure": m.fluid_pressure}, topic
     )
     out: Quantities = {"time": (columns["time"], "ns"), "pressure": (columns["pressure"], "Pa")}
     return _log(path, out, clock, findings)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown import frames, rotation
 from strapdown.errors import DataError
@@ -201,3 +202,42 @@ def test_a_file_of_one_line_that_is_cut(tmp_path):
         check=lambda refused: refused.finding.code == "io.only-line-under-header-cut",
     ):
         read_gnss(path)
+
+
+def bare(folder, rows):
+    path = folder / "bare.pos"
+    path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("more", ["", MORE])
+@pytest.mark.parametrize("when", [DAY, f"{WEEK} {SOW:.3f}"])
+def test_without_a_header_the_columns_are_those_of_rtklib(tmp_path, more, when):
+    velocity = "   1.50000   -2.50000    0.50000 0.1 0.2 0.3 0.0 0.0 0.0" if more else ""
+    whole = read_gnss(pos(tmp_path, [row(when, more=velocity)], header=LEVEL + more))
+    table = read_gnss(bare(tmp_path, [row(when, more=velocity)]))
+    assert np.array_equal(table.to_numpy(), whole.to_numpy())
+    assert table.index[0] == whole.index[0]
+    assert table.attrs["clock"] == whole.attrs["clock"]
+    assert "io.pos-without-header" in [f.code for f in table.attrs["findings"]]
+
+
+def test_without_a_header_positions_of_the_earth(tmp_path):
+    place = " -3962108.6730   3381309.5740   3668678.6370"
+    table = read_gnss(bare(tmp_path, [row(place=place)]))
+    assert abs(table["lat"].iloc[0] - 35.34) < 0.01 and abs(table["lon"].iloc[0] - 139.52) < 0.01
+
+
+@pytest.mark.parametrize(
+    ("rows", "code"),
+    [
+        # Four decimals are meters: a baseline.
+        ([row(place="  10.1234  20.2345  1.3456")], "io.no-line-names-columns-gpst"),
+        (["# stations", " 34.949756936  139.069904560   411.2090   0841"], "io.list-of-stations"),
+        (["one two three"], "io.no-line-names-columns-gpst"),
+        ([], "io.no-line-names-columns-gpst"),
+    ],
+)  # fmt: skip
+def test_without_a_header_nothing_else_is_read(tmp_path, rows, code):
+    with pytest.raises(DataError, check=coded(code)):
+        read_gnss(bare(tmp_path, rows))

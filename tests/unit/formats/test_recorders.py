@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 from tests.coded import coded
 
-from strapdown.errors import DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats import (
     READERS,
     NoStreamError,
+    ReadOptions,
     dataflash,
     novatel,
     open_stream,
@@ -370,6 +371,21 @@ def test_ros_several_topics_are_refused_unless_one_is_raw(tmp_path):
     )
     assert raw.columns["accel_z"][0] == G
     assert raw.findings[0].data["topic"] == "/imu/data_raw"
+
+
+def test_ros_the_topic_that_the_user_names(tmp_path, run_cli):
+    fast = samples()
+    slow = fast[::2]
+    path = bag(tmp_path / "two.bag", 1, [("/a/imu", IMU, slow), ("/b/imu", IMU, fast)])
+    assert len(read_log(path, ReadOptions(format="ros:/a/imu")).imu) == len(slow)
+    with pytest.raises(ConfigError, check=coded("io.unknown-topic")):
+        read_log(path, ReadOptions(format="ros:/c/imu"))
+    refused = run_cli("attitude", path, "--out", tmp_path / "out")
+    # That with the most messages is proposed.
+    assert refused.code == 3 and refused.err.rstrip().endswith("--format ros:/b/imu")
+    csv = written(tmp_path / "log.csv", b"time,gyro_x\n0,1\n")
+    with pytest.raises(ConfigError, check=coded("io.format-without-parts")):
+        read_log(csv, ReadOptions(format="csv:part"))
 
 
 def test_ros_what_is_not_measured_is_not_read(tmp_path):
@@ -729,7 +745,8 @@ def test_ubx_sensors_in_ms_of_the_receiver(tmp_path):
     assert (raw.axes, raw.clock) == (None, "gps-seconds-of-week")
     assert "io.ubx-clock-by-order" in [f.code for f in raw.findings]
     # The fix at 136 154 s follows the sample with the tag 5900, each further one a second later.
-    assert read_log(path).imu.index[0] == pytest.approx(136_154.0 - 0.9, abs=1e-9)
+    # The second sample of the gyro is the first between two of the accelerometer.
+    assert read_log(path).imu.index[0] == pytest.approx(136_154.0 - 0.8, abs=1e-9)
     alone = written(
         tmp_path / "alone.ubx", b"".join(esf_meas(k, [(14, 0), (13, 0), (5, 9)]) for k in range(9))
     )
