@@ -13,7 +13,15 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.formats.arrays import numbers, ticks_of
-from strapdown.formats.clocks import RELATIVE, Clock, Stamps, clock_of_name, read_stamps, with_clock
+from strapdown.formats.clocks import (
+    RELATIVE,
+    Clock,
+    Stamps,
+    clock_of_name,
+    counted,
+    read_stamps,
+    with_clock,
+)
 from strapdown.formats.columns import EULERS, QUATERNIONS, parse_axes
 from strapdown.formats.find_columns import AXES, Column, find_columns, require_gyro
 from strapdown.formats.inference import Inference
@@ -306,8 +314,30 @@ def stamps_of_log(
     if ticks is None:
         if rate is None:
             raise DataError("io.time-column-missing", file=raw.name, quantity="time")
-        everything = np.ones(rows.size, dtype=bool)
         why = f"no time column: {rate:g} Hz as stated"
+        if numbered := counted(raw.columns):
+            name, count = numbered
+            findings.append(
+                Finding(
+                    "io.time-from-counter",
+                    file=raw.name,
+                    quantity="time",
+                    severity="note",
+                    source=name,
+                    rate=rate,
+                    lost=int(count[-1]) + 1 - count.size,
+                )
+            )
+            said_by = f"samples as numbered by {name!r}, {rate:g} Hz as stated"
+            return read_stamps(
+                count[rows] / rate,
+                "s",
+                said_by,
+                file=raw.name,
+                row=lambda k: raw.row(int(rows[k])),
+                repair=options.repair,
+            )
+        everything = np.ones(rows.size, dtype=bool)
         return Stamps(rows / rate, "s", why, everything, Origin(0, "s"), [])
     column = found["time"]
     if options.rate is not None:
@@ -323,7 +353,7 @@ def stamps_of_log(
         )
     unit, why = column.unit, "in its name"
     if dated:
-        unit, why = "ns", "dates and times of ISO 8601"
+        unit, why = "ns", "dates or times of day"
     elif options.time_unit:
         unit, why = parse_unit(options.time_unit, "time"), "stated by --time-unit"
     elif column.why == "stated by the file":

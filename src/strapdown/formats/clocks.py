@@ -17,7 +17,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -38,6 +38,7 @@ __all__ = [
     "Clock",
     "clock_of",
     "clock_of_name",
+    "counted",
     "gps_from_unix",
     "leap_seconds",
     "on_clock_of",
@@ -156,10 +157,12 @@ def clock_of_name(name: str, first: float, *, dated: bool = False) -> str:
     """Infer the clock from a column's name and its first stamp.
 
     `name`: as ``gps_sow_s``, ``unix_time_ms``, ``t``. `first` (s): its first stamp. `dated`:
-    whether the stamps are dates. Returns `GPS`, `UNIX` or `RELATIVE`.
+    whether the stamps are dates, or times of day. Returns `GPS`, `UNIX` or `RELATIVE`.
     """
     words = set(re.split(r"[^a-z]+", name.lower()))
-    if dated or words & _WORDS[UNIX]:
+    if dated:
+        return UNIX if first > _MODERN else RELATIVE
+    if words & _WORDS[UNIX]:
         return UNIX
     if words & _WORDS[GPS] and 0.0 <= first <= WEEK + 1.0:
         return GPS
@@ -260,6 +263,39 @@ def on_clock_of(
         severity="note",
         shift=shift,
     )
+
+
+# Samples that are numbered.
+
+
+#: Names of columns that number samples, without signs and blanks, in small letters.
+_COUNTERS = {
+    *("packetcounter", "packet", "packets", "counter", "count", "sample", "samples", "index"),
+    *("idx", "seq", "sequence", "headerseq", "n", "no", "nr", "#", "frame", "framenumber"),
+    *("loggingsample", "unnamed0", "packetnumber", "samplenumber", "num", ""),
+}
+
+
+def counted(columns: Mapping[str, NDArray[Any]]) -> tuple[str, NDArray[np.int64]] | None:
+    """Return the name of the column that numbers the samples, and the numbers without wraps.
+
+    It holds whole numbers, of which each is most often that before plus one; lost samples are
+    lost numbers. None if there is none.
+    """
+    for name, values in columns.items():
+        word = re.sub(r"[^a-z0-9#]|\(.*", "", name.lower())
+        if word not in _COUNTERS or values.dtype.kind not in "iu" or values.size < 2:
+            continue
+        steps = np.diff(values.astype(np.int64))
+        if 2 * int((steps == 1).sum()) <= steps.size:
+            continue
+        for bits in (8, 16, 24, 31, 32):
+            if values.min() >= 0 and values.max() < 2**bits:
+                # A wrap goes from the end of the range to its beginning.
+                steps = np.where(steps < -(2 ** (bits - 1)), steps + 2**bits, steps)
+                break
+        return name, np.concatenate([[0], np.cumsum(steps)])
+    return None
 
 
 # Time stamps of a log: units, faults and repairs.

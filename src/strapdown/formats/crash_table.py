@@ -28,7 +28,7 @@ from strapdown.formats.crash_record import (
     unique,
 )
 from strapdown.formats.crash_samples import ONE_STEP, Clock, seconds_of
-from strapdown.formats.csv import day_nanoseconds
+from strapdown.formats.dates import day_nanoseconds
 from strapdown.formats.find_columns import Column
 from strapdown.formats.recording import RawLog
 from strapdown.units import FACTORS, OF_CRASHES, find_unit

@@ -1,4 +1,10 @@
-"""Text tables: commas, semicolons, tabs or blanks, with or without a header line."""
+"""Text tables: commas, semicolons, tabs, bars or blanks, with or without names of columns.
+
+A table without any oddity is read at once (`text_columns`), anything else line by line: text above
+and among the rows, quotes, decimal commas, separators that end rows, a last line that was cut.
+Lines of labelled values (``ax: 0.1, ay: 0.2``) and of a serial monitor (``14:22:07.010 -> 1,2``)
+are rows, too.
+"""
 
 from __future__ import annotations
 
@@ -6,9 +12,7 @@ import codecs
 import itertools
 import re
 from collections import Counter
-from collections.abc import Sequence
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -16,40 +20,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
+from strapdown.formats.columns import read_name
+from strapdown.formats.dates import is_date, is_day_time, is_stamp
+from strapdown.formats.preamble import stated_by_keys, stated_rate, stated_units
 from strapdown.formats.recording import RawLog, stated_by
+from strapdown.formats.text_columns import NULLS, Columns, columns_at_once, parsed
 from strapdown.units import unit_of
 
-__all__ = [
-    "NULLS",
-    "Columns",
-    "columns_at_once",
-    "day_nanoseconds",
-    "is_day_time",
-    "parsed",
-    "single_blanks",
-]
-
-
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat")
-COMMENTS = ("#", "%", "//")
-_META = re.compile(r"(?:[#%]|//)\s*(\w+)\s*:\s*(.+?)\s*$")
-# A preamble that states the rate: "Sample Rate:,128,Hz", "// Update Rate: 100.0Hz".
-_RATE = re.compile(
-    r"(?:sampl\w*|update|output|logging|data)[ _-]*(?:rate|freq\w*)"
-    r"\W*(\d+(?:\.\d*)?)(?!\d|\s*[a-gi-z])",
-    re.I,
-)
-_UNIT = re.compile(r"\s*[\[(].*")
+COMMENTS = ("#", "%", "//", "!")
+_MARKS = "#%/;!"
 _SEPARATOR = re.compile(r"sep=.?", re.I)
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?|[+-]?nan|[+-]?inf(inity)?", re.I)
 # Numbers with a decimal comma, separated by blanks.
 _COMMAS = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?(\s+[+-]?\d+(,\d+)?([eE][+-]?\d+)?)+")
-_DATE = re.compile(r"\d{4}-\d\d-\d\d[T ]\d\d:.*")
+_UNIT = re.compile(r"\s*[\[(].*")
 _HEX = re.compile(r"[+-]?0x[0-9a-f]+", re.I)
 # Bytes of a text that are examined to learn how its table begins.
 HEAD = 1 << 16
-# Null bytes and unusual line breaks.
-_ODD = (b"\0", b"\x0b", b"\x0c", b"\x1c", b"\x1d", b"\x1e")
+#: Lines at the top of a text in which its rows of numbers are searched, their characters, and the
+#: fields of each that are judged.
+SEARCHED, SEARCHED_TEXT, JUDGED = 400, 1 << 20, 200
+# Line breaks of Python that are none of an editor.
+_BREAKS = re.compile("[\x0b\x0c\x1c\x1d\x1e\x85\u2028\u2029]|\r(?!\n)")
+Lines = list[tuple[int, str]]
 
 
 def detect(path: Path) -> bool:
@@ -58,13 +52,15 @@ def detect(path: Path) -> bool:
         return path.is_file()
     with path.open("rb") as stream:
         head = stream.read(HEAD)
-    if b"\0" in head or not head.strip():
+    if not head.strip():
         return False
-    numbered, _ = _numbered(head[: head.rfind(b"\n") + 1].decode("utf-8", "replace"))
-    rows = [fields_of(line, separator_of(line)) for _, line in numbered[-20:]]
-    return len(rows) > 2 and all(
-        len(row) > 2 and 2 * sum(map(is_data, row)) >= len(row) for row in rows
-    )
+    try:
+        text, _ = decoded(head[: head.rfind(b"\n") + 1] or head, path.name)
+    except DataError:
+        return False
+    lines = _rewritten(_numbered(text)[0])[-21:]
+    rows = [fields_of(line, separator_of(line)) for _, line in lines[:-1] or lines]
+    return len(rows) > 2 and all(len(row) > 2 and are_data(row) for row in rows)
 
 
 def read(path: Path) -> RawLog:
@@ -74,7 +70,7 @@ def read(path: Path) -> RawLog:
     -------
     RawLog
         Columns that hold anything but numbers are left as text. Lines at the top that begin
-        with ``#``, ``%``, ``//`` or ``;`` are comments; the comment ``# sampling: mean`` is
+        with ``#``, ``%``, ``//``, ``!`` or ``;`` are comments; the comment ``# sampling: mean`` is
         understood.
 
     Raises
@@ -82,7 +78,8 @@ def read(path: Path) -> RawLog:
     DataError
         The file is empty, holds only a header, or is not text.
     """
-    return parse(path.read_bytes(), path.name, (path,))
+    files = (path,)
+    return _at_once(path, path.name, files) or _line_by_line(path.read_bytes(), path.name, files)
 
 
 def parse(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog:
@@ -93,34 +90,49 @@ def parse(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog:
     return _at_once(data, name, files) or _line_by_line(data, name, files)
 
 
-def _at_once(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog | None:
-    """Parse a text whose lines are all like the first; ten times faster.
+def _at_once(source: bytes | Path, name: str, files: tuple[Path, ...]) -> RawLog | None:
+    """Read a text whose rows are all like the first; ten times faster.
 
     None if anything is irregular: the lines then have to be parsed one by one.
     """
-    if not data.endswith(b"\n") or not data.isascii() or any(c in data for c in _ODD):
+    head, tail, size = _ends(source)
+    try:
+        text = head[: head.rfind(b"\n") + 1].decode("utf-8-sig")
+    except UnicodeDecodeError:
         return None
-    head = data[:HEAD].decode()
-    numbered, comments = _numbered(head[: head.rfind("\n") + 1])
-    if not numbered:
+    if not text or "\0" in text or _BREAKS.search(text):
         return None
-    top = _top(numbered, comments)
+    numbered, comments = _numbered(text)
+    if not numbered or _rewritten(numbered) is not numbered:
+        return None
+    top = _Top(numbered, comments)
     if not top.data:
         return None
     first, _ = top.data[0]
     start = 0
     for _ in range(first - 1):
-        start = data.index(b"\n", start) + 1
-    # Quotes are regular only in the names of columns.
-    if data.find(b'"', start) >= 0:
-        return None
-    columns = columns_at_once(data, len(top.names), top.separator, start)
-    if columns is None:
-        return None
+        start = head.index(b"\n", start) + 1
+    if not tail.endswith(b"\n"):
+        before, _, last = tail.decode("latin-1").rpartition("\n")
+        rows = [*enumerate(before.split("\n"))][-20:]
+        if size <= HEAD or _was_cut(last, rows, top, ended=False):
+            return None
+    columns = columns_at_once(source, len(top.names), top.separator, start)
     # A line of text between rows makes text of every column.
-    if all(c.dtype.kind == "O" for c in columns):
+    if columns is None or all(c.dtype.kind == "O" for c in columns):
         return None
-    return _log(name, files, top, columns, np.arange(first, first + columns[0].size), [])
+    return top.log(name, files, columns, np.arange(first, first + columns[0].size), [])
+
+
+def _ends(source: bytes | Path) -> tuple[bytes, bytes, int]:
+    """Return the beginning and the end of a text, and its size."""
+    if isinstance(source, bytes):
+        return source[:HEAD], source[-HEAD:], len(source)
+    with source.open("rb") as stream:
+        head = stream.read(HEAD)
+        size = stream.seek(0, 2)
+        stream.seek(max(0, size - HEAD))
+        return head, stream.read(), size
 
 
 def _line_by_line(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog:
@@ -128,63 +140,161 @@ def _line_by_line(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog:
     numbered, comments = _numbered(text)
     if not numbered:
         raise DataError("io.file-holds-comments-alone" if comments else "io.file-empty", file=name)
-    top = _top(numbered, comments)
+    top = _Top(_rewritten(numbered), comments)
     if not top.data:
         raise DataError("io.csv-without-rows", file=name, row=numbered[0][0])
-    rows, lines = _whole_lines(top.data, len(top.names), top.separator, text, name, findings)
+    ended = text.endswith(("\n", "\r"))
+    rows, lines = _whole_lines(top, ended, name, findings)
     columns = _parse(lines, len(top.names), top.separator, name)
-    return _log(name, files, top, columns, np.array(rows), findings)
+    return top.log(name, files, columns, np.array(rows), findings)
 
 
-@dataclass(frozen=True)
-class _Top:
-    """Top of a table, and the lines under it."""
-
-    names: list[str]
-    units: dict[str, str]
-    separator: str | None
-    data: list[tuple[int, str]]
-    above: list[str]
-
-
-def _numbered(text: str) -> tuple[list[tuple[int, str]], list[str]]:
+def _numbered(text: str) -> tuple[Lines, list[str]]:
     """Split into non-blank lines with their row numbers, and the comments at the top."""
     numbered = [(row, line) for row, line in enumerate(text.splitlines(), 1) if line.strip()]
     comments = [line for _, line in itertools.takewhile(lambda n: is_comment(n[1]), numbered)]
     return numbered[len(comments) :], comments
 
 
-def _top(numbered: list[tuple[int, str]], comments: list[str]) -> _Top:
-    """Find where the rows of numbers begin, and their names and units above them.
+# Lines that are rows in another form.
+
+
+#: What the serial monitor of a development environment puts before a line: the time of its arrival.
+_ARRIVAL = re.compile(r"(\d\d:\d\d:\d\d\.\d+) -> ?")
+# "ax: 0.12 g," or "ax = 0.12": a name, its value, and its unit where a sign ends the field.
+_LABELLED = re.compile(
+    r"\s*([A-Za-z_][\w ./()\[\]-]*?)\s*[:=]\s*([^\s,;|=]+)"
+    r"(?:[ \t]*([^\s\d,;|:=][^\s,;|:=]*)(?=[ \t]*[,;|]|$))?[ \t]*[,;|]?"
+)
+#: Fewest labelled values of a line that is taken for a row.
+LABELS = 3
+
+
+def _rewritten(numbered: Lines) -> Lines:
+    """Return lines of labelled values, or with the time of arrival before them, as rows.
+
+    The same object if there are none.
+    """
+    top = numbered[:SEARCHED]
+    stamped = sum(_ARRIVAL.match(line) is not None for _, line in top)
+    if 2 * stamped > len(top):
+        stamps = [_ARRIVAL.match(line) for _, line in numbered]
+        bare = [
+            (row, line[m.end() :] if m else line)
+            for m, (row, line) in zip(stamps, numbered, strict=True)
+        ]
+        rows = _unlabelled(bare)
+        by_row = {row: m[1] for m, (row, _) in zip(stamps, numbered, strict=True) if m}
+        return [(row, _with_arrival(line, by_row.get(row))) for row, line in rows if line.strip()]
+    return _unlabelled(numbered)
+
+
+def _with_arrival(line: str, stamp: str | None) -> str:
+    """Put the time of arrival into the first field; it is a clock where there is no other."""
+    separator = separator_of(line)
+    fields = fields_of(line, separator)
+    if not are_data(fields):
+        other = any(read_name(name).quantity == "time" for name in fields)
+        stamp = "arrival" if other else "time"
+    return line if stamp is None else f"{stamp}{separator or ' '}{line.lstrip()}"
+
+
+def _unlabelled(numbered: Lines) -> Lines:
+    """Return lines of labelled values as rows under their labels."""
+    usual = Counter(
+        names for _, line in numbered[:SEARCHED] if (names := _labels(line)[0])
+    ).most_common(1)
+    if not usual or 2 * usual[0][1] <= len(numbered[:SEARCHED]):
+        return numbered
+    names, first = usual[0][0], True
+    out: Lines = []
+    for row, line in numbered:
+        said, values = _labels(line)
+        if said and said == names[: len(said)]:
+            if first:
+                out.append((row, "\t".join(names)))
+                first = False
+            line = "\t".join(values)
+        out.append((row, line))
+    return out
+
+
+def _labels(line: str) -> tuple[tuple[str, ...], list[str]]:
+    """Return labels with units, and values, of a line that has little else; or empty."""
+    found = _LABELLED.findall(line) if len(line) < HEAD else []
+    if len(found) < LABELS or _LABELLED.sub("", line).strip():
+        return (), []
+    names = tuple(f"{name} [{unit}]" if unit else name for name, _, unit in found)
+    return names, [value for _, value, _ in found]
+
+
+# The top of a table: where rows of numbers begin, and what the lines above them say.
+
+
+class _Top:
+    """Names, units and separator of a table, and the lines from its first row on.
 
     Lines above the names are a preamble. Two lines of names are a group and its members, as
     ``Gyroscope,,`` over ``x,y,z``.
+
+    Parameters
+    ----------
+    numbered : list of (int, str)
+        Lines with their rows, without the comments at the top.
+    comments : list of str
     """
-    first, separator, width = _first_row(numbered)
-    preamble = [line for _, line in numbered[:first]]
-    above = [_named(line, separator, width) for line in preamble[-3:]][::-1]
-    units: dict[str, str] = {}
-    names = above[0] if above else None
-    if names is None:
-        names = _above(comments + preamble, width, separator)
-        return _Top(names, units, separator, numbered[first:], comments + preamble)
-    over = above[1] if len(above) > 1 else None
-    below = _units(preamble[-1], separator, width)
-    if below and over is not None:
-        names, over = over, above[2] if len(above) > 2 else None
-        units = {n: u for n, u in zip(_unique(names), below, strict=True) if u}
-    bare = [_UNIT.sub("", n) for n in names if n]
-    if over is not None and len(set(bare)) < len(bare) and _are_groups(over):
-        names = [f"{g} {n}".strip() for g, n in zip(_filled(over), names, strict=True)]
-        units = {n: u for n, u in zip(_unique(names), below or [], strict=False) if u}
-    return _Top(names, units, separator, numbered[first:], comments + preamble)
+
+    def __init__(self, numbered: Lines, comments: list[str]) -> None:
+        first, self.separator, width = _first_row(numbered)
+        self.data = numbered[first:]
+        #: Lines above, without those of the names.
+        self.above = comments + [line for _, line in numbered[:first]]
+        self.units: dict[str, str] = {}
+        near = [line for _, line in numbered[max(0, first - 3) : first]][::-1]
+        lines = [_named(line, self.separator, width) for line in near] + [None, None]
+        names, over = lines[:2]
+        if names is None:
+            named = _above(self.above, width, self.separator)
+            if named is not None:
+                self.above.pop()
+            self.names = _unique(named or [f"column {k + 1}" for k in range(width)])
+            return
+        below = _units(near[0], self.separator, width) if over is not None else None
+        if below and over is not None:
+            names, over = over, lines[2]
+        bare = [_UNIT.sub("", n) for n in names if n]
+        grouped = over is not None and len(set(bare)) < len(bare) and _are_groups(over)
+        if grouped and over is not None:
+            names = [f"{g} {n}".strip() for g, n in zip(_filled(over), names, strict=True)]
+        del self.above[len(self.above) - 1 - bool(below) - grouped :]
+        self.names = _unique(names)
+        if below:
+            self.units = {n: u for n, u in zip(self.names, below, strict=True) if u}
+
+    def log(
+        self,
+        name: str,
+        files: tuple[Path, ...],
+        columns: Columns,
+        rows: NDArray[np.int64],
+        findings: list[Finding],
+    ) -> RawLog:
+        """Make the log of these columns, with what the lines above them state."""
+        held = dict(zip(self.names, columns, strict=True))
+        return RawLog(
+            name=name,
+            files=files,
+            columns=one_clock_of_parts(held, self.units),
+            rows=rows,
+            units=self.units,
+            triad_units=stated_units(self.above, held),
+            rate=stated_rate(self.above),
+            findings=findings,
+            **stated_by(stated_by_keys(self.above)),
+        )
 
 
-#: Lines at the top of a text in which its rows of numbers are searched.
-SEARCHED = 400
-
-
-def _first_row(numbered: list[tuple[int, str]]) -> tuple[int, str | None, int]:
+def _first_row(numbered: Lines) -> tuple[int, str | None, int]:
     """Return the first of rows of numbers, their separator, and their number of fields.
 
     They are the most frequent form, and two of the first three have it. Where every line above has
@@ -192,11 +302,14 @@ def _first_row(numbered: list[tuple[int, str]]) -> tuple[int, str | None, int]:
     """
     forms: list[tuple[str | None, int]] = []
     data: list[bool] = []
+    read = 0
     for _, line in numbered[:SEARCHED]:
         separator = separator_of(line)
         fields = fields_of(line, separator)
         forms.append((separator, len(fields)))
-        data.append(_are_data(fields))
+        data.append(are_data(fields))
+        if (read := read + len(line)) > SEARCHED_TEXT and len(forms) > 4:
+            break
     # Numbers in a preamble are fewer than the rows.
     usual = Counter(f for f, d in zip(forms, data, strict=True) if d).most_common(1)
     like = [bool(usual) and d and f == usual[0][0] for f, d in zip(forms, data, strict=True)]
@@ -220,31 +333,29 @@ def _first_row(numbered: list[tuple[int, str]]) -> tuple[int, str | None, int]:
     return 1, separator, len(names) - (len(names) > 1 and not names[-1])
 
 
-def _are_data(fields: list[str]) -> bool:
-    """Whether half of the fields that are there are data."""
-    full = [f for f in fields if f]
+def are_data(fields: list[str]) -> bool:
+    """Whether half of the fields that are there are data; of many fields, the first."""
+    full = [f for f in fields if f][:JUDGED]
     return bool(full) and 2 * sum(map(is_data, full)) >= len(full)
 
 
-def _ends_empty(numbered: list[tuple[int, str]], form: tuple[str | None, int], first: int) -> bool:
+def _ends_empty(numbered: Lines, form: tuple[str | None, int], first: int) -> bool:
     """Whether every row ends with a separator, and the names have no field for it."""
     separator, width = form
     above = fields_of(numbered[first - 1][1], separator) if first else []
     if len(above) == width and above[-1]:
         return False
-    rows = [fields_of(line, separator) for _, line in numbered[first:SEARCHED]]
+    rows = [fields_of(line, separator) for _, line in numbered[first : first + 50]]
     return all(len(row) != width or not row[-1] for row in rows)
 
 
 def _named(line: str, separator: str | None, width: int) -> list[str] | None:
     """Return the fields of a line that may name columns, or None."""
-    fields = fields_of(line.strip().lstrip("#%/;").strip() if is_comment(line) else line, separator)
+    bare = line.strip().lstrip(_MARKS).strip() if is_comment(line) else line
+    fields = fields_of(bare, separator)
     if len(fields) == width + 1 and not fields[-1]:
         fields = fields[:-1]
-    full = [f for f in fields if f]
-    if len(fields) != width or not full or 2 * sum(is_data(f) for f in full) > len(full):
-        return None
-    return fields
+    return fields if len(fields) == width and any(fields) and not are_data(fields) else None
 
 
 def _are_groups(fields: list[str]) -> bool:
@@ -261,36 +372,82 @@ def _filled(fields: list[str]) -> list[str]:
     return out
 
 
-def _log(
-    name: str,
-    files: tuple[Path, ...],
-    top: _Top,
-    columns: Columns,
-    rows: NDArray[np.int64],
-    findings: list[Finding],
-) -> RawLog:
-    meta = {m[1]: m[2] for c in top.above if (m := _META.match(c))}
-    rates = [float(m[1]) for line in top.above if (m := _RATE.search(line))]
-    return RawLog(
-        name=name,
-        files=files,
-        columns=dict(zip(_unique(top.names), columns, strict=True)),
-        rows=rows,
-        units=top.units,
-        rate=rates[0] if rates and rates[0] > 0.0 else None,
-        findings=findings,
-        **stated_by(meta),
-    )
+def _units(line: str, separator: str | None, width: int) -> list[str] | None:
+    """Return the units of a second header line, if most fields are units known here."""
+    fields = [f.strip("[]() ") for f in fields_of(line, separator)][:width]
+    known = [unit_of(f) is not None for f in fields if f]
+    return fields if len(fields) == width and known and 2 * sum(known) > len(known) else None
+
+
+def _above(comments: list[str], width: int, separator: str | None) -> list[str] | None:
+    """Return the names that the last comment gives to columns without a header, or None."""
+    names = _named(comments[-1], separator, width) if comments else None
+    if comments and names is None and separator is None:
+        # Names over columns of blanks may be separated otherwise: "% time, x, y".
+        names = _named(comments[-1], separator_of(comments[-1].strip().lstrip(_MARKS)), width)
+    return None if names is None or any(is_data(n) for n in names) else names
+
+
+def _unique(names: list[str]) -> list[str]:
+    seen: dict[str, int] = {}
+    out = []
+    for name in names:
+        seen[name] = seen.get(name, 0) + 1
+        out.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
+    return out
+
+
+#: Ends of names of a stamp's two numbers, as ROS writes them.
+_PARTS = ((".secs", ".nsecs"), (".sec", ".nanosec"), ("/secs", "/nsecs"), ("/sec", "/nanosec"))
+
+
+def one_clock_of_parts(
+    columns: dict[str, NDArray[Any]], units: dict[str, str]
+) -> dict[str, NDArray[Any]]:
+    """Join a date and a time of day, and seconds and nanoseconds, that are two columns.
+
+    `units`: the unit of the joined column is added.
+    """
+    out = dict(columns)
+    for whole, part in _PARTS:
+        for name in [n for n in columns if n.endswith(whole)]:
+            other = name.removesuffix(whole) + part
+            if other in columns and all(columns[n].dtype.kind in "iu" for n in (name, other)):
+                out.pop(other)
+                held = columns[name].astype(np.int64) * 10**9 + columns[other]
+                one = name.removesuffix(whole)
+                out = {one if n == name else n: held if n == name else c for n, c in out.items()}
+                units[one] = "ns"
+    dates = [n for n, c in columns.items() if c.dtype.kind == "O" and is_date(c[0])]
+    times = [n for n, c in columns.items() if c.dtype.kind == "O" and is_day_time(c[0])]
+    if len(dates) == len(times) == 1 and "date" in dates[0].lower():
+        days = out.pop(dates[0])
+        out[times[0]] = np.array(
+            [
+                None if None in both else " ".join(both)
+                for both in zip(days, out[times[0]], strict=True)
+            ],
+            dtype=object,
+        )
+    return out
+
+
+# Lines, fields and numbers.
 
 
 def decoded(data: bytes, name: str) -> tuple[str, list[Finding]]:
     """Decode the text of a file and collect findings.
 
+    UTF-16 is known by its mark, or by null bytes at every second byte of a text in ASCII.
     DataError: the content is not text.
     """
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
         return data.decode("utf-16", "replace"), []
-    if b"\0" in data[:4096]:
+    top = data[:4096]
+    if b"\0" in top:
+        for first, code in ((1, "utf-16-le"), (0, "utf-16-be")):
+            if len(top) > 20 and not any(top[first::2]) and b"\0" not in top[1 - first :: 2]:
+                return data.decode(code, "replace"), []
         raise DataError("io.text-with-zero-bytes", file=name)
     try:
         return data.decode("utf-8-sig"), []
@@ -313,71 +470,46 @@ def is_comment(line: str) -> bool:
 
 def is_data(field: str) -> bool:
     """Whether a field is a number, a date, a time of day, or missing; not a name."""
-    if field in NULLS or is_day_time(field):
-        return True
-    return any(p.fullmatch(field) for p in (_NUMBER, _DATE, _HEX))
-
-
-def _units(line: str, separator: str | None, width: int) -> list[str] | None:
-    """Return the units of a second header line, if most fields are units known here."""
-    fields = [f.strip("[]() ") for f in fields_of(line, separator)][:width]
-    known = [unit_of(f) is not None for f in fields if f]
-    return fields if len(fields) == width and known and 2 * sum(known) > len(known) else None
-
-
-def _above(comments: list[str], width: int, separator: str | None) -> list[str]:
-    """Name the columns without a header: by the last comment if it fits, else by numbers."""
-    names = _named(comments[-1], separator, width) if comments else None
-    if comments and names is None and separator is None:
-        # Names over columns of blanks may be separated otherwise: "% time, x, y".
-        names = _named(comments[-1], separator_of(comments[-1].strip().lstrip("#%/;")), width)
-    if names is None or any(is_data(n) for n in names):
-        return [f"column {k + 1}" for k in range(width)]
-    return names
-
-
-def _unique(names: list[str]) -> list[str]:
-    seen: dict[str, int] = {}
-    out = []
-    for name in names:
-        seen[name] = seen.get(name, 0) + 1
-        out.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
-    return out
+    if len(field) > 64:
+        return False
+    return field in NULLS or any(p.fullmatch(field) for p in (_NUMBER, _HEX)) or is_stamp(field)
 
 
 def separator_of(line: str) -> str | None:
     """Return the separator of a line; None for any run of blanks."""
-    for candidate in ("\t", ";", ","):
+    for candidate in ("\t", ";"):
         if candidate in line:
-            return None if candidate == "," and _COMMAS.fullmatch(line.strip()) else candidate
-    return None
+            return candidate
+    # Between bars, a name may hold a comma; between commas, bars mean a norm.
+    if line.count("|") > max(1, line.count(",") - 1):
+        return "|"
+    return None if "," not in line or _COMMAS.fullmatch(line.strip()) else ","
 
 
 def fields_of(line: str, separator: str | None) -> list[str]:
-    """Split a line into fields, without the blanks and quotes around them."""
+    """Split a line into fields, without the blanks and quotes around them.
+
+    Quotes that do not close are text.
+    """
     if separator is not None and '"' in line:
         import csv
 
-        return [f.strip() for f in next(csv.reader([line], delimiter=separator))]
+        with suppress(csv.Error):  # of a quote that does not close, or a field too long
+            return [f.strip() for f in next(csv.reader([line], delimiter=separator))]
     return [f.strip() for f in line.split(separator)]
 
 
 def _whole_lines(
-    numbered: list[tuple[int, str]],
-    width: int,
-    separator: str | None,
-    text: str,
-    name: str,
-    findings: list[Finding],
+    top: _Top, ended: bool, name: str, findings: list[Finding]
 ) -> tuple[list[int], list[str]]:
     """Return rows and lines of one width; drop a truncated last line."""
+    numbered, width, separator = top.data, len(top.names), top.separator
     rows, lines = [], []
-    amid: list[tuple[int, str]] = []
-    numeric = _are_data(fields_of(numbered[0][1], separator))
-    ended = text.endswith(("\n", "\r"))
+    amid: Lines = []
+    numeric = are_data(fields_of(numbered[0][1], separator))
     for k, (row, line) in enumerate(numbered):
         last = k == len(numbered) - 1
-        if last and k and _was_cut(line, numbered[max(0, k - 20) : k], width, separator, ended):
+        if last and k and _was_cut(line, numbered[max(0, k - 20) : k], top, ended):
             findings.append(
                 Finding("io.last-line-cut-left-out", severity="note", file=name, row=row)
             )
@@ -422,7 +554,7 @@ def _whole_lines(
 KINDS = 8
 
 
-def _refuse_kinds(numbered: list[tuple[int, str]], separator: str | None, name: str) -> None:
+def _refuse_kinds(numbered: Lines, separator: str | None, name: str) -> None:
     """Refuse rows whose first field says of which kind they are, each kind with its own width."""
     widths: dict[str, set[int]] = {}
     rows: Counter[str] = Counter()
@@ -449,10 +581,9 @@ def _count(line: str, separator: str | None) -> int:
     return line.count(separator) + 1
 
 
-def _was_cut(
-    line: str, before: list[tuple[int, str]], width: int, separator: str | None, ended: bool
-) -> bool:
+def _was_cut(line: str, before: Lines, top: _Top, ended: bool) -> bool:
     """Whether the last line ends within a field, or before the last one."""
+    width, separator = len(top.names), top.separator
     fields = fields_of(line, separator)
     if len(fields) < width:
         return True
@@ -512,190 +643,3 @@ def write(path: Path, columns: dict[str, NDArray[Any]], comments: dict[str, str]
             stream,
             pa_csv.WriteOptions(include_header=False),
         )
-
-
-# Fast parsing of text lines into numeric columns.
-
-
-Columns = list[NDArray[Any]]
-#: Texts of missing values.
-NULLS = ("", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "NULL", "null", "None")
-#: From this many bytes on, the first lines decide which columns are numeric.
-LONG = 1 << 22
-
-
-def columns_at_once(
-    data: bytes, count: int, separator: str | None, start: int = 0
-) -> Columns | None:
-    """Parse columns of lines of equal width.
-
-    `data`: ASCII, without quotes from `start` on; the last line ends with a line break. `count`:
-    number of columns. `separator`: separator of fields; None for any run of blanks. `start`:
-    characters before the first of these lines. Returns or None, as `parsed`. None if a line has
-    another width, is empty, or may hold non-numbers.
-    """
-    # A comma may be a decimal sign, and an x part of a hexadecimal number.
-    odd = (b"x", b"X", *(() if separator == "," else (b",",)))
-    if count < 2 or any(data.find(c, start) >= 0 for c in odd):
-        return None
-    if data.find(b"\r", start) >= 0:
-        data, start = data[start:].replace(b"\r\n", b"\n"), 0
-        if b"\r" in data:
-            return None
-    # No copy: a text may take half of the memory.
-    columns = _parsed_or_none(memoryview(data)[start:], count, separator or " ")
-    if columns is not None and all(_full(c) for c in columns):
-        return columns
-    body = data[start:]
-    # A missing value may be two adjacent blanks, or a line without any.
-    if separator is None:
-        body = single_blanks(body)
-        columns = _parsed_or_none(body, count, " ")
-    return None if b"\n\n" in body or body.startswith(b"\n") else columns
-
-
-def _parsed_or_none(body: bytes | memoryview, count: int, delimiter: str) -> Columns | None:
-    import pyarrow as pa
-
-    try:
-        return parsed(body, count, delimiter)
-    except pa.ArrowInvalid:
-        return None
-
-
-def _full(column: NDArray[Any]) -> bool:
-    return column.dtype.kind in "iu" or (
-        column.dtype.kind == "f" and bool(np.isfinite(column.sum()))
-    )
-
-
-def single_blanks(text: bytes) -> bytes:
-    """Reduce runs of blanks to one between fields, with none at the ends of a line.
-
-    `text`: fields separated by blanks and tabs. Returns the same object if unchanged.
-    """
-    text = text.replace(b"\t", b" ")
-    # Four passes reduce runs of up to 300 blanks; longer ones take more passes.
-    for run in (16, 4, 3, 2):
-        text = text.replace(b" " * run, b" ")
-    while b"  " in text:
-        text = text.replace(b"  ", b" ")
-    return text.replace(b"\n ", b"\n").replace(b" \n", b"\n").removeprefix(b" ")
-
-
-def parsed(
-    body: bytes | memoryview,
-    count: int,
-    delimiter: str,
-    *,
-    decimal: str = ".",
-    quote: str | Literal[False] = '"',
-    text: Sequence[int] = (),
-) -> Columns:
-    """Parse lines, each number to the nearest double.
-
-    `body`: UTF-8, without a header. `count`: number of columns. `quote`: quote around fields that
-    hold the delimiter. `text`: columns to keep as text. Returns (n,), numbers with NaN for missing
-    values, dates as dates, the rest as text. pyarrow.ArrowInvalid: a line has the wrong number of
-    fields.
-    """
-    import pyarrow as pa
-
-    def read(part: bytes | memoryview, types: dict[str, Any]) -> Any:
-        return _table(part, types, count, delimiter, decimal, quote)
-
-    asked = {str(k): pa.string() for k in text}
-    table = None
-    if len(body) > LONG:
-        # Where a type is not stated, Arrow keeps all of the text until it is known.
-        with suppress(pa.ArrowInvalid):
-            top = bytes(body[:LONG])
-            seen = read(top[: top.rfind(b"\n") + 1], asked).schema
-            numbers = {f.name: f.type for f in seen if str(f.type) in ("int64", "double")}
-            table = read(body, {**numbers, **asked})
-    if table is None:
-        table = read(body, asked)
-    columns = []
-    # Column by column, so that at most one is in memory twice.
-    for _ in range(count):
-        columns.append(_array(table.column(0)))
-        table = table.remove_column(0)
-    pa.default_memory_pool().release_unused()
-    return columns
-
-
-def _table(
-    body: bytes | memoryview,
-    types: dict[str, Any],
-    count: int,
-    delimiter: str,
-    decimal: str,
-    quote: str | Literal[False],
-) -> Any:
-    import pyarrow as pa
-    import pyarrow.csv as pa_csv
-
-    return pa_csv.read_csv(
-        pa.BufferReader(body),
-        read_options=pa_csv.ReadOptions(
-            column_names=[str(k) for k in range(count)], use_threads=False
-        ),
-        parse_options=pa_csv.ParseOptions(
-            delimiter=delimiter, quote_char=quote, ignore_empty_lines=False
-        ),
-        convert_options=pa_csv.ConvertOptions(
-            decimal_point=decimal,
-            null_values=list(NULLS),
-            strings_can_be_null=True,
-            column_types=types,
-        ),
-    )
-
-
-def _array(column: Any) -> NDArray[Any]:
-    """Convert to numbers with NaN for missing values, to dates, or to text."""
-    kind = str(column.type)
-    if kind in ("int64", "double"):
-        values: NDArray[Any] = column.to_numpy()
-        return values
-    if kind == "null":
-        return np.full(len(column), np.nan)
-    if kind.startswith("timestamp") and not column.null_count:
-        dates: NDArray[Any] = column.cast("timestamp[ns]").to_numpy()
-        return dates
-    return np.array([None if v is None else str(v) for v in column.to_pylist()], dtype=object)
-
-
-_TIME = re.compile(
-    r"(?:\d{1,2}[./-]\d{1,2}[./-]\d{2,4}[ T]+)?(\d{1,2}):([0-5]\d):([0-5]\d)(?:[.,:](\d{1,9}))?"
-)
-_DAY = 86_400 * 10**9
-# A decrease of more than half a day is midnight.
-_HALF_DAY = _DAY // 2
-
-
-def is_day_time(field: str) -> bool:
-    """Whether a field is a time of day, with seconds."""
-    return _TIME.fullmatch(field) is not None
-
-
-def day_nanoseconds(texts: NDArray[Any]) -> NDArray[np.int64] | None:
-    """Convert times of day to nanoseconds since the midnight before the first.
-
-    `texts` ((n,)). Returns (n,), or None, none if one is not a time of day. Counting continues past
-    midnight; dates are ignored.
-    """
-    found = [None if t is None else _TIME.fullmatch(str(t).strip()) for t in texts]
-    if not found or any(m is None or int(m[1]) > 23 for m in found):
-        return None
-    whole = np.array(
-        [
-            (int(m[1]) * 3600 + int(m[2]) * 60 + int(m[3])) * 10**9
-            + int((m[4] or "0").ljust(9, "0"))
-            for m in found
-            if m
-        ],
-        dtype=np.int64,
-    )
-    fell = np.concatenate([[0], np.cumsum(np.diff(whole) < -_HALF_DAY)])
-    return np.asarray(whole + fell * _DAY, dtype=np.int64)

@@ -23,12 +23,12 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import UNIX, Clock
-from strapdown.formats.csv import parsed
 from strapdown.formats.find_columns import Column
 from strapdown.formats.gnss_fixes import RADIUS, UNSTATED_VERTICAL, Fixes
 from strapdown.formats.join import join
 from strapdown.formats.phones import sensor_log
 from strapdown.formats.recording import RawLog
+from strapdown.formats.text_columns import parsed
 
 Array = NDArray[np.float64]
 

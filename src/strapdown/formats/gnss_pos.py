@@ -20,8 +20,8 @@ from strapdown import rotation
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.clocks import GPS, WEEK, Clock, leap_seconds
-from strapdown.formats.csv import columns_at_once
 from strapdown.formats.gnss_fixes import Fixes
+from strapdown.formats.text_columns import columns_at_once
 from strapdown.frames import geodetic_from_ecef, q_ne
 
 __all__ = ["QUALITY", "detect", "read"]

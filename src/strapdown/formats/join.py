@@ -108,6 +108,7 @@ def join(
         rows=rows[keep],
         stated=known_only(stated),
         units={f"{label}/{n}": u for n, u in gyro.units.items()},
+        triad_units={t: u for log in logs for t, u in log.triad_units.items()},
         rate=gyro.rate,
         sampling=gyro.sampling,
         axes=_one_of("axes", logs, name),

@@ -162,6 +162,9 @@ class RawLog:
         For a known recording: column to (quantity, unit); unit None if not stated.
     units : dict of str to str
         Column to unit, if stated apart from the name.
+    triad_units : dict of str to str
+        Unit of ``gyro``, ``accel``, ``mag``, if stated of the sensor and not of a column: as
+        ``deg/s``, or of raw counts as ``deg/s/131``.
     rate : float or None
         Sampling rate in Hz, if stated apart from stamps.
     sampling, axes : str or None
@@ -185,6 +188,7 @@ class RawLog:
     rows: NDArray[np.int64] | None = None
     stated: Mapping[str, tuple[str, str | None]] = field(default_factory=dict)
     units: dict[str, str] = field(default_factory=dict)
+    triad_units: dict[str, str] = field(default_factory=dict)
     rate: float | None = None
     sampling: str | None = None
     axes: str | None = None

@@ -53,7 +53,7 @@ def told_by_numbers(
     `values` ((n, 3)): from `values_of_triads`. `ticks` ((n,)): stamps as in the file. `dated`:
     whether they were dates, now converted to ns. Returns by quantity.
     """
-    if set(values) == {"gyro"} and _stated_unit(found, "gyro", options):
+    if set(values) == {"gyro"} and _stated_unit(raw, found, "gyro", options):
         return {}
     unit = "ns" if dated else None
     if ticks is not None and not dated:
@@ -94,7 +94,7 @@ def units_of_triads(
         if triad == "accel" and _without_gravity(found, said):
             findings.append(_not_used(raw, triad, "io.left-out-linear-acceleration"))
             continue
-        stated = _stated_unit(found, triad, options)
+        stated = _stated_unit(raw, found, triad, options)
         if stated is None or raw.checked or _asked_unit(triad, options):
             asked.add(triad)
         try:
@@ -144,7 +144,7 @@ def _asked_unit(triad: str, options: ReadOptions) -> str | None:
 
 
 def _stated_unit(
-    found: dict[str, Column], triad: str, options: ReadOptions
+    raw: RawLog, found: dict[str, Column], triad: str, options: ReadOptions
 ) -> tuple[str, str] | None:
     asked = _asked_unit(triad, options)
     if asked:
@@ -159,6 +159,8 @@ def _stated_unit(
     if len(units) == 1 and unit is not None and unit in known:
         stated = columns[0].why == "stated by the file"
         return unit, "stated by the file" if stated else "in its name"
+    if units == {None} and triad in raw.triad_units:
+        return parse_unit(raw.triad_units[triad], triad), "stated above the table"
     return None
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from strapdown.formats import csv
-from strapdown.formats.csv import single_blanks
+from strapdown.formats.text_columns import single_blanks
 
 ROWS = [[f"{0.01 * k:.2f}", f"{k / 7:.12f}", f"-{k * 1e-7 / 3!r}", str(k)] for k in range(50)]
 

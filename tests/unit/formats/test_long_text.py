@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 
 from strapdown.formats import csv
-from strapdown.formats.csv import LONG, parsed
+from strapdown.formats.text_columns import BLOCK, parsed
 
 ROW = "{0},{0}.25,{1}\n"
 
 
 def long_text(last: str, first: str = "0.5") -> bytes:
-    rows = LONG // 16
+    rows = BLOCK // 16
     text = "".join(ROW.format(k, first) for k in range(rows))
-    assert len(text) > LONG
+    assert len(text) > BLOCK
     return (text + ROW.format(rows, last)).encode()
 
 

@@ -1,0 +1,253 @@
+"""Lines of a text with equally many fields as columns, by pyarrow: each number the nearest double.
+
+`columns_at_once` reads a regular table block by block, from a file without holding it in memory;
+`parsed` reads lines whose irregularities are known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["NULLS", "Columns", "columns_at_once", "parsed", "single_blanks"]
+
+Columns = list[NDArray[Any]]
+#: Texts of missing values.
+NULLS = ("", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "NULL", "null", "None")
+#: Bytes of a block; the first decides which columns are numeric.
+BLOCK = 1 << 20
+# Null bytes and unusual line breaks, which are regular in no text.
+_ODD = (b"\0", b"\x0b", b"\x0c", b"\x1c", b"\x1d", b"\x1e")
+# Types of numbers; each holds those before it.
+_WIDER = ("null", "int64", "double")
+
+
+def columns_at_once(
+    source: bytes | Path, count: int, separator: str | None, start: int = 0, end: int | None = None
+) -> Columns | None:
+    """Parse columns of lines of equal width.
+
+    Parameters
+    ----------
+    source : bytes or Path
+        A text, or the file that holds it.
+    count : int
+        Number of columns.
+    separator : str or None
+        Separator of fields; None for any run of blanks.
+    start, end : int, bytes
+        Part of the text with these lines; to its end by default.
+
+    Returns
+    -------
+    list of ndarray, (n,), or None
+        As `parsed`. None if a line has another width, is empty, or a field may be other than a
+        plain number, date or word: in quotes, hexadecimal, with a decimal comma, not ASCII.
+    """
+    import pyarrow as pa
+
+    # A comma may be a decimal sign, and an x part of a hexadecimal number.
+    odd = (b"x", b"X", b'"', *(() if separator == "," else (b",",)))
+    if count < 2:
+        return None
+    parts: list[Columns] = []
+    types: dict[str, Any] = {}
+    for block in _blocks(source, start, end):
+        if any(c in block for c in odd):
+            return None
+        read = _block(block, count, separator, types)
+        if read is None:
+            return None
+        parts.append(read)
+    columns = []
+    for k in range(count):
+        held = [part[k] for part in parts]
+        kinds = {c.dtype.kind for c in held}
+        if len(kinds) != 1 and not kinds <= set("iuf"):
+            return None
+        columns.append(held[0] if len(held) == 1 else np.concatenate(held))
+        for part in parts:
+            part[k] = np.empty(0)  # at most one column is in memory twice
+    pa.default_memory_pool().release_unused()
+    return columns or None
+
+
+def _blocks(source: bytes | Path, start: int, end: int | None) -> Iterator[bytes]:
+    """Yield whole lines of a text, about a block at a time."""
+    if isinstance(source, bytes):
+        end = len(source) if end is None else end
+        while start < end:
+            stop = source.rfind(b"\n", start, min(start + BLOCK, end)) + 1
+            if not stop:
+                stop = source.find(b"\n", start, end) + 1 or end
+            yield _ended(source[start:stop])
+            start = stop
+        return
+    with source.open("rb") as stream:
+        left = source.stat().st_size - start if end is None else end - start
+        stream.seek(start)
+        held = b""
+        while left > 0 and (block := stream.read(min(BLOCK, left))):
+            left -= len(block)
+            lines, newline, rest = block.rpartition(b"\n")
+            if newline:
+                yield held + lines + newline
+                held = b""
+            held += rest
+        if held:
+            yield _ended(held)
+
+
+def _ended(lines: bytes) -> bytes:
+    return lines if lines.endswith(b"\n") else lines + b"\n"
+
+
+def _block(
+    block: bytes, count: int, separator: str | None, types: dict[str, Any]
+) -> Columns | None:
+    """Parse one block. `types`: of the blocks before, to which those of this one are added."""
+    columns = _typed(block, count, separator or " ", types)
+    # A missing value may be two adjacent blanks, or a line without any.
+    if columns is None or not all(_full(c) for c in columns):
+        if separator is None:
+            columns = _typed(single_blanks(block), count, " ", types)
+        if any(empty in b"\n" + block for empty in (b"\n\n", b"\n\r")):
+            return None
+    # Words are checked for what a number cannot hold.
+    words = columns is not None and any(c.dtype.kind == "O" for c in columns)
+    odd = words and (not block.isascii() or any(c in block for c in _ODD))
+    return None if odd else columns
+
+
+def _typed(block: bytes, count: int, separator: str, types: dict[str, Any]) -> Columns | None:
+    """Parse one block with the types known so far; numbers may make them wider."""
+    import pyarrow as pa
+
+    if types:
+        with suppress(pa.ArrowInvalid):
+            return _arrays(_table(block, types, count, separator, ".", False))
+    try:
+        table = _table(block, {}, count, separator, ".", False)
+    except pa.ArrowInvalid:
+        return None
+    for field in table.schema:
+        both = {str(types.get(field.name, field.type)), str(field.type)}
+        dates = all(kind.startswith("timestamp") for kind in both)
+        if len(both) > 1 and not (dates or both <= set(_WIDER)):
+            return None  # a word among numbers makes words of them
+        if dates or max(both, key=_WIDER.index if both <= set(_WIDER) else len) == str(field.type):
+            types[field.name] = field.type
+    return _arrays(table)
+
+
+def _full(column: NDArray[Any]) -> bool:
+    return column.dtype.kind in "iu" or (
+        column.dtype.kind == "f" and bool(np.isfinite(column.sum()))
+    )
+
+
+def single_blanks(text: bytes) -> bytes:
+    """Reduce runs of blanks to one between fields, with none at the ends of a line.
+
+    `text`: fields separated by blanks and tabs. Returns the same object if unchanged.
+    """
+    text = text.replace(b"\t", b" ")
+    # Four passes reduce runs of up to 300 blanks; longer ones take more passes.
+    for run in (16, 4, 3, 2):
+        text = text.replace(b" " * run, b" ")
+    while b"  " in text:
+        text = text.replace(b"  ", b" ")
+    return text.replace(b"\n ", b"\n").replace(b" \n", b"\n").removeprefix(b" ")
+
+
+def parsed(
+    body: bytes | memoryview,
+    count: int,
+    delimiter: str,
+    *,
+    decimal: str = ".",
+    quote: str | Literal[False] = '"',
+    text: Sequence[int] = (),
+) -> Columns:
+    """Parse lines, each number to the nearest double.
+
+    `body`: UTF-8, without a header. `count`: number of columns. `quote`: quote around fields that
+    hold the delimiter. `text`: columns to keep as text. Returns (n,), numbers with NaN for missing
+    values, dates as dates, the rest as text. pyarrow.ArrowInvalid: a line has the wrong number of
+    fields.
+    """
+    import pyarrow as pa
+
+    def read(part: bytes | memoryview, types: dict[str, Any]) -> Any:
+        return _table(part, types, count, delimiter, decimal, quote)
+
+    asked = {str(k): pa.string() for k in text}
+    table = None
+    if len(body) > BLOCK:
+        # Where a type is not stated, Arrow keeps all of the text until it is known.
+        with suppress(pa.ArrowInvalid):
+            top = bytes(body[:BLOCK])
+            seen = read(top[: top.rfind(b"\n") + 1], asked).schema
+            numbers = {f.name: f.type for f in seen if str(f.type) in ("int64", "double")}
+            table = read(body, {**numbers, **asked})
+    if table is None:
+        table = read(body, asked)
+    columns = _arrays(table)
+    pa.default_memory_pool().release_unused()
+    return columns
+
+
+def _table(
+    body: bytes | memoryview,
+    types: dict[str, Any],
+    count: int,
+    delimiter: str,
+    decimal: str,
+    quote: str | Literal[False],
+) -> Any:
+    import pyarrow as pa
+    import pyarrow.csv as pa_csv
+
+    return pa_csv.read_csv(
+        pa.BufferReader(body),
+        read_options=pa_csv.ReadOptions(
+            column_names=[str(k) for k in range(count)], use_threads=False
+        ),
+        parse_options=pa_csv.ParseOptions(
+            delimiter=delimiter, quote_char=quote, ignore_empty_lines=False
+        ),
+        convert_options=pa_csv.ConvertOptions(
+            decimal_point=decimal,
+            null_values=list(NULLS),
+            strings_can_be_null=True,
+            column_types=types,
+        ),
+    )
+
+
+def _arrays(table: Any) -> Columns:
+    """Convert column by column, so that at most one is in memory twice."""
+    columns = []
+    for _ in range(table.num_columns):
+        columns.append(_array(table.column(0)))
+        table = table.remove_column(0)
+    return columns
+
+
+def _array(column: Any) -> NDArray[Any]:
+    """Convert to numbers with NaN for missing values, to dates, or to text."""
+    kind = str(column.type)
+    if kind in ("int64", "double"):
+        values: NDArray[Any] = column.to_numpy()
+        return values
+    if kind == "null":
+        return np.full(len(column), np.nan)
+    if kind.startswith("timestamp") and not column.null_count:
+        dates: NDArray[Any] = column.cast("timestamp[ns]").to_numpy()
+        return dates
+    return np.array([None if v is None else str(v) for v in column.to_pylist()], dtype=object)
