@@ -21,6 +21,8 @@ Columns = list[NDArray[Any]]
 NULLS = ("", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "NULL", "null", "None")
 #: Bytes of a block; the first decides which columns are numeric.
 BLOCK = 1 << 20
+#: Bytes that are parsed at a time where all columns are numbers; they stay in the cache.
+STREAMED = 1 << 18
 # Null bytes and unusual line breaks, which are regular in no text.
 _ODD = (b"\0", b"\x0b", b"\x0c", b"\x1c", b"\x1d", b"\x1e")
 # Types of numbers; each holds those before it.
@@ -28,7 +30,7 @@ _WIDER = ("null", "int64", "double")
 
 
 def columns_at_once(
-    source: bytes | Path, count: int, separator: str | None, start: int = 0, end: int | None = None
+    source: bytes | Path, count: int, separator: str | None, start: int = 0
 ) -> Columns | None:
     """Parse columns of lines of equal width.
 
@@ -40,8 +42,8 @@ def columns_at_once(
         Number of columns.
     separator : str or None
         Separator of fields; None for any run of blanks.
-    start, end : int, bytes
-        Part of the text with these lines; to its end by default.
+    start : int, bytes
+        Where the first of these lines begins.
 
     Returns
     -------
@@ -57,12 +59,16 @@ def columns_at_once(
         return None
     parts: list[Columns] = []
     types: dict[str, Any] = {}
-    for block in _blocks(source, start, end):
+    for block in _blocks(source, start):
         if any(c in block for c in odd):
             return None
         read = _block(block, count, separator, types)
         if read is None:
             return None
+        if not parts and {str(t) for t in types.values()} <= {"int64", "double"}:
+            streamed = _streamed(source, start, types, separator or " ", len(block) / len(read[0]))
+            if streamed is not None:
+                return streamed
         parts.append(read)
     columns = []
     for k in range(count):
@@ -77,10 +83,50 @@ def columns_at_once(
     return columns or None
 
 
-def _blocks(source: bytes | Path, start: int, end: int | None) -> Iterator[bytes]:
+def _streamed(
+    source: bytes | Path, start: int, types: dict[str, Any], separator: str, width: float
+) -> Columns | None:
+    """Parse numbers alone, of stated types; None if there is anything else, or an empty field.
+
+    `width`: bytes of a line, about.
+    """
+    import pyarrow as pa
+    import pyarrow.csv as pa_csv
+
+    # Arrow reads whole numbers with an x as hexadecimal.
+    whole = any(str(t) == "int64" for t in types.values())
+    if whole and any(b"x" in b or b"X" in b for b in _blocks(source, start)):
+        return None
+    view = memoryview(source)[start:] if isinstance(source, bytes) else b""
+    size = len(view) if isinstance(source, bytes) else source.stat().st_size - start
+    columns = [
+        np.empty(int(1.02 * size / width) + 16, np.int64 if str(t) == "int64" else np.float64)
+        for t in types.values()
+    ]
+    rows = 0
+    try:
+        with pa.BufferReader(view) if isinstance(source, bytes) else pa.OSFile(str(source)) as held:
+            held.seek(0 if isinstance(source, bytes) else start)
+            options = _options(types, len(types), separator, ".", False)
+            options[0].block_size = STREAMED
+            for batch in pa_csv.open_csv(held, *options):
+                end = rows + batch.num_rows
+                for k, parsed_now in enumerate(batch.columns):
+                    if parsed_now.null_count:
+                        return None
+                    if end > columns[k].size:
+                        columns[k] = np.resize(columns[k], 2 * end)
+                    columns[k][rows:end] = parsed_now.to_numpy()
+                rows = end
+    except pa.ArrowInvalid:
+        return None
+    return [column[:rows] for column in columns]
+
+
+def _blocks(source: bytes | Path, start: int) -> Iterator[bytes]:
     """Yield whole lines of a text, about a block at a time."""
     if isinstance(source, bytes):
-        end = len(source) if end is None else end
+        end = len(source)
         while start < end:
             stop = source.rfind(b"\n", start, min(start + BLOCK, end)) + 1
             if not stop:
@@ -89,11 +135,9 @@ def _blocks(source: bytes | Path, start: int, end: int | None) -> Iterator[bytes
             start = stop
         return
     with source.open("rb") as stream:
-        left = source.stat().st_size - start if end is None else end - start
         stream.seek(start)
         held = b""
-        while left > 0 and (block := stream.read(min(BLOCK, left))):
-            left -= len(block)
+        while block := stream.read(BLOCK):
             lines, newline, rest = block.rpartition(b"\n")
             if newline:
                 yield held + lines + newline
@@ -214,14 +258,19 @@ def _table(
     import pyarrow.csv as pa_csv
 
     return pa_csv.read_csv(
-        pa.BufferReader(body),
-        read_options=pa_csv.ReadOptions(
-            column_names=[str(k) for k in range(count)], use_threads=False
-        ),
-        parse_options=pa_csv.ParseOptions(
-            delimiter=delimiter, quote_char=quote, ignore_empty_lines=False
-        ),
-        convert_options=pa_csv.ConvertOptions(
+        pa.BufferReader(body), *_options(types, count, delimiter, decimal, quote)
+    )
+
+
+def _options(
+    types: dict[str, Any], count: int, delimiter: str, decimal: str, quote: str | Literal[False]
+) -> tuple[Any, Any, Any]:
+    import pyarrow.csv as pa_csv
+
+    return (
+        pa_csv.ReadOptions(column_names=[str(k) for k in range(count)], use_threads=False),
+        pa_csv.ParseOptions(delimiter=delimiter, quote_char=quote, ignore_empty_lines=False),
+        pa_csv.ConvertOptions(
             decimal_point=decimal,
             null_values=list(NULLS),
             strings_can_be_null=True,
