@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     )
     from strapdown.api.reading import GnssFixes, Imu, Streams, read, read_gnss, read_imu
     from strapdown.api.simulation import Simulation, simulate
+    from strapdown.api.writing import write
     from strapdown.crash.entry import Entry
     from strapdown.crash.path import sample_paths
     from strapdown.crash.reconstruction import (
@@ -144,6 +145,7 @@ __all__ = [
     "trajectory_differences",
     "verify",
     "vote_units",
+    "write",
     "write_trajectory",
 ]
 
@@ -161,6 +163,7 @@ load_on_first_use(
         "NonHolonomic Odometer ZeroAngularRate ZeroVelocity navigate",
         "api.reading": "GnssFixes Imu Streams read read_gnss read_imu",
         "api.simulation": "Simulation simulate",
+        "api.writing": "write",
         "crash.entry": "Entry",
         "crash.path": "sample_paths",
         "crash.reconstruction": "CrashOptions CrashReconstruction reconstruct_crash",

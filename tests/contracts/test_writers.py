@@ -133,7 +133,10 @@ def test_its_reader_recognizes_the_content_of_each_stream_alone_and_of_all(tmp_p
 def test_streams_that_it_does_not_hold_are_named(tmp_path, name):
     made = streams()
     findings = WRITERS[name].write(path_of(tmp_path, name), made)
-    left = {f.quantity for f in findings if f.code == "io.stream-not-written"}
+    codes = ("io.stream-of-own-file",) if WRITERS[name].alone else ("io.stream-not-written",)
+    left = {f.quantity for f in findings if f.code in codes}
+    written = {f.quantity for f in findings if f.code == "io.stream-written"}
+    assert written == set(made) - left
     lost = set(made) - set(WRITERS[name].streams)
     if WRITERS[name].alone:
         lost = set(made) - {"imu"}
@@ -220,7 +223,8 @@ def test_a_table_states_sampling_axes_field_and_attitude(tmp_path, name):
         imu.index, rotation.quaternion_from_euler(streams()["reference"][EULER].to_numpy())
     )
     path = path_of(tmp_path, name)
-    assert WRITERS[name].write(path, {"imu": imu, "reference": truth}) == []
+    found = WRITERS[name].write(path, {"imu": imu, "reference": truth})
+    assert [f.code for f in found] == ["io.stream-written"] * 2
     back = read_log(path)
     assert [f.code for f in back.findings] == ["io.time-from-first-stamp"]
     assert np.array_equal(back.imu.to_numpy(), imu.to_numpy())
@@ -308,6 +312,22 @@ def test_fixes_without_velocity_or_accuracy_stay_without(tmp_path):
     assert np.loadtxt(tmp_path / "kf" / "gnss.txt").shape == (len(gnss) - 1, 7)
 
 
+def test_velocities_of_unknown_accuracy_are_written_without_it(tmp_path):
+    gnss = streams()["gnss"]
+    gnss[VELOCITY_SD] = 1.0
+    gnss.attrs["velocity_sd_taken"] = 1.0
+    for name in ("csv", "mcap", "nmea"):
+        path = path_of(tmp_path, name)
+        WRITERS[name].write(path, {"gnss": gnss})
+        back = read_gnss(path, GnssOptions(unstated_velocity_sd=7.0))
+        plane = VELOCITY[:2] if name == "nmea" else VELOCITY
+        assert back[plane].to_numpy() == pytest.approx(gnss[plane].to_numpy(), abs=1e-5)
+        if name != "mcap":  # a covariance of zero is unknown there, and the reader takes it so
+            assert (back[VELOCITY_SD[:2]] == 7.0).all().all()
+    WRITERS["kf-gins"].write(tmp_path / "kf", {"imu": streams()["imu"], "gnss": gnss})
+    assert np.loadtxt(tmp_path / "kf" / "gnss.txt").shape[1] == 7
+
+
 @pytest.mark.parametrize("name", ["gpx", "nmea"])
 def test_heights_over_the_sea(tmp_path, name):
     gnss = streams()["gnss"]
@@ -388,7 +408,8 @@ def test_velocities_of_poses_are_those_between_them(tmp_path):
     track = streams("relative")["reference"]
     track.index = pd.Index(np.arange(ROWS) * 0.01, name="time")
     found = WRITERS["tum"].write(tmp_path / "a.tum", {"reference": track})
-    assert {f.code for f in found} == {"io.written-origin", "io.written-without"}
+    codes = {"io.stream-written", "io.written-origin", "io.written-without"}
+    assert {f.code for f in found} == codes
     back = read_trajectory(tmp_path / "a.tum")
     assert "io.tum-velocities" in {f.code for f in back.attrs["findings"]}
     moved = np.diff(ecef_from_geodetic(track[GEODETIC].to_numpy()), axis=0)

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from strapdown.config.alignment import LogTable
 
 __all__ = [
+    "ABSENT",
     "GnssFile",
     "GnssFixes",
     "Imu",
@@ -397,7 +398,7 @@ def read(path: str | Path) -> Streams:
     if not tables:
         # A file without a stream is no fault: report that of a stream that it has.
         raised = refused.values()
-        raise next((e for e in raised if e.finding.code not in _LACKS), next(iter(raised)))
+        raise next((e for e in raised if e.finding.code not in ABSENT), next(iter(raised)))
     left_out = [
         Finding(
             "api.stream-left-out",
@@ -407,13 +408,13 @@ def read(path: str | Path) -> Streams:
             reason=error.finding,
         )
         for stream, error in refused.items()
-        if stream not in tables and error.finding.code not in _LACKS
+        if stream not in tables and error.finding.code not in ABSENT
     ]
     return Streams(tables, Path(path).name, left_out)
 
 
 #: Codes that say that a recording does not have a stream.
-_LACKS = {
+ABSENT = {
     "io.no-stream",
     "io.no-gyro-columns",
     "io.no-gyro-columns-left-out",

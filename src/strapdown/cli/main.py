@@ -37,6 +37,7 @@ COMMANDS = (
     "navigate",
     "coast",
     "init",
+    "convert",
     "crash",
     "simulate",
     "verify",

@@ -166,7 +166,7 @@ def fix_keys(given: Mapping[str, Any], path: Path | None) -> dict[str, Any]:
         "columns": columns or None,
         "units": units or None,
         "datum_height_m": given["gnss_datum_height"],
-        "origin": None if given["gnss_origin"] is None else _origin(given["gnss_origin"]),
+        "origin": as_origin(given["gnss_origin"], "--gnss-origin"),
         "position_sd_m": given["gnss_position_sd"],
         "velocity_sd_m_per_s": given["gnss_velocity_sd"],
     }
@@ -183,11 +183,14 @@ def _pairs(items: list[str] | None, flag: str) -> dict[str, str]:
     return out
 
 
-def _origin(text: str) -> tuple[float, float, float]:
+def as_origin(text: str | None, flag: str) -> tuple[float, float, float] | None:
+    """Latitude, longitude and height of an option; ConfigError: it has another form."""
+    if text is None:
+        return None
     try:
         lat, lon, height = (float(part) for part in text.split(","))
     except ValueError:
-        raise ConfigError("cli.bad-origin", quantity="--gnss-origin", text=text) from None
+        raise ConfigError("cli.bad-origin", quantity=flag, text=text) from None
     return lat, lon, height
 
 

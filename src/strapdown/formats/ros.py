@@ -322,6 +322,9 @@ def write(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
             source = tables[stream].attrs.get("source")
             raise DataError("io.written-stamp-below-zero", file=source, quantity="time", form="ROS")
         findings += [*said, *_lost(stream, tables[stream])]
+        if stream == "imu":
+            source, axes = tables[stream].attrs.get("source"), "forward-left-up"
+            findings.append(Finding("io.written-axes", file=source, severity="note", axes=axes))
         topics += [make(tables[stream], stamps.tolist(), store.types) for make in makers]
     if "reference" in tables:
         findings.append(stream_not_held("MCAP", "reference", tables["reference"]))

@@ -56,7 +56,7 @@ from strapdown.tables import (
     check_imu,
     check_trajectory,
 )
-from strapdown.tables.checks import GEODETIC, MAG, NED, VELOCITY
+from strapdown.tables.checks import GEODETIC, MAG, NED, VELOCITY, VELOCITY_SD
 
 __all__ = [
     "LOG_FORMATS",
@@ -115,6 +115,8 @@ class Writer:
             _check(stream, table)
         lost = [stream_not_held(self.title, k, tables[k]) for k in tables if k not in self.streams]
         held = {stream: tables[stream] for stream in self.streams if stream in tables}
+        if "gnss" in held:
+            held["gnss"] = _as_stated(held["gnss"])
         if not held:
             raise DataError("io.written-needs-stream", form=self.title, needed=[*self.streams])
         if self.alone:
@@ -122,9 +124,21 @@ class Writer:
             kept = {first: held[first]}
             if first == "imu" and _same_rows(held):
                 kept["reference"] = held["reference"]
-            lost += [stream_not_held(self.title, k, held[k]) for k in held if k not in kept]
+            lost += [_of_own_file(k, held[k]) for k in held if k not in kept]
             held = kept
-        return [*lost, *self.function(path, held, options or FileOptions())]
+        lost += self.function(path, held, options or FileOptions())
+        left = {f.quantity for f in lost if f.code == "io.stream-not-written"}
+        return [*(self._written(k, t) for k, t in held.items() if k not in left), *lost]
+
+    def _written(self, stream: str, table: pd.DataFrame) -> Finding:
+        return Finding(
+            "io.stream-written",
+            file=table.attrs.get("source"),
+            quantity=stream,
+            severity="note",
+            rows=len(table),
+            held=self.streams[stream],
+        )
 
 
 def _check(stream: str, table: pd.DataFrame) -> None:
@@ -135,6 +149,22 @@ def _check(stream: str, table: pd.DataFrame) -> None:
         check_gnss(table)
     elif stream == "reference":
         (check_trajectory if is_trajectory(table) else check_attitude)(table)
+
+
+def _of_own_file(stream: str, table: pd.DataFrame) -> Finding:
+    source = table.attrs.get("source")
+    data = {"stream": stream, "rows": len(table)}
+    return Finding("io.stream-of-own-file", file=source, quantity=stream, data=data)
+
+
+def _as_stated(gnss: pd.DataFrame) -> pd.DataFrame:
+    """Return fixes whose velocities of assumed accuracy have a standard deviation of 0: unknown."""
+    if "velocity_sd_taken" not in gnss.attrs:
+        return gnss
+    sd = gnss[VELOCITY_SD]
+    out = gnss.assign(**sd.where(np.isinf(sd), 0.0))
+    out.attrs = dict(gnss.attrs)
+    return out
 
 
 def _same_rows(tables: Tables) -> bool:
@@ -208,7 +238,9 @@ def _columns(tables: Tables) -> tuple[dict[str, Array], dict[str, str]]:
     if "imu" in tables:
         columns, said = imu_columns(tables["imu"], tables.get("reference"))
     else:
-        columns, said = table_columns(next(iter(tables.values()))), {}
+        table = next(iter(tables.values()))
+        unknown = [c for c in VELOCITY_SD if c in table.columns and (table[c] == 0.0).any()]
+        columns, said = table_columns(table.drop(columns=unknown and VELOCITY_SD)), {}
     first = next(iter(columns))
     timed = time_column(next(iter(tables.values())))
     return timed | {name: values for name, values in columns.items() if name != first}, said
@@ -406,7 +438,7 @@ WRITERS: dict[str, Writer] = {
         "kitti",
     ),
     "kf-gins": Writer(
-        kf_gins.FOLDER_TITLE,
+        "KF-GINS, folder",
         {
             "imu": "imu.txt: increments in rad, m/s, forward-right-down; seconds of the GPS week",
             "gnss": "gnss.txt: deg, m, m/s, standard deviations",
@@ -419,7 +451,7 @@ WRITERS: dict[str, Writer] = {
         "GPX track", {"gnss": _PLACES, "reference": _PLACES}, gpx.write, "gpx", (".gpx",)
     ),
     "nmea": Writer(
-        "NMEA 0183: GGA, RMC, GST",
+        "NMEA 0183",
         {"gnss": f"{_PLACES}; standard deviations", "reference": _PLACES},
         gnss_nmea.write,
         "nmea",

@@ -102,7 +102,8 @@ def gps_ns(
                 clock=clock.name,
                 first=stamps[0] / SECOND,
             )
-        return stamps, None, [_note(table, "io.written-on-own-clock", clock=clock.name)]
+        said = _note(table, "io.written-on-own-clock", severity="warning", clock=clock.name)
+        return stamps, None, [said]
     utc, findings = found
     seconds = utc // SECOND
     ahead = np.rint(gps_from_unix(seconds.astype(np.float64)) - seconds).astype(np.int64)
