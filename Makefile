@@ -8,7 +8,7 @@ PYTEST = PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest
 # A cache of compiled kernels for one run; otherwise its folder is named after their sources.
 FRESH = cache=$$(mktemp -d); trap 'rm -rf "$$cache"' EXIT; NUMBA_CACHE_DIR="$$cache"
 
-.PHONY: demo test test-slow test-bounds examples papers record mutation check format bench docs codes pictures clean
+.PHONY: demo test test-slow test-bounds examples papers record mutation check format bench docs codes strangers pictures clean
 .DEFAULT_GOAL := help
 
 help:
@@ -73,6 +73,9 @@ bench: $(VENV)/.dev
 
 codes: $(VENV)/.test
 	STRAPDOWN_WRITE_CODES=1 $(PYTEST) -m '' tests/cli/test_bad_input.py
+
+strangers: $(VENV)/.test
+	STRAPDOWN_WRITE_STRANGERS=1 $(PYTEST) -m '' tests/reference/test_files_of_strangers.py
 
 papers: $(VENV)/.test
 	$(PYTEST) -n 2 --dist worksteal papers

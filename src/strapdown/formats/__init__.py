@@ -38,6 +38,7 @@ from strapdown.formats import (
     kf_gins,
     kitti,
     matlab_mobile,
+    mavlink,
     microstrain,
     mpu6050,
     navego,
@@ -149,6 +150,16 @@ READERS: dict[str, Reader] = {
             "reference": dataflash.read_reference,
             "magnetometer": dataflash.read_magnetometer,
             "barometer": dataflash.read_barometer,
+        },
+    ),
+    "mavlink": Reader(
+        mavlink.TITLE,
+        mavlink.detect,
+        {
+            "imu": mavlink.read,
+            "gnss": mavlink.read_fixes,
+            "reference": mavlink.read_reference,
+            "barometer": mavlink.read_barometer,
         },
     ),
     "ros": Reader(
@@ -473,9 +484,6 @@ FOREIGN = (
         "a log of ArduPilot as text",
         "mavlogdump.py --format csv of pymavlink",
         (b"FMT, 128, 89",),
-    ),
-    Foreign(
-        "a telemetry log of MAVLink", "mavlogdump.py --format csv of pymavlink", (), (".tlog",)
     ),
     Foreign(
         "a log of a DJI aircraft", "DatCon, which writes CSV", (b"BUILD",), (".dat",), offset=16

@@ -188,7 +188,7 @@ def _without_header(lines: list[str], file: str, findings: list[Finding]) -> _La
             return _Layout("GPST", names, separator, row)
     places = [f for f in fields[:2] if _FLOAT.fullmatch(f) and "." in f and abs(float(f)) <= 180.0]
     code = "io.list-of-stations" if len(places) == 2 else "io.no-line-names-columns-gpst"
-    raise DataError(code, file=file, row=row or None, first=" ".join(fields[:6]))
+    raise DataError(code, file=file, row=row or None, first=" ".join(fields[:4]))
 
 
 _FLOAT = re.compile(r"[+-]?\d+\.?\d*")
