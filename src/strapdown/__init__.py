@@ -41,6 +41,7 @@ if TYPE_CHECKING:
         compare_attitude,
     )
     from strapdown.api.crash import CrashRun, reconstruct
+    from strapdown.api.doctor import Diagnosis, doctor
     from strapdown.api.navigation import (
         Barometer,
         BodyVelocity,
@@ -96,6 +97,7 @@ __all__ = [
     "CrashReconstruction",
     "CrashRun",
     "CrashUnit",
+    "Diagnosis",
     "Entry",
     "FineAlignment",
     "Gnss",
@@ -127,6 +129,7 @@ __all__ = [
     "check_imu_channels",
     "coast",
     "compare_attitude",
+    "doctor",
     "motion_increments",
     "navigate",
     "read",
@@ -159,6 +162,7 @@ load_on_first_use(
         "api.attitude": "Attitude AttitudeComparison AttitudeOptions OrientationFilter attitude "
         "compare_attitude",
         "api.crash": "CrashRun reconstruct",
+        "api.doctor": "Diagnosis doctor",
         "api.navigation": "Barometer BodyVelocity Gnss Heading Measurement NavigationRun "
         "NonHolonomic Odometer ZeroAngularRate ZeroVelocity navigate",
         "api.reading": "GnssFixes Imu Streams read read_gnss read_imu",

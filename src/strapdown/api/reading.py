@@ -23,6 +23,7 @@ from strapdown.config.spec import specify
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.formats.gnss_files import read_gnss as read_gnss_table
 from strapdown.formats.gnss_fixes import GnssOptions
+from strapdown.formats.recording import ABSENT
 from strapdown.tables import ACCEL, GYRO, QUATERNION, imu_table
 
 if TYPE_CHECKING:
@@ -411,18 +412,6 @@ def read(path: str | Path) -> Streams:
         if stream not in tables and error.finding.code not in ABSENT
     ]
     return Streams(tables, Path(path).name, left_out)
-
-
-#: Codes that say that a recording does not have a stream.
-ABSENT = {
-    "io.no-stream",
-    "io.no-gyro-columns",
-    "io.no-gyro-columns-left-out",
-    "io.table-of-positions",
-    "io.table-of-attitudes",
-    "io.missing-columns-2",
-    "io.missing-columns-3",
-}
 
 
 def imu_input(source: Any) -> ImuFile | pd.DataFrame:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from strapdown.api.reading import ABSENT, ImuFile, Streams
+from strapdown.api.reading import ImuFile, Streams
 from strapdown.bundle.reading import read_manifest
 from strapdown.config.alignment import FixesTable, LogTable
 from strapdown.config.spec import specify
@@ -21,7 +21,7 @@ from strapdown.formats import STREAMS, open_stream
 from strapdown.formats.clocks import RELATIVE, Clock, clock_of, own_ns, read_stamps, with_clock
 from strapdown.formats.columns import parse_axes
 from strapdown.formats.gnss_files import read_gnss
-from strapdown.formats.recording import NoStreamError, RawLog
+from strapdown.formats.recording import ABSENT, NoStreamError, RawLog
 from strapdown.formats.trajectory_readers import read_trajectory
 from strapdown.formats.writers import FileOptions, find_writer, write_streams
 from strapdown.tables import GYRO, QUATERNION, attitude_table

@@ -32,6 +32,7 @@ EXIT_CODES = (
 
 #: Modules of the commands, in the order of the help.
 COMMANDS = (
+    "doctor",
     "attitude",
     "align",
     "navigate",

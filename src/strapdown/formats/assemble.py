@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.formats.arrays import numbers, ticks_of
 from strapdown.formats.clocks import (
@@ -139,6 +140,7 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
         sampling = sampling_of_rates(raw, options, findings)
     report_gaps(raw.name, time, body["gyro"], findings)
     report_absurd(raw.name, body["gyro"], lambda k: raw.row(int(kept[k])), findings)
+    report_weightless(raw.name, body.get("accel"), findings)
     imu = imu_table(
         time,
         body.pop("gyro"),
@@ -517,6 +519,21 @@ def report_absurd(
                     reading=reading,
                 )
             )
+
+
+# Half of a log of a body that is carried, driven or flown has more force than this: only a fall
+# has less.
+WEIGHTLESS = 0.3 * STANDARD_GRAVITY  # m/s²
+
+
+def report_weightless(name: str, accel: Array | None, findings: list[Finding]) -> None:
+    """Report a specific force too small for gravity, which the numbers left open without a unit."""
+    if accel is None or any(f.code == "io.no-gravity" for f in findings):
+        return
+    usual = float(np.sqrt(np.median((accel * accel).sum(axis=1))))
+    if usual < WEIGHTLESS:
+        reason = Finding("io.evidence-force-too-small", severity="note", usual=usual)
+        findings.append(Finding("io.no-gravity", file=name, quantity="accel", reason=reason))
 
 
 def finite_rows(

@@ -30,6 +30,18 @@ __all__ = [
 ]
 
 
+#: Codes that say that a recording does not have a stream, which is no fault.
+ABSENT = {
+    "io.no-stream",
+    "io.no-gyro-columns",
+    "io.no-gyro-columns-left-out",
+    "io.table-of-positions",
+    "io.table-of-attitudes",
+    "io.missing-columns-2",
+    "io.missing-columns-3",
+}
+
+
 class NoStreamError(DataError):
     """A file is of a known format that does not hold the stream.
 

@@ -32,6 +32,7 @@ from strapdown.report.attitude import write_attitude
 from strapdown.report.coast import COAST
 from strapdown.report.crash_case import CRASH
 from strapdown.report.crash_simulation import write_crash_simulation
+from strapdown.report.doctor import DOCTOR
 from strapdown.report.navigation import NAVIGATION
 from strapdown.report.report_bundle import ReportBundle
 from strapdown.report.simulation import write_simulation, write_trajectory_simulation
@@ -93,7 +94,7 @@ def _rerun_report(
     return bundle.rerun(configuration, out, report=_with_page(configuration))
 
 
-BUNDLES: tuple[ReportBundle[Any], ...] = (ALIGNMENT, COAST, CRASH, NAVIGATION)
+BUNDLES: tuple[ReportBundle[Any], ...] = (ALIGNMENT, COAST, CRASH, DOCTOR, NAVIGATION)
 RERUNS: dict[str, Callable[[dict[str, Any], Path, set[str]], Seal]] = {
     "attitude": _rerun_attitude,
     "simulate": _rerun_simulation,

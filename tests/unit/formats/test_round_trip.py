@@ -19,7 +19,7 @@ def tables(sampling: str, *, accel: bool):
     imu = imu_table(
         time,
         rng.normal(size=(200, 3)),
-        rng.normal(size=(200, 3)) if accel else None,
+        rng.normal(size=(200, 3)) - [0.0, 0.0, 9.8] if accel else None,
         sampling=sampling,
         source="log",
     )

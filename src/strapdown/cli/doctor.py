@@ -1,0 +1,131 @@
+"""``strapdown doctor``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from strapdown.cli.shared_options import (
+    LOG_FLAGS,
+    FixFlags,
+    LogFlags,
+    OutFlags,
+    as_flag,
+    fix_keys,
+    folder_to_make,
+    log_keys,
+    spread,
+    writing,
+)
+from strapdown.errors import ConfigError
+
+if TYPE_CHECKING:
+    from strapdown.progress import Progress
+    from strapdown.systems.doctor import Diagnosis, LogDiagnosis
+
+EPILOG = (
+    "Example: strapdown doctor drive.csv\n\n"
+    "Example: strapdown doctor drive.csv --gyro-unit deg/s --fix drive.parquet"
+)
+#: Faults in full on the terminal, and characters of a sentence.
+MOST, WIDTH = 8, 300
+
+
+@spread
+def doctor(
+    logs: Annotated[
+        list[Path],
+        typer.Argument(metavar="LOG…", help="Logs, or folders of recordings.", show_default=False),
+    ],
+    fix: Annotated[
+        Path | None,
+        writing(
+            "FILE",
+            "Write a clean log (.parquet or .csv): SI, body axes, increasing stamps; other streams "
+            "and the record of what was done beside it.",
+        ),
+    ] = None,
+    *,
+    flags: LogFlags,
+    fixes: FixFlags,
+    out: Annotated[Path | None, folder_to_make("LOG-doctor")] = None,
+    write: OutFlags,
+) -> None:
+    """Examine logs: what is in them, what is wrong, the fix, and what they suffice for.
+
+    Streams, rates, gaps and clocks; units and axes with the evidence; gravity, saturation,
+    quantization, stuck channels, stationary stretches with the noise there. A log that leaves
+    something open is examined with the answers as inferred, and the questions are listed.
+    """
+    from strapdown.api.doctor import doctor as examine
+    from strapdown.cli.console import console, print_findings, print_seal
+    from strapdown.cli.result_folder import default_folder, refuse_result, run_and_save
+    from strapdown.systems.clean_log import write_clean_log
+
+    for log in logs:
+        refuse_result(log, "log")
+    keys = {key: value for key, value in log_keys(flags.given()).items() if value}
+    found: list[Diagnosis] = []
+
+    def compute(report: Progress) -> Diagnosis:
+        try:
+            paths = [str(log) for log in logs]
+            gnss = fix_keys(fixes.given(), None)
+            found.append(examine(paths, axes=flags.axes, gnss=gnss, progress=report, **keys))
+        except ConfigError as error:
+            raise as_flag(error, lambda key: LOG_FLAGS.get(f"log, {key}", key)) from None
+        return found[0]
+
+    done = run_and_save(compute, out or default_folder(logs[0], "doctor"), write, "doctor.json")
+    if done is not None:
+        result, seal = done
+        paths = {one.name: log.path for log, one in zip(result.spec.logs, result.logs, strict=True)}
+        for one in result.logs:
+            print_log(one, paths, tables=write.verbose)
+        print_findings(result.between)
+        print_seal(seal, "report.html")
+    if fix is not None:
+        files = write_clean_log(found[0], fix, force=write.force)
+        if done is not None:
+            console().print(f"Clean {', '.join(map(str, files))}")
+
+
+def print_log(one: LogDiagnosis, paths: Mapping[str, str], *, tables: bool) -> None:
+    """Print what a log is fit for, its streams, and its faults with their fixes.
+
+    `paths`: of logs by name, for commands. `tables`: also those of channels and rests.
+    """
+    from strapdown.cli.console import console, print_block
+    from strapdown.report import doctor as report
+    from strapdown.report.values import spaced
+
+    out = console()
+    out.print(report.headline(one), style="bold")
+    for use in report.uses(one):
+        out.print(spaced(f"  {use:<11}{one.answer(use)}: {_cut(report.reasons(one, use))}"))
+        line = report.command(one, use, one.log.path, paths.get(one.data["fixes_from"]))
+        if line := line or report.way(one, use):
+            out.print(f"  {'':<11}{line}", style="dim")
+    blocks = [report.stream_table(one)]
+    if tables:
+        blocks += [report.channel_table(one), report.rest_table(one)]
+    for block in blocks:
+        if block is not None:
+            print_block(block)
+    faults = report.wrong(one)
+    for number, (head, text, fix) in enumerate(faults[:MOST], 1):
+        said = _cut(" ".join(text.split()))
+        out.print(f"{number}. {f'{head}: {said}' if head else said}", style="yellow")
+        if fix:
+            out.print(f"   {_cut(fix)}", style="dim")
+    if len(faults) > MOST:
+        out.print(f"   {len(faults) - MOST} more; see the report", style="yellow")
+    if line := report.answering(one, one.log.path):
+        out.print(f"As inferred: {line}")
+
+
+def _cut(text: str) -> str:
+    return text if len(text) <= WIDTH else f"{text[:WIDTH]} …"

@@ -1,0 +1,524 @@
+"""Write the diagnosis of logs as a sealed bundle: one page and one JSON."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from strapdown import __version__
+from strapdown.bundle.seal import to_json
+from strapdown.config.doctor import DoctorSpec
+from strapdown.constants import MICRO_G
+from strapdown.errors import DataError, Finding
+from strapdown.formats.clocks import on_clock_of
+from strapdown.progress import Progress
+from strapdown.report.chart import (
+    AXIS_COLOURS,
+    BLACK,
+    BLUE,
+    GREY,
+    Array,
+    Band,
+    Chart,
+    Line,
+    Panel,
+    curve,
+)
+from strapdown.report.document import (
+    Block,
+    Document,
+    Facts,
+    Items,
+    Paragraph,
+    Section,
+    TableBlock,
+    blocks,
+    capital,
+    finding_json,
+    paragraph,
+    run_again,
+    section,
+    write_text,
+)
+from strapdown.report.report_bundle import ReportBundle, write_report
+from strapdown.report.values import duration_words, instant, small
+from strapdown.systems.doctor import USES, Diagnosis, LogDiagnosis, run_doctor
+from strapdown.tables import ACCEL, GEODETIC, GYRO, VELOCITY, VELOCITY_SD, find_gaps
+from strapdown.tables.checks import index_of, values_of
+
+#: Commands of the uses.
+COMMANDS = {"attitude": "attitude", "navigation": "init navigate", "crash": "init crash"}
+#: Stationary stretches in a table and bands in a chart, at most.
+MOST_RESTS, MOST_BANDS = 12, 40
+BUCKETS = 500
+
+
+def _configuration(result: Diagnosis) -> dict[str, Any]:
+    return {"doctor": result.spec.plain()}
+
+
+def _run(configuration: dict[str, Any]) -> Diagnosis:
+    return run_doctor(DoctorSpec.checked(configuration["doctor"]))
+
+
+def _write(result: Diagnosis, folder: Path, name: str, report: bool, progress: Progress) -> None:
+    write_text(folder / "doctor.json", to_json(diagnosis_json(result)))
+    if report:
+        write_report(doctor_document(result, name), folder, progress, figures=False)
+
+
+#: Page and JSON of a diagnosis.
+DOCTOR = ReportBundle("doctor", _configuration, _run, _write)
+
+
+def diagnosis_json(result: Diagnosis) -> dict[str, Any]:
+    """Return a diagnosis as plain data for programs.
+
+    Returns
+    -------
+    dict
+        ``logs``, each with its streams, columns, channels, stationary stretches, and for each use
+        the answer with its reasons; questions, faults and notes; ``between`` the logs.
+    """
+    logs = [
+        {
+            **_finite(dict(one.data)),
+            "fit": {
+                use: {"answer": one.answer(use), "reasons": _listed(one.fit[use])} for use in USES
+            },
+            "questions": _listed(one.questions),
+            "faults": _listed(one.faults),
+            "notes": _listed(one.notes),
+        }
+        for one in result.logs
+    ]
+    return {"logs": logs, "between": _listed(result.between)}
+
+
+def _listed(findings: Iterable[Finding]) -> list[Any]:
+    return [_finite(finding_json(one, "cli")) for one in findings]
+
+
+def _finite(value: Any) -> Any:
+    """Replace numbers that JSON does not have by null."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {k: _finite(v) for k, v in value.items()}
+    return [_finite(v) for v in value] if isinstance(value, list | tuple) else value
+
+
+# The answer, which page and terminal share.
+
+
+def headline(one: LogDiagnosis) -> str:
+    """Say what a log is fit for, in one sentence."""
+    if not uses(one):
+        held = " and ".join(str(s["name"]) for s in one.data["streams"])
+        return f"{one.name}: {held} without inertial samples; give it beside a log of them."
+    words = {"yes": "fit for {}", "with limits": "fit for {} with limits", "no": "not fit for {}"}
+    by_answer: dict[str, list[str]] = {}
+    for use in USES:
+        by_answer.setdefault(one.answer(use), []).append(use)
+    parts = [words[a].format(_or(by_answer[a])) for a in words if a in by_answer]
+    return f"{one.name}: {'; '.join(parts)}."
+
+
+def _or(uses: list[str]) -> str:
+    return " or ".join([", ".join(uses[:-1]), uses[-1]]) if len(uses) > 1 else uses[0]
+
+
+def uses(one: LogDiagnosis) -> tuple[str, ...]:
+    """Return the uses that a log is judged for: none of fixes or a reference alone."""
+    return () if one.streams and "imu" not in one.streams and not one.questions else USES
+
+
+def reasons(one: LogDiagnosis, use: str) -> str:
+    """List what prevents or limits a use, faults by their number; else what supports it."""
+    found = one.fit[use]
+    against = [f for f in found if f.severity != "note"]
+    if preventing := [f for f in against if f.severity == "error"]:
+        against = preventing
+    numbered = {_key(f): k for k, f in enumerate((*one.questions, *one.faults), 1)}
+    said: list[str] = []
+    for finding in against or found:
+        number = numbered.get(_key(finding))
+        if number is not None:
+            said.append(f"point {number}" + (f" ({finding.quantity})" if finding.quantity else ""))
+            continue
+        text = finding.sentence("cli").partition("\n")[0]
+        said.append(f"{text} ({finding.quantity})" if finding.quantity else text)
+    return "; ".join(dict.fromkeys(said))
+
+
+def _key(finding: Finding) -> tuple[str, str | None, int | None]:
+    return finding.code, finding.quantity, finding.row
+
+
+def command(
+    one: LogDiagnosis, use: str, log: str | None = None, fixes: str | None = None
+) -> str | None:
+    """Return the command line for a use; None if the log is not fit for it.
+
+    `log`, `fixes`: paths; by default the names of the files.
+    """
+    if one.answer(use) == "no":
+        return None
+    flags = one.data["options"] if use != "crash" else ""
+    if use == "navigation":
+        beside = fixes or one.data["fixes_from"]
+        flags += f" --gnss {shlex.quote(beside)}" if beside else ""
+        flags = f"{flags} {one.data['fixes_options']}".strip()
+    return _line(COMMANDS[use], log or one.name, flags)
+
+
+def way(one: LogDiagnosis, use: str) -> str | None:
+    """Return how a log becomes fit for a use that it is not fit for."""
+    known = {_key(f) for f in (*one.questions, *one.faults)}
+    preventing = [f for f in one.fit[use] if f.severity == "error" and _key(f) not in known]
+    return next((a for f in preventing if (a := f.advice("cli"))), None)
+
+
+def answering(one: LogDiagnosis, log: str | None = None) -> str | None:
+    """Return the command line that answers the open questions as inferred."""
+    if not one.questions:
+        return None
+    flags = str(one.data["options"])
+    if one.refused is not None and one.refused.data.get("flags"):
+        flags = f"{flags} {one.refused.data['flags']}".strip()
+    flags = f"{flags} {one.data['fixes_options']}".strip()
+    return _line("doctor", log or one.name, flags)
+
+
+def _line(name: str, log: str, flags: str) -> str:
+    return f"strapdown {name} {shlex.quote(log)} {flags}".strip()
+
+
+def wrong(one: LogDiagnosis) -> list[tuple[str, str, str]]:
+    """List the location, sentence and fix of each question and fault."""
+    return [
+        (
+            ", ".join(p for p in (f.quantity, f.row and f"row {f.row}") if p),
+            f.sentence("cli"),
+            f.advice("cli") or "",
+        )
+        for f in (*one.questions, *one.faults)
+    ]
+
+
+def stream_table(one: LogDiagnosis) -> TableBlock | None:
+    """Rows, span, rate, gaps and clock of each stream."""
+    rows = []
+    for s in one.data["streams"]:
+        rate = s["rate_hz"]
+        gaps = f"{s['gaps']}, {small(s['longest_gap_s'])} s at most" if s["gaps"] else "none"
+        clock = s["clock"] + (f" + {s['clock_origin_s']:.9g} s" if s["clock_origin_s"] else "")
+        rows.append(
+            (
+                s["name"],
+                str(s["rows"]),
+                instant(s["from_s"]),
+                instant(s["to_s"]),
+                "–" if rate is None else f"{rate:.4g}",
+                gaps,
+                clock,
+            )
+        )
+    columns = ("stream", "rows", "from", "to", "rate, Hz", "gaps", "clock")
+    return TableBlock(columns, tuple(rows), text=(0, 5, 6)) if rows else None
+
+
+def channel_table(one: LogDiagnosis) -> TableBlock | None:
+    """Source, unit, range, noise and resolution of each channel."""
+    facts = one.data["channels"]
+    if not facts:
+        return None
+    sources = {r["quantity"].lstrip("-"): r for r in one.data["read_as"]}
+    rows = []
+    for name, c in facts.items():
+        factor = math.degrees(1.0) if name in GYRO else 1.0
+        read = sources.get(name)
+        step = c["quantization"]
+        rows.append(
+            (
+                name,
+                "–"
+                if read is None
+                else f"{'-' if read['quantity'].startswith('-') else ''}{read['source']}, "
+                f"{read['unit']}",
+                f"{factor * c['least']:.4g} to {factor * c['largest']:.4g}",
+                f"{factor * c['noise']:.2g}",
+                "–" if step is None else f"{factor * step:.2g}",
+                ", ".join(dict.fromkeys(c["faults"])) or "none",
+            )
+        )
+    columns = ("channel", "column, unit", "range", "noise", "step", "faults")
+    caption = "Body axes forward, right, down. Gyros in deg/s, accelerometers in m/s²."
+    return TableBlock(columns, tuple(rows), text=(0, 1, 5), caption=caption)
+
+
+def rest_table(one: LogDiagnosis) -> TableBlock | None:
+    """Longest stationary stretches with the noise there."""
+    rests = sorted(one.data["stationary"], key=lambda r: r["from_s"] - r["to_s"])[:MOST_RESTS]
+    rows = []
+    for r in sorted(rests, key=lambda r: float(r["from_s"])):
+        bias = math.degrees(float(np.linalg.norm(r["gyro_mean_rad_per_s"])))
+        gyro = [60.0 * math.degrees(x) for x in r["gyro_density_rad_per_s_per_sqrt_hz"]]
+        accel = [MICRO_G * x for x in r["accel_density_m_per_s2_per_sqrt_hz"]]
+        size = r["accel_size_m_per_s2"]
+        rows.append(
+            (
+                f"{instant(r['from_s'])} to {instant(r['to_s'])}",
+                r["grade"],
+                f"{bias:.3g}",
+                f"{math.degrees(max(r['gyro_sd_rad_per_s'])):.2g}",
+                f"{max(gyro):.2g}",
+                "–" if size is None else f"{size:.4f}",
+                f"{max(r['accel_sd_m_per_s2']):.2g}" if r["accel_sd_m_per_s2"] else "–",
+                f"{max(accel):.3g}" if accel else "–",
+            )
+        )
+    if not rows:
+        return None
+    more = len(one.data["stationary"]) - len(rows)
+    caption = (
+        "Noise of the noisiest axis: standard deviation, and white noise by second differences."
+    )
+    caption += f" {more} shorter ones are in doctor.json." if more > 0 else ""
+    columns = (
+        "stationary",
+        "grade",
+        "gyro mean, deg/s",
+        "sd, deg/s",
+        "deg/√h",
+        "force, m/s²",
+        "sd, m/s²",
+        "µg/√Hz",
+    )
+    return TableBlock(columns, tuple(rows), text=(0, 1), caption=caption)
+
+
+# The page.
+
+
+def doctor_document(result: Diagnosis, name: str = "") -> Document:
+    """Return the report of a diagnosis."""
+    several = len(result.logs) > 1
+    front: list[Block] = []
+    sections: list[Section] = []
+    for k, one in enumerate(result.logs):
+        front += _answer(one)
+        sections += _sections(
+            one, f"{k + 1}-" if several else "", f"{one.name}: " if several else ""
+        )
+    if several:
+        sections.insert(0, section("between", "Between the logs", _found(result.between)))
+    if name:
+        sections.append(section("again", "Check this folder", *run_again(name)))
+    title = ", ".join(one.name for one in result.logs)
+    facts = (("Software", f"strapdown {__version__}"),)
+    return Document(
+        title, "What is in the log, and what is wrong", facts, tuple(front), tuple(sections)
+    )
+
+
+def _answer(one: LogDiagnosis) -> tuple[Block, ...]:
+    shown = uses(one)
+    good = not shown or any(one.answer(use) == "yes" for use in shown)
+    rows = []
+    for use in shown:
+        helps = way(one, use)
+        text = f"{capital(reasons(one, use))}.{f' {capital(helps)}.' if helps else ''}"
+        rows.append((f"{capital(use)}: {one.answer(use)}", text))
+    commands = [line for use in shown if (line := command(one, use))]
+    ask = answering(one)
+    items = [
+        (head, f"{capital(text)}. {'Fix: ' + fix + '.' if fix else ''}".strip())
+        for head, text, fix in wrong(one)
+    ]
+    return blocks(
+        Paragraph(headline(one), "lead" if good else "warning"),
+        Items(tuple(rows)) if rows else None,
+        paragraph("\n".join(commands), "mono"),
+        Paragraph("What is wrong, and the fix:" if items else "No fault was found."),
+        Items(tuple(items), numbered=True) if items else None,
+        paragraph("With every question answered as inferred:" if ask else None),
+        paragraph(ask, "mono"),
+    )
+
+
+def _sections(one: LogDiagnosis, slug: str, title: str) -> list[Section]:
+    read = [
+        (f"{r['source']} → {r['quantity']}", f"{r['unit']}; {r['why']}; first value {r['first']}")
+        for r in one.data["read_as"]
+    ]
+    columns = [
+        (
+            c["name"] + (f" [{c['unit']}]" if c["unit"] else ""),
+            f"{c['least']:.6g} to {c['largest']:.6g}; first {c['first']}"
+            if "least" in c
+            else f"first {c['first']}",
+        )
+        for c in one.data["columns"]
+    ]
+    made = [
+        section(f"{slug}signals", f"{title}Signals", signal_chart(one, slug), fix_chart(one, slug)),
+        section(f"{slug}streams", f"{title}Streams", stream_table(one), Facts(_facts(one))),
+        section(
+            f"{slug}channels",
+            f"{title}Channels and stationary stretches",
+            channel_table(one),
+            rest_table(one),
+        ),
+        section(
+            f"{slug}columns",
+            f"{title}Units and axes, with the evidence",
+            Items(tuple(read)) if read else None,
+            Items(tuple(columns)) if columns else None,
+        ),
+        section(f"{slug}notes", f"{title}Notes", _found(one.notes)),
+    ]
+    return [one for one in made if one.blocks]
+
+
+def _found(findings: Iterable[Finding]) -> Block:
+    rows = tuple(
+        (
+            ", ".join(str(p) for p in (f.file, f.quantity) if p),
+            f.sentence("cli") + (f". {a}." if (a := f.advice("cli")) else ""),
+        )
+        for f in findings
+    )
+    return Items(rows) if rows else Paragraph("None.")
+
+
+def _facts(one: LogDiagnosis) -> tuple[tuple[str, str], ...]:
+    data = one.data
+    rows = []
+    if data["format"] is not None:
+        rows.append(("Format", data["format"]["title"]))
+    if stamps := data["stamps"]:
+        low, usual, high = (1e3 * stamps[f"{k}_s"] for k in _STEPS)
+        rows.append(("Steps of time", f"{usual:.4g} ms; 98 % from {low:.4g} to {high:.4g} ms"))
+    if (gravity := data["gravity"]) is not None:
+        rest = gravity["at_rest_m_per_s2"]
+        size = f"median {gravity['median_m_per_s2']:.4g} m/s²"
+        size += "" if rest is None else f", {rest:.5g} m/s² at rest"
+        rows.append(("Gravity", f"{'included' if gravity['included'] else 'removed'}; {size}"))
+    if clock := data["receiver_clock"]:
+        said = f"{clock['offset_s']:.3f} ± {clock['sd_s']:.2g} s against the samples (1 sd)"
+        rows.append(("Receiver clock", said))
+    if warm := data["temperature"]:
+        rows.append(("Temperature", f"{warm['least_degc']:.4g} to {warm['largest_degc']:.4g} °C"))
+    if rests := data["stationary"]:
+        total = sum(r["to_s"] - r["from_s"] for r in rests)
+        rows.append(("Stationary", f"{len(rests)} stretches, {duration_words(total)} in all"))
+    return tuple(rows)
+
+
+_STEPS = ("low_1_percent", "median", "high_1_percent")
+
+
+# Charts.
+
+
+def signal_chart(one: LogDiagnosis, slug: str = "") -> Chart | None:
+    """Angular rate, specific force with its magnitude, steps of time, and speed of the fixes."""
+    imu = one.streams.get("imu")
+    if imu is None:
+        return None
+    time = index_of(imu)
+    gaps = [gap.sample for gap in find_gaps(time)]
+
+    between = np.insert(time, gaps, [0.5 * (time[k] + time[k - 1]) for k in gaps])
+
+    def line(name: str, values: Array, colour: str, width: float = 0.9) -> Line:
+        broken = np.insert(values, gaps, np.nan)
+        return curve(name, between, broken, colour, width=width, buckets=BUCKETS)
+
+    def triad(columns: list[str], factor: float) -> list[Line]:
+        return [
+            line(axis, factor * imu[c].to_numpy(dtype=np.float64), colour)
+            for axis, c, colour in zip(_AXES, columns, AXIS_COLOURS, strict=True)
+        ]
+
+    panels = [Panel("rate, deg/s", tuple(triad(GYRO, math.degrees(1.0))), title="Gyros")]
+    if ACCEL[0] in imu.columns:
+        size = np.linalg.norm(values_of(imu, ACCEL), axis=1)
+        lines = [line("magnitude", size, BLACK, 0.7), *triad(ACCEL, 1.0)]
+        panels.append(Panel("force, m/s²", tuple(lines), title="Accelerometers"))
+    steps = curve("step", time[1:], 1e3 * np.diff(time), GREY, width=0.9, buckets=BUCKETS)
+    panels.append(Panel("step, ms", (steps,), title="Steps of time", height=0.6))
+    if (fixes := _speed(one)) is not None:
+        panels.append(Panel("speed, m/s", (fixes,), title="Fixes", height=0.7))
+    return Chart(
+        f"{slug}signals",
+        "Signals in body axes",
+        "Least and largest values of each pixel. Bands: stationary stretches and faults.",
+        "time, s",
+        tuple(panels),
+        bands=_bands(one),
+    )
+
+
+_AXES = ("x, forward", "y, right", "z, down")
+
+
+def _bands(one: LogDiagnosis) -> tuple[Band, ...]:
+    """Longest stationary stretches, and stretches of channel faults."""
+    rests = sorted(one.rests, key=lambda r: r.start - r.end)[:MOST_BANDS]
+    found = [Band(r.start, r.end, "at rest") for r in rests]
+    for fault in one.faults:
+        reason = fault.data.get("reason")
+        if fault.code == "navigation.channel-fault" and isinstance(reason, Finding):
+            found.append(Band(reason.data["begin"], reason.data["end"], str(fault.quantity)))
+    return tuple(sorted(found, key=lambda b: b.start))
+
+
+def _speed(one: LogDiagnosis) -> Line | None:
+    """Horizontal speed of the fixes on the clock of the samples, measured or by positions."""
+    gnss, imu = one.streams.get("gnss"), one.streams.get("imu")
+    if gnss is None or len(gnss) < 2:
+        return None
+    if imu is not None:
+        try:
+            gnss, _ = on_clock_of(gnss, imu)
+        except DataError:
+            return None
+        stamps, time = index_of(imu), index_of(gnss)
+        gnss = gnss[(time >= stamps[0]) & (time <= stamps[-1])]
+        if len(gnss) < 2:
+            return None
+    time = index_of(gnss)
+    known = np.isfinite(values_of(gnss, VELOCITY_SD[:2])).all(axis=1)
+    if known.any():
+        speed = np.where(known, np.hypot(*values_of(gnss, VELOCITY)[:, :2].T), np.nan)
+    else:
+        from strapdown.frames import place_difference
+
+        place = values_of(gnss, GEODETIC)
+        moved = np.linalg.norm(place_difference(place[1:], place[:-1])[:, :2], axis=1)
+        speed = np.append(moved / np.diff(time), np.nan)
+    return curve("speed over ground", time, speed, BLUE, width=1.2, buckets=BUCKETS)
+
+
+def fix_chart(one: LogDiagnosis, slug: str = "") -> Chart | None:
+    """Speed, height and interval of fixes without inertial samples."""
+    gnss = one.streams.get("gnss")
+    if gnss is None or "imu" in one.streams or len(gnss) < 3:
+        return None
+    time = index_of(gnss)
+    speed = _speed(one)
+    height = curve("height", time, gnss["alt"].to_numpy(), BLUE, width=1.2, buckets=BUCKETS)
+    steps = curve("step", time[1:], np.diff(time), GREY, width=0.9, buckets=BUCKETS)
+    panels = [
+        *([Panel("speed, m/s", (speed,), title="Speed over ground")] if speed else []),
+        Panel("height, m", (height,), title="Height over the ellipsoid"),
+        Panel("step, s", (steps,), title="Steps of time", height=0.6),
+    ]
+    return Chart(f"{slug}fixes", "Fixes", "", "time, s", tuple(panels))

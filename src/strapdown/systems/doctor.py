@@ -1,0 +1,868 @@
+"""Examine logs: streams, clocks, units, channels, rests, faults, and what they suffice for."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.bundle.seal import InputFiles, Seal, input_files
+from strapdown.config.alignment import AxesTable, FixesTable, LogTable
+from strapdown.config.doctor import DoctorSpec, flags_of, flags_of_fixes
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.dsp.running_integral import running_integral
+from strapdown.errors import DataError, Finding, Severity, StrapdownError
+from strapdown.evaluation.second_log import align_second_log
+from strapdown.formats import (
+    READERS,
+    STREAMS,
+    TABLE,
+    NoStreamError,
+    Reader,
+    files_of,
+    open_stream,
+    readers_of,
+)
+from strapdown.formats.arrays import ticks_of
+from strapdown.formats.clocks import RELATIVE, clock_of, on_clock_of
+from strapdown.formats.crash_records import read_crash_record
+from strapdown.formats.find_columns import Column
+from strapdown.formats.gnss_files import read_gnss
+from strapdown.formats.gnss_fixes import GnssOptions
+from strapdown.formats.recording import ABSENT, RawLog, Recording
+from strapdown.formats.trajectory_readers import read_trajectory
+from strapdown.navigation.measurements.gnss_clock import time_offset
+from strapdown.navigation.measurements.gnss_readiness import gnss_readiness
+from strapdown.progress import Progress, silent
+from strapdown.sensors.health_log import LEAST_SAMPLES, ChannelFault
+from strapdown.sensors.imu_health import ImuHealth, check_imu_channels
+from strapdown.sensors.rest import RestStretch, find_rests_of_every_grade
+from strapdown.sensors.sampling_health import check_sampling, quantization_step
+from strapdown.systems.alignment_source import body_record
+from strapdown.systems.inputs import Memory, SavedRun
+from strapdown.systems.navigation_checks import MOST, SILENT
+from strapdown.systems.navigation_proposal import CODE_POSITION_SD, CODE_VELOCITY_SD
+from strapdown.systems.one_thread import one_thread
+from strapdown.tables import ACCEL, GYRO, POSITION_SD, find_gaps
+from strapdown.tables.checks import index_of, values_of
+from strapdown.units import TIME_UNITS
+
+__all__ = ["USES", "Diagnosis", "LogDiagnosis", "run_doctor"]
+
+Array = NDArray[np.float64]
+
+#: Uses that a log is judged for.
+USES = ("attitude", "navigation", "crash")
+#: Rounds of questions of one file: a unit that is known may open the next question.
+ROUNDS = 4
+#: Sample rates below which an attitude misses ordinary motion, and all motion, Hz.
+LEAST_RATE, USELESS_RATE = 20.0, 4.0
+#: Rate of delta-V in 49 CFR 563, Hz; its interval, s, and the change that is an event, m/s.
+EVENT_RATE, EVENT, EVENT_DV = 100.0, 0.15, 8.0 / 3.6
+#: Mean before an event that is subtracted with gravity, s.
+BEFORE = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class LogDiagnosis:
+    """Diagnosis of one log.
+
+    Attributes
+    ----------
+    log : LogTable
+        As it was read: with the answers to its questions as inferred.
+    recording : Recording or None
+        None if it has no inertial samples, or none that can be read.
+    streams : mapping of str to DataFrame
+        By name of `formats.STREAMS`; ``imu`` in body axes and SI.
+    questions : tuple of Finding
+        What the file leaves open.
+    answers : mapping of str to str
+        To the questions, as inferred.
+    refused : Finding or None
+        Why inertial samples could not be read.
+    faults : tuple of Finding
+        Of severity warning or error, the gravest first.
+    notes : tuple of Finding
+    fit : mapping of str to tuple of Finding
+        By use: a note supports it, a warning limits it, an error prevents it.
+    health : ImuHealth or None
+        Tests of the channels.
+    rests : tuple of RestStretch
+    data : mapping
+        Everything that was measured, as plain data.
+    """
+
+    log: LogTable
+    recording: Recording | None
+    streams: Mapping[str, pd.DataFrame]
+    questions: tuple[Finding, ...]
+    answers: Mapping[str, str]
+    refused: Finding | None
+    faults: tuple[Finding, ...]
+    notes: tuple[Finding, ...]
+    fit: Mapping[str, tuple[Finding, ...]]
+    health: ImuHealth | None
+    rests: tuple[RestStretch, ...]
+    data: Mapping[str, Any]
+
+    @property
+    def name(self) -> str:
+        """Name of the file or folder."""
+        return str(self.data["name"])
+
+    def answer(self, use: str) -> str:
+        """``yes``, ``with limits`` or ``no``."""
+        worst = {one.severity for one in self.fit[use]}
+        return "no" if "error" in worst else "with limits" if "warning" in worst else "yes"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Diagnosis(SavedRun):
+    """Result of `doctor`: in memory until `save` writes its page and its JSON.
+
+    Attributes
+    ----------
+    logs : tuple of LogDiagnosis
+        In the order given.
+    between : tuple of Finding
+        Clocks between the logs.
+    findings : tuple of Finding
+        Questions, faults and notes of every log, and `between`.
+    """
+
+    configuration: ClassVar[str] = "spec"
+
+    spec: DoctorSpec
+    logs: tuple[LogDiagnosis, ...]
+    between: tuple[Finding, ...]
+    inputs: tuple[InputFiles, ...]
+    findings: tuple[Finding, ...]
+    memory: Memory = field(default=Memory({}))
+
+    @property
+    def data(self) -> dict[str, Any]:
+        """Everything that was measured, as plain data."""
+        return {"logs": [dict(log.data) for log in self.logs]}
+
+    def to_pandas(self) -> pd.DataFrame:
+        """One row per stream: log, name, rows, first and last stamp in s, rate in Hz."""
+        rows = [{"log": log.name, **one} for log in self.logs for one in log.data["streams"]]
+        return pd.DataFrame(rows)
+
+    @staticmethod
+    def _writer() -> Callable[..., Seal]:
+        from strapdown.report.doctor import DOCTOR
+
+        return DOCTOR.write
+
+    def __repr__(self) -> str:
+        said = "; ".join(
+            f"{log.name}: "
+            + ", ".join(f"{use} {log.answer(use)}" for use in USES)
+            + f", {len(log.faults)} faults"
+            for log in self.logs
+        )
+        return f"<Diagnosis {said}>"
+
+
+@one_thread()
+def run_doctor(spec: DoctorSpec, progress: Progress = silent) -> Diagnosis:
+    """Examine logs.
+
+    Parameters
+    ----------
+    spec : DoctorSpec
+    progress : callable, optional
+        Called with a stage and the share that is done.
+
+    Raises
+    ------
+    ConfigError
+        A file does not exist, or an option does not fit it.
+    DataError
+        No file holds anything that can be read.
+    """
+    logs: list[LogDiagnosis] = []
+    unread: list[DataError] = []
+    by_path = {fixes.path: fixes for fixes in spec.fixes}
+    for k, log in enumerate(spec.logs):
+        progress(f"examining {Path(log.path).name}", 0.05 + 0.7 * k / len(spec.logs))
+        try:
+            logs.append(_diagnose(log, spec.axes, by_path.get(log.path)))
+        except DataError as error:
+            unread.append(error)
+    if not logs:
+        raise unread[0]
+    alone = [k for k, one in enumerate(logs) if "gnss" in one.streams and "imu" not in one.streams]
+    for k, one in enumerate(logs):
+        if alone and "imu" in one.streams and "gnss" not in one.streams:
+            logs[k] = _with_fixes(one, logs[alone[0]])
+    between = (*(e.finding for e in unread), *_between(logs))
+    findings = tuple(f for one in logs for f in (*one.questions, *one.faults, *one.notes))
+    inputs = tuple(input_files("log", x.log.path, _files(x)) for x in logs)
+    kept = [log for log in spec.logs if log.path in {x.log.path for x in logs}]
+    asked = spec.model_copy(update={"logs": tuple(kept)})
+    return Diagnosis(asked, tuple(logs), between, inputs, (*findings, *between))
+
+
+def _files(one: LogDiagnosis) -> tuple[Path, ...]:
+    """List the files of a log; every file of a folder whose samples were not read."""
+    read = files_of(one.log.path) if one.recording is None else one.recording.files
+    files = [f for p in read for f in (p.rglob("*") if p.is_dir() else (p,)) if f.is_file()]
+    return tuple(sorted(files))
+
+
+def _diagnose(log: LogTable, axes: str | None, fixes: FixesTable | None) -> LogDiagnosis:
+    form, reader = _reader(log)
+    inertial = _inertial(log, axes)
+    streams = {} if inertial.imu is None else {"imu": inertial.imu}
+    findings = list(inertial.findings)
+    others, found = _others(log, reader, inertial.recording, fixes)
+    streams |= others
+    findings += found
+    raw = None
+    if inertial.imu is None and reader is not None:
+        raw = _columns(log.path, form)
+    missing = inertial.refused
+    if not streams and raw is None:
+        assert missing is not None
+        lacking = missing.code in ABSENT and not inertial.questions
+        raise DataError(next((f for f in findings if lacking and f.severity == "error"), missing))
+    health: ImuHealth | None = None
+    rests: tuple[RestStretch, ...] = ()
+    if inertial.imu is not None:
+        health, rests, found = _channels(inertial.imu)
+        findings += found
+    clock, found = _fixes_against(streams)
+    findings += found
+    if missing is not None and not inertial.questions:
+        if not streams:
+            findings.append(missing)
+        elif missing.code not in ABSENT:
+            findings.append(missing.replace(severity="warning"))
+    lacks = raw is not None and missing is not None and missing.code in ABSENT
+    impact = None if inertial.imu is None else _impact(inertial.imu)
+    order = {"error": 0, "warning": 1}
+    faults = sorted((f for f in findings if f.severity in order), key=lambda f: order[f.severity])
+    flags = flags_of(inertial.log, axes)
+    data: dict[str, Any] = {
+        "name": Path(log.path).resolve().name,
+        "format": None if reader is None else {"name": form, "title": reader.title},
+        "options": flags,
+        "fixes_options": flags_of_fixes(fixes),
+        "answers_inferred": dict(inertial.answers),
+        "streams": [_stream(name, streams[name]) for name in STREAMS if name in streams],
+        "read_as": [asdict(r) for r in inertial.recording.readings] if inertial.recording else [],
+        "columns": [] if raw is None else _ranges(raw),
+        "stamps": None if inertial.imu is None else _steps(inertial.imu),
+        "channels": {} if health is None else _channel_facts(streams["imu"], health),
+        "stationary": [_rest(streams["imu"], rest) for rest in rests],
+        "gravity": _gravity(inertial, rests),
+        "receiver_clock": clock,
+        "fixes_from": None,
+        "impact": impact,
+        "crash_record": _crash_record(log.path) if lacks else None,
+        "temperature": _temperature(streams),
+    }
+    one = LogDiagnosis(
+        inertial.log,
+        inertial.recording,
+        streams,
+        inertial.questions,
+        inertial.answers,
+        missing,
+        tuple(faults),
+        tuple(f for f in findings if f.severity == "note"),
+        {},
+        health,
+        rests,
+        data,
+    )
+    return _judged(one)
+
+
+def _judged(one: LogDiagnosis) -> LogDiagnosis:
+    return replace(one, fit={use: tuple(_FIT[use](one)) for use in USES})
+
+
+def _with_fixes(one: LogDiagnosis, other: LogDiagnosis) -> LogDiagnosis:
+    """Return a log with the fixes of another file, and what they are against its samples."""
+    streams = {**one.streams, "gnss": other.streams["gnss"]}
+    clock, found = _fixes_against(streams)
+    found = [f for f in found if f not in (*other.faults, *other.notes)]
+    more = {"receiver_clock": clock, "fixes_from": other.name}
+    listed = [*one.data["streams"], *(s for s in other.data["streams"] if s["name"] == "gnss")]
+    return _judged(
+        replace(
+            one,
+            streams=streams,
+            faults=(*one.faults, *(f for f in found if f.severity != "note")),
+            notes=(*one.notes, *(f for f in found if f.severity == "note")),
+            data={**one.data, **more, "streams": listed},
+        )
+    )
+
+
+# Reading: every stream, with the answers to open questions as inferred.
+
+
+def _reader(log: LogTable) -> tuple[str, Reader | None]:
+    path = Path(log.path)
+    if log.format in READERS:
+        return str(log.format), READERS[str(log.format)]
+    if not path.exists():
+        return "", None
+    return next(readers_of(path), ("", None))
+
+
+@dataclass(frozen=True, eq=False)
+class _Inertial:
+    """Inertial samples of a log, or why there are none."""
+
+    log: LogTable
+    recording: Recording | None
+    imu: pd.DataFrame | None
+    findings: tuple[Finding, ...]
+    questions: tuple[Finding, ...]
+    answers: dict[str, str]
+    refused: Finding | None
+
+
+def _inertial(log: LogTable, axes: str | None) -> _Inertial:
+    """Read inertial samples; open questions are answered as inferred, and listed."""
+    questions: list[Finding] = []
+    answers: dict[str, str] = {}
+    refused = None
+    for _ in range(ROUNDS):
+        try:
+            recording, imu, findings = body_record(log, AxesTable(axes=axes))
+            return _Inertial(log, recording, imu, findings, tuple(questions), answers, None)
+        except DataError as error:
+            refused = error.finding
+        if "answers" not in refused.data:
+            break
+        asked = refused.data["questions"] if refused.code == "io.questions" else [refused]
+        questions += [one for one in asked if one not in questions]
+        new = {q: a for q, a in refused.data["answers"] if answers.get(q) != a}
+        if not new or "UNIT" in new.values():
+            break
+        answers |= new
+        log = _answered(log, new)
+    return _Inertial(log, None, None, (), tuple(questions), answers, refused)
+
+
+def _answered(log: LogTable, answers: Mapping[str, str]) -> LogTable:
+    keys = LogTable.model_fields
+    columns = log.columns | {q: c for q, c in answers.items() if q not in keys}
+    stated: dict[str, Any] = {q: a for q, a in answers.items() if q in keys}
+    stated |= {"repair": True} if "repair" in answers else {}
+    return log.model_copy(update={**stated, "columns": columns})
+
+
+def _others(
+    log: LogTable, reader: Reader | None, recording: Recording | None, fixes: FixesTable | None
+) -> tuple[dict[str, pd.DataFrame], list[Finding]]:
+    """Read fixes, reference and the streams of other sensors."""
+    streams: dict[str, pd.DataFrame] = {}
+    findings: list[Finding] = []
+    held = {} if reader is None else reader.streams
+    if "gnss" in held or TABLE in held:
+        options = replace(
+            GnssOptions(format=log.format) if fixes is None else fixes.options(),
+            unstated_position_sd=CODE_POSITION_SD,
+            unstated_velocity_sd=CODE_VELOCITY_SD,
+            repair=log.repair,
+        )
+        try:
+            try:
+                streams["gnss"] = read_gnss(log.path, options)
+            except DataError as error:
+                if error.finding.code in ABSENT:
+                    raise
+                streams["gnss"] = read_gnss(log.path, replace(options, repair=True))
+                findings.append(error.finding.replace(severity="warning"))
+            findings += streams["gnss"].attrs["findings"]
+        except DataError as error:
+            # A table of samples need not be one of fixes.
+            if error.finding.code not in ABSENT and ("gnss" in held or recording is None):
+                findings.append(error.finding)
+    if recording is not None and recording.truth is not None:
+        streams["reference"] = recording.truth
+    elif "reference" in held or TABLE in held:
+        try:
+            streams["reference"] = read_trajectory(log.path)
+            findings += streams["reference"].attrs.get("findings", ())
+        except DataError as error:
+            if "reference" in held and error.finding.code not in ABSENT:
+                findings.append(error.finding.replace(severity="warning"))
+    for name in ("magnetometer", "barometer", "wheel"):
+        if name not in held:
+            continue
+        try:
+            raw = open_stream(log.path, name, log.format)
+        except NoStreamError:
+            continue
+        except DataError as error:
+            findings.append(error.finding.replace(severity="warning"))
+            continue
+        if isinstance(raw, RawLog) and (table := _table(raw)) is not None:
+            streams[name] = table
+    # A stream that shares the reading of another has its findings, too.
+    return streams, list(dict.fromkeys(findings))
+
+
+def _table(raw: RawLog) -> pd.DataFrame | None:
+    """Return the stated quantities of a stream by time in s; None without stamps."""
+    stated = {quantity: (name, unit) for name, (quantity, unit) in raw.stated.items()}
+    if "time" not in stated:
+        return None
+    name, unit = stated.pop("time")
+    ticks, dated = ticks_of(raw, Column(name, unit, ""))
+    time = ticks * (1e-9 if dated else TIME_UNITS.get(unit or "s", 1.0))
+    columns = {q: raw.columns[source] for q, (source, _) in stated.items() if source in raw.columns}
+    table = pd.DataFrame(columns, index=pd.Index(np.asarray(time, dtype=np.float64), name="time"))
+    table.attrs |= {"source": raw.name, "findings": (), "clock": raw.clock or RELATIVE}
+    table.attrs["units"] = {q: u for q, (_, u) in stated.items()}
+    return table
+
+
+def _columns(path: str, form: str) -> RawLog | None:
+    """Return the raw columns of a table that could not be read as a log."""
+    try:
+        raw = open_stream(path, "imu", form or None)
+    except DataError:
+        return None
+    return raw if isinstance(raw, RawLog) and raw.columns else None
+
+
+def _crash_record(path: str) -> int | None:
+    """Return the number of channels that the file has as a crash record."""
+    try:
+        return len(read_crash_record(path).channels)
+    except StrapdownError:
+        return None
+
+
+# Checks across channels and streams.
+
+
+def _channels(
+    imu: pd.DataFrame,
+) -> tuple[ImuHealth | None, tuple[RestStretch, ...], list[Finding]]:
+    """Test channels and sampling, and find rests."""
+    if len(imu) < LEAST_SAMPLES:
+        return None, (), []
+    health = check_imu_channels(imu)
+    silent = {f.channel for f in health.faults if f.kind in ("missing", "stuck", "dead")}
+    sampling = check_sampling(imu, [name for name in health.channels if name not in silent])
+    # Samples that are held step, and channels are compared with one another.
+    held = any(f.code == "sensors.samples-held" for f in sampling)
+    faults = [f for f in health.faults if f.kind != "noisy" or not held]
+    return health, find_rests_of_every_grade(imu), [*_worst(imu, faults), *sampling]
+
+
+def _worst(imu: pd.DataFrame, faults: Sequence[ChannelFault]) -> list[Finding]:
+    """Return the longest stretch of each channel and kind of fault, and its share in all."""
+    groups: dict[tuple[str, str], list[ChannelFault]] = {}
+    for fault in faults:
+        groups.setdefault((fault.channel, fault.kind), []).append(fault)
+    found = []
+    for group in groups.values():
+        said = max(group, key=lambda f: f.last - f.first).finding
+        lost = sum(f.last - f.first + 1 for f in group)
+        found.append(
+            Finding(
+                "navigation.channel-fault",
+                severity=said.severity,
+                file=said.file,
+                row=said.row,
+                quantity=said.quantity,
+                reason=said,
+                percent=100.0 * lost / len(imu),
+            )
+        )
+    return found
+
+
+def _fixes_against(
+    streams: Mapping[str, pd.DataFrame],
+) -> tuple[dict[str, float] | None, list[Finding]]:
+    """Check fixes by themselves and against the samples; return the offset of the clocks, too."""
+    gnss, imu = streams.get("gnss"), streams.get("imu")
+    if gnss is None:
+        return None, []
+    found: list[Finding] = []
+    try:
+        if imu is None:
+            return None, list(gnss_readiness(gnss))
+        fixes, shifted = on_clock_of(gnss, imu)
+        found += [shifted] if shifted else []
+        found += gnss_readiness(fixes, imu)
+        offset = time_offset(fixes, imu)
+    except DataError as error:
+        return None, [*found, error.finding]
+    if offset is None:
+        return None, found
+    return {"offset_s": offset.offset, "sd_s": offset.sd, "explained": offset.share}, found
+
+
+def _between(logs: Sequence[LogDiagnosis]) -> list[Finding]:
+    """Compare the clocks of each log of inertial samples with those of the other logs."""
+    found: list[Finding] = []
+    bases = [one for one in logs if "imu" in one.streams]
+    for base in bases:
+        for other in logs:
+            lent = other.name == base.data["fixes_from"] or other.data["fixes_from"] is not None
+            if other is base or lent or "gnss" not in other.streams:
+                continue
+            _, said = _fixes_against({**other.streams, "imu": base.streams["imu"]})
+            own = set(other.faults) | set(other.notes)
+            found += [f for f in said if f not in own]
+    for k, base in enumerate(bases):
+        for other in bases[k + 1 :]:
+            try:
+                fit = align_second_log(base.streams["imu"], other.streams["imu"])
+            except DataError as error:
+                found.append(
+                    Finding(
+                        "doctor.logs-not-aligned",
+                        severity="note",
+                        file=base.name,
+                        quantity="time",
+                        other=other.name,
+                        reason=error.finding,
+                    )
+                )
+                continue
+            apart = abs(fit.offset) > max(3.0 * fit.offset_sd, 0.02)
+            found.append(
+                Finding(
+                    "doctor.logs-apart" if apart else "doctor.logs-on-one-clock",
+                    severity="warning" if apart else "note",
+                    offset=fit.offset,
+                    sd=fit.offset_sd,
+                    drift_ppm=fit.drift_ppm,
+                    drift_sd_ppm=fit.drift_sd_ppm,
+                    file=base.name,
+                    quantity="time",
+                    other=other.name,
+                )
+            )
+    return found
+
+
+def _impact(imu: pd.DataFrame) -> dict[str, float] | None:
+    """Find the largest change of velocity within 150 ms, without the mean force before it."""
+    time = index_of(imu)
+    if ACCEL[0] not in imu.columns or time[-1] - time[0] < BEFORE + EVENT:
+        return None
+    force = values_of(imu, ACCEL)
+    gained = running_integral(time, force, means=imu.attrs["sampling"] == "mean")
+    begin = np.flatnonzero(time >= time[0] + BEFORE)
+    end = np.searchsorted(time, time[begin] + EVENT, side="right") - 1
+    before = np.searchsorted(time, time[begin] - BEFORE)
+    begin, end, before = (k[before < begin] for k in (begin, end, before))
+    if not begin.size:
+        return None
+    usual = (gained[begin] - gained[before]) / (time[begin] - time[before])[:, None]
+    lasting = (time[end] - time[begin])[:, None]
+    change = np.linalg.norm(gained[end] - gained[begin] - usual * lasting, axis=1)
+    # A step across a gap integrates what was not measured.
+    steps = np.diff(time)
+    long = np.concatenate([[0], np.cumsum(steps > EVENT)])
+    change[(long[end] > long[before]) | (end <= begin)] = 0.0
+    k = int(change.argmax())
+    size = np.linalg.norm(force, axis=1)
+    return {
+        "delta_v_m_per_s": float(change[k]),
+        "at_s": float(time[begin[k]]),
+        "largest_m_per_s2": float(size.max()),
+    }
+
+
+# What was measured, as plain data.
+
+
+def _stream(name: str, table: pd.DataFrame) -> dict[str, Any]:
+    time = index_of(table)
+    gaps = find_gaps(time) if (np.diff(time) > 0.0).all() else []
+    lost = float(sum(g.length - g.usual for g in gaps))
+    lasting = float(time[-1] - time[0]) - float(sum(g.length for g in gaps))
+    clock = clock_of(table)
+    return {
+        "name": name,
+        "rows": len(time),
+        "from_s": float(time[0]),
+        "to_s": float(time[-1]),
+        "rate_hz": (len(time) - 1 - len(gaps)) / lasting if lasting > 0.0 else None,
+        "gaps": len(gaps),
+        "longest_gap_s": max((g.length for g in gaps), default=0.0),
+        "lost_s": lost,
+        "clock": clock.name,
+        "clock_origin_s": clock.origin,
+        "columns": [str(c) for c in table.columns],
+    }
+
+
+def _steps(imu: pd.DataFrame) -> dict[str, float]:
+    steps = np.diff(index_of(imu))
+    quantiles = np.quantile(steps, [0.0, 0.01, 0.5, 0.99, 1.0])
+    names = ("least_s", "low_1_percent_s", "median_s", "high_1_percent_s", "largest_s")
+    return {**dict(zip(names, quantiles.tolist(), strict=True)), "sd_s": float(steps.std())}
+
+
+def _channel_facts(imu: pd.DataFrame, health: ImuHealth) -> dict[str, dict[str, Any]]:
+    facts: dict[str, dict[str, Any]] = {}
+    for name in health.channels:
+        values = imu[name].to_numpy(dtype=np.float64)
+        facts[name] = {
+            "unit": "rad/s" if name in GYRO else "m/s2",
+            "least": float(values.min()),
+            "mean": float(values.mean()),
+            "largest": float(values.max()),
+            "noise": health.noise[name],
+            "quantization": quantization_step(values),
+            "faults": [f.kind for f in health.of(name)],
+        }
+    return facts
+
+
+def _rest(imu: pd.DataFrame, rest: RestStretch) -> dict[str, Any]:
+    """Describe a rest; densities are of the white noise, by second differences."""
+    part = imu[(imu.index >= rest.start) & (imu.index <= rest.end)]
+    step = float(np.median(np.diff(index_of(part))))
+
+    def density(columns: list[str]) -> list[float]:
+        second = np.diff(values_of(part, columns), n=2, axis=0)
+        sd = np.sqrt(np.square(second).mean(axis=0) / 6.0)
+        return [float(x) for x in sd * math.sqrt(step)]
+
+    force = rest.accel_mean
+    return {
+        "from_s": rest.start,
+        "to_s": rest.end,
+        "grade": rest.grade,
+        "gyro_mean_rad_per_s": list(rest.gyro_mean),
+        "gyro_mean_sd_rad_per_s": list(rest.gyro_mean_sd or ()),
+        "gyro_sd_rad_per_s": list(rest.gyro_sd),
+        "gyro_density_rad_per_s_per_sqrt_hz": density(GYRO),
+        "accel_size_m_per_s2": None if force is None else float(np.linalg.norm(force)),
+        "accel_sd_m_per_s2": list(rest.accel_sd or ()),
+        "accel_density_m_per_s2_per_sqrt_hz": [] if force is None else density(ACCEL),
+    }
+
+
+def _gravity(inertial: _Inertial, rests: Sequence[RestStretch]) -> dict[str, Any] | None:
+    """Whether the specific force has gravity, with its size at rest."""
+    imu = inertial.imu
+    if imu is None or ACCEL[0] not in imu.columns:
+        return None
+    removed = any(f.code == "io.no-gravity" for f in inertial.findings)
+    at_rest = [float(np.linalg.norm(r.accel_mean)) for r in rests if r.accel_mean is not None]
+    usual = float(np.median(np.linalg.norm(values_of(imu, ACCEL), axis=1)))
+    return {
+        "included": not removed,
+        "median_m_per_s2": usual,
+        "at_rest_m_per_s2": float(np.median(at_rest)) if at_rest else None,
+    }
+
+
+def _temperature(streams: Mapping[str, pd.DataFrame]) -> dict[str, float] | None:
+    for table in streams.values():
+        if "temperature" in table.columns:
+            values = table["temperature"].to_numpy(dtype=np.float64)
+            values = values[np.isfinite(values)]
+            if values.size:
+                return {"least_degc": float(values.min()), "largest_degc": float(values.max())}
+    return None
+
+
+def _ranges(raw: RawLog) -> list[dict[str, Any]]:
+    """Name, first value and range of each raw column."""
+    rows = []
+    for name, values in raw.columns.items():
+        row: dict[str, Any] = {"name": name, "unit": raw.units.get(name)}
+        row["first"] = str(values[0]) if values.size else ""
+        if values.dtype.kind in "iuf" and np.isfinite(values.astype(np.float64)).any():
+            row |= {"least": float(np.nanmin(values)), "largest": float(np.nanmax(values))}
+        rows.append(row)
+    return rows
+
+
+# What the log suffices for.
+
+
+def _samples(one: LogDiagnosis) -> list[Finding]:
+    """Reasons that hold for every use of inertial samples."""
+    imu = one.streams.get("imu")
+    if imu is None:
+        reasons = [q.replace(severity="error") for q in one.questions]
+        if not reasons and one.refused is not None and one.refused.code not in ABSENT:
+            reasons = [one.refused]
+        return reasons or [Finding("doctor.no-rates", severity="error", file=one.name)]
+    if inferred := {q: a for q, a in one.answers.items() if q != "repair"}:
+        found = [
+            Finding(
+                "doctor.answers-inferred",
+                file=one.name,
+                answers=[f"{q} = {a}" for q, a in inferred.items()],
+            )
+        ]
+    else:
+        found = []
+    health = one.health
+    for name in () if health is None else health.channels:
+        assert health is not None
+        lost = sum(f.last - f.first + 1 for f in health.of(name) if f.kind in SILENT)
+        if lost > MOST * len(imu):
+            found.append(
+                Finding(
+                    "doctor.channel-lost",
+                    severity="error",
+                    file=one.name,
+                    quantity=name,
+                    percent=100.0 * lost / len(imu),
+                )
+            )
+    return found
+
+
+def _attitude(one: LogDiagnosis) -> list[Finding]:
+    found = _samples(one)
+    imu = one.streams.get("imu")
+    if imu is None:
+        return found
+    rate = _rate(one)
+    if rate < LEAST_RATE:
+        severity: Severity = "error" if rate < USELESS_RATE else "warning"
+        found.append(Finding("doctor.rate-low", severity=severity, file=one.name, rate_hz=rate))
+    else:
+        said = Finding("doctor.rates-on-three-axes", severity="note", file=one.name, rate_hz=rate)
+        found.append(said)
+    gravity = one.data["gravity"]
+    leveled = gravity is not None and gravity["included"]
+    found.append(
+        Finding(
+            "doctor.levels-by-gravity" if leveled else "doctor.no-leveling",
+            severity="note" if leveled else "warning",
+            file=one.name,
+        )
+    )
+    found.append(_bias(one))
+    found += [f for f in one.faults if f.code in ("io.long-gap", *_TURNED)]
+    return found
+
+
+#: Axes that contradict gravity.
+_TURNED = (
+    "io.axes-not-stated-other-up",
+    "io.axes-not-stated-y-up",
+    "io.axes-not-stated-z-up",
+    "io.axes-upside-down",
+    "io.gyro-axes-differ",
+    "io.gyro-turns-against-gravity",
+)
+
+
+def _rate(one: LogDiagnosis) -> float:
+    return next(float(s["rate_hz"]) for s in one.data["streams"] if s["name"] == "imu")
+
+
+def _bias(one: LogDiagnosis) -> Finding:
+    """How well the gyro bias is known from the longest rest."""
+    if not one.rests:
+        return Finding("doctor.bias-unknown", file=one.name)
+    rest = max(one.rests, key=lambda r: r.end - r.start)
+    sd = float(np.max(rest.gyro_mean_sd or rest.gyro_sd))
+    return Finding(
+        "doctor.bias-from-rest",
+        severity="note",
+        file=one.name,
+        bias=float(np.degrees(np.linalg.norm(rest.gyro_mean))),
+        duration=rest.end - rest.start,
+        drift=math.degrees(sd) * 60.0,
+    )
+
+
+def _navigation(one: LogDiagnosis) -> list[Finding]:
+    found = _samples(one)
+    imu, gnss = one.streams.get("imu"), one.streams.get("gnss")
+    gravity = one.data["gravity"]
+    if imu is not None and (gravity is None or not gravity["included"]):
+        found.append(Finding("doctor.no-specific-force", severity="error", file=one.name))
+    if gnss is None:
+        log = shlex.quote(one.name)
+        return [*found, Finding("doctor.no-fixes", severity="error", file=one.name, log=log)]
+    found += [f for f in one.faults if f.code.startswith("navigation.") and f.severity == "error"]
+    if imu is None:
+        return found
+    fixes, _ = _on_clock(gnss, imu)
+    stamps, time = index_of(imu), index_of(fixes)
+    inside = time[(time >= stamps[0]) & (time <= stamps[-1])]
+    if inside.size < 2:
+        return found
+    sd = values_of(gnss, POSITION_SD)[:, 0]
+    finite = sd[np.isfinite(sd)]
+    found.append(
+        Finding(
+            "doctor.fixes",
+            severity="note",
+            file=one.name,
+            count=inside.size,
+            percent=100.0 * float(inside[-1] - inside[0]) / float(stamps[-1] - stamps[0]),
+            sd=float(np.median(finite)) if finite.size else math.inf,
+        )
+    )
+    found += [f for f in one.faults if f.code.startswith("navigation.") and f not in found]
+    found += [f for f in one.faults if f.code in ("io.long-gap", *_TURNED)]
+    return found
+
+
+def _on_clock(gnss: pd.DataFrame, imu: pd.DataFrame) -> tuple[pd.DataFrame, Finding | None]:
+    try:
+        return on_clock_of(gnss, imu)
+    except DataError:
+        return gnss, None
+
+
+def _crash(one: LogDiagnosis) -> list[Finding]:
+    found = _samples(one)
+    impact = one.data["impact"]
+    if count := one.data["crash_record"]:
+        return [Finding("doctor.crash-record", file=one.name, count=count)]
+    if "imu" not in one.streams:
+        return found
+    if impact is None:
+        return [*found, Finding("doctor.no-specific-force", severity="error", file=one.name)]
+    change = impact["delta_v_m_per_s"]
+    hit = change >= EVENT_DV
+    found.append(
+        Finding(
+            "doctor.impact" if hit else "doctor.no-impact",
+            severity="warning" if hit else "error",
+            file=one.name,
+            delta_v=3.6 * change,
+            at=impact["at_s"],
+            peak=impact["largest_m_per_s2"] / STANDARD_GRAVITY,
+        )
+    )
+    rate = _rate(one)
+    if rate < 0.99 * EVENT_RATE:
+        found.append(Finding("doctor.rate-low-for-crash", file=one.name, rate_hz=rate))
+    found += [f for f in one.faults if f.code == "navigation.channel-fault"]
+    return found
+
+
+_FIT: dict[str, Callable[[LogDiagnosis], list[Finding]]] = {
+    "attitude": _attitude,
+    "navigation": _navigation,
+    "crash": _crash,
+}

@@ -1,0 +1,75 @@
+"""`strapdown doctor`: what it prints and writes, and how it ends."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from strapdown.formats import csv
+
+NAMES = ["time_s", *(f"gyro_{a}" for a in "xyz"), *(f"accel_{a}_m_s2" for a in "xyz")]
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    """A unit at rest for a minute, with rates in an unknown unit, and one row twice."""
+    rng = np.random.default_rng(4)
+    time = np.arange(0.0, 60.0, 0.01)
+    time[3000] = time[2999]
+    values = rng.normal(0.0, 1e-3, (time.size, 6)) - np.array([0.0, 0.0, 0.0, 0.0, 0.0, 9.81])
+    path = tmp_path_factory.mktemp("doctor") / "log.csv"
+    columns = dict(zip(NAMES, [time, *values.T], strict=True))
+    csv.write(path, columns, {"axes": "forward-right-down", "sampling": "instantaneous"})
+    return path
+
+
+def test_a_log_with_questions_gets_a_page_that_asks_them_together(log, run_cli, tmp_path):
+    done = run_cli("doctor", log, "--out", tmp_path / "out")
+    assert done.code == 0, done.err
+    assert len(done.out.splitlines()) < 40
+    assert "--gyro-unit rad/s --repair" in done.out
+    found = json.loads((tmp_path / "out" / "doctor.json").read_text())
+    (one,) = found["logs"]
+    assert {"io.unit-undecided", "io.stamp-repeated"} == {q["code"] for q in one["questions"]}
+    assert one["fit"]["attitude"]["answer"] == "with limits"
+    assert one["answers_inferred"] == {"gyro_unit": "rad/s", "repair": "true"}
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "--gyro-unit rad/s --repair" in page
+    assert len(page) < 2_000_000
+
+
+def test_the_answers_are_options_and_the_clean_log_needs_none(log, run_cli, tmp_path):
+    clean = tmp_path / "clean.csv"
+    done = run_cli(
+        *("doctor", log, "--gyro-unit", "rad/s", "--fix", clean, "--json"),
+        *("--out", tmp_path / "out"),
+    )
+    assert done.code == 0, done.err
+    (one,) = json.loads(done.out)["logs"]
+    assert one["fit"]["attitude"]["answer"] == "yes"
+    assert one["options"] == "--gyro-unit rad/s --repair"
+    assert json.loads((tmp_path / "clean.json").read_text())["files"] == {"imu": "clean.csv"}
+    done = run_cli("attitude", clean, "--quiet", "--out", tmp_path / "attitude")
+    assert (done.code, done.err) == (0, "")
+    done = run_cli("doctor", clean, "--out", tmp_path / "again")
+    assert done.code == 0
+    assert "No fault" in (tmp_path / "again" / "report.html").read_text(encoding="utf-8")
+    assert run_cli("verify", tmp_path / "again").code == 0
+
+
+def test_nothing_is_written_of_a_log_whose_unit_is_open(log, run_cli, tmp_path):
+    done = run_cli("doctor", log, "--fix", tmp_path / "clean.csv", "--out", tmp_path / "out")
+    assert done.code == 3
+    assert not (tmp_path / "clean.csv").exists()
+    done = run_cli("doctor", log, log, "--fix", tmp_path / "clean.csv", "--out", tmp_path / "two")
+    assert done.code == 4
+
+
+def test_what_cannot_be_read_at_all_is_refused(run_cli, tmp_path):
+    (tmp_path / "noise.dat").write_bytes(bytes(range(256)) * 8)
+    done = run_cli("doctor", tmp_path / "noise.dat", "--out", tmp_path / "out")
+    assert done.code == 3
+    assert not (tmp_path / "out").exists()
+    assert run_cli("doctor", tmp_path / "none.csv").code == 4

@@ -1,0 +1,298 @@
+"""The doctor finds each fault of a log, none in a sound one, and writes a clean log."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.spatial.transform import Rotation
+from tests.town_drive import motion
+
+import strapdown as sd
+from strapdown.errors import ConfigError, DataError
+from strapdown.formats import csv, read_log
+from strapdown.formats.clocks import clock_of
+from strapdown.formats.gnss_files import read_gnss
+from strapdown.formats.writers import table_columns
+from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
+from strapdown.simulation import simulate_imu
+from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
+from strapdown.systems.doctor import USES
+
+RATE, REST, MOVING = 100.0, 20.0, 60.0
+G = 9.81
+COLUMNS = [
+    "time_s",
+    *(f"gyro_{a}_rad_s" for a in "xyz"),
+    *(f"accel_{a}_m_s2" for a in "xyz"),
+]
+GYROS, ACCELS = COLUMNS[1:4], COLUMNS[4:]
+
+
+@pytest.fixture(scope="module")
+def sound():
+    """A unit at rest for 20 s and then turned by hand for a minute, with the noise of a phone."""
+    rng = np.random.default_rng(11)
+    time = np.arange(0.0, REST + MOVING, 1.0 / RATE)
+    u = np.maximum(time - REST, 0.0)
+    # Angles begin and end their motion smoothly; their rates are those of a hand.
+    angles = np.column_stack(
+        [
+            a * (1.0 - np.cos(w * u)) / 2.0 + b * np.sin(v * u) ** 3
+            for a, w, b, v in (
+                (70.0, 1.1, 25.0, 1.7),
+                (50.0, 0.7, 20.0, 2.3),
+                (120.0, 0.5, 30.0, 1.3),
+            )
+        ]
+    )
+    turn = Rotation.from_euler("xyz", angles, degrees=True)
+    step = (turn[:-1].inv() * turn[1:]).as_rotvec() * RATE
+    gyro = np.vstack([step[:1], 0.5 * (step[1:] + step[:-1]), step[-1:]])
+    force = turn.inv().apply([0.0, 0.0, -G])
+    force += np.where(u[:, None] > 0.0, 1.5 * np.sin(np.outer(u, [3.1, 2.2, 4.3])), 0.0)
+    values = np.hstack(
+        [
+            gyro + np.radians(0.3) + rng.normal(0.0, np.radians(0.05), gyro.shape),
+            force + rng.normal(0.0, 0.02, force.shape),
+        ]
+    )
+    return pd.DataFrame(np.column_stack([time, values]), columns=COLUMNS)
+
+
+def written(table, path, **stated):
+    said = {"axes": "forward-right-down", "sampling": "instantaneous", **stated}
+    csv.write(path, {name: table[name].to_numpy() for name in table.columns}, said)
+    return path
+
+
+def codes(one):
+    """Codes of questions and faults, and of what a channel's fault is."""
+    found = [*one.questions, *one.faults]
+    reasons = [f.data["reason"] for f in found if f.code == "navigation.channel-fault"]
+    return {f.code for f in (*found, *reasons)}
+
+
+def without_rows(table):
+    return table[(table.time_s < 40.0) | (table.time_s > 42.0)]
+
+
+def in_bursts(table):
+    k = np.arange(len(table))
+    return table.assign(time_s=np.floor(k / 10) * 0.1 + (k % 10) * 2e-4)
+
+
+def with_jitter(table):
+    rng = np.random.default_rng(5)
+    return table.assign(time_s=table.time_s + rng.uniform(-0.004, 0.004, len(table)))
+
+
+def thinned(table):
+    return table[np.random.default_rng(6).random(len(table)) > 0.02]
+
+
+def stuck(table):
+    out = table.copy()
+    part = out.time_s.between(50.0, 55.0)
+    out.loc[part, GYROS[1]] = out.loc[part, GYROS[1]].iloc[0]
+    return out
+
+
+def swapped(table):
+    return table.rename(columns={GYROS[0]: GYROS[1], GYROS[1]: GYROS[0]})[COLUMNS]
+
+
+def clipped(table):
+    return table.assign(**{name: table[name].clip(-1.0, 1.0) for name in GYROS})
+
+
+def free_of_gravity(table):
+    rng = np.random.default_rng(7)
+    push = np.sin(np.outer(np.maximum(table.time_s - REST, 0.0), [3.1, 2.2, 4.3]))
+    return table.assign(
+        **{a: 1.5 * push[:, k] + rng.normal(0.0, 0.02, len(table)) for k, a in enumerate(ACCELS)}
+    )
+
+
+def in_degrees(table):
+    return table.assign(**{name: np.degrees(table[name]) for name in GYROS})
+
+
+def with_rows_twice(table):
+    return table.loc[np.sort(np.append(table.index, table.index[3000:3100]))]
+
+
+def coarse(table):
+    step = np.radians(0.5)
+    return table.assign(**{name: np.round(table[name] / step) * step for name in GYROS})
+
+
+def held(table):
+    kept = table[GYROS].iloc[np.arange(len(table)) // 2 * 2].to_numpy()
+    return table.assign(**dict(zip(GYROS, kept.T, strict=True)))
+
+
+FAULTS = {
+    without_rows: "io.long-gap",
+    in_bursts: "sensors.stamps-in-bursts",
+    with_jitter: "sensors.stamps-jitter",
+    thinned: "sensors.samples-dropped",
+    stuck: "sensors.stuck-beyond-noise",
+    swapped: "io.gyro-axes-differ",
+    clipped: "sensors.saturated-flat-top",
+    free_of_gravity: "io.no-gravity",
+    in_degrees: "io.contradicts-unit",
+    with_rows_twice: "io.stamp-repeated",
+    coarse: "sensors.quantization-coarse",
+    held: "sensors.samples-held",
+}
+
+
+def test_a_sound_log_has_no_fault_and_is_fit_for_an_attitude(sound, tmp_path):
+    (one,) = sd.doctor(written(sound, tmp_path / "sound.csv")).logs
+    assert codes(one) == set()
+    assert [one.answer(use) for use in USES] == ["yes", "no", one.answer("crash")]
+    (rest, *_) = one.data["stationary"]
+    assert (rest["from_s"], rest["to_s"]) == pytest.approx((0.0, REST), abs=0.6)
+    # White noise of 0.05 deg/s at 100 Hz; the root mean square of 2000 second differences is known
+    # to 2 %.
+    density = np.radians(0.05) / np.sqrt(RATE)
+    assert rest["gyro_density_rad_per_s_per_sqrt_hz"] == pytest.approx([density] * 3, rel=0.1)
+    assert one.data["gravity"]["included"]
+    assert one.data["gravity"]["at_rest_m_per_s2"] == pytest.approx(G, abs=0.005)
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.__name__)
+def test_each_fault_is_found_and_no_other(fault, sound, tmp_path):
+    (one,) = sd.doctor(written(fault(sound), tmp_path / "log.csv")).logs
+    # The doubled rows of a held gyro hide nothing else; a stuck channel is only stuck.
+    assert codes(one) - {"navigation.channel-fault", "io.rate-at-full-scale"} == {FAULTS[fault]}
+
+
+def test_open_questions_have_answers_and_do_not_hide_what_is_in_the_log(sound, tmp_path):
+    path = written(in_degrees(sound), tmp_path / "log.csv")
+    (one,) = sd.doctor(path).logs
+    assert one.answers == {"gyro_unit": "deg/s"}
+    assert one.answer("attitude") == "with limits"
+    np.testing.assert_allclose(one.streams["imu"].to_numpy(), sound[COLUMNS[1:]], rtol=1e-12)
+    (told,) = sd.doctor(path, units={"gyro": "deg/s"}).logs
+    assert codes(told) == set()
+    with pytest.raises(DataError) as error:
+        sd.doctor(path, fix=tmp_path / "clean.csv")
+    assert error.value.finding.code == "io.questions"
+    assert not (tmp_path / "clean.csv").exists()
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet"])
+def test_a_clean_log_is_the_same_recording_without_a_question(sound, tmp_path, suffix):
+    table = with_rows_twice(in_degrees(sound))
+    path = written(table, tmp_path / "log.csv", axes="unknown")
+    clean = tmp_path / f"clean.{suffix}"
+    how = {"units": {"gyro": "deg/s"}, "axes": "x,-y,-z"}
+    sd.doctor(path, fix=clean, **how)
+    before = sd.read_imu(path, repair=True, **how)
+    after = read_log(clean).imu
+    assert np.array_equal(after.to_numpy(), before.to_numpy())
+    assert np.array_equal(after.index, before.index)
+    record = json.loads((tmp_path / "clean.json").read_text())
+    assert [file["name"] for file in record["source"]] == ["log.csv"]
+    assert "io.stamp-repeated" in {f["code"] for f in record["findings"]}
+    (again,) = sd.doctor(clean).logs
+    assert again.questions == ()
+    with pytest.raises(ConfigError) as error:
+        sd.doctor(path, fix=clean, **how)
+    assert error.value.finding.code == "cli.file-exists"
+
+
+def test_units_that_a_person_decided_are_not_asked_again(sound, tmp_path):
+    # The numbers say rad/s; whoever states deg/s is believed, also by the clean log.
+    path = written(
+        sound.rename(columns={g: g.removesuffix("_rad_s") for g in GYROS}), tmp_path / "log.csv"
+    )
+    clean = tmp_path / "clean.parquet"
+    sd.doctor(path, units={"gyro": "deg/s"}, fix=clean)
+    before = sd.read_imu(path, units={"gyro": "deg/s"})
+    assert np.array_equal(read_log(clean).imu.to_numpy(), before.to_numpy())
+
+
+def test_a_clock_of_1970_survives_to_the_last_bit(sound, tmp_path):
+    stamps = 1_600_000_000_000 + np.round(1e3 * sound.time_s).astype(np.int64)
+    table = sound.drop(columns="time_s").assign(unix_time_ms=stamps)
+    path = written(table, tmp_path / "log.csv")
+    for clean in (tmp_path / "clean.csv", tmp_path / "clean.parquet"):
+        sd.doctor(path, fix=clean, force=True)
+        before, after = read_log(path).imu, read_log(clean).imu
+        assert np.array_equal(before.index, after.index)
+        assert clock_of(after) == clock_of(before)
+        assert clock_of(after).origin == pytest.approx(1.6e9)
+
+
+@pytest.fixture(scope="module")
+def drive():
+    """A drive through a town, and fixes of it."""
+    errors = ImuErrors(
+        TriadErrors(noise_density=np.radians(0.005)), TriadErrors(noise_density=1e-3)
+    )
+    imu, _ = simulate_imu(motion(), errors, rate=50.0, seed=3)
+    receiver = GnssReceiver(rate=5.0, position_noise=1.0, velocity_noise=0.1)
+    return imu, simulate_gnss(motion(), receiver, seed=5)
+
+
+def test_the_offset_of_the_receivers_clock_is_found(drive, tmp_path):
+    imu, gnss = drive
+    log, fixes = tmp_path / "imu.csv", tmp_path / "fixes.csv"
+    written(pd.DataFrame(np.column_stack([imu.index, imu.to_numpy()]), columns=COLUMNS), log)
+    csv.write(fixes, table_columns(gnss), {})
+    one, _ = sd.doctor([log, fixes]).logs
+    assert one.answer("navigation") == "yes"
+    assert codes(one) == set()
+    late = gnss.copy()
+    late.index = gnss.index + 0.7
+    csv.write(fixes, table_columns(late), {})
+    one, _ = sd.doctor([log, fixes], fix=tmp_path / "clean.csv").logs
+    (fault,) = one.faults
+    assert one.answer("navigation") == "with limits"
+    assert fault.code == "navigation.receiver-clock-off"
+    assert np.array_equal(read_gnss(tmp_path / "clean-gnss.csv"), read_gnss(fixes))
+    assert fault.data["offset"] == pytest.approx(0.7, abs=0.05)
+
+
+def test_fixes_of_a_clean_log_are_beside_it(drive, tmp_path):
+    _, gnss = drive
+    fixes, clean = tmp_path / "fixes.csv", tmp_path / "clean.parquet"
+    csv.write(fixes, table_columns(gnss), {})
+    sd.doctor(fixes, fix=clean)
+    before, after = read_gnss(fixes), read_gnss(clean)
+    assert np.array_equal(before.to_numpy(), after.to_numpy())
+    assert np.array_equal(before.index, after.index)
+
+
+def test_two_logs_of_one_body_have_an_offset(sound, tmp_path):
+    one, two = tmp_path / "one.csv", tmp_path / "two.csv"
+    written(sound, one)
+    rng = np.random.default_rng(8)
+    other = sound.assign(time_s=sound.time_s + 0.35)
+    other[GYROS] += rng.normal(0.0, np.radians(0.05), (len(other), 3))
+    written(other, two)
+    (found,) = sd.doctor([one, two]).between
+    assert found.code == "doctor.logs-apart"
+    assert found.data["offset"] == pytest.approx(0.35, abs=5e-3)
+
+
+def test_what_holds_nothing_is_refused_with_the_way_in(tmp_path):
+    path = tmp_path / "log.bbl"
+    path.write_bytes(b"H Product:Blackbox flight data recorder\n")
+    with pytest.raises(DataError) as error:
+        sd.doctor(path)
+    assert error.value.finding.code == "io.foreign-format"
+
+
+def test_samples_in_memory_are_examined_saved_and_repeated(sound, tmp_path):
+    values = sound.to_numpy()
+    found = sd.doctor((values[:, 0], values[:, 1:4], values[:, 4:]))
+    assert len(found.to_pandas()) == 1
+    seal = found.save(tmp_path / "out")
+    assert (seal.path / "report.html").stat().st_size < 2e6
+    assert sd.verify(seal.path).verdict == "identical"
