@@ -191,9 +191,11 @@ def _reader(
         return lambda: ImuFile(specify(LogTable, path=str(path), **log), axes).read()
     if stream == "reference":
         return lambda: read_trajectory(path)
+    # A topic after the format is that of the samples.
+    form = (log.get("format") or "").partition(":")[0] or None
     if stream != "gnss":
-        return lambda: _beside(path, stream, log.get("format"), axes)
-    keys = {"format": log.get("format"), "repair": bool(log.get("repair")), **fixes}
+        return lambda: _beside(path, stream, form, axes)
+    keys = {"format": form, "repair": bool(log.get("repair")), **fixes}
     asked = specify(FixesTable, path=str(path), **keys).options()
     # A velocity of unknown accuracy is one, and is written without it.
     known = dataclasses.replace(asked, unstated_position_sd=math.inf, unstated_velocity_sd=1.0)
