@@ -1095,7 +1095,9 @@ def phone(d: Draw, path: Path) -> Made:
             *([Column("TgF", "", _text(gf, 3))] if d.odds(0.5) else []),
             *tr.gyro,
         ]
-        return _plain(d, path, "phone: gFx and wx", tr, c, cols, how, rate)
+        made = _plain(d, path, "phone: gFx and wx", tr, c, cols, how, rate)
+        made.truth.to_frd = PHONE  # the app is known, and with it its axes
+        return made
     if app == "andro":
         tr = triads(
             d,
@@ -1221,7 +1223,7 @@ def phone(d: Draw, path: Path) -> Made:
         c.columns[0].name = "Time (s)"
         how.quoted = True
         how.sep = d.one([",", ";", "\t"])
-        return _plain(
+        made = _plain(
             d,
             path,
             "phone: quoted names with units",
@@ -1231,6 +1233,8 @@ def phone(d: Draw, path: Path) -> Made:
             how,
             rate,
         )
+        made.truth.to_frd = PHONE
+        return made
     tr = triads(d, m, "none", ("gyro_{x}", "acc_{x}", "mag_{x}"), "rad/s", "m/s2")
     c = clock(d, m.t, rate, "none", "epoch ms")
     lin = [Column(f"linear_acc_{x}", "", _text(m.linear[:, k], 5)) for k, x in enumerate("xyz")]
@@ -1316,6 +1320,8 @@ def mixed(d: Draw, path: Path) -> Made:
     truth = _truth(c, tr, rate)
     truth.own_rates, truth.accel_t, truth.accel = True, own - m.t[0], accel
     truth.accel_names = (accel_words,)
+    if gyro_words.startswith(("android", "TYPE_", "4")):
+        truth.to_frd = PHONE  # names and numbers of Android, which defines the axes
     kind = f"rows of several sensors, {gyro_words}, {gu}/{au}" + ("" if head else ", no header")
     return Made(path, truth, kind, tr.decidable and gyro_words not in ("4", "G"))
 

@@ -14,6 +14,7 @@ is inferred unless the header states it; Android's own are ns.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import re
 from collections import Counter
 from collections.abc import Mapping
@@ -32,9 +33,9 @@ from strapdown.formats.phones import force_of, sensor_log
 from strapdown.formats.recording import RawLog
 
 KINDS = {
-    "gyro": ("4", "gyro", "gyr", "gyroscope"),
+    "gyro": ("4", "gyro", "gyr", "gyroscope", "rotationrate", "angularvelocity"),
     "gyro uncalibrated": ("16", "gyroscopeuncalibrated", "uncalgyro", "gyrouncalibrated"),
-    "accel": ("1", "acc", "accel", "accelerometer", "acce"),
+    "accel": ("1", "acc", "accel", "accelerometer", "acce", "accelerationincludinggravity"),
     "accel uncalibrated": ("35", "accelerometeruncalibrated", "uncalaccel", "accuncalibrated"),
     "linear": ("10", "linearacceleration", "linacc", "linearaccelerometer", "lacc"),
     "gravity": ("9", "gravity", "grav"),
@@ -42,7 +43,7 @@ KINDS = {
 }
 UNITS = {"gyro": "rad/s", "accel": "m/s2", "mag": "uT"}
 _OF = {word: kind for kind, words in KINDS.items() for word in words}
-_STAMP = re.compile(r"\d{6,}|\d+\.\d+")
+_STAMP = re.compile(r"\d+(?:\.\d+)?")
 # Rows at the top by which the layout is told.
 TOP = 200
 
@@ -76,9 +77,18 @@ def _layout(text: str) -> tuple[int, int, str | None] | None:
         usual = 2 * len(fields) <= len(body) and not any(
             "." in f and f[:1].isdigit() for f in fields
         )
-        if usual and all(_STAMP.fullmatch(r[stamp]) for r in body) and len(kinds) > 1:
+        advances = all(_STAMP.fullmatch(r[stamp]) for r in body) and _advance(
+            [float(r[stamp]) for r in body]
+        )
+        if usual and advances and len(kinds) > 1:
             return (kind, stamp, unit) if kinds & {"gyro", "gyro uncalibrated"} else None
     return None
+
+
+def _advance(stamps: list[float]) -> bool:
+    """Whether numbers are stamps, and no kinds: nearly all are as late as that before, or later."""
+    later = sum(b >= a for a, b in itertools.pairwise(stamps))
+    return stamps[-1] > stamps[0] and later >= 0.9 * (len(stamps) - 1)
 
 
 def read(path: Path) -> RawLog:

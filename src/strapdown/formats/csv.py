@@ -41,6 +41,8 @@ HEAD = 1 << 16
 #: Lines at the top of a text in which its rows of numbers are searched, their characters, and the
 #: fields of each that are judged.
 SEARCHED, SEARCHED_TEXT, JUDGED = 400, 1 << 20, 200
+#: Most fields of a row; no log has more, and a damaged line may.
+MOST_COLUMNS = 10_000
 # Line breaks of Python that are none of an editor.
 _BREAKS = re.compile("[\x0b\x0c\x1c\x1d\x1e\x85\u2028\u2029]|\r(?!\n)")
 Lines = list[tuple[int, str]]
@@ -105,7 +107,7 @@ def _at_once(source: bytes | Path, name: str, files: tuple[Path, ...]) -> RawLog
     numbered, comments = _numbered(text)
     if not numbered or _rewritten(numbered) is not numbered:
         return None
-    top = _Top(numbered, comments)
+    top = _Top(numbered, comments, name)
     if not top.data:
         return None
     first, _ = top.data[0]
@@ -140,7 +142,7 @@ def _line_by_line(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog:
     numbered, comments = _numbered(text)
     if not numbered:
         raise DataError("io.file-holds-comments-alone" if comments else "io.file-empty", file=name)
-    top = _Top(_rewritten(numbered), comments)
+    top = _Top(_rewritten(numbered), comments, name)
     if not top.data:
         raise DataError("io.csv-without-rows", file=name, row=numbered[0][0])
     ended = text.endswith(("\n", "\r"))
@@ -163,9 +165,11 @@ def _numbered(text: str) -> tuple[Lines, list[str]]:
 _ARRIVAL = re.compile(r"(\d\d:\d\d:\d\d\.\d+) -> ?")
 # "ax: 0.12 g," or "ax = 0.12": a name, its value, and its unit where a sign ends the field.
 _LABELLED = re.compile(
-    r"\s*([A-Za-z_][\w ./()\[\]-]*?)\s*[:=]\s*([^\s,;|=]+)"
+    r"\s*([A-Za-z_][\w ./()\[\]-]{0,40}?)\s*[:=]\s*([^\s,;|=]+)"
     r"(?:[ \t]*([^\s\d,;|:=][^\s,;|:=]*)(?=[ \t]*[,;|]|$))?[ \t]*[,;|]?"
 )
+#: Longest line above the rows that is understood, and of labelled values.
+LONGEST = 2000
 #: Fewest labelled values of a line that is taken for a row.
 LABELS = 3
 
@@ -221,7 +225,7 @@ def _unlabelled(numbered: Lines) -> Lines:
 
 def _labels(line: str) -> tuple[tuple[str, ...], list[str]]:
     """Return labels with units, and values, of a line that has little else; or empty."""
-    found = _LABELLED.findall(line) if len(line) < HEAD else []
+    found = _LABELLED.findall(line) if len(line) < LONGEST else []
     if len(found) < LABELS or _LABELLED.sub("", line).strip():
         return (), []
     names = tuple(f"{name} [{unit}]" if unit else name for name, _, unit in found)
@@ -242,10 +246,22 @@ class _Top:
     numbered : list of (int, str)
         Lines with their rows, without the comments at the top.
     comments : list of str
+    name : str
+        For messages.
+
+    Raises
+    ------
+    DataError
+        A row has more than `MOST_COLUMNS` fields.
     """
 
-    def __init__(self, numbered: Lines, comments: list[str]) -> None:
+    def __init__(self, numbered: Lines, comments: list[str], name: str) -> None:
         first, self.separator, width = _first_row(numbered)
+        if width > MOST_COLUMNS:
+            row = numbered[min(first, len(numbered) - 1)][0]
+            raise DataError(
+                "io.csv-too-many-columns", file=name, row=row, count=width, most=MOST_COLUMNS
+            )
         self.data = numbered[first:]
         #: Lines above, without those of the names.
         self.above = comments + [line for _, line in numbered[:first]]
@@ -281,16 +297,17 @@ class _Top:
     ) -> RawLog:
         """Make the log of these columns, with what the lines above them state."""
         held = dict(zip(self.names, columns, strict=True))
+        said = [line[:LONGEST] for line in self.above]
         return RawLog(
             name=name,
             files=files,
             columns=one_clock_of_parts(held, self.units),
             rows=rows,
             units=self.units,
-            triad_units=stated_units(self.above, held),
-            rate=stated_rate(self.above),
+            triad_units=stated_units(said, held),
+            rate=stated_rate(said),
             findings=findings,
-            **stated_by(stated_by_keys(self.above)),
+            **stated_by(stated_by_keys(said)),
         )
 
 

@@ -26,7 +26,7 @@ _RATES = (
 )
 _STEP = re.compile(r"\bdt\s*=\s*(\d*\.?\d+(?:e-?\d+)?)\s*s\b", re.I)
 _SENSOR = re.compile(
-    r"(?P<gyro>gyro(?:s|scopes?)?|ang(?:ular)?[ _-]?(?:rate|vel(?:ocity)?)s?|(?:rotation|turn)"
+    r"(?P<gyro>gyro(?:scopes?|s)?|ang(?:ular)?[ _-]?(?:rate|vel(?:ocity)?)s?|(?:rotation|turn)"
     r"[ _-]?rates?)|(?P<accel>acc(?:el(?:eration|erometer)?s?)?|specific[ _-]force)"
     r"|(?P<mag>mag(?:netometer|netic[ _-]?field|n)?)",
     re.I,
@@ -87,7 +87,9 @@ def _counts(triad: str, text: str, of_16_bits: bool) -> str | None:
     elif m := _PER_COUNT.search(text):
         return f"{m[1]} {of}" if (of := unit_of(m[2])) in _KNOWN[triad] else None
     elif of_16_bits and triad in _OF_RANGE and (m := _RANGE.search(text)) and int(m[1]):
-        scale, unit = f"/{32768 / int(m[1]):g}", unit_of(m[2]) if m[2] else _OF_RANGE[triad]
+        # Names of registers have no unit.
+        default = _OF_RANGE[triad] if m[0].upper().startswith("_FS") else None
+        scale, unit = f"/{32768 / int(m[1]):g}", unit_of(m[2]) or default
     else:
         return None
     return f"{unit}{scale}" if unit in _KNOWN[triad] else None
