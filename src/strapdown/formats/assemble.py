@@ -63,7 +63,8 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     DataError: a value, a stamp or a unit cannot be used; the message names file, row and remedy.
     ConfigError: an option names a column that does not exist.
     """
-    found = find_columns(raw, options)
+    questions = Questions(raw.name)
+    found = find_columns(raw, options, questions)
     require_gyro(raw, found)
     unused = _unused(raw, found)
     if parts := _by_sensor(raw, found):
@@ -76,7 +77,6 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     ticks, dated = ticks_of(raw, found["time"]) if "time" in found else (None, False)
     said = told_by_numbers(raw, found, options, values, ticks, dated)
     axes = body_axes(raw, options, said, findings)
-    questions = Questions(raw.name)
     units = units_of_triads(raw, found, options, values, said, findings, questions)
     values = {t: values[t] for t in units}
     try:

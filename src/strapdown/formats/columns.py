@@ -1,12 +1,16 @@
-"""Quantity and unit from the name of a column."""
+"""Quantity, axis and unit from the name of a column, a key, a data set or a variable."""
 
 from __future__ import annotations
 
+import dataclasses
 import re
+import unicodedata
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from strapdown.errors import ConfigError, check_choice
-from strapdown.units import TIME_UNITS, unit_of, unit_words
+from strapdown.units import find_unit, unit_of, unit_words
 
 __all__ = [
     "QUANTITIES",
@@ -14,103 +18,50 @@ __all__ = [
     "parse_axes",
     "parse_column_option",
     "read_name",
-    "says_increment",
-    "says_linear",
 ]
 
 
 _AXES = "xyz"
-TRIADS = {
-    "gyro": [
-        "gyro",
-        "gyros",
-        "gyr",
-        "gyroscope",
-        "gyroscopes",
-        "imugyr",
-        "imugyro",
-        "angularvelocity",
-        "angularvel",
-        "angvel",
-        "angularrate",
-        "angularrates",
-        "angrate",
-        "turnrate",
-        "rot",
-        "rotationrate",
-        "omega",
-        "rate",
-        "w",
-        "g",
-    ],
-    "accel": [
-        "accel",
-        "acce",
-        "acc",
-        "accelerometer",
-        "accelerometers",
-        "accelerations",
-        "acceleration",
-        "linearacceleration",
-        "linacc",
-        "linaccel",
-        "accl",
-        "gforce",
-        "gf",
-        "imuacc",
-        "imuaccel",
-        "specificforce",
-        "a",
-        "f",
-    ],
-    "mag": [
-        "mag",
-        "magn",
-        "magnet",
-        "magnetometer",
-        "magnetometers",
-        "magneticfield",
-        "imumag",
-        "compass",
-        "m",
-    ],
+# Names of a sensor without their axis: blanks, underscores and capitals do not count.
+_TRIAD_WORDS = {
+    "gyro": "gyro gyros gyr gyroscope gyroscopes imugyr imugyro angularvelocity angularvel angvel "
+    "angularrate angularrates angrate angularspeed turnrate rot rotationrate rotrate omega rate "
+    "drehrate w g ω",
+    "accel": "accel acce acc accelerometer accelerometers accelerations acceleration accl "
+    "linearacceleration linacc linaccel lina gforce gf imuacc imuaccel specificforce beschl "
+    "beschleunigung a f",
+    "mag": "mag magn magnet magnetic magnetometer magnetometers magneticfield magfield field "
+    "imumag compass m b",
 }
+TRIADS = {triad: words.split() for triad, words in _TRIAD_WORDS.items()}
 # Names of columns that hold increments per sample.
 SUMMED = {
     "gyro": ["dtheta", "deltatheta", "dangle", "deltaangle", "angleincrement", "dang"],
     "accel": ["dv", "deltav", "dvel", "deltavel", "deltavelocity", "velocityincrement"],
 }
-TIMES = [
-    "time",
-    "t",
-    "timestamp",
-    "timestamps",
-    "timesec",
-    "elapsed",
-    "secondselapsed",
-    "seconds",
-    "sec",
-    "tow",
-    "sow",
-    "gpssow",
-    "gpstow",
-    "gpstime",
-    "unixtime",
-    "epoch",
-    "stamp",
-    "elapsedtime",
-    "timeelapsed",
-    "timesincestart",
-    "sampletime",
-    "sensortime",
-    "systemtime",
-    "unixtimestamp",
-    "datetime",
-    "localtime",
-    "utc",
-    "utctime",
-    "timeutc",
-]
+#: Gravity by itself, as phones write it beside acceleration without it.
+_GRAVITY = ("gravity", "grav", "gvec")
+# Words that may stand beside the name of a sensor, and say the same again or how it is meant.
+_BESIDE = {
+    "gyro": {"angular", "rotation", "rotational", "rate", "rates", "velocity", "vel", "speed"},
+    "accel": {"acceleration", "linear", "lin", "user", "including", "gravity", "with", "without"},
+    "mag": {"magnetic", "field"},
+}
+_WITHOUT_GRAVITY = {"linear", "lin", "user", "without", "linacc", "linaccel", "linearacceleration"}
+# A name that is a unit says the sensor: dps_x, uT_x. The letter g may be anything.
+_NAMED_BY_UNIT = {
+    **dict.fromkeys(("dps", "mdps", "rads", "degs"), "gyro"),
+    **dict.fromkeys(("mps2", "ms2"), "accel"),
+    **dict.fromkeys(("ut",), "mag"),
+}
+_TURNS = {"roll": "x", "pitch": "y", "yaw": "z"}
+_RATES = {"rate", "speed", "velocity", "vel", "dot", *TRIADS["gyro"]} - set("wgω")
+_TIME_WORDS = (
+    "time t ts timestamp timestamps timesec elapsed secondselapsed seconds sec tow sow gpssow "
+    "gpstow gpstime unixtime epoch stamp elapsedtime timeelapsed timesincestart sampletime "
+    "sensortime systemtime unixtimestamp datetime localtime utc utctime timeutc"
+)
+TIMES = _TIME_WORDS.split()
 # Names of clocks that state their unit.
 CLOCKS = {
     "seconds": "s",
@@ -148,6 +99,12 @@ QUANTITIES = [
 BODY_RATES = {"rate_p": "gyro_x", "rate_q": "gyro_y", "rate_r": "gyro_z"}
 # G is also gravity.
 _MAGNETIC = {"g": "gauss", "mg": "mG"}
+# Arrays of PX4 (msg/SensorCombined.msg, SensorMag.msg), whose comments define their units.
+_PX4 = {
+    "gyro_rad": ("gyro", "rad/s"),
+    "accelerometer_m_s2": ("accel", "m/s2"),
+    "magnetometer_ga": ("mag", "gauss"),
+}
 #: A column of an array: its name and its number.
 INDEXED = re.compile(r"(.*)\[(\d+)\]")
 # Word to the axis of the body and its sign.
@@ -160,70 +117,104 @@ _DIRECTIONS = {
     "down": (2, 1.0),
     "up": (2, -1.0),
 }
-_AXES_BY_INDEX = {"0": "x", "1": "y", "2": "z"}
 # Words of a name: split at signs, and where capitals begin or end.
-_HUMPS = re.compile(r"[A-Z]+(?![a-z])\d*|[A-Z]?[a-zµμ°]+\d*|\d+|²")
+_HUMPS = re.compile(r"[A-Z]+(?![a-z])\d*|[A-Z]?[^\W\d_A-Z]+\d*|[°µ]+|\d+|²")
+_SIGNS = r"[\s_\-/:,;|]+"
 # Words that do not tell quantities apart.
 _NOISE = {
-    *("raw", "field", "imu", "sensor", "sensors", "data", "body", "device", "phone", "watch"),
+    *("raw", "imu", "sensor", "sensors", "data", "body", "device", "phone", "watch", "motion"),
     *("cal", "calib", "calibrated", "corrected", "meas", "measured", "value", "values", "axis"),
-    *("ins", "the", "of", "in", "reading", "readings"),
+    *("ins", "the", "of", "in", "reading", "readings", "uncal", "uncalibrated"),
+}
+# Words of a quantity that is about another: its spread, its error, its demand.
+_ABOUT = {
+    *("bias", "offset", "scale", "cov", "covariance", "std", "stddev", "stdev", "sd", "sigma"),
+    *("var", "variance", "error", "err", "accuracy", "setpoint", "desired", "noise"),
 }
 _BRACKETS = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$")
 
 
 @dataclass(frozen=True)
 class ColumnName:
-    """Quantity and unit of a column name.
+    """What the name of a column says.
 
     Attributes
     ----------
     quantity : str or None
-        One of `QUANTITIES`, or a triad's name where the column holds three numbers.
+        One of `QUANTITIES`, or a triad's name where the column holds three numbers or the name ends
+        in a number; ``gravity_x``, ``rate_p``.
     unit : str or None
         In the spelling of this package.
     loose : bool
         The quantity follows only without the words and the order of the name.
+    family : str
+        Of a sensor: the name without its axis. Columns of one sensor share it. One letter may mean
+        anything.
+    linear : bool
+        The name says acceleration without gravity, as phones have it; in ROS it has gravity.
+    increment : bool
+        The name says increments per sample.
+    number : int or None
+        At the end of the name of a triad: ``gyro_1``.
     """
 
     quantity: str | None
-    unit: str | None
+    unit: str | None = None
     loose: bool = False
+    family: str = ""
+    linear: bool = False
+    increment: bool = False
+    number: int | None = None
 
 
 def read_name(name: str) -> ColumnName:
-    """Parse quantity and unit from a column's name.
+    """Parse what the name of a column says.
 
-    `name`: as ``gyro_x_rad_s``, ``Gyroscope x (rad/s)``, ``wx``, ``acc_y [g]``, ``time_ms``; or
-    ``gyro[0]``, the first of an array of three. Returns none for each part that the name does not
-    state.
+    `name`: as ``gyro_x_rad_s``, ``Gyroscope x (rad/s)``, ``wx``, ``acc_y [g]``, ``time_ms``,
+    ``IMU1/X-axis angular rate``, ``gyro_1``; or ``gyro[0]``, the first of an array of three.
     """
-    text, index = name.strip(), ""
+    text, index = unicodedata.normalize("NFC", name).strip(), ""
     if match := INDEXED.fullmatch(text):
         text, index = match.groups()
-    bracket = _BRACKETS.search(text)
-    unit = unit_of(bracket.group(1)) if bracket else None
-    if bracket:
-        text = text[: bracket.start()]
-    said = ColumnName(None, unit)
     if text.startswith("field."):
         return _ros_field(text)
+    if index and text in _PX4:
+        return _of_array(ColumnName(*_PX4[text], family=text), index)
+    bracket = _BRACKETS.search(text)
+    unit: str | None = unit_of(bracket.group(1)) if bracket else None
+    bare = text[: bracket.start()] if bracket else text
+    if unit is None:
+        bare, unit = _without_unit(bare)
+    said = ColumnName(None, unit)
     # In group/sub/name the last part decides, unless the whole is a known name.
-    parts = re.split(r"[/.]", text)
-    for start in range(len(parts)):
-        said = _read_words(" ".join(parts[start:]), unit)
-        if said.quantity:
-            break
+    parts = re.split(r"[/.]", bare)
+    if not any(word in _ABOUT for word in re.split(rf"[/.]|{_SIGNS}", bare.lower())):
+        for start in range(len(parts)):
+            said = _read_words(" ".join(parts[start:]), unit)
+            if said.quantity:
+                family = f"{' '.join(parts[:start]).lower()} {said.family}".strip()
+                said = _with(said, family=family if said.family else "")
+                break
     quantity = said.quantity
+    kind = find_unit(said.unit) if said.unit else None
     if str(quantity).startswith("mag") and said.unit in _MAGNETIC:
-        said = ColumnName(quantity, _MAGNETIC[said.unit], said.loose)
-    if quantity in TRIADS and index in _AXES_BY_INDEX:
-        quantity = f"{quantity}_{_AXES_BY_INDEX[index]}"
-    if quantity == "time" and (
-        (bracket and unit is None) or (said.unit is not None and said.unit not in TIME_UNITS)
-    ):
+        said = _with(said, unit=_MAGNETIC[said.unit])
+    elif quantity == "time" and ((bracket and unit is None) or (kind and kind[0] != "time")):
         return ColumnName(None, said.unit)
-    return ColumnName(quantity, said.unit, said.loose)
+    elif quantity in QUANTITIES[1:] and kind and kind[0] == "time":
+        return ColumnName(None, said.unit)  # gyro_x_min
+    return _of_array(said, index) if index else said
+
+
+def _with(said: ColumnName, **changes: Any) -> ColumnName:
+    return dataclasses.replace(said, **changes)
+
+
+def _of_array(said: ColumnName, index: str) -> ColumnName:
+    """Give a triad the axis of an element of an array of three."""
+    if said.quantity in TRIADS and int(index) < len(_AXES):
+        return _with(said, quantity=f"{said.quantity}_{_AXES[int(index)]}", number=None)
+    return said
 
 
 def _ros_field(text: str) -> ColumnName:
@@ -237,65 +228,128 @@ def _ros_field(text: str) -> ColumnName:
     triad = {"angular_velocity": "gyro", "linear_acceleration": "accel", "magnetic_field": "mag"}
     units = {"gyro": "rad/s", "accel": "m/s2", "mag": "T"}
     if kind in triad and axis in ("x", "y", "z"):
-        return ColumnName(f"{triad[kind]}_{axis}", units[triad[kind]])
-    return ColumnName(None, None)
+        return ColumnName(f"{triad[kind]}_{axis}", units[triad[kind]], family=f"field.{kind}")
+    return ColumnName(None)
+
+
+def _without_unit(text: str) -> tuple[str, str | None]:
+    """Split a unit off the end of a name, the longest first: ``acc x m/s/s``, ``P,rad/s``."""
+    whole = "".join(re.split(_SIGNS, text.lower()))
+    if whole in TIMES or whole in CLOCKS:
+        return text, None
+    for sign in re.finditer(_SIGNS, text):
+        if sign.start() and (unit := unit_of(text[sign.end() :])):
+            return re.sub(r"\s+in$", "", text[: sign.start()]), unit
+    return text, None
 
 
 def _read_words(text: str, unit: str | None) -> ColumnName:
-    words = [w for w in re.split(r"[\s_\-/:]+", text.lower()) if w]
-    bare, its = (words, unit) if unit else unit_words(words)
-    word = "".join(bare)
-    if quantity := _quantity(word):
-        return ColumnName(quantity, its or CLOCKS.get(word))
+    word = "".join(re.split(_SIGNS, text.lower()))
+    if (said := _known(word)) and not said.loose:
+        return _with(said, unit=unit or said.unit)
     # Names in capitals without separators (latDeg), in another order (x_gyro), with words that say
-    # nothing of the quantity (raw_acceleration_x).
+    # nothing of the quantity (raw_acceleration_x), or twice the same (gyroRotationRateX).
     words = [w.lower() for w in _HUMPS.findall(text)]
-    bare, its = (words, unit) if unit else unit_words(words)
+    if unit is None:
+        words, its = unit_words(words)
+        unit = its or None
+    bare = [part for w in words if not _is_model(w) for part in re.findall(r"\D+|\d+", w)]
     bare = [w for w in bare if w not in _NOISE]
-    axes = [w for w in bare if w in _AXES]
+    axes = [k for k, w in enumerate(bare) if w in _AXES]
     if len(axes) == 1:
-        bare = [w for w in bare if w != axes[0]] + axes
-    word = "".join(bare)
-    return ColumnName(_quantity(word), its or CLOCKS.get(word), loose=True)
+        bare.append(bare.pop(axes[0]))
+    said = _known("".join(bare)) or _of_words(bare)
+    said = said or _known("".join(w for w in bare if not w.isdecimal()))
+    if said is None:
+        return ColumnName(None, unit)
+    if said.family and said.number is None:
+        # All words but the axis, so that two sensors are two families.
+        axis = str(said.quantity)[-1]
+        rest = [w for w in words if w != axis and w not in _TURNS]
+        family = "".join(rest) if len(rest) < len(words) else said.family
+        family = f"of {family}" if words[:1] == [axis] else family
+        said = _with(said, family=f"{family}#" if len(family) < 2 else family)
+    return _with(said, unit=unit or said.unit, loose=True)
 
 
-def _quantity(word: str) -> str | None:
+def _is_model(word: str) -> bool:
+    """Whether a word of letters and digits names a unit or a chip: BMI160, imu1."""
+    letters = word.rstrip("0123456789")
+    return 0 < len(letters) < len(word) and not any(letters in names for names, _, _ in _NAMES)
+
+
+def _known(word: str) -> ColumnName | None:
+    """Read a name without blanks and signs, in lower case."""
     if f"rate_{word}" in BODY_RATES:
-        return f"rate_{word}"
+        return ColumnName(f"rate_{word}", family="p")
     if word in TIMES or word in CLOCKS:
-        return "time"
-    for table in (QUATERNIONS, EULERS):
-        for quantity, names in table.items():
-            if word in names:
-                return quantity
-    for triad, names in TRIADS.items():
-        if word[-1:] in _AXES and word[:-1] in names:
-            return f"{triad}_{word[-1]}"
+        return ColumnName("time", CLOCKS.get(word))
+    for quantity, known in {**QUATERNIONS, **EULERS}.items():
+        if word in known:
+            return ColumnName(quantity)
+    sensor, axis = word[:-1], word[-1:]
+    if axis not in _AXES:
+        sensor, axis = (word[1:], word[:1]) if word[:1] in _AXES and len(word) > 2 else (word, "")
+    turned = word[:1] == axis
+    for names, triad, increment in _NAMES:
+        if sensor in names and (axis or len(sensor) > 1):
+            quantity = f"{triad}_{axis}" if axis and axis in _AXES else triad
+            return ColumnName(
+                quantity,
+                unit_of(sensor) if sensor in _NAMED_BY_UNIT else None,
+                loose=turned,
+                family=f"of {sensor}" if turned else sensor,
+                linear=sensor in _WITHOUT_GRAVITY,
+                increment=increment,
+            )
+        # A name that ends in x, y or z without meaning an axis.
         if word in names and len(word) > 1:
-            return triad
-    for triad, names in SUMMED.items():
-        if word in names or (word[-1:] in _AXES and word[:-1] in names):
-            return triad if word in names else f"{triad}_{word[-1]}"
+            return ColumnName(triad, family=word, increment=increment)
     return None
 
 
-def says_linear(name: str) -> bool:
-    """Whether a name is of linear acceleration: without gravity on phones, with it in ROS."""
-    return not name.startswith("field.") and "linear" in name.lower()
+_NAMES: tuple[tuple[Sequence[str], str, bool], ...] = (
+    *((names, triad, False) for triad, names in TRIADS.items()),
+    *((names, triad, True) for triad, names in SUMMED.items()),
+    *(((unit,), triad, False) for unit, triad in _NAMED_BY_UNIT.items()),
+    (_GRAVITY, "gravity", False),
+)
 
 
-def says_increment(name: str) -> bool:
-    """Whether a name states that its column holds increments per sample.
+def _of_words(words: list[str]) -> ColumnName | None:
+    """Read the words of a name together: sensors with words beside them, turns, numbers."""
+    turn = [w for w in words if w in _TURNS]
+    rest = [w for w in words if w not in _TURNS]
+    if len(turn) == 1 and rest and ("".join(rest) in _RATES or set(rest) <= _RATES):
+        return ColumnName(f"gyro_{_TURNS[turn[0]]}", family="".join(rest))
+    axis = words[-1] if words and words[-1] in _AXES else ""
+    number = words[-1] if words and words[-1].isdecimal() else ""
+    bare = [w for w in (words[:-1] if axis or number else words) if not w.isdecimal()]
+    for triad, beside in _BESIDE.items():
+        named = [w for w in bare if w in TRIADS[triad] and len(w) > 2]
+        known = "".join(bare) in TRIADS[triad]
+        known = known or (bool(axis) and bare == [_SHORT[triad]])
+        if not (known or (named and set(bare) <= {*named, *beside})):
+            continue
+        return ColumnName(
+            f"{triad}_{axis}" if axis else triad,
+            family="".join(bare),
+            linear=bool(_WITHOUT_GRAVITY & {*bare, "".join(bare)}),
+            number=int(number) if number and len(number) == 1 else None,
+        )
+    clock = {"time", "timestamp", "timestamps", "stamp"} & set(words) and set(words) <= _OF_TIME
+    if clock or words == ["date"]:
+        return ColumnName("time")
+    return None
 
-    `name`: as ``dtheta_x_rad``, ``delta_v_y (m/s)``, ``dv[2]``.
-    """
-    text = _BRACKETS.sub("", INDEXED.sub(r"\1", name.strip()))
-    known = [n for names in SUMMED.values() for n in names]
-    words, _ = unit_words([w for w in re.split(r"[\s_\-/:.]+", text.lower()) if w])
-    return any(
-        (word := "".join(words[start:])) in known or (word[-1:] in _AXES and word[:-1] in known)
-        for start in range(len(words))
-    )
+
+# Names that are parts of words, unless their axis stands apart: MaX, but not max.
+_SHORT = {"gyro": "gy", "accel": "ac", "mag": "ma"}
+# Words of the name of a clock.
+_OF_TIME = {
+    *("time", "timestamp", "timestamps", "stamp", "unix", "epoch", "utc", "gps", "system"),
+    *("sample", "logging", "elapsed", "since", "start", "boot", "reboot", "local", "ros", "header"),
+}
 
 
 def parse_column_option(items: list[str]) -> dict[str, str]:

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NoReturn
 
 import numpy as np
 
-from strapdown.errors import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.columns import (
     BODY_RATES,
     INDEXED,
     QUANTITIES,
     TRIADS,
+    ColumnName,
     read_name,
-    says_increment,
 )
-from strapdown.formats.recording import RawLog, ReadOptions, as_stated
-from strapdown.units import unit_of
+from strapdown.formats.recording import Questions, RawLog, ReadOptions
+from strapdown.units import ACCEL_UNITS, GYRO_UNITS, unit_of
 
 AXES = "xyz"
 
@@ -31,21 +33,19 @@ class Column:
     why: str
 
 
-def find_columns(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
+def find_columns(
+    raw: RawLog, options: ReadOptions, questions: Questions | None = None
+) -> dict[str, Column]:
     """Find the column of each quantity.
 
-    `options`: its `columns` override what the file states, which overrides column names. Returns
-    quantity to column; quantities that were not found are absent. ConfigError: two columns fit one
-    quantity, or an option names a column that does not exist.
+    `options`: its `columns` override what the file states, which overrides column names.
+    `questions`: where several columns fit one quantity, or names leave it open, the user is asked,
+    and the first is returned meanwhile. Without it this is refused at once. Returns quantity to
+    column; quantities that were not found are absent. ConfigError: an option names a column that
+    does not exist. DataError: two columns fit one quantity.
     """
-    found = {
-        quantity: Column(source, unit, "stated by the file")
-        for source, (quantity, unit) in raw.stated.items()
-        if source in raw.columns
-    }
-    if not raw.stated:
-        found |= _by_name(raw, options)
-    asked: dict[str, str] = {}
+    asked_here = questions or Questions(raw.name)
+    wanted: dict[str, str] = {}
     for quantity, source in options.columns.items():
         if quantity not in QUANTITIES and quantity not in TRIADS:
             raise ConfigError(
@@ -56,16 +56,26 @@ def find_columns(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
                 known=[*QUANTITIES, *TRIADS],
             )
         for q, name in _asked(raw, quantity, source):
-            if name in asked.values():
+            if name in wanted.values():
                 raise ConfigError(
                     "io.column-named-twice",
                     file=raw.name,
                     quantity=f"--columns {q}",
                     name=name,
                 )
-            asked[q] = name
-            stated = found[q].unit if q in found and found[q].source == name else None
-            found[q] = Column(name, _unit_of(raw, name) or stated, "stated by --columns")
+            wanted[q] = name
+    found = {
+        quantity: Column(source, unit, "stated by the file")
+        for source, (quantity, unit) in raw.stated.items()
+        if source in raw.columns
+    }
+    if not raw.stated:
+        found |= _by_name(raw, wanted, asked_here)
+    for q, name in wanted.items():
+        stated = found[q].unit if q in found and found[q].source == name else None
+        found[q] = Column(name, _unit_of(raw, name) or stated, "stated by --columns")
+    if questions is None:
+        asked_here.refuse()
     return found
 
 
@@ -109,63 +119,165 @@ def _refuse_nameless(raw: RawLog) -> NoReturn:
     )
 
 
-def _by_name(raw: RawLog, options: ReadOptions) -> dict[str, Column]:
-    candidates: dict[str, list[str]] = {}
-    for name in raw.columns:
-        quantity = read_name(name).quantity
-        if quantity is None or quantity in TRIADS:
+#: Columns of one sensor, by axis.
+Family = dict[str, str]
+
+
+def _by_name(raw: RawLog, wanted: dict[str, str], questions: Questions) -> dict[str, Column]:
+    """Find the columns of the quantities that the user did not state."""
+    said = {name: read_name(name) for name in raw.columns}
+    for quantity, name in wanted.items():
+        if str(said[name].quantity).partition("_")[0] != quantity.partition("_")[0]:
+            said[name] = ColumnName(None)
+    found: dict[str, str] = {}
+    families = _families(raw, said)
+    _letter_g(raw, families, wanted, questions, found)
+    for triad in TRIADS:
+        kept = _best({f: m for (t, f), m in families.items() if t == triad}, said)
+        if not kept:
+            continue
+        first = next(iter(kept.values()))
+        members = {f"{triad}_{axis}": name for axis, name in first.items()}
+        found |= {q: name for q, name in members.items() if q not in wanted}
+        if len(kept) > 1 and not wanted.keys() & members.keys():
+            _ask_which(raw, triad, list(kept.values()), questions)
+    rest: dict[str, list[str]] = {}
+    for name, one in said.items():
+        if one.quantity in QUANTITIES and not one.family:
+            rest.setdefault(one.quantity, []).append(name)
+    for quantity, names in rest.items():
+        if quantity in wanted:
+            continue
+        if len(names) > 1 and quantity == "time":
+            names = _one_clock(raw, [n for n in names if n != "T"])
+        # Names read without their order are a last resort.
+        names = [n for n in names if not said[n].loose] or names
+        found[quantity] = names[0]
+        if len(names) > 1:
+            questions.ask(
+                _several(raw, quantity, names, names[0]), **{quantity: _reference(raw, names[0])}
+            )
+    return {q: Column(name, _unit_of(raw, name), "by its name") for q, name in found.items()}
+
+
+def _families(raw: RawLog, said: dict[str, ColumnName]) -> dict[tuple[str, str], Family]:
+    """Gather the columns of each sensor: triad and name without the axis, to the axes."""
+    out: dict[tuple[str, str], Family] = {}
+    numbered: dict[tuple[str, str], dict[int, str]] = {}
+    for name, one in said.items():
+        triad, _, axis = str(one.quantity).partition("_")
+        if not one.family:
             continue
         # An array of four need not begin with x, y and z.
         if (part := INDEXED.fullmatch(name)) and _width(raw, part.group(1)) != 3:
             continue
-        candidates.setdefault(quantity, []).append(name)
-    if BODY_RATES.keys() <= candidates.keys() and "gyro_x" not in candidates:
-        candidates |= {gyro: candidates[rate] for rate, gyro in BODY_RATES.items()}
-    for rate in BODY_RATES:
-        candidates.pop(rate, None)
-    asked = {q for key in options.columns for q in _members(key)}
-    found = {}
-    several: dict[str, list[str]] = {}
-    for quantity, names in candidates.items():
-        if quantity in asked:
-            continue
-        if len(names) > 1 and quantity == "time":
-            names = _one_clock(raw, names)
-        # Names read without their order are a last resort.
-        names = [n for n in names if not read_name(n).loose] or names
-        if len(names) > 1:
-            # Rates are preferred to increments.
-            names = [n for n in names if not says_increment(n)] or names
-        if len(names) > 1:
-            several[quantity] = names
-        found[quantity] = Column(names[0], _unit_of(raw, names[0]), "by its name")
-    if several:
-        quantity, names = next(iter(several.items()))
-        raise ConfigError(
-            "io.columns-ambiguous",
-            file=raw.name,
-            quantity=quantity,
-            count=len(names),
-            names=names,
-            of_what=quantity,
-            names_2=names[0],
-            **as_stated(_first_of_several(raw, several)),
-        )
-    return found
+        if one.quantity in BODY_RATES:
+            triad, axis = "gyro", BODY_RATES[one.quantity][-1]
+        if axis:
+            key = triad, one.family
+            while axis in out.get(key, ()):  # the same name once more
+                key = triad, key[1] + "'"
+            out.setdefault(key, {})[axis] = name
+        elif one.number is not None:
+            numbered.setdefault((triad, one.family), {})[one.number] = name
+    for key, names in numbered.items():
+        if sorted(names) in ([0, 1, 2], [1, 2, 3]) and key not in out:
+            out[key] = dict(zip(AXES, (names[k] for k in sorted(names)), strict=True))
+    if len(out.get(("gyro", "p"), "xyz")) < 3:
+        del out["gyro", "p"]
+    return out
 
 
-def _first_of_several(raw: RawLog, several: dict[str, list[str]]) -> dict[str, str]:
-    """Answer which columns to use by the first of each; a triad by what its names begin with."""
-    answers: dict[str, str] = {}
-    for quantity, names in several.items():
-        triad = quantity.rpartition("_")[0]
-        if triad not in TRIADS:
-            answers[quantity] = names[0]
-        elif triad not in answers:
-            prefix = names[0].rstrip("xyzXYZ").rstrip("_-. /:[(")
-            whole = len(_three_of(raw, triad, prefix)) == 3
-            answers |= {triad: prefix} if whole else {quantity: names[0]}
-    return answers
+def _best(families: dict[str, Family], said: dict[str, ColumnName]) -> dict[str, Family]:
+    """Keep the families of a triad that are whole, are rates and have gravity, by best names."""
+    kept = {f: m for f, m in families.items() if len(m) == len(AXES)} or families
+    preferences: tuple[Callable[[ColumnName, str], bool], ...] = (
+        lambda one, family: not one.increment,
+        lambda one, family: not one.linear,
+        lambda one, family: "including" in family,
+        # A letter may mean anything, and names read without their order are a last resort.
+        lambda one, family: len(family) > 1,
+        lambda one, family: not one.loose,
+    )
+    for preferred in preferences:
+        kept = {f: m for f, m in kept.items() if preferred(said[next(iter(m.values()))], f)} or kept
+    return kept
+
+
+def _letter_g(
+    raw: RawLog,
+    families: dict[tuple[str, str], Family],
+    wanted: dict[str, str],
+    questions: Questions,
+    found: dict[str, str],
+) -> None:
+    """Decide what ``gx gy gz`` are: rates beside ``ax ay az``; else gravity, or g, or rates.
+
+    Beside other rates they are gravity or acceleration in g: asked, if no other acceleration is
+    there.
+    """
+    own = families.get(("gyro", "g"))
+    units = {_unit_of(raw, name) for name in own.values()} if own else set()
+    if not own or units <= set(GYRO_UNITS) or set(own.values()) & set(wanted.values()):
+        return
+    linear = [n for (t, _), m in families.items() if t == "accel" for n in m.values()]
+    whole = [n for n in linear if not read_name(n).linear]
+    whole += [n for q, n in wanted.items() if q.startswith("accel")]
+    rates = "gyro_x" in wanted or any(
+        t == "gyro" and f != "g" and len(m) == 3 for (t, f), m in families.items()
+    )
+    if not rates and (whole or not linear) and not units <= set(ACCEL_UNITS):
+        return
+    del families["gyro", "g"]
+    if whole or len(own) < len(AXES):
+        return
+    triad = "accel" if rates or units <= set(ACCEL_UNITS) else "gyro"
+    names = [own[a] for a in AXES]
+    if linear and rates:
+        return  # gravity, beside acceleration without it
+    found |= {f"{triad}_{a}": name for a, name in own.items()}
+    questions.ask(
+        Finding("io.letter-g-open", file=raw.name, quantity=triad, names=names, triad=triad),
+        **_answer(raw, triad, own),
+    )
+
+
+def _several(raw: RawLog, quantity: str, names: list[str], first: str) -> Finding:
+    return Finding(
+        "io.columns-ambiguous",
+        file=raw.name,
+        quantity=quantity,
+        count=len(names),
+        names=names,
+        of_what=quantity,
+        names_2=first,
+    )
+
+
+def _ask_which(raw: RawLog, triad: str, kept: list[Family], questions: Questions) -> None:
+    """Ask which of several sensors to use; the first is the answer as inferred."""
+    axis = next(iter(kept[0]))
+    names = [m[axis] for m in kept if axis in m]
+    answer = _answer(raw, triad, kept[0])
+    questions.ask(_several(raw, f"{triad}_{axis}", names, names[0]), **answer)
+
+
+def _answer(raw: RawLog, triad: str, family: Family) -> dict[str, str]:
+    """Answer with the columns of a triad; with what their names begin with, if that is enough."""
+    names = list(family.values())
+    prefix = names[0].rstrip("xyzXYZ").rstrip("_-. /:[(")
+    if (
+        prefix
+        and "," not in prefix
+        and _three_of(raw, triad, prefix) == [family.get(a) for a in AXES]
+    ):
+        return {triad: prefix}
+    return {f"{triad}_{a}": _reference(raw, family[a]) for a in AXES if a in family}
+
+
+def _reference(raw: RawLog, name: str) -> str:
+    """Name a column on the command line: by its number where the name has a separator of them."""
+    return str(list(raw.columns).index(name) + 1) if "," in name or "=" in name else name
 
 
 def _one_clock(raw: RawLog, names: list[str]) -> list[str]:
@@ -190,7 +302,20 @@ def _one_clock(raw: RawLog, names: list[str]) -> list[str]:
 def _unit_of(raw: RawLog, column: str) -> str | None:
     if column in raw.units:
         return unit_of(raw.units[column])
-    return read_name(column).unit
+    return read_name(column).unit or _ros_unit(raw, column)
+
+
+#: Fields of sensor_msgs/Imu and sensor_msgs/MagneticField, which define their units (ROS REP 103).
+ROS_FIELD = re.compile(r"(.*(angular_velocity|linear_acceleration|magnetic_field))[./][xyz]")
+ROS_UNITS = {"angular_velocity": "rad/s", "linear_acceleration": "m/s2", "magnetic_field": "T"}
+
+
+def _ros_unit(raw: RawLog, column: str) -> str | None:
+    """Return the unit of a field of a ROS message: its covariance is beside it."""
+    field = ROS_FIELD.fullmatch(column)
+    if field is None or not any(n.startswith(f"{field[1]}_covariance") for n in raw.columns):
+        return None
+    return ROS_UNITS[field[2]]
 
 
 def _members(quantity: str) -> list[str]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.formats.arrays import numbers
-from strapdown.formats.columns import parse_axes, says_increment, says_linear
+from strapdown.formats.columns import parse_axes, read_name
 from strapdown.formats.find_columns import AXES, Column
 from strapdown.formats.inference import Inference, Signals, infer_signals
 from strapdown.formats.judge import (
@@ -121,7 +121,7 @@ def units_of_triads(
 def _without_gravity(found: dict[str, Column], said: dict[str, Inference]) -> bool:
     """Whether a column named linear acceleration has no gravity, as far as numbers decide."""
     column, gravity = found["accel_x"], said.get("gravity")
-    if column.why != "by its name" or not says_linear(column.source):
+    if column.why != "by its name" or not read_name(column.source).linear:
         return False
     return gravity is None or not gravity.settled or gravity.value != "present"
 
@@ -130,7 +130,7 @@ def _refuse_open(raw: RawLog, found: dict[str, Column], triad: str) -> None:
     """Refuse a unit that the file leaves open: the numbers cannot decide between f and -f."""
     column = found[f"{triad}_x"]
     unit = column.unit
-    if unit is None and says_increment(column.source):
+    if unit is None and read_name(column.source).increment:
         unit = OPEN[triad]
     if unit and " or " in unit:
         raise DataError(
@@ -153,7 +153,7 @@ def _stated_unit(
     units = {c.unit for c in columns}
     known = set(UNITS[triad])
     # Degrees often mean degrees per second: only a name that states increments is trusted.
-    if all(says_increment(c.source) for c in columns):
+    if all(read_name(c.source).increment for c in columns):
         known |= set(SUMS[triad])
     unit = columns[0].unit
     if len(units) == 1 and unit is not None and unit in known:

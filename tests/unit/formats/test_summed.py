@@ -8,7 +8,7 @@ from tests.coded import coded
 
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import ReadOptions, read_log
-from strapdown.formats.columns import read_name, says_increment
+from strapdown.formats.columns import read_name
 from strapdown.formats.judge import intervals
 from strapdown.tables import ACCEL, GYRO
 
@@ -143,4 +143,4 @@ def test_a_row_that_is_left_out_takes_its_increment_with_it(tmp_path):
 def test_what_names_of_increments_say(name, quantity, unit, increment):
     said = read_name(name)
     assert (said.quantity, said.unit) == (quantity, unit)
-    assert says_increment(name) is increment
+    assert said.increment is increment

@@ -10,7 +10,7 @@ from tests.coded import coded
 
 import strapdown as sd
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.errors import ConfigError, DataError
+from strapdown.errors import DataError
 from strapdown.formats import ReadOptions, read_log
 from strapdown.formats.columns import read_name
 from strapdown.formats.gnss_files import has_fixes
@@ -112,6 +112,48 @@ def test_a_rate_above_the_names_serves_where_no_time_is(tmp_path):
         ("max", None, None),
         ("row", None, None),
         ("lat", None, None),
+        ("roll_rate", "gyro_x", None),
+        ("PitchRate", "gyro_y", None),
+        ("yaw_rate_deg_s", "gyro_z", "deg/s"),
+        ("wx", "gyro_x", None),
+        ("w_x", "gyro_x", None),
+        ("ωx", "gyro_x", None),
+        ("omega_x", "gyro_x", None),
+        ("ang_vel_x", "gyro_x", None),
+        ("rot_rate_x", "gyro_x", None),
+        ("gyrX", "gyro_x", None),
+        ("GyX", "gyro_x", None),
+        ("xgyro", "gyro_x", None),
+        ("X-Axis Angular Rate", "gyro_x", None),
+        ("Gyroscope X (rad/s)", "gyro_x", "rad/s"),
+        ("motionRotationRateX(rad/s)", "gyro_x", "rad/s"),
+        ("IMU1_Gyro_X", "gyro_x", None),
+        ("BMI160_gyr_x", "gyro_x", None),
+        ("/imu/data/angular_velocity/x", "gyro_x", None),
+        ("gyro_rad[1]", "gyro_y", "rad/s"),
+        ("dps_x", "gyro_x", "deg/s"),
+        ("Gyr_X", "gyro_x", None),
+        ("fx,m/s2", "accel_x", "m/s2"),
+        ("a_x", "accel_x", None),
+        ("acc_x in m s^-2", "accel_x", "m/s2"),
+        ("acc_x / m/s^2", "accel_x", "m/s2"),
+        ("specific_force_x", "accel_x", None),
+        ("accelerometerAccelerationX(G)", "accel_x", "g"),
+        ("accelerationIncludingGravity_x_mps2", "accel_x", "m/s2"),
+        ("motionGravityX(G)", "gravity_x", "g"),
+        ("B_x", "mag_x", None),
+        ("uT_x", "mag_x", "uT"),
+        ("magnetometer_ga[0]", "mag_x", "gauss"),
+        ("gz_rad_s (nominal; not calibrated)", "gyro_z", "rad/s"),
+        ("gyro_bias_x", None, None),
+        ("bias/gyro_x", None, None),
+        ("angular_velocity_covariance_0", None, None),
+        ("gyro_x_min", None, "min"),
+        ("rotation.x", None, None),
+        ("may", None, None),
+        ("temp", None, None),
+        ("vel_x", None, None),
+        ("Date", "time", None),
     ],
 )
 def test_names_in_any_order(name, quantity, unit):
@@ -132,9 +174,15 @@ def test_several_units_of_one_kind_are_asked_for_once(tmp_path):
     ]
     one = [line.partition(",") for line in rows()]
     lines = [",".join(["Time (s)", *names])] + [f"{t},{v},{v}" for t, _, v in one]
-    with pytest.raises(ConfigError) as refused:
+    with pytest.raises(DataError) as refused:
         read(tmp_path, lines)
-    assert refused.value.finding.data["flags"] == "--columns gyro=Left/Gyro,accel=Left/Accel"
+    asked = refused.value.finding.data
+    assert asked["flags"] == "--gyro-unit UNIT --columns gyro=Left/Gyro,accel=Left/Accel"
+    assert [f.code for f in asked["questions"]] == [
+        "io.columns-ambiguous",
+        "io.columns-ambiguous",
+        "io.unit-undecided",
+    ]
     log = read(
         tmp_path,
         lines,
@@ -143,6 +191,78 @@ def test_several_units_of_one_kind_are_asked_for_once(tmp_path):
         accel_unit="g",
     )
     check(log)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        "gyro_1,gyro_2,gyro_3,acc_1,acc_2,acc_3",
+        "gyro0,gyro1,gyro2,acc0,acc1,acc2",
+        "roll_rate,pitch_rate,yaw_rate,fx,fy,fz",
+        "gx,gy,gz,ax,ay,az",
+        "P,Q,R,AX,AY,AZ",
+        "dps_x,dps_y,dps_z,acc_x,acc_y,acc_z",
+    ],
+)
+def test_sensors_by_their_columns_together(tmp_path, names):
+    check(read(tmp_path, [f"t_s,{names}", *rows()], gyro_unit="deg/s", accel_unit="g"))
+
+
+def test_numbers_that_are_not_three_axes_are_no_sensor(tmp_path):
+    with pytest.raises(DataError, check=coded("io.no-gyro-columns")):
+        read(tmp_path, ["t_s,gyro_2,gyro_3,gyro_4,ax,ay,az", *rows()], gyro_unit="deg/s")
+
+
+G = "gx,gy,gz"
+OPEN = "io.letter-g-open"
+
+
+@pytest.mark.parametrize(
+    ("names", "code", "answer"),
+    [
+        # Beside acceleration without gravity, gx is gravity as often as a rate.
+        (f"{G},lin_acc_x,lin_acc_y,lin_acc_z", OPEN, {"gyro": "g"}),
+        # Beside other rates without acceleration it is acceleration in g, or gravity.
+        (f"wx,wy,wz,{G}", OPEN, {"accel": "g"}),
+        (f"wx,wy,wz,{G},ax,ay,az", None, {}),
+        (f"wx,wy,wz,userAcceleration.x,userAcceleration.y,userAcceleration.z,{G}", None, {}),
+    ],
+)
+def test_the_letter_g_is_asked_and_never_guessed(tmp_path, names, code, answer):
+    lines = [f"t_s,{names}"] + [f"{line},1,2,3" for line in rows()]
+    lines = [",".join(line.split(",")[: names.count(",") + 2]) for line in lines]
+    given = {"gyro_unit": "deg/s", "accel_unit": "g"}
+    if code is None:
+        log = read(tmp_path, lines, **given)
+        assert np.allclose(log.imu[GYRO].to_numpy()[0], RATES, atol=1e-5)
+        assert (
+            "gx" in next(f for f in log.findings if f.code == "io.columns-not-used").data["names"]
+        )
+        return
+    with pytest.raises(DataError, check=coded(code)) as refused:
+        read(tmp_path, lines, **given)
+    triad, prefix = next(iter(answer.items()))
+    assert refused.value.finding.data["flags"] == f"--columns {triad}={prefix}"
+    log = read(tmp_path, lines, columns=answer, **given)
+    assert f"{triad}_x" in log.imu.columns
+
+
+def test_of_accelerations_the_one_with_gravity_is_used(tmp_path):
+    names = [f"{kind} {axis} (m/s²)" for kind in ("LINEAR ACCELERATION", "ACCEL") for axis in "XYZ"]
+    lines = [",".join(["t_s", *(f"GYRO {a} (deg/s)" for a in "XYZ"), *names])]
+    lines += [
+        line + "".join(f",{9.80665 * float(v):.6f}" for v in line.split(",")[4:]) for line in rows()
+    ]
+    check(read(tmp_path, lines))
+
+
+def test_a_message_of_ros_defines_its_units(tmp_path):
+    names = [f"angular_velocity.{a}" for a in "xyz"] + [f"linear_acceleration.{a}" for a in "xyz"]
+    head = ["Time", *names, "angular_velocity_covariance_0", "linear_acceleration_covariance_0"]
+    values = ",".join(f"{v:.6f}" for v in (*RATES, *FORCE))
+    log = read(tmp_path, [",".join(head)] + [f"{0.01 * k:.2f},{values},0,0" for k in range(40)])
+    check(log)
+    assert {r.unit for r in log.readings if r.quantity.startswith("gyro")} == {"rad/s"}
 
 
 def test_linear_acceleration_is_used_only_where_gravity_is_in_it(tmp_path):
