@@ -811,10 +811,11 @@ def _navigation(one: LogDiagnosis) -> list[Finding]:
         return found
     sd = values_of(gnss, POSITION_SD)[:, 0]
     finite = sd[np.isfinite(sd)]
+    assumed = "position_sd_taken" in gnss.attrs
     found.append(
         Finding(
-            "doctor.fixes",
-            severity="note",
+            "doctor.fixes-without-sd" if assumed else "doctor.fixes",
+            severity="warning" if assumed else "note",
             file=one.name,
             count=inside.size,
             percent=100.0 * float(inside[-1] - inside[0]) / float(stamps[-1] - stamps[0]),
