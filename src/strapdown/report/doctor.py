@@ -153,7 +153,7 @@ def reasons(one: LogDiagnosis, use: str) -> str:
             continue
         text = finding.sentence("cli").partition("\n")[0]
         if finding.severity == "warning" and (helps := finding.advice("cli")):
-            text = f"{text}: {helps}"
+            text = f"{text}; {helps}"
         said.append(f"{text} ({finding.quantity})" if finding.quantity else text)
     return "; ".join(dict.fromkeys(said))
 
