@@ -34,6 +34,7 @@ SLOW = {
     "consistency",
     "crash",
     "crash_tutorial",
+    "doctor",
     "error_models",
     "health",
     "mechanization",
