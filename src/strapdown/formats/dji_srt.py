@@ -3,13 +3,15 @@
 Two families, as in the samples of https://github.com/JuanIrache/DJI_SRT_Parser (MIT):
 
 - ``[latitude: 59.30] [longitude: 18.20] [rel_alt: 1.3 abs_alt: 132.8]`` (older: ``[latitude : …]
-  [longtitude : …] [altitude: …]``): degrees; ``abs_alt`` and ``altitude`` are over the sea,
-  ``rel_alt`` over the place of take-off;
+  [longtitude : …] [altitude: …]``): degrees; ``rel_alt`` is over the point of take-off;
+  ``abs_alt`` and ``altitude`` are over the ellipsoid in drones with RTK, and by the air pressure
+  over the sea in others, which the file does not say (DJI Onboard SDK, "Altitude": fused altitude
+  from the sea level at standard pressure, GPS and RTK altitude over the ellipsoid);
 - ``GPS (13.37, 52.50, 15) … H 85.80m``: longitude, latitude, and a third number that is a count of
   satellites or a height, depending on the drone, and is not used; ``H`` and ``BAROMETER`` are
   heights over the point of take-off.
 
-Of both families the height over the sea is read if it is there, else that over the take-off.
+Of both families the absolute height is read if it is there, else that over the take-off.
 
 Stamps are those of the subtitles, from the start of the video; the printed date has no time zone.
 """
@@ -93,7 +95,7 @@ def read(path: Path) -> RawLog:
         "time": (time, "s"),
         "lat": (lats, "deg"),
         "lon": (lons, "deg"),
-        **({"alt_take_off": (ups, "m")} if np.isnan(alts).all() else {"alt_msl": (alts, "m")}),
+        **({"alt_take_off": (ups, "m")} if np.isnan(alts).all() else {"alt_unstated": (alts, "m")}),
         "quality": (np.where(none, 0.0, 1.0), None),
     }
     return RawLog.of(path, held, rows=np.array(rows), clock=RELATIVE, findings=findings)

@@ -6,7 +6,8 @@ in m/s and ``gps_accuracy`` in m; ``gyroscope_data``, ``accelerometer_data`` and
 ``magnetometer_data`` have arrays of samples, each with its offset in ms from the stamp of the
 message. Where a device did not calibrate them, ``three_d_sensor_calibration`` converts counts: less
 ``level_shift`` and ``offset_cal``, times ``calibration_factor`` over ``calibration_divisor``,
-turned by ``orientation_matrix``. The profile does not say where the axes of a device point.
+turned by ``orientation_matrix`` (FIT SDK, "calibration adjustment"). The profile does not say where
+the axes of a device point.
 """
 
 from __future__ import annotations

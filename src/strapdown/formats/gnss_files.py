@@ -90,6 +90,8 @@ QUANTITIES: dict[str, Quantity] = {
         ),
         LENGTHS,
     ),
+    # Of formats that do not say whether it is over the ellipsoid or over the sea.
+    "alt_unstated": Quantity((), LENGTHS),
     "north": Quantity(("north", "posn", "positionnorth", "northposition"), LENGTHS),
     "east": Quantity(("east", "pose", "positioneast", "eastposition"), LENGTHS),
     "up": Quantity(("up", "posu", "positionup"), LENGTHS, ("down", "posd", "positiondown")),
@@ -203,7 +205,7 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
         position_sd=_accuracy(raw, found, values) if position_sd is None else position_sd,
         velocity_sd=velocity_sd,
         quality=_quality(raw, found, values),
-        heights_from={"alt_msl": "sea", "alt_take_off": "take-off"}.get(datum, ""),
+        heights_from=_LEVELS.get(datum, ""),
         height_source=found[datum].source if datum in found else "",
         findings=raw.findings,
     )
@@ -227,7 +229,8 @@ def _in_units(raw: RawLog, found: dict[str, Found], units: Mapping[str, str]) ->
 
 #: Columns of a position, each set with its order; heights of a geodetic position, the first counts.
 _GEODETIC, _ECEF, _LOCAL = ("lat", "lon"), ("ecef_x", "ecef_y", "ecef_z"), ("north", "east")
-_HEIGHTS = ("alt", "alt_msl", "alt_take_off")
+_HEIGHTS = ("alt", "alt_msl", "alt_take_off", "alt_unstated")
+_LEVELS = {"alt_msl": "sea", "alt_take_off": "take-off", "alt_unstated": "unstated"}
 
 
 def _refuse_missing(raw: RawLog, found: dict[str, Found]) -> None:

@@ -102,7 +102,7 @@ class Fixes:
         As field 6 of NMEA 0183 GGA.
     zero_is_unknown : bool
         A standard deviation of zero means unknown.
-    heights_from : {'sea', 'take-off', ''}
+    heights_from : {'sea', 'take-off', 'unstated', ''}
         Level from which heights are counted; empty: from the ellipsoid.
     height_source : str
         Column or field of the heights, for messages.
@@ -175,6 +175,14 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
     return table
 
 
+#: Code of the question, by the level from which heights are counted.
+_LEVELS = {
+    "sea": "io.height-over-sea-column",
+    "take-off": "io.heights-over-take-off",
+    "unstated": "io.height-level-not-stated",
+}
+
+
 def _over_ellipsoid(fixes: Fixes, options: GnssOptions) -> Array:
     """Return positions with the height over the ellipsoid, or ask for the level of the file's."""
     if not fixes.heights_from:
@@ -183,16 +191,16 @@ def _over_ellipsoid(fixes: Fixes, options: GnssOptions) -> Array:
                 "io.heights-over-ellipsoid-already", file=fixes.name, quantity="datum_height_m"
             )
         return fixes.place
-    sea = fixes.heights_from == "sea"
     if options.datum_height is None:
+        # Heights that stay over the sea change gravity by 35 µg at most; over a take-off on a
+        # mountain they would change it by more, so that no value is proposed.
+        proposed = {"flags": "--gnss-datum-height 0", "keys": "datum_height_m = 0.0"}
         raise DataError(
-            "io.height-over-sea-column" if sea else "io.heights-over-take-off",
+            _LEVELS[fixes.heights_from],
             file=fixes.name,
             quantity="alt",
             source=fixes.height_source,
-            # Heights that stay over the sea change gravity by 35 µg at most; over a take-off on a
-            # mountain they would change it by more, so that no value is proposed.
-            **({"flags": "--gnss-datum-height 0", "keys": "datum_height_m = 0.0"} if sea else {}),
+            **(proposed if fixes.heights_from != "take-off" else {}),
         )
     fixes.findings.append(
         Finding(

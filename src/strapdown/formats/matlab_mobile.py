@@ -5,7 +5,8 @@ The application writes timetables ``Acceleration`` (m/s², with gravity), ``Angu
 ``course``, ``hacc`` in m) (MathWorks, "Sensor Data Collection with MATLAB Mobile"). MATLAB alone
 opens the objects of a ``.mat``; ``writetimetable`` writes each as CSV: ``Timestamp,X,Y,Z`` with
 ``14-Apr-2021 15:33:42.123`` of a day in no stated time zone. Axes are those of the phone; the
-reference of the altitude is not stated.
+reference of the altitude is not stated: phones with Android give it over the ellipsoid (Android
+reference, ``Location.getAltitude``), those with iOS over the sea (Apple, ``CLLocation.altitude``).
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ TABLES = {
 FIXES: dict[str, tuple[str, str | None]] = {
     "lat": ("latitude", "deg"),
     "lon": ("longitude", "deg"),
-    "alt_msl": ("altitude", "m"),
+    "alt_unstated": ("altitude", "m"),
     "speed": ("speed", "m/s"),
     "course": ("course", "deg"),
     "horizontal_accuracy": ("hacc", "m"),

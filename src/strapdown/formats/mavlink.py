@@ -214,7 +214,10 @@ def read_reference(path: Path) -> pd.DataFrame:
     if not use.any():
         raise DataError("io.reference-height-over-sea", file=path.name, quantity="alt")
     with damage(path):
-        time, own = _time(path, log, kind) * 1e-6, _time(path, log, "ATTITUDE") * 1e-6
+        time, own = (
+            np.asarray(_time(path, log, name) * 1e-6, dtype=np.float64)
+            for name in (kind, "ATTITUDE")
+        )
         geoid = np.median((fix["alt_ellipsoid"][use] - fix["alt"][use]) * 1e-3)
         position = np.column_stack(
             [place["lat"] * 1e-7, place["lon"] * 1e-7, place["alt"] * 1e-3 + geoid]

@@ -3,8 +3,9 @@
 ``GPS TFlags, GPS Week, GPS TOW, X Accel [x8004], …``: numbers in brackets are the fields of the MIP
 protocol (MicroStrain MIP data reference, set 0x80): 0x8004 scaled acceleration in g, 0x8005 rates
 in rad/s, 0x8006 magnetic field in gauss, 0x8007 and 0x8008 increments in rad and g s, 0x8017
-pressure in mbar. SensorConnect names the same channels ``scaledAccelX`` … after the name of the
-node, and has a ``Time`` of dates. Axes are those printed on the unit.
+pressure in mbar. SensorConnect and MSCL name the same channels ``scaledAccelX``, ``scaledGyroX``,
+``deltaThetaX``, ``deltaVelX`` …; in files of SensorConnect the name of the node goes before, and
+``Time`` has dates. Axes are those printed on the unit.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ TRIADS = {"gyro": ("gyro", "{}_rate_of_rotation"), "accel": ("acc", "{}_acc")}
 FIXES = {
     "lat": "latitude",
     "lon": "longitude",
-    "alt_msl": "altitude",
+    "alt_unstated": "altitude",
     "speed": "speed",
     "course": "bearing",
     "horizontal_accuracy": "accuracy",

@@ -601,7 +601,7 @@ def test_subtitles_with_an_absolute_height(tmp_path):
     found = columns(raw)
     np.testing.assert_allclose(found["time"][0], 0.5 + np.arange(4))
     np.testing.assert_allclose(found["lat"][0], [59.30, 59.31, 59.32, 59.33])
-    assert set(found["lon"][0]) == {18.2} and set(found["alt_msl"][0]) == {132.86}
+    assert set(found["lon"][0]) == {18.2} and set(found["alt_unstated"][0]) == {132.86}
     assert raw.clock == "relative" and raw.rows[1] == 8
     assert [f.code for f in raw.findings] == ["io.subtitles-without-place"]
 

@@ -369,7 +369,9 @@ def test_racechrono_takes_sensors_apart(tmp_path):
     np.testing.assert_allclose(held["lat"][0], [47.0, 47.1, 47.2, 47.3, 47.4, 47.5])
     # The altitude has no stated reference, so it is not over the ellipsoid.
     assert (
-        "alt" not in held and set(held["alt_msl"][0]) == {200.0} and set(held["speed"][0]) == {20.0}
+        "alt" not in held
+        and set(held["alt_unstated"][0]) == {200.0}
+        and set(held["speed"][0]) == {20.0}
     )
     assert held["horizontal_accuracy"][1] == "m"
     truncations(path, tmp_path, "imu")
@@ -665,7 +667,7 @@ def test_tables_of_matlab_mobile(tmp_path):
     np.testing.assert_allclose(recording.imu["accel_z"], FORCE[:, 2])
     np.testing.assert_allclose(np.diff(recording.imu.index), 0.01, atol=1e-9)
     found = columns(open_stream(tmp_path / "m", "gnss"))
-    assert "alt" not in found and found["alt_msl"][0][0] == 500.0
+    assert "alt" not in found and found["alt_unstated"][0][0] == 500.0
     written(
         tmp_path / "m" / "AngularVelocity.csv",
         ["Timestamp,X,Y,Z", f"{dates[0]},1,2,3", "14-,1,2,3"],
