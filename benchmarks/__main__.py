@@ -17,6 +17,7 @@ from benchmarks import (
     prefilter,
     smoothing,
     start_up,
+    text_table,
 )
 
 
@@ -37,6 +38,7 @@ def main() -> None:
         crash,
         answer,
         start_up,
+        text_table,
         memory,
     ):
         for row in module.ratios():

@@ -37,6 +37,7 @@ from strapdown.formats import (
     json_objects,
     kf_gins,
     kitti,
+    labview,
     matlab_mobile,
     mavlink,
     microstrain,
@@ -89,6 +90,7 @@ __all__ = [
     "read_joined",
     "read_log",
     "read_raw",
+    "reader_of",
     "readers_of",
 ]
 
@@ -319,6 +321,7 @@ READERS: dict[str, Reader] = {
         android_events.detect,
         {"imu": android_events.read},
     ),
+    "labview": Reader("measurement file of LabVIEW (.lvm)", labview.detect, {TABLE: labview.read}),
     "json": Reader("JSON of samples: lines, list", json_objects.detect, {TABLE: json_objects.read}),
     "excel": Reader("Excel workbook (.xlsx)", excel.detect, {TABLE: excel.read}),
     "inertial-explorer": Reader(
@@ -384,6 +387,11 @@ def readers_of(path: Path) -> Iterator[tuple[str, Reader]]:
         _log.warning("%s", one)
 
 
+def reader_of(path: Path) -> tuple[str, Reader | None]:
+    """Return the reader that reads a file or folder, the first that recognizes it, and its name."""
+    return next(readers_of(path), ("", None))
+
+
 def open_stream(path: str | Path, stream: str, form: str | None = None) -> Raw:
     """Read one stream of a recording as it is in the file.
 
@@ -401,7 +409,7 @@ def open_stream(path: str | Path, stream: str, form: str | None = None) -> Raw:
         raise DataError("io.file-empty", file=path.name)
     part = ""
     if form is None:
-        form, reader = next(readers_of(path), ("", None))
+        form, reader = reader_of(path)
     else:
         form, _, part = form.partition(":")
         reader = READERS.get(form) or plugin("reader", form, Reader)
@@ -431,10 +439,9 @@ def open_stream(path: str | Path, stream: str, form: str | None = None) -> Raw:
 def files_of(path: str | Path) -> tuple[Path, ...]:
     """List the files that are read for a path: itself, or several of a folder."""
     given = Path(path)
-    for _, reader in readers_of(given):
-        if reader.files is not None and (files := reader.files(given)):
-            return files
-    return (given,)
+    _, reader = reader_of(given)
+    files = reader.files(given) if reader is not None and reader.files is not None else ()
+    return files or (given,)
 
 
 def read_raw(path: str | Path, form: str | None = None) -> RawLog:

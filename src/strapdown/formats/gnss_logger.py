@@ -26,6 +26,7 @@ from strapdown.formats.clocks import UNIX, Clock
 from strapdown.formats.find_columns import Column
 from strapdown.formats.gnss_fixes import RADIUS, UNSTATED_VERTICAL, Fixes
 from strapdown.formats.join import join
+from strapdown.formats.known_text import head
 from strapdown.formats.phones import sensor_log
 from strapdown.formats.recording import RawLog
 from strapdown.formats.text_columns import parsed
@@ -65,13 +66,11 @@ def detect(path: Path) -> bool:
     """Detect by the header of a table, or by the comments that define the fields."""
     if not csv.detect(path):
         return False
-    with path.open("rb") as stream:
-        head = stream.read(HEAD).decode("utf-8-sig", "replace")
     return any(
         line.startswith(HEADER)
         or _is_description(line, ("UncalGyro", "Gyro", FIX))
         or _is_fix_header(line)
-        for line in head.splitlines()
+        for line in head(path, HEAD).splitlines()
     )
 
 
@@ -280,10 +279,13 @@ def _ahead(path: Path, lines: dict[str, list[tuple[int, str]]], findings: list[F
 
 
 def _fix_names(path: Path) -> list[str]:
-    with path.open("rb") as stream:
-        head = stream.read(HEAD).decode("utf-8-sig", "replace")
     line = next(
-        (n for n in head.splitlines() if _is_description(n, (FIX,)) or _is_fix_header(n)), ""
+        (
+            n
+            for n in head(path, HEAD).splitlines()
+            if _is_description(n, (FIX,)) or _is_fix_header(n)
+        ),
+        "",
     )
     return [name.strip() for name in line.lstrip("# ").split(",")]
 

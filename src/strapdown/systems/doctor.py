@@ -28,7 +28,7 @@ from strapdown.formats import (
     Reader,
     files_of,
     open_stream,
-    readers_of,
+    reader_of,
 )
 from strapdown.formats.arrays import ticks_of
 from strapdown.formats.clocks import RELATIVE, clock_of, on_clock_of
@@ -320,7 +320,7 @@ def _reader(log: LogTable) -> tuple[str, Reader | None]:
         return str(log.format), READERS[str(log.format)]
     if not path.exists():
         return "", None
-    return next(readers_of(path), ("", None))
+    return reader_of(path)
 
 
 @dataclass(frozen=True, eq=False)

@@ -261,6 +261,35 @@ def test_damaged_bytes_end_in_numbers_or_in_an_error_of_the_package(tmp_path, da
         assert len(imu) >= N - 2
 
 
+def labview(mark=".", units=("g",) * 3 + ("deg/s",) * 3, x="X_Value"):
+    end = "***End_of_Header***"
+    names = [*([x] if x else []), *(f"Acc {a}" for a in "XYZ"), *(f"Gyro {a}" for a in "XYZ")]
+    rows = [
+        "\t".join([*([f"{0.01 * k:.2f}"] if x else []), "0.0", "0.0", "1.0", "1.0", "-2.0", "3.5"])
+        for k in range(N)
+    ]
+    return [
+        "LabVIEW Measurement\t", f"Decimal_Separator\t{mark}", "Time\t13:05:22,44", end, "\t",
+        "Channels\t6", "Y_Unit_Label\t" + "\t".join(units), "Delta_X" + "\t0,010000" * 6, end,
+        "\t".join([*names, "Comment"]), *(r.replace(".", mark) for r in rows),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("mark", [".", ","])
+@pytest.mark.parametrize("x", ["X_Value", ""])
+def test_a_measurement_of_labview(tmp_path, mark, x):
+    imu = read_log(written(tmp_path, labview(mark, x=x), "run.lvm")).imu
+    assert np.allclose(np.degrees(imu[GYRO].to_numpy()), (1, -2, 3.5))
+    assert np.allclose(imu[ACCEL].to_numpy(), (0, 0, 9.80665))
+    assert imu.index[-1] == pytest.approx(0.39)
+
+
+def test_a_second_measurement_of_labview_is_refused(tmp_path):
+    lines = labview()
+    with pytest.raises(DataError, check=coded("io.labview-headers", count=3)):
+        read_log(written(tmp_path, [*lines, *lines[5:]], "run.lvm"))
+
+
 # Blocks.
 
 
