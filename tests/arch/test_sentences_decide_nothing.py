@@ -147,8 +147,8 @@ def test_a_run_is_judged_without_a_sentence(without_words):
     assert after.verdict == before.verdict
     assert codes(after.reasons) == codes(before.reasons)
     assert codes(other.findings) == codes(one.findings)
-    assert codes(other.trust.unwitnessed) == codes(one.trust.unwitnessed)
-    pd.testing.assert_frame_equal(other.trust.light.table, one.trust.light.table)
+    assert codes(other.trust.unconfirmed) == codes(one.trust.unconfirmed)
+    pd.testing.assert_frame_equal(other.trust.heading.table, one.trust.heading.table)
     pd.testing.assert_frame_equal(other.record.trajectory, one.record.trajectory, check_exact=True)
     pd.testing.assert_frame_equal(other.record.sd, one.record.sd, check_exact=True)
 

@@ -1,11 +1,11 @@
-"""Heading integrity, second by second: trusted, unverified or rejected (green, amber, red).
+"""Heading integrity, second by second: trusted, unverified or rejected.
 
-Green is a promise: the heading error is within the requested limit. It requires two solutions that
-do not share the assumptions made at the start: the run by its own bound, and an independent heading
-check by its own. The check is a solution by fixes that began without a heading
-(`navigation.heading_witness`), gyrocompassing at rest carried on by the gyros
-(`navigation.heading_witness.carry_headings`), or two independent sources of heading
-(`navigation.heading_witness.agreeing_sources`).
+Trusted is a promise: the heading error is within the requested limit. It requires two solutions
+that do not share the assumptions made at the start: the run by its own bound, and an independent
+heading check by its own. The check is a solution by fixes that began without a heading
+(`navigation.heading_checks`), gyrocompassing at rest carried on by the gyros
+(`navigation.heading_checks.carry_headings`), or two independent sources of heading
+(`navigation.heading_checks.agreeing_sources`).
 """
 
 from __future__ import annotations
@@ -23,15 +23,15 @@ from strapdown.errors import ConfigError
 from strapdown.navigation.record import NavigationRecord
 
 __all__ = [
-    "COLOURS",
+    "CHECKS",
     "REASONS",
+    "STATUSES",
     "SURE",
-    "WITNESSES",
     "HeadingCheck",
     "HeadingIntegrity",
-    "LightSpan",
+    "StatusSpan",
     "doubted",
-    "heading_light",
+    "heading_status",
     "recent_scatter",
     "seconds_of",
 ]
@@ -39,9 +39,10 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-COLOURS = ("green", "amber", "red")
-GREEN, AMBER, RED = range(3)
-#: Reason of a status other than green, by its code.
+#: Status of the heading, in the order of the codes in a table.
+STATUSES = ("trusted", "unverified", "rejected")
+TRUSTED, UNVERIFIED, REJECTED = range(3)
+#: Reason of a status, by its code.
 REASONS: dict[str, str] = {
     "": "the run and an independent check agree that it is within the limit",
     "assumed": "its own bound is small, but rests on the start or on one measurement only",
@@ -52,7 +53,7 @@ REASONS: dict[str, str] = {
     "unknown": "it is unknown",
 }
 #: Independent heading checks, by kind.
-WITNESSES: dict[str, str] = {
+CHECKS: dict[str, str] = {
     "motion": "an independent solution from GNSS fixes",
     "gyrocompass": "gyrocompassing at rest",
     "sources": "two independent heading measurements",
@@ -61,7 +62,7 @@ WITNESSES: dict[str, str] = {
 #: so many standard deviations bound the error of an independent check.
 SURE = 2.5758293035489004
 #: Scatter of the innovations over the last seconds, relative to the predicted one: beyond the first
-#: limit the status is not green, beyond the second it is red.
+#: limit the heading is not trusted, beyond the second it is rejected.
 FAR_OFF, REFUTED = 2.0, 3.0
 #: Validity of the result of a check, s, and the factor on the run's own growth since then.
 CARRIED, GROWS = 60.0, 2.0
@@ -71,7 +72,7 @@ RECENT, FEWEST = 30.0, 8
 VERTICAL = ("down", "VD", "height")
 #: Limit of one normalized innovation, and its value if it was rejected: half of all rejected refute
 #: a run.
-CLIP, REJECTED = 4.0, 3.0
+CLIP, LOST = 4.0, 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +90,7 @@ class HeadingCheck:
     sd : ndarray, (n,), deg
         Standard deviation of the check's heading; carried by gyros, a 99 % bound divided by `SURE`.
     kind : str
-        A key of `WITNESSES`.
+        A key of `CHECKS`.
     scale : ndarray, (n,)
         By fixes: factor, 1 or more, by which its innovations scatter more than expected,
         correlation included; it is part of `sd`.
@@ -110,19 +111,21 @@ class HeadingCheck:
 
 
 @dataclass(frozen=True)
-class LightSpan:
+class StatusSpan:
     """Consecutive seconds of one status for one reason.
 
     Attributes
     ----------
     begin, end : float, s
+    status : str
+        One of `STATUSES`.
     reason : str
         A key of `REASONS`.
     """
 
     begin: float
     end: float
-    colour: str
+    status: str
     reason: str
 
 
@@ -133,48 +136,48 @@ class HeadingIntegrity:
     Attributes
     ----------
     table : DataFrame
-        By time in s, the seconds of the run: ``light`` (0 green, 1 amber, 2 red), ``reason`` (a key
+        By time in s, the seconds of the run: ``status`` (index in `STATUSES`), ``reason`` (a key
         of `REASONS`), ``bound`` (1.96 standard deviations of the run, deg), ``difference`` (run
-        minus check, deg), ``witness_sd`` (standard deviation of the check, deg), ``witnessed``
+        minus check, deg), ``check_sd`` (standard deviation of the check, deg), ``check_bound``
         (`SURE` standard deviations of the check plus the difference, deg), ``carried`` (that, or an
-        earlier one plus the growth since, deg: the value that decides on green), ``witness_since``
-        (s), ``witness`` (a key of `WITNESSES`, or empty), ``scatter`` (of the innovations, relative
+        earlier one plus the growth since, deg: the value that decides on trust), ``check_since``
+        (s), ``check`` (a key of `CHECKS`, or empty), ``scatter`` (of the innovations, relative
         to the predicted one).
-    green, red : float, deg
-        Limits.
+    trusted_below, rejected_beyond : float, deg
+        Limits of the heading error, and of the 95 % bound.
     """
 
     table: pd.DataFrame
-    green: float
-    red: float
+    trusted_below: float
+    rejected_beyond: float
 
-    def share(self, colour: str) -> float:
+    def share(self, status: str) -> float:
         """Share of the seconds with a status."""
-        light = self.table["light"].to_numpy()
-        return float(np.mean(light == COLOURS.index(colour))) if len(light) else 0.0
+        codes = self.table["status"].to_numpy()
+        return float(np.mean(codes == STATUSES.index(status))) if len(codes) else 0.0
 
     @property
-    def spans(self) -> tuple[LightSpan, ...]:
+    def spans(self) -> tuple[StatusSpan, ...]:
         """Consecutive seconds of one status for one reason, in order of time."""
         time = self.table.index.to_numpy(dtype=np.float64)
         if not len(time):
             return ()
-        keys = list(zip(self.table["light"].tolist(), self.table["reason"].tolist(), strict=True))
+        keys = list(zip(self.table["status"].tolist(), self.table["reason"].tolist(), strict=True))
         starts = [k for k in range(len(keys)) if k == 0 or keys[k] != keys[k - 1]]
         ends = [*(time[k] for k in starts[1:]), float(time[-1]) + 1.0]
         return tuple(
-            LightSpan(float(time[k]), float(end), COLOURS[keys[k][0]], keys[k][1])
+            StatusSpan(float(time[k]), float(end), STATUSES[keys[k][0]], keys[k][1])
             for k, end in zip(starts, ends, strict=True)
         )
 
 
-def heading_light(
+def heading_status(
     record: NavigationRecord,
     evidence: Sequence[HeadingCheck],
     scatter: Array | None = None,
     *,
-    green: float = 3.0,
-    red: float = 10.0,
+    trusted_below: float = 3.0,
+    rejected_beyond: float = 10.0,
 ) -> HeadingIntegrity:
     """Return the heading integrity of each second of a run.
 
@@ -184,8 +187,8 @@ def heading_light(
         Results of the independent checks; empty without a check.
     scatter : ndarray, (n,), optional
         Of `recent_scatter` at the seconds of the run.
-    green, red : float, deg
-        Green promises an error below the first; beyond the second a bound is red.
+    trusted_below, rejected_beyond : float, deg
+        Trusted promises an error below the first; a bound beyond the second is rejected.
 
     Raises
     ------
@@ -200,54 +203,57 @@ def heading_light(
     times the root of the total growth of the run's own variance, not reduced by updates. The run is
     contradicted where d is beyond 2.58 standard deviations of both, and beyond half of the limit.
     """
-    if not 0.0 < green <= red:
+    if not 0.0 < trusted_below <= rejected_beyond:
         raise ConfigError(
-            "evaluation.green-below-red-beyond-no", quantity="trust", green=green, red=red
+            "evaluation.heading-limits",
+            quantity="trust",
+            trusted_below=trusted_below,
+            rejected_beyond=rejected_beyond,
         )
     seconds = seconds_of(record)
     count = len(seconds)
     own = _own_sd(record, seconds)
-    difference, witness, since, who = _best(seconds, evidence)
-    witnessed = np.abs(difference) + SURE * witness
+    difference, check_sd, since, kind = _best(seconds, evidence)
+    check_bound = np.abs(difference) + SURE * check_sd
     spread = np.ones(count) if scatter is None else scatter
     bound = TWO_SIDED_95 * own
     with np.errstate(invalid="ignore"):
-        apart = (np.abs(difference) > SURE * np.hypot(witness, own)) & (
-            np.abs(difference) > 0.5 * green
+        apart = (np.abs(difference) > SURE * np.hypot(check_sd, own)) & (
+            np.abs(difference) > 0.5 * trusted_below
         )
-    apart |= _contradicted(seconds, evidence, own, green)
-    carried = _carried(seconds, witnessed, own, apart)
-    light = np.full(count, AMBER)
+    apart |= _contradicted(seconds, evidence, own, trusted_below)
+    carried = _carried(seconds, check_bound, own, apart)
+    status = np.full(count, UNVERIFIED)
     reason = np.full(count, "assumed", dtype=object)
-    wide = ~(bound <= green)
+    wide = ~(bound <= trusted_below)
     reason[wide] = "wide"
-    good = ~wide & (carried <= green)
-    light[good], reason[good] = GREEN, ""
-    loose = ~wide & ~good & np.isfinite(witness) & (SURE * witness <= red)
+    good = ~wide & (carried <= trusted_below)
+    status[good], reason[good] = TRUSTED, ""
+    loose = ~wide & ~good & np.isfinite(check_sd) & (SURE * check_sd <= rejected_beyond)
     reason[loose] = "faint"
     off = spread > FAR_OFF
-    light[off & (light == GREEN)] = AMBER
+    status[off & (status == TRUSTED)] = UNVERIFIED
     reason[off] = "scatter"
-    light[spread > REFUTED] = RED
-    light[apart], reason[apart] = RED, "apart"
-    unknown = ~(bound <= red)
-    light[unknown], reason[unknown] = RED, "unknown"
+    status[spread > REFUTED] = REJECTED
+    status[apart], reason[apart] = REJECTED, "apart"
+    unknown = ~(bound <= rejected_beyond)
+    status[unknown], reason[unknown] = REJECTED, "unknown"
     table = pd.DataFrame(
         {
-            "light": light,
+            "status": status,
             "reason": reason,
             "bound": bound,
             "difference": difference,
-            "witness_sd": witness,
-            "witnessed": witnessed,
+            "check_sd": check_sd,
+            "check_bound": check_bound,
             "carried": carried,
-            "witness_since": since,
-            "witness": who,
+            "check_since": since,
+            "check": kind,
             "scatter": spread,
         },
         index=pd.Index(seconds, name="time"),
     )
-    return HeadingIntegrity(table, green, red)
+    return HeadingIntegrity(table, trusted_below, rejected_beyond)
 
 
 def seconds_of(record: NavigationRecord) -> Array:
@@ -277,13 +283,13 @@ def recent_scatter(record: NavigationRecord) -> Array:
         with np.errstate(divide="ignore", invalid="ignore"):
             u = np.where(s > 0.0, nu / np.sqrt(s), np.nan)
         weight = table[[f"weight {str(c)[3:]}" for c in labels]].to_numpy(dtype=np.float64)
-        told = np.isfinite(u)
+        known = np.isfinite(u)
         # Rejected measurements did no harm, unless there are many.
-        lost = told & (weight <= 0.0)
-        u = np.where(lost, REJECTED, np.clip(u, -CLIP, CLIP))
-        square = np.where(told, np.where(told, u, 0.0) ** 2, 0.0)
+        lost = known & (weight <= 0.0)
+        u = np.where(lost, LOST, np.clip(u, -CLIP, CLIP))
+        square = np.where(known, np.where(known, u, 0.0) ** 2, 0.0)
         total = np.concatenate([[0.0], np.cumsum(square.sum(axis=1))])
-        count = np.concatenate([[0], np.cumsum(told.sum(axis=1))])
+        count = np.concatenate([[0], np.cumsum(known.sum(axis=1))])
         time = table.index.to_numpy(dtype=np.float64)
         upto = np.searchsorted(time, seconds + 1e-6, side="right")
         since = np.searchsorted(time, seconds - RECENT, side="right")
@@ -294,7 +300,7 @@ def recent_scatter(record: NavigationRecord) -> Array:
 
 
 def doubted(
-    record: NavigationRecord, evidence: Sequence[HeadingCheck], upto: float, green: float
+    record: NavigationRecord, evidence: Sequence[HeadingCheck], upto: float, trusted_below: float
 ) -> bool:
     """Whether a run was contradicted, or its innovations scattered too much, until an instant.
 
@@ -303,12 +309,12 @@ def doubted(
     evidence : sequence of HeadingCheck
         Results of the independent checks.
     upto : float, s
-    green : float, deg
-        As of `heading_light`.
+    trusted_below : float, deg
+        As of `heading_status`.
     """
     seconds = seconds_of(record)
     before = seconds <= upto
-    apart = _contradicted(seconds, evidence, _own_sd(record, seconds), green)
+    apart = _contradicted(seconds, evidence, _own_sd(record, seconds), trusted_below)
     return bool((apart | (recent_scatter(record) > FAR_OFF))[before].any())
 
 
@@ -341,26 +347,26 @@ def _best(
     return difference, sd, since, who
 
 
-def _carried(seconds: Array, witnessed: Array, own: Array, apart: NDArray[np.bool_]) -> Array:
+def _carried(seconds: Array, check_bound: Array, own: Array, apart: NDArray[np.bool_]) -> Array:
     """Bound by the checks now, or by an earlier check plus the growth since."""
-    out = np.where(np.isfinite(witnessed), witnessed, np.inf)
+    out = np.where(np.isfinite(check_bound), check_bound, np.inf)
     grown = np.maximum(np.diff(own**2, prepend=own[:1] ** 2), 0.0)
-    told, added, since = math.inf, 0.0, -math.inf
+    known, added, since = math.inf, 0.0, -math.inf
     for k, now in enumerate(seconds.tolist()):
         added += float(grown[k])
         if apart[k]:
-            told = math.inf
+            known = math.inf
             continue
-        held = told + GROWS * SURE * math.sqrt(added) if now - since <= CARRIED else math.inf
+        held = known + GROWS * SURE * math.sqrt(added) if now - since <= CARRIED else math.inf
         if out[k] <= held:
-            told, added, since = float(out[k]), 0.0, now
+            known, added, since = float(out[k]), 0.0, now
         else:
             out[k] = held
     return out
 
 
 def _contradicted(
-    seconds: Array, evidence: Sequence[HeadingCheck], own: Array, green: float
+    seconds: Array, evidence: Sequence[HeadingCheck], own: Array, trusted_below: float
 ) -> NDArray[np.bool_]:
     """Seconds at which any check with a known heading contradicts the run."""
     out = np.zeros(len(seconds), dtype=np.bool_)
@@ -368,5 +374,5 @@ def _contradicted(
         at = np.searchsorted(seconds, one.time - 1e-6)
         inside = at < len(seconds)
         at, d, s = at[inside], np.abs(one.difference[inside]), one.sd[inside]
-        out[at[(d > SURE * np.hypot(s, own[at])) & (d > 0.5 * green)]] = True
+        out[at[(d > SURE * np.hypot(s, own[at])) & (d > 0.5 * trusted_below)]] = True
     return out

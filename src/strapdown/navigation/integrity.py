@@ -27,20 +27,20 @@ from strapdown.navigation.gyrocompass import (
     north_within,
     sd_after,
 )
+from strapdown.navigation.heading_checks import (
+    HeadingChecks,
+    agreeing_sources,
+    carry_headings,
+    heading_checks_of,
+    run_heading_checks,
+)
 from strapdown.navigation.heading_integrity import (
     SURE,
     HeadingCheck,
     HeadingIntegrity,
-    LightSpan,
-    heading_light,
+    StatusSpan,
+    heading_status,
     recent_scatter,
-)
-from strapdown.navigation.heading_witness import (
-    Witnesses,
-    agreeing_sources,
-    carry_headings,
-    hear_witnesses,
-    witnesses_of,
 )
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.measurement import Measurement, TabulatedMeasurement, lasting
@@ -82,7 +82,7 @@ class Advice:
         receiver to observe one.
     """
 
-    span: LightSpan
+    span: StatusSpan
     time: float
     sd: float
     options: tuple[tuple[Manoeuvre, float], ...]
@@ -94,12 +94,12 @@ class IntegrityReport:
 
     Attributes
     ----------
-    unwitnessed : tuple of Finding
+    unconfirmed : tuple of Finding
         Why no independent heading check was possible; empty where one was.
     north_sd : float, deg
         Standard deviation of north found by these gyros at rest.
     advice : tuple of Advice
-        For the longest spans that are not green.
+        For the longest spans without a trusted heading.
     consistency : mapping of str to ObservationConsistency
         By name of the observation.
     inconsistencies : tuple of Inconsistency
@@ -108,8 +108,8 @@ class IntegrityReport:
         The run without the first inconsistent measurement.
     """
 
-    light: HeadingIntegrity
-    unwitnessed: tuple[Finding, ...]
+    heading: HeadingIntegrity
+    unconfirmed: tuple[Finding, ...]
     north_sd: float
     advice: tuple[Advice, ...]
     consistency: Mapping[str, ObservationConsistency]
@@ -148,14 +148,14 @@ def assess_integrity(
     tables : mapping of str to DataFrame
         By name of the measurement.
     limits_deg : tuple of float, (2,), deg
-        Error limit for a trusted heading (green), and 95 % bound of a rejected one (red).
+        Error limit for a trusted heading, and 95 % bound of a rejected one.
     repeat : bool
         Whether to run again excluding the first inconsistent measurement.
     progress : callable
         Called with a stage and its completed share.
     """
     record = run.record
-    green, red = limits_deg
+    trusted_below, rejected_beyond = limits_deg
     ellipsoid = find_ellipsoid(chain.navigator.filter.mechanization.ellipsoid)
     progress("judging the heading", 0.0)
     consistency = consistency_of_all(record.innovations)
@@ -163,20 +163,26 @@ def assess_integrity(
     made, why = None, _unable(chain, record)
     try:
         if why is None:
-            made = witnesses_of(filter_, chain, imu, tables, record, consistency)
+            made = heading_checks_of(filter_, chain, imu, tables, record, consistency)
             why = None if made is not None else Finding(NO_FIXES, severity="note")
         if made is not None:
-            evidence = hear_witnesses(made, record, green / 3.0)
+            evidence = run_heading_checks(made, record, trusted_below / 3.0)
     except StrapdownError as error:
         # Where an independent solution is not possible, the run is reported without it.
         made, evidence = None, []
         why = Finding("navigation.no-second-solution", severity="note", reason=error.finding)
     assert chain.sensors is not None
     north_sd = north_within(chain.sensors, float(record.trajectory["lat"].iloc[0]), ellipsoid)
-    carried, no_north = _carried(chain, imu, run, north_sd, green)
+    carried, no_north = _carried(chain, imu, run, north_sd, trusted_below)
     sources = agreeing_sources(chain, record, carried)
     heard = [*evidence, *carried, *sources]
-    light = heading_light(record, heard, recent_scatter(record), green=green, red=red)
+    heading = heading_status(
+        record,
+        heard,
+        recent_scatter(record),
+        trusted_below=trusted_below,
+        rejected_beyond=rejected_beyond,
+    )
     found = inconsistencies(consistency, record.innovations, lasting(chain.navigator.aids))
     repeated = None
     if found and repeat:
@@ -192,10 +198,10 @@ def assess_integrity(
             lambda _, share: progress(stage, 0.3 + 0.7 * share),
         )
     return IntegrityReport(
-        light=light,
-        unwitnessed=() if heard or why is None else (why, *no_north),
+        heading=heading,
+        unconfirmed=() if heard or why is None else (why, *no_north),
         north_sd=north_sd,
-        advice=_advice(light, evidence, made, record),
+        advice=_advice(heading, evidence, made, record),
         consistency=consistency,
         inconsistencies=found,
         repeated=repeated,
@@ -203,13 +209,17 @@ def assess_integrity(
 
 
 def _carried(
-    chain: NavigationPipeline, imu: pd.DataFrame, run: PipelineRun, north_sd: float, green: float
+    chain: NavigationPipeline,
+    imu: pd.DataFrame,
+    run: PipelineRun,
+    north_sd: float,
+    trusted_below: float,
 ) -> tuple[list[HeadingCheck], tuple[Finding, ...]]:
     """Headings carried from rests, or why there are none."""
     sensors, record = chain.sensors, run.record
     assert sensors is not None
     ellipsoid = find_ellipsoid(chain.navigator.filter.mechanization.ellipsoid)
-    if not SURE * north_sd <= green:
+    if not SURE * north_sd <= trusted_below:
         if north_sd >= NO_NORTH:
             return [], (Finding("navigation.gyros-find-no-north", severity="note"),)
         code = "navigation.gyros-find-north-coarsely"
@@ -237,13 +247,13 @@ def _unable(chain: NavigationPipeline, record: NavigationRecord) -> Finding | No
 
 
 def _advice(
-    light: HeadingIntegrity,
+    heading: HeadingIntegrity,
     evidence: list[HeadingCheck],
-    made: Witnesses | None,
+    made: HeadingChecks | None,
     record: NavigationRecord,
 ) -> tuple[Advice, ...]:
-    """Advice for the longest spans that are not green."""
-    spans = [s for s in light.spans if s.colour != "green" and s.end - s.begin >= LEAST_ADVISED]
+    """Advice for the longest spans without a trusted heading."""
+    spans = [s for s in heading.spans if s.status != "trusted" and s.end - s.begin >= LEAST_ADVISED]
     longest = sorted(spans, key=lambda s: s.begin - s.end)[:MOST_ADVISED]
     out = []
     for span in sorted(longest, key=lambda s: s.begin):
@@ -259,10 +269,10 @@ def _advice(
 
 
 def _advised(
-    span: LightSpan,
+    span: StatusSpan,
     time: float,
     evidence: list[HeadingCheck],
-    made: Witnesses,
+    made: HeadingChecks,
     record: NavigationRecord,
 ) -> Advice:
     told = [(e, int(np.searchsorted(e.time, time))) for e in evidence]

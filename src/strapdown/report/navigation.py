@@ -21,7 +21,7 @@ from strapdown.formats import csv
 from strapdown.formats.file_options import FileOptions
 from strapdown.formats.writers import write_trajectory
 from strapdown.navigation.consistency import Inconsistency
-from strapdown.navigation.heading_integrity import COLOURS, REASONS
+from strapdown.navigation.heading_integrity import REASONS, STATUSES
 from strapdown.navigation.integrity import Repeated
 from strapdown.navigation.record import NavigationRecord
 from strapdown.progress import Progress
@@ -56,7 +56,6 @@ from strapdown.report.report_bundle import (
 )
 from strapdown.report.values import spaced
 from strapdown.report.verdict import (
-    STATUS,
     answer,
     check_words,
     first_words,
@@ -474,8 +473,8 @@ def write_verdict(result: NavigationRun, name: str, folder: Path) -> None:
     """
     write_text(folder / "verdict.html", document_page(verdict_document(result, name)))
     write_text(folder / "verdict.json", to_json(verdict_json(result)))
-    table = result.trust.light.table
-    status = [STATUS[COLOURS[k]] for k in table["light"].to_numpy(dtype=np.int64)]
+    table = result.trust.heading.table
+    status = [STATUSES[k] for k in table["status"].to_numpy(dtype=np.int64)]
     csv.write(
         folder / "heading_integrity.csv",
         {
@@ -484,25 +483,25 @@ def write_verdict(result: NavigationRun, name: str, folder: Path) -> None:
             "reason": np.array([str(r) for r in table["reason"]], dtype=np.str_),
             "bound_95_deg": table["bound"].to_numpy(dtype=np.float64),
             "confirmed_99_deg": table["carried"].to_numpy(dtype=np.float64),
-            "check": np.array([str(w) for w in table["witness"]], dtype=np.str_),
+            "check": np.array([str(w) for w in table["check"]], dtype=np.str_),
             "check_difference_deg": table["difference"].to_numpy(dtype=np.float64),
-            "check_sd_deg": table["witness_sd"].to_numpy(dtype=np.float64),
-            "check_since_s": table["witness_since"].to_numpy(dtype=np.float64),
+            "check_sd_deg": table["check_sd"].to_numpy(dtype=np.float64),
+            "check_since_s": table["check_since"].to_numpy(dtype=np.float64),
             "innovation_scatter": table["scatter"].to_numpy(dtype=np.float64),
         },
         {
             "run": result.source.name,
-            "trusted_below_deg": f"{result.trust.light.green:g}",
-            "rejected_beyond_deg": f"{result.trust.light.red:g}",
+            "trusted_below_deg": f"{result.trust.heading.trusted_below:g}",
+            "rejected_beyond_deg": f"{result.trust.heading.rejected_beyond:g}",
         },
     )
 
 
 def verdict_json(result: NavigationRun) -> dict[str, Any]:
     """Return a verdict for programs; angles in degrees, lengths in meters, times in s."""
-    trust, light = result.trust, result.trust.light
+    trust, heading = result.trust, result.trust.heading
     bounds = plane_bound(result.record.covariance)
-    spans = light.spans
+    spans = heading.spans
     return {
         "answer": spaced(answer(result)),
         "position": {
@@ -512,20 +511,20 @@ def verdict_json(result: NavigationRun) -> dict[str, Any]:
         },
         "heading": {
             "meaning": {
-                STATUS[c]: spaced(v) for c, (_, v) in zip(COLOURS, promise(trust), strict=True)
+                status: spaced(v) for status, (_, v) in zip(STATUSES, promise(trust), strict=True)
             },
-            "trusted_below_deg": light.green,
-            "rejected_beyond_deg": light.red,
-            "confirmed": not trust.unwitnessed,
-            "why_not": [finding_json(f) for f in trust.unwitnessed],
+            "trusted_below_deg": heading.trusted_below,
+            "rejected_beyond_deg": heading.rejected_beyond,
+            "confirmed": not trust.unconfirmed,
+            "why_not": [finding_json(f) for f in trust.unconfirmed],
             "confirmed_by": check_words(trust) or None,
-            "share": {STATUS[c]: light.share(c) for c in COLOURS},
-            "at_end": STATUS[spans[-1].colour] if spans else None,
+            "share": {one: heading.share(one) for one in STATUSES},
+            "at_end": spans[-1].status if spans else None,
             "spans": [
                 {
                     "from_s": s.begin,
                     "to_s": s.end,
-                    "status": STATUS[s.colour],
+                    "status": s.status,
                     "reason": s.reason,
                     "why": REASONS[s.reason],
                 }
@@ -534,7 +533,7 @@ def verdict_json(result: NavigationRun) -> dict[str, Any]:
             "advice": [
                 {
                     "time_s": a.time,
-                    "status": STATUS[a.span.colour],
+                    "status": a.span.status,
                     "sd_deg": json_number(a.sd),
                     "manoeuvres": [
                         {

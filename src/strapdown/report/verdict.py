@@ -10,12 +10,13 @@ import numpy as np
 from strapdown import __version__
 from strapdown.constants import TWO_SIDED_95
 from strapdown.evaluation.plane_bound import plane_bound
+from strapdown.navigation.heading_checks import UNSEEN
 from strapdown.navigation.heading_integrity import (
+    CHECKS,
     REASONS,
+    STATUSES,
     SURE,
-    WITNESSES,
 )
-from strapdown.navigation.heading_witness import UNSEEN
 from strapdown.navigation.integrity import NO_NORTH, Advice, IntegrityReport
 from strapdown.navigation.record import Span
 from strapdown.report.chart import (
@@ -57,8 +58,8 @@ _KINDS = {
 }
 
 
-#: Heading status of each color.
-STATUS = {"green": "trusted", "amber": "unverified", "red": "rejected"}
+#: Color of each heading status in the terminal.
+STATUS_STYLES = {"trusted": "green", "unverified": "yellow", "rejected": "red"}
 
 
 def answer(result: NavigationRun) -> str:
@@ -92,36 +93,39 @@ def position_words(result: NavigationRun) -> str:
 
 def heading_words(trust: IntegrityReport) -> str:
     """Return the share of time with a trusted heading, and the status at the end."""
-    light = trust.light
-    if not len(light.table):
+    heading = trust.heading
+    if not len(heading.table):
         return "The run is too short to judge its heading."
-    shares = [(c, light.share(c)) for c in ("green", "amber", "red")]
-    said = ", ".join(f"{STATUS[c]} {share_words(s)}" for c, s in shares if s > 0.0)
-    last = light.spans[-1]
-    now = f"final status: {STATUS[last.colour]}"
-    if last.colour != "green":
+    shares = [(c, heading.share(c)) for c in STATUSES]
+    said = ", ".join(f"{c} {share_words(s)}" for c, s in shares if s > 0.0)
+    last = heading.spans[-1]
+    now = f"final status: {last.status}"
+    if last.status != "trusted":
         now += f" ({REASONS[last.reason]})"
     elif check := check_words(trust):
         now += f", confirmed by {check}"
-    if trust.unwitnessed:
+    if trust.unconfirmed:
         now += f". No independent check: {unconfirmed_words(trust)}"
     return f"Heading: {said} of the time; {now}."
 
 
 def unconfirmed_words(trust: IntegrityReport) -> str:
     """Return the reasons why no independent check could confirm the heading."""
-    return "; ".join(one.sentence() for one in trust.unwitnessed)
+    return "; ".join(one.sentence() for one in trust.unconfirmed)
 
 
 def promise(trust: IntegrityReport) -> tuple[tuple[str, str], ...]:
     """Return the definition of each status color, in words and numbers."""
-    green, red = plain(trust.light.green, 1), plain(trust.light.red, 1)
+    trusted, rejected = (
+        plain(trust.heading.trusted_below, 1),
+        plain(trust.heading.rejected_beyond, 1),
+    )
     return (
         (
             "Trusted (green)",
-            f"the heading error is below {green}°. Required: the run's 95{GAP}% bound is below "
-            f"{green}°; an independent check bounds the error below {green}° with 99{GAP}%; and "
-            "innovations scatter by at most twice the expected value. The check is a second "
+            f"the heading error is below {trusted}°. Required: the run's 95{GAP}% bound is below "
+            f"{trusted}°; an independent check bounds the error below {trusted}° with 99{GAP}%; "
+            "and innovations scatter by at most twice the expected value. The check is a second "
             "navigator driven by fixes that began without a heading (now, or up to a minute ago "
             "plus the growth since); or gyrocompassing at rest, propagated by the gyros; or two "
             "independent heading measurements.",
@@ -129,13 +133,13 @@ def promise(trust: IntegrityReport) -> tuple[tuple[str, str], ...]:
         (
             "Unverified (amber)",
             "the heading depends on the stated start, on an alignment without a test of its own, "
-            f"or on one measurement; or its 95{GAP}% bound exceeds {green}°; or innovations "
+            f"or on one measurement; or its 95{GAP}% bound exceeds {trusted}°; or innovations "
             "scatter by more than twice the expected value.",
         ),
         (
             "Rejected (red)",
-            f"do not use the heading: its bound exceeds {red}°, an independent check contradicts "
-            "it, or innovations scatter by more than three times the expected value.",
+            f"do not use the heading: its bound exceeds {rejected}°, an independent check "
+            "contradicts it, or innovations scatter by more than three times the expected value.",
         ),
     )
 
@@ -158,7 +162,7 @@ def _without_fixes(trust: IntegrityReport) -> str:
     north = f"these gyros find north to {degrees_words(trust.north_sd)} (1 standard deviation)"
     if trust.north_sd >= NO_NORTH:
         north = "these gyros cannot find north"
-    if SURE * trust.north_sd <= trust.light.green:
+    if SURE * trust.north_sd <= trust.heading.trusted_below:
         return (
             f"{north}: a fine alignment, or a stop of some minutes with zero velocity updates "
             '(kind = "zero_velocity"), would confirm it; so would GNSS fixes with a change of '
@@ -171,11 +175,11 @@ def _without_fixes(trust: IntegrityReport) -> str:
 
 
 def check_words(trust: IntegrityReport) -> str:
-    """Independent heading checks that confirmed it while green, longest first; empty if none."""
-    table = trust.light.table
-    green = table[(table["light"] == 0) & (table["witness"] != "")]
-    kinds = green["witness"].value_counts().index
-    return "; ".join(WITNESSES[str(kind)] for kind in kinds)
+    """Independent heading checks that confirmed it while trusted, longest first; empty if none."""
+    table = trust.heading.table
+    confirmed = table[(table["status"] == 0) & (table["check"] != "")]
+    kinds = confirmed["check"].value_counts().index
+    return "; ".join(CHECKS[str(kind)] for kind in kinds)
 
 
 def first_words(trust: IntegrityReport) -> str:
@@ -240,8 +244,8 @@ def repeated_words(result: NavigationRun) -> str:
 def terminal_lines(result: NavigationRun, *, brief: bool = False) -> list[tuple[str, str]]:
     """Up to four lines for the terminal, each with its style; brief, without the position."""
     trust = result.trust
-    last = trust.light.spans[-1].colour if trust.light.spans else "red"
-    style = "yellow" if last == "amber" else last
+    last = trust.heading.spans[-1].status if trust.heading.spans else "rejected"
+    style = STATUS_STYLES[last]
     lines = [(heading_words(trust) if brief else answer(result), style)]
     if trust.first is not None:
         first = trust.first
@@ -252,7 +256,7 @@ def terminal_lines(result: NavigationRun, *, brief: bool = False) -> list[tuple[
         said = repeated_words(result)
         if said:
             lines.append((said, ""))
-    elif trust.advice and trust.light.spans[-1].colour != "green":
+    elif trust.advice and trust.heading.spans[-1].status != "trusted":
         lines.append((f"For the heading: {advice_words(trust.advice[-1], trust)}.", ""))
     return lines
 
@@ -293,8 +297,8 @@ def verdict_document(result: NavigationRun, name: str) -> Document:
         Folder name.
     """
     trust = result.trust
-    seen = len(trust.light.table) > 0
-    sound = trust.first is None and seen and trust.light.spans[-1].colour == "green"
+    seen = len(trust.heading.table) > 0
+    sound = trust.first is None and seen and trust.heading.spans[-1].status == "trusted"
     sections = (
         Section("heading", "Heading integrity", _heading(result)),
         Section("innovations", "Innovations", _innovations(result)),
@@ -339,27 +343,27 @@ def _of_filter(result: NavigationRun) -> tuple[Block, ...]:
 
 
 def _keys(result: NavigationRun) -> tuple[KeyFigure, ...]:
-    trust, light = result.trust, result.trust.light
+    trust, heading = result.trust, result.trust.heading
     bounds = plane_bound(result.record.covariance)
-    heading = half(result.record.sd["heading"].iloc[-1])
-    spans = light.spans
-    last = spans[-1].colour if spans else "unknown"
-    since = next((s.begin for s in reversed(spans) if s.colour != last), None)
+    bound = half(result.record.sd["heading"].iloc[-1])
+    spans = heading.spans
+    last = spans[-1].status if spans else "unknown"
+    since = next((s.begin for s in reversed(spans) if s.status != last), None)
     begun = "throughout" if since is None else f"for the last {_since(result, last)}"
     first = trust.first
     return (
         KeyFigure(
             "Final heading status",
-            STATUS.get(last, last),
-            f"{begun}; 95{GAP}% bound {degrees_words(heading)}",
+            last,
+            f"{begun}; 95{GAP}% bound {degrees_words(bound)}",
             REASONS[spans[-1].reason] if spans else "",
         ),
         KeyFigure(
             "Heading trusted",
-            share_words(light.share("green")),
-            f"of the time: error below {plain(light.green, 1)}°",
-            f"unverified {share_words(light.share('amber'))}, "
-            f"rejected {share_words(light.share('red'))}",
+            share_words(heading.share("trusted")),
+            f"of the time: error below {plain(heading.trusted_below, 1)}°",
+            f"unverified {share_words(heading.share('unverified'))}, "
+            f"rejected {share_words(heading.share('rejected'))}",
         ),
         KeyFigure(
             "Final position",
@@ -390,21 +394,21 @@ def _agrees(result: NavigationRun) -> str:
     return "inconsistent"
 
 
-def _since(result: NavigationRun, colour: str) -> str:
+def _since(result: NavigationRun, status: str) -> str:
     seconds = 0.0
-    for span in reversed(result.trust.light.spans):
-        if span.colour != colour:
+    for span in reversed(result.trust.heading.spans):
+        if span.status != status:
             break
         seconds += span.end - span.begin
     return duration_words(seconds)
 
 
 def _heading(result: NavigationRun) -> tuple[Block, ...]:
-    trust, light = result.trust, result.trust.light
-    if not len(light.table):
+    trust, heading = result.trust, result.trust.heading
+    if not len(heading.table):
         return (Paragraph("The run is shorter than a second."),)
     blocks: list[Block] = [*_of_filter(result), _reasons(result)]
-    if trust.unwitnessed:
+    if trust.unconfirmed:
         blocks.append(
             Paragraph(
                 f"No independent heading check: {unconfirmed_words(trust)}. The heading depends on "
@@ -415,7 +419,7 @@ def _heading(result: NavigationRun) -> tuple[Block, ...]:
     if any(a.options for a in trust.advice):
         rows = tuple(
             (
-                f"{STATUS[a.span.colour].capitalize()}, {instant(a.span.begin)} to "
+                f"{a.span.status.capitalize()}, {instant(a.span.begin)} to "
                 f"{instant(a.span.end)} ({duration_words(a.span.end - a.span.begin)}): "
                 f"{REASONS[a.span.reason]}",
                 capital(advice_words(a, trust)),
@@ -438,16 +442,16 @@ def _heading(result: NavigationRun) -> tuple[Block, ...]:
 
 
 def _reasons(result: NavigationRun) -> TableBlock:
-    table = result.trust.light.table
+    table = result.trust.heading.table
     rows = []
-    for colour, number in (("green", 0), ("amber", 1), ("red", 2)):
-        those = table[table["light"] == number]
+    for number, status in enumerate(STATUSES):
+        those = table[table["status"] == number]
         for reason, count in those["reason"].value_counts().items():
             share = share_words(count / len(table))
             why = REASONS[str(reason)]
-            if colour == "green" and check_words(result.trust):
+            if status == "trusted" and check_words(result.trust):
                 why = f"{why}: {check_words(result.trust)}"
-            rows.append((STATUS[colour], why, f"{count}", share))
+            rows.append((status, why, f"{count}", share))
     return TableBlock(
         ("status", "reason", "seconds", "of the time"), tuple(rows), (0, 1), "Heading status"
     )
@@ -455,20 +459,20 @@ def _reasons(result: NavigationRun) -> TableBlock:
 
 def _against_truth(result: NavigationRun) -> TableBlock | None:
     """Sizes of the errors under each status color; None if the truth is not known."""
-    light = result.trust.light
-    error = heading_error(result, light.table.index.to_numpy(dtype=np.float64))
+    heading = result.trust.heading
+    error = heading_error(result, heading.table.index.to_numpy(dtype=np.float64))
     if error is None:
         return None
-    size, number = np.abs(error), light.table["light"].to_numpy()
+    size, number = np.abs(error), heading.table["status"].to_numpy()
     rows = []
-    for colour, k in (("green", 0), ("amber", 1), ("red", 2)):
+    for k, status in enumerate(STATUSES):
         those = size[(number == k) & np.isfinite(size)]
         if len(those):
-            within = share_words(float(np.mean(those <= light.green)))
+            within = share_words(float(np.mean(those <= heading.trusted_below)))
             largest, rms = float(those.max()), math.sqrt(float(np.mean(those**2)))
             rows.append(
                 (
-                    STATUS[colour],
+                    status,
                     f"{len(those)}",
                     within,
                     f"{plain(rms, 3)}",
@@ -478,7 +482,13 @@ def _against_truth(result: NavigationRun) -> TableBlock | None:
     if not rows:
         return None
     return TableBlock(
-        ("status", "seconds", f"within {plain(light.green, 1)}°", "rms, deg", "largest, deg"),
+        (
+            "status",
+            "seconds",
+            f"within {plain(heading.trusted_below, 1)}°",
+            "rms, deg",
+            "largest, deg",
+        ),
         tuple(rows),
         (0,),
         f"Heading error against {result.source.truth_name}, by status",
@@ -568,7 +578,7 @@ def _limits() -> Block:
 
 
 #: Colors of the heading status, and the half height of its bar, which shows it without color.
-COLOURS = {"green": (GREEN, 0.45), "amber": (ORANGE, 0.3), "red": (VERMILLION, 0.18)}
+COLOURS = {"trusted": (GREEN, 0.45), "unverified": (ORANGE, 0.3), "rejected": (VERMILLION, 0.18)}
 BUCKETS = 500
 
 
@@ -584,33 +594,37 @@ def heading_error(result: NavigationRun, time: Array) -> Array | None:
 
 def heading_chart(result: NavigationRun) -> Chart:
     """Heading integrity of each second, with the bounds that determine it."""
-    light = result.trust.light
-    table = light.table
+    heading = result.trust.heading
+    table = heading.table
     time = table.index.to_numpy(dtype=np.float64)
     spans: list[Span] = []
-    for one in light.spans:
-        if spans and spans[-1].name == one.colour:
+    for one in heading.spans:
+        if spans and spans[-1].name == one.status:
             spans[-1] = replace(spans[-1], end=one.end)
         else:
-            spans.append(Span(one.colour, one.begin, one.end))
+            spans.append(Span(one.status, one.begin, one.end))
     whole = Span("", float(time[0]), max(float(time[-1]) + 1.0, float(time[0]) + 2.0))
     fills = []
     for name, (colour, half_height) in COLOURS.items():
         those = tuple(one for one in spans if one.name == name)
         if those:
-            fills.append(bar(STATUS[name], those, 0.0, half_height, colour))
+            fills.append(bar(name, those, 0.0, half_height, colour))
     ends = Line("", np.array([whole.begin, whole.end]), np.full(2, np.nan), GREY, legend=False)
     strip = Panel(
         "",
-        (ends, *span_names(tuple(replace(s, name=STATUS[s.name]) for s in spans), whole)),
+        (ends, *span_names(tuple(spans), whole)),
         categories=("status",),
         height=0.22,
         fills=tuple(fills),
     )
     bound = table["bound"].to_numpy(dtype=np.float64)
-    carried = np.where(np.isfinite(table["carried"]), table["carried"], light.red)
+    carried = np.where(np.isfinite(table["carried"]), table["carried"], heading.rejected_beyond)
     # Decades from below the smallest bound up to a practically unknown heading.
-    known = min(float(np.nanmin(bound)), light.green) if np.isfinite(bound).any() else light.green
+    known = (
+        min(float(np.nanmin(bound)), heading.trusted_below)
+        if np.isfinite(bound).any()
+        else heading.trusted_below
+    )
     shown = [
         ("bound of the run (95 %)", bound, BLUE, "solid", 1.6),
         ("bound by an independent check (99 %)", carried, BLACK, "solid", 2.0),
@@ -624,17 +638,28 @@ def heading_chart(result: NavigationRun) -> Chart:
             known = min(known, max(float(np.nanmedian(np.abs(error))), 1e-3))
     least = 10.0 ** math.floor(math.log10(max(known, 1e-4)))
     lines = tuple(
-        curve(name, time, np.clip(values, least, light.red), colour, dash, width, BUCKETS)
+        curve(
+            name,
+            time,
+            np.clip(values, least, heading.rejected_beyond),
+            colour,
+            dash,
+            width,
+            BUCKETS,
+        )
         for name, values, colour, dash, width in shown
     )
-    green = f"{plain(light.green, 1)}°"
+    limit = f"{plain(heading.trusted_below, 1)}°"
     return Chart(
         "heading-integrity",
         "Heading integrity",
-        f"Above: status. Below: its bounds; trusted requires both below {green} (dashed). A curve "
+        f"Above: status. Below: its bounds; trusted requires both below {limit} (dashed). A curve "
         "at the top is unknown.",
         "time, s",
-        (strip, Panel("heading, deg", lines, log=True, levels=(Level(light.green, green),))),
+        (
+            strip,
+            Panel("heading, deg", lines, log=True, levels=(Level(heading.trusted_below, limit),)),
+        ),
     )
 
 

@@ -12,8 +12,8 @@ from scipy import stats
 from strapdown.config.navigation import NavigationSpec
 from strapdown.ellipsoids import WGS84
 from strapdown.navigation.gyrocompass import STUDENT, north_within
+from strapdown.navigation.heading_checks import UNSEEN, agreeing_sources
 from strapdown.navigation.heading_integrity import SURE, HeadingCheck
-from strapdown.navigation.heading_witness import UNSEEN, agreeing_sources
 from strapdown.navigation.measurements.heading import Heading
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty
@@ -70,9 +70,9 @@ def spec_of(*, sensor="fog-1000", latitude=None, stated=None, heading=None, bias
 
 def errors(result):
     """Light and error of the heading of each second."""
-    light = result.trust.light.table
+    light = result.trust.heading.table
     known = result.differences
-    return light["light"].to_numpy(), np.interp(light.index, known.index, known["heading"])
+    return light["status"].to_numpy(), np.interp(light.index, known.index, known["heading"])
 
 
 @pytest.fixture(scope="module")
@@ -86,23 +86,23 @@ def test_a_run_that_found_north_is_green_from_its_begin(sound):
     assert np.mean(light == 0) > 0.97
     assert light[0] == 0
     assert np.abs(error).max() < LIMIT
-    assert set(sound.trust.light.table["witness"]) == {"gyrocompass"}
-    assert sound.trust.unwitnessed == ()
+    assert set(sound.trust.heading.table["check"]) == {"gyrocompass"}
+    assert sound.trust.unconfirmed == ()
 
 
 def test_what_is_carried_is_off_by_no_more_than_its_bound(sound):
-    table = sound.trust.light.table
+    table = sound.trust.heading.table
     _, error = errors(sound)
     # Run less witness is known; the error of the witness is that of the run less this.
     of_witness = error - table["difference"].to_numpy()
-    assert (np.abs(of_witness) < SURE * table["witness_sd"].to_numpy()).all()
+    assert (np.abs(of_witness) < SURE * table["check_sd"].to_numpy()).all()
     # It has followed a turn of 110 deg by the gyros alone: noise of 0.001 deg/√h adds nothing.
-    before = table.index < sound.trust.light.table.index[0] + 100.0
+    before = table.index < sound.trust.heading.table.index[0] + 100.0
     assert np.ptp(of_witness[before]) < 0.01
 
 
 def test_a_stop_begins_anew(sound):
-    since = sound.trust.light.table["witness_since"].to_numpy()
+    since = sound.trust.heading.table["check_since"].to_numpy()
     # The stop lasts from some 400 s on for two minutes; five seconds at its ends are left out.
     assert len(np.unique(since)) == 2
     assert 480.0 < since[-1] < 560.0
@@ -113,7 +113,7 @@ def test_a_wrong_latitude_takes_the_witness_away():
     light, _ = errors(result)
     # 5 deg are 1.1 deg/h of the Earth's horizontal rate, a hundred times the gyros' bias.
     assert (light != 0).all()
-    codes = [one.code for one in result.trust.unwitnessed]
+    codes = [one.code for one in result.trust.unconfirmed]
     assert codes[1:] == ["navigation.rest-not-consistent"]
 
 
@@ -140,7 +140,7 @@ def test_gyros_that_find_no_north_say_what_would_help():
     result = run_navigation(spec_of(sensor="hg1700", heading=0.0))
     light, _ = errors(result)
     assert (light != 0).all()
-    codes = [one.code for one in result.trust.unwitnessed]
+    codes = [one.code for one in result.trust.unconfirmed]
     assert codes[1:] == ["navigation.gyros-find-north-coarsely"]
 
 
@@ -203,10 +203,10 @@ def test_a_heading_aid_and_the_gyros_bear_each_other_out():
 
 
 def test_what_nobody_sees_grows_by_the_hour(sound):
-    table = sound.trust.light.table
-    since = table["witness_since"].to_numpy()
+    table = sound.trust.heading.table
+    since = table["check_since"].to_numpy()
     first = table[since == since[0]]
-    sd = first["witness_sd"].to_numpy()
+    sd = first["check_sd"].to_numpy()
     hours = (first.index[-1] - first.index[0]) / 3600.0
     bias = np.hypot(0.01, 0.003)
     # Noise of 0.001 deg/√h, the bias, and 110 deg by a scale factor and an axis that are off.

@@ -10,8 +10,8 @@ import pytest
 
 from strapdown.config.alignment import sensors_of
 from strapdown.config.navigation import NavigationSpec, make_filter
+from strapdown.navigation.heading_checks import heading_checks_of, run_heading_checks
 from strapdown.navigation.heading_integrity import SURE
-from strapdown.navigation.heading_witness import hear_witnesses, witnesses_of
 from strapdown.report.navigation import NAVIGATION
 from strapdown.systems.navigation_run import make_chain, run_navigation
 
@@ -70,10 +70,10 @@ def drive(
 
 def errors(result):
     """Light and error of the heading of each second."""
-    light = result.trust.light.table
+    light = result.trust.heading.table
     known = result.differences
     error = np.interp(light.index, known.index, known["heading"])
-    return light["light"].to_numpy(), error
+    return light["status"].to_numpy(), error
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +96,7 @@ def test_without_a_manoeuvre_a_start_is_borne_out_by_nothing():
     result = run_navigation(drive(error=6.0, manoeuvres=False))
     light, error = errors(result)
     # The bound of the run itself believes a heading that is off by 6 deg.
-    assert np.sum(result.trust.light.table["bound"] < LIMIT) > 20
+    assert np.sum(result.trust.heading.table["bound"] < LIMIT) > 20
     assert (np.abs(error) > LIMIT).mean() > 0.9
     assert (light != 0).all()
     advice = result.trust.advice[-1]
@@ -124,7 +124,7 @@ def test_what_was_wrong_with_a_run_does_not_pass_to_a_later_witness(tmp_path):
     spec = drive(laps=3, error=8.0, compass=compass, trust={"repeat": False})
     result = run_navigation(spec)
     source, record, sensors = result.source, result.record, sensors_of(spec)
-    made = witnesses_of(
+    made = heading_checks_of(
         make_filter(spec, sensors),
         make_chain(spec, sensors),
         source.imu,
@@ -135,7 +135,7 @@ def test_what_was_wrong_with_a_run_does_not_pass_to_a_later_witness(tmp_path):
     known = result.differences
     off = [
         (np.interp(one.time, known.index, known["heading"]) - one.difference) / one.sd
-        for one in hear_witnesses(made, record, LIMIT / 3.0)
+        for one in run_heading_checks(made, record, LIMIT / 3.0)
         if one.since > 30.0
     ]
     off = np.abs(np.concatenate(off))
@@ -169,19 +169,19 @@ def test_repeating_can_be_turned_off():
 
 def test_without_fixes_nothing_bears_a_heading_out():
     result = run_navigation(drive(aids=False))
-    assert result.trust.unwitnessed[0].code == "navigation.no-receiver-fixes"
-    assert result.trust.light.share("green") == 0.0
+    assert result.trust.unconfirmed[0].code == "navigation.no-receiver-fixes"
+    assert result.trust.heading.share("trusted") == 0.0
 
 
 def test_the_files_say_what_was_judged(sound, tmp_path):
     NAVIGATION.write(sound, tmp_path / "out")
     told = json.loads((tmp_path / "out" / "verdict.json").read_text(encoding="utf-8"))
-    light = sound.trust.light
-    assert told["heading"]["share"]["trusted"] == light.share("green")
+    light = sound.trust.heading
+    assert told["heading"]["share"]["trusted"] == light.share("trusted")
     assert told["answer"].startswith("Position bound, ")
     table = pd.read_csv(tmp_path / "out" / "heading_integrity.csv", comment="#")
     assert len(table) == len(light.table)
-    assert (table["status"] == "trusted").mean() == light.share("green")
+    assert (table["status"] == "trusted").mean() == light.share("trusted")
     page = (tmp_path / "out" / "verdict.html").read_text(encoding="utf-8")
     assert 'href="report.html"' in page
     assert f"{len(sound.trust.consistency)} measurements tested" in page

@@ -59,11 +59,11 @@ from strapdown.tables.checks import index_of, values_of
 __all__ = [
     "LONGEST",
     "UNSEEN",
-    "Witnesses",
+    "HeadingChecks",
     "agreeing_sources",
     "carry_headings",
-    "hear_witnesses",
-    "witnesses_of",
+    "heading_checks_of",
+    "run_heading_checks",
 ]
 
 
@@ -92,7 +92,9 @@ CLIP = 3.0
 NEAR = 1e-6
 
 
-def hear_witnesses(made: Witnesses, record: NavigationRecord, enough: float) -> list[HeadingCheck]:
+def run_heading_checks(
+    made: HeadingChecks, record: NavigationRecord, enough: float
+) -> list[HeadingCheck]:
     """Run heading checks over a record, two at a time at most.
 
     A new check begins each minute, and each three minutes while one is accurate enough. The older
@@ -121,9 +123,9 @@ def hear_witnesses(made: Witnesses, record: NavigationRecord, enough: float) -> 
     wanted = np.unique(np.concatenate([begun, made.time[places]]))
     ellipsoid = find_ellipsoid(made.navigator.filter.mechanization.ellipsoid)
     run = trajectory_at(record.trajectory, wanted, ellipsoid)
-    done: list[_Witness] = []
-    heard: list[_Witness] = []
-    told: list[_Witness] = []
+    done: list[_Check] = []
+    heard: list[_Check] = []
+    told: list[_Check] = []
     doubt = False
     for at, first, last in zip(begun.tolist(), firsts, [*firsts[1:], len(made.time)], strict=True):
         if len(heard) > 1 and heard[-1].sd <= enough:
@@ -135,7 +137,7 @@ def hear_witnesses(made: Witnesses, record: NavigationRecord, enough: float) -> 
             if not doubt:
                 said = [one.evidence() for one in told if one.marks]
                 doubt = doubted(record, said, at, 3.0 * enough)
-            fresh = _Witness(made, record, run, at, doubt)
+            fresh = _Check(made, record, run, at, doubt)
             done.append(fresh)
             heard.append(fresh)
             told = list(heard)
@@ -145,12 +147,12 @@ def hear_witnesses(made: Witnesses, record: NavigationRecord, enough: float) -> 
     return [one.evidence() for one in done if one.marks]
 
 
-class _Witness:
+class _Check:
     """Heading check in progress."""
 
     def __init__(
         self,
-        made: Witnesses,
+        made: HeadingChecks,
         record: NavigationRecord,
         run: pd.DataFrame,
         since: float,
@@ -281,7 +283,7 @@ POLAR = 85.0
 
 
 @dataclass(frozen=True, eq=False)
-class Witnesses:
+class HeadingChecks:
     """Filter, receivers and record of the heading checks.
 
     Attributes
@@ -303,14 +305,14 @@ class Witnesses:
     begun: float
 
 
-def witnesses_of(
+def heading_checks_of(
     filter_: ErrorFilter,
     chain: NavigationPipeline,
     imu: pd.DataFrame,
     tables: Mapping[str, pd.DataFrame],
     record: NavigationRecord,
     consistency: Mapping[str, ObservationConsistency],
-) -> Witnesses | None:
+) -> HeadingChecks | None:
     """Prepare the heading checks of a run.
 
     Parameters
@@ -330,7 +332,7 @@ def witnesses_of(
 
     Returns
     -------
-    Witnesses or None
+    HeadingChecks or None
         None without a GNSS receiver: no other measurement observes a direction independently.
     """
     receivers = [aid for aid in chain.navigator.aids if type(aid) is Gnss and aid.name in tables]
@@ -354,7 +356,9 @@ def witnesses_of(
     )
     thinned = {aid.name: _thinned(tables[aid.name]) for aid in receivers}
     begun = float(time[0] - rows[0, 0])
-    return Witnesses(Navigator(small, aids, mark_interval=FIXES_APART), time, rows, thinned, begun)
+    return HeadingChecks(
+        Navigator(small, aids, mark_interval=FIXES_APART), time, rows, thinned, begun
+    )
 
 
 def _known(aid: Gnss, record: NavigationRecord, robust: bool) -> Gnss:

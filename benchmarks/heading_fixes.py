@@ -1,11 +1,11 @@
-"""Drives with fixes of a receiver, sound and with faults, for the trial of the heading light."""
+"""Drives with fixes of a receiver, sound and with faults, for the trial of the heading status."""
 
 from __future__ import annotations
 
 import numpy as np
 import pandas as pd
 
-from benchmarks.light_case import KNOWN, LIMIT, Case, add_antennas, started
+from benchmarks.heading_case import KNOWN, LIMIT, Case, add_antennas, started
 from strapdown import rotation
 from strapdown.config.alignment import sensors_of
 from strapdown.config.navigation import NavigationSpec

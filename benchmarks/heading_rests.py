@@ -1,4 +1,4 @@
-"""Runs without fixes that find north at rest, for the trial of the heading light."""
+"""Runs without fixes that find north at rest, for the trial of the heading status."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pandas as pd
 
-from benchmarks.light_case import KNOWN, Case, add_antennas
+from benchmarks.heading_case import KNOWN, Case, add_antennas
 from benchmarks.light_sway import pushed_body, rocking_body, swayed
 from strapdown.config.alignment import sensors_of
 from strapdown.config.navigation import NavigationSpec

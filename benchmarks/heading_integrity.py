@@ -1,9 +1,9 @@
-"""Trial of the heading light: simulated drives with truth, sound and with faults.
+"""Trial of the heading status: simulated drives with truth, sound and with faults.
 
-    python -m benchmarks.heading_light [SEEDS [SCENARIO ...]]
+    python -m benchmarks.heading_integrity [SEEDS [SCENARIO ...]]
 
-For each scenario: seconds by light and by whether the heading was within what green promises. One
-that begins with "unseen" is what no light can tell, and is not counted with the others.
+For each scenario: seconds by status and by whether the heading was within what trusted promises.
+One that begins with "unseen" is what no check can find, and is not counted with the others.
 """
 
 from __future__ import annotations
@@ -13,9 +13,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from benchmarks import light_fixes as fixes
-from benchmarks import light_rests as rests
-from benchmarks.light_case import LIMIT, Case, run
+from benchmarks import heading_fixes as fixes
+from benchmarks import heading_rests as rests
+from benchmarks.heading_case import LIMIT, Case, run
 from strapdown.navigation.heading_integrity import COLOURS
 
 SCENARIOS: dict[str, Callable[[int], Case]] = {
@@ -44,7 +44,7 @@ def main(seeds: int, names: list[str]) -> None:
         for seed in range(seeds):
             try:
                 light, error, bound = run(SCENARIOS[name](seed))
-            except Exception as error_:  # a drive that the run refuses has no light
+            except Exception as error_:  # a drive that the run refuses has no status
                 failed += 1
                 print("  ", name, seed, type(error_).__name__, error_)
                 continue

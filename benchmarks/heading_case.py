@@ -1,4 +1,4 @@
-"""One drive with truth, run and judged, for the trial of the heading light."""
+"""One drive with truth, run and judged, for the trial of the heading status."""
 
 from __future__ import annotations
 
@@ -116,11 +116,11 @@ def run(case: Case) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     limits = (spec.trust.heading_limit_deg, spec.trust.heading_red_deg)
     filter_ = make_filter(spec, sensors)
     report = assess_integrity(chain, filter_, imu, tables, ran, limits, spec.trust.repeat, silent)
-    light = report.light.table
-    time = light.index.to_numpy()
+    status = report.heading.table
+    time = status.index.to_numpy()
     own = np.interp(
         time, record.trajectory.index, np.unwrap(np.radians(record.trajectory["heading"]))
     )
     true = np.interp(time, source.truth.index, np.unwrap(np.radians(source.truth["heading"])))
     error = rotation.within_half_turn(np.degrees(own - true) - case.truth_turned)
-    return light["light"].to_numpy(), error, light["bound"].to_numpy()
+    return status["status"].to_numpy(), error, status["bound"].to_numpy()
