@@ -380,9 +380,9 @@ READERS: dict[str, Reader] = {
 
 def readers_of(path: Path) -> Iterator[tuple[str, Reader]]:
     """Yield the readers that recognize a file or folder, those of plug-ins last."""
-    yield from ((name, reader) for name, reader in READERS.items() if reader.detect(path))
+    yield from ((name, reader) for name, reader in READERS.items() if _detects(reader, path))
     others, broken = plugins("reader", Reader)
-    yield from ((name, reader) for name, reader in others.items() if reader.detect(path))
+    yield from ((name, reader) for name, reader in others.items() if _detects(reader, path))
     for one in broken:
         _log.warning("%s", one)
 
@@ -390,6 +390,19 @@ def readers_of(path: Path) -> Iterator[tuple[str, Reader]]:
 def reader_of(path: Path) -> tuple[str, Reader | None]:
     """Return the reader that reads a file or folder, the first that recognizes it, and its name."""
     return next(readers_of(path), ("", None))
+
+
+#: What is in the file of a stranger can break any reader, and the libraries under it.
+_BROKEN = (ArithmeticError, LookupError, RuntimeError, StopIteration, TypeError, ValueError)
+
+
+def _detects(reader: Reader, path: Path) -> bool:
+    """Whether a format recognizes a file; a file that breaks its detection is not of it."""
+    try:
+        return reader.detect(path)
+    except _BROKEN:
+        _log.debug("%s: %s", path.name, reader.title, exc_info=True)
+        return False
 
 
 def open_stream(path: str | Path, stream: str, form: str | None = None) -> Raw:
@@ -427,8 +440,7 @@ def open_stream(path: str | Path, stream: str, form: str | None = None) -> Raw:
                 if isinstance(raw, RawLog) and reader.files is not None:
                     raw.files = reader.files(path) or raw.files
                 return raw
-            except (ArithmeticError, LookupError, TypeError, ValueError) as error:
-                # What is in the file of a stranger can break any reader.
+            except _BROKEN as error:
                 _log.debug("%s", path.name, exc_info=True)
                 raise DataError(
                     "io.not-of-format", file=path.name, title=reader.title, reason=repr(error)
@@ -551,7 +563,7 @@ def _not_recognized(path: Path) -> DataError:
         head = first_bytes(path, 8).hex(" ")
         return DataError("io.ending-no-known-format", file=path.name, suffix=path.suffix, head=head)
     inside = sorted(path.iterdir())[:MOST_NAMES]
-    may_be = [p for p in inside if any(r.detect(p) for r in READERS.values())]
+    may_be = [p for p in inside if any(_detects(r, p) for r in READERS.values())]
     logs = [p.name for p in may_be if _has_sensors(p)]
     shown = logs or [p.name for p in inside]
     names = ", ".join(shown[:MOST_SHOWN]) + (" …" if len(shown) > MOST_SHOWN else "")

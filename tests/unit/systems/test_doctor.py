@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pandas as pd
@@ -12,7 +13,7 @@ from tests.town_drive import motion
 
 import strapdown as sd
 from strapdown.errors import ConfigError, DataError
-from strapdown.formats import csv, read_log
+from strapdown.formats import READERS, csv, read_log
 from strapdown.formats.clocks import clock_of
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.writers import table_columns
@@ -296,3 +297,12 @@ def test_samples_in_memory_are_examined_saved_and_repeated(sound, tmp_path):
     seal = found.save(tmp_path / "out")
     assert (seal.path / "report.html").stat().st_size < 2e6
     assert sd.verify(seal.path).verdict == "identical"
+
+
+def test_a_file_that_breaks_a_detection_is_not_of_that_format(sound, tmp_path, monkeypatch):
+    def broken(path):
+        raise RuntimeError("damaged")
+
+    monkeypatch.setitem(READERS, "broad", replace(READERS["broad"], detect=broken))
+    (one,) = sd.doctor(written(sound, tmp_path / "log.csv")).logs
+    assert one.data["format"]["name"] == "csv"
