@@ -383,7 +383,7 @@ CASES = [
     ),
     Case(
         "Two columns that could be one quantity",
-        lambda f: text(f / "log.csv", [f"{r},0.5" for r in rows()], HEADER + ",wx"),
+        lambda f: text(f / "log.csv", [f"{r},0.5" for r in rows()], f"{HEADER},gyro_x_rad_s"),
     ),
     Case("Axes that are none", lambda f: text(f / "log.csv", rows()), ("--axes", "x,y,y")),
     Case(

@@ -190,13 +190,15 @@ def _families(raw: RawLog, said: dict[str, ColumnName]) -> dict[tuple[str, str],
 
 def _best(families: dict[str, Family], said: dict[str, ColumnName]) -> dict[str, Family]:
     """Keep the families of a triad that are whole, are rates and have gravity, by best names."""
-    kept = {f: m for f, m in families.items() if len(m) == len(AXES)} or families
+    whole = {f for f, m in families.items() if len(m) == len(AXES)}
+    # A name that is there twice leaves open which of the two is meant.
+    kept = {f: m for f, m in families.items() if f in whole or f.rstrip("'") in whole} or families
     preferences: tuple[Callable[[ColumnName, str], bool], ...] = (
         lambda one, family: not one.increment,
         lambda one, family: not one.linear,
         lambda one, family: "including" in family,
         # A letter may mean anything, and names read without their order are a last resort.
-        lambda one, family: len(family) > 1,
+        lambda one, family: len(family.rstrip("'")) > 1,
         lambda one, family: not one.loose,
     )
     for preferred in preferences:
@@ -256,7 +258,7 @@ def _several(raw: RawLog, quantity: str, names: list[str], first: str) -> Findin
 
 def _ask_which(raw: RawLog, triad: str, kept: list[Family], questions: Questions) -> None:
     """Ask which of several sensors to use; the first is the answer as inferred."""
-    axis = next(iter(kept[0]))
+    axis = next(iter(min(kept, key=len)))
     names = [m[axis] for m in kept if axis in m]
     answer = _answer(raw, triad, kept[0])
     questions.ask(_several(raw, f"{triad}_{axis}", names, names[0]), **answer)

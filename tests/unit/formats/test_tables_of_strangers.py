@@ -208,6 +208,13 @@ def test_sensors_by_their_columns_together(tmp_path, names):
     check(read(tmp_path, [f"t_s,{names}", *rows()], gyro_unit="deg/s", accel_unit="g"))
 
 
+def test_of_a_name_that_is_there_twice_one_is_asked_for(tmp_path):
+    lines = ["t_s,wx,wy,wz,ax,ay,az,wy", *(f"{line},0.5" for line in rows())]
+    with pytest.raises(DataError, check=coded("io.columns-ambiguous", quantity="gyro_y")) as asked:
+        read(tmp_path, lines, gyro_unit="deg/s", accel_unit="g")
+    assert asked.value.finding.data["flags"] == "--columns gyro_x=wx,gyro_y=wy,gyro_z=wz"
+
+
 def test_numbers_that_are_not_three_axes_are_no_sensor(tmp_path):
     with pytest.raises(DataError, check=coded("io.no-gyro-columns")):
         read(tmp_path, ["t_s,gyro_2,gyro_3,gyro_4,ax,ay,az", *rows()], gyro_unit="deg/s")
