@@ -316,7 +316,6 @@ CASES = [
     Case(
         "Degrees that were called radians, and gravity tells it",
         turning("time_s,gx_rad_s,gy_rad_s,gz_rad_s,ax_g,ay_g,az_g", np.pi / 180.0),
-        fails=False,
     ),
     Case(
         "Increments of each sample without a unit",

@@ -258,7 +258,7 @@ def _several(raw: RawLog, quantity: str, names: list[str], first: str) -> Findin
 
 def _ask_which(raw: RawLog, triad: str, kept: list[Family], questions: Questions) -> None:
     """Ask which of several sensors to use; the first is the answer as inferred."""
-    axis = next(iter(min(kept, key=len)))
+    axis = next(iter(sorted(kept, key=len)[0]))
     names = [m[axis] for m in kept if axis in m]
     answer = _answer(raw, triad, kept[0])
     questions.ask(_several(raw, f"{triad}_{axis}", names, names[0]), **answer)

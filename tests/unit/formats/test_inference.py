@@ -318,3 +318,19 @@ def test_it_is_fast():
     infer_signals(signals)
     # A bound that a busy core keeps, too.
     assert clock.perf_counter() - begin < 1.0
+
+
+@pytest.mark.parametrize("row", [(1e300, 0.01), (1e9, 0.01), (0.0, 1e300), (0.0, -np.inf)])
+def test_a_stamp_or_a_value_beyond_all_sensors_does_not_break_the_inference(row):
+    # One stamp far ahead asks for 1e10 windows; one value of 1e300 overflows when it is squared.
+    stamp, value = row
+    n = 400
+    time = 0.01 * np.arange(n)
+    time[-1] += stamp
+    rng = np.random.default_rng(3)
+    gyro, accel = 0.1 * rng.standard_normal((2, n, 3))
+    accel[:, 2] -= 9.8
+    accel[n // 2, 0] = value
+    with np.errstate(all="raise"):
+        found = {one.quantity: one for one in infer_signals(Signals(time, gyro, accel))}
+    assert found["gravity"].value == "present"

@@ -31,6 +31,10 @@ from strapdown.units import MAG_UNITS, TIME_UNITS, parse_unit
 Array = NDArray[np.float64]
 # Longer logs are sampled in parts with this many rows in total.
 LARGEST = 40_000
+#: Mean step below which stamps do not advance, in their unit: the largest, min, counts 60 s.
+LEAST_ADVANCE = 1e-12
+#: Beyond any value of a sensor and any stamp, in any unit: their products would overflow.
+HUGE, FAR = 1e12, 1e25
 
 
 @dataclass(frozen=True)
@@ -91,6 +95,13 @@ def _triad(raw: RawLog, found: dict[str, Column], triad: str) -> Array | None:
 def infer_signals(signals: Signals) -> tuple[Inference, ...]:
     """Infer from the numbers of arrays; see `infer`."""
     out: list[Inference] = []
+    signals = replace(
+        signals,
+        stamps=_below(signals.stamps, FAR),
+        gyro=_below(signals.gyro, HUGE),
+        accel=_below(signals.accel, HUGE),
+        mag=_below(signals.mag, HUGE),
+    )
     stamps = _finite(signals.stamps)
     times = _times(signals, stamps)
     step = _step(signals, stamps, times)
@@ -123,9 +134,10 @@ def infer_signals(signals: Signals) -> tuple[Inference, ...]:
             if times and next(iter(joint)) != next(iter(times)):
                 # A rotation that fits only in another unit of time is a doubt, not a proof.
                 times = {u: min(p, 0.5) for u, p in times.items()}
-    if stamps is not None and times:
+    advance = 0.0 if stamps is None else mean_step(stamps)
+    if stamps is not None and times and advance > LEAST_ADVANCE:
         best = next(iter(times))
-        told = time_evidence(stamps, mean_step(stamps), best)
+        told = time_evidence(stamps, advance, best)
         if signals.time_unit is None:
             out.append(conclude("time_unit", {**times}, told, "--time-unit"))
         else:
@@ -197,6 +209,13 @@ def _sign() -> Inference:
         evidence("io.evidence-sign-of-gravity"),
     )
     return Inference("accel_sign", "reaction", 0.95, told, (("gravity", 0.05),), "--accel-unit")
+
+
+def _below(values: NDArray[Any] | None, limit: float) -> NDArray[Any] | None:
+    """Replace values beyond a limit by NaN; integers stay."""
+    if values is None or values.dtype.kind != "f" or not (np.abs(values) >= limit).any():
+        return values
+    return np.where(np.abs(values) < limit, values, np.nan)
 
 
 def _finite(values: NDArray[Any] | None) -> NDArray[Any] | None:

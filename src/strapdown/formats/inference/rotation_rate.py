@@ -328,7 +328,14 @@ def turns(time: Array, gyro: Array, force: Array) -> tuple[Turn, ...]:
 def _turn(
     time: Array, once: Array, twice: Array, holes: NDArray[np.bool_], width: float
 ) -> list[Turn]:
-    grid = np.arange(time[0], time[-1] - 2 * width + 1e-9, 0.5 * width)
+    half, end = 0.5 * width, time[-1] - 2 * width + 1e-9
+    if end - time[0] < time.size * width:
+        grid = np.arange(time[0], end, half)
+    else:
+        # Pauses take most of the record: windows begin only where there are samples.
+        cells = np.floor((time - time[0]) / half)
+        grid = time[0] + half * np.unique(np.concatenate([cells, np.maximum(cells - 1.0, 0.0)]))
+        grid = grid[grid < end]
     # At the samples, where the integrals are known.
     at = np.array([np.searchsorted(time, grid + k * width) for k in (0, 1, 2)])
     at = np.minimum(at, time.size - 1)
