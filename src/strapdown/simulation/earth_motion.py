@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import pandas as pd
@@ -330,7 +330,12 @@ def integrate_velocity(
         before = now
     found = scaled
     assert found is not None
-    return lambda time: np.asarray(found(time) / _SCALE)
+    # Not a lambda: motions go to other processes.
+    return partial(_unscaled, found)
+
+
+def _unscaled(scaled: RateIntegral, time: Array) -> Array:
+    return np.asarray(scaled(time) / _SCALE)
 
 
 def _refuse_pole(place: Array) -> None:
