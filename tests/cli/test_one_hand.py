@@ -21,7 +21,10 @@ COMMANDS = {
     **{f"init {n}": one for n, one in ROOT.get_command(None, "init").commands.items()},
 }
 READS_A_LOG = ("attitude", "align", "navigate", "init align", "init navigate")
-TABULAR = {"attitude", "align", "navigate", "coast", "crash", "simulate", "verify", "modules"}
+TABULAR = {
+    *("attitude", "align", "navigate", "coast", "crash", "simulate", "verify", "modules"),
+    *("doctor", "convert"),
+}
 #: What one word says of two things: of a scenario beside a log, of a start beside a place.
 OF_ITS_OWN = {
     *(("simulate", flag) for flag in ("--rate", "--sampling", "--sensor", "--seed", "--format")),

@@ -178,7 +178,8 @@ def read_heading(name: str) -> Heading:
     quantity = axis = ""
     if named.quantity == "time":
         quantity = "time"
-    elif named.quantity is not None:
+    elif named.quantity is not None and not (named.loose and named.quantity.startswith("mag")):
+        # A lone b or m is a second accelerometer more often than a magnetometer.
         triad, _, axis = named.quantity.partition("_")
         quantity = {"accel": "acceleration", "gyro": "rate"}.get(triad, "other")
         axis = axis if axis in ("x", "y", "z") else ""

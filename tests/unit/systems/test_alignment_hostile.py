@@ -32,6 +32,8 @@ FLAGS = (
     *("duration", "rate", "sampling", "columns", "gyro_unit", "accel_unit", "time_unit", "axes"),
     "repair",
     "format",
+    *(f"gnss_{key}" for key in ("format", "columns", "units", "datum_height", "origin")),
+    *("gnss_position_sd", "gnss_velocity_sd"),
 )
 
 
