@@ -602,20 +602,6 @@ add(
     ),
     recordings=(CAR_IMU, CAR_GNSS),
 )
-FOOT = "foot/SensorConnectData_32_LLIO.mat"
-add(
-    "navigate-foot-points",
-    Command(
-        "navigate",
-        ("{data}/" + FOOT,),
-        {"sensor": "xsens-mti-1", "lat": 41, "lon": 29, "heading": 0, "duration": 15}
-        | {"control-points": "{data}/" + FOOT, **Q},
-        "nav",
-        exit=3,  # The recording has no rest at gravity for this start: both versions refuse it.
-    ),
-    recordings=(FOOT,),
-)
-
 LIVE = {
     "live": {"sampling": "instantaneous", "hold_s": 0.1},
     "start": {**START, "v_ned_m_per_s": [8.660254037844387, 5.0, 0.0]},
