@@ -57,7 +57,7 @@ def ratios() -> Iterator[Ratio]:
 def _path() -> Any:
     """Path of a simulated pole impact from its entry on, with everything that is not known."""
     from strapdown.crash.entry import Entry
-    from strapdown.crash.reconstruction import reconstruct_crash
+    from strapdown.crash.reconstruction import CrashOptions, reconstruct_crash
     from strapdown.simulation.crash_motion import find_crash
     from strapdown.simulation.crash_recording import paper_units, record_crash
 
@@ -65,4 +65,5 @@ def _path() -> Any:
     design = next(d for d in paper_units() if d.gyro is not None)
     unit, _ = record_crash(crash.motion, design, impact=crash.impacts[0], seed=1)
     entry = Entry.from_speed(7.1, 0.05, slip_sd_deg=1.0)
-    return reconstruct_crash([unit], entry, rate=RATE, window=(0.0, 0.75)).main.path
+    options = CrashOptions(rate=RATE, window=(0.0, 0.75))
+    return reconstruct_crash([unit], entry, options).main.path
