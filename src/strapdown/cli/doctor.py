@@ -63,7 +63,7 @@ def doctor(
     from strapdown.api.doctor import doctor as examine
     from strapdown.cli.console import console, print_findings, print_seal
     from strapdown.cli.result_folder import default_folder, refuse_result, run_and_save
-    from strapdown.systems.clean_log import write_clean_log
+    from strapdown.systems.clean_log import axes_of_clean_log, write_clean_log
 
     for log in logs:
         refuse_result(log, "log")
@@ -91,6 +91,8 @@ def doctor(
         files = write_clean_log(found[0], fix, force=write.force)
         if done is not None:
             console().print(f"Clean {', '.join(map(str, files))}")
+            said = [axes_of_clean_log(one) for one in found[0].logs]
+            print_findings([finding for finding in said if finding is not None])
 
 
 def print_log(one: LogDiagnosis, paths: Mapping[str, str], *, tables: bool) -> None:

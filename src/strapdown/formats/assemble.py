@@ -28,7 +28,15 @@ from strapdown.formats.find_columns import AXES, Column, find_columns, require_g
 from strapdown.formats.inference import Inference
 from strapdown.formats.join import join
 from strapdown.formats.judge import SUMS, UNITS, intervals, sampling_of_sums
-from strapdown.formats.recording import Origin, Questions, RawLog, Reading, ReadOptions, Recording
+from strapdown.formats.recording import (
+    AXES_OF_SENSOR,
+    Origin,
+    Questions,
+    RawLog,
+    Reading,
+    ReadOptions,
+    Recording,
+)
 from strapdown.formats.triad_units import (
     LIKELY,
     Axes,
@@ -149,6 +157,8 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
         sampling=sampling,
         source=raw.name,
     )
+    if not axes.stated:
+        imu.attrs["axes"] = AXES_OF_SENSOR
     with_clock(imu, clock_of_log(raw, found, stamps, dated))
     if raw.epoch == 0.0:
         imu.attrs["clock_origin_stamp"] = (stamps.origin.stamp, stamps.origin.unit)

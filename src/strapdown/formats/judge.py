@@ -176,14 +176,17 @@ def _settled(said: dict[str, Inference], quantity: str) -> bool:
     return quantity in said and said[quantity].settled
 
 
-def axes_against_gravity(said: dict[str, Inference]) -> Finding | None:
+def axes_against_gravity(said: dict[str, Inference]) -> Finding:
     """Check by gravity whether axes taken as forward, right, down are correct.
 
-    Returns none if gravity agrees, or is inconclusive.
+    Returns a note if gravity agrees, with its ``probability``, or is inconclusive.
     """
     up = said.get("up_axis")
-    if up is None or up.value is None or up.value == "-z" or up.confidence < 0.5:
-        return None
+    if up is None or up.value is None or up.confidence < 0.5:
+        return Finding("io.axes-not-stated", severity="note")
+    if up.value == "-z":
+        data = {"percent": up.evidence[0].data["percent"], "probability": up.confidence}
+        return Finding("io.axes-not-stated", severity="note", data=data)
     axis = str(up.value)
     down = axis[1:] if axis.startswith("-") else f"-{axis}"
     code = {"z": "io.axes-not-stated-z-up", "y": "io.axes-not-stated-y-up"}.get(axis)

@@ -331,6 +331,8 @@ def as_stated(answers: Mapping[str, str]) -> dict[str, Any]:
     return {"flags": " ".join(flags), "keys": "; ".join(keys), "answers": tuple(answers.items())}
 
 
+#: Axes of an Imu table whose log does not state them: x, y, z of the sensor.
+AXES_OF_SENSOR = "not stated: x, y, z as in the source"
 #: In the metadata of a file that `strapdown doctor` wrote, by the key ``checked``.
 CHECKED = "strapdown doctor"
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,7 @@ from strapdown.formats.judge import (
     report_upside_down,
 )
 from strapdown.formats.recording import Questions, RawLog, ReadOptions
-from strapdown.units import parse_unit
+from strapdown.units import factor_of, parse_unit
 
 __all__ = [
     "Axes",
@@ -67,7 +67,22 @@ def told_by_numbers(
         time_unit=unit,
         rate=options.rate or raw.rate,
     )
-    return {i.quantity: i for i in infer_signals(signals)}
+    said = {i.quantity: i for i in infer_signals(signals)}
+    up = said.get("up_axis")
+    if up is not None and up.value is not None:
+        stated = _stated_unit(raw, found, "accel", options)
+        if stated and factor_of(stated[0], {**UNITS["accel"], **SUMS["accel"]}) < 0.0:
+            said["up_axis"] = _reversed(up)
+    return said
+
+
+def _reversed(up: Inference) -> Inference:
+    """Return which axis points up for a sensor that reads -1 g upward."""
+    axis, (first, *rest) = str(up.value), up.evidence
+    other = axis[1:] if axis.startswith("-") else f"-{axis}"
+    said = (first.replace(axis=other), *rest)
+    shares = tuple((axis, share) for _, share in up.alternatives)
+    return replace(up, value=other, evidence=said, alternatives=shares)
 
 
 #: Least probability of an answer that is proposed.
@@ -225,6 +240,7 @@ class Axes:
     axis: list[int]
     sign: list[float]
     why: str
+    stated: bool = True
 
 
 def axes_matrix(axis: list[int], sign: list[float]) -> Array:
@@ -246,12 +262,10 @@ def body_axes(
     """
     text = options.axes or raw.axes
     if text is None:
-        doubt = None if options.accel_unit else axes_against_gravity(said)
-        taken = doubt or Finding("io.axes-not-stated", severity="note")
-        findings.append(taken.replace(file=raw.name, quantity="axes"))
-        return Axes([0, 1, 2], [1.0, 1.0, 1.0], "as they are")
+        findings.append(axes_against_gravity(said).replace(file=raw.name, quantity="axes"))
+        return Axes([0, 1, 2], [1.0, 1.0, 1.0], "as they are", stated=False)
     axis, sign = parse_axes(text)
-    if options.axes and not options.accel_unit:
+    if options.axes or text == "x,y,z":
         down = ("-" if sign[2] < 0 else "") + AXES[axis[2]]
         report_upside_down(said, down, raw.name, findings)
     if options.axes and mirrored(axis, sign):

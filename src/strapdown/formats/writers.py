@@ -214,7 +214,7 @@ def imu_columns(
                 columns[f"{name}_{axis}{_SUFFIX[name]}"] = array[:, k]
         else:
             columns[name] = array
-    return columns, {"sampling": imu.attrs["sampling"], "axes": AXES}
+    return columns, {"sampling": imu.attrs["sampling"], "axes": imu.attrs.get("axes", AXES)}
 
 
 def table_columns(table: pd.DataFrame) -> dict[str, Array]:
@@ -272,7 +272,8 @@ def _write_npz(path: Path, tables: Tables, options: FileOptions) -> list[Finding
     said: dict[str, Array] = {}
     arrays = _three_columns(tables)
     if "imu" in tables:
-        said = {"sampling": np.array(tables["imu"].attrs["sampling"]), "axes": np.array(AXES)}
+        stated = imu_columns(tables["imu"], None)[1]
+        said = {key: np.array(text) for key, text in stated.items()}
     numpy_files.write(path, arrays | said)
     return _clock_lost(tables)
 
@@ -280,7 +281,7 @@ def _write_npz(path: Path, tables: Tables, options: FileOptions) -> list[Finding
 def _write_mat(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
     said = {}
     if "imu" in tables:
-        said = {"sampling": str(tables["imu"].attrs["sampling"]), "axes": AXES}
+        said = imu_columns(tables["imu"], None)[1]
     hdf5.write_matlab(path, _three_columns(tables), said)
     return _clock_lost(tables)
 
@@ -302,7 +303,7 @@ def _write_hdf5(path: Path, tables: Tables, options: FileOptions) -> list[Findin
     plain, _, unit = name.rpartition("_")
     arrays = {plain: stamps} | _arrays(imu, tables.get("reference"))
     units = _UNITS | {plain: unit}
-    hdf5.write(path, arrays, units, {"sampling": imu.attrs["sampling"], "axes": AXES})
+    hdf5.write(path, arrays, units, imu_columns(imu, None)[1])
     return _clock_lost(tables)
 
 

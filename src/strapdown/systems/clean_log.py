@@ -22,11 +22,12 @@ from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.gnss_fixes import GnssOptions
 from strapdown.formats.recording import CHECKED
 from strapdown.formats.trajectory_readers import read_trajectory
+from strapdown.formats.triad_units import LIKELY
 from strapdown.formats.writers import imu_columns, table_columns
 from strapdown.systems.doctor import Diagnosis, LogDiagnosis
 from strapdown.tables import POSITION_SD, QUATERNION, TRAJECTORY, VELOCITY_SD
 
-__all__ = ["write_clean_log"]
+__all__ = ["axes_of_clean_log", "write_clean_log"]
 
 Columns = Mapping[str, NDArray[Any]]
 Write = Callable[[Path, dict[str, NDArray[Any]], dict[str, str]], None]
@@ -60,7 +61,8 @@ def write_clean_log(found: Diagnosis, out: str | Path, *, force: bool = False) -
     ConfigError
         There are several logs, a file exists, or the suffix is unknown.
     DataError
-        The log leaves something open other than rows to drop, or it has nothing to write.
+        The log leaves something open other than rows to drop; its axes are not stated, and gravity
+        contradicts or does not determine that z points down; or it has nothing to write.
     """
     out = Path(out)
     # Fixes in a file of their own are written beside the samples.
@@ -73,6 +75,7 @@ def write_clean_log(found: Diagnosis, out: str | Path, *, force: bool = False) -
         raise ConfigError("doctor.fix-suffix", quantity="--fix", suffix=out.suffix)
     one = logs[0]
     _refuse_open(one)
+    axes_of_clean_log(one)
     parts = _parts(one, out)
     if not parts:
         raise DataError("doctor.fix-without-samples", file=one.name)
@@ -105,6 +108,23 @@ def _refuse_open(one: LogDiagnosis) -> None:
         raise DataError("io.questions", file=one.name, **data)
     if not one.streams and one.refused is not None:
         raise DataError(one.refused)
+
+
+def axes_of_clean_log(one: LogDiagnosis) -> Finding | None:
+    """Return that the axes of a clean log are those of the sensor; None if they are stated.
+
+    DataError: they are not stated, and gravity does not show that z points down; or the log has an
+    attitude, which is one of stated axes.
+    """
+    said = [f for f in (*one.faults, *one.notes) if f.code.startswith("io.axes-not-stated")]
+    if not said or one.recording is None:
+        return None
+    (open_axes,) = said
+    probability = float(open_axes.data.get("probability", 0.0))
+    if probability >= LIKELY and one.recording.truth is None:
+        return open_axes.replace(code="doctor.axes-by-gravity", severity="warning")
+    code = f"doctor.fix-axes{open_axes.code.removeprefix('io.axes')}"
+    raise DataError(code, file=one.name, quantity="axes", data=open_axes.data, flags="--axes AXES")
 
 
 def _parts(one: LogDiagnosis, out: Path) -> dict[str, tuple[Path, Columns, dict[str, str]]]:
@@ -176,6 +196,7 @@ def _record(found: Diagnosis, one: LogDiagnosis, files: Mapping[str, str]) -> di
             for file, digest in zip(source.files, source.digests, strict=True)
         ],
         "options": f"{one.data['options']} {one.data['fixes_options']}".strip(),
+        "axes": None if one.recording is None else one.recording.imu.attrs["axes"],
         "columns": [asdict(reading) for reading in readings],
         "streams": list(one.data["streams"]),
         "findings": [f.plain() for f in (*one.questions, *one.faults, *one.notes)],

@@ -306,3 +306,88 @@ def test_a_file_that_breaks_a_detection_is_not_of_that_format(sound, tmp_path, m
     monkeypatch.setitem(READERS, "broad", replace(READERS["broad"], detect=broken))
     (one,) = sd.doctor(written(sound, tmp_path / "log.csv")).logs
     assert one.data["format"]["name"] == "csv"
+
+
+# Axes that nobody stated.
+
+
+def of_unstated_axes(table, path, turn=None):
+    """Write a log of a level unit whose axes are not stated, by rows of `turn` of its body axes."""
+    level = table[table.time_s < REST]
+    turn = np.eye(3) if turn is None else np.array(turn, dtype=float)
+    columns = {"time_s": level.time_s.to_numpy()}
+    for names in (GYROS, ACCELS):
+        columns |= dict(zip(names, turn @ level[names].to_numpy().T, strict=True))
+    csv.write(path, columns, {"sampling": "instantaneous"})
+    return path
+
+
+FORWARD_LEFT_UP = [[1, 0, 0], [0, -1, 0], [0, 0, -1]]
+UPRIGHT = [[0, 1, 0], [0, 0, -1], [-1, 0, 0]]
+
+
+@pytest.mark.parametrize(
+    ("turn", "end", "axes"),
+    [(FORWARD_LEFT_UP, "z-up", "x,-y,-z"), (UPRIGHT, "y-up", "-z,x,-y")],
+)
+def test_a_clean_log_asks_for_axes_that_gravity_contradicts(sound, tmp_path, turn, end, axes):
+    path = of_unstated_axes(sound, tmp_path / "log.csv", turn)
+    with pytest.raises(DataError) as refused:
+        sd.doctor(path, fix=tmp_path / "clean.csv")
+    assert refused.value.finding.code == f"doctor.fix-axes-not-stated-{end}"
+    assert refused.value.finding.data["flags"] == "--axes AXES"
+    assert not list(tmp_path.glob("clean*"))
+    sd.doctor(path, axes=axes, fix=tmp_path / "clean.csv")
+    (one,) = sd.doctor(tmp_path / "clean.csv").logs
+    assert not one.faults
+    assert one.streams["imu"]["accel_z"].median() == pytest.approx(-G, abs=0.01)
+
+
+def test_axes_that_gravity_confirms_stay_unstated_in_a_clean_log(sound, tmp_path):
+    path = of_unstated_axes(sound, tmp_path / "log.csv")
+    sd.doctor(path, fix=tmp_path / "clean.csv")
+    (found,) = [
+        f for f in sd.doctor(tmp_path / "clean.csv").findings if f.code == "io.axes-not-stated"
+    ]
+    assert found.data["probability"] == pytest.approx(0.95, abs=0.01)
+    sd.doctor(path, axes="x,y,z", fix=tmp_path / "clean.csv", force=True)
+    found = sd.doctor(tmp_path / "clean.csv").findings
+    assert not [f for f in found if f.code.startswith("io.axes")]
+
+
+def test_axes_without_evidence_are_asked_for(sound, tmp_path):
+    names = COLUMNS[:4]
+    path = tmp_path / "gyro.csv"
+    csv.write(path, {n: sound[n].to_numpy() for n in names}, {"sampling": "instantaneous"})
+    with pytest.raises(DataError) as refused:
+        sd.doctor(path, fix=tmp_path / "clean.csv")
+    assert refused.value.finding.code == "doctor.fix-axes-not-stated"
+
+
+@pytest.mark.parametrize("unit", ["m/s2", "-m/s2"])
+def test_a_stated_unit_of_the_accelerometer_does_not_hide_axes_upside_down(sound, tmp_path, unit):
+    turn = np.array(FORWARD_LEFT_UP, dtype=float)
+    path = of_unstated_axes(sound, tmp_path / "log.csv", turn if unit == "m/s2" else np.eye(3))
+    (one,) = sd.doctor(path, units={"accel": unit}).logs
+    assert [f.code for f in one.faults] == ["io.axes-not-stated-z-up"]
+    (one,) = sd.doctor(path, units={"accel": unit}, axes="x,y,z").logs
+    assert [f.code for f in one.faults] == ["io.axes-upside-down"]
+    other = "-m/s2" if unit == "m/s2" else "m/s2"
+    assert not sd.doctor(path, units={"accel": other}).logs[0].faults
+
+
+def test_a_clean_log_that_is_upside_down_says_so(sound, tmp_path):
+    path = of_unstated_axes(sound, tmp_path / "log.csv", FORWARD_LEFT_UP)
+    sd.doctor(path, axes="x,y,z", fix=tmp_path / "clean.csv")
+    (one,) = sd.doctor(tmp_path / "clean.csv").logs
+    assert [f.code for f in one.faults] == ["io.axes-upside-down"]
+
+
+@pytest.mark.parametrize("suffix", ["csv", "parquet", "npz", "h5", "mat"])
+def test_converting_does_not_state_axes_that_nobody_stated(sound, tmp_path, suffix):
+    path = of_unstated_axes(sound, tmp_path / "log.csv", FORWARD_LEFT_UP)
+    made = tmp_path / f"made.{suffix}"
+    sd.write(sd.read_imu(path), made)
+    assert "io.axes-not-stated-z-up" in {f.code for f in sd.read_imu(made).findings}
+    sd.write(sd.read_imu(path, axes="x,-y,-z"), made, force=True)
+    assert not [f for f in sd.read_imu(made).findings if f.code.startswith("io.axes")]
