@@ -9,13 +9,19 @@ out of the screen (developer.android.com/reference/android/hardware/SensorEvent)
 acceleration and gravity are used only where there is no accelerometer: their sum. Short names are
 also those of other loggers, so that units and axes under them are left open. The unit of the stamps
 is inferred unless the header states it; Android's own are ns.
+
+A table of samples is none of these: its header names axes of sensors (``ax``, ``gyro_x``). Small
+whole numbers are kinds only under a name that says so or without a header, and only if the values
+have decimals, the rows of the accelerometer have gravity, and those of the gyroscope have not.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 import re
+import statistics
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
@@ -44,6 +50,10 @@ KINDS = {
 UNITS = {"gyro": "rad/s", "accel": "m/s2", "mag": "uT"}
 _OF = {word: kind for kind, words in KINDS.items() for word in words}
 _STAMP = re.compile(r"\d+(?:\.\d+)?")
+#: Names of the column of kinds in a header, where the kinds are numbers.
+_HEADED = re.compile(r"(sensor|event)?[\s_-]*(type|kind|id|sensor|name|event)?", re.I)
+# Specific force of most rows of an accelerometer, m/s²; a hand or a vehicle changes it less.
+_GRAVITY = (6.0, 14.0)
 # Rows at the top by which the layout is told.
 TOP = 200
 
@@ -51,7 +61,9 @@ TOP = 200
 def kind_of(field: str) -> str | None:
     """Return the kind of sensor that a field names."""
     word = field.strip(" \"'").lower().removeprefix("android.sensor.").removeprefix("type_")
-    return _OF.get(re.sub(r"[^a-z0-9]", "", word))
+    # Neither -4 nor 1.6 is a kind.
+    letters = re.search("[a-z]", word)
+    return _OF.get(re.sub(r"[^a-z0-9]", "", word) if letters else word)
 
 
 def detect(path: Path) -> bool:
@@ -66,6 +78,9 @@ def _layout(text: str) -> tuple[int, int, str | None] | None:
         return None
     separator = csv.separator_of(lines[1])
     rows = [split(line, separator) for line in lines]
+    header = rows[0] if len(rows[0]) >= 5 and not csv.are_data(rows[0][2:]) else []
+    if any(_is_axis_of_sensor(name) for name in header):
+        return None
     unit = read_name(rows[0][0]).unit or (read_name(rows[0][1]).unit if rows[0][1:] else None)
     body = [r for r in rows[1:-1] if len(r) >= 5]
     if len(body) < 0.9 * (len(rows) - 2):
@@ -81,8 +96,45 @@ def _layout(text: str) -> tuple[int, int, str | None] | None:
             [float(r[stamp]) for r in body]
         )
         if usual and advances and len(kinds) > 1:
+            if any(field.isdecimal() and kind_of(field) for field in fields):
+                named = not header or _HEADED.fullmatch(header[kind])
+                signed = any(field.startswith("-") for field in fields)
+                if signed or not named or not _are_of_android([(r[kind], *r[2:5]) for r in body]):
+                    continue
             return (kind, stamp, unit) if kinds & {"gyro", "gyro uncalibrated"} else None
     return None
+
+
+def _is_axis_of_sensor(name: str) -> bool:
+    """Whether a name of a header is an axis of a sensor, as in a table of samples."""
+    quantity = str(read_name(name).quantity)
+    return quantity.startswith(("gyro_", "accel_", "mag_", "rate_"))
+
+
+def _are_of_android(rows: list[tuple[str, ...]]) -> bool:
+    """Whether numbers are kinds: by gravity in the rows of an accelerometer, and not of a gyro.
+
+    `rows`: kind, x, y, z. In a table of samples the rows of every number are alike. The values of
+    an event are floating-point numbers and written so.
+    """
+    if 2 * sum("." in v for _, *values in rows for v in values) < 3 * len(rows):
+        return False
+    sizes: dict[str | None, list[float]] = {}
+    for field, *values in rows:
+        try:
+            size = math.sqrt(sum(float(v) ** 2 for v in values))
+        except ValueError:
+            return False
+        sizes.setdefault(kind_of(field), []).append(size)
+    usual = {kind: statistics.median(held) for kind, held in sizes.items()}
+    low, high = _GRAVITY
+    force = [usual[k] for k in ("accel", "accel uncalibrated", "gravity") if k in usual]
+    turns = [usual[k] for k in ("gyro", "gyro uncalibrated") if k in usual]
+    return (
+        bool(force)
+        and all(low <= f <= high for f in force)
+        and not any(low <= rate <= high for rate in turns)
+    )
 
 
 def _advance(stamps: list[float]) -> bool:

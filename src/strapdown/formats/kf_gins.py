@@ -1,7 +1,8 @@
 """Increments of inertial sensors in KF-GINS format: seven columns without a header.
 
 Each line: GPS seconds of week, three increments of angle in rad, three of velocity in m/s, axes
-forward, right, down; an increment belongs to the interval that ends at its stamp.
+forward, right, down; an increment belongs to the interval that ends at its stamp. At 10 Hz the
+increments of velocity at rest are those of a table in g, which therefore needs the format stated.
 """
 
 from __future__ import annotations
@@ -68,6 +69,7 @@ _KINDS += [(f"accel_{a}", "m/s") for a in "xyz"]
 _GRAVITY = (9.6, 10.0)  # m/s²
 _STEPS = (1e-4, 0.5)  # s
 _TURNS = 2.0 * np.pi  # rad/s
+_G = (0.9, 1.1)  # of a table in g
 
 
 def detect(path: Path) -> bool:
@@ -101,7 +103,10 @@ def _are_increments(block: Array) -> bool:
     usual = float(np.median(steps))
     if not _STEPS[0] <= usual <= _STEPS[1] or not -1.0 < block[0, 0] <= WEEK + 1.0:
         return False
-    force = float(np.median(np.linalg.norm(block[:, 4:], axis=1))) / usual
+    size = float(np.median(np.linalg.norm(block[:, 4:], axis=1)))
+    if _G[0] <= size <= _G[1]:
+        return False
+    force = size / usual
     turn = float(np.median(np.linalg.norm(block[:, 1:4], axis=1))) / usual
     return _GRAVITY[0] <= force <= _GRAVITY[1] and turn < _TURNS
 
@@ -249,6 +254,8 @@ TRAJECTORY_NAMES = ("week", "time", *TRAJECTORY)
 SUFFIX = ".nav"
 # Decimals of the columns: 10 ns; 1e-11 deg is a micrometer; 1e-8 m and m/s; 1e-9 deg.
 DECIMALS = (0, 8, 11, 11, 8, 8, 8, 8, 9, 9, 9)
+# Largest latitude and longitude (deg), height (m), velocity (m/s), roll, pitch, heading (deg).
+_MOST_OF_STATE = (90.0, 360.0, 1e6, 1e4, 1e4, 1e4, 180.0, 90.0, 360.0)
 
 
 def detect_trajectory(path: Path) -> bool:
@@ -262,7 +269,15 @@ def detect_trajectory(path: Path) -> bool:
     with path.open("rb") as stream:
         lines = stream.read(csv.HEAD).splitlines()
     rows = [line.split() for line in lines if line.strip() and line.lstrip()[:1] not in b"#%"]
-    return bool(rows) and len(rows[0]) == len(TRAJECTORY_NAMES) and all(_number(f) for f in rows[0])
+    if not rows or len(rows[0]) != len(TRAJECTORY_NAMES) or not all(map(_number, rows[0])):
+        return False
+    # A log of nine axes and a temperature has eleven columns, too.
+    week, time, *state = (float(f) for f in rows[0])
+    return (
+        week == round(week) >= 0.0
+        and 0.0 <= time <= WEEK
+        and all(abs(x) <= most for x, most in zip(state, _MOST_OF_STATE, strict=True))
+    )
 
 
 def _number(field: bytes) -> bool:

@@ -2,7 +2,7 @@
 
 A line is a stamp in seconds and any subset of blocks: ``timestamp, id, v1, v2, v3, id, …``. A block
 has three values, or one for pressure and battery temperature. Files have no header; a blank may
-follow each comma.
+follow each comma. A table of whole numbers is none of them, for stamps and values have decimals.
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ def detect(path: Path) -> bool:
     ids = set()
     for line in lines:
         parsed = blocks_of(line)
-        if parsed is None:
+        if parsed is None or "." not in line:
             return False
         ids |= set(parsed[1])
     return bool(ids & {3, 4, 82, 83})
