@@ -70,7 +70,7 @@ from strapdown.formats.assemble import assemble
 from strapdown.formats.binary import first_bytes, or_sentences
 from strapdown.formats.find_columns import names_of_quantities
 from strapdown.formats.gnss_fixes import Fixes
-from strapdown.formats.quantity_columns import GEODETIC_QUANTITIES, read_words
+from strapdown.formats.quantity_columns import names_of_fixes
 from strapdown.formats.recording import NoStreamError, RawLog, ReadOptions, Recording
 from strapdown.plugins import plugin, plugins
 
@@ -644,10 +644,8 @@ def read_log(path: str | Path, options: ReadOptions | None = None) -> Recording:
 
 def _refuse_other_table(raw: RawLog) -> None:
     """Refuse a table without a gyro that has positions or attitudes; it has another use."""
-    words = {read_words(name, GEODETIC_QUANTITIES)[0] for name in raw.columns}
-    lat, lon = (set(GEODETIC_QUANTITIES[q].words) & words for q in ("lat", "lon"))
     known = names_of_quantities(raw)
-    if lat and lon:
+    if names_of_fixes(raw):
         code = "io.table-of-positions"
     elif {"roll", "pitch", "heading"} <= known or {"q_w", "q_x", "q_y", "q_z"} <= known:
         code = "io.table-of-attitudes"

@@ -28,6 +28,7 @@ from strapdown.formats.find_columns import AXES, Column, find_columns, require_g
 from strapdown.formats.inference import Inference
 from strapdown.formats.join import join
 from strapdown.formats.judge import SUMS, UNITS, intervals, sampling_of_sums
+from strapdown.formats.quantity_columns import names_of_fixes
 from strapdown.formats.recording import (
     AXES_OF_SENSOR,
     Origin,
@@ -193,8 +194,8 @@ SLOWEST = 2.0
 
 
 def _unused(raw: RawLog, found: dict[str, Column]) -> list[Finding]:
-    """List the columns that no quantity takes."""
-    used = {column.source for column in found.values()}
+    """List the columns that neither a quantity takes nor a fix."""
+    used = {column.source for column in found.values()} | names_of_fixes(raw)
     names = [name for name in raw.columns if name and name not in used]
     if not names:
         return []

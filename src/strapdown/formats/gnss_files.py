@@ -16,7 +16,6 @@ from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, ch
 from strapdown.formats import comma2k19, open_stream
 from strapdown.formats.arrays import numbers, ticks_of
 from strapdown.formats.clocks import GPS, RELATIVE, UNIX, WEEK, Clock, clock_of_name
-from strapdown.formats.columns import CLOCKS, TIMES
 from strapdown.formats.find_columns import Column, names_of_quantities
 from strapdown.formats.gnss_fixes import (
     RADIUS,
@@ -26,14 +25,14 @@ from strapdown.formats.gnss_fixes import (
     table_of_fixes,
 )
 from strapdown.formats.gnss_pos import QUALITY
-from strapdown.formats.quantity_columns import GEODETIC_QUANTITIES, Found, Quantity, quantities_of
+from strapdown.formats.quantity_columns import FIX_QUANTITIES, Found, fix_columns
 from strapdown.formats.recording import RawLog
+from strapdown.formats.trajectory_readers import EARTH
 from strapdown.frames import geodetic_from_ecef, geodetic_from_ned
 from strapdown.tables.checks import POSITION_SD, VELOCITY, VELOCITY_SD
-from strapdown.units import ANGLES, LENGTHS, OF_TABLES, SPEEDS, TIME_UNITS, unit_of
+from strapdown.units import OF_TABLES, SPEEDS, TIME_UNITS, unit_of
 
 __all__ = [
-    "QUANTITIES",
     "GnssOptions",
     "fixes_of_columns",
     "has_fixes",
@@ -45,111 +44,6 @@ __all__ = [
 
 
 Array = NDArray[np.float64]
-_SD_HEADS = ("sd", "std", "stddev", "stdev", "sigma", "s")
-
-
-def _sds(*words: str) -> tuple[str, ...]:
-    """List names of a standard deviation, with the word for it before or after the quantity."""
-    return tuple(h + w for h in _SD_HEADS for w in words) + tuple(
-        w + h for h in _SD_HEADS[:-1] for w in words
-    )
-
-
-#: Quantities of a table of fixes, with their possible names.
-QUANTITIES: dict[str, Quantity] = {
-    "time": Quantity(
-        (*TIMES, *CLOCKS, "gpssecondsofweek", "secondsofweek", "utc", "datetime", "date"),
-        TIME_UNITS,
-    ),
-    "week": Quantity(("week", "gpsweek", "weeknumber", "wn"), {}),
-    **GEODETIC_QUANTITIES,
-    "alt_msl": Quantity(
-        (
-            "hmsl",
-            "altmsl",
-            "altitudemsl",
-            "heightmsl",
-            "mslaltitude",
-            "mslheight",
-            "orthometricheight",
-        ),
-        LENGTHS,
-    ),
-    "geoid": Quantity(
-        ("geoid", "undulation", "geoidsep", "geoidseparation", "geoidheight", "geoidundulation"),
-        LENGTHS,
-    ),
-    "alt_take_off": Quantity(
-        (
-            "relalt",
-            "relativealt",
-            "relativealtitude",
-            "heightabovetakeoff",
-            "altitudeabovetakeoff",
-            "heighttakeoff",
-        ),
-        LENGTHS,
-    ),
-    # Of formats that do not say whether it is over the ellipsoid or over the sea.
-    "alt_unstated": Quantity((), LENGTHS),
-    "north": Quantity(("north", "posn", "positionnorth", "northposition"), LENGTHS),
-    "east": Quantity(("east", "pose", "positioneast", "eastposition"), LENGTHS),
-    "up": Quantity(("up", "posu", "positionup"), LENGTHS, ("down", "posd", "positiondown")),
-    **{
-        f"ecef_{axis}": Quantity((f"ecef{axis}", f"{axis}ecef", f"positionecef{axis}"), LENGTHS)
-        for axis in "xyz"
-    },
-    "north_sd": Quantity(_sds("n", "north", "lat", "latitude"), LENGTHS),
-    "east_sd": Quantity(_sds("e", "east", "lon", "longitude"), LENGTHS),
-    "down_sd": Quantity(
-        _sds("d", "down", "u", "up", "h", "alt", "altitude", "height", "hgt"), LENGTHS
-    ),
-    "VN_sd": Quantity(_sds("vn", "veln", "velocityn", "northvelocity", "velnorth"), SPEEDS),
-    "VE_sd": Quantity(_sds("ve", "vele", "velocitye", "eastvelocity", "veleast"), SPEEDS),
-    "VD_sd": Quantity(
-        _sds("vd", "veld", "velocityd", "vu", "velu", "velocityu", "veldown", "velup"), SPEEDS
-    ),
-    "horizontal_accuracy": Quantity(
-        (
-            "accuracy",
-            "horizontalaccuracy",
-            "locationhorizontalaccuracy",
-            "accuracyhorizontal",
-            "hacc",
-            "haccuracy",
-            "eph",
-        ),
-        LENGTHS,
-    ),
-    "vertical_accuracy": Quantity(
-        (
-            "verticalaccuracy",
-            "locationverticalaccuracy",
-            "altitudeaccuracy",
-            "accuracyvertical",
-            "vacc",
-            "vaccuracy",
-            "epv",
-        ),
-        LENGTHS,
-    ),
-    "speed": Quantity(("speed", "sog", "groundspeed", "locationspeed", "speedoverground"), SPEEDS),
-    "speed_sd": Quantity(("speedaccuracy", "speedsd", "sacc", "locationspeedaccuracy"), SPEEDS),
-    "course": Quantity(
-        (
-            "course",
-            "cog",
-            "bearing",
-            "courseoverground",
-            "locationcourse",
-            "track",
-            "directionofmotion",
-        ),
-        ANGLES,
-    ),
-    "quality": Quantity(("quality", "fixquality", "gpsquality", "gnssquality"), {}),
-    "Q": Quantity(("q",), {}),
-}
 
 
 def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
@@ -161,7 +55,7 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
     north, east, up of an origin that the user states. DataError: time or the position is missing,
     two columns fit one quantity, or a unit is unknown.
     """
-    found = _in_units(raw, quantities_of(raw, QUANTITIES, options.columns), options.units)
+    found = _in_units(raw, fix_columns(raw, options.columns), options.units)
     raw = _rows_of_fixes(raw, found)
     _refuse_missing(raw, found)
 
@@ -195,6 +89,8 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
     position_sd = block(POSITION_SD)
     if velocity is None and {"speed", "course"} <= found.keys():
         velocity, velocity_sd = _over_ground(raw, found, values)
+    if velocity is not None:
+        _refuse_unit_of_speed(raw, found, time, place, velocity)
     return Fixes(
         name=raw.name,
         time=time,
@@ -219,7 +115,7 @@ def _in_units(raw: RawLog, found: dict[str, Found], units: Mapping[str, str]) ->
             raise ConfigError(
                 "io.unit-of-missing-column", file=raw.name, quantity="units", of_what=quantity
             )
-        known = QUANTITIES[quantity].units
+        known = FIX_QUANTITIES[quantity].units
         spelled = unit_of(unit, OF_TABLES) or unit
         check_choice("io.unknown-unit", known, quantity=f"units {quantity}", unit=spelled)
         sign = -1.0 if found[quantity].factor < 0.0 else 1.0
@@ -394,6 +290,57 @@ def _over_ground(
     return np.column_stack([speed * np.cos(angle), speed * np.sin(angle), none]), sd
 
 
+#: Steps between fixes that tell a speed, s, and the shortest way in them, m.
+_STEPS, _WAY = (0.05, 10.0), 50.0
+#: Units that a speed without one may have, and how near the ratio to that of the positions is.
+_SPEEDS, _NEAR = ("km/h", "kn", "mph"), 0.04
+
+
+def _refuse_unit_of_speed(
+    raw: RawLog, found: dict[str, Found], time: Array, place: Array, velocity: Array
+) -> None:
+    """Refuse a velocity without a unit that fits the positions in another one than m/s.
+
+    `time` ((n,), s). `place` ((n, 3)): deg, deg, m. `velocity` ((n, 3)): taken as m/s. The way
+    between two fixes, regressed on the mean velocity at its ends, has its noise in the way alone.
+    """
+    names = [q for q in ("speed", *VELOCITY) if q in found and not found[q].stated]
+    names = [q for q in names if q != "speed" or "VN" not in found]
+    if not names or raw.stated:
+        return
+    known = np.isfinite(place).all(axis=1) & np.isfinite(velocity[:, :2]).all(axis=1)
+    known &= np.isfinite(time)
+    at, v, t = np.radians(place[known, :2]), velocity[known, :2], time[known]
+    step = np.diff(t)
+    use = (step > _STEPS[0]) & (step < _STEPS[1])
+    meters = EARTH * np.column_stack([np.ones(len(at)), np.cos(at[:, 0])])
+    turn = np.diff(at, axis=0)
+    turn[:, 1] = np.remainder(turn[:, 1] + np.pi, 2 * np.pi) - np.pi
+    way = (turn * meters[1:])[use].ravel()
+    asked = (0.5 * (v[1:] + v[:-1]) * step[:, None])[use].ravel()
+    size = float(asked @ asked)
+    if np.abs(way).sum() < _WAY or not size > 0.0:
+        return
+    ratio = float(asked @ way) / size
+    off = way - ratio * asked
+    sd = float(np.sqrt(off @ off / max(off.size - 1, 1) / size))
+    unit = next((u for u in _SPEEDS if abs(ratio / SPEEDS[u] - 1.0) < _NEAR), None)
+    if unit is None or 2.0 * sd > _NEAR * ratio:
+        return
+    answer = {name: unit for name in names}
+    raise DataError(
+        "io.speed-unit-not-stated",
+        file=raw.name,
+        quantity=", ".join(names),
+        source=found[names[0]].source,
+        ratio=1.0 / ratio,
+        unit=unit,
+        name=names[0],
+        flags="--gnss-units " + ",".join(f"{q}={u}" for q, u in answer.items()),
+        keys="units = {" + ", ".join(f'{q} = "{u}"' for q, u in answer.items()) + "}",
+    )
+
+
 def _accuracy(raw: RawLog, found: dict[str, Found], values: Callable[[str], Array]) -> Array | None:
     """Return standard deviations by the accuracies that a phone states, or None.
 
@@ -495,7 +442,7 @@ def has_fixes(path: str | Path) -> bool:
         raw = open_stream(path, "gnss")
         if not isinstance(raw, RawLog):
             return True
-        return {"time", "lat", "lon"} <= quantities_of(raw, QUANTITIES, {}).keys()
+        return {"time", "lat", "lon"} <= fix_columns(raw, {}).keys()
     except StrapdownError:
         return False
 

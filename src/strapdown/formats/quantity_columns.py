@@ -6,17 +6,19 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from strapdown.errors import ConfigError, DataError, check_choice
-from strapdown.formats.columns import CLOCKS
+from strapdown.errors import ConfigError, DataError, StrapdownError, check_choice
+from strapdown.formats.columns import CLOCKS, TIMES
 from strapdown.formats.recording import RawLog
-from strapdown.units import ANGLES, LENGTHS, OF_TABLES, SPEEDS, unit_of, unit_words
+from strapdown.units import ANGLES, LENGTHS, OF_TABLES, SPEEDS, TIME_UNITS, unit_of, unit_words
 
 __all__ = [
+    "FIX_QUANTITIES",
     "GEODETIC_QUANTITIES",
     "Found",
     "Quantity",
     "find_quantities",
-    "quantities_of",
+    "fix_columns",
+    "names_of_fixes",
 ]
 
 
@@ -62,14 +64,17 @@ class Found:
 
 
 def quantities_of(
-    raw: RawLog, known: Mapping[str, Quantity], asked: Mapping[str, str], of: str = "this table"
+    raw: RawLog,
+    known: Mapping[str, Quantity],
+    asked: Mapping[str, str],
+    before: re.Pattern[str] | None = None,
 ) -> dict[str, Found]:
     """Find the column of each quantity: as asked, else as the file states, else by its name.
 
     See `find_quantities`. A file that states its columns is not searched by names.
     """
     if not raw.stated:
-        return find_quantities(raw.columns, known, asked, raw.name, raw.units, of)
+        return find_quantities(raw.columns, known, asked, raw.name, raw.units, before=before)
     found = {
         quantity: Found(column, 1.0 if unit is None else known[quantity].units[unit], True)
         for column, (quantity, unit) in raw.stated.items()
@@ -85,13 +90,15 @@ def find_quantities(
     file: str,
     units: Mapping[str, str] | None = None,
     of: str = "this table",
+    before: re.Pattern[str] | None = None,
 ) -> dict[str, Found]:
     """Find the column of each quantity.
 
     `names`: as in the file. `asked`: quantity to the name of its column, or its number, from 1;
     overrides what the names suggest. `file`: for messages. `units`: column to unit, if stated apart
-    from the name. `of`: object that the quantities describe, for messages. Returns quantities that
-    were not found are absent. ConfigError: a requested column does not exist, or its quantity is
+    from the name. `of`: object that the quantities describe, for messages. `before`: words that may
+    stand before the name of a quantity that has no column otherwise. Returns quantities that were
+    not found are absent. ConfigError: a requested column does not exist, or its quantity is
     unknown. DataError: two columns fit one quantity, or a unit does not fit its quantity.
     """
     columns = list(names)
@@ -113,10 +120,16 @@ def find_quantities(
         )
         wanted[name] = quantity
     found: dict[str, Found] = {}
+    read = {name: read_words(name, known) for name in columns}
+    there = {_quantity_of(word, known) for word, _ in read.values()}
     for name in columns:
-        word, unit = read_words(name, known)
+        word, unit = read[name]
         unit = unit or ((units or {}).get(name, "").strip("[]() ").lower() or None)
-        said = next((q for q, k in known.items() if word in k.words or word in k.negative), None)
+        said = _quantity_of(word, known)
+        while said is None and before is not None and (match := before.match(word)):
+            word = word[match.end() :]
+            said = _quantity_of(word, known)
+            said = None if said in there else said
         meant = wanted.get(name, said)
         if meant is None or (name not in wanted and meant in asked):
             continue
@@ -133,6 +146,10 @@ def find_quantities(
             )
         found[meant] = Found(name, factor, bool(unit))
     return found
+
+
+def _quantity_of(word: str, known: Mapping[str, Quantity]) -> str | None:
+    return next((q for q, k in known.items() if word in k.words or word in k.negative), None)
 
 
 def read_words(name: str, known: Mapping[str, Quantity]) -> tuple[str, str | None]:
@@ -207,3 +224,137 @@ GEODETIC_QUANTITIES: dict[str, Quantity] = {
     "VE": Quantity(_velocities("e", "east"), SPEEDS),
     "VD": Quantity(_velocities("d", "down"), SPEEDS, _velocities("u", "up")),
 }
+
+
+# Column names of fixes.
+
+
+#: Words before the names of a fix among other columns, as in ``gps_lat``, ``location.latitude``.
+_OF_FIXES = re.compile(r"(?:gps|gnss|navsat|location|loc|position|pos|coords|fix)(?=..)")
+_SD_HEADS = ("sd", "std", "stddev", "stdev", "sigma", "s")
+
+
+def _sds(*words: str) -> tuple[str, ...]:
+    """List names of a standard deviation, with the word for it before or after the quantity."""
+    return tuple(h + w for h in _SD_HEADS for w in words) + tuple(
+        w + h for h in _SD_HEADS[:-1] for w in words
+    )
+
+
+#: Quantities of a table of fixes, with their possible names.
+FIX_QUANTITIES: dict[str, Quantity] = {
+    "time": Quantity(
+        (*TIMES, *CLOCKS, "gpssecondsofweek", "secondsofweek", "utc", "datetime", "date"),
+        TIME_UNITS,
+    ),
+    "week": Quantity(("week", "gpsweek", "weeknumber", "wn"), {}),
+    **GEODETIC_QUANTITIES,
+    "alt_msl": Quantity(
+        (
+            "hmsl",
+            "altmsl",
+            "altitudemsl",
+            "heightmsl",
+            "mslaltitude",
+            "mslheight",
+            "orthometricheight",
+        ),
+        LENGTHS,
+    ),
+    "geoid": Quantity(
+        ("geoid", "undulation", "geoidsep", "geoidseparation", "geoidheight", "geoidundulation"),
+        LENGTHS,
+    ),
+    "alt_take_off": Quantity(
+        (
+            "relalt",
+            "relativealt",
+            "relativealtitude",
+            "heightabovetakeoff",
+            "altitudeabovetakeoff",
+            "heighttakeoff",
+        ),
+        LENGTHS,
+    ),
+    # Of formats that do not say whether it is over the ellipsoid or over the sea.
+    "alt_unstated": Quantity((), LENGTHS),
+    "north": Quantity(("north", "posn", "positionnorth", "northposition"), LENGTHS),
+    "east": Quantity(("east", "pose", "positioneast", "eastposition"), LENGTHS),
+    "up": Quantity(("up", "posu", "positionup"), LENGTHS, ("down", "posd", "positiondown")),
+    **{
+        f"ecef_{axis}": Quantity((f"ecef{axis}", f"{axis}ecef", f"positionecef{axis}"), LENGTHS)
+        for axis in "xyz"
+    },
+    "north_sd": Quantity(_sds("n", "north", "lat", "latitude"), LENGTHS),
+    "east_sd": Quantity(_sds("e", "east", "lon", "longitude"), LENGTHS),
+    "down_sd": Quantity(
+        _sds("d", "down", "u", "up", "h", "alt", "altitude", "height", "hgt"), LENGTHS
+    ),
+    "VN_sd": Quantity(_sds("vn", "veln", "velocityn", "northvelocity", "velnorth"), SPEEDS),
+    "VE_sd": Quantity(_sds("ve", "vele", "velocitye", "eastvelocity", "veleast"), SPEEDS),
+    "VD_sd": Quantity(
+        _sds("vd", "veld", "velocityd", "vu", "velu", "velocityu", "veldown", "velup"), SPEEDS
+    ),
+    "horizontal_accuracy": Quantity(
+        (
+            "accuracy",
+            "horizontalaccuracy",
+            "locationhorizontalaccuracy",
+            "accuracyhorizontal",
+            "hacc",
+            "haccuracy",
+            "eph",
+        ),
+        LENGTHS,
+    ),
+    "vertical_accuracy": Quantity(
+        (
+            "verticalaccuracy",
+            "locationverticalaccuracy",
+            "altitudeaccuracy",
+            "accuracyvertical",
+            "vacc",
+            "vaccuracy",
+            "epv",
+        ),
+        LENGTHS,
+    ),
+    "speed": Quantity(("speed", "sog", "groundspeed", "locationspeed", "speedoverground"), SPEEDS),
+    "speed_sd": Quantity(("speedaccuracy", "speedsd", "sacc", "locationspeedaccuracy"), SPEEDS),
+    "course": Quantity(
+        (
+            "course",
+            "cog",
+            "bearing",
+            "courseoverground",
+            "locationcourse",
+            "track",
+            "directionofmotion",
+            "gpsheading",
+            "gnssheading",
+            "headmot",
+        ),
+        ANGLES,
+    ),
+    "quality": Quantity(("quality", "fixquality", "gpsquality", "gnssquality"), {}),
+    "Q": Quantity(("q",), {}),
+}
+
+
+def fix_columns(raw: RawLog, asked: Mapping[str, str]) -> dict[str, Found]:
+    """Find the columns of fixes, by names as `FIX_QUANTITIES` has them or after ``gps_``.
+
+    A quantity that has its own name is not searched behind such a word: beside ``time`` and
+    ``speed``, ``gps_time`` and ``gps_speed`` are others. Errors as of `find_quantities`.
+    """
+    return quantities_of(raw, FIX_QUANTITIES, asked, before=_OF_FIXES)
+
+
+def names_of_fixes(raw: RawLog) -> set[str]:
+    """Return the columns that are of fixes; empty if there is no latitude and longitude."""
+    try:
+        found = fix_columns(raw, {})
+    except StrapdownError:
+        return set()
+    there = {"lat", "lon"} <= found.keys()
+    return {column.source for column in found.values()} if there else set()

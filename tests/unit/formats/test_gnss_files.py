@@ -8,7 +8,8 @@ import pytest
 from tests.coded import coded
 
 from strapdown.errors import ConfigError, DataError
-from strapdown.formats.gnss_files import GnssOptions, read_gnss
+from strapdown.formats import ReadOptions, read_log
+from strapdown.formats.gnss_files import GnssOptions, has_fixes, read_gnss
 from strapdown.tables import GNSS, check_gnss
 from strapdown.tables.checks import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
 
@@ -249,3 +250,55 @@ def test_no_file_of_fixes(tmp_path):
         ConfigError, check=lambda refused: refused.finding.code == "io.no-standard-deviation"
     ):
         GnssOptions(position_sd=0.0)
+
+
+def drive(before, speed, *, factor=1.0, stated=""):
+    """A turn at 10 m/s, 1 Hz, with inertial samples beside the fixes."""
+    t = np.arange(60.0)
+    course = 0.02 * t
+    north, east = np.cumsum(10.0 * np.cos(course)), np.cumsum(10.0 * np.sin(course))
+    lat, lon = 47.0 + np.degrees(north / 6.371e6), 9.0 + np.degrees(east / 6.371e6 / 0.682)
+    lines = [
+        "time,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,"
+        + ",".join(before + w for w in ("lat", "longitude", "alt", "accuracy", "course"))
+        + f",{before}{speed}{stated}"
+    ]
+    for k in range(60):
+        row = (t[k], 0.0, 0.0, 0.02, lat[k], lon[k], 400.0, 3.0, np.degrees(course[k]), 10 * factor)
+        lines.append(",".join(f"{v:.9f}" for v in row))
+    return "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize(
+    "before", ["gps_", "gps.", "gnss_", "location.", "position_", "fix ", "GPS"]
+)
+def test_fixes_as_other_people_name_them(tmp_path, before):
+    path = written(tmp_path, drive(before, "speed"))
+    table = read_gnss(path)
+    assert table[["lat", "lon", "alt"]].iloc[0].tolist() == pytest.approx([47, 9, 400], abs=1e-3)
+    assert table["VN"].iloc[0] == pytest.approx(10.0)
+    assert has_fixes(path)
+    # What a fix takes is not listed as unused by the inertial sensors.
+    log = read_log(path, ReadOptions(time_unit="s"))
+    assert "io.columns-not-used" not in {f.code for f in log.findings}
+
+
+def test_a_plain_name_precedes_one_with_a_word_before_it(tmp_path):
+    text = drive("", "speed").replace("time,", "gps_v,time,", 1).replace("\n", "\n7,")
+    table = read_gnss(written(tmp_path, text.removesuffix("7,")))
+    assert table["VN"].iloc[0] == pytest.approx(10.0)
+
+
+@pytest.mark.parametrize(("unit", "factor"), [("km/h", 3.6), ("kn", 1.94384), ("mph", 2.23694)])
+def test_a_speed_without_its_unit_is_asked_for_if_the_positions_contradict(tmp_path, unit, factor):
+    path = written(tmp_path, drive("gps_", "speed", factor=factor))
+    flags = f"--gnss-units speed={unit}"
+    with pytest.raises(DataError, check=coded("io.speed-unit-not-stated", flags=flags)):
+        read_gnss(path)
+    table = read_gnss(path, GnssOptions(units={"speed": unit}))
+    assert table["VN"].iloc[0] == pytest.approx(10.0, rel=1e-4)
+    # A person may insist, and a name that states the unit is believed.
+    table = read_gnss(path, GnssOptions(units={"speed": "m/s"}))
+    assert table["VN"].iloc[0] == pytest.approx(10.0 * factor, rel=1e-4)
+    text = drive("gps_", "speed", factor=factor, stated=f" [{unit}]")
+    assert read_gnss(written(tmp_path, text))["VN"].iloc[0] == pytest.approx(10.0, rel=1e-4)
