@@ -327,7 +327,7 @@ def _refuse_unit_of_speed(
     unit = next((u for u in _SPEEDS if abs(ratio / SPEEDS[u] - 1.0) < _NEAR), None)
     if unit is None or 2.0 * sd > _NEAR * ratio:
         return
-    answer = {name: unit for name in names}
+    answer = dict.fromkeys(names, unit)
     raise DataError(
         "io.speed-unit-not-stated",
         file=raw.name,
