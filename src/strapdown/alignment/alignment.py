@@ -45,11 +45,14 @@ class Alignment:
         If the method estimates the latitude without the site's: from gravity and Earth rate.
     velocity : ndarray, (3,), m/s, optional
         North, east, down, if the method estimates it.
-    joint : ndarray, (39, 39), optional
+    place : ndarray, (3,), optional
+        Latitude and longitude in deg and height in m, if the method estimates the position.
+    joint : ndarray, (39, 39) or (42, 42), optional
         Covariance of the errors of velocity, of the rotation as above, of gyros and accelerometers,
         SI, and of `by_input`, if the method estimates their correlations: an unknown bias is
         correlated with the attitude error that it causes. Error = computed − true; those of the
-        sensors are the residual excess of the readings: bias − estimate.
+        sensors are the residual excess of the readings: bias − estimate. With `place` the errors of
+        the position follow, north, east, down, without that by a wrong clock of the fixes.
     by_input : ndarray, (27,), optional
         If the method estimates them, errors in proportion to the input above the means of the
         record, at which the biases hold: elements (i, j) are the excess of axis i by input j,
@@ -72,6 +75,7 @@ class Alignment:
     velocity: Array | None = None
     joint: Array | None = None
     by_input: Array | None = None
+    place: Array | None = None
     findings: tuple[Finding, ...] = field(default=())
 
     @property

@@ -13,10 +13,20 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.alignment.inertial_sums import InertialSums, sum_inertially
 from strapdown.errors import DataError
+from strapdown.frames import geodetic_from_ned, ned_from_geodetic
 from strapdown.increments import motion_increments
 from strapdown.sensors.rest import RestStretch, find_rests_of_every_grade, rest_between
 from strapdown.sensors.uncertainty import ImuUncertainty
-from strapdown.tables import ACCEL, DV, GYRO, VELOCITY, VELOCITY_SD, check_gnss
+from strapdown.tables import (
+    ACCEL,
+    DV,
+    GEODETIC,
+    GYRO,
+    POSITION_SD,
+    VELOCITY,
+    VELOCITY_SD,
+    check_gnss,
+)
 from strapdown.tables.checks import source_of
 
 Array = NDArray[np.float64]
@@ -40,7 +50,9 @@ class DriveSums:
     a bias of each axis in each stretch alone. Signs: bias is reading − truth, the attitude error is
     true − computed. `by_turn` ((k, 3, 21 + 3 s)): velocity error at a fix by the same errors, in
     the axes at the end, m/s. `by_accel` ((k, 3, 12 + 3 s)): velocity error at a fix by errors of
-    the accelerometers: likewise, nine in proportion to the specific force.
+    the accelerometers: likewise, nine in proportion to the specific force. `moved`,
+    `moved_by_turn`, `moved_by_accel`: integrals over time of `gained`, `by_turn` and `by_accel`
+    from a fix to the end, m.
     """
 
     until_end: Array
@@ -51,6 +63,9 @@ class DriveSums:
     by_gyro: Array
     by_accel: Array
     by_turn: Array
+    moved: Array
+    moved_by_turn: Array
+    moved_by_accel: Array
 
 
 def drive_sums(imu: pd.DataFrame, time: Array, means: Array, errors: Array) -> DriveSums:
@@ -80,6 +95,9 @@ def drive_sums(imu: pd.DataFrame, time: Array, means: Array, errors: Array) -> D
     end = rotation.dcm_from_quaternion(sums.turned[-1]).T
     part = ((time - stamps[before]) / (stamps[before + 1] - stamps[before]))[:, None]
     there = gained[before] + part * steps[before]
+    since = part * (stamps[before + 1] - stamps[before])[:, None]
+    fallen = sums.fallen[before] + since * (gained[before] + 0.5 * part * steps[before])
+    until_end = (stamps[-1] - time)[:, None]
     turn = rotation.rotation_vector_from_quaternion(
         rotation.compose(rotation.conjugate(sums.turned[before]), sums.turned[before + 1])
     )
@@ -89,6 +107,7 @@ def drive_sums(imu: pd.DataFrame, time: Array, means: Array, errors: Array) -> D
         sums, end, gained[np.r_[0, ends]], means - errors[:6]
     )
     edge = np.searchsorted(np.r_[0, ends], before)
+    edges = sums.stamps[np.r_[0, ends]]
     return DriveSums(
         stamps[-1] - time,
         end @ turned,
@@ -98,6 +117,9 @@ def drive_sums(imu: pd.DataFrame, time: Array, means: Array, errors: Array) -> D
         by_gyro[edge],
         by_accel[edge],
         by_turn[edge],
+        (gained[-1] * until_end - (sums.fallen[-1] - fallen)) @ end.T,
+        _integral_to_end(edges, by_turn)[edge],
+        _integral_to_end(edges, by_accel)[edge],
     )
 
 
@@ -151,6 +173,12 @@ def _from_end(nodes: Array) -> Array:
     return np.concatenate([np.cumsum(nodes[::-1], axis=0)[::-1], nothing])
 
 
+def _integral_to_end(edges: Array, values: Array) -> Array:
+    """Integral over time from each edge to the last, by the trapezoidal rule."""
+    steps = np.diff(edges)[:, None, None] * 0.5 * (values[1:] + values[:-1])
+    return _from_end(steps)
+
+
 def _rate(turned: Array, stamps: Array, time: Array) -> Array:
     """Mean rates about instants; body axes."""
     last = len(stamps) - 1
@@ -163,8 +191,13 @@ def _rate(turned: Array, stamps: Array, time: Array) -> Array:
 
 # Velocities of the fixes of a drive, and the fixes with a valid course.
 
-#: Lower bound of the standard deviation of a velocity, m/s.
+#: Lower bound of the standard deviation of a velocity, m/s, and of a position, m.
 LEAST_SD = 1e-6
+#: Positions are differentiated over the shortest of these times, s, over which the median course
+#: of the moving vehicle has a third of the largest standard deviation; else over the last.
+BASELINES = (1.0, 2.0, 4.0, 8.0, 12.0)
+#: Fewer positions alone determine neither velocity nor level.
+LEAST_PLACES = 4
 
 
 @dataclass(frozen=True)
@@ -182,11 +215,14 @@ class Antenna:
 
 @dataclass(frozen=True, eq=False)
 class CourseFixes:
-    """Fixes with a velocity during an inertial record.
+    """Fixes with a velocity, or with a position alone, during an inertial record.
 
-    `time` ((k,), s): at which the velocities hold. `velocity`, `sd` ((k, 3), m/s): North, east,
+    `time` ((k,), s): at which the fixes hold. `velocity`, `sd` ((k, 3), m/s): North, east,
     down. The standard deviation of the last may be infinite. `fast` ((k,)): whether they are fast
-    enough to have a course. `row` ((k,)): of the table, from 1. `source`: of the fixes.
+    enough to have a course. `row` ((k,)): of the table, from 1. `source`: of the fixes. Of
+    positions alone the velocities are differences over the time `baseline` (s), for a first guess;
+    the observations are then `place`, `place_sd` ((k, 3), m): north, east, down of `origin` (deg,
+    deg, m), which is near the end of the record.
     """
 
     time: Array
@@ -195,11 +231,21 @@ class CourseFixes:
     fast: NDArray[np.bool_]
     row: NDArray[np.int64]
     source: str | None
+    baseline: float = 0.0
+    place: Array | None = None
+    place_sd: Array | None = None
+    origin: Array | None = None
 
     def only(self, rows: NDArray[np.bool_]) -> CourseFixes:
         """Select fixes."""
-        names = ("time", "velocity", "sd", "fast", "row")
+        names = ["time", "velocity", "sd", "fast", "row"]
+        names += [] if self.place is None else ["place", "place_sd"]
         return replace(self, **{name: getattr(self, name)[rows] for name in names})
+
+    def independent(self) -> NDArray[np.bool_]:
+        """Fixes whose velocities have no position in common."""
+        at = np.floor((self.time[-1] - self.time) / max(self.baseline, 1e-9))
+        return np.append(np.diff(at) != 0.0, True) if self.baseline else np.full(len(at), True)
 
 
 def course_fixes(
@@ -209,23 +255,32 @@ def course_fixes(
     largest_sd: float,
     velocity_delay: float = 0.0,
 ) -> CourseFixes:
-    """Select the fixes with a velocity of a record that ends in motion.
+    """Select the fixes of a record that ends in motion, with a velocity or a position alone.
 
-    `least_speed` (m/s). `largest_sd` (rad): of a course by the noise of the receiver.
+    Positions are the observations where more fixes of the record have them alone than with a
+    velocity. `least_speed` (m/s). `largest_sd` (rad): of a course by the noise of the receiver.
     `velocity_delay` (s). DataError: the Gnss table is missing, it has fewer than two fixes with a
-    velocity during the record, or the last two are too slow.
+    velocity and fewer than `LEAST_PLACES` with a position during the record, or the last two are
+    too slow.
     """
     if gnss is None:
         raise DataError("alignment.no-fixes-for-course", file=source_of(imu), quantity="gnss")
     check_gnss(gnss)
     source = source_of(gnss)
     first, last = float(imu.index[0]), float(imu.index[-1])
-    time = gnss.index.to_numpy(dtype=np.float64) - velocity_delay
+    stamps = gnss.index.to_numpy(dtype=np.float64)
     velocity = gnss[VELOCITY].to_numpy(dtype=np.float64)
     sd = gnss[VELOCITY_SD].to_numpy(dtype=np.float64)
-    good = (time >= first) & (time <= last) & (gnss["quality"].to_numpy() > 0.0)
-    timely = int(good.sum())
-    good &= np.isfinite(sd[:, :2]).all(axis=1)
+    sound = gnss["quality"].to_numpy() > 0.0
+    measured = np.isfinite(sd[:, :2]).all(axis=1)
+    placed = sound & np.isfinite(gnss[POSITION_SD].to_numpy(dtype=np.float64)).all(axis=1)
+    time = stamps - velocity_delay
+    within = (time >= first) & (time <= last)
+    good = sound & within & measured
+    alone = placed & ~measured & (stamps >= first) & (stamps <= last)
+    if alone.sum() >= LEAST_PLACES and alone.sum() > good.sum():
+        rows = np.flatnonzero(placed & (stamps >= first) & (stamps <= last))
+        return _by_places(gnss, rows, last, least_speed, largest_sd)
     if good.sum() < 2:
         raise DataError(
             "alignment.too-few-fix-velocities",
@@ -233,11 +288,74 @@ def course_fixes(
             quantity="VN, VE",
             first=first,
             last=last,
-            timely=timely,
+            timely=int((sound & within).sum()),
             good=int(good.sum()),
         )
     rows = np.flatnonzero(good)
     time, velocity, sd = time[rows], velocity[rows], np.maximum(sd[rows], LEAST_SD)
+    fast = _fast(time, velocity, sd, rows, source, least_speed, largest_sd)
+    return CourseFixes(time, velocity, sd, fast, rows + 1, source)
+
+
+def _by_places(
+    gnss: pd.DataFrame, rows: Indices, last: float, least_speed: float, largest_sd: float
+) -> CourseFixes:
+    """Positions of fixes without velocities, and their differences."""
+    time = gnss.index.to_numpy(dtype=np.float64)[rows]
+    geodetic = gnss[GEODETIC].to_numpy(dtype=np.float64)[rows]
+    sd = np.maximum(gnss[POSITION_SD].to_numpy(dtype=np.float64)[rows], LEAST_SD)
+    place = ned_from_geodetic(geodetic, geodetic[-1])
+    step = float(np.median(np.diff(time)))
+    for baseline in np.maximum(BASELINES, 2.0 * step).tolist():
+        velocity, velocity_sd = _differences(time, place, sd, baseline)
+        speed = np.hypot(velocity[:, 0], velocity[:, 1])
+        courses = velocity_sd[:, :2].max(axis=1) / np.maximum(speed, 1e-9)
+        moving = speed >= least_speed
+        if moving.any() and np.median(courses[moving]) <= largest_sd / 3.0:
+            break
+    # The axes are those of the end: a plane through a place a second before is tilted there.
+    newest = np.median(velocity[-5:], axis=0)
+    origin = geodetic_from_ned(place[-1] + newest * (last - time[-1]), geodetic[-1])
+    fast = _fast(time, velocity, velocity_sd, rows, source_of(gnss), least_speed, largest_sd)
+    return CourseFixes(
+        time,
+        velocity,
+        velocity_sd,
+        fast,
+        rows + 1,
+        source_of(gnss),
+        baseline,
+        ned_from_geodetic(geodetic, origin),
+        sd,
+        origin,
+    )
+
+
+def _differences(time: Array, place: Array, sd: Array, baseline: float) -> tuple[Array, Array]:
+    """Velocities by differences over a time about each fix, at the ends beside it, and their sd.
+
+    At least the two neighbors are taken.
+    """
+    k, end = np.arange(len(time)), len(time) - 1
+    middle = np.clip(time, time[0] + 0.5 * baseline, max(time[-1] - 0.5 * baseline, time[0]))
+    before = np.searchsorted(time, middle - 0.5 * baseline - 1e-6)
+    after = np.searchsorted(time, middle + 0.5 * baseline + 1e-6, side="right") - 1
+    before = np.minimum(before, np.maximum(k - 1, 0))
+    after = np.maximum(after, np.minimum(k + 1, end))
+    apart = (time[after] - time[before])[:, None]
+    return (place[after] - place[before]) / apart, np.hypot(sd[after], sd[before]) / apart
+
+
+def _fast(
+    time: Array,
+    velocity: Array,
+    sd: Array,
+    rows: Indices,
+    source: str | None,
+    least_speed: float,
+    largest_sd: float,
+) -> NDArray[np.bool_]:
+    """Fixes fast enough for a course; DataError if the last two are not."""
     speed = np.hypot(velocity[:, 0], velocity[:, 1])
     course_sd = sd[:, :2].max(axis=1) / np.maximum(speed, 1e-9)
     fast = (speed >= least_speed) & (course_sd <= largest_sd)
@@ -255,7 +373,7 @@ def course_fixes(
             least_speed=least_speed,
             largest_sd_deg=np.degrees(largest_sd),
         )
-    return CourseFixes(time, velocity, sd, fast, rows + 1, source)
+    return np.asarray(fast)
 
 
 # Gyro means while the fixes of a drive show the vehicle stationary.
@@ -346,6 +464,8 @@ YAW: Final = ACCEL_NOISE.stop
 AXLE: Final = YAW + 1
 OFFSET: Final = YAW + 2
 COUNT: Final = YAW + 3
+# Displacement at the end of the record: an unknown of positions alone.
+END_PLACE = slice(COUNT, COUNT + 3)
 
 #: In the order of `DriveSums.by_gyro` and `DriveSums.by_accel`.
 OF_GYROS = np.r_[GYRO_BIAS, GYRO_MATRIX, GYRO_BY_FORCE, GYRO_NOISE]

@@ -19,6 +19,7 @@ from strapdown.alignment.course_sums import (
     ASKED,
     AXLE,
     COUNT,
+    END_PLACE,
     END_VELOCITY,
     GYRO_BIAS,
     GYRO_BY_FORCE,
@@ -45,6 +46,7 @@ from strapdown.dsp.running_integral import running_integral
 from strapdown.earth import transport_rate
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.estimation.robust import Huber, Igg3, Influence
+from strapdown.frames import geodetic_from_ned
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import is_number, source_of
@@ -147,6 +149,9 @@ class GnssCourse(CoarseAlignment):
             )
         findings += left_out(fixes, found)
         joint = found.covariance
+        place = None
+        if fixes.origin is not None:
+            place = geodetic_from_ned(found.place, fixes.origin)
         return Alignment(
             self.name,
             float(imu.index[-1]),
@@ -160,6 +165,7 @@ class GnssCourse(CoarseAlignment):
             velocity=found.velocity,
             joint=joint,
             by_input=found.by_input,
+            place=place,
             findings=findings,
         )
 
@@ -170,6 +176,8 @@ class GnssCourse(CoarseAlignment):
 SIGN = np.where(OF_SENSORS.start > HANDED, 1.0, -1.0)
 # Prior standard deviations of an unknown velocity, m/s, and of an unknown attitude, rad.
 UNKNOWN = (100.0, 3.0)
+# Prior standard deviation of the position at the end, m, against that by the newest fixes.
+UNKNOWN_PLACE = 1e4
 # The scatter of the fixes is judged from so many velocities beyond the number of unknowns.
 LEAST_FREE = 12.0
 # Number of updates of weights and scale with one linearization.
@@ -209,7 +217,8 @@ class Found:
     truth. `covariance` ((39, 39)): as `Alignment.joint`. `fitted` ((k, 3), m/s): velocities at the
     fixes, north, east, down, near which courses are linear. `weight` ((k,)): weight of each fix.
     `scale`: factor of the scatter of the velocities over their stated one; at least 1. `onward`:
-    share of the courses that agree with the assumed direction of driving.
+    share of the courses that agree with the assumed direction of driving. `place` ((3,), m): of
+    positions alone, at the end; its covariance follows the 39 rows.
     """
 
     C: Array
@@ -220,6 +229,7 @@ class Found:
     weight: Array
     scale: float
     onward: float = 1.0
+    place: Array = field(default_factory=lambda: np.zeros(3))
 
     @property
     def bias(self) -> Array:
@@ -261,18 +271,21 @@ class CourseFit:
         rate = _level_rate(found.velocity, self.site)
         level = rotation.dcm_from_rotation_vector(rate * sums.until_end[:, None])
         C = level @ found.C @ sums.turned
-        turns = np.zeros((len(time), 3, COUNT))
+        turns = np.zeros((len(time), 3, self.unknowns))
         turns[:, :, TURN] = np.eye(3)
         turns[:, :, OF_GYROS] = found.C @ sums.by_gyro
         there, by = self._velocities(found, sums, rate)
         k = len(fixes.time)
-        arm = np.cross(sums.rate[:k], self.model.antenna.lever_arm)
-        read = fixes.velocity - np.einsum("kij,kj->ki", C[:k], arm)
-        gap = np.einsum("kji,kj->ki", level[:k], read) - there[:k]
+        if self.by_places:
+            gap, seen, fix_sd, within = self._places(found, sums, there, by, turns)
+        else:
+            arm = np.cross(sums.rate[:k], self.model.antenna.lever_arm)
+            read = fixes.velocity - np.einsum("kij,kj->ki", C[:k], arm)
+            gap = np.einsum("kji,kj->ki", level[:k], read) - there[:k]
+            seen, fix_sd, within = by[:k], fixes.sd, self._within(sums)[1]
         courses = self._courses(found, sums, C[:k], there[:k], level[:k], by[:k], turns[:k])
-        told = np.isfinite(fixes.sd)
-        _, pushed = self._within(sums)
-        stated = np.sqrt(np.where(told, np.square(fixes.sd), 1.0) + pushed)
+        told = np.isfinite(fix_sd)
+        stated = np.sqrt(np.where(told, np.square(fix_sd), 1.0) + within)
         weight, scale = found.weight, found.scale
         fixed = []
         fixed += [self._rest(rest, found, C[k + i], turns[k + i]) for i, rest in enumerate(rests)]
@@ -280,12 +293,12 @@ class CourseFit:
         for _ in range(SWEEPS):
             share = told * weight[:, None] / np.square(scale * stated)
             parts = [
-                (gap.ravel(), by[:k].reshape(3 * k, -1), share.ravel()),
+                (gap.ravel(), seen.reshape(3 * k, -1), share.ravel()),
                 (courses[0], courses[1], onward * courses[2]),
                 *fixed,
             ]
             x, inverse, spent = _solve(parts, sd, found.errors)
-            left = np.where(told, np.abs(gap - by[:k] @ x) / stated, 0.0)
+            left = np.where(told, np.abs(gap - seen @ x) / stated, 0.0)
             used = left[told & (weight > 0.0)[:, None]]
             free = len(used) + len(onward) - spent
             if free >= LEAST_FREE:
@@ -293,24 +306,43 @@ class CourseFit:
                 scale = max(1.0, MAD_TO_SD * middle)
             weight = np.array([influence.weight(float(u)) for u in left.max(axis=1) / scale])
             onward = (np.abs(courses[0] - courses[1] @ x) < GROSS).astype(np.float64)
+        handed, sign = HANDED, SIGN
+        if self.by_places:
+            handed, sign = np.r_[HANDED, END_PLACE], np.r_[SIGN, np.ones(3)]
+            # The displacement by a wrong clock is left to the owner of that error.
+            shift = np.eye(len(inverse))
+            shift[END_PLACE, OFFSET] = found.velocity + x[END_VELOCITY]
+            inverse = shift @ inverse @ shift.T
         return Found(
             rotation.dcm_from_rotation_vector(x[TURN]) @ found.C,
             found.velocity + x[END_VELOCITY],
             found.errors + x[OF_SENSORS],
-            inverse[np.ix_(HANDED, HANDED)] * np.outer(SIGN, SIGN),
+            inverse[np.ix_(handed, handed)] * np.outer(sign, sign),
             np.einsum("kij,kj->ki", level[:k], there[:k] + by[:k] @ x),
             weight,
             scale,
             float(onward.mean()) if len(onward) else 0.0,
+            found.place + x[END_PLACE] if self.by_places else found.place,
         )
+
+    @property
+    def by_places(self) -> bool:
+        """Whether positions alone are the observations."""
+        return self.fixes.place is not None
+
+    @property
+    def unknowns(self) -> int:
+        """Number of unknowns."""
+        return COUNT + 3 * self.by_places
 
     def _prior(self, found: Found, sums: DriveSums) -> Array:
         """Standard deviation of each unknown before the fixes."""
         gyro, accel, model = self.sensors.gyro, self.sensors.accel, self.model
         inputs = self.means - found.bias
         rate, force = inputs[:3], inputs[3:]
-        sd = np.zeros(COUNT)
+        sd = np.zeros(self.unknowns)
         sd[END_VELOCITY], sd[TURN] = UNKNOWN
+        sd[COUNT:] = UNKNOWN_PLACE
         still = np.square(gyro.axis("bias")) + np.square(self.sensors.gyro_drift.triad)
         still = still + np.square(gyro.axis("g_sensitivity")) * float(force @ force)
         sd[GYRO_BIAS] = np.sqrt(still + gyro.variance_by_input(rate))
@@ -344,7 +376,7 @@ class CourseFit:
             np.append(0.0, sums.until_end[from_end]), np.vstack([found.velocity, v[from_end]])
         )[1:]
         v = v + np.cross(self.site.earth_rate, way)
-        by = np.zeros((len(v), 3, COUNT))
+        by = np.zeros((len(v), 3, self.unknowns))
         by[:, :, END_VELOCITY] = np.eye(3)
         by[:, :, TURN] = rotation.cross_matrix(gained)
         by[:, :, OF_GYROS] = found.C @ sums.by_turn
@@ -352,6 +384,52 @@ class CourseFit:
         time = -sums.until_end[: len(self.fixes.time)]
         by[: len(time), :, OFFSET] = np.gradient(v[: len(time)], time, axis=0)
         return v, by
+
+    def _places(
+        self, found: Found, sums: DriveSums, there: Array, by: Array, turns: Array
+    ) -> tuple[Array, Array, Array, float]:
+        """Positions of the antenna: residuals, derivatives, stated sd, variance within stretches.
+
+        In Earth-fixed axes, level at the end, ``s = s_e - int (1 + [w_ie x] T) v``: the axes have
+        turned by ``w_ie T`` since. A white noise that is modeled as a bias of each of n stretches
+        L leaves a random walk of the position of ``N² L³ / 12`` a stretch, of which a bridge of n
+        has a quarter at most.
+        """
+        fixes, earth = self.fixes, self.site.earth_rate
+        assert fixes.place is not None and fixes.place_sd is not None
+        k = len(fixes.time)
+        T, g = sums.until_end[:k, None], self.site.gravity
+        moved = sums.moved[:k] @ found.C.T
+        way = found.velocity * T - moved - 0.5 * g * T**2 + np.cross(earth, g) * T**3 / 6.0
+        # By integrals from fix to fix: the Earth turns the way and the velocity, and gravity points
+        # down where the vehicle is, not where it ends.
+        past = np.append(0.0, sums.until_end[:k][::-1])
+        along = np.vstack([found.velocity, there[:k][::-1]])
+        ways = running_integral(past, along)
+        tilt = transport_rate(self.site.lat_deg, self.site.alt, ways, ellipsoid=self.site.ellipsoid)
+        bent = running_integral(past, np.cross(tilt, g))
+        turned = running_integral(past, np.cross(earth, ways + past[:, None] * along) + bent)
+        way = way + turned[1:][::-1]
+        fixed = rotation.dcm_from_rotation_vector(earth * T)
+        arm = np.einsum("kij,kj->ki", fixed @ found.C @ sums.turned[:k], self._arms(k))
+        out = np.zeros((k, 3, self.unknowns))
+        out[:, :, END_PLACE] = np.eye(3)
+        out[:, :, END_VELOCITY] = -T[:, :, None] * np.eye(3)
+        out[:, :, TURN] = -rotation.cross_matrix(moved)
+        out[:, :, OF_GYROS] = -found.C @ sums.moved_by_turn[:k]
+        out[:, :, OF_ACCELS] = -found.C @ sums.moved_by_accel[:k]
+        out -= rotation.cross_matrix(arm) @ turns[:k]
+        out[:, :, OFFSET] = there[:k]
+        gap = fixes.place - (found.place - way + arm)
+        stretch = float(sums.stretch.max())
+        push = max(self.sensors.accel.axis("noise_density")) ** 2
+        tilt = (max(self.sensors.gyro.axis("noise_density")) * STANDARD_GRAVITY * stretch) ** 2
+        walk = (push + tilt / 12.0) * stretch**3 / 12.0
+        return gap, out, fixes.place_sd, walk * len(sums.stretch) / 4.0
+
+    def _arms(self, count: int) -> Array:
+        """Lever arm for each fix, (k, 3), m."""
+        return np.tile(np.asarray(self.model.antenna.lever_arm, dtype=np.float64), (count, 1))
 
     def _courses(
         self,
@@ -422,7 +500,10 @@ class CourseFit:
         newest = fixes.time[-min(LEAST_FIXES, len(fixes.time))]
         length = end - min(newest, fixes.time[-1] - LEAST_LENGTH)
         bias, sd = self._bias_of_rests()
-        length = max(length, LINEAR / max(sd, 1e-12))
+        least = min(LEAST_BASELINES * fixes.baseline, end - begin)
+        if sd * least > LINEAR:
+            bias[:3], sd = self._part(end - least)._bias_of_courses(bias[:3], sd)
+        length = max(length, LINEAR / max(sd, 1e-12), least)
         found = None
         while True:
             begin_here = max(end - length, begin)
@@ -465,6 +546,23 @@ class CourseFit:
         errors = np.zeros(OF_SENSORS.stop - OF_SENSORS.start)
         errors[:3] = rate
         return errors, float(known.max())
+
+    def _bias_of_courses(self, bias: Array, sd: float) -> tuple[Array, float]:
+        """Bias of the gyros of a vehicle whose tilt stays and whose heading follows its course.
+
+        If that is more accurate than `sd`, the accuracy of `bias`.
+        """
+        fixes = self.fixes
+        fast = fixes.only(fixes.fast & fixes.independent())
+        if len(fast.time) < 3:
+            return bias, sd
+        mean = self.imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64).mean(axis=0)
+        down = -mean[3:] / np.linalg.norm(mean[3:])
+        course = np.unwrap(np.arctan2(fast.velocity[:, 1], fast.velocity[:, 0]))
+        length = float(fast.time[-1] - fast.time[0])
+        found = mean[:3] - down * float(course[-1] - course[0]) / length
+        found_sd = TILTS / length
+        return (found, found_sd) if found_sd < sd else (bias, sd)
 
     def _part(self, begin: float) -> CourseFit:
         time = self.imu.index.to_numpy(dtype=np.float64)
@@ -541,6 +639,10 @@ LEAST_FIXES, LEAST_LENGTH, GROWTH = 4, 1.0, 1.5
 # Gauss-Newton steps over each part: iteration ends when the largest step is below a part of its
 # standard deviation.
 STEPS, SMALL = 8, 0.02
+# Of positions alone the first part is as many times the baseline of their differences.
+LEAST_BASELINES = 3.0
+# Change of the tilt of a vehicle, and error of a change of its course, rad.
+TILTS = 0.2
 # Errors that belong to a stretch of one part alone.
 NOISE = np.r_[GYRO_NOISE, ACCEL_NOISE] - OF_SENSORS.start
 # A velocity is an outlier beyond so many of its standard deviations, or of the usual ones.
@@ -638,7 +740,7 @@ def check_forward(imu: pd.DataFrame, fixes: CourseFixes, sums: DriveSums, revers
     one. DataError: the force falls while the vehicle gains speed. Fewer than six steps from fix to
     fix, or no changes of speed, allow no check.
     """
-    fast = fixes.fast
+    fast = fixes.fast & fixes.independent()
     if fast.sum() <= LEAST_STEPS:
         return
     fixes, gained, turned = fixes.only(fast), sums.gained[fast], sums.turned[fast]

@@ -56,6 +56,8 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
+# Rows of the displacement in the covariance of an alignment that estimates the position.
+PLACE = slice(39, 42)
 # Tolerance of an instant, s.
 INSTANT = 1e-7
 # The rate at an instant is a mean over this time before and after it, s.
@@ -124,15 +126,22 @@ def handed_over(chain: NavigationPipeline, state: PipelineState, found: Aligned)
     if isinstance(mode, CoarseMode) and isinstance(mode.way, GnssCourse):
         ellipsoid = find_ellipsoid(filter_.mechanization.ellipsoid)
         assert found.alignment.velocity is not None and found.alignment.joint is not None
-        start, P = here_by_fix(
-            _fixes(chain, state),
-            state.time,
-            q_nb,
-            _lever_arm(chain),
-            ellipsoid,
-            found.alignment.velocity,
-            found.alignment.joint[:3, :3],
-        )
+        velocity, joint = found.alignment.velocity, found.alignment.joint
+        if found.alignment.place is None:
+            start, P = here_by_fix(
+                _fixes(chain, state),
+                state.time,
+                q_nb,
+                _lever_arm(chain),
+                ellipsoid,
+                velocity,
+                joint[:3, :3],
+            )
+        else:
+            lat, lon, alt = found.alignment.place.tolist()
+            start = NavState(state.time, np.radians(lat), np.radians(lon), alt, velocity, q_nb)
+            of = np.r_[PLACE, 0:3]
+            P = joint[np.ix_(of, of)]
         turn = _turn(_window(chain, state), state.time)
         return from_alignment(
             filter_, found.alignment, start, P, rest, _by_antenna(chain, q_nb, start.v_n, turn)
@@ -316,10 +325,14 @@ def from_alignment(
     joint[:PHYSICAL, :PHYSICAL] = whole
     joint[PHYSICAL:, PHYSICAL:] = np.diag(np.square(sd))
     if found.joint is not None:
-        joint[3:, 3:] = found.joint
-        # A velocity error has moved the position since its fix, and carries the alignment's
-        # correlations with the velocity.
-        joint[:3, 3:] = np.linalg.solve(P[3:, 3:], P[3:, :3]).T @ found.joint[:3]
+        size = len(joint) - 3
+        joint[3:, 3:] = found.joint[:size, :size]
+        if found.place is None:
+            # A velocity error has moved the position since its fix, and carries the alignment's
+            # correlations with the velocity.
+            joint[:3, 3:] = np.linalg.solve(P[3:, 3:], P[3:, :3]).T @ found.joint[:3]
+        else:
+            joint[:3, 3:] = found.joint[size:, :size]
         joint[3:, :3] = joint[:3, 3:].T
     return _with_biases(filter_, start, joint, told, rest, by_others)
 

@@ -546,6 +546,7 @@ class ModeSequencer:
     def _end(self, mode: str) -> None:
         state = self._state
         if state.navigator is None:
+            self._refuse_if_attained()
             raise DataError(
                 "navigation.samples-end-mode-before-navigation",
                 file=state.intake.source,
@@ -558,6 +559,26 @@ class ModeSequencer:
         events, outages = self._chain.deliveries.finish(state.deliveries, state.time)
         self._events += events
         self._outages += outages
+
+    def _refuse_if_attained(self) -> None:
+        """State the accuracy of an alignment at the end of the samples that misses its limits."""
+        state, mode = self._state, self._chain.modes[self._state.mode]
+        if mode.kind == "navigation" or not mode.until.converges:
+            return
+        try:
+            found = align(self._chain, state)
+        except (DataError, DivergenceError):
+            return
+        roll, pitch, heading = found.alignment.sd_deg_after(AHEAD).tolist()
+        raise DataError(
+            "navigation.samples-end-alignment-too-uncertain",
+            file=state.intake.source,
+            quantity="time",
+            time=state.time,
+            mode=mode.name,
+            heading_deg=heading,
+            tilt_deg=max(roll, pitch),
+        )
 
     def _found(self, hole: Hole) -> None:
         policy = self._chain.intake.gaps

@@ -10,16 +10,20 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.alignment.alignment import Site
+from strapdown.alignment.gnss_course import GnssCourse
 from strapdown.config.alignment import AxesTable, FixesTable, LogTable
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.errors import ConfigError, Finding
+from strapdown.errors import ConfigError, DataError, DivergenceError, Finding
 from strapdown.formats.assemble import require_accel
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import has_fixes, read_gnss
 from strapdown.formats.recording import Recording
 from strapdown.navigation.measurements.gnss_clock import time_offset, velocity_delay
+from strapdown.navigation.pipeline import AHEAD
 from strapdown.sensors.catalogue import SENSORS, load_sensor
-from strapdown.sensors.uncertainty import ImuUncertainty
+from strapdown.sensors.rest import find_rests_of_every_grade
+from strapdown.sensors.uncertainty import ImuUncertainty, stated_imu
 from strapdown.systems.alignment_source import body_record
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
 from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
@@ -43,12 +47,17 @@ STANDS, DRIVES = 0.5, 3.0
 #: Distance between positions, in standard deviations, that proves motion: four of a hundred
 #: thousand pairs of positions at rest exceed it, exp(-APPARENT**2 / 2).
 APPARENT = 4.5
+#: Fixes that begin later than so many of their intervals do not show what was before.
+UNSEEN = 3.0
 #: Gyro bias that allows gyrocompassing, and the rest needed for it.
 NORTH, LEAST_REST = math.radians(2.0 / 3600.0), 60.0
 #: Longest rest used for a coarse alignment, s.
 COARSE = 100.0
 #: Standard deviation of the angles that ends an alignment by course, deg.
 WELL = 3.0
+#: Trials of it: factor of the length from trial to trial, margin over the best of them, and the
+#: largest standard deviation that is not too large for a linear filter, deg.
+LATER, MARGIN, LARGEST_START = 1.15, 1.2, 15.0
 #: Rules that give gross errors zero weight keep their accuracy among them; with its scale this one
 #: cannot reject for ever. Time-correlated errors make innovations small, which does not show a
 #: receiver better than stated.
@@ -161,7 +170,14 @@ def propose(
     if place is not None:
         table["site"] = dict(zip(("lat_deg", "lon_deg", "alt_m"), place, strict=True))
     rest, drives = _motion(imu, fixes)
-    chosen, how = _alignment(named, rest, drives, heading_deg, float(imu.index[-1] - imu.index[0]))
+    span = float(imu.index[-1] - imu.index[0])
+    measured = fixes is not None and np.isfinite(values_of(fixes, VELOCITY_SD[:2])).any()
+    chosen, how = _alignment(named, rest, drives, heading_deg, span, bool(measured))
+    if fixes is not None and named is not None and chosen["coarse"]["kind"] == "gnss_course":
+        stated = table["sensors"]
+        known = (load_sensor(named), stated.get("gyro", {}), stated.get("accel", {}))
+        chosen, how, tried = _tried(chosen, how, imu, fixes, stated_imu(*known))
+        findings = (*findings, *tried)
     table |= chosen
     if fixes is not None:
         assert gnss is not None  # whence the fixes are
@@ -240,6 +256,14 @@ def _motion(imu: pd.DataFrame, fixes: pd.DataFrame | None) -> tuple[float, bool]
         return 0.0, False
     begins, fastest = _moving(fixes[within])
     rest = float((at[within][begins] if begins is not None else time[-1]) - time[0])
+    first = float(at[within][0])
+    if begins == 0:
+        rest = 0.0
+    elif first - time[0] > UNSEEN * float(np.median(np.diff(at[within]))):
+        # Before the first fix the sensors alone show a rest.
+        still = find_rests_of_every_grade(imu.loc[:first])
+        seen = any(one.start <= time[0] + 1.0 and one.end >= first - 1.0 for one in still)
+        rest = rest if seen else 0.0
     return max(rest, 0.0), fastest > DRIVES
 
 
@@ -290,7 +314,12 @@ def _clock(fixes: pd.DataFrame, imu: pd.DataFrame, drives: bool) -> dict[str, fl
 
 
 def _alignment(
-    sensor: str | None, rest: float, drives: bool, heading_deg: float | None, span: float
+    sensor: str | None,
+    rest: float,
+    drives: bool,
+    heading_deg: float | None,
+    span: float,
+    velocities: bool = True,
 ) -> tuple[dict[str, Any], str]:
     """Coarse and fine alignment for such a record of `span` seconds, and why.
 
@@ -325,11 +354,63 @@ def _alignment(
                 },
                 "fine": {"kind": "none"},
             },
-            "by its course, once it drives: its forward axis is taken to point where it goes",
+            "by its course, once it drives: its forward axis is taken to point where it goes"
+            + ("" if velocities else "; the fixes state no velocity, so from positions alone"),
         )
     return (
         {"coarse": {"kind": "known_heading", "duration_s": most}, "fine": {"kind": "none"}},
         "neither a rest with gyros that find north, nor a drive with fixes: the heading is asked",
+    )
+
+
+def _tried(
+    chosen: dict[str, Any],
+    how: str,
+    imu: pd.DataFrame,
+    fixes: pd.DataFrame,
+    sensors: ImuUncertainty,
+) -> tuple[dict[str, Any], str, tuple[Finding, ...]]:
+    """An alignment by course with limits that the record meets, by trial at instants of it.
+
+    If no instant allows an alignment, the heading is asked, and a finding gives the reason.
+    """
+    coarse = chosen["coarse"]
+    limits = coarse["until_heading_sd_deg"], coarse["until_tilt_sd_deg"]
+    time = index_of(imu)
+    place = np.median(values_of(fixes, GEODETIC), axis=0).tolist()
+    site, length = Site(*place), 2.0
+    best: tuple[float, float] | None = None
+    refused: Finding | None = None
+    span = float(time[-1] - time[0])
+    while True:
+        length = min(length, span)
+        begin, end = np.searchsorted(
+            time, time[0] + np.array([length - coarse["window_s"], length]) + 1e-7
+        )
+        try:
+            found = GnssCourse().align(imu.iloc[begin:end], site, sensors, fixes)
+            roll, pitch, heading = np.maximum(found.sd_deg_after(AHEAD), found.sd_deg).tolist()
+            tilt = max(roll, pitch)
+            if heading <= limits[0] and tilt <= limits[1]:
+                return chosen, how, ()
+            if best is None or max(heading, tilt) < max(best):
+                best = heading, tilt
+        except (DataError, DivergenceError) as error:
+            refused = error.finding
+        if length >= span:
+            break
+        length = float(math.ceil(length * LATER))
+    if best is not None and max(best) < LARGEST_START:
+        wider = [max(a, math.ceil(MARGIN * b)) for a, b in zip(limits, best, strict=True)]
+        keys = ("until_heading_sd_deg", "until_tilt_sd_deg")
+        coarse = {**coarse, **dict(zip(keys, wider, strict=True))}
+        return {**chosen, "coarse": coarse}, f"{how}; no better than within {max(best):.2g} deg", ()
+    most = {"kind": "known_heading", "duration_s": round(min(10.0, 0.5 * span), 3)}
+    reason = refused or Finding("navigation.course-too-uncertain", sd=max(best or (math.inf,)))
+    return (
+        {"coarse": most, "fine": {"kind": "none"}},
+        "the fixes do not give the attitude, by the reason that is reported: the heading is asked",
+        (reason,),
     )
 
 

@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
+import functools
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
+from scipy.stats import binom, chi2
 from tests.coded import coded
 
 sys.path.insert(0, str(Path(__file__).parent))
 
 from stands import ORIGIN, SITE, chi_square, ideal, phi, still, unit
 
+from strapdown.alignment.course_sums import Antenna
 from strapdown.alignment.gnss_course import GnssCourse
 from strapdown.errors import ConfigError, DataError
+from strapdown.frames import ned_from_geodetic
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
 from strapdown.simulation.motion import Track
 from strapdown.simulation.path_motion import PathMotion
-from strapdown.tables import POSITION_SD, VELOCITY, VELOCITY_SD
+from strapdown.tables import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
 
 # Speeds up, brakes, turns both ways, climbs; leans on its springs.
 DRIVE = PathMotion(
@@ -39,8 +42,8 @@ NO_SLIP = GnssCourse(sideslip_sd_deg=0.001, axle_sd=0.0)
 RUNS = 12
 
 
-def fixes(seed=0, motion=DRIVE, noise=0.05, rate=5.0):
-    receiver = GnssReceiver(rate=rate, velocity_noise=noise, position_noise=1.0)
+def fixes(seed=0, motion=DRIVE, noise=0.05, rate=5.0, place_noise=1.0):
+    receiver = GnssReceiver(rate=rate, velocity_noise=noise, position_noise=place_noise)
     return simulate_gnss(motion, receiver, seed=seed, source="gnss.csv")
 
 
@@ -230,7 +233,7 @@ def test_what_it_refuses():
     with pytest.raises(DataError, match=r"(?s)inertial record: 0;.*both clocks"):
         GnssCourse().align(imu, SITE, sensors, other_clock)
     unmeasured = fixes()
-    unmeasured[VELOCITY_SD] = np.inf
+    unmeasured[[*POSITION_SD, *VELOCITY_SD]] = np.inf
     with pytest.raises(DataError, match=r"(?s)standard deviation: 0; two.*measures velocity"):
         GnssCourse().align(imu, SITE, sensors, unmeasured)
     with pytest.raises(DataError, match=r"(?s)gnss.csv, row 301, VN, VE: .* m/s at 60 s.*at least"):
@@ -265,3 +268,68 @@ def test_places_need_no_precision():
     placeless[POSITION_SD] = np.inf
     found = GnssCourse().align(imu, SITE, sensors, placeless)
     assert chi_square(found, truth[-1]) < chi2.isf(1e-6, 3)
+
+
+@functools.cache
+def true_states():
+    truth = DRIVE.trajectory(ideal(DRIVE, 100.0)[0].index.to_numpy())
+    return truth[[*GEODETIC, *VELOCITY]].to_numpy()
+
+
+def true_state(row):
+    """Latitude, longitude, height and velocity of the drive."""
+    return true_states()[row]
+
+
+def alone(table):
+    """Positions of the fixes without their velocities."""
+    out = table.copy()
+    out.attrs = dict(table.attrs)
+    out[VELOCITY], out[VELOCITY_SD] = 0.0, np.inf
+    return out
+
+
+@pytest.mark.slow
+def test_positions_alone_without_errors():
+    imu, truth = ideal(DRIVE, 100.0)
+    arm = (0.5, -0.3, -1.2)
+    receiver = GnssReceiver(rate=10.0, antenna=arm, position_noise=1e-4)
+    exact = alone(simulate_gnss(DRIVE, receiver))
+    none = ImuUncertainty(TriadUncertainty(bias=1e-9), TriadUncertainty(bias=1e-9))
+    for end in (1001, 2501, 6001):
+        found = GnssCourse().align(imu.iloc[:end], SITE, none, exact, Antenna(lever_arm=arm))
+        # As of velocities; the integral over a window is closer still.
+        error = np.abs(phi(found, truth[end - 1]))
+        assert error[:2].max() < 1e-5
+        assert error[2] < 5e-5
+        sd = np.sqrt(np.diagonal(found.joint)[39:])
+        off = ned_from_geodetic(found.place, true_state(end - 1)[:3])
+        # Gravity is that of the site: 15 m higher it is 5e-5 m/s² less, over 60 s by t²/8.
+        assert (np.abs(off) < 5.0 * sd + 0.025).all()
+
+
+@pytest.mark.slow
+def test_positions_alone_are_worth_what_is_stated():
+    """Heading, tilt, velocity and position of 102 units: inside 1.96 sd as often as 95 % allow."""
+    inside, squares = [], []
+    cases = (("icm-42688-p", 1.0, 1.0), ("adis16495-1", 0.02, 1.0), ("mpu-6050", 2.0, 5.0))
+    for seed in range(102):
+        sensor, noise, rate = cases[seed % 3]
+        imu, truth, sensors = unit(DRIVE, 100.0, seed, sensor)
+        end = (3001, 4001, 5001)[seed % 3]
+        table = alone(fixes(seed, rate=rate, place_noise=noise))
+        found = NO_SLIP.align(imu.iloc[:end], SITE, sensors, table)
+        error = phi(found, truth[end - 1])
+        squares.append(chi_square(found, truth[end - 1]))
+        state = true_state(end - 1)
+        off = np.concatenate(
+            [ned_from_geodetic(found.place, state[:3]), found.velocity - state[3:]]
+        )
+        sd = np.sqrt(np.diagonal(found.joint))
+        share = np.abs(np.concatenate([error, off])) / np.r_[sd[3:6], sd[39:], sd[:3]]
+        inside.append(share < 1.96)
+    low, high = binom.interval(0.99, len(inside), 0.95)
+    count = np.sum(inside, axis=0)
+    assert (low <= count).all() and (count <= high).all(), count
+    low, high = chi2.isf([0.995, 0.005], 3 * len(squares))
+    assert low < sum(squares) < high
