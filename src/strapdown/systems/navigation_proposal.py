@@ -22,7 +22,7 @@ from strapdown.formats.recording import Recording
 from strapdown.navigation.measurements.gnss_clock import time_offset, velocity_delay
 from strapdown.navigation.pipeline import AHEAD
 from strapdown.sensors.catalogue import SENSORS, load_sensor
-from strapdown.sensors.rest import find_rests_of_every_grade
+from strapdown.sensors.rest import LEAST_LENGTH, find_rests_of_every_grade
 from strapdown.sensors.uncertainty import ImuUncertainty, stated_imu
 from strapdown.systems.alignment_source import body_record
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
@@ -89,7 +89,7 @@ class Proposal:
     gnss : DataFrame or None
         Gnss table, on the clock of the samples.
     rest : float, s
-        How long the vehicle is stationary at the start, as far as known.
+        How long the vehicle is stationary at the start, by everything that can tell.
     noise : tuple of float, (2,), or None
         Of the gyros in rad/s/√Hz, of the accelerometers in m/s²/√Hz, while it is quiet.
     guessed : bool
@@ -169,7 +169,8 @@ def propose(
         place = (start.lat_deg, start.lon_deg, start.alt)
     if place is not None:
         table["site"] = dict(zip(("lat_deg", "lon_deg", "alt_m"), place, strict=True))
-    rest, drives = _motion(imu, fixes)
+    until, drives = _motion(imu, fixes)
+    rest = _rest(imu, until, rocks=named is not None and _finds_north(named))
     span = float(imu.index[-1] - imu.index[0])
     measured = fixes is not None and np.isfinite(values_of(fixes, VELOCITY_SD[:2])).any()
     chosen, how = _alignment(named, rest, drives, heading_deg, span, bool(measured))
@@ -245,8 +246,29 @@ def _nearest(noise: tuple[float, ...]) -> str:
     return best
 
 
+def _rest(imu: pd.DataFrame, until: float, *, rocks: bool) -> float:
+    """Length of the initial rest in s, in which gyros and accelerometers agree with the fixes.
+
+    `until` (s from the first sample): when the fixes prove motion, which positions do late. `rocks`:
+    gyros find north on a body that rocks; it is at rest until its last quiet stretch, or until the
+    fixes prove motion if it has none.
+    """
+    time = index_of(imu)
+    first, last = float(time[0]), float(time[0]) + until
+    part = imu[time <= last]
+    quiet = find_rests_of_every_grade(part) if len(part) > 1 else ()
+    if rocks:
+        return max((r.end for r in quiet), default=last) - first
+    ends = first
+    for one in quiet:
+        if one.start - ends > LEAST_LENGTH:
+            break
+        ends = one.end
+    return ends - first
+
+
 def _motion(imu: pd.DataFrame, fixes: pd.DataFrame | None) -> tuple[float, bool]:
-    """Length of the initial rest, and whether the vehicle then is fast enough for a course."""
+    """When fixes first prove motion, s, and whether it then is fast enough for a course."""
     time = index_of(imu)
     if fixes is None:
         return float(time[-1] - time[0]), False

@@ -6,8 +6,8 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from strapdown.systems.navigation_proposal import _alignment, _motion, _moving
-from strapdown.tables import gnss_table
+from strapdown.systems.navigation_proposal import _alignment, _motion, _moving, _rest
+from strapdown.tables import gnss_table, imu_table
 
 RATE = 10.0
 SD = 5.0
@@ -59,3 +59,40 @@ def test_levelling_leaves_half_of_a_short_record_to_navigation(heading_deg):
 
     assert length(6.5, 6.5) == 3.25
     assert length(600.0, 300.0) == 10.0
+
+
+BEGINS = 6.0
+
+
+def car(begins=BEGINS, rocking=0.0):
+    """A unit with the noise of a phone: it rests, and then accelerates and turns."""
+    rng = np.random.default_rng(5)
+    time = np.arange(0.0, 40.0, 0.01)
+    moves = time >= begins
+    rate = np.zeros((time.size, 3))
+    rate[:, 2] = np.where(moves, 0.2 * np.sin(time - begins), 0.0)
+    rate[:, 0] = rocking * np.cos(2.0 * time)
+    force = np.zeros((time.size, 3)) + [0.0, 0.0, -9.81]
+    force[:, 0] += np.where(moves, 1.5, 0.0)
+    return imu_table(
+        time,
+        rate + rng.normal(0.0, 0.001, rate.shape),
+        force + rng.normal(0.0, 0.02, force.shape),
+        sampling="instantaneous",
+        source="car.csv",
+    )
+
+
+def test_the_rest_ends_when_the_sensors_move_though_positions_prove_it_later():
+    assert _rest(car(), 12.4, rocks=False) == pytest.approx(BEGINS, abs=0.5)
+    assert _rest(car(), 12.4, rocks=True) == pytest.approx(BEGINS, abs=0.5)
+
+
+def test_the_rest_ends_when_the_fixes_move_though_the_sensors_are_quiet():
+    assert _rest(car(begins=100.0), 12.4, rocks=False) == pytest.approx(12.4, abs=0.02)
+
+
+def test_a_body_that_rocks_from_the_start_is_at_rest_for_gyros_that_find_north_alone():
+    rocking = car(begins=100.0, rocking=0.05)
+    assert _rest(rocking, 12.4, rocks=False) == 0.0
+    assert _rest(rocking, 12.4, rocks=True) == pytest.approx(12.4)
