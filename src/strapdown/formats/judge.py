@@ -63,7 +63,10 @@ def _undecided(triad: str, unit: Inference | None, values: Array) -> Finding:
 
     Raw counts are integers. The unit of a magnetometer has no option.
     """
-    largest = float(np.nanmax(np.abs(np.where(np.isfinite(values), values, np.nan)), initial=0.0))
+    finite = np.where(np.isfinite(values), values, np.nan)
+    # The evidence for a unit of the gyro is about the rate of the three axes together.
+    sizes = np.linalg.norm(finite, axis=1) if triad == "gyro" else np.abs(finite)
+    largest = float(np.nanmax(sizes, initial=0.0))
     counts = None
     if triad == "mag":
         code = "io.mag-unit-not-stated" if unit is None else "io.mag-unit-undecided"

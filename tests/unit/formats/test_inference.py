@@ -334,3 +334,19 @@ def test_a_stamp_or_a_value_beyond_all_sensors_does_not_break_the_inference(row)
     with np.errstate(all="raise"):
         found = {one.quantity: one for one in infer_signals(Signals(time, gyro, accel))}
     assert found["gravity"].value == "present"
+
+
+def test_the_largest_rate_of_a_choice_is_of_the_set_of_which_the_evidence_speaks(tmp_path):
+    # A steady rotation about a slanted axis: its rate exceeds each of its components.
+    rng = np.random.default_rng(2)
+    gyro = 12.0 + rng.normal(0.0, 0.3, (600, 3))
+    table = np.column_stack([np.arange(600) * 0.01, gyro])
+    path = tmp_path / "turntable.csv"
+    np.savetxt(path, table, delimiter=",", header="time_s,gyro_x,gyro_y,gyro_z", comments="")
+    with pytest.raises(DataError) as refused:
+        read_log(path)
+    data = refused.value.finding.data
+    (below,) = [f.data["largest"] for f in data["evidence"] if "largest" in f.data]
+    for choice in data["choices"]:
+        assert choice.data["largest"] == pytest.approx(np.linalg.norm(gyro, axis=1).max())
+        assert below < choice.data["largest"]
