@@ -41,13 +41,13 @@ from strapdown.formats.trajectory_readers import read_trajectory
 from strapdown.navigation.measurements.gnss_clock import time_offset
 from strapdown.navigation.measurements.gnss_readiness import gnss_readiness
 from strapdown.progress import Progress, silent
-from strapdown.sensors.health_log import LEAST_SAMPLES, ChannelFault
+from strapdown.sensors.health_log import LEAST_SAMPLES
 from strapdown.sensors.imu_health import ImuHealth, check_imu_channels
 from strapdown.sensors.rest import RestStretch, find_rests_of_every_grade
 from strapdown.sensors.sampling_health import check_sampling, quantization_step
 from strapdown.systems.alignment_source import body_record
 from strapdown.systems.inputs import Memory, SavedRun
-from strapdown.systems.navigation_checks import MOST, SILENT
+from strapdown.systems.navigation_checks import MOST, longest_faults, unusable_samples
 from strapdown.systems.navigation_proposal import CODE_POSITION_SD, CODE_VELOCITY_SD
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GYRO, POSITION_SD, find_gaps
@@ -466,30 +466,7 @@ def _channels(
     # Samples that are held step, and channels are compared with one another.
     held = any(f.code == "sensors.samples-held" for f in sampling)
     faults = [f for f in health.faults if f.kind != "noisy" or not held]
-    return health, find_rests_of_every_grade(imu), [*_worst(imu, faults), *sampling]
-
-
-def _worst(imu: pd.DataFrame, faults: Sequence[ChannelFault]) -> list[Finding]:
-    """Return the longest stretch of each channel and kind of fault, and its share in all."""
-    groups: dict[tuple[str, str], list[ChannelFault]] = {}
-    for fault in faults:
-        groups.setdefault((fault.channel, fault.kind), []).append(fault)
-    found = []
-    for group in groups.values():
-        said = max(group, key=lambda f: f.last - f.first).finding
-        lost = sum(f.last - f.first + 1 for f in group)
-        found.append(
-            Finding(
-                "navigation.channel-fault",
-                severity=said.severity,
-                file=said.file,
-                row=said.row,
-                quantity=said.quantity,
-                reason=said,
-                percent=100.0 * lost / len(imu),
-            )
-        )
-    return found
+    return health, find_rests_of_every_grade(imu), [*longest_faults(imu, faults), *sampling]
 
 
 def _fixes_against(
@@ -718,21 +695,42 @@ def _samples(one: LogDiagnosis) -> list[Finding]:
         ]
     else:
         found = []
-    health = one.health
-    for name in () if health is None else health.channels:
-        assert health is not None
-        lost = sum(f.last - f.first + 1 for f in health.of(name) if f.kind in SILENT)
-        if lost > MOST * len(imu):
-            found.append(
-                Finding(
-                    "doctor.channel-lost",
-                    severity="error",
-                    file=one.name,
-                    quantity=name,
-                    percent=100.0 * lost / len(imu),
-                )
-            )
-    return found
+    return [*found, *_lost_channels(one, imu)]
+
+
+def _noise_free(values: Array) -> bool:
+    """Whether channels are of a simulation without noise, in which a constant one may be right.
+
+    Of white noise the fourth differences exceed the second 3.4 times, of a smooth motion they are
+    far below.
+    """
+    second = np.diff(values, n=2, axis=0)
+    fourth = np.diff(second, n=2, axis=0)
+    return bool((np.square(fourth).mean(axis=0) <= np.square(second).mean(axis=0)).all())
+
+
+def _lost_channels(one: LogDiagnosis, imu: pd.DataFrame) -> list[Finding]:
+    """Channels that do not read the motion, of all samples or of some."""
+    if one.health is None:
+        return []
+    most_of = {**MOST, "dead": MOST["stuck"]}
+    if _noise_free(values_of(imu, one.health.channels)):
+        del most_of["dead"], most_of["stuck"]
+    lost: dict[str, tuple[int, bool]] = {}
+    for (name, kind), count in unusable_samples(imu, one.health.faults).items():
+        if (most := most_of.get(kind)) is not None:
+            before, gone = lost.get(name, (0, False))
+            lost[name] = before + count, gone or count > most * len(imu)
+    return [
+        Finding(
+            "doctor.channel-lost" if gone else "doctor.channel-lost-in-part",
+            severity="error" if gone else "warning",
+            file=one.name,
+            quantity=name,
+            percent=100.0 * count / len(imu),
+        )
+        for name, (count, gone) in lost.items()
+    ]
 
 
 def _attitude(one: LogDiagnosis) -> list[Finding]:

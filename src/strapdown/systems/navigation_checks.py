@@ -151,10 +151,9 @@ def _height(spec: NavigationSpec, imu: pd.DataFrame) -> tuple[Finding, ...]:
 # Channels that do not read the motion of the body: reported or refused before use.
 
 
-#: Faults that make a channel unusable, and their largest share of a record.
-SILENT, MOST = ("missing", "stuck", "saturated"), 0.5
-#: Largest share of saturated samples: a linear filter does not know the lost rotation.
-MOST_SATURATED = 0.15
+#: Faults that make a channel unusable, and their largest share of a record. A linear filter does
+#: not know the rotation that saturated samples lost.
+MOST = {"missing": 0.5, "stuck": 0.5, "saturated": 0.15}
 #: Share of the largest reading of a saturated stretch that counts as saturated, too.
 AT_END = 0.999
 #: Approximate noise ratio to the data sheet of gyros in deg/s that are read as rad/s.
@@ -191,18 +190,11 @@ def channel_findings(
 
 
 def _told(imu: pd.DataFrame, faults: Sequence[ChannelFault]) -> tuple[Finding, ...]:
-    """The longest stretch of each channel and kind of fault."""
-    worst: dict[tuple[str, str], ChannelFault] = {}
-    lost: dict[tuple[str, str], int] = {}
-    for fault in faults:
-        key = (fault.channel, fault.kind)
-        lost[key] = lost.get(key, 0) + _without(imu, fault)
-        if key not in worst or fault.last - fault.first > worst[key].last - worst[key].first:
-            worst[key] = fault
-    for (channel, kind), count in lost.items():
-        most = MOST_SATURATED if kind == "saturated" else MOST
-        if kind in SILENT and count > most * len(imu):
-            said = worst[channel, kind].finding
+    """The longest stretch of each channel and kind of fault; DataError: a channel is lost."""
+    for (channel, kind), count in unusable_samples(imu, faults).items():
+        if count > MOST.get(kind, 1.0) * len(imu):
+            of_kind = [f for f in faults if (f.channel, f.kind) == (channel, kind)]
+            said = max(of_kind, key=lambda f: f.last - f.first).finding
             raise DataError(
                 "navigation.channel-lost",
                 file=said.file,
@@ -210,7 +202,40 @@ def _told(imu: pd.DataFrame, faults: Sequence[ChannelFault]) -> tuple[Finding, .
                 quantity=said.quantity,
                 reason=said,
             )
-    return tuple(_counted(worst[key].finding, lost[key], len(imu)) for key in worst)
+    return longest_faults(imu, faults)
+
+
+def longest_faults(imu: pd.DataFrame, faults: Sequence[ChannelFault]) -> tuple[Finding, ...]:
+    """Return the longest stretch of each channel and kind of fault, with the share of all."""
+    worst: dict[tuple[str, str], ChannelFault] = {}
+    for fault in faults:
+        key = (fault.channel, fault.kind)
+        if key not in worst or fault.last - fault.first > worst[key].last - worst[key].first:
+            worst[key] = fault
+    lost = unusable_samples(imu, faults)
+    return tuple(
+        Finding(
+            "navigation.channel-fault",
+            severity=one.finding.severity,
+            file=one.finding.file,
+            row=one.finding.row,
+            quantity=one.finding.quantity,
+            reason=one.finding,
+            percent=100.0 * lost[key] / len(imu),
+        )
+        for key, one in worst.items()
+    )
+
+
+def unusable_samples(
+    imu: pd.DataFrame, faults: Sequence[ChannelFault]
+) -> dict[tuple[str, str], int]:
+    """Count the samples of each channel in each kind of fault."""
+    lost: dict[tuple[str, str], int] = {}
+    for fault in faults:
+        key = (fault.channel, fault.kind)
+        lost[key] = lost.get(key, 0) + _without(imu, fault)
+    return lost
 
 
 def saturated_findings(imu: pd.DataFrame, sensors: ImuUncertainty) -> tuple[Finding, ...]:
@@ -233,18 +258,6 @@ def _without(imu: pd.DataFrame, fault: ChannelFault) -> int:
         return fault.last - fault.first + 1
     values = imu[fault.channel].to_numpy(dtype=np.float64)[fault.first : fault.last + 1]
     return int(np.count_nonzero(np.abs(values) >= AT_END * fault.size))
-
-
-def _counted(finding: Finding, lost: int, samples: int) -> Finding:
-    return Finding(
-        "navigation.channel-fault",
-        severity=finding.severity,
-        file=finding.file,
-        row=finding.row,
-        quantity=finding.quantity,
-        reason=finding,
-        percent=100.0 * lost / samples,
-    )
 
 
 def _refuse_degrees(imu: pd.DataFrame, sensors: ImuUncertainty) -> None:

@@ -391,3 +391,33 @@ def test_converting_does_not_state_axes_that_nobody_stated(sound, tmp_path, suff
     assert "io.axes-not-stated-z-up" in {f.code for f in sd.read_imu(made).findings}
     sd.write(sd.read_imu(path, axes="x,-y,-z"), made, force=True)
     assert not [f for f in sd.read_imu(made).findings if f.code.startswith("io.axes")]
+
+
+# Channels that do not read the motion.
+
+
+@pytest.mark.parametrize("value", [0.0, 0.0123])
+def test_a_log_whose_gyro_is_constant_on_one_axis_has_no_attitude(sound, tmp_path, value):
+    table = sound.assign(gyro_y_rad_s=value)
+    (one,) = sd.doctor(written(table, tmp_path / "log.csv")).logs
+    for use in ("attitude", "navigation"):
+        assert one.answer(use) == "no"
+        (lost,) = [f for f in one.fit[use] if f.code == "doctor.channel-lost"]
+        assert (lost.quantity, lost.data["percent"]) == ("gyro_y", 100.0)
+
+
+def test_an_axis_that_is_stuck_for_a_while_limits_the_attitude(sound, tmp_path):
+    table = sound.copy()
+    table.loc[3000:3799, "gyro_z_rad_s"] = table.gyro_z_rad_s[3000]
+    (one,) = sd.doctor(written(table, tmp_path / "log.csv")).logs
+    assert one.answer("attitude") == "with limits"
+    (lost,) = [f for f in one.fit["attitude"] if f.code == "doctor.channel-lost-in-part"]
+    assert (lost.quantity, lost.data["percent"]) == ("gyro_z", 10.0)
+
+
+def test_a_gyro_of_zero_is_no_fault_in_a_simulation_without_noise(tmp_path):
+    time = np.arange(0.0, 60.0, 0.01)
+    gyro = np.column_stack([0.0 * time, 0.0 * time, 0.2 * np.sin(time)])
+    force = np.tile([0.0, 0.0, -G], (time.size, 1))
+    (one,) = sd.doctor(sd.Imu.from_arrays(time, gyro, force)).logs
+    assert one.answer("attitude") != "no"
