@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shutil
 from datetime import UTC, datetime
@@ -543,3 +544,42 @@ def test_an_unknown_format_lists_what_each_holds(tmp_path):
         assert {f.data["name"] for f in listed} == set(WRITERS)
         assert all(list(f.data["streams"]) == list(WRITERS[f.data["name"]].streams) for f in listed)
     assert {w.reader for w in WRITERS.values()} - {None} <= set(READERS)
+
+
+@pytest.mark.parametrize("name", ["kml", "geojson"])
+def test_a_map_needs_positions_alone(name, tmp_path):
+    gnss = streams()["gnss"]
+    places = gnss.assign(VN=0.0, VE=0.0, VD=0.0, **dict.fromkeys(VELOCITY_SD, np.inf))
+    places.attrs = dict(gnss.attrs)
+    path = tmp_path / f"track.{name}"
+    (found,) = [
+        f for f in write_streams(path, {"gnss": places}, name) if f.code == "io.stream-written"
+    ]
+    assert (found.quantity, found.data["rows"]) == ("gnss", len(gnss))
+    if name == "geojson":
+        line, start, end = json.loads(path.read_text())["features"]
+        lon, lat, alt = np.array(line["geometry"]["coordinates"]).T
+        assert np.abs(lat - gnss["lat"]).max() < 1e-9
+        assert np.abs(lon - gnss["lon"]).max() < 1e-9
+        assert np.abs(alt - gnss["alt"]).max() < 1e-4
+        # No velocity is stated, and zero is one.
+        for feature in (line, start, end):
+            assert not [key for key in feature["properties"] if "m_s" in key]
+    else:
+        assert path.read_text().count("<gx:coord>") == len(gnss)
+
+
+def test_a_map_of_an_attitude_is_refused(tmp_path):
+    attitude = attitude_table([0.0, 1.0], [[1.0, 0.0, 0.0, 0.0]] * 2)
+    with pytest.raises(DataError) as refused:
+        write_streams(tmp_path / "track.kml", {"reference": attitude})
+    assert refused.value.finding.code == "io.written-needs-stream"
+
+
+def test_what_is_written_is_named_only_where_it_is_there(tmp_path):
+    made = streams()
+    (found, *_) = write_streams(tmp_path / "a.csv", {"imu": made["imu"]})
+    (more, *_) = write_streams(
+        tmp_path / "b.csv", {"imu": made["imu"].assign(**made["magnetometer"])}
+    )
+    assert set(more.data["held"].split(", ")) - set(found.data["held"].split(", ")) == {"µT"}

@@ -20,7 +20,15 @@ from strapdown.formats.file_options import FileOptions
 from strapdown.formats.trajectory_csv import one_line
 from strapdown.frames import ecef_from_geodetic
 from strapdown.rotation import within_half_turn
-from strapdown.tables import EULER, VELOCITY, check_trajectory, places_of
+from strapdown.tables import (
+    EULER,
+    POSITION_SD,
+    VELOCITY,
+    VELOCITY_SD,
+    check_gnss,
+    check_trajectory,
+    places_of,
+)
 
 __all__ = ["Thinned", "cut_at_date_line", "thin", "write_geojson", "write_kml"]
 
@@ -29,13 +37,13 @@ Array = NDArray[np.float64]
 
 
 def write_geojson(path: Path, trajectory: pd.DataFrame, options: FileOptions | None = None) -> None:
-    """Write a trajectory as a FeatureCollection: the path, its start and its end.
+    """Write a trajectory or fixes as a FeatureCollection: the path, its start and its end.
 
     Parameters
     ----------
     path : Path
     trajectory : DataFrame
-        A Trajectory table of one row or more, on WGS 84.
+        A Trajectory or Gnss table of one row or more, on WGS 84.
     options : FileOptions, optional
         With `epoch`, dates are added to the times. More than `most_points` rows are thinned to
         those that preserve the path best (`thin`).
@@ -56,9 +64,7 @@ def write_geojson(path: Path, trajectory: pd.DataFrame, options: FileOptions | N
     """
     chosen = options or FileOptions()
     chosen.require_wgs84("GeoJSON")
-    check_trajectory(trajectory)
-    if trajectory.empty:
-        raise DataError("io.trajectory-no-rows")
+    _check(trajectory)
     thinned = thin(trajectory, chosen.most_points)
     title = one_line(chosen.name)
     features = [_end(trajectory, 0, "start", title, chosen)]
@@ -75,6 +81,20 @@ def write_geojson(path: Path, trajectory: pd.DataFrame, options: FileOptions | N
     path.write_bytes(text.encode())
 
 
+def _check(track: pd.DataFrame) -> None:
+    """Refuse a table that is neither a trajectory nor fixes, or has no rows."""
+    (check_gnss if POSITION_SD[0] in track.columns else check_trajectory)(track)
+    if track.empty:
+        raise DataError("io.trajectory-no-rows")
+
+
+def _known_velocity(track: pd.DataFrame) -> bool:
+    """Whether every row has a velocity: fixes may state positions alone."""
+    if VELOCITY_SD[0] not in track.columns:
+        return True
+    return bool(np.isfinite(track[VELOCITY_SD].to_numpy(dtype=np.float64)).all())
+
+
 def _position(point: Array) -> list[float]:
     # Avoid negative zeros.
     return [round(v, d) + 0.0 for v, d in zip(point.tolist(), (9, 9, 4), strict=True)]
@@ -89,7 +109,11 @@ def _path_feature(
     parts = cut_at_date_line(np.column_stack([points, time]))
     coordinates = [[_position(p[:3]) for p in part] for part in parts]
     times = [part[:, 3].tolist() for part in parts]
-    speed = np.sqrt(np.square(trajectory[VELOCITY].to_numpy(dtype=np.float64)).sum(axis=1))
+    speeds: dict[str, float] = {}
+    if _known_velocity(trajectory):
+        speed = np.sqrt(np.square(trajectory[VELOCITY].to_numpy(dtype=np.float64)).sum(axis=1))
+        stamps = trajectory.index.to_numpy(dtype=np.float64)
+        speeds = {"largest_speed_m_s": float(speed.max()), "mean_speed_m_s": _mean(stamps, speed)}
     properties: dict[str, Any] = {
         "name": name,
         "part": "path",
@@ -98,8 +122,7 @@ def _path_feature(
         "largest_deviation_m": float(f"{thinned.deviation_m:.3g}"),
         "start_s": float(time[0]),
         "end_s": float(time[-1]),
-        "largest_speed_m_s": float(speed.max()),
-        "mean_speed_m_s": _mean(trajectory.index.to_numpy(dtype=np.float64), speed),
+        **speeds,
         "height": "over the WGS 84 ellipsoid",
         **_dates(options, {"start_utc": float(time[0]), "end_utc": float(time[-1])}),
         "time_s": times[0] if len(parts) == 1 else times,
@@ -127,13 +150,14 @@ def _end(
     time = float(trajectory.index[row])
     point = at[["lon", "lat", "alt"]].to_numpy(dtype=np.float64).copy()
     point[:1] = within_half_turn(point[:1])
+    moves = VELOCITY if _known_velocity(trajectory.iloc[[row]]) else []
     properties = {
         "name": name,
         "part": part,
         "time_s": time,
         **_dates(options, {"time_utc": time}),
-        **{f"{c}_m_s": float(at[c]) for c in VELOCITY},
-        **{f"{c}_deg": float(at[c]) for c in EULER},
+        **{f"{c}_m_s": float(at[c]) for c in moves},
+        **{f"{c}_deg": float(at[c]) for c in EULER if c in trajectory.columns},
     }
     geometry = {"type": "Point", "coordinates": _position(point)}
     return {"type": "Feature", "geometry": geometry, "properties": properties}
@@ -151,13 +175,13 @@ _STYLE = '<Style id="path"><LineStyle><color>ff2d6fd9</color><width>3</width></L
 
 
 def write_kml(path: Path, trajectory: pd.DataFrame, options: FileOptions | None = None) -> None:
-    """Write a trajectory as OGC KML 2.2: the path, its start and its end.
+    """Write a trajectory or fixes as OGC KML 2.2: the path, its start and its end.
 
     Parameters
     ----------
     path : Path
     trajectory : DataFrame
-        A Trajectory table of one row or more, on WGS 84.
+        A Trajectory or Gnss table of one row or more, on WGS 84.
     options : FileOptions, optional
         With `epoch`, a track with dates (``gx:Track``, Google's extension) is written in
         addition to the path. More than `most_points` rows are thinned to those that preserve
@@ -179,9 +203,7 @@ def write_kml(path: Path, trajectory: pd.DataFrame, options: FileOptions | None 
     """
     chosen = options or FileOptions()
     chosen.require_wgs84("KML")
-    check_trajectory(trajectory)
-    if trajectory.empty:
-        raise DataError("io.trajectory-no-rows")
+    _check(trajectory)
     thinned = thin(trajectory, chosen.most_points)
     kept = trajectory.iloc[thinned.rows]
     points = kept[["lon", "lat", "alt"]].to_numpy(dtype=np.float64).copy()

@@ -56,7 +56,7 @@ from strapdown.tables import (
     check_imu,
     check_trajectory,
 )
-from strapdown.tables.checks import GEODETIC, MAG, NED, VELOCITY, VELOCITY_SD
+from strapdown.tables.checks import GEODETIC, MAG, NED, POSITION_SD, VELOCITY, VELOCITY_SD
 
 __all__ = [
     "LOG_FORMATS",
@@ -75,6 +75,8 @@ __all__ = [
 
 Array = NDArray[Any]
 AXES = "forward-right-down"
+#: What is held: always, or of tables with a column.
+Part = str | tuple[str, str]
 
 
 @dataclass(frozen=True)
@@ -84,8 +86,9 @@ class Writer:
     Attributes
     ----------
     title : str
-    streams : mapping of str to str
-        What it holds of each stream: units, axes, clock.
+    streams : mapping of str to tuple of parts
+        What it holds of each stream: units, axes, clock. A part that only some tables have is a
+        pair with the column that these have.
     function : callable
         Writes a file, or a folder, that does not exist.
     reader : str or None
@@ -97,7 +100,7 @@ class Writer:
     """
 
     title: str
-    streams: Mapping[str, str]
+    streams: Mapping[str, tuple[Part, ...]]
     function: Callable[[Path, Tables, FileOptions], list[Finding]]
     reader: str | None
     endings: tuple[str, ...] = ()
@@ -128,17 +131,34 @@ class Writer:
             held = kept
         lost += self.function(path, held, options or FileOptions())
         left = {f.quantity for f in lost if f.code == "io.stream-not-written"}
-        return [*(self._written(k, t) for k, t in held.items() if k not in left), *lost]
+        return [*(self._written(k, held) for k in held if k not in left), *lost]
 
-    def _written(self, stream: str, table: pd.DataFrame) -> Finding:
+    def _written(self, stream: str, held: Tables) -> Finding:
+        table = held[stream]
+        there = _known_columns(table)
+        if stream == "imu" and _same_rows(held):
+            there.add(QUATERNION[0])
+        parts = [p for p in self.streams[stream] if isinstance(p, str) or p[1] in there]
+        texts = [part if isinstance(part, str) else part[0] for part in parts]
+        if stream == "imu" and table.attrs.get("axes", AXES) != AXES:
+            texts = ["axes not stated" if text == AXES else text for text in texts]
         return Finding(
             "io.stream-written",
             file=table.attrs.get("source"),
             quantity=stream,
             severity="note",
             rows=len(table),
-            held=self.streams[stream],
+            held=", ".join(texts),
         )
+
+
+def _known_columns(table: pd.DataFrame) -> set[str]:
+    """Return the columns of a table that hold a value: fixes may state positions alone."""
+    columns = set(map(str, table.columns))
+    for group, sds in ((VELOCITY, VELOCITY_SD), (POSITION_SD, POSITION_SD)):
+        if set(sds) <= columns and not np.isfinite(table[sds].to_numpy(dtype=np.float64)).any():
+            columns -= {*group, *sds}
+    return columns
 
 
 def _check(stream: str, table: pd.DataFrame) -> None:
@@ -348,12 +368,16 @@ def _write_tum(path: Path, tables: Tables, options: FileOptions) -> list[Finding
 
 
 def _write_map(path: Path, tables: Tables, options: FileOptions, write: Any) -> list[Finding]:
-    """Write a map, with dates if the clock of the trajectory is related to UTC."""
-    track = _trajectory(tables, "a map")
-    findings: list[Finding] = []
+    """Write a map of a trajectory, else of fixes, with dates if the clock is related to UTC."""
+    places = {k: t for k, t in tables.items() if k == "gnss" or is_trajectory(t)}
+    if not places:
+        raise DataError("io.written-needs-stream", form="a map", needed=["gnss", "a trajectory"])
+    stream, track = next(iter(places.items()))
+    findings = [_of_own_file(k, t) for k, t in tables.items() if k != stream]
     if clock_of(track).name != RELATIVE and options.epoch is None:
-        stamps, findings = unix_ns(track, options)
-        if not any(f.code == "io.written-on-own-clock" for f in findings):
+        stamps, said = unix_ns(track, options)
+        findings += said
+        if not any(f.code == "io.written-on-own-clock" for f in said):
             zero = int(stamps[0]) // 1000 - round(float(track.index[0]) * 1e6)
             epoch = datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=zero)
             options = dataclasses.replace(options, epoch=epoch)
@@ -362,7 +386,11 @@ def _write_map(path: Path, tables: Tables, options: FileOptions, write: Any) -> 
         data = {"most": options.most_points, "rows": len(track)}
         source = track.attrs.get("source")
         findings.append(Finding("io.written-thinned", file=source, severity="note", data=data))
-    return [*findings, not_held("a map", "reference", "attitude and velocities", track)]
+    if stream == "reference":
+        findings.append(not_held("a map", stream, "attitude and velocities", track))
+    elif POSITION_SD[0] in _known_columns(track):
+        findings.append(not_held("a map", stream, "standard deviations", track))
+    return findings
 
 
 def _write_kml(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
@@ -390,16 +418,26 @@ def _trajectory(tables: Tables, form: str) -> pd.DataFrame:
 
 # The table.
 
-_TABLE = {
-    "imu": "rad/s, m/s², µT, forward-right-down, attitude of each sample",
-    "gnss": "deg, m, m/s, standard deviations, quality",
-    "reference": "trajectory: deg, m, m/s; or attitude",
-    "magnetometer": "µT, forward-right-down",
-    "barometer": "Pa",
-    "wheel": "m/s",
+_TABLE: dict[str, tuple[Part, ...]] = {
+    "imu": (
+        "rad/s",
+        ("m/s²", ACCEL[0]),
+        ("µT", MAG[0]),
+        AXES,
+        ("attitude of each sample", QUATERNION[0]),
+    ),
+    "gnss": ("deg", "m", ("m/s", VELOCITY[0]), ("standard deviations", POSITION_SD[0]), "quality"),
+    "reference": (
+        ("positions in deg and m", GEODETIC[0]),
+        ("velocities in m/s", VELOCITY[0]),
+        ("attitude", EULER[0]),
+    ),
+    "magnetometer": ("µT", AXES),
+    "barometer": ("Pa",),
+    "wheel": ("m/s",),
 }
-_PLACES = "positions over WGS 84; dates; speed and course"
-_TRACK = {"reference": "trajectory: deg, m, m/s"}
+_PLACES: tuple[Part, ...] = ("positions over WGS 84", "dates", ("speed and course", VELOCITY[0]))
+_MAP: dict[str, tuple[Part, ...]] = dict.fromkeys(("reference", "gnss"), ("positions over WGS 84",))
 
 #: In the order in which they are shown; an ending belongs to the first that has it.
 WRITERS: dict[str, Writer] = {
@@ -411,10 +449,19 @@ WRITERS: dict[str, Writer] = {
     "mcap": Writer(
         "bag of ROS 2 in MCAP",
         {
-            "imu": "Imu: rad/s, m/s², forward-left-up; MagneticField; ns since 1970",
-            "gnss": "NavSatFix, TwistWithCovarianceStamped: deg, m, east-north-up",
-            "magnetometer": "MagneticField: T, forward-left-up",
-            "barometer": "FluidPressure: Pa",
+            "imu": (
+                "Imu in rad/s and m/s²",
+                ("MagneticField", MAG[0]),
+                "forward-left-up",
+                "ns since 1970",
+            ),
+            "gnss": (
+                "NavSatFix",
+                ("TwistWithCovarianceStamped, east-north-up", VELOCITY[0]),
+                "ns since 1970",
+            ),
+            "magnetometer": ("MagneticField in T", "forward-left-up"),
+            "barometer": ("FluidPressure in Pa",),
         },
         ros.write,
         "ros",
@@ -423,8 +470,12 @@ WRITERS: dict[str, Writer] = {
     "euroc": Writer(
         "EuRoC, folder mav0",
         {
-            "imu": "imu0: rad/s, m/s², forward-right-down; ns since 1970",
-            "reference": "state_groundtruth_estimate0: m, north-west-up at an origin; quaternion",
+            "imu": ("imu0 in rad/s and m/s²", AXES, "ns since 1970"),
+            "reference": (
+                "state_groundtruth_estimate0",
+                ("m, north-west-up at an origin", GEODETIC[0]),
+                "quaternion",
+            ),
         },
         asl.write,
         "asl",
@@ -432,8 +483,8 @@ WRITERS: dict[str, Writer] = {
     "kitti": Writer(
         "KITTI raw, folder oxts",
         {
-            "reference": "deg, m, m/s, rad; dates",
-            "imu": "at the same rows: rad/s, m/s², forward-left-up",
+            "reference": ("deg, m, m/s, rad", "dates"),
+            "imu": ("at the same rows", "rad/s, m/s²", "forward-left-up"),
         },
         kitti.write,
         "kitti",
@@ -441,9 +492,13 @@ WRITERS: dict[str, Writer] = {
     "kf-gins": Writer(
         "KF-GINS, folder",
         {
-            "imu": "imu.txt: increments in rad, m/s, forward-right-down; seconds of the GPS week",
-            "gnss": "gnss.txt: deg, m, m/s, standard deviations",
-            "reference": "truth.nav: deg, m, m/s",
+            "imu": ("imu.txt: increments in rad and m/s", AXES, "seconds of the GPS week"),
+            "gnss": (
+                "gnss.txt: deg, m",
+                ("m/s", VELOCITY[0]),
+                ("standard deviations", POSITION_SD[0]),
+            ),
+            "reference": ("truth.nav: deg, m, m/s",),
         },
         kf_gins.write,
         "kf-gins-folder",
@@ -453,23 +508,29 @@ WRITERS: dict[str, Writer] = {
     ),
     "nmea": Writer(
         "NMEA 0183",
-        {"gnss": f"{_PLACES}; standard deviations", "reference": _PLACES},
+        {"gnss": (*_PLACES, ("standard deviations", POSITION_SD[0])), "reference": _PLACES},
         gnss_nmea.write,
         "nmea",
         (".nmea",),
     ),
     "tum": Writer(
         "poses as of the TUM RGB-D benchmark",
-        {"reference": "m, east-north-up at an origin; quaternion of forward-left-up; s since 1970"},
+        {
+            "reference": (
+                "m, east-north-up at an origin",
+                "quaternion of forward-left-up",
+                "s since 1970",
+            )
+        },
         _write_tum,
         "tum",
         (".tum",),
     ),
-    "kml": Writer("KML 2.2", _TRACK, _write_kml, None, (".kml",)),
-    "geojson": Writer("GeoJSON", _TRACK, _write_geojson, None, (".geojson",)),
+    "kml": Writer("KML 2.2", _MAP, _write_kml, None, (".kml",)),
+    "geojson": Writer("GeoJSON", _MAP, _write_geojson, None, (".geojson",)),
     "nav": Writer(
         "KF-GINS trajectory",
-        {"reference": "deg, m, m/s; GPS week and seconds of it"},
+        {"reference": ("deg, m, m/s", "GPS week and seconds of it")},
         _write_nav,
         "kf-gins-nav",
         (".nav",),

@@ -268,9 +268,7 @@ def _aids(page: Page, made: Proposal, folder: Path, foot: bool) -> list[str]:
     within = int(((time >= own[0]) & (time <= own[-1])).sum())
     told = [f"{made.gnss.attrs['source']}: {within} of {len(time)} fixes within the log"]
     if made.rest >= 1.0:
-        told.append(
-            f"stationary for the first {made.rest:.4g} s, by gyros, accelerometers and fixes"
-        )
+        told.append(f"stationary for the first {made.rest:.4g} s, by the sensors and the fixes")
     return told
 
 

@@ -249,9 +249,9 @@ def _nearest(noise: tuple[float, ...]) -> str:
 def _rest(imu: pd.DataFrame, until: float, *, rocks: bool) -> float:
     """Length of the initial rest in s, in which gyros and accelerometers agree with the fixes.
 
-    `until` (s from the first sample): when the fixes prove motion, which positions do late. `rocks`:
-    gyros find north on a body that rocks; it is at rest until its last quiet stretch, or until the
-    fixes prove motion if it has none.
+    `until` (s from the first sample): when the fixes prove motion, which positions do late.
+    `rocks`: gyros find north on a body that rocks; it is at rest until its last quiet stretch, or
+    until the fixes prove motion if it has none.
     """
     time = index_of(imu)
     first, last = float(time[0]), float(time[0]) + until

@@ -72,7 +72,7 @@ def car(begins=BEGINS, rocking=0.0):
     rate = np.zeros((time.size, 3))
     rate[:, 2] = np.where(moves, 0.2 * np.sin(time - begins), 0.0)
     rate[:, 0] = rocking * np.cos(2.0 * time)
-    force = np.zeros((time.size, 3)) + [0.0, 0.0, -9.81]
+    force = np.tile([0.0, 0.0, -9.81], (time.size, 1))
     force[:, 0] += np.where(moves, 1.5, 0.0)
     return imu_table(
         time,
