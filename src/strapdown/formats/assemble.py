@@ -27,7 +27,7 @@ from strapdown.formats.columns import EULERS, QUATERNIONS, parse_axes
 from strapdown.formats.find_columns import AXES, Column, find_columns, require_gyro
 from strapdown.formats.inference import Inference
 from strapdown.formats.join import join
-from strapdown.formats.judge import SUMS, UNITS, intervals, sampling_of_sums
+from strapdown.formats.judge import LIKELY, SUMS, UNITS, intervals, sampling_of_sums
 from strapdown.formats.quantity_columns import names_of_fixes
 from strapdown.formats.recording import (
     AXES_OF_SENSOR,
@@ -39,7 +39,6 @@ from strapdown.formats.recording import (
     Recording,
 )
 from strapdown.formats.triad_units import (
-    LIKELY,
     Axes,
     axes_matrix,
     body_axes,

@@ -20,6 +20,9 @@ UNITS = {"gyro": GYRO_UNITS, "accel": ACCEL_UNITS, "mag": MAG_UNITS}
 # Sensor suggested for raw counts, that of most boards (InvenSense, MPU-6000 and MPU-6050 Product
 # Specification, revision 3.4, sections 6.1 and 6.2).
 _COUNTS = {"gyro": "io.example-gyro-counts", "accel": "io.example-accel-counts"}
+_LIKELY_COUNTS = {"gyro": "io.likely-gyro-counts", "accel": "io.likely-accel-counts"}
+#: Least probability of an answer that is proposed.
+LIKELY = 0.9
 # Axes with each axis of the sensor up.
 _EXAMPLES = {"z": "x,-y,-z", "y": "-z,x,-y", "-y": "z,x,y", "x": "y,z,-x", "-x": "y,-z,x"}
 # Values shown for a unit that the numbers leave open.
@@ -72,7 +75,12 @@ def _undecided(triad: str, unit: Inference | None, values: Array) -> Finding:
         code = "io.mag-unit-not-stated" if unit is None else "io.mag-unit-undecided"
     elif bool((values == np.round(values)).all()):
         code = "io.counts-unit-not-stated" if unit is None else "io.counts-unit-undecided"
-        counts = Finding(_COUNTS[triad], severity="note")
+        unit_of_count = unit_of_counts(unit)
+        counts = Finding(
+            _COUNTS[triad] if unit_of_count is None else _LIKELY_COUNTS[triad],
+            severity="note",
+            unit=unit_of_count,
+        )
     else:
         code = "io.unit-not-stated" if unit is None else "io.unit-undecided"
     return Finding(
@@ -82,6 +90,14 @@ def _undecided(triad: str, unit: Inference | None, values: Array) -> Finding:
         counts=counts,
         **what_numbers_say(unit),
     )
+
+
+def unit_of_counts(unit: Inference | None) -> str | None:
+    """Return the unit of raw counts that the numbers make likely: ``g/16384``."""
+    for said in unit.evidence if unit is not None else ():
+        if said.code == "io.evidence-counts" and said.data["share"] >= LIKELY:
+            return str(said.data["unit"])
+    return None
 
 
 def what_numbers_say(unit: Inference | None) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from strapdown.formats.columns import parse_axes, read_name
 from strapdown.formats.find_columns import AXES, Column
 from strapdown.formats.inference import Inference, Signals, infer_signals
 from strapdown.formats.judge import (
+    LIKELY,
     OPEN,
     SUMS,
     UNITS,
@@ -21,6 +22,7 @@ from strapdown.formats.judge import (
     inferred_unit,
     report_contradictions,
     report_upside_down,
+    unit_of_counts,
 )
 from strapdown.formats.recording import Questions, RawLog, ReadOptions
 from strapdown.units import factor_of, parse_unit
@@ -85,8 +87,7 @@ def _reversed(up: Inference) -> Inference:
     return replace(up, value=other, evidence=said, alternatives=shares)
 
 
-#: Least probability of an answer that is proposed.
-LIKELY = 0.9
+_OF_COUNTS = {"io.counts-unit-not-stated", "io.counts-unit-undecided"}
 
 
 def units_of_triads(
@@ -117,12 +118,16 @@ def units_of_triads(
                 _refuse_open(raw, found, triad)
             units[triad] = stated or inferred_unit(triad, said, block, raw.name, findings)
         except DataError as error:
+            likely = said.get(f"{triad}_unit")
             if triad != "gyro":
+                # Beside a gyro whose unit is asked, counts of its accelerometer are asked, too.
+                if error.finding.code in _OF_COUNTS and units["gyro"][1] == "asked":
+                    questions.ask(error.finding, accel_unit=unit_of_counts(likely) or "UNIT")
                 findings.append(left_out(raw, triad, error))
                 continue
-            likely = said.get("gyro_unit")
             sure = likely is not None and likely.value and likely.confidence >= LIKELY
             unit = str(likely.value) if likely is not None and sure else "UNIT"
+            unit = unit_of_counts(likely) or unit
             if error.finding.code == "io.unit-not-stated-of-increments":
                 unit = str(error.finding.data["sum_of"]).split(" or ")[0]
             questions.ask(error.finding, gyro_unit=unit)

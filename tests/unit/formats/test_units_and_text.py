@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from tests.coded import coded
 
 from strapdown.errors import ConfigError, DataError
@@ -65,13 +66,37 @@ def test_counts_of_a_log(tmp_path):
     counts = np.round(ROWS[:, 1:] * 1000).astype(int)
     rows = [f"{10 * k}," + ",".join(map(str, row)) for k, row in enumerate(counts)]
     path.write_text("millis,gx,gy,gz,ax,ay,az\n" + "\n".join(rows) + "\n")
-    with pytest.raises(
-        DataError, check=lambda refused: refused.finding.code == "io.counts-unit-undecided"
-    ):
+    with pytest.raises(DataError) as refused:
         read_log(path)
+    asked = refused.value.finding.data["questions"]
+    assert {q.code for q in asked} == {"io.counts-unit-undecided"}
+    assert [q.quantity for q in asked] == ["gyro", "accel"]
     imu = read_log(path, ReadOptions(gyro_unit="deg/s/131", accel_unit="g/16384")).imu
     np.testing.assert_allclose(imu[GYRO], np.radians(counts[:, :3] / 131.0), rtol=1e-12)
     np.testing.assert_allclose(imu[ACCEL], counts[:, 3:] / 16384.0 * 9.80665, rtol=1e-12)
+
+
+@pytest.mark.parametrize("turns", [True, False])
+@pytest.mark.parametrize(("scale", "rate"), [(16384, 131), (8192, 65.5), (2048, 16.4)])
+def test_counts_are_proposed_by_gravity_and_its_turns(tmp_path, scale, rate, turns):
+    rng = np.random.default_rng(scale)
+    time = 0.01 * np.arange(3000.0)
+    omega = turns * np.column_stack([0.8 * np.sin(time / 2), 0.6 * np.cos(time / 1.3), 0 * time])
+    force, turn = [], Rotation.identity()
+    for step in omega:
+        force.append(turn.inv().apply([0.0, 0.0, 1.0]))
+        turn = turn * Rotation.from_rotvec(0.01 * step)
+    accel = np.rint((np.array(force) + rng.normal(0, 0.004, (3000, 3))) * scale)
+    gyro = np.rint(np.degrees(omega + rng.normal(0.01, 0.002, (3000, 3))) * rate)
+    path = tmp_path / "mpu.csv"
+    rows = np.column_stack([10 * np.arange(3000), accel, gyro]).astype(int)
+    np.savetxt(path, rows, "%d", ",", header="millis,ax,ay,az,gx,gy,gz", comments="")
+    with pytest.raises(DataError) as refused:
+        read_log(path)
+    answers = dict(refused.value.finding.data["answers"])
+    assert answers["accel_unit"] == f"g/{scale}"
+    # Without a turn of gravity the numbers cannot tell the scale of the gyro.
+    assert answers["gyro_unit"] == (f"deg/s/{rate:g}" if turns else "UNIT")
 
 
 def text_of(separator=",", decimal="."):

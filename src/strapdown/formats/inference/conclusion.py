@@ -95,6 +95,16 @@ def evidence(code: str, **values: Any) -> Finding:
     return Finding(code, severity="note", **values)
 
 
+def evidence_of_counts(shares: Mapping[str, float]) -> tuple[Finding, ...]:
+    """Return the unit of raw counts that is more probable than not; empty if there is none.
+
+    `shares`: unit, as in ``g/16384``, to probability.
+    """
+    unit = max(shares, key=lambda u: shares[u])
+    known = shares[unit] > 0.5
+    return (evidence("io.evidence-counts", unit=unit, share=shares[unit]),) if known else ()
+
+
 def posterior(log_weights: dict[K, float]) -> dict[K, float]:
     """Normalize logarithms of prior times likelihood to probabilities, in descending order.
 
@@ -392,6 +402,9 @@ def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference,
     else:
         said = evidence("io.evidence-norm-of-no-unit", **norm, units=list(SCALES))
     told = (said,)
+    if whole:
+        named = {f"g/{c:.0f}": forms.get(f"counts {k}", 0.0) for k, c in enumerate(_COUNTS)}
+        told += evidence_of_counts(named)
     gravity = posterior_of(
         {
             "present": forms.get("rate", 0.0) + forms.get("increment", 0.0),

@@ -14,6 +14,7 @@ from strapdown.formats.inference.conclusion import (
     Inference,
     conclude,
     evidence,
+    evidence_of_counts,
     mean_step,
     posterior,
 )
@@ -25,9 +26,20 @@ Array = NDArray[np.float64]
 _PRIOR = {"rad/s": 0.55, "deg/s": 0.43, "mdeg/s": 0.01, "mrad/s": 0.005, "deg/h": 0.005}
 _INCREMENTS = 0.01
 _OTHER = 0.02  # turns per second and other unlisted units
-# Raw counts of a 16-bit sensor, deg/s each (data sheets of MPU-6050, BMI160, LSM6DS3). A full scale
-# of 2000 deg/s gives 1.06 mrad/s, close enough to be taken for that.
-_COUNTS = [2000.0 / 32768.0 / 2.0**k for k in range(5)] + [0.00875, 0.0175, 0.035, 0.07]
+# Raw counts of a 16-bit sensor, deg/s each (data sheets of MPU-6050, BMI160, LSM6DS3), by the unit
+# that a user states. A full scale of 2000 deg/s gives 1.06 mrad/s, close enough to be taken for it.
+_OF_COUNTS = {
+    "deg/s/16.4": 2000.0 / 32768.0,
+    "deg/s/32.8": 1000.0 / 32768.0,
+    "deg/s/65.5": 500.0 / 32768.0,
+    "deg/s/131": 250.0 / 32768.0,
+    "deg/s/262": 125.0 / 32768.0,
+    "0.00875 deg/s": 0.00875,
+    "0.0175 deg/s": 0.0175,
+    "0.035 deg/s": 0.035,
+    "0.07 deg/s": 0.07,
+}
+_COUNTS = list(_OF_COUNTS.values())
 _PRIOR_COUNTS = 0.03
 # Probability of integers only, for each unit; counts are integers unless averaged.
 _WHOLE = {"rad/s": 1e-4, "deg/s": 0.01, "mrad/s": 0.1, "mdeg/s": 0.5, "deg/h": 0.2}
@@ -137,13 +149,18 @@ def infer_gyro(
     pooled = [posterior(t) for t in by_scale.values()] or [posterior(weights)]
     # Which time scale is free of in-phase motion is not known: each contributes its share.
     total: dict[Hypothesis, float] = {}
+    counts = dict.fromkeys(_OF_COUNTS, 0.0)
     for probabilities in pooled:
         for hypothesis, p in probabilities.items():
+            if hypothesis[1].startswith("counts"):
+                counts[list(counts)[int(hypothesis[1].split()[1])]] += p / len(pooled)
             # Counts are rates in an unknown unit.
             kind = "rate" if hypothesis[1].startswith("counts") else hypothesis[1]
             merged = (hypothesis[0], kind, hypothesis[2], hypothesis[3])
             total[merged] = total.get(merged, 0.0) + p / len(pooled)
     told = _evidence(largest, scales, total)
+    if whole and scales:
+        told += evidence_of_counts(counts)
     axes = {k or None: v for k, v in _marginal(total, 2).items()}
     said_unit = conclude("gyro_unit", _marginal(total, 0), told, "--gyro-unit")
     said_form = conclude("gyro_form", _marginal(total, 1), told)
