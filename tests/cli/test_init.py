@@ -108,3 +108,64 @@ def test_help_says_what_it_does(run_cli):
     page = run_cli("init", "crash", "--help").out
     assert "--out" in page
     assert "RECORD" in page
+
+
+# A log and its fixes.
+
+
+@pytest.fixture
+def ride(tmp_path):
+    """A level car at rest, and its fixes without velocities; and those of another ride."""
+    rng = np.random.default_rng(4)
+    time = np.arange(0.0, 60.0, 0.01)
+    values = rng.normal((0.0, 0.0, 0.0, 0.0, 0.0, -9.81), [1e-3] * 3 + [0.02] * 3, (time.size, 6))
+    log, fixes, other = (tmp_path / name for name in ("imu.csv", "fixes.csv", "other.csv"))
+    names = [f"gyro_{a}_rad_s" for a in "xyz"] + [f"accel_{a}_m_s2" for a in "xyz"]
+    rows = np.column_stack([time + 1.7e9, values])
+    header = ",".join(["unix_time_s", *names])
+    np.savetxt(log, rows, fmt="%.6f", delimiter=",", header=header, comments="")
+    at = np.arange(0.0, 60.0)
+    for path, begin in ((fixes, 1.7e9), (other, 1.7e9 + 5000.0)):
+        places = np.column_stack([at + begin, 0.0 * at + 49.0, 0.0 * at + 8.4, 0.0 * at + 150.0])
+        header = "unix_time_s,lat_deg,lon_deg,height_m"
+        np.savetxt(path, places, fmt="%.6f", delimiter=",", header=header, comments="")
+    return log, fixes, other
+
+
+def test_fixes_may_be_the_second_argument(run_cli, ride, tmp_path):
+    log, fixes, _ = ride
+    outs = tmp_path / "a.toml", tmp_path / "b.toml"
+    for out, arguments in zip(outs, ([fixes], ["--gnss", fixes]), strict=True):
+        assert run_cli("init", "navigate", log, *arguments, "--out", out).code == 0
+    assert outs[0].read_text() == outs[1].read_text()
+    assert tomllib.loads(outs[0].read_text())["aiding"]["gnss"]["path"] == "fixes.csv"
+    assert run_cli("init", "navigate", log, fixes, "--gnss", fixes).code == 4
+
+
+def test_fixes_without_velocity_are_named_with_what_follows(run_cli, ride, tmp_path):
+    log, fixes, _ = ride
+    done = run_cli("init", "navigate", log, fixes, "--out", tmp_path / "a.toml")
+    (line,) = [line for line in done.out.splitlines() if "no velocity" in line]
+    assert "positions alone" in line
+
+
+def test_fixes_of_another_time_are_refused_as_the_run_refuses_them(run_cli, ride, tmp_path):
+    import strapdown as sd
+    from strapdown.config.alignment import FixesTable, LogTable
+    from strapdown.errors import DataError
+    from strapdown.systems.navigation_draft import draft_navigation
+
+    log, _, other = ride
+    done = run_cli("init", "navigate", log, other, "--out", tmp_path / "a.toml")
+    assert done.code == 3
+    assert not (tmp_path / "a.toml").exists()
+    with pytest.raises(DataError) as proposed:
+        draft_navigation(LogTable(path=str(log)), folder=tmp_path, gnss=FixesTable(path=str(other)))
+    with pytest.raises(DataError) as run:
+        sd.navigate(
+            str(log),
+            [sd.Gnss(str(other), position_sd_m=5.0)],
+            sensor="mpu-9250",
+            start={"heading_deg": 0.0},
+        )
+    assert proposed.value.finding.code == run.value.finding.code == "navigation.no-fix-in-record"

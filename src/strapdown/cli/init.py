@@ -129,6 +129,10 @@ def navigate(
             metavar="LOG", help="A log of gyros and accelerometers.", show_default=False
         ),
     ],
+    beside: Annotated[
+        Path | None,
+        typer.Argument(metavar="[FIXES]", help="As --gnss.", show_default=False),
+    ] = None,
     gnss: Annotated[Path | None, with_what("FIXES", "Fixes of a satellite receiver.")] = None,
     sensor: Annotated[
         str | None,
@@ -153,8 +157,11 @@ def navigate(
     from strapdown.config.spec import specify
     from strapdown.systems.navigation_draft import draft_navigation
 
+    if beside is not None and gnss is not None:
+        raise ConfigError("cli.fixes-twice", quantity="--gnss", files=[str(gnss), str(beside)])
+
     def draft(folder: Path, _: Progress) -> Any:
-        keys = fix_keys(fixes.given(), gnss)
+        keys = fix_keys(fixes.given(), gnss or beside)
         receiver = specify(FixesTable, **{"path": str(log), **keys}) if keys else None
         return draft_navigation(
             _table(log, flags),

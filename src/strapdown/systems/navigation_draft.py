@@ -32,7 +32,7 @@ from strapdown.systems.alignment_draft import (
     toml_value,
 )
 from strapdown.systems.navigation_proposal import TAKEN, Proposal, propose
-from strapdown.tables import ACCEL, GYRO
+from strapdown.tables import ACCEL, GYRO, VELOCITY_SD
 from strapdown.tables.checks import index_of, source_of, values_of
 
 __all__ = ["STANCE", "STANDING", "draft_navigation", "first_stand", "on_foot", "second_order"]
@@ -267,6 +267,11 @@ def _aids(page: Page, made: Proposal, folder: Path, foot: bool) -> list[str]:
     time, own = index_of(made.gnss), index_of(made.imu)
     within = int(((time >= own[0]) & (time <= own[-1])).sum())
     told = [f"{made.gnss.attrs['source']}: {within} of {len(time)} fixes within the log"]
+    if not np.isfinite(values_of(made.gnss, VELOCITY_SD[:2])).any():
+        told.append(
+            "the fixes state no velocity: heading and tilt are found from positions alone, later "
+            "and less accurately; a log of the receiver with speed and course is better"
+        )
     if made.rest >= 1.0:
         told.append(f"stationary for the first {made.rest:.4g} s, by the sensors and the fixes")
     return told

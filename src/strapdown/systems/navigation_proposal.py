@@ -19,7 +19,12 @@ from strapdown.formats.assemble import require_accel
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import has_fixes, read_gnss
 from strapdown.formats.recording import Recording
-from strapdown.navigation.measurements.gnss_clock import time_offset, velocity_delay
+from strapdown.navigation.measurements.gnss_clock import (
+    check_overlap,
+    time_offset,
+    velocity_delay,
+)
+from strapdown.navigation.measurements.gnss_readiness import check_fixes
 from strapdown.navigation.pipeline import AHEAD
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.rest import LEAST_LENGTH, find_rests_of_every_grade
@@ -155,6 +160,9 @@ def propose(
         )
         fixes, shifted = on_clock_of(read_gnss(gnss.path, asked), recording.imu)
         findings = (*findings, *fixes.attrs["findings"], *([shifted] if shifted else []))
+        # What the run would refuse is refused before a file is written.
+        check_fixes(fixes)
+        check_overlap(fixes, imu, 0.0)
     scatter = _scatter(imu)
     # Engine vibration differs between axes; the quietest axis identifies the sensor.
     noise = None if scatter is None else tuple(scatter[0].min(axis=1).tolist())

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from strapdown._kernels import piecewise
 from strapdown.dsp.running_integral import running_integral
 from strapdown.errors import DataError, Finding
+from strapdown.formats.clocks import RELATIVE
 from strapdown.frames import place_difference
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY, VELOCITY_SD
 from strapdown.tables.checks import index_of, source_of, values_of
@@ -87,7 +88,9 @@ def check_overlap(gnss: pd.DataFrame, imu: pd.DataFrame, offset: float = 0.0) ->
     source = source_of(gnss)
     within = (time >= stamps[0]) & (time <= stamps[-1])
     if not within.any():
-        code, clocks = _difference(time, stamps)
+        clock = gnss.attrs.get("clock", RELATIVE)
+        shared = clock != RELATIVE and clock == imu.attrs.get("clock")
+        code, clocks = _difference(time, stamps, shared=shared)
         raise DataError(
             code,
             file=source,
@@ -302,10 +305,31 @@ def _integrals(stamps: Array, values: Array, means: bool) -> tuple[Array, Array]
     return stamps[kept], sums[kept]
 
 
-def _difference(time: Array, stamps: Array) -> tuple[str, dict[str, Any]]:
-    """The finding code of the difference of two clocks, and its data."""
+def _difference(time: Array, stamps: Array, *, shared: bool) -> tuple[str, dict[str, Any]]:
+    """The finding code of the difference of two clocks, and its data.
+
+    `shared`: both are stated to be of one clock, such as that of 1970.
+    """
     apart = float(time[0] - stamps[0])
     span = max(float(time[-1] - time[0]), float(stamps[-1] - stamps[0]), 60.0)
+    found = None if shared else _of_two_clocks(time, stamps, apart, span)
+    if found is not None:
+        return found
+    for length, code in (
+        (WEEK, "navigation.no-fix-in-record-weeks-apart"),
+        (86_400.0, "navigation.no-fix-in-record-days-apart"),
+        (3600.0, "navigation.no-fix-in-record-hours-apart"),
+    ):
+        count = round(apart / length)
+        if count and abs(apart - count * length) < min(span, 0.2 * length):
+            return code, {"count": abs(count), "shift": count * length}
+    return "navigation.no-fix-in-record", {"apart": abs(apart), "shift": apart}
+
+
+def _of_two_clocks(
+    time: Array, stamps: Array, apart: float, span: float
+) -> tuple[str, dict[str, Any]] | None:
+    """The finding code of two clocks or units, and its data; None if there is only one."""
     known = (
         (GPS_EPOCH - LEAP, "navigation.no-fix-in-record-unix-and-gps-time"),
         (GPS_EPOCH, "navigation.no-fix-in-record-unix-and-since-1980"),
@@ -330,15 +354,7 @@ def _difference(time: Array, stamps: Array) -> tuple[str, dict[str, Any]]:
             shift = {"shift": _to_week(stamps)}
             return "navigation.no-fix-in-record-record-in-unix-time", {**clocks, **shift}
         return "navigation.no-fix-in-record-two-clocks", clocks
-    for length, code in (
-        (WEEK, "navigation.no-fix-in-record-weeks-apart"),
-        (86_400.0, "navigation.no-fix-in-record-days-apart"),
-        (3600.0, "navigation.no-fix-in-record-hours-apart"),
-    ):
-        count = round(apart / length)
-        if count and abs(apart - count * length) < min(span, 0.2 * length):
-            return code, {"count": abs(count), "shift": count * length}
-    return "navigation.no-fix-in-record", {"apart": abs(apart), "shift": apart}
+    return None
 
 
 UNIX_TIME, GPS_WEEK = "Unix time", "seconds of the GPS week"
