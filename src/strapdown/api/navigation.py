@@ -300,13 +300,13 @@ def _ask(
 ) -> None:
     """Ask for everything that neither the user nor the files state, in one refusal."""
     open_: list[Finding] = []
-    answers: list[str | None] = []
+    answers: list[str] = []
     name = Path(proposal.recording.name).name
     if sensor is None:
         near = proposal.table.get("sensors", {}).get("sensor")
         code = "api.no-sensor-near-one" if near else "api.no-sensor-for-navigation"
         open_.append(Finding(code, severity="error", quantity=called("sensor"), near=near))
-        answers.append(near and f"--sensor {near}")
+        answers.append(f"--sensor {near or 'SENSOR'}")
     aid = proposal.table.get("aiding", {}).get("gnss", {})
     taken = aid.get("position_sd_m") if fixes and fixes.get("position_sd_m") is None else None
     if taken is not None:
@@ -332,7 +332,7 @@ def _ask(
                 called_2=called("gnss"),
             )
         )
-        answers.append(None)
+        answers.append("--heading DEG")
     if "site" not in proposal.table and proposal.gnss is None:
         open_.append(
             Finding(
@@ -345,14 +345,13 @@ def _ask(
                 called_4=called("gnss"),
             )
         )
-        answers.append(None)
+        answers.append("--lat DEG --lon DEG --alt M")
     if not open_:
         return
-    # A command that leaves a question open would only be refused again.
-    flags = {"flags": " ".join(map(str, answers))} if all(answers) else {}
+    flags = " ".join(answers)
     if len(open_) == 1:
-        raise ConfigError(open_[0], **flags)
-    raise ConfigError("api.open-questions", file=name, questions=open_, **flags)
+        raise ConfigError(open_[0], flags=flags)
+    raise ConfigError("api.open-questions", file=name, questions=open_, flags=flags)
 
 
 def _fixes_table(aid: Mapping[str, Any]) -> FixesTable:

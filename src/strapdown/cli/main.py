@@ -8,6 +8,7 @@ import gc
 import inspect
 import io
 import os
+import re
 import shlex
 import signal
 import sys
@@ -124,10 +125,7 @@ def run() -> None:
         with logged():
             app()
     except StrapdownError as error:
-        text = error.finding.text(WORDS.get())
-        if flags := error.finding.data.get("flags"):
-            # What the file leaves open, answered as inferred, ready to paste.
-            text += f"\n  As inferred: strapdown {shlex.join(sys.argv[1:])} {flags}"
+        text = "\n  ".join([error.finding.text(WORDS.get()), *_answers(error.finding)])
         _fail(text, error.exit_code)
     except OSError as error:
         if error.errno == errno.EPIPE:
@@ -139,6 +137,36 @@ def run() -> None:
             reason=error.strerror or str(error),
         )
         _fail(what.text(WORDS.get()), 4)
+
+
+#: What a person has to fill in, in options whose value cannot be inferred.
+_BLANKS = re.compile(r"(?<=[ =])(SENSOR|DEG|M|UNIT|NAME|AXES)\b")
+
+
+def _answers(refused: Finding) -> list[str]:
+    """Return the lines that answer what a file leaves open, ready to paste.
+
+    A command with options; beside a configuration file the keys, and the table that takes them.
+    Empty if the command was refused with these answers.
+    """
+    flags, given = refused.data.get("flags"), sys.argv[1:]
+    if not flags:
+        return []
+    keys = refused.data.get("keys")
+    if WORDS.get() == "file":
+        # Of a fault of the file itself, `keys` are names.
+        if not isinstance(keys, str):
+            return []
+        table = "log"
+        if str(flags).startswith("--gnss-"):
+            table = "gnss" if given[:1] == ["align"] else "aiding.gnss"
+        said = "Fill in, and write" if _BLANKS.search(f" {keys}".replace('"', " ")) else "Write"
+        lines = re.split(r"; (?=\w+ = )", keys)
+        return [f"{said} into the table [{table}] of the file:", *(f"  {line}" for line in lines)]
+    if set(shlex.split(str(flags))) <= set(given):
+        return []
+    said = "Fill in" if _BLANKS.search(str(flags)) else "As inferred"
+    return [f"{said}: strapdown {shlex.join(given)} {flags}"]
 
 
 def _fail(message: str, code: int) -> NoReturn:

@@ -379,9 +379,13 @@ def as_flag(error: ConfigError, flag: Callable[[str], str]) -> ConfigError:
     `flag`: flag of a key path of a specification.
     """
     if error.finding.code == "config.several":
-        faults = [f.replace(quantity=flag(f.quantity or "")) for f in error.finding.data["faults"]]
+        faults = [
+            f.replace(quantity=flag(f.quantity)) if f.quantity else f
+            for f in error.finding.data["faults"]
+        ]
         return error.replaced(faults=faults)
-    return error.replaced(quantity=flag(error.finding.quantity or ""))
+    quantity = error.finding.quantity
+    return error.replaced(quantity=flag(quantity)) if quantity else error
 
 
 def module_of_flag(text: str) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.aid_table import read_reference_path
 from strapdown.formats.clocks import EPOCH
-from strapdown.formats.columns import read_name
+from strapdown.formats.columns import ABROAD, DIRECTIONS, TURNS, read_name, without_accents
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.formats.crash_samples import last_midnight, mean_accelerations_of
 from strapdown.formats.inference.conclusion import (
@@ -127,23 +127,22 @@ def _words(text: str) -> tuple[str, ...]:
     return tuple(text.split())
 
 
-_TIME = _words("zeit temps tiempo tempo vrijeme vreme czas stamp clock time")
+_TIME = (*ABROAD["time"], "stamp", "clock", "time")
 _COUNTER = _words("n nr no num number index idx sample count counter row")
 _OTHER = _words(
     "temp tmp batt volt spannung druck press humid feucht mag magn kompass compass lat lon alt "
     "satell status flag valid quality speed geschw vitesse brems brake throttle engine rpm"
 )
-_ACCEL = _words(
-    "acc accel beschl accél aceler przysp ubrz versnell specificforce lowg highg gforce nd hd"
-)
-_RATE = _words("gyro gyr rate omega angular drehrate winkelg gier wank nick yaw roll pitch rot")
+_ACCEL = (*ABROAD["acceleration"], *_words("acc accel specificforce lowg highg gforce nd hd"))
+# Rotation words, also in compounds: Gierrate, Nickwinkel.
+_TURNS = {word: axis for turn, axis in TURNS.items() for word in (turn, *ABROAD[turn])}
+_RATE = (*ABROAD["gyroscope"], "winkelg", *_words("gyro gyr rate omega angular rot"), *_TURNS)
 _AXES = {
-    "x": _words("x longitudinal longit long laengs längs forward fwd roll wank"),
-    "y": _words("y lateral quer right transv pitch nick"),
-    "z": _words("z vertical vertikal vert hoch down yaw gier"),
+    "x": ("x", *DIRECTIONS["x"], *_words("long forward fwd")),
+    "y": ("y", *DIRECTIONS["y"], *_words("right transv")),
+    "z": ("z", *DIRECTIONS["z"], *_words("vert down")),
 }
-# Rotation words used in compounds: Gierrate, Nickwinkel.
-_TURNS = {"wank": "x", "roll": "x", "nick": "y", "pitch": "y", "gier": "z", "yaw": "z"}
+_AXES = {a: (*known, *(t for t in _TURNS if _TURNS[t] == a)) for a, known in _AXES.items()}
 _NO_AXIS = ("hz", "khz", "mhz", "max", "idx", "index", "mux", "aux", "fix")
 _BRACKET = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]")
 _WORD = re.compile(r"[^\W\d_]+|\d+")
@@ -174,7 +173,7 @@ def read_heading(name: str) -> Heading:
     bracket = _BRACKET.search(name)
     text = bracket.group(1).lower().replace(" ", "") if bracket else ""
     unit = named.unit or (unit_of(text, (*OF_LOGS, "velocity")) or "" if bracket else "")
-    words = _WORD.findall(_BRACKET.sub(" ", name).lower())
+    words = _WORD.findall(without_accents(_BRACKET.sub(" ", name).lower()))
     quantity = axis = ""
     if named.quantity == "time":
         quantity = "time"

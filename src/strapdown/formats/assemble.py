@@ -106,7 +106,7 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
             unit = str(best["unit"]) if best["share"] >= LIKELY else "UNIT"
             questions.ask(error.finding, time_unit=unit)
         elif code == "io.time-column-missing":
-            questions.ask(error.finding)
+            questions.ask(error.finding, time=_likely_clock(raw, found) or "NAME")
         else:
             questions.refuse()
             raise
@@ -176,6 +176,24 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
         findings=tuple(findings),
         start=raw.start,
     )
+
+
+def _likely_clock(raw: RawLog, found: dict[str, Column]) -> str:
+    """Return the column that advances evenly as a clock does; empty if there is not just one.
+
+    A count of samples advances by one, and is none.
+    """
+    used = {column.source for column in found.values()}
+    likely = []
+    for name, values in raw.columns.items():
+        if name in used or values.dtype.kind not in "iuf" or values.size < 3:
+            continue
+        steps = np.diff(values.astype(np.float64))
+        usual = float(np.median(steps))
+        even = np.mean(np.abs(steps - usual) <= 0.5 * usual)
+        if usual > 0.0 and (steps >= 0.0).all() and even > 0.9 and not (steps == 1.0).all():
+            likely.append(name)
+    return likely[0] if len(likely) == 1 and not set(",=") & set(likely[0]) else ""
 
 
 #: Faults of rows that `ReadOptions.repair` leaves out.

@@ -22,14 +22,38 @@ __all__ = [
 
 
 _AXES = "xyz"
+#: Beginnings of German, French, Spanish, Italian and further words, without accents, by the English
+#: word that they stand for.
+ABROAD = {
+    english: tuple(stems.split())
+    for english, stems in {
+        "time": "zeit uhrzeit temps horodat tiempo tempo vrijeme vreme czas tijd",
+        "acceleration": "beschl aceler accelerazion accelerometr przysp ubrz versnell",
+        "gyroscope": "drehrate drehgeschw winkelgeschw giroscop gyroskop kreisel",
+        "magnetometer": "magnetfeld magnetometr",
+        "velocity": "geschwindigkeit vitesse velocidad velocita",
+        "angular": "angulaire angolar",
+        "linear": "linear lineaire lineal",
+        "without": "ohne sans senza",
+        "roll": "wank roulis alabeo rollio",
+        "pitch": "nick tangage cabeceo beccheggio",
+        "yaw": "gier lacet guinada imbardata",
+    }.items()
+}
+#: Words for the axes of a vehicle.
+DIRECTIONS = {
+    "x": ("longitudinal", "longit", "langs", "laengs", "longitudinale"),
+    "y": ("lateral", "quer", "laterale", "transversal"),
+    "z": ("vertical", "vertikal", "hoch", "verticale"),
+}
 # Names of a sensor without their axis: blanks, underscores and capitals do not count.
 _TRIAD_WORDS = {
     "gyro": "gyro gyros gyr gyroscope gyroscopes imugyr imugyro angularvelocity angularvel angvel "
+    "velocityangular rotationvelocity velocityrotation "
     "angularrate angularrates angrate angularspeed turnrate rot rotationrate rotrate omega rate "
-    "drehrate w g ω",
+    "w g ω",
     "accel": "accel acce acc accelerometer accelerometers accelerations acceleration accl "
-    "linearacceleration linacc linaccel lina gforce gf imuacc imuaccel specificforce beschl "
-    "beschleunigung a f",
+    "linearacceleration linacc linaccel lina gforce gf imuacc imuaccel specificforce a f",
     "mag": "mag magn magnet magnetic magnetometer magnetometers magneticfield magfield field "
     "imumag compass m b",
 }
@@ -54,12 +78,14 @@ _NAMED_BY_UNIT = {
     **dict.fromkeys(("mps2", "ms2"), "accel"),
     **dict.fromkeys(("ut",), "mag"),
 }
-_TURNS = {"roll": "x", "pitch": "y", "yaw": "z"}
+#: Axis of the body that a turn is about.
+TURNS = {"roll": "x", "pitch": "y", "yaw": "z"}
 _RATES = {"rate", "speed", "velocity", "vel", "dot", *TRIADS["gyro"]} - set("wgω")
 _TIME_WORDS = (
     "time t ts timestamp timestamps timesec elapsed secondselapsed seconds sec tow sow gpssow "
     "gpstow gpstime unixtime epoch stamp elapsedtime timeelapsed timesincestart sampletime "
-    "sensortime systemtime unixtimestamp datetime localtime utc utctime timeutc"
+    "sensortime systemtime unixtimestamp datetime localtime utc utctime timeutc "
+    "zeit zeitstempel temps tiempo tempo"
 )
 TIMES = _TIME_WORDS.split()
 # Names of clocks that state their unit.
@@ -124,7 +150,7 @@ _SIGNS = r"[\s_\-/:,;|]+"
 _NOISE = {
     *("raw", "imu", "sensor", "sensors", "data", "body", "device", "phone", "watch", "motion"),
     *("cal", "calib", "calibrated", "corrected", "meas", "measured", "value", "values", "axis"),
-    *("ins", "the", "of", "in", "reading", "readings", "uncal", "uncalibrated"),
+    *("ins", "the", "of", "in", "de", "del", "di", "reading", "readings", "uncal", "uncalibrated"),
 }
 # Words of a quantity that is about another: its spread, its error, its demand.
 _ABOUT = {
@@ -249,13 +275,16 @@ def _read_words(text: str, unit: str | None) -> ColumnName:
         return _with(said, unit=unit or said.unit)
     # Names in capitals without separators (latDeg), in another order (x_gyro), with words that say
     # nothing of the quantity (raw_acceleration_x), or twice the same (gyroRotationRateX).
-    words = [w.lower() for w in _HUMPS.findall(text)]
+    words = [e for w in _HUMPS.findall(text) for e in _english(w.lower())]
     if unit is None:
         words, its = unit_words(words)
         unit = its or None
     bare = [part for w in words if not _is_model(w) for part in re.findall(r"\D+|\d+", w)]
     bare = [w for w in bare if w not in _NOISE]
     axes = [k for k, w in enumerate(bare) if w in _AXES]
+    if not axes and any(w in TRIADS["accel"] for w in bare):
+        bare = [next((a for a, known in DIRECTIONS.items() if w in known), w) for w in bare]
+        axes = [k for k, w in enumerate(bare) if w in _AXES]
     if len(axes) == 1:
         bare.append(bare.pop(axes[0]))
     said = _known("".join(bare)) or _of_words(bare)
@@ -265,11 +294,28 @@ def _read_words(text: str, unit: str | None) -> ColumnName:
     if said.family and said.number is None:
         # All words but the axis, so that two sensors are two families.
         axis = str(said.quantity)[-1]
-        rest = [w for w in words if w != axis and w not in _TURNS]
+        rest = [w for w in words if w != axis and w not in TURNS]
         family = "".join(rest) if len(rest) < len(words) else said.family
         family = f"of {family}" if words[:1] == [axis] else family
         said = _with(said, family=f"{family}#" if len(family) < 2 else family)
     return _with(said, unit=unit or said.unit, loose=True)
+
+
+def _english(word: str) -> list[str]:
+    """Return a word in English, if it is one of `ABROAD`; Gierrate becomes yaw and rate."""
+    plain = without_accents(word)
+    for english, stems in ABROAD.items():
+        stem = next((s for s in stems if plain.startswith(s)), "")
+        if stem and english in TURNS:
+            return [english, *(_english(plain[len(stem) :]) if plain != stem else [])]
+        if stem:
+            return [english]
+    return [plain]
+
+
+def without_accents(text: str) -> str:
+    """Return the letters of a text without their accents."""
+    return "".join(c for c in unicodedata.normalize("NFD", text) if not unicodedata.combining(c))
 
 
 def _is_model(word: str) -> bool:
@@ -318,10 +364,10 @@ _NAMES: tuple[tuple[Sequence[str], str, bool], ...] = (
 
 def _of_words(words: list[str]) -> ColumnName | None:
     """Read the words of a name together: sensors with words beside them, turns, numbers."""
-    turn = [w for w in words if w in _TURNS]
-    rest = [w for w in words if w not in _TURNS]
+    turn = [w for w in words if w in TURNS]
+    rest = [w for w in words if w not in TURNS]
     if len(turn) == 1 and rest and ("".join(rest) in _RATES or set(rest) <= _RATES):
-        return ColumnName(f"gyro_{_TURNS[turn[0]]}", family="".join(rest))
+        return ColumnName(f"gyro_{TURNS[turn[0]]}", family="".join(rest))
     axis = words[-1] if words and words[-1] in _AXES else ""
     number = words[-1] if words and words[-1].isdecimal() else ""
     bare = [w for w in (words[:-1] if axis or number else words) if not w.isdecimal()]

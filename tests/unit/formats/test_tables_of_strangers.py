@@ -346,3 +346,52 @@ def test_rows_of_several_kinds_are_named(tmp_path):
         "'0' (20 rows of 8 fields)",
         "'1' (4 rows of 4 fields)",
     )
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity", "unit"),
+    [
+        ("Zeit [s]", "time", "s"),
+        ("Zeitstempel_ms", "time", "ms"),
+        ("temps", "time", None),
+        ("Tiempo (s)", "time", "s"),
+        ("tempo", "time", None),
+        ("Beschleunigung X [m/s²]", "accel_x", "m/s2"),
+        ("Beschl. quer", "accel_y", None),
+        ("Beschl_längs", "accel_x", None),
+        ("Drehrate Z [°/s]", "gyro_z", "deg/s"),
+        ("Wankrate", "gyro_x", None),
+        ("Nickgeschwindigkeit [°/s]", "gyro_y", "deg/s"),
+        ("Gierrate", "gyro_z", None),
+        ("Winkelgeschwindigkeit_x", "gyro_x", None),
+        ("Accélération y (m/s²)", "accel_y", "m/s2"),
+        ("accélération linéaire x", "accel_x", None),
+        ("Vitesse angulaire x (rad/s)", "gyro_x", "rad/s"),
+        ("Aceleración Z (m/s^2)", "accel_z", "m/s2"),
+        ("giroscopio_x", "gyro_x", None),
+        ("Velocidad angular X (rad/s)", "gyro_x", "rad/s"),
+        ("Velocità angolare Y [rad/s]", "gyro_y", "rad/s"),
+        ("accelerazione z", "accel_z", None),
+        # Words that only begin alike.
+        ("Temperatur X", None, None),
+        ("Gierwinkel", None, None),
+        ("Geschwindigkeit x", None, None),
+        ("Uhr", None, None),
+    ],
+)
+def test_words_of_other_languages(name, quantity, unit):
+    said = read_name(name)
+    assert (said.quantity, said.unit) == (quantity, unit)
+    assert said.linear == ("linéaire" in name)
+
+
+def test_a_clock_of_an_unknown_name_is_proposed_and_a_counter_is_not(tmp_path):
+    for name, step, likely in (("Uhr", 10, "Uhr"), ("n", 1, "NAME")):
+        lines = [f"{name},gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s"]
+        lines += [f"{step * k},0.1,{0.01 * (k % 7)},0.3" for k in range(50)]
+        path = tmp_path / "a.csv"
+        path.write_text("\n".join(lines) + "\n")
+        with pytest.raises(DataError) as refused:
+            read_log(path)
+        assert refused.value.finding.code == "io.time-column-missing"
+        assert dict(refused.value.finding.data["answers"]) == {"time": likely}
