@@ -106,11 +106,14 @@ def print_log(one: LogDiagnosis, paths: Mapping[str, str], *, tables: bool) -> N
 
     out = console()
     out.print(report.headline(one), style="bold")
+    ways: set[str] = set()
     for use in report.uses(one):
         out.print(spaced(f"  {use:<11}{one.answer(use)}: {_cut(report.reasons(one, use))}"))
         line = report.command(one, use, one.log.path, paths.get(one.data["fixes_from"]))
-        if line := line or report.way(one, use):
+        line = line or report.way(one, use)
+        if line and line not in ways:
             out.print(f"  {'':<11}{line}", style="dim")
+            ways.add(line)
     blocks = [report.stream_table(one)]
     if tables:
         blocks += [report.channel_table(one), report.rest_table(one)]

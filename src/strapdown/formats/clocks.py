@@ -484,13 +484,16 @@ def _repaired(
     latest = np.maximum.accumulate(np.concatenate([[-np.inf], ticks[:-1]]))
     keep = ticks > latest
     if dropped := int((~keep).sum()):
+        # Repeated stamps lose no motion; after a clock that was set back, what was dropped may.
+        back = int((np.diff(ticks) < 0).sum())
         findings.append(
             Finding(
-                "io.rows-not-later-left-out",
+                "io.rows-not-later-left-out" if not back else "io.rows-after-step-back-left-out",
                 file=file,
                 quantity="time",
-                severity="note",
+                severity="warning" if back else "note",
                 count=dropped,
+                back=back,
             )
         )
     return keep, ticks

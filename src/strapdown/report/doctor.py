@@ -191,8 +191,10 @@ def answering(one: LogDiagnosis, log: str | None = None) -> str | None:
     if not one.questions:
         return None
     flags = str(one.data["options"])
-    if one.refused is not None and one.refused.data.get("flags"):
-        flags = f"{flags} {one.refused.data['flags']}".strip()
+    more = "" if one.refused is None else str(one.refused.data.get("flags") or "")
+    if not more and not one.answers:
+        return None  # the same command would be refused again
+    flags = f"{flags} {more}".strip()
     flags = f"{flags} {one.data['fixes_options']}".strip()
     return _line("doctor", log or one.name, flags)
 

@@ -710,7 +710,7 @@ def _noise_free(values: Array) -> bool:
 
 
 def _lost_channels(one: LogDiagnosis, imu: pd.DataFrame) -> list[Finding]:
-    """Channels that do not read the motion, of all samples or of some."""
+    """Channels that do not read the motion: lost, or the faults of a part of the samples."""
     if one.health is None:
         return []
     most_of = {**MOST, "dead": MOST["stuck"]}
@@ -721,16 +721,16 @@ def _lost_channels(one: LogDiagnosis, imu: pd.DataFrame) -> list[Finding]:
         if (most := most_of.get(kind)) is not None:
             before, gone = lost.get(name, (0, False))
             lost[name] = before + count, gone or count > most * len(imu)
-    return [
-        Finding(
-            "doctor.channel-lost" if gone else "doctor.channel-lost-in-part",
-            severity="error" if gone else "warning",
-            file=one.name,
-            quantity=name,
-            percent=100.0 * count / len(imu),
-        )
-        for name, (count, gone) in lost.items()
-    ]
+    found = [f for f in one.faults if f.code == "io.rate-at-full-scale"]
+    for name, (count, gone) in lost.items():
+        if gone:
+            percent = 100.0 * count / len(imu)
+            where: dict[str, Any] = {"file": one.name, "quantity": name}
+            found.append(Finding("doctor.channel-lost", severity="error", percent=percent, **where))
+            continue
+        parts = [f for f in one.faults if f.quantity == name and f.data.get("kind") in most_of]
+        found += [f for f in parts if f not in found]
+    return found
 
 
 def _attitude(one: LogDiagnosis) -> list[Finding]:
@@ -755,12 +755,14 @@ def _attitude(one: LogDiagnosis) -> list[Finding]:
         )
     )
     found.append(_bias(one))
-    found += [f for f in one.faults if f.code in ("io.long-gap", *_TURNED)]
+    found += [f for f in one.faults if f.code in _LIMITS]
     return found
 
 
-#: Axes that contradict gravity.
-_TURNED = (
+#: Motion that is missing, and axes that contradict gravity.
+_LIMITS = (
+    "io.long-gap",
+    "io.rows-after-step-back-left-out",
     "io.axes-not-stated-other-up",
     "io.axes-not-stated-y-up",
     "io.axes-not-stated-z-up",
@@ -821,7 +823,7 @@ def _navigation(one: LogDiagnosis) -> list[Finding]:
         )
     )
     found += [f for f in one.faults if f.code.startswith("navigation.") and f not in found]
-    found += [f for f in one.faults if f.code in ("io.long-gap", *_TURNED)]
+    found += [f for f in one.faults if f.code in _LIMITS]
     return found
 
 

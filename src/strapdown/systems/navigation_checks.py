@@ -222,6 +222,7 @@ def longest_faults(imu: pd.DataFrame, faults: Sequence[ChannelFault]) -> tuple[F
             quantity=one.finding.quantity,
             reason=one.finding,
             percent=100.0 * lost[key] / len(imu),
+            kind=one.kind,
         )
         for key, one in worst.items()
     )

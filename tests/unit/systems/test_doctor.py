@@ -411,8 +411,21 @@ def test_an_axis_that_is_stuck_for_a_while_limits_the_attitude(sound, tmp_path):
     table.loc[3000:3799, "gyro_z_rad_s"] = table.gyro_z_rad_s[3000]
     (one,) = sd.doctor(written(table, tmp_path / "log.csv")).logs
     assert one.answer("attitude") == "with limits"
-    (lost,) = [f for f in one.fit["attitude"] if f.code == "doctor.channel-lost-in-part"]
-    assert (lost.quantity, lost.data["percent"]) == ("gyro_z", 10.0)
+    (lost,) = [f for f in one.fit["attitude"] if f.severity == "warning"]
+    assert lost in one.faults
+    assert (lost.quantity, lost.data["kind"], lost.data["percent"]) == ("gyro_z", "stuck", 10.0)
+
+
+def test_a_clock_that_is_set_back_limits_the_attitude_and_rows_twice_do_not(sound, tmp_path):
+    table = sound.copy()
+    table.loc[table.time_s > 40.0, "time_s"] -= 2.0
+    (one,) = sd.doctor(written(table, tmp_path / "back.csv")).logs
+    assert [q.code for q in one.questions] == ["io.time-goes-back"]
+    (left,) = [f for f in one.fit["attitude"] if f.code == "io.rows-after-step-back-left-out"]
+    assert (one.answer("attitude"), left.data["count"]) == ("with limits", 200)
+    twice = sound.iloc[np.sort(np.r_[np.arange(len(sound)), 4000])]
+    (one,) = sd.doctor(written(twice, tmp_path / "twice.csv")).logs
+    assert one.answer("attitude") == "yes"
 
 
 def test_a_gyro_of_zero_is_no_fault_in_a_simulation_without_noise(tmp_path):
