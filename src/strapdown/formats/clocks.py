@@ -484,8 +484,7 @@ def _repaired(
     latest = np.maximum.accumulate(np.concatenate([[-np.inf], ticks[:-1]]))
     keep = ticks > latest
     if dropped := int((~keep).sum()):
-        # Repeated stamps lose no motion; after a clock that was set back, what was dropped may.
-        back = int((np.diff(ticks) < 0).sum())
+        back = _set_back(ticks, keep, usual)
         findings.append(
             Finding(
                 "io.rows-not-later-left-out" if not back else "io.rows-after-step-back-left-out",
@@ -497,6 +496,19 @@ def _repaired(
             )
         )
     return keep, ticks
+
+
+def _set_back(ticks: Array, keep: NDArray[np.bool_], usual: float) -> int:
+    """Count how often dropped rows leave no gap, as after a clock that was set back.
+
+    A single wrong stamp leaves one, and a repeated stamp loses no motion.
+    """
+    kept = np.append(np.flatnonzero(keep), ticks.size)
+    count = 0
+    for a, b in zip(kept[:-1][np.diff(kept) > 1], kept[1:][np.diff(kept) > 1], strict=True):
+        over = b < ticks.size and ticks[b] - ticks[a] >= 0.5 * (b - a) * usual
+        count += bool((np.diff(ticks[a:b]) < 0).any() and not over)
+    return count
 
 
 def _evident_unit(
