@@ -129,15 +129,7 @@ class GnssCourse(CoarseAlignment):
         record, the vehicle is too slow, or the accelerometers are too uncertain for a level.
         """
         findings = check_record(imu)
-        slowest, widest = self.least_speed, math.radians(self.largest_sd_deg)
-        fixes = course_fixes(imu, gnss, slowest, widest, antenna.velocity_delay)
-        rests = rest_rates(imu, fixes, sensors)
-        yaw = math.radians(self.mounting_yaw_deg) + (math.pi if self.reverse else 0.0)
-        slip = math.radians(self.sideslip_sd_deg)
-        yaw_sd = math.hypot(slip, math.radians(self.mounting_yaw_sd_deg))
-        model = CourseModel(self.reverse, yaw, yaw_sd, SLIP_SHARE * slip, self.axle_sd, antenna)
-        means = imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64).mean(axis=0)
-        found = CourseFit(imu, means, fixes, rests, site, sensors, model).search()
+        fixes, found = self.fit(imu, site, sensors, gnss, antenna)
         sd = np.sqrt(np.linalg.eigvalsh(found.covariance[3:5, 3:5])[-1])
         if not sd < LARGEST_TILT_SD:
             raise DataError(
@@ -168,6 +160,25 @@ class GnssCourse(CoarseAlignment):
             place=place,
             findings=findings,
         )
+
+    def fit(
+        self,
+        imu: pd.DataFrame,
+        site: Site,
+        sensors: ImuUncertainty,
+        gnss: pd.DataFrame | None,
+        antenna: Antenna,
+    ) -> tuple[CourseFixes, Found]:
+        """Fixes of a record, and the least squares over them; parameters and errors of `align`."""
+        slowest, widest = self.least_speed, math.radians(self.largest_sd_deg)
+        fixes = course_fixes(imu, gnss, slowest, widest, antenna.velocity_delay)
+        rests = rest_rates(imu, fixes, sensors)
+        yaw = math.radians(self.mounting_yaw_deg) + (math.pi if self.reverse else 0.0)
+        slip = math.radians(self.sideslip_sd_deg)
+        yaw_sd = math.hypot(slip, math.radians(self.mounting_yaw_sd_deg))
+        model = CourseModel(self.reverse, yaw, yaw_sd, SLIP_SHARE * slip, self.axle_sd, antenna)
+        means = imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64).mean(axis=0)
+        return fixes, CourseFit(imu, means, fixes, rests, site, sensors, model).search()
 
 
 # Attitude, velocity and biases at the end of a drive, by least squares over its fixes.
@@ -218,7 +229,8 @@ class Found:
     fixes, north, east, down, near which courses are linear. `weight` ((k,)): weight of each fix.
     `scale`: factor of the scatter of the velocities over their stated one; at least 1. `onward`:
     share of the courses that agree with the assumed direction of driving. `place` ((3,), m): of
-    positions alone, at the end; its covariance follows the 39 rows.
+    positions alone, at the end; its covariance follows the 39 rows. `offset` (s): of the stamps of
+    the fixes from those that were taken, later is positive, and its standard deviation.
     """
 
     C: Array
@@ -230,6 +242,7 @@ class Found:
     scale: float
     onward: float = 1.0
     place: Array = field(default_factory=lambda: np.zeros(3))
+    offset: tuple[float, float] = (0.0, 0.0)
 
     @property
     def bias(self) -> Array:
@@ -306,6 +319,7 @@ class CourseFit:
                 scale = max(1.0, MAD_TO_SD * middle)
             weight = np.array([influence.weight(float(u)) for u in left.max(axis=1) / scale])
             onward = (np.abs(courses[0] - courses[1] @ x) < GROSS).astype(np.float64)
+        offset = -float(x[OFFSET]), float(np.sqrt(inverse[OFFSET, OFFSET]))
         handed, sign = HANDED, SIGN
         if self.by_places:
             handed, sign = np.r_[HANDED, END_PLACE], np.r_[SIGN, np.ones(3)]
@@ -323,6 +337,7 @@ class CourseFit:
             scale,
             float(onward.mean()) if len(onward) else 0.0,
             found.place + x[END_PLACE] if self.by_places else found.place,
+            offset,
         )
 
     @property
@@ -423,8 +438,8 @@ class CourseFit:
         gap = fixes.place - (found.place - way + arm)
         stretch = float(sums.stretch.max())
         push = max(self.sensors.accel.axis("noise_density")) ** 2
-        tilt = (max(self.sensors.gyro.axis("noise_density")) * STANDARD_GRAVITY * stretch) ** 2
-        walk = (push + tilt / 12.0) * stretch**3 / 12.0
+        lean = (max(self.sensors.gyro.axis("noise_density")) * STANDARD_GRAVITY * stretch) ** 2
+        walk = (push + lean / 12.0) * stretch**3 / 12.0
         return gap, out, fixes.place_sd, walk * len(sums.stretch) / 4.0
 
     def _arms(self, count: int) -> Array:

@@ -67,7 +67,8 @@ def draft_navigation(
     made = propose(log, axes=axes, gnss=gnss, sensor=sensor)
     if foot:
         made = on_foot(made)
-        log = log.model_copy(update={"from_s": made.table["log"].get("from_s", log.from_s)})
+    parts = {key: made.table["log"].get(key) for key in ("from_s", "to_s", "duration_s")}
+    log = log.model_copy(update=parts)
     page = Page()
     page.say(
         f"Navigation over {made.recording.name}: place, velocity and attitude, and how well each "

@@ -19,6 +19,8 @@ from strapdown.formats.assemble import require_accel
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import has_fixes, read_gnss
 from strapdown.formats.recording import Recording
+from strapdown.frames import place_difference
+from strapdown.navigation.measurements.clock_windows import step_finding, window_offsets
 from strapdown.navigation.measurements.gnss_clock import (
     check_overlap,
     time_offset,
@@ -71,9 +73,15 @@ RULE = {"kind": "adaptive", "influence": "igg3", "scale": {"lowest": 1.0}}
 CODE_POSITION_SD, CODE_VELOCITY_SD = 5.0, 0.3
 #: Standard deviation of the offset between receiver stamps and sensor clock, s: search range.
 OFFSET_SD = 0.2
-#: Estimates of clocks from the motion are used beyond these standard deviations, and a delay
-#: beyond this time, s; the filter estimates an offset to this standard deviation, s.
-SURE, LEAST_DELAY, LEAST_OFFSET_SD = 4.0, 0.01, 0.05
+#: A delay of velocities is used beyond so many standard deviations and this time, s; an offset of
+#: stamps likewise; the filter then estimates it from this standard deviation, s, at least.
+SURE, LEAST_DELAY = 4.0, 0.01
+SIGNIFICANT, LEAST_OFFSET, LEAST_OFFSET_SD = 3.0, 0.01, 0.05
+#: An offset that is not significant is a state where its uncertainty times the speed exceeds the
+#: standard deviation of the positions so many times.
+FAR = 3.0
+#: Distance to a step of a clock, s.
+ASIDE = 2.0
 #: Stamps with an offset come from another clock, and two quartz clocks drift apart by 50 ppm:
 #: a random walk of this many s/√s over 400 s, during which the offset may be unobservable.
 APART = 1e-3
@@ -182,10 +190,17 @@ def propose(
     span = float(imu.index[-1] - imu.index[0])
     measured = fixes is not None and np.isfinite(values_of(fixes, VELOCITY_SD[:2])).any()
     chosen, how = _alignment(named, rest, drives, heading_deg, span, bool(measured))
+    clock: dict[str, float] = {}
+    if fixes is not None:
+        clock, step = _clock(fixes, imu, drives, None if named is None else _stated(table))
+        if step is not None:
+            part = _longer_part(log, imu, step)
+            made = propose(
+                part, axes=axes, gnss=gnss, sensor=sensor, site=site, heading_deg=heading_deg
+            )
+            return replace(made, findings=(*made.findings, step))
     if fixes is not None and named is not None and chosen["coarse"]["kind"] == "gnss_course":
-        stated = table["sensors"]
-        known = (load_sensor(named), stated.get("gyro", {}), stated.get("accel", {}))
-        chosen, how, tried = _tried(chosen, how, imu, fixes, stated_imu(*known))
+        chosen, how, tried = _tried(chosen, how, imu, fixes, _stated(table))
         findings = (*findings, *tried)
     table |= chosen
     if fixes is not None:
@@ -197,10 +212,27 @@ def propose(
                 "lever_arm_m": (0.0, 0.0, 0.0),
                 "update_rule": RULE,
                 **{k: fixes.attrs[taken] for taken, k in TAKEN.items() if taken in fixes.attrs},
-                **_clock(fixes, imu, drives),
+                **clock,
             }
         }
     return Proposal(table, recording, imu, fixes, rest, noise, guessed, drives, how, findings)
+
+
+def _stated(table: dict[str, Any]) -> ImuUncertainty:
+    """Uncertainty of the sensors in a proposed table."""
+    stated = table["sensors"]
+    sensor = load_sensor(stated["sensor"])
+    return stated_imu(sensor, stated.get("gyro", {}), stated.get("accel", {}))
+
+
+def _longer_part(log: LogTable, imu: pd.DataFrame, step: Finding) -> LogTable:
+    """The longer part of a log before or after a step of a clock."""
+    time = index_of(imu)
+    before, after = step.data["begin"] - ASIDE, step.data["end"] + ASIDE
+    if before - time[0] >= time[-1] - after:
+        return log.model_copy(update={"to_s": round(before, 3), "duration_s": None})
+    to = log.to_s if log.duration_s is None else float(time[-1])
+    return log.model_copy(update={"from_s": round(after, 3), "to_s": to, "duration_s": None})
 
 
 def _scatter(imu: pd.DataFrame) -> tuple[Array, Array] | None:
@@ -328,19 +360,46 @@ def _moving(fixes: pd.DataFrame) -> tuple[int | None, float]:
     return begins, fastest
 
 
-def _clock(fixes: pd.DataFrame, imu: pd.DataFrame, drives: bool) -> dict[str, float]:
-    """Delays of the receiver's velocities and stamps, where the motion makes them observable."""
+def _clock(
+    fixes: pd.DataFrame, imu: pd.DataFrame, drives: bool, sensors: ImuUncertainty | None = None
+) -> tuple[dict[str, float], Finding | None]:
+    """Delays of the receiver's velocities and stamps that are significant, and a clock step.
+
+    An offset is a state of the filter where it is significant, and where its uncertainty moves the
+    vehicle by far more than the standard deviation of its fixes.
+    """
     late = velocity_delay(fixes)
     delay = 0.0 if late is None or late.delay < SURE * late.sd else late.delay
-    found = time_offset(fixes, imu, delay)
     out = {"velocity_delay_s": round(delay, 3)} if delay > LEAST_DELAY else {}
+    scan = time_offset(fixes, imu, delay)
+    found = None if scan is None else (scan.offset, scan.sd)
+    if drives and sensors is not None:
+        windows = window_offsets(fixes, imu, sensors, 0.0 if found is None else found[0], delay)
+        step = windows.step()
+        if step is not None:
+            return out, step_finding(fixes, imu, step)
+        joint = windows.joint()
+        if joint is not None and (found is None or joint[1] < found[1]):
+            found = joint
     if found is None:
-        return out | ({"time_offset_sd_s": OFFSET_SD} if drives else {})
-    sd = max(2.0 * found.sd, LEAST_OFFSET_SD)
-    out |= {"time_offset_s": round(found.offset, 3), "time_offset_sd_s": round(sd, 3)}
-    if abs(found.offset) > SURE * found.sd:
-        out["time_offset_drift_s_per_sqrt_s"] = APART
-    return out
+        return out | ({"time_offset_sd_s": OFFSET_SD} if drives else {}), None
+    offset, sd = found
+    if abs(offset) > max(SIGNIFICANT * sd, LEAST_OFFSET):
+        out |= {"time_offset_s": round(offset, 3)}
+        out |= {"time_offset_sd_s": round(max(2.0 * sd, LEAST_OFFSET_SD), 3)}
+        return out | {"time_offset_drift_s_per_sqrt_s": APART}, None
+    if _speed(fixes) * sd > FAR * float(np.median(values_of(fixes, POSITION_SD)[:, :2])):
+        out |= {"time_offset_sd_s": max(round(2.0 * sd, 3), 0.001)}
+    return out, None
+
+
+def _speed(fixes: pd.DataFrame) -> float:
+    """Root mean square of the speed over ground by positions, m/s."""
+    place = values_of(fixes, GEODETIC)
+    if len(place) < 2:
+        return 0.0
+    way = np.linalg.norm(place_difference(place[1:], place[:-1])[:, :2], axis=1)
+    return float(np.sqrt(np.mean(np.square(way / np.diff(index_of(fixes))))))
 
 
 def _alignment(

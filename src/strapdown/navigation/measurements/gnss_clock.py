@@ -389,6 +389,8 @@ GNSS_DELAY_LEAST_STEPS, GNSS_DELAY_LONGEST_STEP = 20, 1.5
 #: Length of the segments over which positions and velocities are compared, s: long against their
 #: noise, short against the correlation time of position errors.
 PIECE = 2.0
+#: A residual of so many medians has no weight, and a usual one nearly all.
+FAULT = 6.0
 #: A delay is reported from so many standard deviations, if it matters: if the velocity error by it
 #: is at least this part of the stated standard deviation.
 GNSS_DELAY_SURE, MATTERS = 4.0, 0.5
@@ -463,16 +465,23 @@ def velocity_delay(table: pd.DataFrame) -> VelocityDelay | None:
     def left(delay: float) -> Array:
         return np.asarray(moved[near] - between(way(time + delay)))
 
+    def weights(residuals: Array) -> Array:
+        """Redescending weights by the size of a residual: a fault of some seconds has none."""
+        size = np.linalg.norm(residuals, axis=1)
+        scale = max(float(np.median(size)), 1e-9)
+        return np.asarray(np.square(np.maximum(1.0 - np.square(size / (FAULT * scale)), 0.0)))
+
     grid = np.arange(-GNSS_DELAY_LARGEST, GNSS_DELAY_LARGEST + 1e-9, 0.05)
-    delay = float(grid[np.argmin([np.square(left(d)).sum() for d in grid])])
+    delay = float(grid[np.argmin([np.linalg.norm(left(d), axis=1).sum() for d in grid])])
     for _ in range(6):
         gained = between(speed(time + delay))
-        power = float(np.square(gained).sum())
+        weight = weights(left(delay))[:, None]
+        power = float((weight * np.square(gained)).sum())
         if power == 0.0:
             return None
-        delay += float((gained * left(delay)).sum()) / power
+        delay += float((weight * gained * left(delay)).sum()) / power
         delay = min(max(delay, -GNSS_DELAY_LARGEST), GNSS_DELAY_LARGEST)
-    score = (gained * left(delay)).sum(axis=1)
+    score = (weight * gained * left(delay)).sum(axis=1)
     variance, lags = float(score @ score), 2 * apart
     # With negatively correlated residuals the sum may vanish.
     least = 0.05 * variance

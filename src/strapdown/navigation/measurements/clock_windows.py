@@ -1,0 +1,244 @@
+"""Clock offset of a receiver in windows of a drive: its value, its significance, and its steps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.alignment.alignment import Site
+from strapdown.alignment.course_sums import Antenna
+from strapdown.alignment.gnss_course import GnssCourse
+from strapdown.errors import DataError, DivergenceError, Finding
+from strapdown.frames import place_difference
+from strapdown.sensors.uncertainty import ImuUncertainty
+from strapdown.tables import ACCEL, GEODETIC, GYRO
+from strapdown.tables.checks import index_of, source_of, values_of
+
+__all__ = ["ClockStep", "Offsets", "step_finding", "window_offsets"]
+
+Array = NDArray[np.float64]
+
+#: Length of a window, s, and the largest number of them.
+WINDOW, MOST = 60.0, 10
+#: Offset before a fit, s, one standard deviation, and the rounds with the stamps corrected by the
+#: last: the fit is linear in the offset.
+UNKNOWN, ROUNDS = 0.5, 3
+#: Windows end where the vehicle moves: if not, so many times earlier by so much, s.
+EARLIER = (0.0, 7.0, 15.0)
+#: Nothing is known in advance of how the unit is mounted, deg.
+MOUNTING = 20.0
+#: Nor where it is: a course that is ahead of the heading by d / v looks like an offset, m.
+AXLE = 10.0
+#: Samples are averaged to this rate, Hz: motions of a vehicle are slower.
+FAST = 20.0
+#: The way between two fixes shows a step of the receiver's clock to this part of it.
+AGREES = 0.3
+#: A window beyond so many standard deviations of the others has a fault of its own; a step of the
+#: clock is found from so many, from this size, s, and from so many windows on each side.
+STRAYS, CLEAR, LEAST_STEP, SIDE = 4.0, 6.0, 0.2, 2
+
+
+@dataclass(frozen=True)
+class ClockStep:
+    """Step of the offset between two clocks: size in s, and the interval in which it occurs."""
+
+    size: float
+    sd: float
+    after: float
+    before: float
+
+
+@dataclass(frozen=True, eq=False)
+class Offsets:
+    """Offsets (w,) s of windows that begin and end at times (w, 2) s, with standard deviations."""
+
+    spans: Array
+    offset: Array
+    sd: Array
+
+    def joint(self) -> tuple[float, float] | None:
+        """Offset of all windows and its standard deviation; windows that stray do not count.
+
+        A part of the errors is common to the windows, as those of biases: what their scatter lacks
+        of their standard deviations. It does not fall with their number. None without two windows
+        that agree.
+        """
+        if len(self.offset) < 2:
+            return None
+        order = np.argsort(self.offset)
+        part = np.cumsum(self.sd[order] ** -2)
+        middle = float(self.offset[order][np.searchsorted(part, 0.5 * part[-1])])
+        used = np.abs(self.offset - middle) < STRAYS * np.maximum(self.sd, np.median(self.sd))
+        if used.sum() < 2:
+            return None
+        weight = self.sd[used] ** -2
+        offset = float(weight @ self.offset[used] / weight.sum())
+        share = float(weight @ np.square(self.offset[used] - offset)) / (used.sum() - 1)
+        common = max(0.0, 1.0 - share) * used.sum()
+        return offset, float(np.sqrt((share + common) / weight.sum()))
+
+    def step(self) -> ClockStep | None:
+        """The most likely single step, if it is significant."""
+        best, found = np.inf, None
+        for k in range(SIDE, len(self.offset) - SIDE + 1):
+            left = Offsets(self.spans[:k], self.offset[:k], self.sd[:k]).joint()
+            right = Offsets(self.spans[k:], self.offset[k:], self.sd[k:]).joint()
+            if left is None or right is None:
+                continue
+            level = np.where(np.arange(len(self.offset)) < k, left[0], right[0])
+            far = np.abs(self.offset - level) / self.sd
+            cost = float(np.minimum(np.square(far), STRAYS**2).sum())
+            if cost < best:
+                sd = float(np.hypot(left[1], right[1]))
+                best = cost
+                found = ClockStep(right[0] - left[0], sd, self.spans[k - 1, 0], self.spans[k, 1])
+        if found is None or abs(found.size) < max(CLEAR * found.sd, LEAST_STEP):
+            return None
+        return found
+
+
+def window_offsets(
+    gnss: pd.DataFrame,
+    imu: pd.DataFrame,
+    sensors: ImuUncertainty,
+    start: float = 0.0,
+    velocity_delay: float = 0.0,
+) -> Offsets:
+    """Fit the offset in windows of a drive, with attitude, velocity and biases.
+
+    Parameters
+    ----------
+    start : float, s
+        Stamps of the receiver minus the time of the sensors, near the answer: the fit of a window
+        converges from a second away.
+    velocity_delay : float, s
+
+    Returns
+    -------
+    Offsets
+        Of the windows that allow an alignment by course; others do not show an offset.
+
+    Notes
+    -----
+    The offset is an unknown of `GnssCourse`, which shifts each fix by its velocity, or changes its
+    velocity by the acceleration. The prior of `UNKNOWN` is taken off the answer.
+    """
+    time, stamps = index_of(imu), index_of(gnss) - start
+    begin, end = max(time[0], stamps[0]), min(time[-1], stamps[-1])
+    count = int(min(MOST, max(1.0, (end - begin) // WINDOW)))
+    ends = begin + (end - begin) * (np.arange(count) + 1.0) / count
+    imu = _thinned(imu)
+    spans, found = [], []
+    for last in ends.tolist():
+        for earlier in EARLIER:
+            span = max(begin, last - WINDOW - earlier), last - earlier
+            one = _window(gnss, imu, sensors, span, start, velocity_delay)
+            if one is not None:
+                spans.append(span)
+                found.append(one)
+                break
+    values = np.array(found, dtype=np.float64).reshape(-1, 2)
+    return Offsets(np.array(spans).reshape(-1, 2), values[:, 0], values[:, 1])
+
+
+def _thinned(imu: pd.DataFrame) -> pd.DataFrame:
+    """Means over as many samples as leave `FAST` of them a second."""
+    time = index_of(imu)
+    each = max(1, int(1.0 / (FAST * float(np.median(np.diff(time))))))
+    if each == 1:
+        return imu
+    count = len(time) // each
+    columns = [*GYRO, *ACCEL]
+    values = values_of(imu, columns)[: count * each].reshape(count, each, -1).mean(axis=1)
+    # A rate at its stamp is a mean over the steps about it.
+    late = 0.0 if imu.attrs["sampling"] == "mean" else 0.5 * float(np.median(np.diff(time)))
+    out = pd.DataFrame(values, pd.Index(time[each - 1 : count * each : each] + late, name="time"))
+    out.columns, out.attrs = columns, {**imu.attrs, "sampling": "mean"}
+    return out
+
+
+def _window(
+    gnss: pd.DataFrame,
+    imu: pd.DataFrame,
+    sensors: ImuUncertainty,
+    span: tuple[float, float],
+    start: float,
+    velocity_delay: float,
+) -> tuple[float, float] | None:
+    """Offset and standard deviation of one window; None where it does not show one."""
+    part = imu.loc[span[0] : span[1]]
+    stamps, offset = index_of(gnss), start
+    if len(part) < 2:
+        return None
+    for _ in range(ROUNDS):
+        near = (stamps - offset >= span[0]) & (stamps - offset <= span[1])
+        fixes = gnss[near].set_axis(stamps[near] - offset)
+        fixes.index.name, fixes.attrs = "time", dict(gnss.attrs)
+        if len(fixes) < 2:
+            return None
+        site = Site(*np.median(values_of(fixes, GEODETIC), axis=0).tolist())
+        antenna = Antenna(velocity_delay=velocity_delay, time_offset_sd=UNKNOWN)
+        way = GnssCourse(mounting_yaw_sd_deg=MOUNTING, axle_sd=AXLE)
+        try:
+            more, sd = way.fit(part, site, sensors, fixes, antenna)[1].offset
+        except (DataError, DivergenceError):
+            return None
+        known = 1.0 - (sd / UNKNOWN) ** 2
+        if not known > 0.5:
+            return None
+        more, sd = more / known, sd / float(np.sqrt(known))
+        offset += more
+        if abs(more) < 0.3 * sd:
+            break
+    return offset, sd
+
+
+def step_finding(gnss: pd.DataFrame, imu: pd.DataFrame, step: ClockStep) -> Finding:
+    """The finding of a step, dated by the stamps or the way between fixes that show it."""
+    begin, end, which = _date(gnss, imu, step)
+    codes = {
+        "receiver": "navigation.clock-step-of-receiver",
+        "sensors": "navigation.clock-step-of-sensors",
+    }
+    return Finding(
+        codes[which],
+        file=source_of(gnss),
+        quantity="time",
+        size=step.size,
+        sd=step.sd,
+        time=0.5 * (begin + end),
+        begin=begin,
+        end=end,
+    )
+
+
+def _date(gnss: pd.DataFrame, imu: pd.DataFrame, step: ClockStep) -> tuple[float, float, str]:
+    """Between which instants a step occurs, and of which clock it is.
+
+    At a step of the receiver's clock the way from a fix to the next does not go with their stamps
+    and the ways before and after. Otherwise the step is of the sensors' clock, at their longest
+    interval, or in the middle where they have none.
+    """
+    stamps = index_of(gnss)
+    rows = np.flatnonzero((stamps >= step.after) & (stamps <= step.before))
+    time, place = stamps[rows], values_of(gnss, GEODETIC)[rows]
+    if len(rows) > 4:
+        steps = np.diff(time)
+        way = np.linalg.norm(place_difference(place[1:], place[:-1])[:, :2], axis=1)
+        padded = np.pad(way / steps, 2, "edge")
+        near = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
+        # Time that the way takes beyond its stamps, at the speed about it.
+        beyond = np.where(near > 1.0, way / np.maximum(near, 1.0) - steps, 0.0)
+        k = int(np.argmin(np.abs(beyond + step.size)))
+        if abs(beyond[k] + step.size) < AGREES * abs(step.size):
+            return float(time[k]), float(time[k + 1]), "receiver"
+    own = index_of(imu)
+    near_own = own[(own >= step.after) & (own <= step.before)]
+    gaps = np.diff(near_own)
+    if len(gaps) and gaps.max() > 5.0 * np.median(gaps):
+        k = int(np.argmax(gaps))
+        return float(near_own[k]), float(near_own[k + 1]), "sensors"
+    return float(step.after), float(step.before), "sensors"

@@ -1,0 +1,155 @@
+"""Offset of a receiver's clock in windows of a drive."""
+
+from __future__ import annotations
+
+import sys
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[3]))
+
+import town_drive as town
+from strapdown.frames import geodetic_from_ned
+from strapdown.navigation.measurements.clock_windows import step_finding, window_offsets
+from strapdown.navigation.measurements.gnss_clock import velocity_delay
+from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
+from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
+from strapdown.simulation import Origin, car, simulate_imu
+from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
+from strapdown.simulation.vehicles import Accelerate, Brake, Straight, Turn
+from strapdown.tables import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD, gnss_table
+
+SENSORS = ImuUncertainty(
+    TriadUncertainty(noise_density=town.GYRO_NOISE, bias=town.GYRO_BIAS),
+    TriadUncertainty(noise_density=town.ACCEL_NOISE, bias=town.ACCEL_BIAS),
+)
+
+
+@cache
+def motion():
+    """Ten minutes around blocks."""
+    legs = [("begin", Straight(4.0))]
+    for k in range(20):
+        legs += [
+            (f"{k} bend", Turn(90.0 if k % 2 else -90.0, 25.0, ramp=2.0)),
+            (f"{k} faster", Accelerate(11.0 + k % 4, 5.0)),
+            (f"{k} on", Straight(5.0 + k % 3)),
+            (f"{k} slower", Brake(8.0 + k % 3, 4.0)),
+            (f"{k} bend back", Turn(-100.0 if k % 2 else 80.0, 30.0, ramp=2.0)),
+            (f"{k} and on", Straight(4.0)),
+        ]
+    return car(Origin(45.0, 20.0, 80.0), legs, speed=10.0)
+
+
+@cache
+def imu(seed):
+    rng = np.random.default_rng(seed)
+    errors = ImuErrors(
+        TriadErrors(noise_density=town.GYRO_NOISE, bias=tuple(rng.normal(0, town.GYRO_BIAS, 3))),
+        TriadErrors(noise_density=town.ACCEL_NOISE, bias=tuple(rng.normal(0, town.ACCEL_BIAS, 3))),
+    )
+    return simulate_imu(motion(), errors, rate=20.0, sampling="mean", seed=seed)[0]
+
+
+def fixes(seed, *, offset=0.0, velocities=False, noise=0.5, late=0.0):
+    """Fixes by a clock that is so much ahead; velocities late by so much."""
+    receiver = GnssReceiver(rate=1.0, position_noise=noise, velocity_noise=0.05)
+    table = simulate_gnss(motion(), receiver, seed=seed)
+    time = table.index.to_numpy()
+    speed = table[VELOCITY].to_numpy()
+    if late:
+        speed = np.column_stack([np.interp(time - late, time, one) for one in speed.T])
+    sd = table[VELOCITY_SD].to_numpy() if velocities else np.full((len(time), 3), np.inf)
+    place = table[GEODETIC].to_numpy()
+    return gnss_table(time + offset, place, speed, table[POSITION_SD].to_numpy(), sd, source="g")
+
+
+def moved(table, stamps=None, place=None):
+    """The same fixes at other stamps or places."""
+    return gnss_table(
+        table.index.to_numpy() if stamps is None else stamps,
+        table[GEODETIC].to_numpy() if place is None else place,
+        *(table[names].to_numpy() for names in (VELOCITY, POSITION_SD, VELOCITY_SD)),
+        source="g",
+    )
+
+
+def faulty(table):
+    """Five seconds 50 m to the north."""
+    place = table[GEODETIC].to_numpy().copy()
+    for k in range(200, 205):
+        place[k] = geodetic_from_ned([50.0, 0.0, 0.0], place[k])
+    return moved(table, place=place)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("true", [0.0, 0.3])
+def test_an_offset_does_not_depend_on_where_it_starts(true):
+    table = fixes(7101, offset=true)
+    found = [window_offsets(table, imu(7101), SENSORS, s).joint() for s in (-0.2, 0.0, 0.1)]
+    values, sds = np.array(found).T
+    assert np.ptp(values) < 0.3 * sds.max()
+    assert (np.abs(values - true) < 3.0 * sds).all()
+
+
+@pytest.mark.slow
+def test_offsets_of_drives_are_within_their_bounds():
+    errors = []
+    for seed in range(7201, 7207):
+        velocities = seed % 2 == 0
+        offset, sd = window_offsets(fixes(seed, velocities=velocities), imu(seed), SENSORS).joint()
+        errors.append(offset / sd)
+    # Of six, none beyond three standard deviations, and their mean square not that of a bound
+    # that is a third of the error.
+    assert np.abs(errors).max() < 3.0
+    assert np.mean(np.square(errors)) < 2.8
+
+
+@pytest.mark.slow
+def test_five_seconds_of_a_fault_move_neither_offset_nor_delay():
+    table = fixes(7301)
+    plain = window_offsets(table, imu(7301), SENSORS)
+    other = window_offsets(faulty(table), imu(7301), SENSORS)
+    assert abs(other.joint()[0] - plain.joint()[0]) < 0.5 * plain.joint()[1]
+    assert other.step() is None
+    delayed = fixes(7302, velocities=True, late=0.25)
+    for one in (delayed, faulty(delayed)):
+        found = velocity_delay(one)
+        assert abs(found.delay - 0.25) < 4.0 * found.sd
+        assert found.delay > 4.0 * found.sd
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("at", "size"), [(211.5, 1.0), (390.5, -1.0)])
+def test_a_step_of_the_receivers_clock_is_found_and_dated(at, size):
+    table = fixes(7401)
+    stamps = table.index.to_numpy()
+    kept = (stamps < at) | (stamps > at + 2.0)
+    table, stamps = table[kept], stamps[kept]
+    stepped = moved(table, stamps=stamps + np.where(stamps > at, size, 0.0))
+    step = window_offsets(stepped, imu(7401), SENSORS).step()
+    assert step is not None
+    assert abs(step.size - size) < 3.0 * step.sd
+    finding = step_finding(stepped, imu(7401), step)
+    assert finding.code == "navigation.clock-step-of-receiver"
+    assert finding.data["begin"] <= at + 1.0
+    assert finding.data["end"] >= at - 1.0
+    assert finding.data["end"] - finding.data["begin"] < 5.0
+
+
+@pytest.mark.slow
+def test_a_step_of_the_sensors_clock_is_found_and_dated():
+    record = imu(7501)
+    time = record.index.to_numpy()
+    late = record.set_axis(time + np.where(time > 300.02, 1.0, 0.0))
+    late.index.name, late.attrs = "time", dict(record.attrs)
+    table = fixes(7501)
+    step = window_offsets(table, late, SENSORS).step()
+    assert step is not None
+    assert abs(step.size + 1.0) < 3.0 * step.sd
+    finding = step_finding(table, late, step)
+    assert finding.code == "navigation.clock-step-of-sensors"
+    assert 300.0 <= finding.data["end"] <= 301.1
