@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from scipy.signal import lfilter
 from scipy.spatial.transform import Rotation
-from tests.drives.motion import DEG, KINDS, MARGIN, STEP, G, Motion, geodetic, make_motion, to_ned
+from tests.drives.motion import DEG, KINDS, G, Motion, geodetic, make_motion, to_ned
 
 GRADES = ("phone", "industrial", "tactical", "navigation")
 ROOT = 20261123
@@ -80,7 +80,9 @@ def _figures(rng: np.random.Generator, keys: tuple[str, ...], bounds: Any) -> di
 
 
 def _pick(rng: np.random.Generator, choices: Mapping[str, float]) -> str:
-    return str(rng.choice(list(choices), p=np.array(list(choices.values())) / sum(choices.values())))
+    return str(
+        rng.choice(list(choices), p=np.array(list(choices.values())) / sum(choices.values()))
+    )
 
 
 # ------------------------------------------------------------------------------- the draw
@@ -96,6 +98,8 @@ def draw(seed: int) -> dict[str, Any]:
     out["lat_deg"] = round(float(rng.uniform(-55, 66)), 5)
     out["lon_deg"] = round(float(rng.uniform(-179, 179)), 5)
     out["alt_m"] = round(float(rng.uniform(20, 1200)), 1) if kind != "boat" else 30.0
+    if kind == "aircraft" and out["start"] == "moving":
+        out["alt_m"] += 800.0
     out["hand_deg"] = round(float(rng.choice([0.0, 3.0, 8.0])), 1)
     reach = {"town": (1.5, 0.4, 0.5), "motorway": (1.5, 0.4, 0.5), "aircraft": (1.5, 0.3, 0.4)}.get(
         kind, (2.0, 0.8, 0.8) if kind == "boat" else (0.1, 0.1, 0.1)
@@ -133,7 +137,9 @@ def draw(seed: int) -> dict[str, Any]:
     out["mount_deg"] = [round(float(x), 3) for x in np.array(skew) * rng.uniform(-1, 1, 3)]
 
     rng = stream(seed, "receiver.draw")
-    shares = {"phone": (0.4, 0.45, 0.15), "industrial": (0.45, 0.15, 0.4)}.get(grade, (0.4, 0.0, 0.6))
+    shares = {"phone": (0.4, 0.45, 0.15), "industrial": (0.45, 0.15, 0.4)}.get(
+        grade, (0.4, 0.0, 0.6)
+    )
     receiver = _pick(rng, dict(zip(("code", "phone", "rtk"), shares, strict=True)))
     out["receiver"] = receiver
     out["fix_hz"] = 1 if receiver == "phone" else int(rng.choice([1, 2, 4, 5, 10], p=[0.3, 0.1, 0.2, 0.25, 0.15]))  # fmt: skip
@@ -175,12 +181,16 @@ def draw(seed: int) -> dict[str, Any]:
     out["step_s"] = 0.0
     if rng.random() < 0.1:
         back = rng.random() < 0.4
-        out["step_s"] = round(float(rng.uniform(0.2, 0.9)) * (-1.0 / out["fix_hz"] if back else 1), 3)
+        out["step_s"] = round(
+            float(rng.uniform(0.2, 0.9)) * (-1.0 / out["fix_hz"] if back else 1), 3
+        )
     out["step_at_s"] = round(float(rng.uniform(0.3, 0.8)) * out["duration_s"], 1)
     out["clock"] = _pick(rng, {"since start": 0.5, "unix": 0.35, "uptime": 0.15})
     phone = grade == "phone"
     out["jitter_s"] = round(_log(rng, 1e-5, 1.5e-3), 6) if phone else 0.0
-    out["lost_share"] = round(float(rng.uniform(0, 2e-3)), 5) if phone and rng.random() < 0.4 else 0.0
+    out["lost_share"] = (
+        round(float(rng.uniform(0, 2e-3)), 5) if phone and rng.random() < 0.4 else 0.0
+    )
 
     rng = stream(seed, "person.draw")
     out["knows_sensor"] = bool(rng.random() < 0.5)
@@ -194,7 +204,9 @@ def draw(seed: int) -> dict[str, Any]:
 
 
 # ------------------------------------------------------------------------------ the sensor
-def _wander(rng: np.random.Generator, n: int, step: float, tau: float, width: int = 3) -> np.ndarray:
+def _wander(
+    rng: np.random.Generator, n: int, step: float, tau: float, width: int = 3
+) -> np.ndarray:
     """Gauss-Markov processes of unit variance."""
     k = np.exp(-step / tau)
     drive = np.sqrt(1 - k * k) * rng.normal(size=(n, width))
@@ -295,7 +307,9 @@ class Made:
         return {
             "axes": d["axes"],
             "lever_arm_m": d["arm_measured_m"],
-            "heading_deg": round(float(first["heading"][0]) + float(stream(d["seed"], "person").normal(0, 3)), 0),  # fmt: skip
+            "heading_deg": round(
+                float(first["heading"][0]) + float(stream(d["seed"], "person").normal(0, 3)), 0
+            ),  # fmt: skip
             "sensor": d["part"] if d["knows_sensor"] else None,
             "position_sd_m": sd,
             "velocity_sd_m_per_s": {"code": 0.1, "phone": 0.5, "rtk": 0.05}[d["receiver"]],
@@ -391,7 +405,7 @@ LOG_STYLES: dict[str, tuple[str, str, str, float, float, float]] = {
 #: Names of time, latitude, longitude, height, velocities, speed, course, standard deviations.
 FIX_STYLES: dict[str, dict[str, str]] = {
     "plain": {
-        "time": "time_s", "lat": "lat_deg", "lon": "lon_deg", "alt": "alt_ellipsoid_m",
+        "time": "time_s", "lat": "lat_deg", "lon": "lon_deg", "alt": "height_ellipsoid_m",
         "VN": "vn_m_s", "VE": "ve_m_s", "VD": "vd_m_s", "speed": "speed_m_s", "course": "course_deg",
         "sd": "sd_{d}_m", "vsd": "sd_v{d}_m_s",
     },
@@ -402,7 +416,7 @@ FIX_STYLES: dict[str, dict[str, str]] = {
     },
     "receiver": {
         "time": "time_s", "lat": "latitude", "lon": "longitude", "alt": "h_ell_m", "VN": "vN",
-        "VE": "vE", "VD": "vD", "speed": "speed_m_s", "course": "heading_of_motion_deg",
+        "VE": "vE", "VD": "vD", "speed": "speed_m_s", "course": "bearing_deg",
         "sd": "sd{D}", "vsd": "std_v{d}",
     },
 }  # fmt: skip
@@ -411,7 +425,12 @@ FIX_STYLES: dict[str, dict[str, str]] = {
 def _write(path: Path, names: list[str], columns: list[np.ndarray], digits: list[int]) -> None:
     formats = [f"%.{k}f" for k in digits]
     np.savetxt(
-        path, np.column_stack(columns), fmt=formats, delimiter=",", header=",".join(names), comments=""
+        path,
+        np.column_stack(columns),
+        fmt=formats,
+        delimiter=",",
+        header=",".join(names),
+        comments="",
     )
 
 
@@ -464,12 +483,11 @@ def make(facts: Mapping[str, Any], folder: Path) -> Made:
             (says["sd"].format(d=x, D=x.upper()), got["sd"][:, k], 4) for k, x in enumerate(letters)
         ]
         if d["velocity"] == "ned":
-            rows += [(says["vsd"].format(d=x), got["velocity_sd"][:, k], 4) for k, x in enumerate("ned")]
+            rows += [
+                (says["vsd"].format(d=x), got["velocity_sd"][:, k], 4) for k, x in enumerate("ned")
+            ]
     _write(folder / "fixes.csv", *map(list, zip(*rows, strict=True)))
     return Made(
         d, folder / "imu.csv", folder / "fixes.csv", motion, stamps, t, gyro, accel,
         got["stamp"], got["t"], got["ecef"], got["sound"],
     )  # fmt: skip
-
-
-__all__ = ["AXES", "GRADES", "MARGIN", "STEP", "Made", "draw", "fixes", "make", "samples", "stream"]

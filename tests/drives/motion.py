@@ -61,7 +61,7 @@ def to_ned(lat: Any, lon: Any) -> np.ndarray:
 
 
 def gravity(lat: Any, alt: Any) -> np.ndarray:
-    """Normal gravity along the normal of the ellipsoid, m/s² (Somigliana, second order in height)."""
+    """Normal gravity down the normal, m/s² (Somigliana, second order in height)."""
     s2 = np.sin(lat) ** 2
     surface = 9.7803253359 * (1 + 0.00193185265241 * s2) / np.sqrt(1 - E2 * s2)
     m = EARTH_RATE**2 * A**3 * (1 - F) / GM
@@ -242,7 +242,7 @@ def _road(
     pitch = np.arctan(slope) + lean + 0.25 * DEG * rough * bounce[:, 1]
     roll = -speed * rate * rng.uniform(0.2, 0.8) * DEG + 0.35 * DEG * rough * bounce[:, 2]
     flat = speed * np.cos(np.arctan(slope))
-    return np.column_stack([flat, hill + 0.004 * rough * bounce[:, 0]]), pitch, roll
+    return np.column_stack([flat, hill + 0.0025 * rough * bounce[:, 0]]), pitch, roll
 
 
 def _turned(along: np.ndarray, heading: np.ndarray, t: np.ndarray) -> np.ndarray:
@@ -308,7 +308,7 @@ def _aircraft(
     wind = rng.uniform(0, 12) * np.array([np.sin(wind_to), np.cos(wind_to)])
     flat = _turned(np.sqrt(np.maximum(speed**2 - up**2, 0)), heading, t)
     flat += cumulative_trapezoid(airborne[:, None] * wind, t, axis=0, initial=0.0)
-    high = cumulative_trapezoid(up, t, initial=0.0) + 0.25 * rough * gusts[:, 2]
+    high = cumulative_trapezoid(up, t, initial=0.0) + 0.05 * rough * gusts[:, 2]
     heading = heading + 0.8 * DEG * rough * gusts[:, 3]
     engine = np.clip(0.3 + 0.7 * speed / cruise, 0, 1)
     return np.column_stack([flat, high]), heading, pitch, bank, engine
@@ -370,7 +370,7 @@ def _boat(rng: np.random.Generator, t: np.ndarray, draw: dict[str, Any]) -> tupl
         now += length + rng.uniform(3, 30)
     heading = rng.uniform(-np.pi, np.pi) + cumulative_trapezoid(rate, t, initial=0.0)
     sea = rng.uniform(0.2, 1.0) * (0.4 + 0.6 * np.clip(speed / cruise, 0, 1))
-    waves = noise(rng, n, 0.12, 0.4, 4) + 0.1 * noise(rng, n, 0.8, 2.0, 4)
+    waves = noise(rng, n, 0.12, 0.4, 4) + 0.03 * noise(rng, n, 0.8, 2.0, 4)
     pitch = 2.0 * DEG * sea * waves[:, 0] + 0.3 * DEG * speed
     roll = 4.0 * DEG * sea * waves[:, 1] + np.arctan(speed * rate / G) * 0.8
     set_to, way = rng.uniform(-np.pi, np.pi), _turned(speed, heading, t)
@@ -390,7 +390,7 @@ def make_motion(rng: np.random.Generator, draw: dict[str, Any], mount: Rotation)
     vehicle = Rotation.from_euler("ZYX", np.column_stack([heading, pitch, roll]))
     arm = vehicle.apply(draw["unit_at_m"])  # north, east, down
     path = path + np.column_stack([arm[:, 1], arm[:, 0], -arm[:, 2]])
-    path = path - path[int(round(MARGIN / STEP))]
+    path = path - path[round(MARGIN / STEP)]
     path[:, 2] -= (path[:, 0] ** 2 + path[:, 1] ** 2) / (2 * A)  # along the level of the Earth
     spline = make_interp_spline(t, np.column_stack([path, heading, pitch, roll]), k=5)
     disturbance = rng.normal(0, [1.5e-4, 1.5e-4, 3e-4])  # deflection of some seconds of arc
