@@ -1,9 +1,9 @@
 """Made-up short drives with their exact truth, as the logs and fixes of people would have them.
 
-`draw` draws from one seed what a record is, a table of plain numbers and words; `make` makes it: the
-motion, the samples of a sensor, the fixes of a receiver, both files, and what their owner knows. A
-part of the draw can be changed and the rest stays as it was, because every part has its own stream
-of random numbers. The generator knows nothing of how a navigator works or begins.
+`draw` draws from one seed what a record is, as plain numbers and words; `make` makes it:
+the motion, the samples of a sensor, the fixes of a receiver, both files, and what their owner
+knows. A part of the draw can be changed and the rest stays as it was, because every part has its
+own stream of random numbers. The generator knows nothing of how a navigator works or begins.
 """
 
 from __future__ import annotations
@@ -32,7 +32,8 @@ GYRO = {
         (2e-3, 1e-2), (0.02, 0.4), (2, 20), (0.05, 0.5), (0.03, 0.3), (2e-3, 0.02), (5e-3, 0.05),
     ],
     "tactical": [
-        (5e-4, 3e-3), (2e-4, 8e-3), (0.2, 4), (0.01, 0.1), (0.006, 0.06), (2e-4, 2e-3), (2e-4, 3e-3),
+        (5e-4, 3e-3), (2e-4, 8e-3), (0.2, 4), (0.01, 0.1), (6e-3, 0.06), (2e-4, 2e-3),
+        (2e-4, 3e-3),
     ],
     "navigation": [
         (2e-5, 2e-4), (5e-7, 1e-5), (1e-3, 2e-2), (5e-4, 3e-3), (3e-4, 3e-3), (1e-8, 1e-7),
@@ -42,7 +43,9 @@ GYRO = {
 ACCEL = {
     "phone": [(80, 400), (5, 70), (20, 300), (0.1, 1.5), (0.2, 1.2), (1, 10), (0.1, 2)],
     "industrial": [(30, 200), (1, 20), (8, 80), (0.03, 0.5), (0.03, 0.3), (0.2, 3), (0.03, 0.4)],
-    "tactical": [(15, 100), (0.3, 4), (4, 40), (0.02, 0.15), (6e-3, 0.06), (0.05, 0.6), (0.01, 0.1)],
+    "tactical": [
+        (15, 100), (0.3, 4), (4, 40), (0.02, 0.15), (6e-3, 0.06), (0.05, 0.6), (0.01, 0.1),
+    ],
     "navigation": [
         (3, 25), (0.01, 0.12), (1, 12), (1e-3, 1e-2), (3e-4, 3e-3), (3e-3, 0.03), (3e-3, 0.03),
     ],
@@ -142,11 +145,15 @@ def draw(seed: int) -> dict[str, Any]:
     )
     receiver = _pick(rng, dict(zip(("code", "phone", "rtk"), shares, strict=True)))
     out["receiver"] = receiver
-    out["fix_hz"] = 1 if receiver == "phone" else int(rng.choice([1, 2, 4, 5, 10], p=[0.3, 0.1, 0.2, 0.25, 0.15]))  # fmt: skip
+    usual = int(rng.choice([1, 2, 4, 5, 10], p=[0.3, 0.1, 0.2, 0.25, 0.15]))
+    out["fix_hz"] = 1 if receiver == "phone" else usual
     velocity = {"code": (0.3, 0.4, 0.3), "phone": (0.3, 0.0, 0.7), "rtk": (0.5, 0.4, 0.1)}[receiver]
     out["velocity"] = _pick(rng, dict(zip(("none", "ned", "course"), velocity, strict=True)))
-    spans = {"code": ((0.15, 0.6), (0.5, 2.5)), "phone": ((0.2, 0.8), (2, 7)), "rtk": ((4e-3, 0.015), (3e-3, 0.012))}  # fmt: skip
-    white, drift = spans[receiver]
+    white, drift = {
+        "code": ((0.15, 0.6), (0.5, 2.5)),
+        "phone": ((0.2, 0.8), (2, 7)),
+        "rtk": ((4e-3, 0.015), (3e-3, 0.012)),
+    }[receiver]
     out["white_m"], out["drift_m"] = round(_log(rng, *white), 4), round(_log(rng, *drift), 4)
     out["drift_s"] = round(_log(rng, 20, 300), 1)
     out["vertical"] = round(float(rng.uniform(1.4, 2.5)), 2)
@@ -195,7 +202,8 @@ def draw(seed: int) -> dict[str, Any]:
     rng = stream(seed, "person.draw")
     out["knows_sensor"] = bool(rng.random() < 0.5)
     out["part"] = str(rng.choice(PARTS[grade]))
-    out["arm_measured_m"] = [round(float(x), 2) for x in np.array(out["antenna_m"]) + rng.normal(0, 0.02, 3)]  # fmt: skip
+    measured = np.array(out["antenna_m"]) + rng.normal(0, 0.02, 3)
+    out["arm_measured_m"] = [round(float(x), 2) for x in measured]
     if receiver == "phone":
         out["arm_measured_m"] = [0.0] * 3
     out["log_style"] = str(rng.choice(list(LOG_STYLES)))
@@ -217,7 +225,7 @@ def _wander(
 def _hum(
     rng: np.random.Generator, motion: Motion, t: np.ndarray, draw: Mapping[str, Any]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vibration of an engine in force and rate, averaged as the sensor does, and its mean square."""
+    """Vibration in force and rate, averaged as the sensor does, and the mean square of force."""
     many = max(4, int(np.ceil(800 / draw["rate_hz"])))
     step = 1.0 / draw["rate_hz"]
     fine = (t[:, None] - step + step * (np.arange(many) + 0.5) / many).ravel()
@@ -256,15 +264,17 @@ def _seen(motion: Motion, t: np.ndarray, draw: Mapping[str, Any]) -> tuple[np.nd
     out = []
     for values in motion.sensed(fine):
         low = lfilter([1 - k], [1, -k], values - values[0], axis=0) + values[0]
-        # The mean delay of a discrete pole is that of its step response.
         out.append(np.column_stack([np.interp(t, fine, low[:, j]) for j in range(3)]))
     return out[0], out[1]
 
 
 def _triad(
-    rng: np.random.Generator, true: np.ndarray, figures: Mapping[str, float], draw: Mapping[str, Any],
+    rng: np.random.Generator,
+    true: np.ndarray,
+    figures: Mapping[str, float],
+    draw: Mapping[str, Any],
     units: tuple[float, float, float],
-) -> np.ndarray:  # fmt: skip
+) -> np.ndarray:
     """A triad with its errors: `units` are those of noise, of bias and of the drift in the run."""
     n, step = len(true), 1.0 / draw["rate_hz"]
     turn = np.eye(3) + rng.normal(0, figures["misalignment"] * DEG, (3, 3)) * (1 - np.eye(3))
@@ -303,13 +313,11 @@ class Made:
         """What the owner says when he is asked."""
         d = self.draw
         sd = {"code": 2.5, "phone": 5.0, "rtk": 0.02}[d["receiver"]]
-        first = self.motion.state(np.array([0.0]))
+        heading = float(self.motion.state(np.array([0.0]))["heading"][0])
         return {
             "axes": d["axes"],
             "lever_arm_m": d["arm_measured_m"],
-            "heading_deg": round(
-                float(first["heading"][0]) + float(stream(d["seed"], "person").normal(0, 3)), 0
-            ),  # fmt: skip
+            "heading_deg": round(heading + float(stream(d["seed"], "person").normal(0, 3)), 0),
             "sensor": d["part"] if d["knows_sensor"] else None,
             "position_sd_m": sd,
             "velocity_sd_m_per_s": {"code": 0.1, "phone": 0.5, "rtk": 0.05}[d["receiver"]],
@@ -386,8 +394,9 @@ def fixes(motion: Motion, draw: Mapping[str, Any]) -> dict[str, np.ndarray]:
     latest = np.maximum.accumulate(np.where(keep, stamp, -np.inf))
     keep[1:] &= stamp[1:] > latest[:-1]
     table = {
-        "t": t, "stamp": stamp, "ecef": position, "velocity": velocity, "sd": sd * draw["stated_factor"],
-        "velocity_sd": draw["velocity_m_s"] * np.array([1, 1, 1.5]) * draw["stated_factor"] * np.ones((n, 1)),
+        "t": t, "stamp": stamp, "ecef": position, "velocity": velocity,
+        "sd": sd * draw["stated_factor"],
+        "velocity_sd": draw["velocity_m_s"] * draw["stated_factor"] * np.tile([1, 1, 1.5], (n, 1)),
         "sound": sound & ~floating, "floating": floating,
     }  # fmt: skip
     return {key: value[keep] for key, value in table.items()}
@@ -406,13 +415,15 @@ LOG_STYLES: dict[str, tuple[str, str, str, float, float, float]] = {
 FIX_STYLES: dict[str, dict[str, str]] = {
     "plain": {
         "time": "time_s", "lat": "lat_deg", "lon": "lon_deg", "alt": "height_ellipsoid_m",
-        "VN": "vn_m_s", "VE": "ve_m_s", "VD": "vd_m_s", "speed": "speed_m_s", "course": "course_deg",
+        "VN": "vn_m_s", "VE": "ve_m_s", "VD": "vd_m_s", "speed": "speed_m_s",
+        "course": "course_deg",
         "sd": "sd_{d}_m", "vsd": "sd_v{d}_m_s",
     },
     "words": {
         "time": "Time (s)", "lat": "Latitude (deg)", "lon": "Longitude (deg)",
         "alt": "Height ellipsoid (m)", "VN": "VN (m/s)", "VE": "VE (m/s)", "VD": "VD (m/s)",
-        "speed": "Speed (m/s)", "course": "Course (deg)", "sd": "sd_{d} (m)", "vsd": "sd_v{d} (m/s)",
+        "speed": "Speed (m/s)", "course": "Course (deg)", "sd": "sd_{d} (m)",
+        "vsd": "sd_v{d} (m/s)",
     },
     "receiver": {
         "time": "time_s", "lat": "latitude", "lon": "longitude", "alt": "h_ell_m", "VN": "vN",

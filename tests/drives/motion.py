@@ -1,8 +1,8 @@
 """Motions of vehicles and people over the Earth, exact to rounding.
 
-A motion is a spline of the fifth degree through six channels on a grid of 100 Hz: east, north, up of
-the unit in a plane that touches the ellipsoid, and heading, pitch, roll of the vehicle against that
-plane. The spline is the truth: rates and specific force follow from its derivatives in closed form.
+A motion is a spline of the fifth degree through six channels on a grid of 100 Hz: east, north, up
+of the unit in a plane that touches the ellipsoid, and heading, pitch, roll of the vehicle against
+that plane. The spline is the truth: rates and specific force follow in closed form.
 """
 
 from __future__ import annotations
