@@ -19,8 +19,9 @@ from strapdown.navigation.truth_comparison import band_of_mean, normalised_squar
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from drives import ACCEL_BIAS, GYRO_BIAS, MODELS, START_SD, Plan, drawn, navigator_of, truth_at
 from test_navigation_trials import believable
+
+from drives import ACCEL_BIAS, GYRO_BIAS, MODELS, START_SD, Plan, drawn, navigator_of, truth_at
 
 RUNS = 100
 SMALL_START = tuple(0.1 * np.array(START_SD))
