@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Iterable
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,8 @@ from strapdown.bundle.seal import to_json
 from strapdown.config.doctor import DoctorSpec
 from strapdown.constants import MICRO_G
 from strapdown.errors import DataError, Finding
-from strapdown.formats.clocks import on_clock_of
+from strapdown.formats.clocks import UNIX, on_clock_of
+from strapdown.formats.recording import AXES_OF_SENSOR
 from strapdown.progress import Progress
 from strapdown.report.chart import (
     AXIS_COLOURS,
@@ -47,7 +49,7 @@ from strapdown.report.document import (
 )
 from strapdown.report.report_bundle import ReportBundle, write_report
 from strapdown.report.values import duration_words, instant, small
-from strapdown.systems.doctor import USES, Diagnosis, LogDiagnosis, run_doctor
+from strapdown.systems.doctor import USES, Diagnosis, LogDiagnosis, refused_fixes, run_doctor
 from strapdown.tables import ACCEL, GEODETIC, GYRO, VELOCITY, VELOCITY_SD, find_gaps
 from strapdown.tables.checks import index_of, values_of
 
@@ -56,6 +58,8 @@ COMMANDS = {"attitude": "attitude", "navigation": "init navigate", "crash": "ini
 #: Stationary stretches in a table and bands in a chart, at most.
 MOST_RESTS, MOST_BANDS = 12, 40
 BUCKETS = 500
+#: Seconds since 1970 beyond which a date has no year of four digits.
+LATEST = 2.5e11
 
 
 def _configuration(result: Diagnosis) -> dict[str, Any]:
@@ -188,14 +192,12 @@ def way(one: LogDiagnosis, use: str) -> str | None:
 
 def answering(one: LogDiagnosis, log: str | None = None) -> str | None:
     """Return the command line that answers the open questions as inferred."""
-    if not one.questions:
-        return None
-    flags = str(one.data["options"])
-    more = "" if one.refused is None else str(one.refused.data.get("flags") or "")
-    if not more and not one.answers:
+    found = [one.refused if one.questions else None, refused_fixes(one)]
+    more = [str(f.data.get("flags") or "") for f in found if f is not None]
+    if not any(more) and not one.answers:
         return None  # the same command would be refused again
-    flags = f"{flags} {more}".strip()
-    flags = f"{flags} {one.data['fixes_options']}".strip()
+    flags = [str(one.data["options"]), *more, str(one.data["fixes_options"])]
+    flags = " ".join(part for part in flags if part)
     return _line("doctor", log or one.name, flags)
 
 
@@ -221,7 +223,6 @@ def stream_table(one: LogDiagnosis) -> TableBlock | None:
     for s in one.data["streams"]:
         rate = s["rate_hz"]
         gaps = f"{s['gaps']}, {small(s['longest_gap_s'])} s at most" if s["gaps"] else "none"
-        clock = s["clock"] + (f" + {s['clock_origin_s']:.9g} s" if s["clock_origin_s"] else "")
         rows.append(
             (
                 s["name"],
@@ -230,11 +231,23 @@ def stream_table(one: LogDiagnosis) -> TableBlock | None:
                 instant(s["to_s"]),
                 "–" if rate is None else f"{rate:.4g}",
                 gaps,
-                clock,
+                _clock(s["clock"], s["clock_origin_s"]),
             )
         )
     columns = ("stream", "rows", "from", "to", "rate, Hz", "gaps", "clock")
     return TableBlock(columns, tuple(rows), text=(0, 5, 6)) if rows else None
+
+
+def _clock(name: str, origin: float) -> str:
+    """Name a clock with the instant at 0 s of the stamps."""
+    if name == UNIX and 0.0 < origin < LATEST:
+        zero = datetime.fromtimestamp(origin, UTC)
+        return f"unix, 0 s is {zero:%Y-%m-%d %H:%M:%S} UTC"
+    return f"{name} + {origin:.9g} s" if origin else name
+
+
+def _stated_axes(one: LogDiagnosis) -> bool:
+    return one.recording is None or one.recording.imu.attrs["axes"] != AXES_OF_SENSOR
 
 
 def channel_table(one: LogDiagnosis) -> TableBlock | None:
@@ -262,7 +275,8 @@ def channel_table(one: LogDiagnosis) -> TableBlock | None:
             )
         )
     columns = ("channel", "column, unit", "range", "noise", "step", "faults")
-    caption = "Body axes forward, right, down. Gyros in deg/s, accelerometers in m/s²."
+    axes = "Body axes forward, right, down" if _stated_axes(one) else "Axes as in the file"
+    caption = f"{axes}. Gyros in deg/s, accelerometers in m/s²."
     return TableBlock(columns, tuple(rows), text=(0, 1, 5), caption=caption)
 
 
@@ -421,7 +435,8 @@ def _facts(one: LogDiagnosis) -> tuple[tuple[str, str], ...]:
         rows.append(("Temperature", f"{warm['least_degc']:.4g} to {warm['largest_degc']:.4g} °C"))
     if rests := data["stationary"]:
         total = sum(r["to_s"] - r["from_s"] for r in rests)
-        rows.append(("Stationary", f"{len(rests)} stretches, {duration_words(total)} in all"))
+        count = f"{len(rests)} stretches" if len(rests) > 1 else "1 stretch"
+        rows.append(("Stationary", f"{count}, {duration_words(total)} in all"))
     return tuple(rows)
 
 
@@ -437,6 +452,7 @@ def signal_chart(one: LogDiagnosis, slug: str = "") -> Chart | None:
     if imu is None:
         return None
     time = index_of(imu)
+    names = _AXES if _stated_axes(one) else tuple("xyz")
     gaps = [gap.sample for gap in find_gaps(time)]
 
     between = np.insert(time, gaps, [0.5 * (time[k] + time[k - 1]) for k in gaps])
@@ -448,7 +464,7 @@ def signal_chart(one: LogDiagnosis, slug: str = "") -> Chart | None:
     def triad(columns: list[str], factor: float) -> list[Line]:
         return [
             line(axis, factor * imu[c].to_numpy(dtype=np.float64), colour)
-            for axis, c, colour in zip(_AXES, columns, AXIS_COLOURS, strict=True)
+            for axis, c, colour in zip(names, columns, AXIS_COLOURS, strict=True)
         ]
 
     panels = [Panel("rate, deg/s", tuple(triad(GYRO, math.degrees(1.0))), title="Gyros")]
@@ -462,7 +478,7 @@ def signal_chart(one: LogDiagnosis, slug: str = "") -> Chart | None:
         panels.append(Panel("speed, m/s", (fixes,), title="Fixes", height=0.7))
     return Chart(
         f"{slug}signals",
-        "Signals in body axes",
+        "Signals in body axes" if _stated_axes(one) else "Signals in axes that are not stated",
         "Least and largest values of each pixel. Bands: stationary stretches and faults.",
         "time, s",
         tuple(panels),

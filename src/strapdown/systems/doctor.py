@@ -54,7 +54,7 @@ from strapdown.tables import ACCEL, GYRO, POSITION_SD, find_gaps
 from strapdown.tables.checks import index_of, values_of
 from strapdown.units import TIME_UNITS
 
-__all__ = ["USES", "Diagnosis", "LogDiagnosis", "run_doctor"]
+__all__ = ["USES", "Diagnosis", "LogDiagnosis", "refused_fixes", "run_doctor"]
 
 Array = NDArray[np.float64]
 
@@ -391,9 +391,10 @@ def _others(
                 findings.append(error.finding.replace(severity="warning"))
             findings += streams["gnss"].attrs["findings"]
         except DataError as error:
-            # A table of samples need not be one of fixes.
-            if error.finding.code not in ABSENT and ("gnss" in held or recording is None):
-                findings.append(error.finding)
+            # A table of samples need not be one of fixes, unless an answer makes it one.
+            certain = "gnss" in held or recording is None or "flags" in error.finding.data
+            if error.finding.code not in ABSENT and certain:
+                findings.append(error.finding.replace(severity="error", stream="gnss"))
     if recording is not None and recording.truth is not None:
         streams["reference"] = recording.truth
     elif "reference" in held or TABLE in held:
@@ -798,6 +799,8 @@ def _navigation(one: LogDiagnosis) -> list[Finding]:
     gravity = one.data["gravity"]
     if imu is not None and (gravity is None or not gravity["included"]):
         found.append(Finding("doctor.no-specific-force", severity="error", file=one.name))
+    if gnss is None and (refused := refused_fixes(one)):
+        return [*found, refused]
     if gnss is None:
         log = shlex.quote(one.name)
         return [*found, Finding("doctor.no-fixes", severity="error", file=one.name, log=log)]
@@ -825,6 +828,13 @@ def _navigation(one: LogDiagnosis) -> list[Finding]:
     found += [f for f in one.faults if f.code.startswith("navigation.") and f not in found]
     found += [f for f in one.faults if f.code in _LIMITS]
     return found
+
+
+def refused_fixes(one: LogDiagnosis) -> Finding | None:
+    """Return why the fixes in a log could not be read; None if they were, or it has none."""
+    if "gnss" in one.streams:
+        return None
+    return next((f for f in one.faults if f.data.get("stream") == "gnss"), None)
 
 
 def _on_clock(gnss: pd.DataFrame, imu: pd.DataFrame) -> tuple[pd.DataFrame, Finding | None]:

@@ -434,3 +434,13 @@ def test_a_gyro_of_zero_is_no_fault_in_a_simulation_without_noise(tmp_path):
     force = np.tile([0.0, 0.0, -G], (time.size, 1))
     (one,) = sd.doctor(sd.Imu.from_arrays(time, gyro, force)).logs
     assert one.answer("attitude") != "no"
+
+
+def test_fixes_that_are_refused_are_not_missing(sound, tmp_path):
+    place = {"lat_deg": 49.0 + 1e-7 * sound.index, "lon_deg": 8.4, "alt_msl_m": 120.0}
+    path = written(sound.assign(**place), tmp_path / "log.csv")
+    (one,) = sd.doctor(path).logs
+    (refused,) = [f for f in one.fit["navigation"] if f.severity == "error"]
+    assert (refused.quantity, refused.data["flags"]) == ("alt", "--gnss-datum-height 0")
+    (one,) = sd.doctor(path, gnss={"datum_height_m": 46.0}).logs
+    assert "gnss" in one.streams
