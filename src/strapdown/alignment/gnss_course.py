@@ -440,7 +440,7 @@ class CourseFit:
         push = max(self.sensors.accel.axis("noise_density")) ** 2
         lean = (max(self.sensors.gyro.axis("noise_density")) * STANDARD_GRAVITY * stretch) ** 2
         walk = (push + lean / 12.0) * stretch**3 / 12.0
-        return gap, out, fixes.place_sd, walk * len(sums.stretch) / 4.0
+        return gap, out, fixes.place_sd, float(walk * len(sums.stretch) / 4.0)
 
     def _arms(self, count: int) -> Array:
         """Lever arm for each fix, (k, 3), m."""

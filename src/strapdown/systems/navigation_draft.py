@@ -149,8 +149,8 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
     if named is None:
         page.key("sensor", ASK, "only you know: one of the catalogue, or a .toml file of your own")
     else:
-        check = "" if not made.guessed else "the sensor of the catalogue that is nearest by noise"
-        remark = "assumed: nearest of the catalogue by its noise" if made.guessed else ""
+        check = "" if not made.guessed else "the sensor, of which the log tells the grade alone"
+        remark = "assumed: the grade, by its noise; name yours" if made.guessed else ""
         page.key("sensor", string(named), remark, check=check)
     page.say(
         f"The catalogue (strapdown modules): {', '.join(s.name for s in _whole())}; or a .toml "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,9 +13,11 @@ from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Site
 from strapdown.alignment.gnss_course import GnssCourse
+from strapdown.alignment.inertial_frame import fit_inertially, heading_rate
+from strapdown.alignment.inertial_sums import sum_inertially
 from strapdown.config.alignment import AxesTable, FixesTable, LogTable
-from strapdown.constants import STANDARD_GRAVITY
-from strapdown.errors import ConfigError, DataError, DivergenceError, Finding
+from strapdown.constants import DEG_PER_HOUR, STANDARD_GRAVITY
+from strapdown.errors import DataError, DivergenceError, Finding
 from strapdown.formats.assemble import require_accel
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import has_fixes, read_gnss
@@ -28,9 +31,9 @@ from strapdown.navigation.measurements.gnss_clock import (
 )
 from strapdown.navigation.measurements.gnss_readiness import check_fixes
 from strapdown.navigation.pipeline import AHEAD
-from strapdown.sensors.catalogue import SENSORS, load_sensor
+from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV, load_sensor
 from strapdown.sensors.rest import LEAST_LENGTH, find_rests_of_every_grade
-from strapdown.sensors.uncertainty import ImuUncertainty, stated_imu
+from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty, stated_imu
 from strapdown.systems.alignment_source import body_record
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
 from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
@@ -56,8 +59,12 @@ STANDS, DRIVES = 0.5, 3.0
 APPARENT = 4.5
 #: Fixes that begin later than so many of their intervals do not show what was before.
 UNSEEN = 3.0
-#: Gyro bias that allows gyrocompassing, and the rest needed for it.
-NORTH, LEAST_REST = math.radians(2.0 / 3600.0), 60.0
+#: Gyro bias that allows gyrocompassing, the rest needed for it, and the longest that is used, s.
+NORTH, LEAST_REST, LONGEST_REST = 2.0 / DEG_PER_HOUR, 60.0, 600.0
+#: Gyro noise of which no consumer part is capable, rad/s/√Hz: the best of the catalogue have 0.1
+#: deg/√h.
+TACTICAL_NOISE = math.radians(0.06) / 60.0
+NO_ERRORS = ImuUncertainty(TriadUncertainty(), TriadUncertainty())
 #: Longest rest used for a coarse alignment, s.
 COARSE = 100.0
 #: Standard deviation of the angles that ends an alignment by course, deg.
@@ -106,7 +113,7 @@ class Proposal:
     noise : tuple of float, (2,), or None
         Of the gyros in rad/s/√Hz, of the accelerometers in m/s²/√Hz, while it is quiet.
     guessed : bool
-        Whether the sensor is only the one of the catalogue with the nearest noise.
+        Whether the sensor is only a grade, by its noise.
     drives : bool
         Whether it drives fast enough for a course, by the fixes.
     how : str
@@ -148,7 +155,7 @@ def propose(
         The fixes, and statements about them; by default the log itself, if it has fixes. Where
         standard deviations are not stated, those of a code receiver are taken.
     sensor : str, optional
-        A sensor of the catalogue, or a file; the one with the nearest noise, if not given.
+        A sensor of the catalogue, or a file; a grade by the noise, if not given.
     site : tuple of float, optional
         Latitude and longitude in deg, height in m; that of the fixes, or of the log, if not given.
     heading_deg : float, optional
@@ -171,36 +178,36 @@ def propose(
         # What the run would refuse is refused before a file is written.
         check_fixes(fixes)
         check_overlap(fixes, imu, 0.0)
-    scatter = _scatter(imu)
-    # Engine vibration differs between axes; the quietest axis identifies the sensor.
-    noise = None if scatter is None else tuple(scatter[0].min(axis=1).tolist())
-    guessed = sensor is None
-    named = sensor or (None if noise is None else _nearest(noise))
-    if named is not None:
-        # For gyrocompassing gyros the rocking of a vehicle is motion, not noise.
-        shaken = {} if scatter is None or _finds_north(named) else _louder(scatter[1], named)
-        table["sensors"] = {"sensor": named, **shaken}
     place, start = site, recording.start
     if not place and start is not None:
         place = (start.lat_deg, start.lon_deg, start.alt)
     if place is not None:
         table["site"] = dict(zip(("lat_deg", "lon_deg", "alt_m"), place, strict=True))
     until, drives = _motion(imu, fixes)
-    rest = _rest(imu, until, rocks=named is not None and _finds_north(named))
+    scatter = _scatter(imu)
+    # Engine vibration differs between axes; the quietest axis identifies the grade.
+    noise = None if scatter is None else tuple(scatter[0].min(axis=1).tolist())
+    guessed = sensor is None
+    sensors: ImuUncertainty | None = None
+    if sensor is not None or scatter is not None:
+        rocking = _rest(imu, until, rocks=True)
+        table["sensors"] = _sensors(sensor, scatter, _rest_bias(imu, rocking, place, fixes))
+        sensors = _uncertainty(table["sensors"])
+    rest = _rest(imu, until, rocks=sensors is not None and _finds_north(sensors))
     span = float(imu.index[-1] - imu.index[0])
     measured = fixes is not None and np.isfinite(values_of(fixes, VELOCITY_SD[:2])).any()
-    chosen, how = _alignment(named, rest, drives, heading_deg, span, bool(measured))
+    chosen, how = _alignment(sensors, rest, drives, heading_deg, span, bool(measured))
     clock: dict[str, float] = {}
     if fixes is not None:
-        clock, step = _clock(fixes, imu, drives, None if named is None else _stated(table))
+        clock, step = _clock(fixes, imu, drives, sensors)
         if step is not None:
             part = _longer_part(log, imu, step)
             made = propose(
                 part, axes=axes, gnss=gnss, sensor=sensor, site=site, heading_deg=heading_deg
             )
             return replace(made, findings=(*made.findings, step))
-    if fixes is not None and named is not None and chosen["coarse"]["kind"] == "gnss_course":
-        chosen, how, tried = _tried(chosen, how, imu, fixes, _stated(table))
+    if fixes is not None and sensors is not None and chosen["coarse"]["kind"] == "gnss_course":
+        chosen, how, tried = _tried(chosen, how, imu, fixes, sensors)
         findings = (*findings, *tried)
     table |= chosen
     if fixes is not None:
@@ -259,31 +266,76 @@ def _scatter(imu: pd.DataFrame) -> tuple[Array, Array] | None:
     return (quiet, usual) if quiet.min() > 0.0 else None
 
 
-def _louder(usual: Array, sensor: str) -> dict[str, dict[str, Any]]:
-    """Noise to state instead of the data sheet's, of triads with far larger vibration."""
-    known = ImuUncertainty.of_sensor(load_sensor(sensor))
-    out: dict[str, dict[str, Any]] = {}
+def _sensors(
+    named: str | None, scatter: tuple[Array, Array] | None, bias: float | None
+) -> dict[str, Any]:
+    """Sensor to state: the one that is named, or the grade that the noise allows.
+
+    `scatter`: as of `_scatter`. `bias`: of the gyros by a rest, as of `_rest_bias`. The noise is
+    measured where it exceeds the data sheet's; of a grade it always is.
+    """
+    out: dict[str, Any] = {"sensor": named}
+    if named is None:
+        assert scatter is not None
+        steady = min(scatter[0][0]) < TACTICAL_NOISE
+        out["sensor"] = "tactical-grade" if steady else "consumer-grade"
+    known = ImuUncertainty.of_sensor(load_sensor(out["sensor"]))
+    # For gyrocompassing gyros the rocking of a vehicle is motion, not noise.
+    north = _finds_north(known) or (named is None and bias is not None and bias <= NORTH)
     for k, (triad, key, unit) in enumerate(NOISE_KEYS):
+        if scatter is None:
+            break
+        quiet, usual = scatter[0][k], scatter[1][k]
         sheet = np.asarray(getattr(known, triad).axis("noise_density"))
-        if (usual[k] > LOUD * sheet).any():
-            stated = np.maximum(usual[k], sheet) / unit
-            out[triad] = {key: tuple(float(f"{x:.2g}") for x in stated)}
+        stated = quiet if named is None else np.maximum(quiet, sheet)
+        if not north and (usual > LOUD * stated).any():
+            stated = np.maximum(usual, stated)
+        if (stated != sheet).any():
+            out[triad] = {key: tuple(float(f"{x:.2g}") for x in stated / unit)}
+    if named is None and bias is not None and bias < max(known.gyro.axis("bias")):
+        part = bias / max(known.gyro.axis("bias"))
+        slow = max(known.gyro_drift.triad) * part * ALLAN_OF_GAUSS_MARKOV
+        out["gyro"] = out.get("gyro", {}) | {
+            "bias_sd_deg_per_h": float(f"{bias * DEG_PER_HOUR:.2g}"),
+            "bias_instability_deg_per_h": float(f"{slow * DEG_PER_HOUR:.2g}"),
+        }
     return out
 
 
-def _nearest(noise: tuple[float, ...]) -> str:
-    """Sensor of the catalogue with the nearest noise, by ratios."""
-    best, least = "", math.inf
-    for name in SENSORS:
-        try:
-            known = ImuUncertainty.of_sensor(load_sensor(name))
-        except ConfigError:
-            continue  # it lacks a triad
-        densities = (max(known.gyro.axis("noise_density")), max(known.accel.axis("noise_density")))
-        far = sum(math.log(a / b) ** 2 for a, b in zip(noise, densities, strict=True))
-        if far < least:
-            best, least = name, far
-    return best
+def _uncertainty(sensors: Mapping[str, Any]) -> ImuUncertainty:
+    """Uncertainty of a table of sensors."""
+    return stated_imu(
+        load_sensor(sensors["sensor"]), sensors.get("gyro", {}), sensors.get("accel", {})
+    )
+
+
+def _rest_bias(
+    imu: pd.DataFrame,
+    rest: float,
+    place: tuple[float, float, float] | None,
+    fixes: pd.DataFrame | None,
+) -> float | None:
+    """Standard deviation of the gyro biases that a rest allows, rad/s; None without a long rest.
+
+    Against the Earth's rate two components of the bias are observable: along the vertical, and
+    north. For a standard deviation b their squares have the sum ``b² χ²`` with two degrees of
+    freedom, which exceeds 0.103 with a probability of 0.95. A rotation of the body about the
+    vertical counts as bias.
+    """
+    if rest < LEAST_REST or (place is None and fixes is None):
+        return None
+    if place is None:
+        assert fixes is not None
+        lat, lon, alt = np.nanmedian(values_of(fixes, GEODETIC)[:10], axis=0).tolist()
+        place = (lat, lon, alt)
+    site = Site(*place)
+    begin = float(imu.index[0])
+    sums = sum_inertially(imu[imu.index <= begin + min(rest, LONGEST_REST)])
+    fit = fit_inertially(sums, site)
+    vertical, _ = heading_rate(sums, fit.C_nb, site, NO_ERRORS)
+    # Of the horizontal rate w cos(lat), by the latitude that it seems to be.
+    north = float(site.earth_rate[2]) * fit.latitude_change
+    return math.hypot(vertical, north) / math.sqrt(-2.0 * math.log(0.95))
 
 
 def _rest(imu: pd.DataFrame, until: float, *, rocks: bool) -> float:
@@ -403,7 +455,7 @@ def _speed(fixes: pd.DataFrame) -> float:
 
 
 def _alignment(
-    sensor: str | None,
+    sensors: ImuUncertainty | None,
     rest: float,
     drives: bool,
     heading_deg: float | None,
@@ -422,7 +474,7 @@ def _alignment(
             {"coarse": {**coarse, "duration_s": length}, "fine": {"kind": "none"}},
             f"levelled by {length:g} s, with the heading that is stated",
         )
-    if rest >= LEAST_REST and sensor is not None and _finds_north(sensor):
+    if rest >= LEAST_REST and sensors is not None and _finds_north(sensors):
         coarse_s = float(math.floor(min(COARSE, rest / 3.0)))
         fine_s = float(math.floor(min(rest, 600.0) - coarse_s))
         return (
@@ -439,7 +491,7 @@ def _alignment(
                     "kind": "gnss_course",
                     "window_s": 60.0,
                     "until_heading_sd_deg": WELL,
-                    "until_tilt_sd_deg": _tilt(sensor),
+                    "until_tilt_sd_deg": _tilt(sensors),
                 },
                 "fine": {"kind": "none"},
             },
@@ -503,13 +555,13 @@ def _tried(
     )
 
 
-def _tilt(sensor: str | None) -> float:
+def _tilt(sensors: ImuUncertainty | None) -> float:
     """Tilt for an alignment by course, deg: accelerometer bias over g."""
-    if sensor is None:
+    if sensors is None:
         return WELL
-    bias = max(ImuUncertainty.of_sensor(load_sensor(sensor)).accel.axis("bias"))
+    bias = max(sensors.accel.axis("bias"))
     return max(WELL, float(math.ceil(2.0 * math.degrees(bias / STANDARD_GRAVITY))))
 
 
-def _finds_north(sensor: str) -> bool:
-    return max(ImuUncertainty.of_sensor(load_sensor(sensor)).gyro.axis("bias")) <= NORTH
+def _finds_north(sensors: ImuUncertainty) -> bool:
+    return max(sensors.gyro.axis("bias")) <= NORTH

@@ -401,7 +401,7 @@ def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference,
         said = evidence("io.evidence-norm", **norm, unit=best, si=usual * SCALES[best])
     else:
         said = evidence("io.evidence-norm-of-no-unit", **norm, units=list(SCALES))
-    told = (said,)
+    told: tuple[Finding, ...] = (said,)
     if whole:
         named = {f"g/{c:.0f}": forms.get(f"counts {k}", 0.0) for k, c in enumerate(_COUNTS)}
         told += evidence_of_counts(named)

@@ -1,0 +1,141 @@
+"""Which sensor is proposed where none is named, and that it is good enough for the one it was."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from strapdown.config.alignment import FixesTable, LogTable
+from strapdown.config.navigation import NavigationSpec
+from strapdown.constants import DEG_PER_HOUR, MICRO_G
+from strapdown.frames import place_difference
+from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
+from strapdown.simulation import Origin, car, simulate_imu
+from strapdown.simulation.earth_motion import StationaryMotion
+from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
+from strapdown.simulation.vehicles import Accelerate, Stop, Straight, Turn
+from strapdown.systems.navigation_proposal import (
+    LOUD,
+    TACTICAL_NOISE,
+    _rest_bias,
+    _sensors,
+    propose,
+)
+from strapdown.systems.navigation_run import run_navigation
+from strapdown.tables import ACCEL, GEODETIC, GYRO
+
+PLACE = (45.0, 20.0, 80.0)
+#: RTK, m and m/s.
+RECEIVER = {"rate": 1.0, "position_noise": 0.01, "velocity_noise": 0.03}
+
+
+def scatter(gyro, accel, shaken=1.0):
+    """Quiet and usual noise of three like axes, as `_scatter` gives them."""
+    quiet = np.outer([gyro, accel], np.ones(3))
+    return quiet, shaken * quiet
+
+
+def test_noise_tells_the_grade_and_is_stated():
+    gyro, accel = 0.5 * TACTICAL_NOISE, 60.0 / MICRO_G
+    found = _sensors(None, scatter(gyro, accel), None)
+    assert found["sensor"] == "tactical-grade"
+    assert found["accel"]["noise_density_ug_per_sqrt_hz"] == (60.0, 60.0, 60.0)
+    assert np.degrees(gyro) * 60.0 == pytest.approx(
+        found["gyro"]["noise_density_deg_per_sqrt_h"][0], rel=0.05
+    )
+    assert _sensors(None, scatter(2.0 * TACTICAL_NOISE, accel), None)["sensor"] == "consumer-grade"
+
+
+def test_noise_beyond_the_data_sheet_is_stated_for_a_named_sensor_too():
+    # The HG9900 has accelerometers of 10 µg/√Hz and gyros of 0.002 deg/√h.
+    gyro = np.radians(0.001) / 60.0
+    found = _sensors("hg9900", scatter(gyro, 48.0 / MICRO_G), None)
+    assert "gyro" not in found
+    assert found["accel"]["noise_density_ug_per_sqrt_hz"] == (48.0, 48.0, 48.0)
+
+
+def test_shaking_is_stated_but_for_gyros_that_find_north():
+    gyro, accel, shaken = 0.5 * TACTICAL_NOISE, 60.0 / MICRO_G, 2.0 * LOUD
+    key = "noise_density_ug_per_sqrt_hz"
+    found = _sensors(None, scatter(gyro, accel, shaken), None)
+    assert found["accel"][key][0] == pytest.approx(60.0 * shaken)
+    quiet = _sensors(None, scatter(gyro, accel, shaken), 1.0 / DEG_PER_HOUR)
+    assert quiet["accel"][key][0] == pytest.approx(60.0)
+    assert quiet["gyro"]["bias_sd_deg_per_h"] == pytest.approx(1.0)
+
+
+def test_a_rest_bounds_the_gyro_biases_as_often_as_it_says():
+    """The factor is the 95 % bound of the standard deviation by two components."""
+    sd, held = 1.0 / DEG_PER_HOUR, 0
+    draws = np.random.default_rng(20261123)
+    count = 200
+    for _ in range(count):
+        roll, pitch, heading = draws.uniform([-5.0, -5.0, 0.0], [5.0, 5.0, 360.0])
+        motion = StationaryMotion(120.0, Origin(*PLACE), roll, pitch, heading)
+        errors = ImuErrors(
+            TriadErrors(bias=tuple(draws.normal(0.0, sd, 3))), TriadErrors(bias=1e-4)
+        )
+        imu, _ = simulate_imu(motion, errors, rate=5.0, sampling="mean")
+        found = _rest_bias(imu, 120.0, PLACE, None)
+        held += found >= sd
+    low, high = stats.binomtest(held, count).proportion_ci(0.99)
+    assert low <= 0.95 <= high, held
+
+
+def test_a_short_rest_bounds_nothing():
+    imu = pd.DataFrame(np.zeros((3, 6)), index=[0.0, 30.0, 59.0], columns=[*GYRO, *ACCEL])
+    assert _rest_bias(imu, 59.0, PLACE, None) is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 2])
+def test_quiet_sensors_with_large_slow_errors_follow_their_fixes(tmp_path, seed):
+    """Noise as that of a navigation unit, biases and scale factors of a tactical one.
+
+    The nearest sensor of the catalogue by noise was taken: one of 10 µg/√Hz, 25 µg and 100 ppm for
+    one of 50 µg/√Hz, 300 µg and 500 ppm. With a receiver good to 1 cm the height ran away.
+    """
+    legs = [("rest", Straight(70.0))]
+    for k in range(6):
+        legs += [
+            (f"{k} faster", Accelerate(14.0, 6.0)),
+            (f"{k} on", Straight(10.0)),
+            (f"{k} bend", Turn(90.0 if k % 3 else -120.0, 25.0, ramp=2.0)),
+            (f"{k} stop", Stop(6.0)),
+        ]
+    motion = car(Origin(*PLACE), legs, speed=0.0)
+    draws = np.random.default_rng(seed)
+    errors = ImuErrors(
+        TriadErrors(
+            noise_density=np.radians(0.003) / 60.0,
+            bias=tuple(draws.normal(0.0, 0.03 / DEG_PER_HOUR, 3)),
+            scale=tuple(draws.normal(0.0, 500e-6, 3)),
+        ),
+        TriadErrors(
+            noise_density=50.0 / MICRO_G,
+            bias=tuple(draws.normal(0.0, 300.0 / MICRO_G, 3)),
+            scale=tuple(draws.normal(0.0, 500e-6, 3)),
+        ),
+    )
+    imu, _ = simulate_imu(motion, errors, rate=50.0, sampling="mean", seed=seed)
+    fixes = simulate_gnss(motion, GnssReceiver(**RECEIVER), seed=seed)
+    names = [*(f"gyro_{a}_rad_s" for a in "xyz"), *(f"accel_{a}_m_s2" for a in "xyz")]
+    log = imu[[*GYRO, *ACCEL]].set_axis(names, axis=1).rename_axis("time_s")
+    (tmp_path / "log.csv").write_text("# sampling: mean\n" + log.to_csv())
+    fixes.to_csv(tmp_path / "fixes.csv")
+    made = propose(
+        LogTable(path=str(tmp_path / "log.csv")),
+        axes="forward-right-down",
+        gnss=FixesTable(path=str(tmp_path / "fixes.csv")),
+    )
+    run = run_navigation(NavigationSpec.checked({"name": "drive", **made.table}))
+    found = run.trajectory
+    later = found[found.index > found.index[-1] - 60.0]
+    truth = motion.trajectory(later.index.to_numpy())[GEODETIC].to_numpy()
+    off = place_difference(later[GEODETIC].to_numpy(), truth)
+    sd = run.sd[["north", "east", "down"]].reindex(later.index, method="nearest").to_numpy()
+    # 1 cm of the fixes, and 2 ms between the clocks at 14 m/s.
+    assert np.median(sd) < 0.03
+    assert (np.abs(off) < 1.96 * sd).mean() > 0.9
