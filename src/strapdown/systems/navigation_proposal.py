@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -192,7 +191,7 @@ def propose(
     if sensor is not None or scatter is not None:
         rocking = _rest(imu, until, rocks=True)
         table["sensors"] = _sensors(sensor, scatter, _rest_bias(imu, rocking, place, fixes))
-        sensors = _uncertainty(table["sensors"])
+        sensors = _stated(table)
     rest = _rest(imu, until, rocks=sensors is not None and _finds_north(sensors))
     span = float(imu.index[-1] - imu.index[0])
     measured = fixes is not None and np.isfinite(values_of(fixes, VELOCITY_SD[:2])).any()
@@ -300,13 +299,6 @@ def _sensors(
             "bias_instability_deg_per_h": float(f"{slow * DEG_PER_HOUR:.2g}"),
         }
     return out
-
-
-def _uncertainty(sensors: Mapping[str, Any]) -> ImuUncertainty:
-    """Uncertainty of a table of sensors."""
-    return stated_imu(
-        load_sensor(sensors["sensor"]), sensors.get("gyro", {}), sensors.get("accel", {})
-    )
 
 
 def _rest_bias(
