@@ -583,3 +583,21 @@ def test_what_is_written_is_named_only_where_it_is_there(tmp_path):
         tmp_path / "b.csv", {"imu": made["imu"].assign(**made["magnetometer"])}
     )
     assert set(more.data["held"].split(", ")) - set(found.data["held"].split(", ")) == {"µT"}
+
+
+def test_the_trajectory_of_a_run_has_the_clock_of_its_samples(tmp_path):
+    from strapdown.api.writing import _reader
+
+    track = streams()["reference"].copy()
+    track.attrs = {"source": "made"}
+    write_streams(tmp_path / "trajectory.csv", {"reference": track})
+    clock = {"name": UNIX, "origin_s": 1.7e9, "gps_week": None}
+    (tmp_path / "navigation.json").write_text(json.dumps({"record": {"clock": clock}}))
+    read = _reader("reference", tmp_path / "trajectory.csv", {}, None, {})()
+    assert clock_of(read) == Clock(UNIX, 1.7e9)
+    first = int(own_ns(read)[0])
+    assert first == 1_700_000_000_000_000_000 + round(track.index[0] * 1e9)
+    # The same path elsewhere is on a clock of its own.
+    (tmp_path / "navigation.json").unlink()
+    read = _reader("reference", tmp_path / "trajectory.csv", {}, None, {})()
+    assert clock_of(read).name == RELATIVE

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
@@ -190,7 +191,7 @@ def _reader(
     if stream == "imu":
         return lambda: ImuFile(specify(LogTable, path=str(path), **log), axes).read()
     if stream == "reference":
-        return lambda: read_trajectory(path)
+        return lambda: _on_clock_of_run(read_trajectory(path), path)
     # A topic after the format is that of the samples.
     form = (log.get("format") or "").partition(":")[0] or None
     if stream != "gnss":
@@ -200,6 +201,17 @@ def _reader(
     # A velocity of unknown accuracy is one, and is written without it.
     known = dataclasses.replace(asked, unstated_position_sd=math.inf, unstated_velocity_sd=1.0)
     return lambda: read_gnss(path, known)
+
+
+def _on_clock_of_run(trajectory: pd.DataFrame, path: Path) -> pd.DataFrame:
+    """Give the trajectory of a navigation result the clock of its samples."""
+    run = path.parent / "navigation.json"
+    if path.stem != "trajectory" or not run.is_file():
+        return trajectory
+    clock = json.loads(run.read_text(encoding="utf-8"))["record"].get("clock")
+    if clock is None or clock_of(trajectory).name != RELATIVE:
+        return trajectory
+    return with_clock(trajectory, Clock(clock["name"], clock["origin_s"], clock["gps_week"]))
 
 
 #: Quantities of the streams beside samples and fixes: their columns, units, and that of the table.

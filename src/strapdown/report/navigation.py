@@ -18,6 +18,7 @@ from strapdown.config.navigation import STAGES, NavigationSpec
 from strapdown.errors import ConfigError
 from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.formats import csv
+from strapdown.formats.clocks import clock_of
 from strapdown.formats.file_options import FileOptions
 from strapdown.formats.writers import write_trajectory
 from strapdown.navigation.consistency import Inconsistency
@@ -155,6 +156,7 @@ def navigation_json(
     """
     record, source = result.record, result.source
     time = record.trajectory.index
+    clock = clock_of(source.imu)
     found = evaluation_of(result) if found is None else found
     return {
         "conventions": {key.lower().replace(" ", "_"): text for key, text in CONVENTIONS},
@@ -167,6 +169,7 @@ def navigation_json(
             "samples": len(source.imu),
             "from_s": float(source.imu.index[0]),
             "to_s": float(source.imu.index[-1]),
+            "clock": {"name": clock.name, "origin_s": clock.origin, "gps_week": clock.week},
             "read_as": [asdict(reading) for reading in source.readings],
         },
         "ellipsoid": result.ellipsoid.name,
