@@ -38,6 +38,7 @@ sensor = "mpu-6050"
 
 [coarse]
 kind = "gnss_course"
+mounting_yaw_sd_deg = 0.0
 window_s = 60.0
 until_heading_sd_deg = 3.0
 until_tilt_sd_deg = 6.0

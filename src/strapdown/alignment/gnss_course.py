@@ -68,8 +68,9 @@ class GnssCourse(CoarseAlignment):
     mounting_yaw_deg : float, deg
         Heading of the unit's forward axis minus that of the vehicle's.
     mounting_yaw_sd_deg, sideslip_sd_deg : float, deg
-        Standard deviation of that angle, and of the sideslip: 1 deg for a car that does not
-        turn hard; an aircraft or a ship drifts more with wind and current.
+        Standard deviation of that angle, unless it is measured 5 deg; accelerations and turns
+        tell the heading better. And of the sideslip: 1 deg for a car that does not turn hard; an
+        aircraft or a ship drifts more with wind and current.
     least_speed : float, m/s
         Below it no course is taken.
     largest_sd_deg : float, deg
@@ -91,7 +92,7 @@ class GnssCourse(CoarseAlignment):
     source: ClassVar[str] = "Groves 2013, sec. 5.6.2 and 6.1.1; window and weights: derived here"
 
     mounting_yaw_deg: float = 0.0
-    mounting_yaw_sd_deg: float = 0.0
+    mounting_yaw_sd_deg: float = 5.0
     sideslip_sd_deg: float = 1.0
     least_speed: float = 2.0
     largest_sd_deg: float = 10.0

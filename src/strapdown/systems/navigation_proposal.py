@@ -66,8 +66,9 @@ TACTICAL_NOISE = math.radians(0.06) / 60.0
 NO_ERRORS = ImuUncertainty(TriadUncertainty(), TriadUncertainty())
 #: Longest rest used for a coarse alignment, s.
 COARSE = 100.0
-#: Standard deviation of the angles that ends an alignment by course, deg.
-WELL = 3.0
+#: Standard deviations that end an alignment by course, deg: of the tilt; and of the heading, which
+#: has that of the mounting of the unit, 5 deg, besides.
+WELL, HEADING = 3.0, 6.0
 #: Trials of it: factor of the length from trial to trial, margin over the best of them, and the
 #: largest standard deviation that is not too large for a linear filter, deg.
 LATER, MARGIN, LARGEST_START = 1.15, 1.2, 15.0
@@ -482,7 +483,7 @@ def _alignment(
                 "coarse": {
                     "kind": "gnss_course",
                     "window_s": 60.0,
-                    "until_heading_sd_deg": WELL,
+                    "until_heading_sd_deg": HEADING,
                     "until_tilt_sd_deg": _tilt(sensors),
                 },
                 "fine": {"kind": "none"},

@@ -15,6 +15,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from stands import ORIGIN, SITE, chi_square, ideal, phi, still, unit
 
+from strapdown import rotation
 from strapdown.alignment.course_sums import Antenna
 from strapdown.alignment.gnss_course import GnssCourse
 from strapdown.errors import ConfigError, DataError
@@ -24,7 +25,7 @@ from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
 from strapdown.simulation.motion import Track
 from strapdown.simulation.path_motion import PathMotion
-from strapdown.tables import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
+from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY, VELOCITY_SD
 
 # Speeds up, brakes, turns both ways, climbs; leans on its springs.
 DRIVE = PathMotion(
@@ -38,7 +39,7 @@ DRIVE = PathMotion(
     sway_roll=0.5,
     sway_pitch=0.3,
 )
-NO_SLIP = GnssCourse(sideslip_sd_deg=0.001, axle_sd=0.0)
+NO_SLIP = GnssCourse(mounting_yaw_sd_deg=0.0, sideslip_sd_deg=0.001, axle_sd=0.0)
 RUNS = 12
 
 
@@ -114,6 +115,29 @@ def test_accelerations_tell_of_a_mounting_that_is_not_as_stated():
     # Gyros and accelerometers of a fog-1000 know the heading to some 0.02 deg of their own.
     assert abs(phi(found, truth[-1])[2]) < np.radians(0.1)
     assert found.sd_deg[2] < 0.05
+
+
+@pytest.mark.slow
+def test_a_mounting_that_is_not_stated_is_within_the_bound_of_the_heading():
+    """4 and -5 deg off: where speed and course stay, the prior; else what the sensors tell."""
+    straight = PathMotion(20.0, ORIGIN, heading_deg=30.0, speed=Track((0.0,), (20.0,)))
+    for motion, low, high in ((straight, 4.5, 6.0), (DRIVE, 0.0, 1.5)):
+        inside = []
+        for seed, off in enumerate((4.0, -5.0, 4.0, -5.0)):
+            imu, truth, sensors = unit(motion, 100.0, seed, "icm-42688-p")
+            c, s = np.cos(np.radians(off)), np.sin(np.radians(off))
+            turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+            turned = imu.copy()
+            turned.attrs = dict(imu.attrs)
+            for names in (GYRO, ACCEL):
+                turned[names] = imu[names].to_numpy() @ turn
+            q = rotation.compose(truth[-1], rotation.quaternion_from_dcm(turn))
+            found = GnssCourse().align(turned, SITE, sensors, fixes(seed, motion))
+            sd = np.sqrt(found.covariance[2, 2])
+            assert low < np.degrees(sd) < high
+            inside.append(abs(phi(found, q)[2]) / sd)
+        # None beyond 2.6 standard deviations, which one of a hundred exceeds.
+        assert max(inside) < 2.6
 
 
 def test_reverse():
