@@ -33,7 +33,9 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.columns import read_name
+from strapdown.formats.inference.conclusion import infer_accel
 from strapdown.formats.join import join
+from strapdown.formats.judge import LIKELY
 from strapdown.formats.known_text import head, split
 from strapdown.formats.phones import force_of, sensor_log
 from strapdown.formats.recording import RawLog
@@ -213,6 +215,13 @@ def _columns(path: Path, kind: str, rows: list[tuple[Any, ...]]) -> dict[str, ND
     return out
 
 
+def _has_gravity(events: Mapping[str, dict[str, NDArray[Any]]]) -> bool:
+    """Whether events named linear acceleration have gravity, as those of ROS do."""
+    values = np.column_stack([events["linear"][a] for a in "xyz"]).astype(np.float64)
+    _, _, gravity, _ = infer_accel(values[np.isfinite(values).all(axis=1)], None)
+    return gravity.value == "present" and gravity.confidence >= LIKELY
+
+
 def joined(
     path: Path,
     events: Mapping[str, dict[str, NDArray[Any]]],
@@ -251,6 +260,8 @@ def joined(
                 )
         elif triad == "accel" and {"linear", "gravity"} <= events.keys():
             logs.append(force_of(log("linear", "accel"), log("gravity", "accel")))
+        elif triad == "accel" and "linear" in events and not android and _has_gravity(events):
+            logs.append(log("linear", "accel"))
         elif triad == "accel" and "linear" in events:
             findings.append(
                 Finding("io.left-out-without-gravity-no", file=path.name, quantity="accel")

@@ -214,6 +214,9 @@ def read_name(name: str) -> ColumnName:
     said = ColumnName(None, unit)
     # In group/sub/name the last part decides, unless the whole is a known name.
     parts = re.split(r"[/.]", bare)
+    if unit is None and len(parts) > 1 and parts[-1].lower() in tuple(_AXES):
+        # The unit of a sensor whose axes are members: gyro_dps.x.
+        parts[-2], unit = _without_unit(parts[-2])
     if not any(word in _ABOUT for word in re.split(rf"[/.]|{_SIGNS}", bare.lower())):
         for start in range(len(parts)):
             said = _read_words(" ".join(parts[start:]), unit)
@@ -225,7 +228,10 @@ def read_name(name: str) -> ColumnName:
     kind = find_unit(said.unit) if said.unit else None
     if str(quantity).startswith("mag") and said.unit in _MAGNETIC:
         said = _with(said, unit=_MAGNETIC[said.unit])
-    elif quantity == "time" and ((bracket and unit is None) or (kind and kind[0] != "time")):
+    elif quantity == "time" and (
+        (bracket and unit is None and bracket.group(1).lower() not in _OF_TIME)
+        or (kind and kind[0] != "time")
+    ):
         return ColumnName(None, said.unit)
     elif quantity in QUANTITIES[1:] and kind and kind[0] == "time":
         return ColumnName(None, said.unit)  # gyro_x_min
@@ -394,7 +400,19 @@ _SHORT = {"gyro": "gy", "accel": "ac", "mag": "ma"}
 # Words of the name of a clock.
 _OF_TIME = {
     *("time", "timestamp", "timestamps", "stamp", "unix", "epoch", "utc", "gps", "system"),
-    *("sample", "logging", "elapsed", "since", "start", "boot", "reboot", "local", "ros", "header"),
+    *(
+        "gmt",
+        "sample",
+        "logging",
+        "elapsed",
+        "since",
+        "start",
+        "boot",
+        "reboot",
+        "local",
+        "ros",
+        "header",
+    ),
 }
 
 

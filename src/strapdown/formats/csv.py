@@ -535,7 +535,9 @@ def _whole_lines(
         if count == width + 1 and separator and line.rstrip().endswith(separator):
             line, count = line.rstrip()[:-1], width
         odd = count != width
-        if odd or (numeric and line.lstrip()[:1].isalpha()):
+        # Names once more, as where logs were joined.
+        first = line.lstrip(" \t\"'")[:1]
+        if odd or (numeric and (first.isalpha() or first in _MARKS)):
             fields = fields_of(line, separator)
             if (odd and is_comment(line)) or not any(is_data(f) for f in fields if f):
                 amid.append((row, line))

@@ -21,11 +21,13 @@ import numpy as np
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.clocks import RELATIVE
+from strapdown.formats.columns import read_name
 from strapdown.formats.join import join
 from strapdown.formats.known_text import lacking
 from strapdown.formats.phones import AXES, XYZ
 from strapdown.formats.recording import RawLog
 from strapdown.formats.sensor_folder import Member, file_member, first_line, members_of, peek
+from strapdown.tables import GYRO
 
 _TIME = re.compile(r"time \(s\)", re.I)
 _TRIADS = {
@@ -59,6 +61,10 @@ def detect(path: Path) -> bool:
     members = peek(path)
     if path.is_file() and path.suffix.lower() in csv.SUFFIXES:
         members = [file_member(path)]
+        # A table that others wrote has names and units of its own beside some of phyphox.
+        names = [n for m in members for n in _fields(m) if str(read_name(n).quantity) in GYRO]
+        if not all(_TRIADS["gyro"][0].fullmatch(n) or _PLAIN.fullmatch(n) for n in names):
+            return False
     return any(_sensors(m) or _stream_of(m) for m in members)
 
 

@@ -139,11 +139,18 @@ def units_of_triads(
 
 
 def _without_gravity(found: dict[str, Column], said: dict[str, Inference]) -> bool:
-    """Whether a column named linear acceleration has no gravity, as far as numbers decide."""
+    """Whether a column named linear acceleration has no gravity, as far as numbers decide.
+
+    Beside an angular velocity the name is that of ROS, whose linear acceleration has gravity (REP
+    145), so that less is needed to believe it.
+    """
     column, gravity = found["accel_x"], said.get("gravity")
     if column.why != "by its name" or not read_name(column.source).linear:
         return False
-    return gravity is None or not gravity.settled or gravity.value != "present"
+    if gravity is None or gravity.value != "present":
+        return True
+    of_ros = "angular" in found["gyro_x"].source.lower()
+    return not gravity.settled and not (of_ros and gravity.confidence >= LIKELY)
 
 
 def _refuse_open(raw: RawLog, found: dict[str, Column], triad: str) -> None:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import re
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from tests.coded import coded
 
 import strapdown as sd
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError
-from strapdown.formats import ReadOptions, read_log
+from strapdown.formats import ReadOptions, read_log, reader_of
 from strapdown.formats.columns import read_name
 from strapdown.formats.gnss_files import has_fixes
 from strapdown.tables import ACCEL, GYRO
@@ -395,3 +397,79 @@ def test_a_clock_of_an_unknown_name_is_proposed_and_a_counter_is_not(tmp_path):
             read_log(path)
         assert refused.value.finding.code == "io.time-column-missing"
         assert dict(refused.value.finding.data["answers"]) == {"time": likely}
+
+
+def moving(n=1500, *, seed=3):
+    """Stamps in s, rates in deg/s, specific force in m/s² of a body that turns about two axes."""
+    rng = np.random.default_rng(seed)
+    time = 0.01 * np.arange(n)
+    omega = np.column_stack([0.8 * np.sin(time / 2), 0.6 * np.cos(time / 1.3), 0 * time])
+    force, turn = [], Rotation.identity()
+    for step in omega:
+        force.append(turn.inv().apply([0.0, 0.0, STANDARD_GRAVITY]))
+        turn = turn * Rotation.from_rotvec(0.01 * step)
+    gyro = np.degrees(omega) + rng.normal(0, 0.1, (n, 3))
+    return time, gyro, np.array(force) + rng.normal(0, 0.03, (n, 3))
+
+
+def table_of(path, names, columns, *, separator=",", again="", quoted=False):
+    lines = [separator.join(f"{v:.5f}" for v in row) for row in np.column_stack(columns)]
+    head = separator.join(f'"{n}"' if quoted else n for n in names)
+    lines[500:500] = [again.replace("HEAD", head)] if again else []
+    path.write_text("\n".join([head, *lines]) + "\n")
+    return path
+
+
+UNITS = [f"gyro_{a} [deg/s]" for a in "xyz"] + [f"acc_{a} [m/s2]" for a in "xyz"]
+
+
+@pytest.mark.parametrize(("again", "quoted"), [("HEAD", False), ("HEAD", True), ("# HEAD", False)])
+def test_names_that_are_repeated_among_the_rows_are_left_out(tmp_path, again, quoted):
+    time, gyro, accel = moving()
+    path = table_of(
+        tmp_path / "a.csv", ["t [s]", *UNITS], (time, gyro, accel), again=again, quoted=quoted
+    )
+    imu = sd.read_imu(path)
+    assert len(imu) == len(time)
+    assert "io.comments-among-rows" in {f.code for f in imu.findings}
+    np.testing.assert_allclose(imu[GYRO], np.radians(gyro), atol=1e-6)
+
+
+def test_a_time_zone_in_brackets_is_no_unit():
+    assert read_name("Timestamp (UTC)").quantity == "time"
+    assert read_name("Time (local)").quantity == "time"
+    assert read_name("Time (samples)").quantity is None
+
+
+def test_the_unit_of_a_sensor_stands_before_its_members():
+    assert (read_name("gyroscope_dps.x").quantity, read_name("gyroscope_dps.x").unit) == (
+        "gyro_x",
+        "deg/s",
+    )
+    assert read_name("accelerometer_mps2.z").unit == "m/s2"
+
+
+def test_a_table_with_some_names_of_phyphox_is_read_as_a_table(tmp_path):
+    time, gyro, accel = moving()
+    names = ["Time (s)", *(f"Acceleration {a} (m/s^2)" for a in "xyz")]
+    names += [f"Gyroscope {a} (rad s^-1)" for a in "xyz"]
+    path = table_of(tmp_path / "a.csv", names, (time, accel, np.radians(gyro)))
+    assert reader_of(path)[0] == "csv"
+    np.testing.assert_allclose(sd.read_imu(path)[GYRO], np.radians(gyro), atol=1e-5)
+
+
+@pytest.mark.parametrize("gravity", [True, False])
+def test_linear_acceleration_beside_an_angular_velocity_is_that_of_ros(tmp_path, gravity):
+    time, gyro, accel = moving()
+    if not gravity:
+        accel = np.random.default_rng(1).normal(0, 0.5, accel.shape)
+    lines = []
+    for k in range(len(time)):
+        for name, values in (("angular_velocity", gyro[k]), ("linear_acceleration", accel[k])):
+            one = {"time_ms": round(1e3 * time[k]), "sensor": name, "values": list(values)}
+            lines.append(json.dumps(one))
+    (tmp_path / "a.jsonl").write_text("\n".join(lines) + "\n")
+    imu = sd.read_imu(tmp_path / "a.jsonl", units={"gyro": "deg/s", "accel": "m/s2"})
+    assert (ACCEL[0] in imu.columns) == gravity
+    if gravity:
+        np.testing.assert_allclose(imu[ACCEL], accel, atol=1e-6)
