@@ -14,6 +14,7 @@ import pandas as pd
 
 from strapdown.alignment.alignment import Alignment, Site
 from strapdown.alignment.fine import FineResult
+from strapdown.alignment.gnss_course import GnssCourse
 from strapdown.bundle.seal import InputFiles, Seal
 from strapdown.config.alignment import sensors_of
 from strapdown.config.navigation import (
@@ -61,6 +62,7 @@ from strapdown.systems.navigation_source import (
 )
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import EULER, GEODETIC, VELOCITY
+from strapdown.tables.checks import source_of
 
 if TYPE_CHECKING:
     from strapdown.evaluation.control_points import ControlPointScore
@@ -74,6 +76,8 @@ __all__ = ["Drive", "NavigationRun", "make_chain", "run_navigation", "withheld_a
 Drive = Callable[..., PipelineRun]
 
 #: Shares of a whole run at which its pipeline begins and ends.
+#: A shorter part without navigation at the start, s, is not reported.
+LEAST_LOST = 1.0
 BEGUN, ENDED = 0.15, 0.8
 #: Length of a chunk of the record, and interval of progress reports, s.
 CHUNK = 20.0
@@ -185,6 +189,7 @@ def run_navigation(
         *looked,
         *(f for one in run.aligned for f in one.alignment.findings),
         *(() if fine is None or fine.fine is None else fine.fine.findings),
+        *_lost_start(chain, source.imu, told_by.trajectory),
     ]
     return NavigationRun(
         spec=spec,
@@ -203,6 +208,27 @@ def run_navigation(
         trust=trust,
         inputs=(*configuration_file(file), *source.inputs),
         findings=tuple(dict.fromkeys(findings)),
+    )
+
+
+def _lost_start(
+    chain: NavigationPipeline, imu: pd.DataFrame, trajectory: pd.DataFrame
+) -> tuple[Finding, ...]:
+    """Report the samples before navigation of a vehicle that was aligned while it moved."""
+    mode = chain.modes[0]
+    begin, begun = float(imu.index[0]), float(trajectory.index[0])
+    moving = isinstance(mode, CoarseMode) and isinstance(mode.way, GnssCourse)
+    if not moving or begun - begin <= LEAST_LOST:
+        return ()
+    return (
+        Finding(
+            "navigation.start-lost",
+            file=source_of(imu),
+            quantity="time",
+            seconds=begun - begin,
+            begin=begin,
+            begun=begun,
+        ),
     )
 
 

@@ -1,0 +1,57 @@
+"""The part of a record before navigation, of a vehicle that is aligned while it moves."""
+
+from __future__ import annotations
+
+import pytest
+
+from strapdown.config.navigation import NavigationSpec
+from strapdown.systems.navigation_run import run_navigation
+
+TEXT = """
+[simulation]
+rate_hz = 100.0
+seed = 8101
+
+[simulation.motion]
+kind = "car"
+lat_deg = 55.75
+lon_deg = 37.62
+alt_m = 150.0
+heading_deg = 30.0
+speed_km_per_h = 50.0
+manoeuvres = [
+  { do = "straight", duration_s = 8.0 },
+  { do = "accelerate", to_km_per_h = 60.0, duration_s = 4.0 },
+  { do = "turn_left", angle_deg = 60.0, radius_m = 40.0 },
+  { do = "straight", duration_s = 20.0 },
+]
+
+[simulation.gnss.rtk]
+rate_hz = 5.0
+position_noise_m = 0.05
+velocity_noise_m_per_s = 0.05
+
+[sensors]
+sensor = "mpu-6050"
+
+[coarse]
+kind = "gnss_course"
+duration_s = 12.0
+
+[fine]
+kind = "none"
+
+[aiding.rtk]
+kind = "gnss"
+"""
+
+
+@pytest.mark.slow
+def test_seconds_without_navigation_at_the_start_are_reported(tmp_path):
+    file = tmp_path / "navigate.toml"
+    file.write_text(TEXT)
+    result = run_navigation(NavigationSpec.read(file), file)
+    begun = float(result.record.trajectory.index[0])
+    (lost,) = [f for f in result.findings if f.code == "navigation.start-lost"]
+    assert lost.data["seconds"] == pytest.approx(begun - float(result.source.imu.index[0]))
+    assert 11.5 < lost.data["seconds"] < 12.5
