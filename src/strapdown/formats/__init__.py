@@ -500,11 +500,6 @@ FOREIGN = (
         tuple(b"UU" + kind for kind in (b"z1", b"a1", b"a2", b"s1", b"s2", b"e1", b"e2", b"zT")),
     ),
     Foreign(
-        "a log of ArduPilot as text",
-        "mavlogdump.py --format csv of pymavlink",
-        (b"FMT, 128, 89",),
-    ),
-    Foreign(
         "a log of a DJI aircraft", "DatCon, which writes CSV", (b"BUILD",), (".dat",), offset=16
     ),
     Foreign("a binary log of Xsens", "MT Manager, exported as text", (b"\xfa\xff",), (".mtb",)),

@@ -1,4 +1,4 @@
-"""ArduPilot DataFlash logs (``.bin``): records that the log itself describes.
+"""ArduPilot DataFlash logs (``.bin``, or as text ``.log``): records that the log itself describes.
 
 File: https://ardupilot.org/dev/docs/code-overview-adding-a-new-log-message.html; messages:
 https://ardupilot.org/copter/docs/logmessages.html. A record begins with A3 95 and the number of its
@@ -7,12 +7,15 @@ Letters c, C, e, E stand for hundredths and L for 1e-7 deg. Records FMTU and UNI
 ``TimeUS`` counts µs since the start of the autopilot. IMU: rad/s and m/s² of specific force,
 forward, right, down. GPS: ``Alt`` is over the sea; GPA has accuracies, and ``AEl``, the height over
 the ellipsoid, or in older logs ``Und``, the geoid undulation with its sign reversed (pull request
-29904 of ArduPilot). MAG: milligauss. XKF1 or NKF1 and POS: the solution of the autopilot.
+29904 of ArduPilot). As text a line is the name of its type and its values, scaled
+already: ``GPS, 33200000, 3, …``. MAG: milligauss. XKF1 or NKF1 and POS: the solution of the autopilot.
 """
 
 from __future__ import annotations
 
+import re
 import struct
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -27,7 +30,7 @@ from strapdown.formats.binary import Quantities, damage, first_bytes, interpolat
 from strapdown.formats.clocks import RELATIVE, Clock
 from strapdown.formats.recording import NoStreamError, RawLog
 
-TITLE = "ArduPilot DataFlash log (.bin)"
+TITLE = "ArduPilot DataFlash log (.bin, .log)"
 STREAMS = {"imu": "IMU", "gnss": "GPS", "reference": "POS", "magnetometer": "MAG"}
 STREAMS |= {"barometer": "BARO"}
 SYNC, FMT, FMT_SIZE = b"\xa3\x95", 128, 89
@@ -54,15 +57,21 @@ FORMATS = {
     "q": "<i8",
     "Q": "<u8",
 }
+# Of the values of a text, where they are no numbers with a fraction.
+_TYPES: dict[str, Any] = {**dict.fromkeys("bBhHiIqQ", np.int64), **dict.fromkeys("aMnNZ", "S64")}
 SCALES = {"c": 0.01, "C": 0.01, "e": 0.01, "E": 0.01, "L": 1e-7}
 # Status of a receiver to field 6 of NMEA GGA.
 QUALITY = {2: 1, 3: 1, 4: 2, 5: 5, 6: 4}
 UNITS = {"Gyr": "rad/s", "Acc": "m/s/s"}  # as UNIT spells them
 Record = dict[str, NDArray[Any]]
+# The description of descriptions, as text.
+_TEXT = re.compile(rb"(?:\A|\n)FMT, ?128, ?89, ?FMT,")
 
 
 def detect(path: Path) -> bool:
     """Detect by the first record, which describes itself."""
+    if _TEXT.search(first_bytes(path, 4096)):
+        return True
     return first_bytes(path, 4) == SYNC + bytes([FMT, FMT]) or (
         first_bytes(path, 3) == SYNC + bytes([FMT]) and path.suffix.lower() == ".bin"
     )
@@ -72,6 +81,8 @@ def detect(path: Path) -> bool:
 def _records(path: Path, stamp: int) -> tuple[dict[str, Record], int]:
     """Read every record by name, and count the bytes between records that are none."""
     data = path.read_bytes()
+    if _TEXT.search(data[:4096]):
+        return _records_of_text(data.decode("ascii", "replace"))
     types: dict[int, tuple[str, list[str], str, int]] = {}
     where: dict[int, list[int]] = {}
     sizes, k, lost = {FMT: FMT_SIZE}, 0, 0
@@ -103,6 +114,38 @@ def _records(path: Path, stamp: int) -> tuple[dict[str, Record], int]:
         }
         out[name]["#"] = np.full(len(table), kind)
     return out, lost
+
+
+def _records_of_text(text: str) -> tuple[dict[str, Record], int]:
+    """Read every record of a log as text, and count the characters of lines that are none."""
+    types: dict[str, tuple[int, str, list[str]]] = {}
+    held: dict[str, list[list[str]]] = {}
+    lost = 0
+    for line in text.splitlines():
+        name, *fields = [field.strip() for field in line.split(",")]
+        if name == "FMT" and len(fields) > 4 and fields[0].isdecimal():
+            types[fields[2]] = (int(fields[0]), fields[3], fields[4:])
+        elif name in types and len(fields) == len(types[name][2]) == len(types[name][1]):
+            held.setdefault(name, []).append(fields)
+        elif name not in types:
+            lost += len(line)
+    out: dict[str, Record] = {}
+    for name, rows in held.items():
+        kind, letters, names = types[name]
+        out[name] = {
+            n: _of_letter(letter, values)
+            for n, letter, values in zip(names, letters, zip(*rows, strict=True), strict=True)
+        }
+        out[name]["#"] = np.full(len(rows), kind)
+    return out, lost
+
+
+def _of_letter(letter: str, values: Sequence[str]) -> NDArray[Any]:
+    """Convert the texts of a field; those that are no numbers stay texts."""
+    try:
+        return np.array(values, dtype=_TYPES.get(letter, np.float64))
+    except ValueError:
+        return np.array(values, dtype="S64")
 
 
 def _log(path: Path, stream: str) -> tuple[dict[str, Record], Record, list[Finding]]:

@@ -542,6 +542,35 @@ def test_dataflash_garbage_between_records_is_counted(tmp_path):
     assert raw.findings[0].code == "io.bytes-left-out"
 
 
+def as_text(path):
+    """The log as ground stations write it: names and values, which are scaled."""
+    log, _ = dataflash._records(path.resolve(), path.stat().st_mtime_ns)
+    letters = {"IMU": FLASH_IMU[1], "GPS": FLASH_GPS[1], "GPA": "QBCCCe"}
+    lines = ["FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns"]
+    for name, form in letters.items():
+        names = [n for n in log[name] if n != "#"]
+        lines.append(f"FMT, {log[name]['#'][0]}, 45, {name}, {form}, {','.join(names)}")
+        for row in zip(*(log[name][n].tolist() for n in names), strict=True):
+            lines.append(f"{name}, " + ", ".join(map(str, row)))
+    lines.append("MSG, 100, ArduCopter V4.5.1, and more")
+    return written(path.with_suffix(".log"), "\n".join(lines).encode())
+
+
+def test_dataflash_as_text_is_the_same_log(tmp_path):
+    path = arducopter(tmp_path, ("AEl", "e", 60_750))
+    text = as_text(path)
+    assert kind(text) == "dataflash"
+    for read in (dataflash.read, dataflash.read_fixes):
+        binary, said = read(path), read(text)
+        assert said.axes == binary.axes and list(said.columns) == list(binary.columns)
+        for name, values in binary.columns.items():
+            np.testing.assert_allclose(said.columns[name], values, rtol=1e-12)
+    assert dataflash.read(text).columns["time"].dtype.kind == "i"
+    with text.open("ab") as stream:
+        stream.write(b"\nIMU, 99000, 0, 0.1, cut")
+    assert len(dataflash.read(text).columns["time"]) == 29
+
+
 def test_dataflash_recorded(recordings):
     path = recordings("zoo/ardupilot/test.BIN")
     data = path.read_bytes()
