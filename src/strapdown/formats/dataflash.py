@@ -7,8 +7,8 @@ Letters c, C, e, E stand for hundredths and L for 1e-7 deg. Records FMTU and UNI
 ``TimeUS`` counts µs since the start of the autopilot. IMU: rad/s and m/s² of specific force,
 forward, right, down. GPS: ``Alt`` is over the sea; GPA has accuracies, and ``AEl``, the height over
 the ellipsoid, or in older logs ``Und``, the geoid undulation with its sign reversed (pull request
-29904 of ArduPilot). As text a line is the name of its type and its values, scaled
-already: ``GPS, 33200000, 3, …``. MAG: milligauss. XKF1 or NKF1 and POS: the solution of the autopilot.
+29904 of ArduPilot). As text a line is the name of its type and its values, scaled already: ``GPS,
+33200000, 3, …``. MAG: milligauss. XKF1 or NKF1 and POS: the solution of the autopilot.
 """
 
 from __future__ import annotations
