@@ -318,6 +318,7 @@ class Made:
             "axes": d["axes"],
             "lever_arm_m": d["arm_measured_m"],
             "heading_deg": round(heading + float(stream(d["seed"], "person").normal(0, 3)), 0),
+            "sd_deg": 5.0,  # how well he knows that
             "sensor": d["part"] if d["knows_sensor"] else None,
             "position_sd_m": sd,
             "velocity_sd_m_per_s": {"code": 0.1, "phone": 0.5, "rtk": 0.05}[d["receiver"]],

@@ -2,9 +2,11 @@
 
     python -m tests.drives.judge 0:50 --out drives
     python -m tests.drives.judge 17 --set fault='"none"' --set late_s=0
+    python -m tests.drives.judge 17 --isolate
 
 `init navigate` proposes, the owner of the record answers what is asked and changes no other line,
-and the run is compared with the truth. `--set` changes one part of the draw, to find a cause.
+and the run is compared with the truth. `--set` changes one part of the draw, to find a cause;
+`--isolate` runs a record again without each of its difficulties in turn.
 """
 
 from __future__ import annotations
@@ -49,6 +51,25 @@ COVERED = (
 FAR = 5.0  # bounds
 DIVERGED = 10.0  # times what the fixes alone give
 LIMITS = {1: 3.841, 2: 5.991, 3: 7.815}  # of chi-square, 95 %
+#: Difficulties of a record, each with what the draw is without it.
+EASIER: dict[str, dict[str, Any]] = {
+    "no fault": {"fault": "none"},
+    "no outage": {"outages_s": []},
+    "clocks agree": {"late_s": 0.0, "drift_ppm": 0.0, "step_s": 0.0, "velocity_late_s": 0.0},
+    "no clock step": {"step_s": 0.0},
+    "no delay of velocity": {"velocity_late_s": 0.0},
+    "stated right": {"stated": "right", "stated_factor": 1.0},
+    "white errors of fixes": {"drift_m": 1e-4, "float_share": 0.0},
+    "velocities": {"velocity": "ned"},
+    "no vibration": {"vibration_m_s2": 0.0, "vibration_deg_s": 0.0},
+    "mounted straight": {"mount_deg": [0.0, 0.0, 0.0]},
+    "means at each sample": {"sampling": "mean", "jitter_s": 0.0, "lost_share": 0.0},
+    "no warming": {"warming": False},
+    "sensor named": {"knows_sensor": True},
+    "sensor not named": {"knows_sensor": False},
+    "antenna at the unit": {"antenna_m": [0.0] * 3, "arm_measured_m": [0.0] * 3},
+    "begins at rest": {"start": "rest", "rest_s": 20.0},
+}
 
 
 # ------------------------------------------------------------------------------ the command
@@ -161,11 +182,14 @@ def _score(made: Made, record: tuple[Any, Any], origin: float, share: float) -> 
     }  # fmt: skip
 
 
-def judge(facts: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """Make one record, navigate over it as proposed, and compare with the truth."""
+def judge(facts: dict[str, Any], folder: Path, smoothed: bool = True) -> dict[str, Any]:
+    """Make one record, navigate over it as proposed, and compare with the truth.
+
+    Half of the records are smoothed, too, unless `smoothed` is false.
+    """
     out: dict[str, Any] = {"draw": facts, "outcome": "crashed"}
     rng = stream(facts["seed"], "judge")
-    smooth, share = bool(rng.random() < 0.5), float(rng.random())
+    smooth, share = bool(rng.random() < 0.5) and smoothed, float(rng.random())
     made = make(facts, folder)
     out["smooth"] = smooth
     stage, began = "init", time.perf_counter()
@@ -287,6 +311,16 @@ def line(r: dict[str, Any]) -> str:
     return f"{text}; {r['verdict']}, begins {r['filter']['start_s']:.0f} s"
 
 
+def isolate(facts: dict[str, Any]) -> None:
+    """Run one record without each of its difficulties, and print the outcomes."""
+    for name, change in {"as drawn": {}, **EASIER}.items():
+        easier = facts | change
+        if change and easier == facts:
+            continue
+        with tempfile.TemporaryDirectory() as scratch:
+            print(f"{name:24}{line(judge(easier, Path(scratch), smoothed=False))}", flush=True)
+
+
 def main() -> int:
     """Judge a range of seeds, print the table and write one JSON for each."""
     parser = argparse.ArgumentParser(description="Judge navigation as proposed by made-up drives.")
@@ -294,6 +328,7 @@ def main() -> int:
     parser.add_argument("--out", type=Path, help="folder of the JSON of each seed")
     parser.add_argument("--keep", type=Path, help="folder to keep the records in")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=JSON")
+    parser.add_argument("--isolate", action="store_true", help="without each difficulty in turn")
     given = parser.parse_args()
     first, colon, last = given.seeds.partition(":")
     seeds = range(int(first), int(last)) if colon else [int(s) for s in first.split(",")]
@@ -310,6 +345,9 @@ def main() -> int:
             if key not in table:
                 parser.error(f"{key} is not part of a draw: {', '.join(table)}")
             table[key] = json.loads(value)
+        if given.isolate:
+            isolate(facts)
+            continue
         with tempfile.TemporaryDirectory() as scratch:
             where = given.keep / str(seed) if given.keep else Path(scratch) / str(seed)
             result = judge(facts, where)
@@ -318,7 +356,8 @@ def main() -> int:
         if given.out:
             given.out.mkdir(parents=True, exist_ok=True)
             (given.out / f"{seed}.json").write_text(json.dumps(result, indent=1) + "\n")
-    print(report(results))
+    if results:
+        print(report(results))
     return 0
 
 
