@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.signal import lfilter
+from scipy.signal import butter, lfilter, sosfilt
 from scipy.spatial.transform import Rotation
 from tests.drives.motion import DEG, KINDS, G, Motion, geodetic, make_motion, to_ned
 
@@ -238,14 +238,20 @@ def _hum(
             sizes = rng.normal(size=3) / order
             phases = rng.uniform(0, 6.28, 3)
             parts[k] += sizes * np.sin(order * turns[:, None] + phases)
+    # A body that shakes does not go anywhere: what is broad-band begins at 15 Hz.
+    sieve = butter(2, 15.0, "highpass", fs=many / step, output="sos")
     for k in range(2):
-        parts[k] += 0.7 * rng.normal(size=parts[k].shape) * np.sqrt(many) / 3
+        parts[k] += 0.7 * sosfilt(sieve, rng.normal(size=parts[k].shape), axis=0)
         parts[k] *= (work / np.sqrt(np.mean(parts[k] ** 2)))[:, None]
     force, rate = draw["vibration_m_s2"] * parts[0], draw["vibration_deg_s"] * DEG * parts[1]
     square = (force.reshape(len(t), many, 3) ** 2).mean(axis=1)
     slow = np.exp(-step / 0.5)  # rectification answers to the shaking of half a second
     square = lfilter([1 - slow], [1, -slow], square, axis=0)
-    return force.reshape(len(t), many, 3).mean(1), rate.reshape(len(t), many, 3).mean(1), square
+    if draw["sampling"] == "mean":
+        return (*(x.reshape(len(t), many, 3).mean(axis=1) for x in (force, rate)), square)
+    k = np.exp(-2 * np.pi * draw["cut_off_share"] / many)
+    low = (lfilter([1 - k], [1, -k], x, axis=0) for x in (force, rate))
+    return (*(x[many - 1 :: many] for x in low), square)  # with what is folded down
 
 
 def _seen(motion: Motion, t: np.ndarray, draw: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:

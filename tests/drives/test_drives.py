@@ -12,6 +12,7 @@ from tests.drives.generator import (
     FIX_STYLES,
     GRADES,
     LOG_STYLES,
+    _hum,
     draw,
     fixes,
     make,
@@ -158,6 +159,20 @@ def test_errors_have_the_drawn_sizes():
     ):
         noise = np.diff((read - true)[rest], axis=0).std() / np.sqrt(2)
         assert noise * np.sqrt(1 / facts["rate_hz"]) == pytest.approx(density, rel=0.05)
+
+
+@pytest.mark.parametrize("sampling", ["mean", "filtered"])
+def test_a_shaken_body_does_not_go_anywhere(sampling):
+    facts = first_of("boat") | {"start": "moving", "duration_s": 60.0, "sampling": sampling}
+    facts |= {"vibration_m_s2": 2.0, "vibration_deg_s": 1.0, "rate_hz": 200, "cut_off_share": 0.2}
+    t = np.arange(0, 60, 0.005)
+    force, rate, square = _hum(stream(1, "vibration"), moved(facts), t, facts)
+    assert np.sqrt(np.mean(force**2)) > 0.5
+    white = np.sqrt(np.mean(force**2)) * np.sqrt(0.005)  # m/s/√s, if it were white
+    way = np.cumsum(force, axis=0) * 0.005
+    assert np.std(way[-6000:] - way[:6000]) < 0.2 * white * np.sqrt(30)
+    assert np.sqrt(square[t > 5].mean()) == pytest.approx(2.0, rel=0.5)
+    assert np.abs(np.degrees(np.cumsum(rate, axis=0) * 0.005)).max() < 1.0
 
 
 def test_fixes_without_errors_are_the_antenna():
