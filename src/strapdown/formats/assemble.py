@@ -92,7 +92,7 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     except DataError as error:
         if error.finding.code not in REPAIRABLE:
             raise
-        questions.ask(error.finding, repair="true")
+        questions.ask(error.finding, **_repair(error.finding, len(values["gyro"])))
         questions.refuse()
         raise
     try:
@@ -100,7 +100,7 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     except DataError as error:
         code, choices = error.finding.code, error.finding.data.get("choices")
         if code in REPAIRABLE:
-            questions.ask(error.finding, repair="true")
+            questions.ask(error.finding, **_repair(error.finding, len(finite)))
         elif code == "io.time-unit-undecided" and choices:
             best = choices[0].data
             unit = str(best["unit"]) if best["share"] >= LIKELY else "UNIT"
@@ -203,6 +203,17 @@ REPAIRABLE = {
     "io.time-goes-back",
     "io.time-counter-wraps",
 }
+
+
+#: Largest share of the rows whose loss is proposed. Rows that arrive in bursts with one stamp are
+#: no faults of rows.
+MOST_REPAIRED = 0.1
+
+
+def _repair(fault: Finding, count: int) -> dict[str, str]:
+    """Return the answer to faults of rows, if it does not cost much of the log."""
+    rows = fault.data.get("count", 1)
+    return {"repair": "true"} if rows <= MOST_REPAIRED * count else {}
 
 
 #: Longest usual step of a log with a gyro, s. Between samples that are farther apart any turn may

@@ -490,7 +490,7 @@ def _repaired(
                 "io.rows-not-later-left-out" if not back else "io.rows-after-step-back-left-out",
                 file=file,
                 quantity="time",
-                severity="warning" if back else "note",
+                severity="warning" if back or dropped > 0.1 * ticks.size else "note",
                 count=dropped,
                 back=back,
             )

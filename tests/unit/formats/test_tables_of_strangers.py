@@ -473,3 +473,21 @@ def test_linear_acceleration_beside_an_angular_velocity_is_that_of_ros(tmp_path,
     assert (ACCEL[0] in imu.columns) == gravity
     if gravity:
         np.testing.assert_allclose(imu[ACCEL], accel, atol=1e-6)
+
+
+@pytest.mark.parametrize(("every", "proposed"), [(50, True), (4, False)])
+def test_a_repair_that_loses_much_of_a_log_is_not_proposed(tmp_path, every, proposed):
+    time, gyro, accel = moving()
+    # One stamp again in 50 rows is a fault of rows; three in four are bursts.
+    again = np.arange(len(time)) % every == 1 if proposed else np.arange(len(time)) % every != 0
+    time[again] = np.nan
+    time = np.maximum.accumulate(np.nan_to_num(time))
+    path = table_of(tmp_path / "a.csv", ["t [s]", *UNITS], (time, gyro, accel))
+    with pytest.raises(DataError) as refused:
+        read_log(path)
+    finding = refused.value.finding
+    assert finding.code == "io.stamp-repeated"
+    assert ("--repair" in finding.data["flags"]) == proposed
+    kept = read_log(path, ReadOptions(repair=True)).findings
+    dropped = next(f for f in kept if f.code == "io.rows-not-later-left-out")
+    assert dropped.severity == ("note" if proposed else "warning")
