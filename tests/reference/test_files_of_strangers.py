@@ -33,7 +33,8 @@ of a gyro and an accelerometer.
 #: What a person knows of his file: a log, a gyro alone, fixes, a trajectory, attitudes.
 LOG = "init navigate {}"
 GYRO = "attitude {} --algorithms quaternion"
-FIXES = "init navigate LOG --gnss {}"
+FIXES = "doctor {}"
+BESIDE = "init navigate LOG --gnss {}"
 ATTITUDES = "attitude LOG --algorithms quaternion --reference {}"
 COMMANDS = {
     "apdm/imuData01.csv": LOG,
@@ -55,7 +56,7 @@ COMMANDS = {
     "gsdc/Pixel4_ground_truth.csv": FIXES,
     "gsdc/device_gnss.csv": FIXES,
     "gsdc/gnss_log.txt": LOG,
-    "gtsam/KittiGps_converted.txt": FIXES,
+    "gtsam/KittiGps_converted.txt": BESIDE,
     "gtsam/imuAndGPSdata.csv": LOG,
     "gtsam/quadraped_imu_data.csv": LOG,
     "matlab_mobile/imu_orientation.csv": LOG,
@@ -109,9 +110,9 @@ def stationary_log(tmp_path):
 def read_of(out):
     """Samples with their rate, and fixes, as the command says what it found."""
     log = re.search(r"^  (?!log\.csv)\S+: (\d+) samples, .* s, (.* Hz)$", out, re.M)
-    fixes = re.search(r": \d+ of (\d+) fixes within the log$", out, re.M)
+    fixes = re.search(r": \d+ of (\d+) fixes within the log$|^ gnss +(\d+) ", out, re.M)
     parts = [f"{log[1]} samples, {log[2]}"] if log else []
-    return "; ".join(parts + ([f"{fixes[1]} fixes"] if fixes else []))
+    return "; ".join(parts + ([f"{fixes[1] or fixes[2]} fixes"] if fixes else []))
 
 
 def result_of(run_cli, words):

@@ -25,7 +25,7 @@ from strapdown.formats.recording import CHECKED
 from strapdown.formats.trajectory_readers import read_trajectory
 from strapdown.formats.writers import imu_columns, table_columns
 from strapdown.systems.doctor import Diagnosis, LogDiagnosis
-from strapdown.tables import POSITION_SD, QUATERNION, TRAJECTORY, VELOCITY_SD
+from strapdown.tables import POSITION_SD, QUATERNION, TRAJECTORY, VELOCITY, VELOCITY_SD
 
 __all__ = ["axes_of_clean_log", "write_clean_log"]
 
@@ -171,6 +171,10 @@ def _as_stated(fixes: pd.DataFrame) -> pd.DataFrame:
         *(VELOCITY_SD if "velocity_sd_taken" in fixes.attrs else ()),
     ]
     out = fixes.drop(columns=taken)
+    if "velocity_sd_taken" in fixes.attrs:
+        # A component that is not measured, as the vertical one of speed and course, has no number.
+        measured = np.isfinite(fixes[VELOCITY_SD].to_numpy(dtype=np.float64))
+        out[VELOCITY] = fixes[VELOCITY].where(measured)
     out.attrs = dict(fixes.attrs)
     return out
 
