@@ -611,10 +611,9 @@ def _was_cut(line: str, before: Lines, top: _Top, ended: bool) -> bool:
     ends = [fields_of(other, separator)[-1] for _, other in before]
     if not all(_NUMBER.fullmatch(e) for e in ends):
         return False
-    # Without a line end the last number may have lost digits; it shows if all others have the same
-    # number of decimals.
-    decimals = {len(e.partition(".")[2]) for e in ends}
-    short = len(decimals) == 1 and len(fields[-1].partition(".")[2]) < decimals.pop()
+    # Without a line end the last number may have lost digits; it shows if all others have more.
+    fewest = min((len(e.partition(".")[2]) for e in ends), default=0)
+    short = len(fields[-1].partition(".")[2]) < fewest
     return not _NUMBER.fullmatch(fields[-1]) or short
 
 

@@ -491,3 +491,12 @@ def test_a_repair_that_loses_much_of_a_log_is_not_proposed(tmp_path, every, prop
     kept = read_log(path, ReadOptions(repair=True)).findings
     dropped = next(f for f in kept if f.code == "io.rows-not-later-left-out")
     assert dropped.severity == ("note" if proposed else "warning")
+
+
+@pytest.mark.parametrize(("last", "rows"), [("0.21", 59), ("0.2131", 60)])
+def test_a_last_number_shorter_than_all_others_was_cut(tmp_path, last, rows):
+    lines = [f"{0.01 * k:.2f},1.5,0.2,0.3{k:02d}{'7' * (k % 3)}" for k in range(60)]
+    lines[-1] = lines[-1].rpartition(",")[0] + f",{last}"
+    path = tmp_path / "a.csv"
+    path.write_text("t_s,gyro_x_dps,gyro_y_dps,gyro_z_dps\n" + "\n".join(lines))
+    assert len(sd.read_imu(path)) == rows
