@@ -60,9 +60,13 @@ APPARENT = 4.5
 UNSEEN = 3.0
 #: Gyro bias that allows gyrocompassing, the rest needed for it, and the longest that is used, s.
 NORTH, LEAST_REST, LONGEST_REST = 2.0 / DEG_PER_HOUR, 60.0, 600.0
-#: Gyro noise of which no consumer part is capable, rad/s/√Hz: the best of the catalogue have 0.1
-#: deg/√h.
-TACTICAL_NOISE = math.radians(0.06) / 60.0
+#: Grades by the noise of the quietest gyro, rad/s/√Hz: the best consumer part of the catalogue has
+#: 0.168 deg/√h, the best calibrated MEMS unit 0.1 deg/√h; a little less counts as the same.
+GRADES = (
+    ("tactical-grade", math.radians(0.06) / 60.0),
+    ("industrial-grade", math.radians(0.13) / 60.0),
+    ("consumer-grade", math.inf),
+)
 NO_ERRORS = ImuUncertainty(TriadUncertainty(), TriadUncertainty())
 #: Longest rest used for a coarse alignment, s.
 COARSE = 100.0
@@ -277,8 +281,7 @@ def _sensors(
     out: dict[str, Any] = {"sensor": named}
     if named is None:
         assert scatter is not None
-        steady = min(scatter[0][0]) < TACTICAL_NOISE
-        out["sensor"] = "tactical-grade" if steady else "consumer-grade"
+        out["sensor"] = next(name for name, most in GRADES if min(scatter[0][0]) < most)
     known = ImuUncertainty.of_sensor(load_sensor(out["sensor"]))
     # For gyrocompassing gyros the rocking of a vehicle is motion, not noise.
     north = _finds_north(known) or (named is None and bias is not None and bias <= NORTH)

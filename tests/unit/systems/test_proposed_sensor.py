@@ -17,8 +17,8 @@ from strapdown.simulation.earth_motion import StationaryMotion
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
 from strapdown.simulation.vehicles import Accelerate, Stop, Straight, Turn
 from strapdown.systems.navigation_proposal import (
+    GRADES,
     LOUD,
-    TACTICAL_NOISE,
     _rest_bias,
     _sensors,
     propose,
@@ -26,6 +26,7 @@ from strapdown.systems.navigation_proposal import (
 from strapdown.systems.navigation_run import run_navigation
 from strapdown.tables import ACCEL, GEODETIC, GYRO
 
+TACTICAL_NOISE = GRADES[0][1]
 PLACE = (45.0, 20.0, 80.0)
 #: RTK, m and m/s.
 RECEIVER = {"rate": 1.0, "position_noise": 0.01, "velocity_noise": 0.03}
@@ -45,7 +46,9 @@ def test_noise_tells_the_grade_and_is_stated():
     assert np.degrees(gyro) * 60.0 == pytest.approx(
         found["gyro"]["noise_density_deg_per_sqrt_h"][0], rel=0.05
     )
-    assert _sensors(None, scatter(2.0 * TACTICAL_NOISE, accel), None)["sensor"] == "consumer-grade"
+    for noise, grade in ((0.1, "industrial-grade"), (0.168, "consumer-grade")):
+        found = _sensors(None, scatter(np.radians(noise) / 60.0, accel), None)
+        assert found["sensor"] == grade
 
 
 def test_noise_beyond_the_data_sheet_is_stated_for_a_named_sensor_too():
