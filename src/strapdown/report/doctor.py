@@ -197,8 +197,7 @@ def answering(one: LogDiagnosis, log: str | None = None) -> str | None:
     if not any(more) and not one.answers:
         return None  # the same command would be refused again
     flags = [str(one.data["options"]), *more, str(one.data["fixes_options"])]
-    flags = " ".join(part for part in flags if part)
-    return _line("doctor", log or one.name, flags)
+    return _line("doctor", log or one.name, " ".join(part for part in flags if part))
 
 
 def _line(name: str, log: str, flags: str) -> str:
