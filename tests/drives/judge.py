@@ -3,6 +3,9 @@
     python -m tests.drives.judge 0:50 --out drives
     python -m tests.drives.judge 17 --set fault='"none"' --set late_s=0
     python -m tests.drives.judge 17 --isolate
+    python -m tests.drives.judge --out drives
+
+The last prints the table of all seeds that were judged into a folder.
 
 `init navigate` proposes, the owner of the record answers what is asked and changes no other line,
 and the run is compared with the truth. `--set` changes one part of the draw, to find a cause;
@@ -250,7 +253,7 @@ def _rows(name: str, choices: Iterable[str], results: list[dict[str, Any]]) -> l
         if not own:
             continue
         ran = [r for r in own if "verdict" in r]
-        far = Counter(r["verdict"] for r in ran if r["outside"])
+        far = Counter(r["verdict"] for r in ran if r["outside"] and not r["diverged"])
         lost = sum(r["diverged"] for r in ran)
         low, high = interval(lost, max(len(ran), 1))
         sound = sum(r["outcome"] == "sound" for r in own)
@@ -324,12 +327,16 @@ def isolate(facts: dict[str, Any]) -> None:
 def main() -> int:
     """Judge a range of seeds, print the table and write one JSON for each."""
     parser = argparse.ArgumentParser(description="Judge navigation as proposed by made-up drives.")
-    parser.add_argument("seeds", help="A:B, or one seed, or A,B,C")
+    parser.add_argument("seeds", nargs="?", help="A:B, or one seed, or A,B,C")
     parser.add_argument("--out", type=Path, help="folder of the JSON of each seed")
     parser.add_argument("--keep", type=Path, help="folder to keep the records in")
     parser.add_argument("--set", action="append", default=[], metavar="KEY=JSON")
     parser.add_argument("--isolate", action="store_true", help="without each difficulty in turn")
     given = parser.parse_args()
+    if given.seeds is None:
+        files = sorted(given.out.glob("*.json"), key=lambda path: int(path.stem))
+        print(report([json.loads(path.read_text()) for path in files]))
+        return 0
     first, colon, last = given.seeds.partition(":")
     seeds = range(int(first), int(last)) if colon else [int(s) for s in first.split(",")]
     warnings.simplefilter("ignore")
