@@ -31,7 +31,7 @@ from strapdown.systems.alignment_draft import (
     stage,
     toml_value,
 )
-from strapdown.systems.navigation_proposal import TAKEN, Proposal, propose
+from strapdown.systems.navigation_proposal import LOUD, NOISE_KEYS, TAKEN, Proposal, propose
 from strapdown.tables import ACCEL, GYRO, VELOCITY_SD
 from strapdown.tables.checks import index_of, source_of, values_of
 
@@ -167,13 +167,23 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
         stated = made.table.get("sensors", {}).get(triad)
         if stated is None:
             continue
-        page.table(
-            f"[sensors.{triad}]",
-            "Found: it shakes far beyond its data sheet; half of the time so much, x, y, z:",
-        )
+        how = _how_loud(made, triad, stated)
+        full = {"gyro": "gyros", "accel": "accelerometers"}[triad]
+        if how == "shaken":
+            why = (
+                "Found: it shakes far beyond its noise at rest; half of the time so much, x, y, z:"
+            )
+            told.append(f"the {full} shake far beyond their noise while it is quiet")
+        elif made.guessed:
+            why = "Found: noise while it is quiet, x, y, z; biases of the gyros as a rest allows."
+        else:
+            why = (
+                "Found: noise beyond the data sheet while it is quiet: is it this sensor? x, y, z:"
+            )
+            told.append(f"the noise of the {full} exceeds that of {named}: is it this sensor?")
+        page.table(f"[sensors.{triad}]", why)
         for key, value in stated.items():
             page.key(key, toml_value(value) or "")
-        told.append(f"vibration of the {triad}s far exceeds the data sheet: {key} {list(value)}")
     for block, stated in made.table.get("states", {}).items():
         page.table(
             f"[states.{block}]",
@@ -183,6 +193,14 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
         for key, value in stated.items():
             page.key(key, toml_value(value) or "")
     return told
+
+
+def _how_loud(made: Proposal, triad: str, stated: dict[str, Any]) -> str:
+    """Whether a triad's stated noise is that of shaking, or of the log while it is quiet."""
+    k, key, unit = next((k, key, u) for k, (name, key, u) in enumerate(NOISE_KEYS) if name == triad)
+    if made.noise is None or key not in stated:
+        return "quiet"
+    return "shaken" if max(stated[key]) * unit > LOUD * made.noise[k] else "quiet"
 
 
 def _whole() -> list[Any]:

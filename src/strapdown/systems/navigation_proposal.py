@@ -34,6 +34,7 @@ from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV, load_sensor
 from strapdown.sensors.rest import LEAST_LENGTH, find_rests_of_every_grade
 from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty, stated_imu
 from strapdown.systems.alignment_source import body_record
+from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
 from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
 from strapdown.tables.checks import index_of, values_of
@@ -138,6 +139,7 @@ class Proposal:
     findings: tuple[Finding, ...]
 
 
+@one_thread()
 def propose(
     log: LogTable,
     *,
