@@ -273,7 +273,7 @@ def test_coarse_alignments(name):
     way = COARSE_ALIGNMENTS[name](**OPTIONS.get(name, {}))
     if name == "gnss_course":
         chain = driving(navigation())
-        until = Until(10.0, heading_sd_deg=5.0)
+        until = Until(10.0, heading_sd_deg=8.0)
         modes = (CoarseMode(way=way, until=until, window=3.0), Navigation())
         sensors = ImuUncertainty(
             TriadUncertainty(bias=GYRO_BIAS, noise_density=GYRO_NOISE),
