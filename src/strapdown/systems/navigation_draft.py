@@ -149,7 +149,9 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
     if named is None:
         page.key("sensor", ASK, "only you know: one of the catalogue, or a .toml file of your own")
     else:
-        check = "" if not made.guessed else "the sensor, of which the log tells the grade alone"
+        check = (
+            "" if not made.guessed else "a grade by the noise of the log; name yours if you know it"
+        )
         remark = "assumed: the grade, by its noise; name yours" if made.guessed else ""
         page.key("sensor", string(named), remark, check=check)
     page.say(
