@@ -327,9 +327,6 @@ STATED_STATES: dict[str, tuple[str, str, Callable[..., SensorStates], str]] = {
 }
 
 
-#: Scale factors follow the temperature: over the time in which a unit takes that of its
-#: surroundings, s. As constants, an hour of fixes makes them more certain than they stay.
-SCALE_TIME = 3600.0
 #: Errors in proportion to rate and force: negligible at rest, largest in motion.
 MOVING = ("gyro_scale", "accel_scale", "gyro_misalignment", "accel_misalignment")
 
@@ -388,8 +385,6 @@ def _block(
             keys=keys,
             triad=triad,
         )
-    if attribute == "scale":
-        return gauss_markov(make(sd), SCALE_TIME)
     if attribute != "drift":
         return make(sd)
     if math.isinf(drift.correlation_time):

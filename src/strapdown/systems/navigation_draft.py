@@ -187,11 +187,13 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
         for key, value in stated.items():
             page.key(key, toml_value(value) or "")
     for block, stated in made.table.get("states", {}).items():
-        page.table(
-            f"[states.{block}]",
+        why = (
             "As a start whose tilt is hardly known wants it: once the tilt is found, gravity along "
-            "the body is another by its square, and a linear filter does not carry that over.",
+            "the body is another by its square, and a linear filter does not carry that over."
         )
+        if block.endswith("_scale"):
+            why = "Scale factors follow the temperature of the unit."
+        page.table(f"[states.{block}]", why)
         for key, value in stated.items():
             page.key(key, toml_value(value) or "")
     return told

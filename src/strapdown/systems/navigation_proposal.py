@@ -68,6 +68,9 @@ GRADES = (
     ("industrial-grade", math.radians(0.13) / 60.0),
     ("consumer-grade", math.inf),
 )
+#: Scale factors of an unknown tactical unit follow its temperature, over the time in which it takes
+#: that of its surroundings: as constants an hour of good fixes makes them surer than they stay.
+SCALES = {"correlation_time_s": 3600.0}
 NO_ERRORS = ImuUncertainty(TriadUncertainty(), TriadUncertainty())
 #: Longest rest used for a coarse alignment, s.
 COARSE = 100.0
@@ -199,6 +202,8 @@ def propose(
         rocking = _rest(imu, until, rocks=True)
         table["sensors"] = _sensors(sensor, scatter, _rest_bias(imu, rocking, place, fixes))
         sensors = _stated(table)
+        if table["sensors"]["sensor"] == "tactical-grade":
+            table["states"] = {name: dict(SCALES) for name in ("gyro_scale", "accel_scale")}
     rest = _rest(imu, until, rocks=sensors is not None and _finds_north(sensors))
     span = float(imu.index[-1] - imu.index[0])
     measured = fixes is not None and np.isfinite(values_of(fixes, VELOCITY_SD[:2])).any()
