@@ -38,8 +38,9 @@ UNITS = 5  # of each sensor
 
 
 def phone_gyros() -> tuple[str, ...]:
-    """Return the names of the catalogue's sensors for phones."""
-    return tuple(name for name in SENSORS if load_sensor(name).grade == "phone")
+    """Names of the catalogue's sensors for phones that have a data sheet; a grade has none."""
+    phones = (one for one in map(load_sensor, SENSORS) if one.grade == "phone")
+    return tuple(one.name for one in phones if any(figure.source for figure in one.sources))
 
 
 @dataclass(frozen=True)
