@@ -31,6 +31,7 @@ __all__ = [
     "ned_from_geodetic",
     "place_difference",
     "q_ne",
+    "ways_between",
 ]
 
 Array = NDArray[np.float64]
@@ -256,6 +257,12 @@ def place_difference(
     line = np.broadcast_to(to - start, leading)
     halfway = geodetic_from_ecef(0.5 * (to + start), ellipsoid=ellipsoid)
     return rotation.rotate(q_ne(halfway[..., 0], halfway[..., 1]), line)
+
+
+def ways_between(place: ArrayLike) -> Array:
+    """Horizontal distance from each position to the next, (n - 1,), m; `place` as above, (n, 3)."""
+    at = np.asarray(place, dtype=np.float64)
+    return np.asarray(np.linalg.norm(place_difference(at[1:], at[:-1])[:, :2], axis=1))
 
 
 def q_ne(lat_deg: ArrayLike, lon_deg: ArrayLike) -> Array:

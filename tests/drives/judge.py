@@ -30,7 +30,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.stats import beta
+from scipy.stats import binomtest
 from tests.drives.generator import GRADES, Made, draw, make, stream
 from tests.drives.motion import KINDS, ecef, to_ned
 
@@ -239,9 +239,8 @@ def judge(facts: dict[str, Any], folder: Path, smoothed: bool = True) -> dict[st
 # -------------------------------------------------------------------------------- the table
 def interval(hits: int, of: int, level: float = 0.99) -> tuple[float, float]:
     """Return the exact binomial interval (Clopper and Pearson)."""
-    tail = (1 - level) / 2
-    low = 0.0 if hits == 0 else float(beta.ppf(tail, hits, of - hits + 1))
-    return low, 1.0 if hits == of else float(beta.ppf(1 - tail, hits + 1, of - hits))
+    low, high = binomtest(hits, of).proportion_ci(level)
+    return float(low), float(high)
 
 
 def _rows(name: str, choices: Iterable[str], results: list[dict[str, Any]]) -> list[str]:

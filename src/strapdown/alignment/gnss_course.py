@@ -427,7 +427,7 @@ class CourseFit:
         turned = running_integral(past, np.cross(earth, ways + past[:, None] * along) + bent)
         way = way + turned[1:][::-1]
         fixed = rotation.dcm_from_rotation_vector(earth * T)
-        arm = np.einsum("kij,kj->ki", fixed @ found.C @ sums.turned[:k], self._arms(k))
+        arm = fixed @ found.C @ sums.turned[:k] @ np.asarray(self.model.antenna.lever_arm, float)
         out = np.zeros((k, 3, self.unknowns))
         out[:, :, END_PLACE] = np.eye(3)
         out[:, :, END_VELOCITY] = -T[:, :, None] * np.eye(3)
@@ -442,10 +442,6 @@ class CourseFit:
         lean = (max(self.sensors.gyro.axis("noise_density")) * STANDARD_GRAVITY * stretch) ** 2
         walk = (push + lean / 12.0) * stretch**3 / 12.0
         return gap, out, fixes.place_sd, float(walk * len(sums.stretch) / 4.0)
-
-    def _arms(self, count: int) -> Array:
-        """Lever arm for each fix, (k, 3), m."""
-        return np.tile(np.asarray(self.model.antenna.lever_arm, dtype=np.float64), (count, 1))
 
     def _courses(
         self,

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.formats.inference.conclusion import THRESHOLD, infer_time_unit, wrap_bits
 from strapdown.formats.recording import Origin
+from strapdown.tables.checks import RELATIVE
 from strapdown.units import TIME_UNITS
 
 __all__ = [
@@ -51,7 +52,7 @@ __all__ = [
 
 
 Array = NDArray[np.float64]
-GPS, UNIX, RELATIVE = "gps-seconds-of-week", "unix", "relative"
+GPS, UNIX = "gps-seconds-of-week", "unix"
 WEEK = 604_800.0  # s
 #: 1980-01-06, the origin of GPS weeks, in seconds since 1970.
 GPS_EPOCH = 315_964_800.0

@@ -518,11 +518,9 @@ def _speed(one: LogDiagnosis) -> Line | None:
     if known.any():
         speed = np.where(known, np.hypot(*values_of(gnss, VELOCITY)[:, :2].T), np.nan)
     else:
-        from strapdown.frames import place_difference
+        from strapdown.frames import ways_between
 
-        place = values_of(gnss, GEODETIC)
-        moved = np.linalg.norm(place_difference(place[1:], place[:-1])[:, :2], axis=1)
-        speed = np.append(moved / np.diff(time), np.nan)
+        speed = np.append(ways_between(values_of(gnss, GEODETIC)) / np.diff(time), np.nan)
     return curve("speed over ground", time, speed, BLUE, width=1.2, buckets=BUCKETS)
 
 

@@ -169,9 +169,8 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
         stated = made.table.get("sensors", {}).get(triad)
         if stated is None:
             continue
-        how = _how_loud(made, triad, stated)
         full = {"gyro": "gyros", "accel": "accelerometers"}[triad]
-        if how == "shaken":
+        if _shakes(made, triad, stated):
             why = (
                 "Found: it shakes far beyond its noise at rest; half of the time so much, x, y, z:"
             )
@@ -199,12 +198,12 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
     return told
 
 
-def _how_loud(made: Proposal, triad: str, stated: dict[str, Any]) -> str:
-    """Whether a triad's stated noise is that of shaking, or of the log while it is quiet."""
+def _shakes(made: Proposal, triad: str, stated: dict[str, Any]) -> bool:
+    """Whether a triad's stated noise is that of shaking, and not of the log while it is quiet."""
     k, key, unit = next((k, key, u) for k, (name, key, u) in enumerate(NOISE_KEYS) if name == triad)
     if made.noise is None or key not in stated:
-        return "quiet"
-    return "shaken" if max(stated[key]) * unit > LOUD * made.noise[k] else "quiet"
+        return False
+    return bool(max(stated[key]) * unit > LOUD * made.noise[k])
 
 
 def _whole() -> list[Any]:

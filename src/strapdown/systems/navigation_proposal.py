@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,7 +22,7 @@ from strapdown.formats.assemble import require_accel
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import has_fixes, read_gnss
 from strapdown.formats.recording import Recording
-from strapdown.frames import place_difference
+from strapdown.frames import ways_between
 from strapdown.navigation.measurements.clock_windows import step_finding, window_offsets
 from strapdown.navigation.measurements.gnss_clock import (
     check_overlap,
@@ -63,7 +64,7 @@ UNSEEN = 3.0
 NORTH, LEAST_REST, LONGEST_REST = 2.0 / DEG_PER_HOUR, 60.0, 600.0
 #: Grades by the noise of the quietest gyro, rad/s/√Hz: the best consumer part of the catalogue has
 #: 0.168 deg/√h, the best calibrated MEMS unit 0.1 deg/√h; a little less counts as the same.
-GRADES = (
+NOISE_OF_GRADES = (
     ("tactical-grade", math.radians(0.06) / 60.0),
     ("industrial-grade", math.radians(0.13) / 60.0),
     ("consumer-grade", math.inf),
@@ -193,18 +194,19 @@ def propose(
     if place is not None:
         table["site"] = dict(zip(("lat_deg", "lon_deg", "alt_m"), place, strict=True))
     until, drives = _motion(imu, fixes)
+    quiet = _quiet(imu, until)
     scatter = _scatter(imu)
     # Engine vibration differs between axes; the quietest axis identifies the grade.
     noise = None if scatter is None else tuple(scatter[0].min(axis=1).tolist())
     guessed = sensor is None
     sensors: ImuUncertainty | None = None
     if sensor is not None or scatter is not None:
-        rocking = _rest(imu, until, rocks=True)
+        rocking = _rest(quiet, until, rocks=True)
         table["sensors"] = _sensors(sensor, scatter, _rest_bias(imu, rocking, place, fixes))
         sensors = _stated(table)
         if table["sensors"]["sensor"] == "tactical-grade":
             table["states"] = {name: dict(SCALES) for name in ("gyro_scale", "accel_scale")}
-    rest = _rest(imu, until, rocks=sensors is not None and _finds_north(sensors))
+    rest = _rest(quiet, until, rocks=sensors is not None and _finds_north(sensors))
     span = float(imu.index[-1] - imu.index[0])
     measured = fixes is not None and np.isfinite(values_of(fixes, VELOCITY_SD[:2])).any()
     chosen, how = _alignment(sensors, rest, drives, heading_deg, span, bool(measured))
@@ -288,23 +290,22 @@ def _sensors(
     out: dict[str, Any] = {"sensor": named}
     if named is None:
         assert scatter is not None
-        out["sensor"] = next(name for name, most in GRADES if min(scatter[0][0]) < most)
+        out["sensor"] = next(name for name, most in NOISE_OF_GRADES if min(scatter[0][0]) < most)
     known = ImuUncertainty.of_sensor(load_sensor(out["sensor"]))
     # For gyrocompassing gyros the rocking of a vehicle is motion, not noise.
     north = _finds_north(known) or (named is None and bias is not None and bias <= NORTH)
-    for k, (triad, key, unit) in enumerate(NOISE_KEYS):
-        if scatter is None:
-            break
-        quiet, usual = scatter[0][k], scatter[1][k]
+    if scatter is None:
+        return out
+    for (triad, key, unit), quiet, usual in zip(NOISE_KEYS, *scatter, strict=True):
         sheet = np.asarray(getattr(known, triad).axis("noise_density"))
         stated = quiet if named is None else np.maximum(quiet, sheet)
         if not north and (usual > LOUD * stated).any():
             stated = np.maximum(usual, stated)
         if (stated != sheet).any():
             out[triad] = {key: tuple(float(f"{x:.2g}") for x in stated / unit)}
-    if named is None and bias is not None and bias < max(known.gyro.axis("bias")):
-        part = bias / max(known.gyro.axis("bias"))
-        slow = max(known.gyro_drift.triad) * part * ALLAN_OF_GAUSS_MARKOV
+    largest = max(known.gyro.axis("bias"))
+    if named is None and bias is not None and bias < largest:
+        slow = max(known.gyro_drift.triad) * bias / largest * ALLAN_OF_GAUSS_MARKOV
         out["gyro"] = out.get("gyro", {}) | {
             "bias_sd_deg_per_h": float(f"{bias * DEG_PER_HOUR:.2g}"),
             "bias_instability_deg_per_h": float(f"{slow * DEG_PER_HOUR:.2g}"),
@@ -341,25 +342,29 @@ def _rest_bias(
     return math.hypot(vertical, north) / math.sqrt(-2.0 * math.log(0.95))
 
 
-def _rest(imu: pd.DataFrame, until: float, *, rocks: bool) -> float:
+def _quiet(imu: pd.DataFrame, until: float) -> list[tuple[float, float]]:
+    """Begin and end of each quiet stretch until the fixes prove motion, s from the first sample."""
+    first = float(imu.index[0])
+    part = imu[index_of(imu) <= first + until]
+    found = find_rests_of_every_grade(part) if len(part) > 1 else ()
+    return [(one.start - first, one.end - first) for one in found]
+
+
+def _rest(quiet: Sequence[tuple[float, float]], until: float, *, rocks: bool) -> float:
     """Length of the initial rest in s, in which gyros and accelerometers agree with the fixes.
 
-    `until` (s from the first sample): when the fixes prove motion, which positions do late.
-    `rocks`: gyros find north on a body that rocks; it is at rest until its last quiet stretch, or
-    until the fixes prove motion if it has none.
+    `quiet`: as of `_quiet`. `until` (s from the first sample): when the fixes prove motion, which
+    positions do late. `rocks`: gyros find north on a body that rocks; it is at rest until its last
+    quiet stretch, or until the fixes prove motion if it has none.
     """
-    time = index_of(imu)
-    first, last = float(time[0]), float(time[0]) + until
-    part = imu[time <= last]
-    quiet = find_rests_of_every_grade(part) if len(part) > 1 else ()
     if rocks:
-        return max((r.end for r in quiet), default=last) - first
-    ends = first
-    for one in quiet:
-        if one.start - ends > LEAST_LENGTH:
+        return max((end for _, end in quiet), default=until)
+    ends = 0.0
+    for begin, end in quiet:
+        if begin - ends > LEAST_LENGTH:
             break
-        ends = one.end
-    return ends - first
+        ends = end
+    return ends
 
 
 def _motion(imu: pd.DataFrame, fixes: pd.DataFrame | None) -> tuple[float, bool]:
@@ -453,8 +458,7 @@ def _speed(fixes: pd.DataFrame) -> float:
     place = values_of(fixes, GEODETIC)
     if len(place) < 2:
         return 0.0
-    way = np.linalg.norm(place_difference(place[1:], place[:-1])[:, :2], axis=1)
-    return float(np.sqrt(np.mean(np.square(way / np.diff(index_of(fixes))))))
+    return float(np.sqrt(np.mean(np.square(ways_between(place) / np.diff(index_of(fixes))))))
 
 
 def _alignment(

@@ -75,9 +75,9 @@ __all__ = ["Drive", "NavigationRun", "make_chain", "run_navigation", "withheld_a
 #: Runs a pipeline over samples and tables, with a recorder and a progress callback.
 Drive = Callable[..., PipelineRun]
 
-#: Shares of a whole run at which its pipeline begins and ends.
 #: A shorter part without navigation at the start, s, is not reported.
 LEAST_LOST = 1.0
+#: Shares of a whole run at which its pipeline begins and ends.
 BEGUN, ENDED = 0.15, 0.8
 #: Length of a chunk of the record, and interval of progress reports, s.
 CHUNK = 20.0

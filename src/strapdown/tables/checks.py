@@ -236,6 +236,8 @@ NED = ["north", "east", "down"]
 POSITION_SD = ["north_sd", "east_sd", "down_sd"]
 VELOCITY_SD = ["VN_sd", "VE_sd", "VD_sd"]
 REFERENCE = ["time", "kind", "since", *EULER, "turns", "axis", "sd"]
+#: Clock of a table (``attrs["clock"]``) whose stamps count from its own start.
+RELATIVE = "relative"
 
 
 # Gaps in a record.

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from strapdown.systems.navigation_proposal import _alignment, _motion, _moving, _rest
+from strapdown.systems.navigation_proposal import _alignment, _motion, _moving, _quiet, _rest
 from strapdown.tables import gnss_table, imu_table
 
 RATE = 10.0
@@ -84,15 +84,17 @@ def car(begins=BEGINS, rocking=0.0):
 
 
 def test_the_rest_ends_when_the_sensors_move_though_positions_prove_it_later():
-    assert _rest(car(), 12.4, rocks=False) == pytest.approx(BEGINS, abs=0.5)
-    assert _rest(car(), 12.4, rocks=True) == pytest.approx(BEGINS, abs=0.5)
+    assert _rest(_quiet(car(), 12.4), 12.4, rocks=False) == pytest.approx(BEGINS, abs=0.5)
+    assert _rest(_quiet(car(), 12.4), 12.4, rocks=True) == pytest.approx(BEGINS, abs=0.5)
 
 
 def test_the_rest_ends_when_the_fixes_move_though_the_sensors_are_quiet():
-    assert _rest(car(begins=100.0), 12.4, rocks=False) == pytest.approx(12.4, abs=0.02)
+    assert _rest(_quiet(car(begins=100.0), 12.4), 12.4, rocks=False) == pytest.approx(
+        12.4, abs=0.02
+    )
 
 
 def test_a_body_that_rocks_from_the_start_is_at_rest_for_gyros_that_find_north_alone():
     rocking = car(begins=100.0, rocking=0.05)
-    assert _rest(rocking, 12.4, rocks=False) == 0.0
-    assert _rest(rocking, 12.4, rocks=True) == pytest.approx(12.4)
+    assert _rest(_quiet(rocking, 12.4), 12.4, rocks=False) == 0.0
+    assert _rest(_quiet(rocking, 12.4), 12.4, rocks=True) == pytest.approx(12.4)

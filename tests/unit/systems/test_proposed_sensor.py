@@ -17,8 +17,8 @@ from strapdown.simulation.earth_motion import StationaryMotion
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
 from strapdown.simulation.vehicles import Accelerate, Stop, Straight, Turn
 from strapdown.systems.navigation_proposal import (
-    GRADES,
     LOUD,
+    NOISE_OF_GRADES,
     _rest_bias,
     _sensors,
     propose,
@@ -26,7 +26,7 @@ from strapdown.systems.navigation_proposal import (
 from strapdown.systems.navigation_run import run_navigation
 from strapdown.tables import ACCEL, GEODETIC, GYRO
 
-TACTICAL_NOISE = GRADES[0][1]
+TACTICAL_NOISE = NOISE_OF_GRADES[0][1]
 PLACE = (45.0, 20.0, 80.0)
 #: RTK, m and m/s.
 RECEIVER = {"rate": 1.0, "position_noise": 0.01, "velocity_noise": 0.03}

@@ -12,7 +12,7 @@ from strapdown.alignment.alignment import Site
 from strapdown.alignment.course_sums import Antenna
 from strapdown.alignment.gnss_course import GnssCourse
 from strapdown.errors import DataError, DivergenceError, Finding
-from strapdown.frames import place_difference
+from strapdown.frames import ways_between
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GEODETIC, GYRO
 from strapdown.tables.checks import index_of, source_of, values_of
@@ -227,7 +227,7 @@ def _date(gnss: pd.DataFrame, imu: pd.DataFrame, step: ClockStep) -> tuple[float
     time, place = stamps[rows], values_of(gnss, GEODETIC)[rows]
     if len(rows) > 4:
         steps = np.diff(time)
-        way = np.linalg.norm(place_difference(place[1:], place[:-1])[:, :2], axis=1)
+        way = ways_between(place)
         padded = np.pad(way / steps, 2, "edge")
         near = np.median(np.lib.stride_tricks.sliding_window_view(padded, 5), axis=1)
         # Time that the way takes beyond its stamps, at the speed about it.

@@ -15,7 +15,7 @@ from strapdown.dsp.running_integral import running_integral
 from strapdown.errors import DataError, Finding
 from strapdown.frames import place_difference
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY, VELOCITY_SD
-from strapdown.tables.checks import index_of, source_of, values_of
+from strapdown.tables.checks import RELATIVE, index_of, source_of, values_of
 
 __all__ = [
     "TimeOffset",
@@ -30,8 +30,6 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
-#: Clock of a table (``attrs["clock"]``) whose stamps count from its own start.
-RELATIVE = "relative"
 WEEK = 604_800.0
 #: Unix time of the first second of GPS time, and its lead over UTC since 2017, s.
 GPS_EPOCH, LEAP = 315_964_800.0, 18.0

@@ -7,7 +7,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
-from strapdown.frames import place_difference
+from strapdown.frames import place_difference, ways_between
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.gnss_clock import (
     check_overlap,
@@ -125,8 +125,7 @@ def _refuse_units(table: pd.DataFrame, time: Array, placed: Flags, source: str |
     if len(rows) < 2:
         return
     place, velocity = values_of(table, GEODETIC)[rows], values_of(table, VELOCITY)[rows]
-    moved = np.linalg.norm(place_difference(place[1:], place[:-1])[:, :2], axis=1)
-    speed = np.asarray(moved / np.diff(time[rows]))
+    speed = ways_between(place) / np.diff(time[rows])
     beyond = np.flatnonzero(speed > LARGEST_SPEED)
     if beyond.size > 0.5 * len(speed):
         k = int(beyond[0])
