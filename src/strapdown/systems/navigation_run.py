@@ -223,6 +223,7 @@ def _lost_start(
     return (
         Finding(
             "navigation.start-lost",
+            severity="note",
             file=source_of(imu),
             quantity="time",
             seconds=begun - begin,

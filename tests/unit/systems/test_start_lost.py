@@ -55,3 +55,5 @@ def test_seconds_without_navigation_at_the_start_are_reported(tmp_path):
     (lost,) = [f for f in result.findings if f.code == "navigation.start-lost"]
     assert lost.data["seconds"] == pytest.approx(begun - float(result.source.imu.index[0]))
     assert 11.5 < lost.data["seconds"] < 12.5
+    # It says what the output lacks; nothing speaks against the rest.
+    assert lost.severity == "note"
