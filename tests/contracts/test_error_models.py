@@ -66,6 +66,17 @@ def test_states_of_physical_errors_tell_these_errors(name, segment):
     np.testing.assert_allclose(both * SIZE / SIZE[:, None], expected, atol=1e-9)
 
 
+@pytest.mark.parametrize("height", ["free", "held"])
+@pytest.mark.parametrize("name", list(ERROR_MODELS))
+def test_what_it_estimates_is_what_its_states_can_hold(name, height):
+    model, used = ERROR_MODELS[name](**NOISE), WanderAzimuth(height=height)
+    row = used.history_row(used.begin(start(60.0, 100.0, (30.0, 5.0, 0.0))))
+    both = model.to_physical(used, 3.0, row) @ model.from_physical(used, 3.0, row)
+    # An error that has no state is lost on the way: one by one, whatever the size of a variance.
+    np.testing.assert_allclose(np.diag(both)[:9], model.estimated(used), atol=1e-9)
+    assert all(model.estimated(used)) == model.has_height
+
+
 @pytest.mark.parametrize("name", list(ERROR_MODELS))
 def test_noise_is_a_covariance_and_grows(name, segment):
     model = ERROR_MODELS[name](**NOISE)

@@ -122,6 +122,13 @@ class ErrorModel(ABC):
         physical meaning, such as the norm of a quaternion, are zero.
         """
 
+    def estimated(self, mechanization: Mechanization) -> tuple[bool, ...]:
+        """Return which of the nine physical errors have states, in their order.
+
+        The covariance of the others is not that of an error: it is zero, or of other errors.
+        """
+        return (True,) * PHYSICAL
+
 
 def refuse_damped_height(mechanization: Mechanization) -> None:
     """Refuse a mechanization with a height loop of its own.
@@ -341,6 +348,10 @@ class QuaternionModel(ErrorModel):
         out[:STATES, :PHYSICAL] = forth[:, :PHYSICAL] @ core
         out[STATES:, PHYSICAL:] = np.eye(k)
         return out
+
+    def estimated(self, mechanization: Mechanization) -> tuple[bool, ...]:
+        """Return all but the height, and the vertical velocity of one that is held."""
+        return (True, True, False, True, True, mechanization.height != "held", True, True, True)
 
     def null_directions(self, mechanization: Mechanization, time: float, row: Array) -> Array:
         """Return the directions without physical meaning.

@@ -254,7 +254,8 @@ def _begin(
     start = replace(state_of_row(row), time=at)
     marks = record.sd.index.to_numpy(dtype=np.float64)
     k = max(int(np.searchsorted(marks, at + NEAR, side="right")) - 1, 0)
-    P = LOOSER**2 * record.covariance[k]
+    # Without what the run does not estimate, as its height.
+    P = LOOSER**2 * np.nan_to_num(record.covariance[k])
     P[8, :8] = P[:8, 8] = 0.0
     P[8, 8] = max(math.radians(UNKNOWN) ** 2, float(P[8, 8]))
     tilt = DOUBTED_TILT if doubt else LEAST_TILT

@@ -184,6 +184,7 @@ def forecast(
     record = record_of(navigator, go(navigator, state), "outage")
     time = np.concatenate([[0.0], record.sd.index.to_numpy(dtype=np.float64) - begin])
     P = np.concatenate([start[None], record.covariance])
+    P = np.where(np.isnan(P).any(axis=0), np.nan, P)
     trajectory = record.trajectory
     course = courses(trajectory, time + begin)
     part = AIDED_PART if aided else LINEAR_PART

@@ -8,12 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from strapdown.errors import Finding
 from strapdown.estimation.covariance import Innovations, Observation
 from strapdown.nav_state import NavState
-from strapdown.tables import EULER, GEODETIC, VELOCITY
+from strapdown.rotation import euler_sd
+from strapdown.tables import EULER, GEODETIC, VELOCITY, trajectory_error_table
 
 __all__ = [
     "CovarianceSnapshot",
@@ -23,6 +24,7 @@ __all__ = [
     "NavigationChunk",
     "NavigationRecord",
     "Span",
+    "standard_deviations",
     "state_of_row",
 ]
 
@@ -79,7 +81,8 @@ class NavigationRecord:
         TrajectoryError table of standard deviations, by time of the marks.
     covariance : ndarray, (m, 9, 9)
         At the marks: displacement m, velocity m/s, rotation rad, north-east-down
-        (`mechanization.state_error.state_error`).
+        (`mechanization.state_error.state_error`). Here and in `sd` NaN for what the error model
+        does not estimate (`not_estimated`).
     sensors, sensors_sd : DataFrame
         By time of the marks: estimates of the errors of sensors and aids, in SI, and their
         standard deviations; columns as ``gyro_bias_x``, ``rtk.lever_arm_x``.
@@ -105,6 +108,35 @@ class NavigationRecord:
     events: tuple[Event, ...] = ()
     modes: tuple[Span, ...] = ()
     outages: Mapping[str, tuple[Span, ...]] = field(default_factory=dict)
+
+    @property
+    def not_estimated(self) -> tuple[str, ...]:
+        """Columns of `sd` of which the error model has no state, as a height in 17 states."""
+        return tuple(str(c) for c in self.sd.columns[self.sd.isna().all().to_numpy()])
+
+
+def standard_deviations(
+    time: ArrayLike, covariance: Array, euler: Array, source: str | None = None
+) -> pd.DataFrame:
+    """Return a TrajectoryError table of the standard deviations of covariances.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+    covariance : ndarray, (n, 9, 9)
+        NaN in the rows and columns of what is not estimated, which is NaN in the table, too.
+    euler : ndarray, (n, 3), deg
+        Roll, pitch, heading.
+    source : str, optional
+        Name for messages.
+    """
+    variance = np.diagonal(covariance, axis1=1, axis2=2)
+    without = np.isnan(variance)
+    sd = np.sqrt(np.where(without, 0.0, variance))
+    table = trajectory_error_table(
+        time, sd[:, :3], sd[:, 3:6], euler_sd(euler, covariance[:, 6:, 6:]), source
+    )
+    return table.mask(without)
 
 
 def state_of_row(row: pd.Series) -> NavState:

@@ -22,9 +22,9 @@ from strapdown.navigation.record import (
     NavigationChunk,
     NavigationRecord,
     Span,
+    standard_deviations,
 )
-from strapdown.rotation import euler_sd
-from strapdown.tables import EULER, trajectory_error_table
+from strapdown.tables import EULER
 from strapdown.tables.checks import is_number
 
 if TYPE_CHECKING:
@@ -186,18 +186,17 @@ class Tape:
             marks[:, 82 + count :] = later.sensors_sd
         trajectory = used.trajectory(at, np.array(history), source)
         time = pd.Index(marks[:, 0], name="time")
-        covariance = marks[:, 1:82].reshape(-1, 9, 9)
-        sd = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2))
+        covariance = marks[:, 1:82].reshape(-1, 9, 9).copy()
+        without = ~np.array(model.estimated(used))
+        covariance[:, without, :] = covariance[:, :, without] = np.nan
         nearest = np.clip(trajectory.index.searchsorted(time), 0, len(trajectory) - 1)
         euler = trajectory[EULER].to_numpy()[nearest]
         labels = list(model.layout.labels())[model.layout.size - count :]
         units = [one.block.unit for one in model.sensors for _ in one.block.labels]
         return NavigationRecord(
             trajectory=trajectory,
-            sd=trajectory_error_table(
-                time, sd[:, :3], sd[:, 3:6], euler_sd(euler, covariance[:, 6:, 6:]), source
-            ),
-            covariance=covariance.copy(),
+            sd=standard_deviations(time, covariance, euler, source),
+            covariance=covariance,
             sensors=pd.DataFrame(marks[:, 82 : 82 + count].copy(), index=time, columns=labels),
             sensors_sd=pd.DataFrame(marks[:, 82 + count :].copy(), index=time, columns=labels),
             units=dict(zip(labels, units, strict=True)),

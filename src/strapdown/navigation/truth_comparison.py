@@ -22,8 +22,7 @@ from strapdown.evaluation.trajectory_differences import (
     trajectory_differences,
 )
 from strapdown.frames import q_ne
-from strapdown.navigation.record import NavigationRecord
-from strapdown.rotation import euler_sd
+from strapdown.navigation.record import NavigationRecord, standard_deviations
 from strapdown.tables import (
     EULER,
     GEODETIC,
@@ -31,7 +30,6 @@ from strapdown.tables import (
     TRAJECTORY,
     TRAJECTORY_ERROR,
     places_of,
-    trajectory_error_table,
 )
 
 if TYPE_CHECKING:
@@ -93,8 +91,8 @@ class TruthComparison:
     nees : DataFrame
         By time: normalized squares of the `PARTS` that can be computed.
     freedom : dict of str to int
-        Number of components in each; without those that have no variance of their own, as the
-        vertical velocity of a held height.
+        Number of components in each; without those that are not estimated, and those that have
+        no variance of their own.
     inside : dict of str to float
         Share of the epochs at which each is below its 95 % bound (chi-square, one-sided);
         ``horizontal``: inside of the 95 % ellipse.
@@ -137,7 +135,7 @@ def compare_with_truth(
     marks : array_like, (m,), s
         Instants of the covariance (``NavigationRecord.sd.index``).
     covariance : ndarray, (m, 9, 9)
-        `NavigationRecord.covariance`.
+        `NavigationRecord.covariance`: NaN for errors that are not estimated.
     truth : DataFrame or EarthMotion
         Trajectory table of any rate, on the same clock (`trajectory_at`), or the motion itself.
 
@@ -225,7 +223,9 @@ def compare_with_places(
         _displacements(places_of(computed), usable[GEODETIC].to_numpy(dtype=np.float64), ellipsoid)
         + arm
     )
-    P = np.asarray(covariance)[mark].copy()
+    P = np.asarray(covariance)[mark]
+    without = np.isnan(P)
+    P = np.where(without, 0.0, P)
     # The antenna position has the error dr + psi x arm, too.
     J = np.concatenate(
         [np.broadcast_to(np.eye(3), (len(time), 3, 3)), -rotation.cross_matrix(arm)], axis=2
@@ -235,6 +235,7 @@ def compare_with_places(
     if set(POSITION_SD) <= set(usable.columns):
         own = usable[POSITION_SD].to_numpy(dtype=np.float64) ** 2
         P[:, [0, 1, 2], [0, 1, 2]] += np.where(np.isfinite(own), own, 0.0)
+    P[without] = np.nan
     differences = pd.DataFrame(errors, index=pd.Index(time, name="time"), columns=TRAJECTORY_ERROR)
     return _comparison(time, errors, P, differences, computed[EULER].to_numpy(), ())
 
@@ -293,6 +294,7 @@ def _comparison(
     findings: tuple[Finding, ...],
 ) -> TruthComparison:
     variance = np.diagonal(P, axis1=1, axis2=2)
+    # NaN where the run does not estimate; zero where it is certain by what it was started with.
     known = np.asarray(np.isfinite(errors).all(axis=0) & (variance > 0.0).all(axis=0))
     told = _independent(known, P)
     squares, freedom, inside = {}, {}, {}
@@ -306,14 +308,13 @@ def _comparison(
         limit = bounds(len(kept), 2.0 * SHARE - 1.0)[1]
         inside[part] = float(np.mean(squares[part] <= limit))
     index = pd.Index(time, name="time")
-    sd = np.sqrt(np.maximum(variance, 0.0))
-    sds = trajectory_error_table(time, sd[:, :3], sd[:, 3:6], euler_sd(euler, P[:, 6:, 6:]))
+    sd = np.sqrt(np.maximum(variance, 0.0))  # NaN stays NaN
     return TruthComparison(
         time,
         errors,
         P,
         differences,
-        sds,
+        standard_deviations(time, P, euler),
         pd.DataFrame(squares, index=index),
         freedom,
         inside,

@@ -167,7 +167,10 @@ def coast_json(result: OutageRun) -> dict[str, Any]:
         "remaining_measurements": list(result.stays),
         "at_the_end": {
             "horizontal_95_m": end_bound(result),
-            **{SHOWN[q][0]: SHOWN[q][1] * math.sqrt(max(v, 0.0)) for q, v in whole.items()},
+            **{
+                SHOWN[q][0]: json_number(SHOWN[q][1] * math.sqrt(max(v, 0.0)))
+                for q, v in whole.items()
+            },
         },
         "budget": {
             "outage_from_s": found.begin,
@@ -178,7 +181,7 @@ def coast_json(result: OutageRun) -> dict[str, Any]:
                     "sd_at_start": one.sd.tolist(),
                     "unit": one.source.unit,
                     "share": {
-                        q: float(one.variance[q][-1] / _positive(found.variance(q)[-1]))
+                        q: json_number(one.variance[q][-1] / _positive(found.variance(q)[-1]))
                         for q in QUANTITIES
                     },
                     "alone_m": json_number(float(one.alone["horizontal"][-1])),
@@ -186,7 +189,8 @@ def coast_json(result: OutageRun) -> dict[str, Any]:
                 for one in found.shares
             ],
             "measurements": {
-                q: float(v[-1] / _positive(found.variance(q)[-1])) for q, v in found.aids.items()
+                q: json_number(v[-1] / _positive(found.variance(q)[-1]))
+                for q, v in found.aids.items()
             },
         },
         "measured": spaced(inside_words(result)),

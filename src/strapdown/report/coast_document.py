@@ -41,6 +41,7 @@ from strapdown.report.plan import ellipse
 from strapdown.report.values import (
     GAP,
     KMH,
+    NOT_ESTIMATED,
     duration_words,
     half,
     length_words,
@@ -264,7 +265,9 @@ def key_figures(result: OutageRun) -> tuple[KeyFigure, ...]:
         KeyFigure("Horizontal", length_words(end_bound(result)), said),
         KeyFigure("Along track", f"±{GAP}{length_words(half(sd('along')))}", said),
         KeyFigure("Cross track", f"±{GAP}{length_words(half(sd('across')))}", said),
-        KeyFigure("Vertical", f"±{GAP}{length_words(half(sd('vertical')))}", said),
+        KeyFigure("Vertical", NOT_ESTIMATED, "the error model has no height")
+        if math.isnan(sd("vertical"))
+        else KeyFigure("Vertical", f"±{GAP}{length_words(half(sd('vertical')))}", said),
         KeyFigure("Heading", f"±{GAP}{_three(math.degrees(half(sd('heading'))))}°", said),
     ]
     drifts = drifts_of(result)

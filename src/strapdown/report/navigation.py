@@ -185,6 +185,7 @@ def navigation_json(
         },
         "start": _state(found, 0),
         "end": _state(found, -1),
+        "not_estimated": list(record.not_estimated),
         "sensors": {
             str(name): {
                 "unit": record.units.get(str(name), ""),
@@ -435,7 +436,8 @@ def _write_states(
         path = folder / f"trajectory.{form}"
         write_trajectory(path, record.trajectory, name=result.source.name, options=options)
     sd = record.sd.rename(columns={c: f"{c}_sd_{UNITS[str(c)]}" for c in record.sd.columns})
-    _write(folder / "sd.csv", sd, told)
+    without = {"not_estimated": " ".join(record.not_estimated)} if record.not_estimated else {}
+    _write(folder / "sd.csv", sd, {**told, **without})
     _write(folder / "sensor_errors.csv", _sensors(record), told)
 
 

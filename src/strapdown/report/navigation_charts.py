@@ -44,6 +44,7 @@ from strapdown.report.navigation_evaluation import (
     rejected_times,
     unwrapped,
 )
+from strapdown.report.values import NOT_ESTIMATED
 from strapdown.tables import EULER, NED, VELOCITY
 
 TIME = "time, s"
@@ -96,6 +97,9 @@ def bound_chart(found: NavigationEvaluation) -> Chart:
         for k, (name, value, colour) in enumerate(curves):
             shown = np.where(value > 0.0, value, np.nan)
             dash = ("solid", "dash", "dot")[k]
+            if np.isnan(value).all():
+                title += f" ({name} {NOT_ESTIMATED})"
+                continue
             lines.append(curve(name, time, shown, colour, dash, 1.6, buckets=BUCKETS))
         every = np.concatenate([value[value > 0.0] for _, value, _ in curves])
         log = bool(every.size and every.max() > WIDE * every.min())
@@ -173,6 +177,8 @@ def _state_panel(
         lines.append(_true(found, column, values))
     at = record.sd.index.to_numpy(dtype=np.float64)
     half = TWO_SIDED_95 * record.sd[error].to_numpy(dtype=np.float64)
+    if np.isnan(half).all():
+        return Panel(f"{label} ({NOT_ESTIMATED})", tuple(lines), height=0.8)
     fill = thin_fill(BOUND, at, here - half, here + half, BLUE, opacity=0.25)
     return Panel(label, tuple(lines), fills=(fill,), height=0.8)
 
@@ -421,14 +427,13 @@ def error_charts(found: NavigationEvaluation) -> tuple[Chart, ...]:
         panels = []
         for k, column in enumerate(columns):
             half, error = errors.bound(column), errors.error(column)
-            panels.append(
-                Panel(
-                    f"{_NAMES.get(column, column)}, {unit}",
-                    (curve("error", errors.time, error, AXIS_COLOURS[k], buckets=BUCKETS),),
-                    fills=(thin_fill(BOUND, errors.time, -half, half, AXIS_COLOURS[k]),),
-                    height=0.8,
-                )
-            )
+            label = f"{_NAMES.get(column, column)}, {unit}"
+            lines = (curve("error", errors.time, error, AXIS_COLOURS[k], buckets=BUCKETS),)
+            if np.isnan(half).all():
+                panels.append(Panel(f"{label} ({NOT_ESTIMATED})", lines, height=0.8))
+                continue
+            fills = (thin_fill(BOUND, errors.time, -half, half, AXIS_COLOURS[k]),)
+            panels.append(Panel(label, lines, fills=fills, height=0.8))
         caption = f"Computed − {found.truth_name}, with the run's 95 % bounds."
         out.append(over_time(slug, title, caption, tuple(panels), found.record))
     return tuple(out)

@@ -48,6 +48,7 @@ from strapdown.report.navigation_evaluation import (
 from strapdown.report.navigation_plan import plan_chart
 from strapdown.report.values import (
     GAP,
+    NOT_ESTIMATED,
     about,
     duration_words,
     half,
@@ -103,7 +104,7 @@ def key_figures(found: NavigationEvaluation) -> tuple[KeyFigure, ...]:
         KeyFigure(
             "Final position",
             f"±{GAP}{length_words(plane)}",
-            f"horizontal, 95{GAP}%; height {about(float(last['alt']), half(sd['down']), 'm')}",
+            f"horizontal, 95{GAP}%; height {_stated(float(last['alt']), sd['down'], 'm')}",
             position_words(found),
         ),
         KeyFigure(
@@ -415,6 +416,8 @@ def _bound(record: NavigationRecord, column: str) -> Array:
 
 
 def _figure(value: float) -> str:
+    if math.isnan(value):
+        return "–"
     return f"{value:.3g}" if value < 1000.0 else f"{value:.0f}"
 
 
@@ -445,11 +448,18 @@ def end_table(found: NavigationEvaluation) -> TableBlock:
         for k in (0, -1):
             value = float(record.trajectory[column].iloc[k])
             value = value % 360.0 if column == "heading" else value
-            cells.append(about(value, half(record.sd[sd].iloc[k]), unit))
+            cells.append(_stated(value, record.sd[sd].iloc[k], unit))
         rows.append((name, *cells))
     return TableBlock(
         ("", "start", "end"), tuple(rows), text=(0,), caption="Start and end, with 95 % bounds."
     )
+
+
+def _stated(value: float, sd: float, unit: str) -> str:
+    """Format a value with its 95 % bound, or as one of which the run estimates no error."""
+    if math.isnan(sd):
+        return f"{plain(value, 2)}{GAP}{unit}, {NOT_ESTIMATED}"
+    return about(value, half(sd), unit)
 
 
 def state_table(found: NavigationEvaluation) -> TableBlock | None:
@@ -611,7 +621,7 @@ def error_table(found: NavigationEvaluation) -> TableBlock | None:
                 plain(score.rms, places),
                 plain(score.largest, places),
                 instant(score.largest_at),
-                plain(score.bound, places),
+                NOT_ESTIMATED if math.isnan(score.bound) else plain(score.bound, places),
                 share_words(score.share),
             )
         )

@@ -22,6 +22,8 @@ MINUS = "\u2212"
 GAP = "\u00a0"
 # Significant digits of a bound; its value is rounded to the same decimal.
 DIGITS = 2
+#: Instead of the bound of a quantity of which the error model has no state.
+NOT_ESTIMATED = "not estimated"
 
 
 def plain(value: float, places: int) -> str:

@@ -123,15 +123,54 @@ def test_what_the_run_has_no_state_of_is_left_out(run):
     time, _, P, trajectory = run
     marks = time[::10]
     P = P.copy()
-    P[2] = P[:, 2] = 0.0
+    P[2] = P[:, 2] = np.nan
     out = compare_with_truth(trajectory, marks, np.broadcast_to(P, (len(marks), 9, 9)), MOTION)
     assert out.freedom["all"] == 8
     assert out.freedom["position"] == 2
     assert np.isnan(out.table.loc["down", "inside"])
+    assert out.sd["down"].isna().all()
+    assert np.isfinite(out.sd.drop(columns="down").to_numpy()).all()
+    exact = np.where(np.isnan(P), 0.0, P)
+    same = compare_with_truth(trajectory, marks, np.broadcast_to(exact, (len(marks), 9, 9)), MOTION)
+    # A variance of zero is another thing: a quantity that is known exactly.
+    assert (same.sd["down"] == 0.0).all()
+    assert same.nees.equals(out.nees)
 
 
-def test_a_held_height_has_no_vertical_velocity_of_its_own():
-    """Its error is that of the level, a linear function of the position's, in every epoch."""
+def test_no_rounding_makes_an_estimate_of_what_is_none(run):
+    """The vertical velocity of a held height is a function of the position's error, to rounding."""
+    time, _, P, trajectory = run
+    marks = time[::10]
+    T = np.eye(9)
+    T[5] = 0.0
+    T[5, :2] = 1e-6, -2e-6
+    P = np.broadcast_to(T @ P @ T.T, (len(marks), 9, 9)).copy()
+    # As of a covariance in components of quaternions, whose entries differ by 1e13.
+    P[:, 5, 5] *= 1.0 - 1e-9
+    assert (P[:, 5, 5] > 0.0).all()
+    with pytest.raises(DataError, check=coded("evaluation.covariance-not-positive-definite")):
+        compare_with_truth(trajectory, marks, P, MOTION)
+    P[:, 5] = P[:, :, 5] = np.nan
+    out = compare_with_truth(trajectory, marks, P, MOTION)
+    assert out.freedom["all"] == 8
+    assert np.isfinite(out.nees.to_numpy()).all()
+
+
+def test_places_of_a_run_without_a_height_are_compared_in_the_plane(run):
+    time, _, P, trajectory = run
+    places = MOTION.trajectory(time[5::10])[["lat", "lon", "alt"]]
+    P = np.broadcast_to(P, (len(time), 9, 9)).copy()
+    whole = compare_with_places(trajectory, time, P, places, antenna=(2.0, -1.0, -1.5))
+    P[:, 2] = P[:, :, 2] = np.nan
+    out = compare_with_places(trajectory, time, P, places, antenna=(2.0, -1.0, -1.5))
+    assert out.freedom == {"all": 2, "position": 2, "horizontal": 2}
+    assert out.nees["horizontal"].to_numpy() == pytest.approx(
+        whole.nees["horizontal"].to_numpy(), rel=1e-9
+    )
+    assert out.sd["down"].isna().all()
+
+
+def test_a_held_height_of_17_states_is_not_estimated():
     start = {"lat_deg": 55.0, "lon_deg": 37.0, "alt_m": 150.0, "heading_deg": 30.0}
     drive = [
         {"do": "accelerate", "to_km_per_h": 50.0, "duration_s": 6.0},
@@ -151,7 +190,11 @@ def test_a_held_height_has_no_vertical_velocity_of_its_own():
         }
     )
     run = run_navigation(spec)
-    assert (run.record.covariance[:, 5, 5] > 0.0).all()
+    assert run.record.not_estimated == ("down", "VD")
+    without = np.isnan(run.record.covariance)
+    assert without[:, [2, 5]].all()
+    assert without[:, :, [2, 5]].all()
+    assert not np.delete(np.delete(without, [2, 5], axis=1), [2, 5], axis=2).any()
     out = compare_with_truth(
         run.trajectory, run.record.sd.index, run.record.covariance, run.source.truth
     )

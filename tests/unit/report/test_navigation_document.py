@@ -19,6 +19,7 @@ from strapdown.report.document import (
     TableBlock,
     document_page,
 )
+from strapdown.report.navigation_charts import bound_chart, error_charts, height_chart
 from strapdown.report.navigation_document import (
     cautions,
     end_table,
@@ -33,7 +34,7 @@ from strapdown.report.navigation_document import (
     withheld_table,
 )
 from strapdown.report.navigation_evaluation import Withheld, distance_over_ground, trust
-from strapdown.report.values import duration_words, length_words, share_words
+from strapdown.report.values import NOT_ESTIMATED, duration_words, length_words, share_words
 
 
 def plain(text):
@@ -63,6 +64,41 @@ def test_the_end_stands_in_the_table():
     assert table["velocity north"][1] == "−7.52 ± 0.20 m/s"  # 8 cos 200
     assert table["position"][0].startswith("−33.75")
     assert "−70.60" in table["position"][0]
+
+
+def without_height(made):
+    """The same run of an error model without a height."""
+    covariance, sd = made.covariance.copy(), made.sd.copy()
+    covariance[:, 2] = covariance[:, :, 2] = np.nan
+    sd["down"] = np.nan
+    return replace(made, covariance=covariance, sd=sd)
+
+
+def test_what_is_not_estimated_has_no_bound_of_zero():
+    made = without_height(record())
+    found = told(made, truth=shifted(made.trajectory, down=176.0))
+    assert made.not_estimated == ("down",)
+    table = rows(end_table(found))
+    assert all(NOT_ESTIMATED in cell and "±" not in cell for cell in table["height"])
+    assert all("±" in cell for cell in table["heading"])
+    errors = {row[0]: row for row in error_table(found).rows}
+    assert errors["down (height), m"][4] == NOT_ESTIMATED
+    # Neither for nor against the run: its error is in the table.
+    assert float(errors["down (height), m"][2]) == pytest.approx(176.0)
+    assert not [one for one in trust(found).reasons if one.data.get("component") == "height"]
+    figures = key_figures(found)
+    assert NOT_ESTIMATED in figures[1].bound
+    assert found.errors.freedom == 8
+    bounds = bound_chart(found).panels
+    assert NOT_ESTIMATED in bounds[1].y_label
+    assert [line.name for line in bounds[1].lines] == ["horizontal"]
+    height = height_chart(found).panels[-1]
+    assert NOT_ESTIMATED in height.y_label
+    assert not height.fills
+    panels = error_charts(found)[0].panels[-3:]
+    assert [bool(panel.fills) for panel in panels] == [True, True, False]
+    for text in words(navigation_document(found, "made")):
+        assert not re.search(r"\bnan\b", text), text
 
 
 def test_longitudes_that_went_on_are_told_within_half_a_turn():
@@ -321,6 +357,7 @@ def words(document):
             sensors=made.sensors.iloc[:, :0],
             sensors_sd=made.sensors_sd.iloc[:, :0],
         ),
+        without_height,
     ],
 )
 def test_any_run_has_a_report_without_numbers_that_are_none(make):
