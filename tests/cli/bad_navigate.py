@@ -285,6 +285,11 @@ NAVIGATE_CASES = (
         '\n[mechanization]\nheight = "held"\n\n[aiding.baro]\nkind = "barometer"\n'
         'path = "fixes.csv"\n',
     ),
+    _own(
+        "A smoother of states that are not corrected",
+        "",
+        '\n[damping]\nkind = "none"\n\n[smoother]\nkind = "rts"\n',
+    ),
     NavigateCase(
         "A course without fixes",
         lambda folder: write_drive(folder, file=_course),

@@ -55,6 +55,7 @@ from strapdown.estimation.sensor_blocks import (
 )
 from strapdown.formats.writers import TRAJECTORY_FORMATS
 from strapdown.nav_state import NavState
+from strapdown.navigation.filter_options import DAMPINGS
 from strapdown.navigation.measurements.measurement import Measurement, TabulatedMeasurement
 from strapdown.navigation.navigator import with_states
 from strapdown.sensors.uncertainty import STATED_KEYS, ImuUncertainty
@@ -483,6 +484,8 @@ class NavigationSpec(FileSpec):
 
     def _filter_faults(self) -> Iterator[Fault]:
         """Initialize the filter, which refuses incompatible parts."""
+        if self.smoother.kind != NONE and not DAMPINGS[self.damping.kind].corrects:
+            yield Fault(("smoother", "kind"), "navigation.smoother-without-correction")
         try:
             sensors = sensors_of(self)
         except ConfigError:  # already among the faults

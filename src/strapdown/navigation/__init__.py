@@ -8,7 +8,12 @@ from strapdown.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
     from strapdown.navigation.engine import LostCovarianceError
-    from strapdown.navigation.filter_options import ClosedLoop, Correction, OpenLoop
+    from strapdown.navigation.filter_options import (
+        ClosedLoop,
+        Correction,
+        NoCorrection,
+        OpenLoop,
+    )
     from strapdown.navigation.measurements import Gnss
     from strapdown.navigation.navigator import Navigator
     from strapdown.navigation.record import NavigationChunk
@@ -20,6 +25,7 @@ __all__ = [
     "LostCovarianceError",
     "NavigationChunk",
     "Navigator",
+    "NoCorrection",
     "OpenLoop",
 ]
 
@@ -27,7 +33,7 @@ load_on_first_use(
     __name__,
     {
         "engine": "LostCovarianceError",
-        "filter_options": "ClosedLoop Correction OpenLoop",
+        "filter_options": "ClosedLoop Correction NoCorrection OpenLoop",
         "measurements": "Gnss",
         "navigator": "Navigator",
         "record": "NavigationChunk",

@@ -168,6 +168,10 @@ class Engine(ABC):
     def state(self) -> EngineState:
         """Return the current state."""
 
+    def left(self) -> Array:
+        """Return the estimated errors that are left on the output, (9,), in level axes."""
+        return np.zeros(PHYSICAL)
+
     def estimates(self, filter_: ErrorFilter) -> Array:
         """Return the estimated errors of the sensors, (k,)."""
         T = filter_.model.to_physical(filter_.mechanization, self.filter.time, self.filter.row)
@@ -178,9 +182,11 @@ class Engine(ABC):
 class GeneralEngine(Engine):
     """Engine for any mechanization, error model and form: group by group."""
 
-    def __init__(self, filter_: ErrorFilter, state: EngineState, feeds_back: bool) -> None:
+    def __init__(
+        self, filter_: ErrorFilter, state: EngineState, feeds_back: bool, corrects: bool = True
+    ) -> None:
         self.navigation = filter_
-        self.feeds_back = feeds_back
+        self.feeds_back, self.corrects = feeds_back, corrects
         self.filter, self.errors = state.filter, state.errors
         self.time, self.row, self.last = state.time, state.row, state.last
         self.mechanization = state.mechanization.copy()
@@ -247,7 +253,7 @@ class GeneralEngine(Engine):
 
     def shown(self) -> Array:
         """Return the row of the newest step with the estimated errors subtracted."""
-        if self.feeds_back:
+        if self.feeds_back or not self.corrects:
             return self.row
         used = self.navigation.mechanization
         T = self.navigation.model.to_physical(used, self.filter.time, self.filter.row)
@@ -255,6 +261,14 @@ class GeneralEngine(Engine):
         # Since the last instant of the covariance the position has moved with the velocity.
         error[:3] += error[3:6] * (self.time - self.filter.time)
         return used.history_row(used.correct(self.mechanization, error))
+
+    def left(self) -> Array:
+        """Return the estimates that are not subtracted, as `Engine.left`."""
+        if self.corrects:
+            return super().left()
+        used = self.navigation
+        T = used.model.to_physical(used.mechanization, self.filter.time, self.filter.row)
+        return np.asarray((T @ self.errors)[:PHYSICAL])
 
     def state(self) -> EngineState:
         """Return the current state."""

@@ -10,7 +10,7 @@ from strapdown.estimation.covariance import COVARIANCES, CovarianceForm, UpdateR
 from strapdown.estimation.error_model import ErrorModel, RotationVectorModel
 from strapdown.tables.checks import is_number
 
-__all__ = ["DAMPINGS", "ClosedLoop", "Correction", "FilterOptions", "OpenLoop"]
+__all__ = ["DAMPINGS", "ClosedLoop", "Correction", "FilterOptions", "NoCorrection", "OpenLoop"]
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class FilterOptions:
                 )
 
 
-# Correction by the estimated errors: closed-loop (fed back), or open-loop (output only).
+# Correction by the estimated errors: closed-loop (fed back), open-loop (output only), or none.
 
 
 @dataclass(frozen=True)
@@ -58,6 +58,8 @@ class Correction:
     source: ClassVar[str]
     #: Whether mechanization and sensors are corrected by the estimates (closed loop).
     feeds_back: ClassVar[bool]
+    #: Whether the estimates are subtracted from the output.
+    corrects: ClassVar[bool] = True
 
 
 @dataclass(frozen=True)
@@ -65,8 +67,10 @@ class ClosedLoop(Correction):
     """State and sensors are corrected at every epoch, so that errors stay small ("damping")."""
 
     kind: ClassVar[str] = "feedback"
-    summary: ClassVar[str] = "errors are taken off the state and the sensors at each epoch"
-    source: ClassVar[str] = "Chernodarov (2009), damping"
+    summary: ClassVar[str] = (
+        "closed loop: estimates are subtracted from the state and the sensors at each epoch"
+    )
+    source: ClassVar[str] = "Chernodarov (2009), Figs. 8, 10"
     feeds_back: ClassVar[bool] = True
 
 
@@ -82,9 +86,33 @@ class OpenLoop(Correction):
     """
 
     kind: ClassVar[str] = "feedforward"
-    summary: ClassVar[str] = "the mechanization runs free; errors are taken off what is shown"
-    source: ClassVar[str] = "Chernodarov (2009), without damping"
+    summary: ClassVar[str] = (
+        "open loop: the mechanization runs free; estimates, predicted, are subtracted from its "
+        "output"
+    )
+    source: ClassVar[str] = "Chernodarov (2009) (6)"
     feeds_back: ClassVar[bool] = False
 
 
-DAMPINGS: dict[str, type[Correction]] = {"feedback": ClosedLoop, "feedforward": OpenLoop}
+@dataclass(frozen=True)
+class NoCorrection(Correction):
+    """No correction: the mechanization runs free, and its output is shown as it is.
+
+    The filter estimates as with open-loop correction, and its estimates are recorded; drifts and
+    biases that an alignment has estimated stay on the sensors, and the attitude of the alignment
+    is kept. The error of the output is the estimate that is left on it, x, with the covariance P
+    of the estimate: its stated covariance is the mean square, ``P + x x'``.
+    """
+
+    kind: ClassVar[str] = "none"
+    summary: ClassVar[str] = (
+        "none: the mechanization runs free and is shown as it is; estimates are only recorded"
+    )
+    source: ClassVar[str] = "Chernodarov (2009), Figs. 9, 11"
+    feeds_back: ClassVar[bool] = False
+    corrects: ClassVar[bool] = False
+
+
+DAMPINGS: dict[str, type[Correction]] = {
+    one.kind: one for one in (ClosedLoop, OpenLoop, NoCorrection)
+}

@@ -71,8 +71,8 @@ class Navigator:
         With names of their own.
     mark_interval : float, s
         Longest time between two marks of the covariance.
-    damping : Damping
-        Whether the estimated errors are fed back (closed-loop correction).
+    damping : Correction
+        Whether the estimated errors are fed back, subtracted from the output, or left on it.
     smoother : RauchTungStriebel, optional
         If given, the chunks hold the smoother history, too; the filter's result is the same to
         the last bit.
@@ -80,7 +80,7 @@ class Navigator:
     Raises
     ------
     ConfigError
-        Two aids have one name.
+        Two aids have one name, or a smoother is to correct what is not corrected.
     """
 
     filter: ErrorFilter
@@ -90,6 +90,8 @@ class Navigator:
     smoother: RauchTungStriebel | None = None
 
     def __post_init__(self) -> None:
+        if self.smoother is not None and not self.damping.corrects:
+            raise ConfigError("navigation.smoother-without-correction", quantity="smoother")
         names = [aid.name for aid in self.aids]
         for name in names:
             if not name or names.count(name) > 1:
@@ -208,7 +210,7 @@ class Navigator:
         """Return the engine for a state: compiled, if available for the modules."""
         if self.damping.feeds_back and compiled(self.filter):
             return CompiledEngine.going_on(self.filter, state)
-        return GeneralEngine(self.filter, state, self.damping.feeds_back)
+        return GeneralEngine(self.filter, state, self.damping.feeds_back, self.damping.corrects)
 
 
 def with_states(filter_: ErrorFilter, aids: tuple[Measurement, ...]) -> ErrorFilter:
@@ -525,11 +527,11 @@ class EpochLoop:
     def mark(self, before: float = 0.0) -> None:
         """Record covariance and estimates, with a time stamp so much earlier."""
         filter_, state = self.navigator.filter, self.engine.filter
-        P = filter_.physical_covariance(state)
+        P, left = filter_.physical_covariance(state), self.engine.left()
         turn = np.kron(np.eye(3), filter_.mechanization.level_from_ned(state.row))
         mark = CovarianceSnapshot(
             state.time - before,
-            turn.T @ P[:9, :9] @ turn,
+            turn.T @ (P[:9, :9] + np.outer(left, left)) @ turn,
             self.engine.estimates(filter_),
             self._sd(state.time, P),
         )

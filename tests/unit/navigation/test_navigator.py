@@ -22,9 +22,10 @@ from strapdown.mechanization.mechanization import state_error
 from strapdown.nav_state import NavState
 from strapdown.navigation import navigator as navigator_module
 from strapdown.navigation.compiled_engine import compiled
-from strapdown.navigation.filter_options import OpenLoop
+from strapdown.navigation.filter_options import NoCorrection, OpenLoop
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.navigator import Navigator, with_states
+from strapdown.navigation.smoother import RauchTungStriebel
 from strapdown.sensors.triad_errors import ImuErrors
 from strapdown.simulation import Origin, SineVelocityMotion, simulate_imu
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
@@ -193,6 +194,52 @@ def test_feedforward_goes_by_pieces_too(log):
     navigator, state = started("wander", "ud", LONE, damping=OpenLoop())
     cuts = [3, 77, 78, 1000]
     same(run(log, navigator, state), run(log, navigator, state, cuts))
+
+
+@pytest.mark.parametrize("model", ["rotation_vector", "quaternions"])
+def test_without_correction_the_estimates_are_only_recorded(log, model):
+    navigator, state = started("wander", "ud", LONE, model, damping=OpenLoop())
+    shown, marks, seen, end = run(log, navigator, state)
+    none = replace(navigator, damping=NoCorrection())
+    free = run(log, none, none.begin_from(state.engine.filter))
+    used, time = navigator.filter.mechanization, log[0]
+    # The same mechanization and filter to the last bit; the output alone is another.
+    np.testing.assert_array_equal(free[3].engine.mechanization, end.engine.mechanization)
+    np.testing.assert_array_equal(free[0][-1], used.history_row(end.engine.mechanization))
+    assert np.abs(free[0] - shown).max() > 0.0
+    for one, other in zip(free[2], seen, strict=True):
+        np.testing.assert_array_equal(one.innovations.nu, other.innovations.nu)
+    for one, other in zip(free[1], marks, strict=True):
+        np.testing.assert_array_equal(one.sensors, other.sensors)
+        np.testing.assert_array_equal(one.sensors_sd, other.sensors_sd)
+    # What is left is the difference of both outputs; its square is in the covariance.
+    at, mark = next(
+        (k, i)
+        for i, one in reversed(list(enumerate(marks)))
+        if abs(time[k := min(int(time.searchsorted(one.time - 1e-7)), len(time) - 1)] - one.time)
+        < 1e-7
+    )
+    raw, corrected = (
+        NavState.from_trajectory(used.trajectory(time[: at + 1], rows[: at + 1]), -1)
+        for rows in (free[0], shown)
+    )
+    more = free[1][mark].covariance - marks[mark].covariance
+    kept = slice(0, 9) if navigator.filter.model.has_height else np.r_[0, 1, 3:9]
+    left = state_error(raw, corrected)
+    # To first order in the errors, a hundredth of a radian and less.
+    np.testing.assert_allclose(
+        np.sqrt(np.diagonal(more)[kept]), np.abs(left[kept]), rtol=0.01, atol=1e-6
+    )
+    off = np.abs(state_error(raw, truth_at(float(time[at]))))[kept]
+    bounds = [np.sqrt(np.diagonal(one[mark].covariance))[kept] for one in (free[1], marks)]
+    assert (off < 4.0 * bounds[0]).all()
+    assert (off > 4.0 * bounds[1]).any()
+
+
+def test_a_smoother_of_what_is_not_corrected_is_refused(log):
+    navigator, _ = started("wander", "ud", LONE)
+    with pytest.raises(ConfigError, check=coded("navigation.smoother-without-correction")):
+        replace(navigator, damping=NoCorrection(), smoother=RauchTungStriebel())
 
 
 def test_a_fix_that_comes_too_late_is_said_and_not_used(log):
