@@ -49,6 +49,7 @@ __all__ = [
     "from_state",
     "handed_over",
     "here_by_fix",
+    "motion_by_fixes",
     "site_of_fixes",
     "unused_fixes",
 ]
@@ -146,11 +147,46 @@ def handed_over(chain: NavigationPipeline, state: PipelineState, found: Aligned)
         return from_alignment(
             filter_, found.alignment, start, P, rest, _by_antenna(chain, q_nb, start.v_n, turn)
         )
+    fixes = _fixes(chain, state)
+    moved = None if chain.site is not None else motion_by_fixes(fixes, state.begun, state.time)
+    if moved is not None:
+        return _in_motion(chain, state, found, rest, moved)
     site, sd = _site(chain, state, q_nb)
     start = NavState.from_degrees(site.lat_deg, site.lon_deg, site.alt, time=state.time)
     P = np.diag(np.square(np.concatenate([sd, chain.velocity_sd])))
     by_others = None if chain.site is not None else _by_antenna(chain, q_nb, still, still)
     return from_alignment(filter_, found.alignment, start, P, rest, by_others)
+
+
+def _in_motion(
+    chain: NavigationPipeline,
+    state: PipelineState,
+    found: Aligned,
+    rest: Array,
+    moved: tuple[Array, Array],
+) -> FilterState:
+    """State of a body that its fixes show moving while it is levelled.
+
+    `moved`: its velocity and standard deviation, (3,), m/s. The mean specific force was taken for
+    gravity's, though the velocity may have changed by as much as it is.
+    """
+    filter_, q_nb = chain.navigator.filter, found.alignment.q_nb
+    velocity, sd = moved
+    start, P = here_by_fix(
+        _fixes(chain, state),
+        state.time,
+        q_nb,
+        _lever_arm(chain),
+        find_ellipsoid(filter_.mechanization.ellipsoid),
+        velocity,
+        np.diag(np.square(sd)),
+    )
+    length = max(state.time - state.begun, INSTANT)
+    tilt = math.hypot(*velocity[:2]) / (length * float(np.linalg.norm(rest[3:])))
+    level = found.alignment.covariance + np.diag([tilt**2, tilt**2, 0.0])
+    by_others = _by_antenna(chain, q_nb, velocity, _turn(_window(chain, state), state.time))
+    alignment = replace(found.alignment, covariance=level)
+    return from_alignment(filter_, alignment, start, P, rest, by_others)
 
 
 def unused_fixes(
@@ -524,8 +560,11 @@ def errors_by_antenna(
 MANOEUVRE = 1.0
 # Fixes considered for outliers: most, longest time, s, and fewest.
 LOOKED_AT, LOOKED_BACK, LEAST_LOOKED_AT = 9, 10.0, 4
-# Standard deviations that make a fix an outlier.
+# Standard deviations that make a fix an outlier, or that prove motion.
 CLEAR = 5.0
+# Speed of a body that is not at rest, m/s; vertical one of a moving body, unmeasured, m/s; number
+# of velocities that show it.
+MOVES, CLIMB, LEAST_VELOCITIES = 0.5, 1.0, 3
 
 
 def fixes_until(
@@ -627,6 +666,57 @@ def here_by_fix(
     P[:3, 3:] = P[3:, :3] = velocity_covariance * after
     P[3:, 3:] = velocity_covariance
     return state, P
+
+
+def motion_by_fixes(
+    fixes: pd.DataFrame | None, begin: float, time: float
+) -> tuple[Array, Array] | None:
+    """Return the velocity of a receiver that has moved since an instant, by its newest fixes.
+
+    Parameters
+    ----------
+    fixes : DataFrame or None
+        Fixes until `time`.
+    begin, time : float, s
+
+    Returns
+    -------
+    velocity, sd : ndarray, (3,), m/s
+        At `time`, north, east, down: the newest velocity, or a difference of positions over the
+        time with the least error. The acceleration since is unknown, 1 m/s². None where the fixes
+        since `begin` are those of a receiver at rest.
+    """
+    if fixes is None or begin >= time:
+        return None
+    part = fixes[fixes.index >= begin]
+    good = values_of(part, ["quality"])[:, 0] > 0.0
+    v, v_sd = values_of(part, VELOCITY_COLUMNS), values_of(part, VELOCITY_SD)
+    told = good & np.isfinite(v_sd[:, :2]).all(axis=1)
+    if told.sum() >= LEAST_VELOCITIES:
+        rows = np.flatnonzero(told)[-LEAST_VELOCITIES:]
+        k = int(rows[-1])
+        speed = float(np.median(np.hypot(v[rows, 0], v[rows, 1])))
+        if speed <= max(MOVES, CLEAR * float(v_sd[k, :2].max())):
+            return None
+        since = time - float(index_of(part)[k])
+        measured = np.isfinite(v_sd[k])
+        own = np.where(measured, v_sd[k], CLIMB)
+        return np.where(measured, v[k], 0.0), np.hypot(own, MANOEUVRE * since)
+    sd = values_of(part, POSITION_SD)
+    good &= np.isfinite(sd).all(axis=1)
+    if good.sum() < 2:
+        return None
+    place, sd, stamps = values_of(part, GEODETIC)[good], sd[good], index_of(part)[good]
+    way = ned_from_geodetic(place, place[-1])
+    far = np.hypot(way[:, 0], way[:, 1])
+    span = np.maximum(stamps[-1] - stamps, INSTANT)
+    blur = np.hypot(sd, sd[-1])
+    if not (far > np.maximum(CLEAR * blur[:, :2].max(axis=1), MOVES * span)).any():
+        return None
+    # Half of the span before the newest fix, the velocity is that of the difference.
+    whole = np.hypot(blur / span[:, None], MANOEUVRE * (0.5 * span + time - stamps[-1])[:, None])
+    k = int(np.argmin(whole[:-1, :2].max(axis=1)))
+    return -way[k] / span[k], whole[k]
 
 
 def _newest_that_agrees(

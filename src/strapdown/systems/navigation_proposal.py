@@ -75,6 +75,9 @@ SCALES = {"correlation_time_s": 3600.0}
 NO_ERRORS = ImuUncertainty(TriadUncertainty(), TriadUncertainty())
 #: Longest rest used for a coarse alignment, s.
 COARSE = 100.0
+#: Levelling for a heading that is asked: the longest, s, and that of a body in motion, which may
+#: turn meanwhile.
+LEVELLED, LEVELLED_IN_MOTION = 10.0, 2.0
 #: Standard deviations that end an alignment by course, deg: of the tilt; and of the heading, which
 #: has that of the mounting of the unit, 5 deg, besides.
 WELL, HEADING = 3.0, 6.0
@@ -209,7 +212,10 @@ def propose(
     rest = _rest(quiet, until, rocks=sensors is not None and _finds_north(sensors))
     span = float(imu.index[-1] - imu.index[0])
     measured = fixes is not None and np.isfinite(values_of(fixes, VELOCITY_SD[:2])).any()
-    chosen, how = _alignment(sensors, rest, drives, heading_deg, span, bool(measured))
+    levelled = _levelled(rest, until, span)
+    chosen, how = _alignment(
+        sensors, rest, drives, heading_deg, span, levelled, velocities=bool(measured)
+    )
     clock: dict[str, float] = {}
     if fixes is not None:
         clock, step = _clock(fixes, imu, drives, sensors)
@@ -220,7 +226,7 @@ def propose(
             )
             return replace(made, findings=(*made.findings, step))
     if fixes is not None and sensors is not None and chosen["coarse"]["kind"] == "gnss_course":
-        chosen, how, tried = _tried(chosen, how, imu, fixes, sensors)
+        chosen, how, tried = _tried(chosen, how, imu, fixes, sensors, levelled)
         findings = (*findings, *tried)
     table |= chosen
     if fixes is not None:
@@ -461,19 +467,30 @@ def _speed(fixes: pd.DataFrame) -> float:
     return float(np.sqrt(np.mean(np.square(ways_between(place) / np.diff(index_of(fixes))))))
 
 
+def _levelled(rest: float, until: float, span: float) -> float:
+    """How long to level a body whose heading is asked, s.
+
+    At most half of a record of `span` seconds: navigation needs the rest. `rest`, `until`: of the
+    body, and until the fixes prove motion.
+    """
+    most = round(min(LEVELLED, 0.5 * span), 3)
+    return most if until >= most else min(most, max(rest, LEVELLED_IN_MOTION))
+
+
 def _alignment(
     sensors: ImuUncertainty | None,
     rest: float,
     drives: bool,
     heading_deg: float | None,
     span: float,
+    levelled: float,
     velocities: bool = True,
 ) -> tuple[dict[str, Any], str]:
     """Coarse and fine alignment for such a record of `span` seconds, and why.
 
-    Levelling takes at most half of the record: navigation needs the rest.
+    `levelled` (s): as of `_levelled`.
     """
-    most = round(min(10.0, 0.5 * span), 3)
+    most = round(min(LEVELLED, 0.5 * span), 3)
     if heading_deg is not None:
         coarse = {"kind": "known_heading", "heading_deg": heading_deg, "sd_deg": 2.0}
         length = min(max(rest, 1.0), most)
@@ -506,7 +523,7 @@ def _alignment(
             + ("" if velocities else "; the fixes state no velocity, so from positions alone"),
         )
     return (
-        {"coarse": {"kind": "known_heading", "duration_s": most}, "fine": {"kind": "none"}},
+        {"coarse": {"kind": "known_heading", "duration_s": levelled}, "fine": {"kind": "none"}},
         "neither a rest with gyros that find north, nor a drive with fixes: the heading is asked",
     )
 
@@ -517,6 +534,7 @@ def _tried(
     imu: pd.DataFrame,
     fixes: pd.DataFrame,
     sensors: ImuUncertainty,
+    levelled: float,
 ) -> tuple[dict[str, Any], str, tuple[Finding, ...]]:
     """An alignment by course with limits that the record meets, by trial at instants of it.
 
@@ -553,7 +571,7 @@ def _tried(
         keys = ("until_heading_sd_deg", "until_tilt_sd_deg")
         coarse = {**coarse, **dict(zip(keys, wider, strict=True))}
         return {**chosen, "coarse": coarse}, f"{how}; no better than within {max(best):.2g} deg", ()
-    most = {"kind": "known_heading", "duration_s": round(min(10.0, 0.5 * span), 3)}
+    most = {"kind": "known_heading", "duration_s": levelled}
     reason = refused or Finding("navigation.course-too-uncertain", sd=max(best or (math.inf,)))
     return (
         {"coarse": most, "fine": {"kind": "none"}},

@@ -6,7 +6,14 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from strapdown.systems.navigation_proposal import _alignment, _motion, _moving, _quiet, _rest
+from strapdown.systems.navigation_proposal import (
+    _alignment,
+    _levelled,
+    _motion,
+    _moving,
+    _quiet,
+    _rest,
+)
 from strapdown.tables import gnss_table, imu_table
 
 RATE = 10.0
@@ -55,7 +62,9 @@ def test_by_places_the_drive_is_fast_enough_for_a_course():
 @pytest.mark.parametrize("heading_deg", [None, 30.0])
 def test_levelling_leaves_half_of_a_short_record_to_navigation(heading_deg):
     def length(span, rest):
-        return _alignment(None, rest, False, heading_deg, span)[0]["coarse"]["duration_s"]
+        return _alignment(None, rest, False, heading_deg, span, _levelled(rest, rest, span))[0][
+            "coarse"
+        ]["duration_s"]
 
     assert length(6.5, 6.5) == 3.25
     assert length(600.0, 300.0) == 10.0
