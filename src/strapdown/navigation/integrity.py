@@ -35,12 +35,21 @@ from strapdown.navigation.heading_checks import (
     run_heading_checks,
 )
 from strapdown.navigation.heading_integrity import (
+    CARRIED,
+    CLIP,
+    FAR_OFF,
+    FEWEST,
+    LOST,
+    RECENT,
+    REFUTED,
+    STATUSES,
     SURE,
     HeadingCheck,
     HeadingIntegrity,
     StatusSpan,
     heading_status,
     recent_scatter,
+    seconds_of,
 )
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.measurement import Measurement, TabulatedMeasurement, lasting
@@ -53,7 +62,15 @@ from strapdown.progress import Progress
 from strapdown.tables import POSITION_SD, VELOCITY_SD
 from strapdown.tables.checks import index_of, values_of
 
-__all__ = ["Advice", "IntegrityReport", "Repeated", "assess_integrity", "repeat_without"]
+__all__ = [
+    "Advice",
+    "IntegrityReport",
+    "QuantityIntegrity",
+    "Repeated",
+    "assess_integrity",
+    "quantity_status",
+    "repeat_without",
+]
 
 
 Array = NDArray[np.float64]
@@ -65,6 +82,8 @@ NO_NORTH = 45.0
 #: Interval between states from which a check can begin, s.
 LONGEST_STEP = 0.25
 NO_FIXES = "navigation.no-receiver-fixes"
+#: Share of the newest measurements of a quantity whose rejection rejects the quantity.
+MOSTLY = 0.5
 
 
 @dataclass(frozen=True)
@@ -106,6 +125,8 @@ class IntegrityReport:
         In order of time.
     repeated : Repeated or None
         The run without the first inconsistent measurement.
+    quantities : tuple of QuantityIntegrity
+        Of position and velocity, horizontal and vertical.
     """
 
     heading: HeadingIntegrity
@@ -115,6 +136,13 @@ class IntegrityReport:
     consistency: Mapping[str, ObservationConsistency]
     inconsistencies: tuple[Inconsistency, ...]
     repeated: Repeated | None
+    quantities: tuple[QuantityIntegrity, ...] = ()
+
+    @property
+    def worst(self) -> QuantityIntegrity | None:
+        """The quantity that was rejected for the longest time; None where none was."""
+        rejected = [one for one in self.quantities if one.share("rejected") > 0.0]
+        return max(rejected, key=lambda one: one.share("rejected"), default=None)
 
     @property
     def first(self) -> Inconsistency | None:
@@ -205,6 +233,7 @@ def assess_integrity(
         consistency=consistency,
         inconsistencies=found,
         repeated=repeated,
+        quantities=quantity_status(record),
     )
 
 
@@ -307,6 +336,115 @@ def _typical(table: pd.DataFrame, columns: list[str], factor: float) -> Array | 
     sd = values_of(table, columns)
     sd = sd[np.isfinite(sd).all(axis=1) & (sd > 0.0).all(axis=1)]
     return np.asarray(factor * np.median(sd, axis=0)) if len(sd) else None
+
+
+# Position and velocity, horizontal and vertical, beside the measurements of each.
+
+
+#: Quantities, the labels of the innovations that measure each, and its columns of `sd`.
+QUANTITIES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "horizontal position": (("north, m", "east, m"), ("north", "east")),
+    "height": (("down, m", "height, m"), ("down",)),
+    "horizontal velocity": (("VN, m/s", "VE, m/s"), ("VN", "VE")),
+    "vertical velocity": (("VD, m/s",), ("VD",)),
+}
+#: Reason of a status of these, by its code.
+QUANTITY_REASONS: dict[str, str] = {
+    "": "its measurements agree with it",
+    "unmeasured": "too few measurements of it, or none for a minute: inertial sensors alone",
+    "not_estimated": "the error model does not estimate it, and no measurement tests it",
+    "scatter": "its measurements scatter more than expected",
+    "apart": "its measurements contradict it: most are rejected, or far beyond their bounds",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class QuantityIntegrity:
+    """Status of a quantity at each second of a run, by the measurements of it.
+
+    Attributes
+    ----------
+    name : str
+        One of `QUANTITIES`.
+    table : DataFrame
+        By time in s: ``status`` (index in `STATUSES`) and ``reason`` (a key of
+        `QUANTITY_REASONS`).
+    """
+
+    name: str
+    table: pd.DataFrame
+
+    def share(self, status: str) -> float:
+        """Share of the seconds with a status."""
+        codes = self.table["status"].to_numpy()
+        return float(np.mean(codes == STATUSES.index(status))) if len(codes) else 0.0
+
+    @property
+    def at_end(self) -> tuple[str, str]:
+        """Status and reason of the last second."""
+        last = self.table.iloc[-1]
+        return STATUSES[int(last["status"])], str(last["reason"])
+
+
+def quantity_status(record: NavigationRecord) -> tuple[QuantityIntegrity, ...]:
+    """Return the status of position and velocity, horizontal and vertical, at each second.
+
+    Trusted: measured within the last minute, and the newest innovations scatter at most twice as
+    much as predicted. Rejected: they scatter more than three times as much, or half of them were
+    rejected, which says that the measurement or the run is wrong. Unverified: all else.
+    """
+    seconds = seconds_of(record)
+    if not len(seconds):
+        return ()
+    return tuple(
+        QuantityIntegrity(name, _status_by(record, seconds, labels, set(columns)))
+        for name, (labels, columns) in QUANTITIES.items()
+    )
+
+
+def _status_by(
+    record: NavigationRecord, seconds: Array, labels: Sequence[str], columns: set[str]
+) -> pd.DataFrame:
+    """Status at each second, by the worst of the observations with these components."""
+    estimated = not columns & set(record.not_estimated)
+    status = np.full(len(seconds), STATUSES.index("unverified"))
+    reason = np.full(len(seconds), "unmeasured" if estimated else "not_estimated", dtype=object)
+    spread, lost = np.full((2, len(seconds)), np.nan)
+    for table in record.innovations.values():
+        there = [label for label in labels if f"nu {label}" in table.columns]
+        if not there or not len(table):
+            continue
+        nu, s, weight = (
+            table[[f"{part} {label}" for label in there]].to_numpy(dtype=np.float64)
+            for part in ("nu", "s", "weight")
+        )
+        with np.errstate(divide="ignore", invalid="ignore"):
+            u = np.nan_to_num(np.clip(nu / np.sqrt(s), -CLIP, CLIP))
+        # As `recent_scatter`: single rejected measurements did no harm.
+        u[weight <= 0.0] = LOST
+        time = table.index.to_numpy(dtype=np.float64)
+        upto = np.searchsorted(time, seconds + 1e-6, side="right")
+        # The last half minute, or the newest epochs of a measurement with fewer in it.
+        since = np.minimum(
+            np.searchsorted(time, seconds - RECENT, side="right"), np.maximum(upto - FEWEST, 0)
+        )
+        heard = (upto >= FEWEST) & (seconds - time[np.maximum(upto - 1, 0)] <= CARRIED)
+        count = np.maximum(upto - since, 1)
+        sums = [
+            np.concatenate([[0.0], np.cumsum(x.mean(axis=1))])
+            for x in (np.square(u), weight <= 0.0)
+        ]
+        square, refused = ((x[upto] - x[since]) / count for x in sums)
+        spread = np.where(heard, np.fmax(spread, np.sqrt(square)), spread)
+        lost = np.where(heard, np.fmax(lost, refused), lost)
+    heard = np.isfinite(spread)
+    with np.errstate(invalid="ignore"):
+        off, apart = spread > FAR_OFF, (spread > REFUTED) | (lost >= MOSTLY)
+    if estimated:
+        status[heard], reason[heard] = STATUSES.index("trusted"), ""
+        status[off], reason[off] = STATUSES.index("unverified"), "scatter"
+    status[apart], reason[apart] = STATUSES.index("rejected"), "apart"
+    return pd.DataFrame({"status": status, "reason": reason}, index=pd.Index(seconds, name="time"))
 
 
 # Re-run of the navigation without the inconsistent measurements.

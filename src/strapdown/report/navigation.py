@@ -23,7 +23,7 @@ from strapdown.formats.file_options import FileOptions
 from strapdown.formats.writers import write_trajectory
 from strapdown.navigation.consistency import Inconsistency
 from strapdown.navigation.heading_integrity import REASONS, STATUSES
-from strapdown.navigation.integrity import Repeated
+from strapdown.navigation.integrity import QUANTITY_REASONS, Repeated
 from strapdown.navigation.record import NavigationRecord
 from strapdown.progress import Progress
 from strapdown.report import navigation_charts as charts
@@ -553,6 +553,15 @@ def verdict_json(result: NavigationRun) -> dict[str, Any]:
                 }
                 for a in trust.advice
             ],
+        },
+        "quantities": {
+            one.name.replace(" ", "_"): {
+                "share": {status: one.share(status) for status in STATUSES},
+                "at_end": one.at_end[0],
+                "reason": one.at_end[1],
+                "why": QUANTITY_REASONS[one.at_end[1]],
+            }
+            for one in trust.quantities
         },
         "innovations": {name: one.consistent for name, one in trust.consistency.items()},
         "inconsistencies": [_doubt(i) for i in trust.inconsistencies],

@@ -17,7 +17,12 @@ from strapdown.navigation.heading_integrity import (
     STATUSES,
     SURE,
 )
-from strapdown.navigation.integrity import NO_NORTH, Advice, IntegrityReport
+from strapdown.navigation.integrity import (
+    NO_NORTH,
+    QUANTITY_REASONS,
+    Advice,
+    IntegrityReport,
+)
 from strapdown.navigation.record import Span
 from strapdown.report.chart import (
     BLACK,
@@ -107,6 +112,23 @@ def heading_words(trust: IntegrityReport) -> str:
     if trust.unconfirmed:
         now += f". No independent check: {unconfirmed_words(trust)}"
     return f"Heading: {said} of the time; {now}."
+
+
+def worst_words(trust: IntegrityReport) -> str:
+    """Return the quantity that its measurements contradict for the longest time; or nothing."""
+    worst = trust.worst
+    if worst is None:
+        return ""
+    status, reason = worst.at_end
+    others = [
+        one.name for one in trust.quantities if one is not worst and one.share("rejected") > 0.0
+    ]
+    more = f"; also rejected at times: {', '.join(others)}" if others else ""
+    return (
+        f"{capital(worst.name)}: rejected {share_words(worst.share('rejected'))} of the time "
+        f"({QUANTITY_REASONS['apart']}); final status: {status}"
+        f"{'' if status == 'trusted' else f' ({QUANTITY_REASONS[reason]})'}{more}."
+    )
 
 
 def unconfirmed_words(trust: IntegrityReport) -> str:
@@ -242,11 +264,13 @@ def repeated_words(result: NavigationRun) -> str:
 
 
 def terminal_lines(result: NavigationRun, *, brief: bool = False) -> list[tuple[str, str]]:
-    """Up to four lines for the terminal, each with its style; brief, without the position."""
+    """Up to five lines for the terminal, each with its style; brief, without the position."""
     trust = result.trust
     last = trust.heading.spans[-1].status if trust.heading.spans else "rejected"
     style = STATUS_STYLES[last]
     lines = [(heading_words(trust) if brief else answer(result), style)]
+    if said := worst_words(trust):
+        lines.insert(0, (said, STATUS_STYLES["rejected"]))
     if trust.first is not None:
         first = trust.first
         since = "throughout" if first.throughout else f"first at {instant(first.since)}"
@@ -301,6 +325,7 @@ def verdict_document(result: NavigationRun, name: str) -> Document:
     sound = trust.first is None and seen and trust.heading.spans[-1].status == "trusted"
     sections = (
         Section("heading", "Heading integrity", _heading(result)),
+        Section("quantities", "Position and velocity", _quantities(result)),
         Section("innovations", "Innovations", _innovations(result)),
         Section("first", "First inconsistency, and the re-run without it", _first(result)),
         Section("meaning", "Meaning of the status", (Items(promise(trust)), _limits())),
@@ -492,6 +517,28 @@ def _against_truth(result: NavigationRun) -> TableBlock | None:
         tuple(rows),
         (0,),
         f"Heading error against {result.source.truth_name}, by status",
+    )
+
+
+def _quantities(result: NavigationRun) -> tuple[Block, ...]:
+    """Status of position and velocity, horizontal and vertical, with its shares of the time."""
+    rows = []
+    for one in result.trust.quantities:
+        status, reason = one.at_end
+        shares = (share_words(one.share(name)) for name in STATUSES)
+        rows.append((one.name, *shares, status, QUANTITY_REASONS[reason]))
+    if not rows:
+        return (Paragraph("The run is shorter than a second."),)
+    said = worst_words(result.trust)
+    return (
+        *((Paragraph(said, "warning"),) if said else ()),
+        TableBlock(
+            ("quantity", *STATUSES, "at the end", "reason"),
+            tuple(rows),
+            (0, 4, 5),
+            "Status by the measurements of each quantity: its newest innovations, and how many "
+            "were rejected",
+        ),
     )
 
 

@@ -179,6 +179,9 @@ def test_the_files_say_what_was_judged(sound, tmp_path):
     light = sound.trust.heading
     assert told["heading"]["share"]["trusted"] == light.share("trusted")
     assert told["answer"].startswith("Position bound, ")
+    assert {name: one["at_end"] for name, one in told["quantities"].items()} == dict.fromkeys(
+        ("horizontal_position", "height", "horizontal_velocity", "vertical_velocity"), "trusted"
+    )
     table = pd.read_csv(tmp_path / "out" / "heading_integrity.csv", comment="#")
     assert len(table) == len(light.table)
     assert (table["status"] == "trusted").mean() == light.share("trusted")
