@@ -43,6 +43,7 @@ SLOW = {
     "references",
     "results",
     "scenarios",
+    "sins1000",
     "smoothing",
     "start",
     "trajectories",

@@ -25,6 +25,7 @@ from strapdown.report.navigation_evaluation import (
     evaluation_of,
     trust,
 )
+from strapdown.report.paired_corrections import paired_table
 from strapdown.report.values import (
     duration_words,
     length_words,
@@ -72,11 +73,12 @@ def print_navigation(
     out.print(spaced(f"{name}, {duration}, {distance}, {len(time)} samples"))
     tables: list[TableBlock | None]
     if verbose:
-        tables = [end_table(found), error_table(found), point_table(found)]
+        tables = [end_table(found), error_table(found), paired_table(result), point_table(found)]
         tables += [observation_table(found), outage_table(found), withheld_table(found)]
         tables += [state_table(found)]
     else:
-        tables = [_end(found), point_table(found), observation_table(found), withheld_table(found)]
+        tables = [_end(found), paired_table(result), point_table(found)]
+        tables += [observation_table(found), withheld_table(found)]
     lines = [(verdict.sentence, STYLES[verdict.verdict])]
     lines += [(f"{head}: {said}", "") for head, said in cautions(found, brief=not verbose)]
     lines += terminal_lines(result, brief=not verbose)

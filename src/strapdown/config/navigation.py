@@ -190,6 +190,13 @@ class AidSpec(FixesTable, ChoiceSpec):
     path: FileName | None = None  # type: ignore[assignment]
 
 
+class DampingSpec(ChoiceSpec):
+    """Correction by the estimated errors, and another one for comparison."""
+
+    #: Kind with which the record is navigated a second time, for one report of both.
+    beside: Word | None = None
+
+
 class TruthTable(Spec):
     """Independent reference trajectory to compare the result with."""
 
@@ -318,7 +325,7 @@ STAGES: dict[str, Kinds] = {
         Kinds("fine", "filter", True, FineModeSpec),
         Kinds("mechanization", "ned"),
         Kinds("filter", "error_state"),
-        Kinds("damping", "feedback"),
+        Kinds("damping", "feedback", base=DampingSpec),
         Kinds("smoother", NONE, True),
         Kinds("recorder", "interval"),
     )
@@ -349,7 +356,7 @@ class NavigationSpec(FileSpec):
     gaps: GapsTable = GapsTable()
     mechanization: Annotated[ChoiceSpec, BeforeValidator(STAGES["mechanization"])] = slot("ned")
     filter: Annotated[ChoiceSpec, BeforeValidator(STAGES["filter"])] = slot("error_state")
-    damping: Annotated[ChoiceSpec, BeforeValidator(STAGES["damping"])] = slot("feedback")
+    damping: Annotated[DampingSpec, BeforeValidator(STAGES["damping"])] = slot("feedback")
     smoother: Annotated[ChoiceSpec, BeforeValidator(STAGES["smoother"])] = slot(NONE)
     recorder: Annotated[ChoiceSpec, BeforeValidator(STAGES["recorder"])] = slot("interval")
     aiding: dict[str, Annotated[AidSpec, BeforeValidator(Kinds("aiding", base=AidSpec))]] = Field(
@@ -484,6 +491,9 @@ class NavigationSpec(FileSpec):
 
     def _filter_faults(self) -> Iterator[Fault]:
         """Initialize the filter, which refuses incompatible parts."""
+        beside, known = self.damping.beside, [k for k in DAMPINGS if k != self.damping.kind]
+        if beside is not None and beside not in known:
+            yield Fault(("damping", "beside"), "config.unknown-correction-beside", {"known": known})
         if self.smoother.kind != NONE and not DAMPINGS[self.damping.kind].corrects:
             yield Fault(("smoother", "kind"), "navigation.smoother-without-correction")
         try:

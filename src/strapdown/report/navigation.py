@@ -48,6 +48,12 @@ from strapdown.report.navigation_evaluation import (
     worst_within,
 )
 from strapdown.report.navigation_plan import plan_chart
+from strapdown.report.paired_corrections import (
+    paired_charts,
+    paired_json,
+    paired_table,
+    write_paired,
+)
 from strapdown.report.report_bundle import (
     ReportBundle,
     file_of,
@@ -86,7 +92,12 @@ def _write_all(
     write_navigation_files(result, folder)
     if report:
         write_verdict(result, name, folder)
-        document = navigation_document(found, name, integrity_section(result))
+        document = navigation_document(
+            found,
+            name,
+            integrity_section(result),
+            (paired_table(result), *paired_charts(result)),
+        )
         write_report(document, folder, progress, figures=result.spec.output.figures)
 
 
@@ -217,6 +228,7 @@ def navigation_json(
         ],
         "against": _against(found),
         "control_points": _points(found),
+        "paired": paired_json(result),
         "method": _method(result),
         "findings": [finding_json(f) for f in result.findings],
     }
@@ -425,6 +437,7 @@ def write_navigation_files(result: NavigationRun, folder: Path) -> None:
         )
         against = {**told, "against": result.source.truth_name, "sign": "computed minus truth"}
         _write(folder / "errors.csv", errors, against)
+    write_paired(result, folder, told)
 
 
 def _write_states(

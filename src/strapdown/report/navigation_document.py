@@ -660,7 +660,10 @@ def event_table(found: NavigationEvaluation) -> TableBlock | None:
 
 
 def navigation_document(
-    found: NavigationEvaluation, name: str, integrity: Section | None = None
+    found: NavigationEvaluation,
+    name: str,
+    integrity: Section | None = None,
+    paired: tuple[Block | None, ...] = (),
 ) -> Document:
     """Return the report of a navigation run.
 
@@ -670,6 +673,8 @@ def navigation_document(
         Folder name, for the verification command; no command if empty.
     integrity : Section, optional
         Integrity section, for a run whose verdict is on a separate page.
+    paired : tuple of Block
+        Table and chart of the same record with another correction.
     """
     verdict = trust(found)
     plan = plan_chart(found)
@@ -694,6 +699,7 @@ def navigation_document(
             *error_charts(found),
             nees_chart(found),
         ),
+        section("paired", "With two corrections of the estimated errors", *paired),
         section("points", "At the control points", point_table(found)),
         section(
             "smoothing",

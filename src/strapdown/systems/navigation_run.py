@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -34,6 +34,7 @@ from strapdown.evaluation.trajectory_differences import (
     trajectory_differences,
 )
 from strapdown.nav_state import NavState
+from strapdown.navigation.filter_options import DAMPINGS
 from strapdown.navigation.integrity import IntegrityReport, assess_integrity
 from strapdown.navigation.modes import (
     CoarseMode,
@@ -140,6 +141,16 @@ def run_navigation(
     progress("aligning" if spec.start is None else "navigating", BEGUN)
     with said_of_file(*tables):
         run = drive(chain, source.imu, source.tables, recorder, told)
+    beside = None
+    if spec.damping.beside is not None:
+        with said_of_file(*tables):
+            beside = _AT_ONCE(
+                _with_correction(chain, spec.damping.beside),
+                source.imu,
+                source.tables,
+                recorder,
+                lambda mode, share: progress(f"{spec.damping.beside}: {mode}", ENDED),
+            ).record
     progress("comparing", ENDED)
     told_by = run.smoothed or run.record
     differences, errors = _against_truth(told_by.trajectory, source, spec)
@@ -204,11 +215,18 @@ def run_navigation(
         errors=errors,
         forward_differences=forward_differences,
         points=points,
+        beside=beside,
         withheld=withheld,
         trust=trust,
         inputs=(*configuration_file(file), *source.inputs),
         findings=tuple(dict.fromkeys(findings)),
     )
+
+
+def _with_correction(chain: NavigationPipeline, kind: str) -> NavigationPipeline:
+    """Return a pipeline with another correction by the estimated errors, without a smoother."""
+    navigator = replace(chain.navigator, damping=DAMPINGS[kind](), smoother=None)
+    return replace(chain, navigator=navigator)
 
 
 def _lost_start(
@@ -292,6 +310,8 @@ class NavigationRun(SavedRun):
         Of the filter solution of a smoothed run.
     points : ControlPointScore or None
         The path at its control points.
+    beside : NavigationRecord or None
+        The same record with the other correction of ``[damping]``.
     withheld : tuple of Withheld
         Test outages and their errors.
     memory : Memory
@@ -310,6 +330,7 @@ class NavigationRun(SavedRun):
     errors: DifferenceSummary | None
     forward_differences: pd.DataFrame | None
     points: ControlPointScore | None
+    beside: NavigationRecord | None
     withheld: tuple[Withheld, ...]
     trust: IntegrityReport
     inputs: tuple[InputFiles, ...]
