@@ -24,6 +24,7 @@ from strapdown.report.chart_svg import ChartFigure
 from strapdown.report.document import drawings
 from strapdown.report.navigation_document import navigation_document
 from strapdown.report.navigation_evaluation import evaluation_of
+from strapdown.report.paired_corrections import paired_charts, paired_errors
 from strapdown.report.simulation import simulation_chart
 from strapdown.report.verdict import heading_chart
 from strapdown.systems.navigation_draft import draft_navigation
@@ -130,6 +131,23 @@ def test_the_drive_of_the_readme_is_what_is_drawn_now(driven, tmp_path):
 @pytest.mark.slow
 def test_the_light_of_the_manual_is_what_is_drawn_now(driven, tmp_path):
     compare_chart(heading_chart(driven), "trust_light.svg", tmp_path)
+
+
+@pytest.mark.slow
+def test_both_corrections_of_the_manual_are_what_is_drawn_now(tmp_path):
+    """The whole chain of the SINS-1000, which takes two minutes; and what its page says of it."""
+    run = run_navigation(NavigationSpec.read(EXAMPLES / "navigate_sins1000.toml"))
+    compare_chart(paired_charts(run)[0], "sins1000_paired.svg", tmp_path)
+    assert run.record.not_estimated == run.beside.not_estimated == ("down", "VD")
+    corrected, left = paired_errors(run)
+    for one in (corrected, left):
+        # Beyond three root sums of two equal variances at one instant in 8,000 (Rayleigh, exp(-9)),
+        # and the instants of one run are correlated.
+        assert (one.velocity < 3.0 * one.velocity_sd).all()
+        assert (one.position < 3.0 * one.position_sd).all()
+    # On the bench; the stated gain is that of the drifts that the alignment has found.
+    bench = (corrected.time > 260.0) & (corrected.time < 320.0)
+    assert (left.velocity_sd[bench] > 1.3 * corrected.velocity_sd[bench]).all()
 
 
 def test_the_walk_of_the_manual_is_what_is_drawn_now(recordings, tmp_path):

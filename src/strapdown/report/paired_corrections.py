@@ -27,7 +27,7 @@ from strapdown.tables import GEODETIC, VELOCITY
 from strapdown.tables.checks import index_of, values_of
 
 #: Times after the begin of navigation that the table has, s, besides the end.
-AT = (60.0, 300.0, 1200.0, 3600.0)
+AT = (60.0, 120.0, 300.0, 1200.0, 3600.0)
 COLOURS = (BLUE, VERMILLION)
 
 
