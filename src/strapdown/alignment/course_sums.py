@@ -211,6 +211,19 @@ class Antenna:
     lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
     velocity_delay: float = 0.0
     time_offset_sd: float = 0.0
+    correlated_share: float = 0.0
+    correlation_time: float = 1.0
+
+    def position_sd_factor(self, step: float, length: float) -> float:
+        """Factor on positions each `step` whose changes over `length` (s) are to be fitted.
+
+        At the frequency of one over that length Gauss-Markov errors of variance s² have the
+        spectral density ``2 T s² / (1 + (2 pi T / length)²)``, white ones ``s² step``. Slower
+        errors shift the path; they are left to the owner of that error.
+        """
+        share, time = self.correlated_share, self.correlation_time
+        slow = 2.0 * time / (step * (1.0 + (2.0 * math.pi * time / length) ** 2))
+        return math.sqrt(max(1.0, 1.0 - share + share * slow))
 
 
 @dataclass(frozen=True, eq=False)
@@ -253,15 +266,15 @@ def course_fixes(
     gnss: pd.DataFrame | None,
     least_speed: float,
     largest_sd: float,
-    velocity_delay: float = 0.0,
+    antenna: Antenna = Antenna(),
 ) -> CourseFixes:
     """Select the fixes of a record that ends in motion, with a velocity or a position alone.
 
     Positions are the observations where more fixes of the record have them alone than with a
     velocity. `least_speed` (m/s). `largest_sd` (rad): of a course by the noise of the receiver.
-    `velocity_delay` (s). DataError: the Gnss table is missing, it has fewer than two fixes with a
-    velocity and fewer than `LEAST_PLACES` with a position during the record, or the last two are
-    too slow.
+    `antenna`: its delay, and its correlated errors. DataError: the Gnss table is missing, it has
+    fewer than two fixes with a velocity and fewer than `LEAST_PLACES` with a position during the
+    record, or the last two are too slow.
     """
     if gnss is None:
         raise DataError("alignment.no-fixes-for-course", file=source_of(imu), quantity="gnss")
@@ -274,13 +287,13 @@ def course_fixes(
     sound = gnss["quality"].to_numpy() > 0.0
     measured = np.isfinite(sd[:, :2]).all(axis=1)
     placed = sound & np.isfinite(gnss[POSITION_SD].to_numpy(dtype=np.float64)).all(axis=1)
-    time = stamps - velocity_delay
+    time = stamps - antenna.velocity_delay
     within = (time >= first) & (time <= last)
     good = sound & within & measured
     alone = placed & ~measured & (stamps >= first) & (stamps <= last)
     if alone.sum() >= LEAST_PLACES and alone.sum() > good.sum():
         rows = np.flatnonzero(placed & (stamps >= first) & (stamps <= last))
-        return _by_places(gnss, rows, last, least_speed, largest_sd)
+        return _by_places(gnss, rows, antenna, last, least_speed, largest_sd)
     if good.sum() < 2:
         raise DataError(
             "alignment.too-few-fix-velocities",
@@ -298,7 +311,12 @@ def course_fixes(
 
 
 def _by_places(
-    gnss: pd.DataFrame, rows: Indices, last: float, least_speed: float, largest_sd: float
+    gnss: pd.DataFrame,
+    rows: Indices,
+    antenna: Antenna,
+    last: float,
+    least_speed: float,
+    largest_sd: float,
 ) -> CourseFixes:
     """Positions of fixes without velocities, and their differences."""
     time = gnss.index.to_numpy(dtype=np.float64)[rows]
@@ -306,6 +324,8 @@ def _by_places(
     sd = np.maximum(gnss[POSITION_SD].to_numpy(dtype=np.float64)[rows], LEAST_SD)
     place = ned_from_geodetic(geodetic, geodetic[-1])
     step = float(np.median(np.diff(time)))
+    if antenna.correlated_share > 0.0:
+        sd = sd * antenna.position_sd_factor(step, float(time[-1] - time[0]))
     for baseline in np.maximum(BASELINES, 2.0 * step).tolist():
         velocity, velocity_sd = _differences(time, place, sd, baseline)
         speed = np.hypot(velocity[:, 0], velocity[:, 1])

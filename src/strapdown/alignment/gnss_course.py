@@ -172,7 +172,7 @@ class GnssCourse(CoarseAlignment):
     ) -> tuple[CourseFixes, Found]:
         """Fixes of a record, and the least squares over them; parameters and errors of `align`."""
         slowest, widest = self.least_speed, math.radians(self.largest_sd_deg)
-        fixes = course_fixes(imu, gnss, slowest, widest, antenna.velocity_delay)
+        fixes = course_fixes(imu, gnss, slowest, widest, antenna)
         rests = rest_rates(imu, fixes, sensors)
         yaw = math.radians(self.mounting_yaw_deg) + (math.pi if self.reverse else 0.0)
         slip = math.radians(self.sideslip_sd_deg)

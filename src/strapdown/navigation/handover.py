@@ -24,6 +24,7 @@ from strapdown.estimation.error_filter import ErrorFilter, FilterState, symmetri
 from strapdown.estimation.error_model import PHYSICAL
 from strapdown.frames import geodetic_from_ned, ned_from_geodetic
 from strapdown.nav_state import NavState
+from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.measurement import (
     DISPLACEMENT,
     ROTATION,
@@ -121,7 +122,7 @@ def handed_over(chain: NavigationPipeline, state: PipelineState, found: Aligned)
         if chain.site is None:
             arm = _lever_arm(chain)
             shift = rotate(before, arm) - rotate(q_nb, arm)
-            by_others = _by_antenna(chain, q_nb, still, still)
+            by_others = _by_antenna(chain, state, q_nb, still, still)
         return from_fine(filter_, found.fine, rest, sd, shift, by_others)
     mode = chain.modes[state.mode]
     if isinstance(mode, CoarseMode) and isinstance(mode.way, GnssCourse):
@@ -144,9 +145,8 @@ def handed_over(chain: NavigationPipeline, state: PipelineState, found: Aligned)
             of = np.r_[PLACE, 0:3]
             P = joint[np.ix_(of, of)]
         turn = _turn(_window(chain, state), state.time)
-        return from_alignment(
-            filter_, found.alignment, start, P, rest, _by_antenna(chain, q_nb, start.v_n, turn)
-        )
+        by_others = _by_antenna(chain, state, q_nb, start.v_n, turn)
+        return from_alignment(filter_, found.alignment, start, P, rest, by_others)
     fixes = _fixes(chain, state)
     moved = None if chain.site is not None else motion_by_fixes(fixes, state.begun, state.time)
     if moved is not None:
@@ -154,7 +154,7 @@ def handed_over(chain: NavigationPipeline, state: PipelineState, found: Aligned)
     site, sd = _site(chain, state, q_nb)
     start = NavState.from_degrees(site.lat_deg, site.lon_deg, site.alt, time=state.time)
     P = np.diag(np.square(np.concatenate([sd, chain.velocity_sd])))
-    by_others = None if chain.site is not None else _by_antenna(chain, q_nb, still, still)
+    by_others = None if chain.site is not None else _by_antenna(chain, state, q_nb, still, still)
     return from_alignment(filter_, found.alignment, start, P, rest, by_others)
 
 
@@ -184,7 +184,7 @@ def _in_motion(
     length = max(state.time - state.begun, INSTANT)
     tilt = math.hypot(*velocity[:2]) / (length * float(np.linalg.norm(rest[3:])))
     level = found.alignment.covariance + np.diag([tilt**2, tilt**2, 0.0])
-    by_others = _by_antenna(chain, q_nb, velocity, _turn(_window(chain, state), state.time))
+    by_others = _by_antenna(chain, state, q_nb, velocity, _turn(_window(chain, state), state.time))
     alignment = replace(found.alignment, covariance=level)
     return from_alignment(filter_, alignment, start, P, rest, by_others)
 
@@ -216,13 +216,16 @@ def unused_fixes(
 
 
 def _by_antenna(
-    chain: NavigationPipeline, q_nb: Array, velocity: Array, turn: Array
+    chain: NavigationPipeline, state: PipelineState, q_nb: Array, velocity: Array, turn: Array
 ) -> Array | None:
     """Error of position and velocity from fixes per physical error."""
     if chain.fixes_from is None:
         return None
-    arm, filter_ = _lever_arm(chain), chain.navigator.filter
-    return errors_by_antenna(filter_, chain.fixes_from, q_nb, arm, velocity, turn)
+    arm, filter_, aid = _lever_arm(chain), chain.navigator.filter, _receiver(chain)
+    lasting = np.zeros(3)
+    if isinstance(aid, Gnss) and aid.lasts:
+        lasting = aid.lasting_sd(_good(_fixes(chain, state), POSITION_SD, state.time)[1][-1])
+    return errors_by_antenna(filter_, chain.fixes_from, q_nb, arm, velocity, turn, lasting)
 
 
 def _turn(kept: Array, at: float) -> Array:
@@ -285,6 +288,8 @@ def _antenna(chain: NavigationPipeline) -> Antenna:
         (x, y, z),
         float(getattr(aid, "velocity_delay", 0.0)),
         float(getattr(aid, "time_offset_sd", 0.0)),
+        float(getattr(aid, "position_correlated_share", 0.0)),
+        float(getattr(aid, "position_correlation_time", 1.0)),
     )
 
 
@@ -509,7 +514,13 @@ def _read_by_input(filter_: ErrorFilter) -> Array:
 
 
 def errors_by_antenna(
-    filter_: ErrorFilter, name: str, q_nb: Array, lever_arm: Array, velocity: Array, turn: Array
+    filter_: ErrorFilter,
+    name: str,
+    q_nb: Array,
+    lever_arm: Array,
+    velocity: Array,
+    turn: Array,
+    lasting: ArrayLike = (0.0, 0.0, 0.0),
 ) -> Array:
     """Return the errors of position and velocity from fixes per physical error.
 
@@ -524,6 +535,8 @@ def errors_by_antenna(
         North, east, down.
     turn : ndarray, (3,), rad/s
         Rate of the body relative to the Earth, body axes.
+    lasting : array_like, (3,), m
+        Standard deviation of the correlated errors of the positions.
 
     Returns
     -------
@@ -550,6 +563,8 @@ def errors_by_antenna(
         out[VELOCITY, arm] = -C @ rotation.cross_matrix(turn)
     if f"{name}.time_offset" in columns:
         out[DISPLACEMENT, columns[f"{name}.time_offset"]] = velocity[:, None]
+    if f"{name}.position_error" in columns:
+        out[DISPLACEMENT, columns[f"{name}.position_error"]] = np.diag(np.asarray(lasting))
     return out
 
 

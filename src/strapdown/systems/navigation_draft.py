@@ -303,7 +303,11 @@ def _with_remarks(page: Page) -> None:
     page.say(
         "lever_arm_m: of the antenna from the inertial sensors, forward, right, down; zero is "
         "assumed: measure it. time_offset_sd_s above zero: stamps may be off by it, and by how "
-        "much is estimated."
+        "much is estimated.",
+        "position_correlated_share: part of the variance of each position that lasts for "
+        "position_correlation_time_s; found where positions scatter less from fix to fix than they "
+        "state. Without it bounds of position become too narrow with the number of fixes. "
+        "lever_arm_sd_m: a tape measure's; 0 for an arm that is known to a millimetre.",
     )
 
 

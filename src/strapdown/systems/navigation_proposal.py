@@ -12,6 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Site
+from strapdown.alignment.course_sums import Antenna
 from strapdown.alignment.gnss_course import GnssCourse
 from strapdown.alignment.inertial_frame import fit_inertially, heading_rate
 from strapdown.alignment.inertial_sums import sum_inertially
@@ -24,12 +25,13 @@ from strapdown.formats.gnss_files import has_fixes, read_gnss
 from strapdown.formats.recording import Recording
 from strapdown.frames import ways_between
 from strapdown.navigation.measurements.clock_windows import step_finding, window_offsets
+from strapdown.navigation.measurements.gnss import LASTING
 from strapdown.navigation.measurements.gnss_clock import (
     check_overlap,
     time_offset,
     velocity_delay,
 )
-from strapdown.navigation.measurements.gnss_readiness import check_fixes
+from strapdown.navigation.measurements.gnss_readiness import check_fixes, white_position_sd
 from strapdown.navigation.pipeline import AHEAD
 from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV, load_sensor
 from strapdown.sensors.rest import LEAST_LENGTH, find_rests_of_every_grade
@@ -104,6 +106,14 @@ ASIDE = 2.0
 #: Stamps with an offset come from another clock, and two quartz clocks drift apart by 50 ppm:
 #: a random walk of this many s/√s over 400 s, during which the offset may be unobservable.
 APART = 1e-3
+#: Share of the variance of positions that lasts from fix to fix: proposed from the first on, and at
+#: most; by a variance of the rest that is so many times that by medians, whose tails are heavier
+#: than a normal one's. Where standard deviations are assumed: that of fixes that scatter like those
+#: of a code receiver, and of others; the scatter, m, that tells them apart.
+LASTS, LASTS_MOST, TAILS = 0.5, 0.9, 2.0
+LASTS_BY_CODE, LASTS_BY_PHASE, PHASE = 0.9, 0.5, 0.05
+#: Fixes better than this, m, show that a lever arm is measured by a tape to so much, m.
+SHOWS_ARM, ARM_SD = 0.1, 0.02
 #: Attributes of fixes with assumed standard deviations, and the keys of these.
 TAKEN = {"position_sd_taken": "position_sd_m", "velocity_sd_taken": "velocity_sd_m_per_s"}
 
@@ -226,7 +236,7 @@ def propose(
             )
             return replace(made, findings=(*made.findings, step))
     if fixes is not None and sensors is not None and chosen["coarse"]["kind"] == "gnss_course":
-        chosen, how, tried = _tried(chosen, how, imu, fixes, sensors, levelled)
+        chosen, how, tried = _tried(chosen, how, imu, fixes, sensors, levelled, _antenna(clock))
         findings = (*findings, *tried)
     table |= chosen
     if fixes is not None:
@@ -429,7 +439,7 @@ def _moving(fixes: pd.DataFrame) -> tuple[int | None, float]:
 def _clock(
     fixes: pd.DataFrame, imu: pd.DataFrame, drives: bool, sensors: ImuUncertainty | None = None
 ) -> tuple[dict[str, float], Finding | None]:
-    """Delays of the receiver's velocities and stamps that are significant, and a clock step.
+    """Errors of positions, significant delays of velocities and stamps, and a step of a clock.
 
     An offset is a state of the filter where it is significant, and where its uncertainty moves the
     vehicle by far more than the standard deviation of its fixes.
@@ -437,10 +447,12 @@ def _clock(
     late = velocity_delay(fixes)
     delay = 0.0 if late is None or late.delay < SURE * late.sd else late.delay
     out = {"velocity_delay_s": round(delay, 3)} if delay > LEAST_DELAY else {}
+    out |= _position_errors(fixes, delay)
+    antenna = _antenna(out)
     scan = time_offset(fixes, imu, delay)
     found = None if scan is None else (scan.offset, scan.sd)
     if drives and sensors is not None:
-        windows = window_offsets(fixes, imu, sensors, 0.0 if found is None else found[0], delay)
+        windows = window_offsets(fixes, imu, sensors, 0.0 if found is None else found[0], antenna)
         step = windows.step()
         if step is not None:
             return out, step_finding(fixes, imu, step)
@@ -457,6 +469,35 @@ def _clock(
     if _speed(fixes) * sd > FAR * float(np.median(values_of(fixes, POSITION_SD)[:, :2])):
         out |= {"time_offset_sd_s": max(round(2.0 * sd, 3), 0.001)}
     return out, None
+
+
+def _antenna(aid: dict[str, Any]) -> Antenna:
+    """Delay and correlated errors of a proposed receiver."""
+    return Antenna(
+        velocity_delay=aid.get("velocity_delay_s", 0.0),
+        correlated_share=aid.get("position_correlated_share", 0.0),
+        correlation_time=LASTING,
+    )
+
+
+def _position_errors(fixes: pd.DataFrame, delay: float) -> dict[str, float]:
+    """Share of the positions' variance that lasts, and the uncertainty of a measured lever arm.
+
+    By the scatter from fix to fix, which lacks what lasts.
+    """
+    found = white_position_sd(fixes, delay)
+    if found is None:
+        return {}
+    white, part = found
+    assumed = "position_sd_taken" in fixes.attrs
+    lasting = min(1.0 - TAILS * part**2, LASTS_MOST)
+    if assumed:
+        lasting = LASTS_BY_PHASE if white < PHASE else LASTS_BY_CODE
+    out = {"position_correlated_share": round(lasting, 2)} if lasting >= LASTS else {}
+    stated = float(np.nanmedian(values_of(fixes, POSITION_SD)[:, :2]))
+    if (white < PHASE) if assumed else (stated < SHOWS_ARM):
+        out["lever_arm_sd_m"] = ARM_SD
+    return out
 
 
 def _speed(fixes: pd.DataFrame) -> float:
@@ -535,6 +576,7 @@ def _tried(
     fixes: pd.DataFrame,
     sensors: ImuUncertainty,
     levelled: float,
+    antenna: Antenna,
 ) -> tuple[dict[str, Any], str, tuple[Finding, ...]]:
     """An alignment by course with limits that the record meets, by trial at instants of it.
 
@@ -554,7 +596,7 @@ def _tried(
             time, time[0] + np.array([length - coarse["window_s"], length]) + 1e-7
         )
         try:
-            found = GnssCourse().align(imu.iloc[begin:end], site, sensors, fixes)
+            found = GnssCourse().align(imu.iloc[begin:end], site, sensors, fixes, antenna)
             roll, pitch, heading = np.maximum(found.sd_deg_after(AHEAD), found.sd_deg).tolist()
             tilt = max(roll, pitch)
             if heading <= limits[0] and tilt <= limits[1]:

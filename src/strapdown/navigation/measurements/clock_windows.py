@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -105,7 +105,7 @@ def window_offsets(
     imu: pd.DataFrame,
     sensors: ImuUncertainty,
     start: float = 0.0,
-    velocity_delay: float = 0.0,
+    antenna: Antenna = Antenna(),  # noqa: B008
 ) -> Offsets:
     """Fit the offset in windows of a drive, with attitude, velocity and biases.
 
@@ -114,7 +114,8 @@ def window_offsets(
     start : float, s
         Stamps of the receiver minus the time of the sensors, near the answer: the fit of a window
         converges from a second away.
-    velocity_delay : float, s
+    antenna : Antenna
+        Its delay and its correlated errors.
 
     Returns
     -------
@@ -135,7 +136,7 @@ def window_offsets(
     for last in ends.tolist():
         for earlier in EARLIER:
             span = max(begin, last - WINDOW - earlier), last - earlier
-            one = _window(gnss, imu, sensors, span, start, velocity_delay)
+            one = _window(gnss, imu, sensors, span, start, antenna)
             if one is not None:
                 spans.append(span)
                 found.append(one)
@@ -166,7 +167,7 @@ def _window(
     sensors: ImuUncertainty,
     span: tuple[float, float],
     start: float,
-    velocity_delay: float,
+    antenna: Antenna,
 ) -> tuple[float, float] | None:
     """Offset and standard deviation of one window; None where it does not show one."""
     part = imu.loc[span[0] : span[1]]
@@ -180,10 +181,10 @@ def _window(
         if len(fixes) < 2:
             return None
         site = Site(*np.median(values_of(fixes, GEODETIC), axis=0).tolist())
-        antenna = Antenna(velocity_delay=velocity_delay, time_offset_sd=UNKNOWN)
+        unknown = replace(antenna, time_offset_sd=UNKNOWN)
         way = GnssCourse(mounting_yaw_sd_deg=MOUNTING, axle_sd=AXLE)
         try:
-            more, sd = way.fit(part, site, sensors, fixes, antenna)[1].offset
+            more, sd = way.fit(part, site, sensors, fixes, unknown)[1].offset
         except (DataError, DivergenceError):
             return None
         known = 1.0 - (sd / UNKNOWN) ** 2

@@ -15,7 +15,13 @@ from strapdown.earth import gravity
 from strapdown.errors import ConfigError, DataError
 from strapdown.estimation.covariance import Observation
 from strapdown.estimation.error_model import PHYSICAL
-from strapdown.estimation.sensor_blocks import lever_arm, random_walk, time_offset
+from strapdown.estimation.sensor_blocks import (
+    gauss_markov,
+    lever_arm,
+    random_walk,
+    time_offset,
+    unseen,
+)
 from strapdown.estimation.sensor_states import SensorStates
 from strapdown.mechanization.mechanization import displacement_between
 from strapdown.nav_state import NavState
@@ -46,6 +52,9 @@ PLACE = ("north, m", "east, m", "down, m")
 SPEED = ("VN, m/s", "VE, m/s", "VD, m/s")
 #: Beyond this, s, a time offset is a wrong clock, and the second-order arc is not valid.
 LARGEST_OFFSET = 2.0
+#: Correlation time of the errors of positions by code: reflections last for tens of seconds to
+#: minutes, the atmosphere and orbits for longer, s.
+LASTING = 100.0
 
 
 def _in(unit: str, default: float = 0.0) -> float:
@@ -83,6 +92,13 @@ class Gnss(TabulatedMeasurement):
     velocity_delay : float, s
         Delay of the velocity against the position of the same row: half of the interval for a
         mean over the preceding interval.
+    position_correlated_share : float
+        Share of the variance of a position that lasts from fix to fix, as errors of orbits,
+        atmosphere and reflections do. Above zero it is estimated: states ``NAME.position_error``,
+        north, east, down, in standard deviations of that share. As white errors it would average
+        out in the bounds, and not in the fixes.
+    position_correlation_time : float, s
+        For which it lasts: autocorrelation ``exp(-|t| / position_correlation_time)``.
     position_sd_factor, velocity_sd_factor : float
         Factors on the stated standard deviations.
     least_position_sd, least_velocity_sd : float, m and m/s
@@ -103,6 +119,8 @@ class Gnss(TabulatedMeasurement):
     time_offset_sd: float = _in("s")
     time_offset_drift: float = _in("s_per_sqrt_s")
     velocity_delay: float = _in("s")
+    position_correlated_share: float = 0.0
+    position_correlation_time: float = _in("s", LASTING)
     use_position: bool = True
     use_velocity: bool = True
     position_sd_factor: float = 1.0
@@ -130,6 +148,8 @@ class Gnss(TabulatedMeasurement):
             check_number(self, name, low=0.0)
         for name in ("least_position_sd", "least_velocity_sd"):
             check_number(self, name, low=0.0)
+        check_number(self, "position_correlated_share", low=0.0, high=0.999)
+        check_number(self, "position_correlation_time", low=0.0, above=True)
         for name in ("position_sd_factor", "velocity_sd_factor"):
             check_number(self, name, low=1e-6)
         if not (self.use_position or self.use_velocity):
@@ -154,7 +174,20 @@ class Gnss(TabulatedMeasurement):
         if self.time_offset_sd > 0.0:
             offset = time_offset(self.time_offset_sd).named(self._offset)
             out.append(random_walk(offset, self.time_offset_drift))
+        if self.position_correlated_share > 0.0:
+            lasting = unseen("position_error", ("north", "east", "down"), "1", 1.0)
+            out.append(gauss_markov(lasting.named(self._error), self.position_correlation_time))
         return tuple(out)
+
+    @property
+    def lasts(self) -> bool:
+        """As `Measurement.lasts`: with a share of the positions' errors that is correlated."""
+        return self.position_correlated_share > 0.0
+
+    def lasting_sd(self, sd: Array) -> Array:
+        """Return the standard deviation of the correlated errors of a position, by that stated."""
+        used = np.maximum(self.position_sd_factor * sd, self.least_position_sd)
+        return np.asarray(math.sqrt(self.position_correlated_share) * used)
 
     @property
     def wants_steady(self) -> bool:
@@ -218,17 +251,23 @@ class Gnss(TabulatedMeasurement):
         if view.has(self._offset):
             late = float(view.estimate(self._offset)[0])
             computed = _later(view, self._offset, late, of_place, place, velocity, acceleration)
-        C_nl = view.C_ln.T
+        C_nl, variance = view.C_ln.T, values[4:]
         z, H = C_nl @ computed.value, C_nl @ computed.H
         if of_place:
             lat, lon, alt = values[1:4].tolist()
             measured = NavState(view.time, lat, lon, alt, np.zeros(3), view.here.q_nb)
             z += displacement_between(view.here, measured, view.ellipsoid)
+            if view.has(self._error):
+                share = self.position_correlated_share
+                lasting = np.sqrt(share * variance)
+                z += lasting * view.estimate(self._error)
+                H[:, view.place(self._error)] = -np.diag(lasting)
+                variance = (1.0 - share) * variance
         else:
             z -= values[1:4]
         name, labels = self.names(float(values[0]))
         n = len(labels)
-        return [Observation(name, z[:n], H[:n], values[4 : 4 + n], labels)]
+        return [Observation(name, z[:n], H[:n], variance[:n], labels)]
 
     def names(self, code: float) -> tuple[str, tuple[str, ...]]:
         """Return the name of the observation of an epoch, and the labels of its components."""
@@ -243,6 +282,10 @@ class Gnss(TabulatedMeasurement):
     @property
     def _offset(self) -> str:
         return f"{self.name}.time_offset"
+
+    @property
+    def _error(self) -> str:
+        return f"{self.name}.position_error"
 
 
 def _later(

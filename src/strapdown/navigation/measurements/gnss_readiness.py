@@ -6,8 +6,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.constants import MAD_TO_SD
 from strapdown.errors import DataError, Finding
-from strapdown.frames import place_difference, ways_between
+from strapdown.frames import ned_from_geodetic, place_difference, ways_between
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.gnss_clock import (
     check_overlap,
@@ -18,7 +19,7 @@ from strapdown.navigation.measurements.gnss_clock import (
 from strapdown.tables import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD, check_gnss, find_gaps
 from strapdown.tables.checks import index_of, source_of, values_of
 
-__all__ = ["check_fixes", "gnss_readiness"]
+__all__ = ["check_fixes", "gnss_readiness", "white_position_sd"]
 
 
 def gnss_readiness(
@@ -60,12 +61,61 @@ def gnss_readiness(
     return tuple(found)
 
 
+def white_position_sd(table: pd.DataFrame, delay: float = 0.0) -> tuple[float, float] | None:
+    """Measure by how much positions scatter from fix to fix.
+
+    By their steps less the mean of the velocities at both ends, or by their third differences. An
+    error that lasts longer than some fixes is not in it; sudden motion is, so that it is an upper
+    bound. Medians are not moved by faults.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Gnss table.
+    delay : float, s
+        Of its velocities.
+
+    Returns
+    -------
+    sd, share : float
+        Standard deviation of the errors that are new with each fix, horizontal, a component, m; and
+        the same relative to the stated one, median. None with too few fixes at equal intervals.
+    """
+    sd, time = values_of(table, POSITION_SD)[:, :2], index_of(table)
+    good = (values_of(table, ["quality"])[:, 0] > 0.0) & np.isfinite(sd).all(axis=1)
+    if good.sum() < LEAST_ROWS:
+        return None
+    place = values_of(table, GEODETIC)[good]
+    place = ned_from_geodetic(place, place[0])[:, :2]
+    sd, time = sd[good], time[good]
+    step = float(np.median(np.diff(time)))
+    measured = np.isfinite(values_of(table, VELOCITY_SD)[good][:, :2]).all(axis=1)
+    if measured.all():
+        v = values_of(table, VELOCITY)[good][:, :2]
+        then = [np.interp(time, time - delay, one) for one in v.T]
+        way = 0.5 * (np.column_stack(then)[1:] + np.column_stack(then)[:-1])
+        apart = np.diff(time)
+        left = (np.diff(place, axis=0) - way * apart[:, None]) / np.sqrt(2.0)
+        even = np.abs(apart - step) < UNEVEN * step
+    else:
+        left = np.diff(place, n=3, axis=0) / np.sqrt(20.0)
+        even = np.abs(time[3:] - time[:-3] - 3.0 * step) < UNEVEN * step
+    if even.sum() < LEAST_ROWS:
+        return None
+    left, stated = np.abs(left[even]), sd[-len(left) :][even]
+    white = MAD_TO_SD * np.median(left, axis=0)
+    share = MAD_TO_SD * np.median(left / stated, axis=0)
+    return float(np.sqrt(np.mean(white**2))), float(np.sqrt(np.mean(share**2)))
+
+
 # Errors of fixes that a Gnss table alone reveals.
 
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
+#: Number of fixes that show their scatter; a longer interval, relative to the usual, is a gap.
+LEAST_ROWS, UNEVEN = 30, 0.2
 #: Limits beyond any vehicle: a speed over the ground, m/s, and an acceleration, m/s².
 LARGEST_SPEED, LARGEST_ACCELERATION = 12_000.0, 60.0
 #: In standard deviations of the positions and of the displacement between them.

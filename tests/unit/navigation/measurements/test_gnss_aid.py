@@ -26,7 +26,13 @@ START = NavState.from_degrees(
 )
 RATE = np.array([0.3, -0.5, 0.8])
 FORCE = np.array([2.0, -1.5, -9.6])
-AID = Gnss(name="rtk", lever_arm=ARM, lever_arm_sd=0.1, time_offset_sd=0.2)
+AID = Gnss(
+    name="rtk",
+    lever_arm=ARM,
+    lever_arm_sd=0.1,
+    time_offset_sd=0.2,
+    position_correlated_share=0.6,
+)
 BLOCKS = (gyro_bias(1e-4), accel_bias(1e-2), gyro_scale(1e-3), accel_scale(1e-3))
 
 
@@ -214,6 +220,8 @@ def test_a_fix_that_claims_to_be_exact_is_refused_with_the_option_that_helps():
         ({"qualities": (0,)}, "qualities"),
         ({"time_offset_drift": 1e-3}, "time_offset_drift"),
         ({"position_sd_factor": 0.0}, "position_sd_factor"),
+        ({"position_correlated_share": 1.0}, "position_correlated_share"),
+        ({"position_correlation_time": 0.0}, "position_correlation_time"),
     ],
 )
 def test_options_out_of_range_are_refused(options, quantity):
@@ -224,7 +232,7 @@ def test_options_out_of_range_are_refused(options, quantity):
 def test_states_are_only_those_that_are_to_be_estimated():
     assert not Gnss(name="rtk").states()
     names = [one.block.name for one in AID.states()]
-    assert names == ["rtk.lever_arm", "rtk.time_offset"]
+    assert names == ["rtk.lever_arm", "rtk.time_offset", "rtk.position_error"]
     walking = Gnss(name="rtk", time_offset_sd=0.1, time_offset_drift=2e-4).states()[0]
     assert walking.drive == pytest.approx([2e-4])
 

@@ -1,0 +1,99 @@
+"""Errors of positions that last from fix to fix: their state, their measure, and the bounds."""
+
+import numpy as np
+import pytest
+from tests import town_drive as town
+
+from strapdown.alignment.course_sums import Antenna
+from strapdown.frames import geodetic_from_ned
+from strapdown.navigation.measurements.gnss_readiness import white_position_sd
+from strapdown.systems.navigation_proposal import TAILS, _position_errors
+from strapdown.tables import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
+
+WHITE, LASTING, TIME = 0.3, 1.0, 60.0
+SHARE = LASTING**2 / (LASTING**2 + WHITE**2)
+STATED = float(np.hypot(WHITE, LASTING))
+
+
+def fixes(seed, velocities=True, lasting=LASTING):
+    table = town.fixes(seed, position_noise=1e-4)
+    rng, k = np.random.default_rng(seed), np.exp(-0.5 / TIME)
+    error = WHITE * rng.normal(size=(len(table), 3))
+    slow = rng.normal(size=3)
+    for row in error:
+        row += lasting * slow
+        slow = k * slow + np.sqrt(1.0 - k * k) * rng.normal(size=3)
+    places = zip(error, table[GEODETIC].to_numpy(), strict=True)
+    table[GEODETIC] = [geodetic_from_ned(e, place) for e, place in places]
+    table[POSITION_SD] = STATED
+    if not velocities:
+        table[VELOCITY], table[VELOCITY_SD] = 0.0, np.inf
+    return table
+
+
+def ratios(share):
+    """Errors of the position over their standard deviations, at instants far apart."""
+    out = []
+    for seed in range(8401, 8407):
+        aid = town.gnss(position_correlated_share=share, position_correlation_time=TIME)
+        navigator, state = town.begun(aid)
+        _, piece = town.run(navigator, state, fixes(seed))
+        off = town.off(piece)
+        for mark in piece.marks:
+            if mark.time % 40.0 < 0.5 and mark.time > 20.0:
+                k = int(np.searchsorted(piece.time, mark.time))
+                out.append(off[k] / np.sqrt(np.diagonal(mark.covariance)[:3]))
+    return np.array(out)
+
+
+def test_bounds_hold_where_errors_last_and_their_share_is_stated():
+    # 6 drives of 160 s, about 3 independent instants of 3 axes each: the mean square of 54 is 1
+    # within 4 times sqrt(2 / 54); as white errors the bounds are narrower by the root of the number
+    # of fixes in a correlation time.
+    assert 0.4 < np.mean(np.square(ratios(SHARE))) < 1.8
+    assert np.mean(np.square(ratios(0.0))) > 4.0
+
+
+@pytest.mark.parametrize("velocities", [True, False])
+def test_the_scatter_from_fix_to_fix_lacks_what_lasts(velocities):
+    table = fixes(8501, velocities)
+    white, share = white_position_sd(table)
+    # Velocities of 0.1 m/s add 0.035 m at 2 Hz, and a minute's drift 0.13 m a step.
+    assert white == pytest.approx(WHITE, rel=0.25)
+    assert share == pytest.approx(white / STATED, rel=1e-6)
+    proposed = _position_errors(table, 0.0)
+    assert proposed["position_correlated_share"] == pytest.approx(
+        1.0 - TAILS * (1.0 - SHARE), abs=0.09
+    )
+    assert "lever_arm_sd_m" not in proposed
+
+
+def test_white_errors_have_no_share_that_lasts():
+    table = fixes(8502, lasting=0.0)
+    table[POSITION_SD] = WHITE
+    assert _position_errors(table, 0.0) == {}
+    assert white_position_sd(table.iloc[:20]) is None
+
+
+def test_an_antenna_of_precise_fixes_is_measured_by_a_tape():
+    table = town.fixes(8503, position_noise=0.02)
+    assert _position_errors(table, 0.0) == {"lever_arm_sd_m": 0.02}
+
+
+def test_the_factor_of_an_alignment_is_that_of_slopes():
+    def slope_sd(time, length, step=0.2, many=400):
+        """Scatter of fitted slopes of correlated errors over that of white ones."""
+        rng, n = np.random.default_rng(8), round(length / step)
+        k = np.exp(-step / time)
+        x = np.empty((n, many))
+        x[0] = rng.normal(size=many)
+        for i in range(1, n):
+            x[i] = k * x[i - 1] + np.sqrt(1.0 - k * k) * rng.normal(size=many)
+        t = step * (np.arange(n) - 0.5 * (n - 1))
+        return np.std(t @ x) / np.sqrt(t @ t)
+
+    for time, length in ((100.0, 60.0), (20.0, 60.0), (300.0, 60.0)):
+        factor = Antenna(correlated_share=1.0, correlation_time=time)
+        found = factor.position_sd_factor(0.2, length)
+        assert 0.5 < found / slope_sd(time, length) < 2.0
+    assert Antenna().position_sd_factor(0.2, 60.0) == 1.0
