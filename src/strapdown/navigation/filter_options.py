@@ -67,9 +67,7 @@ class ClosedLoop(Correction):
     """State and sensors are corrected at every epoch, so that errors stay small ("damping")."""
 
     kind: ClassVar[str] = "feedback"
-    summary: ClassVar[str] = (
-        "closed loop: estimates are subtracted from the state and the sensors at each epoch"
-    )
+    summary: ClassVar[str] = "closed loop: state and sensors are corrected at each epoch"
     source: ClassVar[str] = "Chernodarov (2009), Figs. 8, 10"
     feeds_back: ClassVar[bool] = True
 
@@ -86,10 +84,7 @@ class OpenLoop(Correction):
     """
 
     kind: ClassVar[str] = "feedforward"
-    summary: ClassVar[str] = (
-        "open loop: the mechanization runs free; estimates, predicted, are subtracted from its "
-        "output"
-    )
+    summary: ClassVar[str] = "open loop: the mechanization runs free, its output is corrected"
     source: ClassVar[str] = "Chernodarov (2009) (6)"
     feeds_back: ClassVar[bool] = False
 
@@ -105,9 +100,7 @@ class NoCorrection(Correction):
     """
 
     kind: ClassVar[str] = "none"
-    summary: ClassVar[str] = (
-        "none: the mechanization runs free and is shown as it is; estimates are only recorded"
-    )
+    summary: ClassVar[str] = "not corrected: the output of the free mechanization"
     source: ClassVar[str] = "Chernodarov (2009), Figs. 9, 11"
     feeds_back: ClassVar[bool] = False
     corrects: ClassVar[bool] = False

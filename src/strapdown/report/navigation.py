@@ -134,10 +134,12 @@ def plot(result: NavigationRun, kind: str) -> ChartFigure:
     if kind in observed:
         found = {one.name: one for one in agreements(result.filtered)}
         return ChartFigure(innovation_chart(result.filtered, found[kind]))
+    both = paired_charts(result)
+    if kind == "paired" and both:
+        return ChartFigure(both[0])
     if kind not in KINDS:
-        raise ConfigError(
-            "report.unknown-chart", quantity="kind", word=kind, known=[*KINDS, *observed]
-        )
+        known = [*KINDS, *(["paired"] if both else []), *observed]
+        raise ConfigError("report.unknown-chart", quantity="kind", word=kind, known=known)
     chart = KINDS[kind](evaluation_of(result))
     if chart is None:
         raise ConfigError("report.no-path-to-draw", quantity=f"kind '{kind}'")

@@ -393,7 +393,7 @@ class NavigationRun(SavedRun):
         ----------
         kind : str
             ``plan``, ``bound``, ``height``, ``velocity``, ``attitude``, or the name of an
-            observation of `innovations`.
+            observation of `innovations`; with `beside` also ``paired``.
 
         Returns
         -------

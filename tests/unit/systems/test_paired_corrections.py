@@ -123,6 +123,8 @@ def test_the_report_has_both(both, tmp_path):
     np.testing.assert_array_equal(table["none_position_error_m"], left.position)
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert page.count("none, 1 sd as stated") >= 1
+    both.plot("paired").save(tmp_path / "paired.svg")
+    assert (tmp_path / "paired.svg").stat().st_size > 0
     rows = paired_table(both).rows
     assert len(rows[0]) == len(paired_table(both).columns)
     assert rows[-1][0] == "rms"
