@@ -123,11 +123,11 @@ def worst_words(trust: IntegrityReport) -> str:
     others = [
         one.name for one in trust.quantities if one is not worst and one.share("rejected") > 0.0
     ]
+    why = "" if reason in ("", "apart") else f" ({QUANTITY_REASONS[reason]})"
     more = f"; also rejected at times: {', '.join(others)}" if others else ""
     return (
         f"{capital(worst.name)}: rejected {share_words(worst.share('rejected'))} of the time "
-        f"({QUANTITY_REASONS['apart']}); final status: {status}"
-        f"{'' if status == 'trusted' else f' ({QUANTITY_REASONS[reason]})'}{more}."
+        f"({QUANTITY_REASONS['apart']}); final status: {status}{why}{more}."
     )
 
 

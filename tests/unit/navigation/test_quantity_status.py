@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from tests.unit.report.navigation_records import record, without_aids
 
+from strapdown.config.navigation import NavigationSpec
 from strapdown.navigation.heading_integrity import STATUSES
 from strapdown.navigation.integrity import (
     QUANTITIES,
@@ -15,7 +16,8 @@ from strapdown.navigation.integrity import (
     IntegrityReport,
     quantity_status,
 )
-from strapdown.report.verdict import worst_words
+from strapdown.report.verdict import STATUS_STYLES, terminal_lines, worst_words
+from strapdown.systems.navigation_run import run_navigation
 
 
 def with_innovations(made, label, since, nu=None, weight=None):
@@ -106,3 +108,52 @@ def test_without_measurements_nothing_is_trusted_or_rejected():
     report = IntegrityReport(None, (), 0.0, (), {}, (), None, quantity_status(record()))
     assert report.worst is None
     assert not worst_words(report)
+
+
+def test_a_start_at_a_wrong_height_is_seen_where_the_heading_is_sound():
+    """176 m off and stated to 0.1 m: a robust rule rejects every position of the receiver."""
+    place = {"lat_deg": 55.75, "lon_deg": 37.62, "heading_deg": 30.0}
+    rule = {"kind": "adaptive", "influence": "igg3", "scale": {"lowest": 1.0}}
+    run = run_navigation(
+        NavigationSpec.checked(
+            {
+                "simulation": {
+                    "rate_hz": 50.0,
+                    "seed": 3,
+                    "motion": {
+                        "kind": "car",
+                        **place,
+                        "alt_m": 150.0,
+                        "manoeuvres": [
+                            {"do": "straight", "duration_s": 10.0},
+                            {"do": "accelerate", "to_km_per_h": 50.0, "duration_s": 10.0},
+                            {"do": "turn_left", "angle_deg": 90.0, "radius_m": 60.0},
+                            {"do": "straight", "duration_s": 20.0},
+                        ],
+                    },
+                    "gnss": {"rtk": {"position_noise_m": 1.0, "velocity_noise_m_per_s": 0.03}},
+                },
+                "sensors": {"sensor": "fog-1000"},
+                "start": {
+                    **place,
+                    "alt_m": 326.0,
+                    "roll_deg": 0.0,
+                    "pitch_deg": 0.0,
+                    "position_sd_m": 0.1,
+                    "tilt_sd_deg": 0.1,
+                    "heading_sd_deg": 0.5,
+                },
+                "aiding": {"rtk": {"kind": "gnss", "update_rule": rule}},
+                "trust": {"repeat": False},
+            }
+        )
+    )
+    assert run.trust.heading.spans[-1].status == "trusted"
+    assert run.trust.worst.name == "height"
+    assert run.trust.worst.at_end == ("rejected", "apart")
+    assert run.trust.worst.share("trusted") == 0.0
+    others = {one.name: one.at_end[0] for one in run.trust.quantities if one.name != "height"}
+    assert set(others.values()) == {"trusted"}
+    (first, style), *_ = terminal_lines(run, brief=True)
+    assert first == worst_words(run.trust)
+    assert style == STATUS_STYLES["rejected"]
