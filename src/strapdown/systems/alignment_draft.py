@@ -97,9 +97,18 @@ def draft_alignment(log: LogTable, *, folder: Path, axes: str | None = None) -> 
 
 
 def log_table(
-    page: Page, log: LogTable, folder: Path, imu: pd.DataFrame, name: str, part: str = ""
+    page: Page,
+    log: LogTable,
+    folder: Path,
+    imu: pd.DataFrame,
+    name: str,
+    part: str = "",
+    check_sampling: str = "",
 ) -> list[str]:
-    """Write ``[log]`` with the keys that the user stated; return what the log is."""
+    """Write ``[log]`` with the keys that the user stated; return what the log is.
+
+    `check_sampling`: consequence of a kind of sampling that is assumed, if the user is to check it.
+    """
     time = index_of(imu)
     rate = (len(time) - 1) / float(time[-1] - time[0])
     span = f"{len(time)} samples, {time[0]:.9g} to {time[-1]:.9g} s, {rate:.4g} Hz"
@@ -110,6 +119,8 @@ def log_table(
     for key, value in log.model_dump(exclude={"path", "columns"}).items():
         if value is not None and value is not False:
             page.key(key, toml_value(value) or "")
+    if check_sampling:
+        page.key("sampling", string(imu.attrs["sampling"]), "assumed", check=check_sampling)
     if log.from_s is log.to_s is log.duration_s is None:
         page.say(f"from_s = {time[0]:.9g}, duration_s = 300.0 (or to_s): a part alone{part}")
     return [f"{name}: {span}"]

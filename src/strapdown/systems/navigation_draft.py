@@ -20,6 +20,7 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError, Finding
 from strapdown.estimation.sensor_blocks import STATED_STATES, resting_sd, states_that_are_stated
 from strapdown.formats.gnss_fixes import POSITION_SDS, VELOCITY_SDS
+from strapdown.frames import ways_between
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.alignment_draft import (
@@ -32,12 +33,14 @@ from strapdown.systems.alignment_draft import (
     toml_value,
 )
 from strapdown.systems.navigation_proposal import LOUD, NOISE_KEYS, TAKEN, Proposal, propose
-from strapdown.tables import ACCEL, GYRO, VELOCITY_SD
+from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
 from strapdown.tables.checks import index_of, source_of, values_of
 
 __all__ = ["STANCE", "STANDING", "draft_navigation", "first_stand", "on_foot", "second_order"]
 
 
+#: Finding of a kind of sampling that is not stated; turns are means over so many seconds.
+UNSTATED, STEADY = "io.sampling-taken-as-instantaneous", 0.5
 #: Other measurements, as comments.
 OTHER_AIDS = ("no_slip", "zero_velocity", "odometer", "barometer")
 
@@ -77,7 +80,14 @@ def draft_navigation(
         "with # show the defaults. Then: strapdown navigate on this file.",
     )
     found = [
-        *log_table(page, log, folder, made.imu, made.recording.name),
+        *log_table(
+            page,
+            log,
+            folder,
+            made.imu,
+            made.recording.name,
+            check_sampling=_sampling_to_check(made),
+        ),
         *_where(page, made, foot),
     ]
     axes_table(page, axes)
@@ -92,6 +102,36 @@ def draft_navigation(
     found += _aids(page, made, folder, foot)
     _rest(page, foot)
     return Draft(page.text, tuple(found), tuple(page.asked), made.findings, tuple(page.to_check))
+
+
+def _sampling_to_check(made: Proposal) -> str:
+    """Consequence of the assumed kind of sampling; empty where it is stated, or does not matter.
+
+    A row that is the mean over the interval before its stamp is half of it older than one that is
+    the reading at its stamp. That shifts the way along itself, and turns the attitude, which
+    matters against what fixes and accelerometers resolve.
+    """
+    if made.gnss is None or all(f.code != UNSTATED for f in made.findings):
+        return ""
+    time, gnss = index_of(made.imu), made.gnss
+    half = 0.5 * float(np.median(np.diff(time)))
+    size = max(1, round(STEADY / (2.0 * half)))
+    blocks = values_of(made.imu, GYRO)[: len(time) // size * size].reshape(-1, size, 3).mean(axis=1)
+    turn = half * float(np.sqrt(np.square(blocks).sum(axis=1).mean()))
+    known = load_sensor(made.table["sensors"]["sensor"]) if "sensors" in made.table else None
+    tilt = math.inf
+    if known is not None:
+        tilt = max(ImuUncertainty.of_sensor(known).accel.axis("bias")) / STANDARD_GRAVITY
+    way, span = ways_between(values_of(gnss, GEODETIC)), np.diff(index_of(gnss))
+    shift = half * float(np.median(way / span)) if len(span) else 0.0
+    sd = float(np.nanmedian(values_of(gnss, POSITION_SD)[:, :2]))
+    if not (turn > tilt or shift > sd):
+        return ""
+    return (
+        f'"mean" if each row is the mean over the interval before its stamp, as of tactical units '
+        f"and better: it is {1e3 * half:.3g} ms older then, {shift:.2g} m of the way and "
+        f"{math.degrees(turn):.2g} deg of attitude"
+    )
 
 
 def _where(page: Page, made: Proposal, foot: bool) -> list[str]:
