@@ -301,6 +301,8 @@ def smoothing_chart(found: NavigationEvaluation) -> Chart | None:
         ("down", "height, m"),
         ("heading", "heading, deg"),
     ):
+        if column in record.not_estimated:
+            continue
         lines = tuple(
             curve(
                 name,
@@ -341,7 +343,11 @@ def smoothing_table(found: NavigationEvaluation) -> TableBlock | None:
                 _figure(after),
                 plain(before / after, 1) if after > 0.0 else "–",
                 *_errors(found, column),
-                share_words(float(agreement.share[k])) if agreement.instants[k] else "–",
+                NOT_ESTIMATED
+                if column in found.record.not_estimated
+                else share_words(float(agreement.share[k]))
+                if agreement.instants[k]
+                else "–",
             )
         )
     return TableBlock(

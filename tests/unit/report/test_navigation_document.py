@@ -30,6 +30,8 @@ from strapdown.report.navigation_document import (
     navigation_document,
     observation_table,
     outage_table,
+    smoothing_chart,
+    smoothing_table,
     state_table,
     withheld_table,
 )
@@ -99,6 +101,19 @@ def test_what_is_not_estimated_has_no_bound_of_zero():
     assert [bool(panel.fills) for panel in panels] == [True, True, False]
     for text in words(navigation_document(found, "made")):
         assert not re.search(r"\bnan\b", text), text
+
+
+def test_a_smoothed_run_has_no_bound_of_what_is_not_estimated():
+    made = without_height(record())
+    found = told(made, forward=without_height(record()))
+    (chart,) = [smoothing_chart(found)]
+    assert [panel.y_label for panel in chart.panels if panel.lines and panel.log] == [
+        "horizontal, m",
+        "heading, deg",
+    ]
+    table = rows(smoothing_table(found))
+    assert table["down, m"] == ["–", "–", "–", NOT_ESTIMATED]
+    assert NOT_ESTIMATED not in table["north, m"]
 
 
 def test_longitudes_that_went_on_are_told_within_half_a_turn():
