@@ -10,12 +10,17 @@ import pandas as pd
 import pytest
 from tests.coded import coded
 
+from strapdown.config.coast import CoastSpec
 from strapdown.config.navigation import NavigationSpec
 from strapdown.errors import ConfigError
 from strapdown.evaluation.trajectory_differences import trajectory_differences
+from strapdown.report.coast import coast_json
+from strapdown.report.coast_document import key_figures
 from strapdown.report.navigation import NAVIGATION
 from strapdown.report.paired_corrections import paired_errors, paired_table, reference_words
+from strapdown.report.values import NOT_ESTIMATED
 from strapdown.systems.navigation_run import run_navigation
+from strapdown.systems.outage_run import run_coast
 
 #: The fixes end here, s.
 LAST_FIX = 70.0
@@ -134,3 +139,14 @@ def test_the_report_has_both(both, tmp_path):
 def test_beside_is_another_kind(beside):
     with pytest.raises(ConfigError, check=coded("config.unknown-correction-beside")):
         spec(kind="feedback", beside=beside)
+
+
+def test_an_outage_has_no_bound_of_a_height_that_is_not_estimated():
+    """The same drive, of which 17 states know no height."""
+    made = run_coast(CoastSpec(outage_s=2.0, places=1), spec(kind="feedback"))
+    told = coast_json(made)
+    assert told["at_the_end"]["vertical_sd_m"] is None
+    assert told["at_the_end"]["horizontal_sd_m"] > 0.0
+    figures = {one.name: one.value for one in key_figures(made)}
+    assert figures["Vertical"] == NOT_ESTIMATED
+    json.dumps(told, allow_nan=False)
