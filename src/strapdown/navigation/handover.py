@@ -148,7 +148,11 @@ def handed_over(chain: NavigationPipeline, state: PipelineState, found: Aligned)
         by_others = _by_antenna(chain, state, q_nb, start.v_n, turn)
         return from_alignment(filter_, found.alignment, start, P, rest, by_others)
     fixes = _fixes(chain, state)
-    moved = None if chain.site is not None else motion_by_fixes(fixes, state.begun, state.time)
+    moved = None
+    if chain.site is None:
+        shaken = any(finding.code == SHAKEN for finding in found.alignment.findings)
+        clear = DOUBTFUL if shaken else CLEAR
+        moved = motion_by_fixes(fixes, state.begun, state.time, clear)
     if moved is not None:
         return _in_motion(chain, state, found, rest, moved)
     site, sd = _site(chain, state, q_nb)
@@ -577,9 +581,11 @@ MANOEUVRE = 1.0
 LOOKED_AT, LOOKED_BACK, LEAST_LOOKED_AT = 9, 10.0, 4
 # Standard deviations that make a fix an outlier, or that prove motion.
 CLEAR = 5.0
+# And those of a body that the sensors do not show at rest, by this finding of its levelling.
+DOUBTFUL, SHAKEN = 1.0, "alignment.specific-force-scatters"
 # Speed of a body that is not at rest, m/s; vertical one of a moving body, unmeasured, m/s; number
-# of velocities that show it.
-MOVES, CLIMB, LEAST_VELOCITIES = 0.5, 1.0, 3
+# of velocities whose median shows it.
+MOVES, CLIMB, NEWEST = 0.5, 1.0, 3
 
 
 def fixes_until(
@@ -684,7 +690,7 @@ def here_by_fix(
 
 
 def motion_by_fixes(
-    fixes: pd.DataFrame | None, begin: float, time: float
+    fixes: pd.DataFrame | None, begin: float, time: float, clear: float = CLEAR
 ) -> tuple[Array, Array] | None:
     """Return the velocity of a receiver that has moved since an instant, by its newest fixes.
 
@@ -693,6 +699,8 @@ def motion_by_fixes(
     fixes : DataFrame or None
         Fixes until `time`.
     begin, time : float, s
+    clear : float
+        Standard deviations that prove motion; fewer where the sensors do not show a rest.
 
     Returns
     -------
@@ -707,11 +715,11 @@ def motion_by_fixes(
     good = values_of(part, ["quality"])[:, 0] > 0.0
     v, v_sd = values_of(part, VELOCITY_COLUMNS), values_of(part, VELOCITY_SD)
     told = good & np.isfinite(v_sd[:, :2]).all(axis=1)
-    if told.sum() >= LEAST_VELOCITIES:
-        rows = np.flatnonzero(told)[-LEAST_VELOCITIES:]
+    if told.any():
+        rows = np.flatnonzero(told)[-NEWEST:]
         k = int(rows[-1])
         speed = float(np.median(np.hypot(v[rows, 0], v[rows, 1])))
-        if speed <= max(MOVES, CLEAR * float(v_sd[k, :2].max())):
+        if speed <= max(MOVES, clear * float(v_sd[k, :2].max())):
             return None
         since = time - float(index_of(part)[k])
         measured = np.isfinite(v_sd[k])
@@ -726,7 +734,7 @@ def motion_by_fixes(
     far = np.hypot(way[:, 0], way[:, 1])
     span = np.maximum(stamps[-1] - stamps, INSTANT)
     blur = np.hypot(sd, sd[-1])
-    if not (far > np.maximum(CLEAR * blur[:, :2].max(axis=1), MOVES * span)).any():
+    if not (far > np.maximum(clear * blur[:, :2].max(axis=1), MOVES * span)).any():
         return None
     # Half of the span before the newest fix, the velocity is that of the difference.
     whole = np.hypot(blur / span[:, None], MANOEUVRE * (0.5 * span + time - stamps[-1])[:, None])

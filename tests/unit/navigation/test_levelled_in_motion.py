@@ -8,7 +8,7 @@ from tests import town_drive as town
 
 from strapdown.alignment.levelling import KnownHeading
 from strapdown.frames import place_difference
-from strapdown.navigation.handover import motion_by_fixes
+from strapdown.navigation.handover import DOUBTFUL, motion_by_fixes
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.modes import CoarseMode, Navigation, Until
 from strapdown.navigation.navigator import Navigator, with_states
@@ -74,3 +74,13 @@ def test_fixes_at_rest_show_no_motion():
     moving = motion_by_fixes(receiver(1.0, velocities=True), 0.0, 3.0)
     assert moving is not None
     assert np.hypot(*moving[0][:2]) == pytest.approx(10.0, abs=0.5)
+
+
+def test_a_body_that_shakes_needs_less_proof_of_its_motion():
+    table = receiver(1.0, velocities=True)
+    table[VELOCITY_SD] = 4.0
+    assert motion_by_fixes(table, 0.0, 3.0) is None
+    moving = motion_by_fixes(table, 0.0, 3.0, DOUBTFUL)
+    assert moving is not None
+    # It is no better known than it is measured.
+    assert (moving[1] >= 4.0).all()
