@@ -17,6 +17,7 @@ from strapdown.config.navigation import make_aids
 from strapdown.constants import TWO_SIDED_95
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import Finding
+from strapdown.estimation.robust import AdaptiveScale
 from strapdown.evaluation.plane_bound import plane_bound, plane_reach
 from strapdown.navigation.consistency import (
     ComponentConsistency,
@@ -32,7 +33,7 @@ from strapdown.navigation.truth_comparison import (
     compare_with_truth,
     smoother_consistency,
 )
-from strapdown.report.chart import Array, break_jumps
+from strapdown.report.chart import Array, break_jumps, runs
 from strapdown.report.document import Trust, reason
 from strapdown.report.values import plain, shown_unit
 from strapdown.systems.navigation_run import NavigationRun, withheld_aid
@@ -813,4 +814,22 @@ def _rejected(found: NavigationEvaluation) -> list[Finding]:
                     share=one.rejected / one.epochs,
                 )
             )
+        for label, column in zip(one.labels, one.weight.T, strict=True):
+            ends = [k for k in runs(np.where(column > 0.0, np.nan, 0.0)) if _long(k)]
+            if ends:
+                out.append(
+                    reason(
+                        False,
+                        "navigation.rejected-in-a-row",
+                        component=f"{one.name} {label.partition(',')[0]}",
+                        count=max(k.stop - k.start for k in ends),
+                        since=float(one.time[ends[0].start]),
+                        until=float(one.time[ends[-1].stop - 1]),
+                    )
+                )
     return out
+
+
+def _long(rejected: slice) -> bool:
+    """Whether so many were rejected in a row that the adaptive rule took the next."""
+    return rejected.stop - rejected.start >= AdaptiveScale.patience

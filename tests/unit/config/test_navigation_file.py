@@ -134,6 +134,7 @@ def test_options_have_the_units_of_their_fields():
         "gate",
     }
     plain |= {"position_sd_factor", "velocity_sd_factor", "mounting_of", "scale_sd", "update_rule"}
+    plain |= {"position_correlated_share"}
     endings = (
         "_m",
         "_s",

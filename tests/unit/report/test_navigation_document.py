@@ -234,6 +234,16 @@ def test_many_rejections_speak_against_it():
     assert "navigation.many-rejected" in [one.code for one in found.against]
 
 
+def test_as_many_rejections_in_a_row_as_the_rule_endures_speak_against_it():
+    """After ten the next fix is taken, whichever of receiver and inertial solution was wrong."""
+    assert trust(told(record(seconds=600.0, reject=range(20, 29)))).against == ()
+    found = trust(told(record(seconds=600.0, reject=range(20, 30))))
+    (down,) = (one for one in found.against if one.data["component"] == "rtk.position down")
+    assert down.code == "navigation.rejected-in-a-row"
+    assert down.data["count"] == 10
+    assert (down.data["since"], down.data["until"]) == (21.0, 30.0)
+
+
 def test_a_good_run_can_be_trusted():
     made = record()
     found = trust(told(made, truth=shifted(made.trajectory, north=1.0)))
