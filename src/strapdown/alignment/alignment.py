@@ -57,6 +57,8 @@ class Alignment:
         If the method estimates them, errors in proportion to the input above the means of the
         record, at which the biases hold: elements (i, j) are the excess of axis i by input j,
         nine of gyros by rates, nine of gyros by forces, nine of accelerometers by forces.
+    earlier : Alignment, optional
+        At the first sample of the record, if the method carries its state back there.
     findings : tuple of Finding
         Assumptions that do not hold, and quantities that the sensors cannot determine.
     """
@@ -76,6 +78,7 @@ class Alignment:
     joint: Array | None = None
     by_input: Array | None = None
     place: Array | None = None
+    earlier: Alignment | None = None
     findings: tuple[Finding, ...] = field(default=())
 
     @property

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown.alignment.alignment import Alignment, CoarseAlignment, Site
@@ -26,6 +26,7 @@ from strapdown.alignment.course_sums import (
     GYRO_MATRIX,
     GYRO_NOISE,
     HANDED,
+    LEAST_SD,
     OF_ACCELS,
     OF_GYROS,
     OF_SENSORS,
@@ -46,9 +47,9 @@ from strapdown.dsp.running_integral import running_integral
 from strapdown.earth import transport_rate
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.estimation.robust import Huber, Igg3, Influence
-from strapdown.frames import geodetic_from_ned
+from strapdown.frames import geodetic_from_ned, ned_from_geodetic
 from strapdown.sensors.uncertainty import ImuUncertainty
-from strapdown.tables import ACCEL, GYRO
+from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD
 from strapdown.tables.checks import is_number, source_of
 
 Array = NDArray[np.float64]
@@ -80,6 +81,9 @@ class GnssCourse(CoarseAlignment):
     axle_sd : float, m
         Distance of the unit ahead of or behind the unsteered axle: a unit off the axle moves
         sideways while the vehicle turns.
+    backtrack : bool
+        The state is carried back to the first sample, too, for a navigation that begins there
+        (`Alignment.earlier`).
 
     Raises
     ------
@@ -98,6 +102,7 @@ class GnssCourse(CoarseAlignment):
     largest_sd_deg: float = 10.0
     reverse: bool = False
     axle_sd: float = field(default=1.0, metadata={"unit": "m"})
+    backtrack: bool = False
 
     def __post_init__(self) -> None:
         for name, least in (
@@ -130,7 +135,8 @@ class GnssCourse(CoarseAlignment):
         record, the vehicle is too slow, or the accelerometers are too uncertain for a level.
         """
         findings = check_record(imu)
-        fixes, found = self.fit(imu, site, sensors, gnss, antenna)
+        fit = self.fit(imu, site, sensors, gnss, antenna)
+        fixes, found = fit.fixes, fit.search()
         sd = np.sqrt(np.linalg.eigvalsh(found.covariance[3:5, 3:5])[-1])
         if not sd < LARGEST_TILT_SD:
             raise DataError(
@@ -141,13 +147,24 @@ class GnssCourse(CoarseAlignment):
                 sd_deg=np.degrees(sd),
             )
         findings += left_out(fixes, found)
-        joint = found.covariance
         place = None
         if fixes.origin is not None:
             place = geodetic_from_ned(found.place, fixes.origin)
+        earlier = None
+        if self.backtrack:
+            assert gnss is not None
+            first = fit.at_first_sample(found, gnss)
+            if first is not None:
+                earlier = self._of(float(imu.index[0]), *first)
+        return replace(
+            self._of(float(imu.index[-1]), found, place), findings=findings, earlier=earlier
+        )
+
+    def _of(self, time: float, found: Found, place: Array | None) -> Alignment:
+        joint = found.covariance
         return Alignment(
             self.name,
-            float(imu.index[-1]),
+            time,
             rotation.quaternion_from_dcm(found.C),
             joint[3:6, 3:6],
             gyro_bias=found.bias[:3],
@@ -159,7 +176,6 @@ class GnssCourse(CoarseAlignment):
             joint=joint,
             by_input=found.by_input,
             place=place,
-            findings=findings,
         )
 
     def fit(
@@ -169,8 +185,8 @@ class GnssCourse(CoarseAlignment):
         sensors: ImuUncertainty,
         gnss: pd.DataFrame | None,
         antenna: Antenna,
-    ) -> tuple[CourseFixes, Found]:
-        """Fixes of a record, and the least squares over them; parameters and errors of `align`."""
+    ) -> CourseFit:
+        """The least squares over a record; parameters and errors of `align`."""
         slowest, widest = self.least_speed, math.radians(self.largest_sd_deg)
         fixes = course_fixes(imu, gnss, slowest, widest, antenna)
         rests = rest_rates(imu, fixes, sensors)
@@ -179,7 +195,7 @@ class GnssCourse(CoarseAlignment):
         yaw_sd = math.hypot(slip, math.radians(self.mounting_yaw_sd_deg))
         model = CourseModel(self.reverse, yaw, yaw_sd, SLIP_SHARE * slip, self.axle_sd, antenna)
         means = imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64).mean(axis=0)
-        return fixes, CourseFit(imu, means, fixes, rests, site, sensors, model).search()
+        return CourseFit(imu, means, fixes, rests, site, sensors, model)
 
 
 # Attitude, velocity and biases at the end of a drive, by least squares over its fixes.
@@ -194,6 +210,10 @@ UNKNOWN_PLACE = 1e4
 LEAST_FREE = 12.0
 # Number of updates of weights and scale with one linearization.
 SWEEPS = 3
+# Share of the weight of fixes and rests in a state from which a filter meets them again.
+ONCE = 0.1
+# Number of first positions, the first of which to agree with the others gives the position.
+ANCHORS = 9
 # A course error beyond this, rad, is that of a reversing vehicle.
 GROSS = 0.8
 # Courses closer than this, s, have the same sideslip.
@@ -256,6 +276,32 @@ class Found:
         return np.asarray(self.errors[HANDED[ASKED:] - OF_SENSORS.start])
 
 
+class Observed(NamedTuple):
+    """Predictions of a fit at its fixes, its rests and more instants, and residuals of the fixes.
+
+    `sums`: from the instants to the end. `prior`: sd of each unknown. `level`, `C` ((n, 3, 3)): the
+    level axes from those of the end, and the attitude. `turns`, `velocity`, `by_velocity` ((n, 3),
+    (n, 3, unknowns)): derivative of the rotation; velocity in the level axes of the end, and its
+    derivative. `gap`, `rows`, `told`, `sd` ((k, 3), with the unknowns for `rows`): residuals of
+    the fixes, derivatives, whether they are stated, and sd. `courses`, `rests`: residuals,
+    derivatives and weights.
+    """
+
+    sums: DriveSums
+    prior: Array
+    level: Array
+    C: Array
+    turns: Array
+    velocity: Array
+    by_velocity: Array
+    gap: Array
+    rows: Array
+    told: NDArray[np.bool_]
+    sd: Array
+    courses: tuple[Array, Array, Array]
+    rests: list[tuple[Array, Array, Array]]
+
+
 @dataclass(frozen=True, eq=False)
 class CourseFit:
     """Least squares over the fixes of a record, or of a part that reaches to its end.
@@ -278,41 +324,19 @@ class CourseFit:
         `found`: its covariance is not used. `influence`: of the velocities of fixes, by the largest
         residual of the three.
         """
-        fixes, rests = self.fixes, self.rests
-        time = np.concatenate([fixes.time, [rest.time for rest in rests]])
-        sums = drive_sums(self.imu, time, self.means, found.errors)
-        sd = self._prior(found, sums)
-        rate = _level_rate(found.velocity, self.site)
-        level = rotation.dcm_from_rotation_vector(rate * sums.until_end[:, None])
-        C = level @ found.C @ sums.turned
-        turns = np.zeros((len(time), 3, self.unknowns))
-        turns[:, :, TURN] = np.eye(3)
-        turns[:, :, OF_GYROS] = found.C @ sums.by_gyro
-        there, by = self._velocities(found, sums, rate)
-        k = len(fixes.time)
-        if self.by_places:
-            gap, seen, fix_sd, within = self._places(found, sums, there, by, turns)
-        else:
-            arm = np.cross(sums.rate[:k], self.model.antenna.lever_arm)
-            read = fixes.velocity - np.einsum("kij,kj->ki", C[:k], arm)
-            gap = np.einsum("kji,kj->ki", level[:k], read) - there[:k]
-            seen, fix_sd, within = by[:k], fixes.sd, self._within(sums)[1]
-        courses = self._courses(found, sums, C[:k], there[:k], level[:k], by[:k], turns[:k])
-        told = np.isfinite(fix_sd)
-        stated = np.sqrt(np.where(told, np.square(fix_sd), 1.0) + within)
-        weight, scale = found.weight, found.scale
-        fixed = []
-        fixed += [self._rest(rest, found, C[k + i], turns[k + i]) for i, rest in enumerate(rests)]
+        seen = self._observed(found)
+        gap, rows, told, stated, courses = seen.gap, seen.rows, seen.told, seen.sd, seen.courses
+        weight, scale, k = found.weight, found.scale, len(self.fixes.time)
         onward = np.ones(len(courses[0]))
         for _ in range(SWEEPS):
             share = told * weight[:, None] / np.square(scale * stated)
             parts = [
-                (gap.ravel(), seen.reshape(3 * k, -1), share.ravel()),
+                (gap.ravel(), rows.reshape(3 * k, -1), share.ravel()),
                 (courses[0], courses[1], onward * courses[2]),
-                *fixed,
+                *seen.rests,
             ]
-            x, inverse, spent = _solve(parts, sd, found.errors)
-            left = np.where(told, np.abs(gap - seen @ x) / stated, 0.0)
+            x, inverse, spent = _solve(parts, seen.prior, found.errors)
+            left = np.where(told, np.abs(gap - rows @ x) / stated, 0.0)
             used = left[told & (weight > 0.0)[:, None]]
             free = len(used) + len(onward) - spent
             if free >= LEAST_FREE:
@@ -333,13 +357,139 @@ class CourseFit:
             found.velocity + x[END_VELOCITY],
             found.errors + x[OF_SENSORS],
             inverse[np.ix_(handed, handed)] * np.outer(sign, sign),
-            np.einsum("kij,kj->ki", level[:k], there[:k] + by[:k] @ x),
+            np.einsum("kij,kj->ki", seen.level[:k], (seen.velocity + seen.by_velocity @ x)[:k]),
             weight,
             scale,
             float(onward.mean()) if len(onward) else 0.0,
             found.place + x[END_PLACE] if self.by_places else found.place,
             offset,
         )
+
+    def _observed(self, found: Found, more: ArrayLike = ()) -> Observed:
+        """What the estimates predict at the fixes, the rests and `more` instants, and residuals."""
+        fixes, rests = self.fixes, self.rests
+        time = np.concatenate([fixes.time, [rest.time for rest in rests], np.asarray(more, float)])
+        sums = drive_sums(self.imu, time, self.means, found.errors)
+        rate = _level_rate(found.velocity, self.site)
+        level = rotation.dcm_from_rotation_vector(rate * sums.until_end[:, None])
+        C = level @ found.C @ sums.turned
+        turns = np.zeros((len(time), 3, self.unknowns))
+        turns[:, :, TURN] = np.eye(3)
+        turns[:, :, OF_GYROS] = found.C @ sums.by_gyro
+        there, by = self._velocities(found, sums, rate)
+        k = len(fixes.time)
+        if self.by_places:
+            assert fixes.place is not None and fixes.place_sd is not None
+            off, rows = self._displacements(found, sums, there, turns, slice(k), antenna=True)
+            rows[:, :, OFFSET] = there[:k]
+            gap, fix_sd = fixes.place - (found.place + off), fixes.place_sd
+            within = self._walk(sums)
+        else:
+            arm = np.cross(sums.rate[:k], self.model.antenna.lever_arm)
+            read = fixes.velocity - np.einsum("kij,kj->ki", C[:k], arm)
+            gap = np.einsum("kji,kj->ki", level[:k], read) - there[:k]
+            rows, fix_sd, within = by[:k], fixes.sd, self._within(sums)[1]
+        told = np.isfinite(fix_sd)
+        return Observed(
+            sums,
+            self._prior(found, sums),
+            level,
+            C,
+            turns,
+            there,
+            by,
+            gap,
+            rows,
+            told,
+            np.sqrt(np.where(told, np.square(fix_sd), 1.0) + within),
+            self._courses(found, sums, C[:k], there[:k], level[:k], by[:k], turns[:k]),
+            [self._rest(rest, found, C[k + i], turns[k + i]) for i, rest in enumerate(rests)],
+        )
+
+    def at_first_sample(self, found: Found, gnss: pd.DataFrame) -> tuple[Found, Array] | None:
+        """State at the first sample of the record, and its position (deg, deg, m).
+
+        A navigation that begins there meets all fixes again: they count by a part of their weight
+        (`ONCE`), so that its covariance owes next to nothing to them. `found`: by `search`. `gnss`:
+        whose first position that agrees with the others gives the position. None without one.
+        """
+        fixes, first = self.fixes, float(self.imu.index[0])
+        if first < fixes.time[0]:
+            # The stretches with a noise of their own are those of another part.
+            errors = found.errors.copy()
+            errors[NOISE] = 0.0
+            found = _converged(self, replace(found, errors=errors), Igg3())
+        anchors = self._anchors(found, gnss)
+        if anchors is None:
+            return None
+        stamps, place, place_sd, origin = anchors
+        seen = self._observed(found, np.append(stamps, first))
+        k = len(fixes.time)
+        share = ONCE * seen.told * found.weight[:, None] / np.square(found.scale * seen.sd)
+        gap, rows, weight = seen.courses
+        parts = [
+            (seen.gap.ravel(), seen.rows.reshape(3 * k, -1), share.ravel()),
+            (gap, rows, weight * (np.abs(gap) < GROSS)),
+            *((gap, rows, ONCE * weight) for gap, rows, weight in seen.rests),
+        ]
+        _, inverse, _ = _solve(parts, seen.prior, found.errors)
+        whole = slice(None)
+        here = len(seen.level) - 1
+        way, by_way = self._displacements(found, seen.sums, seen.velocity, seen.turns, whole)
+        if self.by_places:
+            at, by_at, own = found.place + way[here], by_way[here], np.zeros(3)
+        else:
+            near = slice(here - len(stamps), here)
+            off, by_off = self._displacements(
+                found, seen.sums, seen.velocity, seen.turns, whole, antenna=True
+            )
+            guess = place - off[near] + way[here]
+            apart = guess - np.median(guess, axis=0)
+            usual = np.maximum(place_sd, MAD_TO_SD * np.median(np.abs(apart), axis=0))
+            j = int(np.argmax((np.abs(apart) <= CLEAR * usual).all(axis=1)))
+            at, by_at = guess[j], by_way[here] - by_off[near][j]
+            own = np.square(place_sd[j]) / ONCE
+        level = seen.level[here]
+        J = np.zeros((len(HANDED) + 3, self.unknowns))
+        J[END_VELOCITY] = -level @ seen.by_velocity[here]
+        J[TURN] = -level @ seen.turns[here]
+        J[np.arange(GYRO_BIAS.start, len(HANDED)), HANDED[GYRO_BIAS.start :]] = 1.0
+        J[len(HANDED) :] = -by_at
+        # The shift by a wrong clock is left to the owner of that error.
+        J[:, OFFSET] = 0.0
+        covariance = J @ inverse @ J.T
+        covariance[len(HANDED) :, len(HANDED) :] += np.diag(own)
+        state = Found(
+            seen.C[here],
+            level @ seen.velocity[here],
+            found.errors,
+            covariance,
+            found.fitted,
+            found.weight,
+            found.scale,
+            found.onward,
+        )
+        return state, geodetic_from_ned(at, origin, ellipsoid=self.site.ellipsoid)
+
+    def _anchors(
+        self, found: Found, gnss: pd.DataFrame
+    ) -> tuple[Array, Array, Array, Array] | None:
+        """Stamps, positions and sd of the first fixes with one, north-east-down of an origin."""
+        fixes = self.fixes
+        stamps = gnss.index.to_numpy(dtype=np.float64)
+        sd = gnss[POSITION_SD].to_numpy(dtype=np.float64)
+        good = np.isfinite(sd).all(axis=1) & (gnss["quality"].to_numpy() > 0.0)
+        good &= (stamps >= self.imu.index[0]) & (stamps <= self.imu.index[-1])
+        if not good.any():
+            return None
+        places = gnss[GEODETIC].to_numpy(dtype=np.float64)
+        origin, newest = fixes.origin, int(np.flatnonzero(good)[-1])
+        if origin is None:
+            ahead = found.velocity * (self.imu.index[-1] - stamps[newest])
+            origin = geodetic_from_ned(ahead, places[newest], ellipsoid=self.site.ellipsoid)
+        rows = np.flatnonzero(good)[:ANCHORS]
+        here = ned_from_geodetic(places[rows], origin, ellipsoid=self.site.ellipsoid)
+        return stamps[rows], here, np.maximum(sd[rows], LEAST_SD), origin
 
     @property
     def by_places(self) -> bool:
@@ -401,47 +551,58 @@ class CourseFit:
         by[: len(time), :, OFFSET] = np.gradient(v[: len(time)], time, axis=0)
         return v, by
 
-    def _places(
-        self, found: Found, sums: DriveSums, there: Array, by: Array, turns: Array
-    ) -> tuple[Array, Array, Array, float]:
-        """Positions of the antenna: residuals, derivatives, stated sd, variance within stretches.
+    def _displacements(
+        self,
+        found: Found,
+        sums: DriveSums,
+        there: Array,
+        turns: Array,
+        rows: slice,
+        antenna: bool = False,
+    ) -> tuple[Array, Array]:
+        """Positions at instants less that at the end, and their derivatives.
 
         In Earth-fixed axes, level at the end, ``s = s_e - int (1 + [w_ie x] T) v``: the axes have
-        turned by ``w_ie T`` since. A white noise that is modeled as a bias of each of n stretches
-        L leaves a random walk of the position of ``N² L³ / 12`` a stretch, of which a bridge of n
-        has a quarter at most.
+        turned by ``w_ie T`` since. `antenna`: whether of the antenna instead of the sensors.
         """
-        fixes, earth = self.fixes, self.site.earth_rate
-        assert fixes.place is not None and fixes.place_sd is not None
-        k = len(fixes.time)
-        T, g = sums.until_end[:k, None], self.site.gravity
-        moved = sums.moved[:k] @ found.C.T
+        earth, until = self.site.earth_rate, sums.until_end[rows]
+        T, g = until[:, None], self.site.gravity
+        moved = sums.moved[rows] @ found.C.T
         way = found.velocity * T - moved - 0.5 * g * T**2 + np.cross(earth, g) * T**3 / 6.0
         # By integrals from fix to fix: the Earth turns the way and the velocity, and gravity points
         # down where the vehicle is, not where it ends.
-        past = np.append(0.0, sums.until_end[:k][::-1])
-        along = np.vstack([found.velocity, there[:k][::-1]])
+        from_end = np.argsort(-until, kind="stable")[::-1]
+        past = np.append(0.0, until[from_end])
+        along = np.vstack([found.velocity, there[rows][from_end]])
         ways = running_integral(past, along)
         tilt = transport_rate(self.site.lat_deg, self.site.alt, ways, ellipsoid=self.site.ellipsoid)
         bent = running_integral(past, np.cross(tilt, g))
         turned = running_integral(past, np.cross(earth, ways + past[:, None] * along) + bent)
-        way = way + turned[1:][::-1]
-        fixed = rotation.dcm_from_rotation_vector(earth * T)
-        arm = fixed @ found.C @ sums.turned[:k] @ np.asarray(self.model.antenna.lever_arm, float)
-        out = np.zeros((k, 3, self.unknowns))
-        out[:, :, END_PLACE] = np.eye(3)
+        way[from_end] += turned[1:]
+        out = np.zeros((len(until), 3, self.unknowns))
+        out[:, :, COUNT:] = np.eye(3)[:, : self.unknowns - COUNT]
         out[:, :, END_VELOCITY] = -T[:, :, None] * np.eye(3)
         out[:, :, TURN] = -rotation.cross_matrix(moved)
-        out[:, :, OF_GYROS] = -found.C @ sums.moved_by_turn[:k]
-        out[:, :, OF_ACCELS] = -found.C @ sums.moved_by_accel[:k]
-        out -= rotation.cross_matrix(arm) @ turns[:k]
-        out[:, :, OFFSET] = there[:k]
-        gap = fixes.place - (found.place - way + arm)
+        out[:, :, OF_GYROS] = -found.C @ sums.moved_by_turn[rows]
+        out[:, :, OF_ACCELS] = -found.C @ sums.moved_by_accel[rows]
+        if not antenna:
+            return -way, out
+        fixed = rotation.dcm_from_rotation_vector(earth * T)
+        lever_arm = np.asarray(self.model.antenna.lever_arm, float)
+        arm = fixed @ found.C @ sums.turned[rows] @ lever_arm
+        return arm - way, out - rotation.cross_matrix(arm) @ turns[rows]
+
+    def _walk(self, sums: DriveSums) -> float:
+        """Variance of a position within stretches, whose noise is modeled as a bias of each.
+
+        A white noise that is modeled as a bias of each of n stretches L leaves a random walk of the
+        position of ``N² L³ / 12`` a stretch, of which a bridge of n has a quarter at most.
+        """
         stretch = float(sums.stretch.max())
         push = max(self.sensors.accel.axis("noise_density")) ** 2
         lean = (max(self.sensors.gyro.axis("noise_density")) * STANDARD_GRAVITY * stretch) ** 2
         walk = (push + lean / 12.0) * stretch**3 / 12.0
-        return gap, out, fixes.place_sd, float(walk * len(sums.stretch) / 4.0)
+        return float(walk * len(sums.stretch) / 4.0)
 
     def _courses(
         self,

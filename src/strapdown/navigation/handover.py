@@ -127,26 +127,20 @@ def handed_over(chain: NavigationPipeline, state: PipelineState, found: Aligned)
     mode = chain.modes[state.mode]
     if isinstance(mode, CoarseMode) and isinstance(mode.way, GnssCourse):
         ellipsoid = find_ellipsoid(filter_.mechanization.ellipsoid)
-        assert found.alignment.velocity is not None and found.alignment.joint is not None
-        velocity, joint = found.alignment.velocity, found.alignment.joint
-        if found.alignment.place is None:
-            start, P = here_by_fix(
-                _fixes(chain, state),
-                state.time,
-                q_nb,
-                _lever_arm(chain),
-                ellipsoid,
-                velocity,
-                joint[:3, :3],
-            )
+        course = found.alignment.earlier or found.alignment
+        assert course.velocity is not None and course.joint is not None
+        time, q_nb, velocity, joint = course.time, course.q_nb, course.velocity, course.joint
+        if course.place is None:
+            arm, near = _lever_arm(chain), joint[:3, :3]
+            start, P = here_by_fix(_fixes(chain, state), time, q_nb, arm, ellipsoid, velocity, near)
         else:
-            lat, lon, alt = found.alignment.place.tolist()
-            start = NavState(state.time, np.radians(lat), np.radians(lon), alt, velocity, q_nb)
+            lat, lon, alt = course.place.tolist()
+            start = NavState(time, np.radians(lat), np.radians(lon), alt, velocity, q_nb)
             of = np.r_[PLACE, 0:3]
             P = joint[np.ix_(of, of)]
-        turn = _turn(_window(chain, state), state.time)
+        turn = _turn(_window(chain, state), time)
         by_others = _by_antenna(chain, state, q_nb, start.v_n, turn)
-        return from_alignment(filter_, found.alignment, start, P, rest, by_others)
+        return from_alignment(filter_, course, start, P, rest, by_others)
     fixes = _fixes(chain, state)
     moved = None
     if chain.site is None:

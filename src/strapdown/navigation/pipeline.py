@@ -741,7 +741,7 @@ class ModeSequencer:
         kept = state.kept.rows
         if chain.modes[place].kind == "navigation":
             begun = handed_over(chain, state, found)
-            self._begin_mode(place, state.time)
+            self._begin_mode(place, begun.time)
             self._begin_navigation(begun, without=unused_fixes(chain, state, begun.time))
             rest = kept[kept[:, TIME] > begun.time + INSTANT]
             if len(rest):

@@ -832,4 +832,4 @@ def _rejected(found: NavigationEvaluation) -> list[Finding]:
 
 def _long(rejected: slice) -> bool:
     """Whether so many were rejected in a row that the adaptive rule took the next."""
-    return rejected.stop - rejected.start >= AdaptiveScale.patience
+    return bool(rejected.stop - rejected.start >= AdaptiveScale.patience)

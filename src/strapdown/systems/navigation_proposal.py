@@ -557,6 +557,7 @@ def _alignment(
                     "window_s": 60.0,
                     "until_heading_sd_deg": HEADING,
                     "until_tilt_sd_deg": _tilt(sensors),
+                    "backtrack": True,
                 },
                 "fine": {"kind": "none"},
             },

@@ -357,3 +357,70 @@ def test_positions_alone_are_worth_what_is_stated():
     assert (low <= count).all() and (count <= high).all(), count
     low, high = chi2.isf([0.995, 0.005], 3 * len(squares))
     assert low < sum(squares) < high
+
+
+def whole_error(found, row):
+    """Errors of position, velocity and attitude, (9,), and their covariance."""
+    truth, state = ideal(DRIVE, 100.0)[1][row], true_state(row)
+    place = ned_from_geodetic(found.place, state[:3])
+    error = np.concatenate([place, found.velocity - state[3:], phi(found, truth)])
+    rows = np.r_[39:42, 0:6]
+    return error, found.joint[np.ix_(rows, rows)]
+
+
+def nees(pairs):
+    return [float(error @ np.linalg.solve(P, error)) for error, P in pairs]
+
+
+@pytest.mark.slow
+def test_errors_of_position_and_velocity_are_correlated_as_stated():
+    """By positions alone a velocity that is too large has moved the position too far."""
+    found = []
+    for seed in range(RUNS):
+        imu, _, sensors = unit(DRIVE, 100.0, seed, "icm-42688-p")
+        result = NO_SLIP.align(imu.iloc[:4001], SITE, sensors, alone(fixes(seed)))
+        found.append(whole_error(result, 4000))
+    low, high = chi2.isf([0.995, 0.005], 9 * RUNS)
+    assert low < sum(nees(found)) < high
+
+
+@pytest.mark.parametrize("positions", [False, True])
+def test_the_first_sample_without_errors(positions):
+    imu, _ = ideal(DRIVE, 100.0)
+    arm = (0.5, -0.3, -1.2)
+    receiver = GnssReceiver(rate=10.0, antenna=arm, velocity_noise=1e-5, position_noise=1e-4)
+    exact = simulate_gnss(DRIVE, receiver)
+    exact = alone(exact) if positions else exact
+    # The first fix is 3 s later.
+    exact = exact[exact.index >= 3.0]
+    none = ImuUncertainty(TriadUncertainty(bias=1e-9), TriadUncertainty(bias=1e-9))
+    way = GnssCourse(backtrack=True)
+    found = way.align(imu.iloc[:2001], SITE, none, exact, Antenna(lever_arm=arm)).earlier
+    assert found.time == imu.index[0]
+    error, _ = whole_error(found, 0)
+    # As at the end (see above): tilts of 1e-4 rad, over 3 s a velocity of 3 mm/s and 5 mm.
+    assert np.abs(error[:3]).max() < 0.02
+    assert np.abs(error[3:6]).max() < 0.01
+    assert np.abs(error[6:8]).max() < 1e-4
+    assert abs(error[8]) < 5e-4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("positions", [False, True])
+def test_errors_at_the_first_sample_are_as_stated(positions, monkeypatch):
+    """With the whole weight of the fixes; a filter that meets them again gets a tenth of it."""
+    way = GnssCourse(mounting_yaw_sd_deg=0.0, sideslip_sd_deg=0.001, axle_sd=0.0, backtrack=True)
+    found, least = [], []
+    for seed in range(RUNS):
+        imu, _, sensors = unit(DRIVE, 100.0, seed, "icm-42688-p")
+        table = fixes(seed)
+        table = alone(table) if positions else table
+        table = table[table.index >= 3.0]
+        least.append(whole_error(way.align(imu.iloc[:4001], SITE, sensors, table).earlier, 0))
+        with monkeypatch.context() as patched:
+            patched.setattr("strapdown.alignment.gnss_course.ONCE", 1.0)
+            once = way.align(imu.iloc[:4001], SITE, sensors, table).earlier
+        found.append(whole_error(once, 0))
+    low, high = chi2.isf([0.995, 0.005], 9 * RUNS)
+    assert low < sum(nees(found)) < high
+    assert 0.1 * low < sum(nees(least)) < high

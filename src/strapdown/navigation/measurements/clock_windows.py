@@ -184,7 +184,7 @@ def _window(
         unknown = replace(antenna, time_offset_sd=UNKNOWN)
         way = GnssCourse(mounting_yaw_sd_deg=MOUNTING, axle_sd=AXLE)
         try:
-            more, sd = way.fit(part, site, sensors, fixes, unknown)[1].offset
+            more, sd = way.fit(part, site, sensors, fixes, unknown).search().offset
         except (DataError, DivergenceError):
             return None
         known = 1.0 - (sd / UNKNOWN) ** 2
