@@ -86,6 +86,8 @@ WELL, HEADING = 3.0, 6.0
 #: Trials of it: factor of the length from trial to trial, margin over the best of them, and the
 #: largest standard deviation that is not too large for a linear filter, deg.
 LATER, MARGIN, LARGEST_START = 1.15, 1.2, 15.0
+#: Longest part of a record to align by course as a whole, s, so that navigation begins with it.
+MOST_BACK = 300.0
 #: Rules that give gross errors zero weight keep their accuracy among them; with its scale this one
 #: cannot reject for ever. Time-correlated errors make innovations small, which does not show a
 #: receiver better than stated.
@@ -593,15 +595,17 @@ def _tried(
     span = float(time[-1] - time[0])
     while True:
         length = min(length, span)
-        begin, end = np.searchsorted(
-            time, time[0] + np.array([length - coarse["window_s"], length]) + 1e-7
-        )
+        window = length if length <= MOST_BACK else coarse["window_s"]
+        begin, end = np.searchsorted(time, time[0] + np.array([length - window, length]) + 1e-7)
         try:
             found = GnssCourse().align(imu.iloc[begin:end], site, sensors, fixes, antenna)
             roll, pitch, heading = np.maximum(found.sd_deg_after(AHEAD), found.sd_deg).tolist()
             tilt = max(roll, pitch)
             if heading <= limits[0] and tilt <= limits[1]:
-                return chosen, how, ()
+                # The run tries at instants of its own, somewhat later.
+                whole = float(math.ceil(MARGIN * window))
+                coarse = {**coarse, "window_s": max(coarse["window_s"], whole)}
+                return {**chosen, "coarse": coarse}, how, ()
             if best is None or max(heading, tilt) < max(best):
                 best = heading, tilt
         except (DataError, DivergenceError) as error:
