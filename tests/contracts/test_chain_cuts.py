@@ -268,10 +268,13 @@ def standing_fixes():
     return {"gnss": gnss_table(time, np.tile(HERE, (n, 1)), np.zeros((n, 3)), (1,) * 3, (0.1,) * 3)}
 
 
-@pytest.mark.parametrize("name", COARSE_ALIGNMENTS)
+@pytest.mark.parametrize("name", [*COARSE_ALIGNMENTS, "backtrack"])
 def test_coarse_alignments(name):
-    way = COARSE_ALIGNMENTS[name](**OPTIONS.get(name, {}))
-    if name == "gnss_course":
+    if name == "backtrack":
+        way = COARSE_ALIGNMENTS["gnss_course"](least_speed=2.0, backtrack=True)
+    else:
+        way = COARSE_ALIGNMENTS[name](**OPTIONS.get(name, {}))
+    if way.name == "gnss_course":
         chain = driving(navigation())
         until = Until(10.0, heading_sd_deg=8.0)
         modes = (CoarseMode(way=way, until=until, window=3.0), Navigation())
