@@ -12,7 +12,9 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.alignment.alignment import Alignment, CoarseAlignment, Site
+from strapdown.alignment.inertial_sums import sum_inertially
 from strapdown.alignment.mean_errors import (
+    BlockMeans,
     block_means,
     excursion,
     force_covariance,
@@ -20,8 +22,10 @@ from strapdown.alignment.mean_errors import (
     of_mean,
 )
 from strapdown.alignment.record_checks import check_gravity, check_record, gravity_findings
+from strapdown.ellipsoids import WGS84
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.sensors.uncertainty import ImuUncertainty
+from strapdown.tables import GYRO
 from strapdown.tables.checks import is_number, source_of
 
 # Roll and pitch alone: the heading is undetermined.
@@ -67,7 +71,8 @@ class KnownHeading(CoarseAlignment):
     Attributes
     ----------
     heading_deg : float, deg
-        Of the body's forward axis at the last sample, from true north, clockwise.
+        Of the body's forward axis at the first sample, from true north, clockwise. A body that
+        swings is followed from there by its gyros; any other keeps it.
     sd_deg : float, deg
         Its standard deviation, above zero.
 
@@ -126,10 +131,12 @@ def level_at_rest(
 ) -> Alignment:
     """Level a stationary record.
 
-    `method`: to be named in the result. `heading_deg` (deg). `heading_sd` (rad). The result holds
-    at the last sample. Scatter of the force beyond noise, and the angles by which the body swings,
-    are included in the covariance, with a finding. DataError: as `record_checks.check_record` and
-    `check_gravity`; the body points to the zenith or the nadir.
+    `method`: to be named in the result. `heading_deg` (deg): at the first sample. `heading_sd`
+    (rad). The result holds at the last sample. Scatter of the force beyond noise is included in the
+    covariance, with a finding. A body that swings is followed by its gyros (`_held`), or over a
+    long time keeps its mean attitude within its angles.
+    DataError: as `record_checks.check_record` and `check_gravity`; the body points to the zenith or
+    the nadir.
 
     `rotation.level` takes gravity as vertical; above the ellipsoid its north component is
     ``8e-9 alt sin(2 lat)`` m/s², a microradian of tilt at 1200 m, which is neglected.
@@ -138,15 +145,16 @@ def level_at_rest(
     findings = [*check_record(imu)]
     means = block_means(imu, BLOCKS)
     findings += check_gravity(means.whole_force, source)
-    roll, pitch = rotation.level(means.whole_force)
-    q_nb = rotation.quaternion_from_euler([roll, pitch, heading_deg])
-    C_nb = rotation.dcm_from_quaternion(q_nb)
-    force = force_covariance(sensors, means.length, means.whole_force)
     turning, loud = means.scatter(sensors)
-    swing = np.zeros((3, 3))
+    mean, blocks, swing = means.whole_force, means.force, np.zeros((3, 3))
+    turned, turned_sd = NOT_TURNED, np.zeros(3)
     if loud > 1.0 or turning > 1.0:
-        force = force + (of_mean(means.force) if loud > 1.0 else 0.0)
         swing = excursion(imu, sensors.gyro.axis("noise_density"))
+        size = float(np.sqrt(np.trace(swing)))
+        followed = size > LEAST_SWING and EARTH_RATE * means.length < SMALL * size
+        if turning > 1.0 and followed:
+            blocks, turned, turned_sd = _held(imu, sensors, means, swing)
+            mean, swing = blocks.mean(axis=0), np.zeros((3, 3))
         findings.append(
             Finding(
                 "alignment.specific-force-scatters",
@@ -157,18 +165,73 @@ def level_at_rest(
                 loud=loud,
                 turning=turning,
                 in_bound=True,
-                swing_deg=np.degrees(np.sqrt(np.trace(swing))),
+                swing_deg=math.degrees(size),
             )
         )
-    change = gravity_change(means.whole_force, force, site.gravity)
+    roll, pitch = rotation.level(mean)
+    C_nb = rotation.dcm_from_quaternion(rotation.quaternion_from_euler([roll, pitch, heading_deg]))
+    force = force_covariance(sensors, means.length, mean)
+    if loud > 1.0:
+        force = force + of_mean(blocks)
+    change = gravity_change(mean, force, site.gravity)
     findings += gravity_findings(*change, source)
     by_force, by_heading = error_of_force_and_heading(-site.gravity, pitch, heading_deg, source)
-    # A stated heading is that of the last sample: a swing about the vertical does not affect it.
+    # A swing about the vertical does not affect a heading that is stated for the mean attitude.
     by_swing = by_force @ rotation.cross_matrix(site.gravity) @ C_nb
     to_ned = by_force @ C_nb
     covariance = to_ned @ force @ to_ned.T + by_swing @ swing @ by_swing.T
     covariance += heading_sd**2 * np.outer(by_heading, by_heading)
+    # Gravity is found in the middle, from which a wrong bias turns for half of the time.
+    q_nb = rotation.compose(rotation.quaternion_from_dcm(C_nb), turned)
+    late = means.length * np.array([[0.5], [0.5], [1.0]]) * rotation.dcm_from_quaternion(q_nb)
+    covariance += (late * np.square(turned_sd)) @ late.T
     return Alignment(method, float(imu.index[-1]), q_nb, covariance, findings=tuple(findings))
+
+
+#: No rotation from the first to the last sample. A mean rate beyond so many standard deviations of
+#: the gyros' bias is a turn of the body.
+NOT_TURNED = np.array([1.0, 0.0, 0.0, 0.0])
+TURNS = 3.0
+#: Standard deviation of the net turn of a swing over that of its angles.
+NET = 2.0
+#: A swing of this size, rad, is followed where the Earth turns by less than this part of it
+#: meanwhile: over a longer time the mean attitude is better known than the angle turned.
+LEAST_SWING, SMALL = math.radians(0.5), 0.1
+EARTH_RATE = WGS84.rotation_rate
+
+
+def _held(
+    imu: pd.DataFrame, sensors: ImuUncertainty, means: BlockMeans, swing: Array
+) -> tuple[Array, Array, Array]:
+    """Means of the force of a swinging body in its axes at the first sample, held by the gyros.
+
+    `swing`: as of `excursion`. Also the rotation to the last sample (quaternion), and the standard
+    deviations of the rates that it is by, (3,), rad/s. The mean rate is that of a bias of known
+    standard deviation B and of a swing, of mean rate m: the part ``B² / (B² + m²)`` is bias. A
+    swing ends as far from its begin as two of its angles, sd √2 of theirs; a slow one further,
+    because `excursion` is about a line: twice.
+    """
+    gyro = sensors.gyro
+    bias = np.square(gyro.axis("bias")) + np.square(sensors.gyro_drift.triad)
+    rate = means.whole_rate
+    by_swing = np.square(NET / means.length) * np.diagonal(swing)
+    # Of a swing as slow as the record the halves differ; by how much is known of all axes together.
+    half = len(means.rate) // 2
+    halves = means.rate[:half].mean(axis=0) - means.rate[half:].mean(axis=0)
+    by_swing = np.maximum(by_swing, 0.5 * float(np.mean(np.square(halves))))
+    turns = np.abs(rate) > TURNS * np.sqrt(bias)
+    by_swing = np.where(turns, np.maximum(by_swing, np.square(rate) - bias), by_swing)
+    part = np.divide(bias, bias + by_swing, out=np.zeros(3), where=bias > 0.0)
+    table = imu.copy()
+    table.attrs = dict(imu.attrs)
+    table[GYRO] = table[GYRO].to_numpy(dtype=np.float64) - part * rate
+    sums = sum_inertially(table)
+    ends = np.cumsum(sums.node_length)
+    begins = np.searchsorted(ends, sums.length * np.arange(BLOCKS) / BLOCKS, side="right")
+    begins = np.unique(np.minimum(begins, len(ends) - 1))
+    lengths = np.add.reduceat(sums.node_length, begins)
+    blocks = np.add.reduceat(sums.node_velocity, begins, axis=0) / lengths[:, None]
+    return blocks, sums.turned[-1], np.sqrt(part * by_swing)
 
 
 # Attitude errors for a force known in both frames and a stated heading.

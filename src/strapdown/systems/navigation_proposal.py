@@ -31,7 +31,12 @@ from strapdown.navigation.measurements.gnss_clock import (
     time_offset,
     velocity_delay,
 )
-from strapdown.navigation.measurements.gnss_readiness import check_fixes, white_position_sd
+from strapdown.navigation.measurements.gnss_readiness import (
+    check_fixes,
+    lasting_position_sd,
+    white_position_sd,
+    without_repeats,
+)
 from strapdown.navigation.pipeline import AHEAD
 from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV, load_sensor
 from strapdown.sensors.rest import LEAST_LENGTH, find_rests_of_every_grade
@@ -108,12 +113,18 @@ ASIDE = 2.0
 #: Stamps with an offset come from another clock, and two quartz clocks drift apart by 50 ppm:
 #: a random walk of this many s/√s over 400 s, during which the offset may be unobservable.
 APART = 1e-3
+#: Relative rate of two quartz clocks, at most, where the record does not show a smaller one; one
+#: below the other is no state where it is not significant.
+QUARTZ, FEW = 5e-5, 1.5e-5
 #: Share of the variance of positions that lasts from fix to fix: proposed from the first on, and at
 #: most; by a variance of the rest that is so many times that by medians, whose tails are heavier
 #: than a normal one's. Where standard deviations are assumed: that of fixes that scatter like those
 #: of a code receiver, and of others; the scatter, m, that tells them apart.
 LASTS, LASTS_MOST, TAILS = 0.5, 0.9, 2.0
 LASTS_BY_CODE, LASTS_BY_PHASE, PHASE = 0.9, 0.5, 0.05
+#: The least share that is proposed where velocities show what lasts; the factor of the standard
+#: deviations from which a receiver understates its errors, and beyond which it has others.
+SHOWN, UNDERSTATED, MISSTATED = 0.1, 1.5, 10.0
 #: Fixes better than this, m, show that a lever arm is measured by a tape to so much, m.
 SHOWS_ARM, ARM_SD = 0.1, 0.02
 #: Attributes of fixes with assumed standard deviations, and the keys of these.
@@ -200,6 +211,8 @@ def propose(
         )
         fixes, shifted = on_clock_of(read_gnss(gnss.path, asked), recording.imu)
         findings = (*findings, *fixes.attrs["findings"], *([shifted] if shifted else []))
+        fixes, repeats = without_repeats(fixes)
+        findings = (*findings, *repeats)
         # What the run would refuse is refused before a file is written.
         check_fixes(fixes)
         check_overlap(fixes, imu, 0.0)
@@ -453,6 +466,11 @@ def _clock(
     antenna = _antenna(out)
     scan = time_offset(fixes, imu, delay)
     found = None if scan is None else (scan.offset, scan.sd)
+    speed, place_sd = _speed(fixes), float(np.median(values_of(fixes, POSITION_SD)[:, :2]))
+    if "position_sd_taken" in fixes.attrs and (scatter := white_position_sd(fixes, delay)):
+        place_sd = min(place_sd, scatter[0])  # where nothing is stated
+    span = float(index_of(fixes)[-1] - index_of(fixes)[0])
+    apart, drift = QUARTZ, None
     if drives and sensors is not None:
         windows = window_offsets(fixes, imu, sensors, 0.0 if found is None else found[0], antenna)
         step = windows.step()
@@ -461,15 +479,25 @@ def _clock(
         joint = windows.joint()
         if joint is not None and (found is None or joint[1] < found[1]):
             found = joint
+        drift = windows.drift()
+    if drift is not None:
+        apart = min(math.hypot(*drift), QUARTZ)
+        apart = apart if abs(drift[0]) > SIGNIFICANT * drift[1] or apart > FEW else 0.0
+    # A random walk that goes as far as the drift.
+    walk = {}
+    if 0.5 * apart * span * speed > FAR * place_sd:
+        walk = {"time_offset_drift_s_per_sqrt_s": float(f"{apart * math.sqrt(span):.1g}")}
     if found is None:
-        return out | ({"time_offset_sd_s": OFFSET_SD} if drives else {}), None
+        if drives or speed * OFFSET_SD > FAR * place_sd:
+            out |= {"time_offset_sd_s": OFFSET_SD} | walk
+        return out, None
     offset, sd = found
     if abs(offset) > max(SIGNIFICANT * sd, LEAST_OFFSET):
         out |= {"time_offset_s": round(offset, 3)}
         out |= {"time_offset_sd_s": round(max(2.0 * sd, LEAST_OFFSET_SD), 3)}
         return out | {"time_offset_drift_s_per_sqrt_s": APART}, None
-    if _speed(fixes) * sd > FAR * float(np.median(values_of(fixes, POSITION_SD)[:, :2])):
-        out |= {"time_offset_sd_s": max(round(2.0 * sd, 3), 0.001)}
+    if walk or speed * sd > FAR * place_sd:
+        out |= {"time_offset_sd_s": max(round(2.0 * sd, 3), 0.001)} | walk
     return out, None
 
 
@@ -483,21 +511,33 @@ def _antenna(aid: dict[str, Any]) -> Antenna:
 
 
 def _position_errors(fixes: pd.DataFrame, delay: float) -> dict[str, float]:
-    """Share of the positions' variance that lasts, and the uncertainty of a measured lever arm.
+    """Share of the positions' variance that lasts, factor of their sd, uncertainty of a tape.
 
-    By the scatter from fix to fix, which lacks what lasts.
+    The share by the scatter from fix to fix, which lacks what lasts; where the velocities show
+    what lasts, by its size, which a receiver may understate.
     """
     found = white_position_sd(fixes, delay)
     if found is None:
         return {}
     white, part = found
     assumed = "position_sd_taken" in fixes.attrs
-    lasting = min(1.0 - TAILS * part**2, LASTS_MOST)
-    if assumed:
-        lasting = LASTS_BY_PHASE if white < PHASE else LASTS_BY_CODE
-    out = {"position_correlated_share": round(lasting, 2)} if lasting >= LASTS else {}
     stated = float(np.nanmedian(values_of(fixes, POSITION_SD)[:, :2]))
-    if (white < PHASE) if assumed else (stated < SHOWS_ARM):
+    precise = white < PHASE if assumed else stated < SHOWS_ARM
+    by_velocity = None if precise else lasting_position_sd(fixes, delay)
+    least, lasting, total = LASTS, 1.0 - TAILS * part**2, 1.0
+    if by_velocity is not None:
+        least, quiet, slow = SHOWN, *(x**2 for x in by_velocity)
+        if "velocity_sd_taken" not in fixes.attrs and quiet + slow < MISSTATED**2:
+            total = max(1.0, quiet + slow)
+        lasting = 1.0 - max(min(TAILS * quiet, total - slow), quiet) / total
+    if assumed:
+        usual = LASTS_BY_PHASE if white < PHASE else LASTS_BY_CODE
+        lasting = usual if by_velocity is None else max(lasting, usual)
+    lasting = min(lasting, LASTS_MOST)
+    out = {"position_correlated_share": round(lasting, 2)} if lasting >= least else {}
+    if math.sqrt(total) >= UNDERSTATED:
+        out["position_sd_factor"] = round(math.sqrt(total), 2)
+    if precise:
         out["lever_arm_sd_m"] = ARM_SD
     return out
 

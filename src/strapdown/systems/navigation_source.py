@@ -25,6 +25,7 @@ from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.recording import Reading, StatedStart
 from strapdown.formats.trajectory_readers import read_trajectory
+from strapdown.navigation.measurements.gnss_readiness import without_repeats
 from strapdown.navigation.measurements.measurement import TabulatedMeasurement
 from strapdown.sensors.error_chain import child, normal
 from strapdown.systems.alignment_source import body_record
@@ -119,6 +120,9 @@ def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
     for name, table in tables.items():
         tables[name], shifted = on_clock_of(table, recording.imu)
         findings += [] if shifted is None else [shifted]
+        if set(GNSS) <= set(table.columns):
+            tables[name], repeats = without_repeats(tables[name])
+            findings += repeats
     if points is not None:
         points, shifted = on_clock_of(points, recording.imu)
         findings += [] if shifted is None else [shifted]

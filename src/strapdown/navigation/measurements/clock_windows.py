@@ -80,6 +80,20 @@ class Offsets:
         common = max(0.0, 1.0 - share) * used.sum()
         return offset, float(np.sqrt((share + common) / weight.sum()))
 
+    def drift(self) -> tuple[float, float] | None:
+        """Drift of the offset and its standard deviation, s/s; None without three windows."""
+        if len(self.offset) < 3:
+            return None
+        middle = self.spans.mean(axis=1)
+        weight = self.sd**-2.0
+        past = middle - float(weight @ middle / weight.sum())
+        spread = float(weight @ np.square(past))
+        rate = float((weight * past) @ self.offset) / spread
+        level = float(weight @ self.offset / weight.sum())
+        off = (self.offset - level - rate * past) / self.sd
+        scatter = max(1.0, float(off @ off) / (len(off) - 2))
+        return rate, float(np.sqrt(scatter / spread))
+
     def step(self) -> ClockStep | None:
         """The most likely single step, if it is significant."""
         best, found = np.inf, None

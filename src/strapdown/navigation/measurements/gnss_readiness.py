@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
+from scipy.optimize import nnls
 
 from strapdown.constants import MAD_TO_SD
 from strapdown.errors import DataError, Finding
@@ -19,7 +20,14 @@ from strapdown.navigation.measurements.gnss_clock import (
 from strapdown.tables import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD, check_gnss, find_gaps
 from strapdown.tables.checks import index_of, source_of, values_of
 
-__all__ = ["check_fixes", "gnss_readiness", "white_position_sd"]
+__all__ = [
+    "check_fixes",
+    "gnss_readiness",
+    "lasting_position_sd",
+    "repeated_rows",
+    "white_position_sd",
+    "without_repeats",
+]
 
 
 def gnss_readiness(
@@ -108,6 +116,71 @@ def white_position_sd(table: pd.DataFrame, delay: float = 0.0) -> tuple[float, f
     return float(np.sqrt(np.mean(white**2))), float(np.sqrt(np.mean(share**2)))
 
 
+def lasting_position_sd(table: pd.DataFrame, delay: float = 0.0) -> tuple[float, float] | None:
+    """Measure the errors of positions that last, by the velocities of the same receiver.
+
+    Positions less the integral of the velocities change from one instant to one t later by
+    ``2 w² + 2 s² (1 - exp(-t / T)) + q t`` in variance: white errors w, lasting ones s and the
+    noise of the velocities. Their stated noise q is subtracted, and w and s are fitted to lags
+    from one fix to `LAGS`, each by its median: less than half of the pairs may be faulty. The T
+    that fits best is one of `TIMES`: lags that short show little of it, and a longer one by a
+    smaller s.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Gnss table.
+    delay : float, s
+        Of its velocities.
+
+    Returns
+    -------
+    white, lasting : float
+        Standard deviations relative to the stated ones, horizontal, a component. None without
+        velocities, with too few fixes, or where the noise of the velocities hides what lasts.
+    """
+    columns = [*POSITION_SD[:2], *VELOCITY_SD[:2]]
+    sd, time = values_of(table, columns), index_of(table)
+    good = (values_of(table, ["quality"])[:, 0] > 0.0) & np.isfinite(sd).all(axis=1)
+    if good.sum() < LEAST_ROWS:
+        return None
+    sd, time = sd[good], time[good]
+    place, v = values_of(table, GEODETIC)[good], values_of(table, VELOCITY)[good][:, :2]
+    then = np.column_stack([np.interp(time, time - delay, one) for one in v.T])
+    apart = np.diff(time)
+    step = float(np.median(apart))
+    gained = np.gradient(then, time, axis=0)
+    way = 0.5 * (then[1:] + then[:-1]) * apart[:, None]
+    way -= np.diff(gained, axis=0) * np.square(apart)[:, None] / 12.0
+    off = place_difference(place[1:], place[:-1])[:, :2] - way
+    off = np.vstack([np.zeros(2), np.cumsum(off, axis=0)])
+    piece = np.append(0, np.cumsum(apart > (1.0 + UNEVEN) * step))
+    stated, noise = np.square(sd[:, :2]), np.square(sd[:, 2:]) * step
+    rows = []
+    for lag in sorted({1, *(max(1, round(x / step)) for x in LAGS)}):
+        same = piece[lag:] == piece[:-lag] if lag < len(time) else np.zeros(0, dtype=np.bool_)
+        if same.sum() < LEAST_ROWS:
+            continue
+        both = 0.5 * (stated[lag:] + stated[:-lag])[same]
+        u = np.abs(off[lag:] - off[:-lag])[same] / np.sqrt(both)
+        spread = 0.5 * float(np.mean(np.square(MAD_TO_SD * np.median(u, axis=0))))
+        grown = 0.5 * lag * step * float(np.median(noise[lag:][same] / both))
+        rows.append((lag * step, spread, grown))
+    if not rows or rows[-1][0] < LEAST_LAG:
+        return None
+    lags, spread, hidden = np.array(rows).T
+    if hidden[-1] > HIDDEN * spread[-1]:
+        return None
+    # A lag shows one independent pair in its own length.
+    weight = 1.0 / (np.maximum(spread, np.finfo(np.float64).tiny) * np.sqrt(lags))
+    fits = []
+    for last in TIMES:
+        A = np.column_stack([np.ones(len(lags)), 1.0 - np.exp(-lags / last)])
+        fits.append(nnls(A * weight[:, None], np.maximum(spread - hidden, 0.0) * weight))
+    white, lasting = np.sqrt(min(fits, key=lambda fit: fit[1])[0]).tolist()
+    return white, lasting
+
+
 # Errors of fixes that a Gnss table alone reveals.
 
 
@@ -116,6 +189,11 @@ Flags = NDArray[np.bool_]
 
 #: Number of fixes that show their scatter; a longer interval, relative to the usual, is a gap.
 LEAST_ROWS, UNEVEN = 30, 0.2
+#: Lags over which errors are shown to last, s, the longest that is needed, and the share of the
+#: noise of velocities in it that is too large.
+LAGS, LEAST_LAG, HIDDEN = (1.0, 2.0, 5.0, 10.0, 20.0, 40.0), 9.0, 0.5
+#: Correlation times that are tried, s.
+TIMES = (30.0, 100.0)
 #: Limits beyond any vehicle: a speed over the ground, m/s, and an acceleration, m/s².
 LARGEST_SPEED, LARGEST_ACCELERATION = 12_000.0, 60.0
 #: In standard deviations of the positions and of the displacement between them.
@@ -165,7 +243,7 @@ def check_fixes(table: pd.DataFrame) -> list[Finding]:
             )
         )
     found += _jumps(table, time, placed, fast, source)
-    found += _repeats(table, placed, fast, source)
+    found += _repeats(table, source)
     return found
 
 
@@ -287,32 +365,82 @@ def _jumps(
     ]
 
 
-def _repeats(table: pd.DataFrame, placed: Flags, fast: Flags, source: str | None) -> list[Finding]:
-    """Rows that are identical while the receiver reports motion."""
-    values = values_of(table, [*GEODETIC, *VELOCITY])
-    same = np.zeros(len(values), dtype=np.bool_)
-    same[1:] = (values[1:] == values[:-1]).all(axis=1) & placed[1:] & placed[:-1]
-    speed = np.linalg.norm(values[:, 3:], axis=1)
-    sd = np.where(fast, np.linalg.norm(values_of(table, VELOCITY_SD), axis=1), np.inf)
-    same &= speed > np.maximum(3.0 * sd, 0.5)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
-    runs = [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= ALIKE - 1]
-    if not runs:
+def _repeats(table: pd.DataFrame, source: str | None) -> list[Finding]:
+    """Rows that repeat an earlier fix while the vehicle moves."""
+    frozen, speed = repeated_rows(table)
+    if not frozen.any():
         return []
-    frozen = np.zeros(len(values), dtype=np.bool_)
-    for a, b in runs:
-        frozen[a:b] = True
-    first = int(runs[0][0])
     return [
         Finding(
             "navigation.receiver-repeats",
             file=source,
-            row=first + 1,
+            row=int(np.argmax(frozen)) + 1,
             quantity="lat, lon, alt, VN, VE, VD",
             rows=_rows(frozen),
-            speed=speed[first],
+            speed=speed,
         )
     ]
+
+
+def repeated_rows(table: pd.DataFrame) -> tuple[Flags, float]:
+    """Find rows that repeat the position and velocity of an earlier one while the vehicle moves.
+
+    Moving is what the repeated velocity states. Without it the position after them shows it: as far
+    off as the speed before and after makes in this time, and beyond the errors of positions. A
+    vehicle that has stopped is near where it stopped.
+
+    Parameters
+    ----------
+    table : DataFrame
+        Gnss table.
+
+    Returns
+    -------
+    rows : ndarray of bool, (n,)
+    speed : float, m/s
+        Of the vehicle in the first of them; 0 without any.
+    """
+    sd, velocity_sd = values_of(table, POSITION_SD), values_of(table, VELOCITY_SD)
+    good = values_of(table, ["quality"])[:, 0] > 0.0
+    placed = good & np.isfinite(sd).all(axis=1)
+    fast = good & np.isfinite(velocity_sd[:, :2]).all(axis=1)
+    place, time = values_of(table, GEODETIC), index_of(table)
+    velocity = np.where(np.isfinite(velocity_sd), values_of(table, VELOCITY), 0.0)
+    values = np.column_stack([place, velocity])
+    same = np.zeros(len(values), dtype=np.bool_)
+    same[1:] = (values[1:] == values[:-1]).all(axis=1) & placed[1:] & placed[:-1]
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
+    out, first = np.zeros(len(values), dtype=np.bool_), 0.0
+    for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        if b - a < ALIKE - 1:
+            continue
+        if fast[a]:
+            speed = float(np.linalg.norm(velocity[a]))
+            slip = np.where(np.isfinite(velocity_sd[a]), velocity_sd[a], 0.0)
+            moves = speed > max(3.0 * float(np.linalg.norm(slip)), 0.5)
+        elif a < 2 or b + 1 >= len(values):
+            continue
+        else:
+            ways = ways_between(place[[a - 2, a - 1, b, b + 1]])
+            speed = min(ways[0] / (time[a - 1] - time[a - 2]), ways[2] / (time[b + 1] - time[b]))
+            way = speed * (time[b] - time[a - 1])
+            blur = 5.0 * float(np.linalg.norm(sd[[a, b]]))
+            moves = way > blur and ways[1] > max(blur, 0.5 * way)
+        if moves:
+            out[a:b] = True
+            first = first or speed
+    return out, first
+
+
+def without_repeats(table: pd.DataFrame) -> tuple[pd.DataFrame, tuple[Finding, ...]]:
+    """Return fixes of which those that `repeated_rows` finds have no quality, and the finding."""
+    found = _repeats(table, source_of(table))
+    if not found:
+        return table, ()
+    out = table.copy()
+    out.attrs = dict(table.attrs)
+    out.loc[repeated_rows(table)[0], "quality"] = 0.0
+    return out, tuple(found)
 
 
 def _rows(struck: Flags) -> list[int | str]:

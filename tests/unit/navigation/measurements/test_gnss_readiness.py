@@ -24,7 +24,7 @@ from strapdown.navigation.measurements.gnss_clock import (
     time_offset,
     velocity_delay,
 )
-from strapdown.navigation.measurements.gnss_readiness import gnss_readiness
+from strapdown.navigation.measurements.gnss_readiness import gnss_readiness, without_repeats
 from strapdown.sensors.triad_errors import ImuErrors
 from strapdown.simulation import simulate_imu
 from strapdown.tables import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD, gnss_table
@@ -175,6 +175,26 @@ def test_gaps_jumps_and_repeats_are_told_with_their_rows():
     assert "repeats its fixes in rows" in frozen.what
     wild = inject_gnss_faults(table, [Outliers(share=0.1, size=50.0)])
     assert any("jumps" in one.what for one in gnss_readiness(remade(wild)))
+
+
+def test_a_frozen_receiver_is_found_by_positions_alone_and_one_that_stands_is_not():
+    alone = {"velocity_sd": (np.inf,) * 3}
+    table = remade(inject_gnss_faults(town.fixes(), [Frozen(60.0, 68.0)]), **alone)
+    left, (found,) = without_repeats(table)
+    assert found.code == "navigation.receiver-repeats"
+    time, dropped = table.index.to_numpy(), left["quality"].to_numpy() == 0.0
+    assert dropped.sum() >= 14
+    assert ((time[dropped] > 60.0) & (time[dropped] < 68.5)).all()
+    assert (table["quality"] > 0.0).all()
+    # It stops within 10 s, its receiver holds the position, and it drives off.
+    fresh = town.fixes()[GEODETIC].to_numpy()
+    place = fresh.copy()
+    ahead = np.linspace(0.0, 1.0, 21)[:, None]
+    place[100:121] = fresh[100] + (fresh[120] - fresh[100]) * (2.0 * ahead - ahead**2)
+    place[120:140] = place[120]
+    off = np.clip(np.arange(len(place) - 140) / 60.0, 0.0, 1.0)[:, None]
+    place[140:] = place[120] + (fresh[140:] - fresh[140]) * off
+    assert without_repeats(remade(town.fixes(), place=place, **alone))[1] == ()
 
 
 def test_jumps_are_found_in_places_alone():

@@ -6,7 +6,7 @@ from tests import town_drive as town
 
 from strapdown.alignment.course_sums import Antenna
 from strapdown.frames import geodetic_from_ned
-from strapdown.navigation.measurements.gnss_readiness import white_position_sd
+from strapdown.navigation.measurements.gnss_readiness import lasting_position_sd, white_position_sd
 from strapdown.systems.navigation_proposal import TAILS, _position_errors
 from strapdown.tables import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
 
@@ -15,10 +15,10 @@ SHARE = LASTING**2 / (LASTING**2 + WHITE**2)
 STATED = float(np.hypot(WHITE, LASTING))
 
 
-def fixes(seed, velocities=True, lasting=LASTING):
+def fixes(seed, velocities=True, lasting=LASTING, white=WHITE):
     table = town.fixes(seed, position_noise=1e-4)
     rng, k = np.random.default_rng(seed), np.exp(-0.5 / TIME)
-    error = WHITE * rng.normal(size=(len(table), 3))
+    error = white * rng.normal(size=(len(table), 3))
     slow = rng.normal(size=3)
     for row in error:
         row += lasting * slow
@@ -62,15 +62,53 @@ def test_the_scatter_from_fix_to_fix_lacks_what_lasts(velocities):
     assert white == pytest.approx(WHITE, rel=0.25)
     assert share == pytest.approx(white / STATED, rel=1e-6)
     proposed = _position_errors(table, 0.0)
-    assert proposed["position_correlated_share"] == pytest.approx(
-        1.0 - TAILS * (1.0 - SHARE), abs=0.09
-    )
+    # Velocities show the share itself; the scatter alone is taken for twice as large.
+    expected = SHARE if velocities else 1.0 - TAILS * (1.0 - SHARE)
+    assert proposed["position_correlated_share"] == pytest.approx(expected, abs=0.12)
     assert "lever_arm_sd_m" not in proposed
+
+
+@pytest.mark.parametrize("seed", [8511, 8512, 8513])
+def test_velocities_show_how_large_the_errors_are_that_last(seed):
+    table = fixes(seed)
+    white, lasting = lasting_position_sd(table)
+    # 160 s show three independent pairs of the longest lags, on two axes.
+    assert white * STATED == pytest.approx(WHITE, rel=0.3)
+    assert 0.5 * LASTING < lasting * STATED < 1.8 * LASTING
+    table[[*VELOCITY_SD]] = 2.0
+    assert lasting_position_sd(table) is None  # the velocities hide it
+    assert lasting_position_sd(fixes(seed, velocities=False)) is None
+
+
+def test_a_receiver_that_understates_what_lasts_gets_a_factor():
+    factors, false = [], 0
+    for seed in range(8521, 8527):
+        table = fixes(seed)
+        table[POSITION_SD] = 0.3 * STATED
+        proposed = _position_errors(table, 0.0)
+        assert proposed["position_correlated_share"] > 0.6
+        factors.append(proposed["position_sd_factor"])
+        false += "position_sd_factor" in _position_errors(fixes(seed), 0.0)
+    # Three independent pairs of the longest lags: one in some drives looks half as large again.
+    assert false <= 1
+    assert np.median(factors) == pytest.approx(1.0 / 0.3, rel=0.3)
+
+
+def test_a_share_between_white_and_lasting_is_proposed_where_velocities_show_it():
+    # By the scatter alone 1 - 2 (0.65 / 1.05)² is no share.
+    shares = []
+    for seed in range(8531, 8537):
+        table = fixes(seed, lasting=0.6, white=0.55)
+        table[POSITION_SD] = float(np.hypot(0.6, 0.55))
+        shares.append(_position_errors(table, 0.0).get("position_correlated_share", 0.0))
+    assert np.median(shares) > 0.35
 
 
 def test_white_errors_have_no_share_that_lasts():
     table = fixes(8502, lasting=0.0)
     table[POSITION_SD] = WHITE
+    assert _position_errors(table, 0.0) == {}
+    table[VELOCITY_SD] = np.inf
     assert _position_errors(table, 0.0) == {}
     assert white_position_sd(table.iloc[:20]) is None
 
