@@ -67,11 +67,12 @@ from strapdown.formats import (
     xsens,
 )
 from strapdown.formats.assemble import assemble
-from strapdown.formats.binary import first_bytes, or_sentences
+from strapdown.formats.binary import or_sentences
 from strapdown.formats.find_columns import names_of_quantities
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.quantity_columns import names_of_fixes
 from strapdown.formats.recording import NoStreamError, RawLog, ReadOptions, Recording
+from strapdown.formats.signs import HEAD, Signs, first_bytes
 from strapdown.plugins import plugin, plugins
 
 _log = logging.getLogger("strapdown")
@@ -327,6 +328,12 @@ READERS: dict[str, Reader] = {
     "inertial-explorer": Reader(
         inertial_explorer.TITLE, inertial_explorer.detect, {"reference": inertial_explorer.read}
     ),
+    "kitti-odometry": Reader(
+        kitti.ODOMETRY_TITLE,
+        kitti.detect_poses,
+        {"reference": kitti.read_poses},
+        kitti.files_of_poses,
+    ),
     "tum": Reader(tum.TITLE, tum.detect, {"reference": tum.read}),
     "rtklib": Reader("solution of RTKLIB (.pos)", gnss_pos.detect, {"gnss": gnss_pos.read}),
     "nmea": Reader(
@@ -378,11 +385,21 @@ READERS: dict[str, Reader] = {
 }
 
 
+#: What is in the file of a stranger can break any reader, and the libraries under it.
+_BROKEN = (ArithmeticError, LookupError, RuntimeError, StopIteration, TypeError, ValueError)
+
+
 def readers_of(path: Path) -> Iterator[tuple[str, Reader]]:
     """Yield the readers that recognize a file or folder, those of plug-ins last."""
-    yield from ((name, reader) for name, reader in READERS.items() if _detects(reader, path))
     others, broken = plugins("reader", Reader)
-    yield from ((name, reader) for name, reader in others.items() if _detects(reader, path))
+    data = first_bytes(path, HEAD)
+    for name, reader in (*READERS.items(), *others.items()):
+        try:
+            signs = reader.detect
+            if signs(path, data) if isinstance(signs, Signs) else signs(path):
+                yield name, reader
+        except _BROKEN:  # a file that breaks the detection of a format is not of it
+            _log.debug("%s: %s", path.name, reader.title, exc_info=True)
     for one in broken:
         _log.warning("%s", one)
 
@@ -390,19 +407,6 @@ def readers_of(path: Path) -> Iterator[tuple[str, Reader]]:
 def reader_of(path: Path) -> tuple[str, Reader | None]:
     """Return the reader that reads a file or folder, the first that recognizes it, and its name."""
     return next(readers_of(path), ("", None))
-
-
-#: What is in the file of a stranger can break any reader, and the libraries under it.
-_BROKEN = (ArithmeticError, LookupError, RuntimeError, StopIteration, TypeError, ValueError)
-
-
-def _detects(reader: Reader, path: Path) -> bool:
-    """Whether a format recognizes a file; a file that breaks its detection is not of it."""
-    try:
-        return reader.detect(path)
-    except _BROKEN:
-        _log.debug("%s: %s", path.name, reader.title, exc_info=True)
-        return False
 
 
 def open_stream(path: str | Path, stream: str, form: str | None = None) -> Raw:
@@ -558,7 +562,7 @@ def _not_recognized(path: Path) -> DataError:
         head = first_bytes(path, 8).hex(" ")
         return DataError("io.ending-no-known-format", file=path.name, suffix=path.suffix, head=head)
     inside = sorted(path.iterdir())[:MOST_NAMES]
-    may_be = [p for p in inside if any(_detects(r, p) for r in READERS.values())]
+    may_be = [p for p in inside if reader_of(p)[1] is not None]
     logs = [p.name for p in may_be if _has_sensors(p)]
     shown = logs or [p.name for p in inside]
     names = ", ".join(shown[:MOST_SHOWN]) + (" …" if len(shown) > MOST_SHOWN else "")

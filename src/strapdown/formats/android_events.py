@@ -7,8 +7,10 @@ gyroscope uncalibrated, 35 accelerometer uncalibrated), its string type
 axes and the sign of gravity are those of Android: rad/s, m/s² with gravity, µT, x right, y up, z
 out of the screen (developer.android.com/reference/android/hardware/SensorEvent). Linear
 acceleration and gravity are used only where there is no accelerometer: their sum. Short names are
-also those of other loggers, so that units and axes under them are left open. The unit of the stamps
-is inferred unless the header states it; Android's own are ns.
+also those of other loggers, so that units and axes under them are left open; so are units under the
+names of Android where the accelerometer has no gravity in m/s², as of applications that write deg/s
+and g. A name may state its unit: ``Gyroscope (deg/s)``. The unit of the stamps is inferred unless
+the header states it; Android's own are ns.
 
 A table of samples is none of these: its header names axes of sensors (``ax``, ``gyro_x``). Small
 whole numbers are kinds only under a name that says so or without a header, and only if the values
@@ -36,9 +38,11 @@ from strapdown.formats.columns import read_name
 from strapdown.formats.inference.conclusion import infer_accel
 from strapdown.formats.join import join
 from strapdown.formats.judge import LIKELY
-from strapdown.formats.known_text import head, split
+from strapdown.formats.known_text import split
 from strapdown.formats.phones import force_of, sensor_log
 from strapdown.formats.recording import RawLog
+from strapdown.formats.signs import Signs, head
+from strapdown.units import TIME_UNITS
 
 KINDS = {
     "gyro": ("4", "gyro", "gyr", "gyroscope", "rotationrate", "angularvelocity"),
@@ -51,26 +55,36 @@ KINDS = {
 }
 UNITS = {"gyro": "rad/s", "accel": "m/s2", "mag": "uT"}
 _OF = {word: kind for kind, words in KINDS.items() for word in words}
+_UNIT = re.compile(r"\s*[\[(][^\])]*[\])]$")
 _STAMP = re.compile(r"\d+(?:\.\d+)?")
 #: Names of the column of kinds in a header, where the kinds are numbers.
 _HEADED = re.compile(r"(sensor|event)?[\s_-]*(type|kind|id|sensor|name|event)?", re.I)
 # Specific force of most rows of an accelerometer, m/s²; a hand or a vehicle changes it less.
 _GRAVITY = (6.0, 14.0)
+_FORCES = ("accel", "accel uncalibrated", "gravity")
 # Rows at the top by which the layout is told.
 TOP = 200
 
 
 def kind_of(field: str) -> str | None:
-    """Return the kind of sensor that a field names."""
-    word = field.strip(" \"'").lower().removeprefix("android.sensor.").removeprefix("type_")
+    """Return the kind of sensor that a field names, with or without its unit in brackets."""
+    word = _UNIT.sub("", field.strip(" \"'").lower())
+    word = word.removeprefix("android.sensor.").removeprefix("type_")
     # Neither -4 nor 1.6 is a kind.
     letters = re.search("[a-z]", word)
     return _OF.get(re.sub(r"[^a-z0-9]", "", word) if letters else word)
 
 
-def detect(path: Path) -> bool:
-    """Detect by a gyroscope and another sensor among the kinds of the first rows."""
+def _has_layout(path: Path) -> bool:
+    """Whether a gyroscope and another sensor are among the kinds of the first rows."""
     return csv.detect(path) and _layout(head(path, 1 << 16)) is not None
+
+
+detect = Signs(
+    # A kind that is a gyroscope.
+    text=r"(?i)gyr|rotation|angular|(?:^|[,;\t |])[ \"']*(?:4|16)[ \"']*[,;\t |]",
+    also=_has_layout,
+)
 
 
 def _layout(text: str) -> tuple[int, int, str | None] | None:
@@ -83,7 +97,8 @@ def _layout(text: str) -> tuple[int, int, str | None] | None:
     header = rows[0] if len(rows[0]) >= 5 and not csv.are_data(rows[0][2:]) else []
     if any(_is_axis_of_sensor(name) for name in header):
         return None
-    unit = read_name(rows[0][0]).unit or (read_name(rows[0][1]).unit if rows[0][1:] else None)
+    units = [read_name(name).unit for name in rows[0][:2]]
+    unit = next((u for u in units if u in TIME_UNITS), None)
     body = [r for r in rows[1:-1] if len(r) >= 5]
     if len(body) < 0.9 * (len(rows) - 2):
         return None
@@ -130,7 +145,7 @@ def _are_of_android(rows: list[tuple[str, ...]]) -> bool:
         sizes.setdefault(kind_of(field), []).append(size)
     usual = {kind: statistics.median(held) for kind, held in sizes.items()}
     low, high = _GRAVITY
-    force = [usual[k] for k in ("accel", "accel uncalibrated", "gravity") if k in usual]
+    force = [usual[k] for k in _FORCES if k in usual]
     turns = [usual[k] for k in ("gyro", "gyro uncalibrated") if k in usual]
     return (
         bool(force)
@@ -160,8 +175,8 @@ def read(path: Path) -> RawLog:
     kind, stamp, unit = layout
     separator = None
     events: dict[str, list[tuple[Any, ...]]] = {}
+    names: dict[str, str] = {}
     unknown: set[str] = set()
-    android = False
     lines = text.splitlines()
     for row, line in enumerate(lines, 1):
         if not line.strip() or csv.is_comment(line):
@@ -181,8 +196,7 @@ def read(path: Path) -> RawLog:
             raise DataError(
                 "io.fields-expected", file=path.name, row=row, count=len(fields), width=5
             )
-        word = fields[kind].strip(" \"'").lower()
-        android |= word.isdigit() or word.startswith(("android.sensor.", "type_"))
+        names.setdefault(which, fields[kind])
         events.setdefault(which, []).append((row, fields[stamp], *fields[2:5]))
     others = sorted(u for u in unknown if u and not read_name(u).quantity)[:6]
     if others:
@@ -190,7 +204,15 @@ def read(path: Path) -> RawLog:
             Finding("io.events-not-used", file=path.name, severity="note", kinds=others)
         )
     columns = {k: _columns(path, k, rows) for k, rows in events.items()}
-    return joined(path, columns, unit, findings, android=android)
+    android = any(
+        (word := name.strip(" \"'").lower()).isdigit()
+        or word.startswith(("android.sensor.", "type_"))
+        for name in names.values()
+    )
+    units = {k: read_name(name).unit for k, name in names.items()}
+    if android and not any(units.values()) and _has_units_of_android(columns):
+        units = {k: UNITS.get(k.partition(" ")[0], "m/s2") for k in names}
+    return joined(path, columns, {**units, "time": unit}, findings, android=android)
 
 
 def _columns(path: Path, kind: str, rows: list[tuple[Any, ...]]) -> dict[str, NDArray[Any]]:
@@ -215,6 +237,16 @@ def _columns(path: Path, kind: str, rows: list[tuple[Any, ...]]) -> dict[str, ND
     return out
 
 
+def _has_units_of_android(events: Mapping[str, dict[str, NDArray[Any]]]) -> bool:
+    """Whether an accelerometer, if there is one, has gravity in m/s².
+
+    Applications write values in deg/s and g under the names of Android, too.
+    """
+    forces = [np.column_stack([events[k][a] for a in "xyz"]) for k in _FORCES if k in events]
+    usual = [float(np.median(np.linalg.norm(force, axis=1))) for force in forces]
+    return all(_GRAVITY[0] <= size <= _GRAVITY[1] for size in usual)
+
+
 def _has_gravity(events: Mapping[str, dict[str, NDArray[Any]]]) -> bool:
     """Whether events named linear acceleration have gravity, as those of ROS do."""
     values = np.column_stack([events["linear"][a] for a in "xyz"]).astype(np.float64)
@@ -225,14 +257,15 @@ def _has_gravity(events: Mapping[str, dict[str, NDArray[Any]]]) -> bool:
 def joined(
     path: Path,
     events: Mapping[str, dict[str, NDArray[Any]]],
-    unit: str | None,
+    units: Mapping[str, str | None],
     findings: list[Finding],
     *,
     android: bool,
 ) -> RawLog:
     """Join the events of each kind on the stamps of the gyro.
 
-    `android`: units and axes are those of Android; otherwise they are left open.
+    `units`: by kind, and of ``time``; None where left open. `android`: axes are those of Android;
+    otherwise they are left open.
     """
 
     def log(kind: str, triad: str) -> RawLog:
@@ -242,8 +275,8 @@ def joined(
             path,
             held,
             triad,
-            UNITS[triad],
-            time=("time", unit or ""),
+            units.get(kind),
+            time=("time", units["time"] or ""),
             rows=events[kind]["row"],
         )
 
@@ -270,7 +303,4 @@ def joined(
         one.stated = {c: (q, u or None) for c, (q, u) in one.stated.items()}
     out = join(logs, path.name, (path,))
     out.findings[:0] = findings
-    if android:
-        return out
-    stated = {c: (q, u if q == "time" else None) for c, (q, u) in out.stated.items()}
-    return dataclasses.replace(out, stated=stated, axes=None)
+    return out if android else dataclasses.replace(out, axes=None)

@@ -11,6 +11,7 @@ printed on the monitor.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,9 @@ import numpy as np
 from strapdown.errors import DataError, Finding
 from strapdown.formats.clocks import UNIX
 from strapdown.formats.hdf5 import SIGNATURE, read_arrays
-from strapdown.formats.known_text import column, head, lacking, split, under
+from strapdown.formats.known_text import column, lacking, split, under
 from strapdown.formats.recording import RawLog
+from strapdown.formats.signs import Signs, first_bytes, head
 from strapdown.units import unit_of
 
 TITLE = "APDM Opal"
@@ -32,15 +34,18 @@ SETS = {
 }
 
 
-def detect(path: Path) -> bool:
-    """Detect by the lines above the table, or by the attributes of the HDF5."""
-    if not path.is_file():
-        return False
-    with path.open("rb") as stream:
-        if stream.read(8) == SIGNATURE:
-            return bool(_groups(path))
+def _has_monitor(path: Path) -> bool:
+    """Whether there are lines of Motion Studio above a table, or groups of it in HDF5."""
+    if first_bytes(path, 8) == SIGNATURE:
+        return bool(_groups(path))
     text = head(path)
     return text.startswith("Test Name:") and "/Angular Velocity/X" in text
+
+
+detect = Signs(
+    first=re.escape(SIGNATURE) + rb"|(?:\xef\xbb\xbf)?Test Name:|\xff\xfe|\xfe\xff",
+    also=_has_monitor,
+)
 
 
 def read(path: Path) -> RawLog:

@@ -28,6 +28,7 @@ from strapdown.formats.file_options import FileOptions
 from strapdown.formats.find_columns import Column
 from strapdown.formats.recording import RawLog, TruthInSensorAxes
 from strapdown.formats.sensor_folder import file_member, first_line
+from strapdown.formats.signs import Signs
 from strapdown.formats.tum import poses
 from strapdown.formats.writing import (
     Tables,
@@ -58,11 +59,20 @@ LONGEST_STEP = 0.1  # s
 MOST_TILT = 15.0  # deg
 
 
-def detect(path: Path) -> bool:
-    """Detect by the header of the table, or of the inertial sensor's table in a folder."""
-    if path.is_dir():
-        return _imu_of(path) is not None or _truth_of(path) is not None
-    return path.suffix.lower() == ".csv" and (_is_imu(path) or _is_truth(path))
+def _has_names(path: Path) -> bool:
+    return _is_imu(path) or _is_truth(path)
+
+
+def _has_tables(folder: Path) -> bool:
+    return _imu_of(folder) is not None or _truth_of(folder) is not None
+
+
+detect = Signs(
+    suffixes=(".csv",),
+    text=r"(?i)\A\s*(?=.*timestamp)(?=.*(?:w_rs_s_x|q_rs_w))",
+    also=_has_names,
+    folder=_has_tables,
+)
 
 
 def read(path: Path) -> RawLog:

@@ -24,7 +24,6 @@ from strapdown.tables import trajectory_table
 __all__ = [
     "Quantities",
     "damage",
-    "first_bytes",
     "interpolated",
     "or_sentences",
     "solution",
@@ -37,15 +36,6 @@ Quantities = dict[str, tuple[NDArray[Any], str | None]]
 
 
 _SENTENCE = re.compile(rb"\$[A-Z]{5},[ -#%-)+-~]*\*[0-9A-Fa-f]{2}")
-
-
-def first_bytes(path: Path, count: int) -> bytes:
-    """Return the first bytes of a file; none of a folder or an unreadable file."""
-    try:
-        with path.open("rb") as stream:
-            return stream.read(count)
-    except OSError:
-        return b""
 
 
 @contextmanager

@@ -13,13 +13,12 @@ from strapdown.formats import hdf5
 from strapdown.formats.arrays import raw_log
 from strapdown.formats.assemble import LOST
 from strapdown.formats.recording import RawLog, TruthInSensorAxes
+from strapdown.formats.signs import Signs
 from strapdown.rotation import Q_NED_ENU
 
 
-def detect(path: Path) -> bool:
-    """Whether this is an HDF5 file with the datasets of BROAD."""
-    if path.suffix.lower() not in hdf5.SUFFIXES or not hdf5.detect(path):
-        return False
+def _has_trial(path: Path) -> bool:
+    """Whether HDF5 has the datasets of BROAD."""
     import h5py
 
     try:
@@ -27,6 +26,9 @@ def detect(path: Path) -> bool:
             return {"imu_gyr", "imu_acc", "opt_quat"} <= set(file)
     except OSError:
         return False
+
+
+detect = Signs(suffixes=hdf5.SUFFIXES, also=_has_trial)
 
 
 def read(path: Path) -> RawLog:

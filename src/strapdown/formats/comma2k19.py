@@ -24,6 +24,7 @@ from strapdown.formats.clocks import RELATIVE, Clock
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.join import join
 from strapdown.formats.recording import NoStreamError, RawLog, TruthInSensorAxes
+from strapdown.formats.signs import Signs
 
 __all__ = ["belongs", "detect", "files_of", "read", "read_fixes"]
 
@@ -41,9 +42,12 @@ AXES = "x,y,z"
 LONGEST_STEP = 0.5  # s
 
 
-def detect(path: Path) -> bool:
+def _has_arrays(folder: Path) -> bool:
     """Whether a folder has the arrays of the gyro or of a receiver."""
-    return path.is_dir() and (_find(path, "IMU", "gyro", "t") is not None or bool(files_of(path)))
+    return _find(folder, "IMU", "gyro", "t") is not None or bool(files_of(folder))
+
+
+detect = Signs(folder=_has_arrays)
 
 
 def read(path: Path) -> RawLog:

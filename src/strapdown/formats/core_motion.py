@@ -24,6 +24,7 @@ from strapdown.formats.columns import read_name
 from strapdown.formats.known_text import column, names_of, stated_by, under
 from strapdown.formats.phones import AXES
 from strapdown.formats.recording import RawLog
+from strapdown.formats.signs import Signs
 
 WORDS = {
     "gyro": ("rotationrate", "motionrotationrate", "rotrate"),
@@ -32,9 +33,12 @@ WORDS = {
 }
 
 
-def detect(path: Path) -> bool:
-    """Detect by the names of the three vectors."""
+def _has_vectors(path: Path) -> bool:
+    """Whether the first line names the three vectors."""
     return csv.detect(path) and len(_named(names_of(path))) == 9
+
+
+detect = Signs(text=r"(?i)\A.*grav", also=_has_vectors)
 
 
 def _named(names: list[str]) -> dict[str, str]:

@@ -24,6 +24,7 @@ from strapdown.formats.columns import read_name
 from strapdown.formats.dates import is_date, is_day_time, is_stamp
 from strapdown.formats.preamble import stated_by_keys, stated_rate, stated_units
 from strapdown.formats.recording import RawLog, stated_by
+from strapdown.formats.signs import HEAD, Signs, first_bytes
 from strapdown.formats.text_columns import NULLS, Columns, columns_at_once, parsed
 from strapdown.units import unit_of
 
@@ -36,8 +37,6 @@ _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?|[+-]?nan|[+-]
 _COMMAS = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?(\s+[+-]?\d+(,\d+)?([eE][+-]?\d+)?)+")
 _UNIT = re.compile(r"\s*[\[(].*")
 _HEX = re.compile(r"[+-]?0x[0-9a-f]+", re.I)
-# Bytes of a text that are examined to learn how its table begins.
-HEAD = 1 << 16
 #: Lines at the top of a text in which its rows of numbers are searched, their characters, and the
 #: fields of each that are judged.
 SEARCHED, SEARCHED_TEXT, JUDGED = 400, 1 << 20, 200
@@ -48,21 +47,21 @@ _BREAKS = re.compile("[\x0b\x0c\x1c\x1d\x1e\x85\u2028\u2029]|\r(?!\n)")
 Lines = list[tuple[int, str]]
 
 
-def detect(path: Path) -> bool:
-    """Whether the name is that of a text table, or the first lines are."""
-    if not path.is_file() or path.suffix.lower() in SUFFIXES:
-        return path.is_file()
-    with path.open("rb") as stream:
-        head = stream.read(HEAD)
-    if not head.strip():
+def _begins_with_rows(path: Path) -> bool:
+    """Whether the first lines are rows of data under any name."""
+    data = first_bytes(path, HEAD)
+    if not data.strip():
         return False
     try:
-        text, _ = decoded(head[: head.rfind(b"\n") + 1] or head, path.name)
+        text, _ = decoded(data[: data.rfind(b"\n") + 1] or data, path.name)
     except DataError:
         return False
     lines = _rewritten(_numbered(text)[0])[-21:]
     rows = [fields_of(line, separator_of(line)) for _, line in lines[:-1] or lines]
     return len(rows) > 2 and all(len(row) > 2 and are_data(row) for row in rows)
+
+
+detect = Signs(named=SUFFIXES, also=_begins_with_rows)
 
 
 def read(path: Path) -> RawLog:

@@ -26,9 +26,10 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.errors import DataError, Finding
-from strapdown.formats.binary import Quantities, damage, first_bytes, interpolated, solution, turned
+from strapdown.formats.binary import Quantities, damage, interpolated, solution, turned
 from strapdown.formats.clocks import RELATIVE, Clock
 from strapdown.formats.recording import NoStreamError, RawLog
+from strapdown.formats.signs import Signs
 
 TITLE = "ArduPilot DataFlash log (.bin, .log)"
 STREAMS = {"imu": "IMU", "gnss": "GPS", "reference": "POS", "magnetometer": "MAG"}
@@ -68,13 +69,8 @@ Record = dict[str, NDArray[Any]]
 _TEXT = re.compile(rb"(?:\A|\n)FMT, ?128, ?89, ?FMT,")
 
 
-def detect(path: Path) -> bool:
-    """Detect by the first record, which describes itself."""
-    if _TEXT.search(first_bytes(path, 4096)):
-        return True
-    return first_bytes(path, 4) == SYNC + bytes([FMT, FMT]) or (
-        first_bytes(path, 3) == SYNC + bytes([FMT]) and path.suffix.lower() == ".bin"
-    )
+# The first record describes itself.
+detect = Signs(first=rb"\xa3\x95\x80|(?:.{0,4095}\n)?FMT, ?128, ?89, ?FMT,")
 
 
 @lru_cache(maxsize=1)

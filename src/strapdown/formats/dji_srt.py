@@ -26,8 +26,8 @@ import numpy as np
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.clocks import RELATIVE
-from strapdown.formats.known_text import head
 from strapdown.formats.recording import RawLog
+from strapdown.formats.signs import Signs, head
 
 _TIME = re.compile(r"(\d+):(\d\d):(\d\d)[,.](\d{1,3})\s*-->")
 _NUMBER = r"\s*([+-]?\d+(?:\.\d+)?)\s*"
@@ -38,10 +38,12 @@ _UP = re.compile(r"\b(?:rel_alt\s*:|H(?=\s)|BAROMETER\s*:)" + _NUMBER, re.I)
 _PAIR = re.compile(r"\bGPS\s*\(" + _NUMBER + "," + _NUMBER + ",")
 
 
-def detect(path: Path) -> bool:
-    """Detect by the stamps of subtitles with positions among them."""
-    text = head(path, 4096) if path.is_file() else ""
+def _has_positions(path: Path) -> bool:
+    text = head(path, 4096)
     return bool(_TIME.search(text) and (_LAT.search(text) or _PAIR.search(text)))
+
+
+detect = Signs(text=_TIME.pattern, also=_has_positions)
 
 
 def read(path: Path) -> RawLog:

@@ -15,14 +15,9 @@ from typing import Any
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.recording import RawLog, library
+from strapdown.formats.signs import Signs
 
-
-def detect(path: Path) -> bool:
-    """Detect by the name, and by the signature of an archive."""
-    if not path.is_file() or path.suffix.lower() not in (".xlsx", ".xlsm"):
-        return False
-    with path.open("rb") as stream:
-        return stream.read(4) == b"PK\x03\x04"
+detect = Signs(suffixes=(".xlsx", ".xlsm"), first=rb"PK\x03\x04")
 
 
 def read(path: Path) -> RawLog:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError
 from strapdown.formats import hdf5
 from strapdown.formats.recording import RawLog
+from strapdown.formats.signs import Signs
 
 __all__ = ["detect", "detect_points", "read", "read_points"]
 
@@ -25,9 +26,11 @@ LOG, POINTS = ("timestamps", "imu_data"), ("strideIndex", "GCP")
 COLUMNS = [*(f"accel_{a}" for a in "xyz"), *(f"gyro_{a}" for a in "xyz")]
 
 
-def detect(path: Path) -> bool:
-    """Detect by the names of the arrays."""
+def _has_log(path: Path) -> bool:
     return set(LOG) <= _names(path)
+
+
+detect = Signs(suffixes=(".mat",), also=_has_log)
 
 
 def detect_points(path: Path) -> bool:

@@ -25,6 +25,7 @@ from strapdown.formats.clocks import RELATIVE, UNIX
 from strapdown.formats.join import join
 from strapdown.formats.known_text import lacking
 from strapdown.formats.recording import RawLog, library
+from strapdown.formats.signs import Signs
 
 TITLE = "Garmin FIT"
 #: Degrees of a semicircle.
@@ -37,13 +38,7 @@ SENSORS = {
 Message = dict[str, Any]
 
 
-def detect(path: Path) -> bool:
-    """Detect by the signature in the header of the file."""
-    if not path.is_file():
-        return False
-    with path.open("rb") as stream:
-        first = stream.read(14)
-    return first[8:12] == b".FIT" and first[0] in (12, 14)
+detect = Signs(first=rb"[\x0c\x0e].{7}\.FIT")
 
 
 def read(path: Path) -> RawLog:

@@ -23,8 +23,9 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.formats.clocks import RELATIVE, Clock, with_clock
 from strapdown.formats.columns import read_name
-from strapdown.formats.known_text import column, head, lacking, under
+from strapdown.formats.known_text import column, lacking, under
 from strapdown.formats.recording import RawLog
+from strapdown.formats.signs import Signs, head
 from strapdown.rotation import dcm_from_euler
 from strapdown.tables import trajectory_table
 
@@ -33,11 +34,14 @@ _TABLES = re.compile(r"(gyro|accel|mag|gps)-\d+\.csv|ref_\w+\.csv|(gps_)?time\.c
 NED = {"vN": "VN", "vE": "VE", "vD": "VD"}
 
 
-def detect(path: Path) -> bool:
-    """Detect by the stamps and a table named after a sensor or the reference."""
+def _has_stamps(path: Path) -> bool:
+    """Whether the folder, or that of a table, has stamps and a table of a sensor or a reference."""
     folder = _folder(path)
     stamps = head(folder / "time.csv", 64)
     return stamps.startswith("time (sec)") and bool(_streams(folder))
+
+
+detect = Signs(suffixes=(".csv",), text=r"\A\w+ \(", also=_has_stamps, folder=_has_stamps)
 
 
 def _folder(path: Path) -> Path:

@@ -26,9 +26,9 @@ from strapdown.formats.clocks import UNIX, Clock
 from strapdown.formats.find_columns import Column
 from strapdown.formats.gnss_fixes import RADIUS, UNSTATED_VERTICAL, Fixes
 from strapdown.formats.join import join
-from strapdown.formats.known_text import head
 from strapdown.formats.phones import sensor_log
 from strapdown.formats.recording import RawLog
+from strapdown.formats.signs import Signs, head
 from strapdown.formats.text_columns import parsed
 
 Array = NDArray[np.float64]
@@ -62,16 +62,17 @@ MOST_DRIFT = 0.05  # s
 HEAD = 1 << 16  # bytes
 
 
-def detect(path: Path) -> bool:
-    """Detect by the header of a table, or by the comments that define the fields."""
-    if not csv.detect(path):
-        return False
-    return any(
+def _has_header(path: Path) -> bool:
+    """Whether there is the header of a table, or comments that define the fields."""
+    return csv.detect(path) and any(
         line.startswith(HEADER)
         or _is_description(line, ("UncalGyro", "Gyro", FIX))
         or _is_fix_header(line)
         for line in head(path, HEAD).splitlines()
     )
+
+
+detect = Signs(text=rf"^(?:MessageType,|#.*(?:Gyro|{FIX}))", also=_has_header)
 
 
 def _is_description(line: str, kinds: tuple[str, ...]) -> bool:

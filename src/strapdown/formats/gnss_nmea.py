@@ -22,6 +22,7 @@ from strapdown.formats import csv
 from strapdown.formats.clocks import RELATIVE, UNIX, Clock
 from strapdown.formats.file_options import FileOptions
 from strapdown.formats.gnss_fixes import Fixes
+from strapdown.formats.signs import Signs
 from strapdown.formats.writing import (
     Tables,
     dates,
@@ -41,13 +42,8 @@ _KNOT = 1852.0 / 3600.0  # m/s
 _NAN3 = (np.nan, np.nan, np.nan)
 
 
-def detect(path: Path) -> bool:
-    """Detect by a sentence among the first lines."""
-    if not path.is_file():
-        return False
-    with path.open("rb") as stream:
-        head = stream.read(csv.HEAD).decode("latin-1")
-    return any(line.startswith(("$GP", "$GN", "$GL", "$GA", "$GB")) for line in head.splitlines())
+# A sentence among the first lines.
+detect = Signs(first=rb"(?:.*?[\r\n])?\$G[PNLAB]")
 
 
 @dataclass

@@ -21,6 +21,7 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.clocks import GPS, WEEK, Clock, leap_seconds
 from strapdown.formats.gnss_fixes import Fixes
+from strapdown.formats.signs import Signs
 from strapdown.formats.text_columns import columns_at_once
 from strapdown.frames import geodetic_from_ecef, q_ne
 
@@ -38,15 +39,11 @@ _DAYS_OF_1980 = 3657  # from 1970-01-01 to 1980-01-06
 _XYZ = ["x-ecef(m)", "y-ecef(m)", "z-ecef(m)"]
 
 
-def detect(path: Path) -> bool:
-    """Detect by the name, or by the line that names the columns."""
-    if not path.is_file():
-        return False
-    if path.suffix.lower() == SUFFIX:
-        return True
-    with path.open("rb") as stream:
-        head = stream.read(csv.HEAD).decode("latin-1")
-    return any(_header(line) for line in head.splitlines() if line.startswith("%"))
+# The line that names the columns.
+detect = Signs(
+    named=(SUFFIX,),
+    text=r"^%[ \t]*(?i:GPST|UTC|JST)\b.*(?:latitude\(|x-ecef\(|e-baseline\(|longitude\()",
+)
 
 
 def _header(line: str) -> re.Match[str] | None:

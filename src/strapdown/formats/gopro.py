@@ -30,9 +30,10 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError
 from strapdown.formats.clocks import RELATIVE, UNIX
 from strapdown.formats.join import join
-from strapdown.formats.known_text import from_json, head, lacking
+from strapdown.formats.known_text import from_json, lacking
 from strapdown.formats.mp4_telemetry import telemetry_of
 from strapdown.formats.recording import RawLog
+from strapdown.formats.signs import Signs, first_bytes, head
 from strapdown.units import unit_of
 
 TITLE = "GoPro telemetry"
@@ -69,16 +70,20 @@ class Stream:
     time: Array | None = None
 
 
-def detect(path: Path) -> bool:
-    """Detect by the first key of GPMF, a ``gpmd`` track, or the streams of the JSON."""
-    if not path.is_file():
-        return False
-    with path.open("rb") as stream:
-        first = stream.read(12)
-    if first[:4] == b"DEVC" or first[4:8] == b"ftyp":
+def _has_telemetry(path: Path) -> bool:
+    """Whether a video has a ``gpmd`` track, or a JSON the streams."""
+    first = first_bytes(path, 8)
+    if first[:4] == b"DEVC" or first[4:] == b"ftyp":
         return first[:4] == b"DEVC" or telemetry_of(path) is not None
     text = head(path, 4096) if path.suffix.lower() == ".json" else ""
     return text.lstrip().startswith("{") and '"streams"' in text and '"samples"' in text
+
+
+# Text in UTF-16 too.
+detect = Signs(
+    first=rb"DEVC|.{4}ftyp|(?:\xef\xbb\xbf)?\s*\{|\xff\xfe|\xfe\xff",
+    also=_has_telemetry,
+)
 
 
 def read(path: Path) -> RawLog:

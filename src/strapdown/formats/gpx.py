@@ -17,8 +17,9 @@ import numpy as np
 from strapdown.errors import DataError, Finding
 from strapdown.formats.clocks import UNIX
 from strapdown.formats.file_options import FileOptions
-from strapdown.formats.known_text import head, selected
+from strapdown.formats.known_text import selected
 from strapdown.formats.recording import RawLog, library
+from strapdown.formats.signs import Signs
 from strapdown.formats.trajectory_csv import one_line
 from strapdown.formats.writing import (
     Tables,
@@ -34,9 +35,7 @@ from strapdown.tables.checks import values_of
 QUALITY = {"none": 0.0, "dgps": 2.0, "pps": 3.0}
 
 
-def detect(path: Path) -> bool:
-    """Detect by the first element of the XML."""
-    return path.is_file() and "<gpx" in head(path, 4096)
+detect = Signs(text=r"\A[\s\S]{0,4092}<gpx")
 
 
 def read(path: Path) -> RawLog:

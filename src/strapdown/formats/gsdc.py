@@ -14,22 +14,18 @@ from pathlib import Path
 
 from strapdown.errors import DataError
 from strapdown.formats.clocks import UNIX, unix_from_gps
-from strapdown.formats.known_text import column, head, optional, stated_by, under
+from strapdown.formats.known_text import column, optional, stated_by, under
 from strapdown.formats.recording import RawLog
+from strapdown.formats.signs import Signs
 
 TRUTH = "collectionName,phoneName,millisSinceGpsEpoch,latDeg,lngDeg,"
 RAW = ("ReceivedSvTimeNanos", "receivedSvTimeInGpsNanos", "rawPrM")
 
 
-def detect(path: Path) -> bool:
-    """Detect by the header of the positions of 2021."""
-    return path.is_file() and head(path, 256).startswith(TRUTH)
+detect = Signs(text=rf"\A{TRUTH}")
 
 
-def detect_raw(path: Path) -> bool:
-    """Detect by the header of a table of pseudoranges."""
-    line = head(path).partition("\n")[0] if path.is_file() else ""
-    return line.startswith(("MessageType,", "collectionName,")) and any(n in line for n in RAW)
+detect_raw = Signs(text=rf"\A(?:MessageType|collectionName),.*(?:{'|'.join(RAW)})")
 
 
 def read(path: Path) -> RawLog:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError
 from strapdown.formats.arrays import raw_log, refuse_lie
 from strapdown.formats.recording import RawLog
+from strapdown.formats.signs import Signs, first_bytes
 
 if TYPE_CHECKING:
     import h5py
@@ -22,13 +23,13 @@ SUFFIXES = (".h5", ".hdf5", ".hdf", ".mat")
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 
-def detect(path: Path) -> bool:
-    """Whether the content is HDF5; MATLAB prepends 512 bytes."""
-    if not path.is_file() or path.suffix.lower() not in SUFFIXES:
-        return False
-    with path.open("rb") as stream:
-        start = stream.read(1024)
+def _is_hdf5(path: Path) -> bool:
+    """Whether a file of MATLAB is HDF5, to which 512 bytes are prepended; others are by name."""
+    start = first_bytes(path, 1024)
     return path.suffix.lower() != ".mat" or SIGNATURE in (start[:8], start[512:520])
+
+
+detect = Signs(suffixes=SUFFIXES, also=_is_hdf5)
 
 
 def read(path: Path) -> RawLog:
@@ -121,9 +122,11 @@ def write(
 _HEADER = b"MATLAB 5.0 MAT-file, written by strapdown"
 
 
-def detect_matlab(path: Path) -> bool:
-    """Whether the name is that of a MATLAB file and the content is not HDF5."""
-    return path.is_file() and path.suffix.lower() == ".mat" and not detect(path)
+def _is_old(path: Path) -> bool:
+    return not _is_hdf5(path)
+
+
+detect_matlab = Signs(suffixes=(".mat",), also=_is_old)
 
 
 def read_matlab(path: Path) -> RawLog:

@@ -20,11 +20,11 @@ import pandas as pd
 from strapdown import rotation
 from strapdown.errors import DataError
 from strapdown.formats import csv
-from strapdown.formats.binary import damage, first_bytes, solution
+from strapdown.formats.binary import damage, solution
 from strapdown.formats.clocks import GPS, WEEK, Clock
+from strapdown.formats.signs import Signs
 
 TITLE = "text export of Inertial Explorer"
-_PROGRAM = re.compile(rb"^\s*Program:\s+Inertial Explorer", re.M)
 _UNIT = re.compile(r"\([^)]*\)|\S+")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 PLACE, ANGLES = ("latitude", "longitude", "h-ell"), ("roll", "pitch", "heading")
@@ -34,9 +34,8 @@ UNITS |= {"longitude": UNITS["latitude"], **dict.fromkeys(ANGLES, ("deg",))}
 UNITS |= dict.fromkeys((*LEVEL, *BODY), ("m/s",))
 
 
-def detect(path: Path) -> bool:
-    """Detect by the line that names the program."""
-    return path.is_file() and _PROGRAM.search(first_bytes(path, 8192)) is not None
+# The line that names the program.
+detect = Signs(first=rb"(?:.{0,8160}\n)?\s*Program:\s+Inertial Explorer")
 
 
 def read(path: Path) -> pd.DataFrame:

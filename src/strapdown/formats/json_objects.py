@@ -18,8 +18,9 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.android_events import joined, kind_of
 from strapdown.formats.columns import read_name
-from strapdown.formats.known_text import from_json, head
+from strapdown.formats.known_text import from_json
 from strapdown.formats.recording import RawLog
+from strapdown.formats.signs import Signs, head
 
 SUFFIXES = (".json", ".jsonl", ".ndjson", ".jsonlines", ".ldjson")
 KINDS = ("sensor", "type", "name", "kind", "sensorType", "sensor_type")
@@ -27,21 +28,22 @@ KINDS = ("sensor", "type", "name", "kind", "sensorType", "sensor_type")
 DEEP = 6
 
 
-def detect(path: Path) -> bool:
-    """Detect by the ending, and by an object at the beginning."""
-    if not path.is_file() or path.suffix.lower() not in (*SUFFIXES, ".txt", ".log"):
+def _is_object(line: str) -> bool:
+    try:
+        return isinstance(json.loads(line), dict)
+    except (ValueError, RecursionError):
         return False
+
+
+def _begins(path: Path) -> bool:
+    """Whether an object is at the beginning."""
     text = head(path).lstrip()
     if path.suffix.lower() in SUFFIXES[:1] and text.startswith("["):
         return text[1:].lstrip().startswith("{")
     return _is_object(text.partition("\n")[0])
 
 
-def _is_object(line: str) -> bool:
-    try:
-        return isinstance(json.loads(line), dict)
-    except (ValueError, RecursionError):
-        return False
+detect = Signs(suffixes=(*SUFFIXES, ".txt", ".log"), text=r"\A\s*[\[{]", also=_begins)
 
 
 def read(path: Path) -> RawLog:
@@ -142,4 +144,4 @@ def _events(
         k: {n: np.array([e[j] for e in es]) for j, n in enumerate(("row", "time", "x", "y", "z"))}
         for k, es in events.items()
     }
-    return joined(path, held, unit, findings, android=False)
+    return joined(path, held, {"time": unit}, findings, android=False)

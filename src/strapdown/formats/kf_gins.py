@@ -23,6 +23,7 @@ from strapdown.formats.find_columns import Column
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.judge import intervals
 from strapdown.formats.recording import NoStreamError, RawLog
+from strapdown.formats.signs import HEAD, Signs, first_bytes
 from strapdown.formats.trajectory_csv import write_decimals
 from strapdown.formats.writing import (
     SECOND,
@@ -72,24 +73,6 @@ _TURNS = 2.0 * np.pi  # rad/s
 _G = (0.9, 1.1)  # of a table in g
 
 
-def detect(path: Path) -> bool:
-    """Detect by the first numbers: a clock, and gravity in the increments."""
-    if not path.is_file() or path.suffix.lower() not in SUFFIXES:
-        return False
-    with path.open("rb") as stream:
-        head = stream.read(csv.HEAD)
-    if b"," in head or b"\0" in head:
-        return False
-    whole = head[: head.rfind(b"\n") + 1]
-    lines = [line for line in whole.splitlines() if line.strip()]
-    lines = [line for line in lines if not line.lstrip().startswith((b"#", b"%"))]
-    # One bad line is a fault of the file, not another layout.
-    block = [row for line in lines if (row := _numbers(line)) is not None]
-    if len(block) < 3 or len(block) < 0.9 * len(lines) or _numbers(lines[0]) is None:
-        return False
-    return _are_increments(np.array(block))
-
-
 def _numbers(line: bytes) -> list[float] | None:
     fields = line.split()
     try:
@@ -109,6 +92,21 @@ def _are_increments(block: Array) -> bool:
     force = size / usual
     turn = float(np.median(np.linalg.norm(block[:, 1:4], axis=1))) / usual
     return _GRAVITY[0] <= force <= _GRAVITY[1] and turn < _TURNS
+
+
+def _begins_with_increments(path: Path) -> bool:
+    """Whether the first numbers are a clock, and gravity in the increments."""
+    data = first_bytes(path, HEAD)
+    lines = [line for line in data[: data.rfind(b"\n") + 1].splitlines() if line.strip()]
+    lines = [line for line in lines if not line.lstrip().startswith((b"#", b"%"))]
+    # One bad line is a fault of the file, not another layout.
+    block = [row for line in lines if (row := _numbers(line)) is not None]
+    if len(block) < 3 or len(block) < 0.9 * len(lines) or _numbers(lines[0]) is None:
+        return False
+    return _are_increments(np.array(block))
+
+
+detect = Signs(suffixes=SUFFIXES, first=rb"[^,\0]*\Z", also=_begins_with_increments)
 
 
 def read(path: Path) -> RawLog:
@@ -182,17 +180,18 @@ NAMES = ("time", "lat", "lon", "alt", "north_sd", "east_sd", "down_sd")
 WITH_VELOCITY = (*NAMES, "VN", "VE", "VD", "VN_sd", "VE_sd", "VD_sd")
 
 
-def detect_fixes(path: Path) -> bool:
-    """Detect by rows of seven or thirteen numbers without a header."""
-    if not path.is_file() or path.suffix.lower() not in csv.SUFFIXES:
-        return False
-    with path.open("rb") as stream:
-        head = stream.read(csv.HEAD)
-    lines = [line.split() for line in head.splitlines() if line.strip()]
+def _begins_with_fixes(path: Path) -> bool:
+    """Whether the first row has seven or thirteen numbers, without a header."""
+    lines = [line.split() for line in first_bytes(path, HEAD).splitlines() if line.strip()]
     lines = [line for line in lines if not line[0].startswith((b"#", b"%"))]
     if not lines or len(lines[0]) not in (len(NAMES), len(WITH_VELOCITY)):
         return False
     return all(csv.is_data(f.decode("latin-1")) for f in lines[0])
+
+
+detect_fixes = Signs(
+    suffixes=csv.SUFFIXES, text=r"^\s*[^\s#%]\S*(?:[ \t]+\S+){6}", also=_begins_with_fixes
+)
 
 
 def read_fixes(path: Path) -> Fixes:
@@ -258,16 +257,9 @@ DECIMALS = (0, 8, 11, 11, 8, 8, 8, 8, 9, 9, 9)
 _MOST_OF_STATE = (90.0, 360.0, 1e6, 1e4, 1e4, 1e4, 180.0, 90.0, 360.0)
 
 
-def detect_trajectory(path: Path) -> bool:
-    """Detect by the name, or by rows of eleven numbers without a header."""
-    if not path.is_file():
-        return False
-    if path.suffix.lower() == SUFFIX:
-        return True
-    if path.suffix.lower() not in csv.SUFFIXES:
-        return False
-    with path.open("rb") as stream:
-        lines = stream.read(csv.HEAD).splitlines()
+def _begins_with_states(path: Path) -> bool:
+    """Whether the first row has eleven numbers, without a header."""
+    lines = first_bytes(path, HEAD).splitlines()
     rows = [line.split() for line in lines if line.strip() and line.lstrip()[:1] not in b"#%"]
     if not rows or len(rows[0]) != len(TRAJECTORY_NAMES) or not all(map(_number, rows[0])):
         return False
@@ -278,6 +270,14 @@ def detect_trajectory(path: Path) -> bool:
         and 0.0 <= time <= WEEK
         and all(abs(x) <= most for x, most in zip(state, _MOST_OF_STATE, strict=True))
     )
+
+
+detect_trajectory = Signs(
+    named=(SUFFIX,),
+    suffixes=csv.SUFFIXES,
+    text=r"^\s*(?:[^\s,#%]+[ \t]+){10}[^\s,]+\s*$",
+    also=_begins_with_states,
+)
 
 
 def _number(field: bytes) -> bool:
@@ -360,16 +360,19 @@ def write_nav(path: Path, trajectory: pd.DataFrame, options: FileOptions | None 
 IMU_FILE, FIX_FILE, TRUTH_FILE = "imu.txt", "gnss.txt", "truth.nav"
 
 
-def detect_folder(path: Path) -> bool:
-    """Detect a folder with a text of increments of KF-GINS; there may be fixes and a trajectory."""
-    return path.is_dir() and _member(path, detect) is not None
-
-
 def _member(folder: Path, is_one: Callable[[Path], bool]) -> Path | None:
     """Return the only file of a kind, or None."""
     files = [p for p in sorted(folder.iterdir())[:MOST_FILES] if p.is_file()]
     found = [p for p in files if is_one(p)]
     return found[0] if len(found) == 1 else None
+
+
+def _has_increments(folder: Path) -> bool:
+    """Whether there is one text of increments; there may be fixes and a trajectory."""
+    return _member(folder, detect) is not None
+
+
+detect_folder = Signs(folder=_has_increments)
 
 
 def _of_folder(path: Path, stream: str, is_one: Callable[[Path], bool]) -> Path:

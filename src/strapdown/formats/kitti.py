@@ -9,6 +9,12 @@ states of the receiver. A number that is not measured is nan. x points forward, 
 is positive with the left side up, pitch with the front down, and yaw counts from east to north:
 Rz(yaw) Ry(pitch) Rx(roll) rotates x, y, z to east, north, up. Rows of the folder are counted
 from 1.
+
+Poses of KITTI odometry (``00.txt``) have twelve numbers a row: the matrix, three rows of four, from
+the axes of the left camera, x right, y down, z forward, to those of its first pose (readme.txt of
+its development kit). Stamps are in ``times.txt``. Neither says where on the Earth the first pose is
+and how it is oriented: comments at the top do, ``# origin lat lon deg, height m: 49.0 8.4 116`` and
+``# roll pitch heading deg: 0 0 57``.
 """
 
 from __future__ import annotations
@@ -21,12 +27,18 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
+from strapdown.ellipsoids import WGS84
 from strapdown.errors import DataError, Finding
 from strapdown.evaluation.trajectory_differences import trajectory_at
-from strapdown.formats.clocks import UNIX, Clock, with_clock
+from strapdown.formats import csv
+from strapdown.formats.arrays import numbers
+from strapdown.formats.clocks import RELATIVE, UNIX, Clock, with_clock
 from strapdown.formats.file_options import FileOptions
+from strapdown.formats.find_columns import Column
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.recording import NoStreamError, RawLog, TruthInSensorAxes
+from strapdown.formats.signs import Signs, head
+from strapdown.formats.tum import trajectory_of_poses
 from strapdown.formats.writing import (
     FLU,
     SECOND,
@@ -37,6 +49,7 @@ from strapdown.formats.writing import (
     is_trajectory,
     stream_not_held,
 )
+from strapdown.frames import ecef_from_geodetic, q_ne
 from strapdown.tables import ACCEL, GYRO, VELOCITY, places_of, trajectory_table
 from strapdown.tables import EULER as ANGLES
 from strapdown.tables.checks import values_of
@@ -53,13 +66,16 @@ Q_SB = np.array([0.0, 1.0, 0.0, 0.0])
 _NAME = re.compile(r"\d{10}\.txt")
 
 
-def detect(path: Path) -> bool:
-    """Detect by ``timestamps.txt`` and a first file of thirty numbers."""
+def _has_samples(path: Path) -> bool:
+    """Whether there are ``timestamps.txt`` and a first file of thirty numbers."""
     folder = _oxts(path)
     first = None if folder is None else folder / "data" / f"{0:010d}.txt"
     if first is None or not first.is_file():
         return False
     return len(first.read_text(encoding="ascii", errors="replace").split()) == FIELDS
+
+
+detect = Signs(folder=_has_samples)
 
 
 def read(path: Path) -> RawLog:
@@ -228,6 +244,83 @@ def _euler(values: Array) -> Array:
 
 def _velocity(values: Array) -> Array:
     return np.column_stack([values[:, NORTH_EAST], -values[:, UP]])
+
+
+# Poses of KITTI odometry.
+
+ODOMETRY_TITLE = "poses of KITTI odometry, twelve numbers a row"
+_SAID = re.compile(r"# (origin lat lon deg, height m|roll pitch heading deg): (.*)")
+#: From right, down, forward to forward, right, down.
+_BODY_CAMERA = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+_ORTHOGONAL = 1e-3  # of a matrix times its transpose
+
+
+def _has_poses(path: Path) -> bool:
+    """Whether the first rows of twelve numbers hold rotations."""
+    lines = [line for line in head(path).split("\n")[:-1] if line.strip()]
+    rows = [line.split() for line in lines if not line.startswith("#")]
+    try:
+        block = np.array([[float(f) for f in row] for row in rows[:50]])
+    except ValueError:
+        return False
+    if block.ndim != 2 or block.shape[1] != 12:
+        return False
+    # One bad row is a fault of the file, not another layout.
+    return bool(_are_rotations(block).mean() > 0.9)
+
+
+def _are_rotations(values: Array) -> NDArray[np.bool_]:
+    turn = values.reshape(-1, 3, 4)[:, :, :3]
+    off = np.abs(turn @ turn.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2))
+    return np.asarray((off < _ORTHOGONAL) & (np.linalg.det(turn) > 0.0))
+
+
+detect_poses = Signs(
+    suffixes=csv.SUFFIXES,
+    text=r"^[ \t]*(?:[^\s,#]+[ \t]+){11}[^\s,#]+[ \t]*\r?$",
+    also=_has_poses,
+)
+
+
+def files_of_poses(path: Path) -> tuple[Path, ...]:
+    """List the poses, and the stamps beside them or in the folder of their sequence."""
+    sequence = path.absolute().parent.parent / "sequences" / path.stem
+    beside = (path.parent / "times.txt", sequence / "times.txt")
+    return (path, *[p for p in beside if p.is_file() and p != path][:1])
+
+
+def read_poses(path: Path) -> pd.DataFrame:
+    """Read a trajectory whose comments state where its first pose is.
+
+    DataError: they do not, a stamp is missing, or a row is no pose.
+    """
+    raw = csv.read(path)
+    said = dict(m.groups() for m in map(_SAID.match, head(path).split("\n")) if m)
+    if len(said) < 2:
+        raise DataError("io.poses-without-origin", file=path.name, quantity="reference")
+    values = np.column_stack([numbers(raw, Column(c, None, ""), c) for c in raw.columns])
+    good = _are_rotations(values) & np.isfinite(values).all(axis=1)
+    if not good.all():
+        bad = int(np.argmin(good))
+        raise DataError("io.pose-without-rotation", file=path.name, row=raw.row(bad))
+    stamps = [csv.read(p) for p in files_of_poses(path)[1:]]
+    time = np.concatenate(
+        [np.asarray(next(iter(s.columns.values())), float) for s in stamps] or [[]]
+    )
+    if time.size != len(values):
+        raise DataError(
+            "io.poses-without-times", file=path.name, count=len(values), stamps=time.size
+        )
+    origin, euler = (np.array(said[key].split(), dtype=np.float64) for key in sorted(said))
+    pose = values.reshape(-1, 3, 4)
+    q_ew = rotation.compose(
+        rotation.conjugate(q_ne(origin[0], origin[1])), rotation.quaternion_from_euler(euler)
+    )
+    place = rotation.rotate(q_ew, pose[:, :, 3] @ _BODY_CAMERA.T) + ecef_from_geodetic(origin)
+    turn = rotation.quaternion_from_dcm(_BODY_CAMERA @ pose[:, :, :3] @ _BODY_CAMERA.T)
+    table = trajectory_of_poses(path, time, place, rotation.compose(q_ew, turn), WGS84)
+    table.attrs["findings"] = (*raw.findings, *table.attrs["findings"])
+    return with_clock(table, Clock(RELATIVE))
 
 
 # Writing.

@@ -15,11 +15,11 @@ from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
 from strapdown.formats.find_columns import Column
 from strapdown.formats.recording import NoStreamError, RawLog
+from strapdown.formats.signs import head
 
 __all__ = [
     "column",
     "from_json",
-    "head",
     "lacking",
     "names_of",
     "optional",
@@ -28,20 +28,6 @@ __all__ = [
     "stated_by",
     "under",
 ]
-
-HEAD = 1 << 14  # bytes
-
-
-def head(path: Path, count: int = HEAD) -> str:
-    """Return the beginning of a text for format detection; empty if there is none."""
-    try:
-        with path.open("rb") as stream:
-            data = stream.read(count)
-    except OSError:
-        return ""
-    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return data.decode("utf-16", "replace")
-    return "" if b"\0" in data else data.decode("utf-8-sig", "replace")
 
 
 def under(path: Path, skip: int = 0, header: str | None = None, drop: int = 0) -> RawLog:

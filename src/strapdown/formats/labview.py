@@ -12,15 +12,14 @@ from pathlib import Path
 
 from strapdown.errors import DataError
 from strapdown.formats import csv
-from strapdown.formats.known_text import head, under
+from strapdown.formats.known_text import under
 from strapdown.formats.recording import RawLog
+from strapdown.formats.signs import Signs
 
 MAGIC, END = "LabVIEW Measurement", "***End_of_Header***"
 
 
-def detect(path: Path) -> bool:
-    """Detect by the first line."""
-    return path.is_file() and head(path, 64).startswith(MAGIC)
+detect = Signs(text=rf"\A{MAGIC}")
 
 
 def read(path: Path) -> RawLog:

@@ -20,9 +20,10 @@ import pandas as pd
 from strapdown.errors import DataError
 from strapdown.formats.clocks import RELATIVE
 from strapdown.formats.join import join
-from strapdown.formats.known_text import column, head, lacking, optional, stated_by, under
+from strapdown.formats.known_text import column, lacking, optional, stated_by, under
 from strapdown.formats.phones import sensor_log
 from strapdown.formats.recording import RawLog
+from strapdown.formats.signs import Signs, head
 
 TITLE = "timetables of MATLAB Mobile"
 TABLES = {
@@ -41,21 +42,25 @@ FIXES: dict[str, tuple[str, str | None]] = {
 _DATE = "%d-%b-%Y %H:%M:%S.%f"
 
 
-def detect(path: Path) -> bool:
-    """Detect a folder by its tables, whose stamps have the months of MATLAB's dates."""
-    return path.is_dir() and any(_table(path, name) for name in ("AngularVelocity", "Position"))
+def _has_tables(folder: Path) -> bool:
+    """Whether a folder has tables whose stamps have the months of MATLAB's dates."""
+    return any(_table(folder, name) for name in ("AngularVelocity", "Position"))
 
 
-def detect_objects(path: Path) -> bool:
-    """Detect objects of MATLAB in a ``.mat``, which nothing else opens."""
-    if not path.is_file() or path.suffix.lower() != ".mat":
-        return False
+detect = Signs(folder=_has_tables)
+
+
+def _has_objects(path: Path) -> bool:
+    """Whether there are objects of MATLAB, which nothing else opens."""
     from scipy.io import whosmat
 
     try:
         return any(kind == "opaque" for _, _, kind in whosmat(path))
     except Exception:  # of another version, or damaged
         return False
+
+
+detect_objects = Signs(suffixes=(".mat",), also=_has_objects)
 
 
 def refuse(path: Path) -> RawLog:

@@ -31,9 +31,10 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.errors import DataError, Finding
-from strapdown.formats.binary import Quantities, damage, first_bytes, solution, turned
+from strapdown.formats.binary import Quantities, damage, solution, turned
 from strapdown.formats.clocks import RELATIVE, Clock
 from strapdown.formats.recording import NoStreamError, RawLog, library
+from strapdown.formats.signs import Signs, first_bytes
 
 TITLE = "telemetry log of MAVLink (.tlog)"
 #: Messages by their numbers.
@@ -59,9 +60,12 @@ HEAD = 8  # bytes of a stamp
 Fields = dict[str, NDArray[Any]]
 
 
-def detect(path: Path) -> bool:
-    """Detect by two records, each a stamp of these decades and a frame."""
+def _begins(path: Path) -> bool:
+    """Whether there are two records, each a stamp of these decades and a frame."""
     return len(list(_frames(first_bytes(path, 1024), most=2))) == 2
+
+
+detect = Signs(first=rb".{8,1023}?[\xfd\xfe]", also=_begins)
 
 
 def _frames(data: bytes, most: int | None = None) -> Iterator[tuple[int, bytes]]:

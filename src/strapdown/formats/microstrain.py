@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError
 from strapdown.formats.clocks import GPS, UNIX, WEEK
-from strapdown.formats.known_text import column, head, lacking, stated_by, under
+from strapdown.formats.known_text import column, lacking, stated_by, under
 from strapdown.formats.recording import RawLog
+from strapdown.formats.signs import Signs, head
 
 TITLE = "MicroStrain CSV"
 START = "DATA_START"
@@ -42,9 +43,7 @@ SUMS = {
 PRESSURE = re.compile(r"(?:Ambient )?Pressure \[x8017\]|.*scaledAmbientPressure")
 
 
-def detect(path: Path) -> bool:
-    """Detect by the line above the table."""
-    return path.is_file() and _top(path) is not None
+detect = Signs(text=rf"^[ ,;\r]*{START}[ ,;\r]*$")
 
 
 def _top(path: Path) -> int | None:

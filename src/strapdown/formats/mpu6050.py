@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.formats import hdf5
 from strapdown.formats.recording import RawLog
+from strapdown.formats.signs import Signs
 
 GYRO_FILE = "mpu6050_gyroscope.mat"
 ACCEL_FILE = "mpu6050_accelerometer.mat"
@@ -26,9 +27,11 @@ ACCEL_FILE = "mpu6050_accelerometer.mat"
 AXES = "-x,y,-z"
 
 
-def detect(path: Path) -> bool:
-    """Whether this is such a folder."""
-    return path.is_dir() and (path / GYRO_FILE).is_file()
+def _has_gyro(folder: Path) -> bool:
+    return (folder / GYRO_FILE).is_file()
+
+
+detect = Signs(folder=_has_gyro)
 
 
 def read(path: Path) -> RawLog:

@@ -21,6 +21,7 @@ from strapdown.formats import hdf5
 from strapdown.formats.clocks import RELATIVE, Clock, with_clock
 from strapdown.formats.known_text import lacking
 from strapdown.formats.recording import RawLog
+from strapdown.formats.signs import Signs
 from strapdown.tables import trajectory_table
 
 TITLE = "structures of NaveGo (.mat)"
@@ -33,10 +34,8 @@ FIELDS = {
 }
 
 
-def detect(path: Path) -> bool:
-    """Detect by the fields of the structures."""
-    if not path.is_file() or path.suffix.lower() != ".mat":
-        return False
+def _has_structures(path: Path) -> bool:
+    """Whether a file of MATLAB has structures with the fields of NaveGo."""
     from scipy.io import whosmat
 
     try:
@@ -46,6 +45,9 @@ def detect(path: Path) -> bool:
         return bool(_kinds(_structures(path)))
     except Exception:  # damaged, or of another version
         return False
+
+
+detect = Signs(suffixes=(".mat",), also=_has_structures)
 
 
 def _structures(path: Path) -> dict[str, dict[str, Array]]:

@@ -21,9 +21,10 @@ import pandas as pd
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError, Finding
-from strapdown.formats.binary import Quantities, damage, first_bytes, solution
+from strapdown.formats.binary import Quantities, damage, solution
 from strapdown.formats.clocks import GPS, WEEK, Clock
 from strapdown.formats.recording import NoStreamError, RawLog
+from strapdown.formats.signs import Signs, first_bytes
 
 TITLE = "NovAtel OEM binary log"
 SYNCS = (b"\xaa\x44\x12", b"\xaa\x44\x13")
@@ -60,10 +61,12 @@ WEEK_MS = 604_800_000
 Frames = dict[int, list[tuple[int, bytes]]]
 
 
-def detect(path: Path) -> bool:
-    """Detect by two frames with their CRC among the first bytes."""
-    head = first_bytes(path, 8192)
-    return any(s in head for s in SYNCS) and sum(map(len, _frames(head)[0].values())) >= 2
+def _has_messages(path: Path) -> bool:
+    """Whether two frames with their CRC are among the first bytes."""
+    return sum(map(len, _frames(first_bytes(path, 8192))[0].values())) >= 2
+
+
+detect = Signs(first=rb".{0,8191}?\xaa\x44[\x12\x13]", also=_has_messages)
 
 
 def _frames(data: bytes) -> tuple[Frames, int]:

@@ -14,11 +14,9 @@ from strapdown.errors import DataError
 from strapdown.formats.arrays import raw_log, refuse_lie
 from strapdown.formats.columns import read_name
 from strapdown.formats.recording import RawLog
+from strapdown.formats.signs import Signs
 
-
-def detect(path: Path) -> bool:
-    """Whether the name is that of a NumPy archive."""
-    return path.is_file() and path.suffix.lower() == ".npz"
+detect = Signs(named=(".npz",))
 
 
 def read(path: Path) -> RawLog:
@@ -121,9 +119,12 @@ def read_array(stream: BinaryIO | Any, size: int, name: str | None, file: str) -
 # Folders of NumPy arrays, one per quantity: ``time.npy``, ``gyro_rad_s.npy``, ``accel.npy``.
 
 
-def detect_folder(path: Path) -> bool:
+def _has_gyro(folder: Path) -> bool:
     """Whether a folder has an array with the name of a gyro."""
-    return any(str(read_name(p.stem).quantity).startswith("gyro") for p in _arrays(path))
+    return any(str(read_name(p.stem).quantity).startswith("gyro") for p in _arrays(folder))
+
+
+detect_folder = Signs(folder=_has_gyro)
 
 
 def read_folder(path: Path) -> RawLog:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -11,18 +12,14 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError
 from strapdown.formats.arrays import raw_log, refuse_lie
 from strapdown.formats.recording import RawLog
+from strapdown.formats.signs import Signs
 
 SUFFIXES = (".parquet", ".pq")
 MAGIC = b"PAR1"
 UNITS = (b"unit", b"units")
 
 
-def detect(path: Path) -> bool:
-    """Detect by the first bytes, or by the name."""
-    if not path.is_file():
-        return False
-    with path.open("rb") as stream:
-        return stream.read(len(MAGIC)) == MAGIC or path.suffix.lower() in SUFFIXES
+detect = Signs(named=SUFFIXES, first=re.escape(MAGIC))
 
 
 def read(path: Path) -> RawLog:

@@ -26,7 +26,15 @@ from strapdown.formats.join import join
 from strapdown.formats.known_text import lacking
 from strapdown.formats.phones import AXES, XYZ
 from strapdown.formats.recording import RawLog
-from strapdown.formats.sensor_folder import Member, file_member, first_line, members_of, peek
+from strapdown.formats.sensor_folder import (
+    Member,
+    file_member,
+    first_line,
+    is_container,
+    members_of,
+    peek,
+)
+from strapdown.formats.signs import Signs
 from strapdown.tables import GYRO
 
 _TIME = re.compile(r"time \(s\)", re.I)
@@ -56,16 +64,25 @@ TITLE = "recording of phyphox"
 _EVENTS = "meta/time.csv"
 
 
-def detect(path: Path) -> bool:
-    """Detect by a header with stamps and a sensor named as in phyphox."""
+def _has_sensor(path: Path) -> bool:
+    """Whether a header has stamps and a sensor named as in phyphox."""
     members = peek(path)
-    if path.is_file() and path.suffix.lower() in csv.SUFFIXES:
+    if not is_container(path):
         members = [file_member(path)]
         # A table that others wrote has names and units of its own beside some of phyphox.
         names = [n for m in members for n in _fields(m) if str(read_name(n).quantity) in GYRO]
         if not all(_TRIADS["gyro"][0].fullmatch(n) or _PLAIN.fullmatch(n) for n in names):
             return False
     return any(_sensors(m) or _stream_of(m) for m in members)
+
+
+detect = Signs(
+    suffixes=csv.SUFFIXES,
+    text=r"(?i)\A\s*.*time \(s\)",
+    also=_has_sensor,
+    folder=_has_sensor,
+    zipped=True,
+)
 
 
 def read(path: Path) -> RawLog:

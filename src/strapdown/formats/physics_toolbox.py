@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.clocks import RELATIVE
-from strapdown.formats.known_text import column, lacking, names_of, optional, stated_by, under
+from strapdown.formats.known_text import column, lacking, optional, stated_by, under
 from strapdown.formats.phones import AXES
 from strapdown.formats.recording import RawLog
+from strapdown.formats.signs import Signs
 
 TITLE = "recording of Physics Toolbox"
 QUANTITIES: dict[str, tuple[str, str | None]] = {f"gyro_{a}": (f"w{a}", "rad/s") for a in "xyz"}
@@ -27,12 +28,8 @@ QUANTITIES |= {f"accel_{a}": (f"gF{a}", "g or -g") for a in "xyz"}
 QUANTITIES |= {f"mag_{a}": (f"B{a}", "uT") for a in "xyz"}
 
 
-def detect(path: Path) -> bool:
-    """Detect by ``time`` and the names of the g-force, which no other application has."""
-    if not csv.detect(path):
-        return False
-    names = names_of(path)
-    return names[:1] == ["time"] and {"gFx", "gFy", "gFz"} <= set(names)
+# No other application has these names of the g-force.
+detect = Signs(text=r'\A[\s"]*time\b(?=.*\bgFx\b)(?=.*\bgFy\b)(?=.*\bgFz\b)', also=csv.detect)
 
 
 def read(path: Path) -> RawLog:

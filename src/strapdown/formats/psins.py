@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.recording import RawLog, StatedStart
+from strapdown.formats.signs import Signs
 
 Array = NDArray[np.float64]
 Lines = list[tuple[int, str]]
@@ -42,9 +43,7 @@ _GRAVITY = (9.6, 10.0)  # m/s²
 _STEPS = (1e-5, 1.0)  # s
 
 
-def detect(path: Path) -> bool:
-    """Whether the file name is that of PSINS increments."""
-    return path.is_file() and path.suffix.lower() == SUFFIX
+detect = Signs(named=(SUFFIX,))
 
 
 def read(path: Path) -> RawLog:

@@ -12,6 +12,7 @@ are accuracies in m. ``vehicle_attitude`` rotates body axes to north-east-down, 
 from __future__ import annotations
 
 import io
+import re
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
@@ -21,10 +22,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
-from strapdown.formats.binary import Quantities, damage, first_bytes, interpolated, solution, turned
+from strapdown.formats.binary import Quantities, damage, interpolated, solution, turned
 from strapdown.formats.clocks import RELATIVE, Clock
 from strapdown.formats.join import join
 from strapdown.formats.recording import NoStreamError, RawLog, library
+from strapdown.formats.signs import Signs
 
 TITLE = "PX4 flight log (.ulg)"
 STREAMS = ("imu", "gnss", "reference", "magnetometer", "barometer")
@@ -36,9 +38,7 @@ QUALITY = {2: 1, 3: 1, 4: 2, 5: 5, 6: 4, 7: 1, 8: 6}
 Topic = dict[str, NDArray[Any]]
 
 
-def detect(path: Path) -> bool:
-    """Detect by the first bytes."""
-    return first_bytes(path, len(MAGIC)) == MAGIC
+detect = Signs(first=re.escape(MAGIC))
 
 
 def _topics(path: Path, stream: str, *names: str) -> tuple[dict[str, Topic], list[Finding], Any]:

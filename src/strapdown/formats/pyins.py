@@ -19,6 +19,7 @@ from strapdown.formats import numpy_files
 from strapdown.formats.clocks import RELATIVE, Clock, with_clock
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.recording import NoStreamError, RawLog
+from strapdown.formats.signs import Signs
 from strapdown.tables import trajectory_table
 
 __all__ = ["detect", "read", "read_fixes", "read_truth"]
@@ -40,9 +41,12 @@ def _holds(path: Path, *names: str) -> bool:
 STREAMS = {"imu": ("time", "imu"), "gnss": ("fix_time", "fix"), "reference": ("time", "truth")}
 
 
-def detect(path: Path) -> bool:
-    """Detect by the names of the arrays."""
+def _has_stream(path: Path) -> bool:
+    """Whether the archive has the arrays of a stream."""
     return any(_holds(path, *names) for names in STREAMS.values())
+
+
+detect = Signs(suffixes=(".npz",), also=_has_stream)
 
 
 def _arrays(path: Path, stream: str, width: int) -> tuple[Array, Array]:

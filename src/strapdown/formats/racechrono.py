@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError
 from strapdown.formats.clocks import UNIX
 from strapdown.formats.join import join
-from strapdown.formats.known_text import column, head, lacking, selected, split, stated_by, under
+from strapdown.formats.known_text import column, lacking, selected, split, stated_by, under
 from strapdown.formats.recording import RawLog
+from strapdown.formats.signs import Signs, head
 
 TITLE = "RaceChrono CSV"
 TRIADS = {"gyro": ("gyro", "{}_rate_of_rotation"), "accel": ("acc", "{}_acc")}
@@ -33,9 +34,7 @@ FIXES = {
 UNITS = {"deg": "deg", "m": "m", "m/s": "m/s", "G": "g", "kmh": "km/h", "km/h": "km/h"}
 
 
-def detect(path: Path) -> bool:
-    """Detect by the first line."""
-    return path.is_file() and head(path, 256).startswith("This file is created using RaceChrono")
+detect = Signs(text=r"\AThis file is created using RaceChrono")
 
 
 def read(path: Path) -> RawLog:

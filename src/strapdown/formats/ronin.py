@@ -16,16 +16,15 @@ from strapdown.formats import hdf5
 from strapdown.formats.arrays import raw_log
 from strapdown.formats.phones import AXES
 from strapdown.formats.recording import RawLog
+from strapdown.formats.signs import Signs
 
 TIME, GYRO, FORCE, MAG = "synced/time", "synced/gyro", "synced/acce", "synced/magnet"
 TRIADS = {GYRO: ("gyro", "rad/s"), FORCE: ("accel", "m/s2"), MAG: ("mag", "uT")}
 CHEST = "pose/tango_ori"
 
 
-def detect(path: Path) -> bool:
-    """Detect by the names of its datasets."""
-    if not hdf5.detect(path):
-        return False
+def _has_datasets(path: Path) -> bool:
+    """Whether HDF5 has the stamps and both sensors."""
     import h5py
 
     try:
@@ -33,6 +32,9 @@ def detect(path: Path) -> bool:
             return all(name in file for name in (TIME, GYRO, FORCE))
     except OSError:
         return False
+
+
+detect = Signs(suffixes=hdf5.SUFFIXES, also=_has_datasets)
 
 
 def read(path: Path) -> RawLog:

@@ -12,6 +12,7 @@ headers, in ns. The reference is INSPVAX or INSPVA of novatel_oem7_msgs.
 from __future__ import annotations
 
 import heapq
+import re
 import shlex
 import shutil
 import sqlite3
@@ -26,10 +27,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding, check_choice
-from strapdown.formats.binary import Quantities, damage, first_bytes, solution
+from strapdown.formats.binary import Quantities, damage, solution
 from strapdown.formats.clocks import RELATIVE, UNIX, Clock
 from strapdown.formats.file_options import FileOptions
 from strapdown.formats.recording import NoStreamError, RawLog, library
+from strapdown.formats.signs import Signs, first_bytes
 from strapdown.formats.writing import (
     FLU,
     SECOND,
@@ -57,19 +59,25 @@ MODERN = 10**18  # ns, 2001: a clock since the start of a device never counts so
 Columns = dict[str, NDArray[Any]]
 
 
-def detect(path: Path) -> bool:
-    """Detect by the first bytes; of a database, by its tables; of a folder, by its metadata."""
-    if path.is_dir():
-        return b"rosbag2_bagfile_information" in first_bytes(path / "metadata.yaml", 4096)
-    kind = _suffix(path)
-    if kind != ".db3":
-        return kind is not None
+def _has_messages(path: Path) -> bool:
+    """Whether a bag is no database, or has the tables of one."""
+    if _suffix(path) != ".db3":
+        return True
     try:
         with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)) as base:
             names = {name for (name,) in base.execute("select name from sqlite_master")}
     except sqlite3.Error:
         return False
     return {"messages", "topics"} <= names
+
+
+def _is_described(folder: Path) -> bool:
+    return b"rosbag2_bagfile_information" in first_bytes(folder / "metadata.yaml", 4096)
+
+
+detect = Signs(
+    first=b"|".join(re.escape(magic) for magic in MAGIC), also=_has_messages, folder=_is_described
+)
 
 
 def _suffix(path: Path) -> str | None:

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 
 from strapdown.earth import radii_of_curvature
 from strapdown.errors import DataError, Finding
-from strapdown.formats.binary import damage, first_bytes, solution
+from strapdown.formats.binary import damage, solution
 from strapdown.formats.clocks import GPS, RELATIVE, WEEK, Clock
+from strapdown.formats.signs import Signs, first_bytes
 
 TITLE = "Applanix SBET trajectory"
 FIELDS = 17
@@ -31,12 +32,9 @@ LONGEST_STEP = 10.0  # s
 SLOWEST = 0.5  # m/s, root mean square, of a motion that tells the axes of velocity
 
 
-def detect(path: Path) -> bool:
-    """Detect by the size, and by plausible values of the first records."""
-    try:
-        if not path.is_file() or path.stat().st_size % SIZE:
-            return False
-    except OSError:
+def _has_records(path: Path) -> bool:
+    """Whether the size is that of records, and the first have plausible values."""
+    if path.stat().st_size % SIZE:
         return False
     head = np.frombuffer(first_bytes(path, 8 * SIZE), dtype="<f8").reshape(-1, FIELDS)
     if not len(head) or not np.isfinite(head).all() or (head[:, 0] < 0.0).any():
@@ -46,6 +44,10 @@ def detect(path: Path) -> bool:
     # Numbers of other files, read as doubles, are mostly of tiny or huge size.
     sized = (np.abs(head[:, 1:3]) > 1e-6).all() and (head[:, 0] > 1e-3).all()
     return bool((np.abs(head[:, : MOST.size]) <= MOST).all() and moves and sized)
+
+
+# The exponent of the first time.
+detect = Signs(first=rb".{7}[\x3f-\x41]", also=_has_records)
 
 
 def read(path: Path) -> pd.DataFrame:

@@ -11,6 +11,7 @@ setup relates to the vehicle. A value of -2e10 is not known.
 from __future__ import annotations
 
 import binascii
+import re
 import struct
 from pathlib import Path
 from typing import Any
@@ -19,10 +20,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
-from strapdown.formats.binary import Quantities, damage, first_bytes
+from strapdown.formats.binary import Quantities, damage
 from strapdown.formats.clocks import GPS
 from strapdown.formats.join import join
 from strapdown.formats.recording import NoStreamError, RawLog
+from strapdown.formats.signs import Signs, first_bytes
 from strapdown.frames import C_ne, geodetic_from_ecef
 
 TITLE = "Septentrio SBF"
@@ -39,11 +41,14 @@ Blocks = dict[int, list[tuple[int, bytes]]]
 Array = NDArray[np.float64]
 
 
-def detect(path: Path) -> bool:
-    """Detect by blocks with their CRC: one at the start, or several among other lines."""
+def _has_blocks(path: Path) -> bool:
+    """Whether a block with its CRC is at the start, or several are among other lines."""
     head = first_bytes(path, 65536)
     count = sum(map(len, _blocks(head).values()))
     return count >= LEAST_BLOCKS or bool(count and head.startswith(SYNC))
+
+
+detect = Signs(first=b".*?" + re.escape(SYNC), also=_has_blocks)
 
 
 def _blocks(data: bytes) -> Blocks:

@@ -16,6 +16,7 @@ from strapdown.formats.columns import read_name
 from strapdown.formats.find_columns import find_columns
 from strapdown.formats.join import join
 from strapdown.formats.recording import RawLog, ReadOptions
+from strapdown.formats.signs import Signs
 
 __all__ = ["Member", "is_container", "members_of", "peek"]
 
@@ -24,11 +25,13 @@ _TRIADS = {"gyro": "gyro", "accel": "accel", "mag": "mag", "magnetometer": "mag"
 _AXIS = re.compile(r"([xyz])(?:[\s_-]*axis)?(?:\s*[\[(].*)?", re.I)
 
 
-def detect(path: Path) -> bool:
-    """Whether a folder has a table named after a gyro; any archive is accepted."""
-    if path.is_file():
-        return path.suffix.lower() == ".zip"
-    return any(_triad(m) == "gyro" for m in peek(path))
+def _has_gyro(folder: Path) -> bool:
+    """Whether a folder has a table named after a gyro."""
+    return any(_triad(m) == "gyro" for m in peek(folder))
+
+
+#: Any archive is accepted.
+detect = Signs(named=(".zip",), folder=_has_gyro)
 
 
 def read(path: Path) -> RawLog:

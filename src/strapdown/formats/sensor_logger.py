@@ -35,7 +35,15 @@ from strapdown.formats.join import join
 from strapdown.formats.known_text import lacking
 from strapdown.formats.phones import AXES, force_of, sensor_log
 from strapdown.formats.recording import RawLog
-from strapdown.formats.sensor_folder import Member, file_member, first_line, members_of, peek
+from strapdown.formats.sensor_folder import (
+    Member,
+    file_member,
+    first_line,
+    is_container,
+    members_of,
+    peek,
+)
+from strapdown.formats.signs import Signs, head
 
 TIME = ("time", "ns")
 GYROS = ("Gyroscope", "GyroscopeUncalibrated")
@@ -75,18 +83,24 @@ class Sensor:
     findings: list[Finding]
 
 
-def detect(path: Path) -> bool:
-    """Detect by the header of a sensor's file, or by the first record of a JSON file."""
-    if path.is_file() and path.suffix.lower() == ".json":
-        with path.open("rb") as stream:
-            head = stream.read(4096).decode("utf-8-sig", "replace")
-        return head.lstrip().startswith("[") and '"sensor"' in head
-    members = peek(path)
-    if path.is_file() and path.suffix.lower() == ".csv":
-        members = [file_member(path)]
+def _has_sensor(path: Path) -> bool:
+    """Whether a table, or one in a folder or an archive, has the header of a sensor."""
+    if path.suffix.lower() == ".json" and path.is_file():
+        text = head(path, 4096)
+        return text.lstrip().startswith("[") and '"sensor"' in text
+    members = peek(path) if is_container(path) else [file_member(path)]
     return any(_sensor(m) in SENSORS and _has_header(m) for m in members) or any(
         _is_located(m) for m in members
     )
+
+
+detect = Signs(
+    suffixes=(".csv", ".json"),
+    text=r"(?i)\A\s*(?:\[|.*seconds_elapsed)",
+    also=_has_sensor,
+    folder=_has_sensor,
+    zipped=True,
+)
 
 
 def read(path: Path) -> RawLog:

@@ -31,6 +31,7 @@ from strapdown.formats.known_text import column, lacking, optional, selected, st
 from strapdown.formats.phones import force_of, sensor_log
 from strapdown.formats.recording import RawLog
 from strapdown.formats.sensor_folder import file_member, first_line
+from strapdown.formats.signs import Signs
 
 MOTION, GYRO, FORCE = "motionRotationRate", "gyroRotation", "accelerometerAcceleration"
 USER, GRAVITY = "motionUserAcceleration", "motionGravity"
@@ -58,13 +59,14 @@ FIXES: dict[str, tuple[str, str | None]] = {
 ZONE = 900.0  # s
 
 
-def detect(path: Path) -> bool:
-    """Detect by the names of a gyro's columns, with their unit."""
-    if not csv.detect(path):
-        return False
+def _has_gyro(path: Path) -> bool:
+    """Whether the first line names the columns of a gyro, with their unit."""
     line = first_line(file_member(path))
     names = set(csv.fields_of(line, csv.separator_of(line)))
-    return any(set(_three(kind, RADIANS)) <= names for kind in (MOTION, GYRO))
+    return csv.detect(path) and any(set(_three(kind, RADIANS)) <= names for kind in (MOTION, GYRO))
+
+
+detect = Signs(text=r"\A\s*.*\(rad/s\)", also=_has_gyro)
 
 
 def read(path: Path) -> RawLog:

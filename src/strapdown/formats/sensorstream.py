@@ -17,6 +17,7 @@ from strapdown.formats.csv import SUFFIXES, decoded
 from strapdown.formats.join import join
 from strapdown.formats.phones import force_of, sensor_log
 from strapdown.formats.recording import RawLog
+from strapdown.formats.signs import Signs, first_bytes
 
 # Number of values in a block, by its id: 1 GPS, 3 accelerometer, 4 gyroscope, 5 magnetic field,
 # 6 GPS in ECEF, 7 GPS velocity, 81 orientation, 82 linear acceleration, 83 gravity, 84 rotation
@@ -30,14 +31,10 @@ _LOOKED_AT = 20  # lines examined to detect the format
 Blocks = dict[int, tuple[float, ...]]
 
 
-def detect(path: Path) -> bool:
-    """Whether each of the first lines of a text file is a stamp and blocks."""
-    if not path.is_file() or path.suffix.lower() not in SUFFIXES:
-        return False
-    with path.open("rb") as stream:
-        data = stream.read(16384)
+def _has_blocks(path: Path) -> bool:
+    """Whether each of the first lines is a stamp and blocks."""
     try:
-        text = decoded(data, path.name)[0]
+        text = decoded(first_bytes(path, 16384), path.name)[0]
     except DataError:
         return False
     lines = [line for line in text.splitlines()[:_LOOKED_AT] if line.strip()]
@@ -50,6 +47,13 @@ def detect(path: Path) -> bool:
             return False
         ids |= set(parsed[1])
     return bool(ids & {3, 4, 82, 83})
+
+
+detect = Signs(
+    suffixes=SUFFIXES,
+    text=rf"\A\s*[^,\n]*,\s*(?:{'|'.join(map(str, WIDTHS))})\s*,",
+    also=_has_blocks,
+)
 
 
 def read(path: Path) -> RawLog:

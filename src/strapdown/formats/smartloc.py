@@ -8,24 +8,23 @@ One rate and one acceleration are not three axes: the file gives positions, once
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 
 from strapdown.errors import Finding
 from strapdown.formats.clocks import GPS
-from strapdown.formats.known_text import column, head, selected, stated_by, under
+from strapdown.formats.known_text import column, selected, stated_by, under
 from strapdown.formats.recording import RawLog
+from strapdown.formats.signs import Signs
 
 FIRST = ("GPSWeek [weeks]", "GPSSecondsOfWeek [s]")
 LAT, LON = "Latitude (GT Lat) [deg]", "Longitude (GT Lon) [deg]"
 ALT, SPEED = "Height above ellipsoid (GT Height) [m]", "Velocity (GT Velocity) [m/s]"
 
 
-def detect(path: Path) -> bool:
-    """Detect by the names of the week and of its seconds, with their units."""
-    line = head(path).partition("\n")[0] if path.is_file() else ""
-    return all(name in line for name in (*FIRST, LAT, LON))
+detect = Signs(text=r"\A" + "".join(f"(?=.*{re.escape(n)})" for n in (*FIRST, LAT, LON)))
 
 
 def read(path: Path) -> RawLog:

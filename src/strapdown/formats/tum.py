@@ -17,17 +17,18 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
-from strapdown.ellipsoids import find_ellipsoid
+from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.clocks import Clock, clock_of_name, with_clock
 from strapdown.formats.file_options import TUM_FRAMES, FileOptions
+from strapdown.formats.signs import HEAD, Signs
 from strapdown.formats.trajectory_csv import one_line
 from strapdown.frames import ecef_from_geodetic, geodetic_from_ecef, q_ne
 from strapdown.rotation import Q_NED_ENU
 from strapdown.tables import EULER, VELOCITY, check_trajectory, places_of, trajectory_table
 
-__all__ = ["TITLE", "detect", "poses", "read", "write_tum"]
+__all__ = ["TITLE", "detect", "poses", "read", "trajectory_of_poses", "write_tum"]
 
 TITLE = "poses as of the TUM RGB-D benchmark"
 Array = NDArray[np.float64]
@@ -141,13 +142,11 @@ _NORM = 1e-3  # of a quaternion less 1
 
 def _lines(path: Path) -> list[bytes]:
     with path.open("rb") as stream:
-        return stream.read(csv.HEAD).split(b"\n")[:-1]
+        return stream.read(HEAD).split(b"\n")[:-1]
 
 
-def detect(path: Path) -> bool:
-    """Detect by rows of eight numbers, the last four of which are a unit quaternion."""
-    if not path.is_file() or path.suffix.lower() not in (*csv.SUFFIXES, ".tum"):
-        return False
+def _has_poses(path: Path) -> bool:
+    """Whether the rows are of eight numbers, the last four of which are a unit quaternion."""
     rows = [line.split() for line in _lines(path) if line.strip() and not line.startswith(b"#")]
     try:
         block = np.array([[float(f) for f in row] for row in rows[:50]])
@@ -156,6 +155,13 @@ def detect(path: Path) -> bool:
     if block.ndim != 2 or block.shape[1:] != (8,):
         return False
     return bool((np.abs(np.linalg.norm(block[:, 4:], axis=1) - 1.0) < _NORM).all())
+
+
+detect = Signs(
+    suffixes=(*csv.SUFFIXES, ".tum"),
+    text=r"^\s*(?:[^\s,#]+\s+){7}[^\s,#]+\s*$",
+    also=_has_poses,
+)
 
 
 def read(path: Path) -> pd.DataFrame:
@@ -187,6 +193,19 @@ def read(path: Path) -> pd.DataFrame:
         position = rotation.rotate(rotation.conjugate(q_we), position)
         position = position + ecef_from_geodetic(at, ellipsoid=ellipsoid)
         q_wb = rotation.compose(rotation.conjugate(q_we), q_wb)
+    table = trajectory_of_poses(path, time, position, q_wb, ellipsoid)
+    table.attrs["findings"] = (*raw.findings, *table.attrs["findings"])
+    return with_clock(table, Clock(clock_of_name("time", float(time[0]))))
+
+
+def trajectory_of_poses(
+    path: Path, time: Array, position: Array, q_eb: Array, ellipsoid: Ellipsoid
+) -> pd.DataFrame:
+    """Make a Trajectory of poses in axes of the Earth, with the velocities between them.
+
+    `time` ((n,), s). `position` ((n, 3), m): from the center of the Earth. `q_eb` ((n, 4)): body
+    (forward, right, down) to axes of the Earth.
+    """
     place = geodetic_from_ecef(position, ellipsoid=ellipsoid)
     to_level = q_ne(place[:, 0], place[:, 1])
     middle = 0.5 * (time[1:] + time[:-1])
@@ -196,9 +215,9 @@ def read(path: Path) -> pd.DataFrame:
         time,
         place,
         rotation.rotate(to_level, velocity),
-        rotation.euler_from_quaternion(rotation.compose(to_level, q_wb)),
+        rotation.euler_from_quaternion(rotation.compose(to_level, q_eb)),
         source=path.name,
     )
     note = Finding("io.tum-velocities", file=path.name, quantity=", ".join(VELOCITY))
-    table.attrs |= {"ellipsoid": ellipsoid.name, "findings": (*raw.findings, note)}
-    return with_clock(table, Clock(clock_of_name("time", float(time[0]))))
+    table.attrs |= {"ellipsoid": ellipsoid.name, "findings": (note,)}
+    return table

@@ -13,6 +13,7 @@ not read.
 
 from __future__ import annotations
 
+import re
 import struct
 from collections.abc import Iterator
 from datetime import UTC, datetime
@@ -24,10 +25,11 @@ import numpy as np
 import pandas as pd
 
 from strapdown.errors import DataError, Finding
-from strapdown.formats.binary import Quantities, damage, first_bytes, solution
+from strapdown.formats.binary import Quantities, damage, solution
 from strapdown.formats.clocks import GPS, RELATIVE, WEEK, Clock, gps_from_unix
 from strapdown.formats.join import join
 from strapdown.formats.recording import NoStreamError, RawLog, library
+from strapdown.formats.signs import Signs, first_bytes
 
 TITLE = "u-blox UBX stream"
 SYNC, MOST_PAYLOAD = b"\xb5\x62", 8192
@@ -45,11 +47,14 @@ GYRO, ACCEL, SPEED = (14, 13, 5), (16, 17, 18), 11  # types of data, x y z
 SCALES = {**dict.fromkeys(GYRO, 2.0**-12), **dict.fromkeys(ACCEL, 2.0**-10), SPEED: 1e-3}
 
 
-def detect(path: Path) -> bool:
-    """Detect by frames with their checksums: one at the start, or several among other lines."""
+def _has_frames(path: Path) -> bool:
+    """Whether a frame with its checksum is at the start, or several are among other lines."""
     head = first_bytes(path, 65536)
     frames = list(islice(_frames(head), LEAST_FRAMES))
     return len(frames) == LEAST_FRAMES or bool(frames and head.startswith(SYNC))
+
+
+detect = Signs(first=b".*?" + re.escape(SYNC), also=_has_frames)
 
 
 def _frames(data: bytes) -> Iterator[bytes]:

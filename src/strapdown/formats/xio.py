@@ -13,8 +13,9 @@ from pathlib import Path
 import numpy as np
 
 from strapdown.errors import Finding
-from strapdown.formats.known_text import column, head, selected, under
+from strapdown.formats.known_text import column, selected, under
 from strapdown.formats.recording import RawLog
+from strapdown.formats.signs import Signs, head
 
 NAMES = {f"gyro_{a}": (f"Gyroscope {a.upper()} (deg/s)", "deg/s") for a in "xyz"}
 NAMES |= {f"accel_{a}": (f"Accelerometer {a.upper()} (g)", "g") for a in "xyz"}
@@ -22,12 +23,14 @@ TIMES = {"Timestamp (us)": "us", "Time (s)": "s"}
 TABLE = "Inertial.csv"
 
 
-def detect(path: Path) -> bool:
-    """Detect by the names of the inertial table."""
-    table = path / TABLE if path.is_dir() else path
-    line = head(table, 4096).partition("\n")[0] if table.is_file() else ""
+def _has_names(path: Path) -> bool:
+    """Whether the table, or that of a folder, has the inertial names."""
+    line = head(path / TABLE if path.is_dir() else path, 4096).partition("\n")[0]
     names = [n.strip() for n in line.split(",")]
     return any(t in names for t in TIMES) and all(n in names for n, _ in NAMES.values())
+
+
+detect = Signs(text=r"\A.*Gyroscope X \(deg/s\)", also=_has_names, folder=_has_names)
 
 
 def files_of(path: Path) -> tuple[Path, ...]:

@@ -24,6 +24,7 @@ from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
 from strapdown.formats.find_columns import Column
 from strapdown.formats.recording import RawLog
+from strapdown.formats.signs import Signs, head
 
 COUNTER, STAMP = "PacketCounter", "SampleTimeFine"
 TRIADS = {"Gyr": ("gyro", "rad/s"), "Acc": ("accel", "m/s2")}
@@ -36,16 +37,18 @@ RATES = (1.0, 2000.0)  # Hz
 HEAD = 4096  # bytes
 
 
-def detect(path: Path) -> bool:
-    """Detect by the comments at the top and the names under them."""
+def _has_names(path: Path) -> bool:
+    """Whether the names are under the comments at the top of a table."""
     if not csv.detect(path):
         return False
-    with path.open("rb") as stream:
-        lines = stream.read(HEAD).decode("utf-8-sig", "replace").splitlines()
+    lines = head(path, HEAD).splitlines()
     names = next((line for line in lines if line.strip() and not csv.is_comment(line)), "")
     fields = set(csv.fields_of(names, csv.separator_of(names)))
     named = any({f"{t}_{a}" for a in "XYZ"} <= fields for t in TRIADS)
     return bool({COUNTER, STAMP} & fields) and named
+
+
+detect = Signs(text=f"{COUNTER}|{STAMP}", also=_has_names)
 
 
 def read(path: Path) -> RawLog:

@@ -5,6 +5,7 @@ Samples against an independent parse by pandas; other files are written here as 
 
 from __future__ import annotations
 
+import dataclasses
 import json
 
 import h5py
@@ -14,6 +15,7 @@ import pytest
 from scipy.io import savemat
 from tests.coded import coded
 
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError
 from strapdown.formats import READERS, NoStreamError, open_stream, read_log
 from strapdown.formats.clocks import unix_from_gps
@@ -639,6 +641,34 @@ def test_android_events(tmp_path, gyro, accel, swapped, header):
     truncations(path, tmp_path, "imu")
 
 
+@pytest.mark.parametrize(
+    ("gyro", "accel"),
+    [
+        ("android.sensor.gyroscope", "android.sensor.accelerometer"),
+        ("TYPE_GYROSCOPE (deg/s)", "TYPE_ACCELEROMETER (g)"),
+        ("Gyroscope [deg/s]", "Accelerometer [g]"),
+    ],
+)
+def test_android_events_in_degrees_and_g(tmp_path, gyro, accel):
+    kinds = {gyro: np.degrees(RATE), accel: -FORCE / STANDARD_GRAVITY}
+    path = written(tmp_path / "a.csv", events(kinds))
+    assert reader_of(path) == "android-events"
+    raw = open_stream(path, "imu")
+    found, stated = columns(raw), "(" in gyro or "[" in gyro
+    assert found["gyro_x"][1] == ("deg/s" if stated else None)
+    assert found["accel_x"][1] == ("g" if stated else None)
+    assert raw.axes == (None if gyro.startswith("Gyroscope") else "y,x,-z")
+    options = ReadOptions(axes="y,x,-z", time_unit="ns")
+    if not stated:
+        with pytest.raises(DataError) as caught:
+            read_log(path, options)
+        assert "gyro_unit" in dict(caught.value.finding.data["answers"])
+        options = dataclasses.replace(options, gyro_unit="deg/s", accel_unit="g")
+    imu = read_log(path, options).imu
+    np.testing.assert_allclose(imu[GYRO], RATE[:, [1, 0, 2]] * [1.0, 1.0, -1.0], atol=1e-15)
+    np.testing.assert_allclose(imu[ACCEL], -FORCE[:, [1, 0, 2]] * [1.0, 1.0, -1.0])
+
+
 def test_android_events_without_an_accelerometer_sum_or_warn(tmp_path):
     kinds = {"gyroscope": RATE, "gravity": -FORCE, "linear_acceleration": RATE}
     path = written(tmp_path / "a.csv", events(kinds))
@@ -770,3 +800,38 @@ def test_a_missing_library_of_excel_is_named(tmp_path, monkeypatch):
     monkeypatch.setattr("importlib.import_module", missing)
     with pytest.raises(DataError, check=coded("io.library-missing", library="openpyxl")):
         open_stream(path, "imu")
+
+
+def test_poses_of_kitti_odometry(tmp_path):
+    """Ten meters a second to the east, then a turn to the right about the camera's own y, down."""
+    time = 0.1 * np.arange(20)
+    turn = np.radians(np.where(time < 1.0, 0.0, 30.0 * (time - 1.0)))
+    rows = np.zeros((20, 3, 4))
+    rows[:, 0, 0] = rows[:, 2, 2] = np.cos(turn)
+    rows[:, 0, 2] = np.sin(turn)
+    rows[:, 2, 0] = -np.sin(turn)
+    rows[:, 1, 1] = 1.0
+    rows[:, 2, 3] = 10.0 * time  # forward
+    rows[:, 1, 3] = 0.5 * time  # down
+    lines = [" ".join(f"{v:.9e}" for v in row.ravel()) for row in rows]
+    said = ["# origin lat lon deg, height m: 49.0 8.4 116.0", "# roll pitch heading deg: 0 0 90"]
+    path = written(tmp_path / "poses" / "00.txt", lines)
+    assert reader_of(path) == "kitti-odometry"
+    with pytest.raises(DataError, check=coded("io.poses-without-origin")):
+        read_trajectory(path)
+    written(path, [*said, *lines])
+    with pytest.raises(DataError, check=coded("io.poses-without-times")):
+        read_trajectory(path)
+    written(tmp_path / "sequences" / "00" / "times.txt", [f"{t:e}" for t in time])
+    track = read_trajectory(path)
+    np.testing.assert_allclose(track.index, time, atol=1e-9)
+    np.testing.assert_allclose(track["VE"], 10.0, rtol=1e-4)
+    np.testing.assert_allclose(track["VN"], 0.0, atol=1e-3)
+    np.testing.assert_allclose(track["alt"], 116.0 - 0.5 * time, atol=1e-4)
+    np.testing.assert_allclose(track["heading"], 90.0 + np.degrees(turn), atol=1e-3)
+    np.testing.assert_allclose(track[["roll", "pitch"]], 0.0, atol=1e-3)
+    assert track["lon"].iloc[-1] > 8.4
+    written(path, [*said, *lines[:5], lines[5].replace("1.000000000e+00", "2.0"), *lines[6:]])
+    with pytest.raises(DataError, check=coded("io.pose-without-rotation", row=8)):
+        read_trajectory(path)
+    truncations(path, tmp_path, "reference", cuts=8)
