@@ -11,11 +11,9 @@ from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats import csv, foot_mounted, parquet, read_raw
-from strapdown.formats.arrays import numbers, ticks_of
-from strapdown.formats.clocks import GPS, RELATIVE, Clock, clock_of_name, unrolled, with_clock
+from strapdown.formats.clocks import GPS, RELATIVE, Clock, unrolled, with_clock
 from strapdown.formats.columns import CLOCKS, TIMES
-from strapdown.formats.find_columns import Column
-from strapdown.formats.quantity_columns import Found, Quantity, find_quantities
+from strapdown.formats.quantity_columns import Quantity, find_quantities
 from strapdown.formats.recording import RawLog
 from strapdown.tables import NED, POSITION_SD
 from strapdown.units import ANGLES, GYRO_UNITS, LENGTHS, PRESSURES, SPEEDS, TIME_UNITS
@@ -92,9 +90,11 @@ def read_aid_table(
             missing_2=missing[0],
         )
     findings = list(raw.findings)
-    time, clock = _time(raw, found["time"])
+    time, clock, _ = found["time"].stamps(raw)
+    if clock in (GPS, RELATIVE) and np.isfinite(time).all():
+        time, _ = unrolled(time)
     there = [name for name in columns if name in found]
-    values = {name: _values(raw, name, found[name]) for name in there}
+    values = {name: found[name].values(raw, name) for name in there}
     for name, unit in columns.items():
         if name in values and UNITS[unit] and not found[name].stated:
             findings.append(
@@ -115,7 +115,7 @@ def read_aid_table(
     first, last = raw.row(int(rows[0])), raw.row(int(rows[-1]))
     table.attrs |= {"source": raw.name, "findings": tuple(findings)}
     table.attrs["first_row"] = first if last - first == len(rows) - 1 else None
-    return with_clock(table, clock)
+    return with_clock(table, Clock(clock))
 
 
 def _raw(path: Path) -> RawLog:
@@ -169,22 +169,6 @@ def _words(name: str) -> tuple[str, ...]:
             s + w for w in of for s in _SD_WORDS
         )
     return (name.lower().replace("_", ""), *SYNONYMS.get(name, ()))
-
-
-def _time(raw: RawLog, found: Found) -> tuple[Array, Clock]:
-    ticks, dated = ticks_of(raw, Column(found.source, None, ""))
-    time = np.asarray(ticks * (1e-9 if dated else found.factor), dtype=np.float64)
-    finite = np.isfinite(time)
-    first = float(time[finite][0]) if finite.any() else 0.0
-    clock = clock_of_name(found.source, first, dated=dated)
-    if clock in (GPS, RELATIVE) and finite.all():
-        time, _ = unrolled(time)
-    return time, Clock(clock)
-
-
-def _values(raw: RawLog, name: str, found: Found) -> Array:
-    read = numbers(raw, Column(found.source, None, ""), name)
-    return np.asarray(read, dtype=np.float64) * found.factor
 
 
 def _usable(

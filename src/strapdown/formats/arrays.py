@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.formats.columns import read_name
 from strapdown.formats.dates import excel_nanoseconds, is_stamp, nanoseconds_of
-from strapdown.formats.find_columns import Column
 from strapdown.formats.recording import RawLog, stated_by
 
 __all__ = ["told_by_file_rows"]
@@ -144,13 +143,13 @@ def _text(value: Any) -> str | None:
     return str(value)
 
 
-def numbers(raw: RawLog, column: Column, quantity: str) -> NDArray[Any]:
+def numbers(raw: RawLog, source: str, quantity: str) -> NDArray[Any]:
     """Return the values of a column as numbers.
 
-    `quantity`: for messages. Returns (n,), integers or floats, as in the file; NaN for missing
-    values. DataError: a value is not a number.
+    `source`: the column. `quantity`: for messages. Returns (n,), integers or floats, as in the
+    file; NaN for missing values. DataError: a value is not a number.
     """
-    values = raw.columns[column.source]
+    values = raw.columns[source]
     if values.dtype.kind in "iufb":
         return values
     texts = pd.Series(values)
@@ -163,25 +162,25 @@ def numbers(raw: RawLog, column: Column, quantity: str) -> NDArray[Any]:
             row=raw.row(int(bad[0])),
             quantity=quantity,
             values=values[bad[0]],
-            source=column.source,
+            source=source,
         )
     return found
 
 
-def ticks_of(raw: RawLog, column: Column) -> tuple[NDArray[Any], bool]:
+def ticks_of(raw: RawLog, source: str, unit: str | None = None) -> tuple[NDArray[Any], bool]:
     """Return stamps as numbers; dates and times of day as nanoseconds, and True.
 
     Nanoseconds count from 1970, or from a midnight where there is no date. DataError: a stamp is
     neither, or of another kind than those before it.
     """
-    values = raw.columns[column.source]
+    values = raw.columns[source]
     if values.dtype.kind == "M":
         return values.astype("datetime64[ns]").astype(np.int64), True
     if values.dtype.kind != "O":
-        days = excel_nanoseconds(values) if column.unit is None else None
-        return (numbers(raw, column, "time"), False) if days is None else (days, True)
+        days = excel_nanoseconds(values) if unit is None else None
+        return (numbers(raw, source, "time"), False) if days is None else (days, True)
     if not is_stamp(str(values[0])):
-        return numbers(raw, column, "time"), False
+        return numbers(raw, source, "time"), False
     if re.match(r"\d{4}-\d\d-\d\d[T ]", str(values[0])):  # a hundred times faster
         texts = pd.Series(values).str.replace(",", ".")
         dates = pd.to_datetime(texts, format="ISO8601", utc=True, errors="coerce")
@@ -197,7 +196,7 @@ def ticks_of(raw: RawLog, column: Column) -> tuple[NDArray[Any], bool]:
             row=raw.row(first),
             quantity="time",
             values=values[first],
-            source=column.source,
+            source=source,
         )
     return found, True
 

@@ -25,7 +25,6 @@ from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
 from strapdown.formats.columns import read_name
 from strapdown.formats.file_options import FileOptions
-from strapdown.formats.find_columns import Column
 from strapdown.formats.recording import RawLog, TruthInSensorAxes
 from strapdown.formats.sensor_folder import file_member, first_line
 from strapdown.formats.signs import Signs
@@ -146,7 +145,7 @@ def _stated(raw: RawLog, known: dict[str, str]) -> RawLog:
 def _truth_table(path: Path, name: str) -> RawLog:
     """Read stamps and attitude of a ground truth, taking z of R as up and x as north."""
     raw = _stated(csv.parse(path.read_bytes(), name, (path,)), TURN)
-    by_quantity = {q: Column(c, None, "") for c, (q, _) in raw.stated.items()}
+    by_quantity = {q: c for c, (q, _) in raw.stated.items()}
     q = np.column_stack([numbers(raw, by_quantity[k], k) for k in TURN.values()]).astype(np.float64)
     norm = np.linalg.norm(np.where(np.abs(q) < 2.0, q, np.nan), axis=1)
     good = np.abs(norm - 1.0) < 0.01
@@ -183,7 +182,7 @@ def _seconds(raw: RawLog, origin: RawLog) -> Array:
 
     def stamps(log: RawLog) -> NDArray[np.generic]:
         column = next(c for c, (q, _) in log.stated.items() if q == "time")
-        return numbers(log, Column(column, None, ""), "time")
+        return numbers(log, column, "time")
 
     return np.asarray((stamps(raw) - stamps(origin)[0]).astype(np.float64) * 1e-9)
 
@@ -214,7 +213,7 @@ def _with(raw: RawLog, q_ns: Array, known: RawLog) -> RawLog:
     at = np.asarray(np.isfinite(q_ns).all(axis=1))
     force = np.column_stack(
         [
-            numbers(raw, Column(c, None, ""), q).astype(np.float64)
+            numbers(raw, c, q).astype(np.float64)
             for a in "xyz"
             for c, (q, _) in raw.stated.items()
             if q == f"accel_{a}"

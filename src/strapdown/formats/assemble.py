@@ -82,7 +82,11 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
         found = find_columns(raw, dataclasses.replace(options, columns={}))
     findings = [*raw.findings, *unused]
     values = values_of_triads(raw, found, findings)
-    ticks, dated = ticks_of(raw, found["time"]) if "time" in found else (None, False)
+    ticks, dated = (
+        ticks_of(raw, found["time"].source, found["time"].unit)
+        if "time" in found
+        else (None, False)
+    )
     said = told_by_numbers(raw, found, options, values, ticks, dated)
     axes = body_axes(raw, options, said, findings)
     units = units_of_triads(raw, found, options, values, said, findings, questions)
@@ -666,7 +670,7 @@ def truth_of_log(
             return None, None
         for name in names:
             column = found[name]
-            values = numbers(raw, column, name)
+            values = numbers(raw, column.source, name)
             first = float(values[kept[np.argmax(np.isfinite(values[kept]))]])
             readings.append(Reading(column.source, name, column.unit or "", column.why, first))
         q_ns, scored = q, np.ones(kept.size, dtype=bool)
@@ -694,7 +698,7 @@ def truth_of_file(raw: RawLog, options: ReadOptions, origin: Origin) -> pd.DataF
         q, _ = _quaternions(raw, found)
     if q is None or "time" not in found:
         return None
-    ticks, dated = ticks_of(raw, found["time"])
+    ticks, dated = ticks_of(raw, found["time"].source, found["time"].unit)
     rows = np.flatnonzero(_known(q) & np.isfinite(ticks.astype(np.float64)))
     if not rows.size:
         return None
@@ -744,11 +748,11 @@ def _known(q: Array) -> NDArray[np.bool_]:
 def _quaternions(raw: RawLog, found: dict[str, Column]) -> tuple[Array | None, list[str]]:
     """Return the attitude of each row, NaN where unknown, and its source columns."""
     if all(n in found for n in QUATERNIONS):
-        parts = [numbers(raw, found[n], n) for n in QUATERNIONS]
+        parts = [numbers(raw, found[n].source, n) for n in QUATERNIONS]
         return np.column_stack(parts).astype(np.float64, copy=False), list(QUATERNIONS)
     if not all(n in found for n in EULERS):
         return None, []
-    angles = np.column_stack([numbers(raw, found[n], n) for n in EULERS]).astype(np.float64)
+    angles = np.column_stack([numbers(raw, found[n].source, n) for n in EULERS]).astype(np.float64)
     units = {found[n].unit for n in EULERS}
     if units == {"rad"}:
         angles = np.degrees(angles)

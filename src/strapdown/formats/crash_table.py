@@ -29,7 +29,6 @@ from strapdown.formats.crash_record import (
 )
 from strapdown.formats.crash_samples import ONE_STEP, Clock, seconds_of
 from strapdown.formats.dates import day_nanoseconds
-from strapdown.formats.find_columns import Column
 from strapdown.formats.recording import RawLog
 from strapdown.units import FACTORS, OF_CRASHES, find_unit
 
@@ -297,12 +296,11 @@ def _samples(
 
 
 def _numbers(raw: RawLog, source: str) -> NDArray[Any]:
-    column = Column(source, None, "")
-    return _retold(lambda: numbers(raw, column, f"channel {source}"))
+    return _retold(lambda: numbers(raw, source, f"channel {source}"))
 
 
 def _ticks(raw: RawLog, source: str) -> tuple[NDArray[Any], bool]:
-    return _retold(lambda: ticks_of(raw, Column(source, None, "")))
+    return _retold(lambda: ticks_of(raw, source))
 
 
 def _retold(read: Callable[[], T]) -> T:

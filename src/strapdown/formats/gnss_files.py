@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
 from strapdown.formats import comma2k19, open_stream
-from strapdown.formats.arrays import numbers, ticks_of
-from strapdown.formats.clocks import GPS, RELATIVE, UNIX, WEEK, Clock, clock_of_name
-from strapdown.formats.find_columns import Column, names_of_quantities
+from strapdown.formats.arrays import numbers
+from strapdown.formats.clocks import GPS, RELATIVE, UNIX, WEEK, Clock
+from strapdown.formats.find_columns import names_of_quantities
 from strapdown.formats.gnss_fixes import (
     RADIUS,
     UNSTATED_VERTICAL,
@@ -60,9 +60,7 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
     _refuse_missing(raw, found)
 
     def values(quantity: str) -> Array:
-        column = found[quantity]
-        read = numbers(raw, Column(column.source, None, ""), quantity)
-        return np.asarray(read, dtype=np.float64) * column.factor
+        return found[quantity].values(raw, quantity)
 
     def block(names: Sequence[str]) -> Array | None:
         there = [name for name in names if name in found]
@@ -135,7 +133,7 @@ def _refuse_missing(raw: RawLog, found: dict[str, Found]) -> None:
     if not any(set(one) <= found.keys() for one in (_GEODETIC, _ECEF, _LOCAL)):
         if not missing and (axes := _bare_axes(raw)):
             x, y, z = axes
-            xyz = np.column_stack([numbers(raw, Column(c, None, ""), c) for c in axes])
+            xyz = np.column_stack([numbers(raw, c, c) for c in axes])
             far = np.nanmedian(np.linalg.norm(np.asarray(xyz, dtype=np.float64), axis=1))
             if _NEAR_EARTH[0] < far < _NEAR_EARTH[1]:
                 columns = f"ecef_x={x},ecef_y={y},ecef_z={z}"
@@ -232,7 +230,7 @@ def _rows_of_fixes(raw: RawLog, found: dict[str, Found]) -> RawLog:
     if not {"lat", "lon"} <= found.keys() or "gyro_x" not in names_of_quantities(raw):
         return raw
     place = [
-        np.asarray(numbers(raw, Column(found[q].source, None, ""), q), dtype=np.float64)
+        np.asarray(numbers(raw, found[q].source, q), dtype=np.float64)
         for q in ("lat", "lon", *_HEIGHTS, "speed", "course", *VELOCITY)
         if q in found
     ]
@@ -374,13 +372,9 @@ _DATES = (9.467e8, 2.367e9)
 
 
 def _time(raw: RawLog, found: Found) -> tuple[Array, Clock]:
-    ticks, dated = ticks_of(raw, Column(found.source, None, ""))
-    time = np.asarray(ticks * (1e-9 if dated else found.factor), dtype=np.float64)
+    time, name, dated = found.stamps(raw)
     first = float(time[np.isfinite(time)][0]) if np.isfinite(time).any() else 0.0
-    name = raw.clock or clock_of_name(found.source, first, dated=dated)
-    if raw.clock:
-        return time, Clock(name)
-    if name == UNIX and not dated and not found.stated and first > 1e11:
+    if name == UNIX and not (raw.clock or dated or found.stated) and first > 1e11:
         step = float(np.median(np.abs(np.diff(time)))) if time.size > 1 else np.nan
         # A receiver gives 100 fixes a second to one in two minutes: this, not the stamp, tells a
         # clock of 1970 in ms from one in ns that counts from the start of a phone.

@@ -23,7 +23,6 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import UNIX, Clock
-from strapdown.formats.find_columns import Column
 from strapdown.formats.gnss_fixes import RADIUS, UNSTATED_VERTICAL, Fixes
 from strapdown.formats.join import join
 from strapdown.formats.phones import sensor_log
@@ -162,7 +161,7 @@ def read_fixes(path: Path) -> Fixes:
         if name is None:
             return np.full(int(keep.sum()), np.nan)
         raw = RawLog(path.name, (path,), {name: table[name]}, rows=rows)
-        return numbers(raw, Column(name, None, ""), quantity).astype(np.float64)[keep]
+        return numbers(raw, name, quantity).astype(np.float64)[keep]
 
     time = values("utc") * 1e-3
     if at["elapsed"] and any(lines.get(k) for k in ("UncalGyro", "Gyro")):

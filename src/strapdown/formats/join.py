@@ -133,7 +133,7 @@ def clock_of(log: RawLog, found: dict[str, Column]) -> Clock:
             quantity="time",
             columns=list(log.columns),
         )
-    ticks, dated = ticks_of(log, found["time"])
+    ticks, dated = ticks_of(log, found["time"].source, found["time"].unit)
     return Clock(ticks, "ns" if dated else found["time"].unit)
 
 
@@ -192,7 +192,10 @@ def _onto(
 ) -> tuple[Array | None, NDArray[np.bool_]]:
     """Return a triad at the stamps of the gyro, and where it has values."""
     values = np.column_stack(
-        [numbers(log, theirs[f"{triad}_{a}"], f"{triad}_{a}").astype(np.float64) for a in AXES]
+        [
+            numbers(log, theirs[f"{triad}_{a}"].source, f"{triad}_{a}").astype(np.float64)
+            for a in AXES
+        ]
     )
     origin, clock = clock_of(gyro, own), clock_of(log, theirs)
     if (origin.unit is None) != (clock.unit is None):

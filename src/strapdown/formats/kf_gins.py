@@ -19,7 +19,6 @@ from strapdown.formats import csv
 from strapdown.formats.arrays import numbers, told_by_file_rows
 from strapdown.formats.clocks import GPS, WEEK, Clock, clock_of, unrolled, with_clock
 from strapdown.formats.file_options import FileOptions
-from strapdown.formats.find_columns import Column
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.judge import intervals
 from strapdown.formats.recording import NoStreamError, RawLog
@@ -214,7 +213,7 @@ def read_fixes(path: Path) -> Fixes:
 def fixes_of(raw: RawLog, names: tuple[str, ...]) -> Fixes:
     """Convert columns in a known order to fixes."""
     values = {
-        name: np.asarray(numbers(raw, Column(column, None, ""), name), dtype=np.float64)
+        name: np.asarray(numbers(raw, column, name), dtype=np.float64)
         for name, column in zip(names, raw.columns, strict=True)
     }
 
@@ -312,9 +311,7 @@ def read_trajectory(path: Path) -> pd.DataFrame:
             count_2=len(TRAJECTORY_NAMES),
         )
     named = zip(TRAJECTORY_NAMES, raw.columns, strict=True)
-    values = {
-        n: np.asarray(numbers(raw, Column(c, None, ""), n), dtype=np.float64) for n, c in named
-    }
+    values = {n: np.asarray(numbers(raw, c, n), dtype=np.float64) for n, c in named}
     week = values["week"]
     time = values["time"] + WEEK * (week - week[0])
     if np.isfinite(time).all():

@@ -34,7 +34,6 @@ from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import RELATIVE, UNIX, Clock, with_clock
 from strapdown.formats.file_options import FileOptions
-from strapdown.formats.find_columns import Column
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.recording import NoStreamError, RawLog, TruthInSensorAxes
 from strapdown.formats.signs import Signs, head
@@ -298,7 +297,7 @@ def read_poses(path: Path) -> pd.DataFrame:
     said = dict(m.groups() for m in map(_SAID.match, head(path).split("\n")) if m)
     if len(said) < 2:
         raise DataError("io.poses-without-origin", file=path.name, quantity="reference")
-    values = np.column_stack([numbers(raw, Column(c, None, ""), c) for c in raw.columns])
+    values = np.column_stack([numbers(raw, c, c) for c in raw.columns])
     good = _are_rotations(values) & np.isfinite(values).all(axis=1)
     if not good.all():
         bad = int(np.argmin(good))

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError
 from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
-from strapdown.formats.find_columns import Column
 from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.signs import head
 
@@ -58,7 +57,7 @@ def column(raw: RawLog, name: str) -> NDArray[Any]:
         raise DataError(
             "io.no-column-4", file=raw.name, missing=[name], columns=", ".join(raw.columns)
         )
-    return numbers(raw, Column(name, None, ""), name)
+    return numbers(raw, name, name)
 
 
 def optional(

@@ -6,7 +6,12 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from strapdown.errors import ConfigError, DataError, StrapdownError, check_choice
+from strapdown.formats.arrays import numbers, ticks_of
+from strapdown.formats.clocks import clock_of_name
 from strapdown.formats.columns import CLOCKS, TIMES
 from strapdown.formats.recording import RawLog
 from strapdown.units import ANGLES, LENGTHS, OF_TABLES, SPEEDS, TIME_UNITS, unit_of, unit_words
@@ -22,6 +27,7 @@ __all__ = [
 ]
 
 
+Array = NDArray[np.float64]
 _BRACKETS = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]\s*$")
 
 
@@ -61,6 +67,24 @@ class Found:
     source: str
     factor: float
     stated: bool
+
+    def values(self, raw: RawLog, quantity: str) -> Array:
+        """Return the numbers in the table's unit and sign; (n,).
+
+        `quantity`: for messages. DataError: a value is not a number.
+        """
+        return np.asarray(numbers(raw, self.source, quantity), np.float64) * self.factor
+
+    def stamps(self, raw: RawLog) -> tuple[Array, str, bool]:
+        """Return seconds, (n,), the name of their clock, and whether they were dates.
+
+        DataError: a stamp is neither a number nor a date.
+        """
+        ticks, dated = ticks_of(raw, self.source)
+        time = np.asarray(ticks * (1e-9 if dated else self.factor), dtype=np.float64)
+        finite = time[np.isfinite(time)]
+        first = float(finite[0]) if finite.size else 0.0
+        return time, raw.clock or clock_of_name(self.source, first, dated=dated), dated
 
 
 def quantities_of(

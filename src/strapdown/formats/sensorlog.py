@@ -25,7 +25,6 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.arrays import ticks_of
 from strapdown.formats.clocks import RELATIVE, UNIX
-from strapdown.formats.find_columns import Column
 from strapdown.formats.join import join
 from strapdown.formats.known_text import column, lacking, optional, selected, stated_by
 from strapdown.formats.phones import force_of, sensor_log
@@ -112,7 +111,7 @@ def read_fixes(path: Path) -> RawLog:
     clock = UNIX
     motion = next((STAMPS[k] for k in (MOTION, GYRO) if STAMPS[k] in raw.columns), None)
     if motion is not None and WALL_CLOCK in raw.columns:
-        wall = ticks_of(raw, Column(WALL_CLOCK, None, ""))[0] * 1e-9
+        wall = ticks_of(raw, WALL_CLOCK)[0] * 1e-9
         ahead = float(np.nanmedian(wall - column(raw, motion)))
         # The time of day may be that of the place.
         ahead += ZONE * round(float(np.nanmedian((time - wall)[own])) / ZONE) if own.any() else 0.0
@@ -133,7 +132,7 @@ def _log(raw: RawLog, kind: str, triad: str, unit: str, findings: list[Finding])
     time = _clock(raw, kind)
     stamps = raw.columns[time]
     if time == WALL_CLOCK:
-        stamps, _ = ticks_of(raw, Column(time, None, ""))
+        stamps, _ = ticks_of(raw, time)
     own = _changes(stamps) if time != WALL_CLOCK else np.ones(stamps.size, dtype=bool)
     if (repeated := int((~own).sum())) and triad == "gyro":
         findings.append(

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from strapdown.dsp.running_integral import running_integral
 from strapdown.errors import DataError, Finding
 from strapdown.formats import open_stream
-from strapdown.formats.arrays import numbers, ticks_of, told_by_file_rows
-from strapdown.formats.clocks import Clock, clock_of_name, with_clock
+from strapdown.formats.arrays import told_by_file_rows
+from strapdown.formats.clocks import Clock, with_clock
 from strapdown.formats.columns import CLOCKS, EULERS, TIMES
-from strapdown.formats.find_columns import Column
 from strapdown.formats.quantity_columns import GEODETIC_QUANTITIES, Found, Quantity, find_quantities
 from strapdown.formats.recording import RawLog
 from strapdown.rotation import within_half_turn
@@ -73,10 +72,11 @@ def read_trajectory(path: str | Path, columns: Mapping[str, str] | None = None) 
         return raw
     assert isinstance(raw, RawLog)  # the columns of a table
     found = find_trajectory_columns(raw.columns, columns or {}, raw.name)
-    values = {q: _values(raw, q, found[q]) for q in QUANTITIES}
+    time, clock, _ = found["time"].stamps(raw)
+    values = {q: found[q].values(raw, q) for q in QUANTITIES if q != "time"}
     with told_by_file_rows(raw.name, raw.row):
         table = trajectory_table(
-            values["time"],
+            time,
             np.column_stack([values[q] for q in ("lat", "lon", "alt")]),
             np.column_stack([values[q] for q in ("VN", "VE", "VD")]),
             np.column_stack([values[q] for q in ("roll", "pitch", "heading")]),
@@ -89,21 +89,10 @@ def read_trajectory(path: str | Path, columns: Mapping[str, str] | None = None) 
     )
     with path.open("rb") as stream:
         stated = _ELLIPSOID.search(stream.read(4096).decode("utf-8", "replace"))
-    first = float(values["time"][0])
-    dated = raw.columns[found["time"].source].dtype.kind in "MO"
-    with_clock(table, Clock(clock_of_name(found["time"].source, first, dated=dated)))
+    with_clock(table, Clock(clock))
     table.attrs["ellipsoid"] = stated.group(1) if stated else None
     table.attrs["findings"] = (*raw.findings, *judged)
     return table
-
-
-def _values(raw: RawLog, quantity: str, column: Found) -> Array:
-    of = Column(column.source, None, "")
-    if quantity == "time":
-        ticks, dated = ticks_of(raw, of)
-        return np.asarray(ticks * (1e-9 if dated else column.factor), dtype=np.float64)
-    values = np.asarray(numbers(raw, of, quantity), dtype=np.float64)
-    return values if column.factor == 1.0 else values * column.factor
 
 
 # Assignment of the columns of a text table to the quantities of a trajectory, with units.

@@ -230,7 +230,7 @@ def _not_used(raw: RawLog, triad: str, code: str, **data: Any) -> Finding:
 
 
 def _triad(raw: RawLog, found: dict[str, Column], triad: str) -> Array:
-    parts = [numbers(raw, found[f"{triad}_{a}"], f"{triad}_{a}") for a in AXES]
+    parts = [numbers(raw, found[f"{triad}_{a}"].source, f"{triad}_{a}") for a in AXES]
     return np.column_stack(parts).astype(np.float64, copy=False)
 
 

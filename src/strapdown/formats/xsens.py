@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
-from strapdown.formats.find_columns import Column
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, head
 
@@ -142,7 +141,7 @@ def _unwrapped(
     raw: RawLog, name: str, widths: tuple[int, ...], findings: list[Finding]
 ) -> NDArray[Any]:
     """Unwrap a counter that overflows."""
-    count = numbers(raw, Column(name, None, ""), "time")
+    count = numbers(raw, name, "time")
     if count.dtype.kind not in "iu":
         return count
     count = count.astype(np.int64)

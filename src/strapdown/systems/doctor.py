@@ -33,7 +33,6 @@ from strapdown.formats import (
 from strapdown.formats.arrays import ticks_of
 from strapdown.formats.clocks import RELATIVE, clock_of, on_clock_of
 from strapdown.formats.crash_records import read_crash_record
-from strapdown.formats.find_columns import Column
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.gnss_fixes import GnssOptions
 from strapdown.formats.recording import ABSENT, RawLog, Recording
@@ -426,7 +425,7 @@ def _table(raw: RawLog) -> pd.DataFrame | None:
     if "time" not in stated:
         return None
     name, unit = stated.pop("time")
-    ticks, dated = ticks_of(raw, Column(name, unit, ""))
+    ticks, dated = ticks_of(raw, name, unit)
     time = ticks * (1e-9 if dated else TIME_UNITS.get(unit or "s", 1.0))
     columns = {q: raw.columns[source] for q, (source, _) in stated.items() if source in raw.columns}
     table = pd.DataFrame(columns, index=pd.Index(np.asarray(time, dtype=np.float64), name="time"))

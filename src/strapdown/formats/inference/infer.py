@@ -71,7 +71,7 @@ def infer(raw: RawLog, options: ReadOptions | None = None) -> tuple[Inference, .
     found = find_columns(raw, options)
     stamps, unit = None, None
     if "time" in found:
-        stamps, dated = ticks_of(raw, found["time"])
+        stamps, dated = ticks_of(raw, found["time"].source, found["time"].unit)
         unit = "ns" if dated else found["time"].unit
         if options.time_unit:
             unit = parse_unit(options.time_unit, "time")
@@ -84,7 +84,7 @@ def _triad(raw: RawLog, found: dict[str, Column], triad: str) -> Array | None:
     if not all(c in found for c in columns):
         return None
     try:
-        parts = [numbers(raw, found[c], c).astype(np.float64) for c in columns]
+        parts = [numbers(raw, found[c].source, c).astype(np.float64) for c in columns]
     except DataError:
         if triad == "gyro":
             raise
