@@ -82,7 +82,8 @@ def _has_layout(path: Path) -> bool:
 
 detect = Signs(
     # A kind that is a gyroscope.
-    text=r"(?i)gyr|rotation|angular|(?:^|[,;\t |])[ \"']*(?:4|16)[ \"']*[,;\t |]",
+    text=r"\A[\s\S]{0,16000}?(?:(?i:gyr|rotation|angular)"
+    r"|(?:^|[,;\t |])[ \"']*(?:4|16)[ \"']*[,;\t |])",
     also=_has_layout,
 )
 

@@ -43,7 +43,7 @@ def _has_monitor(path: Path) -> bool:
 
 
 detect = Signs(
-    first=re.escape(SIGNATURE) + rb"|(?:\xef\xbb\xbf)?Test Name:|\xff\xfe|\xfe\xff",
+    first=rb"\A(?:" + re.escape(SIGNATURE) + rb"|(?:\xef\xbb\xbf)?Test Name:|\xff\xfe|\xfe\xff)",
     also=_has_monitor,
 )
 

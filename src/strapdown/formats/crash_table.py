@@ -484,16 +484,11 @@ def _axis(words: list[str], quantity: str, triad: str | None) -> str:
 # Text tables exported by recorders: a title above the header, and a row of units under it.
 
 
-# Number of lines that are searched for a header.
-HIGHEST_HEADER = 200
-# Number of rows under the first that must look like it.
-ROWS = 3
 # Most lines above a table that are kept for people.
 MOST_REMARKS = 24
 # Largest table of a crash, bytes: rows of numbers have some hundred bytes.
 LARGEST = 2_000_000_000
 _TITLE = "# title: "
-_NO_UNIT = ("", "-", "--", "none", "1")
 
 
 def read_text_table(
@@ -512,38 +507,14 @@ def read_text_table(
     text, findings = csv.decoded(path.read_bytes(), path.name)
     if "\0" in text:
         raise DataError("io.crash-table-with-zero-bytes", file=path.name)
-    lines = text.splitlines()
-    header, units_at, units = _header(lines)
-    remarks = _remarks(lines, header)
-    if header is not None:
-        # Blank lines are skipped; row numbers are kept.
-        above = [line if csv.is_comment(line) else "" for line in lines[:header]]
-        lines[:header] = above
-        if units_at is not None:
-            lines[units_at] = ""
-    ended = "\n" if text.endswith(("\n", "\r")) else ""
-    raw = csv.parse(("\n".join(lines) + ended).encode(), path.name, (path,))
+    raw = csv.parse(text.encode(), path.name, (path,), OF_CRASHES)
     raw.findings[:0] = findings
-    if units and len(units) == len(raw.columns):
-        raw.units |= {name: u for name, u in zip(raw.columns, units, strict=True) if u}
     _read_clocks(raw)
-    notes = notes_of(lines, raw)
-    title = next((line[len(_TITLE) :] for line in lines[:1] if line.startswith(_TITLE)), "")
-    # A comment may be the header.
-    return raw, notes, title, tuple(r for r in remarks if not r.startswith(next(iter(raw.columns))))
-
-
-def _remarks(lines: list[str], header: int | None) -> tuple[str, ...]:
-    above = []
-    for at, line in enumerate(lines[:HIGHEST_HEADER]):
-        if at == header or (not csv.is_comment(line) and (header is None or at > header)):
-            break
-        if line.startswith((NOTE, _TITLE)):
-            continue
-        text = clean(line.lstrip("#% "), LONGEST_NAME)
-        if text:
-            above.append(text)
-    return tuple(above[:MOST_REMARKS])
+    notes = notes_of(text.splitlines(), raw)
+    title = next((line[len(_TITLE) :] for line in raw.above[:1] if line.startswith(_TITLE)), "")
+    said = [line for line in raw.above if not line.startswith((NOTE, _TITLE))]
+    remarks = [clean(line.lstrip("#% "), LONGEST_NAME) for line in said]
+    return raw, notes, title, tuple([r for r in remarks if r][:MOST_REMARKS])
 
 
 def _read_clocks(raw: RawLog) -> None:
@@ -585,51 +556,6 @@ def notes_of(lines: list[str], raw: RawLog) -> dict[str, dict[str, Any]]:
                 )
             )
     return notes
-
-
-def _header(lines: list[str]) -> tuple[int | None, int | None, list[str]]:
-    """Find the lines of header and units, and the units; None if the first line is the header."""
-    said = [
-        (at, csv.fields_of(line, csv.separator_of(line)))
-        for at, line in enumerate(lines[:HIGHEST_HEADER])
-        if line.strip() and not csv.is_comment(line)
-    ]
-    # Rows of numbers; in a table with a text column, rows that are mostly numbers. "Channels: 3"
-    # above a table looks like one, so consistency with the following rows is required first.
-    for goes_on in (True, False):
-        for whole in (True, False):
-            for k, (_, fields) in enumerate(said):
-                if not _is_row(fields, whole):
-                    continue
-                below = [f for _, f in said[k + 1 : k + 1 + ROWS]]
-                if goes_on and not (
-                    below and all(len(f) == len(fields) and _is_row(f, whole) for f in below)
-                ):
-                    continue
-                return _above(said[:k], len(fields))
-    return None, None, []
-
-
-def _is_row(fields: list[str], whole: bool) -> bool:
-    there = [f for f in fields if f]
-    numbers = sum(map(csv.is_data, there))
-    return bool(numbers and (numbers == len(there) if whole else 2 * numbers >= len(fields)))
-
-
-def _above(
-    said: list[tuple[int, list[str]]], width: int
-) -> tuple[int | None, int | None, list[str]]:
-    whole = [(at, fields) for at, fields in said if len(fields) == width]
-    if not whole or whole[-1] != said[-1]:
-        return None, None, []
-    at, fields = whole[-1]
-    # A cell above the table may hold only a unit: a row of units has one in every cell.
-    plain = [f.strip("[](){} ") for f in fields]
-    known = [find_unit(p, OF_CRASHES) is not None for p in plain if p.lower() not in _NO_UNIT]
-    if len(whole) > 1 and whole[-2] == said[-2] and known and all(known):
-        units = ["" if p.lower() in _NO_UNIT else p for p in plain]
-        return whole[-2][0], at, units
-    return at, None, []
 
 
 # Crash records written as text tables: units in the headings, the rest in comments.

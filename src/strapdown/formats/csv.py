@@ -12,6 +12,7 @@ import codecs
 import itertools
 import re
 from collections import Counter
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Literal
@@ -26,7 +27,7 @@ from strapdown.formats.preamble import stated_by_keys, stated_rate, stated_units
 from strapdown.formats.recording import RawLog, stated_by
 from strapdown.formats.signs import HEAD, Signs, first_bytes
 from strapdown.formats.text_columns import NULLS, Columns, columns_at_once, parsed
-from strapdown.units import unit_of
+from strapdown.units import OF_LOGS, unit_of
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat")
 COMMENTS = ("#", "%", "//", "!")
@@ -36,6 +37,7 @@ _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?|[+-]?nan|[+-]
 # Numbers with a decimal comma, separated by blanks.
 _COMMAS = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?(\s+[+-]?\d+(,\d+)?([eE][+-]?\d+)?)+")
 _UNIT = re.compile(r"\s*[\[(].*")
+_NO_UNIT = ("-", "--", "none", "1")
 _HEX = re.compile(r"[+-]?0x[0-9a-f]+", re.I)
 #: Lines at the top of a text in which its rows of numbers are searched, their characters, and the
 #: fields of each that are judged.
@@ -83,15 +85,19 @@ def read(path: Path) -> RawLog:
     return _at_once(path, path.name, files) or _line_by_line(path.read_bytes(), path.name, files)
 
 
-def parse(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog:
+def parse(
+    data: bytes, name: str, files: tuple[Path, ...], kinds: Sequence[str] = OF_LOGS
+) -> RawLog:
     """Read the columns of a text table from a file or a member of an archive.
 
-    `name`: for messages. `files`: file that holds it.
+    `name`: for messages. `files`: file that holds it. `kinds`: of units in a row under the names.
     """
-    return _at_once(data, name, files) or _line_by_line(data, name, files)
+    return _at_once(data, name, files, kinds) or _line_by_line(data, name, files, kinds)
 
 
-def _at_once(source: bytes | Path, name: str, files: tuple[Path, ...]) -> RawLog | None:
+def _at_once(
+    source: bytes | Path, name: str, files: tuple[Path, ...], kinds: Sequence[str] = OF_LOGS
+) -> RawLog | None:
     """Read a text whose rows are all like the first; ten times faster.
 
     None if anything is irregular: the lines then have to be parsed one by one.
@@ -106,7 +112,7 @@ def _at_once(source: bytes | Path, name: str, files: tuple[Path, ...]) -> RawLog
     numbered, comments = _numbered(text)
     if not numbered or _rewritten(numbered) is not numbered:
         return None
-    top = _Top(numbered, comments, name)
+    top = _Top(numbered, comments, name, kinds)
     if not top.data:
         return None
     first, _ = top.data[0]
@@ -136,12 +142,14 @@ def _ends(source: bytes | Path) -> tuple[bytes, bytes, int]:
         return head, stream.read(), size
 
 
-def _line_by_line(data: bytes, name: str, files: tuple[Path, ...]) -> RawLog:
+def _line_by_line(
+    data: bytes, name: str, files: tuple[Path, ...], kinds: Sequence[str] = OF_LOGS
+) -> RawLog:
     text, findings = decoded(data, name)
     numbered, comments = _numbered(text)
     if not numbered:
         raise DataError("io.file-holds-comments-alone" if comments else "io.file-empty", file=name)
-    top = _Top(_rewritten(numbered), comments, name)
+    top = _Top(_rewritten(numbered), comments, name, kinds)
     if not top.data:
         raise DataError("io.csv-without-rows", file=name, row=numbered[0][0])
     ended = text.endswith(("\n", "\r"))
@@ -247,6 +255,8 @@ class _Top:
     comments : list of str
     name : str
         For messages.
+    kinds : sequence of str
+        Kinds of units that a row under the names may have.
 
     Raises
     ------
@@ -254,8 +264,10 @@ class _Top:
         A row has more than `MOST_COLUMNS` fields.
     """
 
-    def __init__(self, numbered: Lines, comments: list[str], name: str) -> None:
-        first, self.separator, width = _first_row(numbered)
+    def __init__(
+        self, numbered: Lines, comments: list[str], name: str, kinds: Sequence[str]
+    ) -> None:
+        first, self.separator, width = _first_row(numbered, kinds)
         if width > MOST_COLUMNS:
             row = numbered[min(first, len(numbered) - 1)][0]
             raise DataError(
@@ -274,7 +286,7 @@ class _Top:
                 self.above.pop()
             self.names = _unique(named or [f"column {k + 1}" for k in range(width)])
             return
-        below = _units(near[0], self.separator, width) if over is not None else None
+        below = _units(near[0], self.separator, width, kinds) if over is not None else None
         if below and over is not None:
             names, over = over, lines[2]
         bare = [_UNIT.sub("", n) for n in names if n]
@@ -305,12 +317,13 @@ class _Top:
             units=self.units,
             triad_units=stated_units(said, held),
             rate=stated_rate(said),
+            above=said,
             findings=findings,
             **stated_by(stated_by_keys(said)),
         )
 
 
-def _first_row(numbered: Lines) -> tuple[int, str | None, int]:
+def _first_row(numbered: Lines, kinds: Sequence[str]) -> tuple[int, str | None, int]:
     """Return the first of rows of numbers, their separator, and their number of fields.
 
     They are the most frequent form, and two of the first three have it. Where every line above has
@@ -339,7 +352,7 @@ def _first_row(numbered: Lines) -> tuple[int, str | None, int]:
         if k > 1 and all(form == forms[k] for form in forms[:k]):
             top = [fields_of(line, separator) for _, line in numbered[:k]]
             first = 1 + _are_groups(top[0])
-            if _units(numbered[first][1], separator, width):
+            if _units(numbered[first][1], separator, width, kinds):
                 first += 1
             return min(first, k), separator, width
         return k, separator, width - _ends_empty(numbered, forms[k], k)
@@ -388,10 +401,11 @@ def _filled(fields: list[str]) -> list[str]:
     return out
 
 
-def _units(line: str, separator: str | None, width: int) -> list[str] | None:
+def _units(line: str, separator: str | None, width: int, kinds: Sequence[str]) -> list[str] | None:
     """Return the units of a second header line, if most fields are units known here."""
-    fields = [f.strip("[]() ") for f in fields_of(line, separator)][:width]
-    known = [unit_of(f) is not None for f in fields if f]
+    fields = [f.strip("[](){} ") for f in fields_of(line, separator)][:width]
+    fields = ["" if f.lower() in _NO_UNIT else f for f in fields]
+    known = [unit_of(f, kinds) is not None for f in fields if f]
     return fields if len(fields) == width and known and 2 * sum(known) > len(known) else None
 
 

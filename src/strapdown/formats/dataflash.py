@@ -70,7 +70,7 @@ _TEXT = re.compile(rb"(?:\A|\n)FMT, ?128, ?89, ?FMT,")
 
 
 # The first record describes itself.
-detect = Signs(first=rb"\xa3\x95\x80|(?:.{0,4095}\n)?FMT, ?128, ?89, ?FMT,")
+detect = Signs(first=rb"\A\xa3\x95\x80|\AFMT, ?128, ?89, ?FMT,|\nFMT, ?128, ?89, ?FMT,")
 
 
 @lru_cache(maxsize=1)

@@ -17,7 +17,7 @@ from strapdown.formats import csv
 from strapdown.formats.recording import RawLog, library
 from strapdown.formats.signs import Signs
 
-detect = Signs(suffixes=(".xlsx", ".xlsm"), first=rb"PK\x03\x04")
+detect = Signs(suffixes=(".xlsx", ".xlsm"), first=rb"\APK\x03\x04")
 
 
 def read(path: Path) -> RawLog:

@@ -38,7 +38,7 @@ SENSORS = {
 Message = dict[str, Any]
 
 
-detect = Signs(first=rb"[\x0c\x0e].{7}\.FIT")
+detect = Signs(first=rb"\A[\x0c\x0e].{7}\.FIT")
 
 
 def read(path: Path) -> RawLog:

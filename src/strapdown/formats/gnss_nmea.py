@@ -43,7 +43,7 @@ _NAN3 = (np.nan, np.nan, np.nan)
 
 
 # A sentence among the first lines.
-detect = Signs(first=rb"(?:.*?[\r\n])?\$G[PNLAB]")
+detect = Signs(first=rb"\$G(?:(?<=\A\$G)|(?<=[\r\n]\$G))[PNLAB]")
 
 
 @dataclass

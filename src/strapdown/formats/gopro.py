@@ -81,7 +81,7 @@ def _has_telemetry(path: Path) -> bool:
 
 # Text in UTF-16 too.
 detect = Signs(
-    first=rb"DEVC|.{4}ftyp|(?:\xef\xbb\xbf)?\s*\{|\xff\xfe|\xfe\xff",
+    first=rb"\A(?:DEVC|.{4}ftyp|(?:\xef\xbb\xbf)?\s*\{|\xff\xfe|\xfe\xff)",
     also=_has_telemetry,
 )
 

@@ -35,7 +35,7 @@ from strapdown.tables.checks import values_of
 QUALITY = {"none": 0.0, "dgps": 2.0, "pps": 3.0}
 
 
-detect = Signs(text=r"\A[\s\S]{0,4092}<gpx")
+detect = Signs(text=r"\A[\s\S]{0,4092}?<gpx")
 
 
 def read(path: Path) -> RawLog:

@@ -105,7 +105,7 @@ def _begins_with_increments(path: Path) -> bool:
     return _are_increments(np.array(block))
 
 
-detect = Signs(suffixes=SUFFIXES, first=rb"[^,\0]*\Z", also=_begins_with_increments)
+detect = Signs(suffixes=SUFFIXES, first=rb"\A[^,\0]*\Z", also=_begins_with_increments)
 
 
 def read(path: Path) -> RawLog:
@@ -189,7 +189,7 @@ def _begins_with_fixes(path: Path) -> bool:
 
 
 detect_fixes = Signs(
-    suffixes=csv.SUFFIXES, text=r"^\s*[^\s#%]\S*(?:[ \t]+\S+){6}", also=_begins_with_fixes
+    suffixes=csv.SUFFIXES, text=r"^[ \t]*[^\s#%]\S*(?:[ \t]+\S+){6}", also=_begins_with_fixes
 )
 
 
@@ -274,7 +274,7 @@ def _begins_with_states(path: Path) -> bool:
 detect_trajectory = Signs(
     named=(SUFFIX,),
     suffixes=csv.SUFFIXES,
-    text=r"^\s*(?:[^\s,#%]+[ \t]+){10}[^\s,]+\s*$",
+    text=r"^[ \t]*(?:[^\s,#%]+[ \t]+){10}[^\s,]+[ \t\r]*$",
     also=_begins_with_states,
 )
 

@@ -276,7 +276,7 @@ def _are_rotations(values: Array) -> NDArray[np.bool_]:
 
 detect_poses = Signs(
     suffixes=csv.SUFFIXES,
-    text=r"^[ \t]*(?:[^\s,#]+[ \t]+){11}[^\s,#]+[ \t]*\r?$",
+    text=r"^[ \t]*(?:[^\s,#]+[ \t]+){11}[^\s,#]+[ \t\r]*$",
     also=_has_poses,
 )
 
@@ -294,7 +294,7 @@ def read_poses(path: Path) -> pd.DataFrame:
     DataError: they do not, a stamp is missing, or a row is no pose.
     """
     raw = csv.read(path)
-    said = dict(m.groups() for m in map(_SAID.match, head(path).split("\n")) if m)
+    said = {m[1]: m[2] for m in map(_SAID.match, head(path).split("\n")) if m}
     if len(said) < 2:
         raise DataError("io.poses-without-origin", file=path.name, quantity="reference")
     values = np.column_stack([numbers(raw, c, c) for c in raw.columns])

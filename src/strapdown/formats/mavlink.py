@@ -65,7 +65,7 @@ def _begins(path: Path) -> bool:
     return len(list(_frames(first_bytes(path, 1024), most=2))) == 2
 
 
-detect = Signs(first=rb".{8,1023}?[\xfd\xfe]", also=_begins)
+detect = Signs(first=rb"\A.{8,1023}?[\xfd\xfe]", also=_begins)
 
 
 def _frames(data: bytes, most: int | None = None) -> Iterator[tuple[int, bytes]]:

@@ -66,7 +66,7 @@ def _has_messages(path: Path) -> bool:
     return sum(map(len, _frames(first_bytes(path, 8192))[0].values())) >= 2
 
 
-detect = Signs(first=rb".{0,8191}?\xaa\x44[\x12\x13]", also=_has_messages)
+detect = Signs(first=rb"\xaa\x44[\x12\x13]", also=_has_messages)
 
 
 def _frames(data: bytes) -> tuple[Frames, int]:

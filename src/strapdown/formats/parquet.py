@@ -19,7 +19,7 @@ MAGIC = b"PAR1"
 UNITS = (b"unit", b"units")
 
 
-detect = Signs(named=SUFFIXES, first=re.escape(MAGIC))
+detect = Signs(named=SUFFIXES, first=rb"\A" + re.escape(MAGIC))
 
 
 def read(path: Path) -> RawLog:

@@ -38,7 +38,7 @@ QUALITY = {2: 1, 3: 1, 4: 2, 5: 5, 6: 4, 7: 1, 8: 6}
 Topic = dict[str, NDArray[Any]]
 
 
-detect = Signs(first=re.escape(MAGIC))
+detect = Signs(first=rb"\A" + re.escape(MAGIC))
 
 
 def _topics(path: Path, stream: str, *names: str) -> tuple[dict[str, Topic], list[Finding], Any]:

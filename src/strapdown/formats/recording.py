@@ -185,6 +185,8 @@ class RawLog:
     findings : list of Finding
     start : StatedStart or None
         If the file states one.
+    above : list of str
+        Lines above a text table.
     clock : str or None
         Clock of its stamps (`clocks`), if the format defines it.
     epoch : float, s
@@ -207,6 +209,7 @@ class RawLog:
     truth: TruthInSensorAxes | None = None
     findings: list[Finding] = field(default_factory=list)
     start: StatedStart | None = None
+    above: list[str] = field(default_factory=list)
     clock: str | None = None
     epoch: float = 0.0
     checked: bool = False

@@ -76,7 +76,9 @@ def _is_described(folder: Path) -> bool:
 
 
 detect = Signs(
-    first=b"|".join(re.escape(magic) for magic in MAGIC), also=_has_messages, folder=_is_described
+    first=rb"\A(?:" + b"|".join(map(re.escape, MAGIC)) + rb")",
+    also=_has_messages,
+    folder=_is_described,
 )
 
 

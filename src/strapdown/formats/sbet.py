@@ -47,7 +47,7 @@ def _has_records(path: Path) -> bool:
 
 
 # The exponent of the first time.
-detect = Signs(first=rb".{7}[\x3f-\x41]", also=_has_records)
+detect = Signs(first=rb"\A.{7}[\x3f-\x41]", also=_has_records)
 
 
 def read(path: Path) -> pd.DataFrame:

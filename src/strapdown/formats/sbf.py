@@ -48,7 +48,7 @@ def _has_blocks(path: Path) -> bool:
     return count >= LEAST_BLOCKS or bool(count and head.startswith(SYNC))
 
 
-detect = Signs(first=b".*?" + re.escape(SYNC), also=_has_blocks)
+detect = Signs(first=re.escape(SYNC), also=_has_blocks)
 
 
 def _blocks(data: bytes) -> Blocks:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 
 __all__ = ["HEAD", "Signs", "first_bytes", "head"]
@@ -28,8 +29,7 @@ class Signs:
     suffixes : tuple of str
         Endings that a file may have otherwise; any if empty.
     first : bytes
-        Regular expression that the first `HEAD` bytes match from their beginning; a dot stands for
-        any byte.
+        Regular expression that is found in the first `HEAD` bytes; a dot stands for any byte.
     text : str
         Regular expression that is found in the text of these bytes; ``^`` and ``$`` are ends of a
         line. The text of binary content ends at its first zero byte.
@@ -61,7 +61,7 @@ class Signs:
         ):
             return False
         top = first_bytes(path, HEAD) if data is None else data
-        if self.first and not re.match(self.first, top, re.S):
+        if self.first and not re.search(self.first, top, re.S):
             return False
         if self.text and not re.search(self.text, text_of(top), re.M):
             return False
@@ -86,6 +86,7 @@ def head(path: Path, count: int = 1 << 14) -> str:
 _WIDE = (b"\xff\xfe", b"\xfe\xff")
 
 
+@lru_cache(maxsize=2)
 def text_of(data: bytes) -> str:
     """Decode the beginning of a text, up to a zero byte."""
     if data.startswith(_WIDE):

@@ -159,7 +159,7 @@ def _has_poses(path: Path) -> bool:
 
 detect = Signs(
     suffixes=(*csv.SUFFIXES, ".tum"),
-    text=r"^\s*(?:[^\s,#]+\s+){7}[^\s,#]+\s*$",
+    text=r"^[ \t]*(?:[^\s,#]+[ \t]+){7}[^\s,#]+[ \t\r]*$",
     also=_has_poses,
 )
 

@@ -54,7 +54,7 @@ def _has_frames(path: Path) -> bool:
     return len(frames) == LEAST_FRAMES or bool(frames and head.startswith(SYNC))
 
 
-detect = Signs(first=b".*?" + re.escape(SYNC), also=_has_frames)
+detect = Signs(first=re.escape(SYNC), also=_has_frames)
 
 
 def _frames(data: bytes) -> Iterator[bytes]:
