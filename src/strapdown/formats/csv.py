@@ -327,7 +327,7 @@ def _first_row(numbered: Lines, kinds: Sequence[str]) -> tuple[int, str | None, 
     """Return the first of rows of numbers, their separator, and their number of fields.
 
     They are the most frequent form, and two of the first three have it. Where every line above has
-    as many fields, the first names the columns.
+    as many fields, the first that is full names the columns.
     """
     forms: list[tuple[str | None, int]] = []
     data: list[bool] = []
@@ -351,8 +351,10 @@ def _first_row(numbered: Lines, kinds: Sequence[str]) -> tuple[int, str | None, 
         separator, width = forms[k]
         if k > 1 and all(form == forms[k] for form in forms[:k]):
             top = [fields_of(line, separator) for _, line in numbered[:k]]
-            first = 1 + _are_groups(top[0])
-            if _units(numbered[first][1], separator, width, kinds):
+            # Lines of a preamble may be filled up with separators.
+            full = next((m for m, names in enumerate(top) if all(names)), None)
+            first = 1 + (_are_groups(top[0]) if full is None else full)
+            if first < k and _units(numbered[first][1], separator, width, kinds):
                 first += 1
             return min(first, k), separator, width
         return k, separator, width - _ends_empty(numbered, forms[k], k)

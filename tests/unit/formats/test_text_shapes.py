@@ -334,3 +334,19 @@ def test_numbers_that_come_late(tmp_path, last):
 )
 def test_oddities_that_come_late_are_not_read_at_once(tmp_path, last):
     assert both(tmp_path, long_text(last)) is None
+
+
+def test_a_preamble_filled_up_with_separators(tmp_path):
+    """As spreadsheets write it: every line has as many fields as the rows."""
+    above = ["Made by,logger 3,,,,,", "Sample Rate:,100,Hz,,,,", "Time,gx,gy,gz,ax,ay,az"]
+    units = ["s,deg/s,deg/s,deg/s,m/s^2,m/s^2,m/s^2"]
+    rows = [f"{k / 100},1.5,2,3.25,0.1,0.2,-9.8" for k in range(20)]
+    for lines in (above + rows, above + units + rows):
+        path = tmp_path / "a.csv"
+        path.write_text("\n".join(lines) + "\n")
+        raw = csv.read(path)
+        assert list(raw.columns) == above[2].split(",")
+        assert raw.rate == 100.0
+        assert raw.columns["gz"].tolist() == [3.25] * 20
+        assert raw.units.get("gx") == ("deg/s" if units[0] in lines else None)
+        assert raw.row(0) == len(lines) - 19
