@@ -63,9 +63,7 @@ def write_geojson(path: Path, trajectory: pd.DataFrame, options: FileOptions | N
     Longitudes and latitudes have nine decimals (0.1 mm), heights four.
     """
     chosen = options or FileOptions()
-    chosen.require_wgs84("GeoJSON")
-    _check(trajectory)
-    thinned = thin(trajectory, chosen.most_points)
+    thinned = _thinned(trajectory, chosen, "GeoJSON")
     title = one_line(chosen.name)
     features = [_end(trajectory, 0, "start", title, chosen)]
     if len(trajectory) > 1:
@@ -81,11 +79,13 @@ def write_geojson(path: Path, trajectory: pd.DataFrame, options: FileOptions | N
     path.write_bytes(text.encode())
 
 
-def _check(track: pd.DataFrame) -> None:
-    """Refuse a table that is neither a trajectory nor fixes, or has no rows."""
+def _thinned(track: pd.DataFrame, options: FileOptions, form: str) -> Thinned:
+    """Choose the rows of a map; refuse what is neither a trajectory nor fixes, or has no rows."""
+    options.require_wgs84(form)
     (check_gnss if POSITION_SD[0] in track.columns else check_trajectory)(track)
     if track.empty:
         raise DataError("io.trajectory-no-rows")
+    return thin(track, options.most_points)
 
 
 def _known_velocity(track: pd.DataFrame) -> bool:
@@ -95,9 +95,13 @@ def _known_velocity(track: pd.DataFrame) -> bool:
     return bool(np.isfinite(track[VELOCITY_SD].to_numpy(dtype=np.float64)).all())
 
 
+#: Decimals of longitude, latitude (0.1 mm) and height.
+DECIMALS = (9, 9, 4)
+
+
 def _position(point: Array) -> list[float]:
     # Avoid negative zeros.
-    return [round(v, d) + 0.0 for v, d in zip(point.tolist(), (9, 9, 4), strict=True)]
+    return [round(v, d) + 0.0 for v, d in zip(point.tolist(), DECIMALS, strict=True)]
 
 
 def _path_feature(
@@ -113,7 +117,8 @@ def _path_feature(
     if _known_velocity(trajectory):
         speed = np.sqrt(np.square(trajectory[VELOCITY].to_numpy(dtype=np.float64)).sum(axis=1))
         stamps = trajectory.index.to_numpy(dtype=np.float64)
-        speeds = {"largest_speed_m_s": float(speed.max()), "mean_speed_m_s": _mean(stamps, speed)}
+        mean = np.trapezoid(speed, stamps) / (stamps[-1] - stamps[0])
+        speeds = {"largest_speed_m_s": float(speed.max()), "mean_speed_m_s": float(mean)}
     properties: dict[str, Any] = {
         "name": name,
         "part": "path",
@@ -133,10 +138,6 @@ def _path_feature(
         else {"type": "MultiLineString", "coordinates": coordinates}
     )
     return {"type": "Feature", "geometry": geometry, "properties": properties}
-
-
-def _mean(time: Array, values: Array) -> float:
-    return float(np.trapezoid(values, time) / (time[-1] - time[0]))
 
 
 def _dates(options: FileOptions, times: dict[str, float]) -> dict[str, str]:
@@ -202,9 +203,7 @@ def write_kml(path: Path, trajectory: pd.DataFrame, options: FileOptions | None 
     decimals (0.1 mm), heights four.
     """
     chosen = options or FileOptions()
-    chosen.require_wgs84("KML")
-    _check(trajectory)
-    thinned = thin(trajectory, chosen.most_points)
+    thinned = _thinned(trajectory, chosen, "KML")
     kept = trajectory.iloc[thinned.rows]
     points = kept[["lon", "lat", "alt"]].to_numpy(dtype=np.float64).copy()
     points[:, 0] = within_half_turn(points[:, 0])
@@ -223,7 +222,8 @@ def write_kml(path: Path, trajectory: pd.DataFrame, options: FileOptions | None 
             lines += _track(points, [chosen.date(t) for t in time.tolist()])
     ends = [("start", 0)] + ([("end", -1)] if len(points) > 1 else [])
     for label, row in ends:
-        stamp = "" if chosen.epoch is None else _stamp(chosen.date(float(time[row])))
+        date = "" if chosen.epoch is None else chosen.date(float(time[row]))
+        stamp = date and f"<TimeStamp><when>{date}</when></TimeStamp>"
         lines.append(
             f"<Placemark><name>{label}</name><description>{time[row]:.9g} s</description>{stamp}"
             f"<Point><altitudeMode>absolute</altitudeMode><coordinates>"
@@ -245,14 +245,8 @@ def _description(thinned: Thinned, options: FileOptions) -> str:
 
 
 def _coordinates(point: Array, separator: str) -> str:
-    # Avoid negative zeros.
-    lon, lat, alt = (round(v, d) + 0.0 for v, d in zip(point.tolist(), (9, 9, 4), strict=True))
-    return separator.join((_plain(lon, 9), _plain(lat, 9), _plain(alt, 4)))
-
-
-def _plain(value: float, decimals: int) -> str:
-    text = f"{value:.{decimals}f}".rstrip("0").rstrip(".")
-    return text or "0"
+    texts = (f"{v:.{d}f}" for v, d in zip(_position(point), DECIMALS, strict=True))
+    return separator.join(text.rstrip("0").rstrip(".") for text in texts)
 
 
 def _path_placemark(points: Array) -> list[str]:
@@ -278,10 +272,6 @@ def _track(points: Array, dates: list[str]) -> list[str]:
         *(f"<gx:coord>{_coordinates(p, ' ')}</gx:coord>" for p in points),
         "</gx:Track></Placemark>",
     ]
-
-
-def _stamp(date: str) -> str:
-    return f"<TimeStamp><when>{date}</when></TimeStamp>"
 
 
 # Splitting of a line on a map where it crosses the date line.
