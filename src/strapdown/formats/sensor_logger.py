@@ -21,7 +21,7 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -68,19 +68,11 @@ STREAMS: dict[str, tuple[tuple[str, ...], dict[str, tuple[str, str]]]] = {
     "magnetometer": ((MAG,), {f"mag_{a}": (a, "uT") for a in "xyz"}),
     "barometer": (("Barometer",), {"pressure": ("pressure", "hPa")}),
 }
+#: Columns of each kind of table beside ``time``.
+KINDS: dict[str, tuple[str, ...]] = dict.fromkeys(SENSORS, ("x", "y", "z"))
+KINDS |= {k: tuple(c for c, _ in held.values()) for ks, held in STREAMS.values() for k in ks}
 # A second download of a file is called "Gyroscope (1)" or "Gyroscope-2".
 _COPY = re.compile(r"[\s_-]*(\(\d+\)|\d+)$")
-
-
-@dataclass(frozen=True)
-class Sensor:
-    """Samples of one sensor, as recorded."""
-
-    name: str
-    file: Path
-    columns: dict[str, NDArray[Any]]
-    rows: NDArray[np.int64] | None
-    findings: list[Finding]
 
 
 def _has_sensor(path: Path) -> bool:
@@ -112,12 +104,7 @@ def read(path: Path) -> RawLog:
         A file is damaged, or the gyroscope is missing.
     """
     name = path.resolve().name
-    if path.suffix.lower() == ".json" and path.is_file():
-        sensors, meta = _from_json(path)
-        files: tuple[Path, ...] = (path,)
-    else:
-        members = members_of(path) if path.is_dir() or path.suffix.lower() == ".zip" else []
-        sensors, meta, files = _from_members(members or [file_member(path)])
+    sensors, meta, files, _ = _tables(path, SENSORS)
     if not sensors and path.is_file() and detect(path):
         raise lacking(path, "imu", TITLE, ["gnss"])
     if not any(kind in sensors for kind in GYROS):
@@ -156,24 +143,10 @@ def read_barometer(path: Path) -> RawLog:
 
 def _read_stream(path: Path, stream: str) -> RawLog:
     kinds, wanted = STREAMS[stream]
-    if path.is_file() and path.suffix.lower() == ".json":
-        records = _records(path)[0]
-        names = ["time", *(c for c, _ in wanted.values())]
-        for kind in kinds:
-            if where := [k for k, r in enumerate(records) if r.get("sensor") == kind]:
-                there = [n for n in names if n in records[where[0]]]
-                columns = {n: _values(path, records, where, kind, n) for n in there}
-                raw = RawLog(path.name, (path,), columns, np.array(where) + 1)
-                return _stated(raw, wanted)
-        held = {str(r.get("sensor", "")) for r in records}
-    else:
-        inside = path.is_dir() or path.suffix.lower() == ".zip"
-        members = members_of(path) if inside else [file_member(path)]
-        for kind in kinds:
-            if found := [m for m in members if _sensor(m) == kind]:
-                raw = csv.parse(found[0].read(), found[0].label, (found[0].file,))
-                return _stated(raw, wanted)
-        held = {_sensor(m) for m in members}
+    tables, _, _, held = _tables(path, kinds)
+    for kind in kinds:
+        if kind in tables:
+            return _stated(tables[kind], wanted)
     there = [s for s, (k, _) in STREAMS.items() if set(k) & held]
     there += ["imu"] * bool(set(GYROS) & held)
     raise lacking(path, stream, TITLE, there)
@@ -201,32 +174,31 @@ def _has_header(member: Member) -> bool:
     return {"time", "seconds_elapsed", "x", "y", "z"} <= fields
 
 
-def _from_members(
-    members: list[Member],
-) -> tuple[dict[str, Sensor], dict[str, str], tuple[Path, ...]]:
-    sensors: dict[str, Sensor] = {}
-    meta: dict[str, str] = {}
+def _tables(
+    path: Path, wanted: Sequence[str]
+) -> tuple[dict[str, RawLog], dict[str, str], tuple[Path, ...], set[str]]:
+    """Return the tables of wanted kinds, the metadata, their files, and all kinds there are."""
+    if path.is_file() and path.suffix.lower() == ".json":
+        tables, meta, held = _tables_of_records(path, wanted)
+        return tables, meta, (path,), held
+    tables, meta, held = {}, {}, set()
     files = []
-    for member in members:
+    for member in members_of(path) if is_container(path) else [file_member(path)]:
         kind = _sensor(member)
-        if kind not in SENSORS and kind.lower() != METADATA.lower():
-            continue
-        if kind in sensors:
+        held.add(kind)
+        if kind in tables:
             raise DataError(
-                "io.two-of-a-kind", file=member.label, name=sensors[kind].name, kind=kind
+                "io.two-of-a-kind", file=member.label, name=tables[kind].name, kind=kind
             )
-        data = member.read()
-        files.append(member.file)
-        if kind not in SENSORS:
-            table = csv.parse(data, member.label, (member.file,)).columns
+        if kind.lower() == METADATA.lower():
+            table = csv.parse(member.read(), member.label, (member.file,)).columns
             meta = {n.strip().lower(): str(c[0]) for n, c in table.items()}
+        elif kind in wanted:
+            tables[kind] = csv.parse(member.read(), member.label, (member.file,))
+        else:
             continue
-        table_of = csv.parse(data, member.label, (member.file,))
-        _require(member.label, table_of.columns)
-        sensors[kind] = Sensor(
-            member.label, member.file, table_of.columns, table_of.rows, table_of.findings
-        )
-    return sensors, meta, tuple(dict.fromkeys(files))
+        files.append(member.file)
+    return tables, meta, tuple(dict.fromkeys(files)), held
 
 
 def _require(name: str, columns: dict[str, NDArray[Any]]) -> None:
@@ -250,23 +222,28 @@ def _records(path: Path) -> tuple[list[dict[str, Any]], list[Finding]]:
     return records, found
 
 
-def _from_json(path: Path) -> tuple[dict[str, Sensor], dict[str, str]]:
+def _tables_of_records(
+    path: Path, wanted: Sequence[str]
+) -> tuple[dict[str, RawLog], dict[str, str], set[str]]:
     records, found = _records(path)
     groups: dict[str, list[int]] = {}
     meta: dict[str, str] = {}
+    held = set()
     for k, record in enumerate(records):
         kind = str(record.get("sensor", ""))
+        held.add(kind)
         if kind == METADATA:
             meta |= {str(n).lower(): str(v) for n, v in record.items()}
-        elif kind in SENSORS:
+        elif kind in wanted:
             groups.setdefault(kind, []).append(k)
-    sensors = {}
+    tables = {}
     for kind, where in groups.items():
-        columns = {n: _values(path, records, where, kind, n) for n in ("time", "x", "y", "z")}
+        names = [n for n in ("time", *KINDS[kind]) if kind in SENSORS or n in records[where[0]]]
+        columns = {n: _values(path, records, where, kind, n) for n in names}
         rows = np.array(where) + 1
-        sensors[kind] = Sensor(f"{path.name}/{kind}", path, columns, rows, found)
+        tables[kind] = RawLog(f"{path.name}/{kind}", (path,), columns, rows, findings=found)
         found = []
-    return sensors, meta
+    return tables, meta, held
 
 
 def _values(
@@ -295,10 +272,11 @@ def _values(
         ) from None
 
 
-def _log(sensor: Sensor, triad: str, unit: str | None) -> RawLog:
+def _log(sensor: RawLog, triad: str, unit: str | None) -> RawLog:
+    _require(sensor.name, sensor.columns)
     return sensor_log(
         sensor.name,
-        sensor.file,
+        sensor.files[0],
         sensor.columns,
         triad,
         unit,
@@ -308,7 +286,7 @@ def _log(sensor: Sensor, triad: str, unit: str | None) -> RawLog:
     )
 
 
-def _gyro(sensors: dict[str, Sensor], findings: list[Finding]) -> RawLog:
+def _gyro(sensors: dict[str, RawLog], findings: list[Finding]) -> RawLog:
     kind = next(k for k in GYROS if k in sensors)
     if kind == GYROS[1]:
         findings.append(
@@ -323,7 +301,7 @@ def _gyro(sensors: dict[str, Sensor], findings: list[Finding]) -> RawLog:
 
 
 def _force(
-    sensors: dict[str, Sensor], meta: dict[str, str], name: str, findings: list[Finding]
+    sensors: dict[str, RawLog], meta: dict[str, str], name: str, findings: list[Finding]
 ) -> list[RawLog]:
     """Return specific force from the available files; its sign depends on the platform."""
     total, linear, gravity, raw = ACCELS
