@@ -302,10 +302,9 @@ def read_poses(path: Path) -> pd.DataFrame:
     if not good.all():
         bad = int(np.argmin(good))
         raise DataError("io.pose-without-rotation", file=path.name, row=raw.row(bad))
-    stamps = [csv.read(p) for p in files_of_poses(path)[1:]]
-    time = np.concatenate(
-        [np.asarray(next(iter(s.columns.values())), float) for s in stamps] or [[]]
-    )
+    time: Array = np.zeros(0)
+    for stamps in files_of_poses(path)[1:]:
+        time = np.asarray(next(iter(csv.read(stamps).columns.values())), dtype=np.float64)
     if time.size != len(values):
         raise DataError(
             "io.poses-without-times", file=path.name, count=len(values), stamps=time.size
