@@ -83,7 +83,7 @@ def _has_layout(path: Path) -> bool:
 detect = Signs(
     # A kind that is a gyroscope.
     text=r"\A[\s\S]{0,16000}?(?:(?i:gyr|rotation|angular)"
-    r"|(?:^|[,;\t |])[ \"']*(?:4|16)[ \"']*[,;\t |])",
+    r"|(?:^|[,;\t |])[ \"']{0,3}(?:4|16)[ \"']{0,3}[,;\t |])",
     also=_has_layout,
 )
 

@@ -68,7 +68,7 @@ def _has_tables(folder: Path) -> bool:
 
 detect = Signs(
     suffixes=(".csv",),
-    text=r"(?i)\A\s*(?=.*timestamp)(?=.*(?:w_rs_s_x|q_rs_w))",
+    text=r"(?i)\A\s*+(?=.*timestamp)(?=.*(?:w_rs_s_x|q_rs_w))",
     also=_has_names,
     folder=_has_tables,
 )

@@ -43,7 +43,7 @@ def _has_positions(path: Path) -> bool:
     return bool(_TIME.search(text) and (_LAT.search(text) or _PAIR.search(text)))
 
 
-detect = Signs(text=r"\A[\s\S]{0,4080}?" + _TIME.pattern, also=_has_positions)
+detect = Signs(text=r"\A[\s\S]{0,4080}?\d:\d\d:\d\d[,.]\d{1,3}\s*-->", also=_has_positions)
 
 
 def read(path: Path) -> RawLog:

@@ -35,7 +35,7 @@ UNITS |= dict.fromkeys((*LEVEL, *BODY), ("m/s",))
 
 
 # The line that names the program.
-detect = Signs(first=rb"(?m)^\s*Program:\s+Inertial Explorer")
+detect = Signs(first=rb"(?m)^[ \t]*Program:[ \t]+Inertial Explorer")
 
 
 def read(path: Path) -> pd.DataFrame:

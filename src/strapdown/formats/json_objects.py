@@ -43,7 +43,7 @@ def _begins(path: Path) -> bool:
     return _is_object(text.partition("\n")[0])
 
 
-detect = Signs(suffixes=(*SUFFIXES, ".txt", ".log"), text=r"\A\s*[\[{]", also=_begins)
+detect = Signs(suffixes=(*SUFFIXES, ".txt", ".log"), text=r"\A\s*+[\[{]", also=_begins)
 
 
 def read(path: Path) -> RawLog:

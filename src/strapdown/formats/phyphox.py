@@ -78,7 +78,7 @@ def _has_sensor(path: Path) -> bool:
 
 detect = Signs(
     suffixes=csv.SUFFIXES,
-    text=r"(?i)\A\s*.*time \(s\)",
+    text=r"(?i)\A\s*+.*time \(s\)",
     also=_has_sensor,
     folder=_has_sensor,
     zipped=True,

@@ -88,7 +88,7 @@ def _has_sensor(path: Path) -> bool:
 
 detect = Signs(
     suffixes=(".csv", ".json"),
-    text=r"(?i)\A\s*(?:\[|.*seconds_elapsed)",
+    text=r"(?i)\A\s*+(?:\[|.*seconds_elapsed)",
     also=_has_sensor,
     folder=_has_sensor,
     zipped=True,

@@ -65,7 +65,7 @@ def _has_gyro(path: Path) -> bool:
     return csv.detect(path) and any(set(_three(kind, RADIANS)) <= names for kind in (MOTION, GYRO))
 
 
-detect = Signs(text=r"\A\s*.*\(rad/s\)", also=_has_gyro)
+detect = Signs(text=r"\A\s*+.*\(rad/s\)", also=_has_gyro)
 
 
 def read(path: Path) -> RawLog:

@@ -51,7 +51,7 @@ def _has_blocks(path: Path) -> bool:
 
 detect = Signs(
     suffixes=SUFFIXES,
-    text=rf"\A\s*[^,\n]*,\s*(?:{'|'.join(map(str, WIDTHS))})\s*,",
+    text=rf"\A\s*+[^,\n]*+,\s*+(?:{'|'.join(map(str, WIDTHS))})\s*,",
     also=_has_blocks,
 )
 
