@@ -68,6 +68,7 @@ __all__ = [
     "QuantityIntegrity",
     "Repeated",
     "assess_integrity",
+    "likelihood_gain",
     "quantity_status",
     "repeat_without",
 ]
@@ -521,6 +522,51 @@ def repeat_without(
     differences = -trajectory_differences(rows, record.trajectory, ellipsoid)
     left = inconsistencies(consistency_of_all(run.innovations), run.innovations, lasting(aids))
     return Repeated(change, run, differences, left)
+
+
+#: A squared innovation counts at most so many times its variance in a likelihood.
+MOST = 25.0
+
+
+def likelihood_gain(
+    innovations: Mapping[str, pd.DataFrame], other: Mapping[str, pd.DataFrame]
+) -> tuple[float, int]:
+    """Compare two runs over the same measurements by the likelihood of their innovations.
+
+    Parameters
+    ----------
+    innovations, other : mapping of str to DataFrame
+        By name of the observation. Epochs of both are compared.
+
+    Returns
+    -------
+    gain : float
+        Logarithm of the likelihood of the other less that of the first, rejected measurements
+        included: normal, with tails that a gross error does not rule.
+    count : int
+        Number of components compared.
+    """
+    gain, count = 0.0, 0
+    for name, table in innovations.items():
+        if name not in other:
+            continue
+        labels = [column[3:] for column in table.columns if column.startswith("nu ")]
+        _, *rows = np.intersect1d(index_of(table), index_of(other[name]), return_indices=True)
+        nu, variance = (
+            np.stack(
+                [
+                    values_of(one, [f"{part} {label}" for label in labels])[at]
+                    for one, at in zip((table, other[name]), rows, strict=True)
+                ]
+            )
+            for part in ("nu", "s")
+        )
+        told = (variance > 0.0).all(axis=0)
+        size = np.minimum(np.square(nu) / np.where(told, variance, 1.0), MOST)
+        size = np.where(told, size + np.log(np.where(told, variance, 1.0)), 0.0)
+        gain += 0.5 * float(np.sum(size[0] - size[1]))
+        count += int(told.sum())
+    return gain, count
 
 
 def _changed(

@@ -27,7 +27,7 @@ from strapdown.config.navigation import (
     make_filter,
 )
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
-from strapdown.errors import Finding
+from strapdown.errors import Finding, StrapdownError
 from strapdown.evaluation.trajectory_differences import (
     DifferenceSummary,
     summarise_differences,
@@ -35,7 +35,11 @@ from strapdown.evaluation.trajectory_differences import (
 )
 from strapdown.nav_state import NavState
 from strapdown.navigation.filter_options import DAMPINGS
-from strapdown.navigation.integrity import IntegrityReport, assess_integrity
+from strapdown.navigation.integrity import (
+    IntegrityReport,
+    assess_integrity,
+    likelihood_gain,
+)
 from strapdown.navigation.modes import (
     CoarseMode,
     Command,
@@ -49,9 +53,10 @@ from strapdown.navigation.navigator import Navigator, with_states
 from strapdown.navigation.pipeline import NavigationPipeline
 from strapdown.navigation.preprocessing import GapPolicy, ImuPreprocessor, ends_of
 from strapdown.navigation.record import NavigationRecord, Span
-from strapdown.navigation.recorder import Recorder
+from strapdown.navigation.recorder import IntervalRecorder, Recorder
 from strapdown.navigation.replay import PipelineRun, run_batch
 from strapdown.progress import Progress, silent
+from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.inputs import Memory, SavedRun, configuration_file
 from strapdown.systems.navigation_checks import channel_findings, look_through, saturated_findings
@@ -80,6 +85,11 @@ Drive = Callable[..., PipelineRun]
 LEAST_LOST = 1.0
 #: Shares of a whole run at which its pipeline begins and ends.
 BEGUN, ENDED = 0.15, 0.8
+#: Grades of sensors, the best first; one is coarser than a sensor by this factor of its gyro bias.
+GRADES, COARSER = ("tactical-grade", "industrial-grade", "consumer-grade"), 3.0
+#: Gain in the logarithm of the likelihood from which another sensor explains a record: in all, and
+#: for each component. Innovations are correlated: a record has fewer independent ones.
+LEAST_GAIN, GAIN_EACH = 20.0, 0.05
 #: Length of a chunk of the record, and interval of progress reports, s.
 CHUNK = 20.0
 _AT_ONCE = partial(run_batch, chunk=CHUNK)
@@ -192,6 +202,10 @@ def run_navigation(
         spec.trust.repeat,
         after,
     )
+    by_grade: tuple[Finding, ...] = ()
+    if trust.inconsistencies and spec.trust.repeat:
+        with said_of_file(*tables):
+            by_grade = _explained_by_grade(spec, sensors, source, run.record, after)
     aligned = {one.mode: one for one in run.aligned}
     coarse, fine = aligned.get("coarse"), aligned.get("fine")
     findings = [
@@ -201,6 +215,7 @@ def run_navigation(
         *(f for one in run.aligned for f in one.alignment.findings),
         *(() if fine is None or fine.fine is None else fine.fine.findings),
         *_lost_start(chain, source.imu, told_by.trajectory),
+        *by_grade,
     ]
     return NavigationRun(
         spec=spec,
@@ -221,6 +236,71 @@ def run_navigation(
         inputs=(*configuration_file(file), *source.inputs),
         findings=tuple(dict.fromkeys(findings)),
     )
+
+
+def _explained_by_grade(
+    spec: NavigationSpec,
+    sensors: ImuUncertainty,
+    source: NavigationSource,
+    record: NavigationRecord,
+    progress: Progress,
+) -> tuple[Finding, ...]:
+    """Run again with the next coarser grade of sensors; report it where it explains more.
+
+    A unit that is far worse than the one that is named rejects good fixes.
+    """
+    named = spec.sensors.sensor
+    bias = max(sensors.gyro.axis("bias"))
+    coarser = [
+        grade
+        for grade in GRADES
+        if max(ImuUncertainty.of_sensor(load_sensor(grade)).gyro.axis("bias")) > COARSER * bias
+    ]
+    if named is None or named in GRADES or not coarser:
+        return ()
+    other = spec.model_copy(
+        update={"sensors": spec.sensors.model_copy(update={"sensor": coarser[0], "states": None})}
+    )
+    chain = make_chain(other, sensors_of(other))
+    chain = replace(chain, navigator=replace(chain.navigator, smoother=None))
+    stage = f"again, with sensors of {coarser[0]}"
+    try:
+        repeated = run_batch(
+            chain,
+            source.imu,
+            source.tables,
+            IntervalRecorder(rate_hz=1.0),
+            lambda _, share: progress(stage, share),
+            chunk=60.0,
+        ).record
+    except StrapdownError:
+        return ()
+    gain, count = likelihood_gain(record.innovations, repeated.innovations)
+    if gain < max(LEAST_GAIN, GAIN_EACH * count):
+        return ()
+    return (
+        Finding(
+            "navigation.sensor-contradicted",
+            file=source_of(source.imu),
+            quantity="sensors",
+            named=named,
+            grade=coarser[0],
+            gain=gain,
+            count=count,
+            rejected=_rejected(record),
+            left=_rejected(repeated),
+        ),
+    )
+
+
+def _rejected(record: NavigationRecord) -> float:
+    """Share of the components of all measurements that were rejected, percent."""
+    weights = [
+        table[[c for c in table.columns if c.startswith("weight ")]].to_numpy(dtype=np.float64)
+        for table in record.innovations.values()
+    ]
+    flat = np.concatenate([np.empty(0), *(one.ravel() for one in weights)])
+    return 100.0 * float(np.mean(flat <= 0.0)) if len(flat) else 0.0
 
 
 def _with_correction(chain: NavigationPipeline, kind: str) -> NavigationPipeline:

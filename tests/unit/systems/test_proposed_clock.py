@@ -12,10 +12,12 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import town_drive as town
+from strapdown.navigation.measurements.clock_windows import Offsets
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.sensors.triad_errors import ImuErrors
 from strapdown.simulation import simulate_imu
-from strapdown.systems.navigation_proposal import APART, _clock
+from strapdown.systems import navigation_proposal
+from strapdown.systems.navigation_proposal import APART, NO_ERRORS, OFFSET_SD, _clock
 from strapdown.tables import VELOCITY_SD, gnss_table
 
 RECEIVER = {"rate": 4.0, "position_noise": 0.02, "velocity_noise": 0.03}
@@ -79,3 +81,45 @@ def test_what_is_proposed_follows_quartz_and_spoils_little_without_it():
         error, sd = offset_at_the_end(APART, rate)
         assert abs(error) < 3.0 * sd, rate
         assert sd < 0.01
+
+
+def straight(speed, sd, length=200.0):
+    """Positions alone of a way north at a speed: nothing shows an offset of the clock."""
+    time = np.arange(0.0, length, 1.0)
+    place = np.column_stack([45.0 + speed * time / 111_132.0, 0.0 * time + 20.0, 0.0 * time])
+    flat = np.full((len(time), 3), sd)
+    return gnss_table(time, place, 0.0 * place, flat, np.full_like(flat, np.inf), source="r.csv")
+
+
+@pytest.mark.parametrize(("speed", "sd", "offset"), [(1.4, 0.02, True), (1.4, 1.0, False)])
+def test_an_offset_is_a_state_of_a_walk_where_its_fixes_would_show_it(speed, sd, offset):
+    found, _ = _clock(straight(speed, sd), imu(), False)
+    # 0.2 s of a walk are 0.28 m.
+    assert found.get("time_offset_sd_s") == (OFFSET_SD if offset else None)
+    assert DRIFT not in found
+
+
+def windows(rate, sd_rate, count=6):
+    """Offsets of windows of a minute, whose drift is known to a standard deviation."""
+    begin = 60.0 * np.arange(count)
+    middle = begin - begin.mean()
+    sd = sd_rate * np.sqrt(np.square(middle).sum())
+    spans = np.column_stack([begin, begin + 60.0])
+    return Offsets(spans, rate * middle, np.full(count, sd))
+
+
+@pytest.mark.parametrize(
+    ("rate", "sd", "drifts"),
+    [(30e-6, 3e-6, True), (0.0, 3e-6, False), (10e-6, 2e-6, True), (0.0, 40e-6, True)],
+)
+def test_a_drift_is_stated_where_it_is_significant_or_unknown(monkeypatch, rate, sd, drifts):
+    made = windows(rate, sd)
+    assert made.drift() == (pytest.approx(rate, abs=1e-12), pytest.approx(sd))
+    monkeypatch.setattr(navigation_proposal, "window_offsets", lambda *_, **__: made)
+    found, _ = _clock(straight(60.0, 0.02, 360.0), imu(), True, NO_ERRORS)
+    assert (DRIFT in found) == drifts
+    if drifts:
+        # A random walk goes as far in the time of the record as the drift.
+        assert found[DRIFT] == pytest.approx(min(np.hypot(rate, sd), RATE) * 359.0**0.5, rel=0.1)
+    # Fixes of 5 m do not show it.
+    assert DRIFT not in _clock(straight(60.0, 5.0, 360.0), imu(), True, NO_ERRORS)[0]
