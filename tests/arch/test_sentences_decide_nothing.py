@@ -15,7 +15,7 @@ from strapdown.config.navigation import NavigationSpec
 from strapdown.errors import Finding
 from strapdown.report.alignment import alignment_json
 from strapdown.report.alignment_document import trust as alignment_trust
-from strapdown.report.navigation_evaluation import evaluation_of
+from strapdown.report.navigation_evaluation import NavigationEvaluation
 from strapdown.report.navigation_evaluation import trust as navigation_trust
 from strapdown.systems.alignment_run import run_alignment
 from strapdown.systems.navigation_run import run_navigation
@@ -136,7 +136,7 @@ def navigated():
         }
     )
     result = run_navigation(spec)
-    return navigation_trust(evaluation_of(result)), result
+    return navigation_trust(NavigationEvaluation(result)), result
 
 
 def test_a_run_is_judged_without_a_sentence(without_words):

@@ -23,7 +23,7 @@ from strapdown.report.attitude_charts import charts
 from strapdown.report.chart_svg import ChartFigure
 from strapdown.report.document import drawings
 from strapdown.report.navigation_document import navigation_document
-from strapdown.report.navigation_evaluation import evaluation_of
+from strapdown.report.navigation_evaluation import NavigationEvaluation
 from strapdown.report.paired_corrections import paired_charts, paired_errors
 from strapdown.report.simulation import simulation_chart
 from strapdown.report.verdict import heading_chart
@@ -57,7 +57,7 @@ def test_a_picture_of_the_manual_is_what_is_drawn_now(name, tmp_path):
 
 def drawn_of(spec):
     """The charts of the report of a run, without its page."""
-    return drawings(navigation_document(evaluation_of(run_navigation(spec)), ""))
+    return drawings(navigation_document(NavigationEvaluation(run_navigation(spec)), ""))
 
 
 @pytest.fixture(scope="module")
@@ -123,7 +123,7 @@ def test_the_crash_of_the_readme_is_what_is_drawn_now(sealed_crash):
 
 @pytest.mark.slow
 def test_the_drive_of_the_readme_is_what_is_drawn_now(driven, tmp_path):
-    drawn = drawings(navigation_document(evaluation_of(driven), ""))
+    drawn = drawings(navigation_document(NavigationEvaluation(driven), ""))
     (chart,) = [d for d in drawn if d.slug == "plan"]
     compare_chart(chart, "drive_plan.svg", tmp_path)
 

@@ -20,7 +20,6 @@ EPILOG = "Example: strapdown demo --out demo"
 _PAGE = "index.html"
 _TURNS = "mpu6050_turns"
 _TURN = "rotate-360ccw-around-z-pointing-up"
-_VERDICT = (("report.html", "Report"), ("verdict.html", "Integrity"))
 _OUTAGE = 30.0  # s
 _RECORDING = "phone-recording"
 
@@ -178,7 +177,6 @@ def demo_runs(out: Path, data: Path) -> list[DemoRun]:
                 "bound of the height is too small, as the comparison shows.",
                 f"strapdown navigate {out / 'phone.toml'} \\\n  --out {out / 'phone'}",
                 ("plan", "heading-integrity"),
-                _VERDICT,
             ),
             _navigation("phone", data),
             5.0,
@@ -193,7 +191,6 @@ def demo_runs(out: Path, data: Path) -> list[DemoRun]:
                 "heading integrity.",
                 f"strapdown navigate {out / 'tunnel.toml'} \\\n  --out {out / 'tunnel'}",
                 ("plan", "heading-integrity"),
-                _VERDICT,
             ),
             _navigation("tunnel", data),
             6.0,
@@ -222,7 +219,6 @@ def demo_runs(out: Path, data: Path) -> list[DemoRun]:
                 "tests.",
                 f"strapdown navigate {out / 'car.toml'} \\\n  --out {out / 'car'}",
                 ("plan", "heading-integrity"),
-                _VERDICT,
             ),
             _navigation("car", data),
             8.0,
@@ -238,7 +234,6 @@ def demo_runs(out: Path, data: Path) -> list[DemoRun]:
                 "(ZUPT).",
                 f"strapdown navigate {out / 'walk.toml'} \\\n  --out {out / 'walk'}",
                 ("plan",),
-                _VERDICT,
             ),
             _navigation("walk", data),
             4.0,

@@ -22,7 +22,6 @@ from strapdown.report.navigation_document import (
 from strapdown.report.navigation_evaluation import (
     NavigationEvaluation,
     distance_over_ground,
-    evaluation_of,
     trust,
 )
 from strapdown.report.paired_corrections import paired_table
@@ -63,7 +62,7 @@ def print_navigation(
     start's and the sensors' tables, every caution and every finding.
     """
     out = console()
-    found = evaluation_of(result)
+    found = NavigationEvaluation(result)
     verdict = trust(found)
     trajectory = result.record.trajectory
     time = trajectory.index
@@ -73,11 +72,11 @@ def print_navigation(
     out.print(spaced(f"{name}, {duration}, {distance}, {len(time)} samples"))
     tables: list[TableBlock | None]
     if verbose:
-        tables = [end_table(found), error_table(found), paired_table(result), point_table(found)]
+        tables = [end_table(found), error_table(found), paired_table(found), point_table(found)]
         tables += [observation_table(found), outage_table(found), withheld_table(found)]
         tables += [state_table(found)]
     else:
-        tables = [_end(found), paired_table(result), point_table(found)]
+        tables = [_end(found), paired_table(found), point_table(found)]
         tables += [observation_table(found), withheld_table(found)]
     lines = [(verdict.sentence, STYLES[verdict.verdict])]
     lines += [(f"{head}: {said}", "") for head, said in cautions(found, brief=not verbose)]

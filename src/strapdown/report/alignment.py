@@ -23,14 +23,16 @@ from strapdown.report.alignment_document import (
 from strapdown.report.document import finding_json, write_text
 from strapdown.report.report_bundle import (
     ReportBundle,
+    as_comments,
     file_of,
-    json_number,
+    finite,
     with_file,
     write_report,
     write_table,
 )
 from strapdown.systems.alignment_run import AlignmentRun, run_alignment
 from strapdown.tables import EULER
+from strapdown.tables.checks import index_of
 
 
 def _configuration(result: AlignmentRun) -> dict[str, Any]:
@@ -44,7 +46,7 @@ def _run(configuration: dict[str, Any]) -> AlignmentRun:
 
 def _write(result: AlignmentRun, folder: Path, name: str, report: bool, progress: Progress) -> None:
     write_text(folder / "align.json", to_json(alignment_json(result)))
-    told = {key.lower().replace(" ", "_"): text for key, text in CONVENTIONS}
+    told = as_comments(CONVENTIONS)
     write_table(_attitude(result), folder / "attitude.csv", told)
     if result.fine is not None:
         write_table(_history(result.fine.history), folder / "fine.csv", told)
@@ -61,14 +63,12 @@ def _attitude(result: AlignmentRun) -> pd.DataFrame:
     table = result.attitude
     rate = result.spec.output.rate_hz
     if rate is not None:
-        time = table.index.to_numpy(dtype=np.float64)
+        time = index_of(table)
         cell = np.floor((time - time[0]) * rate + 1e-6)
         kept = np.concatenate([[True], np.diff(cell) > 0])
         kept[-1] = True
         table = table[kept]
-    out = table.rename(columns={a: f"{a}_deg" for a in EULER})
-    out.insert(0, "time_s", out.index.to_numpy())
-    return out.reset_index(drop=True)
+    return table.rename(columns={a: f"{a}_deg" for a in EULER})
 
 
 def _history(history: pd.DataFrame) -> pd.DataFrame:
@@ -78,9 +78,7 @@ def _history(history: pd.DataFrame) -> pd.DataFrame:
     units |= {f"accel_bias_{a}": "m_per_s2" for a in "xyz"}
     names = {n: f"{n}_{u}" for n, u in units.items()}
     names |= {f"{n}_sd": f"{n}_sd_{u}" for n, u in units.items()}
-    out = history.rename(columns=names)
-    out.insert(0, "time_s", out.index.to_numpy())
-    return out.reset_index(drop=True)
+    return history.rename(columns=names)
 
 
 # JSON of an alignment: attitude, bounds, findings and method.
@@ -96,7 +94,7 @@ def alignment_json(result: AlignmentRun) -> dict[str, Any]:
     """
     known = answer_error(result)
     spec = result.spec
-    return {
+    made = {
         "record": {
             "name": result.source.name,
             "what": result.source.what,
@@ -122,7 +120,7 @@ def alignment_json(result: AlignmentRun) -> dict[str, Any]:
         else {
             "name": known[0],
             "sd_deg": known[2],
-            "off_deg": {a: json_number(x) for a, x in zip(EULER, known[1], strict=True)},
+            "off_deg": dict(zip(EULER, known[1], strict=True)),
         },
         "prefilter": _prefilter(result),
         "readiness": {
@@ -149,6 +147,7 @@ def alignment_json(result: AlignmentRun) -> dict[str, Any]:
         ),
         "findings": [finding_json(f) for f in result.findings],
     }
+    return finite(made)
 
 
 def _attitude_alignment_json(one: Alignment) -> dict[str, Any]:
@@ -206,6 +205,6 @@ def _thinned(table: pd.DataFrame) -> pd.DataFrame:
 
 def _rows(table: pd.DataFrame) -> list[dict[str, float | None]]:
     return [
-        {"time_s": time} | {f"{k}_deg": json_number(v) for k, v in row.items()}
+        {"time_s": time} | {f"{k}_deg": v for k, v in row.items()}
         for time, row in zip(table.index.tolist(), table.to_dict("records"), strict=True)
     ]

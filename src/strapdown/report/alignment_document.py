@@ -45,12 +45,21 @@ from strapdown.report.document import (
     run_again,
     section,
 )
-from strapdown.report.values import GAP, about, force_words, plain, plus_minus, rate_words, small
+from strapdown.report.values import (
+    GAP,
+    about,
+    decimals,
+    force_words,
+    plain,
+    plus_minus,
+    rate_words,
+    small,
+)
 from strapdown.report.values import stamp as instant
 from strapdown.rotation import within_half_turn
 from strapdown.systems.alignment_run import AlignmentRun, reference_offset
 from strapdown.tables import ACCEL, EULER, GYRO, QUATERNION
-from strapdown.tables.checks import values_of
+from strapdown.tables.checks import index_of, values_of
 
 ORDER = (2, 1, 0)  # heading first: it is the hardest to determine
 
@@ -219,7 +228,7 @@ def readiness_chart(result: AlignmentRun) -> Chart:
         ):
             if table.empty:
                 continue
-            time = table.index.to_numpy(dtype=np.float64)
+            time = index_of(table)
             kept = time > 0.0
             sd = table[sds].to_numpy().max(axis=1)
             size = np.abs(table[[f"{a}_off" for a in angles]].to_numpy()).max(axis=1)
@@ -287,12 +296,12 @@ def signal_chart(result: AlignmentRun) -> Chart:
 def _signal(
     name: str, imu: pd.DataFrame, column: str, factor: float, colour: str, width: float
 ) -> Line:
-    time = imu.index.to_numpy(dtype=np.float64)
+    time = index_of(imu)
     return curve(name, time, factor * imu[column].to_numpy(), colour, width=width, buckets=500)
 
 
 def _means(imu: pd.DataFrame, column: str, factor: float) -> Line:
-    time = imu.index.to_numpy(dtype=np.float64)
+    time = index_of(imu)
     size = max(1, round(1.0 / float(np.median(np.diff(time)))))
     count = max(1, len(time) // size)
     size = min(size, len(time))
@@ -305,7 +314,7 @@ def _means(imu: pd.DataFrame, column: str, factor: float) -> Line:
 def attitude_chart(result: AlignmentRun) -> Chart:
     """Attitude over the record: the aligned attitude propagated by the gyros."""
     table = result.attitude
-    time = table.index.to_numpy(dtype=np.float64)
+    time = index_of(table)
     panels = []
     carried = NOT_KNOWN not in [angle_bound(result.start, k) for k in (0, 1)]
     for k, angle in enumerate(EULER):
@@ -342,7 +351,7 @@ def bias_charts(result: AlignmentRun) -> tuple[Chart, ...]:
     if result.fine is None:
         return ()
     history = result.fine.history
-    time = history.index.to_numpy(dtype=np.float64)
+    time = index_of(history)
     out = []
     for sensor, factor, unit, what in (
         ("gyro", DEG_PER_HOUR, "deg/h", "Gyro biases"),
@@ -380,7 +389,7 @@ def innovation_chart(result: AlignmentRun) -> Chart | None:
         return None
     panels = []
     for name, table in result.fine.innovations.items():
-        time = table.index.to_numpy(dtype=np.float64)
+        time = index_of(table)
         labels = [c.removeprefix("nu ") for c in table.columns if c.startswith("nu ")]
         lines = []
         for k, label in enumerate(labels):
@@ -509,7 +518,7 @@ def alignment_document(result: AlignmentRun, name: str) -> Document:
             readiness_chart(result),
             readiness_table(result),
         ),
-        tuple(s for s in sections if s.blocks),
+        sections,
         title,
     )
 
@@ -551,11 +560,8 @@ def _bound_of(result: AlignmentRun, which: int) -> str:
     if not bounds_hold(result):
         return f"the record contradicts the 95{GAP}% bound"
     sd = float(result.end.sd_deg[which])
-    return f"95{GAP}% bound; standard deviation {plain(sd, _places(TWO_SIDED_95 * sd))}°"
-
-
-def _places(half: float) -> int:
-    return min(5, max(1, 2 - math.floor(math.log10(half)))) if half > 0 else 2
+    places = decimals(TWO_SIDED_95 * sd, least=1, most=5)
+    return f"95{GAP}% bound; standard deviation {plain(sd, places)}°"
 
 
 def limits(result: AlignmentRun) -> tuple[tuple[str, str], ...]:
@@ -707,7 +713,7 @@ def readiness_table(result: AlignmentRun) -> TableBlock:
             for names in (("heading_sd",), ("roll_sd", "pitch_sd")):
                 if table.empty:
                     continue
-                at = table.index.to_numpy(dtype=np.float64)
+                at = index_of(table)
                 sizes = table[list(names)].to_numpy().max(axis=1)
                 inside = at[0] <= time * 1.001
                 # The tested lengths are evenly spaced in their logarithm.

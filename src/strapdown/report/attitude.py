@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +23,9 @@ from strapdown.report.attitude_document import attitude_document
 from strapdown.report.attitude_tables import places_json, share_basis, source_of
 from strapdown.report.chart_svg import ChartFigure
 from strapdown.report.document import finding_json, write_text
-from strapdown.report.report_bundle import write_report
+from strapdown.report.report_bundle import as_comments, finite, write_report
 from strapdown.tables import EULER, GYRO, QUATERNION
+from strapdown.tables.checks import index_of
 
 
 def write_attitude(
@@ -79,17 +79,13 @@ def write_attitude(
 
 def _write_csv(bench: AttitudeComparison, path: Path) -> None:
     """Write the attitude of every algorithm side by side, to 1e-9 and to 1e-6 deg."""
-    columns: dict[str, NDArray[Any]] = {
-        "time_s": bench.runs[0].attitude.index.to_numpy(dtype=np.float64)
-    }
+    columns: dict[str, NDArray[Any]] = {"time_s": index_of(bench.runs[0].attitude)}
     for run in bench.runs:
         # Neither a comma nor a semicolon, which a reader may take for a column separator.
         name = run.algorithm.replace(",", " ")
         columns |= {f"{name} {q}": np.round(run.attitude[q].to_numpy(), 9) for q in QUATERNION}
         columns |= {f"{name} {e}_deg": np.round(run.attitude[e].to_numpy(), 6) for e in EULER}
-    csv.write(
-        path, columns, {key.lower().replace(" ", "_"): text for key, text in words.CONVENTIONS}
-    )
+    csv.write(path, columns, as_comments(words.CONVENTIONS))
 
 
 def _write_sweep(bench: AttitudeComparison, path: Path) -> None:
@@ -110,7 +106,7 @@ def _write_sweep(bench: AttitudeComparison, path: Path) -> None:
             "points, else own_deg",
             "own_deg": share_basis(bench),
         }
-        | {key.lower().replace(" ", "_"): text for key, text in words.CONVENTIONS},
+        | as_comments(words.CONVENTIONS),
     )
 
 
@@ -121,7 +117,7 @@ def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
     """Return a bench as plain data; every key carries its unit."""
     costs = {cost.algorithm: _cost(cost) for cost in bench.costs}
     shares = {share.algorithm: _share(share) for share in bench.shares}
-    return {
+    made = {
         "schema": "strapdown attitude 1",
         "source": bench.source,
         "description": bench.description,
@@ -144,7 +140,7 @@ def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
             for run in bench.runs
         ],
         "share_basis": share_basis(bench),
-        "sweep": [_plain(row) for row in bench.sweep.to_dict("records")],
+        "sweep": bench.sweep.to_dict("records"),
         "trials": _trials(bench),
         "peers": [
             {
@@ -174,6 +170,7 @@ def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
         "readings": [vars(r) for r in bench.readings],
         "findings": [finding_json(f, "python") for f in bench.findings],
     }
+    return finite(made)
 
 
 def _sampling_error(bench: AttitudeComparison) -> dict[str, float] | None:
@@ -232,7 +229,7 @@ def _cost(cost: Cost) -> dict[str, float]:
 
 def _share(share: Share) -> dict[str, Any]:
     def named(three: tuple[float, float, float]) -> dict[str, Any]:
-        return _plain(dict(zip(("final", "rms", "max"), three, strict=True)))
+        return dict(zip(("final", "rms", "max"), three, strict=True))
 
     return {
         "own_deg": named(share.own_deg),
@@ -246,18 +243,9 @@ def _trials(bench: AttitudeComparison) -> dict[str, Any] | None:
         return None
     return {
         "names": list(bench.trials.names),
-        "errors": [_plain(row) for row in bench.trials.errors.to_dict("records")],
-        "ranking": [_plain(row) for row in bench.trials.ranking.to_dict("records")],
+        "errors": bench.trials.errors.to_dict("records"),
+        "ranking": bench.trials.ranking.to_dict("records"),
     }
-
-
-def _plain(row: dict[Any, Any]) -> dict[str, Any]:
-    """Replace NaN by null, because JSON has no NaN; null means not applicable."""
-    plain: dict[str, Any] = {}
-    for key, value in row.items():
-        item = value.item() if hasattr(value, "item") else value
-        plain[str(key)] = None if isinstance(item, float) and not math.isfinite(item) else item
-    return plain
 
 
 # C export of the chosen algorithm.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pandas as pd
 
@@ -36,6 +38,7 @@ from strapdown.report.chart import (
 )
 from strapdown.report.plan import place_labels
 from strapdown.tables import EULER, GYRO
+from strapdown.tables.checks import index_of
 
 _TIME = "time, s"
 
@@ -82,7 +85,7 @@ def _bands(bench: AttitudeComparison) -> tuple[Band, ...]:
 
 
 def _gyro(bench: AttitudeComparison) -> Chart:
-    time = bench.imu.index.to_numpy(dtype=np.float64)
+    time = index_of(bench.imu)
     names = ("x, forward", "y, right", "z, down")
     lines = tuple(
         curve(name, time, np.degrees(bench.imu[column].to_numpy()), colour, width=1.1)
@@ -114,7 +117,7 @@ def _attitude(bench: AttitudeComparison) -> Chart:
             lines.append(
                 curve(
                     "truth",
-                    bench.truth.index.to_numpy(dtype=np.float64),
+                    index_of(bench.truth),
                     break_jumps(bench.truth[angle].to_numpy()),
                     BLACK,
                     "dot",
@@ -248,33 +251,23 @@ def _cost(bench: AttitudeComparison) -> Chart:
     )
     for k, place in zip(np.flatnonzero(known), places, strict=True):
         style, at, name = look(int(k)), cycles[k : k + 1], names[k]
-        lines.append(
-            Line(
-                name,
-                at,
-                total[k : k + 1],
-                style["colour"],
-                points=True,
-                symbol=style["symbol"],
-                size=12,
-                labels=(name,),
-                places=(place,),
-                legend=False,
-            )
+        point = Line(
+            name,
+            at,
+            total[k : k + 1],
+            style["colour"],
+            points=True,
+            symbol=style["symbol"],
+            size=12,
+            labels=(name,),
+            places=(place,),
+            legend=False,
         )
+        lines.append(point)
         if judged:
+            alone, error = f"{name}, algorithm error", own[k : k + 1]
             lines.append(
-                Line(
-                    f"{name}, algorithm error",
-                    at,
-                    own[k : k + 1],
-                    style["colour"],
-                    points=True,
-                    symbol=style["symbol"],
-                    size=10,
-                    hollow=True,
-                    legend=False,
-                )
+                replace(point, name=alone, y=error, size=10, hollow=True, labels=(), places=())
             )
     return Chart(
         "cost",

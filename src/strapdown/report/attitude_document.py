@@ -22,17 +22,7 @@ from strapdown.report.attitude_tables import (
     result_tables,
     sweep_grid,
 )
-from strapdown.report.chart import (
-    AXIS_COLOURS,
-    BLACK,
-    GREY,
-    Array,
-    Chart,
-    Scene,
-    SceneBody,
-    SceneLine,
-    SceneWord,
-)
+from strapdown.report.chart import AXIS_COLOURS, BLACK, GREY, Array, Chart
 from strapdown.report.chart_svg import ChartFigure
 from strapdown.report.document import (
     Animation,
@@ -48,6 +38,8 @@ from strapdown.report.document import (
     findings_list,
     section,
 )
+from strapdown.report.scene import Scene, SceneBody, SceneLine, SceneWord
+from strapdown.tables.checks import index_of
 
 
 def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None = None) -> Document:
@@ -125,7 +117,7 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
                 "Rests of similar attitude, possible reference points:", tables.offer_lines(bench)
             ),
         ),
-        tuple(s for s in sections if s.blocks),
+        sections,
         bench.source,
     )
 
@@ -250,7 +242,7 @@ def _ghost(bench: AttitudeComparison, time: Array) -> Array | None:
     """True attitude at the frames; NaN where it is not known."""
     if bench.truth is None or not len(bench.truth):
         return None
-    stamps = bench.truth.index.to_numpy(dtype=np.float64)
+    stamps = index_of(bench.truth)
     q = attitude_at(bench.truth, time)
     q[(time < stamps[0]) | (time > stamps[-1])] = np.nan
     return q

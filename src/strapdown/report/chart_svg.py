@@ -29,8 +29,16 @@ from strapdown.report.chart import (
     steady_range,
     strip_range,
 )
-from strapdown.report.plan import LONGEST_BESIDE, label_rows, label_side, nice_step, tick_words
-from strapdown.report.svg_drawing import INK, Box, Drawing, number, overlap, text_width
+from strapdown.report.svg_drawing import (
+    INK,
+    Box,
+    Drawing,
+    nice_step,
+    number,
+    overlap,
+    text_width,
+    tick_words,
+)
 
 # Points, legend samples and patterns of a static chart.
 
@@ -41,30 +49,27 @@ _POINT, _RIM = 0.4, 0.5  # radius of a point over its size, and its rim in pixel
 _HATCH = 6.0  # pixels between the lines of a pattern
 
 
-def _star(points: int, inner: float, turn: float = 0.0) -> Array:
-    angle = np.arange(2 * points) * math.pi / points + math.radians(turn)
+def _star(points: int, inner: float) -> Array:
+    angle = np.arange(2 * points) * math.pi / points
     radius = np.where(np.arange(2 * points) % 2, inner, 1.0)
     return np.column_stack([radius * np.sin(angle), -radius * np.cos(angle)])
 
 
-def _plus() -> Array:
-    a = 1.0 / 3.0
-    corners = [(-a, -1), (a, -1), (a, -a), (1, -a), (1, a), (a, a), (a, 1), (-a, 1), (-a, a)]
-    return np.array([*corners, (-1, a), (-1, -a), (-a, -a)], dtype=np.float64)
-
-
-def _turned(points: Array) -> Array:
-    c = math.sqrt(0.5)
-    return np.asarray(points @ np.array([[c, c], [-c, c]]))
-
-
+# Half the width of an arm, and its corners from the top around; turned by 45 deg it is an x.
+_A, _C = 1.0 / 3.0, math.sqrt(0.5)
+_PLUS = np.array(
+    [
+        *([-_A, -1.0], [_A, -1.0], [_A, -_A], [1.0, -_A], [1.0, _A], [_A, _A]),
+        *([_A, 1.0], [-_A, 1.0], [-_A, _A], [-1.0, _A], [-1.0, -_A], [-_A, -_A]),
+    ]
+)
 _OUTLINES = {
     "square": np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]),
     "diamond": 1.4 * np.array([[0.0, -1.0], [1.0, 0.0], [0.0, 1.0], [-1.0, 0.0]]),
     "triangle-up": np.array([[0.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]),
     "triangle-down": np.array([[0.0, 1.0], [1.0, -1.0], [-1.0, -1.0]]),
-    "cross": _plus(),
-    "x": _turned(_plus()),
+    "cross": _PLUS,
+    "x": _PLUS @ np.array([[_C, _C], [-_C, _C]]),
     "star": 1.1 * _star(5, 0.42),
     "pentagon": _star(5, math.cos(math.pi / 5.0)),
     "circle": np.empty((0, 2)),
@@ -105,57 +110,34 @@ def draw_pattern(drawing: Drawing, pattern: str, box: Box) -> None:
                 drawing.line((x, top), (x, top + height), "#ffffff")
 
 
-@dataclass(frozen=True)
-class Entry:
-    """A legend entry: its name and its sample."""
-
-    name: str
-    shown: Line | Fill | Bars
+Shown = Line | Fill | Bars
 
 
-def entries(chart: Chart) -> list[Entry]:
-    """Return the entries of a chart's legend, each name once."""
-    found: dict[str, Line | Fill | Bars] = {}
+def entries(chart: Chart) -> list[Shown]:
+    """Return what a chart's legend has a sample of, each name once."""
+    found: dict[str, Shown] = {}
     for panel in chart.panels:
         lines = {line.name for line in panel.lines if line.legend}
         # A line with a band's name shares its entry.
         fills = [fill for fill in panel.fills if fill.name not in lines]
-        shown: list[Line | Fill | Bars] = [*fills, *panel.lines, *panel.bars]
-        for one in shown:
+        for one in (*fills, *panel.lines, *panel.bars):
             if one.legend and one.name:
                 found.setdefault(one.name, one)
-    return [Entry(name, shown) for name, shown in found.items()]
+    return list(found.values())
 
 
-def _placed(legend: list[Entry], left: float, right: float) -> Iterator[tuple[Entry, float, int]]:
+def _placed(legend: list[Shown], left: float, right: float) -> Iterator[tuple[Shown, float, int]]:
     """Legend entries, each with its left end and its row."""
     x, row = left, 0
-    for entry in legend:
-        wide = _SAMPLE + text_width(entry.name, _SIZE)
+    for one in legend:
+        wide = _SAMPLE + text_width(one.name, _SIZE)
         if x > left and x + wide > right:
             x, row = left, row + 1
-        yield entry, x, row
+        yield one, x, row
         x += wide + _GAP
 
 
-def legend_height(legend: list[Entry], left: float, right: float) -> float:
-    """Return the height of a legend below the panels, in pixels."""
-    rows = [row for _, _, row in _placed(legend, left, right)]
-    return _LEGEND_ROW * (rows[-1] + 1) + 4.0 if rows else 0.0
-
-
-def write_legend(
-    drawing: Drawing, legend: list[Entry], left: float, right: float, top: float
-) -> None:
-    """Write a legend from a height downward."""
-    for entry, x, row in _placed(legend, left, right):
-        y = top + _LEGEND_ROW * (row + 0.5)
-        with drawing.group(data_entry=entry.name):
-            _sample(drawing, entry.shown, x, y)
-            drawing.text((x + _SAMPLE, y), entry.name, _SIZE)
-
-
-def _sample(drawing: Drawing, shown: Line | Fill | Bars, x: float, y: float) -> None:
+def _sample(drawing: Drawing, shown: Shown, x: float, y: float) -> None:
     box = (x, y - 4.5, x + _SAMPLE - 6.0, y + 4.5)
     corners = np.array([[box[0], box[1]], [box[2], box[1]], [box[2], box[3]], [box[0], box[3]]])
     if isinstance(shown, Fill):
@@ -425,8 +407,8 @@ def still(chart: Chart, *, title: bool = False, caption: bool = False) -> str:
     """
     head = _folded(chart.title, _WIDTH - 2.0 * _EDGE, _HEAD, bold=True) if title else []
     foot = _folded(chart.caption, _WIDTH - 2.0 * _EDGE, TICK) if caption else []
-    legend = entries(chart)
-    below = legend_height(legend, _EDGE, _WIDTH - _EDGE)
+    legend = list(_placed(entries(chart), _EDGE, _WIDTH - _EDGE))
+    below = _LEGEND_ROW * (legend[-1][2] + 1) + 4.0 if legend else 0.0
     top = 1.35 * _HEAD * len(head) + 4.0 * bool(head)
     end = top + _INCH * _height(chart) + max(0.0, below - 20.0)
     drawing = Drawing(_WIDTH, end + 1.3 * TICK * len(foot) + 4.0 * bool(foot), chart.title)
@@ -436,7 +418,11 @@ def still(chart: Chart, *, title: bool = False, caption: bool = False) -> str:
         timed = not panel.x_label
         frame.draw(drawing, chart.bands if timed else (), chart.marks if timed else ())
         _around(drawing, chart, frame)
-    write_legend(drawing, legend, _EDGE, _WIDTH - _EDGE, end - below)
+    for shown, x, row in legend:
+        y = end - below + _LEGEND_ROW * (row + 0.5)
+        with drawing.group(data_entry=shown.name):
+            _sample(drawing, shown, x, y)
+            drawing.text((x + _SAMPLE, y), shown.name, _SIZE)
     for k, line in enumerate(foot):
         drawing.text((_EDGE, end + 1.3 * TICK * (k + 0.5)), line, TICK, _SOFT)
     return drawing.svg()
@@ -453,16 +439,6 @@ def _height(chart: Chart) -> float:
     return 0.85 + 0.95 * sum(panel.height for panel in chart.panels) + titles + alone
 
 
-@dataclass(frozen=True)
-class _Room:
-    """Margins of a panel outside of its axes, in pixels."""
-
-    left: float = 0.0
-    right: float = 0.0
-    above: float = 0.0
-    below: float = 0.0
-
-
 def _frames(chart: Chart, start: float, height: float) -> list[Frame]:
     """Panels between two heights of the picture."""
     count = len(chart.panels)
@@ -473,21 +449,20 @@ def _frames(chart: Chart, start: float, height: float) -> list[Frame]:
     named = [chart.beside or bool(p.x_label) or k == count - 1 for k, p in enumerate(chart.panels)]
     rooms = [_upright(chart, k, named[k], xs[k], ys[k]) for k in range(count)]
     if chart.beside:
-        above, below = max(r.above for r in rooms), max(r.below for r in rooms)
+        above, below = max(a for a, _ in rooms), max(b for _, b in rooms)
         spans = [(start + above, height - below)] * count
     else:
-        used = sum(r.above + r.below for r in rooms) + _BETWEEN * (count - 1)
+        used = sum(a + b for a, b in rooms) + _BETWEEN * (count - 1)
         ratios = np.array([panel.height for panel in chart.panels])
         free = np.maximum(height - start - used, 20.0 * count) * ratios / ratios.sum()
         spans, top = [], start
-        for room, tall in zip(rooms, free.tolist(), strict=True):
-            spans.append((top + room.above, top + room.above + tall))
-            top += room.above + tall + room.below + _BETWEEN
+        for (above, below), tall in zip(rooms, free.tolist(), strict=True):
+            spans.append((top + above, top + above + tall))
+            top += above + tall + below + _BETWEEN
     y_ticks = [_y_ticks(p, y, b - t) for p, y, (t, b) in zip(chart.panels, ys, spans, strict=True)]
     y_named = [not chart.beside or k == 0 or bool(p.categories) for k, p in enumerate(chart.panels)]
     sides = [
-        _Room(*_sides(chart.panels[k], y_ticks[k] if y_named[k] else [], spans[k]))
-        for k in range(count)
+        _sides(chart.panels[k], y_ticks[k] if y_named[k] else [], spans[k]) for k in range(count)
     ]
     boxes = _across(chart, sides)
     found = []
@@ -561,8 +536,8 @@ def _y_ticks(panel: Panel, scale: Scale, tall: float) -> list[Tick]:
     return ticks(scale, max(2, min(8, int(tall / _DOWN))), step=panel.step)
 
 
-def _upright(chart: Chart, k: int, named: bool, x: Scale, y: Scale) -> _Room:
-    """Margins above and below a panel."""
+def _upright(chart: Chart, k: int, named: bool, x: Scale, y: Scale) -> tuple[float, float]:
+    """Margins above and below a panel, in pixels."""
     panel = chart.panels[k]
     above = _EDGE + (_TITLE + 6.0) * bool(panel.title)
     if y.power:
@@ -574,7 +549,7 @@ def _upright(chart: Chart, k: int, named: bool, x: Scale, y: Scale) -> _Room:
         below += LONG + TICK + 6.0
         if _x_name(chart, k):
             below += _LINE + 3.0
-    return _Room(above=above, below=below)
+    return above, below
 
 
 def _first_timed(chart: Chart) -> int:
@@ -625,16 +600,16 @@ def _sides(panel: Panel, y_ticks: list[Tick], span: tuple[float, float]) -> tupl
     return left, right
 
 
-def _across(chart: Chart, sides: list[_Room]) -> list[tuple[float, float]]:
-    """Left and right end of each panel's axes."""
+def _across(chart: Chart, sides: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Left and right end of each panel's axes, between margins to both sides."""
     if not chart.beside:
-        left, right = max(s.left for s in sides), max(s.right for s in sides)
+        left, right = max(a for a, _ in sides), max(b for _, b in sides)
         return [(left, _WIDTH - right)] * len(sides)
-    free = (_WIDTH - sum(s.left + s.right for s in sides)) / len(sides)
+    free = (_WIDTH - sum(a + b for a, b in sides)) / len(sides)
     found, at = [], 0.0
-    for side in sides:
-        found.append((at + side.left, at + side.left + free))
-        at += side.left + free + side.right
+    for left, right in sides:
+        found.append((at + left, at + left + free))
+        at += left + free + right
     return found
 
 
@@ -681,6 +656,64 @@ def _write_marks(drawing: Drawing, chart: Chart, frame: Frame, above: float) -> 
 
 def _power(power: int) -> str:
     return "10" + str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+
+
+# Positions of the names of vertical marks above a chart, without overlap.
+
+
+#: Longest name of a level, in letters, that fits beside the axes; longer ones go on its line.
+LONGEST_BESIDE = 18
+# Gap between names in one row, in letters.
+_NAME_GAP = 1.5
+
+
+def label_side(share: float, label: str, letter: float) -> str:
+    """Return the alignment of a name at its mark that keeps it within the axes.
+
+    Parameters
+    ----------
+    share : float
+        Position of the mark, as a share of the axis from the left.
+    letter : float
+        Width of a letter, as a share of the axis.
+
+    Returns
+    -------
+    {'left', 'center', 'right'}
+        Part of the name at the mark.
+    """
+    half = 0.5 * letter * len(label)
+    if share < half:
+        return "left"
+    return "right" if share > 1.0 - half else "center"
+
+
+def label_rows(shares: Sequence[float], labels: Sequence[str], letter: float) -> tuple[int, ...]:
+    """Return the row of each name, from 0 at the axes upward.
+
+    Parameters
+    ----------
+    shares, labels, letter
+        As in `label_side`, for every mark.
+
+    Returns
+    -------
+    tuple of int
+        The lowest row without overlap with the names to the left.
+    """
+    ends: list[float] = []
+    rows = [0] * len(shares)
+    for k in sorted(range(len(shares)), key=lambda j: (shares[j], j)):
+        wide = letter * len(labels[k])
+        part = {"left": 0.0, "center": 0.5, "right": 1.0}[label_side(shares[k], labels[k], letter)]
+        start = shares[k] - part * wide
+        free = (row for row, end in enumerate(ends) if end + _NAME_GAP * letter <= start)
+        row = next(free, len(ends))
+        if row == len(ends):
+            ends.append(0.0)
+        ends[row] = start + wide
+        rows[k] = row
+    return tuple(rows)
 
 
 # Axes of a static chart: their ends and ticks.

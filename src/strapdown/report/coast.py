@@ -33,7 +33,7 @@ from strapdown.report.document import finding_json, write_text
 from strapdown.report.report_bundle import (
     ReportBundle,
     file_of,
-    json_number,
+    finite,
     with_file,
     write_report,
 )
@@ -156,7 +156,7 @@ def coast_json(result: OutageRun) -> dict[str, Any]:
     found, variances = result.forecast, course(result)[2]
     whole = {q: float(v[-1]) for q, v in variances.items()}
     budget = found.variance("horizontal")[-1]
-    return {
+    made = {
         "name": result.name,
         "what": result.what,
         "answer": spaced(headline(result)),
@@ -167,10 +167,7 @@ def coast_json(result: OutageRun) -> dict[str, Any]:
         "remaining_measurements": list(result.stays),
         "at_the_end": {
             "horizontal_95_m": end_bound(result),
-            **{
-                SHOWN[q][0]: json_number(SHOWN[q][1] * math.sqrt(max(v, 0.0)))
-                for q, v in whole.items()
-            },
+            **{SHOWN[q][0]: SHOWN[q][1] * math.sqrt(max(v, 0.0)) for q, v in whole.items()},
         },
         "budget": {
             "outage_from_s": found.begin,
@@ -181,16 +178,15 @@ def coast_json(result: OutageRun) -> dict[str, Any]:
                     "sd_at_start": one.sd.tolist(),
                     "unit": one.source.unit,
                     "share": {
-                        q: json_number(one.variance[q][-1] / _positive(found.variance(q)[-1]))
+                        q: one.variance[q][-1] / _positive(found.variance(q)[-1])
                         for q in QUANTITIES
                     },
-                    "alone_m": json_number(float(one.alone["horizontal"][-1])),
+                    "alone_m": float(one.alone["horizontal"][-1]),
                 }
                 for one in found.shares
             ],
             "measurements": {
-                q: json_number(v[-1] / _positive(found.variance(q)[-1]))
-                for q, v in found.aids.items()
+                q: v[-1] / _positive(found.variance(q)[-1]) for q, v in found.aids.items()
             },
         },
         "measured": spaced(inside_words(result)),
@@ -210,6 +206,7 @@ def coast_json(result: OutageRun) -> dict[str, Any]:
         ],
         "findings": [finding_json(f) for f in result.findings],
     }
+    return finite(made)
 
 
 def write_coast_tables(result: OutageRun, folder: Path) -> None:

@@ -48,6 +48,7 @@ from strapdown.report.values import (
     plain,
     share_words,
     shown_unit,
+    three_digits,
 )
 from strapdown.systems.outage_run import Drift, OutageRun
 
@@ -113,8 +114,8 @@ def at_start(share: Share, result: OutageRun) -> str:
     if name.endswith("_noise"):
         density = float(np.max(triad.axis("noise_density")))
         if name.startswith("gyro"):
-            return f"{_three(density * DEG_PER_HOUR / 60.0)}{GAP}deg/√h"
-        return f"{_three(density * MICRO_G)}{GAP}µg/√Hz"
+            return f"{three_digits(density * DEG_PER_HOUR / 60.0)}{GAP}deg/√h"
+        return f"{three_digits(density * MICRO_G)}{GAP}µg/√Hz"
     if name.endswith("_instability"):
         gyro = name.startswith("gyro")
         drift = result.sensors.gyro_drift if gyro else result.sensors.accel_drift
@@ -122,21 +123,15 @@ def at_start(share: Share, result: OutageRun) -> str:
         if not size or math.isinf(drift.correlation_time):
             return "–"
         factor, unit = shown_unit("rad/s" if gyro else "m/s²", size)
-        return f"{_three(factor * size)}{GAP}{unit} over {duration_words(drift.correlation_time)}"
+        over = duration_words(drift.correlation_time)
+        return f"{three_digits(factor * size)}{GAP}{unit} over {over}"
     if not share.sd.size:
         return "–"
     low, high = float(share.sd.min()), float(share.sd.max())
     factor, unit = shown_unit(share.source.unit, high)
     if high <= 1.2 * low:
-        return f"{_three(factor * high)}{GAP}{unit}"
-    return f"{_three(factor * low)} to {_three(factor * high)}{GAP}{unit}"
-
-
-def _three(value: float) -> str:
-    """Format a number to three digits."""
-    if value == 0.0 or not math.isfinite(value):
-        return "0"
-    return plain(value, min(6, max(0, 2 - math.floor(math.log10(abs(value))))))
+        return f"{three_digits(factor * high)}{GAP}{unit}"
+    return f"{three_digits(factor * low)} to {three_digits(factor * high)}{GAP}{unit}"
 
 
 def course(result: OutageRun) -> tuple[Array, Array, Mapping[str, Array]]:
@@ -268,7 +263,7 @@ def key_figures(result: OutageRun) -> tuple[KeyFigure, ...]:
         KeyFigure("Vertical", NOT_ESTIMATED, "the error model has no height")
         if math.isnan(sd("vertical"))
         else KeyFigure("Vertical", f"±{GAP}{length_words(half(sd('vertical')))}", said),
-        KeyFigure("Heading", f"±{GAP}{_three(math.degrees(half(sd('heading'))))}°", said),
+        KeyFigure("Heading", f"±{GAP}{three_digits(math.degrees(half(sd('heading'))))}°", said),
     ]
     drifts = drifts_of(result)
     if drifts:
@@ -318,7 +313,7 @@ def coast_document(result: OutageRun, name: str) -> Document:
             paragraph(inside_words(result)),
             cone_chart(result),
         ),
-        tuple(s for s in sections if s.blocks),
+        sections,
         title,
     )
 

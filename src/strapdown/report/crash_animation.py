@@ -14,20 +14,12 @@ from numpy.typing import ArrayLike
 from strapdown import rotation
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import CrashPath
-from strapdown.report.chart import (
-    BLUE,
-    GREY,
-    VERMILLION,
-    Array,
-    Scene,
-    SceneBody,
-    SceneLine,
-    SceneWord,
-)
+from strapdown.report.chart import BLUE, GREY, VERMILLION, Array
 from strapdown.report.crash_outline import Outline, path_moments
 from strapdown.report.document import Animation, Picture
-from strapdown.report.plan import hull, nice_step, tick_words
-from strapdown.report.svg_drawing import INK, SMALL, Drawing
+from strapdown.report.plan import hull
+from strapdown.report.scene import Scene, SceneBody, SceneLine, SceneWord
+from strapdown.report.svg_drawing import INK, SMALL, Drawing, nice_step, tick_words
 from strapdown.report.values import plain
 from strapdown.tables import NED
 

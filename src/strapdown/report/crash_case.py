@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -34,13 +33,16 @@ from strapdown.report.document import finding_json, write_text
 from strapdown.report.document_pdf import write_pdf
 from strapdown.report.report_bundle import (
     ReportBundle,
+    as_comments,
     file_of,
+    finite,
     with_file,
     write_report,
     write_table,
 )
-from strapdown.report.values import spaced
+from strapdown.report.values import AXES, spaced
 from strapdown.tables import ACCEL, EULER, GYRO, NED, VELOCITY
+from strapdown.tables.checks import index_of
 
 
 def _configuration(result: CaseResult) -> dict[str, Any]:
@@ -67,7 +69,7 @@ CRASH = ReportBundle("crash", _configuration, _run, _write)
 
 def _write_numbers(result: CaseResult, folder: Path) -> None:
     write_text(folder / "crash.json", to_json(crash_json(result)))
-    told = {key.lower().replace(" ", "_"): text for key, text in CONVENTIONS}
+    told = as_comments(CONVENTIONS)
     main = result.reconstruction.main
     write_table(trajectory_table(main.path), folder / "trajectory.csv", told)
     answers, formats = result.reconstruction.answers, result.spec.options.formats
@@ -101,9 +103,6 @@ def file_name(name: str, made: set[str]) -> str:
 # A crash case as plain data; every key carries its unit.
 
 
-AXES = ("forward", "right", "down")
-
-
 def crash_json(result: CaseResult) -> dict[str, Any]:
     """Return a case as plain data.
 
@@ -130,18 +129,7 @@ def crash_json(result: CaseResult) -> dict[str, Any]:
         "findings": [finding_json(f) for f in result.findings],
         "case": _named(result.spec.model_dump(mode="json", exclude_none=True)),
     }
-    return {key: _numbers(value) for key, value in found.items()}
-
-
-def _numbers(value: Any) -> Any:
-    """Replace NaN and infinity by null."""
-    if isinstance(value, dict):
-        return {key: _numbers(v) for key, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_numbers(v) for v in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+    return finite(found)
 
 
 def _named(value: Any, key: str = "") -> Any:
@@ -312,13 +300,11 @@ def trajectory_table(path: CrashPath) -> pd.DataFrame:
     Returns
     -------
     DataFrame
-        ``time_s``, position, velocity, attitude, then their standard deviations.
+        By time in s: position, velocity, attitude, then their standard deviations.
     """
     values = path.table.rename(columns={c: f"{c}_{u}" for c, u in UNITS.items()})
     sd = path.sd.rename(columns={c: f"{c}_sd_{u}" for c, u in UNITS.items()})
-    table = pd.concat([values, sd], axis=1)
-    table.insert(0, "time_s", path.time)
-    return table.reset_index(drop=True)
+    return pd.concat([values, sd], axis=1).set_index(pd.Index(path.time, name="time"))
 
 
 def signals_table(unit: UnitReconstruction) -> pd.DataFrame:
@@ -332,8 +318,8 @@ def signals_table(unit: UnitReconstruction) -> pd.DataFrame:
         of its range, by sensor axis.
     """
     imu = unit.at_point.imu
-    table = pd.DataFrame({"time_s": imu.index.to_numpy()})
-    for axis, column in zip(("forward", "right", "down"), ACCEL, strict=True):
+    table = pd.DataFrame(index=imu.index)
+    for axis, column in zip(AXES, ACCEL, strict=True):
         table[f"force_{axis}_m_per_s2"] = imu[column].to_numpy()
     for axis, column in zip(("roll", "pitch", "yaw"), GYRO, strict=True):
         table[f"rate_{axis}_deg_per_s"] = np.degrees(imu[column].to_numpy())
@@ -371,7 +357,7 @@ def signal_record(
     channels = []
     for unit in answers:
         imu = unit.at_point.imu
-        time = imu.index.to_numpy(dtype=np.float64)
+        time = index_of(imu)
         for columns, quantity, symbol in ((ACCEL, "acceleration", "m/s2"), (GYRO, "rate", "rad/s")):
             for column, axis in zip(columns, "xyz", strict=True):
                 channels.append(

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
@@ -39,12 +38,13 @@ from strapdown.report.chart import (
     curve,
     look,
 )
-from strapdown.report.crash_outline import AROUND, crash_span, event_marks, unit_look
-from strapdown.report.values import KMH, MEAN, plain
+from strapdown.report.crash_outline import AROUND, SINCE_TRIGGER, crash_span, event_marks, unit_look
+from strapdown.report.values import AXES, KMH, MEAN, decimals, plain
 from strapdown.rotation import within_half_turn
 from strapdown.tables import NED
+from strapdown.tables.checks import index_of
 
-AXES = ("forward", "right", "down", "resultant")
+_PARTS = (*AXES, "resultant")
 # Instants at which the bound is computed; it is smooth between them.
 _INSTANTS = 31
 _SYMBOLS = ("square", "diamond", "triangle-up", "star", "pentagon", "cross")
@@ -154,13 +154,13 @@ def delta_v_chart(
     found = main.events.events[event]
     zero, end = found.time_zero, min(found.end, main.acceleration.end)
     span = (zero - 0.4 * AROUND[0], end + AROUND[1])
-    lines: list[list[Line]] = [[] for _ in AXES]
+    lines: list[list[Line]] = [[] for _ in _PARTS]
     for unit, name, drawn in answers_of(units, combined):
         if unit is combined or unit.acceleration.begin <= zero < unit.acceleration.end:
             course = delta_v_course(unit.acceleration, zero, *span)
             at, style = 1e3 * course[:, 0], (drawn["colour"], drawn["dash"])
             width = 2.2 if unit is main else 1.3
-            for k in range(len(AXES)):
+            for k in range(len(_PARTS)):
                 lines[k].append(curve(name, at, KMH * course[:, 1 + k], *style, width))
     own = unit_look(None if combined is not None else 0)["colour"]
     last = min(span[1], main.acceleration.end)
@@ -172,7 +172,7 @@ def delta_v_chart(
     halves = [*whole.bound.half_width, whole.resultant_bound]
     panels = []
     of = "of the mean" if combined is not None else f"of {main.name}"
-    for k, axis in enumerate(AXES):
+    for k, axis in enumerate(_PARTS):
         middle = KMH * np.interp(instants, course[:, 0], course[:, 1 + k])
         low = middle - half[:, k]
         fill = Fill(
@@ -211,7 +211,7 @@ def delta_v_chart(
         f"delta-v-{event + 1}" if many else "delta-v",
         title,
         _caption(bool(stated)),
-        "time from the trigger, ms",
+        SINCE_TRIGGER,
         tuple(panels),
         marks=event_marks([found], *span),
     )
@@ -262,7 +262,7 @@ def delta_v_budget(change: VelocityChange) -> pd.DataFrame:
     """
     found = change.bound.by_contributor[["xx", "yy", "zz"]]
     values = np.sqrt(np.maximum(found.to_numpy(dtype=np.float64), 0.0))
-    return pd.DataFrame(values, index=found.index, columns=["forward", "right", "down"])
+    return pd.DataFrame(values, index=found.index, columns=list(AXES))
 
 
 def delta_v_budget_chart(change: VelocityChange) -> Chart:
@@ -316,7 +316,7 @@ def _chart(slug: str, title: str, caption: str, table: pd.DataFrame, unit: str) 
     categories = (_SUM, *(str(name) for name in order))
     # Three digits of the larger sum, and the same number of decimals for its contributors.
     most = float(total.max())
-    digits = max(0, 2 - math.floor(math.log10(most))) if most > 0.0 else 0
+    digits = decimals(most) if most > 0.0 else 0
     panels = []
     for column, colour in zip(table.columns, (BLUE, GREEN), strict=True):
         values = np.array([float(total[column]), *(float(table[column][n]) for n in order)])
@@ -443,7 +443,7 @@ def _lines(
             continue
         line = Line(
             name,
-            1e3 * found.index.to_numpy(dtype=np.float64),
+            1e3 * index_of(found),
             _near(found["horizontal_deg"].to_numpy(dtype=np.float64), middle),
             drawn["colour"],
             drawn["dash"],
@@ -473,9 +473,7 @@ def _chosen(main: UnitReconstruction, event: int, at: float, name: str) -> list[
 # Comparison of the units at the reference point.
 
 
-_AXES = ("forward", "right", "down")
 _CLASS = 60
-_X = "time from the trigger, ms"
 
 
 def differences_chart(comparison: UnitComparison, names: Sequence[str]) -> Chart | None:
@@ -493,7 +491,7 @@ def differences_chart(comparison: UnitComparison, names: Sequence[str]) -> Chart
     """
     edges = 1e3 * comparison.edges
     panels = []
-    for k, axis in enumerate(_AXES):
+    for k, axis in enumerate(AXES):
         lines: list[Line] = []
         fills: list[Fill] = []
         measured = [one for one in comparison.against if np.isfinite(one.difference[:, k]).any()]
@@ -517,7 +515,7 @@ def differences_chart(comparison: UnitComparison, names: Sequence[str]) -> Chart
         "by the stated uncertainties, with the recorder's share in the mean. "
         f"Together they are {said} with their bounds (chi-square {comparison.chi_square:.4g} of "
         f"{comparison.freedom} degrees of freedom, probability {comparison.probability:.2g}).",
-        _X,
+        SINCE_TRIGGER,
         tuple(panels),
     )
 
@@ -554,8 +552,8 @@ def accelerations_chart(
         "Acceleration of the reference point by every recorder",
         "In the axes of the vehicle, forward, right, down, less the specific force at rest, "
         f"{how}; 1 g = 9.80665 m/s². Shaded: the event.",
-        _X,
-        tuple(Panel(f"{axis}, g", tuple(rows[k]), height=0.9) for k, axis in enumerate(_AXES)),
+        SINCE_TRIGGER,
+        tuple(Panel(f"{axis}, g", tuple(rows[k]), height=0.9) for k, axis in enumerate(AXES)),
         marks=event_marks(events, *span),
         bands=tuple(Band(1e3 * e.time_zero, 1e3 * e.end, "event") for e in events),
     )

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from strapdown import __version__
@@ -59,6 +58,7 @@ from strapdown.report.document import (
 )
 from strapdown.report.values import GAP, axis_names, plain
 from strapdown.tables import NED
+from strapdown.tables.checks import index_of
 
 SIGNALS = (
     "Specific force, as an accelerometer measures: −1 g downward at rest, 1 g = 9.80665 m/s²; in "
@@ -337,7 +337,7 @@ def reference_in_path_axes(path: CrashPath, answer: ReferenceAnswer) -> pd.DataF
 
     errors = answer.path.errors
     own = CubicHermiteSpline(path.time, path.table[NED].to_numpy(), path.table[["VN", "VE", "VD"]])
-    at = errors.index.to_numpy(dtype=np.float64)
+    at = index_of(errors)
     return pd.DataFrame(own(at) - errors[NED].to_numpy(), index=errors.index, columns=NED)
 
 

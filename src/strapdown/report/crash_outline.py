@@ -180,6 +180,8 @@ def draw_outline(
 # Instants and spans of a crash that several pictures share.
 
 
+#: Horizontal axis of charts over the crash.
+SINCE_TRIGGER = "time from the trigger, ms"
 #: Time drawn before time zero and after the end of an event, s.
 AROUND = (0.05, 0.10)
 # For a record without an event: time about the trigger.

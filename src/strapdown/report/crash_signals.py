@@ -33,6 +33,7 @@ from strapdown.report.chart import (
     curve,
 )
 from strapdown.report.crash_outline import (
+    SINCE_TRIGGER,
     assumed_axes,
     crash_span,
     event_marks,
@@ -40,11 +41,12 @@ from strapdown.report.crash_outline import (
     path_moments,
     unit_look,
 )
+from strapdown.report.values import AXES
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.sensors.synchronise import SynchronisedUnit
 from strapdown.tables import ACCEL, EULER, GYRO, NED, VELOCITY
+from strapdown.tables.checks import index_of
 
-_AXES = ("forward", "right", "down")
 _TURNS = ("roll", "pitch", "yaw")
 _ANGLES = ("roll", "pitch", "heading")
 _RAW = ((GREY, "solid"), (SKY, "dash"), (GREY, "dot"))
@@ -99,7 +101,7 @@ def _about_the_crash(
     C = recorded.mounting.C_vs
     for j, triad in enumerate(recorded.accelerometers):
         there = synchronised.accelerometers[j]
-        at = there.triad.table.index.to_numpy(dtype=np.float64)
+        at = index_of(there.triad.table)
         lines = triad_lines(
             triad,
             (at, np.asarray(there.clipped)),
@@ -112,7 +114,7 @@ def _about_the_crash(
         for k in range(3):
             rows[k] += lines[k]
             levels[k] += near_levels(triad, C, lines[k][:1], k, g, "g")
-    time = prepared.imu.index.to_numpy(dtype=np.float64)
+    time = index_of(prepared.imu)
     force = prepared.imu[ACCEL].to_numpy(dtype=np.float64) / g
     inside = (time >= span[0]) & (time <= span[1])
     cut = flags_in_vehicle_axes(np.asarray(prepared.clipped), C) & inside[:, None]
@@ -120,7 +122,7 @@ def _about_the_crash(
     name = "merged, less bias" if len(recorded.accelerometers) > 1 else "at the common stamps"
     assumed = assumed_axes(unit)
     for k in range(3):
-        if _AXES[k] in assumed:
+        if AXES[k] in assumed:
             continue
         rows[k].append(curve(name, 1e3 * time[inside], force[inside, k], look["colour"], width=2.0))
         if cut[:, k].any():
@@ -132,8 +134,8 @@ def _about_the_crash(
         f"signals-{number + 1}",
         f"{unit.name}: specific force about the crash",
         "Specific force at the recorder. Thin: as recorded; thick: as processed. "
-        "Shaded: the event." + _told([axis for axis in _AXES if axis in assumed]),
-        "time from the trigger, ms",
+        "Shaded: the event." + _told([axis for axis in AXES if axis in assumed]),
+        SINCE_TRIGGER,
         tuple(
             Panel(
                 f"{axis}, g",
@@ -141,7 +143,7 @@ def _about_the_crash(
                 levels=tuple(levels[k]),
                 height=0.9,
             )
-            for k, axis in enumerate(_AXES)
+            for k, axis in enumerate(AXES)
             if axis not in assumed
         ),
     )
@@ -171,10 +173,10 @@ def _rates(
     assert prepared is not None
     degree, there = math.radians(1.0), synchronised.gyro
     assumed = assumed_axes(unit)
-    time = prepared.imu.index.to_numpy(dtype=np.float64)
+    time = index_of(prepared.imu)
     flags = (time, np.asarray(prepared.gyro_clipped))
     if there is not None:
-        flags = (there.triad.table.index.to_numpy(dtype=np.float64), np.asarray(there.clipped))
+        flags = (index_of(there.triad.table), np.asarray(there.clipped))
     C = recorded.mounting.C_vs
     rows = triad_lines(gyro, flags, recorded, synchronised.offset, degree, span, _RAW[0])
     levels = [near_levels(gyro, C, rows[k][:1], k, degree, "deg/s") for k in range(3)]
@@ -188,7 +190,7 @@ def _rates(
         f"{unit.name}: rates about the crash",
         "Rates about the vehicle's axes: roll about forward (right side down is positive), pitch "
         "about right (nose up), yaw about down (clockwise from above). Shaded: the event.",
-        "time from the trigger, ms",
+        SINCE_TRIGGER,
         tuple(
             Panel(f"{turn}, deg/s", tuple(_once(rows[k])), levels=tuple(levels[k]), height=0.9)
             for k, turn in enumerate(_TURNS)
@@ -200,17 +202,17 @@ def _rates(
 def _overview(unit: UnitReconstruction, number: int, events: Sequence[CrashEvent]) -> Chart:
     prepared = unit.at_point.prepared
     assert prepared is not None
-    time = prepared.imu.index.to_numpy(dtype=np.float64)
+    time = index_of(prepared.imu)
     panels = []
     assumed = assumed_axes(unit)
     for label, columns, scale, named in (
-        ("specific force, g", ACCEL, STANDARD_GRAVITY, _AXES),
+        ("specific force, g", ACCEL, STANDARD_GRAVITY, AXES),
         ("rate, deg/s", GYRO, math.radians(1.0), _ANGLES),
     ):
         values = prepared.imu[columns].to_numpy(dtype=np.float64) / scale
         lines = [
             curve(axis, time, values[:, k], AXIS_COLOURS[k], dash, buckets=BUCKETS)
-            for k, (axis, dash) in enumerate(zip(_AXES, ("solid", "dash", "dot"), strict=True))
+            for k, (axis, dash) in enumerate(zip(AXES, ("solid", "dash", "dot"), strict=True))
             if named[k] not in assumed
         ]
         if lines and np.isfinite(values).any():
@@ -275,7 +277,7 @@ def triad_lines(
 ) -> list[list[Line]]:
     """Curves of one triad as recorded, by vehicle axis, with symbols at the end of its range."""
     C = unit.mounting.C_vs
-    stamps = triad.table.index.to_numpy(dtype=np.float64) - offset
+    stamps = index_of(triad.table) - offset
     inside = (stamps >= span[0]) & (stamps <= span[1])
     columns = ACCEL if set(ACCEL) & set(triad.table.columns) else GYRO
     # An axis that was not recorded has no column.
@@ -330,7 +332,6 @@ def near_levels(
 # Charts of position, velocity and attitude over time with bounds, and against references.
 
 
-_X = "time from the trigger, ms"
 # Instants at which the Monte Carlo bounds are taken; they are as smooth as the path.
 _INSTANTS = 160
 _STEADY = 1e-3
@@ -359,7 +360,7 @@ def place_chart(
     labels = [f"{name}, m" for name in (*names, "down")]
     panels = _panels(path, NED, labels, _sampled(samples, 6))
     if reference is not None:
-        at = 1e3 * reference.index.to_numpy(dtype=np.float64)
+        at = 1e3 * index_of(reference)
         for k, column in enumerate(NED):
             y = reference[column].to_numpy(dtype=np.float64)
             line = curve(reference_name, at, y, VERMILLION, "dash", 1.6)
@@ -431,7 +432,7 @@ def reference_chart(
     number : int
         Index of the reference, for the file name.
     """
-    time = 1e3 * comparison.errors.index.to_numpy(dtype=np.float64)
+    time = 1e3 * index_of(comparison.errors)
     panels = []
     for k, axis in enumerate(NED):
         y = comparison.errors[axis].to_numpy(dtype=np.float64)
@@ -448,7 +449,7 @@ def reference_chart(
         + ("they are consistent" if comparison.consistent else "they are NOT consistent")
         + f" at the last instant (chi-square {comparison.chi_square:.3g}, limit "
         f"{comparison.chi_square_95:.3g}).",
-        _X,
+        SINCE_TRIGGER,
         tuple(panels),
     )
 
@@ -517,7 +518,7 @@ def _chart(
         slug,
         title,
         f"{caption}{said}.",
-        _X,
+        SINCE_TRIGGER,
         tuple(panels),
         marks=marks_apart(named, path.time[0], path.time[-1]),
     )

@@ -40,6 +40,7 @@ from strapdown.simulation.crash_cases import (
 from strapdown.simulation.crash_recording import TriadDesign
 from strapdown.simulation.mounted_motion import ExactAnswers
 from strapdown.tables import ACCEL, GYRO
+from strapdown.tables.checks import index_of
 
 # Interval in which 49 CFR 563 seeks the delta-V of an event; all pulses here end within it.
 SPAN = 0.15  # s
@@ -157,7 +158,7 @@ def _channels(
     of: RecordedUnit, which: int | None, triad: RecordedTriad
 ) -> tuple[CrashChannel, CrashChannel, CrashChannel]:
     quantity = "rate" if which is None else "acceleration"
-    time = triad.table.index.to_numpy(dtype=np.float64)
+    time = index_of(triad.table)
     values = triad.table[GYRO if which is None else ACCEL].to_numpy(dtype=np.float64)
 
     def channel(k: int) -> CrashChannel:

@@ -21,12 +21,14 @@ from strapdown.report.values import (
     instant,
     over_ground,
     plain,
+    probability_words,
     recorder,
     speed,
 )
 from strapdown.rotation import within_half_turn
 from strapdown.sensors.crash_unit import RecordedTriad
 from strapdown.tables import NED
+from strapdown.tables.checks import index_of
 
 ANGLES = ("roll, deg", "pitch, deg", "heading, deg")
 OVER_GROUND = "Axes: over ground."
@@ -235,7 +237,7 @@ def comparison_table(result: CaseResult) -> TableBlock | None:
                     for d, s in zip(difference, sd, strict=True)
                 ),
                 f"{pair.chi_square / max(pair.freedom, 1):.2f}",
-                "below 0.0001" if pair.probability < 1e-4 else f"{pair.probability:.2g}",
+                probability_words(pair.probability),
                 "yes" if pair.agree else "NO",
             )
         )
@@ -365,7 +367,7 @@ def _taken(
     result: CaseResult, unit: str, name: str, spec: TriadSpec, triad: RecordedTriad
 ) -> tuple[str, ...]:
     record = result.records[spec.path]
-    time = triad.table.index.to_numpy(dtype=np.float64)
+    time = index_of(triad.table)
     given = [
         f"{axis}:{GAP}{spec.channels[axis]}" for axis in ("x", "y", "z") if axis in spec.channels
     ]

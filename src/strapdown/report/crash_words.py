@@ -16,6 +16,7 @@ from strapdown.errors import Finding
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.report.document import KeyFigure
 from strapdown.report.values import (
+    AXES,
     GAP,
     KMH,
     MEAN,
@@ -26,6 +27,7 @@ from strapdown.report.values import (
     moment,
     over_ground,
     plain,
+    probability_words,
     side_words,
     speed,
     speed_range,
@@ -205,13 +207,9 @@ def units_words(result: CaseResult) -> str:
     mean = "the weighted mean of" if made.combined is not None else f"{made.main.name}, one of"
     return (
         f"The result is {mean} {len(names)} recorders ({', '.join(names)}), which {told} "
-        f"(probability {_probability(made.comparison.probability)} of differences as large or "
+        f"(probability {probability_words(made.comparison.probability)} of differences as large or "
         "larger)."
     )
-
-
-def _probability(value: float) -> str:
-    return "below 0.0001" if value < 1e-4 else f"{value:.2g}"
 
 
 def _axes(result: CaseResult) -> str:
@@ -591,7 +589,6 @@ def _no_reference(result: CaseResult) -> Iterator[tuple[str, str, str]]:
 SHORT_REST = 2.0  # s
 # Below this rate structural ringing is not resolved: up to a quarter of the rate is usable.
 RINGS = 1000.0  # Hz
-AXES = ("forward", "right", "down")
 
 
 def _prepared(result: CaseResult) -> Iterator[tuple[UnitReconstruction, PreparedUnit]]:

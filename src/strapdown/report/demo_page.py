@@ -20,7 +20,7 @@ from strapdown.report.document import (
     Section,
     document_page,
 )
-from strapdown.report.values import plain
+from strapdown.report.values import decimals, plain
 
 _MS_TO_KMH = 3.6
 _SMALL_DEG = 1e-3
@@ -171,7 +171,7 @@ def _attitude_truth(told: dict[str, Any]) -> str | None:
 def _degrees(value: float) -> str:
     if value < _SMALL_DEG:
         return f"less than {_SMALL_DEG:g}°"
-    return f"{plain(value, max(0, 2 - math.floor(math.log10(value))))}°"
+    return f"{plain(value, decimals(value))}°"
 
 
 def _crash_truth(scenario: dict[str, Any]) -> str:

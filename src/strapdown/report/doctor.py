@@ -47,7 +47,7 @@ from strapdown.report.document import (
     section,
     write_text,
 )
-from strapdown.report.report_bundle import ReportBundle, write_report
+from strapdown.report.report_bundle import ReportBundle, finite, write_report
 from strapdown.report.values import duration_words, instant, small
 from strapdown.systems.doctor import USES, Diagnosis, LogDiagnosis, refused_fixes, run_doctor
 from strapdown.tables import ACCEL, GEODETIC, GYRO, VELOCITY, VELOCITY_SD, find_gaps
@@ -91,7 +91,7 @@ def diagnosis_json(result: Diagnosis) -> dict[str, Any]:
     """
     logs = [
         {
-            **_finite(dict(one.data)),
+            **one.data,
             "fit": {
                 use: {"answer": one.answer(use), "reasons": _listed(one.fit[use])} for use in USES
             },
@@ -101,20 +101,11 @@ def diagnosis_json(result: Diagnosis) -> dict[str, Any]:
         }
         for one in result.logs
     ]
-    return {"logs": logs, "between": _listed(result.between)}
+    return finite({"logs": logs, "between": _listed(result.between)})
 
 
 def _listed(findings: Iterable[Finding]) -> list[Any]:
-    return [_finite(finding_json(one, "cli")) for one in findings]
-
-
-def _finite(value: Any) -> Any:
-    """Replace numbers that JSON does not have by null."""
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, dict):
-        return {k: _finite(v) for k, v in value.items()}
-    return [_finite(v) for v in value] if isinstance(value, list | tuple) else value
+    return [finding_json(one, "cli") for one in findings]
 
 
 # The answer, which page and terminal share.
@@ -383,7 +374,7 @@ def _sections(one: LogDiagnosis, slug: str, title: str) -> list[Section]:
         )
         for c in one.data["columns"]
     ]
-    made = [
+    return [
         section(f"{slug}signals", f"{title}Signals", signal_chart(one, slug), fix_chart(one, slug)),
         section(f"{slug}streams", f"{title}Streams", stream_table(one), Facts(_facts(one))),
         section(
@@ -400,7 +391,6 @@ def _sections(one: LogDiagnosis, slug: str, title: str) -> list[Section]:
         ),
         section(f"{slug}notes", f"{title}Notes", _found(one.notes)),
     ]
-    return [one for one in made if one.blocks]
 
 
 def _found(findings: Iterable[Finding]) -> Block:

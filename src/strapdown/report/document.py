@@ -13,12 +13,15 @@ from functools import cache, cached_property
 from importlib.resources import files
 from itertools import count
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 from xml.etree import ElementTree
 
 from strapdown.errors import DataError, Finding, Words
-from strapdown.report.chart import Chart, Scene
+from strapdown.report.chart import Chart
 from strapdown.report.chart_svg import still
+
+if TYPE_CHECKING:
+    from strapdown.report.scene import Scene
 
 
 @dataclass(frozen=True)
@@ -145,7 +148,7 @@ Block = Paragraph | Items | Links | Facts | TableBlock | Chart | Picture | Anima
 
 @dataclass(frozen=True)
 class Section:
-    """A part of the report under a heading; `slug` is its anchor."""
+    """A part of the report under a heading; `slug` is its anchor. Without blocks it is left out."""
 
     slug: str
     title: str
@@ -404,33 +407,32 @@ def plain_text(text: str, limit: int = 4000, *, lines: bool = False) -> str:
     return marked[: max(0, limit - len(count))] + count
 
 
+# Anything but printable ASCII, which needs no look.
+_OTHER = re.compile(r"[^ -~]+")
+
+
 def _marked(text: str, end_of_line: str) -> str:
-    # Printable characters have a glyph; only too many combining marks must be marked.
-    if text.isprintable() and (text.isascii() or not _COMBINING & _kinds(text)):
-        return text
-    out: list[str] = []
-    combining = 0
-    for char in text:
-        kind = unicodedata.category(char)
-        combining = combining + 1 if kind in _COMBINING else 0
-        if char in "\n\r\u2028\u2029":
-            out.append(end_of_line)
-        elif char == "\t":
-            out.append(" ")
-        elif kind in _SHAPELESS or _is_no_character(char) or combining > _MOST_COMBINING:
-            out.append(f"[U+{ord(char):04X}]")
-        else:
-            out.append(char)
-    return "".join(out)
+    """Return text with a mark for each character without a glyph of its own."""
 
+    def marked(found: re.Match[str]) -> str:
+        out: list[str] = []
+        combining = 0
+        for char in found[0]:
+            kind = unicodedata.category(char)
+            combining = combining + 1 if kind in _COMBINING else 0
+            # No characters, and never will be.
+            never = ord(char) & 0xFFFE == 0xFFFE or 0xFDD0 <= ord(char) <= 0xFDEF
+            if char in "\n\r\u2028\u2029":
+                out.append(end_of_line)
+            elif char == "\t":
+                out.append(" ")
+            elif kind in _SHAPELESS or never or combining > _MOST_COMBINING:
+                out.append(f"[U+{ord(char):04X}]")
+            else:
+                out.append(char)
+        return "".join(out)
 
-def _kinds(text: str) -> set[str]:
-    return set(map(unicodedata.category, set(text)))
-
-
-def _is_no_character(char: str) -> bool:
-    code = ord(char)
-    return code & 0xFFFE == 0xFFFE or 0xFDD0 <= code <= 0xFDEF
+    return _OTHER.sub(marked, text)
 
 
 # A document as plain data, from which page and PDF are laid out alike.
@@ -484,8 +486,8 @@ def document_data(
         "title": plain.title,
         "subtitle": plain.subtitle,
         "footer": plain.footer,
-        "facts": _pairs(plain.facts),
-        "links": _pairs(plain.links),
+        "facts": plain.facts,
+        "links": plain.links,
         "front": [writer.block(block) for block in plain.front],
         "sections": [
             {
@@ -494,13 +496,9 @@ def document_data(
                 "title": section.title,
                 "blocks": [writer.block(block) for block in section.blocks],
             }
-            for number, section in enumerate(plain.sections, start=1)
+            for number, section in enumerate((s for s in plain.sections if s.blocks), start=1)
         ],
     }
-
-
-def _pairs(rows: tuple[tuple[str, str], ...]) -> list[list[str]]:
-    return [[name, text] for name, text in rows]
 
 
 class _Writer:
@@ -515,11 +513,11 @@ class _Writer:
         if isinstance(block, Paragraph):
             return {"kind": "paragraph", "style": block.kind, "text": block.text}
         if isinstance(block, Items):
-            return {"kind": "items", "rows": _pairs(block.rows), "numbered": block.numbered}
+            return {"kind": "items", "rows": block.rows, "numbered": block.numbered}
         if isinstance(block, Links):
-            return {"kind": "links", "rows": _pairs(block.rows)}
+            return {"kind": "links", "rows": block.rows}
         if isinstance(block, Facts):
-            return {"kind": "facts", "rows": _pairs(block.rows)}
+            return {"kind": "facts", "rows": block.rows}
         if isinstance(block, TableBlock):
             return self._table(block)
         if isinstance(block, Chart):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Callable
 from dataclasses import asdict
@@ -27,9 +26,9 @@ from strapdown.navigation.integrity import QUANTITY_REASONS, Repeated
 from strapdown.navigation.record import NavigationRecord
 from strapdown.progress import Progress
 from strapdown.report import navigation_charts as charts
-from strapdown.report.chart import Array, Chart
+from strapdown.report.chart import Chart
 from strapdown.report.chart_svg import ChartFigure
-from strapdown.report.document import document_page, finding_json, write_text
+from strapdown.report.document import finding_json, write_text
 from strapdown.report.navigation_charts import innovation_chart
 from strapdown.report.navigation_document import (
     CONVENTIONS,
@@ -41,38 +40,37 @@ from strapdown.report.navigation_evaluation import (
     Agreement,
     NavigationEvaluation,
     Score,
-    agreements,
     distance_over_ground,
-    evaluation_of,
+    rms,
     trust,
     worst_within,
 )
 from strapdown.report.navigation_plan import plan_chart
 from strapdown.report.paired_corrections import (
-    paired_charts,
+    paired_chart,
     paired_json,
-    paired_table,
     write_paired,
 )
 from strapdown.report.report_bundle import (
     ReportBundle,
+    as_comments,
     file_of,
-    json_number,
+    finite,
     with_file,
     write_report,
+    write_table,
 )
 from strapdown.report.values import spaced
 from strapdown.report.verdict import (
     answer,
     check_words,
     first_words,
-    integrity_section,
     promise,
     repeated_words,
-    verdict_document,
 )
 from strapdown.systems.navigation_run import NavigationRun, run_navigation
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
+from strapdown.tables.checks import index_of
 
 
 def _configuration(result: NavigationRun) -> dict[str, Any]:
@@ -87,17 +85,12 @@ def _run(configuration: dict[str, Any]) -> NavigationRun:
 def _write_all(
     result: NavigationRun, folder: Path, name: str, report: bool, progress: Progress
 ) -> None:
-    found = evaluation_of(result)
-    write_text(folder / "navigation.json", to_json(navigation_json(result, found)))
-    write_navigation_files(result, folder)
+    found = NavigationEvaluation(result)
+    write_text(folder / "navigation.json", to_json(navigation_json(found)))
+    write_navigation_files(found, folder)
     if report:
-        write_verdict(result, name, folder)
-        document = navigation_document(
-            found,
-            name,
-            integrity_section(result),
-            (paired_table(result), *paired_charts(result)),
-        )
+        write_integrity(result, folder)
+        document = navigation_document(found, name)
         write_report(document, folder, progress, figures=result.spec.output.figures)
 
 
@@ -114,6 +107,7 @@ KINDS: dict[str, Callable[[NavigationEvaluation], Chart | None]] = {
     "height": charts.height_chart,
     "velocity": charts.velocity_chart,
     "attitude": charts.attitude_chart,
+    "paired": paired_chart,
 }
 
 
@@ -130,17 +124,15 @@ def plot(result: NavigationRun, kind: str) -> ChartFigure:
     ConfigError
         The chart does not exist.
     """
-    observed = result.filtered.innovations
+    found = NavigationEvaluation(result)
+    observed = {one.name: one for one in found.agreements}
     if kind in observed:
-        found = {one.name: one for one in agreements(result.filtered)}
-        return ChartFigure(innovation_chart(result.filtered, found[kind]))
-    both = paired_charts(result)
-    if kind == "paired" and both:
-        return ChartFigure(both[0])
-    if kind not in KINDS:
-        known = [*KINDS, *(["paired"] if both else []), *observed]
+        return ChartFigure(innovation_chart(result.record, observed[kind]))
+    known = [one for one in KINDS if one != "paired" or found.pair]
+    if kind not in known:
+        known += observed
         raise ConfigError("report.unknown-chart", quantity="kind", word=kind, known=known)
-    chart = KINDS[kind](evaluation_of(result))
+    chart = KINDS[kind](found)
     if chart is None:
         raise ConfigError("report.no-path-to-draw", quantity=f"kind '{kind}'")
     return ChartFigure(chart)
@@ -152,27 +144,19 @@ def plot(result: NavigationRun, kind: str) -> ChartFigure:
 MODULES = (*STAGES, "aiding")
 
 
-def navigation_json(
-    result: NavigationRun, found: NavigationEvaluation | None = None
-) -> dict[str, Any]:
+def navigation_json(found: NavigationEvaluation) -> dict[str, Any]:
     """Return a navigation run as plain data for programs.
-
-    Parameters
-    ----------
-    found : NavigationEvaluation, optional
-        From `evaluation_of`, if already computed.
 
     Returns
     -------
     dict
         Angles and their standard deviations in degrees; estimated sensor errors in SI.
     """
-    record, source = result.record, result.source
+    result, record, source = found.run, found.record, found.run.source
     time = record.trajectory.index
     clock = clock_of(source.imu)
-    found = evaluation_of(result) if found is None else found
-    return {
-        "conventions": {key.lower().replace(" ", "_"): text for key, text in CONVENTIONS},
+    made = {
+        "conventions": as_comments(CONVENTIONS),
         "answer": spaced(headline(found)),
         "trust": trust(found).json(),
         "cautions": [spaced(f"{head}: {text}") for head, text in cautions(found)],
@@ -202,8 +186,8 @@ def navigation_json(
         "sensors": {
             str(name): {
                 "unit": record.units.get(str(name), ""),
-                "estimate": json_number(record.sensors[name].iloc[-1]),
-                "sd": json_number(record.sensors_sd[name].iloc[-1]),
+                "estimate": record.sensors[name].iloc[-1],
+                "sd": record.sensors_sd[name].iloc[-1],
             }
             for name in record.sensors.columns
         },
@@ -215,12 +199,10 @@ def navigation_json(
                 "measurement": w.aid,
                 "from_s": w.begin,
                 "to_s": w.end,
-                "largest_horizontal_error_m": json_number(w.error_m),
-                "bound_95_m": json_number(w.bound_m),
+                "largest_horizontal_error_m": w.error_m,
+                "bound_95_m": w.bound_m,
                 "inside": w.inside,
-                "largest_horizontal_error_forward_m": (
-                    None if w.forward_m is None else json_number(w.forward_m)
-                ),
+                "largest_horizontal_error_forward_m": (w.forward_m),
             }
             for w in found.withheld
         ],
@@ -230,10 +212,11 @@ def navigation_json(
         ],
         "against": _against(found),
         "control_points": _points(found),
-        "paired": paired_json(result),
+        "paired": paired_json(found),
         "method": _method(result),
         "findings": [finding_json(f) for f in result.findings],
     }
+    return finite(made)
 
 
 def _smoothing(found: NavigationEvaluation) -> dict[str, Any] | None:
@@ -244,8 +227,8 @@ def _smoothing(found: NavigationEvaluation) -> dict[str, Any] | None:
     return {
         name: {
             "instants": int(one.instants[k]),
-            "share_within_3_sd": json_number(one.share[k]),
-            "rms_in_sd": json_number(one.rms[k]),
+            "share_within_3_sd": one.share[k],
+            "rms_in_sd": one.rms[k],
         }
         for k, name in enumerate(one.columns)
     }
@@ -274,7 +257,7 @@ def _against(found: NavigationEvaluation) -> dict[str, Any] | None:
         "instants": len(errors.time),
         "from_s": float(errors.time[0]),
         "to_s": float(errors.time[-1]),
-        "mean_nees": json_number(errors.nees.mean()) if errors.freedom else None,
+        "mean_nees": errors.nees.mean() if errors.freedom else None,
         "nees_of": errors.freedom,
         "errors": {score.quantity: _score(score) for score in errors.scores},
     }
@@ -282,7 +265,7 @@ def _against(found: NavigationEvaluation) -> dict[str, Any] | None:
 
 def _points(found: NavigationEvaluation) -> dict[str, Any] | None:
     """Errors at the control points, after the best fit of origin and heading."""
-    score = found.points
+    score = found.run.points
     if score is None:
         return None
     return {
@@ -303,13 +286,12 @@ def _outages(record: NavigationRecord) -> list[dict[str, Any]]:
     for aid, spans in record.outages.items():
         for span in spans:
             worst = worst_within(record, span)
-            bound = None if worst is None else json_number(worst[0])
             out.append(
                 {
                     "measurement": aid,
                     "from_s": span.begin,
                     "to_s": span.end,
-                    "largest_horizontal_bound_95_m": bound,
+                    "largest_horizontal_bound_95_m": None if worst is None else worst[0],
                 }
             )
     return out
@@ -318,11 +300,11 @@ def _outages(record: NavigationRecord) -> list[dict[str, Any]]:
 def _score(score: Score) -> dict[str, Any]:
     unit = {"m": "m", "m/s": "m_per_s", "deg": "deg"}[score.unit]
     return {
-        f"rms_{unit}": json_number(score.rms),
-        f"largest_{unit}": json_number(score.largest),
+        f"rms_{unit}": score.rms,
+        f"largest_{unit}": score.largest,
         "largest_at_s": score.largest_at,
-        f"bound_95_rms_{unit}": json_number(score.bound),
-        "share_within_bound": json_number(score.share),
+        f"bound_95_rms_{unit}": score.bound,
+        "share_within_bound": score.share,
     }
 
 
@@ -335,10 +317,10 @@ def _state(found: NavigationEvaluation, row: int) -> dict[str, Any]:
     names = [*GEODETIC, *VELOCITY, *EULER]
     return {
         "time_s": float(record.trajectory.index[row]),
-        **{f"{n}_{units[n]}": json_number(at[n]) for n in names},
+        **{f"{n}_{units[n]}": at[n] for n in names},
         "sd_at_s": float(record.sd.index[row]),
-        **{f"{n}_sd_{units[n]}": json_number(how[n]) for n in [*NED, *VELOCITY, *EULER]},
-        "horizontal_bound_95_m": json_number(plane_bound(record.covariance)[row]),
+        **{f"{n}_sd_{units[n]}": how[n] for n in [*NED, *VELOCITY, *EULER]},
+        "horizontal_bound_95_m": plane_bound(record.covariance)[row],
     }
 
 
@@ -361,23 +343,17 @@ def _innovations(one: Agreement) -> dict[str, Any]:
         "epochs": one.epochs,
         "rejected": one.rejected,
         "weakened": one.weakened,
-        "rms_in_sd": json_number(one.ratio),
-        "mean_nis": json_number(one.mean_nis),
-        "mean_nis_expected_95": [json_number(x) for x in one.band],
-        "correlation_next_epoch": json_number(one.correlation),
-        "correlation_by_chance_95": json_number(one.correlation_bound),
+        "rms_in_sd": one.ratio,
+        "mean_nis": one.mean_nis,
+        "mean_nis_expected_95": list(one.band),
+        "correlation_next_epoch": one.correlation,
+        "correlation_by_chance_95": one.correlation_bound,
         "verdicts": [
             {"kind": v.kind, "component": v.component, "since_s": v.since, "what": v.finding.what}
             for v in one.consistency.verdicts
         ],
-        "rms": {
-            label: json_number(_rms(one.nu[one.used, k])) for k, label in enumerate(one.labels)
-        },
+        "rms": {label: rms(one.nu[one.used, k]) for k, label in enumerate(one.labels)},
     }
-
-
-def _rms(values: Array) -> float:
-    return math.sqrt(float(np.square(values).mean())) if values.size else math.nan
 
 
 # Files of a navigation run beside its report: tables over time, and paths for maps.
@@ -391,7 +367,7 @@ _WORDS = {"rad/s": "rad_s", "m/s²": "m_s2", "1": "", "(rad/s)/(m/s²)": "rad_s_
 MOST_POINTS = 10_000
 
 
-def write_navigation_files(result: NavigationRun, folder: Path) -> None:
+def write_navigation_files(found: NavigationEvaluation, folder: Path) -> None:
     """Write the tables of a run.
 
     Parameters
@@ -401,7 +377,7 @@ def write_navigation_files(result: NavigationRun, folder: Path) -> None:
         ``innovations/NAME.csv``, ``events.csv``, and ``errors.csv`` if the truth is known; for a
         smoothed run also the first three from the filter alone, in ``forward``.
     """
-    record = result.record
+    result, record = found.run, found.record
     told = {"run": result.source.name, "ellipsoid": result.ellipsoid.name}
     _write_states(result, record, folder, told)
     if result.forward is not None:
@@ -411,7 +387,7 @@ def write_navigation_files(result: NavigationRun, folder: Path) -> None:
         (folder / "innovations").mkdir()
         for name, table in record.innovations.items():
             renamed = table.rename(columns={c: _column(str(c)) for c in table.columns})
-            _write(folder / "innovations" / f"{name}.csv", renamed, {**told, "of": name})
+            write_table(renamed, folder / "innovations" / f"{name}.csv", {**told, "of": name})
     events = record.events
     csv.write(
         folder / "events.csv",
@@ -438,8 +414,8 @@ def write_navigation_files(result: NavigationRun, folder: Path) -> None:
             columns={c: f"{c}_{UNITS.get(str(c), 'deg')}" for c in result.differences.columns}
         )
         against = {**told, "against": result.source.truth_name, "sign": "computed minus truth"}
-        _write(folder / "errors.csv", errors, against)
-    write_paired(result, folder, told)
+        write_table(errors, folder / "errors.csv", against)
+    write_paired(found, folder, told)
 
 
 def _write_states(
@@ -452,8 +428,8 @@ def _write_states(
         write_trajectory(path, record.trajectory, name=result.source.name, options=options)
     sd = record.sd.rename(columns={c: f"{c}_sd_{UNITS[str(c)]}" for c in record.sd.columns})
     without = {"not_estimated": " ".join(record.not_estimated)} if record.not_estimated else {}
-    _write(folder / "sd.csv", sd, {**told, **without})
-    _write(folder / "sensor_errors.csv", _sensors(record), told)
+    write_table(sd, folder / "sd.csv", {**told, **without})
+    write_table(_sensors(record), folder / "sensor_errors.csv", told)
 
 
 def _sensors(record: NavigationRecord) -> pd.DataFrame:
@@ -474,31 +450,18 @@ def _column(name: str) -> str:
     return re.sub(r"\W+", "_", f"{part} {label} {'' if part == 'weight' else unit}").strip("_")
 
 
-def _write(path: Path, table: pd.DataFrame, told: dict[str, str]) -> None:
-    named = {"time_s": table.index.to_numpy(dtype=np.float64)}
-    named |= {str(c): table[c].to_numpy(dtype=np.float64) for c in table.columns}
-    csv.write(path, named, told)
+# Integrity as files: its values for programs, and the heading status over time.
 
 
-# Write a verdict as files: the page, its values for programs, and heading integrity over time.
-
-
-def write_verdict(result: NavigationRun, name: str, folder: Path) -> None:
-    """Write ``verdict.html``, ``verdict.json`` and ``heading_integrity.csv``.
-
-    Parameters
-    ----------
-    name : str
-        Folder name shown on the page.
-    """
-    write_text(folder / "verdict.html", document_page(verdict_document(result, name)))
+def write_integrity(result: NavigationRun, folder: Path) -> None:
+    """Write ``verdict.json`` and ``heading_integrity.csv``."""
     write_text(folder / "verdict.json", to_json(verdict_json(result)))
     table = result.trust.heading.table
     status = [STATUSES[k] for k in table["status"].to_numpy(dtype=np.int64)]
     csv.write(
         folder / "heading_integrity.csv",
         {
-            "time_s": table.index.to_numpy(dtype=np.float64),
+            "time_s": index_of(table),
             "status": np.array(status, dtype=np.str_),
             "reason": np.array([str(r) for r in table["reason"]], dtype=np.str_),
             "bound_95_deg": table["bound"].to_numpy(dtype=np.float64),
@@ -522,11 +485,11 @@ def verdict_json(result: NavigationRun) -> dict[str, Any]:
     trust, heading = result.trust, result.trust.heading
     bounds = plane_bound(result.record.covariance)
     spans = heading.spans
-    return {
+    made = {
         "answer": spaced(answer(result)),
         "position": {
-            "bound_95_at_end_m": json_number(bounds[-1]),
-            "largest_bound_95_m": json_number(bounds.max()),
+            "bound_95_at_end_m": bounds[-1],
+            "largest_bound_95_m": bounds.max(),
             "confirmed": bool(trust.consistency) and trust.against_bounds is None,
         },
         "heading": {
@@ -554,14 +517,14 @@ def verdict_json(result: NavigationRun) -> dict[str, Any]:
                 {
                     "time_s": a.time,
                     "status": a.span.status,
-                    "sd_deg": json_number(a.sd),
+                    "sd_deg": a.sd,
                     "manoeuvres": [
                         {
                             "what": m.what,
                             "forward_m_per_s2": m.forward,
                             "aside_m_per_s2": m.aside,
                             "duration_s": m.duration,
-                            "sd_after_deg": json_number(sd),
+                            "sd_after_deg": sd,
                         }
                         for m, sd in a.options
                     ],
@@ -583,6 +546,7 @@ def verdict_json(result: NavigationRun) -> dict[str, Any]:
         "first": spaced(first_words(trust)),
         "repeated": None if trust.repeated is None else _repeated(trust.repeated, result),
     }
+    return finite(made)
 
 
 def _repeated(repeated: Repeated, result: NavigationRun) -> dict[str, Any]:
@@ -598,9 +562,9 @@ def _repeated(repeated: Repeated, result: NavigationRun) -> dict[str, Any]:
         turn = np.abs(table["heading"].to_numpy(dtype=np.float64))
         for name, unit, values in (("position", "m", place), ("heading", "deg", turn)):
             out[f"{name}_difference"] = {
-                f"median_{unit}": json_number(np.median(values)),
-                f"largest_{unit}": json_number(values.max()),
-                f"at_end_{unit}": json_number(values[-1]),
+                f"median_{unit}": np.median(values),
+                f"largest_{unit}": values.max(),
+                f"at_end_{unit}": values[-1],
             }
     return out
 

@@ -46,6 +46,7 @@ from strapdown.report.navigation_evaluation import (
 )
 from strapdown.report.values import NOT_ESTIMATED
 from strapdown.tables import EULER, NED, VELOCITY
+from strapdown.tables.checks import index_of
 
 TIME = "time, s"
 BOUND = "95 % bound"
@@ -74,7 +75,7 @@ def over_time(
 def bound_chart(found: NavigationEvaluation) -> Chart:
     """95 % bounds of position, velocity and attitude over the run."""
     record = found.record
-    time = record.sd.index.to_numpy(dtype=np.float64)
+    time = index_of(record.sd)
     groups = (
         (
             "Position",
@@ -127,7 +128,7 @@ def height_chart(found: NavigationEvaluation) -> Chart:
     return over_time(
         "height",
         "Height",
-        f"Above the ellipsoid ({found.ellipsoid.name}).",
+        f"Above the ellipsoid ({found.run.ellipsoid.name}).",
         (panel,),
         found.record,
     )
@@ -168,14 +169,14 @@ def _state_panel(
     `shown` holds the values over the trajectory and at the marks, if not those of the column.
     """
     record = found.record
-    time = record.trajectory.index.to_numpy(dtype=np.float64)
+    time = index_of(record.trajectory)
     if shown is None:
         shown = record.trajectory[column].to_numpy(dtype=np.float64), at_marks(record, column)
     values, here = shown
     lines = [curve("navigated", time, values, BLUE, width=1.3, buckets=BUCKETS)]
-    if found.truth is not None:
+    if found.run.source.truth is not None:
         lines.append(_true(found, column, values))
-    at = record.sd.index.to_numpy(dtype=np.float64)
+    at = index_of(record.sd)
     half = TWO_SIDED_95 * record.sd[error].to_numpy(dtype=np.float64)
     if np.isnan(half).all():
         return Panel(f"{label} ({NOT_ESTIMATED})", tuple(lines), height=0.8)
@@ -184,7 +185,7 @@ def _state_panel(
 
 
 def _true(found: NavigationEvaluation, column: str, navigated: Array) -> Line:
-    truth = found.truth
+    truth = found.run.source.truth
     assert truth is not None
     time = found.record.trajectory.index
     within = truth[(truth.index >= time[0]) & (truth.index <= time[-1])]
@@ -195,17 +196,17 @@ def _true(found: NavigationEvaluation, column: str, navigated: Array) -> Line:
         values = unwrapped(values)
         # Same number of turns as the navigated heading.
         values = values + 360.0 * np.round((navigated[0] - values[0]) / 360.0)
-    stamps = within.index.to_numpy(dtype=np.float64)
+    stamps = index_of(within)
     return curve("truth", stamps, values, BLACK, "dot", 1.1, buckets=BUCKETS)
 
 
 def state_charts(found: NavigationEvaluation) -> tuple[Chart, ...]:
     """Estimated sensor and measurement errors, with their bounds."""
-    return tuple(_block_chart(found.filtered, block) for block in found.states)
+    return tuple(_block_chart(found.run.filtered, block) for block in found.states)
 
 
 def _block_chart(record: NavigationRecord, block: ShownStates) -> Chart:
-    time = record.sensors.index.to_numpy(dtype=np.float64)
+    time = index_of(record.sensors)
     panels = []
     for k, (column, label) in enumerate(zip(block.columns, block.labels, strict=True)):
         value = block.factor * record.sensors[column].to_numpy(dtype=np.float64)
@@ -257,7 +258,7 @@ def outage_bands(record: NavigationRecord) -> tuple[Band, ...]:
 
 def strip(record: NavigationRecord) -> Panel | None:
     """Rows of modes and measurement sources; None if there are neither."""
-    time = record.trajectory.index.to_numpy(dtype=np.float64)
+    time = index_of(record.trajectory)
     begins = [float(time[0]), *(m.begin for m in record.modes)]
     finishes = [float(time[-1]), *(m.end for m in record.modes)]
     whole = Span("", min(begins), max(finishes))
@@ -311,7 +312,7 @@ def _tables(record: NavigationRecord, aid: str) -> list[pd.DataFrame]:
 
 
 def _epochs(record: NavigationRecord, aid: str) -> Array:
-    found = [table.index.to_numpy(dtype=np.float64) for table in _tables(record, aid)]
+    found = [index_of(table) for table in _tables(record, aid)]
     return np.unique(np.concatenate(found)) if found else np.empty(0)
 
 
@@ -543,11 +544,11 @@ def nis_chart(record: NavigationRecord, found: tuple[Agreement, ...]) -> Chart |
     for k, one in enumerate(found):
         if not one.used.any():
             continue
-        low, high = bounds(one.freedom)
+        low, high = bounds(len(one.labels))
         nis = np.maximum(one.nis, _LEAST)
         colour = AXIS_COLOURS[(2 + k) % 3]
         step = max(1, one.epochs // _POINTS)
-        drawn = (np.arange(one.epochs) % step == 0) | (one.nis > chi_square_far(one.freedom))
+        drawn = (np.arange(one.epochs) % step == 0) | (one.nis > chi_square_far(len(one.labels)))
         lines = _points("epoch", one.time, nis, one.used & drawn, colour, "circle", 3.2)
         lines += _points("rejected", one.time, nis, ~one.used, VERMILLION, "x", 6.0)
         lines += _mean(one)

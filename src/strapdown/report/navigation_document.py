@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from strapdown import __version__
+from strapdown.config.choice import ChoiceSpec
 from strapdown.constants import TWO_SIDED_95
 from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.navigation.record import NavigationRecord, Span
@@ -22,7 +23,6 @@ from strapdown.report.document import (
     KeyFigure,
     KeyFigures,
     Paragraph,
-    Section,
     TableBlock,
     assumed,
     blocks,
@@ -42,14 +42,17 @@ from strapdown.report.navigation_charts import (
 from strapdown.report.navigation_evaluation import (
     NavigationEvaluation,
     distance_over_ground,
+    state_groups,
     trust,
     worst_within,
 )
 from strapdown.report.navigation_plan import plan_chart
+from strapdown.report.paired_corrections import paired_chart, paired_table
 from strapdown.report.values import (
     GAP,
     NOT_ESTIMATED,
     about,
+    decimals,
     duration_words,
     half,
     length_words,
@@ -58,7 +61,9 @@ from strapdown.report.values import (
     share_words,
 )
 from strapdown.report.values import stamp as instant
+from strapdown.report.verdict import integrity_sections, status_figure
 from strapdown.rotation import within_half_turn
+from strapdown.systems.navigation_run import NavigationRun
 from strapdown.tables import EULER, NED, VELOCITY
 
 # 95 % bound in deg from which a heading is unknown.
@@ -117,8 +122,7 @@ def key_figures(found: NavigationEvaluation) -> tuple[KeyFigure, ...]:
             f"{about(float(last['pitch']), half(sd['pitch']), '°')}",
         ),
     ]
-    out.append(_known(found))
-    return tuple(out)
+    return (*out, status_figure(found.run), _known(found))
 
 
 def _known(found: NavigationEvaluation) -> KeyFigure:
@@ -248,7 +252,7 @@ def _refused(found: NavigationEvaluation) -> list[tuple[str, str]]:
 
 def _not_told(found: NavigationEvaluation) -> list[tuple[str, str]]:
     """States whose bounds hardly decreased."""
-    sd = found.filtered.sensors_sd
+    sd = found.run.filtered.sensors_sd
     if len(sd) < 2:
         return []
     names = []
@@ -292,7 +296,7 @@ UNITS = dict.fromkeys(NED, "m") | dict.fromkeys(VELOCITY, "m/s") | dict.fromkeys
 
 def smoothing_chart(found: NavigationEvaluation) -> Chart | None:
     """Bounds of position, height and heading over time, filter and smoother."""
-    forward, record = found.forward, found.record
+    forward, record = found.run.forward, found.record
     if forward is None:
         return None
     panels = []
@@ -330,7 +334,7 @@ def smoothing_chart(found: NavigationEvaluation) -> Chart | None:
 
 def smoothing_table(found: NavigationEvaluation) -> TableBlock | None:
     """Median bounds and errors against the truth, filter and smoother."""
-    forward, agreement = found.forward, found.smoother
+    forward, agreement = found.run.forward, found.smoother
     if forward is None or agreement is None:
         return None
     rows = []
@@ -375,7 +379,7 @@ def _errors(found: NavigationEvaluation, column: str) -> tuple[str, ...]:
 
 def smoothing_words(found: NavigationEvaluation) -> str | None:
     """Effect of the smoother in a sentence."""
-    forward = found.forward
+    forward = found.run.forward
     if forward is None:
         return None
     before, after = (
@@ -470,7 +474,7 @@ def _stated(value: float, sd: float, unit: str) -> str:
 
 def state_table(found: NavigationEvaluation) -> TableBlock | None:
     """Sensor and measurement errors: uncertainty before and after the run."""
-    record = found.filtered
+    record = found.run.filtered
     if record.sensors.empty or not len(record.sensors.columns):
         return None
     rows = []
@@ -575,7 +579,7 @@ def withheld_table(found: NavigationEvaluation) -> TableBlock | None:
     ]
     if not rows:
         return None
-    smoothed = found.forward is not None
+    smoothed = found.run.forward is not None
     return TableBlock(
         (
             *("GNSS outage test", "from", "for", "largest error", "95 % bound", "within bound"),
@@ -592,7 +596,7 @@ def withheld_table(found: NavigationEvaluation) -> TableBlock | None:
 
 def point_table(found: NavigationEvaluation) -> TableBlock | None:
     """Errors at the control points."""
-    score = found.points
+    score = found.run.points
     if score is None:
         return None
     row = (
@@ -620,7 +624,7 @@ def error_table(found: NavigationEvaluation) -> TableBlock | None:
     names |= {v: f"velocity {w}" for v, w in zip(VELOCITY, ("north", "east", "down"), strict=True)}
     rows = []
     for score in found.errors.scores:
-        places = _places(score.rms)
+        places = decimals(score.rms) if score.rms > 0.0 else 3
         rows.append(
             (
                 f"{names.get(score.quantity, score.quantity)}, {score.unit}",
@@ -638,12 +642,6 @@ def error_table(found: NavigationEvaluation) -> TableBlock | None:
         caption=f"Errors against {found.truth_name}, at {len(found.errors.time)} instants.",
         strong=(0,),
     )
-
-
-def _places(value: float) -> int:
-    if not (math.isfinite(value) and value > 0.0):
-        return 3
-    return min(6, max(0, 2 - math.floor(math.log10(value))))
 
 
 def event_table(found: NavigationEvaluation) -> TableBlock | None:
@@ -665,23 +663,15 @@ def event_table(found: NavigationEvaluation) -> TableBlock | None:
 # Report of a navigation run: the answer first, then its basis.
 
 
-def navigation_document(
-    found: NavigationEvaluation,
-    name: str,
-    integrity: Section | None = None,
-    paired: tuple[Block | None, ...] = (),
-) -> Document:
+def navigation_document(found: NavigationEvaluation, name: str) -> Document:
     """Return the report of a navigation run.
 
     Parameters
     ----------
     name : str
         Folder name, for the verification command; no command if empty.
-    integrity : Section, optional
-        Integrity section, for a run whose verdict is on a separate page.
-    paired : tuple of Block
-        Table and chart of the same record with another correction.
     """
+    run = found.run
     verdict = trust(found)
     plan = plan_chart(found)
     said = cautions(found)
@@ -690,7 +680,7 @@ def navigation_document(
     )
     sections = (
         section("answer", "The answer", end_table(found), *verdict.blocks),
-        *(() if integrity is None else (integrity,)),
+        *integrity_sections(run),
         section(
             "state",
             "Height, velocity, attitude",
@@ -705,7 +695,12 @@ def navigation_document(
             *error_charts(found),
             nees_chart(found),
         ),
-        section("paired", "With two corrections of the estimated errors", *paired),
+        section(
+            "paired",
+            "With two corrections of the estimated errors",
+            paired_table(found),
+            paired_chart(found),
+        ),
         section("points", "At the control points", point_table(found)),
         section(
             "smoothing",
@@ -727,7 +722,7 @@ def navigation_document(
         section(
             "method",
             "Method and assumptions",
-            Facts(found.chain) if found.chain else None,
+            Facts(_method(run)),
             *assumed(
                 "Sensor and measurement errors are as stated. Biases that are not among the states "
                 "are zero, and measurement errors are white. Every bound depends on this.",
@@ -738,12 +733,12 @@ def navigation_document(
         ),
         section("conventions", "Conventions", Facts(CONVENTIONS)),
     )
-    title = found.title or f"Navigation of {found.name}"
+    title = run.spec.title or f"Navigation of {run.source.name}"
     return Document(
         title,
         headline(found),
         (
-            ("Record", ", ".join(t for t in (found.name, found.what) if t)),
+            ("Record", f"{run.source.name}, {run.source.what}"),
             ("Start", position_words(found, 0)),
             ("Measurements", ", ".join(aids) or "none"),
             ("Software", f"strapdown {__version__}"),
@@ -756,10 +751,39 @@ def navigation_document(
             plan,
             charts.bound_chart(found),
         ),
-        tuple(s for s in sections if s.blocks),
+        sections,
         title,
-        links=() if integrity is None else (("verdict.html", "Integrity"),),
     )
+
+
+def _method(run: NavigationRun) -> tuple[tuple[str, str], ...]:
+    """Stages with their modules, in words."""
+    spec = run.spec
+    filter_rule = _kind(spec.filter, "update_rule")
+    aids = (
+        (f"Measurement {name}", aid.kind + (f", update rule {rule}" if rule else ""))
+        for name, aid in spec.aiding.items()
+        for rule in (_kind(aid, "update_rule"),)
+    )
+    chain = (
+        ("Record", f"{run.source.name}: {run.source.what}"),
+        ("Pre-filter", spec.prefilter.kind),
+        ("Coarse alignment", "" if run.coarse is None else spec.coarse.kind),
+        ("Fine alignment", "" if run.fine is None else spec.fine.kind),
+        ("Mechanization", spec.mechanization.kind),
+        ("Filter", spec.filter.kind),
+        ("Error model", _kind(spec.filter, "error_model")),
+        ("Update rule", filter_rule or "none: every measurement has full weight"),
+        ("Smoother", "" if run.forward is None else spec.smoother.kind),
+        *aids,
+        ("States", ", ".join(state_groups(run.record))),
+    )
+    return tuple((stage, what) for stage, what in chain if what)
+
+
+def _kind(module: ChoiceSpec, slot: str) -> str:
+    """Kind of the module in a slot of another; empty without one."""
+    return str(getattr(getattr(module, slot, None), "kind", ""))
 
 
 def _observations(found: NavigationEvaluation) -> tuple[Block | None, ...]:

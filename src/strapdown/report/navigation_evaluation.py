@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -12,15 +12,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.config.choice import ChoiceSpec
 from strapdown.config.navigation import make_aids
 from strapdown.constants import TWO_SIDED_95
-from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import Finding
 from strapdown.estimation.robust import AdaptiveScale
 from strapdown.evaluation.plane_bound import plane_bound, plane_reach
+from strapdown.evaluation.trajectory_differences import trajectory_differences
+from strapdown.frames import ned_from_geodetic
 from strapdown.navigation.consistency import (
-    ComponentConsistency,
     ObservationConsistency,
     consistency_of,
 )
@@ -38,65 +37,37 @@ from strapdown.report.document import Trust, reason
 from strapdown.report.values import plain, shown_unit
 from strapdown.systems.navigation_run import NavigationRun, withheld_aid
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
+from strapdown.tables.checks import index_of, values_of
 
 if TYPE_CHECKING:
-    from strapdown.evaluation.control_points import ControlPointScore
     from strapdown.navigation.outage_test import Withheld as WithheldScores
 
 
 @dataclass(frozen=True, eq=False)
 class NavigationEvaluation:
-    """A navigation run with the references known beside it, evaluated for its report.
+    """A navigation run with what its report computes from it, each once."""
 
-    Attributes
-    ----------
-    forward : NavigationRecord, optional
-        For a smoothed run, the record of the filter alone.
-    name, what : str
-        Of the log: its file, and its kind (``recorded log``).
-    title : str
-        Of the report; made from `name` if empty.
-    chain : tuple of (str, str)
-        Slots and their modules, in words.
-    fixes : mapping of str to DataFrame
-        Gnss tables by name of the measurement source, drawn as points.
-    truth : DataFrame, optional
-        Trajectory table on the clock of the run.
-    truth_name : str
-        Words that follow "error against".
-    lasting : tuple of str
-        Names of the measurement sources with stated time-correlated errors.
-    """
-
-    record: NavigationRecord
-    forward: NavigationRecord | None = None
-    name: str = "log"
-    what: str = ""
-    title: str = ""
-    chain: tuple[tuple[str, str], ...] = ()
-    fixes: Mapping[str, pd.DataFrame] = field(default_factory=dict)
-    truth: pd.DataFrame | None = None
-    truth_name: str = "the truth"
-    points: ControlPointScore | None = None
-    withheld: tuple[Withheld, ...] = ()
-    findings: tuple[Finding, ...] = ()
-    ellipsoid: Ellipsoid = WGS84
-    lasting: tuple[str, ...] = ()
+    run: NavigationRun
 
     @property
-    def filtered(self) -> NavigationRecord:
-        """Record of the filter alone, which shows the convergence of the estimated errors."""
-        return self.forward or self.record
+    def record(self) -> NavigationRecord:
+        """Record of the run, smoothed if specified."""
+        return self.run.record
+
+    @property
+    def truth_name(self) -> str:
+        """Words that follow "error against"."""
+        return self.run.source.truth_name or "the truth"
 
     @cached_property
     def states(self) -> tuple[ShownStates, ...]:
         """Sensor and measurement error states of the filter, for display."""
-        return blocks_of(self.filtered)
+        return blocks_of(self.run.filtered)
 
     @cached_property
     def agreements(self) -> tuple[Agreement, ...]:
         """Consistency of each observation that has innovations."""
-        return agreements(self.record, self.lasting)
+        return agreements(self.record, lasting(make_aids(self.run.spec)))
 
     @cached_property
     def errors(self) -> NavigationErrors | None:
@@ -106,26 +77,39 @@ class NavigationEvaluation:
     @cached_property
     def forward_errors(self) -> NavigationErrors | None:
         """Errors of the filter alone, for a smoothed run."""
-        return None if self.forward is None else self._errors(self.forward)
+        return None if self.run.forward is None else self._errors(self.run.forward)
 
     @cached_property
     def smoother(self) -> SmootherConsistency | None:
         """Agreement of filter and smoother, for a smoothed run."""
-        if self.forward is None:
+        if self.run.forward is None:
             return None
-        return smoother_consistency(self.forward, self.record, self.ellipsoid)
+        return smoother_consistency(self.run.forward, self.record, self.run.ellipsoid)
+
+    @cached_property
+    def withheld(self) -> tuple[Withheld, ...]:
+        """GNSS outage tests."""
+        run = self.run
+        return () if not run.withheld else withheld_of(withheld_aid(run.spec), run.withheld)
+
+    @cached_property
+    def pair(self) -> tuple[HorizontalErrors, ...]:
+        """Errors of the run and of the one with the other correction."""
+        return paired_errors(self.run)
 
     @property
     def all_findings(self) -> tuple[Finding, ...]:
         """Findings of the run and of its comparison with the truth."""
-        return (*self.findings, *(() if self.errors is None else self.errors.comparison.findings))
+        more = () if self.errors is None else self.errors.comparison.findings
+        return (*self.run.findings, *more)
 
     def _errors(self, record: NavigationRecord) -> NavigationErrors | None:
-        if self.truth is None:
+        truth = self.run.source.truth
+        if truth is None:
             return None
         return NavigationErrors(
             compare_with_truth(
-                record.trajectory, record.sd.index, record.covariance, self.truth, self.ellipsoid
+                record.trajectory, record.sd.index, record.covariance, truth, self.run.ellipsoid
             )
         )
 
@@ -158,8 +142,27 @@ class Agreement:
     nu, sd : ndarray, (n, m)
     weight : ndarray, (n, m)
         0 if rejected.
+    used : ndarray of bool, (n,)
+        Epochs without a rejected component.
+    nis : ndarray, (n,)
     consistency : ObservationConsistency
         Consistency statistics of the filter.
+    rejected, weakened : int
+        Epochs with a rejected component; those with one of reduced weight and none rejected.
+    mean_nis : float
+        Over the used epochs; NaN if there are none.
+    band : (float, float)
+        95 % interval of the mean NIS of a consistent filter.
+    ratio : float
+        RMS of the innovations in units of their expected standard deviations.
+    usual : float
+        Square root of the median NIS over its expected median; outliers do not affect it.
+    correlation : float
+        Largest lag-1 autocorrelation of a component; NaN for too few epochs.
+    correlation_bound : float
+        95 % bound of the lag-1 autocorrelation of each component for white innovations.
+    lasting : float
+        `ratio` of independent errors with the effect of these first-order Gauss-Markov ones.
     stated : bool
         Whether the errors are stated as time-correlated.
     """
@@ -170,68 +173,24 @@ class Agreement:
     nu: Array
     sd: Array
     weight: Array
+    used: NDArray[np.bool_]
+    nis: Array
     consistency: ObservationConsistency
-    stated: bool = False
-
-    @cached_property
-    def used(self) -> NDArray[np.bool_]:
-        """Epochs without a rejected component, (n,)."""
-        return np.asarray((self.weight > 0.0).all(axis=1) & (self.sd > 0.0).all(axis=1))
-
-    @cached_property
-    def nis(self) -> Array:
-        """Normalized innovation squared of each epoch, (n,)."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(np.square(self.nu / self.sd).sum(axis=1))
-
-    @property
-    def freedom(self) -> int:
-        """Components per epoch."""
-        return len(self.labels)
+    rejected: int
+    weakened: int
+    mean_nis: float
+    band: tuple[float, float]
+    ratio: float
+    usual: float
+    correlation: float
+    correlation_bound: float
+    lasting: float
+    stated: bool
 
     @property
     def epochs(self) -> int:
         """Number of epochs."""
         return len(self.time)
-
-    @property
-    def rejected(self) -> int:
-        """Number of epochs with a rejected component."""
-        return int((self.weight <= 0.0).any(axis=1).sum())
-
-    @property
-    def weakened(self) -> int:
-        """Number of epochs with a component of reduced weight and none rejected."""
-        some = (self.weight > 0.0) & (self.weight < 1.0)
-        return int((some.any(axis=1) & (self.weight > 0.0).all(axis=1)).sum())
-
-    @cached_property
-    def mean_nis(self) -> float:
-        """Mean NIS over the used epochs; NaN if there are none."""
-        return float(self.nis[self.used].mean()) if self.used.any() else math.nan
-
-    @cached_property
-    def band(self) -> tuple[float, float]:
-        """95 % interval of the mean NIS of a consistent filter."""
-        count = int(self.used.sum())
-        if not count:
-            return math.nan, math.nan
-        return band_of_mean(self.freedom, count)
-
-    @property
-    def ratio(self) -> float:
-        """RMS of the innovations in units of their expected standard deviations."""
-        return math.sqrt(self.mean_nis / self.freedom) if self.freedom else math.nan
-
-    @property
-    def usual(self) -> float:
-        """Square root of the median NIS over its expected median."""
-        from scipy.special import chdtri
-
-        if not self.used.any():
-            return math.nan
-        half = float(chdtri(self.freedom, 0.5))
-        return math.sqrt(float(np.median(self.nis[self.used])) / half)
 
     @property
     def refutes(self) -> bool:
@@ -242,22 +201,6 @@ class Agreement:
         return self.usual > REFUTES or lasts or 2 * self.rejected > self.epochs
 
     @property
-    def correlation(self) -> float:
-        """Largest lag-1 autocorrelation of a component; NaN for too few epochs."""
-        found = [float(one.autocorrelation[0]) for one in self._long]
-        return max(found, key=abs, default=math.nan)
-
-    @property
-    def correlation_bound(self) -> float:
-        """95 % bound of the lag-1 autocorrelation of each component for white innovations."""
-        return max((one.autocorrelation_bound for one in self._long), default=math.nan)
-
-    @property
-    def _long(self) -> list[ComponentConsistency]:
-        """Components with enough epochs for an autocorrelation."""
-        return [one for one in self.consistency.components if one.autocorrelation.size]
-
-    @property
     def remembers(self) -> bool:
         """Whether the innovations are correlated in time so much that a bound may be too narrow.
 
@@ -266,18 +209,9 @@ class Agreement:
         accordingly, no bound is too narrow. For errors stated as time-correlated the limit is
         `FAR_OFF`, as for the size.
         """
-        size = abs(self.correlation)
-        far = bool(size > max(REMEMBER, 2.0 * self.correlation_bound))
+        far = bool(abs(self.correlation) > max(REMEMBER, 2.0 * self.correlation_bound))
         most = FAR_OFF if self.stated else 1.0
         return far and (self.correlation < 0.0 or self.lasting > most)
-
-    @property
-    def lasting(self) -> float:
-        """`ratio` of independent errors with the effect of these first-order Gauss-Markov ones."""
-        rho = min(self.correlation, 1.0 - 1.0 / max(int(self.used.sum()), 2))
-        if not rho > 0.0:
-            return self.ratio
-        return self.ratio * math.sqrt((1.0 + rho) / (1.0 - rho))
 
     @property
     def inside(self) -> bool:
@@ -299,11 +233,57 @@ def agreements(record: NavigationRecord, lasting: Collection[str] = ()) -> tuple
     lasting : collection of str
         Names of the measurement sources with stated time-correlated errors.
     """
-    found = (
+    return tuple(
         _agreement(name, table, (name.rpartition(".")[0] or name) in lasting)
         for name, table in record.innovations.items()
+        if len(table)
     )
-    return tuple(one for one in found if one.epochs)
+
+
+def _agreement(name: str, table: pd.DataFrame, stated: bool) -> Agreement:
+    from scipy.special import chdtri
+
+    labels = tuple(str(c)[3:] for c in table.columns if str(c).startswith("nu "))
+    nu, s, weight = (
+        values_of(table, [f"{part} {label}" for label in labels]) for part in ("nu", "s", "weight")
+    )
+    sd = np.sqrt(s)
+    some, lost = (weight < 1.0).any(axis=1), (weight <= 0.0).any(axis=1)
+    used = (weight > 0.0).all(axis=1) & (sd > 0.0).all(axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        nis = np.square(nu / sd).sum(axis=1)
+    count, freedom = int(used.sum()), len(labels)
+    mean, band, usual = math.nan, (math.nan, math.nan), math.nan
+    if count:
+        mean = float(nis[used].mean())
+        band = band_of_mean(freedom, count)
+        usual = math.sqrt(float(np.median(nis[used])) / float(chdtri(freedom, 0.5)))
+    ratio = math.sqrt(mean / freedom) if freedom else math.nan
+    consistency = consistency_of(name, table)
+    long = [one for one in consistency.components if one.autocorrelation.size]
+    correlation = max((float(one.autocorrelation[0]) for one in long), key=abs, default=math.nan)
+    rho = min(correlation, 1.0 - 1.0 / max(count, 2))
+    return Agreement(
+        name=name,
+        labels=labels,
+        time=index_of(table),
+        nu=nu,
+        sd=sd,
+        weight=weight,
+        used=used,
+        nis=nis,
+        consistency=consistency,
+        rejected=int(lost.sum()),
+        weakened=int((some & ~lost).sum()),
+        mean_nis=mean,
+        band=band,
+        ratio=ratio,
+        usual=usual,
+        correlation=correlation,
+        correlation_bound=max((one.autocorrelation_bound for one in long), default=math.nan),
+        lasting=ratio * math.sqrt((1.0 + rho) / (1.0 - rho)) if rho > 0.0 else ratio,
+        stated=stated,
+    )
 
 
 def chi_square_far(freedom: float) -> float:
@@ -311,25 +291,6 @@ def chi_square_far(freedom: float) -> float:
     from scipy.special import chdtri, ndtr
 
     return float(chdtri(freedom, 2.0 * float(ndtr(-3.0))))
-
-
-def _agreement(name: str, table: pd.DataFrame, stated: bool) -> Agreement:
-    labels = tuple(str(c)[3:] for c in table.columns if str(c).startswith("nu "))
-
-    def part(what: str) -> Array:
-        return table[[f"{what} {label}" for label in labels]].to_numpy(dtype=np.float64)
-
-    time = table.index.to_numpy(dtype=np.float64)
-    return Agreement(
-        name,
-        labels,
-        time,
-        part("nu"),
-        np.sqrt(part("s")),
-        part("weight"),
-        consistency_of(name, table),
-        stated,
-    )
 
 
 # A navigation run against its truth: errors, their bounds, and consistency.
@@ -476,52 +437,6 @@ class Withheld:
         return self.error_m <= self.bound_m
 
 
-NO_RULE = "none: every measurement has full weight"
-
-
-def evaluation_of(result: NavigationRun) -> NavigationEvaluation:
-    """Return a run as its report evaluates it."""
-    spec, source = result.spec, result.source
-    chain = [
-        ("Record", f"{source.name}: {source.what}"),
-        ("Pre-filter", spec.prefilter.kind),
-        ("Coarse alignment", "" if result.coarse is None else spec.coarse.kind),
-        ("Fine alignment", "" if result.fine is None else spec.fine.kind),
-        ("Mechanization", spec.mechanization.kind),
-        ("Filter", spec.filter.kind),
-        ("Error model", _kind(spec.filter, "error_model")),
-        ("Update rule", _kind(spec.filter, "update_rule") or NO_RULE),
-        ("Smoother", "" if result.forward is None else spec.smoother.kind),
-        *((f"Measurement {name}", _of_aid(aid)) for name, aid in spec.aiding.items()),
-        ("States", ", ".join(dict.fromkeys(_grouped(result.record)))),
-    ]
-    return NavigationEvaluation(
-        record=result.record,
-        forward=result.forward,
-        name=source.name,
-        what=source.what,
-        title=spec.title,
-        chain=tuple((slot, what) for slot, what in chain if what),
-        fixes={n: t for n, t in source.tables.items() if set(GEODETIC) <= set(t.columns)},
-        truth=source.truth,
-        truth_name=source.truth_name or "the truth",
-        points=result.points,
-        withheld=() if not result.withheld else withheld_of(withheld_aid(spec), result.withheld),
-        findings=result.findings,
-        ellipsoid=result.ellipsoid,
-        lasting=lasting(make_aids(spec)),
-    )
-
-
-def _kind(of: object, slot: str) -> str:
-    return str(getattr(getattr(of, slot, None), "kind", ""))
-
-
-def _of_aid(aid: ChoiceSpec) -> str:
-    rule = _kind(aid, "update_rule")
-    return f"{aid.kind}, update rule {rule}" if rule else aid.kind
-
-
 def withheld_of(aid: str, scores: Sequence[WithheldScores]) -> tuple[Withheld, ...]:
     """Return the GNSS outage tests of a measurement source as a report shows them.
 
@@ -538,6 +453,90 @@ def withheld_of(aid: str, scores: Sequence[WithheldScores]) -> tuple[Withheld, .
         bound = float(told.bound[worst])
         out.append(Withheld(aid, told.span.begin, told.span.end, told.largest, bound, forward))
     return tuple(out)
+
+
+# A record navigated twice, with two corrections of the estimated errors: errors of both.
+
+
+@dataclass(frozen=True, eq=False)
+class HorizontalErrors:
+    """Horizontal errors of one of the two solutions.
+
+    Attributes
+    ----------
+    kind : str
+        Of `DAMPINGS`.
+    time : ndarray, (n,), s
+    velocity, position : ndarray, (n,), m/s and m
+        Lengths of the errors; NaN where the reference has none.
+    velocity_sd, position_sd : ndarray, (n,), m/s and m
+        Stated: root of the sum of both variances.
+    """
+
+    kind: str
+    time: Array
+    velocity: Array
+    position: Array
+    velocity_sd: Array
+    position_sd: Array
+
+
+def reference_words(result: NavigationRun) -> str:
+    """Return what the errors are relative to."""
+    if result.source.truth is not None:
+        return result.source.truth_name or "the truth"
+    return f"the fixes of {name}" if (name := _receiver(result)) else ""
+
+
+def paired_errors(result: NavigationRun) -> tuple[HorizontalErrors, ...]:
+    """Return the errors of the run and of the one beside it; empty without a second or a reference.
+
+    Relative to the truth, or else to the fixes of the first receiver, as in the paper: then the
+    errors contain those of the fixes, and the lever arm of the antenna.
+    """
+    if result.beside is None or not reference_words(result):
+        return ()
+    kinds = (result.spec.damping.kind, str(result.spec.damping.beside))
+    return tuple(
+        _horizontal(result, kind, record)
+        for kind, record in zip(kinds, (result.filtered, result.beside), strict=True)
+    )
+
+
+def _receiver(result: NavigationRun) -> str:
+    """Name of the first measurement with positions."""
+    tables = result.source.tables
+    return next((name for name, one in tables.items() if set(GEODETIC) <= set(one.columns)), "")
+
+
+def _horizontal(result: NavigationRun, kind: str, record: NavigationRecord) -> HorizontalErrors:
+    trajectory = record.trajectory
+    if result.source.truth is not None:
+        apart = trajectory_differences(trajectory, result.source.truth, result.ellipsoid)
+        time = index_of(apart)
+        position = np.hypot(*values_of(apart, ["north", "east"]).T)
+        velocity = np.hypot(*values_of(apart, ["VN", "VE"]).T)
+    else:
+        fixes = result.source.tables[_receiver(result)]
+        time = index_of(fixes)
+        stamps = index_of(trajectory)
+        inside = (time >= stamps[0]) & (time <= stamps[-1])
+        inside &= np.isfinite(values_of(fixes, GEODETIC)).all(axis=1)
+        time, fixes = time[inside], fixes[inside]
+        own = {c: np.interp(time, stamps, trajectory[c]) for c in (*GEODETIC, *VELOCITY[:2])}
+        places = values_of(fixes, GEODETIC)
+        off = [
+            ned_from_geodetic([[own[c][k] for c in GEODETIC]], place)[0]
+            for k, place in enumerate(places)
+        ]
+        position = np.hypot(*np.reshape(off, (-1, 3))[:, :2].T)
+        velocity = np.hypot(*(own[c] - fixes[c].to_numpy() for c in VELOCITY[:2]))
+    marks = index_of(record.sd)
+    stated = [
+        np.interp(time, marks, np.hypot(*values_of(record.sd, columns).T))
+        for columns in (["VN", "VE"], ["north", "east"])
+    ]
+    return HorizontalErrors(kind, time, velocity, position, *stated)
 
 
 #: A heading that turns by more is drawn within 0 to 360 deg.
@@ -568,7 +567,7 @@ class ShownStates:
     factor: float
 
 
-def _grouped(record: NavigationRecord) -> dict[str, list[str]]:
+def state_groups(record: NavigationRecord) -> dict[str, list[str]]:
     """Columns of the states of each kind."""
     groups: dict[str, list[str]] = {}
     for column in map(str, record.sensors.columns):
@@ -579,7 +578,7 @@ def _grouped(record: NavigationRecord) -> dict[str, list[str]]:
 def blocks_of(record: NavigationRecord) -> tuple[ShownStates, ...]:
     """Return the blocks of sensor and measurement error states, in their order."""
     out = []
-    for name, columns in _grouped(record).items():
+    for name, columns in state_groups(record).items():
         labels = [c.removeprefix(name).lstrip("_") for c in columns]
         # The unit must suit both the estimates and their standard deviations.
         sizes = [record.sensors[columns].to_numpy(), record.sensors_sd[columns].to_numpy()]
@@ -614,9 +613,9 @@ def heading_shown(record: NavigationRecord) -> tuple[Array, Array, str]:
     It continues through north, unless it turns too often to be readable; then NaN breaks it at
     north.
     """
-    time = record.trajectory.index.to_numpy(dtype=np.float64)
+    time = index_of(record.trajectory)
     values = unwrapped(record.trajectory["heading"].to_numpy(dtype=np.float64))
-    marks = np.interp(record.sd.index.to_numpy(dtype=np.float64), time, values)
+    marks = np.interp(index_of(record.sd), time, values)
     if np.ptp(values) <= MOST_TURN:
         return values, marks, "The heading continues through north without a jump."
     return (
@@ -628,20 +627,20 @@ def heading_shown(record: NavigationRecord) -> tuple[Array, Array, str]:
 
 def at_marks(record: NavigationRecord, column: str) -> Array:
     """A trajectory column, other than heading, at the covariance marks."""
-    time = record.trajectory.index.to_numpy(dtype=np.float64)
+    time = index_of(record.trajectory)
     values = record.trajectory[column].to_numpy(dtype=np.float64)
-    return np.asarray(np.interp(record.sd.index.to_numpy(dtype=np.float64), time, values))
+    return np.asarray(np.interp(index_of(record.sd), time, values))
 
 
 def rejected_times(table: pd.DataFrame) -> Array:
     """Times of the epochs with a rejected component in a table of innovations."""
     weights = table[[c for c in table.columns if str(c).startswith("weight ")]].to_numpy()
-    return table.index.to_numpy(dtype=np.float64)[(weights <= 0.0).any(axis=1)]
+    return index_of(table)[(weights <= 0.0).any(axis=1)]
 
 
 def worst_within(record: NavigationRecord, span: Span) -> tuple[float, float] | None:
     """The largest horizontal bound in m of a span, and its time; None without a mark in it."""
-    time = record.sd.index.to_numpy(dtype=np.float64)
+    time = index_of(record.sd)
     rows = np.flatnonzero((time >= span.begin) & (time <= span.end))
     if not rows.size:
         return None
@@ -650,9 +649,15 @@ def worst_within(record: NavigationRecord, span: Span) -> tuple[float, float] | 
     return float(bounds[k]), float(time[rows[k]])
 
 
+def rms(values: Array) -> float:
+    """Root mean square of the finite values; NaN if there are none."""
+    known = values[np.isfinite(values)]
+    return math.sqrt(float(np.square(known).mean())) if known.size else math.nan
+
+
 def distance_over_ground(trajectory: pd.DataFrame) -> float:
     """Distance over ground, m: the horizontal speed integrated by the trapezoidal rule."""
-    time = trajectory.index.to_numpy(dtype=np.float64)
+    time = index_of(trajectory)
     speed = np.hypot(*(trajectory[c].to_numpy(dtype=np.float64) for c in ("VN", "VE")))
     return float(np.trapezoid(speed, time))
 
@@ -673,7 +678,7 @@ def trust(found: NavigationEvaluation) -> Trust:
     reasons += [_memory(one) for one in found.agreements if one.remembers]
     reasons += _rejected(found)
     # Notes appear among the findings and do not count against the run.
-    reasons += [f for f in found.findings if f.severity == "warning"]
+    reasons += [f for f in found.run.findings if f.severity == "warning"]
     reasons += _silence(found)
     wrong = any(one.severity == "warning" for one in known)
     wrong |= any(one.refutes for one in found.agreements)

@@ -18,9 +18,11 @@ from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.report.chart import BLACK, BLUE, GREY, PURPLE, VERMILLION, Array, Chart, Line, Panel
 from strapdown.report.navigation_charts import mode_colour
 from strapdown.report.navigation_evaluation import NavigationEvaluation, rejected_times
-from strapdown.report.plan import View, ellipse, nice_step, path_marks, place_labels
+from strapdown.report.plan import View, ellipse, path_marks, place_labels
+from strapdown.report.svg_drawing import nice_step
 from strapdown.report.values import GAP, duration_words, length_words, plain
-from strapdown.tables import places_of
+from strapdown.tables import GEODETIC, places_of
+from strapdown.tables.checks import index_of
 
 MOST_POINTS, MOST_FIXES, MOST_SAMPLES = 1500, 600, 100_000
 # Plans of at least this size, m, are in kilometers.
@@ -46,13 +48,13 @@ def plan_chart(found: NavigationEvaluation) -> Chart | None:
     rows = _rows(found)
     kept = table.iloc[rows]
     origin = places_of(table.iloc[:1])[0]
-    ned = ned_from_geodetic(places_of(kept), origin, ellipsoid=found.ellipsoid)
+    ned = ned_from_geodetic(places_of(kept), origin, ellipsoid=found.run.ellipsoid)
     reach = float(np.ptp(ned[:, :2], axis=0).max())
     if reach < NO_PATH:
         return None
     plane = Plane(origin, found, *(("km", 1e-3) if reach >= _FAR else ("m", 1.0)))
     path = (plane.scale * ned[:, 1], plane.scale * ned[:, 0])
-    time = kept.index.to_numpy(dtype=np.float64)
+    time = index_of(kept)
     tight = View.of([path, *_around(plane)], most=_TALL)
     margin = 0.04 * (tight.high - tight.low)
     view = View(tight.low - margin, tight.high + margin)
@@ -100,7 +102,7 @@ def _course(table: pd.DataFrame, found: NavigationEvaluation) -> NDArray[np.intp
     """Rows that preserve the course, including the last one."""
     # At this sampling no vehicle leaves its course between samples.
     step = max(1, len(table) // MOST_SAMPLES)
-    rows = step * thin(table.iloc[::step], MOST_POINTS, found.ellipsoid).rows
+    rows = step * thin(table.iloc[::step], MOST_POINTS, found.run.ellipsoid).rows
     return np.append(rows, len(table) - 1) if rows[-1] < len(table) - 1 else rows
 
 
@@ -157,10 +159,10 @@ def _fixes(plane: Plane, view: View) -> tuple[list[Line], str]:
     """Fixes as faint points; text on those outside of the view."""
     out: list[Line] = []
     beyond = 0
-    for aid, table in plane.found.fixes.items():
-        if table.empty:
+    for aid, table in plane.found.run.source.tables.items():
+        if table.empty or not {*GEODETIC} <= {*table.columns}:
             continue
-        time = table.index.to_numpy(dtype=np.float64)
+        time = index_of(table)
         east, north = plane.of(table)
         inside = (east >= view.low[0]) & (east <= view.high[0])
         inside &= (north >= view.low[1]) & (north <= view.high[1])
@@ -168,39 +170,23 @@ def _fixes(plane: Plane, view: View) -> tuple[list[Line], str]:
         innovations = plane.found.record.innovations.get(f"{aid}.position")
         rejected = np.empty(0) if innovations is None else rejected_times(innovations)
         lost = np.isin(np.round(time, 6), np.round(rejected, 6))
-        some = np.flatnonzero(inside & ~lost)
-        some = some[:: max(1, -(-some.size // MOST_FIXES))]
-        out.append(
-            Line(
-                f"fixes of {aid}",
-                east[some],
-                north[some],
-                GREY,
-                points=True,
-                symbol="circle",
-                size=4.0,
-            )
-        )
-        if (lost & inside).any():
-            gone = np.flatnonzero(lost & inside)[:MOST_FIXES]
-            out.append(
-                Line(
-                    "rejected",
-                    east[gone],
-                    north[gone],
-                    VERMILLION,
-                    points=True,
-                    symbol="x",
-                    size=6.0,
-                )
-            )
+        used = np.flatnonzero(inside & ~lost)
+        used = used[:: max(1, -(-used.size // MOST_FIXES))]
+        gone = np.flatnonzero(lost & inside)[:MOST_FIXES]
+        for name, rows, colour, symbol, size in (
+            (f"fixes of {aid}", used, GREY, "circle", 4.0),
+            ("rejected", gone, VERMILLION, "x", 6.0),
+        ):
+            if rows.size or name != "rejected":
+                at = east[rows], north[rows]
+                out.append(Line(name, *at, colour, points=True, symbol=symbol, size=size))
     if not beyond:
         return out, ""
     return out, f"{beyond} {'fix is' if beyond == 1 else 'fixes are'} outside of the plan."
 
 
 def _truth(plane: Plane) -> list[Line]:
-    truth = plane.found.truth
+    truth = plane.found.run.source.truth
     if truth is None:
         return []
     time = plane.found.record.trajectory.index
@@ -213,7 +199,7 @@ def _truth(plane: Plane) -> list[Line]:
 
 def _points(plane: Plane) -> list[Line]:
     """Control points, rotated and shifted to the path, and the distance of the path from each."""
-    score = plane.found.points
+    score = plane.found.run.points
     if score is None:
         return []
     placed, there = plane.scale * score.points, plane.scale * (score.points + score.error)
@@ -287,7 +273,7 @@ def ellipse_rows(record: NavigationRecord) -> tuple[list[int], list[tuple[int, S
     at_outages : list of (int, Span)
         The last mark before the end of each; if there are many, those of largest uncertainty.
     """
-    time = record.sd.index.to_numpy(dtype=np.float64)
+    time = index_of(record.sd)
     bounds = plane_bound(record.covariance)
     ends: list[tuple[int, Span]] = []
     for span in sorted({s for v in record.outages.values() for s in v}, key=lambda s: s.begin):
@@ -306,7 +292,7 @@ def ellipse_rows(record: NavigationRecord) -> tuple[list[int], list[tuple[int, S
         return [], ends
     table = record.trajectory
     speed = np.hypot(table["VN"].to_numpy(), table["VE"].to_numpy())
-    at = table.index.to_numpy(dtype=np.float64)
+    at = index_of(table)
     way = running_integral(at, speed)
     gone = np.interp(time[rows], at, way)
     picked = np.searchsorted(gone, np.linspace(0.0, gone[-1], _ALONG + 1)[1:])
@@ -357,8 +343,8 @@ def ellipses(plane: Plane, view: View) -> tuple[list[Line], str, list[tuple[int,
 def centres(plane: Plane, rows: list[int]) -> Array:
     """Return east and north of marks, (k, 2), in the unit of the plan."""
     record = plane.found.record
-    time = record.trajectory.index.to_numpy(dtype=np.float64)
-    at = np.searchsorted(time, record.sd.index.to_numpy(dtype=np.float64)[rows] - 1e-9)
+    time = index_of(record.trajectory)
+    at = np.searchsorted(time, index_of(record.sd)[rows] - 1e-9)
     near = record.trajectory.iloc[np.clip(at, 0, len(time) - 1)]
     return np.column_stack(plane.of(near))
 
@@ -450,7 +436,7 @@ class Plane:
 
     def of(self, table: pd.DataFrame) -> tuple[Array, Array]:
         """East and north of the rows of a table of positions, each (n,)."""
-        ned = ned_from_geodetic(places_of(table), self.origin, ellipsoid=self.found.ellipsoid)
+        ned = ned_from_geodetic(places_of(table), self.origin, ellipsoid=self.found.run.ellipsoid)
         return self.scale * ned[:, 1], self.scale * ned[:, 0]
 
 

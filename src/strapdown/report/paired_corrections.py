@@ -6,115 +6,27 @@ drifts "damped" and not.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from strapdown.evaluation.trajectory_differences import trajectory_differences
 from strapdown.formats import csv
-from strapdown.frames import ned_from_geodetic
-from strapdown.navigation.record import NavigationRecord
-from strapdown.report.chart import BLUE, VERMILLION, Array, Chart, Panel, curve
+from strapdown.report.chart import BLUE, VERMILLION, Chart, Panel, curve
 from strapdown.report.chart import BUCKETS_OVER_TIME as BUCKETS
 from strapdown.report.document import TableBlock
 from strapdown.report.navigation_charts import over_time
-from strapdown.report.report_bundle import json_number
+from strapdown.report.navigation_evaluation import NavigationEvaluation, reference_words, rms
 from strapdown.report.values import duration_words, length_words, plain
-from strapdown.systems.navigation_run import NavigationRun
-from strapdown.tables import GEODETIC, VELOCITY
-from strapdown.tables.checks import index_of, values_of
 
 #: Times after the begin of navigation that the table has, s, besides the end.
 AT = (60.0, 120.0, 300.0, 1200.0, 3600.0)
 COLOURS = (BLUE, VERMILLION)
 
 
-@dataclass(frozen=True, eq=False)
-class HorizontalErrors:
-    """Horizontal errors of one of the two solutions.
-
-    Attributes
-    ----------
-    kind : str
-        Of `DAMPINGS`.
-    time : ndarray, (n,), s
-    velocity, position : ndarray, (n,), m/s and m
-        Lengths of the errors; NaN where the reference has none.
-    velocity_sd, position_sd : ndarray, (n,), m/s and m
-        Stated: root of the sum of both variances.
-    """
-
-    kind: str
-    time: Array
-    velocity: Array
-    position: Array
-    velocity_sd: Array
-    position_sd: Array
-
-
-def reference_words(result: NavigationRun) -> str:
-    """Return what the errors are relative to."""
-    if result.source.truth is not None:
-        return result.source.truth_name or "the truth"
-    return f"the fixes of {name}" if (name := _receiver(result)) else ""
-
-
-def paired_errors(result: NavigationRun) -> tuple[HorizontalErrors, ...]:
-    """Return the errors of the run and of the one beside it; empty without a second or a reference.
-
-    Relative to the truth, or else to the fixes of the first receiver, as in the paper: then the
-    errors contain those of the fixes, and the lever arm of the antenna.
-    """
-    if result.beside is None or not reference_words(result):
-        return ()
-    kinds = (result.spec.damping.kind, str(result.spec.damping.beside))
-    return tuple(
-        _errors(result, kind, record)
-        for kind, record in zip(kinds, (result.filtered, result.beside), strict=True)
-    )
-
-
-def _receiver(result: NavigationRun) -> str:
-    """Name of the first measurement with positions."""
-    tables = result.source.tables
-    return next((name for name, one in tables.items() if set(GEODETIC) <= set(one.columns)), "")
-
-
-def _errors(result: NavigationRun, kind: str, record: NavigationRecord) -> HorizontalErrors:
-    trajectory = record.trajectory
-    if result.source.truth is not None:
-        apart = trajectory_differences(trajectory, result.source.truth, result.ellipsoid)
-        time = index_of(apart)
-        position = np.hypot(*values_of(apart, ["north", "east"]).T)
-        velocity = np.hypot(*values_of(apart, ["VN", "VE"]).T)
-    else:
-        fixes = result.source.tables[_receiver(result)]
-        time = index_of(fixes)
-        stamps = index_of(trajectory)
-        inside = (time >= stamps[0]) & (time <= stamps[-1])
-        inside &= np.isfinite(values_of(fixes, GEODETIC)).all(axis=1)
-        time, fixes = time[inside], fixes[inside]
-        own = {c: np.interp(time, stamps, trajectory[c]) for c in (*GEODETIC, *VELOCITY[:2])}
-        places = values_of(fixes, GEODETIC)
-        off = [
-            ned_from_geodetic([[own[c][k] for c in GEODETIC]], place)[0]
-            for k, place in enumerate(places)
-        ]
-        position = np.hypot(*np.reshape(off, (-1, 3))[:, :2].T)
-        velocity = np.hypot(*(own[c] - fixes[c].to_numpy() for c in VELOCITY[:2]))
-    marks = index_of(record.sd)
-    stated = [
-        np.interp(time, marks, np.hypot(*values_of(record.sd, columns).T))
-        for columns in (["VN", "VE"], ["north", "east"])
-    ]
-    return HorizontalErrors(kind, time, velocity, position, *stated)
-
-
-def paired_table(result: NavigationRun) -> TableBlock | None:
+def paired_table(found: NavigationEvaluation) -> TableBlock | None:
     """Errors of both solutions at some times after the begin, and their ratio."""
-    pair = paired_errors(result)
+    pair = found.pair
     if not pair or not len(pair[0].time):
         return None
     one, other = pair
@@ -131,7 +43,7 @@ def paired_table(result: NavigationRun) -> TableBlock | None:
                 _ratio(other.position[j], one.position[k]),
             )
         )
-    sizes = [_rms(x) for x in (one.velocity, other.velocity, one.position, other.position)]
+    sizes = [rms(x) for x in (one.velocity, other.velocity, one.position, other.position)]
     rows.append(
         (
             "rms",
@@ -152,16 +64,16 @@ def paired_table(result: NavigationRun) -> TableBlock | None:
         tuple(rows),
         text=(0,),
         caption="Horizontal errors of the same record with both corrections of the estimated "
-        f"errors, relative to {reference_words(result)}.",
+        f"errors, relative to {reference_words(found.run)}.",
         strong=(len(rows) - 1,),
     )
 
 
-def paired_charts(result: NavigationRun) -> tuple[Chart, ...]:
+def paired_chart(found: NavigationEvaluation) -> Chart | None:
     """Errors of ground velocity and of position over time, both solutions in one chart."""
-    pair = paired_errors(result)
+    pair = found.pair
     if not pair:
-        return ()
+        return None
     panels = []
     for label, of in (("velocity, m/s", "velocity"), ("position, m", "position")):
         lines = []
@@ -171,42 +83,40 @@ def paired_charts(result: NavigationRun) -> tuple[Chart, ...]:
             name = f"{one.kind}, 1 sd as stated"
             lines.append(curve(name, one.time, sd, colour, "dot", 1.1, buckets=BUCKETS))
         panels.append(Panel(label, tuple(lines)))
-    return (
-        over_time(
-            "paired",
-            "With two corrections of the estimated errors",
-            f"Lengths of the horizontal errors relative to {reference_words(result)}: with "
-            f"{pair[0].kind} and with {pair[1].kind}. Dotted: as stated, one standard deviation.",
-            tuple(panels),
-            result.filtered,
-        ),
+    return over_time(
+        "paired",
+        "With two corrections of the estimated errors",
+        f"Lengths of the horizontal errors relative to {reference_words(found.run)}: with "
+        f"{pair[0].kind} and with {pair[1].kind}. Dotted: as stated, one standard deviation.",
+        tuple(panels),
+        found.run.filtered,
     )
 
 
-def paired_json(result: NavigationRun) -> dict[str, Any] | None:
+def paired_json(found: NavigationEvaluation) -> dict[str, Any] | None:
     """Return the errors of both solutions as plain data."""
-    pair = paired_errors(result)
+    pair = found.pair
     if not pair:
         return None
     return {
-        "relative_to": reference_words(result),
+        "relative_to": reference_words(found.run),
         "horizontal_errors": {
             one.kind: {
-                "velocity_rms_m_per_s": json_number(_rms(one.velocity)),
-                "velocity_at_end_m_per_s": json_number(one.velocity[-1]),
-                "velocity_sd_at_end_m_per_s": json_number(one.velocity_sd[-1]),
-                "position_rms_m": json_number(_rms(one.position)),
-                "position_at_end_m": json_number(one.position[-1]),
-                "position_sd_at_end_m": json_number(one.position_sd[-1]),
+                "velocity_rms_m_per_s": rms(one.velocity),
+                "velocity_at_end_m_per_s": one.velocity[-1],
+                "velocity_sd_at_end_m_per_s": one.velocity_sd[-1],
+                "position_rms_m": rms(one.position),
+                "position_at_end_m": one.position[-1],
+                "position_sd_at_end_m": one.position_sd[-1],
             }
             for one in pair
         },
     }
 
 
-def write_paired(result: NavigationRun, folder: Path, comments: dict[str, str]) -> None:
+def write_paired(found: NavigationEvaluation, folder: Path, comments: dict[str, str]) -> None:
     """Write ``paired.csv``: errors of both solutions over time, if there are two."""
-    pair = paired_errors(result)
+    pair = found.pair
     if not pair:
         return
     one = pair[0]
@@ -220,12 +130,7 @@ def write_paired(result: NavigationRun, folder: Path, comments: dict[str, str]) 
             ("position_sd_m", each.position_sd),
         ):
             columns[f"{each.kind}_{name}"] = np.interp(one.time, at, values)
-    csv.write(folder / "paired.csv", columns, {**comments, "against": reference_words(result)})
-
-
-def _rms(values: Array) -> float:
-    known = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(np.square(known)))) if known.size else float("nan")
+    csv.write(folder / "paired.csv", columns, {**comments, "against": reference_words(found.run)})
 
 
 def _ratio(more: float, less: float) -> str:

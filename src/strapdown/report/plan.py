@@ -1,4 +1,4 @@
-"""Arrows, times, start and end that mark direction and timing of a path on a plan."""
+"""Paths on a plan: extent, marks of direction and time, positions of labels, 95 % ellipses."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from strapdown.evaluation.plane_bound import PLANE_95
 from strapdown.report.chart import BLACK, GREEN, VERMILLION, Array, Line
-from strapdown.report.svg_drawing import INK, SMALL, Drawing, number
+from strapdown.report.svg_drawing import overlap
 
 Path = tuple[Array, Array]
 
@@ -227,8 +227,8 @@ def place_labels(
     for k in sorted(range(len(labels)), key=lambda j: (-len(labels[j]), j)):
         boxes = [_box(unit[k], place, len(labels[k])) for place in PLACES]
         covered = [
-            4.0 * sum(_overlap(box, other) for other in taken)
-            + sum(_overlap(box, dots[j]) for j in _touched(box, dots) if j != k)
+            4.0 * sum(overlap(box, other) for other in taken)
+            + sum(overlap(box, dots[j]) for j in _touched(box, dots) if j != k)
             + _outside(box)
             # Prefer a near position if none overlaps.
             + 1e-7 * number
@@ -265,235 +265,10 @@ def _box(point: Array, place: tuple[int, int], characters: int) -> Array:
     return np.array([left, bottom, left + width, bottom + _LINE])
 
 
-def _overlap(a: Array, b: Array) -> float:
-    width = min(a[2], b[2]) - max(a[0], b[0])
-    height = min(a[3], b[3]) - max(a[1], b[1])
-    return float(max(width, 0.0) * max(height, 0.0))
-
-
 def _outside(box: Array) -> float:
     """Area outside of the axes, which weighs most because it would be cut off."""
     whole = float((box[2] - box[0]) * (box[3] - box[1]))
-    return 10.0 * (whole - _overlap(box, np.array([0.0, 0.0, 1.0, 1.0])))
-
-
-# Positions of the names of vertical marks above a chart, without overlap.
-
-
-#: Longest name of a level, in letters, that fits beside the axes; longer ones go on its line.
-LONGEST_BESIDE = 18
-# Gap between names in one row, in letters.
-_NAME_GAP = 1.5
-
-
-def label_side(share: float, label: str, letter: float) -> str:
-    """Return the alignment of a name at its mark that keeps it within the axes.
-
-    Parameters
-    ----------
-    share : float
-        Position of the mark, as a share of the axis from the left.
-    letter : float
-        Width of a letter, as a share of the axis.
-
-    Returns
-    -------
-    {'left', 'center', 'right'}
-        Part of the name at the mark.
-    """
-    half = 0.5 * letter * len(label)
-    if share < half:
-        return "left"
-    return "right" if share > 1.0 - half else "center"
-
-
-def label_rows(shares: Sequence[float], labels: Sequence[str], letter: float) -> tuple[int, ...]:
-    """Return the row of each name, from 0 at the axes upward.
-
-    Parameters
-    ----------
-    shares, labels, letter
-        As in `label_side`, for every mark.
-
-    Returns
-    -------
-    tuple of int
-        The lowest row without overlap with the names to the left.
-    """
-    ends: list[float] = []
-    rows = [0] * len(shares)
-    for k in sorted(range(len(shares)), key=lambda j: (shares[j], j)):
-        wide = letter * len(labels[k])
-        part = {"left": 0.0, "center": 0.5, "right": 1.0}[label_side(shares[k], labels[k], letter)]
-        start = shares[k] - part * wide
-        free = (row for row, end in enumerate(ends) if end + _NAME_GAP * letter <= start)
-        row = next(free, len(ends))
-        if row == len(ends):
-            ends.append(0.0)
-        ends[row] = start + wide
-        rows[k] = row
-    return tuple(rows)
-
-
-# A level plane in a picture: equal scale on both axes, ticks with units, a scale bar.
-
-
-_SOFT, _GRID = "#4a525c", "#e6e9ed"
-# Minimum pixels between neighboring ticks, and of the scale bar.
-_TICK, _BAR = 40.0, 60.0
-# Height below the points for the scale bar.
-_FOOT = 18.0
-
-
-def nice_step(least: float) -> float:
-    """Smallest of 1, 2, 5 times a power of ten that is not below a number."""
-    if not (math.isfinite(least) and least > 0.0):
-        return 1.0
-    power = 10.0 ** math.floor(math.log10(least))
-    for factor in (1.0, 2.0, 5.0, 10.0):
-        if factor * power >= least * (1.0 - 1e-9):
-            return factor * power
-    return 10.0 * power
-
-
-def tick_words(value: float, step: float) -> str:
-    """Format a tick with as many digits as its step needs."""
-    digits = max(0, -math.floor(math.log10(step) + 1e-9))
-    text = f"{value:.{digits}f}"
-    return (text if float(text) else text.removeprefix("-")).replace("-", "−")
-
-
-@dataclass(frozen=True)
-class PlanView:
-    """Mapping of a level plane to a picture.
-
-    Attributes
-    ----------
-    left, top, width, height : float
-        Of the frame, in pixels.
-    middle : (float, float), m
-        First and second coordinate (north and east, or forward and right) of the frame's middle.
-    scale : float
-        Pixels per meter.
-    names : (str, str)
-        Of the two coordinates. North is drawn up and east to the right; forward to the right and
-        right downward, which is the same plane rotated by a quarter turn, seen from above.
-    """
-
-    left: float
-    top: float
-    width: float
-    height: float
-    middle: tuple[float, float]
-    scale: float
-    names: tuple[str, str]
-
-    @property
-    def north_up(self) -> bool:
-        """Whether the first coordinate points up the page."""
-        return self.names[0] == "north"
-
-    @classmethod
-    def of(
-        cls,
-        points: Array,
-        names: tuple[str, str],
-        at: tuple[float, float],
-        width: float,
-        heights: tuple[float, float],
-        margin: float = 14.0,
-    ) -> PlanView:
-        """The largest view that contains all points.
-
-        Parameters
-        ----------
-        points : ndarray, (n, 2), m
-        names : (str, str)
-        at : (float, float)
-            Upper left corner of the frame.
-        heights : (float, float)
-            Minimum and maximum height of the frame.
-        margin : float
-            Pixels around the points.
-        """
-        finite = points[np.isfinite(points).all(axis=1)]
-        low, high = (finite.min(axis=0), finite.max(axis=0)) if len(finite) else (-np.ones(2),) * 2
-        across, up = (high - low)[::-1] if names[0] == "north" else (high - low)
-        # Points without extent are shown in a square of one centimeter.
-        across, up = max(float(across), 0.01), max(float(up), 0.01)
-        edges = 2.0 * margin + _FOOT
-        scale = min((width - 2.0 * margin) / across, (heights[1] - edges) / up)
-        height = min(max(up * scale + edges, heights[0]), heights[1])
-        a, b = (0.5 * (low + high)).tolist()
-        if names[0] == "north":
-            a -= 0.5 * _FOOT / scale
-        else:
-            b += 0.5 * _FOOT / scale
-        return cls(at[0], at[1], width, height, (a, b), scale, names)
-
-    def pixels(self, points: ArrayLike) -> Array:
-        """Pixel positions, (n, 2), of points, (n, 2), m."""
-        a, b = (np.asarray(points, dtype=np.float64).reshape(-1, 2) - self.middle).T
-        x, y = (b, -a) if self.north_up else (a, b)
-        centre = self.left + 0.5 * self.width, self.top + 0.5 * self.height
-        return np.column_stack([centre[0] + self.scale * x, centre[1] + self.scale * y])
-
-    @property
-    def corners(self) -> Array:
-        """Minimum and maximum coordinates within the frame, (2, 2), m."""
-        half = 0.5 * np.array([self.width, self.height]) / self.scale
-        half = half[::-1] if self.north_up else half
-        return np.vstack([np.array(self.middle) - half, np.array(self.middle) + half])
-
-    def draw_grid(self, out: Drawing) -> None:
-        """Draw the frame, its ticks and axis names."""
-        step = nice_step(_TICK / self.scale)
-        low, high = self.corners
-        right, bottom = self.left + self.width, self.top + self.height
-        box = [(self.left, self.top), (right, self.top), (right, bottom), (self.left, bottom)]
-        for axis in (0, 1):
-            across = (axis == 1) == self.north_up
-            first = math.ceil(low[axis] / step - 1e-9)
-            for k in range(first, math.floor(high[axis] / step + 1e-9) + 1):
-                point = np.array(self.middle)
-                point[axis] = k * step
-                x, y = self.pixels(point)[0].tolist()
-                words = tick_words(k * step, step)
-                if across:
-                    out.line((x, self.top), (x, bottom), _GRID, 0.8)
-                    if self.left + 8.0 < x < right - 8.0:
-                        out.text((x, bottom + 9.0), words, SMALL, _SOFT, anchor="middle")
-                else:
-                    out.line((self.left, y), (right, y), _GRID, 0.8)
-                    if self.top + 5.0 < y < bottom - 5.0:
-                        out.text((self.left - 4.0, y), words, SMALL, _SOFT, anchor="end")
-            name = f"{self.names[axis]}, m"
-            if across:
-                at = (0.5 * (self.left + right), bottom + 23.0)
-                out.text(at, f"{name} →", 10.5, INK, anchor="middle")
-            else:
-                at = (self.left - 40.0, 0.5 * (self.top + bottom))
-                arrow = "→" if self.north_up else "←"
-                told = f"{name} {arrow}" if self.north_up else f"{arrow} {name}"
-                out.text(at, told, 10.5, INK, anchor="middle", turn=-90.0)
-        out.shape(box, "#c3cad2", 1.0)
-
-    def draw_bar(self, out: Drawing) -> None:
-        """Draw a scale bar of round length."""
-        length = nice_step(_BAR / self.scale)
-        x, y = self.left + 10.0, self.top + self.height - 10.0
-        end = x + length * self.scale
-        out.line((x, y), (end, y), INK, 2.0)
-        for at in (x, end):
-            out.line((at, y - 3.5), (at, y + 3.5), INK, 1.4)
-        words = _length_words(length)
-        out.text((0.5 * (x + end), y - 9.0), words, SMALL, INK, anchor="middle", halo=True)
-
-
-def _length_words(length: float) -> str:
-    if length < 0.01:
-        return f"{number(1e3 * length)} mm"
-    return f"{number(100 * length)} cm" if length < 1.0 else f"{number(length)} m"
+    return 10.0 * (whole - overlap(box, np.array([0.0, 0.0, 1.0, 1.0])))
 
 
 # Area that contains a point with 95 % probability, along its path.

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
 
+import numpy as np
 import pandas as pd
 
 from strapdown.bundle.seal import InputFiles, Seal
@@ -22,6 +23,7 @@ from strapdown.report.document import (
     write_text,
 )
 from strapdown.systems.one_thread import one_thread
+from strapdown.tables.checks import index_of
 
 
 class Ran(Protocol):
@@ -139,11 +141,22 @@ def write_report(
 
 
 def write_table(table: pd.DataFrame, path: Path, comments: dict[str, str]) -> None:
-    """Write the columns of a table as CSV, with shortest round-trip numbers and comments on top."""
-    csv.write(path, {str(c): table[c].to_numpy() for c in table.columns}, comments)
+    """Write a table over time as CSV, with shortest round-trip numbers and comments on top."""
+    columns = {str(c): table[c].to_numpy() for c in table.columns}
+    csv.write(path, {"time_s": index_of(table), **columns}, comments)
 
 
-def json_number(value: Any) -> float | None:
-    """Return a number for JSON, which has no NaN and no infinity: these are null."""
-    number = float(value)
-    return number if math.isfinite(number) else None
+def as_comments(rows: Iterable[tuple[str, str]]) -> dict[str, str]:
+    """Return named texts, such as conventions, as comments of a table or keys of a JSON."""
+    return {name.lower().replace(" ", "_"): text for name, text in rows}
+
+
+def finite(value: Any) -> Any:
+    """Return plain data for JSON, which has no NaN and no infinity: these are null."""
+    if isinstance(value, dict):
+        return {str(key): finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite(item) for item in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -32,6 +32,7 @@ from strapdown.report.plan import View, path_marks
 from strapdown.simulation import Motion, PulseMotion, TriadErrors, find_scenario
 from strapdown.systems.trajectory_source import SimulatedTrajectory, simulate_trajectory
 from strapdown.tables import EULER, places_of
+from strapdown.tables.checks import index_of
 
 
 def write_simulation(
@@ -363,7 +364,7 @@ def _drawn(
     left_out = ""
     if len(kept) < len(table):
         left_out = f"Plan{f', {name}' if legend else ''}: {thinned.sentence}"
-    time = kept.index.to_numpy(dtype=np.float64)
+    time = index_of(kept)
     return _Drawn(table, time, ned[:, 1], ned[:, 0], left_out, name, BLUE, "solid", legend)
 
 
@@ -388,7 +389,7 @@ def _plan(drawn: list[_Drawn], reach: float) -> Panel:
 def _over_time(label: str, drawn: list[_Drawn], values: list[Array]) -> Panel:
     lines = tuple(
         replace(
-            curve(d.name, d.table.index.to_numpy(np.float64), v, d.colour, d.dash, buckets=BUCKETS),
+            curve(d.name, index_of(d.table), v, d.colour, d.dash, buckets=BUCKETS),
             legend=d.legend,
         )
         for d, v in zip(drawn, values, strict=True)

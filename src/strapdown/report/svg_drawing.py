@@ -34,6 +34,24 @@ def number(value: float) -> str:
     return "0" if text in ("-0", "") else text
 
 
+def nice_step(least: float) -> float:
+    """Smallest of 1, 2, 5 times a power of ten that is not below a number."""
+    if not (math.isfinite(least) and least > 0.0):
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(least))
+    for factor in (1.0, 2.0, 5.0, 10.0):
+        if factor * power >= least * (1.0 - 1e-9):
+            return factor * power
+    return 10.0 * power
+
+
+def tick_words(value: float, step: float) -> str:
+    """Format a tick with as many digits as its step needs."""
+    digits = max(0, -math.floor(math.log10(step) + 1e-9))
+    text = f"{value:.{digits}f}"
+    return (text if float(text) else text.removeprefix("-")).replace("-", "−")
+
+
 def text_width(text: str, size: float, bold: bool = False) -> float:
     """Upper estimate of the width of a line of text in pixels."""
     ems = sum(0.40 if c in _NARROW else 0.95 if c in _WIDE else 0.64 for c in text)
@@ -49,11 +67,11 @@ def shortened(text: str, width: float, size: float, bold: bool = False) -> str:
     return text.rstrip() + "…"
 
 
-def overlap(a: Box, b: Box) -> float:
+def overlap(a: Box | Array, b: Box | Array) -> float:
     """Overlap area of two boxes (left, top, right, bottom)."""
     across = min(a[2], b[2]) - max(a[0], b[0])
     up = min(a[3], b[3]) - max(a[1], b[1])
-    return max(across, 0.0) * max(up, 0.0)
+    return float(max(across, 0.0) * max(up, 0.0))
 
 
 class Drawing:
@@ -140,10 +158,9 @@ class Drawing:
             return
         path = " ".join(f"{number(x)},{number(y)}" for x, y in array.tolist())
         kind = "polygon" if closed else "polyline"
-        inside = f' fill="{fill or "none"}"' + (
-            f' fill-opacity="{number(opacity)}"' if fill and opacity < 1.0 else ""
+        self._parts.append(
+            f'<{kind} points="{path}"{_fill(fill, opacity)}{_stroke(colour, width, dash)}/>'
         )
-        self._parts.append(f'<{kind} points="{path}"{inside}{_stroke(colour, width, dash)}/>')
 
     def circle(
         self,
@@ -159,10 +176,7 @@ class Drawing:
         """Draw a circle."""
         x, y = centre
         at = f'cx="{number(x)}" cy="{number(y)}" r="{number(radius)}"'
-        inside = f' fill="{fill or "none"}"' + (
-            f' fill-opacity="{number(opacity)}"' if fill and opacity < 1.0 else ""
-        )
-        self._parts.append(f"<circle {at}{inside}{_stroke(colour, width, dash)}/>")
+        self._parts.append(f"<circle {at}{_fill(fill, opacity)}{_stroke(colour, width, dash)}/>")
 
     def curve(
         self, points: Array, colour: str = INK, width: float = 1.0, dash: str = "solid"
@@ -178,8 +192,7 @@ class Drawing:
         """Fill an outline of many finite points, (n, 2), to a hundredth of a pixel."""
         if len(points) < 3:
             return
-        more = f' fill-opacity="{number(opacity)}"' if opacity < 1.0 else ""
-        self._parts.append(f'<path d="{_steps(points)}z" fill="{fill}"{more}/>')
+        self._parts.append(f'<path d="{_steps(points)}z"{_fill(fill, opacity)}/>')
 
     def points(
         self, at: Array, outline: Array, radius: float, colour: str, *, hollow: bool = False
@@ -321,6 +334,11 @@ def _tries(away: float, size: float) -> list[tuple[bool, tuple[float, float]]]:
             up = dy * (reach + (0.5 * size if not dx else 0.0))
             found.append((ring > 1.8, (dx * reach, up)))
     return found
+
+
+def _fill(colour: str | None, opacity: float) -> str:
+    text = f' fill="{colour or "none"}"'
+    return text + (f' fill-opacity="{number(opacity)}"' if colour and opacity < 1.0 else "")
 
 
 def _stroke(colour: str | None, width: float, dash: str) -> str:

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 KMH = 3.6
 #: Name of the recorders' mean, in every table and chart.
 MEAN = "mean of the recorders"
+#: Axes of a vehicle.
+AXES = ("forward", "right", "down")
 MINUS = "\u2212"
 # No-break space between a number, its bound and their unit.
 GAP = "\u00a0"
@@ -42,11 +44,11 @@ def plain(value: float, places: int) -> str:
     return text.replace("-", MINUS)
 
 
-def _places(half: float) -> int:
-    """Number of decimals of the second digit of a bound, at most four."""
-    if not (math.isfinite(half) and half > 0.0):
+def decimals(size: float, digits: int = 3, *, least: int = 0, most: int = 6) -> int:
+    """Return the decimals with which a size has so many digits; two for a size without digits."""
+    if not (math.isfinite(size) and size > 0.0):
         return 2
-    return min(4, max(0, DIGITS - 1 - math.floor(math.log10(half))))
+    return min(most, max(least, digits - 1 - math.floor(math.log10(size))))
 
 
 def about(value: float, half: float, unit: str) -> str:
@@ -62,7 +64,7 @@ def about(value: float, half: float, unit: str) -> str:
     str
         As ``7.34 ± 0.27 m/s``, with no-break spaces.
     """
-    places = _places(half)
+    places = decimals(half, DIGITS, most=4)
     both = f"{plain(value, places)}{GAP}±{GAP}{plain(half, places)}"
     return both + (unit if unit == "°" else GAP + unit if unit else "")
 
@@ -80,7 +82,7 @@ def speed(value: float, half: float) -> str:
 
 def speed_range(value: float, half: float) -> str:
     """Format the bound of a speed in m/s as a range, in km/h and m/s."""
-    places = _places(KMH * half)
+    places = decimals(KMH * half, DIGITS, most=4)
     low, high = KMH * (value - half), KMH * (value + half)
     ends = f"{plain(low, places)} to {plain(high, places)}{GAP}km/h with 95{GAP}%"
     return f"{ends}; {about(value, half, 'm/s')}"
@@ -97,6 +99,18 @@ def angle_range(interval: AngleInterval) -> str:
     if interval.undetermined:
         return "not determined: no direction is excluded with 95 %"
     return f"{plain(interval.low_deg, 1)}° to {plain(interval.high_deg, 1)}° with 95{GAP}%"
+
+
+def three_digits(value: float) -> str:
+    """Format a number to three digits."""
+    if value == 0.0 or not math.isfinite(value):
+        return "0"
+    return plain(value, decimals(abs(value)))
+
+
+def probability_words(value: float) -> str:
+    """Format a probability to two digits."""
+    return "below 0.0001" if value < 1e-4 else f"{value:.2g}"
 
 
 def moment(time: float) -> str:
@@ -130,7 +144,7 @@ def over_ground(result: CaseResult) -> bool:
 
 def axis_names(result: CaseResult) -> tuple[str, str, str]:
     """Return the names of the axes of the path."""
-    return ("north", "east", "down") if over_ground(result) else ("forward", "right", "down")
+    return ("north", "east", "down") if over_ground(result) else AXES
 
 
 def spaced(text: str) -> str:
@@ -228,5 +242,4 @@ def small(value: float) -> str:
     size = abs(value)
     if not math.isfinite(size):
         return "–"
-    places = 2 if size == 0 else min(5, max(1, 1 - math.floor(math.log10(size))))
-    return plain(value, places)
+    return plain(value, decimals(size, 2, least=1, most=5))

@@ -1,4 +1,4 @@
-"""Verdict of a run in sentences, shared by terminal and page."""
+"""Integrity of a navigation run: in sentences for terminal and page, and as report sections."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from strapdown import __version__
 from strapdown.constants import TWO_SIDED_95
 from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.navigation.heading_checks import UNSEEN
@@ -40,19 +39,21 @@ from strapdown.report.chart import (
 )
 from strapdown.report.document import (
     Block,
-    Document,
     Items,
     KeyFigure,
-    KeyFigures,
     Paragraph,
     Section,
     TableBlock,
+    blocks,
     capital,
+    paragraph,
+    section,
 )
 from strapdown.report.navigation_charts import bar, span_names
 from strapdown.report.values import GAP, duration_words, half, length_words, plain, share_words
 from strapdown.report.values import stamp as instant
 from strapdown.systems.navigation_run import NavigationRun
+from strapdown.tables.checks import index_of
 
 _KINDS = {
     "change": "changes within the run",
@@ -248,9 +249,9 @@ def repeated_words(result: NavigationRun) -> str:
         else "the remaining measurements are no more consistent"
     )
     beyond = _beyond(
-        table.index.to_numpy(dtype=np.float64),
+        index_of(table),
         place,
-        repeated.record.sd.index.to_numpy(dtype=np.float64),
+        index_of(repeated.record.sd),
         plane_bound(repeated.record.covariance),
     )
     bound = half(result.filtered.sd["heading"].iloc[-1])
@@ -301,169 +302,91 @@ def degrees_words(value: float) -> str:
     return f"{plain(value, places)}°"
 
 
-def _plural(word: str, count: int) -> str:
-    return word if count == 1 else f"{word}s"
-
-
-# Verdict page of a run: whether it can be trusted, and the evidence against it.
+# Sections of the report on integrity: whether the run can be trusted, and the evidence against it.
 
 
 #: Rows per table of the page; the files have all.
 _MOST = 12
 
 
-def verdict_document(result: NavigationRun, name: str) -> Document:
-    """Return the verdict page of a navigation run.
-
-    Parameters
-    ----------
-    name : str
-        Folder name.
-    """
-    trust = result.trust
-    seen = len(trust.heading.table) > 0
-    sound = trust.first is None and seen and trust.heading.spans[-1].status == "trusted"
-    sections = (
-        Section("heading", "Heading integrity", _heading(result)),
-        Section("quantities", "Position and velocity", _quantities(result)),
-        Section("innovations", "Innovations", _innovations(result)),
-        Section("first", "First inconsistency, and the re-run without it", _first(result)),
-        Section("meaning", "Meaning of the status", (Items(promise(trust)), _limits())),
-    )
-    return Document(
-        "Integrity",
-        result.spec.title or f"Integrity of the navigation of {result.source.name}",
-        (
-            ("Record", f"{result.source.name}, {result.source.what}"),
-            ("Software", f"strapdown {__version__}"),
-        ),
-        (
-            KeyFigures(_keys(result)),
-            Paragraph(answer(result), "lead" if sound else "warning"),
-            *((heading_chart(result),) if seen else ()),
-        ),
-        sections,
-        f"Integrity of {name}",
-        links=(("report.html", "Report"),),
-    )
-
-
-def integrity_section(result: NavigationRun) -> Section:
-    """Heading integrity, as a section of the report."""
-    said = Paragraph(answer(result))
-    return Section("integrity", "Integrity", (said, heading_chart(result), *_of_filter(result)))
-
-
-def _of_filter(result: NavigationRun) -> tuple[Block, ...]:
-    """Note for a smoothed run on the parts that use the filter alone."""
-    if result.forward is None:
-        return ()
+def integrity_sections(result: NavigationRun) -> tuple[Section, ...]:
+    """Return the sections on heading, position and velocity, and the first inconsistency."""
     return (
-        Paragraph(
-            "The heading status and the re-run are those of the filter, from the measurements up "
-            "to each second, not of the smoothed run.",
-            "note",
-        ),
+        section("integrity", "Integrity", Paragraph(answer(result)), *_heading(result)),
+        section("quantities", "Status of position and velocity", *_quantities(result)),
+        section("first", "First inconsistency, and the re-run without it", *_first(result)),
     )
 
 
-def _keys(result: NavigationRun) -> tuple[KeyFigure, ...]:
-    trust, heading = result.trust, result.trust.heading
-    bounds = plane_bound(result.record.covariance)
-    bound = half(result.record.sd["heading"].iloc[-1])
+def status_figure(result: NavigationRun) -> KeyFigure:
+    """Return the heading status at the end, and its share of the time."""
+    heading = result.trust.heading
     spans = heading.spans
-    last = spans[-1].status if spans else "unknown"
-    since = next((s.begin for s in reversed(spans) if s.status != last), None)
-    begun = "throughout" if since is None else f"for the last {_since(result, last)}"
-    first = trust.first
-    return (
-        KeyFigure(
-            "Final heading status",
-            last,
-            f"{begun}; 95{GAP}% bound {degrees_words(bound)}",
-            REASONS[spans[-1].reason] if spans else "",
-        ),
-        KeyFigure(
-            "Heading trusted",
-            share_words(heading.share("trusted")),
-            f"of the time: error below {plain(heading.trusted_below, 1)}°",
-            f"unverified {share_words(heading.share('unverified'))}, "
-            f"rejected {share_words(heading.share('rejected'))}",
-        ),
-        KeyFigure(
-            "Final position",
-            f"±{GAP}{length_words(float(bounds[-1]))}",
-            f"horizontal, 95{GAP}%",
-            f"{length_words(float(bounds.max()))} at most",
-        ),
-        KeyFigure(
-            "Innovations",
-            _agrees(result),
-            f"{len(trust.consistency)} {_plural('measurement', len(trust.consistency))} tested"
-            if first is None
-            else f"{first.name} {_KINDS[first.kind]}",
-            "" if first is None else f"since {instant(first.since)}",
-        ),
+    if not spans:
+        return KeyFigure("Heading status", "unknown", "the run is shorter than a second")
+    last = spans[-1]
+    others = [s.end for s in spans if s.status != last.status]
+    since = f"for the last {duration_words(last.end - others[-1])}" if others else "throughout"
+    return KeyFigure(
+        "Heading status",
+        last.status,
+        f"{since}: {REASONS[last.reason]}",
+        f"trusted (error below {plain(heading.trusted_below, 1)}°) "
+        f"{share_words(heading.share('trusted'))} of the time",
     )
-
-
-def _agrees(result: NavigationRun) -> str:
-    trust = result.trust
-    if not trust.consistency:
-        return "none"
-    if trust.first is None:
-        return "consistent"
-    # Single outliers are not inconsistencies of the filter.
-    if trust.against_bounds is None:
-        return "consistent but for outliers"
-    return "inconsistent"
-
-
-def _since(result: NavigationRun, status: str) -> str:
-    seconds = 0.0
-    for span in reversed(result.trust.heading.spans):
-        if span.status != status:
-            break
-        seconds += span.end - span.begin
-    return duration_words(seconds)
 
 
 def _heading(result: NavigationRun) -> tuple[Block, ...]:
     trust, heading = result.trust, result.trust.heading
     if not len(heading.table):
         return (Paragraph("The run is shorter than a second."),)
-    blocks: list[Block] = [*_of_filter(result), _reasons(result)]
-    if trust.unconfirmed:
-        blocks.append(
-            Paragraph(
-                f"No independent heading check: {unconfirmed_words(trust)}. The heading depends on "
-                "its start or on one measurement, and is never trusted.",
-                "warning",
-            )
+    filtered = (
+        "The heading status and the re-run are those of the filter, from the measurements up to "
+        "each second, not of the smoothed run."
+    )
+    alone = (
+        f"No independent heading check: {unconfirmed_words(trust)}. The heading depends on its "
+        "start or on one measurement, and is never trusted."
+    )
+    return blocks(
+        heading_chart(result),
+        None if result.forward is None else Paragraph(filtered, "note"),
+        _reasons(result),
+        Paragraph(alone, "warning") if trust.unconfirmed else None,
+        *_advice(trust),
+        _against_truth(result),
+        Items(promise(trust)),
+        Paragraph(
+            "Not detectable: fixes that are all wrong consistently, as of a spoofed receiver; and, "
+            f"in a run without fixes, a gyro that changes by more than {UNSEEN:g} standard "
+            "deviations of its bias after the last rest, until the next one.",
+            "note",
+        ),
+    )
+
+
+def _advice(trust: IntegrityReport) -> tuple[Block, ...]:
+    """Return the maneuvers that would have helped, or what else would."""
+    if not trust.advice:
+        return ()
+    if not any(a.options for a in trust.advice):
+        return (Paragraph(f"What would help: {advice_words(trust.advice[-1], trust)}."),)
+    rows = tuple(
+        (
+            f"{a.span.status.capitalize()}, {instant(a.span.begin)} to {instant(a.span.end)} "
+            f"({duration_words(a.span.end - a.span.begin)}): {REASONS[a.span.reason]}",
+            capital(advice_words(a, trust)),
         )
-    if any(a.options for a in trust.advice):
-        rows = tuple(
-            (
-                f"{a.span.status.capitalize()}, {instant(a.span.begin)} to "
-                f"{instant(a.span.end)} ({duration_words(a.span.end - a.span.begin)}): "
-                f"{REASONS[a.span.reason]}",
-                capital(advice_words(a, trust)),
-            )
-            for a in trust.advice
-        )
-        blocks += [
-            Paragraph(
-                "Maneuvers that would have helped, at the end of the longest periods that are not "
-                "trusted (filter covariance propagated through the maneuver, without the assumed "
-                "heading):"
-            ),
-            Items(rows),
-        ]
-    elif trust.advice:
-        said = advice_words(trust.advice[-1], trust)
-        blocks.append(Paragraph(f"What would help: {said}."))
-    table = _against_truth(result)
-    return (*blocks, *(() if table is None else (table,)))
+        for a in trust.advice
+    )
+    return (
+        Paragraph(
+            "Maneuvers that would have helped, at the end of the longest periods that are not "
+            "trusted (filter covariance propagated through the maneuver, without the assumed "
+            "heading):"
+        ),
+        Items(rows),
+    )
 
 
 def _reasons(result: NavigationRun) -> TableBlock:
@@ -485,7 +408,7 @@ def _reasons(result: NavigationRun) -> TableBlock:
 def _against_truth(result: NavigationRun) -> TableBlock | None:
     """Sizes of the errors under each status color; None if the truth is not known."""
     heading = result.trust.heading
-    error = heading_error(result, heading.table.index.to_numpy(dtype=np.float64))
+    error = heading_error(result, index_of(heading.table))
     if error is None:
         return None
     size, number = np.abs(error), heading.table["status"].to_numpy()
@@ -542,86 +465,34 @@ def _quantities(result: NavigationRun) -> tuple[Block, ...]:
     )
 
 
-def _innovations(result: NavigationRun) -> tuple[Block, ...]:
-    trust = result.trust
-    if not trust.consistency:
-        return (Paragraph("No measurement was processed."),)
-    rows = []
-    for name, one in trust.consistency.items():
-        doubts = [i for i in trust.inconsistencies if i.name == name]
-        kinds = ", ".join(dict.fromkeys(_KINDS[i.kind] for i in doubts)) or "consistent"
-        scales = [c.scale for c in one.components if math.isfinite(c.scale)]
-        worst = max(scales, key=lambda x: abs(math.log(max(x, 1e-9))), default=math.nan)
-        gross = sum(c.gross for c in one.components)
-        rows.append((name, kinds, f"{len(one.nis)}", plain(worst, 2), f"{gross}"))
-    blocks: list[Block] = [
-        TableBlock(
-            ("measurement", "verdict", "epochs", "scatter, sd", "gross errors"),
-            tuple(rows),
-            (0, 1),
-            "Innovations in predicted standard deviations; a scatter of 1 is as predicted",
-        )
-    ]
-    small = [
-        (name, v.finding.what)
-        for name, one in trust.consistency.items()
-        for v in one.verdicts
-        if v.kind != "few"
-        and not any(
-            i.name == name and i.component == v.component and i.kind == v.kind
-            for i in trust.inconsistencies
-        )
-    ]
-    if small:
-        blocks += [
-            Paragraph("Significant, but too small to matter, or conservative:"),
-            Items(tuple((name, f"{what}.") for name, what in small[:_MOST])),
-        ]
-    return tuple(blocks)
-
-
 def _first(result: NavigationRun) -> tuple[Block, ...]:
-    trust = result.trust
-    blocks: list[Block] = [Paragraph(first_words(trust))]
-    if len(trust.inconsistencies) > 1:
-        rows = tuple(
-            (instant(i.since), i.name, i.component.partition(",")[0], _KINDS[i.kind])
-            for i in trust.inconsistencies[:_MOST]
+    trust, repeated = result.trust, result.trust.repeated
+    rows = tuple(
+        (instant(i.since), i.name, i.component.partition(",")[0], _KINDS[i.kind])
+        for i in trust.inconsistencies[:_MOST]
+    )
+    left = () if repeated is None else repeated.left[:_MOST]
+    return blocks(
+        Paragraph(first_words(trust)),
+        TableBlock(
+            ("since", "measurement", "component", "inconsistency"),
+            rows,
+            (0, 1, 2, 3),
+            "Inconsistencies, first by time; those that hold throughout come after gross errors of "
+            "the same measurement, which may cause them",
         )
-        blocks.append(
-            TableBlock(
-                ("since", "measurement", "component", "inconsistency"),
-                rows,
-                (0, 1, 2, 3),
-                "Inconsistencies, first by time; those that hold throughout come after gross "
-                "errors of the same measurement, which may cause them",
-            )
-        )
-    said = repeated_words(result)
-    if said:
-        blocks.append(Paragraph(said))
-    chart = repeated_chart(result)
-    if chart is not None:
-        blocks.append(chart)
-    repeated = trust.repeated
-    if repeated is not None and repeated.left:
-        rows_left = tuple(
-            (i.name, f"{_KINDS[i.kind]}: {i.finding.what}.") for i in repeated.left[:_MOST]
-        )
-        blocks += [Paragraph("Inconsistencies of the re-run:"), Items(rows_left)]
-    return tuple(blocks)
-
-
-def _limits() -> Block:
-    return Paragraph(
-        "Not detectable: fixes that are all wrong consistently, as of a spoofed receiver; and, in "
-        f"a run without fixes, a gyro that changes by more than {UNSEEN:g} standard deviations of "
-        "its bias after the last rest, until the next one.",
-        "note",
+        if len(rows) > 1
+        else None,
+        paragraph(repeated_words(result)),
+        repeated_chart(result),
+        Paragraph("Inconsistencies of the re-run:") if left else None,
+        Items(tuple((i.name, f"{_KINDS[i.kind]}: {i.finding.what}.") for i in left))
+        if left
+        else None,
     )
 
 
-# Charts of a verdict: heading integrity over time, and the run against its re-run.
+# Charts: heading integrity over time, and the run against its re-run.
 
 
 #: Colors of the heading status, and the half height of its bar, which shows it without color.
@@ -634,7 +505,7 @@ def heading_error(result: NavigationRun, time: Array) -> Array | None:
     differences = result.filtered_differences
     if differences is None or not len(differences):
         return None
-    known = differences.index.to_numpy(dtype=np.float64)
+    known = index_of(differences)
     error = differences["heading"].to_numpy(dtype=np.float64)
     return np.asarray(np.interp(time, known, error, left=np.nan, right=np.nan))
 
@@ -643,7 +514,7 @@ def heading_chart(result: NavigationRun) -> Chart:
     """Heading integrity of each second, with the bounds that determine it."""
     heading = result.trust.heading
     table = heading.table
-    time = table.index.to_numpy(dtype=np.float64)
+    time = index_of(table)
     spans: list[Span] = []
     for one in heading.spans:
         if spans and spans[-1].name == one.status:
@@ -716,7 +587,7 @@ def repeated_chart(result: NavigationRun) -> Chart | None:
     if repeated is None or repeated.differences is None or repeated.record is None:
         return None
     table = repeated.differences
-    time = table.index.to_numpy(dtype=np.float64)
+    time = index_of(table)
     if len(time) < 2:
         return None
     place = np.hypot(table["north"].to_numpy(), table["east"].to_numpy())
@@ -737,7 +608,7 @@ def repeated_chart(result: NavigationRun) -> Chart | None:
             ("bound of the run (95 %)", both[0], bounds[0], (BLUE, "solid", 1.6)),
             ("bound of the re-run (95 %)", both[1], bounds[1], (GREY, "dash", 1.4)),
         ):
-            at = record.sd.index.to_numpy(dtype=np.float64)
+            at = index_of(record.sd)
             within = (at >= time[0]) & (at <= time[-1])
             lines.append((name, at[within], values[within], look))
             finite = values[within & np.isfinite(values)]

@@ -7,10 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 
+from strapdown.config.alignment import sensors_of
+from strapdown.config.navigation import NavigationSpec
+from strapdown.ellipsoids import WGS84
+from strapdown.errors import Finding
 from strapdown.frames import geodetic_from_ned
+from strapdown.navigation.consistency import consistency_of_all, inconsistencies
+from strapdown.navigation.heading_integrity import heading_status
+from strapdown.navigation.integrity import IntegrityReport
 from strapdown.navigation.record import Event, NavigationRecord, Span
 from strapdown.report.navigation_evaluation import NavigationEvaluation
 from strapdown.rotation import euler_sd
+from strapdown.systems.navigation_run import NavigationRun
+from strapdown.systems.navigation_source import NavigationSource
 from strapdown.tables import gnss_table, trajectory_error_table, trajectory_table
 
 #: Of an ellipse turned by 30 deg from north toward east, 3 m along and 1 m across.
@@ -116,18 +125,66 @@ def one_epoch(made):
     )
 
 
-def told(made, **more):
-    """With fixes where it was."""
+SPEC = NavigationSpec.checked(
+    {
+        "log": {"path": "made.csv"},
+        "sensors": {"sensor": "mpu-6050"},
+        "start": {
+            "lat_deg": 55.0,
+            "lon_deg": 37.0,
+            "alt_m": 150.0,
+            "roll_deg": 0.0,
+            "pitch_deg": 0.0,
+            "heading_deg": 60.0,
+        },
+        "aiding": {"rtk": {"kind": "gnss", "path": "rtk.csv"}},
+        "withhold": {"lengths_s": [30.0]},
+    }
+)
+
+
+def told(made, *, name="made.csv", truth=None, forward=None, findings=(), withheld=(), fixes=None):
+    """A run with this record, and with fixes where it was."""
     rows = made.trajectory.iloc[9::10]
-    fixes = gnss_table(
+    given = gnss_table(
         rows.index,
         rows[["lat", "lon", "alt"]].to_numpy(),
         np.zeros((len(rows), 3)),
         (1.0, 1.0, 1.0),
         (np.inf,) * 3,
     )
-    given = {"name": "made.csv", "what": "made up", "fixes": {"rtk": fixes}} | more
-    return NavigationEvaluation(made, **given)
+    tables = {"rtk": given if fixes is None else fixes}
+    source = NavigationSource(
+        name, "made up", made.trajectory, tables, truth, "", None, None, (), (), ()
+    )
+    consistency = consistency_of_all(made.innovations)
+    trust = IntegrityReport(
+        heading_status(made, ()),
+        (Finding("navigation.no-receiver-fixes"),),
+        90.0,
+        (),
+        consistency,
+        inconsistencies(consistency, made.innovations),
+        None,
+    )
+    differences = dict.fromkeys(("differences", "errors", "forward_differences", "points"))
+    run = NavigationRun(
+        spec=SPEC,
+        source=source,
+        ellipsoid=WGS84,
+        sensors=sensors_of(SPEC),
+        coarse=None,
+        fine=None,
+        record=made,
+        forward=forward,
+        beside=None,
+        withheld=withheld,
+        trust=trust,
+        inputs=(),
+        findings=findings,
+        **differences,
+    )
+    return NavigationEvaluation(run)
 
 
 def shifted(trajectory, north=0.0, east=0.0, down=0.0, heading=0.0):

@@ -248,12 +248,13 @@ def test_the_path_comes_back_bit_for_bit(main, tmp_path):
     table = trajectory_table(main.path)
     write_table(table, tmp_path / "trajectory.csv", {"time": "s"})
     back = read_raw(tmp_path / "trajectory.csv").columns
-    assert list(back) == list(table.columns)
+    assert list(back) == ["time_s", *table.columns]
     for name in table:
         assert (
             np.asarray(back[name], dtype=np.float64).tobytes() == table[name].to_numpy().tobytes()
         )
-    assert np.array_equal(table["time_s"], main.path.time)
+    assert np.array_equal(table.index, main.path.time)
+    assert np.array_equal(back["time_s"], main.path.time)
     assert np.array_equal(table["north_m"], main.path.table["north"])
     assert np.array_equal(table["heading_sd_deg"], main.path.sd["heading"])
     assert all(re.search(r"_(s|m|m_per_s|deg)$", name) for name in table)
@@ -264,6 +265,7 @@ def test_signals_come_back_with_which_range_spoke(result, tmp_path):
         table = signals_table(unit)
         write_table(table, tmp_path / "signals.csv", {})
         back = read_raw(tmp_path / "signals.csv").columns
+        assert np.array_equal(back["time_s"], unit.at_point.imu.index)
         for name in table:
             assert np.array_equal(np.asarray(back[name], dtype=np.float64), table[name])
         if unit.at_point.prepared is not None:

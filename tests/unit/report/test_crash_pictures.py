@@ -26,9 +26,17 @@ from strapdown.report.crash_outline import (
     vehicle_outline,
 )
 from strapdown.report.crash_pictures import Direction, MountingPoint, conventions_picture, pdof_dial
-from strapdown.report.crash_plan import path_plan
-from strapdown.report.plan import PlanView, ellipse, envelope, hull, nice_step, tick_words
-from strapdown.report.svg_drawing import SMALL, Drawing, overlap, shortened, text_width
+from strapdown.report.crash_plan import PlanView, path_plan
+from strapdown.report.plan import ellipse, envelope, hull
+from strapdown.report.svg_drawing import (
+    SMALL,
+    Drawing,
+    nice_step,
+    overlap,
+    shortened,
+    text_width,
+    tick_words,
+)
 from strapdown.report.values import plain
 from strapdown.tables import NED
 

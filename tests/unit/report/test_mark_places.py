@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from strapdown.report.plan import label_rows, label_side
+from strapdown.report.chart_svg import label_rows, label_side
 
 LETTER = 0.01
 

@@ -15,7 +15,7 @@ from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.report.document import draw_stills, drawings, write_drawings
 from strapdown.report.navigation import navigation_json
 from strapdown.report.navigation_document import navigation_document
-from strapdown.report.navigation_evaluation import evaluation_of, trust, withheld_of
+from strapdown.report.navigation_evaluation import NavigationEvaluation, trust, withheld_of
 from strapdown.report.verdict import answer, heading_words
 from strapdown.systems.navigation_run import run_navigation
 
@@ -58,7 +58,7 @@ def result(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def found(result):
-    return evaluation_of(result)
+    return NavigationEvaluation(result)
 
 
 def leaves(value, path=""):
@@ -74,7 +74,7 @@ def leaves(value, path=""):
 
 
 def test_the_json_is_the_record(result, found):
-    told = navigation_json(result, found)
+    told = navigation_json(found)
     record = result.record
     assert told["end"]["lat_deg"] == float(record.trajectory["lat"].iloc[-1])
     assert told["end"]["heading_sd_deg"] == float(record.sd["heading"].iloc[-1])
@@ -99,7 +99,7 @@ def test_numbers_in_the_json_have_units_in_their_keys(result, found):
         r"|epochs|rejected|weakened|instants|nees_of|mean_nis|mean_nees|rms_in_sd"
         r"|share_within_bound|correlation_next_epoch|factor)\b"
     )
-    told = navigation_json(result, found)
+    told = navigation_json(found)
     told.pop("method")  # as the file has it, whose keys are tested with it
     told.pop("findings")
     # The catalogue of sentences has the units of what a finding shows.
@@ -113,10 +113,10 @@ def test_numbers_in_the_json_have_units_in_their_keys(result, found):
 
 
 def test_the_json_states_its_conventions_and_no_clock(result, found):
-    told = navigation_json(result, found)
+    told = navigation_json(found)
     assert "north, east, down" in told["conventions"]["body_axes"]
     assert told["conventions"]["errors"].startswith("error = computed − true")
-    assert told == navigation_json(result)
+    assert told == navigation_json(NavigationEvaluation(result))
     assert json.loads(json.dumps(told, allow_nan=False)) == told
     assert "\u00a0" not in json.dumps(told, ensure_ascii=False)
 
@@ -134,7 +134,7 @@ def test_the_terminal_says_what_the_page_says(result, capsys):
 
     print_navigation(result)
     said = " ".join(capsys.readouterr().out.split())
-    found = evaluation_of(result)
+    found = NavigationEvaluation(result)
     assert trust(found).sentence.replace("\u00a0", " ") in said
     assert heading_words(result.trust).replace("\u00a0", " ") in said
     assert "rtk.position" in said

@@ -132,9 +132,9 @@ def test_a_path_far_shorter_than_its_ellipses_is_seen_within_them():
 def test_fixes_outside_of_the_picture_do_not_widen_it():
     made = record()
     given = told(made)
-    fixes = given.fixes["rtk"].copy()
+    fixes = given.run.source.tables["rtk"].copy()
     fixes.iloc[3, fixes.columns.get_loc("lat")] += 1.0
-    far = told(made, fixes={"rtk": fixes})
+    far = told(made, fixes=fixes)
     assert "1 fix is outside" in plan_chart(far).panels[0].title + plan_chart(far).caption
     assert plan_chart(far).panels[0].height == plan_chart(given).panels[0].height
 

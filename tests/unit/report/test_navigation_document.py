@@ -11,6 +11,9 @@ from tests.coded import coded
 from tests.unit.report.navigation_records import one_epoch, record, shifted, told, without_aids
 
 from strapdown.errors import DataError, Finding
+from strapdown.evaluation.plane_bound import PLANE_95
+from strapdown.navigation.outage_test import Withheld, WithheldScore
+from strapdown.navigation.record import Span
 from strapdown.report.chart import Chart
 from strapdown.report.document import (
     Items,
@@ -35,7 +38,7 @@ from strapdown.report.navigation_document import (
     state_table,
     withheld_table,
 )
-from strapdown.report.navigation_evaluation import Withheld, distance_over_ground, trust
+from strapdown.report.navigation_evaluation import distance_over_ground, trust
 from strapdown.report.values import NOT_ESTIMATED, duration_words, length_words, share_words
 
 
@@ -302,12 +305,16 @@ def test_states_are_told_with_what_was_known_before():
 
 
 def test_what_was_withheld_is_scored():
-    made = record()
-    given = told(
-        made,
-        withheld=(Withheld("rtk", 50.0, 80.0, 12.0, 20.0), Withheld("rtk", 1.0, 2.0, 9.0, 3.0)),
-    )
-    found = given
+    def score(begin, end, error, bound):
+        one = np.array([[bound, 0.0], [0.0, bound]]) ** 2 / PLANE_95**2
+        there = np.array([[error, 0.0, 0.0]])
+        span = Span("withheld", begin, end)
+        return Withheld(
+            WithheldScore(span, np.array([end]), there, np.ones((1, 3)), one[None]), None
+        )
+
+    given = (score(50.0, 80.0, 12.0, 20.0), score(1.0, 2.0, 9.0, 3.0))
+    found = told(record(), withheld=given)
     table = withheld_table(found)
     assert [row[-1] for row in table.rows] == ["yes", "no"]
     assert table.strong == (1,)

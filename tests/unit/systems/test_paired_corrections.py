@@ -17,7 +17,12 @@ from strapdown.evaluation.trajectory_differences import trajectory_differences
 from strapdown.report.coast import coast_json
 from strapdown.report.coast_document import key_figures
 from strapdown.report.navigation import NAVIGATION
-from strapdown.report.paired_corrections import paired_errors, paired_table, reference_words
+from strapdown.report.navigation_evaluation import (
+    NavigationEvaluation,
+    paired_errors,
+    reference_words,
+)
+from strapdown.report.paired_corrections import paired_table
 from strapdown.report.values import NOT_ESTIMATED
 from strapdown.systems.navigation_run import run_navigation
 from strapdown.systems.outage_run import run_coast
@@ -114,7 +119,7 @@ def test_without_a_truth_the_fixes_are_the_reference(both):
         assert np.abs(apart).max() < 5 * 0.5
     nothing = replace(untold, source=replace(untold.source, tables={}))
     assert paired_errors(nothing) == ()
-    assert paired_table(nothing) is None
+    assert paired_table(NavigationEvaluation(nothing)) is None
 
 
 def test_the_report_has_both(both, tmp_path):
@@ -130,8 +135,8 @@ def test_the_report_has_both(both, tmp_path):
     assert page.count("none, 1 sd as stated") >= 1
     both.plot("paired").save(tmp_path / "paired.svg")
     assert (tmp_path / "paired.svg").stat().st_size > 0
-    rows = paired_table(both).rows
-    assert len(rows[0]) == len(paired_table(both).columns)
+    rows = paired_table(NavigationEvaluation(both)).rows
+    assert len(rows[0]) == len(paired_table(NavigationEvaluation(both)).columns)
     assert rows[-1][0] == "rms"
 
 
