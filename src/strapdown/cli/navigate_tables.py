@@ -80,7 +80,7 @@ def print_navigation(
         tables += [observation_table(found), withheld_table(found)]
     lines = [(verdict.sentence, STYLES[verdict.verdict])]
     lines += [(f"{head}: {said}", "") for head, said in cautions(found, brief=not verbose)]
-    lines += terminal_lines(result, brief=not verbose)
+    lines += terminal_lines(found, brief=not verbose)
     room = LINES - PATHS - 1
     for k, block in enumerate(tables):
         if block is not None:

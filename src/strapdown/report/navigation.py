@@ -15,7 +15,6 @@ from strapdown.alignment.alignment import Alignment
 from strapdown.bundle.seal import to_json
 from strapdown.config.navigation import STAGES, NavigationSpec
 from strapdown.errors import ConfigError
-from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.formats import csv
 from strapdown.formats.clocks import clock_of
 from strapdown.formats.file_options import FileOptions
@@ -43,7 +42,6 @@ from strapdown.report.navigation_evaluation import (
     distance_over_ground,
     rms,
     trust,
-    worst_within,
 )
 from strapdown.report.navigation_plan import plan_chart
 from strapdown.report.paired_corrections import (
@@ -89,7 +87,7 @@ def _write_all(
     write_text(folder / "navigation.json", to_json(navigation_json(found)))
     write_navigation_files(found, folder)
     if report:
-        write_integrity(result, folder)
+        write_integrity(found, folder)
         document = navigation_document(found, name)
         write_report(document, folder, progress, figures=result.spec.output.figures)
 
@@ -193,7 +191,15 @@ def navigation_json(found: NavigationEvaluation) -> dict[str, Any]:
         },
         "smoothing": _smoothing(found),
         "observations": {one.name: _innovations(one) for one in found.agreements},
-        "outages": _outages(record),
+        "outages": [
+            {
+                "measurement": aid,
+                "from_s": span.begin,
+                "to_s": span.end,
+                "largest_horizontal_bound_95_m": bound,
+            }
+            for aid, span, bound in found.outages
+        ],
         "gnss_outage_tests": [
             {
                 "measurement": w.aid,
@@ -280,23 +286,6 @@ def _points(found: NavigationEvaluation) -> dict[str, Any] | None:
     }
 
 
-def _outages(record: NavigationRecord) -> list[dict[str, Any]]:
-    """Outages, each with the largest bound at a mark in it; None without a mark."""
-    out = []
-    for aid, spans in record.outages.items():
-        for span in spans:
-            worst = worst_within(record, span)
-            out.append(
-                {
-                    "measurement": aid,
-                    "from_s": span.begin,
-                    "to_s": span.end,
-                    "largest_horizontal_bound_95_m": None if worst is None else worst[0],
-                }
-            )
-    return out
-
-
 def _score(score: Score) -> dict[str, Any]:
     unit = {"m": "m", "m/s": "m_per_s", "deg": "deg"}[score.unit]
     return {
@@ -320,7 +309,7 @@ def _state(found: NavigationEvaluation, row: int) -> dict[str, Any]:
         **{f"{n}_{units[n]}": at[n] for n in names},
         "sd_at_s": float(record.sd.index[row]),
         **{f"{n}_sd_{units[n]}": how[n] for n in [*NED, *VELOCITY, *EULER]},
-        "horizontal_bound_95_m": plane_bound(record.covariance)[row],
+        "horizontal_bound_95_m": found.bounds[row],
     }
 
 
@@ -453,10 +442,11 @@ def _column(name: str) -> str:
 # Integrity as files: its values for programs, and the heading status over time.
 
 
-def write_integrity(result: NavigationRun, folder: Path) -> None:
+def write_integrity(found: NavigationEvaluation, folder: Path) -> None:
     """Write ``verdict.json`` and ``heading_integrity.csv``."""
-    write_text(folder / "verdict.json", to_json(verdict_json(result)))
-    table = result.trust.heading.table
+    write_text(folder / "verdict.json", to_json(verdict_json(found)))
+    result, heading = found.run, found.run.trust.heading
+    table = heading.table
     status = [STATUSES[k] for k in table["status"].to_numpy(dtype=np.int64)]
     csv.write(
         folder / "heading_integrity.csv",
@@ -474,22 +464,22 @@ def write_integrity(result: NavigationRun, folder: Path) -> None:
         },
         {
             "run": result.source.name,
-            "trusted_below_deg": f"{result.trust.heading.trusted_below:g}",
-            "rejected_beyond_deg": f"{result.trust.heading.rejected_beyond:g}",
+            "trusted_below_deg": f"{heading.trusted_below:g}",
+            "rejected_beyond_deg": f"{heading.rejected_beyond:g}",
         },
     )
 
 
-def verdict_json(result: NavigationRun) -> dict[str, Any]:
+def verdict_json(found: NavigationEvaluation) -> dict[str, Any]:
     """Return a verdict for programs; angles in degrees, lengths in meters, times in s."""
-    trust, heading = result.trust, result.trust.heading
-    bounds = plane_bound(result.record.covariance)
+    result, trust = found.run, found.run.trust
+    heading = trust.heading
     spans = heading.spans
     made = {
-        "answer": spaced(answer(result)),
+        "answer": spaced(answer(found)),
         "position": {
-            "bound_95_at_end_m": bounds[-1],
-            "largest_bound_95_m": bounds.max(),
+            "bound_95_at_end_m": found.bounds[-1],
+            "largest_bound_95_m": found.bounds.max(),
             "confirmed": bool(trust.consistency) and trust.against_bounds is None,
         },
         "heading": {

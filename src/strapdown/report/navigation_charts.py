@@ -7,7 +7,6 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.constants import TWO_SIDED_95
-from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.navigation.truth_comparison import bounds
 from strapdown.report.chart import (
@@ -81,7 +80,7 @@ def bound_chart(found: NavigationEvaluation) -> Chart:
             "Position",
             "m",
             (
-                ("horizontal", plane_bound(record.covariance), BLUE),
+                ("horizontal", found.bounds, BLUE),
                 _bound(record, "down", "height"),
             ),
         ),

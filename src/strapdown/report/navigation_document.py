@@ -44,7 +44,6 @@ from strapdown.report.navigation_evaluation import (
     distance_over_ground,
     state_groups,
     trust,
-    worst_within,
 )
 from strapdown.report.navigation_plan import plan_chart
 from strapdown.report.paired_corrections import paired_chart, paired_table
@@ -78,7 +77,7 @@ def headline(found: NavigationEvaluation) -> str:
     return (
         f"Ended at {position_words(found)} after {duration_words(_duration(found))} and "
         f"{length_words(distance_over_ground(record.trajectory))}; 95 % bounds: position "
-        f"{length_words(float(plane_bound(record.covariance)[-1]))}, heading {_heading(found)}."
+        f"{length_words(float(found.bounds[-1]))}, heading {_heading(found)}."
     )
 
 
@@ -96,7 +95,7 @@ def key_figures(found: NavigationEvaluation) -> tuple[KeyFigure, ...]:
     record = found.record
     sd = record.sd.iloc[-1]
     last = record.trajectory.iloc[-1]
-    plane = float(plane_bound(record.covariance)[-1])
+    plane = float(found.bounds[-1])
     heading = half(sd["heading"])
     out = [
         KeyFigure(
@@ -145,7 +144,7 @@ def _known(found: NavigationEvaluation) -> KeyFigure:
             f"horizontal, 95{GAP}%, after {duration_words(span.end - span.begin)} without {aid}",
             f"{len(outages)} {'outage' if len(outages) == 1 else 'outages'} in all",
         )
-    bounds = plane_bound(found.record.covariance)
+    bounds = found.bounds
     worst = int(np.argmax(bounds))
     return KeyFigure(
         "Largest bound",
@@ -157,13 +156,8 @@ def _known(found: NavigationEvaluation) -> KeyFigure:
 
 def longest_outages(found: NavigationEvaluation) -> list[tuple[str, Span, float]]:
     """Source, span and largest horizontal bound in m of each outage, in time order."""
-    out = []
-    for aid, spans in found.record.outages.items():
-        for span in spans:
-            worst = worst_within(found.record, span)
-            if worst is not None:
-                out.append((aid, span, worst[0]))
-    return sorted(out, key=lambda o: (o[1].begin, o[0]))
+    known = [(aid, span, bound) for aid, span, bound in found.outages if bound is not None]
+    return sorted(known, key=lambda o: (o[1].begin, o[0]))
 
 
 def cautions(found: NavigationEvaluation, *, brief: bool = False) -> tuple[tuple[str, str], ...]:
@@ -444,8 +438,7 @@ def end_table(found: NavigationEvaluation) -> TableBlock:
         ("time", *(instant(float(record.trajectory.index[k])) for k in (0, -1))),
         ("position", position_words(found, 0), position_words(found, -1)),
     ]
-    plane = plane_bound(record.covariance)
-    rows.append(("horizontal ±", *(length_words(float(plane[k])) for k in (0, -1))))
+    rows.append(("horizontal ±", *(length_words(float(found.bounds[k])) for k in (0, -1))))
     for name, column, sd, unit in (
         ("height", "alt", "down", "m"),
         *(
@@ -680,7 +673,7 @@ def navigation_document(found: NavigationEvaluation, name: str) -> Document:
     )
     sections = (
         section("answer", "The answer", end_table(found), *verdict.blocks),
-        *integrity_sections(run),
+        *integrity_sections(found),
         section(
             "state",
             "Height, velocity, attitude",

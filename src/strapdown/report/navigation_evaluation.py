@@ -60,6 +60,22 @@ class NavigationEvaluation:
         return self.run.source.truth_name or "the truth"
 
     @cached_property
+    def bounds(self) -> Array:
+        """95 % bounds of the horizontal position at the covariance marks, (n,), m."""
+        return plane_bound(self.record.covariance)
+
+    @cached_property
+    def outages(self) -> tuple[tuple[str, Span, float | None], ...]:
+        """Source, span and largest horizontal bound in m of each outage; None without a mark."""
+        time, found = index_of(self.record.sd), []
+        for aid, spans in self.record.outages.items():
+            for span in spans:
+                inside = (time >= span.begin) & (time <= span.end)
+                bound = float(self.bounds[inside].max()) if inside.any() else None
+                found.append((aid, span, bound))
+        return tuple(found)
+
+    @cached_property
     def states(self) -> tuple[ShownStates, ...]:
         """Sensor and measurement error states of the filter, for display."""
         return blocks_of(self.run.filtered)
@@ -636,17 +652,6 @@ def rejected_times(table: pd.DataFrame) -> Array:
     """Times of the epochs with a rejected component in a table of innovations."""
     weights = table[[c for c in table.columns if str(c).startswith("weight ")]].to_numpy()
     return index_of(table)[(weights <= 0.0).any(axis=1)]
-
-
-def worst_within(record: NavigationRecord, span: Span) -> tuple[float, float] | None:
-    """The largest horizontal bound in m of a span, and its time; None without a mark in it."""
-    time = index_of(record.sd)
-    rows = np.flatnonzero((time >= span.begin) & (time <= span.end))
-    if not rows.size:
-        return None
-    bounds = plane_bound(record.covariance)[rows]
-    k = int(np.argmax(bounds))
-    return float(bounds[k]), float(time[rows[k]])
 
 
 def rms(values: Array) -> float:

@@ -11,7 +11,6 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.dsp.running_integral import running_integral
-from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.formats.trajectory_maps import thin
 from strapdown.frames import ned_from_geodetic
 from strapdown.navigation.record import NavigationRecord, Span
@@ -108,11 +107,11 @@ def _course(table: pd.DataFrame, found: NavigationEvaluation) -> NDArray[np.intp
 
 def _around(plane: Plane) -> list[tuple[Array, Array]]:
     """Corners about the ellipses, which may be larger than the path."""
-    along, ends = ellipse_rows(plane.found.record)
+    along, ends = ellipse_rows(plane.found)
     rows = [*along, *(k for k, _ in ends)]
     if not rows:
         return []
-    bounds = plane_bound(plane.found.record.covariance)[rows] * plane.scale
+    bounds = plane.found.bounds[rows] * plane.scale
     east, north = centres(plane, rows).T
     return [(east + side * bounds, north + side * bounds) for side in (-1.0, 1.0)]
 
@@ -263,7 +262,7 @@ _AT_OUTAGES, _ALONG, _LARGEST = 8, 6, 0.05
 _LETTER, _TEXT = 0.0082, 0.04
 
 
-def ellipse_rows(record: NavigationRecord) -> tuple[list[int], list[tuple[int, Span]]]:
+def ellipse_rows(found: NavigationEvaluation) -> tuple[list[int], list[tuple[int, Span]]]:
     """Covariance marks at which ellipses are drawn: along the path, and at the ends of outages.
 
     Returns
@@ -273,8 +272,8 @@ def ellipse_rows(record: NavigationRecord) -> tuple[list[int], list[tuple[int, S
     at_outages : list of (int, Span)
         The last mark before the end of each; if there are many, those of largest uncertainty.
     """
+    record, bounds = found.record, found.bounds
     time = index_of(record.sd)
-    bounds = plane_bound(record.covariance)
     ends: list[tuple[int, Span]] = []
     for span in sorted({s for v in record.outages.values() for s in v}, key=lambda s: s.begin):
         inside = np.flatnonzero((time >= span.begin) & (time < span.end - 1e-6))
@@ -311,9 +310,9 @@ def ellipses(plane: Plane, view: View) -> tuple[list[Line], str, list[tuple[int,
         As in `ellipse_rows`.
     """
     record = plane.found.record
-    along, ends = ellipse_rows(record)
+    along, ends = ellipse_rows(plane.found)
     rows = [*along, *(k for k, _ in ends)]
-    bounds = plane_bound(record.covariance)[rows] * plane.scale
+    bounds = plane.found.bounds[rows] * plane.scale
     if not rows or not bounds.max() > 0.0:
         return [], "", []
     factor = max(1.0, _round_down(_LARGEST * view.width / float(bounds.max())))
@@ -375,8 +374,7 @@ def bound_labels(
     """
     if not ends:
         return []
-    record = plane.found.record
-    bounds = plane_bound(record.covariance)
+    bounds = plane.found.bounds
     points = centres(plane, [k for k, _ in ends])
     words = tuple(
         f"{length_words(float(bounds[k]))} after {duration_words(s.end - s.begin)}" for k, s in ends

@@ -50,6 +50,7 @@ from strapdown.report.document import (
     section,
 )
 from strapdown.report.navigation_charts import bar, span_names
+from strapdown.report.navigation_evaluation import NavigationEvaluation
 from strapdown.report.values import GAP, duration_words, half, length_words, plain, share_words
 from strapdown.report.values import stamp as instant
 from strapdown.systems.navigation_run import NavigationRun
@@ -68,14 +69,14 @@ _KINDS = {
 STATUS_STYLES = {"trusted": "green", "unverified": "yellow", "rejected": "red"}
 
 
-def answer(result: NavigationRun) -> str:
+def answer(found: NavigationEvaluation) -> str:
     """Return the first sentence of a verdict."""
-    return f"{position_words(result)} {heading_words(result.trust)}"
+    return f"{bound_words(found)} {heading_words(found.run.trust)}"
 
 
-def position_words(result: NavigationRun) -> str:
+def bound_words(found: NavigationEvaluation) -> str:
     """Return the 95 % bound of the position, at the end and at its worst."""
-    bounds = plane_bound(result.record.covariance)
+    result, bounds = found.run, found.bounds
     end, worst = float(bounds[-1]), int(np.argmax(bounds))
     most, at = float(bounds[worst]), float(result.record.sd.index[worst])
     # A run whose bound is largest at the end needs only one number.
@@ -264,12 +265,12 @@ def repeated_words(result: NavigationRun) -> str:
     )
 
 
-def terminal_lines(result: NavigationRun, *, brief: bool = False) -> list[tuple[str, str]]:
+def terminal_lines(found: NavigationEvaluation, *, brief: bool = False) -> list[tuple[str, str]]:
     """Up to five lines for the terminal, each with its style; brief, without the position."""
-    trust = result.trust
+    result, trust = found.run, found.run.trust
     last = trust.heading.spans[-1].status if trust.heading.spans else "rejected"
     style = STATUS_STYLES[last]
-    lines = [(heading_words(trust) if brief else answer(result), style)]
+    lines = [(heading_words(trust) if brief else answer(found), style)]
     if said := worst_words(trust):
         lines.insert(0, (said, STATUS_STYLES["rejected"]))
     if trust.first is not None:
@@ -309,10 +310,11 @@ def degrees_words(value: float) -> str:
 _MOST = 12
 
 
-def integrity_sections(result: NavigationRun) -> tuple[Section, ...]:
+def integrity_sections(found: NavigationEvaluation) -> tuple[Section, ...]:
     """Return the sections on heading, position and velocity, and the first inconsistency."""
+    result = found.run
     return (
-        section("integrity", "Integrity", Paragraph(answer(result)), *_heading(result)),
+        section("integrity", "Integrity", Paragraph(answer(found)), *_heading(result)),
         section("quantities", "Status of position and velocity", *_quantities(result)),
         section("first", "First inconsistency, and the re-run without it", *_first(result)),
     )

@@ -16,6 +16,7 @@ from strapdown.navigation.integrity import (
     IntegrityReport,
     quantity_status,
 )
+from strapdown.report.navigation_evaluation import NavigationEvaluation
 from strapdown.report.verdict import STATUS_STYLES, terminal_lines, worst_words
 from strapdown.systems.navigation_run import run_navigation
 
@@ -154,6 +155,6 @@ def test_a_start_at_a_wrong_height_is_seen_where_the_heading_is_sound():
     assert run.trust.worst.share("trusted") == 0.0
     others = {one.name: one.at_end[0] for one in run.trust.quantities if one.name != "height"}
     assert set(others.values()) == {"trusted"}
-    (first, style), *_ = terminal_lines(run, brief=True)
+    (first, style), *_ = terminal_lines(NavigationEvaluation(run), brief=True)
     assert first == worst_words(run.trust)
     assert style == STATUS_STYLES["rejected"]

@@ -141,7 +141,7 @@ def test_the_terminal_says_what_the_page_says(result, capsys):
     assert "within bound" in said
     print_navigation(result, verbose=True)
     said = " ".join(capsys.readouterr().out.split())
-    assert answer(result).replace("\u00a0", " ") in said
+    assert answer(found).replace("\u00a0", " ") in said
     assert "gyro bias x" in said
 
 
