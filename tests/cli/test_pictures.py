@@ -23,8 +23,8 @@ from strapdown.report.attitude_charts import charts
 from strapdown.report.chart_svg import ChartFigure
 from strapdown.report.document import drawings
 from strapdown.report.navigation_document import navigation_document
-from strapdown.report.navigation_evaluation import NavigationEvaluation
-from strapdown.report.paired_corrections import paired_charts, paired_errors
+from strapdown.report.navigation_evaluation import NavigationEvaluation, paired_errors
+from strapdown.report.paired_corrections import paired_chart
 from strapdown.report.simulation import simulation_chart
 from strapdown.report.verdict import heading_chart
 from strapdown.systems.navigation_draft import draft_navigation
@@ -137,7 +137,7 @@ def test_the_light_of_the_manual_is_what_is_drawn_now(driven, tmp_path):
 def test_both_corrections_of_the_manual_are_what_is_drawn_now(tmp_path):
     """The whole chain of the SINS-1000, which takes two minutes; and what its page says of it."""
     run = run_navigation(NavigationSpec.read(EXAMPLES / "navigate_sins1000.toml"))
-    compare_chart(paired_charts(run)[0], "sins1000_paired.svg", tmp_path)
+    compare_chart(paired_chart(NavigationEvaluation(run)), "sins1000_paired.svg", tmp_path)
     assert run.record.not_estimated == run.beside.not_estimated == ("down", "VD")
     corrected, left = paired_errors(run)
     for one in (corrected, left):

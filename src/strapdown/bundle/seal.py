@@ -127,7 +127,7 @@ def write_timing(
     timing: dict[str, Any] = {"seconds": {stage: round(t, 4) for stage, t in seconds.items()}}
     if sample_ns:
         timing["sample_ns"] = sample_ns
-    (seal.path / TIMING).write_text(to_json(timing), encoding="utf-8", newline="\n")
+    write_json(seal.path / TIMING, timing)
 
 
 def write_latency(seal: Seal, latency: Mapping[str, Any]) -> None:
@@ -135,7 +135,7 @@ def write_latency(seal: Seal, latency: Mapping[str, Any]) -> None:
 
     `latency`: as JSON.
     """
-    (seal.path / LATENCY).write_text(to_json(latency), encoding="utf-8", newline="\n")
+    write_json(seal.path / LATENCY, latency)
 
 
 # JSON format of bundles.
@@ -146,3 +146,8 @@ def to_json(content: Any) -> str:
     text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
     # Names of files need not be valid text; invalid parts become question marks.
     return text.encode("utf-8", "replace").decode("utf-8")
+
+
+def write_json(path: Path, content: Any) -> None:
+    """Write a JSON file of a bundle, the same bytes on every system."""
+    path.write_text(to_json(content), encoding="utf-8", newline="\n")

@@ -23,7 +23,7 @@ from strapdown.bundle.seal import (
     check_destination,
     files_of,
     sha256,
-    to_json,
+    write_json,
 )
 from strapdown.errors import DataError
 
@@ -57,7 +57,7 @@ def write_bundle(
         staging.mkdir(0o700)
         yield staging
         manifest = make_manifest(staging, command, configuration, inputs)
-        (staging / MANIFEST).write_text(to_json(manifest), encoding="utf-8", newline="\n")
+        write_json(staging / MANIFEST, manifest)
         digest = sha256(staging / MANIFEST)
         staging.chmod(0o755)
         _move(staging, out)

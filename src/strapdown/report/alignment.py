@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.alignment.alignment import Alignment
-from strapdown.bundle.seal import to_json
+from strapdown.bundle.seal import write_json
 from strapdown.config.alignment import AlignmentSpec
 from strapdown.progress import Progress
 from strapdown.report.alignment_document import (
@@ -20,7 +20,7 @@ from strapdown.report.alignment_document import (
     limits,
     trust,
 )
-from strapdown.report.document import finding_json, write_text
+from strapdown.report.document import finding_json
 from strapdown.report.report_bundle import (
     ReportBundle,
     as_comments,
@@ -45,7 +45,7 @@ def _run(configuration: dict[str, Any]) -> AlignmentRun:
 
 
 def _write(result: AlignmentRun, folder: Path, name: str, report: bool, progress: Progress) -> None:
-    write_text(folder / "align.json", to_json(alignment_json(result)))
+    write_json(folder / "align.json", alignment_json(result))
     told = as_comments(CONVENTIONS)
     write_table(_attitude(result), folder / "attitude.csv", told)
     if result.fine is not None:

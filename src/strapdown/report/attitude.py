@@ -12,7 +12,7 @@ from strapdown.attitude_algorithms import make_algorithm
 from strapdown.attitude_algorithms.cost import Cost
 from strapdown.attitude_comparison.comparison import AttitudeComparison
 from strapdown.attitude_comparison.sweep import Share
-from strapdown.bundle.seal import Seal, to_json
+from strapdown.bundle.seal import Seal, write_json
 from strapdown.bundle.writing import write_bundle
 from strapdown.errors import ConfigError
 from strapdown.evaluation.reference_points import Score
@@ -22,7 +22,7 @@ from strapdown.report.attitude_charts import charts
 from strapdown.report.attitude_document import attitude_document
 from strapdown.report.attitude_tables import places_json, share_basis, source_of
 from strapdown.report.chart_svg import ChartFigure
-from strapdown.report.document import finding_json, write_text
+from strapdown.report.document import finding_json
 from strapdown.report.report_bundle import as_comments, finite, write_report
 from strapdown.tables import EULER, GYRO, QUATERNION
 from strapdown.tables.checks import index_of
@@ -65,7 +65,7 @@ def write_attitude(
         force=force,
         seals=seals,
     ) as folder:
-        write_text(folder / "attitude.json", to_json(attitude_json(bench)))
+        write_json(folder / "attitude.json", attitude_json(bench))
         _write_csv(bench, folder / "attitude.csv")
         if len(bench.sweep):
             _write_sweep(bench, folder / "sweep.csv")

@@ -287,26 +287,18 @@ def curve(
     width: float = 1.4,
     buckets: int = BUCKETS,
 ) -> Line:
-    """Make a line thinned to the resolution of a screen."""
-    return Line(name, *thin(x, y, buckets), colour, dash, width)
-
-
-def thin(x: ArrayLike, y: ArrayLike, buckets: int = BUCKETS) -> tuple[Array, Array]:
-    """Thin a curve to the resolution of a screen, keeping every peak.
+    """Make a line thinned to the resolution of a screen, keeping every peak.
 
     Parameters
     ----------
     x, y : array_like, (n,)
         NaN in `y` breaks the curve.
-
-    Returns
-    -------
-    x, y : ndarray
-        The minimum and maximum of each of `buckets` equal runs of samples, in time order.
+    buckets : int
+        Equal runs of samples, of each of which the minimum and maximum are kept.
     """
     xs, ys = np.asarray(x, dtype=np.float64), np.asarray(y, dtype=np.float64)
     rows = kept_rows((ys,), buckets)
-    return xs[rows], ys[rows]
+    return Line(name, xs[rows], ys[rows], colour, dash, width)
 
 
 def break_jumps(angle_deg: ArrayLike) -> Array:

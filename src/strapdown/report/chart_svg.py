@@ -120,7 +120,8 @@ def entries(chart: Chart) -> list[Shown]:
         lines = {line.name for line in panel.lines if line.legend}
         # A line with a band's name shares its entry.
         fills = [fill for fill in panel.fills if fill.name not in lines]
-        for one in (*fills, *panel.lines, *panel.bars):
+        shown: list[Shown] = [*fills, *panel.lines, *panel.bars]
+        for one in shown:
             if one.legend and one.name:
                 found.setdefault(one.name, one)
     return list(found.values())

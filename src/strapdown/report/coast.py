@@ -10,7 +10,7 @@ import numpy as np
 
 from strapdown.bundle.configuration_paths import resolved
 from strapdown.bundle.reading import read_manifest, unsealed_changes
-from strapdown.bundle.seal import to_json
+from strapdown.bundle.seal import write_json
 from strapdown.config.coast import CoastSpec
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.spec import specify
@@ -29,7 +29,7 @@ from strapdown.report.coast_document import (
     remedy,
     start_words,
 )
-from strapdown.report.document import finding_json, write_text
+from strapdown.report.document import finding_json
 from strapdown.report.report_bundle import (
     ReportBundle,
     file_of,
@@ -121,7 +121,7 @@ def _run(configuration: dict[str, Any]) -> OutageRun:
 
 
 def _write(result: OutageRun, folder: Path, name: str, report: bool, progress: Progress) -> None:
-    write_text(folder / "coast.json", to_json(coast_json(result)))
+    write_json(folder / "coast.json", coast_json(result))
     write_coast_tables(result, folder)
     if report:
         write_report(coast_document(result, name), folder, progress)
@@ -222,7 +222,10 @@ def write_coast_tables(result: OutageRun, folder: Path) -> None:
     sds = {SHOWN[q][0]: SHOWN[q][1] * np.sqrt(np.maximum(v, 0.0)) for q, v in variances.items()}
     csv.write(folder / "cone.csv", {"time_s": time, "horizontal_95_m": bound, **sds}, told)
     found = result.forecast
-    parts = {f"{_column(one.source.name)}_m2": one.variance["horizontal"] for one in found.shares}
+    parts = {
+        f"{one.source.name.replace('.', '_')}_m2": one.variance["horizontal"]
+        for one in found.shares
+    }
     if found.aids:
         parts["measurements_m2"] = found.aids["horizontal"]
     parts["all_m2"] = found.variance("horizontal")
@@ -239,10 +242,6 @@ def write_coast_tables(result: OutageRun, folder: Path) -> None:
             "inside_95": np.concatenate([d.inside.astype(np.float64) for d in drifts]),
         }
         csv.write(folder / "drifts.csv", columns, {**told, "sign": "computed minus fix"})
-
-
-def _column(name: str) -> str:
-    return name.replace(".", "_")
 
 
 def _positive(value: float) -> float:

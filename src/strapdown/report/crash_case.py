@@ -11,7 +11,7 @@ import pandas as pd
 
 from strapdown import __version__
 from strapdown.bundle.configuration_paths import names_file
-from strapdown.bundle.seal import to_json
+from strapdown.bundle.seal import write_json
 from strapdown.config.crash_case import CaseSpec
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.case import CaseResult, ReferenceAnswer, SeverityAnswer, main_event, run_case
@@ -29,7 +29,7 @@ from strapdown.report import crash_words
 from strapdown.report.chart import Array
 from strapdown.report.crash_document import crash_document
 from strapdown.report.crash_words import CONVENTIONS
-from strapdown.report.document import finding_json, write_text
+from strapdown.report.document import finding_json
 from strapdown.report.document_pdf import write_pdf
 from strapdown.report.report_bundle import (
     ReportBundle,
@@ -68,7 +68,7 @@ CRASH = ReportBundle("crash", _configuration, _run, _write)
 
 
 def _write_numbers(result: CaseResult, folder: Path) -> None:
-    write_text(folder / "crash.json", to_json(crash_json(result)))
+    write_json(folder / "crash.json", crash_json(result))
     told = as_comments(CONVENTIONS)
     main = result.reconstruction.main
     write_table(trajectory_table(main.path), folder / "trajectory.csv", told)

@@ -13,7 +13,6 @@ from strapdown.config.crash_case import VehicleSpec
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import CrashPath
 from strapdown.crash.pdof import AngleInterval
-from strapdown.crash.reconstruction import UnitReconstruction
 from strapdown.report.chart import BLACK, Array, Mark, look
 from strapdown.report.svg_drawing import Drawing
 from strapdown.report.values import plain
@@ -206,11 +205,6 @@ def unit_look(number: int | None, alone: bool = False) -> dict[str, str]:
         return {"colour": BLACK, "dash": "solid", "symbol": "circle"}
     found = look(number)
     return {**found, "dash": "solid" if alone else _DASHES[number % len(_DASHES)]}
-
-
-def assumed_axes(unit: UnitReconstruction) -> tuple[str, ...]:
-    """Axes of forward, right, down, roll, pitch, heading that no sensor of a unit measured."""
-    return unit.at_point.assumed_axes
 
 
 def crash_span(events: Sequence[CrashEvent], begin: float, end: float) -> tuple[float, float]:

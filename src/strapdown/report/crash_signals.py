@@ -34,7 +34,6 @@ from strapdown.report.chart import (
 )
 from strapdown.report.crash_outline import (
     SINCE_TRIGGER,
-    assumed_axes,
     crash_span,
     event_marks,
     marks_apart,
@@ -120,7 +119,7 @@ def _about_the_crash(
     cut = flags_in_vehicle_axes(np.asarray(prepared.clipped), C) & inside[:, None]
     look = unit_look(number)
     name = "merged, less bias" if len(recorded.accelerometers) > 1 else "at the common stamps"
-    assumed = assumed_axes(unit)
+    assumed = unit.at_point.assumed_axes
     for k in range(3):
         if AXES[k] in assumed:
             continue
@@ -172,7 +171,7 @@ def _rates(
     prepared = unit.at_point.prepared
     assert prepared is not None
     degree, there = math.radians(1.0), synchronised.gyro
-    assumed = assumed_axes(unit)
+    assumed = unit.at_point.assumed_axes
     time = index_of(prepared.imu)
     flags = (time, np.asarray(prepared.gyro_clipped))
     if there is not None:
@@ -204,7 +203,7 @@ def _overview(unit: UnitReconstruction, number: int, events: Sequence[CrashEvent
     assert prepared is not None
     time = index_of(prepared.imu)
     panels = []
-    assumed = assumed_axes(unit)
+    assumed = unit.at_point.assumed_axes
     for label, columns, scale, named in (
         ("specific force, g", ACCEL, STANDARD_GRAVITY, AXES),
         ("rate, deg/s", GYRO, math.radians(1.0), _ANGLES),

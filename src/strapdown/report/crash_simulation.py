@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from strapdown import earth
-from strapdown.bundle.seal import Seal, check_destination, to_json
+from strapdown.bundle.seal import Seal, check_destination, write_json
 from strapdown.bundle.writing import write_bundle
 from strapdown.config import CrashSimulationSpec
 from strapdown.crash.pdof import pdof
@@ -101,9 +101,7 @@ def write_crash_simulation(
         write_path_csv(folder / "truth.csv", recorded.truth)
         text = case_text(recorded, places, spec.seed)
         (folder / "case.toml").write_text(text, encoding="utf-8", newline="\n")
-        (folder / "scenario.json").write_text(
-            to_json(_description(spec, recorded)), encoding="utf-8", newline="\n"
-        )
+        write_json(folder / "scenario.json", _description(spec, recorded))
     return seals[0]
 
 

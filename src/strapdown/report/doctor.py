@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from strapdown import __version__
-from strapdown.bundle.seal import to_json
+from strapdown.bundle.seal import write_json
 from strapdown.config.doctor import DoctorSpec
 from strapdown.constants import MICRO_G
 from strapdown.errors import DataError, Finding
@@ -42,10 +42,10 @@ from strapdown.report.document import (
     blocks,
     capital,
     finding_json,
+    findings_list,
     paragraph,
     run_again,
     section,
-    write_text,
 )
 from strapdown.report.report_bundle import ReportBundle, finite, write_report
 from strapdown.report.values import duration_words, instant, small
@@ -71,7 +71,7 @@ def _run(configuration: dict[str, Any]) -> Diagnosis:
 
 
 def _write(result: Diagnosis, folder: Path, name: str, report: bool, progress: Progress) -> None:
-    write_text(folder / "doctor.json", to_json(diagnosis_json(result)))
+    write_json(folder / "doctor.json", diagnosis_json(result))
     if report:
         write_report(doctor_document(result, name), folder, progress, figures=False)
 
@@ -325,7 +325,9 @@ def doctor_document(result: Diagnosis, name: str = "") -> Document:
             one, f"{k + 1}-" if several else "", f"{one.name}: " if several else ""
         )
     if several:
-        sections.insert(0, section("between", "Between the logs", _found(result.between)))
+        sections.insert(
+            0, section("between", "Between the logs", findings_list(result.between, "cli"))
+        )
     if name:
         sections.append(section("again", "Check this folder", *run_again(name)))
     title = ", ".join(one.name for one in result.logs)
@@ -389,19 +391,8 @@ def _sections(one: LogDiagnosis, slug: str, title: str) -> list[Section]:
             Items(tuple(read)) if read else None,
             Items(tuple(columns)) if columns else None,
         ),
-        section(f"{slug}notes", f"{title}Notes", _found(one.notes)),
+        section(f"{slug}notes", f"{title}Notes", findings_list(one.notes, "cli")),
     ]
-
-
-def _found(findings: Iterable[Finding]) -> Block:
-    rows = tuple(
-        (
-            ", ".join(str(p) for p in (f.file, f.quantity) if p),
-            f.sentence("cli") + (f". {a}." if (a := f.advice("cli")) else ""),
-        )
-        for f in findings
-    )
-    return Items(rows) if rows else Paragraph("None.")
 
 
 def _facts(one: LogDiagnosis) -> tuple[tuple[str, str], ...]:

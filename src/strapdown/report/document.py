@@ -225,13 +225,14 @@ def capital(text: str) -> str:
     return f"{text[:1].upper()}{text[1:]}"
 
 
-def findings_list(findings: Iterable[Finding]) -> Items | Paragraph:
+def findings_list(findings: Iterable[Finding], words: Words = "python") -> Items | Paragraph:
     """Return findings with their locations and remedies."""
     rows = []
     for finding in findings:
         parts = (finding.file, finding.quantity, finding.row and f"row {finding.row}")
-        text = finding.what if not finding.remedy else f"{finding.what}. {finding.remedy}."
-        rows.append((", ".join(str(p) for p in parts if p), text))
+        text, remedy = finding.sentence(words), finding.advice(words)
+        where = ", ".join(str(p) for p in parts if p)
+        rows.append((where, f"{text}. {remedy}." if remedy else text))
     return Items(tuple(rows)) if rows else Paragraph("None.")
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.alignment.alignment import Alignment
-from strapdown.bundle.seal import to_json
+from strapdown.bundle.seal import write_json
 from strapdown.config.navigation import STAGES, NavigationSpec
 from strapdown.errors import ConfigError
 from strapdown.formats import csv
@@ -27,7 +27,7 @@ from strapdown.progress import Progress
 from strapdown.report import navigation_charts as charts
 from strapdown.report.chart import Chart
 from strapdown.report.chart_svg import ChartFigure
-from strapdown.report.document import finding_json, write_text
+from strapdown.report.document import finding_json
 from strapdown.report.navigation_charts import innovation_chart
 from strapdown.report.navigation_document import (
     CONVENTIONS,
@@ -84,7 +84,7 @@ def _write_all(
     result: NavigationRun, folder: Path, name: str, report: bool, progress: Progress
 ) -> None:
     found = NavigationEvaluation(result)
-    write_text(folder / "navigation.json", to_json(navigation_json(found)))
+    write_json(folder / "navigation.json", navigation_json(found))
     write_navigation_files(found, folder)
     if report:
         write_integrity(found, folder)
@@ -444,7 +444,7 @@ def _column(name: str) -> str:
 
 def write_integrity(found: NavigationEvaluation, folder: Path) -> None:
     """Write ``verdict.json`` and ``heading_integrity.csv``."""
-    write_text(folder / "verdict.json", to_json(verdict_json(found)))
+    write_json(folder / "verdict.json", verdict_json(found))
     result, heading = found.run, found.run.trust.heading
     table = heading.table
     status = [STATUSES[k] for k in table["status"].to_numpy(dtype=np.int64)]

@@ -37,13 +37,9 @@ from strapdown.report.navigation_evaluation import (
     Agreement,
     NavigationEvaluation,
     ShownStates,
-    at_marks,
-    chi_square_far,
-    heading_shown,
     rejected_times,
-    unwrapped,
 )
-from strapdown.report.values import NOT_ESTIMATED
+from strapdown.report.values import NOT_ESTIMATED, plain
 from strapdown.tables import EULER, NED, VELOCITY
 from strapdown.tables.checks import index_of
 
@@ -154,6 +150,43 @@ def attitude_chart(found: NavigationEvaluation) -> Chart:
         tuple(panels),
         found.record,
     )
+
+
+#: A heading that turns by more is drawn within 0 to 360 deg.
+MOST_TURN = 900.0
+
+
+def unwrapped(heading: Array) -> Array:
+    """Headings in deg without jumps, starting within 0 to 360."""
+    if not heading.size:
+        return heading
+    whole = np.unwrap(heading, period=360.0)
+    return np.asarray(whole - 360.0 * np.floor(whole[0] / 360.0))
+
+
+def heading_shown(record: NavigationRecord) -> tuple[Array, Array, str]:
+    """Heading over the trajectory and at the marks, deg, for display, with its caption.
+
+    It continues through north, unless it turns too often to be readable; then NaN breaks it at
+    north.
+    """
+    time = index_of(record.trajectory)
+    values = unwrapped(record.trajectory["heading"].to_numpy(dtype=np.float64))
+    marks = np.interp(index_of(record.sd), time, values)
+    if np.ptp(values) <= MOST_TURN:
+        return values, marks, "The heading continues through north without a jump."
+    return (
+        break_jumps(values % 360.0),
+        break_jumps(marks % 360.0),
+        f"The heading turns by {plain(float(np.ptp(values)) / 360.0, 1)} full turns in all.",
+    )
+
+
+def at_marks(record: NavigationRecord, column: str) -> Array:
+    """A trajectory column, other than heading, at the covariance marks."""
+    time = index_of(record.trajectory)
+    values = record.trajectory[column].to_numpy(dtype=np.float64)
+    return np.asarray(np.interp(index_of(record.sd), time, values))
 
 
 def _state_panel(
@@ -270,21 +303,28 @@ def strip(record: NavigationRecord) -> Panel | None:
     lines = [Line("", ends, np.full(2, np.nan), GREY, points=True, size=0.0, legend=False)]
     if record.modes:
         rows.append("mode")
-        fills += _modes(record.modes)
+        names = tuple(dict.fromkeys(m.name for m in record.modes))
+        for name in names:
+            those = tuple(m for m in record.modes if m.name == name)
+            fills.append(bar(name, those, 0.0, 0.45, mode_colour(name, names), 0.3))
         lines += span_names(record.modes, whole)
-    for aid in _aids(record)[: _MOST_ROWS - len(rows)]:
+    # Sources with outages first.
+    tables: dict[str, list[pd.DataFrame]] = {aid: [] for aid in record.outages}
+    for name, table in record.innovations.items():
+        tables.setdefault(name.rpartition(".")[0] or name, []).append(table)
+    for aid in [*tables][: _MOST_ROWS - len(rows)]:
         at = float(len(rows))
         rows.append(aid)
         out = record.outages.get(aid, ())
         used = (
             _between(out, going)
             if aid in record.outages
-            else _stretches(_epochs(record, aid), going)
+            else _stretches(_joined([index_of(table) for table in tables[aid]]), going)
         )
         fills.append(bar("used", used, at, 0.3, GREEN))
         if out:
             fills.append(bar("outage", out, at, 0.13, VERMILLION))
-        lost = _rejected(record, aid, whole)
+        lost = _distinct(_joined([rejected_times(table) for table in tables[aid]]), whole)
         if lost.size:
             y = np.full(lost.size, at)
             lines.append(Line("rejected", lost, y, VERMILLION, points=True, symbol="x", size=6.0))
@@ -299,26 +339,12 @@ def strip(record: NavigationRecord) -> Panel | None:
     )
 
 
-def _aids(record: NavigationRecord) -> list[str]:
-    """Names of the measurement sources: those with outages first."""
-    seen = [name.rpartition(".")[0] or name for name in record.innovations]
-    return list(dict.fromkeys([*record.outages, *seen]))
+def _joined(times: list[Array]) -> Array:
+    return np.unique(np.concatenate(times)) if times else np.empty(0)
 
 
-def _tables(record: NavigationRecord, aid: str) -> list[pd.DataFrame]:
-    """Innovations of a measurement source."""
-    return [t for n, t in record.innovations.items() if (n.rpartition(".")[0] or n) == aid]
-
-
-def _epochs(record: NavigationRecord, aid: str) -> Array:
-    found = [index_of(table) for table in _tables(record, aid)]
-    return np.unique(np.concatenate(found)) if found else np.empty(0)
-
-
-def _rejected(record: NavigationRecord, aid: str, whole: Span) -> Array:
-    """Times of rejected epochs, thinned to as many as can be distinguished."""
-    found = [rejected_times(table) for table in _tables(record, aid)]
-    times = np.unique(np.concatenate(found)) if found else np.empty(0)
+def _distinct(times: Array, whole: Span) -> Array:
+    """Times, thinned to as many as can be distinguished."""
     cell = (whole.end - whole.begin) / _MOST_MARKS
     if times.size <= _MOST_MARKS or cell <= 0.0:
         return times
@@ -365,21 +391,6 @@ def bar(
     y = [v for _ in spans for v in (at, at, np.nan)][:-1]
     rows = np.array(y)
     return Fill(name, np.array(x), rows - thick, rows + thick, colour, opacity)
-
-
-def _modes(modes: tuple[Span, ...]) -> list[Fill]:
-    names = tuple(dict.fromkeys(m.name for m in modes))
-    return [
-        bar(
-            name,
-            tuple(m for m in modes if m.name == name),
-            0.0,
-            0.45,
-            mode_colour(name, names),
-            0.3,
-        )
-        for name in names
-    ]
 
 
 def span_names(modes: tuple[Span, ...], whole: Span) -> list[Line]:
@@ -564,6 +575,13 @@ def nis_chart(record: NavigationRecord, found: tuple[Agreement, ...]) -> Chart |
         tuple(panels),
         record,
     )
+
+
+def chi_square_far(freedom: float) -> float:
+    """Quantile of chi-square with the two-sided exceedance probability of three sigma."""
+    from scipy.special import chdtri, ndtr
+
+    return float(chdtri(freedom, 2.0 * float(ndtr(-3.0))))
 
 
 def _mean(one: Agreement) -> list[Line]:

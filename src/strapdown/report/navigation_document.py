@@ -60,7 +60,7 @@ from strapdown.report.values import (
     share_words,
 )
 from strapdown.report.values import stamp as instant
-from strapdown.report.verdict import integrity_sections, status_figure
+from strapdown.report.verdict import integrity_sections, status_words
 from strapdown.rotation import within_half_turn
 from strapdown.systems.navigation_run import NavigationRun
 from strapdown.tables import EULER, NED, VELOCITY
@@ -116,12 +116,13 @@ def key_figures(found: NavigationEvaluation) -> tuple[KeyFigure, ...]:
             "unknown"
             if heading >= _NO_HEADING
             else about(float(last["heading"]) % 360.0, heading, "°"),
-            f"95{GAP}% bound",
+            f"95{GAP}% bound; {status_words(found.run.trust)}",
             f"roll {about(float(last['roll']), half(sd['roll']), '°')}, pitch "
             f"{about(float(last['pitch']), half(sd['pitch']), '°')}",
         ),
     ]
-    return (*out, status_figure(found.run), _known(found))
+    out.append(_known(found))
+    return tuple(out)
 
 
 def _known(found: NavigationEvaluation) -> KeyFigure:

@@ -32,9 +32,9 @@ from strapdown.navigation.truth_comparison import (
     compare_with_truth,
     smoother_consistency,
 )
-from strapdown.report.chart import Array, break_jumps, runs
+from strapdown.report.chart import Array, runs
 from strapdown.report.document import Trust, reason
-from strapdown.report.values import plain, shown_unit
+from strapdown.report.values import shown_unit
 from strapdown.systems.navigation_run import NavigationRun, withheld_aid
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
 from strapdown.tables.checks import index_of, values_of
@@ -265,7 +265,7 @@ def _agreement(name: str, table: pd.DataFrame, stated: bool) -> Agreement:
     )
     sd = np.sqrt(s)
     some, lost = (weight < 1.0).any(axis=1), (weight <= 0.0).any(axis=1)
-    used = (weight > 0.0).all(axis=1) & (sd > 0.0).all(axis=1)
+    used = np.asarray((weight > 0.0).all(axis=1) & (sd > 0.0).all(axis=1))
     with np.errstate(divide="ignore", invalid="ignore"):
         nis = np.square(nu / sd).sum(axis=1)
     count, freedom = int(used.sum()), len(labels)
@@ -300,13 +300,6 @@ def _agreement(name: str, table: pd.DataFrame, stated: bool) -> Agreement:
         lasting=ratio * math.sqrt((1.0 + rho) / (1.0 - rho)) if rho > 0.0 else ratio,
         stated=stated,
     )
-
-
-def chi_square_far(freedom: float) -> float:
-    """Quantile of chi-square with the two-sided exceedance probability of three sigma."""
-    from scipy.special import chdtri, ndtr
-
-    return float(chdtri(freedom, 2.0 * float(ndtr(-3.0))))
 
 
 # A navigation run against its truth: errors, their bounds, and consistency.
@@ -555,10 +548,6 @@ def _horizontal(result: NavigationRun, kind: str, record: NavigationRecord) -> H
     return HorizontalErrors(kind, time, velocity, position, *stated)
 
 
-#: A heading that turns by more is drawn within 0 to 360 deg.
-MOST_TURN = 900.0
-
-
 @dataclass(frozen=True)
 class ShownStates:
     """States of one kind, with their display unit.
@@ -613,39 +602,6 @@ def blocks_of(record: NavigationRecord) -> tuple[ShownStates, ...]:
             )
         )
     return tuple(out)
-
-
-def unwrapped(heading: Array) -> Array:
-    """Headings in deg without jumps, starting within 0 to 360."""
-    if not heading.size:
-        return heading
-    whole = np.unwrap(heading, period=360.0)
-    return np.asarray(whole - 360.0 * np.floor(whole[0] / 360.0))
-
-
-def heading_shown(record: NavigationRecord) -> tuple[Array, Array, str]:
-    """Heading over the trajectory and at the marks, deg, for display, with its caption.
-
-    It continues through north, unless it turns too often to be readable; then NaN breaks it at
-    north.
-    """
-    time = index_of(record.trajectory)
-    values = unwrapped(record.trajectory["heading"].to_numpy(dtype=np.float64))
-    marks = np.interp(index_of(record.sd), time, values)
-    if np.ptp(values) <= MOST_TURN:
-        return values, marks, "The heading continues through north without a jump."
-    return (
-        break_jumps(values % 360.0),
-        break_jumps(marks % 360.0),
-        f"The heading turns by {plain(float(np.ptp(values)) / 360.0, 1)} full turns in all.",
-    )
-
-
-def at_marks(record: NavigationRecord, column: str) -> Array:
-    """A trajectory column, other than heading, at the covariance marks."""
-    time = index_of(record.trajectory)
-    values = record.trajectory[column].to_numpy(dtype=np.float64)
-    return np.asarray(np.interp(index_of(record.sd), time, values))
 
 
 def rejected_times(table: pd.DataFrame) -> Array:

@@ -151,12 +151,16 @@ def as_comments(rows: Iterable[tuple[str, str]]) -> dict[str, str]:
     return {name.lower().replace(" ", "_"): text for name, text in rows}
 
 
-def finite(value: Any) -> Any:
+def finite(data: dict[str, Any]) -> dict[str, Any]:
     """Return plain data for JSON, which has no NaN and no infinity: these are null."""
+    return {str(key): _finite(value) for key, value in data.items()}
+
+
+def _finite(value: Any) -> Any:
     if isinstance(value, dict):
-        return {str(key): finite(item) for key, item in value.items()}
+        return finite(value)
     if isinstance(value, list | tuple):
-        return [finite(item) for item in value]
+        return [_finite(item) for item in value]
     if isinstance(value, np.generic):
         value = value.item()
     return None if isinstance(value, float) and not math.isfinite(value) else value

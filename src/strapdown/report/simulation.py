@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.attitude_comparison.source import scenario_errors, simulate_scenario
-from strapdown.bundle.seal import Seal, check_destination, sensor_file, to_json
+from strapdown.bundle.seal import Seal, check_destination, sensor_file, write_json
 from strapdown.bundle.writing import write_bundle
 from strapdown.config import SimulateSpec, TrajectorySpec
 from strapdown.ellipsoids import WGS84, Ellipsoid, find_ellipsoid
@@ -103,7 +103,7 @@ def write_simulation(
                 "heading_deg": float(final["heading"]),
             },
         }
-        (folder / "scenario.json").write_text(to_json(description), encoding="utf-8", newline="\n")
+        write_json(folder / "scenario.json", description)
     return seals[0]
 
 
@@ -231,7 +231,7 @@ def write_trajectory_simulation(
             "end": _state(trajectory, -1),
             "configuration": configuration | ({"sensor": sensor} if sensor else {}),
         }
-        (folder / "scenario.json").write_text(to_json(description), encoding="utf-8", newline="\n")
+        write_json(folder / "scenario.json", description)
     return seals[0]
 
 

@@ -40,7 +40,6 @@ from strapdown.report.chart import (
 from strapdown.report.document import (
     Block,
     Items,
-    KeyFigure,
     Paragraph,
     Section,
     TableBlock,
@@ -320,28 +319,17 @@ def integrity_sections(found: NavigationEvaluation) -> tuple[Section, ...]:
     )
 
 
-def status_figure(result: NavigationRun) -> KeyFigure:
-    """Return the heading status at the end, and its share of the time."""
-    heading = result.trust.heading
-    spans = heading.spans
-    if not spans:
-        return KeyFigure("Heading status", "unknown", "the run is shorter than a second")
-    last = spans[-1]
-    others = [s.end for s in spans if s.status != last.status]
-    since = f"for the last {duration_words(last.end - others[-1])}" if others else "throughout"
-    return KeyFigure(
-        "Heading status",
-        last.status,
-        f"{since}: {REASONS[last.reason]}",
-        f"trusted (error below {plain(heading.trusted_below, 1)}°) "
-        f"{share_words(heading.share('trusted'))} of the time",
-    )
+def status_words(trust: IntegrityReport) -> str:
+    """Return the heading status at the end, and the share of the time with a trusted heading."""
+    heading = trust.heading
+    last = heading.spans[-1].status if heading.spans else "unknown"
+    return f"status at the end: {last}; trusted {share_words(heading.share('trusted'))} of the time"
 
 
 def _heading(result: NavigationRun) -> tuple[Block, ...]:
     trust, heading = result.trust, result.trust.heading
     if not len(heading.table):
-        return (Paragraph("The run is shorter than a second."),)
+        return ()
     filtered = (
         "The heading status and the re-run are those of the filter, from the measurements up to "
         "each second, not of the smoothed run."

@@ -17,10 +17,6 @@ from strapdown.report.chart import (
     Line,
     Mark,
     Panel,
-    Scene,
-    SceneBody,
-    SceneLine,
-    SceneWord,
 )
 from strapdown.report.document import (
     Animation,
@@ -34,6 +30,7 @@ from strapdown.report.document import (
     Section,
     TableBlock,
 )
+from strapdown.report.scene import Scene, SceneBody, SceneLine, SceneWord
 
 EVIL = (
     "<script>alert(1)</script>",

@@ -31,8 +31,6 @@ from strapdown.report.navigation_charts import (
 )
 from strapdown.report.navigation_evaluation import (
     agreements,
-    heading_shown,
-    unwrapped,
 )
 from strapdown.report.navigation_plan import ellipse_rows, plan_chart
 
@@ -95,7 +93,7 @@ def test_the_ellipses_have_the_axes_of_the_covariance():
 
 def test_ellipses_stand_at_the_ends_of_outages():
     made = record()
-    along, ends = ellipse_rows(made)
+    along, ends = ellipse_rows(told(made))
     assert [(made.sd.index[k], s) for k, s in ends] == [(79.0, Span("outage", 50.0, 80.0))]
     assert all(not 50.0 <= made.sd.index[k] <= 80.0 for k in along)
     assert made.sd.index[along[-1]] == made.sd.index[-1]
@@ -164,7 +162,7 @@ def test_the_plan_is_right_on_every_side_of_the_earth(place, course):
 
 def test_headings_go_on_over_north():
     heading = np.array([350.0, 359.0, 2.0, 10.0, 355.0])
-    assert unwrapped(heading) == pytest.approx([350.0, 359.0, 362.0, 370.0, 355.0])
+    assert charts.unwrapped(heading) == pytest.approx([350.0, 359.0, 362.0, 370.0, 355.0])
     made = record(outage=None)
     made.trajectory["heading"] = np.mod(350.0 + 0.02 * np.arange(len(made.trajectory)), 360.0)
     panel = charts.attitude_chart(told(made)).panels[-1]
@@ -174,13 +172,13 @@ def test_headings_go_on_over_north():
     middle = 0.5 * (fill.low + fill.high)[fill.x == 100.0]
     # Sample 1000 of those that go on by 0.02 deg each; `at` is the mark of that instant.
     assert middle == pytest.approx(350.0 + 0.02 * 999, abs=1e-9)
-    assert heading_shown(made)[1][at] == pytest.approx(350.0 + 0.02 * 999, abs=1e-9)
+    assert charts.heading_shown(made)[1][at] == pytest.approx(350.0 + 0.02 * 999, abs=1e-9)
 
 
 def test_a_heading_that_turns_and_turns_is_broken_at_north():
     made = record(outage=None)
     made.trajectory["heading"] = np.mod(3.0 * np.arange(len(made.trajectory)), 360.0)
-    shown, _, said = heading_shown(made)
+    shown, _, said = charts.heading_shown(made)
     assert np.nanmin(shown) >= 0.0
     assert np.nanmax(shown) < 360.0
     assert "10.0 full turns" in said  # 3 deg * 1199 / 360

@@ -119,6 +119,14 @@ def test_a_smoothed_run_has_no_bound_of_what_is_not_estimated():
     assert NOT_ESTIMATED not in table["north, m"]
 
 
+def test_the_final_heading_is_shown_with_its_status():
+    found = told(record())
+    (heading,) = [one for one in key_figures(found) if one.name == "Final heading"]
+    assert found.run.trust.heading.spans[-1].status in heading.bound
+    slugs = [one.slug for one in navigation_document(found, "made").sections if one.blocks]
+    assert slugs[1:4] == ["integrity", "quantities", "first"]
+
+
 def test_longitudes_that_went_on_are_told_within_half_a_turn():
     made = record(place=(10.0, 179.9995, 0.0), course=90.0)
     made.trajectory["lon"] = np.mod(made.trajectory["lon"], 360.0)

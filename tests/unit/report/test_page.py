@@ -11,7 +11,7 @@ from strapdown.api.attitude import compare_attitude
 from strapdown.report.attitude import write_attitude
 from strapdown.report.attitude_charts import charts
 from strapdown.report.attitude_document import attitude_document
-from strapdown.report.chart import BUCKETS, break_jumps, thin
+from strapdown.report.chart import BUCKETS, break_jumps, curve
 from strapdown.report.document import document_page
 
 EVIL = "</script><script>alert(1)</script><!--<img src=x onerror=alert(2)>"
@@ -94,7 +94,8 @@ def test_thinning_keeps_peaks_ends_and_breaks():
     x = np.arange(100_000.0)
     y = np.sin(x / 500.0)
     y[54_321], y[70_000] = 9.0, np.nan
-    a, b = thin(x, y)
+    line = curve("y", x, y, "#000000")
+    a, b = line.x, line.y
     assert len(a) <= 2 * BUCKETS + 3
     assert (a[0], a[-1]) == (x[0], x[-1])
     assert np.nanmax(b) == 9.0
