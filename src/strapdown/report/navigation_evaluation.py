@@ -67,7 +67,8 @@ class NavigationEvaluation:
     @cached_property
     def outages(self) -> tuple[tuple[str, Span, float | None], ...]:
         """Source, span and largest horizontal bound in m of each outage; None without a mark."""
-        time, found = index_of(self.record.sd), []
+        time = index_of(self.record.sd)
+        found: list[tuple[str, Span, float | None]] = []
         for aid, spans in self.record.outages.items():
             for span in spans:
                 inside = (time >= span.begin) & (time <= span.end)
