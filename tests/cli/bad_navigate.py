@@ -347,13 +347,11 @@ NAVIGATE_CASES = (
 
 def undrawn(patch: pytest.MonkeyPatch) -> None:
     """Without figures and page, which take most of the time and change no number."""
-    import strapdown.report.navigation as navigation
     import strapdown.report.report_bundle as module
 
     patch.setattr(module, "draw_stills", lambda document: [])
     patch.setattr(module, "write_drawings", lambda *given: None)
-    for writer in (module, navigation):
-        patch.setattr(writer, "document_page", lambda document, stills=(): "<html></html>")
+    patch.setattr(module, "document_page", lambda document, stills=(): "<html></html>")
 
 
 def navigate_section(mktemp, run_cli) -> str:
