@@ -87,26 +87,6 @@ class Found:
         return time, raw.clock or clock_of_name(self.source, first, dated=dated), dated
 
 
-def quantities_of(
-    raw: RawLog,
-    known: Mapping[str, Quantity],
-    asked: Mapping[str, str],
-    before: re.Pattern[str] | None = None,
-) -> dict[str, Found]:
-    """Find the column of each quantity: as asked, else as the file states, else by its name.
-
-    See `find_quantities`. A file that states its columns is not searched by names.
-    """
-    if not raw.stated:
-        return find_quantities(raw.columns, known, asked, raw.name, raw.units, before=before)
-    found = {
-        quantity: Found(column, 1.0 if unit is None else known[quantity].units[unit], True)
-        for column, (quantity, unit) in raw.stated.items()
-        if quantity in known and quantity not in asked
-    }
-    return found | (find_quantities(raw.columns, known, asked, raw.name) if asked else {})
-
-
 def find_quantities(
     names: Iterable[str],
     known: Mapping[str, Quantity],
@@ -366,12 +346,22 @@ FIX_QUANTITIES: dict[str, Quantity] = {
 
 
 def fix_columns(raw: RawLog, asked: Mapping[str, str]) -> dict[str, Found]:
-    """Find the columns of fixes, by names as `FIX_QUANTITIES` has them or after ``gps_``.
+    """Find the columns of fixes: as asked, else as the file states, else by their names.
 
-    A quantity that has its own name is not searched behind such a word: beside ``time`` and
-    ``speed``, ``gps_time`` and ``gps_speed`` are others. Errors as of `find_quantities`.
+    Names are those of `FIX_QUANTITIES`, also after ``gps_``: a quantity that has its own name is
+    not searched behind such a word, for beside ``time`` and ``speed``, ``gps_time`` and
+    ``gps_speed`` are others. A file that states its columns is not searched by names. Errors as of
+    `find_quantities`.
     """
-    return quantities_of(raw, FIX_QUANTITIES, asked, before=_OF_FIXES)
+    known = FIX_QUANTITIES
+    if not raw.stated:
+        return find_quantities(raw.columns, known, asked, raw.name, raw.units, before=_OF_FIXES)
+    found = {
+        quantity: Found(column, 1.0 if unit is None else known[quantity].units[unit], True)
+        for column, (quantity, unit) in raw.stated.items()
+        if quantity in known and quantity not in asked
+    }
+    return found | (find_quantities(raw.columns, known, asked, raw.name) if asked else {})
 
 
 def names_of_fixes(raw: RawLog) -> set[str]:
