@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError
 from strapdown.formats.crash_record import LONGEST_NAME, CrashChannel, CrashRecord, clean
-from strapdown.formats.nhtsa import UNITS, Channel, CrashTest, Vehicle, header_of, read_nhtsa
+from strapdown.formats.nhtsa import UNITS, Channel, CrashTest, Vehicle, read_nhtsa
 from strapdown.tables import imu_table
 
 __all__ = ["accelerations", "detect", "imu_of", "read"]
@@ -83,7 +83,7 @@ def read(path: Path) -> CrashRecord:
     CrashRecord
         With the channels whose files exist.
     """
-    test = read_nhtsa(header_of(path))
+    test = read_nhtsa(path)
     there = [c for c in test.channels if c.path is not None]
     vehicles = {v.number for v in test.vehicles} or {c.vehicle for c in there} - {0}
     return CrashRecord(

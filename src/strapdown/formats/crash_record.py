@@ -165,6 +165,26 @@ LONGEST_NAME = 120
 LONGEST_TEXT = 400
 
 
+def header_of(path: Path, suffix: str, several: str, none: str) -> Path:
+    """Find the header of a test, given as file or folder.
+
+    `suffix`: its ending. `several`, `none`: codes of the error. DataError: the folder holds no
+    header, or more than one.
+    """
+    if not path.is_dir():
+        return path
+    headers = sorted(p for p in path.iterdir() if p.suffix.lower() == suffix and p.is_file())
+    if len(headers) != 1:
+        held = ", ".join(clean(p.name, LONGEST_NAME) for p in headers[:6])
+        raise DataError(
+            several if headers else none,
+            file=path.resolve().name,
+            count=len(headers),
+            held=held,
+        )
+    return headers[0]
+
+
 def clean(text: str, longest: int = LONGEST_TEXT) -> str:
     """Reduce a text to one line, without control or bidirectional formatting characters.
 

@@ -18,6 +18,7 @@ from strapdown.formats.crash_record import (
     CrashChannel,
     CrashRecord,
     clean,
+    header_of,
     unique,
 )
 from strapdown.formats.mme_codes import DIMENSIONS, NO_CLASS, MmeCode, decode_mme
@@ -68,7 +69,7 @@ def read(path: Path) -> CrashRecord:
     DataError
         No header, several headers, no channel, or a damaged header.
     """
-    head = _head(path)
+    head = header_of(path, ".mme", "io.folder-holds-tests", "io.no-mme-file")
     header = read_header(head)
     findings: list[Finding] = []
     objects = _objects(header)
@@ -106,21 +107,6 @@ def read(path: Path) -> CrashRecord:
         files=(head, *([index] if index else []), *(f.path for f in files)),
         findings=tuple(findings),
     )
-
-
-def _head(path: Path) -> Path:
-    if not path.is_dir():
-        return path
-    heads = sorted(p for p in path.iterdir() if p.suffix.lower() == ".mme" and p.is_file())
-    if len(heads) != 1:
-        held = ", ".join(clean(p.name, LONGEST_NAME) for p in heads[:6])
-        raise DataError(
-            "io.folder-holds-tests" if heads else "io.no-mme-file",
-            file=path.resolve().name,
-            count=len(heads),
-            held=held,
-        )
-    return heads[0]
 
 
 def _folders(head: Path) -> list[Path]:

@@ -17,9 +17,10 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
+from strapdown.formats.crash_record import header_of
 from strapdown.units import ACCEL_UNITS, GYRO_UNITS
 
-__all__ = ["Channel", "CrashTest", "Vehicle", "header_of", "read_nhtsa"]
+__all__ = ["Channel", "CrashTest", "Vehicle", "read_nhtsa"]
 
 
 TEST_FIELDS, CHANNEL_FIELDS, VEHICLE_FIELDS = 20, 20, 42
@@ -130,7 +131,7 @@ def read_nhtsa(path: str | Path) -> CrashTest:
         The header is missing, empty, truncated, or not in EV5 format; or its number of curves
         differs from its rows.
     """
-    file = header_of(Path(path))
+    file = header_of(Path(path), ".ev5", "io.folder-holds-headers", "io.folder-holds-no-ev-header")
     rows = sections(file)
     test, line = only(rows, "TEST", file)
     if len(test) < TEST_FIELDS:
@@ -166,25 +167,6 @@ def read_nhtsa(path: str | Path) -> CrashTest:
         barrier=tuple(tuple(fields) for fields, _ in rows["BARRIER"]),
         findings=tuple(_findings(channels, file)),
     )
-
-
-def header_of(path: Path) -> Path:
-    """Find the header of a test, given as file or folder.
-
-    DataError: the folder holds no header, or more than one.
-    """
-    if not path.is_dir():
-        return path
-    headers = sorted(p for p in path.iterdir() if p.suffix.lower() == ".ev5")
-    if len(headers) != 1:
-        held = ", ".join(p.name for p in headers[:6])
-        raise DataError(
-            "io.folder-holds-headers" if headers else "io.folder-holds-no-ev-header",
-            file=path.resolve().name,
-            count=len(headers),
-            held=held,
-        )
-    return headers[0]
 
 
 def _channel(fields: list[str], file: Path, line: int, present: dict[str, Path]) -> Channel:
