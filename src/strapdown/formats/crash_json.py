@@ -20,6 +20,7 @@ from strapdown.formats.crash_record import (
     clean,
     unique,
 )
+from strapdown.formats.signs import Signs
 
 Array = NDArray[np.float64]
 
@@ -27,7 +28,6 @@ __all__ = ["detect", "read", "write_crash_json"]
 
 FORMAT = "strapdown crash record"
 VERSION = 1
-_BEGINNING = 200
 LARGEST = 1_000_000_000
 
 
@@ -80,13 +80,7 @@ def write_crash_json(path: str | Path, record: CrashRecord) -> None:
     Path(path).write_bytes((text + "\n").encode())
 
 
-def detect(path: Path) -> bool:
-    """Whether the file is a crash record in JSON."""
-    if not path.is_file():
-        return False
-    with path.open("rb") as stream:
-        begin = stream.read(_BEGINNING)
-    return begin.lstrip().startswith(b"{") and FORMAT.encode() in begin
+detect = Signs(first=rb"\A\s*+\{.{0,180}?" + FORMAT.encode())
 
 
 def read(path: Path) -> CrashRecord:

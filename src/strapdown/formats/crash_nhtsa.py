@@ -14,6 +14,7 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError
 from strapdown.formats.crash_record import LONGEST_NAME, CrashChannel, CrashRecord, clean
 from strapdown.formats.nhtsa import UNITS, Channel, CrashTest, Vehicle, read_nhtsa
+from strapdown.formats.signs import Signs
 from strapdown.tables import imu_table
 
 __all__ = ["accelerations", "detect", "imu_of", "read"]
@@ -60,14 +61,7 @@ _PLACES = {
 _STATUS = {"AM": "as measured", "CF": "channel failed", "NO": "no data"}
 
 
-def detect(path: Path) -> bool:
-    """Whether the path is an EV5 header, or a folder that holds one."""
-    if path.is_dir():
-        return any(p.suffix.lower() == ".ev5" for p in path.iterdir())
-    if path.suffix.lower() == ".ev5":
-        return True
-    with path.open("rb") as stream:
-        return b"----- EV5 -----" in stream.read(4096)
+detect = Signs(named=(".ev5",), first=rb"\A.{0,4081}?----- EV5 -----", inside="*.ev5")
 
 
 def read(path: Path) -> CrashRecord:

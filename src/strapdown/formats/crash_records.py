@@ -112,7 +112,7 @@ CRASH_READERS: dict[str, CrashReader] = {
     ),
     "csv": CrashReader(
         "text table with a column a channel: .csv .txt; also of a vehicle's event data recorder",
-        crash_table.detect,
+        Path.is_file,
         crash_table.read,
     ),
 }

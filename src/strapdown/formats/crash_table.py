@@ -35,7 +35,6 @@ from strapdown.units import FACTORS, OF_CRASHES, find_unit
 __all__ = [
     "NOTE",
     "ChannelName",
-    "detect",
     "notes_of",
     "read",
     "read_channel_name",
@@ -56,11 +55,6 @@ EVEN = 0.01
 # of 50 ms gains less.
 SMALL = 0.2
 _OF_TRIAD = {"gyro": "rate", "accel": "acceleration", "mag": "other"}
-
-
-def detect(path: Path) -> bool:
-    """Whether the path is a file; a file that is not a table is refused by `read`."""
-    return path.is_file()
 
 
 def read(path: Path) -> CrashRecord:

@@ -22,6 +22,7 @@ from strapdown.formats.crash_record import (
     unique,
 )
 from strapdown.formats.mme_codes import DIMENSIONS, NO_CLASS, MmeCode, decode_mme
+from strapdown.formats.signs import Signs
 from strapdown.tables import SAMPLINGS
 from strapdown.units import FACTORS, OF_CRASHES, TIME_UNITS, find_unit
 
@@ -49,11 +50,7 @@ _LISTED = re.compile(r"name of channel (\d+)")
 _TITLES = ("title", "type of the test", "laboratory test ref. number", "test name")
 
 
-def detect(path: Path) -> bool:
-    """Whether the path is a test header, or a folder that holds one."""
-    if path.is_dir():
-        return any(p.suffix.lower() == ".mme" for p in path.iterdir())
-    return path.suffix.lower() == ".mme"
+detect = Signs(named=(".mme",), inside="*.mme")
 
 
 def read(path: Path) -> CrashRecord:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from functools import lru_cache
 from pathlib import Path
 
@@ -35,8 +36,10 @@ class Signs:
         line. The text of binary content ends at its first zero byte.
     also : callable, optional
         Sign that these cannot express; called if all others are there.
+    inside : str
+        Pattern of names (`fnmatch`, in lower case), of which a folder holds at least one.
     folder : callable, optional
-        Sign of a folder; without it no folder is of this format.
+        Sign of a folder. Without either no folder is of this format.
     zipped : bool
         Whether an archive (``.zip``) is looked at like a folder.
     """
@@ -46,12 +49,15 @@ class Signs:
     first: bytes = b""
     text: str = ""
     also: Callable[[Path], bool] | None = None
+    inside: str = ""
     folder: Callable[[Path], bool] | None = None
     zipped: bool = False
 
     def __call__(self, path: Path, data: bytes | None = None) -> bool:
         """Whether a file or folder has the signs. `data`: its first bytes; read if not given."""
         suffix = path.suffix.lower()
+        if path.is_dir() and self.inside:
+            return any(fnmatchcase(p.name.lower(), self.inside) for p in path.iterdir())
         if path.is_dir() or (self.zipped and suffix == ".zip"):
             return self.folder is not None and self.folder(path)
         if not path.is_file() or suffix in self.named:

@@ -27,6 +27,8 @@ def test_signs_of_a_file_and_of_a_folder(tmp_path):
     assert not Signs(text="made")(tmp_path)
     assert Signs(folder=lambda p: p == tmp_path)(tmp_path)
     assert not Signs(folder=lambda p: True)(path)
+    assert Signs(inside="a.l*")(tmp_path)
+    assert not Signs(inside="*.txt")(tmp_path)
     path.with_suffix(".zip").write_bytes(b"PK")
     assert Signs(folder=lambda p: True, zipped=True)(path.with_suffix(".zip"))
     path.write_text("made by me\n", encoding="utf-16")
