@@ -12,9 +12,18 @@ from typing import IO, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown._kernels.smoothing import COVARIANCE, TIME, TURN, padded, row_width, smooth_back
+from strapdown._kernels.smoothing import (
+    COVARIANCE,
+    TIME,
+    TURN,
+    padded,
+    row_width,
+    smooth_back,
+    unpack,
+)
 from strapdown.errors import ConfigError
 from strapdown.estimation.covariance import Observation
+from strapdown.estimation.error_model import PHYSICAL
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.navigation.engine import SAME_INSTANT
 from strapdown.navigation.navigator import Navigator
@@ -192,6 +201,11 @@ class Smoothing:
             wanted[there] = np.arange(len(there))
             P = np.empty((len(there), n, n))
             smooth_back(rows, n, told, less, wanted, errors[begin:end], P)
+            # Less than what rounding leaves of a start that was all but unknown: the filter's is an
+            # upper bound.
+            lost = (np.diagonal(P, axis1=1, axis2=2)[:, :PHYSICAL] < 0.0).any(axis=1)
+            for k in np.flatnonzero(lost):
+                unpack(rows[there[k]], COVARIANCE, P[k])
             yield met, P, rows[there, TURN:COVARIANCE].reshape(-1, 3, 3)
             end = begin
 

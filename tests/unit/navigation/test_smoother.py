@@ -304,3 +304,26 @@ def test_a_recorder_of_one_sample_a_second_keeps_those_of_all():
 def test_a_memory_that_is_none(memory):
     with pytest.raises(ConfigError, match="memory"):
         RauchTungStriebel(memory)
+
+
+def test_a_variance_that_rounding_made_negative_is_the_filter_s(monkeypatch):
+    # A start that is all but unknown has variances some 1e10 times those of its smoothed state.
+    navigator = smoothing(navigator_of(gnss()))
+    forward, sound = both(navigator)
+    whole = smoothing_tape.smooth_back
+    struck = []
+
+    def rounded(rows, n, told, less, wanted, estimates, covariances):
+        whole(rows, n, told, less, wanted, estimates, covariances)
+        if not struck and len(covariances):
+            covariances[0, 4, 4] = -1e-3
+            struck.append(True)
+
+    monkeypatch.setattr(smoothing_tape, "smooth_back", rounded)
+    _, smoothed = both(navigator)
+    assert struck
+    other = np.flatnonzero((smoothed.covariance != sound.covariance).any(axis=(1, 2)))
+    assert 1 <= len(other) <= 2
+    assert np.isfinite(smoothed.sd.to_numpy()).all()
+    for k in other:
+        assert smoothed.covariance[k] == pytest.approx(forward.covariance[k], rel=1e-6)
