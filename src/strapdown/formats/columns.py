@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 import unicodedata
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 from strapdown.errors import ConfigError, check_choice
 from strapdown.units import find_unit, unit_of, unit_words
@@ -222,12 +220,12 @@ def read_name(name: str) -> ColumnName:
             said = _read_words(" ".join(parts[start:]), unit)
             if said.quantity:
                 family = f"{' '.join(parts[:start]).lower()} {said.family}".strip()
-                said = _with(said, family=family if said.family else "")
+                said = replace(said, family=family if said.family else "")
                 break
     quantity = said.quantity
     kind = find_unit(said.unit) if said.unit else None
     if str(quantity).startswith("mag") and said.unit in _MAGNETIC:
-        said = _with(said, unit=_MAGNETIC[said.unit])
+        said = replace(said, unit=_MAGNETIC[said.unit])
     elif quantity == "time" and (
         (bracket and unit is None and bracket.group(1).lower() not in _OF_TIME)
         or (kind and kind[0] != "time")
@@ -238,14 +236,10 @@ def read_name(name: str) -> ColumnName:
     return _of_array(said, index) if index else said
 
 
-def _with(said: ColumnName, **changes: Any) -> ColumnName:
-    return dataclasses.replace(said, **changes)
-
-
 def _of_array(said: ColumnName, index: str) -> ColumnName:
     """Give a triad the axis of an element of an array of three."""
     if said.quantity in TRIADS and int(index) < len(_AXES):
-        return _with(said, quantity=f"{said.quantity}_{_AXES[int(index)]}", number=None)
+        return replace(said, quantity=f"{said.quantity}_{_AXES[int(index)]}", number=None)
     return said
 
 
@@ -278,7 +272,7 @@ def _without_unit(text: str) -> tuple[str, str | None]:
 def _read_words(text: str, unit: str | None) -> ColumnName:
     word = "".join(re.split(_SIGNS, text.lower()))
     if (said := _known(word)) and not said.loose:
-        return _with(said, unit=unit or said.unit)
+        return replace(said, unit=unit or said.unit)
     # Names in capitals without separators (latDeg), in another order (x_gyro), with words that say
     # nothing of the quantity (raw_acceleration_x), or twice the same (gyroRotationRateX).
     words = [e for w in _HUMPS.findall(text) for e in _english(w.lower())]
@@ -303,8 +297,8 @@ def _read_words(text: str, unit: str | None) -> ColumnName:
         rest = [w for w in words if w != axis and w not in TURNS]
         family = "".join(rest) if len(rest) < len(words) else said.family
         family = f"of {family}" if words[:1] == [axis] else family
-        said = _with(said, family=f"{family}#" if len(family) < 2 else family)
-    return _with(said, unit=unit or said.unit, loose=True)
+        said = replace(said, family=f"{family}#" if len(family) < 2 else family)
+    return replace(said, unit=unit or said.unit, loose=True)
 
 
 def _english(word: str) -> list[str]:

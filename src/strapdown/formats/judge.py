@@ -48,17 +48,13 @@ def inferred_unit(
             evidence=form.evidence,
             confidence=form.confidence,
             triad=triad,
-            sum_of=sum_of(_likely(unit), triad),
+            sum_of=sum_of(str(unit.value) if unit is not None and unit.settled else None, triad),
         )
     if unit is not None and unit.settled and (form is None or form.value == "rate"):
         code = "io.mag-unit-inferred" if triad == "mag" else "io.unit-inferred"
         findings.append(unit.finding(code, file=file, quantity=f"unit of {triad}", triad=triad))
         return str(unit.value), str(unit)
     raise DataError(_undecided(triad, unit, values).replace(file=file, quantity=triad))
-
-
-def _likely(unit: Inference | None) -> str | None:
-    return str(unit.value) if unit is not None and unit.settled else None
 
 
 def _undecided(triad: str, unit: Inference | None, values: Array) -> Finding:
@@ -138,7 +134,7 @@ def report_contradictions(
     for triad, unit in units.items():
         other = said.get(f"{triad}_unit")
         # A gyro's numbers are evidence only if gravity rotated with it.
-        heard = triad != "gyro" or _settled(said, "gyro_axes")
+        heard = triad != "gyro" or ("gyro_axes" in said and said["gyro_axes"].settled)
         form = said.get(f"{triad}_form")
         if triad in asked or not heard or other is None or not other.settled:
             continue
@@ -189,10 +185,6 @@ def report_contradictions(
             reason=axes.finding(),
         )
     )
-
-
-def _settled(said: dict[str, Inference], quantity: str) -> bool:
-    return quantity in said and said[quantity].settled
 
 
 def axes_against_gravity(said: dict[str, Inference]) -> Finding:

@@ -12,6 +12,7 @@ import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from functools import partial
 from pathlib import Path
 from secrets import token_hex
 from typing import Any
@@ -101,7 +102,7 @@ class Writer:
 
     title: str
     streams: Mapping[str, tuple[Part, ...]]
-    function: Callable[[Path, Tables, FileOptions], list[Finding]]
+    function: Callable[[Path, Tables, FileOptions], list[Finding] | None]
     reader: str | None
     endings: tuple[str, ...] = ()
     alone: bool = False
@@ -129,7 +130,9 @@ class Writer:
                 kept["reference"] = held["reference"]
             lost += [_of_own_file(k, held[k]) for k in held if k not in kept]
             held = kept
-        lost += self.function(path, held, options or FileOptions())
+        lost += self.function(path, held, options or FileOptions()) or []
+        if self.alone:
+            lost += _clock_lost(held)
         left = {f.quantity for f in lost if f.code == "io.stream-not-written"}
         return [*(self._written(k, held) for k in held if k not in left), *lost]
 
@@ -272,38 +275,34 @@ def _track_of(tables: Tables) -> pd.DataFrame | None:
     return track if "imu" not in tables and track is not None and is_trajectory(track) else None
 
 
-def _write_csv(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
+def _write_csv(path: Path, tables: Tables, options: FileOptions) -> None:
     if (track := _track_of(tables)) is not None:
         write_csv(path, track, options)
     else:
         csv.write(path, *_columns(tables))
-    return _clock_lost(tables)
 
 
-def _write_parquet(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
+def _write_parquet(path: Path, tables: Tables, options: FileOptions) -> None:
     if (track := _track_of(tables)) is not None:
         write_parquet(path, track, options)
-        return _clock_lost(tables)
-    parquet.write(path, *_columns(tables))
-    return _clock_lost(tables)
+    else:
+        parquet.write(path, *_columns(tables))
 
 
-def _write_npz(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
+def _write_npz(path: Path, tables: Tables, options: FileOptions) -> None:
     said: dict[str, Array] = {}
     arrays = _three_columns(tables)
     if "imu" in tables:
         stated = imu_columns(tables["imu"], None)[1]
         said = {key: np.array(text) for key, text in stated.items()}
     numpy_files.write(path, arrays | said)
-    return _clock_lost(tables)
 
 
-def _write_mat(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
+def _write_mat(path: Path, tables: Tables, options: FileOptions) -> None:
     said = {}
     if "imu" in tables:
         said = imu_columns(tables["imu"], None)[1]
     hdf5.write_matlab(path, _three_columns(tables), said)
-    return _clock_lost(tables)
 
 
 def _three_columns(tables: Tables) -> dict[str, Array]:
@@ -314,17 +313,16 @@ def _three_columns(tables: Tables) -> dict[str, Array]:
     return time_column(tables["imu"]) | named
 
 
-def _write_hdf5(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
+def _write_hdf5(path: Path, tables: Tables, options: FileOptions) -> None:
     if "imu" not in tables:
         hdf5.write(path, _columns(tables)[0], {}, {})
-        return _clock_lost(tables)
+        return
     imu = tables["imu"]
     ((name, stamps),) = time_column(imu).items()
     plain, _, unit = name.rpartition("_")
     arrays = {plain: stamps} | _arrays(imu, tables.get("reference"))
     units = _UNITS | {plain: unit}
     hdf5.write(path, arrays, units, imu_columns(imu, None)[1])
-    return _clock_lost(tables)
 
 
 def _clock_lost(tables: Tables) -> list[Finding]:
@@ -391,14 +389,6 @@ def _write_map(path: Path, tables: Tables, options: FileOptions, write: Any) -> 
     elif POSITION_SD[0] in _known_columns(track):
         findings.append(not_held("a map", stream, "standard deviations", track))
     return findings
-
-
-def _write_kml(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
-    return _write_map(path, tables, options, write_kml)
-
-
-def _write_geojson(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
-    return _write_map(path, tables, options, write_geojson)
 
 
 def _write_nav(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
@@ -526,8 +516,10 @@ WRITERS: dict[str, Writer] = {
         "tum",
         (".tum",),
     ),
-    "kml": Writer("KML 2.2", _MAP, _write_kml, None, (".kml",)),
-    "geojson": Writer("GeoJSON", _MAP, _write_geojson, None, (".geojson",)),
+    "kml": Writer("KML 2.2", _MAP, partial(_write_map, write=write_kml), None, (".kml",)),
+    "geojson": Writer(
+        "GeoJSON", _MAP, partial(_write_map, write=write_geojson), None, (".geojson",)
+    ),
     "nav": Writer(
         "KF-GINS trajectory",
         {"reference": ("deg, m, m/s", "GPS week and seconds of it")},
