@@ -23,7 +23,7 @@ from strapdown.formats.clocks import (
     read_stamps,
     with_clock,
 )
-from strapdown.formats.columns import EULERS, QUATERNIONS, parse_axes
+from strapdown.formats.columns import EULERS, QUATERNIONS, parse_axes, read_name
 from strapdown.formats.find_columns import AXES, Column, find_columns, require_gyro
 from strapdown.formats.inference import Inference
 from strapdown.formats.join import join
@@ -231,7 +231,14 @@ def _unused(raw: RawLog, found: dict[str, Column]) -> list[Finding]:
     names = [name for name in raw.columns if name and name not in used]
     if not names:
         return []
-    return [Finding("io.columns-not-used", file=raw.name, severity="note", names=names)]
+    out = [Finding("io.columns-not-used", file=raw.name, severity="note", names=names)]
+    if not set(ACCEL) & set(found):
+        forces = [n for n in names if read_name(n).quantity in ACCEL]
+        if {read_name(n).quantity for n in forces} == set(ACCEL):
+            out.append(
+                Finding("io.accelerometer-not-read", file=raw.name, quantity="accel", names=forces)
+            )
+    return out
 
 
 #: A table whose sensors have their own rows leaves out at least this share of one of them.

@@ -35,7 +35,7 @@ from strapdown.formats.sensor_folder import (
     peek,
 )
 from strapdown.formats.signs import Signs
-from strapdown.tables import GYRO
+from strapdown.tables import ACCEL, GYRO
 
 _TIME = re.compile(r"time \(s\)", re.I)
 _TRIADS = {
@@ -62,6 +62,7 @@ _PRESSURE = {"pressure": (re.compile(r"pressure \(hPa\)", re.I), "hPa")}
 _STREAMS = {"gnss": _FIXES, "barometer": _PRESSURE}
 TITLE = "recording of phyphox"
 _EVENTS = "meta/time.csv"
+INERTIAL = (*GYRO, *ACCEL)
 
 
 def _has_sensor(path: Path) -> bool:
@@ -70,8 +71,9 @@ def _has_sensor(path: Path) -> bool:
     if not is_container(path):
         members = [file_member(path)]
         # A table that others wrote has names and units of its own beside some of phyphox.
-        names = [n for m in members for n in _fields(m) if str(read_name(n).quantity) in GYRO]
-        if not all(_TRIADS["gyro"][0].fullmatch(n) or _PLAIN.fullmatch(n) for n in names):
+        names = [n for m in members for n in _fields(m) if str(read_name(n).quantity) in INERTIAL]
+        own = (_TRIADS["gyro"][0], _TRIADS["accel"][0], _LINEAR, _PLAIN)
+        if not all(any(p.fullmatch(n) for p in own) for n in names):
             return False
     return any(_sensors(m) or _stream_of(m) for m in members)
 

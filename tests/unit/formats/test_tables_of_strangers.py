@@ -14,8 +14,10 @@ import strapdown as sd
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError
 from strapdown.formats import ReadOptions, read_log, reader_of
+from strapdown.formats.assemble import assemble
 from strapdown.formats.columns import read_name
 from strapdown.formats.gnss_files import has_fixes
+from strapdown.formats.recording import RawLog
 from strapdown.tables import ACCEL, GYRO
 
 RATES = np.array([0.1, -0.2, 0.3])  # rad/s
@@ -500,3 +502,34 @@ def test_a_last_number_shorter_than_all_others_was_cut(tmp_path, last, rows):
     path = tmp_path / "a.csv"
     path.write_text("t_s,gyro_x_dps,gyro_y_dps,gyro_z_dps\n" + "\n".join(lines))
     assert len(sd.read_imu(path)) == rows
+
+
+UNUSUAL = """"Time (s)","Acceleration x ({0})","Acceleration y ({0})","Acceleration z ({0})",\
+"Gyroscope x (rad/s)","Gyroscope y (rad/s)","Gyroscope z (rad/s)"
+"""
+
+
+@pytest.mark.parametrize(("unit", "read"), [("m.s^-2", True), ("m s-2", True), ("furlong", False)])
+def test_a_table_with_some_names_of_phyphox_keeps_its_accelerometer(tmp_path, unit, read):
+    """It was taken for an export of phyphox, whose reader knows one unit of the accelerometer."""
+    rows = [f"{k / 50:.2f},0.1,0.2,9.8,0.01,0.02,{0.03 * k / 500}" for k in range(500)]
+    path = tmp_path / "log.csv"
+    path.write_text(UNUSUAL.format(unit) + "\n".join(rows) + "\n")
+    assert reader_of(path) != "phyphox"
+    recording = read_log(path)
+    assert set(ACCEL) <= set(recording.imu.columns)
+    assert ("io.unit-inferred" in [f.code for f in recording.findings]) is not read
+
+
+def test_an_accelerometer_that_a_format_does_not_read_is_no_note():
+    """A reader states its gyro alone: the log says what else looked like a sensor."""
+    n = 500
+    columns = {"t": np.arange(n) / 50.0, **{f"w{a}": np.full(n, 0.01) for a in "xyz"}}
+    stated = {"t": ("time", "s"), **{f"w{a}": (f"gyro_{a}", "rad/s") for a in "xyz"}}
+    forces = {f"Acceleration {a} (m/s^2)": np.full(n, 9.8) for a in "xyz"}
+    raw = RawLog("log.csv", (), columns={**columns, **forces}, rows=np.arange(n), stated=stated)
+    (found,) = [
+        f for f in assemble(raw, ReadOptions()).findings if f.code == "io.accelerometer-not-read"
+    ]
+    assert found.severity == "warning"
+    assert found.data["names"] == tuple(forces)
