@@ -19,6 +19,9 @@ from strapdown.sensors.uncertainty import ImuUncertainty
 
 Array = NDArray[np.float64]
 
+#: A well-known attitude must stay so for this long, s.
+AHEAD = 3.0
+
 
 @dataclass(frozen=True, eq=False)
 class Alignment:
@@ -93,6 +96,16 @@ class Alignment:
         Near a pitch of ±90° those of roll and heading grow without bound.
         """
         return euler_sd(self.roll_pitch_heading, self.covariance)
+
+    @property
+    def sd_deg_to_begin(self) -> Array:
+        """Standard deviations of roll, pitch and heading that decide on a begin, (3,), deg.
+
+        A well-known attitude must stay so for `AHEAD` without fixes that observe the biases; with
+        a state that is carried back, also that one's must be small: the larger of both.
+        """
+        sd = self.sd_deg_after(AHEAD)
+        return sd if self.earlier is None else np.maximum(sd, self.earlier.sd_deg)
 
     def sd_deg_after(self, seconds: float) -> Array:
         """Standard deviations of roll, pitch and heading after propagation by the gyros.

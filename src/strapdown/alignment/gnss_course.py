@@ -448,7 +448,7 @@ class CourseFit:
             usual = np.maximum(place_sd, MAD_TO_SD * np.median(np.abs(apart), axis=0))
             j = int(np.argmax((np.abs(apart) <= CLEAR * usual).all(axis=1)))
             at, by_at = guess[j], by_way[here] - by_off[near][j]
-            own = np.square(place_sd[j]) / ONCE
+            own = np.square(place_sd[j])
         level = seen.level[here]
         J = np.zeros((len(HANDED) + 3, self.unknowns))
         J[END_VELOCITY] = -level @ seen.by_velocity[here]

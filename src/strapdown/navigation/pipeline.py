@@ -487,8 +487,6 @@ class NavigationPipeline:
 
 # Stamps are rounded decimal fractions: tolerance of an instant, s.
 INSTANT = 1e-7
-# A well-known attitude must stay so for this long without fixes that observe the biases, s.
-AHEAD = 3.0
 #: Columns of a kept step.
 TIME, VALUES, ROWS = 0, slice(1, 7), slice(7, 17)
 
@@ -569,7 +567,7 @@ class ModeSequencer:
             found = align(self._chain, state)
         except (DataError, DivergenceError):
             return
-        roll, pitch, heading = found.alignment.sd_deg_after(AHEAD).tolist()
+        roll, pitch, heading = found.alignment.sd_deg_to_begin.tolist()
         raise DataError(
             "navigation.samples-end-alignment-too-uncertain",
             file=state.intake.source,
@@ -705,7 +703,7 @@ class ModeSequencer:
         except (DataError, DivergenceError):
             # Not yet; the longest duration gives the reason.
             return
-        roll, pitch, heading = found.alignment.sd_deg_after(AHEAD).tolist()
+        roll, pitch, heading = found.alignment.sd_deg_to_begin.tolist()
         if mode.until.met(heading, max(roll, pitch)):
             roll, pitch, heading = found.alignment.sd_deg.tolist()
             sd = {"heading_deg": heading, "tilt_deg": max(roll, pitch)}

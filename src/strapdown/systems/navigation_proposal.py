@@ -37,7 +37,6 @@ from strapdown.navigation.measurements.gnss_readiness import (
     white_position_sd,
     without_repeats,
 )
-from strapdown.navigation.pipeline import AHEAD
 from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV, load_sensor
 from strapdown.sensors.rest import LEAST_LENGTH, find_rests_of_every_grade
 from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty, stated_imu
@@ -91,8 +90,6 @@ WELL, HEADING = 3.0, 6.0
 #: Trials of it: factor of the length from trial to trial, margin over the best of them, and the
 #: largest standard deviation that is not too large for a linear filter, deg.
 LATER, MARGIN, LARGEST_START = 1.15, 1.2, 15.0
-#: Longest part of a record to align by course as a whole, s, so that navigation begins with it.
-MOST_BACK = 300.0
 #: Rules that give gross errors zero weight keep their accuracy among them; with its scale this one
 #: cannot reject for ever. Time-correlated errors make innovations small, which does not show a
 #: receiver better than stated.
@@ -599,7 +596,6 @@ def _alignment(
                     "window_s": 60.0,
                     "until_heading_sd_deg": HEADING,
                     "until_tilt_sd_deg": _tilt(sensors),
-                    "backtrack": True,
                 },
                 "fine": {"kind": "none"},
             },
@@ -635,17 +631,15 @@ def _tried(
     span = float(time[-1] - time[0])
     while True:
         length = min(length, span)
-        window = length if length <= MOST_BACK else coarse["window_s"]
-        begin, end = np.searchsorted(time, time[0] + np.array([length - window, length]) + 1e-7)
+        begin, end = np.searchsorted(
+            time, time[0] + np.array([length - coarse["window_s"], length]) + 1e-7
+        )
         try:
             found = GnssCourse().align(imu.iloc[begin:end], site, sensors, fixes, antenna)
-            roll, pitch, heading = np.maximum(found.sd_deg_after(AHEAD), found.sd_deg).tolist()
+            roll, pitch, heading = np.maximum(found.sd_deg_to_begin, found.sd_deg).tolist()
             tilt = max(roll, pitch)
             if heading <= limits[0] and tilt <= limits[1]:
-                # The run tries at instants of its own, somewhat later.
-                whole = float(math.ceil(MARGIN * window))
-                coarse = {**coarse, "window_s": max(coarse["window_s"], whole)}
-                return {**chosen, "coarse": coarse}, how, ()
+                return chosen, how, ()
             if best is None or max(heading, tilt) < max(best):
                 best = heading, tilt
         except (DataError, DivergenceError) as error:
