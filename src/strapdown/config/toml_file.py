@@ -175,13 +175,14 @@ _BLANK = re.compile(r"[ \t]*")
 _BETWEEN = re.compile(r"(?:[ \t\n]|#[^\n]*)*")
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 # Longest first: a triple-quoted string begins like an empty one. Up to two further marks belong to
-# the string before the three that end it.
+# the string before the three that end it. Groups that can fail inside are not possessive: Python
+# before 3.11.5 does not match those (cpython issue 106052).
 _STRINGS = tuple(
     re.compile(pattern)
     for pattern in (
-        r'"""(?:[^"\\]++|\\[\s\S]|"{1,2}+(?!"))*+"{3,5}',
-        r"'''(?:[^']++|'{1,2}+(?!'))*+'{3,5}",
-        r'"(?:[^"\\\n]++|\\.)*+"',
+        r'"""(?:[^"\\]++|\\[\s\S]|"{1,2}+(?!"))*"{3,5}',
+        r"'''(?:[^']++|'{1,2}+(?!'))*'{3,5}",
+        r'"(?:[^"\\\n]++|\\.)*"',
         r"'[^'\n]*'",
     )
 )
