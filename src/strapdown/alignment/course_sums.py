@@ -26,6 +26,7 @@ from strapdown.tables import (
     VELOCITY,
     VELOCITY_SD,
     check_gnss,
+    usable,
 )
 from strapdown.tables.checks import source_of
 
@@ -286,7 +287,7 @@ def course_fixes(
     sd = gnss[VELOCITY_SD].to_numpy(dtype=np.float64)
     sound = gnss["quality"].to_numpy() > 0.0
     measured = np.isfinite(sd[:, :2]).all(axis=1)
-    placed = sound & np.isfinite(gnss[POSITION_SD].to_numpy(dtype=np.float64)).all(axis=1)
+    placed = usable(gnss, POSITION_SD)
     time = stamps - antenna.velocity_delay
     within = (time >= first) & (time <= last)
     good = sound & within & measured

@@ -49,7 +49,7 @@ from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.estimation.robust import Huber, Igg3, Influence
 from strapdown.frames import geodetic_from_ned, ned_from_geodetic
 from strapdown.sensors.uncertainty import ImuUncertainty
-from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD
+from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, usable
 from strapdown.tables.checks import is_number, source_of
 
 Array = NDArray[np.float64]
@@ -380,9 +380,11 @@ class CourseFit:
         k = len(fixes.time)
         if self.by_places:
             assert fixes.place is not None and fixes.place_sd is not None
-            off, rows = self._displacements(found, sums, there, turns, slice(k), antenna=True)
+            way, by_way = self._displacements(found, sums, there, slice(k))
+            arm, by_arm = self._arms(found, sums, turns, slice(k))
+            rows = by_way + by_arm
             rows[:, :, OFFSET] = there[:k]
-            gap, fix_sd = fixes.place - (found.place + off), fixes.place_sd
+            gap, fix_sd = fixes.place - (found.place + (way + arm)), fixes.place_sd
             within = self._walk(sums)
         else:
             arm = np.cross(sums.rate[:k], self.model.antenna.lever_arm)
@@ -433,21 +435,18 @@ class CourseFit:
             *((gap, rows, ONCE * weight) for gap, rows, weight in seen.rests),
         ]
         _, inverse, _ = _solve(parts, seen.prior, found.errors)
-        whole = slice(None)
         here = len(seen.level) - 1
-        way, by_way = self._displacements(found, seen.sums, seen.velocity, seen.turns, whole)
+        way, by_way = self._displacements(found, seen.sums, seen.velocity, slice(None))
         if self.by_places:
             at, by_at, own = found.place + way[here], by_way[here], np.zeros(3)
         else:
             near = slice(here - len(stamps), here)
-            off, by_off = self._displacements(
-                found, seen.sums, seen.velocity, seen.turns, whole, antenna=True
-            )
-            guess = place - off[near] + way[here]
+            arm, by_arm = self._arms(found, seen.sums, seen.turns, near)
+            guess = place - (way[near] + arm) + way[here]
             apart = guess - np.median(guess, axis=0)
             usual = np.maximum(place_sd, MAD_TO_SD * np.median(np.abs(apart), axis=0))
             j = int(np.argmax((np.abs(apart) <= CLEAR * usual).all(axis=1)))
-            at, by_at = guess[j], by_way[here] - by_off[near][j]
+            at, by_at = guess[j], by_way[here] - (by_way[near] + by_arm)[j]
             own = np.square(place_sd[j])
         level = seen.level[here]
         J = np.zeros((len(HANDED) + 3, self.unknowns))
@@ -478,7 +477,7 @@ class CourseFit:
         fixes = self.fixes
         stamps = gnss.index.to_numpy(dtype=np.float64)
         sd = gnss[POSITION_SD].to_numpy(dtype=np.float64)
-        good = np.isfinite(sd).all(axis=1) & (gnss["quality"].to_numpy() > 0.0)
+        good = usable(gnss, POSITION_SD)
         good &= (stamps >= self.imu.index[0]) & (stamps <= self.imu.index[-1])
         if not good.any():
             return None
@@ -552,18 +551,12 @@ class CourseFit:
         return v, by
 
     def _displacements(
-        self,
-        found: Found,
-        sums: DriveSums,
-        there: Array,
-        turns: Array,
-        rows: slice,
-        antenna: bool = False,
+        self, found: Found, sums: DriveSums, there: Array, rows: slice
     ) -> tuple[Array, Array]:
         """Positions at instants less that at the end, and their derivatives.
 
         In Earth-fixed axes, level at the end, ``s = s_e - int (1 + [w_ie x] T) v``: the axes have
-        turned by ``w_ie T`` since. `antenna`: whether of the antenna instead of the sensors.
+        turned by ``w_ie T`` since.
         """
         earth, until = self.site.earth_rate, sums.until_end[rows]
         T, g = until[:, None], self.site.gravity
@@ -585,12 +578,15 @@ class CourseFit:
         out[:, :, TURN] = -rotation.cross_matrix(moved)
         out[:, :, OF_GYROS] = -found.C @ sums.moved_by_turn[rows]
         out[:, :, OF_ACCELS] = -found.C @ sums.moved_by_accel[rows]
-        if not antenna:
-            return -way, out
-        fixed = rotation.dcm_from_rotation_vector(earth * T)
-        lever_arm = np.asarray(self.model.antenna.lever_arm, float)
-        arm = fixed @ found.C @ sums.turned[rows] @ lever_arm
-        return arm - way, out - rotation.cross_matrix(arm) @ turns[rows]
+        return -way, out
+
+    def _arms(
+        self, found: Found, sums: DriveSums, turns: Array, rows: slice
+    ) -> tuple[Array, Array]:
+        """Lever arm of the antenna at instants, in the same axes, and its derivatives."""
+        fixed = rotation.dcm_from_rotation_vector(self.site.earth_rate * sums.until_end[rows, None])
+        arm = fixed @ found.C @ sums.turned[rows] @ np.array(self.model.antenna.lever_arm)
+        return arm, -(rotation.cross_matrix(arm) @ turns[rows])
 
     def _walk(self, sums: DriveSums) -> float:
         """Variance of a position within stretches, whose noise is modeled as a bias of each.

@@ -19,6 +19,7 @@ from strapdown.dsp.chi_square import (
     normal_quantile,
 )
 from strapdown.errors import ConfigError, Finding
+from strapdown.navigation.record import innovation_labels
 
 __all__ = [
     "GROSS",
@@ -175,7 +176,7 @@ def consistency_of(
         raise ConfigError(
             "navigation.no-probability-false-alarm", quantity="false_alarm", false_alarm=false_alarm
         )
-    labels = [column[3:] for column in innovations.columns if column.startswith("nu ")]
+    labels = innovation_labels(innovations)
     time = innovations.index.to_numpy(dtype=np.float64)
     nu = innovations[[f"nu {label}" for label in labels]].to_numpy(dtype=np.float64)
     s = innovations[[f"s {label}" for label in labels]].to_numpy(dtype=np.float64)

@@ -34,7 +34,7 @@ from strapdown.navigation.measurements.measurement import (
 from strapdown.navigation.modes import Aligned, CoarseMode, FineMode
 from strapdown.prefilter.prefilter import CHANNELS
 from strapdown.rotation import rotate
-from strapdown.tables import GEODETIC, MOTION, POSITION_SD, VELOCITY_SD, check_gnss
+from strapdown.tables import GEODETIC, MOTION, POSITION_SD, VELOCITY_SD, check_gnss, usable
 from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
 from strapdown.tables.checks import index_of, source_of, values_of
 
@@ -706,9 +706,8 @@ def motion_by_fixes(
     if fixes is None or begin >= time:
         return None
     part = fixes[fixes.index >= begin]
-    good = values_of(part, ["quality"])[:, 0] > 0.0
     v, v_sd = values_of(part, VELOCITY_COLUMNS), values_of(part, VELOCITY_SD)
-    told = good & np.isfinite(v_sd[:, :2]).all(axis=1)
+    told = usable(part, VELOCITY_SD[:2])
     if told.any():
         rows = np.flatnonzero(told)[-NEWEST:]
         k = int(rows[-1])
@@ -719,8 +718,7 @@ def motion_by_fixes(
         measured = np.isfinite(v_sd[k])
         own = np.where(measured, v_sd[k], CLIMB)
         return np.where(measured, v[k], 0.0), np.hypot(own, MANOEUVRE * since)
-    sd = values_of(part, POSITION_SD)
-    good &= np.isfinite(sd).all(axis=1)
+    sd, good = values_of(part, POSITION_SD), usable(part, POSITION_SD)
     if good.sum() < 2:
         return None
     place, sd, stamps = values_of(part, GEODETIC)[good], sd[good], index_of(part)[good]
@@ -745,8 +743,7 @@ def _newest_that_agrees(
     by the newest fixes.
     """
     rows = np.flatnonzero(stamps >= stamps[-1] - LOOKED_BACK)[-LOOKED_AT:]
-    told = np.isfinite(values_of(fixes, VELOCITY_SD)).all(axis=1)
-    told &= values_of(fixes, ["quality"])[:, 0] > 0.0
+    told = usable(fixes, VELOCITY_SD)
     if len(rows) < LEAST_LOOKED_AT or told.sum() < LEAST_LOOKED_AT:
         return len(stamps) - 1
     v, v_time = values_of(fixes, VELOCITY_COLUMNS)[told], index_of(fixes)[told]
@@ -768,7 +765,7 @@ def _good(
     """Positions, standard deviations and stamps of the fixes that have them."""
     if fixes is not None:
         sd = values_of(fixes, columns)
-        good = np.isfinite(sd).all(axis=1) & (values_of(fixes, ["quality"])[:, 0] > 0.0)
+        good = usable(fixes, columns)
         if good.any():
             return values_of(fixes, GEODETIC)[good], sd[good], index_of(fixes)[good]
     raise DataError(

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from strapdown.constants import TWO_SIDED_95
 from strapdown.errors import ConfigError
-from strapdown.navigation.record import NavigationRecord
+from strapdown.navigation.record import NavigationRecord, innovation_labels
 
 __all__ = [
     "CHECKS",
@@ -274,15 +274,14 @@ def recent_scatter(record: NavigationRecord) -> Array:
     seconds = seconds_of(record)
     worst = np.ones(len(seconds))
     for table in record.innovations.values():
-        labels = [c for c in table.columns if str(c).startswith("nu ")]
-        labels = [c for c in labels if not str(c)[3:].startswith(VERTICAL)]
+        labels = [x for x in innovation_labels(table) if not x.startswith(VERTICAL)]
         if not labels:
             continue
-        nu = table[labels].to_numpy(dtype=np.float64)
-        s = table[[f"s {str(c)[3:]}" for c in labels]].to_numpy(dtype=np.float64)
+        nu = table[[f"nu {x}" for x in labels]].to_numpy(dtype=np.float64)
+        s = table[[f"s {x}" for x in labels]].to_numpy(dtype=np.float64)
         with np.errstate(divide="ignore", invalid="ignore"):
             u = np.where(s > 0.0, nu / np.sqrt(s), np.nan)
-        weight = table[[f"weight {str(c)[3:]}" for c in labels]].to_numpy(dtype=np.float64)
+        weight = table[[f"weight {x}" for x in labels]].to_numpy(dtype=np.float64)
         known = np.isfinite(u)
         # Rejected measurements did no harm, unless there are many.
         lost = known & (weight <= 0.0)

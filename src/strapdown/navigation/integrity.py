@@ -55,7 +55,7 @@ from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.measurement import Measurement, TabulatedMeasurement, lasting
 from strapdown.navigation.pipeline import NavigationPipeline
 from strapdown.navigation.preprocessing import joined_steps
-from strapdown.navigation.record import NavigationRecord, state_of_row
+from strapdown.navigation.record import NavigationRecord, innovation_labels, state_of_row
 from strapdown.navigation.recorder import IntervalRecorder
 from strapdown.navigation.replay import PipelineRun, run_batch
 from strapdown.progress import Progress
@@ -550,7 +550,7 @@ def likelihood_gain(
     for name, table in innovations.items():
         if name not in other:
             continue
-        labels = [column[3:] for column in table.columns if column.startswith("nu ")]
+        labels = innovation_labels(table)
         _, *rows = np.intersect1d(index_of(table), index_of(other[name]), return_indices=True)
         nu, variance = (
             np.stack(

@@ -24,6 +24,7 @@ __all__ = [
     "NavigationChunk",
     "NavigationRecord",
     "Span",
+    "innovation_labels",
     "standard_deviations",
     "state_of_row",
 ]
@@ -174,6 +175,14 @@ class InnovationRecord(NamedTuple):
     labels: tuple[str, ...]
     innovations: Innovations
     observation: Observation | None = None
+
+
+def innovation_labels(innovations: pd.DataFrame) -> list[str]:
+    """Return the labels of the components in a table of innovations, with units.
+
+    Its columns are ``nu LABEL``, ``s LABEL`` and ``weight LABEL`` of each.
+    """
+    return [str(c)[3:] for c in innovations.columns if str(c).startswith("nu ")]
 
 
 class CovarianceSnapshot(NamedTuple):

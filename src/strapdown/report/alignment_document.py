@@ -13,6 +13,7 @@ from strapdown.alignment.fine import ROCKS
 from strapdown.constants import DEG_PER_HOUR, MICRO_G, TWO_SIDED_95
 from strapdown.errors import Finding
 from strapdown.estimation.sensor_blocks import resting_sd
+from strapdown.navigation.record import innovation_labels
 from strapdown.report.chart import (
     AXIS_COLOURS,
     BLACK,
@@ -173,7 +174,7 @@ def _surprises(result: AlignmentRun) -> list[Finding]:
         return []
     out = []
     for name, table in result.fine.innovations.items():
-        labels = [c.removeprefix("nu ") for c in table.columns if c.startswith("nu ")]
+        labels = innovation_labels(table)
         ratios = [float(np.sqrt(np.mean(table[f"nu {x}"] ** 2 / table[f"s {x}"]))) for x in labels]
         worst = max(ratios, default=0.0)
         good = worst < 2.0
@@ -390,7 +391,7 @@ def innovation_chart(result: AlignmentRun) -> Chart | None:
     panels = []
     for name, table in result.fine.innovations.items():
         time = index_of(table)
-        labels = [c.removeprefix("nu ") for c in table.columns if c.startswith("nu ")]
+        labels = innovation_labels(table)
         lines = []
         for k, label in enumerate(labels):
             ratio = values_of(table, [f"nu {label}"])[:, 0] / np.sqrt(table[f"s {label}"])

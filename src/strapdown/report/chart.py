@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from strapdown.dsp.true_runs import true_runs
+
 Array = NDArray[np.float64]
 
 # Colors of Okabe and Ito, distinguishable by color-blind readers.
@@ -264,9 +266,7 @@ def strip_range(chart: Chart) -> tuple[float, float] | None:
 
 def runs(*columns: Array) -> list[slice]:
     """Stretches in which all columns are finite; NaN breaks a curve."""
-    whole = np.isfinite(np.vstack(columns)).all(axis=0)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], whole, [False]]).astype(np.int8)))
-    return [slice(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+    return true_runs(np.asarray(np.isfinite(np.vstack(columns)).all(axis=0)))
 
 
 def look(k: int) -> dict[str, str]:

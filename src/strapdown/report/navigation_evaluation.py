@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from strapdown.config.navigation import make_aids
 from strapdown.constants import TWO_SIDED_95
+from strapdown.dsp.true_runs import true_runs
 from strapdown.errors import Finding
 from strapdown.estimation.robust import AdaptiveScale
 from strapdown.evaluation.plane_bound import plane_bound, plane_reach
@@ -24,7 +25,7 @@ from strapdown.navigation.consistency import (
     consistency_of,
 )
 from strapdown.navigation.measurements.measurement import lasting
-from strapdown.navigation.record import NavigationRecord, Span
+from strapdown.navigation.record import NavigationRecord, Span, innovation_labels
 from strapdown.navigation.truth_comparison import (
     SmootherConsistency,
     TruthComparison,
@@ -32,7 +33,7 @@ from strapdown.navigation.truth_comparison import (
     compare_with_truth,
     smoother_consistency,
 )
-from strapdown.report.chart import Array, runs
+from strapdown.report.chart import Array
 from strapdown.report.document import Trust, reason
 from strapdown.report.values import shown_unit
 from strapdown.systems.navigation_run import NavigationRun, withheld_aid
@@ -260,7 +261,7 @@ def agreements(record: NavigationRecord, lasting: Collection[str] = ()) -> tuple
 def _agreement(name: str, table: pd.DataFrame, stated: bool) -> Agreement:
     from scipy.special import chdtri
 
-    labels = tuple(str(c)[3:] for c in table.columns if str(c).startswith("nu "))
+    labels = tuple(innovation_labels(table))
     nu, s, weight = (
         values_of(table, [f"{part} {label}" for label in labels]) for part in ("nu", "s", "weight")
     )
@@ -607,7 +608,7 @@ def blocks_of(record: NavigationRecord) -> tuple[ShownStates, ...]:
 
 def rejected_times(table: pd.DataFrame) -> Array:
     """Times of the epochs with a rejected component in a table of innovations."""
-    weights = table[[c for c in table.columns if str(c).startswith("weight ")]].to_numpy()
+    weights = values_of(table, [f"weight {label}" for label in innovation_labels(table)])
     return index_of(table)[(weights <= 0.0).any(axis=1)]
 
 
@@ -782,7 +783,7 @@ def _rejected(found: NavigationEvaluation) -> list[Finding]:
                 )
             )
         for label, column in zip(one.labels, one.weight.T, strict=True):
-            ends = [k for k in runs(np.where(column > 0.0, np.nan, 0.0)) if _long(k)]
+            ends = [k for k in true_runs(~(column > 0.0)) if _long(k)]
             if ends:
                 out.append(
                     reason(

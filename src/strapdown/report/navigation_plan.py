@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.dsp.running_integral import running_integral
+from strapdown.dsp.true_runs import true_runs
 from strapdown.formats.trajectory_maps import thin
 from strapdown.frames import ned_from_geodetic
 from strapdown.navigation.record import NavigationRecord, Span
@@ -145,12 +146,11 @@ def _path(record: NavigationRecord, time: Array, path: tuple[Array, Array]) -> l
 
 def _pieces(of: NDArray[np.bool_], path: tuple[Array, Array]) -> tuple[Array, Array]:
     """Stretches of a path over some of its steps, with NaN between them."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], of.astype(np.int8), [0]])))
     x: list[Array] = []
     y: list[Array] = []
-    for begin, end in edges.reshape(-1, 2):
-        x += [path[0][begin : end + 1], np.array([np.nan])]
-        y += [path[1][begin : end + 1], np.array([np.nan])]
+    for run in true_runs(of):
+        x += [path[0][run.start : run.stop + 1], np.array([np.nan])]
+        y += [path[1][run.start : run.stop + 1], np.array([np.nan])]
     return np.concatenate(x)[:-1], np.concatenate(y)[:-1]
 
 

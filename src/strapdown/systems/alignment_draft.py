@@ -200,7 +200,7 @@ def options(page: Page, module: type, chosen: Mapping[str, Any]) -> None:
     """Write chosen options as keys, the others as comments with their defaults."""
     for option in options_of(module):
         if option.key in chosen:
-            page.key(option.key, _inline(chosen[option.key]), _CHOSEN.get(option.key, ""))
+            page.key(option.key, _inline(chosen[option.key]))
             continue
         value = toml_value(option.default)
         if option.slot is not None:
@@ -220,8 +220,6 @@ def _inline(value: Any) -> str:
     return toml_value(value) or ""
 
 
-#: What a chosen option does.
-_CHOSEN = {"backtrack": "navigation begins with the first sample of that part"}
 _WANTED = {
     "heading_deg": "heading of the body at the start, clockwise from north (gyros that "
     "find north at a rest of a minute need none: name their sensor with --sensor)",

@@ -20,7 +20,7 @@ from strapdown.navigation.measurements.measurement import TabulatedMeasurement
 from strapdown.sensors.health_log import LEAST_SAMPLES, ChannelFault
 from strapdown.sensors.imu_health import check_imu_channels
 from strapdown.sensors.uncertainty import ImuUncertainty
-from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD
+from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, usable
 from strapdown.tables.checks import index_of, source_of, values_of
 
 __all__ = ["channel_findings", "look_through", "saturated_findings"]
@@ -82,7 +82,7 @@ def _refuse_far(spec: NavigationSpec, table: pd.DataFrame, imu: pd.DataFrame, ai
     if stated is None or not aid.use_position:
         return
     sd = values_of(table, POSITION_SD)
-    placed = np.isfinite(sd).all(axis=1) & (values_of(table, ["quality"])[:, 0] > 0.0)
+    placed = usable(table, POSITION_SD)
     after = index_of(table) - aid.time_offset - float(imu.index[0])
     rows = np.flatnonzero(placed & (after >= 0.0))
     if not rows.size:

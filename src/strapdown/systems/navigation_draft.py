@@ -17,6 +17,7 @@ from strapdown.config.choice import SLOTS, Slot, options_of
 from strapdown.config.navigation import STAGES
 from strapdown.config.toml_text import ASK, Page, inline, named_from, string
 from strapdown.constants import STANDARD_GRAVITY
+from strapdown.dsp.true_runs import true_runs
 from strapdown.errors import DataError, Finding
 from strapdown.estimation.sensor_blocks import STATED_STATES, resting_sd, states_that_are_stated
 from strapdown.formats.gnss_fixes import POSITION_SDS, VELOCITY_SDS
@@ -452,8 +453,8 @@ def first_stand(imu: pd.DataFrame) -> tuple[float, float] | None:
     length = float(time[np.argmax(moves)]) - BEFORE - float(time[0])
     if length >= LEAST:
         return float(time[0]), length
-    edges = np.flatnonzero(np.diff(np.concatenate([[1], moves, [1]])))
-    begin, end = time[edges[::2]], time[edges[1::2] - 1]
+    rests = true_runs(~moves)
+    begin, end = time[[run.start for run in rests]], time[[run.stop - 1 for run in rests]]
     stances = np.flatnonzero(end - begin >= STEPPED)
     if not stances.size:
         return None

@@ -52,7 +52,7 @@ from strapdown.navigation.modes import (
 from strapdown.navigation.navigator import Navigator, with_states
 from strapdown.navigation.pipeline import NavigationPipeline
 from strapdown.navigation.preprocessing import GapPolicy, ImuPreprocessor, ends_of
-from strapdown.navigation.record import NavigationRecord, Span
+from strapdown.navigation.record import NavigationRecord, Span, innovation_labels
 from strapdown.navigation.recorder import IntervalRecorder, Recorder
 from strapdown.navigation.replay import PipelineRun, run_batch
 from strapdown.progress import Progress, silent
@@ -68,7 +68,7 @@ from strapdown.systems.navigation_source import (
 )
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import EULER, GEODETIC, VELOCITY
-from strapdown.tables.checks import source_of
+from strapdown.tables.checks import source_of, values_of
 
 if TYPE_CHECKING:
     from strapdown.evaluation.control_points import ControlPointScore
@@ -296,7 +296,7 @@ def _explained_by_grade(
 def _rejected(record: NavigationRecord) -> float:
     """Share of the components of all measurements that were rejected, percent."""
     weights = [
-        table[[c for c in table.columns if c.startswith("weight ")]].to_numpy(dtype=np.float64)
+        values_of(table, [f"weight {label}" for label in innovation_labels(table)])
         for table in record.innovations.values()
     ]
     flat = np.concatenate([np.empty(0), *(one.ravel() for one in weights)])

@@ -85,7 +85,7 @@ from strapdown.tables.checks import (
     find_gaps,
     values_of,
 )
-from strapdown.tables.gnss import GNSS, check_gnss, gnss_table
+from strapdown.tables.gnss import GNSS, check_gnss, gnss_table, usable
 from strapdown.tables.imu import (
     MOTION,
     SAMPLINGS,
@@ -162,5 +162,6 @@ __all__ = [
     "references_table",
     "trajectory_error_table",
     "trajectory_table",
+    "usable",
     "values_of",
 ]

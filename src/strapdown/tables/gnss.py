@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
@@ -122,10 +124,22 @@ def check_gnss(table: pd.DataFrame) -> None:
     _check_velocity_fits(table, source)
 
 
+def usable(table: pd.DataFrame, columns: Sequence[str]) -> NDArray[np.bool_]:
+    """Return the rows of a Gnss table with a quality and with finite standard deviations, (n,).
+
+    Parameters
+    ----------
+    table : DataFrame
+    columns : sequence of str
+        Standard deviations: infinite where a quantity was not measured.
+    """
+    sound = values_of(table, ["quality"])[:, 0] > 0.0
+    return np.asarray(sound & np.isfinite(values_of(table, columns)).all(axis=1))
+
+
 def _check_velocity_fits(table: pd.DataFrame, source: str | None) -> None:
     """Refuse velocities that match the positions only in another unit or order."""
-    good = values_of(table, ["quality"])[:, 0] > 0.0
-    good &= np.isfinite(values_of(table, [*POSITION_SD[:2], *VELOCITY_SD[:2]])).all(axis=1)
+    good = usable(table, [*POSITION_SD[:2], *VELOCITY_SD[:2]])
     if good.sum() <= LEAST_STEPS:
         return
     time = index_of(table)[good]

@@ -14,7 +14,7 @@ from strapdown._kernels import piecewise
 from strapdown.dsp.running_integral import running_integral
 from strapdown.errors import DataError, Finding
 from strapdown.frames import place_difference
-from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY, VELOCITY_SD
+from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY, VELOCITY_SD, usable
 from strapdown.tables.checks import RELATIVE, index_of, source_of, values_of
 
 __all__ = [
@@ -228,11 +228,10 @@ def find_time_offset(
 def _courses(gnss: pd.DataFrame, delay: float) -> tuple[Array, Array] | None:
     """Times on the clock of the positions, and horizontal velocity then."""
     time = index_of(gnss)
-    good = values_of(gnss, ["quality"])[:, 0] > 0.0
-    by_velocity = good & np.isfinite(values_of(gnss, VELOCITY_SD[:2])).all(axis=1)
+    by_velocity = usable(gnss, VELOCITY_SD[:2])
     if by_velocity.sum() > LEAST_STEPS:
         return time[by_velocity] - delay, values_of(gnss, VELOCITY)[by_velocity, :2]
-    good &= np.isfinite(values_of(gnss, POSITION_SD[:2])).all(axis=1)
+    good = usable(gnss, POSITION_SD[:2])
     if good.sum() <= LEAST_STEPS + 1:
         return None
     time, place = time[good], values_of(gnss, GEODETIC)[good]
@@ -432,8 +431,7 @@ def velocity_delay(table: pd.DataFrame) -> VelocityDelay | None:
     deviation allows for correlation, as of overlapping segments (Newey and West, Econometrica 55
     (1987) 703).
     """
-    good = values_of(table, ["quality"])[:, 0] > 0.0
-    good &= np.isfinite(values_of(table, [*POSITION_SD, *VELOCITY_SD])).all(axis=1)
+    good = usable(table, [*POSITION_SD, *VELOCITY_SD])
     if good.sum() <= GNSS_DELAY_LEAST_STEPS:
         return None
     time = index_of(table)[good]

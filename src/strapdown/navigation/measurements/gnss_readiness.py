@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from strapdown.constants import MAD_TO_SD
+from strapdown.dsp.true_runs import true_runs
 from strapdown.errors import DataError, Finding
 from strapdown.frames import ned_from_geodetic, place_difference, ways_between
 from strapdown.navigation.measurements.gnss import Gnss
@@ -17,7 +18,15 @@ from strapdown.navigation.measurements.gnss_clock import (
     find_velocity_delay,
     velocity_delay,
 )
-from strapdown.tables import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD, check_gnss, find_gaps
+from strapdown.tables import (
+    GEODETIC,
+    POSITION_SD,
+    VELOCITY,
+    VELOCITY_SD,
+    check_gnss,
+    find_gaps,
+    usable,
+)
 from strapdown.tables.checks import index_of, source_of, values_of
 
 __all__ = [
@@ -90,7 +99,7 @@ def white_position_sd(table: pd.DataFrame, delay: float = 0.0) -> tuple[float, f
         the same relative to the stated one, median. None with too few fixes at equal intervals.
     """
     sd, time = values_of(table, POSITION_SD)[:, :2], index_of(table)
-    good = (values_of(table, ["quality"])[:, 0] > 0.0) & np.isfinite(sd).all(axis=1)
+    good = usable(table, POSITION_SD[:2])
     if good.sum() < LEAST_ROWS:
         return None
     place = values_of(table, GEODETIC)[good]
@@ -100,8 +109,8 @@ def white_position_sd(table: pd.DataFrame, delay: float = 0.0) -> tuple[float, f
     measured = np.isfinite(values_of(table, VELOCITY_SD)[good][:, :2]).all(axis=1)
     if measured.all():
         v = values_of(table, VELOCITY)[good][:, :2]
-        then = [np.interp(time, time - delay, one) for one in v.T]
-        way = 0.5 * (np.column_stack(then)[1:] + np.column_stack(then)[:-1])
+        then = _without_delay(time, v, delay)
+        way = 0.5 * (then[1:] + then[:-1])
         apart = np.diff(time)
         left = (np.diff(place, axis=0) - way * apart[:, None]) / np.sqrt(2.0)
         even = np.abs(apart - step) < UNEVEN * step
@@ -114,6 +123,11 @@ def white_position_sd(table: pd.DataFrame, delay: float = 0.0) -> tuple[float, f
     white = MAD_TO_SD * np.median(left, axis=0)
     share = MAD_TO_SD * np.median(left / stated, axis=0)
     return float(np.sqrt(np.mean(white**2))), float(np.sqrt(np.mean(share**2)))
+
+
+def _without_delay(time: Array, velocity: Array, delay: float) -> Array:
+    """Velocities at the stamps of the positions."""
+    return np.column_stack([np.interp(time, time - delay, one) for one in velocity.T])
 
 
 def lasting_position_sd(table: pd.DataFrame, delay: float = 0.0) -> tuple[float, float] | None:
@@ -141,12 +155,12 @@ def lasting_position_sd(table: pd.DataFrame, delay: float = 0.0) -> tuple[float,
     """
     columns = [*POSITION_SD[:2], *VELOCITY_SD[:2]]
     sd, time = values_of(table, columns), index_of(table)
-    good = (values_of(table, ["quality"])[:, 0] > 0.0) & np.isfinite(sd).all(axis=1)
+    good = usable(table, columns)
     if good.sum() < LEAST_ROWS:
         return None
     sd, time = sd[good], time[good]
     place, v = values_of(table, GEODETIC)[good], values_of(table, VELOCITY)[good][:, :2]
-    then = np.column_stack([np.interp(time, time - delay, one) for one in v.T])
+    then = _without_delay(time, v, delay)
     apart = np.diff(time)
     step = float(np.median(apart))
     gained = np.gradient(then, time, axis=0)
@@ -222,9 +236,7 @@ def check_fixes(table: pd.DataFrame) -> list[Finding]:
     check_gnss(table)
     source = source_of(table)
     time = index_of(table)
-    good = np.asarray(values_of(table, ["quality"])[:, 0] > 0.0)
-    placed = good & np.isfinite(values_of(table, POSITION_SD)).all(axis=1)
-    fast = good & np.isfinite(values_of(table, VELOCITY_SD)).all(axis=1)
+    placed, fast = usable(table, POSITION_SD), usable(table, VELOCITY_SD)
     if not len(time):
         raise DataError("navigation.no-fixes", file=source, quantity="time")
     if not (placed | fast).any():
@@ -232,7 +244,7 @@ def check_fixes(table: pd.DataFrame) -> list[Finding]:
             "navigation.none-rows-fix-quality-or", file=source, quantity="quality", count=len(time)
         )
     _refuse_units(table, time, placed, source)
-    found = [*_certain(table, good, source), *_gaps(time, placed | fast, source)]
+    found = [*_certain(table, source), *_gaps(time, placed | fast, source)]
     if not placed.any():
         found.append(
             Finding(
@@ -243,8 +255,8 @@ def check_fixes(table: pd.DataFrame) -> list[Finding]:
             )
         )
     found += _jumps(table, time, placed, fast, source)
-    found += _repeats(table, source)
-    return found
+    frozen, speed = repeated_rows(table)
+    return [*found, _repeats(source, frozen, speed)] if frozen.any() else found
 
 
 def _refuse_units(table: pd.DataFrame, time: Array, placed: Flags, source: str | None) -> None:
@@ -283,8 +295,9 @@ def _refuse_units(table: pd.DataFrame, time: Array, placed: Flags, source: str |
             raise DataError(code, file=source, row=row, quantity="lat, lon", ratio=ratio)
 
 
-def _certain(table: pd.DataFrame, good: Flags, source: str | None) -> list[Finding]:
+def _certain(table: pd.DataFrame, source: str | None) -> list[Finding]:
     out = []
+    good = np.asarray(values_of(table, ["quality"])[:, 0] > 0.0)
     for columns, option in (
         (POSITION_SD, "least_position_sd_m"),
         (VELOCITY_SD, "least_velocity_sd_m_per_s"),
@@ -365,21 +378,16 @@ def _jumps(
     ]
 
 
-def _repeats(table: pd.DataFrame, source: str | None) -> list[Finding]:
-    """Rows that repeat an earlier fix while the vehicle moves."""
-    frozen, speed = repeated_rows(table)
-    if not frozen.any():
-        return []
-    return [
-        Finding(
-            "navigation.receiver-repeats",
-            file=source,
-            row=int(np.argmax(frozen)) + 1,
-            quantity="lat, lon, alt, VN, VE, VD",
-            rows=_rows(frozen),
-            speed=speed,
-        )
-    ]
+def _repeats(source: str | None, frozen: Flags, speed: float) -> Finding:
+    """Report the rows that repeat an earlier fix while the vehicle moves."""
+    return Finding(
+        "navigation.receiver-repeats",
+        file=source,
+        row=int(np.argmax(frozen)) + 1,
+        quantity="lat, lon, alt, VN, VE, VD",
+        rows=_rows(frozen),
+        speed=speed,
+    )
 
 
 def repeated_rows(table: pd.DataFrame) -> tuple[Flags, float]:
@@ -401,17 +409,15 @@ def repeated_rows(table: pd.DataFrame) -> tuple[Flags, float]:
         Of the vehicle in the first of them; 0 without any.
     """
     sd, velocity_sd = values_of(table, POSITION_SD), values_of(table, VELOCITY_SD)
-    good = values_of(table, ["quality"])[:, 0] > 0.0
-    placed = good & np.isfinite(sd).all(axis=1)
-    fast = good & np.isfinite(velocity_sd[:, :2]).all(axis=1)
+    placed, fast = usable(table, POSITION_SD), usable(table, VELOCITY_SD[:2])
     place, time = values_of(table, GEODETIC), index_of(table)
     velocity = np.where(np.isfinite(velocity_sd), values_of(table, VELOCITY), 0.0)
     values = np.column_stack([place, velocity])
     same = np.zeros(len(values), dtype=np.bool_)
     same[1:] = (values[1:] == values[:-1]).all(axis=1) & placed[1:] & placed[:-1]
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
     out, first = np.zeros(len(values), dtype=np.bool_), 0.0
-    for a, b in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+    for run in true_runs(same):
+        a, b = run.start, run.stop
         if b - a < ALIKE - 1:
             continue
         if fast[a]:
@@ -434,13 +440,13 @@ def repeated_rows(table: pd.DataFrame) -> tuple[Flags, float]:
 
 def without_repeats(table: pd.DataFrame) -> tuple[pd.DataFrame, tuple[Finding, ...]]:
     """Return fixes of which those that `repeated_rows` finds have no quality, and the finding."""
-    found = _repeats(table, source_of(table))
-    if not found:
+    frozen, speed = repeated_rows(table)
+    if not frozen.any():
         return table, ()
     out = table.copy()
     out.attrs = dict(table.attrs)
-    out.loc[repeated_rows(table)[0], "quality"] = 0.0
-    return out, tuple(found)
+    out.loc[frozen, "quality"] = 0.0
+    return out, (_repeats(source_of(table), frozen, speed),)
 
 
 def _rows(struck: Flags) -> list[int | str]:
