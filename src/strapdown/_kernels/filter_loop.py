@@ -376,6 +376,7 @@ def over_fixes(
     fix_time,
     fixes,
     told,
+    aged,
     marked_at,
     marked,
     marked_sensors,
@@ -383,7 +384,9 @@ def over_fixes(
 ):
     """Advance over steps and fixes, to the end of either, after the given number of steps.
 
-    `rows` are changed where a fix cuts a step. Return the status, the steps made, those of the open
+    `rows` are changed where a fix cuts a step. Snapshots are made after each fix, [:, 1], and
+    before it, [:, 0], where the last one is more than `aged` seconds old (otherwise its time is
+    NaN). Return the status, the steps made, those of the open
     group, the fixes processed, and the rows filled for a smoother. The call ends early as
     `over_steps`, or where these rows are full. Instants within `same` seconds count as one.
     """
@@ -462,6 +465,20 @@ def over_fixes(
             x[j] = 0.0
         for j in range(3):
             told[done, 2, j] = 1.0
+        marked_at[done, 0] = math.nan
+        if note_at > -math.inf and epoch > note_at - interval + aged:
+            marked_at[done, 0] = times[AT_STEP]
+            mark(
+                form,
+                which != WANDER,
+                covariance,
+                sensors,
+                turn,
+                P,
+                marked[done, 0],
+                marked_sensors[done, 0],
+                marked_sd[done, 0],
+            )
         if notes.shape[0] > 0:
             pack_covariance(form >= UD, covariance, P, notes[noted], begin_of_move(n))
         if form == UD:
@@ -484,7 +501,7 @@ def over_fixes(
             for j in range(n):
                 notes[noted, begin_of_taken(n) + j] = x[j]
             noted += 1
-        marked_at[done] = times[AT_STEP]
+        marked_at[done, 1] = times[AT_STEP]
         mark(
             form,
             which != WANDER,
@@ -492,9 +509,9 @@ def over_fixes(
             sensors,
             turn,
             P,
-            marked[done],
-            marked_sensors[done],
-            marked_sd[done],
+            marked[done, 1],
+            marked_sensors[done, 1],
+            marked_sd[done, 1],
         )
         for j in range(open_history.shape[1]):
             open_history[0, j] = state[j]

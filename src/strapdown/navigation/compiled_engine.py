@@ -146,7 +146,7 @@ class CompiledEngine(Engine):
         rows: Array,
         history: Array,
         made: int,
-        notes: tuple[float, float],
+        notes: tuple[float, float, float],
         arm: Array,
         fixes: Epochs,
     ) -> tuple[int, tuple[Array, ...], bool]:
@@ -158,8 +158,9 @@ class CompiledEngine(Engine):
             As `propagate`; `rows` are changed where a fix cuts a step.
         made : int
             Steps that are already done.
-        notes : tuple of float, (2,), s
-            Time to stop at, as of `propagate`, and from a mark to the next such time.
+        notes : tuple of float, (3,), s
+            Time to stop at, as of `propagate`; from a mark to the next such time; age of a mark
+            beyond which another is made before a fix.
         arm : ndarray, (3,), m
             Of the antenna.
         fixes : Epochs
@@ -169,14 +170,19 @@ class CompiledEngine(Engine):
         -------
         made : int
         fixed : tuple of ndarray, of the m fixes that were taken
-            Times (m,), s; innovation, its predicted variance and weight (m, 3, 3); then, as of a
-            `CovarianceSnapshot` after each, covariance (m, 9, 9), sensors and their sd (m, k).
+            Innovation, its predicted variance and weight (m, 3, 3); then, as of a
+            `CovarianceSnapshot` before (NaN without one) and after each, times (m, 2), s,
+            covariance (m, 2, 9, 9), sensors and their sd (m, 2, k).
         noted : bool
             Whether it stopped for a covariance to be noted.
         """
-        (note_at, interval), size, k = notes, len(fixes.time), self._n - 9
-        told, at = np.empty((size, kernel.TOLD, 3)), np.empty(size)
-        noted, sensors, sd = np.empty((size, 9, 9)), np.empty((size, k)), np.empty((size, k))
+        (note_at, interval, aged), size, k = notes, len(fixes.time), self._n - 9
+        told, at, noted = (
+            np.empty((size, kernel.TOLD, 3)),
+            np.empty((size, 2)),
+            np.empty((size, 2, 9, 9)),
+        )
+        sensors, sd = np.empty((size, 2, k)), np.empty((size, 2, k))
         why, done = kernel.FULL, 0
         while why == kernel.FULL:
             # A fix needs a propagation and an update.
@@ -189,7 +195,7 @@ class CompiledEngine(Engine):
                 self._count,
                 self._room,
                 self.navigation.step,
-                note_at if not done else at[done - 1] + interval,
+                note_at if not done else at[done - 1, 1] + interval,
                 interval,
                 time,
                 rows,
@@ -203,6 +209,7 @@ class CompiledEngine(Engine):
                 fixes.time[done:],
                 fixes.values[done:],
                 told[done:],
+                aged,
                 at[done:],
                 noted[done:],
                 sensors[done:],
@@ -212,7 +219,7 @@ class CompiledEngine(Engine):
         if why == kernel.BAD_FIX:
             raise bad_observation(0, told[done, 0, 0], told[done, 1, 0], fixes.values[done, 4:])
         self._after(why, time, made)
-        fixed = tuple(each[:done] for each in (at, told, noted, sensors, sd))
+        fixed = tuple(each[:done] for each in (told, at, noted, sensors, sd))
         return int(made), fixed, why == kernel.NOTE
 
     def close(self) -> None:

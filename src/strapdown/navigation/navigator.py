@@ -268,9 +268,9 @@ class NavigatorState:
 #: Averaging time that removes vibration from rates and forces, s: receivers do not see it beyond a
 #: tenth of a second, and a vehicle hardly changes its acceleration in that time.
 STEADY_TIME = 0.2
-#: After so many intervals of marks without an observation, a mark is added before the next
-#: observation; its time stamp is so much earlier, s.
-ALONE = 1.5
+#: A mark older than this is followed by another before an observation, so much earlier, s: what
+#: lies between two marks would not show how far the standard deviation had grown.
+AGED = 0.15
 JUST_BEFORE = 1e-6
 #: Relative size up to which a negative variance is rounding.
 ROUNDING = 1e-12
@@ -362,7 +362,7 @@ class EpochLoop:
         return False
 
     def _fixes(self, made: int, time: Array, rows: Array) -> int:
-        """Process the fixes of a single receiver up to an outage; return the steps."""
+        """Process the fixes of a single receiver, up to one without VD; return the steps."""
         aid, engine = self.navigator.lone_receiver, self.engine
         if aid is None or not isinstance(engine, CompiledEngine) or self.tilted:
             return made
@@ -371,10 +371,14 @@ class EpochLoop:
         queue = self.queues[aid.name]
         while made < len(time):
             due = int(queue.time.searchsorted(time[-1] + SAME_INSTANT, side="right"))
-            usual = self._until_outage(Epochs(queue.time[:due], queue.values[:due]))
-            if not usual.time.size:
+            if not due:
                 break
-            notes = (self.marked + interval, interval)
+            level = np.flatnonzero(queue.values[:due, 0] == HORIZONTAL_CODE)
+            whole = int(level[0]) if len(level) else due
+            if not whole:
+                break
+            usual = Epochs(queue.time[:whole], queue.values[:whole])
+            notes = (self.marked + interval, interval, AGED)
             made, fixed, stopped = engine.propagate_with_fixes(
                 time, rows, self.history, made, notes, arm, usual
             )
@@ -386,31 +390,23 @@ class EpochLoop:
         self.queues[aid.name] = queue
         return made
 
-    def _until_outage(self, queue: Epochs) -> Epochs:
-        """Consecutive whole epochs, and the last observation, before an outage."""
-        if not queue.time.size:
-            return queue
-        longest = ALONE * self.navigator.mark_interval
-        apart = np.diff(queue.time, prepend=self.observed) > longest
-        ends = apart | (queue.values[:, 0] == HORIZONTAL_CODE)
-        count = int(np.argmax(ends)) if ends.any() else len(ends)
-        return Epochs(queue.time[:count], queue.values[:count])
-
     def _fixed(self, aid: Gnss, fixes: Epochs, fixed: tuple[Array, ...]) -> None:
         """Record the results of position fixes."""
-        time, innovations, *marks = fixed
-        count, times = len(time), time.tolist()
+        innovations, times, *marks = fixed
+        count, after = len(times), times[:, 1].tolist()
         codes = fixes.values[:count, 0].tolist()
         names = {code: aid.names(code) for code in set(codes)}
         told = map(Innovations, innovations[:, 0], innovations[:, 1], innovations[:, 2])
         self.seen += [
             InnovationRecord(at, *names[code], nu)
-            for at, code, nu in zip(times, codes, told, strict=True)
+            for at, code, nu in zip(after, codes, told, strict=True)
         ]
-        for mark in map(CovarianceSnapshot, times, *marks):
+        times = times - [JUST_BEFORE, 0.0]
+        made = np.isfinite(times)
+        for mark in map(CovarianceSnapshot, times[made].tolist(), *(each[made] for each in marks)):
             self._add_mark(mark)
         if count:
-            self.observed = times[-1]
+            self.observed = after[-1]
 
     def state(self) -> NavigatorState:
         """Current state."""
@@ -481,7 +477,7 @@ class EpochLoop:
                 told += [(aid, one) for one in aid.observe(view, values)]
             self.queues[aid.name] = Epochs(queue.time[count:], queue.values[count:])
         if told:
-            if at > self.observed + ALONE * self.navigator.mark_interval:
+            if np.isfinite(self.marked) and at > self.marked + AGED:
                 self.mark(JUST_BEFORE)
             self.observed = at
             observations = [one for _, one in told]

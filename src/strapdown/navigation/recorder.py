@@ -13,7 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError
-from strapdown.navigation.navigator import Navigator
+from strapdown.navigation.navigator import JUST_BEFORE, Navigator
 from strapdown.navigation.record import (
     CovarianceSnapshot,
     Event,
@@ -36,6 +36,8 @@ Array = NDArray[np.float64]
 
 # A time stamp within this fraction of the interval counts as on the grid.
 NEAR = 1e-6
+#: Marks before and after an observation are closer than this, s.
+PAIR = 2.0 * JUST_BEFORE
 
 
 @dataclass(frozen=True)
@@ -73,6 +75,8 @@ class FullRecorder(Recorder):
 @dataclass(frozen=True)
 class IntervalRecorder(Recorder):
     """The first sample, and the first mark, of each interval of an even grid from time zero.
+
+    Of marks before and after an observation both or none are kept.
 
     Attributes
     ----------
@@ -221,10 +225,15 @@ class Tape:
         cell = float(self._cells(np.array([mark.time]))[0])
         # The newest one is kept separately, so that the last of a run is always recorded.
         if cell > self._mark_cell:
+            newest = self._newest_mark
+            if newest is not None and mark.time <= newest[0, 0] + PAIR:
+                row = np.vstack([newest, row])
             self._marks = self._marks.and_then(row)
             self._mark_cell, self._newest_mark = cell, None
         elif mark.time == self._marks.rows[-1, 0]:
             self._marks.rows[-1] = row
+        elif mark.time <= self._marks.rows[-1, 0] + PAIR:
+            self._marks = self._marks.and_then(row)
         else:
             self._newest_mark = row
 
