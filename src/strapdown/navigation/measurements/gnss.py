@@ -55,6 +55,9 @@ LARGEST_OFFSET = 2.0
 #: Correlation time of the errors of positions by code: reflections last for tens of seconds to
 #: minutes, the atmosphere and orbits for longer, s.
 LASTING = 100.0
+#: A velocity or acceleration is clear of its error from so many of its standard deviations.
+CLEAR = 3.0
+TINY = 1e-300
 
 
 def _in(unit: str, default: float = 0.0) -> float:
@@ -248,11 +251,19 @@ class Gnss(TabulatedMeasurement):
         place, velocity, acceleration = moving(view, arm, self._arm)
         of_place = values[0] == POSITION_CODE
         computed = place if of_place else velocity
+        C_nl, variance = view.C_ln.T, values[4:]
         if view.has(self._offset):
             late = float(view.estimate(self._offset)[0])
-            computed = _later(view, self._offset, late, of_place, place, velocity, acceleration)
-        C_nl, variance = view.C_ln.T, values[4:]
+            speed = velocity.after(acceleration, late)
+            shift = speed if of_place else acceleration
+            computed = velocity.after(acceleration, late)
+            if of_place:
+                computed = place.after(velocity, late).after(acceleration, 0.5 * late**2)
         z, H = C_nl @ computed.value, C_nl @ computed.H
+        unclear = np.zeros(3)
+        if view.has(self._offset):
+            by_offset, unclear = _by_offset(view, self._offset, C_nl @ shift.value, C_nl @ shift.H)
+            H[:, view.place(self._offset)] = -by_offset[:, None]
         if of_place:
             lat, lon, alt = values[1:4].tolist()
             measured = NavState(view.time, lat, lon, alt, np.zeros(3), view.here.q_nb)
@@ -267,7 +278,7 @@ class Gnss(TabulatedMeasurement):
             z -= values[1:4]
         name, labels = self.names(float(values[0]))
         n = len(labels)
-        return [Observation(name, z[:n], H[:n], variance[:n], labels)]
+        return [Observation(name, z[:n], H[:n], (variance + unclear)[:n], labels)]
 
     def names(self, code: float) -> tuple[str, tuple[str, ...]]:
         """Return the name of the observation of an epoch, and the labels of its components."""
@@ -288,23 +299,26 @@ class Gnss(TabulatedMeasurement):
         return f"{self.name}.position_error"
 
 
-def _later(
-    view: View,
-    name: str,
-    late: float,
-    of_place: bool,
-    place: Moving,
-    velocity: Moving,
-    acceleration: Moving,
-) -> Moving:
-    """Position or velocity after the epoch by the error of the assumed offset."""
-    speed = velocity.after(acceleration, late)
-    out, changes = speed, acceleration
-    if of_place:
-        out, changes = place.after(velocity, late).after(acceleration, 0.5 * late**2), speed
-    H = out.H.copy()
-    H[:, view.place(name)] = -changes.value[:, None]
-    return Moving(out.value, H)
+def _by_offset(view: View, name: str, shift: Array, of_shift: Array) -> tuple[Array, Array]:
+    """Derivative of what is observed by the time offset, and variance of what that leaves out.
+
+    The derivative is the velocity (of a position) or the acceleration, and as uncertain as the
+    state is. At rest it is error alone: as a derivative it would make the errors of the state
+    observe the offset, whose standard deviation falls falsely. By as much as it is not clear of
+    its own error it is noise, in proportion to the offset's variance.
+
+    Parameters
+    ----------
+    shift : ndarray, (3,)
+        Velocity, m/s, or acceleration, m/s², north-east-down.
+    of_shift : ndarray, (3, p)
+        Its error by the physical errors.
+    """
+    P = view.covariance
+    at = view.place(name).start
+    own = np.einsum("ij,jk,ik->i", of_shift, P, of_shift)
+    clear = shift * np.maximum(1.0 - CLEAR**2 * own / np.maximum(shift**2, TINY), 0.0)
+    return clear, P[at, at] * (np.square(shift - clear) + own)
 
 
 def _refuse_certain(

@@ -249,3 +249,29 @@ def test_a_velocity_without_a_vertical_component_is_one_of_two():
     np.testing.assert_array_equal(part.z, whole.z[:2])
     np.testing.assert_array_equal(part.H, whole.H[:2])
     np.testing.assert_array_equal(part.R, whole.R[:2])
+
+
+@pytest.mark.parametrize("sd", [0.01, 40.0])
+def test_a_velocity_within_its_own_error_does_not_show_the_offset(sd):
+    """It is noise then: as a derivative it would lower the offset's deviation by chance."""
+    plain = view_of("ned")
+    offset = plain.place("rtk.time_offset").start
+    P = np.zeros((plain.columns, plain.columns))
+    P[3:6, 3:6] = sd**2 * np.eye(3)
+    P[offset, offset] = 0.3**2
+    view = replace(plain, covariance_of=lambda: P)
+    row = rows_of(AID, table_of((55.0, 37.0, 300.0), START.v_n))[0]
+    (before,), (after,) = AID.observe(plain, row), AID.observe(view, row)
+    speed = -before.H[:, offset]
+    np.testing.assert_array_equal(after.z, before.z)
+    if sd > 1.0:
+        np.testing.assert_array_equal(after.H[:, offset], 0.0)
+        added = 0.3**2 * (speed**2 + sd**2)
+    else:
+        # Shrunk by nine times the share of the error; the rest is noise again.
+        shrunk = 9.0 * sd**2 / speed**2
+        np.testing.assert_allclose(after.H[:, offset], -speed * (1.0 - shrunk), rtol=1e-9)
+        added = 0.3**2 * (np.square(speed * shrunk) + sd**2)
+    np.testing.assert_allclose(after.R - before.R, added, rtol=1e-9)
+    others = np.arange(plain.columns) != offset
+    np.testing.assert_array_equal(after.H[:, others], before.H[:, others])
