@@ -431,19 +431,23 @@ def velocity_delay(table: pd.DataFrame) -> VelocityDelay | None:
     deviation allows for correlation, as of overlapping segments (Newey and West, Econometrica 55
     (1987) 703).
     """
-    good = usable(table, [*POSITION_SD, *VELOCITY_SD])
+    # Many receivers output speed and course only.
+    good, axes = usable(table, [*POSITION_SD, *VELOCITY_SD]), 3
+    level = usable(table, [*POSITION_SD[:2], *VELOCITY_SD[:2]])
+    if 2 * good.sum() < level.sum():
+        good, axes = level, 2
     if good.sum() <= GNSS_DELAY_LEAST_STEPS:
         return None
     time = index_of(table)[good]
     time = time - time[0]
-    place, velocity = values_of(table, GEODETIC)[good], values_of(table, VELOCITY)[good]
+    place, velocity = values_of(table, GEODETIC)[good], values_of(table, VELOCITY)[good, :axes]
     steps = np.diff(time)
     apart = max(1, round(PIECE / float(np.median(steps))))
     if len(time) <= GNSS_DELAY_LEAST_STEPS + apart:
         return None
     from scipy.interpolate import CubicSpline
 
-    moved = place_difference(place[apart:], place[:-apart])
+    moved = place_difference(place[apart:], place[:-apart])[:, :axes]
     speed = CubicSpline(time, velocity)
     way = speed.antiderivative()
     # In a gap, or beyond its end, the spline is not valid.

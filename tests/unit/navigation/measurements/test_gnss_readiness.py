@@ -248,3 +248,14 @@ def test_what_is_configured_is_not_told_again():
     assert gnss_readiness(table, imu())
     assert not gnss_readiness(table, imu(), Gnss(name="rtk", time_offset=0.3))
     assert not gnss_readiness(table, imu(), Gnss(name="rtk", time_offset_sd=0.2))
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.5])
+def test_speed_and_course_alone_show_their_delay(delay):
+    """A phone and a receiver's RMC sentence have no vertical velocity."""
+    table = late(delay, rate=1.0)
+    level = table[VELOCITY_SD].to_numpy().copy()
+    level[:, 2] = np.inf
+    found, whole = velocity_delay(remade(table, velocity_sd=level)), velocity_delay(table)
+    assert found.sd < 1.5 * whole.sd
+    assert found.delay == pytest.approx(delay, abs=4.0 * found.sd)
