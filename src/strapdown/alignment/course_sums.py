@@ -87,7 +87,7 @@ def drive_sums(imu: pd.DataFrame, time: Array, means: Array, errors: Array) -> D
     n = len(stamps) - 1
     before = np.clip(np.searchsorted(stamps, time, side="right") - 1, 0, n - 1)
     even = np.searchsorted(stamps, np.linspace(stamps[0], stamps[-1], 2 * STRETCHES + 1)[1:-1])
-    ends = np.unique(np.concatenate([before, np.clip(even, 1, n), [n]]))
+    ends = np.unique(np.concatenate([before, before + 1, np.clip(even, 1, n), [n]]))
     ends = ends[ends > 0].astype(np.int64)
     sums = sum_inertially(table, ends)
     dv = np.ascontiguousarray(motion_increments(table)[DV].to_numpy(dtype=np.float64))
@@ -107,20 +107,27 @@ def drive_sums(imu: pd.DataFrame, time: Array, means: Array, errors: Array) -> D
     stretch, by_gyro, by_accel, by_turn = _partials(
         sums, end, gained[np.r_[0, ends]], means - errors[:6]
     )
-    edge = np.searchsorted(np.r_[0, ends], before)
-    edges = sums.stamps[np.r_[0, ends]]
+    nodes = np.r_[0, ends]
+    edge, next_edge = np.searchsorted(nodes, before), np.searchsorted(nodes, before + 1)
+    edges = sums.stamps[nodes]
+
+    def at(values: Array) -> Array:
+        """Values at the fixes, between two samples."""
+        share = part[:, :, None]
+        return np.asarray((1.0 - share) * values[edge] + share * values[next_edge])
+
     return DriveSums(
         stamps[-1] - time,
         end @ turned,
         (gained[-1] - there) @ end.T,
         _rate(sums.turned, stamps, time),
         stretch,
-        by_gyro[edge],
-        by_accel[edge],
-        by_turn[edge],
+        at(by_gyro),
+        at(by_accel),
+        at(by_turn),
         (gained[-1] * until_end - (sums.fallen[-1] - fallen)) @ end.T,
-        _integral_to_end(edges, by_turn)[edge],
-        _integral_to_end(edges, by_accel)[edge],
+        at(_integral_to_end(edges, by_turn)),
+        at(_integral_to_end(edges, by_accel)),
     )
 
 
@@ -197,6 +204,8 @@ LEAST_SD = 1e-6
 #: Positions are differentiated over the shortest of these times, s, over which the median course
 #: of the moving vehicle has a third of the largest standard deviation; else over the last.
 BASELINES = (1.0, 2.0, 4.0, 8.0, 12.0)
+#: Vertical velocities by heights are differences over this time, s.
+CLIMBS = 4.0
 #: Fewer positions alone determine neither velocity nor level.
 LEAST_PLACES = 4
 
@@ -306,9 +315,25 @@ def course_fixes(
             good=int(good.sum()),
         )
     rows = np.flatnonzero(good)
+    if not np.isfinite(sd[rows, 2]).any():
+        velocity, sd = _climbs(gnss, rows[placed[rows]], velocity, sd)
     time, velocity, sd = time[rows], velocity[rows], np.maximum(sd[rows], LEAST_SD)
     fast = _fast(time, velocity, sd, rows, source, least_speed, largest_sd)
     return CourseFixes(time, velocity, sd, fast, rows + 1, source)
+
+
+def _climbs(gnss: pd.DataFrame, rows: Indices, velocity: Array, sd: Array) -> tuple[Array, Array]:
+    """Vertical velocities by the heights, of fixes with speed and course alone."""
+    if len(rows) < LEAST_PLACES:
+        return velocity, sd
+    time = gnss.index.to_numpy(dtype=np.float64)[rows]
+    down = -gnss["alt"].to_numpy(dtype=np.float64)[rows]
+    own = np.maximum(gnss[POSITION_SD[2]].to_numpy(dtype=np.float64)[rows], LEAST_SD)
+    baseline = max(CLIMBS, 2.0 * float(np.median(np.diff(time))))
+    climb, climb_sd = _differences(time, down[:, None], own[:, None], baseline)
+    velocity, sd = velocity.copy(), sd.copy()
+    velocity[rows, 2], sd[rows, 2] = climb[:, 0], climb_sd[:, 0]
+    return velocity, sd
 
 
 def _by_places(

@@ -37,6 +37,7 @@ SAME_BIAS = 0.01  # rad/s: rests of one log share their bias to within this
 # A noise-free (simulated) sensor is at rest where it is constant to rounding.
 ROUNDING = 1e-9  # rad/s
 # Number of parts of a rest whose means give the standard deviation of the overall mean.
+TINY = 1e-300
 LEAST_PARTS, MOST_PARTS = 4, 20
 
 
@@ -229,15 +230,17 @@ def sd_of_mean(time: Array, values: Array) -> Array:
     `time` ((n,), s). `values` ((n, k)). Returns (k,): the larger of ``sd / sqrt(n)``, valid for
     white noise, and the estimate from the means of 4 to 20 parts of at least half a second, valid
     for noise correlated over less than a part (batch means; Law and Kelton 1984,
-    doi:10.1287/opre.32.6.1241). A stretch of less than 2 s has only the first.
+    doi:10.1287/opre.32.6.1241). A stretch of less than 2 s is too short for that: its n values
+    count as ``n (1 - r) / (1 + r)``, with r the autocorrelation from value to value.
     """
-    white = values.std(axis=0, ddof=1) / np.sqrt(len(values))
+    n, off = len(values), values - values.mean(axis=0)
+    white = values.std(axis=0, ddof=1) / np.sqrt(n)
     parts = min(MOST_PARTS, int((time[-1] - time[0]) / WINDOW))
-    if parts < LEAST_PARTS:
-        return np.asarray(white, dtype=np.float64)
-    edges = np.linspace(0, len(values), parts + 1).astype(np.int64)
-    if np.diff(edges).min() < 1:
-        return np.asarray(white, dtype=np.float64)
+    edges = np.linspace(0, n, max(parts, 1) + 1).astype(np.int64)
+    if parts < LEAST_PARTS or np.diff(edges).min() < 1:
+        power = np.maximum(np.square(off).sum(axis=0), TINY)
+        r = np.clip((off[1:] * off[:-1]).sum(axis=0) / power, 0.0, 1.0 - 2.0 / n)
+        return np.asarray(white * np.sqrt((1.0 + r) / (1.0 - r)), dtype=np.float64)
     means = _window_mean(values, edges[:-1], edges[1:])
     return np.asarray(np.maximum(white, means.std(axis=0, ddof=1) / np.sqrt(parts)))
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from strapdown.sensors.rest import find_rests
+from strapdown.sensors.rest import find_rests, sd_of_mean
 from strapdown.tables import imu_table
 
 
@@ -76,3 +76,18 @@ def test_a_steady_turn_alone_is_no_rest():
 
 def test_a_bias_at_the_limit_of_a_cheap_gyro_is_a_rest():
     assert len(find_rests(log(100, 2e-3, [], bias=tuple(np.radians([18.0, 5.0, 0.0]))))) == 1
+
+
+def test_a_mean_of_two_seconds_of_rocking_is_not_white_noise():
+    """A moored boat: a second of a slow swing has a mean rate, and next to no scatter about it."""
+    time = np.arange(120) / 100.0
+    rng = np.random.default_rng(2)
+    noise = 1e-3 * rng.normal(size=(120, 3))
+    assert (sd_of_mean(time, noise) < 1.5e-3 / np.sqrt(120)).all()
+    phases = np.linspace(0.0, np.pi, 60)
+    swing = 0.02 * np.sin(2.0 * np.pi * 0.3 * time[:, None] + phases)
+    sd = sd_of_mean(time, swing + 1e-3 * rng.normal(size=swing.shape))
+    # Its mean over whole periods is zero: the mean over this part is the error. A swing that is
+    # longer than the part scatters less than it is off; as white noise it is off by fifteen.
+    off = np.abs(swing.mean(axis=0))
+    assert np.median(off / sd) < 3.0 < 10.0 < np.median(off / (swing.std(axis=0) / np.sqrt(120)))
