@@ -30,10 +30,13 @@ from strapdown.navigation.measurements.measurement import (
     ROTATION,
     VELOCITY,
     Measurement,
+    View,
 )
+from strapdown.navigation.measurements.standstill import rate_at_rest
 from strapdown.navigation.modes import Aligned, CoarseMode, FineMode
 from strapdown.prefilter.prefilter import CHANNELS
 from strapdown.rotation import rotate
+from strapdown.sensors.rest import sd_of_mean
 from strapdown.tables import GEODETIC, MOTION, POSITION_SD, VELOCITY_SD, check_gnss, usable
 from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
 from strapdown.tables.checks import index_of, source_of, values_of
@@ -62,6 +65,9 @@ Array = NDArray[np.float64]
 PLACE = slice(39, 42)
 # Tolerance of an instant, s.
 INSTANT = 1e-7
+# A mean rate of a rest beyond so many standard deviations is a turn. A body that stands turns by so
+# much from the begin to the end, rad.
+TURNS, SWAY = 4.0, math.radians(0.1)
 # The rate at an instant is a mean over this time before and after it, s.
 STEADY = 0.1
 
@@ -153,7 +159,37 @@ def handed_over(chain: NavigationPipeline, state: PipelineState, found: Aligned)
     start = NavState.from_degrees(site.lat_deg, site.lon_deg, site.alt, time=state.time)
     P = np.diag(np.square(np.concatenate([sd, chain.velocity_sd])))
     by_others = None if chain.site is not None else _by_antenna(chain, state, q_nb, still, still)
-    return from_alignment(filter_, found.alignment, start, P, rest, by_others)
+    begun = from_alignment(filter_, found.alignment, start, P, rest, by_others)
+    return (
+        _rested(filter_, begun, _window(chain, state)) if found.alignment.heading_given else begun
+    )
+
+
+def _rested(filter_: ErrorFilter, begun: FilterState, kept: Array) -> FilterState:
+    """State with the gyro errors that the mean rate of the levelled rest shows.
+
+    Without them a heading that was stated is lost at the rate of an unknown bias before the vehicle
+    moves. A rate beyond what the stated errors allow is a turn, and tells nothing.
+    """
+    mean = kept[:, 1:7].mean(axis=0)
+    view = View(
+        mechanization=filter_.mechanization,
+        model=filter_.model,
+        time=begun.time,
+        state=begun.mechanization,
+        row=begun.row,
+        sensors=begun.sensors,
+        rate=mean[:3],
+        force=mean[3:],
+    )
+    sway = SWAY / max(float(kept[-1, 0] - kept[0, 0]), INSTANT)
+    variance = np.square(sd_of_mean(kept[:, 0], kept[:, 1:4])) + sway**2
+    one = rate_at_rest("rest.rate", view, mean, variance)
+    P = filter_.physical_covariance(begun)
+    expected = np.einsum("ij,jk,ik->i", one.H, P, one.H) + variance
+    if (np.square(one.z) > TURNS**2 * expected).any():
+        return begun
+    return filter_.observe(begun, [one], [None])[0]
 
 
 def _in_motion(

@@ -618,18 +618,31 @@ class ZeroRate(StandstillAid):
         """Return the rate minus the Earth's, body axes, unless the velocity is far from zero."""
         if not self.near_rest(view):
             return []
-        earth = view.ellipsoid.rotation_rate * view.level[AXIS : AXIS + 3]
-        C_bl = view.C_lb.T
-        # A scale factor acts on the true rate, at rest the Earth's: with the reading, that of an
-        # axis would be correlated with its bias.
-        readings = np.concatenate([values[MEAN_RATE], values[MEAN_FORCE]])
-        H = rate_columns(view, C_bl @ earth, view.without_errors(readings)[3:])
-        z = values[MEAN_RATE] - H[:, PHYSICAL:] @ view.sensors - C_bl @ earth
-        H[:, ROTATION] = -C_bl @ cross_matrix(earth)
         count = float(values[COUNT])
         used = max(self.window / self.interval, 1.0) if self.interval else count
         R = used * (values[RATE_VARIANCE] / count + math.radians(self.sd_deg_per_s) ** 2)
-        return [Observation(f"{self.name}.rate", z, H, R, ZERO_RATE_LABELS)]
+        readings = np.concatenate([values[MEAN_RATE], values[MEAN_FORCE]])
+        return [rate_at_rest(f"{self.name}.rate", view, readings, R)]
+
+
+def rate_at_rest(name: str, view: View, readings: Array, variance: Array) -> Observation:
+    """Return the rate of a stationary body minus the Earth's, body axes.
+
+    Parameters
+    ----------
+    readings : ndarray, (6,), rad/s and m/s²
+        Mean rate and specific force, as measured.
+    variance : ndarray, (3,)
+        Of the mean rate.
+    """
+    earth = view.ellipsoid.rotation_rate * view.level[AXIS : AXIS + 3]
+    C_bl = view.C_lb.T
+    # A scale factor acts on the true rate, at rest the Earth's: with the reading, that of an
+    # axis would be correlated with its bias.
+    H = rate_columns(view, C_bl @ earth, view.without_errors(readings)[3:])
+    z = readings[:3] - H[:, PHYSICAL:] @ view.sensors - C_bl @ earth
+    H[:, ROTATION] = -C_bl @ cross_matrix(earth)
+    return Observation(name, z, H, variance, ZERO_RATE_LABELS)
 
 
 ZERO_RATE_LABELS = ("x, rad/s", "y, rad/s", "z, rad/s")

@@ -1,0 +1,108 @@
+"""A unit that stands, is levelled, and waits: what the wait shows, and what it does not show."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from strapdown.config.navigation import NavigationSpec
+from strapdown.navigation import handover
+from strapdown.systems.navigation_run import run_navigation
+
+TEXT = """
+[simulation]
+rate_hz = 50.0
+seed = {seed}
+
+[simulation.motion]
+kind = "stationary"
+duration_s = 60.0
+lat_deg = 50.0
+lon_deg = 10.0
+alt_m = 100.0
+heading_deg = 70.0
+
+[simulation.gnss.rtk]
+rate_hz = 1.0
+position_noise_m = 0.01
+velocity_noise_m_per_s = 0.03
+
+[sensors]
+sensor = "mpu-6050"
+
+[coarse]
+kind = "known_heading"
+heading_deg = 70.0
+sd_deg = 2.0
+duration_s = 10.0
+
+[fine]
+kind = "none"
+
+[aiding.rtk]
+kind = "gnss"
+time_offset_sd_s = 0.3
+use_velocity = false
+"""
+
+
+@pytest.fixture(scope="module", params=[0, 1, 2])
+def result(request, tmp_path_factory):
+    file = tmp_path_factory.mktemp("stands") / "navigate.toml"
+    file.write_text(TEXT.format(seed=request.param))
+    return run_navigation(NavigationSpec.read(file), file)
+
+
+def test_the_offset_of_a_clock_stays_unknown_while_nothing_moves(result):
+    """Its deviation fell to a sixtieth in seconds, by the noise of the velocity."""
+    sd = result.record.sensors_sd["rtk.time_offset_t"]
+    assert sd.iloc[-1] > 0.2
+
+
+def test_the_rest_that_was_levelled_shows_the_gyro_biases(result):
+    """A heading that was stated was lost at the rate of an unknown bias, 5 deg/s as stated."""
+    bias_sd = result.record.sensors_sd[[f"gyro_bias_{x}" for x in "xyz"]].iloc[0]
+    # 0.005 deg/s/√Hz over ten seconds, and the drift in the run of the sensor.
+    assert np.degrees(bias_sd).max() < 0.05
+    sd, error = result.record.sd, result.differences
+    apart = error["heading"].reindex(sd.index, method="nearest") / sd["heading"]
+    assert apart.abs().max() < chi2.isf(1e-4, 1) ** 0.5
+    assert sd["heading"].max() < 6.0
+
+
+def test_each_fix_has_a_bound_before_it_and_one_after(result):
+    """Between two bounds after fixes a third would be too small: what grew would not be seen."""
+    sd, fixes = result.record.sd, result.record.innovations["rtk.position"].index
+    at = sd.index.to_numpy()
+    for fix in fixes[(fixes > at[0] + 0.5) & (fixes < at[-1])]:
+        k = int(np.argmin(np.abs(at - fix)))
+        before, after = sd["down"].iloc[k - 1], sd["down"].iloc[k]
+        assert at[k] - at[k - 1] == pytest.approx(1e-6, rel=0.1)
+        assert before > after
+
+
+def test_a_turn_is_no_bias():
+    """What the gyros read beyond what is stated of them is a rotation."""
+    from strapdown.estimation.covariance import COVARIANCES
+    from strapdown.estimation.error_filter import ErrorFilter
+    from strapdown.estimation.error_model import ERROR_MODELS
+    from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias
+    from strapdown.mechanization import MECHANIZATIONS
+    from strapdown.nav_state import NavState
+
+    sensors = (gyro_bias(1e-2), accel_bias(1e-2))
+    model = ERROR_MODELS["rotation_vector"]((1e-5,) * 3, (1e-3,) * 3, sensors)
+    filter_ = ErrorFilter(MECHANIZATIONS["ned"](), model, COVARIANCES["ud"]())
+    start = NavState.from_degrees(50.0, 10.0, 100.0)
+    P = np.diag(np.repeat([1.0, 0.1, 0.05], 3)) ** 2
+    begun = handover.from_state(filter_, start, P)
+    time = np.arange(500) / 50.0
+    for rate, learnt in ((5e-3, True), (0.1, False)):
+        noise = 1e-4 * np.random.default_rng(0).normal(size=(500, 3))
+        force = np.tile([0.0, 0.0, -9.81], (500, 1))
+        kept = np.column_stack([time, noise + np.array([0.0, 0.0, rate]), force])
+        after = handover._rested(filter_, begun, kept)
+        assert (after is not begun) == learnt
+        if learnt:
+            assert after.sensors[2] == pytest.approx(rate, abs=2e-4)
