@@ -153,6 +153,8 @@ class FineModeSpec(ChoiceSpec):
     until_heading_sd_deg: Positive | None = None
     #: Of the worse of roll and pitch.
     until_tilt_sd_deg: Positive | None = None
+    #: Time before which it does not end by these.
+    least_s: Positive | None = None
 
 
 class CoarseModeSpec(FineModeSpec):

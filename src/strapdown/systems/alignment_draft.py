@@ -193,6 +193,7 @@ _ENDS = {
     "window_s": "length of the latest part that is aligned",
     "until_heading_sd_deg": "ends when the sd of heading is below",
     "until_tilt_sd_deg": "and those of roll and pitch",
+    "least_s": "but not before this time",
 }
 
 
@@ -200,7 +201,7 @@ def options(page: Page, module: type, chosen: Mapping[str, Any]) -> None:
     """Write chosen options as keys, the others as comments with their defaults."""
     for option in options_of(module):
         if option.key in chosen:
-            page.key(option.key, _inline(chosen[option.key]))
+            page.key(option.key, _inline(chosen[option.key]), _CHOSEN.get(option.key, ""))
             continue
         value = toml_value(option.default)
         if option.slot is not None:
@@ -220,6 +221,8 @@ def _inline(value: Any) -> str:
     return toml_value(value) or ""
 
 
+#: What a chosen option does.
+_CHOSEN = {"backtrack": "navigation begins with the first sample of that part"}
 _WANTED = {
     "heading_deg": "heading of the body at the start, clockwise from north (gyros that "
     "find north at a rest of a minute need none: name their sensor with --sensor)",

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import pandas as pd
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Site
@@ -64,6 +65,8 @@ STANDS, DRIVES = 0.5, 3.0
 #: Distance between positions, in standard deviations, that proves motion: four of a hundred
 #: thousand pairs of positions at rest exceed it, exp(-APPARENT**2 / 2).
 APPARENT = 4.5
+#: Velocities whose mean shows motion.
+TOGETHER = 5
 #: Fixes that begin later than so many of their intervals do not show what was before.
 UNSEEN = 3.0
 #: Gyro bias that allows gyrocompassing, the rest needed for it, and the longest that is used, s.
@@ -90,6 +93,9 @@ WELL, HEADING = 3.0, 6.0
 #: Trials of it: factor of the length from trial to trial, margin over the best of them, and the
 #: largest standard deviation that is not too large for a linear filter, deg.
 LATER, MARGIN, LARGEST_START = 1.15, 1.2, 15.0
+#: Longest part of a record to align by course as a whole, s, so that navigation begins with it; the
+#: least one, and how much later than possible.
+MOST_BACK, LEAST_BACK, MORE = 300.0, 60.0, 30.0
 #: Rules that give gross errors zero weight keep their accuracy among them; with its scale this one
 #: cannot reject for ever. Time-correlated errors make innovations small, which does not show a
 #: receiver better than stated.
@@ -248,7 +254,7 @@ def propose(
             )
             return replace(made, findings=(*made.findings, step))
     if fixes is not None and sensors is not None and chosen["coarse"]["kind"] == "gnss_course":
-        chosen, how, tried = _tried(chosen, how, imu, fixes, sensors, levelled, _antenna(clock))
+        chosen, how, tried = _tried(chosen, how, imu, fixes, sensors, levelled, clock)
         findings = (*findings, *tried)
     table |= chosen
     if fixes is not None:
@@ -423,10 +429,17 @@ def _moving(fixes: pd.DataFrame) -> tuple[int | None, float]:
     Where the receiver measures no speed: the distance between two positions minus that explained
     by their errors, over 1, 2, 4 … steps, since one step may be shorter than the errors.
     """
-    measured = np.isfinite(values_of(fixes, VELOCITY_SD)).all(axis=1)
-    speed = np.linalg.norm(values_of(fixes, VELOCITY_COLUMNS)[:, :2], axis=1)[measured]
-    moving = np.flatnonzero(measured)[speed > STANDS]
-    begins = int(moving[0]) if moving.size else None
+    measured = np.isfinite(values_of(fixes, VELOCITY_SD[:2])).all(axis=1)
+    velocity = values_of(fixes, VELOCITY_COLUMNS)[measured, :2]
+    speed, sd = np.linalg.norm(velocity, axis=1), values_of(fixes, VELOCITY_SD[:2])[measured]
+    begins, count = None, min(TOGETHER, len(speed))
+    if count:
+        # Single velocities scatter: a phone's at rest by half a metre a second.
+        mean = sliding_window_view(velocity, count, axis=0).mean(axis=2)
+        noise = APPARENT * sd[count - 1 :].max(axis=1) / math.sqrt(count)
+        moves = np.linalg.norm(mean, axis=1) > np.maximum(STANDS, noise)
+        moving = np.flatnonzero(measured)[np.flatnonzero(moves) + count // 2]
+        begins = int(moving[0]) if moving.size else None
     fastest = float(speed.max(initial=0.0))
     if measured.all():
         return begins, fastest
@@ -473,9 +486,7 @@ def _clock(
         step = windows.step()
         if step is not None:
             return out, step_finding(fixes, imu, step)
-        joint = windows.joint()
-        if joint is not None and (found is None or joint[1] < found[1]):
-            found = joint
+        found = _agreed(found, windows.joint())
         drift = windows.drift()
     if drift is not None:
         apart = min(math.hypot(*drift), QUARTZ)
@@ -496,6 +507,22 @@ def _clock(
     if walk or speed * sd > FAR * place_sd:
         out |= {"time_offset_sd_s": max(round(2.0 * sd, 3), 0.001)} | walk
     return out, None
+
+
+def _agreed(
+    scanned: tuple[float, float] | None, fitted: tuple[float, float] | None
+) -> tuple[float, float] | None:
+    """Offset and sd by two estimates of the same record; None if they contradict each other.
+
+    Their errors are common in part: the sd is the smaller one.
+    """
+    if scanned is None or fitted is None:
+        return scanned or fitted
+    (a, a_sd), (b, b_sd) = scanned, fitted
+    if abs(a - b) > SIGNIFICANT * math.hypot(a_sd, b_sd):
+        return None
+    share = b_sd**2 / (a_sd**2 + b_sd**2)
+    return share * a + (1.0 - share) * b, min(a_sd, b_sd)
 
 
 def _antenna(aid: dict[str, Any]) -> Antenna:
@@ -593,9 +620,10 @@ def _alignment(
             {
                 "coarse": {
                     "kind": "gnss_course",
-                    "window_s": 60.0,
+                    "window_s": MOST_BACK,
                     "until_heading_sd_deg": HEADING,
                     "until_tilt_sd_deg": _tilt(sensors),
+                    "backtrack": True,
                 },
                 "fine": {"kind": "none"},
             },
@@ -615,33 +643,40 @@ def _tried(
     fixes: pd.DataFrame,
     sensors: ImuUncertainty,
     levelled: float,
-    antenna: Antenna,
+    clock: dict[str, float],
 ) -> tuple[dict[str, Any], str, tuple[Finding, ...]]:
     """An alignment by course with limits that the record meets, by trial at instants of it.
 
-    If no instant allows an alignment, the heading is asked, and a finding gives the reason.
+    `clock`: offset and delay of the fixes. If no instant allows an alignment, the heading is asked,
+    and a finding gives the reason.
     """
-    coarse = chosen["coarse"]
+    coarse, antenna = chosen["coarse"], _antenna(clock)
     limits = coarse["until_heading_sd_deg"], coarse["until_tilt_sd_deg"]
     time = index_of(imu)
-    place = np.median(values_of(fixes, GEODETIC), axis=0).tolist()
-    site, length = Site(*place), 2.0
+    site = Site(*np.median(values_of(fixes, GEODETIC), axis=0).tolist())
+    attrs, fixes = dict(fixes.attrs), fixes.set_axis(fixes.index - clock.get("time_offset_s", 0.0))
+    fixes.index.name, fixes.attrs = "time", attrs
+
+    def after(length: float) -> tuple[float, float]:
+        """Standard deviations of heading and tilt of an alignment at this time, deg."""
+        begin, end = np.searchsorted(time, time[0] + np.array([length - MOST_BACK, length]) + 1e-7)
+        way = GnssCourse(backtrack=True)
+        found = way.align(imu.iloc[begin:end], site, sensors, fixes, antenna)
+        roll, pitch, heading = np.maximum(found.sd_deg_to_begin, found.sd_deg).tolist()
+        return heading, max(roll, pitch)
+
     best: tuple[float, float] | None = None
     refused: Finding | None = None
-    span = float(time[-1] - time[0])
+    span, length = float(time[-1] - time[0]), 2.0
     while True:
         length = min(length, span)
-        begin, end = np.searchsorted(
-            time, time[0] + np.array([length - coarse["window_s"], length]) + 1e-7
-        )
         try:
-            found = GnssCourse().align(imu.iloc[begin:end], site, sensors, fixes, antenna)
-            roll, pitch, heading = np.maximum(found.sd_deg_to_begin, found.sd_deg).tolist()
-            tilt = max(roll, pitch)
-            if heading <= limits[0] and tilt <= limits[1]:
-                return chosen, how, ()
-            if best is None or max(heading, tilt) < max(best):
-                best = heading, tilt
+            sd = after(length)
+            if sd[0] <= limits[0] and sd[1] <= limits[1]:
+                length = _later(length, span, after, limits)
+                return {**chosen, "coarse": {**coarse, "least_s": length}}, how, ()
+            if best is None or max(sd) < max(best):
+                best = sd
         except (DataError, DivergenceError) as error:
             refused = error.finding
         if length >= span:
@@ -659,6 +694,29 @@ def _tried(
         "the fixes do not give the attitude, by the reason that is reported: the heading is asked",
         (reason,),
     )
+
+
+def _later(
+    length: float,
+    span: float,
+    after: Callable[[float], tuple[float, float]],
+    limits: tuple[float, float],
+) -> float:
+    """Time of the latest alignment within `MORE` that meets the limits, too, s.
+
+    Navigation begins with the first sample in any case, and its start is the better the more of the
+    drive it is made from.
+    """
+    whole = math.floor(min(max(LEAST_BACK, length + MORE), span))
+    while whole > length:
+        try:
+            heading, tilt = after(whole)
+            if heading <= limits[0] and tilt <= limits[1]:
+                return float(whole)
+        except (DataError, DivergenceError):
+            pass
+        whole = math.floor(whole / LATER)
+    return float(math.ceil(length))
 
 
 def _tilt(sensors: ImuUncertainty | None) -> float:

@@ -580,6 +580,7 @@ def _until(mode: CoarseModeSpec | FineModeSpec) -> Until:
         duration=math.inf if mode.duration_s is None else mode.duration_s,
         heading_sd_deg=mode.until_heading_sd_deg,
         tilt_sd_deg=mode.until_tilt_sd_deg,
+        least=Until.least if mode.least_s is None else mode.least_s,
     )
 
 

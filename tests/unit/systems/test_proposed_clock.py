@@ -17,7 +17,7 @@ from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.sensors.triad_errors import ImuErrors
 from strapdown.simulation import simulate_imu
 from strapdown.systems import navigation_proposal
-from strapdown.systems.navigation_proposal import APART, NO_ERRORS, OFFSET_SD, _clock
+from strapdown.systems.navigation_proposal import APART, NO_ERRORS, OFFSET_SD, _agreed, _clock
 from strapdown.tables import VELOCITY_SD, gnss_table
 
 RECEIVER = {"rate": 4.0, "position_noise": 0.02, "velocity_noise": 0.03}
@@ -123,3 +123,11 @@ def test_a_drift_is_stated_where_it_is_significant_or_unknown(monkeypatch, rate,
         assert found[DRIFT] == pytest.approx(min(np.hypot(rate, sd), RATE) * 359.0**0.5, rel=0.1)
     # Fixes of 5 m do not show it.
     assert DRIFT not in _clock(straight(60.0, 5.0, 360.0), imu(), True, NO_ERRORS)[0]
+
+
+def test_two_estimates_of_an_offset_are_joined_or_contradict_each_other():
+    assert _agreed(None, (0.3, 0.05)) == _agreed((0.3, 0.05), None) == (0.3, 0.05)
+    offset, sd = _agreed((0.13, 0.06), (0.29, 0.08))
+    assert offset == pytest.approx((0.13 / 0.06**2 + 0.29 / 0.08**2) / (0.06**-2 + 0.08**-2))
+    assert sd == 0.06
+    assert _agreed((-0.2, 0.08), (0.32, 0.07)) is None

@@ -107,3 +107,15 @@ def test_a_body_that_rocks_from_the_start_is_at_rest_for_gyros_that_find_north_a
     rocking = car(begins=100.0, rocking=0.05)
     assert _rest(_quiet(rocking, 12.4), 12.4, rocks=False) == 0.0
     assert _rest(_quiet(rocking, 12.4), 12.4, rocks=True) == pytest.approx(12.4)
+
+
+def test_a_phone_at_rest_does_not_move_by_the_noise_of_its_speed():
+    time = np.arange(0.0, 60.0)
+    noise = 0.45 * np.random.default_rng(1).normal(size=(60, 3))
+    place = np.tile([45.0, 10.0, 0.0], (60, 1))
+    sd = np.tile([0.5, 0.5, np.inf], (60, 1))
+    for begins in (60, 30):
+        velocity = noise + np.where(time >= begins, 1.4, 0.0)[:, None] * [1.0, 0.0, 0.0]
+        table = gnss_table(time, place, velocity, np.full((60, 3), SD), sd, source="fixes.csv")
+        found = _moving(table)[0]
+        assert found is None if begins == 60 else abs(found - begins) <= 3

@@ -88,3 +88,15 @@ def test_navigation_begins_with_the_first_sample_of_the_window(tmp_path):
         # The state at the first sample is known: not that of fixes of 5 cm, but to a metre.
         assert sd.iloc[0][["north", "east", "down"]].max() < 0.2
         assert sd.iloc[0][["roll", "pitch", "heading"]].max() < 6.0
+
+
+@pytest.mark.slow
+def test_an_alignment_does_not_end_before_its_least_time(tmp_path):
+    file = tmp_path / "navigate.toml"
+    ends = "until_heading_sd_deg = 15.0\nleast_s = 21.0"
+    file.write_text(TEXT.replace("duration_s = 12.0", ends))
+    begun = run_navigation(NavigationSpec.read(file), file).record.trajectory.index[0]
+    assert begun == pytest.approx(21.0, abs=0.1)
+    file.write_text(TEXT.replace("duration_s = 12.0", ends.splitlines()[0]))
+    begun = run_navigation(NavigationSpec.read(file), file).record.trajectory.index[0]
+    assert begun < 20.0
