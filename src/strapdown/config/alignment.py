@@ -105,6 +105,8 @@ class FixesTable(Spec):
     #: Standard deviations, replacing those of the file.
     position_sd_m: OneOrThree | None = None
     velocity_sd_m_per_s: OneOrThree | None = None
+    #: Steps of the receiver's clock: a stamp, and by how much it and the later ones are too late.
+    clock_steps_s: tuple[tuple[Number, Number], ...] = ()
     #: Leave out unusable rows, and report them.
     repair: StrictBool = False
 
@@ -118,6 +120,7 @@ class FixesTable(Spec):
             origin=self.origin,
             position_sd=self.position_sd_m,
             velocity_sd=self.velocity_sd_m_per_s,
+            clock_steps=self.clock_steps_s,
             repair=self.repair,
         )
 

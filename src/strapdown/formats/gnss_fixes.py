@@ -54,6 +54,9 @@ class GnssOptions:
     unstated_position_sd, unstated_velocity_sd : float, optional, m and m/s
         Used where the file states none; `attrs` of the table then has ``position_sd_taken``,
         ``velocity_sd_taken``.
+    clock_steps : tuple of pairs of float, s
+        Steps of the receiver's clock, one after another: a stamp, and what is subtracted from it
+        and the later ones.
     repair : bool
         Drop and count rows that cannot be used, instead of refusing the file.
     """
@@ -67,6 +70,7 @@ class GnssOptions:
     velocity_sd: Sd | None = None
     unstated_position_sd: float | None = None
     unstated_velocity_sd: float | None = None
+    clock_steps: tuple[tuple[float, float], ...] = ()
     repair: bool = False
 
     def __post_init__(self) -> None:
@@ -248,6 +252,8 @@ def _time(fixes: Fixes, options: GnssOptions) -> tuple[Array, NDArray[np.bool_]]
                     severity="note",
                 )
             )
+    for at, size in options.clock_steps:
+        time = np.where(time >= at, time - size, time)
     there = np.where(keep, time, -np.inf)
     before = np.maximum.accumulate(np.concatenate([[-np.inf], there[:-1]]))
     late = np.flatnonzero(keep & (there <= before))

@@ -293,6 +293,9 @@ def _aids(page: Page, made: Proposal, folder: Path, foot: bool) -> list[str]:
             for key in ("format", "datum_height_m", "origin"):
                 if key in aid:
                     page.key(key, toml_value(aid[key]) or "")
+            if "clock_steps_s" in aid:
+                page.say("Found: stamps from the first of each pair on are too late by the second.")
+                page.key("clock_steps_s", toml_value(aid["clock_steps_s"]) or "")
             _with_remarks(page)
         for key, what, usual in (
             ("position_sd_m", "place, m", POSITION_SDS),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,12 @@ from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import has_fixes, read_gnss
 from strapdown.formats.recording import Recording
 from strapdown.frames import ways_between
-from strapdown.navigation.measurements.clock_windows import step_finding, window_offsets
+from strapdown.navigation.measurements.clock_windows import (
+    ClockStep,
+    stamp_step,
+    step_finding,
+    window_offsets,
+)
 from strapdown.navigation.measurements.gnss import LASTING
 from strapdown.navigation.measurements.gnss_clock import (
     check_overlap,
@@ -246,19 +252,24 @@ def propose(
     )
     clock: dict[str, float] = {}
     if fixes is not None:
+        assert gnss is not None  # whence the fixes are
         clock, step = _clock(fixes, imu, drives, sensors)
         if step is not None:
-            part = _longer_part(log, imu, step)
+            found = step_finding(fixes, imu, step, corrected=step.certain)
+            part = log if step.certain else _longer_part(log, imu, found)
+            if step.certain:
+                moved = 0.0 if shifted is None else shifted.data["shift"]
+                gnss = _corrected(gnss, step, moved)
             made = propose(
                 part, axes=axes, gnss=gnss, sensor=sensor, site=site, heading_deg=heading_deg
             )
-            return replace(made, findings=(*made.findings, step))
+            return replace(made, findings=(*made.findings, found))
     if fixes is not None and sensors is not None and chosen["coarse"]["kind"] == "gnss_course":
         chosen, how, tried = _tried(chosen, how, imu, fixes, sensors, levelled, clock)
         findings = (*findings, *tried)
     table |= chosen
     if fixes is not None:
-        assert gnss is not None  # whence the fixes are
+        assert gnss is not None
         table["aiding"] = {
             "gnss": {
                 "kind": "gnss",
@@ -277,6 +288,13 @@ def _stated(table: dict[str, Any]) -> ImuUncertainty:
     stated = table["sensors"]
     sensor = load_sensor(stated["sensor"])
     return stated_imu(sensor, stated.get("gyro", {}), stated.get("accel", {}))
+
+
+def _corrected(gnss: FixesTable, step: ClockStep, moved: float) -> FixesTable:
+    """Fixes with a step of their clock corrected; `moved`: their time minus that of the file, s."""
+    at = round(0.5 * (step.after + step.before) - moved, 6)
+    steps = (*gnss.clock_steps_s, (at, round(step.size, 6)))
+    return gnss.model_copy(update={"clock_steps_s": steps})
 
 
 def _longer_part(log: LogTable, imu: pd.DataFrame, step: Finding) -> LogTable:
@@ -463,12 +481,21 @@ def _moving(fixes: pd.DataFrame) -> tuple[int | None, float]:
 
 def _clock(
     fixes: pd.DataFrame, imu: pd.DataFrame, drives: bool, sensors: ImuUncertainty | None = None
-) -> tuple[dict[str, float], Finding | None]:
+) -> tuple[dict[str, float], ClockStep | None]:
     """Errors of positions, significant delays of velocities and stamps, and a step of a clock.
 
     An offset is a state of the filter where it is significant, and where its uncertainty moves the
     vehicle by far more than the standard deviation of its fixes.
     """
+    windows = None
+    if drives and sensors is not None:
+        windows = partial(window_offsets, fixes, imu, sensors)
+    begin, end = np.searchsorted(index_of(fixes), index_of(imu)[[0, -1]])
+    step = stamp_step(fixes[begin:end], windows)
+    speed, place_sd = _speed(fixes), float(np.median(values_of(fixes, POSITION_SD)[:, :2]))
+    # What may be a step costs no part of the record where it moves the vehicle by less than fixes.
+    if step is not None and (step.certain or abs(step.size) * speed > place_sd):
+        return {}, step
     late = velocity_delay(fixes)
     delay = 0.0 if late is None or late.delay < SURE * late.sd else late.delay
     out = {"velocity_delay_s": round(delay, 3)} if delay > LEAST_DELAY else {}
@@ -476,18 +503,17 @@ def _clock(
     antenna = _antenna(out)
     scan = time_offset(fixes, imu, delay)
     found = None if scan is None else (scan.offset, scan.sd)
-    speed, place_sd = _speed(fixes), float(np.median(values_of(fixes, POSITION_SD)[:, :2]))
     if "position_sd_taken" in fixes.attrs and (scatter := white_position_sd(fixes, delay)):
         place_sd = min(place_sd, scatter[0])  # where nothing is stated
     span = float(index_of(fixes)[-1] - index_of(fixes)[0])
     apart, drift = QUARTZ, None
-    if drives and sensors is not None:
-        windows = window_offsets(fixes, imu, sensors, 0.0 if found is None else found[0], antenna)
-        step = windows.step()
+    if windows is not None:
+        offsets = windows(start=0.0 if found is None else found[0], antenna=antenna)
+        step = offsets.step()
         if step is not None:
-            return out, step_finding(fixes, imu, step)
-        found = _agreed(found, windows.joint())
-        drift = windows.drift()
+            return out, step
+        found = _agreed(found, offsets.joint())
+        drift = offsets.drift()
     if drift is not None:
         apart = min(math.hypot(*drift), QUARTZ)
         apart = apart if abs(drift[0]) > SIGNIFICANT * drift[1] or apart > FEW else 0.0

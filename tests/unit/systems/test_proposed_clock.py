@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import tomllib
 from functools import cache
 from pathlib import Path
 
@@ -12,13 +13,22 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import town_drive as town
+from strapdown.config.alignment import FixesTable, LogTable
 from strapdown.navigation.measurements.clock_windows import Offsets
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.sensors.triad_errors import ImuErrors
 from strapdown.simulation import simulate_imu
 from strapdown.systems import navigation_proposal
-from strapdown.systems.navigation_proposal import APART, NO_ERRORS, OFFSET_SD, _agreed, _clock
-from strapdown.tables import VELOCITY_SD, gnss_table
+from strapdown.systems.navigation_draft import draft_navigation
+from strapdown.systems.navigation_proposal import (
+    APART,
+    NO_ERRORS,
+    OFFSET_SD,
+    _agreed,
+    _clock,
+    propose,
+)
+from strapdown.tables import ACCEL, GYRO, VELOCITY_SD, gnss_table
 
 RECEIVER = {"rate": 4.0, "position_noise": 0.02, "velocity_noise": 0.03}
 DRIFT = "time_offset_drift_s_per_sqrt_s"
@@ -131,3 +141,39 @@ def test_two_estimates_of_an_offset_are_joined_or_contradict_each_other():
     assert offset == pytest.approx((0.13 / 0.06**2 + 0.29 / 0.08**2) / (0.06**-2 + 0.08**-2))
     assert sd == 0.06
     assert _agreed((-0.2, 0.08), (0.32, 0.07)) is None
+
+
+def stepped(folder, size, at=40.0):
+    """Files of a drive with fixes by a clock that steps; the time of the file is from 1970."""
+    zero = 1_700_000_000.0
+    names = [*(f"gyro_{a}_rad_s" for a in "xyz"), *(f"accel_{a}_m_s2" for a in "xyz")]
+    log = imu()[[*GYRO, *ACCEL]].set_axis(names, axis=1).set_axis(imu().index + zero)
+    text = log.rename_axis("time_s").to_csv()
+    (folder / "log.csv").write_text("# sampling: mean\n" + text)
+    table = town.fixes(**RECEIVER)
+    stamps = table.index.to_numpy()
+    late = np.where(stamps >= at, size, 0.0)
+    table.set_axis(stamps + zero + late).rename_axis("time").to_csv(folder / "fixes.csv")
+    log = LogTable(path=str(folder / "log.csv"))
+    return propose(log, gnss=FixesTable(path=str(folder / "fixes.csv")), sensor="adis16495-1")
+
+
+@pytest.mark.parametrize("size", [0.617, -0.1])
+def test_a_step_of_the_clock_is_corrected_in_what_is_proposed(tmp_path, size):
+    made = stepped(tmp_path, size)
+    (found,) = (f for f in made.findings if "clock-step" in f.code)
+    assert found.code == "navigation.clock-step-corrected"
+    ((stamp, by),) = made.table["aiding"]["gnss"]["clock_steps_s"]
+    assert by == pytest.approx(size, abs=1e-6)
+    assert 1_700_000_039.0 < stamp < 1_700_000_041.0
+    # The stamps are those of a clock without a step, and the whole record is proposed.
+    true = town.fixes(**RECEIVER).index.to_numpy()
+    assert made.gnss.index.to_numpy() - made.gnss.index[0] == pytest.approx(
+        true - true[0], abs=1e-5
+    )
+    assert "to_s" not in made.table["log"]
+    assert "from_s" not in made.table["log"]
+    given = FixesTable(path=str(tmp_path / "fixes.csv"))
+    draft = draft_navigation(LogTable(path=str(tmp_path / "log.csv")), gnss=given, folder=tmp_path)
+    written = tomllib.loads(draft.text)["aiding"]["gnss"]["clock_steps_s"]
+    assert written == [[pytest.approx(stamp), pytest.approx(by)]]

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from strapdown.alignment.alignment import Site
 from strapdown.alignment.course_sums import Antenna
 from strapdown.alignment.gnss_course import GnssCourse
 from strapdown.errors import DataError, DivergenceError, Finding
-from strapdown.frames import ways_between
+from strapdown.frames import place_difference, ways_between
 from strapdown.sensors.uncertainty import ImuUncertainty
-from strapdown.tables import ACCEL, GEODETIC, GYRO
+from strapdown.tables import ACCEL, GEODETIC, GYRO, VELOCITY, VELOCITY_SD
 from strapdown.tables.checks import index_of, source_of, values_of
 
-__all__ = ["ClockStep", "Offsets", "step_finding", "window_offsets"]
+__all__ = ["ClockStep", "Offsets", "stamp_step", "step_finding", "window_offsets"]
 
 Array = NDArray[np.float64]
 
@@ -39,16 +41,32 @@ AGREES = 0.3
 #: A window beyond so many standard deviations of the others has a fault of its own; a step of the
 #: clock is found from so many, from this size, s, and from so many windows on each side.
 STRAYS, CLEAR, LEAST_STEP, SIDE = 4.0, 6.0, 0.2, 2
+#: Stamps are regular where all but a few intervals are whole multiples of the usual one, to this
+#: part of it and to so many standard deviations of the others; fewest fixes that show it.
+IRREGULAR, BEYOND, FEW, FEWEST = 0.05, 6.0, 3, 20
+#: Largest step that is looked for, s, and longest interval in which the way can show it, intervals
+#: and s; numbers of fixes on a line that show a velocity.
+LARGEST, SHORT, SHORT_S, LINES = 2.0, 5.0, 3.0, (2, 3, 5, 8)
+#: Differences of chi-square: a step, or none, is certain; lost fixes without another sign of a step
+#: are that; fixes are lost just where a clock steps.
+CERTAIN, LOST, COINCIDENCE = 16.0, 25.0, 9.0
+#: 90 % quantile of chi-square with two degrees of freedom; most that the windows contribute.
+NINETY, MOST_BY_WINDOWS = 4.605, 25.0
 
 
 @dataclass(frozen=True)
 class ClockStep:
-    """Step of the offset between two clocks: size in s, and the interval in which it occurs."""
+    """Step of the offset between two clocks: size in s, and the interval in which it occurs.
+
+    `in_stamps`: the stamps of the receiver show it; `certain`: so that they can be corrected by it.
+    """
 
     size: float
     sd: float
     after: float
     before: float
+    in_stamps: bool = False
+    certain: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -211,15 +229,193 @@ def _window(
     return offset, sd
 
 
-def step_finding(gnss: pd.DataFrame, imu: pd.DataFrame, step: ClockStep) -> Finding:
+def stamp_step(
+    gnss: pd.DataFrame, windows: Callable[[], Offsets] | None = None
+) -> ClockStep | None:
+    """The first step of the receiver's clock that its stamps and its way show.
+
+    Parameters
+    ----------
+    windows : callable, optional
+        Gives `window_offsets`; called where the way does not decide.
+
+    Returns
+    -------
+    ClockStep or None
+        Certain, or possible where stamps that were regular before and after change between two
+        fixes and nothing decides. None of a receiver without regular stamps.
+
+    Notes
+    -----
+    A receiver measures at whole multiples of an interval. Where its stamps do not go on with them,
+    either its clock stepped, by the rest to one of these multiples, or it measured at another time.
+    The way from the last fix before to the first one after, at the velocities before and after,
+    tells which multiple, or that the stamps are right. Its standard deviation is that of the same
+    difference in the rest of the record.
+    """
+    time = index_of(gnss)
+    if len(time) < FEWEST:
+        return None
+    steps = np.diff(time)
+    usual = float(np.median(steps))
+    counts = np.maximum(np.round(steps / usual), 1.0)
+    off = np.abs(steps - usual * counts)
+    odd = off > max(IRREGULAR * usual, BEYOND * 1.4826 * float(np.median(off)))
+    odd[[0, -1]] = False
+    lone = odd & ~np.roll(odd, 1) & ~np.roll(odd, -1)
+    if odd.sum() > FEW or (odd & ~lone).any():
+        return None
+    lost = ~odd & (counts > 1.0) & (steps < min(SHORT * usual, SHORT_S))
+    ways = _Ways(gnss, usual)
+    for k in np.flatnonzero(lone | lost).tolist():
+        found = _stamp_step(ways, k, bool(lone[k]), windows)
+        if found is not None:
+            return found
+    return None
+
+
+def _stamp_step(
+    ways: _Ways, k: int, irregular: bool, windows: Callable[[], Offsets] | None
+) -> ClockStep | None:
+    """Step between fixes k and k + 1, if there is one; `irregular`: their interval is."""
+    time, usual = ways.time, ways.usual
+    interval = float(time[k + 1] - time[k])
+    # Of no step, and of each whole number of intervals that there can have been.
+    whole = usual * np.arange(1.0, np.ceil((interval + LARGEST) / usual) + 1.0)
+    size = np.concatenate([[0.0], interval - whole])
+    size = size[np.abs(size) <= LARGEST]
+    if not irregular:
+        # Fixes are lost more often than clocks step, by just as much, and forward.
+        size = np.array([0.0, interval - usual])
+    cost = ways.misfit(k, interval - size, usually=irregular)
+    # A clock that goes back repeats stamps, which are left out; one that goes forward loses none.
+    cost[(size != 0.0) & (interval > usual) & (interval - size > 1.5 * usual)] += COINCIDENCE
+    if not irregular:
+        cost[size != 0.0] += LOST
+    if windows is not None and _undecided(cost, size):
+        cost += _by_windows(windows(), time[k], time[k + 1], size)
+    best = int(np.argmin(cost))
+    if size[best] == 0.0:
+        if not irregular or cost[1:].min(initial=np.inf) > cost[0] + CERTAIN:
+            return None
+        if interval > SHORT * usual:
+            return None
+        best = 1 + int(np.argmin(cost[1:]))
+    elif cost[0] < cost[best] + CERTAIN and (not irregular or interval > SHORT * usual):
+        return None
+    likely = cost < cost[best] + CERTAIN
+    return ClockStep(
+        float(size[best]),
+        float(np.ptp(size[likely])),
+        float(time[k]),
+        float(time[k + 1]),
+        in_stamps=True,
+        certain=not _undecided(cost, size),
+    )
+
+
+def _undecided(cost: Array, size: Array) -> bool:
+    """Whether another step, or none, is nearly as likely as the best."""
+    return bool((cost < cost.min() + CERTAIN).sum() > 1)
+
+
+def _by_windows(windows: Offsets, before: float, after: float, size: Array) -> Array:
+    """Chi-square of each size of a step by the offsets of windows before and after it."""
+    sides = [
+        Offsets(windows.spans[at], windows.offset[at], windows.sd[at])
+        for at in (windows.spans[:, 1] <= before, windows.spans[:, 0] >= after)
+    ]
+    found = [
+        (float(one.offset[0]), float(one.sd[0])) if len(one.sd) == 1 else one.joint()
+        for one in sides
+    ]
+    if found[0] is None or found[1] is None:
+        return np.zeros(len(size))
+    (left, left_sd), (right, right_sd) = found[0], found[1]
+    square = np.square((right - left - size) / np.hypot(left_sd, right_sd))
+    return np.asarray(np.minimum(square, MOST_BY_WINDOWS))
+
+
+class _Ways:
+    """Ways between fixes, beside those that the way before and after explains.
+
+    From a line through some fixes before, and one through as many after: half way between them
+    both are wrong by the same, half the acceleration times the square of the time. The number is
+    the one that explains best in the rest of the record; or the velocities are measured.
+    """
+
+    def __init__(self, gnss: pd.DataFrame, usual: float) -> None:
+        self.time, self.usual = index_of(gnss), usual
+        place = values_of(gnss, GEODETIC)
+        place = place_difference(place, place[0])[:, :2]
+        self._regular = np.abs(np.diff(self.time) - usual) < IRREGULAR * usual
+        #: Place and velocity at each fix, by those up to it and from it on, (2, n, 2) each.
+        self._lines = [
+            self._line(place, count) for count in LINES if count * FEW < len(place) - FEW
+        ]
+        measured = np.isfinite(values_of(gnss, VELOCITY_SD[:2])).all(axis=1)
+        if measured.all():
+            velocity = values_of(gnss, VELOCITY)[:, :2]
+            self._lines.append((np.stack([place, place]), np.stack([velocity, velocity])))
+
+    def _line(self, place: Array, count: int) -> tuple[Array, Array]:
+        past = np.arange(1.0 - count, 1.0)
+        rate = (past - past.mean()) / np.square(past - past.mean()).sum()
+        here = 1.0 / count - past.mean() * rate
+        at, speed = np.full((2, len(place), 2), np.nan), np.full((2, len(place), 2), np.nan)
+        ends = np.flatnonzero(sliding_window_view(self._regular, count - 1).all(axis=1))
+        of = sliding_window_view(place, count, axis=0)[ends]
+        at[0, ends + count - 1], speed[0, ends + count - 1] = of @ here, of @ rate / self.usual
+        at[1, ends], speed[1, ends] = of[:, :, ::-1] @ here, of[:, :, ::-1] @ -rate / self.usual
+        return at, speed
+
+    def misfit(self, k: int, elapsed: Array, *, usually: bool) -> Array:
+        """Chi-square of the way from fix k to the next if it took each of these times, s.
+
+        By the usual differences, or by the largest one of the record.
+        """
+        counts = np.maximum(np.round(elapsed / self.usual), 1.0).astype(int)
+        out = np.zeros(len(elapsed))
+        for i, count in enumerate(counts.tolist()):
+            best = np.inf
+            for place, rate in self._lines:
+                way = place[1, k + 1] - place[0, k]
+                off = way - elapsed[i] * 0.5 * (rate[0, k] + rate[1, k + 1])
+                variance = self._variance(place, rate, count, usually)
+                if np.isfinite(off).all() and variance < best:
+                    best, out[i] = variance, float(off @ off) / variance
+        return out
+
+    def _variance(self, place: Array, rate: Array, count: int, usually: bool) -> float:
+        """Variance of the difference, m², in the rest of the record; infinite if too short."""
+        if count >= len(self._regular):
+            return np.inf
+        begin = np.flatnonzero(sliding_window_view(self._regular, count).all(axis=1))
+        way = place[1, begin + count] - place[0, begin]
+        off = way - 0.5 * count * self.usual * (rate[0, begin] + rate[1, begin + count])
+        square = np.square(off[np.isfinite(off).all(axis=1)]).sum(axis=1)
+        if len(square) < FEWEST // 2:
+            return np.inf
+        found = float(np.quantile(square, 0.9)) / NINETY
+        if not usually:
+            # The largest of n of chi-square with two degrees of freedom is 2 ln n.
+            found = max(found, float(square.max()) / (2.0 * np.log(len(square))))
+        return found + float(np.finfo(float).tiny)
+
+
+def step_finding(
+    gnss: pd.DataFrame, imu: pd.DataFrame, step: ClockStep, *, corrected: bool = False
+) -> Finding:
     """The finding of a step, dated by the stamps or the way between fixes that show it."""
-    begin, end, which = _date(gnss, imu, step)
     codes = {
         "receiver": "navigation.clock-step-of-receiver",
         "sensors": "navigation.clock-step-of-sensors",
     }
+    begin, end, which = (
+        (step.after, step.before, "receiver") if step.in_stamps else _date(gnss, imu, step)
+    )
     return Finding(
-        codes[which],
+        "navigation.clock-step-corrected" if corrected else codes[which],
         file=source_of(gnss),
         quantity="time",
         size=step.size,

@@ -11,6 +11,7 @@ from strapdown.constants import MAD_TO_SD
 from strapdown.dsp.true_runs import true_runs
 from strapdown.errors import DataError, Finding
 from strapdown.frames import ned_from_geodetic, place_difference, ways_between
+from strapdown.navigation.measurements.clock_windows import stamp_step, step_finding
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.gnss_clock import (
     check_overlap,
@@ -71,6 +72,9 @@ def gnss_readiness(
     if imu is None:
         return tuple(found)
     found += check_overlap(table, imu, aid.time_offset)
+    step = stamp_step(table)
+    if step is not None and step.certain:
+        found.append(step_finding(table, imu, step))
     delay = aid.velocity_delay
     if not delay and (measured := velocity_delay(table)) is not None:
         delay = measured.delay

@@ -13,8 +13,14 @@ sys.path.insert(0, str(Path(__file__).parents[3]))
 
 import town_drive as town
 from strapdown.frames import geodetic_from_ned
-from strapdown.navigation.measurements.clock_windows import step_finding, window_offsets
+from strapdown.navigation.measurements.clock_windows import (
+    Offsets,
+    stamp_step,
+    step_finding,
+    window_offsets,
+)
 from strapdown.navigation.measurements.gnss_clock import velocity_delay
+from strapdown.navigation.measurements.gnss_readiness import gnss_readiness
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 from strapdown.simulation import Origin, car, simulate_imu
@@ -153,3 +159,90 @@ def test_a_step_of_the_sensors_clock_is_found_and_dated():
     finding = step_finding(table, late, step)
     assert finding.code == "navigation.clock-step-of-sensors"
     assert 300.0 <= finding.data["end"] <= 301.1
+
+
+def on_the_way(speed, rate=1.0, noise=1.0, *, size=0.0, at=100.0, lost=(), later=0.0, seed=1):
+    """Fixes on a winding road, by a clock that steps, or by a receiver that then measures later."""
+    time = np.arange(0.0, 200.0, 1.0 / rate)
+    time = time + np.where(time >= at, later, 0.0)
+    course = 0.8 * np.sin(time / 15.0)
+    way = speed * (time + 3.0 * np.sin(time / 7.0))
+    rng = np.random.default_rng(seed)
+    north = way * np.cos(0.2 * course) + noise * rng.normal(size=len(time))
+    east = way * np.sin(0.2 * course) + noise * rng.normal(size=len(time))
+    place = geodetic_from_ned(np.column_stack([north, east, 0.0 * north]), [45.0, 20.0, 80.0])
+    stamps = time + np.where(time >= at, size, 0.0)
+    latest = np.concatenate([[-1.0], np.maximum.accumulate(stamps)[:-1]])
+    keep = stamps > latest
+    for begin, end in lost:
+        keep &= (time < begin) | (time >= end)
+    flat = np.full((keep.sum(), 3), noise)
+    none = np.full_like(flat, np.inf)
+    return gnss_table(stamps[keep], place[keep], 0.0 * flat, flat, none, source="g")
+
+
+@pytest.mark.parametrize(
+    ("rate", "noise", "size"),
+    [
+        (1.0, 1.0, 0.6),
+        (1.0, 1.0, -0.5),
+        (5.0, 0.02, 0.471),
+        (5.0, 0.02, -0.9),
+        (10.0, 0.01, 0.788),
+        (1.0, 0.1, 1.0),
+        (4.0, 0.01, -0.059),
+        (4.0, 0.3, -0.222),
+    ],
+)
+def test_the_stamps_and_the_way_show_a_step_to_the_microsecond(rate, noise, size):
+    step = stamp_step(on_the_way(15.0, rate, noise, size=size))
+    assert step is not None
+    assert step.certain
+    assert step.size == pytest.approx(size, abs=1e-9)
+    assert step.after < 100.0
+    assert step.before > 99.999 + size
+    table = on_the_way(15.0, rate, noise, size=size)
+    inertial = imu(7501)
+    assert [f.data["size"] for f in gnss_readiness(table, inertial) if "step" in f.code] == [
+        step.size
+    ]
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_what_is_no_step_of_a_clock_is_none(seed):
+    for table in (
+        on_the_way(15.0, seed=seed),
+        # Lost fixes, one of them alone; a receiver that begins anew at other instants.
+        on_the_way(15.0, lost=[(40.0, 41.0), (60.0, 63.0), (90.0, 97.0)], seed=seed),
+        on_the_way(15.0, noise=0.5, later=0.6, seed=seed),
+        on_the_way(15.0, 5.0, 0.02, later=0.07, seed=seed),
+    ):
+        assert stamp_step(table) is None
+    # Stamps by a busy computer show no step.
+    table = on_the_way(15.0, size=0.4, seed=seed)
+    late = np.random.default_rng(seed).uniform(0.0, 0.3, len(table))
+    assert stamp_step(moved(table, stamps=table.index.to_numpy() + late)) is None
+    # One late stamp is no step.
+    late = np.where(np.arange(len(table)) == 50, 0.3, 0.0)
+    table = on_the_way(15.0, seed=seed)
+    assert stamp_step(moved(table, stamps=table.index.to_numpy() + late)) is None
+
+
+def test_where_the_way_does_not_decide_the_windows_do_or_nothing_does():
+    table = on_the_way(0.1, noise=2.0, size=0.4)
+    step = stamp_step(table)
+    assert step is not None
+    assert not step.certain
+    assert step.sd >= 0.4
+    assert step_finding(table, imu(7501), step).code == "navigation.clock-step-of-receiver"
+    spans = np.array([[0.0, 45.0], [45.0, 90.0], [105.0, 150.0], [150.0, 199.0]])
+
+    def windows(size):
+        offset = np.where(spans[:, 0] > 100.0, size, 0.0)
+        return lambda: Offsets(spans, offset, np.full(4, 0.03))
+
+    found = stamp_step(table, windows(0.4))
+    assert found is not None
+    assert found.certain
+    assert found.size == pytest.approx(0.4)
+    assert stamp_step(table, windows(0.0)) is None
