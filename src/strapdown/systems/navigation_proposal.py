@@ -256,6 +256,8 @@ def propose(
         clock, step = _clock(fixes, imu, drives, sensors)
         if step is not None:
             found = step_finding(fixes, imu, step, corrected=step.certain)
+            findings = (*findings, found)
+        if step is not None and (step.certain or drives):
             part = log if step.certain else _longer_part(log, imu, found)
             if step.certain:
                 moved = 0.0 if shifted is None else shifted.data["shift"]
@@ -264,6 +266,9 @@ def propose(
                 part, axes=axes, gnss=gnss, sensor=sensor, site=site, heading_deg=heading_deg
             )
             return replace(made, findings=(*made.findings, found))
+        if step is not None:
+            # Where a heading is asked, it is that at the first sample: the whole record is used.
+            clock["time_offset_sd_s"] = max(clock.get("time_offset_sd_s", 0.0), abs(step.size))
     if fixes is not None and sensors is not None and chosen["coarse"]["kind"] == "gnss_course":
         chosen, how, tried = _tried(chosen, how, imu, fixes, sensors, levelled, clock)
         findings = (*findings, *tried)
