@@ -204,7 +204,7 @@ def find_unit(text: str, among: Sequence[str] = OF_LOGS) -> tuple[str, str] | No
     """
     plain = re.sub(r"\s+", "", text.strip().strip("[]").lower())
     bare = plain.strip("()")
-    power = _POWERS.get(re.sub(r"[·*.^]", "", bare.translate(_RAISED)))
+    power = _POWERS.get(re.sub(r"[·*.^_]", "", bare.translate(_RAISED)))
     for word in (plain, bare):
         for quantity in among:
             if unit := _UNIT_OF[quantity].get(word):

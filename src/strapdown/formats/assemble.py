@@ -77,7 +77,11 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     unused = _unused(raw, found)
     if parts := _by_sensor(raw, found):
         raw = dataclasses.replace(
-            join(parts, raw.name, raw.files), axes=raw.axes, sampling=raw.sampling, clock=raw.clock
+            join(parts, raw.name, raw.files),
+            axes=raw.axes,
+            sampling=raw.sampling,
+            clock=raw.clock,
+            triad_units=raw.triad_units,
         )
         found = find_columns(raw, dataclasses.replace(options, columns={}))
     findings = [*raw.findings, *unused]

@@ -70,6 +70,7 @@ _BESIDE = {
     "mag": {"magnetic", "field"},
 }
 _WITHOUT_GRAVITY = {"linear", "lin", "user", "without", "linacc", "linaccel", "linearacceleration"}
+_WITHOUT_GRAVITY |= {"lina", "lineara", "usera"}
 # A name that is a unit says the sensor: dps_x, uT_x. The letter g may be anything.
 _NAMED_BY_UNIT = {
     **dict.fromkeys(("dps", "mdps", "rads", "degs"), "gyro"),
@@ -99,6 +100,12 @@ CLOCKS = {
     "microseconds": "us",
     "nanos": "ns",
     "nanoseconds": "ns",
+    "ms": "ms",
+    "msec": "ms",
+    "us": "us",
+    "usec": "us",
+    "ns": "ns",
+    "nsec": "ns",
 }
 QUATERNIONS = {
     "q_w": ["qw", "quatw", "quaternionw", "q0"],
@@ -121,6 +128,8 @@ QUANTITIES = [
 #: Rates about forward, right and down in the notation of flight mechanics, if all three are there:
 #: a letter alone may be anything.
 BODY_RATES = {"rate_p": "gyro_x", "rate_q": "gyro_y", "rate_r": "gyro_z"}
+# Clocks of X-Plane's data output: of the simulated world and of all.
+_XPLANE = ("_totl,_time",)
 # G is also gravity.
 _MAGNETIC = {"g": "gauss", "mg": "mG"}
 # Arrays of PX4 (msg/SensorCombined.msg, SensorMag.msg), whose comments define their units.
@@ -210,6 +219,10 @@ def read_name(name: str) -> ColumnName:
     if unit is None:
         bare, unit = _without_unit(bare)
     said = ColumnName(None, unit)
+    if text.lower().strip() in _XPLANE:
+        return ColumnName("time", "s")
+    if unit and bare.lower().strip("_ ") == "sampletimefine":
+        return ColumnName("time", unit)  # without a unit it counts 0.1 ms
     # In group/sub/name the last part decides, unless the whole is a known name.
     parts = re.split(r"[/.]", bare)
     if unit is None and len(parts) > 1 and parts[-1].lower() in tuple(_AXES):

@@ -128,6 +128,9 @@ def _at_once(
     # A line of text between rows makes text of every column.
     if columns is None or all(c.dtype.kind == "O" for c in columns):
         return None
+    # Nor are blanks beside a separator part of a word.
+    if any(c.dtype.kind == "O" for c in columns) and f"{top.separator} " in text:
+        return None
     return top.log(name, files, columns, np.arange(first, first + columns[0].size), [])
 
 
@@ -281,10 +284,13 @@ class _Top:
         lines = [_named(line, self.separator, width) for line in near] + [None, None]
         names, over = lines[:2]
         if names is None:
-            named = _above(self.above, width, self.separator)
+            below = self._units_in_comment(width, kinds)
+            named = _above(self.above[:-1] if below else self.above, width, self.separator)
             if named is not None:
-                self.above.pop()
+                del self.above[len(self.above) - 1 - bool(below) :]
             self.names = _unique(named or [f"column {k + 1}" for k in range(width)])
+            if below and named is not None:
+                self.units = {n: u for n, u in zip(self.names, below, strict=True) if u}
             return
         below = _units(near[0], self.separator, width, kinds) if over is not None else None
         if below and over is not None:
@@ -297,6 +303,14 @@ class _Top:
         self.names = _unique(names)
         if below:
             self.units = {n: u for n, u in zip(self.names, below, strict=True) if u}
+
+    def _units_in_comment(self, width: int, kinds: Sequence[str]) -> list[str] | None:
+        """Units in the last comment, where the one before it has the names."""
+        if len(self.above) < 2 or not all(map(is_comment, self.above[-2:])):
+            return None
+        if _above(self.above[:-1], width, self.separator) is None:
+            return None
+        return _units(self.above[-1].strip().lstrip(_MARKS), self.separator, width, kinds)
 
     def log(
         self,
@@ -384,6 +398,10 @@ def _named(line: str, separator: str | None, width: int) -> list[str] | None:
     """Return the fields of a line that may name columns, or None."""
     bare = line.strip().lstrip(_MARKS).strip() if is_comment(line) else line
     fields = fields_of(bare, separator)
+    if bare != line and len(fields) == width - 1:
+        # The mark may be the name of a column of numbers of rows.
+        whole = fields_of(line.strip(), separator)
+        fields = whole if len(whole) == width and not whole[0].strip(_MARKS) else fields
     if len(fields) == width + 1 and not fields[-1]:
         fields = fields[:-1]
     return fields if len(fields) == width and any(fields) and not are_data(fields) else None
@@ -547,8 +565,9 @@ def _whole_lines(
             )
             break
         count = _count(line, separator)
-        if count == width + 1 and separator and line.rstrip().endswith(separator):
-            line, count = line.rstrip()[:-1], width
+        bare = line.rstrip(" \r\n")
+        if count == width + 1 and separator and bare.endswith(separator):
+            line, count = bare[:-1], width
         odd = count != width
         # Names once more, as where logs were joined.
         first = line.lstrip(" \t\"'")[:1]
@@ -627,8 +646,8 @@ def _was_cut(line: str, before: Lines, top: _Top, ended: bool) -> bool:
     if not all(_NUMBER.fullmatch(e) for e in ends):
         return False
     # Without a line end the last number may have lost digits; it shows if all others have more.
-    fewest = min((len(e.partition(".")[2]) for e in ends), default=0)
-    short = len(fields[-1].partition(".")[2]) < fewest
+    digits = [len(e.replace(",", ".").partition(".")[2]) for e in (*ends, fields[-1])]
+    short = digits[-1] < min(digits[:-1], default=0)
     return not _NUMBER.fullmatch(fields[-1]) or short
 
 
@@ -637,6 +656,10 @@ def _parse(lines: list[str], count: int, separator: str | None, name: str) -> Co
     decimal = "," if _comma_is_decimal(lines, separator) else "."
     if separator is None:
         lines = ["\t".join(line.split()) for line in lines]
+    if separator and separator.strip() and any(f"{separator} " in line for line in lines[:JUDGED]):
+        # Blanks beside a separator are no part of a field.
+        around = re.compile(rf"[ \t]*{re.escape(separator)}[ \t]*")
+        lines = [line if '"' in line else around.sub(separator, line) for line in lines]
     # Arrow reads 0xFFF0 as a number, but its meaning for a sensor is unknown.
     odd = next((line for line in lines if "0x" in line or "0X" in line), "")
     hexadecimal = [k for k, f in enumerate(fields_of(odd, separator)) if _HEX.fullmatch(f)]

@@ -350,3 +350,63 @@ def test_the_largest_rate_of_a_choice_is_of_the_set_of_which_the_evidence_speaks
     for choice in data["choices"]:
         assert choice.data["largest"] == pytest.approx(np.linalg.norm(gyro, axis=1).max())
         assert below < choice.data["largest"]
+
+
+#: Full scale over 32768, and the reciprocal of counts per deg/s, as data sheets have them.
+SENSOR_STEPS = (2000.0 / 32768.0, 1.0 / 131.0, 0.00875)
+
+
+def stepping(step, spread, digits=7, seed=5, count=3000):
+    """Rates at rest as whole multiples of a step, with so many digits."""
+    numbers = np.round(np.random.default_rng(seed).normal(0.0, spread, (count, 3)))
+    return np.round(numbers * step, digits)
+
+
+def unit_at_rest(gyro):
+    force = np.random.default_rng(1).normal((0.0, 0.0, 9.81), 0.02, gyro.shape)
+    return said(Signals(np.arange(len(gyro)) * 0.01, gyro, force, time_unit="s"))["gyro_unit"]
+
+
+@pytest.mark.parametrize("step", SENSOR_STEPS)
+@pytest.mark.parametrize("spread", [2.0, 60.0])
+def test_the_step_of_a_common_sensor_gives_the_unit_of_a_gyro_at_rest(step, spread):
+    for unit, scale in (("deg/s", 1.0), ("rad/s", np.pi / 180.0)):
+        # Many values are in step by their phases, and the spread in steps is the evidence.
+        found = unit_at_rest(stepping(step * scale, spread))
+        assert found.value == unit
+        assert found.settled
+        assert "io.evidence-steps-of-sensor" in {e.code for e in found.evidence}
+
+
+def test_other_steps_are_no_evidence_of_a_unit():
+    draws, settled, steps = np.random.default_rng(77), 0, 0
+    for k in range(200):
+        # Round numbers are those of who wrote them.
+        round_one = 10.0 ** -float(draws.integers(2, 5))
+        own = round_one if k % 2 else 10.0 ** draws.uniform(-3.5, -1.5)
+        found = unit_at_rest(stepping(own, draws.uniform(2.0, 100.0), seed=k, count=1500))
+        settled += found.settled
+        steps += any(e.code == "io.evidence-steps-of-sensor" for e in found.evidence)
+        assert not (k % 2 and found.settled)
+    # Two units of thirteen steps within half a part of a thousand, and those by phases.
+    assert settled <= steps <= 6
+
+
+def test_a_step_that_no_sensor_has_is_no_rate_in_that_unit():
+    # 0.061 deg/s, but not to the digits of a data sheet: in rad/s it would be 3.5 deg/s.
+    found = unit_at_rest(stepping(0.0613, 1.5, digits=4))
+    assert found.value == "deg/s"
+    assert dict(found.alternatives).get("rad/s", 0.0) < 0.01
+
+
+def test_beside_an_accelerometer_in_mg_a_gyro_is_rather_in_thousandths():
+    gyro = np.random.default_rng(3).normal(0.0, 2.0, (400, 3)) * 1000.0 * 10.0
+    flat = np.tile([0.0, 0.0, 1.0], (400, 1)) + np.random.default_rng(4).normal(0, 0.004, (400, 3))
+    time = np.arange(400) * 0.01
+    in_mg = said(Signals(time, gyro, 1000.0 * flat, time_unit="s"))["gyro_unit"]
+    in_g = said(Signals(time, gyro, flat, time_unit="s"))["gyro_unit"]
+    share = [
+        dict(((i.value, i.confidence), *i.alternatives)).get("mdeg/s", 0.0) for i in (in_mg, in_g)
+    ]
+    assert share[0] > 0.8
+    assert share[0] > share[1] + 0.1

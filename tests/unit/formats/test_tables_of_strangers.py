@@ -62,6 +62,8 @@ def check(log, count=40):
         ["Time,gx,gy,gz,ax,ay,az", "(s),(deg/s),(deg/s),(deg/s),(g),(g),(g)"],
         ["Test,bench", "Time,gx,gy,gz,ax,ay,az", "s,deg/s,deg/s,deg/s,g,g,g"],
         [HEADER + ","],
+        ["% Time,gx,gy,gz,ax,ay,az", "% s,deg/s,deg/s,deg/s,g,g,g"],
+        ["% Time,gx,gy,gz,ax,ay,az", "% ,deg/s,deg/s,deg/s,g,g,g"],
     ],
 )
 def test_what_stands_above_the_rows(tmp_path, top):
@@ -71,6 +73,51 @@ def test_what_stands_above_the_rows(tmp_path, top):
 def test_separators_at_the_end_of_each_line(tmp_path):
     check(read(tmp_path, [HEADER, *rows(end=",")]))
     check(read(tmp_path, [HEADER + ",", *rows(end=",")]))
+    tabs = HEADER.replace(",", "\t")
+    check(read(tmp_path, ["# board: two", tabs + "\t", *rows(separator="\t", end="\t")]))
+
+
+def test_a_mark_may_be_the_name_of_the_numbers_of_rows(tmp_path):
+    numbered = [f"{k},{row}" for k, row in enumerate(rows())]
+    check(read(tmp_path, ["Update Rate: 100 Hz", f"#,{HEADER}", *numbered]))
+
+
+def test_a_last_number_that_is_cut_shows_by_its_digits_with_a_decimal_comma_too(tmp_path):
+    lines = [row.replace(".", ",") for row in rows(41, separator=";")]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([HEADER.replace(",", ";"), *lines])[:-3])
+    log = read_log(path, ReadOptions())
+    check(log)
+    assert "io.last-line-cut-left-out" in {f.code for f in log.findings}
+
+
+def test_blanks_beside_a_separator_are_no_part_of_a_word(tmp_path):
+    spread = [row.replace(",", ", ") for row in rows()]
+    check(read(tmp_path, [HEADER, *spread]))
+    # A word for a missing value, and a time of day.
+    spread[5] = spread[5].rpartition(",")[0] + ", NULL"
+    assert len(read(tmp_path, [HEADER, *spread], repair=True).imu) == 39
+    times = [f"{row.partition(',')[2]}, 12:00:00.{10 * k:03d}" for k, row in enumerate(rows())]
+    turned = f"{HEADER.partition(',')[2]},time"
+    check(read(tmp_path, [turned, *(row.replace(",", ", ") for row in times)]))
+
+
+def test_rows_of_single_sensors_keep_the_units_stated_above(tmp_path):
+    lines = [f"{k * 0.005:.3f};" + (";;;" if k % 2 else "1.7;0.2;-1.1;") for k in range(80)]
+    lines = [row + ("0.1;0.2;9.8" if k % 2 else ";;") for k, row in enumerate(lines)]
+    above = ["# Gyroscope unit = °/s", "# Accelerometer unit = m/s2"]
+    log = read(tmp_path, [*above, "time;gyroX;gyroY;gyroZ;accX;accY;accZ", *lines])
+    assert log.imu[GYRO].to_numpy()[0] == pytest.approx(np.radians([1.7, 0.2, -1.1]))
+
+
+def test_a_linear_acceleration_by_its_short_name_is_none_with_gravity(tmp_path):
+    names = "Time (s),lin_ax,lin_ay,lin_az,X Accel,Y Accel,Z Accel,gx,gy,gz"
+    time = np.arange(400) * 0.01
+    lines = [
+        f"{t:.2f},0.0{k % 3},0.1,-0.1,0.1,0.2,9.8{k % 7},0.1,0.2,0.3" for k, t in enumerate(time)
+    ]
+    log = read(tmp_path, [names, *lines], accel_unit="m/s2", gyro_unit="deg/s")
+    assert log.imu[ACCEL].to_numpy()[:, 2].mean() == pytest.approx(9.8, abs=0.1)
 
 
 def test_lines_of_text_between_rows_are_left_out_and_said(tmp_path):
@@ -158,6 +205,13 @@ def test_a_rate_above_the_names_serves_where_no_time_is(tmp_path):
         ("temp", None, None),
         ("vel_x", None, None),
         ("Date", "time", None),
+        ("ms", "time", "ms"),
+        ("usec", "time", "us"),
+        ("_totl,_time", "time", "s"),
+        ("SampleTimeFine_us", "time", "us"),
+        ("SampleTimeFine", None, None),
+        ("AccX_(m/s2)", "accel_x", "m/s2"),
+        ("GyroX_(rad_s^-1)", "gyro_x", "rad/s"),
     ],
 )
 def test_names_in_any_order(name, quantity, unit):

@@ -296,7 +296,7 @@ def wrap_bits(before: float, step: float, usual: float) -> int | None:
 # Scales without the sign. Motion cannot decide the sign, because f and -f rotate alike in the body:
 # it is a separate question.
 SCALES = {"m/s2": 1.0, "g": STANDARD_GRAVITY, "mg": 1e-3 * STANDARD_GRAVITY}
-_GRAVITY_PRIOR = {"m/s2": 0.6, "g": 0.37, "mg": 0.03}
+_GRAVITY_PRIOR = {"m/s2": 0.59, "g": 0.36, "mg": 0.05}
 # Prior of the content of a log under these names.
 _PRIOR_FORM = {"rate": 0.93, "linear": 0.03, "increment": 0.01, "other": 0.03}
 # Raw counts per g of 8 to 16 bits; 1024 is close enough to mg.

@@ -130,7 +130,9 @@ def infer_signals(signals: Signals) -> tuple[Inference, ...]:
     if signals.gyro is not None and len(signals.gyro) > 1:
         ticks, gyro, force = _increasing(signals, force)
         if len(gyro) > 1:
-            *turned, joint = infer_gyro(ticks, gyro, force, times or {"s": 1.0}, _increments(heard))
+            *turned, joint = infer_gyro(
+                ticks, gyro, force, times or {"s": 1.0}, _increments(heard), _in_mg(heard)
+            )
             if times and next(iter(joint)) != next(iter(times)):
                 # A rotation that fits only in another unit of time is a doubt, not a proof.
                 times = {u: min(p, 0.5) for u, p in times.items()}
@@ -200,6 +202,13 @@ def _increments(heard: list[Inference]) -> float:
         return 0.01
     shares = dict(((form.value, form.confidence), *form.alternatives))
     return float(np.clip(shares.get("increment", 0.0), 1e-3, 0.95))
+
+
+def _in_mg(heard: list[Inference]) -> float:
+    """Return the probability that the accelerometer is in mg."""
+    unit = next((i for i in heard if i.quantity == "accel_unit"), None)
+    shares = {} if unit is None else dict(((unit.value, unit.confidence), *unit.alternatives))
+    return float(shares.get("mg", 0.0))
 
 
 def _sign() -> Inference:

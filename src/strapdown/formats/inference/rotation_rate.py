@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.constants import MAD_TO_SD
 from strapdown.dsp.running_integral import running_integral
 from strapdown.errors import Finding
 from strapdown.formats.inference.conclusion import (
@@ -24,6 +25,8 @@ Array = NDArray[np.float64]
 
 # Prior of the unit of an unlabeled gyro.
 _PRIOR = {"rad/s": 0.55, "deg/s": 0.43, "mdeg/s": 0.01, "mrad/s": 0.005, "deg/h": 0.005}
+# Beside an accelerometer in mg, as drivers of one maker give both.
+_PRIOR_MILLI = {"rad/s": 0.1, "deg/s": 0.55, "mdeg/s": 0.33, "mrad/s": 0.01, "deg/h": 0.01}
 _INCREMENTS = 0.01
 _OTHER = 0.02  # turns per second and other unlisted units
 # Raw counts of a 16-bit sensor, deg/s each (data sheets of MPU-6050, BMI160, LSM6DS3), by the unit
@@ -44,6 +47,24 @@ _PRIOR_COUNTS = 0.03
 # Probability of integers only, for each unit; counts are integers unless averaged.
 _WHOLE = {"rad/s": 1e-4, "deg/s": 0.01, "mrad/s": 0.1, "mdeg/s": 0.5, "deg/h": 0.2}
 _BROKEN_COUNTS = 0.05
+# Steps of 16-bit sensors, deg/s (the same data sheets, by full scale and by sensitivity): rates
+# are often written as these times whole numbers. Of so many rates, spread evenly over the log,
+# those within so many steps of the median must be in step by the mean of their phases, and so many
+# of their neighbors one step apart, or the true step is a multiple.
+_STEPS = (
+    *(full / 32768.0 for full in (125.0, 250.0, 500.0, 1000.0, 2000.0)),
+    *(1.0 / count for count in (16.4, 32.8, 65.5, 131.0, 262.4)),
+    *(0.004375, 0.00875, 0.0175, 0.035, 0.07),
+)
+_OF_RATES, _WITHIN, _IN_STEP, _NEIGHBORS, _LEAST_SPREAD = 6000, 300.0, 0.85, 0.3, 5.0
+_LEAST_RATES = 100
+# Values that are few have a step of their own: not more than this in any sensor of today, rad/s,
+# but in one log of so many; a round number is how it was written. Steps that agree better than this
+# are the same: half of what 1/16.4 deg/s is from 2000/32768.
+_COARSE, _OF_OLD, _FEW, _EXACT = np.radians(1.0), 0.005, 400, 5e-4
+# Half of all logs keep the steps of their sensor; in four decades of steps the chance that
+# others are in step with one of these, times the spread in steps.
+_CHANCE = len(_STEPS) * 2.0 * np.sqrt(-2.0 * np.log(_IN_STEP)) / (2.0 * np.pi) / np.log(1e4)
 # Gyro and accelerometer of one device usually share their axes. The rest of the prior is even:
 # reversed sense of rotation and single reversed axes are as common as all other cases.
 _PRIOR_SAME = 0.9
@@ -77,6 +98,7 @@ def infer_gyro(
     force: Array | None,
     time_units: dict[str, float],
     increments: float = _INCREMENTS,
+    milli: float = 0.0,
 ) -> tuple[Inference, Inference, Inference, dict[str, float]]:
     """Infer unit, form and axes of a gyro, and update the probabilities of the units of time.
 
@@ -84,7 +106,8 @@ def infer_gyro(
     log's own unit. `force` ((n, 3), or None): accelerometer in units of gravity; None if gravity
     has been removed. `time_units`: probability of each unit of time. `increments`: prior
     probability of increments instead of rates: that of the accelerometer, which usually has the
-    same form. Returns `time_units`: updated probabilities.
+    same form. `milli`: probability that the accelerometer is in mg. Returns `time_units`: updated
+    probabilities.
     """
     largest = float(np.quantile(np.linalg.norm(gyro, axis=1), 0.99)) if len(gyro) else 0.0
     # Stationary sensors read zero in any unit; integers are evidence only where they vary.
@@ -93,6 +116,8 @@ def infer_gyro(
     weights: dict[Hypothesis, float] = {}
     scales: list[tuple[Turn, float]] = []
     likely = {u: p for u, p in time_units.items() if p > 1e-3} or {"s": 1.0}
+    written = _written_step(gyro)
+    steps = {unit: _in_steps(gyro, scale, written) for unit, scale in GYRO_UNITS.items()}
     base: dict[tuple[str | None, str, str], float] = {}
     by_scale: dict[float, dict[Hypothesis, float]] = {}
     for tau, share in likely.items():
@@ -103,7 +128,10 @@ def infer_gyro(
             prior = _PRIOR_COUNTS / len(_COUNTS) * (1.0 if whole else _BROKEN_COUNTS)
             candidates[None, f"counts {k}"] = (np.radians(count), prior)
         for unit, scale in GYRO_UNITS.items():
-            prior = _PRIOR[unit] * (_WHOLE[unit] if whole else 1.0)
+            prior = milli * _PRIOR_MILLI[unit] + (1.0 - milli) * _PRIOR[unit]
+            prior *= _WHOLE[unit] if whole else 1.0
+            prior *= 1.0 + steps[unit][1]
+            prior *= _OF_OLD if written[0] * scale > _COARSE else 1.0
             candidates[unit, "rate"] = (scale, prior * (1 - increments))
             candidates[unit, "increment"] = (scale / step, prior * increments)
         for key, (scale, prior) in candidates.items():
@@ -159,6 +187,9 @@ def infer_gyro(
             merged = (hypothesis[0], kind, hypothesis[2], hypothesis[3])
             total[merged] = total.get(merged, 0.0) + p / len(pooled)
     told = _evidence(largest, scales, total)
+    best = next(iter(_marginal(total, 0)))
+    if best is not None and steps[best][1]:
+        told += (evidence("io.evidence-steps-of-sensor", step=steps[best][0], unit=best),)
     if whole and scales:
         told += evidence_of_counts(counts)
     axes = {k or None: v for k, v in _marginal(total, 2).items()}
@@ -166,6 +197,59 @@ def infer_gyro(
     said_form = conclude("gyro_form", _marginal(total, 1), told)
     times = {str(k): v for k, v in _marginal(total, 3).items()}
     return said_unit, said_form, conclude("gyro_axes", axes, told, "--columns"), times
+
+
+def _in_steps(gyro: Array, scale: float, written: tuple[float, float]) -> tuple[float, float]:
+    """Step of a common sensor that the rates are multiples of, and what it tells.
+
+    `scale`: of their unit, rad/s. `written`: as of `_written_step`. Returns `step`, in that unit,
+    zero if there is none; `gain`: of the probability of a unit in which there is one.
+    """
+    sizes = np.radians(_STEPS) / scale
+    step, blur = written
+    if step and (off := np.abs(sizes / step - 1.0)).min() < (near := max(_EXACT, blur)):
+        return float(sizes[off.argmin()]), np.log(1e4) / (2.0 * near * len(_STEPS))
+    part = gyro[:: max(1, len(gyro) // _OF_RATES)]
+    part = part - np.median(part, axis=0)
+    found = (0.0, 0.0)
+    for step in sizes.tolist():
+        spreads = []
+        for axis in part.T:
+            k = axis[np.abs(axis) < _WITHIN * step] / step
+            spread = MAD_TO_SD * float(np.median(np.abs(k))) if k.size >= _LEAST_RATES else 0.0
+            if spread < _LEAST_SPREAD:
+                continue
+            phase = np.exp(2j * np.pi * k).mean()
+            apart = np.diff(np.unique(np.round(k - np.angle(phase) / (2.0 * np.pi))))
+            kept = abs(phase) > _IN_STEP and np.mean(apart == 1.0) > _NEIGHBORS
+            spreads.append(spread if kept else 0.0)
+        # Every axis that moves has the step, and the finest spread tells most.
+        if spreads and min(spreads) / _CHANCE > found[1]:
+            found = (step, min(spreads) / _CHANCE)
+    return found
+
+
+def _written_step(gyro: Array) -> tuple[float, float]:
+    """Step of values that are few, in their unit, and its relative error by their digits.
+
+    Zero if they are many, if they are multiples of no step, or if it is a round one.
+    """
+    found = (0.0, np.inf)
+    for axis in gyro.T:
+        values = np.unique(axis)
+        if not 4 <= len(values) <= _FEW:
+            continue
+        steps = np.round((values - values[0]) / np.diff(values).min())
+        # Written with few digits, the values are off by up to half of the last one.
+        step = float(np.ptp(values) / steps[-1])
+        number = steps @ (values - values.mean()) / (steps @ (steps - steps.mean()))
+        off = float(np.abs(values - values.mean() - number * (steps - steps.mean())).max())
+        blur = 2.0 * off / float(np.ptp(values))
+        digits = step / 10.0 ** np.floor(np.log10(step))
+        round_one = min(abs(digits / one - 1.0) for one in (1.0, 2.0, 5.0, 10.0)) < 0.01
+        if off < 0.1 * step and blur < found[1] and not round_one:
+            found = (float(number), blur)
+    return found
 
 
 def _marginal(total: dict[Hypothesis, float], key: int) -> dict[str | None, float]:
