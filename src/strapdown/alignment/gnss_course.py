@@ -711,7 +711,9 @@ class CourseFit:
         bias, sd = self._bias_of_rests()
         least = min(LEAST_BASELINES * fixes.baseline, end - begin)
         if sd * least > LINEAR:
-            bias[:3], sd = self._part(end - least)._bias_of_courses(bias[:3], sd)
+            # Fixes may be missing at the end.
+            part = self._part(end - max(length, least))
+            bias[:3], sd = part._bias_of_courses(bias[:3], sd)
         length = max(length, LINEAR / max(sd, 1e-12), least)
         found = None
         while True:

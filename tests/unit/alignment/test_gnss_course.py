@@ -243,6 +243,15 @@ def test_without_a_rest_an_attitude_is_worth_what_the_bias_leaves():
     assert sum(squares) < chi2.isf(1e-4, 3 * len(squares))
 
 
+def test_positions_alone_with_an_outage_at_the_end():
+    # Bias unknown to 3 deg/s: the first part is three baselines long, and no fix is within it.
+    imu, truth, sensors = unit(DRIVE, 100.0, 0, "icm-42688-p")
+    vague = replace(sensors, gyro=replace(sensors.gyro, bias=3.0))
+    before = alone(fixes(rate=5.0, place_noise=0.02)).loc[:30.0]
+    result = GnssCourse().align(imu.iloc[:4001], SITE, vague, before)
+    assert chi_square(result, truth[4000]) < chi2.isf(1e-6, 3)
+
+
 def test_what_it_refuses():
     imu, _ = ideal(DRIVE, 100.0)
     sensors = unit(DRIVE, 100.0, 0)[2]
