@@ -73,7 +73,7 @@ def test_the_page_needs_nothing_else_and_its_links_lead_somewhere(shown):
     assert "://" not in page.replace("http://www.w3.org", "")
     sources = re.findall(r'(?:src|href)="([^"]*)"', page)
     links = [s for s in sources if not s.startswith(("data:image/svg+xml;base64,", "#"))]
-    assert len(links) == 8  # five reports, a PDF and two verdicts
+    assert len(links) == 6  # five reports and a PDF
     for link in links:
         assert (folder / link).is_file(), link
 

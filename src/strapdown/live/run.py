@@ -20,6 +20,7 @@ from strapdown.config.navigation import CommandTable, LiveTable, NavigationSpec
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.formats.clocks import EPOCH
 from strapdown.formats.columns import parse_axes
+from strapdown.formats.file_options import FileOptions
 from strapdown.formats.writers import WRITERS
 from strapdown.live.lines import (
     END,
@@ -255,7 +256,8 @@ def write_received(spec: NavigationSpec, got: Reception, folder: Path) -> Naviga
     samples = got.samples
     imu = pd.DataFrame(samples[:, 1:], index=samples[:, 0], columns=[*GYRO, *ACCEL])
     imu.attrs["sampling"] = got.sampling
-    WRITERS["csv"].write(folder / SAMPLES, {"imu": imu})
+    # As it is: what came is kept where it is too little to be a record.
+    WRITERS["csv"].function(folder / SAMPLES, {"imu": imu}, FileOptions())
     # Without properties that the reader infers from the numbers: they are known.
     whole["log"] = {
         "path": str(folder / SAMPLES),
