@@ -33,8 +33,9 @@ from strapdown.tables.checks import source_of
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-#: The rate at an instant is a mean over so much before and after it, s.
-STEADY = 0.1
+#: The rate at an instant is a mean over so much before and after it, s: little against the swaying
+#: of a vehicle, which its antenna follows.
+STEADY = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,12 +190,14 @@ def _integral_to_end(edges: Array, values: Array) -> Array:
 
 def _rate(turned: Array, stamps: Array, time: Array) -> Array:
     """Mean rates about instants; body axes."""
-    last = len(stamps) - 1
-    first = np.clip(np.searchsorted(stamps, time - STEADY), 0, last - 1)
-    past = np.clip(np.searchsorted(stamps, time + STEADY), first + 1, last)
-    turn = rotation.compose(rotation.conjugate(turned[first]), turned[past])
-    length = (stamps[past] - stamps[first])[:, None]
-    return np.asarray(rotation.rotation_vector_from_quaternion(turn) / length)
+    turns = rotation.compose(rotation.conjugate(turned[:-1]), turned[1:])
+    steps = rotation.rotation_vector_from_quaternion(turns)
+    angles = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
+    # At the ends of a record the mean is over what there is of it.
+    begin = np.maximum(time - STEADY, stamps[0])
+    end = np.minimum(time + STEADY, stamps[-1])
+    turned_by = [np.interp(end, stamps, x) - np.interp(begin, stamps, x) for x in angles.T]
+    return np.asarray(np.stack(turned_by, axis=1) / (end - begin)[:, None])
 
 
 # Velocities of the fixes of a drive, and the fixes with a valid course.
@@ -214,11 +217,13 @@ LEAST_PLACES = 4
 class Antenna:
     """Lever arm and clock of a receiver.
 
-    `lever_arm` (m): from the inertial sensors, body axes. `velocity_delay` (s): by which a stated
-    velocity is older than its stamp. `time_offset_sd` (s): by which all stamps may be wrong.
+    `lever_arm` (m): from the inertial sensors, body axes; `lever_arm_sd` (m) of each element.
+    `velocity_delay` (s): by which a stated velocity is older than its stamp. `time_offset_sd` (s):
+    by which all stamps may be wrong.
     """
 
     lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    lever_arm_sd: float = 0.0
     velocity_delay: float = 0.0
     time_offset_sd: float = 0.0
     correlated_share: float = 0.0
@@ -505,11 +510,13 @@ GYRO_MATRIX, GYRO_BY_FORCE = slice(12, 21), slice(21, 30)
 GYRO_NOISE = slice(30, 30 + 3 * STRETCHES)
 ACCEL_MATRIX = slice(GYRO_NOISE.stop, GYRO_NOISE.stop + 9)
 ACCEL_NOISE = slice(ACCEL_MATRIX.stop, ACCEL_MATRIX.stop + 3 * STRETCHES)
-# Heading minus course; distance of the unit ahead of the axle; offset of the stamps of the fixes.
+# Heading minus course; distance of the unit ahead of the axle; offset of the stamps of the fixes;
+# error of the lever arm.
 YAW: Final = ACCEL_NOISE.stop
 AXLE: Final = YAW + 1
 OFFSET: Final = YAW + 2
-COUNT: Final = YAW + 3
+ARM = slice(YAW + 3, YAW + 6)
+COUNT: Final = YAW + 6
 # Displacement at the end of the record: an unknown of positions alone.
 END_PLACE = slice(COUNT, COUNT + 3)
 

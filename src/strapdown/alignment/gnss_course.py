@@ -16,6 +16,7 @@ from strapdown.alignment.course_sums import (
     ACCEL_BIAS,
     ACCEL_MATRIX,
     ACCEL_NOISE,
+    ARM,
     ASKED,
     AXLE,
     COUNT,
@@ -399,7 +400,8 @@ class CourseFit:
             arm = np.cross(sums.rate[:k], self.model.antenna.lever_arm)
             read = fixes.velocity - np.einsum("kij,kj->ki", C[:k], arm)
             gap = np.einsum("kji,kj->ki", level[:k], read) - there[:k]
-            rows, fix_sd, within = by[:k], fixes.sd, self._within(sums)[1]
+            rows, fix_sd, within = by[:k].copy(), fixes.sd, self._within(sums)[1]
+            rows[:, :, ARM] = found.C @ sums.turned[:k] @ rotation.cross_matrix(sums.rate[:k])
         told = np.isfinite(fix_sd)
         return Observed(
             sums,
@@ -539,7 +541,7 @@ class CourseFit:
             sd[noise] = np.sqrt(white**2 + WALK * STRETCHES * walk).ravel()
         sd[GYRO_BY_FORCE] = np.repeat(gyro.axis("g_sensitivity"), 3)
         sd[YAW], sd[AXLE] = model.yaw_sd, model.axle_sd
-        sd[OFFSET] = model.antenna.time_offset_sd
+        sd[OFFSET], sd[ARM] = model.antenna.time_offset_sd, model.antenna.lever_arm_sd
         return sd
 
     def _velocities(self, found: Found, sums: DriveSums, rate: Array) -> tuple[Array, Array]:
@@ -625,8 +627,11 @@ class CourseFit:
     ) -> tuple[Array, Array]:
         """Lever arm of the antenna at instants, in the same axes, and its derivatives."""
         fixed = rotation.dcm_from_rotation_vector(self.site.earth_rate * sums.until_end[rows, None])
-        arm = fixed @ found.C @ sums.turned[rows] @ np.array(self.model.antenna.lever_arm)
-        return arm, -(rotation.cross_matrix(arm) @ turns[rows])
+        axes = fixed @ found.C @ sums.turned[rows]
+        arm = axes @ np.array(self.model.antenna.lever_arm)
+        by_arm = -(rotation.cross_matrix(arm) @ turns[rows])
+        by_arm[:, :, ARM] = axes
+        return arm, by_arm
 
     def _walk(self, sums: DriveSums) -> float:
         """Variance of a position within stretches, whose noise is modeled as a bias of each.

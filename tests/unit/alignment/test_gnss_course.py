@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from stands import ORIGIN, SITE, chi_square, ideal, phi, still, unit
 
 from strapdown import rotation
-from strapdown.alignment.course_sums import END_VELOCITY, OF_SENSORS, TURN, Antenna
+from strapdown.alignment.course_sums import ARM, END_VELOCITY, OF_SENSORS, TURN, Antenna
 from strapdown.alignment.gnss_course import GnssCourse, _excess
 from strapdown.errors import ConfigError, DataError
 from strapdown.frames import ned_from_geodetic
@@ -507,3 +507,10 @@ def test_derivatives_are_those_of_the_predictions(positions):
         part = 1e-3 if positions else 5e-3
         off = np.abs(change - seen.rows[:, :, column] * step).max() / np.abs(change).max()
         assert off < part, (column, off)
+    for axis in range(3):
+        longer = np.array(antenna.lever_arm)
+        longer[axis] += 0.01
+        other = replace(fit.model, antenna=replace(antenna, lever_arm=tuple(longer)))
+        change = seen.gap - replace(fit, model=other)._observed(found).gap
+        off = np.abs(change - seen.rows[:, :, ARM.start + axis] * 0.01).max()
+        assert off < 1e-9

@@ -257,7 +257,8 @@ def test_the_offset_of_the_receivers_clock_is_found(drive, tmp_path):
     assert one.answer("navigation") == "with limits"
     assert fault.code == "navigation.receiver-clock-off"
     assert np.array_equal(read_gnss(tmp_path / "clean-gnss.csv"), read_gnss(fixes))
-    assert fault.data["offset"] == pytest.approx(0.7, abs=0.05)
+    # An antenna a meter before the axle shifts a course by a meter over the speed, 0.08 s.
+    assert fault.data["offset"] == pytest.approx(0.7, abs=0.08)
 
 
 def test_fixes_of_a_clean_log_are_beside_it(drive, tmp_path):

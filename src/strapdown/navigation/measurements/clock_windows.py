@@ -34,6 +34,8 @@ EARLIER = (0.0, 7.0, 15.0)
 MOUNTING = 20.0
 #: Nor where it is: a course that is ahead of the heading by d / v looks like an offset, m.
 AXLE = 10.0
+#: Nor where the antenna is: on a rough road the roof sways, and so does its course, m.
+ARM = 2.0
 #: Samples are averaged to this rate, Hz: motions of a vehicle are slower.
 FAST = 20.0
 #: The way between two fixes shows a step of the receiver's clock to this part of it.
@@ -213,7 +215,7 @@ def _window(
         if len(fixes) < 2:
             return None
         site = Site(*np.median(values_of(fixes, GEODETIC), axis=0).tolist())
-        unknown = replace(antenna, time_offset_sd=UNKNOWN)
+        unknown = replace(antenna, time_offset_sd=UNKNOWN, lever_arm_sd=ARM)
         way = GnssCourse(mounting_yaw_sd_deg=MOUNTING, axle_sd=AXLE)
         try:
             more, sd = way.fit(part, site, sensors, fixes, unknown).search().offset

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -37,12 +37,16 @@ GPS_EPOCH, LEAP = 315_964_800.0, 18.0
 UNIX = (7.9e8, 2.21e9)
 #: Range of offsets, s, the step of the search, and of the fit about its result.
 LARGEST, STEP, FINE_STEP = 20.0, 0.1, 0.025
+#: Steps about the result: whose misfits count, and to which a parabola is fitted.
+AROUND, FITTED = 20, 4
 #: Interval of the stored integrals of the sensors, s.
 NODES = 0.02
 #: Below this speed, m/s, a course is not usable.
 LEAST_SPEED = 3.0
-#: Largest distance of an antenna from the unsteered axle, m.
-ARM = 1.0
+#: Lever arm of an antenna from the unsteered axle, m, one standard deviation of an element; the
+#: time over which a rate at an instant is taken, s; and the standard deviation of a result from
+#: steps whose residuals are correlated over that from independent ones.
+ARM, ABOUT, CORRELATED = 1.0, 0.1, 2.0
 #: Number of steps needed; fraction of the changes that the sensors must explain; and factor by
 #: which the best offset's residual must be below that of any other more than a second from it.
 LEAST_STEPS, LEAST_SHARE, CLEAR = 20, 0.6, 1.3
@@ -147,10 +151,11 @@ def time_offset(
     -----
     Over a step between fixes, the course changes by a linear function of the integral of the three
     rates, whatever the mounting, as long as the vehicle does not tilt by much; its speed by one of
-    the integral of force. For every offset of a grid the four numbers are fitted by least squares;
-    the least misfit is refined by a parabola, whose curvature gives the standard deviation. The
-    course of an antenna that is a meter before the rear axle is ahead of the heading by a meter
-    over the speed, which sets the weights of course and speed.
+    the integral of force. The velocity of the antenna is another by its lever arm, in proportion
+    to the rates: a meter before the rear axle the course is ahead of the heading by a meter over
+    the speed, and on a roof it follows the rolling of a rough road. For every offset of a grid the
+    coefficients are fitted by least squares, with a prior for the arm; the least misfit is refined
+    by a parabola, whose curvature gives the standard deviation.
     """
     told = _courses(gnss, velocity_delay)
     if told is None:
@@ -163,14 +168,14 @@ def time_offset(
     turns = np.abs(np.diff(course)) < 0.5 * math.pi
     if not ready.any():
         return None
-    ahead = ARM / float(np.sqrt(np.mean(np.square(speed[1:][ready]))))
+    slow = np.maximum(speed, LEAST_SPEED)
     found = [
-        replace(one, sd=math.hypot(one.sd, systematic))
-        for name, change, columns, used, systematic in (
-            ("course", np.diff(course), GYRO, ready & turns, ahead),
-            ("speed", np.diff(speed), ACCEL, ready, 0.0),
+        one
+        for name, change, columns, used, per_rate in (
+            ("course", np.diff(course), GYRO, ready & turns, 1.0 / slow),
+            ("speed", np.diff(speed), ACCEL, ready, np.ones(len(at))),
         )
-        if (one := _best(at, change, used, imu, columns, name)) is not None
+        if (one := _best(at, change, used, imu, columns, per_rate, name)) is not None
     ]
     if not found:
         return None
@@ -245,34 +250,56 @@ def _best(
     used: NDArray[np.bool_],
     imu: pd.DataFrame,
     columns: list[str],
+    per_rate: Array,
     by: str,
 ) -> TimeOffset | None:
-    """The offset at which the integrals of three channels best explain a change."""
+    """The offset at which the integrals of three channels best explain a change.
+
+    `per_rate`: of the value that changes by a rate times a lever arm.
+    """
     stamps = index_of(imu)
     if not set(columns) <= set(imu.columns):
         return None
-    values = values_of(imu, columns)
     # Every offset is judged by the same steps: those within the record at all the offsets.
     most = min(LARGEST, 0.25 * float(stamps[-1] - stamps[0]))
     begin, end = at[:-1], at[1:]
-    used = used & (begin - most >= stamps[0]) & (end + most <= stamps[-1])
+    room = most + ABOUT
+    used = used & (begin - room >= stamps[0]) & (end + room <= stamps[-1])
     if used.sum() < LEAST_STEPS:
         return None
-    change, lasting = change[used], (end - begin)[used]
-    nodes, sums = _integrals(stamps, values, imu.attrs["sampling"] == "mean")
+    # A course is as accurate as it is fast.
+    weight = 1.0 / (0.5 * (per_rate[1:] + per_rate[:-1]))[used]
+    change, lasting = weight * change[used], weight * (end - begin)[used]
+    means = imu.attrs["sampling"] == "mean"
+    nodes, sums = _integrals(stamps, values_of(imu, columns), means)
+    turned = sums
+    if columns != GYRO:
+        turned = _integrals(stamps, values_of(imu, GYRO), means)[1]
 
-    between, X = np.empty((len(at), 3)), np.empty((len(change), 4))
+    between, before, after = (np.empty((len(at), 3)) for _ in range(3))
+    X = np.empty((len(change), 7))
     X[:, 3] = lasting
+    stiff = 0.0
 
     def misfit(offset: float) -> float:
         piecewise.lines(nodes, sums, at - offset, between)
-        X[:, :3] = np.diff(between, axis=0)[used]
+        X[:, :3] = np.diff(between, axis=0)[used] * weight[:, None]
+        piecewise.lines(nodes, turned, at - offset - 0.5 * ABOUT, before)
+        piecewise.lines(nodes, turned, at - offset + 0.5 * ABOUT, after)
+        rate = (after - before) * (per_rate / ABOUT)[:, None]
+        X[:, 4:] = np.diff(rate, axis=0)[used] * weight[:, None]
         # By the small normal equations, which keep enough digits for the comparison.
-        fit, *_ = np.linalg.lstsq(X.T @ X, X.T @ change, rcond=None)
-        return float(np.square(change - X @ fit).sum())
+        normal = X.T @ X
+        normal[[4, 5, 6], [4, 5, 6]] += stiff
+        fit, *_ = np.linalg.lstsq(normal, X.T @ change, rcond=None)
+        off = float(np.square(change - X @ fit).sum())
+        return off + stiff * float(fit[4:] @ fit[4:])
 
     whole = float(np.square(change - change.mean()).sum())
     grid = np.arange(-most, most + 0.5 * STEP, STEP)
+    costs = np.array([misfit(float(one)) for one in grid])
+    variance = CORRELATED**2 * float(costs.min()) / max(len(change) - 8, 1)
+    stiff = variance / ARM**2
     costs = np.array([misfit(float(one)) for one in grid])
     k = int(np.argmin(costs))
     share = 1.0 - float(costs[k]) / whole if whole > 0.0 else 0.0
@@ -284,13 +311,21 @@ def _best(
     ):
         return None
     # Again near the minimum, with a step that is wide against its noise and narrow against motions.
-    fine = grid[k] + np.arange(-4, 5) * FINE_STEP
-    second, first, _ = np.polyfit(fine - grid[k], [misfit(float(one)) for one in fine], 2)
+    fine = grid[k] + np.arange(-AROUND, AROUND + 1) * FINE_STEP
+    near = np.array([misfit(float(one)) for one in fine])
+    best = min(max(int(np.argmin(near)), FITTED), len(fine) - 1 - FITTED)
+    part = slice(best - FITTED, best + FITTED + 1)
+    second, first, level = np.polyfit(fine[part] - fine[best], near[part], 2)
     if not second > 0.0:
         return None
-    offset = float(grid[k] - 0.5 * first / second)
-    # The residuals are correlated from step to step: twice the result for independent steps.
-    sd = 2.0 * math.sqrt(costs[k] / max(len(change) - 5, 1) / second)
+    off = -0.5 * first / second
+    least = float(level - second * off**2)
+    # Where the misfit grows by less farther away, as where an arm explains it, the widest parabola.
+    away = np.abs(fine - fine[best] - off)
+    away[part] = 0.0
+    flat = float(np.max(np.square(away) / np.maximum(near - least, 1e-9 * least)))
+    sd = math.sqrt(variance * max(1.0 / second, flat))
+    offset = float(fine[best] + off)
     return TimeOffset(offset, sd, share, by)
 
 
