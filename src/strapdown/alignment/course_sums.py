@@ -223,11 +223,11 @@ class Antenna:
     """
 
     lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    lever_arm_sd: float = 0.0
     velocity_delay: float = 0.0
     time_offset_sd: float = 0.0
     correlated_share: float = 0.0
     correlation_time: float = 1.0
+    lever_arm_sd: float = 0.0
 
     def position_sd_factor(self, step: float, length: float) -> float:
         """Factor on positions each `step` whose changes over `length` (s) are to be fitted.
