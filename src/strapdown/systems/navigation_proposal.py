@@ -42,6 +42,7 @@ from strapdown.navigation.measurements.gnss_readiness import (
     check_fixes,
     lasting_position_sd,
     white_position_sd,
+    white_velocity_sd,
     without_repeats,
 )
 from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV, load_sensor
@@ -126,14 +127,15 @@ APART = 1e-3
 #: below the other is no state where it is not significant.
 QUARTZ, FEW = 5e-5, 1.5e-5
 #: Share of the variance of positions that lasts from fix to fix: proposed from the first on, and at
-#: most; by a variance of the rest that is so many times that by medians, whose tails are heavier
-#: than a normal one's. Where standard deviations are assumed: that of fixes that scatter like those
-#: of a code receiver, and of others; the scatter, m, that tells them apart.
-LASTS, LASTS_MOST, TAILS = 0.5, 0.9, 2.0
+#: most. Where standard deviations are assumed, or contradicted by the scatter: that of fixes that
+#: scatter like those of a code receiver, and of others; the scatter, m, that tells them apart.
+LASTS, LASTS_MOST = 0.5, 0.9
 LASTS_BY_CODE, LASTS_BY_PHASE, PHASE = 0.9, 0.5, 0.05
 #: The least share that is proposed where velocities show what lasts; the factor of the standard
 #: deviations from which a receiver understates its errors, and beyond which it has others.
-SHOWN, UNDERSTATED, MISSTATED = 0.1, 1.5, 10.0
+SHOWN, UNDERSTATED, MISSTATED = 0.15, 1.5, 10.0
+#: A vehicle's jerk of 3 m/s³ is lost in the scatter of positions at this interval, s.
+SMOOTH = 0.2
 #: Fixes better than this, m, show that a lever arm is measured by a tape to so much, m.
 SHOWS_ARM, ARM_SD = 0.1, 0.02
 #: Attributes of fixes with assumed standard deviations, and the keys of these.
@@ -569,7 +571,8 @@ def _position_errors(fixes: pd.DataFrame, delay: float) -> dict[str, float]:
     """Share of the positions' variance that lasts, factor of their sd, uncertainty of a tape.
 
     The share by the scatter from fix to fix, which lacks what lasts; where the velocities show
-    what lasts, by its size, which a receiver may understate.
+    what lasts, by its size, which a receiver may understate. One that understates its scatter
+    says nothing of what lasts, either.
     """
     found = white_position_sd(fixes, delay)
     if found is None:
@@ -579,14 +582,16 @@ def _position_errors(fixes: pd.DataFrame, delay: float) -> dict[str, float]:
     stated = float(np.nanmedian(values_of(fixes, POSITION_SD)[:, :2]))
     precise = white < PHASE if assumed else stated < SHOWS_ARM
     by_velocity = None if precise else lasting_position_sd(fixes, delay)
-    least, lasting, total = LASTS, 1.0 - TAILS * part**2, 1.0
+    usual = LASTS_BY_PHASE if white < PHASE else LASTS_BY_CODE
+    least, lasting, total = LASTS, 1.0 - part**2, 1.0
     if by_velocity is not None:
         least, quiet, slow = SHOWN, *(x**2 for x in by_velocity)
-        if "velocity_sd_taken" not in fixes.attrs and quiet + slow < MISSTATED**2:
+        if _velocities_as_taken(fixes) and quiet + slow < MISSTATED**2:
             total = max(1.0, quiet + slow)
-        lasting = 1.0 - max(min(TAILS * quiet, total - slow), quiet) / total
+        lasting = 1.0 - quiet / total
+    elif not assumed and UNDERSTATED < part < MISSTATED and _shows_scatter(fixes, white):
+        total, lasting = part**2 / (1.0 - usual), usual
     if assumed:
-        usual = LASTS_BY_PHASE if white < PHASE else LASTS_BY_CODE
         lasting = usual if by_velocity is None else max(lasting, usual)
     lasting = min(lasting, LASTS_MOST)
     out = {"position_correlated_share": round(lasting, 2)} if lasting >= least else {}
@@ -595,6 +600,23 @@ def _position_errors(fixes: pd.DataFrame, delay: float) -> dict[str, float]:
     if precise:
         out["lever_arm_sd_m"] = ARM_SD
     return out
+
+
+def _velocities_as_taken(fixes: pd.DataFrame) -> bool:
+    """Whether velocities state their standard deviation, or scatter no more than is assumed."""
+    taken = fixes.attrs.get("velocity_sd_taken")
+    scatter = None if taken is None else white_velocity_sd(fixes)
+    return taken is None or (scatter is not None and scatter <= taken)
+
+
+def _shows_scatter(fixes: pd.DataFrame, white: float) -> bool:
+    """Whether a scatter of positions, m, is theirs: not that of velocities, nor motion."""
+    step = float(np.median(np.diff(index_of(fixes))))
+    sd = values_of(fixes, VELOCITY_SD)[:, :2]
+    if not np.isfinite(sd).all():
+        return step <= SMOOTH
+    sds = float(np.median(sd)), white_velocity_sd(fixes) or math.inf
+    return 0.5 * min(sds) * step < 0.5 * white
 
 
 def _speed(fixes: pd.DataFrame) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
@@ -87,7 +89,7 @@ def white_position_sd(table: pd.DataFrame, delay: float = 0.0) -> tuple[float, f
 
     By their steps less the mean of the velocities at both ends, or by their third differences. An
     error that lasts longer than some fixes is not in it; sudden motion is, so that it is an upper
-    bound. Medians are not moved by faults.
+    bound. What is beyond `TRIM` standard deviations by the median is a fault and does not count.
 
     Parameters
     ----------
@@ -123,10 +125,26 @@ def white_position_sd(table: pd.DataFrame, delay: float = 0.0) -> tuple[float, f
         even = np.abs(time[3:] - time[:-3] - 3.0 * step) < UNEVEN * step
     if even.sum() < LEAST_ROWS:
         return None
-    left, stated = np.abs(left[even]), sd[-len(left) :][even]
-    white = MAD_TO_SD * np.median(left, axis=0)
-    share = MAD_TO_SD * np.median(left / stated, axis=0)
-    return float(np.sqrt(np.mean(white**2))), float(np.sqrt(np.mean(share**2)))
+    left, stated = left[even], sd[-len(left) :][even]
+    return math.sqrt(_variance(left)), math.sqrt(_variance(left / stated))
+
+
+def white_velocity_sd(table: pd.DataFrame) -> float | None:
+    """Measure by how much horizontal velocities scatter from fix to fix, m/s, a component.
+
+    By their third differences: an upper bound, as sudden motion is in it. None with too few fixes.
+    """
+    v = values_of(table, VELOCITY)[usable(table, VELOCITY_SD[:2])][:, :2]
+    if len(v) < LEAST_ROWS:
+        return None
+    return math.sqrt(_variance(np.diff(v, n=3, axis=0) / math.sqrt(20.0)))
+
+
+def _variance(left: Array) -> float:
+    """Mean variance of two components about zero without faults, (n, 2)."""
+    size = np.abs(left)
+    near = size <= TRIM * MAD_TO_SD * np.median(size, axis=0)
+    return float(np.mean(np.square(left).sum(axis=0, where=near) / near.sum(axis=0)))
 
 
 def _without_delay(time: Array, velocity: Array, delay: float) -> Array:
@@ -139,8 +157,8 @@ def lasting_position_sd(table: pd.DataFrame, delay: float = 0.0) -> tuple[float,
 
     Positions less the integral of the velocities change from one instant to one t later by
     ``2 w² + 2 s² (1 - exp(-t / T)) + q t`` in variance: white errors w, lasting ones s and the
-    noise of the velocities. Their stated noise q is subtracted, and w and s are fitted to lags
-    from one fix to `LAGS`, each by its median: less than half of the pairs may be faulty. The T
+    noise of the velocities. Their stated noise q, or the scatter of velocities that state none, is
+    subtracted, and w and s are fitted to lags from one fix to `LAGS`, without faulty pairs. The T
     that fits best is one of `TIMES`: lags that short show little of it, and a longer one by a
     smaller s.
 
@@ -174,14 +192,15 @@ def lasting_position_sd(table: pd.DataFrame, delay: float = 0.0) -> tuple[float,
     off = np.vstack([np.zeros(2), np.cumsum(off, axis=0)])
     piece = np.append(0, np.cumsum(apart > (1.0 + UNEVEN) * step))
     stated, noise = np.square(sd[:, :2]), np.square(sd[:, 2:]) * step
+    if "velocity_sd_taken" in table.attrs and (scatter := white_velocity_sd(table)) is not None:
+        noise = np.minimum(noise, scatter**2 * step)
     rows = []
     for lag in sorted({1, *(max(1, round(x / step)) for x in LAGS)}):
         same = piece[lag:] == piece[:-lag] if lag < len(time) else np.zeros(0, dtype=np.bool_)
         if same.sum() < LEAST_ROWS:
             continue
         both = 0.5 * (stated[lag:] + stated[:-lag])[same]
-        u = np.abs(off[lag:] - off[:-lag])[same] / np.sqrt(both)
-        spread = 0.5 * float(np.mean(np.square(MAD_TO_SD * np.median(u, axis=0))))
+        spread = 0.5 * _variance((off[lag:] - off[:-lag])[same] / np.sqrt(both))
         grown = 0.5 * lag * step * float(np.median(noise[lag:][same] / both))
         rows.append((lag * step, spread, grown))
     if not rows or rows[-1][0] < LEAST_LAG:
@@ -205,8 +224,9 @@ def lasting_position_sd(table: pd.DataFrame, delay: float = 0.0) -> tuple[float,
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 
-#: Number of fixes that show their scatter; a longer interval, relative to the usual, is a gap.
-LEAST_ROWS, UNEVEN = 30, 0.2
+#: Number of fixes that show their scatter; a longer interval, relative to the usual, is a gap; and
+#: residuals beyond so many standard deviations are faults.
+LEAST_ROWS, UNEVEN, TRIM = 30, 0.2, 5.0
 #: Lags over which errors are shown to last, s, the longest that is needed, and the share of the
 #: noise of velocities in it that is too large.
 LAGS, LEAST_LAG, HIDDEN = (1.0, 2.0, 5.0, 10.0, 20.0, 40.0), 9.0, 0.5

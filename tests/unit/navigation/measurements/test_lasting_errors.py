@@ -7,7 +7,7 @@ from tests import town_drive as town
 from strapdown.alignment.course_sums import Antenna
 from strapdown.frames import geodetic_from_ned
 from strapdown.navigation.measurements.gnss_readiness import lasting_position_sd, white_position_sd
-from strapdown.systems.navigation_proposal import TAILS, _position_errors
+from strapdown.systems.navigation_proposal import _position_errors
 from strapdown.tables import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
 
 WHITE, LASTING, TIME = 0.3, 1.0, 60.0
@@ -62,9 +62,7 @@ def test_the_scatter_from_fix_to_fix_lacks_what_lasts(velocities):
     assert white == pytest.approx(WHITE, rel=0.25)
     assert share == pytest.approx(white / STATED, rel=1e-6)
     proposed = _position_errors(table, 0.0)
-    # Velocities show the share itself; the scatter alone is taken for twice as large.
-    expected = SHARE if velocities else 1.0 - TAILS * (1.0 - SHARE)
-    assert proposed["position_correlated_share"] == pytest.approx(expected, abs=0.12)
+    assert proposed["position_correlated_share"] == pytest.approx(SHARE, abs=0.12)
     assert "lever_arm_sd_m" not in proposed
 
 
@@ -95,7 +93,6 @@ def test_a_receiver_that_understates_what_lasts_gets_a_factor():
 
 
 def test_a_share_between_white_and_lasting_is_proposed_where_velocities_show_it():
-    # By the scatter alone 1 - 2 (0.65 / 1.05)² is no share.
     shares = []
     for seed in range(8531, 8537):
         table = fixes(seed, lasting=0.6, white=0.55)
