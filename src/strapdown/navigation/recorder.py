@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar
 
@@ -12,7 +12,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.dsp.true_runs import true_runs
 from strapdown.errors import ConfigError, DataError
+from strapdown.estimation.robust import AdaptiveScale
+from strapdown.navigation.measurements.gnss import PLACE
 from strapdown.navigation.navigator import JUST_BEFORE, Navigator
 from strapdown.navigation.record import (
     CovarianceSnapshot,
@@ -38,6 +41,10 @@ Array = NDArray[np.float64]
 NEAR = 1e-6
 #: Marks before and after an observation are closer than this, s.
 PAIR = 2.0 * JUST_BEFORE
+#: Faults of receivers, as of a wrong ambiguity or by reflections, last this long at most, s.
+DOUBT = 60.0
+#: A longer interval, relative to the usual, is an outage; after so many observations it is over.
+GAP, SETTLES = 5.0, 3
 
 
 @dataclass(frozen=True)
@@ -191,6 +198,9 @@ class Tape:
         trajectory = used.trajectory(at, np.array(history), source)
         time = pd.Index(marks[:, 0], name="time")
         covariance = marks[:, 1:82].reshape(-1, 9, 9).copy()
+        for component, begin, end, size in self._contradictions():
+            within = (marks[:, 0] >= begin) & (marks[:, 0] <= end)
+            covariance[within, component, component] += size**2
         without = ~np.array(model.estimated(used))
         covariance[:, without, :] = covariance[:, :, without] = np.nan
         nearest = np.clip(trajectory.index.searchsorted(time), 0, len(trajectory) - 1)
@@ -211,6 +221,37 @@ class Tape:
             modes=modes,
             outages=dict(outages or {}),
         )
+
+    def _contradictions(self) -> Iterator[tuple[int, float, float, float]]:
+        """Components, spans (s) and sizes (m) by which fixes and inertial solution contradict.
+
+        A receiver whose positions are rejected so many times in a row is believed again, by and by,
+        and either it or the solution was wrong. What separated the two is a part of the uncertainty
+        until it jumps back, or for `DOUBT` if it does not. After an outage, and at the start, the
+        solution was wrong.
+        """
+        for name, rows in self._seen.items():
+            labels, n = self._labels[name], len(self._labels[name])
+            if not set(labels) <= set(PLACE):
+                continue
+            time, nu, weight = rows.rows[:, 0], rows.rows[:, 1 : 1 + n], rows.rows[:, 1 + 2 * n :]
+            for k, label in enumerate(labels):
+                spans = _long_rejections(weight[:, k] == 0.0)
+                sizes = [float(nu[span.start, k]) for span in spans]
+                usual = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+                since = np.diff(time, prepend=-math.inf) > GAP * usual
+                # What was believed last takes as many observations to settle.
+                settled = [min(span.stop + AdaptiveScale.patience, len(time)) for span in spans]
+                ends = [float(time[stop - 1]) for stop in settled]
+                returned = False
+                for j, span in enumerate(spans):
+                    end = ends[j] + DOUBT
+                    if since[max(span.start - SETTLES, 0) : span.start + 1].any() or returned:
+                        end, returned = ends[j], False
+                    elif j + 1 < len(spans):
+                        returned = abs(sizes[j] + sizes[j + 1]) < 0.5 * abs(sizes[j])
+                        end = ends[j + 1] if returned else end
+                    yield PLACE.index(label), float(time[span.start]), end, abs(sizes[j])
 
     def _cells(self, time: Array) -> Array:
         """Number of the interval of each time stamp."""
@@ -244,6 +285,20 @@ class Tape:
         seen = one.innovations
         row = np.concatenate([[one.time], seen.nu, seen.s, seen.weight])
         self._seen[one.name] = self._seen[one.name].and_then(row[None, :])
+
+
+def _long_rejections(rejected: NDArray[np.bool_]) -> list[slice]:
+    """Spans that begin with so many rejections in a row that the adaptive rule takes the next.
+
+    Others that follow it, after one or two that were taken, are the same.
+    """
+    spans: list[slice] = []
+    for run in true_runs(rejected):
+        if spans and run.start - spans[-1].stop <= 2:
+            spans[-1] = slice(spans[-1].start, run.stop)
+        elif run.stop - run.start >= AdaptiveScale.patience:
+            spans.append(run)
+    return spans
 
 
 def record_of(

@@ -5,8 +5,10 @@ import pytest
 from tests import town_drive as town
 
 from strapdown.alignment.course_sums import Antenna
+from strapdown.estimation.robust import AdaptiveRule, AdaptiveScale, Igg3
 from strapdown.frames import geodetic_from_ned
 from strapdown.navigation.measurements.gnss_readiness import lasting_position_sd, white_position_sd
+from strapdown.navigation.recorder import record_of
 from strapdown.systems.navigation_proposal import _position_errors
 from strapdown.tables import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
 
@@ -132,3 +134,53 @@ def test_the_factor_of_an_alignment_is_that_of_slopes():
         found = factor.position_sd_factor(0.2, length)
         assert 0.5 < found / slope_sd(time, length) < 2.0
     assert Antenna().position_sd_factor(0.2, 60.0) == 1.0
+
+
+def test_a_receiver_that_is_believed_again_makes_the_bound_cover_both():
+    """Twenty seconds of a wrong ambiguity: after ten rejections the receiver is believed.
+
+    Before, the bound was that of its fixes: 0.03 m with an error of 1 m.
+    """
+    table = town.fixes(8541, rate=4.0, position_noise=0.02, velocity_noise=0.05)
+    time = table.index.to_numpy()
+    wrong = (time >= 60.0) & (time < 80.0)
+    places = table[GEODETIC].to_numpy()
+    shift = np.array([0.8, 0.0, -0.6])
+    table.loc[wrong, GEODETIC] = [geodetic_from_ned(shift, place) for place in places[wrong]]
+    rule = AdaptiveRule(Igg3(), AdaptiveScale(lowest=1.0))
+    navigator, state = town.begun(town.gnss(rule=rule))
+    _, piece = town.run(navigator, state, table)
+    found = record_of(navigator, [piece])
+    off, at = town.off(piece), piece.time
+    sd = found.sd[["north", "east", "down"]].to_numpy()
+    bound = 1.96 * np.column_stack([np.interp(at, found.sd.index, one) for one in sd.T])
+    during = (at > 60.0) & (at < 80.0)
+    assert np.abs(off[during][:, [0, 2]]).max() > 0.5
+    assert (np.abs(off[during])[:, [0, 2]] < bound[during][:, [0, 2]]).mean() > 0.99
+    # East is not contradicted. Back again, the receiver is believed after some seconds.
+    assert bound[:, 1][at > 2.0].max() < 0.1
+    assert 0.5 < bound[(at > 80.0) & (at < 85.0)].max() < 3.0
+    assert bound[at > 120.0].max() < 0.1
+
+
+def test_after_an_outage_the_solution_was_wrong():
+    """Fixes that return far from the solution widen the bound only until they are believed."""
+    table = town.fixes(8542, rate=4.0, position_noise=0.02, velocity_noise=0.05)
+    back = table.index.to_numpy() >= 60.0
+    shift = np.array([3.0, 0.0, 0.0])
+    places = table[GEODETIC].to_numpy()
+    # The error of an inertial solution that is worse than its model, seen from the fixes.
+    table.loc[back, GEODETIC] = [geodetic_from_ned(shift, place) for place in places[back]]
+    table = table[(table.index < 50.0) | back]
+    rule = AdaptiveRule(Igg3(), AdaptiveScale(lowest=1.0))
+    navigator, state = town.begun(town.gnss(rule=rule))
+    _, piece = town.run(navigator, state, table)
+    found = record_of(navigator, [piece])
+    at, north = piece.time, found.sd["north"]
+    far = np.abs(town.off(piece)[:, 0] - 3.0)
+    bound = 1.96 * np.interp(at, north.index, north)
+    during = (at > 60.5) & (far > 0.3)
+    assert during.sum() > 300
+    assert (far < bound)[during].mean() > 0.95
+    # Not for the minute of a doubtful receiver.
+    assert bound[at > 95.0].max() < 0.1
