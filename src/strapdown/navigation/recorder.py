@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -44,7 +44,7 @@ PAIR = 2.0 * JUST_BEFORE
 #: Faults of receivers, as of a wrong ambiguity or by reflections, last this long at most, s.
 DOUBT = 60.0
 #: A longer interval, relative to the usual, is an outage; after so many observations it is over.
-GAP, SETTLES = 5.0, 3
+GAP, SETTLES = 5.0, 5
 
 
 @dataclass(frozen=True)
@@ -198,9 +198,9 @@ class Tape:
         trajectory = used.trajectory(at, np.array(history), source)
         time = pd.Index(marks[:, 0], name="time")
         covariance = marks[:, 1:82].reshape(-1, 9, 9).copy()
-        for component, begin, end, size in self._contradictions():
-            within = (marks[:, 0] >= begin) & (marks[:, 0] <= end)
-            covariance[within, component, component] += size**2
+        for component, one in self._contradictions():
+            within = (marks[:, 0] >= one.begin) & (marks[:, 0] <= one.end)
+            covariance[within, component, component] += one.size**2
         without = ~np.array(model.estimated(used))
         covariance[:, without, :] = covariance[:, :, without] = np.nan
         nearest = np.clip(trajectory.index.searchsorted(time), 0, len(trajectory) - 1)
@@ -222,36 +222,15 @@ class Tape:
             outages=dict(outages or {}),
         )
 
-    def _contradictions(self) -> Iterator[tuple[int, float, float, float]]:
-        """Components, spans (s) and sizes (m) by which fixes and inertial solution contradict.
-
-        A receiver whose positions are rejected so many times in a row is believed again, by and by,
-        and either it or the solution was wrong. What separated the two is a part of the uncertainty
-        until it jumps back, or for `DOUBT` if it does not. After an outage, and at the start, the
-        solution was wrong.
-        """
+    def _contradictions(self) -> Iterator[tuple[int, _Contradiction]]:
+        """Contradictions of the receivers' positions, each with its component."""
         for name, rows in self._seen.items():
             labels, n = self._labels[name], len(self._labels[name])
-            if not set(labels) <= set(PLACE):
-                continue
-            time, nu, weight = rows.rows[:, 0], rows.rows[:, 1 : 1 + n], rows.rows[:, 1 + 2 * n :]
-            for k, label in enumerate(labels):
-                spans = _long_rejections(weight[:, k] == 0.0)
-                sizes = [float(nu[span.start, k]) for span in spans]
-                usual = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
-                since = np.diff(time, prepend=-math.inf) > GAP * usual
-                # What was believed last takes as many observations to settle.
-                settled = [min(span.stop + AdaptiveScale.patience, len(time)) for span in spans]
-                ends = [float(time[stop - 1]) for stop in settled]
-                returned = False
-                for j, span in enumerate(spans):
-                    end = ends[j] + DOUBT
-                    if since[max(span.start - SETTLES, 0) : span.start + 1].any() or returned:
-                        end, returned = ends[j], False
-                    elif j + 1 < len(spans):
-                        returned = abs(sizes[j] + sizes[j + 1]) < 0.5 * abs(sizes[j])
-                        end = ends[j + 1] if returned else end
-                    yield PLACE.index(label), float(time[span.start]), end, abs(sizes[j])
+            if set(labels) <= set(PLACE):
+                time, nu, weight = rows.rows[:, 0], rows.rows[:, 1:], rows.rows[:, 1 + 2 * n :]
+                for k, label in enumerate(labels):
+                    for one in _contradictions(time, nu[:, k], weight[:, k] == 0.0):
+                        yield PLACE.index(label), one
 
     def _cells(self, time: Array) -> Array:
         """Number of the interval of each time stamp."""
@@ -287,14 +266,54 @@ class Tape:
         self._seen[one.name] = self._seen[one.name].and_then(row[None, :])
 
 
+class _Contradiction(NamedTuple):
+    """From `begin` to `end`, s, by `size`, m."""
+
+    begin: float
+    end: float
+    size: float
+
+
+def _contradictions(
+    time: Array, nu: Array, rejected: NDArray[np.bool_]
+) -> Iterator[_Contradiction]:
+    """Contradictions of a receiver and the inertial solution, by innovations of a component.
+
+    A receiver that is rejected so many times in a row is believed again, by and by, and either it
+    or the solution was wrong. What separated the two is a part of the uncertainty until it jumps
+    back, or for `DOUBT` if it does not. After an outage the solution was wrong, as it is while an
+    error swings out.
+    """
+    spans = _long_rejections(rejected)
+    if not spans:
+        return
+    first = [float(nu[span.start]) for span in spans]
+    after_gap = np.diff(time, prepend=-math.inf) > GAP * np.median(np.diff(time))
+    back, swings = False, -1
+    for j, span in enumerate(spans):
+        # What was believed last takes as many observations to settle.
+        settled = min(span.stop + AdaptiveScale.patience, len(time))
+        size, end = float(np.abs(nu[span]).max()), float(time[settled - 1])
+        lately = bool(after_gap[max(span.start - SETTLES, 0) : span.start + 1].any())
+        if lately or back or span.start <= swings:
+            yield _Contradiction(float(time[span.start]), end, size)
+            back, swings = False, settled + AdaptiveScale.patience
+            continue
+        end = float(time[span.stop - 1]) + DOUBT
+        if j + 1 < len(spans):
+            back = abs(first[j] + first[j + 1]) < 0.5 * abs(first[j])
+            end = float(time[spans[j + 1].stop - 1]) if back else end
+        yield _Contradiction(float(time[span.start]), end, size)
+
+
 def _long_rejections(rejected: NDArray[np.bool_]) -> list[slice]:
     """Spans that begin with so many rejections in a row that the adaptive rule takes the next.
 
-    Others that follow it, after one or two that were taken, are the same.
+    Others that follow it, after a few that were taken, are the same: an error swings out.
     """
     spans: list[slice] = []
     for run in true_runs(rejected):
-        if spans and run.start - spans[-1].stop <= 2:
+        if spans and run.start - spans[-1].stop <= SETTLES:
             spans[-1] = slice(spans[-1].start, run.stop)
         elif run.stop - run.start >= AdaptiveScale.patience:
             spans.append(run)
