@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from strapdown.dsp.true_runs import true_runs
 from strapdown.errors import ConfigError, DataError
-from strapdown.estimation.robust import AdaptiveScale
+from strapdown.estimation.robust import AdaptiveRule
 from strapdown.navigation.measurements.gnss import PLACE
 from strapdown.navigation.navigator import JUST_BEFORE, Navigator
 from strapdown.navigation.record import (
@@ -224,13 +224,18 @@ class Tape:
 
     def _contradictions(self) -> Iterator[tuple[int, _Contradiction]]:
         """Contradictions of the receivers' positions, each with its component."""
+        general = self.navigator.filter.rule
+        rules = {aid.name: aid.rule or general for aid in self.navigator.aids}
         for name, rows in self._seen.items():
             labels, n = self._labels[name], len(self._labels[name])
-            if set(labels) <= set(PLACE):
-                time, nu, weight = rows.rows[:, 0], rows.rows[:, 1:], rows.rows[:, 1 + 2 * n :]
-                for k, label in enumerate(labels):
-                    for one in _contradictions(time, nu[:, k], weight[:, k] == 0.0):
-                        yield PLACE.index(label), one
+            rule = rules.get(name.rpartition(".")[0])
+            if not isinstance(rule, AdaptiveRule) or not set(labels) <= set(PLACE):
+                continue
+            time, nu, weight = rows.rows[:, 0], rows.rows[:, 1:], rows.rows[:, 1 + 2 * n :]
+            for k, label in enumerate(labels):
+                rejected = weight[:, k] == 0.0
+                for one in _contradictions(time, nu[:, k], rejected, rule.scale.patience):
+                    yield PLACE.index(label), one
 
     def _cells(self, time: Array) -> Array:
         """Number of the interval of each time stamp."""
@@ -275,7 +280,7 @@ class _Contradiction(NamedTuple):
 
 
 def _contradictions(
-    time: Array, nu: Array, rejected: NDArray[np.bool_]
+    time: Array, nu: Array, rejected: NDArray[np.bool_], patience: int
 ) -> Iterator[_Contradiction]:
     """Contradictions of a receiver and the inertial solution, by innovations of a component.
 
@@ -284,7 +289,7 @@ def _contradictions(
     back, or for `DOUBT` if it does not. After an outage the solution was wrong, as it is while an
     error swings out.
     """
-    spans = _long_rejections(rejected)
+    spans = _long_rejections(rejected, patience)
     if not spans:
         return
     first = [float(nu[span.start]) for span in spans]
@@ -292,12 +297,12 @@ def _contradictions(
     back, swings = False, -1
     for j, span in enumerate(spans):
         # What was believed last takes as many observations to settle.
-        settled = min(span.stop + AdaptiveScale.patience, len(time))
+        settled = min(span.stop + patience, len(time))
         size, end = float(np.abs(nu[span]).max()), float(time[settled - 1])
         lately = bool(after_gap[max(span.start - SETTLES, 0) : span.start + 1].any())
         if lately or back or span.start <= swings:
             yield _Contradiction(float(time[span.start]), end, size)
-            back, swings = False, settled + AdaptiveScale.patience
+            back, swings = False, settled + patience
             continue
         end = float(time[span.stop - 1]) + DOUBT
         if j + 1 < len(spans):
@@ -306,7 +311,7 @@ def _contradictions(
         yield _Contradiction(float(time[span.start]), end, size)
 
 
-def _long_rejections(rejected: NDArray[np.bool_]) -> list[slice]:
+def _long_rejections(rejected: NDArray[np.bool_], patience: int) -> list[slice]:
     """Spans that begin with so many rejections in a row that the adaptive rule takes the next.
 
     Others that follow it, after a few that were taken, are the same: an error swings out.
@@ -315,7 +320,7 @@ def _long_rejections(rejected: NDArray[np.bool_]) -> list[slice]:
     for run in true_runs(rejected):
         if spans and run.start - spans[-1].stop <= SETTLES:
             spans[-1] = slice(spans[-1].start, run.stop)
-        elif run.stop - run.start >= AdaptiveScale.patience:
+        elif run.stop - run.start >= patience:
             spans.append(run)
     return spans
 
