@@ -134,8 +134,8 @@ LASTS_BY_CODE, LASTS_BY_PHASE, PHASE = 0.9, 0.5, 0.05
 #: The least share that is proposed where velocities show what lasts; the factor of the standard
 #: deviations from which a receiver understates its errors, and beyond which it has others.
 SHOWN, UNDERSTATED, MISSTATED = 0.15, 1.5, 10.0
-#: A vehicle's jerk of 3 m/s³ is lost in the scatter of positions at this interval, s.
-SMOOTH = 0.2
+#: Jerk of a vehicle, m/s³, that is not to be taken for scatter.
+JERK = 3.0
 #: Fixes better than this, m, show that a lever arm is measured by a tape to so much, m.
 SHOWS_ARM, ARM_SD = 0.1, 0.02
 #: Attributes of fixes with assumed standard deviations, and the keys of these.
@@ -614,9 +614,11 @@ def _shows_scatter(fixes: pd.DataFrame, white: float) -> bool:
     step = float(np.median(np.diff(index_of(fixes))))
     sd = values_of(fixes, VELOCITY_SD)[:, :2]
     if not np.isfinite(sd).all():
-        return step <= SMOOTH
+        # The third difference of a way, over the root of 20.
+        return JERK * step**3 / math.sqrt(20.0) < 0.5 * white
+    # A way by trapezoids, and by velocities with errors.
     sds = float(np.median(sd)), white_velocity_sd(fixes) or math.inf
-    return 0.5 * min(sds) * step < 0.5 * white
+    return math.hypot(0.5 * min(sds) * step, JERK * step**3 / math.sqrt(288.0)) < 0.5 * white
 
 
 def _speed(fixes: pd.DataFrame) -> float:
