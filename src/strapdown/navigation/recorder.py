@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 import pandas as pd
@@ -198,9 +198,9 @@ class Tape:
         trajectory = used.trajectory(at, np.array(history), source)
         time = pd.Index(marks[:, 0], name="time")
         covariance = marks[:, 1:82].reshape(-1, 9, 9).copy()
-        for component, one in self._contradictions():
-            within = (marks[:, 0] >= one.begin) & (marks[:, 0] <= one.end)
-            covariance[within, component, component] += one.size**2
+        for component, begin, end, size in self._contradictions():
+            within = (marks[:, 0] >= begin) & (marks[:, 0] <= end)
+            covariance[within, component, component] += size**2
         without = ~np.array(model.estimated(used))
         covariance[:, without, :] = covariance[:, :, without] = np.nan
         nearest = np.clip(trajectory.index.searchsorted(time), 0, len(trajectory) - 1)
@@ -222,8 +222,8 @@ class Tape:
             outages=dict(outages or {}),
         )
 
-    def _contradictions(self) -> Iterator[tuple[int, _Contradiction]]:
-        """Contradictions of the receivers' positions, each with its component."""
+    def _contradictions(self) -> Iterator[tuple[int, float, float, float]]:
+        """Components, spans and sizes of contradictions of the receivers' positions."""
         general = self.navigator.filter.rule
         rules = {aid.name: aid.rule or general for aid in self.navigator.aids}
         for name, rows in self._seen.items():
@@ -235,7 +235,7 @@ class Tape:
             for k, label in enumerate(labels):
                 rejected = weight[:, k] == 0.0
                 for one in _contradictions(time, nu[:, k], rejected, rule.scale.patience):
-                    yield PLACE.index(label), one
+                    yield PLACE.index(label), *one
 
     def _cells(self, time: Array) -> Array:
         """Number of the interval of each time stamp."""
@@ -271,18 +271,12 @@ class Tape:
         self._seen[one.name] = self._seen[one.name].and_then(row[None, :])
 
 
-class _Contradiction(NamedTuple):
-    """From `begin` to `end`, s, by `size`, m."""
-
-    begin: float
-    end: float
-    size: float
-
-
 def _contradictions(
     time: Array, nu: Array, rejected: NDArray[np.bool_], patience: int
-) -> Iterator[_Contradiction]:
-    """Contradictions of a receiver and the inertial solution, by innovations of a component.
+) -> Iterator[tuple[float, float, float]]:
+    """Begin and end, s, and size, m, of contradictions of a receiver and the inertial solution.
+
+    `nu`, `rejected`: innovations of a component, and which of them an adaptive rule rejected.
 
     A receiver that is rejected so many times in a row is believed again, by and by, and either it
     or the solution was wrong. What separated the two is a part of the uncertainty until it jumps
@@ -301,14 +295,14 @@ def _contradictions(
         size, end = float(np.abs(nu[span]).max()), float(time[settled - 1])
         lately = bool(after_gap[max(span.start - SETTLES, 0) : span.start + 1].any())
         if lately or back or span.start <= swings:
-            yield _Contradiction(float(time[span.start]), end, size)
+            yield float(time[span.start]), end, size
             back, swings = False, settled + patience
             continue
         end = float(time[span.stop - 1]) + DOUBT
         if j + 1 < len(spans):
             back = abs(first[j] + first[j + 1]) < 0.5 * abs(first[j])
             end = float(time[spans[j + 1].stop - 1]) if back else end
-        yield _Contradiction(float(time[span.start]), end, size)
+        yield float(time[span.start]), end, size
 
 
 def _long_rejections(rejected: NDArray[np.bool_], patience: int) -> list[slice]:

@@ -151,6 +151,7 @@ def test_the_swaying_of_a_roof_is_no_offset(true):
     assert sd < 0.05
 
 
+@pytest.mark.slow
 def test_five_seconds_of_a_fault_move_neither_offset_nor_delay():
     table = fixes(7301)
     plain = window_offsets(table, imu(7301), SENSORS)
