@@ -11,10 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown import rotation
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.acceleration import window_weights
 from strapdown.crash.measuring_point import LEVER_ARM, MOUNTING, PointKinematics
+from strapdown.crash.structure import LARGEST_SHARE, Structure, learn_share, unlearnt
 from strapdown.dsp.chi_square import chi_square_above
 from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.sensors.unmeasured import NO_GYRO
 
 Array = NDArray[np.float64]
 
@@ -63,6 +66,13 @@ class VelocityIncrements:
             arm_noise=self.arm_noise[rows],
             turned_noise=self.turned_noise[rows],
         )
+
+    def bent_by(self, structure: Structure, kept: NDArray[np.bool_]) -> VelocityIncrements:
+        """With the structural motion of the unit's point, over the `kept` of all intervals."""
+        if not structure.share.any():
+            return self
+        own = structure.of_increments(self.edges)[np.ix_(kept, kept)]
+        return replace(self, force_noise=self.force_noise + np.kron(own, np.diag(structure.sd**2)))
 
     def borrows(self, other: VelocityIncrements) -> bool:
         """Whether both share one gyro, so that their rates agree by construction."""
@@ -149,7 +159,9 @@ def common_edges(
         raise DataError("crash.unit-comparison-needs-two", quantity="units", count=len(units))
     first = max(float(u.time[0]) for u in units)
     last = min(float(u.time[-1]) for u in units)
-    start, end = (max(first, -0.1), min(last, 0.75)) if window is None else window
+    # A unit without a gyro knows nothing of the turning after the time of its assumption.
+    known = [u.assumed_until for u in units]
+    start, end = (max(first, -0.1), min(last, 0.75, *known)) if window is None else window
     if not first <= start < end <= last:
         begins = next(u.name for u in units if u.time[0] == first)
         ends = next(u.name for u in units if u.time[-1] == last)
@@ -648,18 +660,25 @@ def compare_units(
     edges = common_edges(units, window, pieces)
     increments = [velocity_increments(u, edges) for u in units]
     cut = [clipped_pieces(u, edges) for u in units]
+    rigid = unlearnt(units)
     pairs = tuple(
-        _pair(units[i], units[j], increments[i], increments[j], ~(cut[i] | cut[j]), level)
+        _pair(units[i], units[j], increments[i], increments[j], ~(cut[i] | cut[j]), level, rigid)
         for i, j in itertools.combinations(range(len(units)), 2)
     )
     kept = ~np.any(cut, axis=0)
+    common = [v.of_pieces(kept) for v in increments]
+    structure = _of_vehicle(rigid, pairs, units, common, kept)
     combined, combined_sd, against, chi, freedom = _against_all(
-        units, [v.of_pieces(kept) for v in increments], kept
+        units, [v.bent_by(structure, kept) for v in common], kept, structure
     )
     probability = chi_square_tail(chi, freedom)
     findings = [_left_out(u, edges, c) for u, c in zip(units, cut, strict=True) if c.any()]
     findings += [f for p in pairs for f in p.findings]
-    findings += _odd_one(units, pairs)
+    odd = _odd_one(units, pairs)
+    findings += odd
+    findings += _of_structure(units, structure)
+    doubted = {u.name: _turns_back(units, increments, structure, k) for k, u in enumerate(units)}
+    findings += [found for found in doubted.values() if found is not None]
     return UnitComparison(
         edges,
         pairs,
@@ -670,7 +689,45 @@ def compare_units(
         freedom,
         probability,
         probability >= level and all(p.agree for p in pairs),
+        structure,
+        tuple(u.name for u in units if doubted[u.name] or any(f.file == u.name for f in odd)),
         tuple(findings),
+    )
+
+
+def _of_vehicle(
+    rigid: Structure,
+    pairs: Sequence[UnitPair],
+    units: Sequence[PointKinematics],
+    increments: Sequence[VelocityIncrements],
+    kept: Flags,
+) -> Structure:
+    """Structural motion of a vehicle, by all units together if they agree, else by pairs that do.
+
+    `increments`: of the intervals `kept` of all units.
+    """
+    if len(pairs) == 1:
+        return pairs[0].structure
+    if all(p.agree for p in pairs) and kept.any():
+        size, others = increments[0].values.size, len(units) - 1
+        less = np.hstack([-np.tile(np.eye(size), (others, 1)), np.eye(others * size)])
+        covariance = less @ joint_covariance(increments) @ less.T
+        turning = _turning(units, rigid, increments[0].edges, kept)
+        if turning is not None:
+            turning = less @ turning @ less.T
+            covariance = covariance + turning
+        difference = np.array([v.values.ravel() - increments[0].values.ravel() for v in increments])
+        return learn_share(
+            rigid, increments[0].edges, kept, difference[1:], floored(covariance), turning
+        )
+    told = [p.structure for p in pairs if p.agree] or [p.structure for p in pairs]
+    share = np.sqrt(np.mean([one.share**2 for one in told], axis=0))
+    times = [one.correlation_time for one in told if one.share.any()]
+    return replace(
+        rigid,
+        share=share,
+        turning=float(np.sqrt(np.mean([one.turning**2 for one in told]))),
+        correlation_time=float(np.median(times)) if times else rigid.correlation_time,
     )
 
 
@@ -681,10 +738,22 @@ def _pair(
     b: VelocityIncrements,
     kept: Flags,
     level: float,
+    rigid: Structure,
 ) -> UnitPair:
     edges = a.edges
     a, b = a.of_pieces(kept), b.of_pieces(kept)
     difference, covariance = (a.values - b.values).ravel(), difference_covariance(a, b)
+    turning = _turning((first, second), rigid, edges, kept)
+    if turning is not None:
+        apart = np.hstack([np.eye(difference.size), -np.eye(difference.size)])
+        turning = apart @ turning @ apart.T
+        covariance = covariance + turning
+    structure = learn_share(rigid, edges, kept, difference[None], floored(covariance), turning)
+    stiff = a, b
+    a, b = a.bent_by(structure, kept), b.bent_by(structure, kept)
+    if turning is not None:
+        a = replace(a, force_noise=a.force_noise + structure.turning**2 * turning)
+    covariance = difference_covariance(a, b)
     basis = measured_by_all((first, second))
     told = np.where(measured_axes(basis), 0.0, np.nan)
     chi, freedom = chi_square_along(basis, difference, covariance)
@@ -697,7 +766,9 @@ def _pair(
     findings: list[Finding] = []
     whole = not (first.assumed_axes or second.assumed_axes) and bool(kept.any())
     if whole:
-        axes, turned, lever = match_axes(a, b), mounting_rotation(a, b), check_lever_arm(a, b)
+        # Swapped axes make more of a difference than any structure, which would hide them.
+        axes = match_axes(*((a, b) if probability >= level else stiff))
+        turned, lever = mounting_rotation(a, b), check_lever_arm(a, b)
     else:
         # The checks of relative mounting need three measured axes and a gyro on both units.
         axes, turned, lever = AxisMatch.untold(), MountingRotation.untold(), LeverArmCheck.untold()
@@ -738,12 +809,37 @@ def _pair(
         axes,
         turned,
         lever,
+        structure,
         tuple(findings + found),
     )
 
 
+def _turning(
+    units: Sequence[PointKinematics], structure: Structure, edges: Array, kept: Flags
+) -> Array | None:
+    """Joint covariance, (3 m k, 3 m k), of increments of k units by a turning that none measures.
+
+    The stated turning of the vehicle moves a point by its rate times its lever arm. None where a
+    unit has a gyro.
+    """
+    sds, arms = [], []
+    for u in units:
+        stated = None if u.prepared is None else (u.prepared.unit.lender or u.prepared.unit).assumed
+        if stated is None or u.moved is None or u.gyro != NO_GYRO:
+            return None
+        sds.append(stated.sd_of("turn_sd_deg"))
+        arms.append(u.moved.lever_arm)
+    across = np.cross(np.diag(np.radians(np.max(sds, axis=0))), np.array(arms)[:, None])
+    rates = structure.of_turning(edges, min(u.assumed_until for u in units))[np.ix_(kept, kept)]
+    whole = np.einsum("ab,icx,jcy->iaxjby", rates, across, across)
+    return np.asarray(whole.reshape(3 * len(rates) * len(units), -1))
+
+
 def _against_all(
-    units: Sequence[PointKinematics], increments: Sequence[VelocityIncrements], kept: Flags
+    units: Sequence[PointKinematics],
+    increments: Sequence[VelocityIncrements],
+    kept: Flags,
+    structure: Structure,
 ) -> tuple[Array, Array, tuple[UnitAgainstAll, ...], float, int]:
     """Combine `increments` of the kept intervals and compare each unit with the combination.
 
@@ -760,7 +856,11 @@ def _against_all(
             0.0,
             0,
         )
-    joint = floored(joint_covariance(increments))
+    joint = joint_covariance(increments)
+    turning = _turning(units, structure, increments[0].edges, kept)
+    if turning is not None:
+        joint = joint + structure.turning**2 * turning
+    joint = floored(joint)
     pieces, largest = size // 3, float(np.diagonal(joint).max())
     bases = [measured_by_all((u,)) for u in units]
     for k, basis in enumerate(bases):
@@ -870,6 +970,74 @@ def _odd_one(units: Sequence[PointKinematics], pairs: Sequence[UnitPair]) -> lis
     return [Finding("crash.others-agree-another-not", file=odd[0], quantity="delta-V")]
 
 
+def _of_structure(units: Sequence[PointKinematics], structure: Structure) -> list[Finding]:
+    """Report what the differences show beyond the sensors: structure, and turning."""
+    found = []
+    names = ", ".join(u.name for u in units)
+    if structure.share.any():
+        found.append(
+            Finding(
+                "crash.points-move-with-structure",
+                severity="note",
+                file=names,
+                quantity="delta-V",
+                forward=structure.sd[0],
+                right=structure.sd[1],
+                down=structure.sd[2],
+                share=100.0 * float(structure.share.max()),
+                correlation_ms=1e3 * structure.correlation_time,
+            )
+        )
+    if structure.turning > 1.0:
+        found.append(
+            Finding(
+                "crash.turned-more-than-assumed",
+                file=names,
+                quantity="turn_sd_deg",
+                factor=structure.turning,
+            )
+        )
+    return found
+
+
+def _turns_back(
+    units: Sequence[PointKinematics],
+    increments: Sequence[VelocityIncrements],
+    structure: Structure,
+    number: int,
+) -> Finding | None:
+    """Report a unit whose velocity turns back while that of the others does not.
+
+    A vehicle rebounds as a whole: what one point gives back of its largest change, along the
+    direction in which all of them changed, differs between points by no more than structure does.
+    """
+    if not structure.change > 0.0:
+        return None
+    lengths = np.diff(increments[0].edges)[:, None]
+    curves = []
+    for unit, one in zip(units, increments, strict=True):
+        free = one.values - unit.resting_force(STANDARD_GRAVITY)[0] * lengths
+        curves.append(np.cumsum(free @ (np.eye(3) - unit.unmeasured), axis=0))
+    middle = np.median(curves, axis=0)
+    row = int(np.argmax(np.linalg.norm(middle, axis=1)))
+    along = middle[row] / max(float(np.linalg.norm(middle[row])), TINY)
+    changed = [curve @ along for curve in curves]
+    back = [float(c.max() - c[int(np.argmax(c)) :].min()) for c in changed]
+    others = [b for k, b in enumerate(back) if k != number]
+    more = back[number] - max(others)
+    if more <= LARGEST_SHARE * structure.change:
+        return None
+    return Finding(
+        "crash.velocity-turns-back",
+        file=units[number].name,
+        quantity="delta-V",
+        back=back[number],
+        largest=float(changed[number].max()),
+        others=max(others),
+        time=float(increments[0].edges[1 + int(np.argmax(changed[number]))]),
+    )
+
+
 # Results of a comparison of units.
 
 
@@ -899,6 +1067,7 @@ class UnitPair:
     axes: AxisMatch = field(repr=False)
     turned: MountingRotation = field(repr=False)
     lever_arm: LeverArmCheck = field(repr=False)
+    structure: Structure = field(repr=False)
     findings: tuple[Finding, ...]
 
 
@@ -923,7 +1092,8 @@ class UnitComparison:
 
     `combined`, `combined_sd`, (m + 1, 3), m/s: delta-V of the optimally weighted combination at
     `edges`, gravity included, body axes; NaN along axes that all units assume. Chi-square of all
-    units against it.
+    units against it. `structure`: motion of the units' points against each other. `doubted`: units
+    that the others or the mechanics of a crash contradict.
     """
 
     edges: Array = field(repr=False)
@@ -935,6 +1105,8 @@ class UnitComparison:
     freedom: int
     probability: float
     agree: bool
+    structure: Structure = field(repr=False)
+    doubted: tuple[str, ...]
     findings: tuple[Finding, ...]
 
 

@@ -456,6 +456,14 @@ class PointKinematics:
         return axis_names(self.unmeasured, self.unmeasured_turns)
 
     @property
+    def assumed_until(self) -> float:
+        """End of the time for which an assumed turning is stated, s; infinite with a gyro."""
+        unit = None if self.prepared is None else self.prepared.unit
+        assumed = None if unit is None else (unit.lender or unit).assumed
+        turns = assumed is not None and self.unmeasured_turns.any()
+        return assumed.over[1] if assumed is not None and turns else math.inf
+
+    @property
     def time(self) -> Array:
         """Stamps, (n,), s."""
         return np.asarray(self.imu.index.to_numpy(), dtype=np.float64)

@@ -323,6 +323,19 @@ def reconstruct_unit(
             bound = body_delta_v_bound(effects, change.weights, rest_sd=rest_sd, at_ends=at_ends)
             changes.append(velocity_change(window, change, bound))
         body.append(EventChanges(*changes))
+        over, of_event = changes
+        together = math.hypot(over.resultant_bound, of_event.resultant_bound)
+        if over.resultant - of_event.resultant > together:
+            findings.append(
+                Finding(
+                    "crash.window-exceeds-event",
+                    file=at_point.name,
+                    quantity="delta-V",
+                    length=1e3 * peak_window,
+                    peak=over.resultant,
+                    whole=of_event.resultant,
+                )
+            )
         if path.time[0] <= min(start, peak.start) and max(end, peak.end) <= path.time[-1]:
             course = np.unwrap(path.table["heading"], period=360.0)
             heading = float(np.interp(start, path.time, course)) % 360.0
@@ -535,8 +548,11 @@ class CrashReconstruction:
 
     @property
     def main(self) -> UnitReconstruction:
-        """The mean of the units, or the first unit."""
-        return self.units[0] if self.combined is None else self.combined
+        """The mean of the units, or the first one that nothing contradicts."""
+        if self.combined is not None:
+            return self.combined
+        doubted = () if self.comparison is None else self.comparison.doubted
+        return next((u for u in self.units if u.name not in doubted), self.units[0])
 
     def unit(self, name: str) -> UnitReconstruction:
         """Find a unit by its name.
@@ -607,6 +623,8 @@ def reconstruct_crash(
         findings += () if of.prepared is None else of.prepared.findings
     # Before each unit estimates its own biases, which absorbs part of the differences.
     comparison = compare_units(there) if len(there) > 1 else None
+    if comparison is not None:
+        there = [comparison.structure.within(of) for of in there]
     tied = [entry if isinstance(entry, Entry) else None] * len(there)
     if of_fixes is not None:
         for k, of in enumerate(there):

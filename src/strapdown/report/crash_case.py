@@ -241,6 +241,13 @@ def _comparison(comparison: UnitComparison) -> dict[str, Any]:
         "probability": comparison.probability,
         "chi_square": comparison.chi_square,
         "freedom": comparison.freedom,
+        "contradicted": list(comparison.doubted),
+        "structure": {
+            "sd_forward_right_down_m_per_s": comparison.structure.sd.tolist(),
+            "share_of_delta_v": comparison.structure.share.tolist(),
+            "correlation_time_s": comparison.structure.correlation_time,
+            "turning_of_assumed": comparison.structure.turning,
+        },
         "pairs": [
             {
                 "first": pair.first,

@@ -234,8 +234,11 @@ def apart(result: CaseResult) -> bool:
 
 def apart_headline(result: CaseResult) -> str:
     """Return the answers of all recorders in one sentence."""
-    told = "; ".join(f"{unit.name} {_change(unit)}" for unit in result.reconstruction.units)
-    return f"The recorders disagree; their mean is not reported. Delta-V: {told}."
+    made = result.reconstruction
+    told = "; ".join(f"{unit.name} {_change(unit)}" for unit in made.units)
+    doubted = made.comparison.doubted if made.comparison is not None else ()
+    named = f" The others contradict {' and '.join(doubted)}." if doubted else ""
+    return f"The recorders disagree; their mean is not reported. Delta-V: {told}.{named}"
 
 
 def apart_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
@@ -540,13 +543,20 @@ def _levers(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     longest, name = max(
         (float(np.linalg.norm(point - unit.mounting.position)), unit.name) for unit in result.units
     )
+    comparison = result.reconstruction.comparison
+    bent = np.zeros(3) if comparison is None else comparison.structure.sd
     if longest > 0.0:
+        told = f"{result.spec.point.name}, up to {plain(longest, 2)} m ({name})"
+        learnt = (
+            f" By their differences the recorders moved against each other with a standard "
+            f"deviation of up to {plain(KMH * float(bent.max()), 1)} km/h while the force acted; "
+            "that is in the bounds, a deformation that all of them share is not."
+        )
         yield (
             "rigid-vehicle",
             "The vehicle is assumed to be rigid",
-            f"This applies between each recorder and the {result.spec.point.name}, up to "
-            f"{plain(longest, 2)} m ({name}). A floor or pillar that deformed in between moved "
-            "differently.",
+            f"This applies between each recorder and the {told}. A floor or pillar that deformed "
+            f"in between moved differently.{learnt if bent.any() else ''}",
         )
 
 

@@ -1,0 +1,237 @@
+"""Structural motion of a measuring point relative to the rigid body of its vehicle."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.crash.measuring_point import PointKinematics, SampleEffects
+from strapdown.sensors.unmeasured import AXES
+
+Array = NDArray[np.float64]
+
+#: Line of the error budget.
+STRUCTURE = "structure"
+#: Structure swings on for this long after the force that bends it, s.
+MEMORY = 0.02
+#: Correlation times of a structural velocity that are compared, s.
+CORRELATION_TIMES = (0.003, 0.006, 0.012, 0.024)
+#: Velocities of points of one car differ by up to a quarter of its change of velocity; most by
+#: less than a twentieth. The prior of a share is half-normal with this standard deviation.
+LARGEST_SHARE, USUAL_SHARE = 0.25, 0.1
+SHARES = np.array([0.0, 0.003, 0.006, 0.01, 0.015, 0.022, 0.033, 0.05, 0.075, 0.11, 0.16, 0.25])
+#: Beyond the stated turning of a vehicle without a gyro, in multiples of it.
+MORE_TURNING, USUAL_MORE = np.array([0.0, 0.7, 1.2, 1.7]), 0.7
+ROUNDS = 3
+#: A share is taken from this likelihood ratio (chi-square of one degree of freedom, 1 %).
+SIGNIFICANT = 6.63
+#: Step of the velocities by which the effects on samples are described, s.
+KNOTS = 0.005
+#: Beyond this share of the largest the envelope counts as zero.
+LEAST_ENVELOPE = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """Velocity of measuring points relative to the rigid body, a Gaussian process.
+
+    Along a vehicle axis it has the standard deviation ``share * change * w(t)`` and the correlation
+    ``exp(-|t - s| / correlation_time)``; points and axes are independent. Its mean acceleration is
+    zero: a point that stays a part of the vehicle has its velocity when the blow is over.
+
+    Attributes
+    ----------
+    share : ndarray, (3,)
+        Of the change of velocity, forward, right, down; zero where the records show none.
+    correlation_time : float, s
+    change : float, m/s
+        Change of velocity of the vehicle over the crash.
+    turning : float
+        Turning of a vehicle without a gyro that the differences show, as a multiple of the stated;
+        1 where they show no more.
+    time, envelope : ndarray, (n,), s and 1
+        w, the force as a low-pass with the memory of 20 ms passes it, its largest value 1.
+    """
+
+    share: Array
+    correlation_time: float
+    change: float
+    time: Array = field(repr=False)
+    envelope: Array = field(repr=False)
+    turning: float = 1.0
+
+    @property
+    def sd(self) -> Array:
+        """Largest standard deviation along each vehicle axis, (3,), m/s."""
+        return self.share * self.change
+
+    def correlation(self, time: Array) -> Array:
+        """Covariance of velocities at instants, (k, k), for a largest variance of one."""
+        w = np.interp(time, self.time, self.envelope, left=0.0, right=0.0)
+        apart = np.abs(time[:, None] - time)
+        return np.asarray(w[:, None] * w * np.exp(-apart / self.correlation_time))
+
+    def of_increments(self, edges: Array) -> Array:
+        """Covariance of increments between edges, (m, m), for a largest variance of one."""
+        step = np.diff(np.eye(len(edges)), axis=0)
+        return np.asarray(step @ self.correlation(edges) @ step.T)
+
+    def of_turning(self, edges: Array, until: float) -> Array:
+        """Covariance of increments of an angular rate, (m, m), 1/s², of a body without a gyro.
+
+        The rate is a random walk that the force drives, of intensity ``w²``, so that it stays when
+        the force ends; the rotation until `until`, s, has a standard deviation of 1.
+        """
+        time = self.time[self.time <= until]
+        step = np.gradient(time)
+        driven = np.cumsum(np.square(self.envelope[: len(time)]) * step)
+        whole = 2.0 * float((driven * (until - time) * step).sum())
+        passed = np.interp(edges, time, driven / max(whole, 1e-300), left=0.0)
+        return np.diag(np.diff(passed))
+
+    def within(self, unit: PointKinematics) -> PointKinematics:
+        """A unit with this motion among its unknowns: of its point alone, common with no other.
+
+        The velocities at knots of 5 ms, between which it is linear, are the unknowns, decorrelated
+        by the Cholesky factor of their covariance.
+        """
+        felt = self.time[self.envelope > LEAST_ENVELOPE]
+        axes = np.flatnonzero(self.share > 0.0)
+        if not axes.size or felt.size < 2:
+            return unit
+        count = max(math.ceil((felt[-1] - felt[0]) / KNOTS), 1)
+        knots = np.linspace(felt[0], felt[-1], count + 1)
+        covariance = self.correlation(knots)
+        root = np.linalg.cholesky(covariance + 1e-9 * covariance.max() * np.eye(len(knots)))
+        time = unit.time
+        step = np.diff(time, prepend=2.0 * time[0] - time[1])
+        before = time - step
+        if unit.imu.attrs["sampling"] != "mean":
+            before, time = before + 0.5 * step, time + 0.5 * step
+        at = [
+            np.column_stack([np.interp(t, knots, one, left=0.0, right=0.0) for one in root.T])
+            for t in (before, time)
+        ]
+        pushes = ((at[1] - at[0]) / step[:, None]).T
+        names, force = [], []
+        for axis in axes:
+            names += [f"{unit.name} structure {AXES[axis]} {k}" for k in range(len(knots))]
+            force.append(pushes[:, :, None] * (self.sd[axis] * np.eye(3)[axis]))
+        return replace(unit, effects=_with(unit.effects, names, np.concatenate(force)))
+
+
+def _with(effects: SampleEffects, names: Sequence[str], force: Array) -> SampleEffects:
+    """Effects with more unknowns, of the force alone and not at rest."""
+    none = np.zeros((len(names), 3))
+    return replace(
+        effects,
+        names=(*effects.names, *names),
+        contributors=(*effects.contributors, *[STRUCTURE] * len(names)),
+        force=np.concatenate([effects.force, force]),
+        rate=np.concatenate([effects.rate, np.zeros_like(force)]),
+        rest_force=np.concatenate([effects.rest_force, none]),
+        tilt=np.concatenate([effects.tilt, none]),
+    )
+
+
+def unlearnt(units: Sequence[PointKinematics]) -> Structure:
+    """The process of a vehicle, its envelope and change of velocity by all units, without size."""
+    first, last = max(u.time[0] for u in units), min(u.time[-1] for u in units)
+    finest = min(units, key=lambda u: float(np.median(np.diff(u.time))))
+    time = finest.time[(finest.time >= first) & (finest.time <= last)]
+    sizes, changes = [], []
+    for unit in units:
+        free = (unit.force - unit.resting_force(STANDARD_GRAVITY)[0]) @ (
+            np.eye(3) - unit.unmeasured
+        )
+        free = np.column_stack([np.interp(time, unit.time, column) for column in free.T])
+        steps = np.gradient(time)
+        gained = np.cumsum(free * steps[:, None], axis=0)
+        changes.append(float(np.linalg.norm(gained, axis=1).max()))
+        size = np.linalg.norm(free, axis=1)
+        passed = np.zeros_like(size)
+        for k in range(1, len(time)):
+            kept = math.exp(-(time[k] - time[k - 1]) / MEMORY)
+            passed[k] = kept * passed[k - 1] + (1.0 - kept) * size[k]
+        sizes.append(passed)
+    envelope = np.median(sizes, axis=0)
+    largest = float(envelope.max())
+    return Structure(
+        np.zeros(3),
+        CORRELATION_TIMES[0],
+        float(np.median(changes)),
+        time,
+        envelope / largest if largest > 0.0 else envelope,
+    )
+
+
+def learn_share(
+    structure: Structure,
+    edges: Array,
+    kept: NDArray[np.bool_],
+    difference: Array,
+    covariance: Array,
+    turning: Array | None = None,
+) -> Structure:
+    """The shares and the correlation time that make the differences of units likeliest.
+
+    `difference`, (k, 3 m), m/s: of the velocity increments of k units less those of another, over
+    the `kept` of the intervals between `edges`; `covariance`, (3 k m, 3 k m): by the sensors and
+    all that is stated; `turning`, of the same shape, by a turning without a gyro as large as stated
+    (`of_turning`). Largest posterior of Gaussian differences. A share is zero, and the turning as
+    large as stated, unless another is significantly likelier.
+    """
+    # The point of the other unit moves in every difference.
+    both = np.eye(len(difference)) + 1.0
+    best: tuple[float, Structure] | None = None
+    for correlation_time in CORRELATION_TIMES:
+        one = replace(structure, correlation_time=correlation_time)
+        own = np.kron(both, one.change**2 * one.of_increments(edges)[np.ix_(kept, kept)])
+        along = [np.asarray(np.kron(own, np.diag(e)), dtype=np.float64) for e in np.eye(3)]
+        unknowns = [(axis, SHARES, USUAL_SHARE) for axis in along]
+        if turning is not None:
+            unknowns.append((turning, MORE_TURNING, USUAL_MORE))
+        found, cost = _likeliest(unknowns, difference.ravel(), covariance)
+        if best is None or cost < best[0]:
+            more = float(found[3]) if turning is not None else 0.0
+            best = cost, replace(one, share=found[:3], turning=math.hypot(1.0, more))
+    assert best is not None
+    return best[1]
+
+
+def _likeliest(
+    unknowns: Sequence[tuple[Array, Array, float]], difference: Array, covariance: Array
+) -> tuple[Array, float]:
+    """Sizes of covariances that add to another, by coordinate search, and twice the cost.
+
+    `unknowns`: the covariance of size one, the sizes to try, from zero, and the standard deviation
+    of the half-normal prior of each. The cost is the negative logarithm of the posterior.
+    """
+    sizes = np.zeros(len(unknowns))
+    prior = np.array([sd for _, _, sd in unknowns])
+
+    def cost(tried: Array) -> float:
+        whole = covariance + sum(x**2 * one for x, (one, _, _) in zip(tried, unknowns, strict=True))
+        factor = np.linalg.cholesky(whole)
+        left = np.linalg.solve(factor, difference)
+        logarithm = 2.0 * float(np.log(np.diagonal(factor)).sum())
+        return logarithm + float(left @ left) + float(np.square(tried / prior).sum())
+
+    least = cost(sizes)
+    if not difference.size:
+        return sizes, least
+    for _ in range(ROUNDS):
+        for k, (_, grid, _) in enumerate(unknowns):
+            costs = []
+            for size in grid:
+                sizes[k] = size
+                costs.append(cost(sizes))
+            j = int(np.argmin(costs))
+            j = j if costs[0] - costs[j] > SIGNIFICANT else 0
+            sizes[k], least = grid[j], costs[j]
+    return sizes, least
