@@ -8,6 +8,21 @@ from strapdown.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
     from strapdown.crash.acceleration import Acceleration
+    from strapdown.crash.closure import (
+        Blame,
+        Closure,
+        Figure,
+        Hypothesis,
+        ImpactVehicle,
+        against_barrier,
+        blame,
+        blame_points,
+        close_vehicles,
+        crush_energy,
+        energy_equivalent_speed,
+        equal_force_share,
+        measured_crush_energy,
+    )
     from strapdown.crash.delta_v import delta_v, trailing_delta_v
     from strapdown.crash.delta_v_bound import (
         EventChanges,
@@ -28,22 +43,35 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Acceleration",
+    "Blame",
+    "Closure",
     "CrashOptions",
     "Entry",
     "EventChanges",
+    "Figure",
     "FixCorrelation",
     "GnssEntry",
+    "Hypothesis",
+    "ImpactVehicle",
     "NedPdof",
     "PathComparison",
     "Pdof",
     "Preparation",
     "UnitReconstruction",
     "VelocityChange",
+    "against_barrier",
     "at_point",
+    "blame",
+    "blame_points",
     "body_delta_v_bound",
+    "close_vehicles",
     "compare_with_reference",
+    "crush_energy",
     "delta_v",
     "detect_events",
+    "energy_equivalent_speed",
+    "equal_force_share",
+    "measured_crush_energy",
     "ned_pdof",
     "pdof",
     "prepare_unit",
@@ -58,6 +86,9 @@ load_on_first_use(
     __name__,
     {
         "acceleration": "Acceleration",
+        "closure": "Blame Closure Figure Hypothesis ImpactVehicle against_barrier blame "
+        "blame_points close_vehicles crush_energy energy_equivalent_speed equal_force_share "
+        "measured_crush_energy",
         "delta_v": "delta_v trailing_delta_v",
         "delta_v_bound": "EventChanges VelocityChange body_delta_v_bound "
         "resolved_delta_v_bound velocity_change",
