@@ -53,8 +53,9 @@ RATIO = 32.0
 # An unknown mass or heading: standard deviations relative to the value, and rad, so wide that they
 # add nothing.
 FREE_MASS, FREE_HEADING = 10.0, 10.0
-# A gross error of unknown size: relative standard deviation of a wrong mass, scale or speed.
-GROSS = 0.5
+# A gross error of unknown size: relative standard deviation of a wrong mass, scale or speed, so
+# that zero and twice the value are one of them away.
+GROSS = 1.0
 # Relative to the largest variance: smaller ones are rounding.
 FLOOR = 1e-15
 # Of one standard deviation: step of the differences that propagate it.
@@ -179,9 +180,8 @@ class ImpactVehicle:
         """The vehicle if the true change is a matrix, (2, 2), times the recorded one."""
         whole = np.eye(3)
         whole[:2, :2] = matrix
-        return replace(
-            self, delta_v=whole @ self.delta_v, covariance=whole @ self.covariance @ whole.T
-        )
+        change, covariance = np.asarray(self.delta_v), np.asarray(self.covariance)
+        return replace(self, delta_v=whole @ change, covariance=whole @ covariance @ whole.T)
 
     def tyre_limit(self, friction: float) -> float:
         """Largest change of velocity that the tyres can make, m/s: friction times g times time."""
@@ -278,7 +278,7 @@ def _jacobian(function: Callable[[Array], Array], x: Array, covariance: Array) -
 def _inverse(matrix: Array, size: float) -> Array:
     """Inverse of a covariance of impulses of a size; rounding gives no information."""
     floor = max(FLOOR * float(np.trace(matrix)), (1e-9 * size) ** 2, np.finfo(float).tiny)
-    return np.linalg.inv(matrix + floor * np.eye(len(matrix)))
+    return np.asarray(np.linalg.inv(matrix + floor * np.eye(len(matrix))), dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -644,7 +644,7 @@ def _entries_known(vehicles: Sequence[ImpactVehicle]) -> bool:
 def _not_closed(
     vehicles: Sequence[ImpactVehicle], chi: float, freedom: int, probability: float, level: float
 ) -> Iterator[Finding]:
-    names = {"name": vehicles[0].name, "name_2": vehicles[-1].name}
+    names: dict[str, Any] = {"name": vehicles[0].name, "name_2": vehicles[-1].name}
     if len(vehicles) == 2 and freedom < 2:
         missing = [
             f"{what} of {v.name}"
@@ -674,7 +674,10 @@ def _limits(
     vehicles: Sequence[ImpactVehicle], impact: _Impact, values: Array, spread: Array, level: float
 ) -> Iterator[Finding]:
     """What contact does not allow, beyond its bound."""
-    names = {"name": vehicles[0].name, "name_2": vehicles[-1].name if impact.two else "barrier"}
+    names: dict[str, Any] = {
+        "name": vehicles[0].name,
+        "name_2": vehicles[-1].name if impact.two else "barrier",
+    }
     factor = normal_quantile(1.0 - LIMIT_SHARE * level)
     for code, value, sd in _margins(impact, values, spread):
         if value < -factor * sd:
@@ -978,7 +981,7 @@ def blame(
     the normal density of the momentum that is left over, times the determinant by which the
     hypothesis scales the record, times the probability that what is then found respects the
     limits of contact. A wrong mass, scale or entry speed has an unknown size, with a relative sd
-    of one half. Momentum alone does not determine which: opposite errors of the two vehicles,
+    of one. Momentum alone does not determine which: opposite errors of the two vehicles,
     mass and scale, and all that is symmetric for two equal vehicles leave the same. All within
     `ratio` of the best are `Blame.candidates`.
 
@@ -996,7 +999,10 @@ def blame(
         impact, freedom = _impact(one, other, friction)
         _, covariance, chi = impact.residual()
         probability = chi_square_above(chi, freedom) if freedom else 1.0
-        log = math.log(scale) - 0.5 * (chi + float(np.linalg.slogdet(covariance)[1]))
+        # The density of the impulse, as that of the recorded changes of velocity; masses only
+        # matter where one is free and follows the record.
+        log = math.log(scale) + 2.0 * float(np.log(impact.x[[MASS, SIZE + MASS]]).sum())
+        log -= 0.5 * (chi + float(np.linalg.slogdet(covariance)[1]))
         possible = probability >= level
         if known and possible:
             adjusted = impact.adjusted()
@@ -1059,7 +1065,7 @@ def _hypotheses(first: ImpactVehicle, second: ImpactVehicle, known: bool) -> Ite
         for finding, changed, scale in _errors(own, known):
             pair = (changed, second) if k == 0 else (first, changed)
             yield finding.replace(name=own.name), *pair, scale
-    names = {"name": first.name, "name_2": second.name}
+    names: dict[str, Any] = {"name": first.name, "name_2": second.name}
     record = "delta_v covariance duration entry entry_covariance entry_frame rate rate_change point"
 
     def with_record(of: ImpactVehicle, to: ImpactVehicle) -> ImpactVehicle:

@@ -65,7 +65,8 @@ def solve(mass, inertia, arms, velocity, rate, tyres, normal, restitution, frict
     return impulse
 
 
-def draw(rng, kind, *, noise=1.0, central=False, restitution=None):
+def draw(rng, kind, *, central=False, restitution=None):
+    """Draw an impact of a kind; `central`: without arms, friction, yaw and tyre forces."""
     normal_deg, headings, contacts, speeds, friction = KINDS[kind]
     mass = rng.uniform(1000.0, 2200.0, 2)
     gyration = rng.uniform(1.2, 1.45, 2)
@@ -83,8 +84,7 @@ def draw(rng, kind, *, noise=1.0, central=False, restitution=None):
     tyres = []
     for _ in range(2):
         angle, size = rng.uniform(0, 2 * math.pi), limit * math.sqrt(rng.uniform())
-        tyres.append(0.0 * noise if central else turned(angle, [size, 0.0]))
-    tyres = [np.zeros(2) + t for t in tyres]
+        tyres.append(np.zeros(2) if central else turned(angle, [size, 0.0]))
     e = rng.uniform(0.02, 0.35) if restitution is None else restitution
     inertia = mass * gyration**2
     impulse = solve(mass, inertia, arms, velocity, rate, tyres, normal, e, friction)
@@ -112,13 +112,17 @@ def draw(rng, kind, *, noise=1.0, central=False, restitution=None):
     ]
     relative = (points[0] - points[1]) @ p
     end = float(np.interp(0.0, relative, part[:, 0]))
-    energy = float(kinetic[0] + work - kinetic[1])
+    # The balance of an elastic impact is zero but for rounding.
+    energy = max(float(kinetic[0] + work - kinetic[1]), 0.0)
     true_share = rng.uniform(0.25, 0.75)
     truth = {
         "closing_speed": -float(relative[0]),
         "separation_speed": float(relative[-1]),
         "restitution": -float(relative[-1] / relative[0]),
-        "common_velocity": float(np.interp(end, part[:, 0], points[0] @ p)),
+        # Points of contact that slide on past each other never have a common velocity.
+        "common_velocity": float(np.interp(end, part[:, 0], points[0] @ p))
+        if relative[-1] > 0.0
+        else math.nan,
         "energy": energy,
         "ees_1": math.sqrt(2 * true_share * energy / mass[0]),
         "ees_2": math.sqrt(2 * (1 - true_share) * energy / mass[1]),
