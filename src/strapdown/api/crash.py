@@ -13,7 +13,7 @@ import pandas as pd
 
 from strapdown.bundle.seal import Seal, check_destination
 from strapdown.config.crash_case import CaseSpec
-from strapdown.crash.case import CaseResult, run_case
+from strapdown.crash.case import CaseResult, run_cases
 from strapdown.crash.reconstruction import UnitReconstruction
 from strapdown.errors import check_choice
 from strapdown.progress import Progress, silent
@@ -167,7 +167,8 @@ def reconstruct(
         Case file in TOML of a vehicle (``strapdown init crash`` writes one), or its specification.
     *others : str, Path or CaseSpec
         Cases of the other vehicles of the crash. Each vehicle is reconstructed from its own
-        recorders; their changes of velocity are not tied to each other.
+        recorders. Two vehicles are held against each other: momentum, closing speed, restitution
+        and energy, in `CrashRun.closure`; what each of them says by itself is not changed by it.
     progress : callable, optional
         Called with a stage and the completed fraction.
 
@@ -184,16 +185,9 @@ def reconstruct(
     DivergenceError
         A path left the range possible for a vehicle.
     """
-    cases = (case, *others)
-
-    def run(number: int) -> CaseResult:
-        def part(stage: str, share: float) -> None:
-            progress(stage, (number + share) / len(cases))
-
-        given = cases[number]
-        if isinstance(given, CaseSpec):
-            return run_case(given, None, part)
-        return run_case(CaseSpec.read(Path(given)), Path(given), part)
-
-    first, *rest = (vars(run(number)) for number in range(len(cases)))
+    specs = [
+        (one, None) if isinstance(one, CaseSpec) else (CaseSpec.read(Path(one)), Path(one))
+        for one in (case, *others)
+    ]
+    first, *rest = (vars(run) for run in run_cases(specs, progress))
     return CrashRun(**first, others=tuple(CrashRun(**one) for one in rest))

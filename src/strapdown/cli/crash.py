@@ -12,13 +12,20 @@ from strapdown.cli.shared_options import OutFlags, folder_to_make, spread
 if TYPE_CHECKING:
     from strapdown.crash.case import CaseResult
 
-EPILOG = "Example: strapdown crash case.toml (strapdown init crash RECORD writes one)"
+EPILOG = (
+    "Examples: strapdown crash case.toml (strapdown init crash RECORD writes one); of two vehicles "
+    "strapdown crash case-1.toml case-2.toml"
+)
 
 
 @spread
 def crash(
-    case: Annotated[
-        Path, typer.Argument(metavar="CASE.toml", help="The case; strapdown init crash writes one.")
+    cases: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="CASE.toml...",
+            help="The case of each vehicle; strapdown init crash writes them.",
+        ),
     ],
     *,
     out: Annotated[Path | None, folder_to_make("CASE-crash")] = None,
@@ -27,39 +34,55 @@ def crash(
     """Reconstruct a crash: delta-V, direction of force, severity and path, each with its bound.
 
     Reads the records that the case names and writes a report (HTML and PDF), JSON, CSV and
-    figures, sealed so that any change is found.
+    figures, sealed so that any change is found. Two vehicles are held against each other as well:
+    momentum, closing speed, restitution and energy; each has its report in a folder of its own.
     """
     from strapdown.api.crash import reconstruct
-    from strapdown.bundle.seal import check_destination, write_timing
+    from strapdown.bundle.seal import MANIFEST, Seal, check_destination, sha256, write_timing
     from strapdown.cli.console import (
         WORDS,
         Stopwatch,
         console,
+        print_block,
         print_findings,
         print_seal,
         progress,
     )
     from strapdown.cli.result_folder import default_folder, refuse_result
+    from strapdown.report.crash_tables import closure_table
 
-    refuse_result(case, "case")
-    folder = out or default_folder(case, "crash")
-    check_destination(folder, write.force)
+    for case in cases:
+        refuse_result(case, "case")
+    folder = out or default_folder(cases[0], "crash")
+    several = len(cases) > 1
+    for k in range(len(cases)):
+        check_destination(folder / str(k + 1) if several else folder, write.force)
     WORDS.set("file")
     with progress(write.quiet or write.json) as show:
         report = Stopwatch(show)
-        result = reconstruct(case, progress=report)
-        seal = result.save(folder, force=write.force, progress=report)
+        result = reconstruct(*cases, progress=report)
+        first = result.save(folder, force=write.force, progress=report)
         report.stop()
-        write_timing(seal, report.seconds)
+        write_timing(first, report.seconds)
+    folders = [folder / number if several else folder for number in result.runs]
+    seals = [Seal(one, sha256(one / MANIFEST)) for one in folders]
     if write.json:
-        typer.echo((seal.path / "crash.json").read_text(encoding="utf-8"), nl=False)
+        told = [(seal.path / "crash.json").read_text(encoding="utf-8") for seal in seals]
+        typer.echo("".join(told) if not several else f"[{','.join(told)}]", nl=several)
         return
     if write.quiet:
         return
-    console().print(result.spec.title, style="bold")
-    print_crash(result)
-    print_findings(result.findings)
-    print_seal(seal, "report.html")
+    for run, seal in zip(result.runs.values(), seals, strict=True):
+        console().print(run.spec.title, style="bold")
+        if several:
+            console().print(run.vehicle_names[run.number - 1], style="bold")
+        print_crash(run)
+        print_findings(run.findings)
+        print_seal(seal, "report.html")
+    both = closure_table(result)
+    if both is not None:
+        console().print("Closure of both vehicles", style="bold")
+        print_block(both)
 
 
 def print_crash(result: CaseResult) -> None:

@@ -67,6 +67,21 @@ class VehicleSpec(Spec):
     mass_kg: Annotated[Number, Field(ge=20.0, le=100_000.0)] | None = Field(
         default=None, description="mass of the vehicle with its load"
     )
+    mass_sd_kg: Annotated[Number, Field(gt=0.0, le=50_000.0)] | None = Field(
+        default=None, description="standard deviation of that mass; by default 3 % of it"
+    )
+    contact_m: Pair | None = Field(
+        default=None,
+        description="forward, right of the point at which the other vehicle pushed, from the "
+        "origin that all positions share",
+    )
+    contact_sd_m: PositionSd = Field(
+        default=0.2, description="standard deviation of each of these coordinates"
+    )
+    crush_m: Annotated[Number, Field(gt=0.0, le=5.0)] | None = Field(
+        default=None, description="largest depth to which the vehicle was crushed"
+    )
+    crush_sd_m: PositionSd = Field(default=0.05, description="standard deviation of that depth")
     length_m: Size = Field(default=4.5, description="overall length of the vehicle")
     width_m: Size = Field(default=1.8, description="width of the vehicle without mirrors")
     front_m: Number | None = Field(
@@ -247,6 +262,10 @@ class OptionsSpec(Spec):
     zero_at: Literal["interval", "threshold"] = "interval"
     monte_carlo_runs: StrictInt = Field(default=2000, ge=0, le=100_000)
     seed: StrictInt = Field(default=0, ge=0)
+    #: The largest that is possible: dry asphalt.
+    tyre_friction: Annotated[Number, Field(ge=0.0, le=2.0)] = Field(
+        default=0.8, description="largest coefficient of friction of the tyres on the road"
+    )
     #: None selects those that apply to the crash type.
     severity: Annotated[tuple[Word, ...] | None, Several] = Field(
         default=None, description="names of models of injury risk"

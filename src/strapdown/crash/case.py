@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pandas as pd
 
 from strapdown.bundle.seal import InputFiles, sha256
 from strapdown.config.crash_case import CaseSpec, ReferenceSpec, TriadSpec, UnitSpec
 from strapdown.constants import TWO_SIDED_95
+from strapdown.crash.closure import (
+    Blame,
+    Closure,
+    ImpactVehicle,
+    blame,
+    blame_points,
+    close_vehicles,
+    equal_force_share,
+)
 from strapdown.crash.delta_v import delta_v
 from strapdown.crash.delta_v_bound import body_delta_v_bound
 from strapdown.crash.entry import Entry
@@ -79,6 +89,14 @@ class CaseResult:
         Of the main answer, then of every unit by itself.
     findings : tuple of Finding
         From reading and reconstruction, in this order.
+    number : int
+        Of its vehicle in the crash, from 1.
+    partners : tuple of CaseSpec
+        Cases of the other vehicles of the crash, in order.
+    closure : Closure or None
+        With the other vehicle, the first being that of the first case.
+    blame : Blame or None
+        What would explain that the two do not close.
     """
 
     spec: CaseSpec
@@ -90,6 +108,64 @@ class CaseResult:
     severity: tuple[SeverityAnswer, ...]
     references: tuple[ReferenceAnswer, ...]
     findings: tuple[Finding, ...]
+    number: int = 1
+    partners: tuple[CaseSpec, ...] = ()
+    closure: Closure | None = None
+    blame: Blame | None = None
+
+    @property
+    def vehicle_names(self) -> tuple[str, ...]:
+        """Name of every vehicle of the crash, in order; unique."""
+        specs = list(self.partners)
+        specs.insert(self.number - 1, self.spec)
+        names = [s.vehicle.name or f"vehicle {k}" for k, s in enumerate(specs, start=1)]
+        if len(set(names)) < len(names):
+            names = [f"{name} ({k})" for k, name in enumerate(names, start=1)]
+        return tuple(names)
+
+
+@one_thread()
+def run_cases(
+    cases: Sequence[tuple[CaseSpec, Path | None]], progress: Progress = silent
+) -> tuple[CaseResult, ...]:
+    """Reconstruct every vehicle of a crash by its own case, and close two of them.
+
+    Parameters
+    ----------
+    cases : sequence of (CaseSpec, Path or None)
+        Of each vehicle, as `run_case`.
+
+    Returns
+    -------
+    tuple of CaseResult
+        Each with the inputs of all, since its closure depends on them.
+    """
+    alone = []
+    for k, (spec, file) in enumerate(cases):
+
+        def part(stage: str, share: float, k: int = k) -> None:
+            progress(stage, (k + share) / len(cases))
+
+        alone.append(run_case(spec, file, part))
+    if len(alone) == 1:
+        return tuple(alone)
+    specs = [one.spec for one in alone]
+    together = [
+        replace(
+            one,
+            number=k + 1,
+            partners=tuple(specs[:k] + specs[k + 1 :]),
+            inputs=_with_inputs_of(one, alone[:k] + alone[k + 1 :]),
+        )
+        for k, one in enumerate(alone)
+    ]
+    return _closed(*together) if len(together) == 2 else tuple(together)
+
+
+def _with_inputs_of(own: CaseResult, others: Sequence[CaseResult]) -> tuple[InputFiles, ...]:
+    known = {(i.role, i.path) for i in own.inputs}
+    more = [i for other in others for i in other.inputs if i.role != "case"]
+    return (*own.inputs, *(i for i in more if (i.role, i.path) not in known))
 
 
 @one_thread()
@@ -273,6 +349,119 @@ def _samples(path: CrashPath, runs: int, seed: int) -> tuple[PathSamples | None,
             most=most,
         )
     ]
+
+
+# Closure of two vehicles, each by its own case.
+
+#: Standard deviation of a stated mass without one: fuel, load and passengers.
+MASS_SD = 0.03
+
+
+def _closed(first: CaseResult, second: CaseResult) -> tuple[CaseResult, CaseResult]:
+    """Both results with their closure, and with what contradicts it."""
+    names = first.vehicle_names
+    pair, findings = [], []
+    for result, name in zip((first, second), names, strict=True):
+        vehicle = _impact_vehicle(result, result.reconstruction.main, name)
+        if vehicle is None:
+            findings.append(Finding("crash.closure-without-change", quantity="closure", name=name))
+        else:
+            pair.append(vehicle)
+    closure = blamed = None
+    if len(pair) == 2:
+        friction = max(r.spec.options.tyre_friction for r in (first, second))
+        depths = [r.spec.vehicle for r in (first, second) if r.spec.vehicle.crush_m is not None]
+        share = None
+        if len(depths) == 2:
+            share = equal_force_share(*((v.crush_m or 0.0, v.crush_sd_m) for v in depths))
+        closure = close_vehicles(*pair, friction=friction, energy_share=share)
+        findings += closure.findings
+        blamed = blame(*pair, friction=friction) if closure.contradicted else None
+        findings += [one.finding for one in blamed.candidates] if blamed is not None else []
+        for result, other in ((first, pair[1]), (second, pair[0])):
+            units = result.reconstruction.units
+            points = [_impact_vehicle(result, unit, unit.name) for unit in units]
+            known = [p for p in points if p is not None]
+            if len(known) > 1:
+                findings += blame_points(known, other, friction=friction)
+    return (
+        replace(first, closure=closure, blame=blamed, findings=_once([*first.findings, *findings])),
+        replace(
+            second, closure=closure, blame=blamed, findings=_once([*second.findings, *findings])
+        ),
+    )
+
+
+def _once(findings: Sequence[Finding]) -> tuple[Finding, ...]:
+    return tuple(dict.fromkeys(findings))
+
+
+def _impact_vehicle(
+    result: CaseResult, unit: UnitReconstruction, name: str
+) -> ImpactVehicle | None:
+    """A vehicle by one of its answers, at the reference point; None without a resolved change."""
+    number = main_event(unit)
+    over_ground = None if number is None else unit.ned[number]
+    if number is None or over_ground is None:
+        return None
+    spec, event, path = result.spec, unit.events.events[number], unit.path
+    start = event.time_zero
+    heading = float(np.interp(start, path.time, np.unwrap(path.table["heading"], period=360.0)))
+    turned = np.radians(heading)
+    into_body = np.array(
+        [[np.cos(turned), np.sin(turned), 0.0], [-np.sin(turned), np.cos(turned), 0.0], [0, 0, 1.0]]
+    )
+    velocity = np.array([np.interp(start, path.time, path.table[axis]) for axis in ("VN", "VE")])
+    entry = into_body[:2, :2] @ velocity
+    speed = float(np.linalg.norm(velocity))
+    sd = spec.entry.speed_sd_m_per_s or 0.0
+    across = speed * math.radians(spec.entry.slip_sd_deg)
+    heading_sd: float | None = spec.entry.heading_sd_deg
+    if spec.entry.kind == "gnss":
+        sd = across = float(path.sd[["VN", "VE"]].iloc[path.anchor].max())
+        heading_sd = float(path.sd["heading"].iloc[path.anchor])
+    rate = change = None
+    if "heading" not in unit.at_point.assumed_axes:
+        rate, change = _yaw_rates(unit, start, event.end)
+    vehicle, origin = spec.vehicle, spec.point.position_m
+    mass = vehicle.mass_kg
+    return ImpactVehicle(
+        name,
+        into_body @ over_ground.event.delta_v.vector,
+        unit.body[number].event.bound.covariance,
+        event.end - start,
+        mass=None if mass is None else (mass, vehicle.mass_sd_kg or MASS_SD * mass),
+        heading_deg=(heading, heading_sd) if heading_sd else None,
+        entry=entry,
+        entry_covariance=np.diag([sd**2, across**2]),
+        rate=rate,
+        rate_change=change,
+        contact=None
+        if vehicle.contact_m is None
+        else (
+            vehicle.contact_m[0] - origin[0],
+            vehicle.contact_m[1] - origin[1],
+            vehicle.contact_sd_m,
+        ),
+    )
+
+
+def _yaw_rates(
+    unit: UnitReconstruction, start: float, end: float
+) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Yaw rate at an instant, and its change until another, each with its sd, deg/s."""
+    of, effects = unit.at_point, unit.at_point.effects
+    first, last = np.searchsorted(of.time, [start, end]).clip(0, len(of.time) - 1)
+    by_unknowns = effects.rate[:, :, 2]
+    noise = float(np.median(effects.rate_noise[:, 2]))
+    sd = math.hypot(float(np.linalg.norm(by_unknowns[:, first])), noise)
+    apart = by_unknowns[:, last] - by_unknowns[:, first]
+    change_sd = math.hypot(float(np.linalg.norm(apart)), math.sqrt(2.0) * noise)
+    yaw = np.degrees(of.rate[:, 2])
+    return (
+        (float(yaw[first]), math.degrees(sd)),
+        (float(yaw[last] - yaw[first]), math.degrees(change_sd)),
+    )
 
 
 # Recorders of a case, from its file and the records.

@@ -14,7 +14,8 @@ from strapdown.bundle.configuration_paths import names_file
 from strapdown.bundle.seal import write_json
 from strapdown.config.crash_case import CaseSpec
 from strapdown.constants import TWO_SIDED_95
-from strapdown.crash.case import CaseResult, ReferenceAnswer, SeverityAnswer, main_event, run_case
+from strapdown.crash.case import CaseResult, ReferenceAnswer, SeverityAnswer, main_event, run_cases
+from strapdown.crash.closure import Closure, Figure
 from strapdown.crash.consistency import UnitComparison
 from strapdown.crash.crash_type import CrashType
 from strapdown.crash.delta_v_bound import EventChanges, VelocityChange
@@ -46,12 +47,20 @@ from strapdown.tables.checks import index_of
 
 
 def _configuration(result: CaseResult) -> dict[str, Any]:
-    return with_file({"case": result.spec.plain()}, result, "case", "case_path")
+    stated: dict[str, Any] = {"case": result.spec.plain()}
+    if result.partners:
+        stated["number"] = result.number
+        stated["partners"] = [spec.plain() for spec in result.partners]
+    return with_file(stated, result, "case", "case_path")
 
 
 def _run(configuration: dict[str, Any]) -> CaseResult:
-    spec = CaseSpec.model_validate(configuration["case"])
-    return run_case(spec, file_of(configuration, "case_path"))
+    own = CaseSpec.model_validate(configuration["case"])
+    cases: list[tuple[CaseSpec, Path | None]]
+    cases = [(CaseSpec.model_validate(one), None) for one in configuration.get("partners", ())]
+    number = int(configuration.get("number", 1))
+    cases.insert(number - 1, (own, file_of(configuration, "case_path")))
+    return run_cases(cases)[number - 1]
 
 
 def _write(result: CaseResult, folder: Path, name: str, report: bool, progress: Progress) -> None:
@@ -122,6 +131,7 @@ def crash_json(result: CaseResult) -> dict[str, Any]:
         "main": made.main.name,
         "answers": [_unit(unit) for unit in made.answers],
         "comparison": None if made.comparison is None else _comparison(made.comparison),
+        "closure": None if result.closure is None else _closure(result, result.closure),
         "severity": [_severity(s) for s in result.severity],
         "references": [_reference(r) for r in result.references],
         "assumptions": _pairs(crash_words.assumptions(result)),
@@ -261,6 +271,36 @@ def _comparison(comparison: UnitComparison) -> dict[str, Any]:
             }
             for pair in comparison.pairs
         ],
+    }
+
+
+def _closure(result: CaseResult, closure: Closure) -> dict[str, Any]:
+    def bounded(figure: Figure | None) -> dict[str, float] | None:
+        if figure is None:
+            return None
+        return {"value": figure.value, "low": figure.low, "high": figure.high}
+
+    return {
+        "vehicles": list(result.vehicle_names),
+        "contradicted": closure.contradicted,
+        "velocities_hold_at": closure.basis,
+        "residual_n_s": closure.residual.tolist(),
+        "chi_square": closure.chi_square,
+        "freedom": closure.freedom,
+        "probability": closure.probability,
+        "impulse_difference_n_s": bounded(closure.magnitude),
+        "mass_ratio_second_to_first": bounded(closure.mass_ratio),
+        "relative_heading_deg": bounded(closure.relative_heading_deg),
+        "direction_of_impulse_on_first_deg": bounded(closure.direction_deg),
+        "closing_speed_m_per_s": bounded(closure.closing_speed),
+        "separation_speed_m_per_s": bounded(closure.separation_speed),
+        "restitution": bounded(closure.restitution),
+        "common_velocity_m_per_s": bounded(closure.common_velocity),
+        "energy_lost_j": bounded(closure.energy),
+        "energy_equivalent_speed_m_per_s": [bounded(f) for f in closure.energy_equivalent_speed],
+        "explained_by": []
+        if result.blame is None
+        else [finding_json(one.finding) for one in result.blame.candidates],
     }
 
 

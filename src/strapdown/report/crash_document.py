@@ -136,6 +136,7 @@ def crash_document(result: CaseResult, name: str) -> Document:
             attitude_chart(path, **sampled),
         ),
         section("agreement", "Consistency of the recorders", *_agreement(result)),
+        section("closure", "Closure with the other vehicle", *_closure(result)),
         section(
             "budget",
             "Error budget",
@@ -256,6 +257,19 @@ def _records(result: CaseResult) -> Iterator[Block]:
         if rows:
             yield Paragraph(f"Metadata of {record.path.name}:")
             yield Facts(rows)
+
+
+def _closure(result: CaseResult) -> Iterator[Block | None]:
+    if result.partners:
+        yield crash_tables.closure_table(result)
+        if result.blame is not None:
+            candidates = [one.finding for one in result.blame.candidates]
+            yield Paragraph(
+                "The two do not close. Each of these would explain it, and no other is as likely:"
+                if candidates
+                else "The two do not close, and no single error explains it."
+            )
+            yield Items(tuple(("", one.sentence("file")) for one in candidates))
 
 
 def _agreement(result: CaseResult) -> tuple[Block | None, ...]:

@@ -9,6 +9,7 @@ import numpy as np
 from strapdown.config.crash_case import TriadSpec
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.crash.case import CaseResult, ReferenceAnswer, main_event
+from strapdown.crash.closure import Figure
 from strapdown.crash.delta_v_bound import VelocityChange
 from strapdown.crash.pdof import AngleInterval, Pdof
 from strapdown.report.document import TableBlock
@@ -30,6 +31,7 @@ from strapdown.sensors.crash_unit import RecordedTriad
 from strapdown.tables import NED
 from strapdown.tables.checks import index_of
 
+Row = tuple[str, str, str, str]
 ANGLES = ("roll, deg", "pitch, deg", "heading, deg")
 OVER_GROUND = "Axes: over ground."
 FROM_THE_ENTRY = (
@@ -257,6 +259,48 @@ def comparison_table(result: CaseResult) -> TableBlock | None:
         caption=f"Difference of the delta-V of two recorders at the {result.spec.point.name}, "
         f"{instant(start)} to {instant(end)}, with its 95 % bound. Probability of a difference as "
         "large or larger by the stated uncertainties.",
+    )
+
+
+def closure_table(result: CaseResult) -> TableBlock | None:
+    """What two vehicles say together: momentum, closing speed, restitution, energy."""
+    closure = result.closure
+    if closure is None:
+        return None
+    first, second = result.vehicle_names
+
+    def row(what: str, figure: Figure | None, factor: float, places: int, unit: str) -> Row | None:
+        if figure is None:
+            return None
+        low, high = (plain(factor * x, places) for x in (figure.low, figure.high))
+        return what, plain(factor * figure.value, places), f"{low} to {high}", unit
+
+    at = "at the contact" if closure.basis == "contact" else "of the centres of mass"
+    equivalent = zip((first, second), closure.energy_equivalent_speed, strict=True)
+    rows = (
+        row(f"closing speed {at}, along the impulse", closure.closing_speed, KMH, 1, "km/h"),
+        row(f"separation speed {at}", closure.separation_speed, KMH, 1, "km/h"),
+        row("restitution", closure.restitution, 1.0, 2, ""),
+        row("common velocity along the impulse", closure.common_velocity, KMH, 1, "km/h"),
+        row(f"direction of the impulse on {first}", closure.direction_deg, 1.0, 1, "deg"),
+        row(f"mass of {second} over that of {first}", closure.mass_ratio, 1.0, 3, ""),
+        row(f"impulse of {first} less that of {second}", closure.magnitude, 1e-3, 2, "kN s"),
+        row("heading of the second less the first", closure.relative_heading_deg, 1.0, 1, "deg"),
+        row("kinetic energy lost in the contact", closure.energy, 1e-3, 1, "kJ"),
+        *(row(f"energy-equivalent speed of {name}", of, KMH, 1, "km/h") for name, of in equivalent),
+    )
+    tested = (
+        f"Momentum closes with a probability of {probability_words(closure.probability)} "
+        f"(chi-square {closure.chi_square:.3g}, {closure.freedom} degrees of freedom)."
+        if closure.freedom
+        else "Momentum could not be tested: masses or headings are not known."
+    )
+    return TableBlock(
+        ("quantity", "value", "95 % bound", "unit"),
+        tuple(one for one in rows if one is not None),
+        text=(0, 3),
+        caption=f"{first} and {second} together, each by its own recorders at its "
+        f"{result.spec.point.name}, taken for its centre of mass. {tested}",
     )
 
 

@@ -432,6 +432,7 @@ GRAVE = frozenset(
         "event-before-record",
         "direction-undetermined",
         "recorders-disagree",
+        "vehicles-do-not-close",
         "clipped-accelerometer",
         "clipped-gyro",
         "assumed",
@@ -446,6 +447,7 @@ def limitations(result: CaseResult) -> tuple[tuple[str, str, str], ...]:
         *clipping(result),
         *_disagreement(result),
         *_contradicted(result),
+        *_not_closed(result),
         *assumed(result),
         *rest(result),
         *borrowed(result),
@@ -526,6 +528,18 @@ def _disagreement(result: CaseResult) -> Iterator[tuple[str, str, str]]:
         "or a mounting that was deformed or rang. Do not rely on the answers before the cause is "
         "found; see Consistency of the recorders.",
     )
+
+
+def _not_closed(result: CaseResult) -> Iterator[tuple[str, str, str]]:
+    closure = result.closure
+    if closure is not None and closure.contradicted:
+        yield (
+            "vehicles-do-not-close",
+            f"{' and '.join(result.vehicle_names)} do not close",
+            "Momentum, closing speed or restitution of the two vehicles contradict each other "
+            "beyond their bounds: a record, a mass, a heading or an entry speed is wrong. See "
+            "Closure with the other vehicle.",
+        )
 
 
 def _alone(result: CaseResult) -> Iterator[tuple[str, str, str]]:
