@@ -328,6 +328,13 @@ class _Impact:
             covariance = self.covariance - gain @ spread.T
         return replace(self, x=x, covariance=0.5 * (covariance + covariance.T))
 
+    def keeps_signs_of(self, other: _Impact) -> bool:
+        """Whether masses are positive and neither change of velocity points backward."""
+        return all(
+            self.x[k + MASS] > 0.0 and float(self.x[k : k + 2] @ other.x[k : k + 2]) >= 0.0
+            for k in (0, SIZE)[: 1 + self.two]
+        )
+
     def _velocities(self, x: Array) -> tuple[Array, Array]:
         """Relative velocity of the first to the second before and after, over ground."""
         before, after = np.zeros((2, *x.shape[:-1], 2))
@@ -1004,10 +1011,12 @@ def blame(
         log = math.log(scale) + 2.0 * float(np.log(impact.x[[MASS, SIZE + MASS]]).sum())
         log -= 0.5 * (chi + float(np.linalg.slogdet(covariance)[1]))
         possible = probability >= level
+        adjusted = impact.adjusted()
+        # A wrong size is positive: the other sign is a hypothesis of its own.
+        possible = possible and adjusted.keeps_signs_of(impact)
         if known and possible:
-            adjusted = impact.adjusted()
             for _, value, sd in _margins(adjusted, *adjusted.figures()):
-                normal = value / max(sd, 1e-12)
+                normal = value / max(sd, np.finfo(float).tiny)
                 possible = possible and normal >= -factor
                 log += math.log(max(normal_above(-normal), np.finfo(float).tiny))
         out.append(Hypothesis(finding, log, chi, freedom, probability, possible))

@@ -65,7 +65,7 @@ def solve(mass, inertia, arms, velocity, rate, tyres, normal, restitution, frict
     return impulse
 
 
-def draw(rng, kind, *, central=False, restitution=None):
+def draw(rng, kind, *, central=False, restitution=None, road=FRICTION):
     """Draw an impact of a kind; `central`: without arms, friction, yaw and tyre forces."""
     normal_deg, headings, contacts, speeds, friction = KINDS[kind]
     mass = rng.uniform(1000.0, 2200.0, 2)
@@ -80,7 +80,7 @@ def draw(rng, kind, *, central=False, restitution=None):
     arms = [turned(heading[i], contact[i]) for i in (0, 1)]
     entry = [np.array([rng.uniform(*speeds[i]), rng.uniform(-0.3, 0.3)]) for i in (0, 1)]
     velocity = [turned(heading[i], entry[i]) for i in (0, 1)]
-    limit = FRICTION * G * duration
+    limit = road * G * duration
     tyres = []
     for _ in range(2):
         angle, size = rng.uniform(0, 2 * math.pi), limit * math.sqrt(rng.uniform())

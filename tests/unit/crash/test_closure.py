@@ -72,11 +72,17 @@ def _count(kinds, draws, seed, known=lambda first, second: (first, second)):
     return held, counted, reported
 
 
-def _interval_contains_95(held, counted):
+# Mostly tyre forces: what is uniform within a bound has no tails, and a normal bound of 1.96
+# standard deviations holds up to all of it.
+CONSERVATIVE = ("momentum", "mass_ratio", "magnitude")
+
+
+def _outside_interval(held, counted):
+    """Numbers for which the 99 % interval of the coverage does not contain 95 %."""
     out = []
     for name, n in counted.items():
         low, high = binom.interval(0.99, n, 0.95)
-        if not low <= held[name] <= high:
+        if held[name] < low or (held[name] > high and name not in CONSERVATIVE):
             out.append((name, held[name] / n, n))
     return out
 
@@ -84,17 +90,16 @@ def _interval_contains_95(held, counted):
 def test_bounds_hold_the_truth_and_sound_pairs_are_not_reported():
     # 100 of each kind; per kind in the slow test.
     held, counted, reported = _count(KINDS, 100, seed=11)
-    assert _interval_contains_95(held, counted) == []
+    assert _outside_interval(held, counted) == []
     assert reported <= binom.ppf(0.99, 5 * 100, 0.01)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_bounds_hold_the_truth_by_kind(kind):
-    held, counted, reported = _count([kind], 2000, seed=12)
-    assert _interval_contains_95(held, counted) == []
-    # At most 1 % of sound pairs; five standard errors above the level of all tests would be 1.8 %.
-    assert reported <= 0.01 * 2000
+    held, counted, reported = _count([kind], 500, seed=12)
+    assert _outside_interval(held, counted) == []
+    assert reported <= binom.ppf(0.99, 500, 0.01)
 
 
 PARTLY = {
@@ -111,12 +116,12 @@ PARTLY = {
 def test_bounds_hold_the_truth_where_something_is_not_known(missing):
     freedom, known = PARTLY[missing]
 
-    held, counted, reported = _count(KINDS, 300, seed=13, known=known)
+    held, counted, reported = _count(KINDS, 100, seed=13, known=known)
     del counted["direction_deg"]  # In the axes of the first vehicle without a heading.
     if freedom == 0:
         del counted["momentum"]
-    assert _interval_contains_95(held, counted) == []
-    assert reported <= 0.01 * 5 * 300
+    assert _outside_interval(held, counted) == []
+    assert reported <= binom.ppf(0.99, 5 * 100, 0.01)
 
 
 @pytest.mark.parametrize("missing", PARTLY)
@@ -179,22 +184,28 @@ def test_a_non_central_impact_needs_the_point_of_contact(kind):
 
 
 def test_a_change_away_from_the_centre_of_mass_closes_only_with_its_point():
-    impact = draw(np.random.default_rng(6), "offset")
-    first, second = impact.exact
-    change = math.radians(first.rate_change[0])
-    moved = np.asarray(first.delta_v) + change * np.array([-0.6, -1.5, 0.0])
-    away = replace(first, delta_v=moved, covariance=np.eye(3) * 1e-4)
-    sharp = replace(second, covariance=np.eye(3) * 1e-4)
-    assert abs(change) > 0.5
-    assert close_vehicles(away, sharp, friction=0.05).contradicted
-    placed = replace(away, point=(-1.5, 0.6, 0.02))
-    there, centre = (
-        close_vehicles(v, sharp, friction=0.05)
-        for v in (placed, replace(first, covariance=1e-4 * np.eye(3)))
+    impact = draw(np.random.default_rng(6), "offset", road=0.0)
+    sharp = {"covariance": np.eye(3) * 1e-4, "rate_change": None}
+    first, second = (
+        replace(v, mass=(v.mass[0], 1.0), heading_deg=(v.heading_deg[0], 0.05), **sharp)
+        for v in impact.exact
     )
-    assert there.residual == pytest.approx(centre.residual, abs=1e-6)
+    centre = close_vehicles(first, second, friction=0.01)
+    assert not centre.contradicted
+    # The velocity of the rear left seat by the yaw, 0.6 m to the left and 1.5 m behind.
+    change = impact.exact[0].rate_change
+    yaw = math.radians(change[0])
+    assert abs(yaw) > 0.5
+    moved = first.delta_v + yaw * np.array([0.6, -1.5, 0.0])
+    away = replace(first, delta_v=moved, rate_change=change)
+    assert close_vehicles(away, second, friction=0.01).contradicted
+    placed = replace(away, point=(-1.5, -0.6, 0.02))
+    there = close_vehicles(placed, second, friction=0.01)
+    assert not there.contradicted
+    # A dozen roundings of impulses up to 1e5 N s.
+    assert there.residual == pytest.approx(centre.residual, abs=1e-9)
     with pytest.raises(DataError, check=coded("crash.closure-rate-change-needed")):
-        replace(away, point=(-1.5, 0.6, 0.02), rate_change=None)
+        replace(placed, rate_change=None)
 
 
 def test_entry_over_ground_is_not_turned_by_an_error_of_the_heading():
@@ -255,7 +266,7 @@ def test_a_barrier_by_the_same_function():
         for name, figure in figures.items():
             held[name] += figure.contains(truth[name])
             counted[name] += 1
-    assert _interval_contains_95(held, counted) == []
+    assert _outside_interval(held, counted) == []
     assert closure.energy_equivalent_speed[1] is None
 
 
@@ -432,7 +443,7 @@ def test_an_error_is_found_and_among_the_candidates(kind, fault):
 @pytest.mark.parametrize("fault", FAULTS)
 @pytest.mark.parametrize("kind", KINDS)
 def test_an_error_is_found_at_the_stated_rate(kind, fault):
-    _check(_blamed(kind, fault, 200, seed=22), 200, STATED[kind][fault])
+    _check(_blamed(kind, fault, 100, seed=22), 100, STATED[kind][fault])
 
 
 def test_what_cannot_be_told_apart_is_returned_together():
@@ -475,10 +486,9 @@ def test_an_entry_speed_in_another_unit_is_blamed_on_the_entry():
 
 def test_two_errors_that_no_single_one_explains_have_no_candidate():
     impact = draw(np.random.default_rng(33), "head-on")
-    slow = [replace(v, entry=np.asarray(v.entry) / 3.6) for v in impact.exact]
-    closure = close_vehicles(*slow, friction=FRICTION)
-    assert "crash.restitution-above-one" in {f.code for f in closure.findings}
-    result = blame(*slow, friction=FRICTION)
+    first, second = impact.exact
+    first = first.with_delta_v_times(np.diag([-1.0, 1.0]))
+    result = blame(first, second.with_delta_v_times(3.6 * np.eye(2)), friction=FRICTION)
     assert result.contradicted and result.candidates == ()
 
 
