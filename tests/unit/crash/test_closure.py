@@ -461,6 +461,30 @@ def test_what_cannot_be_told_apart_is_returned_together():
     assert not blame(first, second, friction=FRICTION).candidates
 
 
+def test_a_likelihood_is_that_of_the_record():
+    # Where the mass follows the record, nothing tells its units apart: equal likelihoods.
+    impact = draw(np.random.default_rng(34), "side", road=0.0)
+    first, second = (replace(v, entry=None) for v in impact.measured)
+    result = blame(first, replace(second, mass=None), friction=0.0)
+    logs = {
+        (h.finding.code, h.finding.data.get("name"), h.finding.data.get("factor")): h.log_likelihood
+        for h in result.hypotheses
+    }
+    stated = logs["crash.closes-as-stated", None, None]
+    same = [v for k, v in logs.items() if k[:2] == ("crash.closes-if-unit", "vehicle 2")]
+    # The floor of the inverse and a few roundings.
+    assert len(same) == 8 and same == pytest.approx([stated] * 8, abs=1e-6)
+
+
+def test_a_mass_or_scale_of_the_other_sign_explains_nothing():
+    impact = draw(np.random.default_rng(35), "offset")
+    first, second = (replace(v, entry=None) for v in impact.exact)
+    turned = first.with_delta_v_times(-np.eye(2))
+    codes = {h.finding.code for h in blame(turned, second, friction=FRICTION, ratio=1e9).candidates}
+    assert "crash.closes-if-heading-turned" in codes
+    assert not codes & {"crash.closes-if-mass-wrong", "crash.closes-if-scale-wrong"}
+
+
 def test_without_headings_axes_do_not_matter_and_are_not_blamed_alone():
     impact = draw(np.random.default_rng(32), "offset")
     first, second = (replace(v, heading_deg=None, entry=None) for v in impact.exact)
