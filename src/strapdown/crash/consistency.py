@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.acceleration import window_weights
-from strapdown.crash.measuring_point import LEVER_ARM, MOUNTING, PointKinematics
+from strapdown.crash.measuring_point import LEVER_ARM, MOUNTING, NO_TURNING, PointKinematics
 from strapdown.crash.structure import LARGEST_SHARE, Structure, learn_share, unlearnt
 from strapdown.dsp.chi_square import chi_square_above
 from strapdown.errors import ConfigError, DataError, Finding
@@ -668,9 +668,8 @@ def compare_units(
     kept = ~np.any(cut, axis=0)
     common = [v.of_pieces(kept) for v in increments]
     structure = _of_vehicle(rigid, pairs, units, common, kept)
-    combined, combined_sd, against, chi, freedom = _against_all(
-        units, [v.bent_by(structure, kept) for v in common], kept, structure
-    )
+    bent = [v.bent_by(structure, kept) for v in common]
+    combined, combined_sd, against, chi, freedom = _against_all(units, bent, kept, structure)
     probability = chi_square_tail(chi, freedom)
     findings = [_left_out(u, edges, c) for u, c in zip(units, cut, strict=True) if c.any()]
     findings += [f for p in pairs for f in p.findings]
@@ -690,6 +689,7 @@ def compare_units(
         probability,
         probability >= level and all(p.agree for p in pairs),
         structure,
+        _turned_by_points(units, common, structure, kept),
         tuple(u.name for u in units if doubted[u.name] or any(f.file == u.name for f in odd)),
         tuple(findings),
     )
@@ -822,17 +822,83 @@ def _turning(
     The stated turning of the vehicle moves a point by its rate times its lever arm. None where a
     unit has a gyro.
     """
-    sds, arms = [], []
+    turned = _across(units)
+    if turned is None:
+        return None
+    _, across = turned
+    rates = structure.of_turning(edges, min(u.assumed_until for u in units))[np.ix_(kept, kept)]
+    whole = np.einsum("ab,icx,jcy->iaxjby", rates, across, across)
+    return np.asarray(whole.reshape(3 * len(rates) * len(units), -1))
+
+
+def _across(units: Sequence[PointKinematics]) -> tuple[Array, Array] | None:
+    """Stated turning, (3,), rad, and by it the motion of the point of k units, (k, 3, 3), m.
+
+    Rows by the axis of the turning. None where a unit has a gyro.
+    """
+    stated_sds, arms = [], []
     for u in units:
         stated = None if u.prepared is None else (u.prepared.unit.lender or u.prepared.unit).assumed
         if stated is None or u.moved is None or u.gyro != NO_GYRO:
             return None
-        sds.append(stated.sd_of("turn_sd_deg"))
+        stated_sds.append(stated.sd_of("turn_sd_deg"))
         arms.append(u.moved.lever_arm)
-    across = np.cross(np.diag(np.radians(np.max(sds, axis=0))), np.array(arms)[:, None])
-    rates = structure.of_turning(edges, min(u.assumed_until for u in units))[np.ix_(kept, kept)]
-    whole = np.einsum("ab,icx,jcy->iaxjby", rates, across, across)
-    return np.asarray(whole.reshape(3 * len(rates) * len(units), -1))
+    sds = np.radians(np.max(stated_sds, axis=0))
+    # From the point back to the unit.
+    return sds, np.cross(np.diag(sds), -np.array(arms)[:, None])
+
+
+def _turned_by_points(
+    units: Sequence[PointKinematics],
+    increments: Sequence[VelocityIncrements],
+    structure: Structure,
+    kept: Flags,
+) -> PointTurning | None:
+    """Turning of a vehicle without a gyro, by what moves its points against each other.
+
+    Conditional mean and covariance of the rates of a Gaussian process (`Structure.of_turning`),
+    given the differences of the units' increments over the intervals `kept`. Structure may move a
+    point across as far as it was learnt along any axis: what it does in the direction of a turning
+    is not told apart from it.
+    """
+    turned = _across(units)
+    if turned is None or not kept.any():
+        return None
+    sds, across = turned
+    anywhere = replace(structure, share=np.full(3, structure.share.max()))
+    increments = [one.bent_by(anywhere, kept) for one in increments]
+    edges, until = increments[0].edges, min(u.assumed_until for u in units)
+    size, others = increments[0].values.size, len(units) - 1
+    less = np.hstack([-np.tile(np.eye(size), (others, 1)), np.eye(others * size)])
+    joint = joint_covariance(increments, without=(NO_TURNING,))
+    walk = structure.turning**2 * structure.of_turning(edges, until)
+    seen = walk[np.ix_(kept, kept)]
+    joint = joint + np.einsum("ab,icx,jcy->iaxjby", seen, across, across).reshape(joint.shape)
+    covariance = floored(less @ joint @ less.T)
+    # Of the rates over all intervals, in multiples of the stated, with the differences.
+    with_units = np.einsum("ab,jcy->acjby", walk[:, kept], across).reshape(3 * len(walk), -1)
+    gain = np.linalg.solve(covariance, (with_units @ less.T).T).T
+    given = np.array([v.values for v in increments])
+    upto = np.vstack([np.zeros(len(walk)), np.tril(np.ones((len(walk), len(walk))))])
+    length, arms = np.diff(edges), -np.array([u.moved.lever_arm for u in units if u.moved])
+    steps = gain @ (less @ given.ravel())
+    for _ in range(ROUNDS):
+        # The centripetal force of the rates found so far, on each point.
+        rate = (upto @ steps.reshape(-1, 3) * sds)[:, None]
+        inward = np.cross(rate, np.cross(rate, arms))
+        turned_in = 0.5 * (inward[1:] + inward[:-1]) * length[:, None, None]
+        free = given - turned_in[kept].transpose(1, 0, 2)
+        steps = gain @ (less @ free.ravel())
+    left = np.kron(walk, np.eye(3)) - gain @ (with_units @ less.T).T
+    angle = np.vstack(
+        [np.zeros(len(walk)), np.cumsum(0.5 * (upto[1:] + upto[:-1]) * length[:, None], axis=0)]
+    )
+    out = []
+    for sums in (upto, angle):
+        whole = np.kron(sums, np.diag(np.degrees(sds)))
+        variance = np.maximum(np.einsum("ij,jk,ik->i", whole, left, whole), 0.0)
+        out += [(whole @ steps).reshape(-1, 3), np.sqrt(variance).reshape(-1, 3)]
+    return PointTurning(edges, *out)
 
 
 def _against_all(
@@ -1087,13 +1153,29 @@ class UnitAgainstAll:
 
 
 @dataclass(frozen=True, eq=False)
+class PointTurning:
+    """Turning of a vehicle without a gyro, from the first of `edges`, (m + 1,), s, on.
+
+    `rate`, deg/s, and `angle`, deg, with their standard deviations, (m + 1, 3): about forward,
+    right, down. About an axis that the points do not show it is the assumption: zero, with its sd.
+    """
+
+    edges: Array = field(repr=False)
+    rate: Array
+    rate_sd: Array
+    angle: Array
+    angle_sd: Array
+
+
+@dataclass(frozen=True, eq=False)
 class UnitComparison:
     """Comparison of all units of a vehicle at one point.
 
     `combined`, `combined_sd`, (m + 1, 3), m/s: delta-V of the optimally weighted combination at
     `edges`, gravity included, body axes; NaN along axes that all units assume. Chi-square of all
     units against it. `structure`: motion of the units' points against each other. `doubted`: units
-    that the others or the mechanics of a crash contradict.
+    that the others or the mechanics of a crash contradict. `turned`: by the points alone, None
+    where a unit has a gyro.
     """
 
     edges: Array = field(repr=False)
@@ -1106,6 +1188,7 @@ class UnitComparison:
     probability: float
     agree: bool
     structure: Structure = field(repr=False)
+    turned: PointTurning | None = field(repr=False)
     doubted: tuple[str, ...]
     findings: tuple[Finding, ...]
 

@@ -258,6 +258,15 @@ def _comparison(comparison: UnitComparison) -> dict[str, Any]:
             "correlation_time_s": comparison.structure.correlation_time,
             "turning_of_assumed": comparison.structure.turning,
         },
+        "turning_by_points": None
+        if comparison.turned is None
+        else {
+            "time_s": comparison.turned.edges.tolist(),
+            "rate_roll_pitch_heading_deg_per_s": comparison.turned.rate.tolist(),
+            "rate_sd_deg_per_s": comparison.turned.rate_sd.tolist(),
+            "angle_roll_pitch_heading_deg": comparison.turned.angle.tolist(),
+            "angle_sd_deg": comparison.turned.angle_sd.tolist(),
+        },
         "pairs": [
             {
                 "first": pair.first,

@@ -281,6 +281,7 @@ def _agreement(result: CaseResult) -> tuple[Block | None, ...]:
     remedies = dict.fromkeys(text for f in comparison.findings if (text := f.advice("file")))
     return (
         crash_tables.comparison_table(result),
+        crash_tables.turning_table(result),
         differences_chart(comparison, [u.name for u in found.units]),
         accelerations_chart(found.units, found.combined, found.main.events.events),
         Items(words) if words else None,

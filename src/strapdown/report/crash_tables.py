@@ -262,6 +262,28 @@ def comparison_table(result: CaseResult) -> TableBlock | None:
     )
 
 
+def turning_table(result: CaseResult) -> TableBlock | None:
+    """Turning of a vehicle without a gyro, by its measuring points."""
+    comparison = result.reconstruction.comparison
+    turned = None if comparison is None else comparison.turned
+    if turned is None:
+        return None
+    rows = []
+    for k, axis in enumerate(("roll", "pitch", "heading")):
+        rate, rate_sd = float(turned.rate[-1, k]), float(turned.rate_sd[-1, k])
+        angle, angle_sd = float(turned.angle[-1, k]), float(turned.angle_sd[-1, k])
+        told = [about(v, TWO_SIDED_95 * sd, "") for v, sd in ((rate, rate_sd), (angle, angle_sd))]
+        rows.append((axis, *told))
+    end = instant(float(turned.edges[-1]))
+    return TableBlock(
+        ("about", "rate, deg/s", "turned, deg"),
+        tuple(rows),
+        caption=f"Turning at {end}, by the motion of the recorders against each other, with its "
+        "95 % bound. About an axis that they do not show it is the stated assumption. Positive "
+        "heading to the right.",
+    )
+
+
 def closure_table(result: CaseResult) -> TableBlock | None:
     """What two vehicles say together: momentum, closing speed, restitution, energy."""
     closure = result.closure
@@ -295,6 +317,8 @@ def closure_table(result: CaseResult) -> TableBlock | None:
         if closure.freedom
         else "Momentum could not be tested: masses or headings are not known."
     )
+    if closure.contradicted:
+        tested += " They contradict each other: these bounds do not hold before that is explained."
     return TableBlock(
         ("quantity", "value", "95 % bound", "unit"),
         tuple(one for one in rows if one is not None),

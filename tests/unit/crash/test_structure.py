@@ -281,3 +281,30 @@ def test_both_sides_of_a_real_car_agree_as_proposed(recordings, tmp_path):
     mean = found.combined.delta_v
     assert abs(-mean.delta_v.vector[0] - 18.53) < mean.bound.half_width[0]
     assert mean.bound.half_width[0] < 0.6
+
+
+def turned(crash, gyro=False):
+    """Yaw rate and angle by two points at 0.15 s over their bounds, and the rate's sd, deg/s."""
+    found = compare([crash.unit(k, gyro=gyro) for k in range(2)]).turned
+    time = np.linspace(0.0, 0.15, 3001)
+    rate = np.cumsum(crash.shape(time)) * (time[1] - time[0]) * crash.turned[2]
+    rate = np.degrees(rate * np.exp(-np.maximum(time - 0.12, 0)))
+    off = rate[-1] - found.rate[-1, 2], np.trapezoid(rate, time) - found.angle[-1, 2]
+    return np.array(off) / [found.rate_sd[-1, 2], found.angle_sd[-1, 2]], found.rate_sd[-1, 2]
+
+
+def test_two_points_show_the_yaw_without_a_gyro():
+    z, sd = turned(Crash(901, "oblique"))
+    assert (np.abs(z) < 3.0).all()
+    # The rate is assumed to a standard deviation of about 76 deg/s; the points tell it to a tenth.
+    assert sd < 8.0
+    crash = Crash(901, "oblique")
+    assert compare([crash.unit(k, gyro=True) for k in range(2)]).turned is None
+
+
+@pytest.mark.slow
+def test_the_bound_of_a_yaw_by_points_holds():
+    z = np.array([turned(Crash(900 + s, kind))[0] for kind in KINDS for s in range(40)])
+    for column in z.T:
+        interval = binomtest(int((np.abs(column) < 1.96).sum()), len(column)).proportion_ci(0.99)
+        assert interval.high >= 0.95, interval
