@@ -31,6 +31,7 @@ from strapdown.config.toml_text import (
     string,
 )
 from strapdown.constants import STANDARD_GRAVITY
+from strapdown.crash.event_data import IndicatedEntry, drop_copies, recorder_parts
 from strapdown.crash.events import KMH, PART_563, EventDetector
 from strapdown.crash.pdof import pdof
 from strapdown.crash.record_parts import (
@@ -53,7 +54,7 @@ from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.pre_crash import find_pre_crash_rest
 from strapdown.sensors.saturation import find_limits
 from strapdown.tables import ACCEL, GYRO
-from strapdown.units import GYRO_UNITS, SPEEDS
+from strapdown.units import GYRO_UNITS
 
 Array = NDArray[np.float64]
 
@@ -114,6 +115,7 @@ def draft_case(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> D
     skipped: list[Skipped] = []
     findings: list[Finding] = []
     paths: list[KnownPath] = []
+    entries: list[IndicatedEntry] = []
     for record in records:
         path = named_from(record.path, Path(folder))
         # The case states the reader's finding about the clock.
@@ -122,10 +124,20 @@ def draft_case(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> D
         if known is not None:
             paths.append(known)
             continue
+        if record.format == "edr":
+            own = recorder_parts(path, record)
+            tables += own.parts
+            skipped += own.skipped
+            findings += own.findings
+            entries += [own.entry] if own.entry else []
+            continue
         tabular = all(c.samples is not None for c in record.channels)
         found, left = (table_parts if tabular else laboratory_parts)(path, record)
         skipped += left
         (tables if tabular else settled).extend(found)
+    tables, copies, told_of = drop_copies(tables)
+    skipped += copies
+    findings += told_of
     settled += settle_units(tables)
     units, more = group_units(settled)
     skipped += more
@@ -139,7 +151,7 @@ def draft_case(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> D
         )
     facts = next((r.facts for r in records if r.facts), {})
     title = next((r.title for r in records if r.facts and r.title), "")
-    page = _filled(_face(units), skipped, title, facts, paths)
+    page = _filled(_face(units), skipped, title, facts, paths, entries[:1])
     lines = [_told(unit) for unit in units]
     lines += [
         f"{plain(p.name)}: a path from {instant(p.start)} to {instant(p.end)} s, a reference"
@@ -171,6 +183,7 @@ def _filled(
     title: str,
     facts: Mapping[str, str],
     paths: Sequence[KnownPath],
+    entries: Sequence[IndicatedEntry],
 ) -> Page:
     """Fill the template, and wrap its comments."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -203,6 +216,7 @@ def _filled(
         facts=facts,
         fact=lambda key: _positive(facts.get(key, "")),
         late=late if timed and late > 0.0 else None,
+        indicated=entries[0] if entries else None,
         units=units,
         paths=paths,
         skipped=skipped,
@@ -210,7 +224,7 @@ def _filled(
         far_apart=len(sure) > 1 and max(sizes) > FAR_APART * min(sizes),
         rate=rate,
         same_trigger=all(u.impact.at_zero for u in units),
-        all_velocities=all(p.unit in SPEEDS for u in units for p in u.accelerometers),
+        all_velocities=all(p.velocities for u in units for p in u.accelerometers),
         rings=rate >= FAST and all(u.gyro is None for u in units),
         turning=_turning,
         error_model=error_model,
@@ -357,7 +371,7 @@ class Unit:
         """
         part = self.accelerometers[0]
         before = float(part.time[0]) - self.impact.trigger
-        if not part.zeroed or part.unit in SPEEDS or before > -LEAST_REST:
+        if not part.zeroed or part.velocities or before > -LEAST_REST:
             return None
         return max(before, -LONGEST_REST)
 
