@@ -92,6 +92,10 @@ def recorder_parts(path: str, record: CrashRecord) -> Recorder:
                 others=[str(n) for n in others],
             )
         )
+    for channel in record.channels:
+        if channel.quantity in ("velocity", "acceleration", "rate") and not channel.axis:
+            why = "its heading names no axis, or two; name it in the case if you know it"
+            skipped.append(Skipped(path, f"column '{channel.name}'", why, (channel.name,)))
     context = [c.name for c in record.channels if _is_context(c)]
     if context:
         why = "context: no sensor of the motion in the crash"
@@ -192,6 +196,11 @@ def _changes(part: Part) -> tuple[Array, Array] | None:
     return part.time, np.nan_to_num(part.values * SPEEDS[part.unit])
 
 
+def _rounded(part: Part) -> float:
+    """Last decimal of the recorded numbers in SI."""
+    return rounding(part.values) * FACTORS[part.kind].get(part.unit, 1.0) if part.kind else 0.0
+
+
 def is_copy(a: Part, b: Part) -> bool:
     """Whether two tables of delta-V have the same numbers, to the rounding of both."""
     one, other = _changes(a), _changes(b)
@@ -199,7 +208,7 @@ def is_copy(a: Part, b: Part) -> bool:
         return False
     if np.abs(one[0] - other[0]).max() > 1e-6 or not one[1].any():
         return False
-    limit = 0.5 * (rounding(one[1]) + rounding(other[1])) * (1.0 + 1e-6) + 1e-9
+    limit = 0.5 * (_rounded(a) + _rounded(b)) * (1.0 + 1e-6) + 1e-9
     return bool(np.abs(one[1] - other[1]).max() <= limit)
 
 
@@ -222,8 +231,7 @@ def drop_copies(parts: Sequence[Part]) -> tuple[list[Part], list[Skipped], list[
     kept: list[Part] = []
     skipped: list[Skipped] = []
     findings: list[Finding] = []
-    fine = sorted(parts, key=lambda p: rounding((_changes(p) or (0, p.values))[1]))
-    for part in fine:
+    for part in sorted(parts, key=_rounded):
         twin = next((q for q in kept if q.path != part.path and is_copy(q, part)), None)
         if twin is None:
             kept.append(part)
@@ -309,7 +317,8 @@ def indicated_entry(record: CrashRecord, event: int, events: int) -> IndicatedEn
     age = -float(time[last]) + step
     fell = -change if brake is not False else 0.0
     # Rounding of both speeds may make the change larger.
-    margin = rounding(speed) / span if span > 0.0 else 0.0
+    step_of = rounding(speed / SPEEDS[channel.unit]) * SPEEDS[channel.unit]
+    margin = step_of / span if span > 0.0 else 0.0
     locked = fell > BRAKED + margin
     possible = COASTING if brake is False else BRAKED
     largest = max(min(abs(change), BRAKED), possible, DRIVEN if not brake else 0.0)
@@ -322,7 +331,7 @@ def indicated_entry(record: CrashRecord, event: int, events: int) -> IndicatedEn
     if locked:
         slip_bound = max(slip_bound, float(speed[before]) - value)
     parts = (
-        math.hypot(INDICATED / math.sqrt(3.0), rounding(speed) / math.sqrt(12.0)),
+        math.hypot(INDICATED / math.sqrt(3.0), step_of / math.sqrt(12.0)),
         largest * age / math.sqrt(3.0),
         slip_bound / math.sqrt(3.0),
         TIRE * value,

@@ -1033,19 +1033,24 @@ RECORDER = {"scale_bound_percent": 10.0, "misalignment_sd_deg": 2.0}
 BEFORE_ZERO = 0.8 * KMH
 
 
-def recorder_model(time: Array, change: Array, offset: float) -> dict[str, float]:
+def recorder_model(
+    time: Array, change: Array, channels: Sequence[CrashChannel], offset: float
+) -> dict[str, float]:
     """Error model of a table of delta-V, by keys of the sensor catalogue.
 
-    `time`, (n,), s; `change`, (n, k), m/s; `offset`, m/s: value at time zero. What is absolute -
-    rounding (uniform over a step), change before time zero and value at time zero (bounds) - is a
-    bias that makes it until the largest change.
+    `time`, (n,), s; `change`, (n, k), m/s, of the `channels`; `offset`, m/s: value at time zero.
+    What is absolute - rounding (uniform over a step), change before time zero and value at time
+    zero (bounds) - is a bias that makes it until the largest change.
     """
     largest = np.abs(change).max(axis=1)
     until = max(float(time[int(np.argmax(largest))]), float(np.median(np.diff(time))))
-    steps = [rounding(column) for column in change.T if column.any()]
-    absolute = math.sqrt(
-        max(steps, default=0.0) ** 2 / 12.0 + BEFORE_ZERO**2 / 3.0 + offset**2 / 3.0
-    )
+    steps = []
+    for column, channel in zip(change.T, channels, strict=True):
+        factor = SPEEDS.get(channel.unit, KMH)
+        apart = np.diff(np.unique(np.round(column, 9)))
+        # Decimals may be those of a conversion from whole km/h, which Table III allows.
+        steps.append(max(rounding(column / factor) * factor, min(apart.min(initial=KMH), KMH)))
+    absolute = math.sqrt(max(steps) ** 2 / 12.0 + BEFORE_ZERO**2 / 3.0 + offset**2 / 3.0)
     bias = absolute / until / (1e-3 * STANDARD_GRAVITY)
     return {**RECORDER, "bias_sd_mg": round(bias, 1)}
 
@@ -1077,7 +1082,7 @@ def _as_accelerations(part: Part) -> Part:
         values=values,
         zeroed=True,
         sampling="",
-        uncertainty=recorder_model(time, part.values[:, part.axes], offset),
+        uncertainty=recorder_model(time, part.values[:, part.axes], part.velocities, offset),
         basis="what 49 CFR 563.8 asks of a recorder, 10 % of the change of velocity; as a bias its "
         "rounding, and what may come before time zero",
         notes=(*notes, "changes of velocity; converted to mean accelerations"),

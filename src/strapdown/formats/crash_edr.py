@@ -73,6 +73,13 @@ _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
 # A label of the event that the following tables are of.
 _EVENT = re.compile(r"\b(?:event|ereignis)(?:[ _-]*(?:record|no\.?|number|nr\.?|#))?[ _:-]*(\d+)", re.I)
 _RECENT = (("most recent", 1), ("2nd prior", 3), ("second prior", 3), ("prior event", 2))
+# Which way an axis is positive, beside its name: "lateral, left positive", "from left to right".
+_SIGNS = (
+    (re.compile(r"(from )?left[ -]to[ -]right", re.I), " lateral "),
+    (re.compile(r"(from )?right[ -]to[ -]left", re.I), " left "),
+    (re.compile(r"\blateral\b(?=.*\bleft\b)|\blongitudinal\b(?=.*\b(rear|back)ward\b)", re.I), " "),
+    (re.compile(r"\b(vertical|normal)\b(?=.*\bup\b)", re.I), " "),
+)
 _PRIOR = re.compile(r"\b(before|prior|preceding|vor)\b", re.I)
 
 
@@ -88,9 +95,11 @@ def element_of(heading: str) -> str:
 
 
 def rounding(values: Array) -> float:
-    """Step of the numbers of a table, in their unit: the least difference between two of them."""
-    steps = np.diff(np.unique(np.round(values[np.isfinite(values)], 9)))
-    return float(steps.min()) if steps.size else 0.0
+    """Last decimal of the numbers of a table, in their unit: 1, 0.1, … 1e-9."""
+    held = values[np.isfinite(values)]
+    steps = (10.0**-k for k in range(9))
+    whole = (s for s in steps if np.allclose(held, np.round(held / s) * s, rtol=0.0, atol=1e-4 * s))
+    return next(whole, 1e-9)
 
 
 # Tables in a text.
@@ -198,8 +207,11 @@ def _tables(text: str, name: str) -> _Text:
             continue
         event = _labelled(fields, event)
         above.append((", ".join(f for f in fields if f), event))
-    tables = [t for t in found if _is_recorder(t.columns)]
-    return _Text(_numbered(tables), above)
+    sensed = ("velocity", "acceleration", "rate")
+    tables = [t for t in found if any(c.element or c.said.quantity in sensed for c in t.columns)]
+    # Accelerations alone are of any recorder.
+    own = any(_is_recorder(t.columns) for t in tables)
+    return _Text(_numbered(tables) if own else [], above)
 
 
 def _separator(table: _Open, line: str) -> str | None:
@@ -271,7 +283,7 @@ def _closed(table: _Open, name: str) -> list[_Table]:
         columns += _columns(clean(heading, LONGEST_NAME), row_unit.strip("[](){} "), cells)
     rows = np.array(table.rows)
     times = [c for c in columns if c.said.quantity == "time"]
-    if not times or not _is_recorder(columns):
+    if not times:
         return []
     # A second column of time is context.
     columns = [c for c in columns if c.said.quantity != "time" or c is times[0]]
@@ -310,7 +322,7 @@ def _event_of(heading: str) -> int:
 
 
 def _columns(heading: str, row_unit: str, cells: list[str]) -> Iterator[_Column]:
-    """Columns of one heading: two where each cell has both units, as ``31 [50]``."""
+    """Yield the columns of one heading: two where each cell has both units, as ``31 [50]``."""
     element, time = element_of(heading), _is_time(heading)
     units = _units_of(heading)
     both = [_BOTH.fullmatch(c) for c in cells]
@@ -333,6 +345,8 @@ def _columns(heading: str, row_unit: str, cells: list[str]) -> Iterator[_Column]
 def _said(heading: str, unit: str) -> ChannelName:
     """Meaning of a heading; of context, and of a maximum, only the unit."""
     bare = _EVENT.sub(" ", _BRACKETS.sub(" ", heading))
+    for words, instead in _SIGNS:
+        bare = words.sub(instead, bare)
     said = read_channel_name(bare, unit)
     known = find_unit(unit, OF_CRASHES) if unit else None
     if element_of(heading) or _MAXIMUM.search(heading) or said.quantity == "time":
@@ -344,17 +358,15 @@ def _said(heading: str, unit: str) -> ChannelName:
 
 def _units_of(heading: str) -> list[str]:
     """Units that a heading states, in brackets or as its last words: ``(MPH [km/h])``."""
+    bracketed = re.search(r"[\[(].*", heading)
     found = []
-    for text in re.split(r"[\[\](){}/|,;]|\bor\b", heading.replace("km/h", "kph")):
-        known = find_unit(text.strip(), OF_CRASHES) if text.strip() else None
-        if known and known[1] not in found:
-            found.append(known[1])
-    brackets = [find_unit(b, OF_CRASHES) for b in _BRACKETS.findall(heading)]
-    stated = [known[1] for known in brackets if known]
-    if stated and len(found) < 2:
-        return list(dict.fromkeys(stated))
+    for text in re.split(r"[\[\](){},;|]|\bor\b", bracketed[0] if bracketed else ""):
+        known = [find_unit(text, OF_CRASHES)]
+        if known == [None]:
+            known = [find_unit(part, OF_CRASHES) for part in text.split("/")]
+        found += [k[1] for k in known if k]
     if found:
-        return found
+        return list(dict.fromkeys(found))
     unit = unit_words(re.sub(r"[\[\]()]", " ", heading).lower().split(), OF_CRASHES)[1]
     return [unit] if unit else []
 
@@ -556,7 +568,8 @@ def _one_unit(table: _Table, file: str, findings: list[Finding]) -> _Table:
                     )
                 )
                 continue
-            coarse = a if rounding(x) > rounding(y) else b
+            fine = rounding(a.values) * _factor(a) <= rounding(b.values) * _factor(b)
+            coarse = b if fine else a
             gone.add(id(coarse))
             data["name"] = (b if coarse is a else a).heading
             data["other"] = coarse.heading
@@ -570,16 +583,18 @@ def _si(column: _Column) -> str:
     return {"acceleration": "m/s²", "rate": "rad/s"}.get(column.said.quantity, "m/s")
 
 
+def _factor(column: _Column) -> float:
+    kind = "velocity" if column.element == "speed" else column.said.quantity
+    return FACTORS.get(kind, {}).get(column.said.unit, 1.0)
+
+
 def _compared(a: _Column, b: _Column) -> tuple[Array, Array, Array, float]:
     """Both columns in SI, their differences, and half of the rounding of each."""
-    scaled = []
-    for c in (a, b):
-        kind = "velocity" if c.element == "speed" else c.said.quantity
-        sign = -1.0 if c.said.axis.startswith("-") else 1.0
-        scaled.append(c.values * (sign * FACTORS.get(kind, {}).get(c.said.unit, 1.0)))
-    x, y = scaled
-    limit = 0.5 * (rounding(x) + rounding(y)) * (1.0 + 1e-6) + 1e-9
-    return x, y, np.nan_to_num(np.abs(x - y)), limit
+    steps = [rounding(c.values) * _factor(c) for c in (a, b)]
+    x, y = (
+        c.values * (-_factor(c) if c.said.axis.startswith("-") else _factor(c)) for c in (a, b)
+    )
+    return x, y, np.nan_to_num(np.abs(x - y)), 0.5 * (steps[0] + steps[1]) * (1.0 + 1e-6) + 1e-9
 
 
 def _of_lines(text: _Text, file: str) -> list[Finding]:
@@ -607,15 +622,15 @@ def _of_maximum(
 ) -> list[Finding]:
     letter = "x" if axis == "longitudinal" else "y"
     held = [
-        c.values * SPEEDS[c.said.unit]
+        c
         for t in tables
         for c in t.columns
-        if c.said.change and c.said.axis == letter and c.said.unit in SPEEDS
+        if c.said.change and c.said.axis.endswith(letter) and c.said.unit in SPEEDS
         if not event or t.event == event
     ]
-    reached = max((float(np.nanmax(np.abs(v))) for v in held), default=math.nan)
-    # Of one recorder: the rounding of both is that of the table and 1 km/h (Table III).
-    limit = max((rounding(v) for v in held), default=0.0) + KMH
+    reached = max((float(np.nanmax(np.abs(c.values))) * _factor(c) for c in held), default=math.nan)
+    # The rounding of the table, and 1 km/h of the maximum (Table III).
+    limit = max((rounding(c.values) * _factor(c) for c in held), default=0.0) + KMH
     if not abs(stated) > reached + limit:
         return []
     return [
@@ -642,7 +657,7 @@ def _of_table(table: _Table, file: str) -> list[Finding]:
         there = np.isfinite(column.values)
         v = column.values[there] * SPEEDS[said.unit]
         where: dict[str, Any] = {"file": file, "quantity": column.heading}
-        step = rounding(v)
+        step = rounding(column.values[there]) * _factor(column)
         largest = float(np.abs(v).max())
         at_end = np.flatnonzero(np.abs(v) >= largest - 0.5 * step) if step else np.array([], int)
         if largest >= DELTA_V_RANGE - 0.5 * max(step, KMH) and at_end.size > 1:
