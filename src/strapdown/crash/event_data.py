@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.record_parts import (
-    KMH,
     Clock,
     Part,
     Skipped,
@@ -19,7 +18,7 @@ from strapdown.crash.record_parts import (
     read_heading,
 )
 from strapdown.errors import DataError, Finding
-from strapdown.formats.crash_edr import element_of, rounding
+from strapdown.formats.crash_edr import KMH, element_of, rounding
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.units import FACTORS, SPEEDS, TIME_UNITS
 
@@ -240,7 +239,9 @@ def drop_copies(parts: Sequence[Part]) -> tuple[list[Part], list[Skipped], list[
         why = f"the same recorder as {twin.path}: the numbers are the same, to their rounding"
         skipped.append(Skipped(part.path, ", ".join(names), why, names))
         findings.append(
-            Finding("crash.recorder-exported-twice", severity="note", file=part.path, other=twin.path)
+            Finding(
+                "crash.recorder-exported-twice", severity="note", file=part.path, other=twin.path
+            )
         )
     return [p for p in parts if p in kept], skipped, findings
 
@@ -249,14 +250,13 @@ def drop_copies(parts: Sequence[Part]) -> tuple[list[Part], list[Skipped], list[
 
 # 49 CFR 563.8, Table III: the indicated speed to ±1 km/h.
 INDICATED = 1.0 * KMH
-# A tire of permitted wear and pressure rolls up to 2 to 3 % more or less than the nominal one; one
-# standard deviation.
+# Rolling circumference of a tire, by wear, pressure and size, from the nominal one: one deviation.
 TIRE = 0.02
-# Slip of braked wheels: an ABS regulates about the maximum of friction, at 10 to 30 % of slip (Wong,
-# Theory of Ground Vehicles, section 1.3); below it braking is steady. Bounds, of the speed.
+# Slip of braked wheels: an ABS regulates about the maximum of friction, at 10 to 30 % of slip
+# (Wong, Theory of Ground Vehicles, section 1.3); below it braking is steady. Bounds, of the speed.
 SLIP_STEADY, SLIP_REGULATED = 0.1, 0.3
-# Deceleration: dry asphalt allows 0.9 g at most to tires of cars, and engine, rolling and air 0.2 g;
-# acceleration 0.5 g by the engine. Bounds.
+# Deceleration: dry asphalt allows tires of cars 0.9 g; engine, rolling and air make 0.2 g.
+# Acceleration: 0.5 g by the engine. Bounds.
 BRAKED, COASTING, DRIVEN = (f * STANDARD_GRAVITY for f in (0.9, 0.2, 0.5))
 
 
@@ -307,9 +307,7 @@ def indicated_entry(record: CrashRecord, event: int, events: int) -> IndicatedEn
         return None
     last = int(there[-1])
     step = float(np.median(np.diff(time))) if time.size > 1 else 0.0
-    state = {
-        name: _state(record, held, name, channel.clock, last) for name in ("brake", "abs")
-    }
+    state = {name: _state(record, held, name, channel.clock, last) for name in ("brake", "abs")}
     brake, regulated = state["brake"], state["abs"]
     before = there[-2] if there.size > 1 else last
     span = float(time[last] - time[before])
@@ -322,10 +320,8 @@ def indicated_entry(record: CrashRecord, event: int, events: int) -> IndicatedEn
     locked = fell > BRAKED + margin
     possible = COASTING if brake is False else BRAKED
     largest = max(min(abs(change), BRAKED), possible, DRIVEN if not brake else 0.0)
-    if brake is False:
-        slip = 0.0
-    else:
-        slip = SLIP_STEADY if regulated is False else SLIP_REGULATED
+    slip = SLIP_STEADY if regulated is False else SLIP_REGULATED
+    slip = 0.0 if brake is False else slip
     value = float(speed[last])
     slip_bound = slip * value
     if locked:

@@ -16,8 +16,8 @@ from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.aid_table import read_reference_path
 from strapdown.formats.clocks import EPOCH
 from strapdown.formats.columns import ABROAD, DIRECTIONS, TURNS, read_name, without_accents
-from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.formats.crash_edr import KMH, rounding
+from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.formats.crash_samples import (
     last_midnight,
     mean_accelerations_of,

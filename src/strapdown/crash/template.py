@@ -720,7 +720,8 @@ def find_impact(strong: Part, fine: Part, gyro: Part | None = None) -> Impact:
         largest = detector.largest_change[0]
     # Time zero is not more accurate than the interval in which it is searched allows.
     sd = max(sd if math.isfinite(sd) else 0.0, step, 0.25 * PART_563.wake_window)
-    at_zero = bool(time[0] - 1.5 * step <= 0.0 <= time[-1] and abs(trigger) < AT_ZERO)
+    near = abs(trigger) < AT_ZERO or any(c.from_zero for c in strong.velocities)
+    at_zero = bool(time[0] - 1.5 * step <= 0.0 <= time[-1] and near)
     after = (time >= trigger) & (time <= trigger + CHANGE_OVER)
     return Impact(
         0.0 if at_zero else trigger,

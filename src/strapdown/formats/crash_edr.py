@@ -62,16 +62,19 @@ _ELEMENTS = (
     ("speed", r"\bspeed\b|geschwindigkeit"),
 )
 _MAXIMUM = re.compile(r"\bmax|\bpeak", re.I)
-_ON = frozenset("on yes true engaged active activated applied buckled ein ja aktiv".split())
-_OFF = frozenset(
-    "off no false disengaged inactive unbuckled released aus nein inaktiv".split()
-) | {"not engaged", "non-engaged", "not active", "not applied", "not activated"}
+_ON = ("on", "yes", "true", "engaged", "active", "activated", "applied", "buckled", "ein", "ja")
+_OFF = (
+    *("off", "no", "false", "disengaged", "inactive", "unbuckled", "released", "aus", "nein"),
+    *("not engaged", "non-engaged", "not active", "not applied", "not activated"),
+)
 _BRACKETS = re.compile(r"[\[(]([^\[\]()]*)[\])]")
 # Both units in one cell: 31.1 [50.0].
 _BOTH = re.compile(r"\s*(\S+)\s*[\[(]\s*([^\])\s]+)\s*[\])]\s*")
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
 # A label of the event that the following tables are of.
-_EVENT = re.compile(r"\b(?:event|ereignis)(?:[ _-]*(?:record|no\.?|number|nr\.?|#))?[ _:-]*(\d+)", re.I)
+_EVENT = re.compile(
+    r"\b(?:event|ereignis)(?:[ _-]*(?:record|no\.?|number|nr\.?|#))?[ _:-]*(\d+)", re.I
+)
 _RECENT = (("most recent", 1), ("2nd prior", 3), ("second prior", 3), ("prior event", 2))
 # Which way an axis is positive, beside its name: "lateral, left positive", "from left to right".
 _SIGNS = (
@@ -157,11 +160,7 @@ def detect(path: Path) -> bool:
         return False
     if NOTE in text:
         return False
-    try:
-        return bool(_tables(text, path.name).tables)
-    except DataError:
-        # A table of a recorder with an error: `read` names it.
-        return True
+    return bool(_tables(text).tables)
 
 
 def _is_recorder(columns: Sequence[_Column]) -> bool:
@@ -170,7 +169,7 @@ def _is_recorder(columns: Sequence[_Column]) -> bool:
     return change or ("speed" in kinds and bool(kinds & {"brake", "pedal", "rpm", "abs"}))
 
 
-def _tables(text: str, name: str) -> _Text:
+def _tables(text: str) -> _Text:
     """Find the tables of a recorder, and the lines between them with the event that they name."""
     found: list[_Table] = []
     above: list[tuple[str, int]] = []
@@ -178,13 +177,10 @@ def _tables(text: str, name: str) -> _Text:
     lines = [(k, line) for k, line in enumerate(text.splitlines(), 1)]
     for k, line in [*lines, (0, "")]:
         line = line.lstrip("#%").replace("\N{MINUS SIGN}", "-")
-        separator = csv.separator_of(line)
-        if table is not None:
-            separator = _separator(table, line)
-        fields = csv.fields_of(line, separator) if line.strip() else []
+        fields = _fields(line, table)
         if not any(fields):
             if table is not None and table.cells:
-                found += _closed(table, name)
+                found += _closed(table)
                 table = None
             continue
         if table is not None:
@@ -197,9 +193,9 @@ def _tables(text: str, name: str) -> _Text:
             if not table.cells and not table.units and _are_units(fields):
                 table.units = fields
                 continue
-            found += _closed(table, name)
+            found += _closed(table)
             table = None
-            fields = csv.fields_of(line, csv.separator_of(line))
+            fields = _fields(line, None)
         if _is_header(fields):
             while not fields[-1]:
                 fields.pop()
@@ -214,12 +210,15 @@ def _tables(text: str, name: str) -> _Text:
     return _Text(_numbered(tables) if own else [], above)
 
 
-def _separator(table: _Open, line: str) -> str | None:
-    """Return the separator by which a line has as many fields as the header."""
-    for separator in ("\t", ";", ","):
-        if separator in line and len(csv.fields_of(line, separator)) == len(table.names):
-            return separator
-    return csv.separator_of(line)
+def _fields(line: str, table: _Open | None) -> list[str]:
+    """Split a line, in a table by the separator that yields as many fields as the header has."""
+    for separator in ("\t", ";", ",") if table is not None else ():
+        fields = csv.fields_of(line, separator)
+        if table is not None and len(fields) == len(table.names):
+            return fields
+    # Blanks separate words of a title.
+    separated = csv.separator_of(line)
+    return [line.strip()] if separated is None else csv.fields_of(line, separated)
 
 
 def _is_header(fields: list[str]) -> bool:
@@ -270,7 +269,7 @@ def _number(cell: str) -> float:
     return 1.0 if text.lower() in _ON else 0.0 if text.lower() in _OFF else math.nan
 
 
-def _closed(table: _Open, name: str) -> list[_Table]:
+def _closed(table: _Open) -> list[_Table]:
     """Parse the columns of a table; one with a column of events is one table for each."""
     if not table.cells:
         return []
@@ -294,7 +293,7 @@ def _closed(table: _Open, name: str) -> list[_Table]:
         for event in np.unique(numbers):
             kept = numbers == event
             part = tuple(replace(c, values=c.values[kept]) for c in columns if c.element != "event")
-            out += _parts(_Table(part, rows[kept], int(event)), name)
+            out += _parts(_Table(part, rows[kept], int(event)))
         return out
     if len(own) > 1:
         return [
@@ -309,11 +308,10 @@ def _closed(table: _Open, name: str) -> list[_Table]:
                     ),
                     rows,
                     event,
-                ),
-                name,
+                )
             )
         ]
-    return _parts(_Table(tuple(columns), rows, table.event or next(iter(own), 0)), name)
+    return _parts(_Table(tuple(columns), rows, table.event or next(iter(own), 0)))
 
 
 def _event_of(heading: str) -> int:
@@ -336,7 +334,9 @@ def _columns(heading: str, row_unit: str, cells: list[str]) -> Iterator[_Column]
     if time:
         known = find_unit(unit, ("time",)) if unit else None
         word = re.match(r"\s*(seconds|milliseconds)\b", heading, re.I)
-        stated = known[1] if known else (find_unit(word[1], ("time",)) or ("", ""))[1] if word else ""
+        stated = (
+            known[1] if known else (find_unit(word[1], ("time",)) or ("", ""))[1] if word else ""
+        )
         yield _Column(heading, "time", ChannelName("time", "", stated), values)
         return
     yield _Column(heading, element, _said(heading, unit), values)
@@ -371,8 +371,8 @@ def _units_of(heading: str) -> list[str]:
     return [unit] if unit else []
 
 
-def _parts(table: _Table, name: str) -> list[_Table]:
-    """Split a table whose columns fill different rows; and set its stamps in order."""
+def _parts(table: _Table) -> list[_Table]:
+    """Split a table whose columns fill different rows."""
     groups: dict[tuple[int, int], list[_Column]] = {}
     clock = table.clock
     for column in table.columns:
@@ -389,7 +389,7 @@ def _parts(table: _Table, name: str) -> list[_Table]:
     out = []
     for (first, last), held in groups.items():
         kept = [replace(c, values=c.values[first:last]) for c in (clock, *held)]
-        out.append(_in_order(_Table(tuple(kept), table.rows[first:last], table.event), name))
+        out.append(_Table(tuple(kept), table.rows[first:last], table.event))
     return out
 
 
@@ -428,20 +428,26 @@ def _numbered(tables: list[_Table]) -> list[_Table]:
     """
     if any(t.event for t in tables):
         return [t if t.event else replace(t, event=1) for t in tables]
-    crash = [k for k, t in enumerate(tables) if any(c.said.change for c in t.columns)]
-    before = [k for k in range(len(tables)) if k not in crash]
+    crash = [k for k, t in enumerate(tables) if _is_of_crash(t)]
+    others = [k for k in range(len(tables)) if k not in crash]
+    events = _groups(tables, crash)
     out = list(tables)
-    for k, at in enumerate(_first_of_each(tables, crash)):
+    for k, at in enumerate(events):
         for m in at:
             out[m] = replace(out[m], event=k + 1)
-    for k, m in enumerate(before):
-        # One table before several crashes is of none that could be named.
-        one = len(before) == 1 and len(_first_of_each(tables, crash)) > 1
-        out[m] = replace(out[m], event=0 if one else k + 1)
+    for k, m in enumerate(others):
+        # Where their number is another, a table before a crash is of none that could be named.
+        known = len(others) == len(events)
+        out[m] = replace(out[m], event=k + 1 if known or not events else 0)
     return out
 
 
-def _first_of_each(tables: list[_Table], crash: list[int]) -> list[list[int]]:
+def _is_of_crash(table: _Table) -> bool:
+    kinds = {c.said.quantity for c in table.columns if c.said.axis}
+    return bool(kinds & {"velocity", "acceleration"})
+
+
+def _groups(tables: list[_Table], crash: list[int]) -> list[list[int]]:
     """Group tables of crashes into events: one that repeats an axis begins the next."""
     events: list[list[int]] = []
     held: set[tuple[str, str, str]] = set()
@@ -477,16 +483,21 @@ def read(path: Path) -> CrashRecord:
         The text holds no such table, or its stamps do not advance.
     """
     text, findings = csv.decoded(path.read_bytes(), path.name)
-    found = _tables(text, path.name)
+    found = _tables(text)
     if not found.tables:
         raise DataError("io.no-numeric-column", file=path.name)
+    found = found._replace(tables=[_in_order(t, path.name) for t in found.tables])
     findings += _of_lines(found, path.name)
     several = len({t.event for t in found.tables if t.event}) > 1
     merged = [_one_unit(t, path.name, findings) for t in found.tables]
     for table in merged:
         findings += _of_table(table, path.name)
     bare = [
-        (table, column, f"{column.heading}{f' (event {table.event})' if several and table.event else ''}")
+        (
+            table,
+            column,
+            f"{column.heading}{f' (event {table.event})' if several and table.event else ''}",
+        )
         for table in merged
         for column in table.columns
     ]
@@ -591,9 +602,7 @@ def _factor(column: _Column) -> float:
 def _compared(a: _Column, b: _Column) -> tuple[Array, Array, Array, float]:
     """Both columns in SI, their differences, and half of the rounding of each."""
     steps = [rounding(c.values) * _factor(c) for c in (a, b)]
-    x, y = (
-        c.values * (-_factor(c) if c.said.axis.startswith("-") else _factor(c)) for c in (a, b)
-    )
+    x, y = (c.values * (-_factor(c) if c.said.axis.startswith("-") else _factor(c)) for c in (a, b))
     return x, y, np.nan_to_num(np.abs(x - y)), 0.5 * (steps[0] + steps[1]) * (1.0 + 1e-6) + 1e-9
 
 
@@ -607,9 +616,13 @@ def _of_lines(text: _Text, file: str) -> list[Finding]:
             findings.append(Finding("io.edr-not-complete", file=file, quantity="complete file"))
         axis = next((a for a in ("longitudinal", "lateral") if a in lower), "")
         units = _units_of(label)
-        unit = units[0] if units else (find_unit(value.split()[-1], OF_CRASHES) or ("", ""))[1] if (
-            value.split()
-        ) else ""
+        unit = (
+            units[0]
+            if units
+            else (find_unit(value.split()[-1], OF_CRASHES) or ("", ""))[1]
+            if (value.split())
+            else ""
+        )
         number = re.match(r"\s*([+-]?[\d.]+)", value)
         if not (_MAXIMUM.search(lower) and axis and number and unit in SPEEDS) or "time" in lower:
             continue

@@ -206,7 +206,7 @@ def means_from_zero(time: ArrayLike, velocity: ArrayLike, channel: CrashChannel)
     """
     t = np.asarray(time, dtype=np.float64)
     v = np.asarray(velocity, dtype=np.float64)
-    where = {"file": channel.file or None, "quantity": f"channel {channel.name}"}
+    where: dict[str, Any] = {"file": channel.file or None, "quantity": f"channel {channel.name}"}
     if t.size < 2:
         raise DataError("io.sample-no-change-velocity", size=t.size, **where)
     step = float(np.median(np.diff(t)))
@@ -234,7 +234,7 @@ def means_from_zero(time: ArrayLike, velocity: ArrayLike, channel: CrashChannel)
 
 def of_start(found: FromZero, channel: CrashChannel, unit: float = 1.0) -> list[Finding]:
     """Findings of a table that begins late, or not at zero; `unit`: factor to m/s."""
-    where = {"file": channel.file or None, "quantity": f"channel {channel.name}"}
+    where: dict[str, Any] = {"file": channel.file or None, "quantity": f"channel {channel.name}"}
     findings = []
     if found.late:
         findings.append(Finding("io.delta-v-begins-late", **where, first=found.late))

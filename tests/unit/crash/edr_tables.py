@@ -20,9 +20,10 @@ class Pulse:
     forward: float = -44.3 * KMH
     right: float = 7.4 * KMH
     length: float = 0.095
+    start: float = 0.0
 
     def change(self, time):
-        s = np.clip(np.asarray(time) / self.length, 0.0, 1.0)
+        s = np.clip((np.asarray(time) - self.start) / self.length, 0.0, 1.0)
         shape = s - np.sin(2.0 * np.pi * s) / (2.0 * np.pi)
         return np.outer(shape, [self.forward, self.right])
 
@@ -46,7 +47,7 @@ class Layout:
     comma: bool = False
     bracket: str = "({})"
     preamble: bool = True
-    before: str = "above"  # above, below, none, inside
+    before: str = "above"  # above, below, none, in one table
     rate: float = 2.0
     lateral: bool = True
     acceleration: bool = False
@@ -146,6 +147,16 @@ def text_of(layout: Layout) -> str:
         before, crash = _before(layout, speed, number), _crash(layout, pulse)
         title = f"Event Record {number}" if layout.events == "title" else ""
         own = [(title, *crash)]
+        if layout.before == "in one table":
+            heads, rows = before
+            more, below = crash
+            empty = ("",) * (len(heads) - 1), ("",) * (len(more) - 1)
+            rows = [(*row, *empty[1]) for row in rows]
+            below = [(row[0], *empty[0], *row[1:]) for row in below]
+            # Both have a row at time zero.
+            own = [
+                (title, [*heads, *more[1:]], [*rows[:-1], _joined(rows[-1], below[0]), *below[1:]])
+            ]
         if layout.before in ("above", "below"):
             own.insert(0 if layout.before == "above" else 1, (title, *before))
         tables += own
@@ -163,6 +174,10 @@ def text_of(layout: Layout) -> str:
             lines.append(_row(heads, layout))
         lines += [_row(row, layout) for row in rows]
     return "\n".join(lines) + "\n"
+
+
+def _joined(one, other):
+    return tuple(a or b for a, b in zip(one, other, strict=True))
 
 
 SMALL = Pulse(-11.0 * KMH, 2.0 * KMH, 0.08)
@@ -184,6 +199,12 @@ LAYOUTS = {
         pulses=(Pulse(), SMALL), speeds=(75.0, 62.0), before="none", events="column", decimals=1
     ),
     "cut at 70 ms": Layout(end=0.07, complete=False, units=("mph",), order="backward"),
-    "row of units, no brackets": Layout(units_row=True, units=("mph",), bracket="({})"),
-    "left positive": Layout(left_positive=True, decimals=1, bracket="(kph)"[:0] + "({})"),
+    "row of units, no brackets": Layout(units_row=True, units=("mph",)),
+    "one table": Layout(before="in one table", milliseconds=False, decimals=1),
+    "late in its table": Layout(pulses=(Pulse(length=0.08, start=0.07),), decimals=1, end=0.3),
+    "left positive": Layout(
+        left_positive=True,
+        decimals=1,
+        names={"lateral, left positive": "Delta-V, lateral, left positive"},
+    ),
 }
