@@ -123,7 +123,8 @@ def _part(path: str, record: CrashRecord, kind: str, channels: Sequence[CrashCha
         by_axis[axis] = channel
     by_axis = {a: by_axis[a] for a in "xyz" if a in by_axis}
     units = {c.unit for c in by_axis.values()}
-    clocks = {c.clock for c in by_axis.values()}
+    # Axes in tables of their own have the same stamps.
+    clocks = {_stamps(record, c).tobytes(): c.clock for c in by_axis.values()}
     if len(units) > 1 or len(clocks) > 1:
         raise DataError(
             "crash.axes-of-different-units" if len(units) > 1 else "crash.axes-in-different-tables",
@@ -132,8 +133,8 @@ def _part(path: str, record: CrashRecord, kind: str, channels: Sequence[CrashCha
             names=[c.name for c in by_axis.values()],
             units=sorted(units),
         )
-    name, unit = clocks.pop(), units.pop()
-    clock, time = _clock(record.channel(name))
+    unit = units.pop()
+    clock, time = _clock(record.channel(next(iter(by_axis.values())).clock))
     factor = FACTORS[kind].get(unit, 1.0)
     values = np.full((time.size, 3), np.nan)
     for axis, channel in by_axis.items():
@@ -164,6 +165,12 @@ def _part(path: str, record: CrashRecord, kind: str, channels: Sequence[CrashCha
         remarks=record.remarks,
         velocities=tuple(by_axis.values()) if kind == "velocity" else (),
     )
+
+
+def _stamps(record: CrashRecord, channel: CrashChannel) -> Array:
+    read = record.channel(channel.clock).samples
+    assert read is not None
+    return np.asarray(read(), dtype=np.float64)
 
 
 def _clock(channel: CrashChannel) -> tuple[Clock, Array]:
@@ -303,7 +310,7 @@ def indicated_entry(record: CrashRecord, event: int, events: int) -> IndicatedEn
     time = clock.samples() * TIME_UNITS[clock.unit]
     speed = channel.samples() * SPEEDS[channel.unit]
     there = np.flatnonzero(np.isfinite(speed) & (time <= 1e-9))
-    if not there.size or time[there[-1]] < -MOST_AGE:
+    if not there.size or time[there[-1]] < -MOST_AGE or time[0] >= 0.0:
         return None
     last = int(there[-1])
     step = float(np.median(np.diff(time))) if time.size > 1 else 0.0

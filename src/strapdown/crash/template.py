@@ -216,7 +216,8 @@ def _filled(
         facts=facts,
         fact=lambda key: _positive(facts.get(key, "")),
         late=late if timed and late > 0.0 else None,
-        indicated=entries[0] if entries else None,
+        # The speed before time zero of a recorder, if the case counts from there.
+        indicated=entries[0] if entries and any(u.impact.at_zero for u in units) else None,
         units=units,
         paths=paths,
         skipped=skipped,

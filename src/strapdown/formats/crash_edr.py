@@ -163,10 +163,17 @@ def detect(path: Path) -> bool:
     return bool(_tables(text).tables)
 
 
-def _is_recorder(columns: Sequence[_Column]) -> bool:
-    kinds = {c.element for c in columns}
-    change = any(c.said.change and c.said.axis for c in columns)
-    return change or ("speed" in kinds and bool(kinds & {"brake", "pedal", "rpm", "abs"}))
+def _is_recorder(table: _Table) -> bool:
+    """Whether a table has delta-V, or counts to time zero and has speed with brake or pedal.
+
+    A log of a drive has speed, too; its time begins with the log.
+    """
+    kinds = {c.element for c in table.columns}
+    if any(c.said.change and c.said.axis for c in table.columns):
+        return True
+    stamps = table.clock.values
+    counts = bool(stamps[0] < 0.0 or stamps[0] > stamps[-1] or _PRIOR.search(table.clock.heading))
+    return counts and "speed" in kinds and bool(kinds & {"brake", "pedal", "rpm", "abs"})
 
 
 def _tables(text: str) -> _Text:
@@ -206,7 +213,7 @@ def _tables(text: str) -> _Text:
     sensed = ("velocity", "acceleration", "rate")
     tables = [t for t in found if any(c.element or c.said.quantity in sensed for c in t.columns)]
     # Accelerations alone are of any recorder.
-    own = any(_is_recorder(t.columns) for t in tables)
+    own = any(_is_recorder(t) for t in tables)
     return _Text(_numbered(tables) if own else [], above)
 
 
@@ -518,7 +525,7 @@ def read(path: Path) -> CrashRecord:
         channels=tuple(channels),
         files=(path,),
         findings=tuple(findings),
-        remarks=tuple([r for r in remarks if r][:MOST_REMARKS]),
+        remarks=tuple([r for r in dict.fromkeys(remarks) if r][:MOST_REMARKS]),
     )
 
 

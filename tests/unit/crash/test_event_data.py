@@ -283,3 +283,44 @@ def test_mph_is_the_unit_of_the_speed(tmp_path):
         60.0 * MPH / KMH, rel=1e-5
     )
     assert filled(draft, tmp_path).entry.speed_m_per_s == pytest.approx(60.0 * MPH, rel=1e-5)
+
+
+def test_a_log_of_a_drive_is_no_table_before_a_crash(tmp_path):
+    rows = "".join(f"{k / 100},{60 - 0.1 * k:.1f},{k % 7},{k % 5},0.1,9.8\n" for k in range(200))
+    path = tmp_path / "drive.csv"
+    path.write_text(
+        f"Time (s),Speed (km/h),Accelerator Pedal (%),ax (m/s2),ay (m/s2),az (m/s2)\n{rows}"
+    )
+    assert read_crash_record(path).format == "csv"
+
+
+def test_axes_in_tables_of_their_own_are_one_recorder(tmp_path):
+    change = np.round(Pulse().change(np.arange(26) * 0.01) / KMH, 1)
+    text = "\n".join(
+        f"Time (msec),Delta-V {axis} (km/h)\n"
+        + "".join(f"{10 * k},{change[k, c]}\n" for k in range(26))
+        for c, axis in enumerate(("longitudinal", "lateral"))
+    )
+    _, _, summed = recorded(tmp_path, drafted(tmp_path, text))
+    np.testing.assert_allclose(summed[-1] / KMH, [-44.3, 7.4], rtol=1e-12)
+    # With other stamps they are not.
+    moved = text[: text.rindex("Time")] + "Time (msec),Delta-V lateral (km/h)\n"
+    moved += "".join(f"{10 * k + 5},{change[k, 1]}\n" for k in range(26))
+    with pytest.raises(DataError, check=coded("crash.axes-in-different-tables")):
+        drafted(tmp_path, moved)
+
+
+@pytest.mark.parametrize(
+    ("heading", "sign"),
+    [
+        ("Delta-V, lateral (km/h)", 1.0),
+        ("Delta-V, lateral, left to right (km/h)", 1.0),
+        ("Delta-V, lateral, left positive (km/h)", -1.0),
+        ("Delta-V, right to left (km/h)", -1.0),
+    ],
+)
+def test_the_sign_of_the_lateral_axis(tmp_path, heading, sign):
+    rows = "".join(f"{10 * k},{-3 * min(k, 10)},{min(k, 10)}\n" for k in range(26))
+    text = f'Time (msec),"Delta-V, longitudinal (km/h)","{heading}"\n{rows}'
+    _, _, summed = recorded(tmp_path, drafted(tmp_path, text))
+    np.testing.assert_allclose(summed[-1] / KMH, [-30.0, sign * 10.0], rtol=1e-12)
