@@ -83,6 +83,7 @@ _SIGNS = (
     (re.compile(r"\blateral\b(?=.*\bleft\b)|\blongitudinal\b(?=.*\b(rear|back)ward\b)", re.I), " "),
     (re.compile(r"\b(vertical|normal)\b(?=.*\bup\b)", re.I), " "),
 )
+_NAMED = re.compile(r"delta|\bdv|speed|velocity|geschwindigkeit", re.I)
 _PRIOR = re.compile(r"\b(before|prior|preceding|vor)\b", re.I)
 
 
@@ -158,7 +159,8 @@ def detect(path: Path) -> bool:
         text, _ = csv.decoded(data, path.name)
     except (DataError, OSError):
         return False
-    if NOTE in text:
+    # Logs of other kinds are not parsed.
+    if NOTE in text or not _NAMED.search(text):
         return False
     return bool(_tables(text).tables)
 

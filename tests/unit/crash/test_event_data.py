@@ -10,7 +10,7 @@ import pytest
 from tests.coded import coded
 
 from strapdown.crash.case import case_unit, run_case, whole_records
-from strapdown.crash.event_data import BRAKED, TIRE, indicated_entry
+from strapdown.crash.event_data import BRAKED, TIRE, indicated_entry, recorder_parts
 from strapdown.crash.template import draft_case, read_records
 from strapdown.errors import DataError
 from strapdown.formats.crash_edr import element_of
@@ -152,6 +152,8 @@ def test_a_table_that_begins_late_keeps_its_sum(tmp_path):
     assert change[-1, 0] == pytest.approx(-44.3 * KMH, abs=0.005 * KMH)
     assert time[0] == 0.0
     np.testing.assert_allclose(np.diff(time), 0.01, rtol=1e-9)
+    # What the first value is made of is not known: it is spread evenly.
+    np.testing.assert_allclose(np.diff(change[:4, 0]), change[3, 0] / 3.0, rtol=1e-9)
     assert "io.delta-v-begins-late" in {f.code for f in table.attrs["findings"]}
 
 
@@ -270,11 +272,14 @@ def test_invalid_and_old_speeds(tmp_path):
 def test_speeds_of_an_event_that_is_not_known_are_no_entry(tmp_path):
     # One table before two crashes without labels.
     layout = Layout(before="none", preamble=False, events="none", decimals=1)
-    two = text_of(replace(layout, pulses=(Pulse(forward=-30 * KMH), Pulse()), speeds=(70, 50)))
-    draft = drafted(tmp_path, before(["Off"] * 3, ["Off"] * 3, [70, 70, 70]) + two)
-    toml = tomllib.loads(draft.text)
-    assert toml["entry"]["speed_km_per_h"] == "?"
-    assert toml["units"][0]["accelerometers"][0]["channels"]["x"].endswith("(event 2)")
+    pulses = (Pulse(forward=-30 * KMH), Pulse())
+    for severest, order in ((2, pulses), (1, pulses[::-1])):
+        two = text_of(replace(layout, pulses=order, speeds=(70, 50)))
+        draft = drafted(tmp_path, before(["Off"] * 3, ["Off"] * 3, [70, 70, 70]) + two)
+        toml = tomllib.loads(draft.text)
+        assert toml["entry"]["speed_km_per_h"] == "?"
+        (triad,) = toml["units"][0]["accelerometers"]
+        assert triad["channels"]["x"].endswith(f"(event {severest})")
 
 
 def test_mph_is_the_unit_of_the_speed(tmp_path):
@@ -324,3 +329,38 @@ def test_the_sign_of_the_lateral_axis(tmp_path, heading, sign):
     text = f'Time (msec),"Delta-V, longitudinal (km/h)","{heading}"\n{rows}'
     _, _, summed = recorded(tmp_path, drafted(tmp_path, text))
     np.testing.assert_allclose(summed[-1] / KMH, [-30.0, sign * 10.0], rtol=1e-12)
+    (part,) = recorder_parts("edr.csv", read_crash_record(tmp_path / "edr.csv")).parts
+    np.testing.assert_array_equal(part.values[-1, :2], [-30.0, sign * 10.0])
+
+
+@pytest.mark.parametrize("heading", ["Seconds before AE", "Time before crash (sec)"])
+def test_seconds_before_the_crash_count_down(tmp_path, heading):
+    rows = "".join(f"{5 - k},{60 - k},Off\n" for k in range(6))
+    path = tmp_path / "edr.csv"
+    crash = text_of(Layout(before="none", preamble=False, events="none"))
+    path.write_text(f"{heading},Vehicle Speed (km/h),Brake Switch\n{rows}\n{crash}")
+    found = indicated_entry(read_crash_record(path), 1, 1)
+    assert (found.speed, found.stamp) == (pytest.approx(55 * KMH), 0.0)
+
+
+def test_a_speed_after_time_zero_is_not_that_before(tmp_path):
+    rows = "".join(f"{k},{60 - 9 * max(k, 0)},Off\n" for k in range(-5, 4))
+    path = tmp_path / "edr.csv"
+    crash = text_of(Layout(before="none", preamble=False, events="none"))
+    path.write_text(f"Time (sec),Vehicle Speed (km/h),Brake Switch\n{rows}\n{crash}")
+    assert indicated_entry(read_crash_record(path), 1, 1).speed == pytest.approx(60 * KMH)
+
+
+@pytest.mark.parametrize(("brake", "regulated"), [("Off", "Off"), ("On", "Off"), ("On", "On")])
+def test_the_bound_of_the_entry_speed_holds_the_truth(tmp_path, brake, regulated):
+    # Each part anywhere in its bound, as the model has it: 95 % within twice the deviation or more.
+    found = entry_of(tmp_path, [brake] * 3, [regulated] * 3, [70, 69, 68])
+    rng = np.random.default_rng(4)
+    n = 20_000
+    speed = 68.0 * KMH * np.ones(n) + rng.uniform(-1.0, 1.0, n) * KMH
+    speed *= 1.0 + TIRE * rng.standard_normal(n)
+    slip = {"OffOff": 0.0, "OnOff": 0.1, "OnOn": 0.3}[brake + regulated]
+    speed *= 1.0 + rng.uniform(0.0, slip, n)
+    low, high = (-0.2, 0.5) if brake == "Off" else (-0.9, 0.0)
+    speed += rng.uniform(low, high, n) * 9.80665 * rng.uniform(0.0, 0.5, n)
+    assert np.mean(np.abs(speed - found.speed) < 1.96 * found.sd) > 0.95
