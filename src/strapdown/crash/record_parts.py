@@ -16,8 +16,13 @@ from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.aid_table import read_reference_path
 from strapdown.formats.clocks import EPOCH
 from strapdown.formats.columns import ABROAD, DIRECTIONS, TURNS, read_name, without_accents
+from strapdown.formats.crash_edr import KMH, rounding
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
-from strapdown.formats.crash_samples import last_midnight, mean_accelerations_of
+from strapdown.formats.crash_samples import (
+    last_midnight,
+    mean_accelerations_of,
+    means_from_zero,
+)
 from strapdown.formats.inference.conclusion import (
     THRESHOLD,
     infer_accel,
@@ -61,7 +66,8 @@ class Part:
     settled, with `candidates`, and `unit_why` is its evidence; `time`, (n,), s, and `values`, (n,
     3), SI, by the likeliest units, NaN for missing axes; `label` distinguishes triads of one
     record; `zeroed`: gravity at rest has been subtracted; `named`: the record names the axes;
-    `uncertainty`: error model by keys of the sensor catalogue, with its grounds `basis`.
+    `uncertainty`: error model by keys of the sensor catalogue, with its grounds `basis`;
+    `velocities`: the channels of delta-V of which the accelerations are means.
     """
 
     path: str
@@ -83,6 +89,7 @@ class Part:
     basis: str = ""
     notes: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
+    velocities: tuple[CrashChannel, ...] = ()
 
     @property
     def axes(self) -> list[int]:
@@ -131,7 +138,8 @@ _TIME = (*ABROAD["time"], "stamp", "clock", "time")
 _COUNTER = _words("n nr no num number index idx sample count counter row")
 _OTHER = _words(
     "temp tmp batt volt spannung druck press humid feucht mag magn kompass compass lat lon alt "
-    "satell status flag valid quality speed geschw vitesse brems brake throttle engine rpm"
+    "satell status flag valid quality speed geschw vitesse brems brake throttle engine rpm "
+    "accelerator pedal gaspedal fahrpedal steer lenk belt abs stability"
 )
 _ACCEL = (*ABROAD["acceleration"], *_words("acc accel specificforce lowg highg gforce nd hd"))
 # Rotation words, also in compounds: Gierrate, Nickwinkel.
@@ -316,7 +324,8 @@ def table_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skippe
         if not np.ptp(values[kept][:, has], axis=0).any():
             skipped.append(Skipped(path, ", ".join(names), "they are constant", names))
             continue
-        kinds = {c.sampling for c in record.channels if c.name in names}
+        members = tuple(record.channel(name) for name in names)
+        kinds = {c.sampling for c in members}
         part = Part(
             path,
             group.quantity,
@@ -331,6 +340,7 @@ def table_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skippe
             sampling=(kinds.pop() or "") if len(kinds) == 1 else "",
             notes=(f"{lost} of {rows} rows have no value",) if lost else (),
             remarks=record.remarks,
+            velocities=members if group.quantity == "velocity" else (),
         )
         parts.append(part)
     return parts, skipped
@@ -1013,28 +1023,69 @@ def _speeds(part: Part, factor: float) -> str:
     return f"{float(np.nanmax(np.abs(part.values))) * factor * 3.6:.3g} km/h"
 
 
-# 49 CFR 563.8, Table III: delta-V is recorded to ±10 %.
+# Event data recorders. 49 CFR 563.8, Table III: delta-V to ±10 %, in steps of 1 km/h, from −100 to
+# 100 km/h at least (`formats.crash_edr.DELTA_V_RANGE`: a table that stops there is a finding); an
+# acceleration as its maker states. Table I: each 10 ms from time zero to 250 ms. Time zero (563.5):
+# wake-up of the algorithm, or the first point of the 20 ms in which 0.8 km/h (lateral: 5 ms) are
+# reached, so that up to 0.8 km/h may come before it. 563.8(b): accelerations are filtered; a filter
+# delays delta-V, and does not change its sum. Alignment: fixed to the body, as a control unit is.
 RECORDER = {"scale_bound_percent": 10.0, "misalignment_sd_deg": 2.0}
+BEFORE_ZERO = 0.8 * KMH
+
+
+def recorder_model(
+    time: Array, change: Array, channels: Sequence[CrashChannel], offset: float
+) -> dict[str, float]:
+    """Error model of a table of delta-V, by keys of the sensor catalogue.
+
+    `time`, (n,), s; `change`, (n, k), m/s, of the `channels`; `offset`, m/s: value at time zero.
+    What is absolute - rounding (uniform over a step), change before time zero and value at time
+    zero (bounds) - is a bias that makes it until the largest change.
+    """
+    largest = np.abs(change).max(axis=1)
+    until = max(float(time[int(np.argmax(largest))]), float(np.median(np.diff(time))))
+    steps = []
+    for column, channel in zip(change.T, channels, strict=True):
+        factor = SPEEDS.get(channel.unit, KMH)
+        apart = np.diff(np.unique(np.round(column, 9)))
+        # Decimals may be those of a conversion from whole km/h, which Table III allows.
+        steps.append(max(rounding(column / factor) * factor, min(apart.min(initial=KMH), KMH)))
+    absolute = math.sqrt(max(steps) ** 2 / 12.0 + BEFORE_ZERO**2 / 3.0 + offset**2 / 3.0)
+    bias = absolute / until / (1e-3 * STANDARD_GRAVITY)
+    return {**RECORDER, "bias_sd_mg": round(bias, 1)}
 
 
 def _as_accelerations(part: Part) -> Part:
     """Mean accelerations over the intervals of a table of delta-V, m/s."""
-    time = stamps = part.time
-    from_zero = bool(0.0 < time[0] <= 1.5 * (time[1] - time[0]))
-    columns = []
-    for k in range(3):
-        stamps, mean = mean_accelerations_of(time, part.values[:, k], from_zero=from_zero)
-        columns.append(mean)
+    time, notes, offset = part.time, part.notes, 0.0
+    own: dict[int, tuple[Array, Array]] = {}
+    for k, channel in zip(part.axes, part.velocities, strict=True):
+        if not channel.from_zero:
+            own[k] = mean_accelerations_of(time, part.values[:, k])
+            continue
+        found = means_from_zero(time, part.values[:, k], channel)
+        own[k], offset = (found.time, found.mean), max(offset, abs(found.offset))
+        if found.late:
+            notes = (*notes, f"it begins {found.late:.3g} s after time zero; its sum is kept")
+        if found.offset:
+            notes = (*notes, f"{found.offset / KMH:.3g} km/h at its time zero widen the bound")
+    # Steps before the first row that only one axis has are zero for the others.
+    stamps = max((t for t, _ in own.values()), key=len)
+    values = np.full((stamps.size, 3), np.nan)
+    for k, (ends, mean) in own.items():
+        values[:, k] = 0.0
+        values[stamps.size - ends.size :, k] = mean
     return replace(
         part,
         kind="acceleration",
         time=stamps,
-        values=np.column_stack(columns),
+        values=values,
         zeroed=True,
         sampling="",
-        uncertainty=RECORDER,
-        basis="what 49 CFR 563.8 asks of a recorder: 10 % of the change of velocity",
-        notes=(*part.notes, "changes of velocity; converted to mean accelerations"),
+        uncertainty=recorder_model(time, part.values[:, part.axes], part.velocities, offset),
+        basis="what 49 CFR 563.8 asks of a recorder, 10 % of the change of velocity; as a bias its "
+        "rounding, and what may come before time zero",
+        notes=(*notes, "changes of velocity; converted to mean accelerations"),
     )
 
 

@@ -31,6 +31,7 @@ from strapdown.config.toml_text import (
     string,
 )
 from strapdown.constants import STANDARD_GRAVITY
+from strapdown.crash.event_data import IndicatedEntry, drop_copies, recorder_parts
 from strapdown.crash.events import KMH, PART_563, EventDetector
 from strapdown.crash.pdof import pdof
 from strapdown.crash.record_parts import (
@@ -53,7 +54,7 @@ from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.pre_crash import find_pre_crash_rest
 from strapdown.sensors.saturation import find_limits
 from strapdown.tables import ACCEL, GYRO
-from strapdown.units import GYRO_UNITS, SPEEDS
+from strapdown.units import GYRO_UNITS
 
 Array = NDArray[np.float64]
 
@@ -114,6 +115,7 @@ def draft_case(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> D
     skipped: list[Skipped] = []
     findings: list[Finding] = []
     paths: list[KnownPath] = []
+    entries: list[IndicatedEntry] = []
     for record in records:
         path = named_from(record.path, Path(folder))
         # The case states the reader's finding about the clock.
@@ -122,10 +124,20 @@ def draft_case(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> D
         if known is not None:
             paths.append(known)
             continue
+        if record.format == "edr":
+            own = recorder_parts(path, record)
+            tables += own.parts
+            skipped += own.skipped
+            findings += own.findings
+            entries += [own.entry] if own.entry else []
+            continue
         tabular = all(c.samples is not None for c in record.channels)
         found, left = (table_parts if tabular else laboratory_parts)(path, record)
         skipped += left
         (tables if tabular else settled).extend(found)
+    tables, copies, told_of = drop_copies(tables)
+    skipped += copies
+    findings += told_of
     settled += settle_units(tables)
     units, more = group_units(settled)
     skipped += more
@@ -139,7 +151,7 @@ def draft_case(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> D
         )
     facts = next((r.facts for r in records if r.facts), {})
     title = next((r.title for r in records if r.facts and r.title), "")
-    page = _filled(_face(units), skipped, title, facts, paths)
+    page = _filled(_face(units), skipped, title, facts, paths, entries[:1])
     lines = [_told(unit) for unit in units]
     lines += [
         f"{plain(p.name)}: a path from {instant(p.start)} to {instant(p.end)} s, a reference"
@@ -171,6 +183,7 @@ def _filled(
     title: str,
     facts: Mapping[str, str],
     paths: Sequence[KnownPath],
+    entries: Sequence[IndicatedEntry],
 ) -> Page:
     """Fill the template, and wrap its comments."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -203,6 +216,8 @@ def _filled(
         facts=facts,
         fact=lambda key: _positive(facts.get(key, "")),
         late=late if timed and late > 0.0 else None,
+        # The speed before time zero of a recorder, if the case counts from there.
+        indicated=entries[0] if entries and any(u.impact.at_zero for u in units) else None,
         units=units,
         paths=paths,
         skipped=skipped,
@@ -210,7 +225,7 @@ def _filled(
         far_apart=len(sure) > 1 and max(sizes) > FAR_APART * min(sizes),
         rate=rate,
         same_trigger=all(u.impact.at_zero for u in units),
-        all_velocities=all(p.unit in SPEEDS for u in units for p in u.accelerometers),
+        all_velocities=all(p.velocities for u in units for p in u.accelerometers),
         rings=rate >= FAST and all(u.gyro is None for u in units),
         turning=_turning,
         error_model=error_model,
@@ -357,7 +372,7 @@ class Unit:
         """
         part = self.accelerometers[0]
         before = float(part.time[0]) - self.impact.trigger
-        if not part.zeroed or part.unit in SPEEDS or before > -LEAST_REST:
+        if not part.zeroed or part.velocities or before > -LEAST_REST:
             return None
         return max(before, -LONGEST_REST)
 
@@ -706,7 +721,8 @@ def find_impact(strong: Part, fine: Part, gyro: Part | None = None) -> Impact:
         largest = detector.largest_change[0]
     # Time zero is not more accurate than the interval in which it is searched allows.
     sd = max(sd if math.isfinite(sd) else 0.0, step, 0.25 * PART_563.wake_window)
-    at_zero = bool(time[0] - 1.5 * step <= 0.0 <= time[-1] and abs(trigger) < AT_ZERO)
+    near = abs(trigger) < AT_ZERO or any(c.from_zero for c in strong.velocities)
+    at_zero = bool(time[0] - 1.5 * step <= 0.0 <= time[-1] and near)
     after = (time >= trigger) & (time <= trigger + CHANGE_OVER)
     return Impact(
         0.0 if at_zero else trigger,

@@ -16,6 +16,7 @@ from strapdown.errors import DataError, Finding
 from strapdown.tables import SAMPLINGS
 
 __all__ = [
+    "CHANGE_NOTE",
     "LONGEST_NAME",
     "LONGEST_TEXT",
     "QUANTITIES",
@@ -89,6 +90,10 @@ class CrashChannel:
     samples : callable or None
         Reads only the values, for a record whose stamps may have to be stated first. Those of a
         clock are as recorded, integers where it counts ticks.
+    from_zero : bool
+        Of a velocity: the change since time zero of the recorder, where it was zero.
+    event : int
+        Number of the event of an event data recorder; 0 where none is stated.
     """
 
     name: str
@@ -107,6 +112,8 @@ class CrashChannel:
     row: Callable[[int], int] = field(default=_sample_row, repr=False)
     clock: str = ""
     samples: Callable[[], NDArray[Any]] | None = field(default=None, repr=False)
+    from_zero: bool = False
+    event: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,6 +228,8 @@ def unique(names: list[str]) -> list[str]:
 # Metadata of a crash channel as plain data, for files that store it beside the samples.
 
 
+#: Remark of velocities that count from time zero, in files without `from_zero`.
+CHANGE_NOTE = "change of velocity since time zero of the recorder"
 _AXES = ("", "x", "y", "z", "-x", "-y", "-z")
 _TEXTS = ("name", "quantity", "axis", "unit", "place", "body", "low_pass")
 _NUMBERS = ("full_scale", "bandwidth")
@@ -244,6 +253,7 @@ def attributes_of(channel: CrashChannel) -> dict[str, Any]:
         "remarks": list(channel.remarks),
         "full_scale": channel.full_scale,
         "bandwidth": channel.bandwidth,
+        "from_zero": channel.from_zero,
     }
 
 
@@ -282,6 +292,9 @@ def check_attributes(said: object, file: str, row: int | None = None) -> dict[st
     remarks = said.get("remarks", [])
     if not isinstance(remarks, list) or not all(isinstance(r, str) for r in remarks):
         raise _bad("remarks", "io.channel-remarks-no-texts", file, row)
+    from_zero = said.get("from_zero", CHANGE_NOTE in remarks)
+    if not isinstance(from_zero, bool):
+        raise _bad("from_zero", "io.channel-no-boolean", file, row, value=str(from_zero)[:40])
     sampling = said.get("sampling")
     if sampling not in (None, *SAMPLINGS):
         raise _bad(
@@ -291,6 +304,7 @@ def check_attributes(said: object, file: str, row: int | None = None) -> dict[st
         **texts,
         **numbers,
         "sampling": sampling,
+        "from_zero": from_zero,
         "remarks": tuple(clean(r) for r in remarks[:MOST_REMARKS]),
     }
 

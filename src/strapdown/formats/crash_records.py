@@ -9,7 +9,7 @@ from itertools import islice
 from pathlib import Path
 
 from strapdown.errors import ConfigError, DataError, check_choice
-from strapdown.formats import crash_json, crash_nhtsa, crash_table, mme_reader
+from strapdown.formats import crash_edr, crash_json, crash_nhtsa, crash_table, mme_reader
 from strapdown.formats.crash_record import CrashRecord, clean
 from strapdown.formats.crash_table import record_of
 
@@ -105,13 +105,18 @@ CRASH_READERS: dict[str, CrashReader] = {
     "json": CrashReader(
         "crash record as JSON, as this package writes it", crash_json.detect, crash_json.read
     ),
+    "edr": CrashReader(
+        "tables of an event data recorder (49 CFR 563) as text: .csv .txt",
+        crash_edr.detect,
+        crash_edr.read,
+    ),
     "log": CrashReader(
         "log with a column a channel: .npz .parquet .h5 .mat, of a phone",
         detect,
         read,
     ),
     "csv": CrashReader(
-        "text table with a column a channel: .csv .txt; also of a vehicle's event data recorder",
+        "text table with a column a channel: .csv .txt",
         Path.is_file,
         crash_table.read,
     ),

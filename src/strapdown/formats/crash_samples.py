@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +16,15 @@ from strapdown.formats.inference.conclusion import infer_time_unit
 from strapdown.formats.judge import what_numbers_say
 from strapdown.units import TIME_UNITS
 
-__all__ = ["Clock", "last_midnight", "mean_acceleration", "mean_accelerations_of", "seconds_of"]
+__all__ = [
+    "Clock",
+    "last_midnight",
+    "mean_acceleration",
+    "mean_accelerations_of",
+    "means_from_zero",
+    "of_start",
+    "seconds_of",
+]
 
 
 Array = NDArray[np.float64]
@@ -165,13 +173,75 @@ def mean_acceleration(channel: CrashChannel) -> tuple[Array, Array]:
             quantity=channel.name,
             velocity=velocity[k] if k is not None else None,
         )
-    return mean_accelerations_of(time, velocity, from_zero=starts_at_zero(time, channel))
+    from_zero = channel.from_zero and 0.0 < time[0] <= ONE_STEP * (time[1] - time[0])
+    return mean_accelerations_of(time, velocity, from_zero=bool(from_zero))
 
 
-def starts_at_zero(time: Array, channel: CrashChannel) -> bool:
-    """Whether the table begins one step after the time zero of its changes."""
-    counted = any("time zero" in r for r in channel.remarks)
-    return counted and time.size > 1 and 0.0 < time[0] <= ONE_STEP * (time[1] - time[0])
+# Largest share of the maximum that a change since time zero may have at time zero: its bound grows
+# by it. More is another quantity, or another time zero.
+MOST_AT_ZERO = 0.2
+
+
+class FromZero(NamedTuple):
+    """Mean accelerations of a change of velocity that counts from time zero.
+
+    `time`, (n,), s: ends of the intervals; the first has mean zero, its end is where the change
+    counts from. `mean`, (n,). `late`, s: time before the first sample where it is more than a step,
+    else 0: only the sum is known there. `offset`: value at time zero, which should be zero.
+    """
+
+    time: Array
+    mean: Array
+    late: float
+    offset: float
+
+
+def means_from_zero(time: ArrayLike, velocity: ArrayLike, channel: CrashChannel) -> FromZero:
+    """Compute mean accelerations whose sum is the recorded change at every stamp.
+
+    The change is zero at time zero by definition (49 CFR 563.5, delta-V). A table that begins one
+    step later includes the step from there; one that begins more than a step later has its first
+    value evenly over the steps before. `velocity`: in any unit. DataError: it is not near zero at
+    time zero, or fewer than two samples.
+    """
+    t = np.asarray(time, dtype=np.float64)
+    v = np.asarray(velocity, dtype=np.float64)
+    where: dict[str, Any] = {"file": channel.file or None, "quantity": f"channel {channel.name}"}
+    if t.size < 2:
+        raise DataError("io.sample-no-change-velocity", size=t.size, **where)
+    step = float(np.median(np.diff(t)))
+    largest = float(np.max(np.abs(v)))
+    if t[0] > 0.5 * step and v[0] != 0.0:
+        count = max(round(t[0] / step), 1)
+        late = float(t[0]) if t[0] > ONE_STEP * step else 0.0
+        part = np.arange(count) / count
+        t, v = np.concatenate([part * t[0], t]), np.concatenate([part * v[0], v])
+        offset = 0.0
+    else:
+        late, offset = 0.0, float(v[0])
+        if abs(offset) > MOST_AT_ZERO * largest:
+            raise DataError(
+                "io.delta-v-not-zero-at-start",
+                row=channel.row(0),
+                start=float(t[0]),
+                share=100.0 * abs(offset) / largest,
+                **where,
+            )
+        if offset:
+            t, v = np.concatenate([[t[0] - step], t]), np.concatenate([[0.0], v])
+    return FromZero(t, np.concatenate([[0.0], np.diff(v) / np.diff(t)]), late, offset)
+
+
+def of_start(found: FromZero, channel: CrashChannel, unit: float = 1.0) -> list[Finding]:
+    """Findings of a table that begins late, or not at zero; `unit`: factor to m/s."""
+    where: dict[str, Any] = {"file": channel.file or None, "quantity": f"channel {channel.name}"}
+    findings = []
+    if found.late:
+        findings.append(Finding("io.delta-v-begins-late", **where, first=found.late))
+    if found.offset:
+        offset = found.offset * unit * 3.6
+        findings.append(Finding("io.delta-v-offset-at-start", **where, offset=offset))
+    return findings
 
 
 def mean_accelerations_of(

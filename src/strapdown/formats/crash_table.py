@@ -19,6 +19,7 @@ from strapdown.formats import csv
 from strapdown.formats.arrays import numbers, ticks_of
 from strapdown.formats.columns import INDEXED, TRIADS, read_name
 from strapdown.formats.crash_record import (
+    CHANGE_NOTE,
     LONGEST_NAME,
     CrashChannel,
     CrashRecord,
@@ -247,7 +248,7 @@ def _channel(
     if said.contradiction:
         remarks.append(said.contradiction)
     if said.change:
-        remarks.append("change of velocity since time zero of the recorder")
+        remarks.append(CHANGE_NOTE)
     return CrashChannel(
         name=name,
         quantity=said.quantity,
@@ -260,6 +261,7 @@ def _channel(
         row=raw.row,
         clock=clock_name,
         samples=samples,
+        from_zero=said.change and said.quantity == "velocity",
     )
 
 
@@ -438,7 +440,9 @@ def _says_change(words: list[str]) -> bool:
     joined = " ".join(words)
     return bool(
         re.search(
-            r"\b(delta ?v|dv|delta velocity|delta vel|velocity change|geschwindigkeits)", joined
+            r"\b(delta ?v|dv|delta velocity|delta vel|velocity change|geschwindigkeits"
+            r"|change (in|of) velocity|cumulative velocity)",
+            joined,
         )
     )
 

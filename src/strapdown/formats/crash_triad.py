@@ -200,7 +200,7 @@ def _check_quantity(
 def _as_mean(
     channel: CrashChannel, stamps: Array, values: Array, findings: list[Finding]
 ) -> tuple[Array, Array]:
-    from strapdown.formats.crash_samples import mean_accelerations_of, starts_at_zero
+    from strapdown.formats.crash_samples import mean_accelerations_of, means_from_zero, of_start
 
     if stamps.size < 2:
         raise DataError(
@@ -210,7 +210,7 @@ def _as_mean(
             size=stamps.size,
         )
     _check_finite(channel, stamps, values)
-    from_zero = starts_at_zero(stamps, channel)
+    from_zero = channel.from_zero
     findings.append(
         Finding(
             "io.velocity-made-means-from-zero" if from_zero else "io.velocity-made-means",
@@ -219,7 +219,11 @@ def _as_mean(
             severity="note",
         )
     )
-    return mean_accelerations_of(stamps, values, from_zero=from_zero)
+    if not from_zero:
+        return mean_accelerations_of(stamps, values)
+    found = means_from_zero(stamps, values, channel)
+    findings += of_start(found, channel)
+    return found.time, found.mean
 
 
 def _check_finite(channel: CrashChannel, stamps: Array, values: Array) -> None:

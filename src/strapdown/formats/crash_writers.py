@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError
 from strapdown.formats import csv
-from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord, clean
+from strapdown.formats.crash_record import CHANGE_NOTE, QUANTITIES, CrashChannel, CrashRecord, clean
 from strapdown.formats.mme_codes import FILTERS, LENGTH, NO_CLASS, decode_mme
 from strapdown.formats.mme_reader import (
     AXIS_NOTE,
     BODY_NOTE,
-    CHANGE_NOTE,
     FILTER_NOTE,
     SAMPLING_NOTE,
     even_stamps,

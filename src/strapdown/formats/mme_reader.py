@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.crash_record import (
+    CHANGE_NOTE,
     LONGEST_NAME,
     CrashChannel,
     CrashRecord,
@@ -397,7 +398,6 @@ def stamps_of(
 #: Prefixes of comments in which our writer states data that the standard has no field for.
 SAMPLING_NOTE = "sampling "
 AXIS_NOTE = "axis "
-CHANGE_NOTE = "change of velocity since time zero of the recorder"
 BODY_NOTE = "fixed to "
 FILTER_NOTE = "low-pass "
 AXES = ("x", "y", "z", "-x", "-y", "-z")
@@ -463,6 +463,7 @@ def channel_of(file: MmeFile, name: str, others: Mapping[str, tuple[str, MmeFile
         row=lambda k: header.end + k + 1,
         clock=others[clock.upper()][0] if clock else "",
         samples=samples if open_stamps else None,
+        from_zero=change and quantity == "velocity",
     )
 
 

@@ -24,6 +24,8 @@ from strapdown.crash.record_parts import read_heading
         ("hi_ay", "acceleration", "y", ""),
         ("wz", "rate", "z", ""),
         ("Delta-V Longitudinal (MPH)", "velocity", "x", "mph"),
+        ("Accelerator Pedal (% full)", "other", "", ""),
+        ("Steering Wheel Angle (deg)", "other", "", "deg"),
         ("gx", "", "x", ""),
         ("gx [g]", "acceleration", "x", "g"),
         ("Zeit", "time", "", ""),

@@ -337,8 +337,8 @@ def test_a_table_of_an_event_data_recorder(tmp_path):
     (unit,) = table["units"]
     assert unit["trigger_s"] == 0.0
     assert unit["assumed"] == {"turn_sd_deg": "?", "delta_v_sd_m_per_s": "?", "because": "?"}
-    # The first mean ends at 10 ms; there the path can begin.
-    assert table["entry"]["time_s"] == pytest.approx(0.01)
+    # Delta-V counts from time zero, and so does the path.
+    assert table["entry"]["time_s"] == 0.0
     assert table["options"]["sampling"] == "mean"
     # The last whole km/h of the forward change, with 1 km/h of the lateral.
     assert "26 km/h" in draft.found[0]

@@ -265,7 +265,7 @@ def test_a_reader_can_be_named(tmp_path):
     path = tmp_path / "log.dat"
     path.write_text("t [s],ax [g]\n0,1\n1,1\n")
     assert read_crash_record(path, format="csv").format == "csv"
-    assert set(CRASH_READERS) == {"nhtsa", "mme", "json", "log", "csv"}
+    assert set(CRASH_READERS) == {"nhtsa", "mme", "json", "edr", "log", "csv"}
 
 
 def test_other_logs_are_records_too(tmp_path):

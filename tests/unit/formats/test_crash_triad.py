@@ -231,8 +231,9 @@ def test_changes_of_velocity_are_mean_accelerations(read):
     record = read("t [ms],Longitudinal Delta-V (km/h)\n0,0\n10,-3.6\n20,-10.8\n")
     triad = triad_of_channels(record, {"x": "Longitudinal Delta-V (km/h)"}, quantity="acceleration")
     assert triad.attrs["sampling"] == "mean"
-    np.testing.assert_allclose(triad.index, [0.01, 0.02], rtol=1e-15)
-    np.testing.assert_allclose(triad["accel_x"], [-100.0, -200.0], rtol=1e-14)
+    # The first row is where the change counts from: the step after it is whole.
+    np.testing.assert_allclose(triad.index, [0.0, 0.01, 0.02], rtol=1e-15)
+    np.testing.assert_allclose(triad["accel_x"], [0.0, -100.0, -200.0], rtol=1e-14)
     with pytest.raises(
         ConfigError, check=lambda refused: refused.finding.code == "io.sampling-contradicts-record"
     ):
