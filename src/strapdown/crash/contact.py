@@ -107,10 +107,10 @@ def find_contact(
     ``e - nu`` is largest. White noise of density N = sigma² h moves it by about N / nu²; nu is at
     least ``2 sqrt(N / 5 ms)``.
 
-    An acceleration that grows as a power p <= 2 of time exceeds nu late by at most the time t in
-    which it grows from nu to 4 nu (a parabola by just that, a step not at all). The edge is put
-    into the middle of that interval, with the standard deviation of a uniform distribution. The
-    velocity gained below nu is at most nu t / 2, which the effect of that deviation covers.
+    With the time t in which the acceleration grows from nu to 4 nu, a parabola exceeds nu late by
+    t, a straight rise by t / 3 and a step, with t zero, not at all. The edge is put into the middle
+    of parabola and straight rise, 2 t / 3 outward, with half their distance as its standard
+    deviation. The velocity gained below nu is nu t / 3 or nu t / 6, within its effect.
 
     A record that ends before the contact misses at most what follows if the acceleration continues
     to decay as it has since its peak, exponentially: the last mean over 20 ms times its time
@@ -125,22 +125,26 @@ def find_contact(
     course = VelocityCourse(acceleration)
     struck = max(event.trigger, event.woken)
     return Contact(
-        _edge(acceleration, course, (event.woken, back, low, peak), (low, struck), rule, sds),
-        _edge(acceleration, course, (peak, on, high, peak), (event.woken, on), rule, sds),
+        _edge(acceleration, course, -1.0, (event.woken, back, low, peak), (low, struck), rule, sds),
+        _edge(acceleration, course, 1.0, (peak, on, high, peak), (event.woken, on), rule, sds),
     )
 
 
 def _edge(
     acceleration: Acceleration,
     course: VelocityCourse,
+    sign: float,
     places: tuple[float, float, float, float],
     over: tuple[float, float],
     rule: EventRule,
     noise: tuple[float, float],
 ) -> Edge:
-    """Edge between an instant within the contact and a far one, beyond an instant of quiet."""
+    """Onset (sign -1) or end (1), from an instant within the contact to a far one.
+
+    `places`, s: that instant, where quiet begins, the far one, the peak; `over`, s: the change of
+    velocity between these gives the direction of the force.
+    """
     near, quiet, far, peak = places
-    sign = 1.0 if far > near else -1.0
     force = _direction(course, over)
     stamps = acceleration.time
     mean = acceleration.sampling == "mean"
@@ -158,11 +162,17 @@ def _edge(
     least = ALLOWANCE * rule.wake / rule.wake_window
     nu = max(least, 2.0 * math.sqrt(density / RESOLUTION))
     level_along = float(level @ force)
+    if sign > 0.0 and level_along < 0.0:
+        # Tire forces against the change take a tenth of a second to build up after the contact:
+        # it ends where its own force does.
+        level_along, level = 0.0, np.zeros(3)
 
     inner = stamps[(stamps > min(near, far)) & (stamps < max(near, far))]
     at = np.concatenate([[near], inner[:: int(sign)], [far]])
     gained = sign * (course.velocity(at) - course.velocity(np.array([near]))) @ force
-    k = int(np.argmax(gained - (level_along + nu) * np.abs(at - near)))
+    excess = gained - (level_along + nu) * np.abs(at - near)
+    # The farthest of equals: a record may end at the peak itself.
+    k = len(at) - 1 - int(np.argmax(excess[::-1]))
     rates = course.rate(at) @ force - level_along
     edge = float(at[k])
     if not mean and 0 < k < len(at) - 1:
@@ -177,9 +187,9 @@ def _edge(
     missing = 0.0
     if cut and k == len(at) - 1:
         window = rule.wake_window if sign > 0.0 else rule.lateral_window
-        missing = _missing(course, stamps, (peak, far), window, force)
-    spread = math.hypot(late / math.sqrt(12.0), density / nu**2, step / math.sqrt(12.0))
-    moved = edge + sign * 0.5 * late
+        missing = _missing(course, stamps, (peak, far), sign * window, force)
+    spread = math.hypot(late / 3.0, density / nu**2, step / math.sqrt(12.0))
+    moved = edge + sign * 2.0 / 3.0 * late
     moved = min(moved, far) if sign > 0.0 else max(moved, far)
     return Edge(float(moved), spread, level + nu * force, force, missing)
 
@@ -200,13 +210,14 @@ def _missing(
     window: float,
     force: Array,
 ) -> float:
-    """Change of velocity beyond the end (begin) of a record if the decay (rise) continues, m/s."""
+    """Change of velocity beyond the end of a record if the decay since the peak continues, m/s.
+
+    With a negative window, beyond its beginning, if the rise to the peak is the decay reversed.
+    """
     peak, far = span
-    sign = 1.0 if far > peak else -1.0
     at = np.append(stamps[(stamps >= min(peak, far)) & (stamps <= max(peak, far))], far)
-    inward = np.clip(at - sign * window, stamps[0], stamps[-1])
-    lengths = np.abs(at - inward)
-    means = sign * (course.velocity(at) - course.velocity(inward)) @ force / lengths
+    inward = np.clip(at - window, stamps[0], stamps[-1])
+    means = (course.velocity(at) - course.velocity(inward)) @ force / (at - inward)
     last, most = float(means[-1]), int(np.argmax(means))
     if last <= 0.0:
         return 0.0

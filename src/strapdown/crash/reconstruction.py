@@ -339,9 +339,7 @@ def reconstruct_unit(
         low = min(start + peak_window, end)
         peak = trailing_delta_v(acceleration, peak_window, low, end).peak
         whole = delta_v(acceleration, start, end, across_gaps=True)
-        plain = body_delta_v_bound(
-            effects, whole.weights, rest_sd=rest_sd, at_ends=contact.moved
-        )
+        plain = body_delta_v_bound(effects, whole.weights, rest_sd=rest_sd, at_ends=contact.moved)
         # What the record misses is within the bound, or leaves the change without an upper one.
         least = contact.beyond(TWO_SIDED_95 * plain.along(whole.vector))
         ends_of = {"event": contact.at_ends(least), "peak": _at_peak(peak, contact)}
@@ -426,9 +424,11 @@ def _missing(
     units that measure it were clipped: its weights leave out the others.
     """
     records = [u for u in units if u.prepared is not None]
-    measured = np.array([np.diagonal(u.unmeasured) < 0.5 for u in records]).reshape(-1, 3)
-    cut = np.array([clipped_axes(u, window) for u in records]).reshape(-1, 3)
-    clipped = (cut & measured).any(axis=0) & (cut | ~measured).all(axis=0)
+    clipped = np.zeros(3, dtype=bool)
+    if records:
+        measured = np.array([np.diagonal(u.unmeasured) < 0.5 for u in records])
+        cut = np.array([clipped_axes(u, window) for u in records])
+        clipped = (cut & measured).any(axis=0) & (cut | ~measured).all(axis=0)
     x, y, z = (bool(c) or bool(beyond) for c in clipped)
     return (*beyond, *(("clipped",) if clipped.any() else ())), (x, y, z)
 

@@ -9,8 +9,8 @@ import numpy as np
 from tests.unit.crash.made_units import GYRO, HIGH, LOW, G, haversine, record, table
 
 from strapdown import rotation
-from strapdown.crash.reconstruction import CrashReconstruction, reconstruct_crash
 from strapdown.crash.entry import Entry
+from strapdown.crash.reconstruction import CrashReconstruction, reconstruct_crash
 from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
 
 #: Direction of force, deg, and length of the pulse, s: least and greatest.
@@ -21,8 +21,10 @@ KINDS = {
     "rear": ((165.0, 195.0), (0.08, 0.18)),
     "pole": ((-25.0, 25.0), (0.06, 0.10)),
 }
-STATED = (Mounting((0.6, -0.45, 0.2), (0.0, 0.0, 0.0), 0.02, 1.0),
-          Mounting((-0.3, 0.4, 0.1), (0.0, 0.0, 90.0), 0.02, 1.0))
+STATED = (
+    Mounting((0.6, -0.45, 0.2), (0.0, 0.0, 0.0), 0.02, 1.0),
+    Mounting((-0.3, 0.4, 0.1), (0.0, 0.0, 90.0), 0.02, 1.0),
+)
 
 
 def course(x):
@@ -64,9 +66,8 @@ class DrawnCrash:
         accel[:, 0] -= np.where(time < self.end, self.braking * ramp, 0.0)
         for start, length, change in self.pulses:
             accel += np.outer(haversine((time - start) / length) / length, change)
-        sign = -np.sign(self.change[0]) or 1.0
         slid = course((time - self.end) / 0.1)
-        accel[:, 0] -= np.where(time > self.end, sign * self.sliding * slid, 0.0)
+        accel[:, 0] -= np.where(time > self.end, self.sliding * slid, 0.0)
         yaw = math.radians(self.yaw)
         rate[:, 2] = yaw * course(time / self.end)
         swing[:, 2] = yaw * haversine(time / self.end) / self.end
@@ -82,7 +83,11 @@ class DrawnCrash:
         small = np.radians(rng.normal(scale=stated.angles_sd_deg, size=3))
         turned = rotation.dcm_from_rotation_vector(small) @ stated.C_vs
         triads = []
-        for of, kind, true in ((LOW, "low-G", accel), (HIGH, "high-G", accel), (GYRO, "gyro", rate)):
+        for of, kind, true in (
+            (LOW, "low-G", accel),
+            (HIGH, "high-G", accel),
+            (GYRO, "gyro", rate),
+        ):
             if full_scale is not None and kind == "high-G":
                 of = type(of)(**{**_fields(of), "full_scale": full_scale})
             factor = 1.0 + rng.normal(scale=np.broadcast_to(of.scale, 3))
@@ -100,7 +105,9 @@ def _fields(of):
 def draw(kind, rng) -> DrawnCrash:
     """A crash of a kind."""
     (low, high), (short, long) = KINDS[kind]
-    angle = math.radians(rng.uniform(low, high) * (rng.choice([-1, 1]) if kind in ("oblique", "side") else 1))
+    angle = math.radians(
+        rng.uniform(low, high) * (rng.choice([-1, 1]) if kind in ("oblique", "side") else 1)
+    )
     size, length = rng.uniform(4.0, 15.0), rng.uniform(short, long)
     if kind in ("side", "rear"):
         size *= 0.7
