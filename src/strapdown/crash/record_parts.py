@@ -587,11 +587,12 @@ def _advances(values: Array) -> bool:
 def coarse_rate(time: Array) -> float | None:
     """Rate of stamps, (n,), s, that repeat because they are whole seconds, say, Hz.
 
-    From their first change to their last. None where they do not repeat, go back, or change less
-    than twice.
+    From their first change to their last. None where fewer than a third repeat the one before,
+    where they go back, or change less than twice.
     """
     steps = np.diff(time)
-    if not np.isfinite(steps).all() or not steps.size or steps.min() != 0.0:
+    repeated = np.count_nonzero(steps == 0.0)
+    if not np.isfinite(steps).all() or 3 * repeated < steps.size or (steps < 0.0).any():
         return None
     at = np.flatnonzero(steps > 0.0) + 1
     if at.size < 2:

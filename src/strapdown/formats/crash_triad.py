@@ -340,9 +340,9 @@ def triad_stamps(
     if rate_hz is None:
         return _same_length(channel, *_stated(record, name, time_unit, findings), values)
     if time is None and name and channel.samples is not None:
-        own = _clock_of(record, name, time_unit).stamps.astype(np.float64)
-        # Stamps that repeat or go back are no clock: samples are counted from zero.
-        name = name if bool((np.diff(own) > 0.0).all()) else ""
+        steps = np.diff(_clock_of(record, name, time_unit).stamps.astype(np.float64))
+        # Stamps that go back, or change once, are no clock: samples are counted from zero.
+        name = "" if bool((steps < 0.0).any()) or np.count_nonzero(steps) < 2 else name
     return _even(record, channel, name, time_unit, rate_hz, findings, values), values
 
 
