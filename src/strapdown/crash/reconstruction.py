@@ -354,7 +354,7 @@ def reconstruct_unit(
             )
             why, of = missing[window]
             changes.append(velocity_change(window, change, bound, missing=why, open_axes=of))
-        body.append(EventChanges(*changes, contact))
+        body.append(EventChanges(changes[0], changes[1], contact))
         if changes[1].at_least:
             findings.append(_at_least(changes[1], at_point.name))
         if path.time[0] <= min(start, peak.start) and max(end, peak.end) <= path.time[-1]:
@@ -372,7 +372,7 @@ def reconstruct_unit(
                 changes.append(
                     velocity_change(window, change, bound, heading, missing=why, open_axes=every)
                 )
-            ned.append(EventChanges(*changes, contact))
+            ned.append(EventChanges(changes[0], changes[1], contact))
         else:
             ned.append(None)
             findings.append(
