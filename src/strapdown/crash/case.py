@@ -581,27 +581,29 @@ def compare_reference(
     number = main_event(unit)
     if spec.over_s is not None:
         start, end = spec.over_s
+        try:
+            change = delta_v(unit.acceleration, start, end, across_gaps=True)
+        except DataError as error:
+            raise DataError(
+                "crash.reference-span-outside-record",
+                file=unit.name,
+                quantity="over_s",
+                name=spec.name,
+                reason=error.finding,
+            ) from None
+        _, rest_sd = unit.at_point.resting_force(gravity)
+        bound = body_delta_v_bound(unit.at_point.effects, change.weights, rest_sd=rest_sd)
+        is_open = (False, False, False)
     elif number is not None:
-        event = unit.events.events[number]
-        start, end = event.time_zero, event.end
+        whole = unit.body[number].event
+        change, bound, is_open = whole.delta_v, whole.bound, whole.open_axes
+        start, end = change.start, change.end
     else:
         raise ConfigError(
             "crash.no-event-no-span-stated",
             quantity=f"references, {spec.name}, over_s",
             name=unit.name,
         )
-    try:
-        change = delta_v(unit.acceleration, start, end, across_gaps=True)
-    except DataError as error:
-        raise DataError(
-            "crash.reference-span-outside-record",
-            file=unit.name,
-            quantity="over_s",
-            name=spec.name,
-            reason=error.finding,
-        ) from None
-    _, rest_sd = unit.at_point.resting_force(gravity)
-    bound = body_delta_v_bound(unit.at_point.effects, change.weights, rest_sd=rest_sd)
     if spec.axis == "resultant":
         value, sd = change.resultant, bound.along(change.vector)
     else:
@@ -609,7 +611,12 @@ def compare_reference(
         value = float(change.vector @ axis)
         sd = bound.along(axis)
     together = TWO_SIDED_95 * math.hypot(sd, spec.delta_v_sd_m_per_s)
-    near = abs(value - spec.delta_v_m_per_s) <= together
+    more = spec.delta_v_m_per_s - value
+    near = abs(more) <= together
+    along = (1.0, 1.0, 1.0) if spec.axis == "resultant" else AXES[spec.axis]
+    if any(o and a for o, a in zip(is_open, along, strict=True)):
+        # A part is consistent with every change that continues it.
+        near |= more * value >= 0.0
     return ReferenceAnswer(spec, unit.name, None, None, (start, end), value, sd, near)
 
 
@@ -618,11 +625,15 @@ def compare_reference(
 
 @dataclass(frozen=True, eq=False)
 class SeverityAnswer:
-    """Severity by one model, or the finding because of which it does not apply."""
+    """Severity by one model, or the finding because of which it does not apply.
+
+    `at_least`: delta-V is a lower bound, and so is the probability; its upper bound does not hold.
+    """
 
     model: SeverityModel
     risk: InjuryRisk | None
     because: Finding | None = None
+    at_least: bool = False
 
 
 def main_event(unit: UnitReconstruction) -> int | None:
@@ -656,7 +667,10 @@ def case_severity(spec: CaseSpec, unit: UnitReconstruction) -> tuple[SeverityAns
     answers = []
     for model in models:
         try:
-            answers.append(SeverityAnswer(model, injury_risk(model, inputs, sd)))
+            risk = injury_risk(model, inputs, sd)
         except DataError as error:
             answers.append(SeverityAnswer(model, None, error.finding))
+        else:
+            least = whole.at_least and "delta_v" in model.inputs
+            answers.append(SeverityAnswer(model, risk, at_least=least))
     return tuple(answers)

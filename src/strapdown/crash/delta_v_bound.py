@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown.constants import STANDARD_GRAVITY as GRAVITY
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.acceleration import NOISE, by_contributor
+from strapdown.crash.contact import Contact
 from strapdown.crash.delta_v import DeltaV
 from strapdown.crash.measuring_point import SampleEffects
 from strapdown.crash.path import ATTITUDE, VELOCITY, CrashPath
@@ -174,7 +175,7 @@ class VelocityChange:
     Attributes
     ----------
     window : {'peak', 'event'}
-        The trailing window in which the change is largest, or the whole event.
+        The trailing window in which the change is largest, or the whole contact.
     delta_v : DeltaV
         In its frame: ``body``, as recorders integrate, or ``ned``, gravity subtracted by the
         attitude.
@@ -182,6 +183,12 @@ class VelocityChange:
     pdof : Pdof or NedPdof
     interval : PdofInterval
         Of the direction, 95 %; for north-east-down, of the azimuth.
+    missing : tuple of {'before', 'after', 'clipped'}
+        Why the record holds only a part of the change: it begins within the contact, it ends
+        within it, or a sensor was at the end of its range. Empty where it holds all, or where what
+        it misses is within the bound.
+    open_axes : tuple of bool
+        Components of which a part is missing.
     """
 
     window: str
@@ -189,9 +196,36 @@ class VelocityChange:
     bound: DeltaVBound = field(repr=False)
     pdof: Pdof | NedPdof
     interval: PdofInterval
+    missing: tuple[str, ...] = ()
+    open_axes: tuple[bool, bool, bool] = (False, False, False)
 
     def __repr__(self) -> str:
         return f"<VelocityChange, {change_line(self)}>"
+
+    @property
+    def at_least(self) -> bool:
+        """Whether the resultant has a lower bound only, and the direction is that of a part."""
+        return bool(self.missing)
+
+    @property
+    def resultant_range(self) -> tuple[float, float]:
+        """95 % bounds of the resultant, m/s; the upper one is infinite where `at_least`."""
+        low, high = self.resultant - self.resultant_bound, self.resultant + self.resultant_bound
+        return (max(low, 0.0), math.inf) if self.at_least else (low, high)
+
+    @property
+    def ranges(self) -> Array:
+        """95 % bounds of the components, (3, 2), m/s.
+
+        Infinite on the far side of a component of which a part is missing, and on both sides where
+        its sign is not determined.
+        """
+        half = np.asarray(self.bound.half_width)
+        ends = np.column_stack([self.delta_v.vector - half, self.delta_v.vector + half])
+        is_open = np.asarray(self.open_axes)
+        down, up = is_open & (ends[:, 0] <= 0.0), is_open & (ends[:, 1] >= 0.0)
+        ends[down, 0], ends[up, 1] = -math.inf, math.inf
+        return ends
 
     @property
     def resultant(self) -> float:
@@ -213,22 +247,32 @@ class EventChanges:
     peak : VelocityChange
         Over the trailing window in which the change is largest.
     event : VelocityChange
-        From time zero to the end.
+        Over the contact.
+    contact : Contact
     """
 
     peak: VelocityChange
     event: VelocityChange
+    contact: Contact = field(repr=False)
 
 
 def velocity_change(
-    window: str, change: DeltaV, bound: DeltaVBound, heading_deg: float = 0.0
+    window: str,
+    change: DeltaV,
+    bound: DeltaVBound,
+    heading_deg: float = 0.0,
+    *,
+    missing: tuple[str, ...] = (),
+    open_axes: tuple[bool, bool, bool] = (False, False, False),
 ) -> VelocityChange:
     """Combine a change, its bound in the same axes, and its direction of force.
 
-    `heading_deg`: of the vehicle at the impact, for a change in north-east-down.
+    `heading_deg`: of the vehicle at the impact, for a change in north-east-down. `missing` and
+    `open_axes` as `VelocityChange`.
     """
     direction = ned_pdof(change, heading_deg) if change.frame == "ned" else pdof(change)
-    return VelocityChange(window, change, bound, direction, pdof_interval(change, bound.covariance))
+    interval = pdof_interval(change, bound.covariance)
+    return VelocityChange(window, change, bound, direction, interval, missing, open_axes)
 
 
 def change_line(change: VelocityChange) -> str:
@@ -240,6 +284,9 @@ def change_line(change: VelocityChange) -> str:
     )
     at, low, high = direction_bounds(change)
     name = "azimuth" if change.delta_v.frame == "ned" else "PDOF"
+    if change.at_least:
+        parts = f"recorded part {parts}"
+        name += " of the recorded part"
     direction = (
         "not determined"
         if change.interval.horizontal.undetermined

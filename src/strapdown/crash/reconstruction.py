@@ -11,10 +11,12 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.crash.acceleration import Acceleration, body_acceleration, resolved_acceleration
 from strapdown.crash.combine_units import combine_units
-from strapdown.crash.consistency import UnitComparison, compare_units
+from strapdown.crash.consistency import UnitComparison, clipped_axes, compare_units
+from strapdown.crash.contact import Contact, find_contact
 from strapdown.crash.crash_type import CrashType, RollRecord, classify_crashes
 from strapdown.crash.delta_v import DeltaV, delta_v, trailing_delta_v
 from strapdown.crash.delta_v_bound import (
@@ -27,7 +29,7 @@ from strapdown.crash.delta_v_bound import (
     velocity_change,
 )
 from strapdown.crash.entry import Entry
-from strapdown.crash.events import PART_563, CrashEvents, EventRule, detect_events
+from strapdown.crash.events import KMH, PART_563, CrashEvents, EventRule, detect_events
 from strapdown.crash.measuring_point import PointKinematics
 from strapdown.crash.path import VELOCITY, CrashPath, path_line, reconstruct_path
 from strapdown.crash.preparation import prepare_together
@@ -48,7 +50,9 @@ def summary_table(units: Sequence[UnitReconstruction]) -> pd.DataFrame:
     """Changes of velocity, directions of force and ends of the path, with 95 % bounds.
 
     By ``unit``, ``part`` (number and type of the event, or ``path``) and ``quantity``, which names
-    the unit: ``value``, ``low`` and ``high``.
+    the unit: ``value``, ``low`` and ``high``. A change of velocity of which the record holds only a
+    part (`VelocityChange.missing`) is open: ``high`` of its resultant is infinite, and of a
+    component the bound on its far side; the direction is named that of the recorded part.
     """
     index, rows = [], []
     for unit in units:
@@ -71,25 +75,28 @@ def _unit_rows(unit: UnitReconstruction) -> list[Row]:
         event = unit.events.events[k - 1]
         sd = TWO_SIDED_95 * event.time_zero_sd
         rows.append((part, "time zero s", *_about(event.time_zero, sd)))
-        for name, value, half in zip(
+        onset = changes.contact.start
+        rows.append((part, "onset s", *_about(onset.time, TWO_SIDED_95 * onset.sd)))
+        for name, value, ends in zip(
             ("delta-V forward m/s", "delta-V right m/s", "delta-V down m/s"),
             whole.delta_v.vector.tolist(),
-            whole.bound.half_width,
+            whole.ranges.tolist(),
             strict=True,
         ):
-            rows.append((part, name, *_about(value, half)))
+            rows.append((part, name, value, *ends))
         length = 1e3 * (peak.delta_v.end - peak.delta_v.start)
         for name, change in (
             ("delta-V resultant m/s", whole),
             (f"largest in {length:.3g} ms m/s", peak),
         ):
-            rows.append((part, name, *_about(change.resultant, change.resultant_bound)))
-        rows.append((part, "PDOF deg", *direction_bounds(whole)))
+            rows.append((part, name, change.resultant, *change.resultant_range))
+        name = "PDOF of the recorded part deg" if whole.at_least else "PDOF deg"
+        rows.append((part, name, *direction_bounds(whole)))
     path = unit.path
-    ends = TWO_SIDED_95 * path.sd.iloc[-1]
+    last = TWO_SIDED_95 * path.sd.iloc[-1]
     for axis in NED:
         value = float(path.table[axis].iloc[-1])
-        rows.append(("path", f"end {axis} m", *_about(value, float(ends[axis]))))
+        rows.append(("path", f"end {axis} m", *_about(value, float(last[axis]))))
     return rows
 
 
@@ -100,14 +107,20 @@ def _about(value: float, half: float) -> tuple[float, float, float]:
 def unit_line(unit: UnitReconstruction) -> str:
     """Results of one unit: a line for each event, and one for the path."""
     lines = [
-        f"{unit.name}, event {k}, {kind.name}: delta-V {c.event.resultant:.2f} ± "
-        f"{c.event.resultant_bound:.2f} m/s; {change_line(c.event)}"
+        f"{unit.name}, event {k}, {kind.name}: delta-V {_size(c.event)}; {change_line(c.event)}"
         for k, (c, kind) in enumerate(zip(unit.body, unit.types, strict=True), start=1)
     ]
     if not lines:
         size, axis = unit.events.largest_change, unit.events.largest_axis
         lines = [f"{unit.name}: no event, at most {size:.2f} m/s ({axis})"]
     return "\n".join([*lines, f"{unit.name}, {path_line(unit.path)}"])
+
+
+def _size(change: VelocityChange) -> str:
+    size, half = change.resultant, change.resultant_bound
+    if change.at_least:
+        return f"at least {size:.2f} m/s (95 %: {change.resultant_range[0]:.2f})"
+    return f"{size:.2f} ± {half:.2f} m/s"
 
 
 # Crash reconstruction from one unit, or from the mean of several.
@@ -238,7 +251,11 @@ class CrashOptions:
 
 
 def reconstruct_unit(
-    at_point: PointKinematics, entry: Entry | None, options: CrashOptions = CrashOptions()
+    at_point: PointKinematics,
+    entry: Entry | None,
+    options: CrashOptions = CrashOptions(),
+    *,
+    units: Sequence[PointKinematics] = (),
 ) -> UnitReconstruction:
     """Find the events of a unit, its changes of velocity and its path.
 
@@ -249,6 +266,8 @@ def reconstruct_unit(
         As `reconstruct_path`.
     options : CrashOptions
         Window, peak window, rule, gravity and mechanization are used.
+    units : sequence of PointKinematics
+        Units of which `at_point` is the mean, whose clipped axes it has.
 
     Returns
     -------
@@ -275,11 +294,9 @@ def reconstruct_unit(
     at_rest, rest_sd = at_point.resting_force(gravity)
     acceleration = body_acceleration(at_point.imu, at_rest.tolist())
     effects = at_point.effects
+    noise = tuple(float(x) for x in np.median(effects.force_noise, axis=0))
     events = detect_events(
-        acceleration,
-        options.rule,
-        noise=tuple(float(x) for x in np.median(effects.force_noise, axis=0)),
-        bias_sd=tuple(float(x) for x in rest_sd),
+        acceleration, options.rule, noise=noise, bias_sd=tuple(float(x) for x in rest_sd)
     )
     path = reconstruct_path(
         at_point.imu,
@@ -312,20 +329,35 @@ def reconstruct_unit(
                 blind=blind,
             )
         )
-    for event in events.events:
-        ends = -event.time_zero_sd, 0.0 if math.isnan(event.end_sd) else event.end_sd
-        start, end = event.time_zero, min(event.end, acceleration.end)
-        peak = trailing_delta_v(acceleration, peak_window, min(start + peak_window, end), end).peak
+    for k, event in enumerate(events.events):
+        between = (
+            events.events[k - 1].end if k else -math.inf,
+            events.events[k + 1].time_zero if k + 1 < len(events.events) else math.inf,
+        )
+        contact = find_contact(acceleration, event, options.rule, noise=noise, between=between)
+        start, end = contact.start.time, contact.end.time
+        low = min(start + peak_window, end)
+        peak = trailing_delta_v(acceleration, peak_window, low, end).peak
         whole = delta_v(acceleration, start, end, across_gaps=True)
+        plain = body_delta_v_bound(effects, whole.weights, rest_sd=rest_sd, at_ends=contact.moved)
+        # What the record misses is within the bound, or leaves the change without an upper one.
+        least = contact.beyond(TWO_SIDED_95 * plain.along(whole.vector))
+        ends_of = {"event": contact.at_ends(least), "peak": _at_peak(peak, contact)}
+        missing = {
+            "event": _missing(least, (at_point, *units), (start, end)),
+            "peak": _missing(contact.beyond(math.inf), (at_point, *units), (peak.start, peak.end)),
+        }
         changes = []
         for window, change in (("peak", peak), ("event", whole)):
-            at_ends = _at_ends(change, ends) if window == "event" else None
-            bound = body_delta_v_bound(effects, change.weights, rest_sd=rest_sd, at_ends=at_ends)
-            changes.append(velocity_change(window, change, bound))
-        body.append(EventChanges(*changes))
+            bound = body_delta_v_bound(
+                effects, change.weights, rest_sd=rest_sd, at_ends=ends_of[window]
+            )
+            why, of = missing[window]
+            changes.append(velocity_change(window, change, bound, missing=why, open_axes=of))
+        body.append(EventChanges(changes[0], changes[1], contact))
         over, of_event = changes
         together = math.hypot(over.resultant_bound, of_event.resultant_bound)
-        if over.resultant - of_event.resultant > together:
+        if not of_event.at_least and over.resultant - of_event.resultant > together:
             findings.append(
                 Finding(
                     "crash.window-exceeds-event",
@@ -336,16 +368,24 @@ def reconstruct_unit(
                     whole=of_event.resultant,
                 )
             )
+        if changes[1].at_least:
+            findings.append(_at_least(changes[1], at_point.name))
         if path.time[0] <= min(start, peak.start) and max(end, peak.end) <= path.time[-1]:
             course = np.unwrap(path.table["heading"], period=360.0)
             heading = float(np.interp(start, path.time, course)) % 360.0
             changes = []
             for window, span in (("peak", (peak.start, peak.end)), ("event", (start, end))):
                 change = delta_v(resolved, *span, across_gaps=True)
-                at_ends = _at_ends(change, ends) if window == "event" else None
-                bound = resolved_delta_v_bound(path, *span, at_ends=at_ends)
-                changes.append(velocity_change(window, change, bound, heading))
-            ned.append(EventChanges(*changes))
+                at = np.clip(np.searchsorted(path.time, span[0]), 0, len(path.time) - 1)
+                turned = rotation.rotate(path.q_nb[at], ends_of[window])
+                bound = resolved_delta_v_bound(path, *span, at_ends=turned)
+                why, of = missing[window]
+                # Axes of the vehicle are not those of the path.
+                every = (any(of),) * 3
+                changes.append(
+                    velocity_change(window, change, bound, heading, missing=why, open_axes=every)
+                )
+            ned.append(EventChanges(changes[0], changes[1], contact))
         else:
             ned.append(None)
             findings.append(
@@ -388,9 +428,47 @@ def reconstruct_unit(
     )
 
 
-def _at_ends(change: DeltaV, ends: tuple[float, float]) -> Array:
-    """Effect on the change of one standard deviation of either end of an event."""
-    return np.array([change.start_rate * ends[0], change.end_rate * ends[1]])
+def _missing(
+    beyond: tuple[str, ...], units: Sequence[PointKinematics], window: tuple[float, float]
+) -> tuple[tuple[str, ...], tuple[bool, bool, bool]]:
+    """Why, and along which axes, a change over a window is only a part.
+
+    `beyond`: ends of the record within the contact. Of a mean, an axis counts as clipped where all
+    units that measure it were clipped: its weights leave out the others.
+    """
+    records = [u for u in units if u.prepared is not None]
+    clipped = np.zeros(3, dtype=bool)
+    if records:
+        measured = np.array([np.diagonal(u.unmeasured) < 0.5 for u in records])
+        cut = np.array([clipped_axes(u, window) for u in records])
+        clipped = (cut & measured).any(axis=0) & (cut | ~measured).all(axis=0)
+    x, y, z = (bool(c) or bool(beyond) for c in clipped)
+    return (*beyond, *(("clipped",) if clipped.any() else ())), (x, y, z)
+
+
+def _at_least(change: VelocityChange, name: str) -> Finding:
+    return Finding(
+        "crash.delta-v-at-least",
+        file=name,
+        quantity="delta-V",
+        reasons=[Finding(f"crash.missing-{m}", severity="note") for m in change.missing],
+        resultant=change.resultant / KMH,
+        low=change.resultant_range[0] / KMH,
+    )
+
+
+def _at_peak(change: DeltaV, contact: Contact) -> Array:
+    """Effect on the largest change of one standard deviation of the time of its window.
+
+    The window is where the length of the change is stationary, unless the contact's onset or end
+    bounds it: what moves with it is the direction.
+    """
+    moved = change.end_rate - change.start_rate
+    bounded = change.start <= contact.start.time + contact.start.sd
+    sd = contact.start.sd if bounded else contact.end.sd
+    if not bounded and change.end < contact.end.time - contact.end.sd:
+        sd = 0.0
+    return (sd * moved)[None]
 
 
 # Consistency of the stated entry with the record.
@@ -636,7 +714,7 @@ def reconstruct_crash(
     )
     combined = None
     if combine and comparison is not None and comparison.agree:
-        combined = reconstruct_unit(combine_units(there), tied[0], options)
+        combined = reconstruct_unit(combine_units(there), tied[0], options, units=there)
     for reconstruction in (*found, *(() if combined is None else (combined,))):
         findings += reconstruction.findings
     if comparison is not None:

@@ -22,6 +22,7 @@ from strapdown.formats.crash_samples import (
     last_midnight,
     mean_accelerations_of,
     means_from_zero,
+    past_midnight,
 )
 from strapdown.formats.inference.conclusion import (
     THRESHOLD,
@@ -66,6 +67,7 @@ class Part:
     settled, with `candidates`, and `unit_why` is its evidence; `time`, (n,), s, and `values`, (n,
     3), SI, by the likeliest units, NaN for missing axes; `label` distinguishes triads of one
     record; `zeroed`: gravity at rest has been subtracted; `named`: the record names the axes;
+    `of_vehicle`: why they are the vehicle's, where the record defines them so, else empty;
     `uncertainty`: error model by keys of the sensor catalogue, with its grounds `basis`;
     `velocities`: the channels of delta-V of which the accelerations are means.
     """
@@ -84,6 +86,7 @@ class Part:
     zeroed: bool = False
     sampling: str = ""
     named: bool = False
+    of_vehicle: str = ""
     place: str = ""
     uncertainty: Mapping[str, float] = field(default_factory=dict)
     basis: str = ""
@@ -288,6 +291,8 @@ def table_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skippe
             skipped.append(Skipped(path, f"column '{name}'", error.finding, (name,)))
             continue
         headings[name] = heading
+        if heading.quantity == "time":
+            raw = past_midnight(raw, heading.unit if heading.unit in TIME_UNITS else "")
         if raw.dtype.kind in "iu" and raw.size and abs(int(raw[0])) > FAR:
             origins[name] = float(raw[0])
             raw = raw.astype(np.int64) - np.int64(raw[0])
@@ -337,6 +342,7 @@ def table_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skippe
             values[kept],
             label=group.label,
             named=group.by_heading,
+            of_vehicle=_of_vehicle(group),
             sampling=(kinds.pop() or "") if len(kinds) == 1 else "",
             notes=(f"{lost} of {rows} rows have no value",) if lost else (),
             remarks=record.remarks,
@@ -344,6 +350,16 @@ def table_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skippe
         )
         parts.append(part)
     return parts, skipped
+
+
+def _of_vehicle(group: Group) -> str:
+    """Why the axes of a group are the vehicle's: all headings name directions, not letters."""
+    for axis, name in group.columns.items():
+        words = _WORD.findall(without_accents(_BRACKET.sub(" ", name).lower()))
+        known = tuple(word for word in _AXES[axis] if len(word) > 1 and word not in _TURNS)
+        if not any(word.startswith(known) for word in words):
+            return ""
+    return "its headings name directions of the vehicle" if group.by_heading else ""
 
 
 def _stamps(
@@ -365,13 +381,16 @@ def _stamps(
             clock = replace(clock, rate=likely_rate(whole))
         return clock, np.arange(rows, dtype=np.float64) / clock.rate
     own = columns[clock.column]
-    _check_advances(record.channel(clock.column), own)
+    coarse = coarse_rate(own)
+    if coarse is None:
+        _check_advances(record.channel(clock.column), own)
     factor = 1.0 / (clock.rate * clock.step)
     origin = origins.get(clock.column, 0.0)
     # As the case reader does: a clock with a distant origin counts from midnight.
     if abs(origin * factor + time[0]) > EPOCH:
         raw = origin + float(own[0])
-        return evenly(clock, time - time[0] + (raw - last_midnight(raw, factor)) * factor)
+        start = (raw - last_midnight(raw, factor)) * factor
+        return evenly(clock, time - time[0] + start)
     return evenly(clock, time + origin * factor)
 
 
@@ -550,12 +569,46 @@ def find_clock(
         ([n for n in growing if headings[n].quantity == "time"], "by its heading"),
         ([n for n in plain if not _counts(columns[n])], "it grows in equal steps"),
         ([n for n in plain if _counts(columns[n])], "it grows in steps of one"),
+        (
+            [n for n, v in columns.items() if headings[n].quantity == "time" and _advances(v)],
+            "by its heading, though its steps are uneven",
+        ),
     ):
         if names:
             # A clock with a stated unit has priority.
             name = next((n for n in names if headings[n].unit in TIME_UNITS), names[0])
             return _clock(name, columns[name], headings[name], why)
+    for name, values in columns.items():
+        unit = headings[name].unit
+        if headings[name].quantity == "time" and unit in TIME_UNITS and values.size:
+            time = values * TIME_UNITS[unit]
+            if found := coarse_rate(time):
+                why = f"by its heading; its stamps are whole, {found:.5g} samples to the second"
+                clock = Clock(name, unit, why, 1.0 / (found * TIME_UNITS[unit]), found)
+                # As the case reader counts: evenly from the first stamp.
+                even = time[0] + np.arange(time.size) / found
+                return replace(clock, stated=True, rate_why=why), even
     return Clock("", "", "no column grows in equal steps", math.nan, math.nan), None
+
+
+def _advances(values: Array) -> bool:
+    return values.size > 1 and bool(np.isfinite(values).all() and (np.diff(values) > 0.0).all())
+
+
+def coarse_rate(time: Array) -> float | None:
+    """Rate of stamps, (n,), s, that repeat because they are whole seconds, say, Hz.
+
+    From their first change to their last. None where fewer than a third repeat the one before,
+    where they go back, or change less than twice.
+    """
+    steps = np.diff(time)
+    repeated = np.count_nonzero(steps == 0.0)
+    if not np.isfinite(steps).all() or 3 * repeated < steps.size or (steps < 0.0).any():
+        return None
+    at = np.flatnonzero(steps > 0.0) + 1
+    if at.size < 2:
+        return None
+    return float((at[-1] - at[0]) / (time[at[-1]] - time[at[0]]))
 
 
 def likely_rate(values: Array) -> float:
@@ -1182,6 +1235,7 @@ def _block(
         label=place,
         zeroed=quantity == "acceleration",
         named=True,
+        of_vehicle="its format defines x, y, z as forward, right, down of the vehicle (SAE J211)",
         place=place,
         uncertainty=model | ({key: round(min(scales) / unit, 6)} if scales else {}),
         basis="of a sensor of a crash laboratory, calibrated by SAE J211; zeroed before the "

@@ -843,8 +843,8 @@ AFTER, GYRO_REST, GAP = 0.5, 1.0, 0.05
 # An eyewitness cannot give the direction of a smaller turn, deg.
 LEAST_TURN = 3.0
 TURNS = (0.0, 90.0, 180.0, -90.0)
-# A frontal impact, the most common one, is within this of the front.
-FRONTAL = 45.0  # deg
+# An axis that leans more than this points up or down, and to no side.
+MOST_PITCH = 45.0  # deg
 # Two units of a vehicle measure one direction; the next right angle differs by more than this.
 SAME_DIRECTION = 30.0  # deg
 POINTS = {0.0: "forward", 90.0: "to the right", 180.0: "rearward", -90.0: "to the left"}
@@ -894,11 +894,12 @@ def direction(unit: Unit, heading_deg: float) -> float | None:
     """Direction of the force, deg, at this heading of the unit; None without acceleration."""
     sitting = unit.impact.sitting
     change = np.nan_to_num(unit.impact.change)
-    if sitting is not None:
-        change = sitting.into_vehicle(change[None, :], heading_deg)[0]
-    elif heading_deg:
-        return None
-    if not unit.impact.found or np.hypot(*change[:2]) == 0.0:
+    # Without gravity in the record, as if its z pointed down.
+    level = sitting or Sitting(0.0, 0.0, "", 0.0, 0.0)
+    change = level.into_vehicle(change[None, :], heading_deg)[0]
+    # Where the unit of the values is asked, the size of a blow is not known, but its direction is.
+    blow = unit.impact.found or not unit.strong.unit
+    if not blow or np.hypot(*change[:2]) == 0.0:
         return None
     return float(pdof((change[0], change[1], 0.0)).horizontal_deg)
 
@@ -909,21 +910,11 @@ def side_of(came: float) -> str:
 
 
 def _own_heading(unit: Unit) -> Unit:
-    sitting = unit.impact.sitting
-    if not all(p.named for p in unit.accelerometers):
+    """Heading of a unit whose record defines its axes as the vehicle's; none of another."""
+    sitting, grounds = unit.impact.sitting, [p.of_vehicle for p in unit.accelerometers]
+    if not all(grounds) or not (sitting is None or sitting.along.endswith("z")):
         return unit
-    came, why = direction(unit, 0.0), ""
-    if sitting is None and unit.accelerometers[0].zeroed:
-        why = (
-            "assumed: x, y, z of the record point forward, right, down; gravity is not in it, so "
-            "that nothing can be seen of how it sits"
-        )
-    elif sitting and sitting.along.endswith("z") and came is not None and abs(came) <= FRONTAL:
-        why = (
-            "assumed: x points forward, as its heading says x and the blow then comes from the "
-            f"front ({came:.0f} deg)"
-        )
-    return replace(unit, heading_deg=0.0, heading_why=why) if why else unit
+    return replace(unit, heading_deg=0.0, heading_why=f"found: {grounds[0]}")
 
 
 def _like(unit: Unit, goal: float | None, name: str) -> Unit:
@@ -939,10 +930,12 @@ def _like(unit: Unit, goal: float | None, name: str) -> Unit:
             why = f"with it the blow comes from where '{name}' has it, within {off[best]:.0f} deg"
             return replace(unit, heading_deg=best, heading_why=f"assumed: {why}")
     # Where x is vertical, it points to no side.
-    shown = sitting is not None and abs(sitting.pitch_deg) <= FRONTAL
+    shown = sitting is not None and abs(sitting.pitch_deg) <= MOST_PITCH
     told = [
         f"{turn:g}{f' (its x points {POINTS[turn]})' if shown else ''} makes it a blow from "
         f"{side_of(at)}"
         for turn, at in came.items()
     ]
+    if sitting is None and told:
+        told[0] = f"gravity is not in it; if its z points down, a heading of {told[0]}"
     return replace(unit, heading_why=", ".join(told) or "not in the record")

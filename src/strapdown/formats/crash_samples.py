@@ -23,6 +23,7 @@ __all__ = [
     "mean_accelerations_of",
     "means_from_zero",
     "of_start",
+    "past_midnight",
     "seconds_of",
 ]
 
@@ -65,7 +66,7 @@ def seconds_of(clock: Clock) -> tuple[Array, list[Finding]]:
     does not advance, or the unit is not stated and not evident.
     """
     findings: list[Finding] = []
-    stamps = clock.stamps
+    stamps = past_midnight(clock.stamps, clock.unit)
     stamps = stamps.astype(np.int64) if stamps.dtype.kind in "iub" else stamps.astype(np.float64)
     missing = np.flatnonzero(~np.isfinite(stamps))
     if missing.size:
@@ -116,6 +117,34 @@ def last_midnight(stamp: float, factor: float) -> float:
     """
     day = round(DAY / factor)
     return stamp // day * day
+
+
+# A step over midnight is no longer than so many others: a longer one joins two records.
+LONGEST_STEP = 10.0
+
+
+def past_midnight(stamps: NDArray[Any], unit: str) -> NDArray[Any]:
+    """Continue stamps of the time of day past midnight, where they begin again at zero.
+
+    `stamps`: in ticks; integers stay integers. `unit`: a key of `TIME_UNITS`, or empty: then the
+    one whose day makes the step over midnight like the others. Others are returned unchanged.
+    """
+    if stamps.dtype.kind not in "iuf" or stamps.size < 3 or not np.isfinite(stamps).all():
+        return stamps
+    steps = np.diff(stamps.astype(np.float64))
+    back = np.flatnonzero(steps < 0.0)
+    if back.size != 1 or steps.max() <= 0.0:
+        return stamps
+    # Whole seconds repeat.
+    usual = float(np.median(steps[steps > 0.0]))
+    for factor in [TIME_UNITS[unit]] if unit else TIME_UNITS.values():
+        day = round(DAY / factor)
+        over = float(steps[back[0]]) + day
+        if 0.0 < over <= LONGEST_STEP * usual and stamps.min() >= 0 and stamps.max() < day:
+            moved = stamps.copy()
+            moved[int(back[0]) + 1 :] += day
+            return moved
+    return stamps
 
 
 def _evident(clock: Clock, stamps: NDArray[Any], findings: list[Finding]) -> str:

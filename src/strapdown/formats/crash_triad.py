@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.formats.clocks import EPOCH
 from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord
-from strapdown.formats.crash_samples import Clock, last_midnight, seconds_of
+from strapdown.formats.crash_samples import Clock, last_midnight, past_midnight, seconds_of
 from strapdown.formats.inference import Signals, infer_signals
 from strapdown.formats.judge import what_numbers_say
 from strapdown.tables import ACCEL, GYRO, SAMPLINGS
@@ -343,6 +343,10 @@ def triad_stamps(
     values = np.asarray(values, dtype=np.float64)
     if rate_hz is None:
         return _same_length(channel, *_stated(record, name, time_unit, findings), values)
+    if time is None and name and channel.samples is not None:
+        steps = np.diff(_clock_of(record, name, time_unit).stamps.astype(np.float64))
+        # Stamps that go back, or change once, are no clock: samples are counted from zero.
+        name = "" if bool((steps < 0.0).any()) or np.count_nonzero(steps) < 2 else name
     return _even(record, channel, name, time_unit, rate_hz, findings, values), values
 
 
@@ -366,7 +370,9 @@ def _clock_of(record: CrashRecord, name: str, time_unit: str | None) -> Clock:
             time_unit=time_unit,
             recorded=recorded,
         )
-    return Clock(name, read(), recorded or stated, held.file or record.path.name, held.row)
+    unit = recorded or stated
+    stamps = past_midnight(np.asarray(read()), unit)
+    return Clock(name, stamps, unit, held.file or record.path.name, held.row)
 
 
 def _stated(
@@ -403,13 +409,17 @@ def _even(
 ) -> Array:
     """Make evenly spaced stamps, from the first recorded one if there is one."""
     count = np.arange(values.size, dtype=np.float64)
-    start, span = 0.0, 0.0
+    start, span, slack = 0.0, 0.0, 0.0
     if name:
         clock = _clock_of(record, name, time_unit)
         stamps = _same_length(channel, clock.stamps.astype(np.float64), name, values)[0]
         ends = stamps[[0, -1]]
         seconds = _ends(clock, ends, rate_hz, values.size)
         start, span = float(seconds[0]), float(seconds[1] - seconds[0])
+        steps = np.diff(stamps)
+        if span > 0.0 and steps.min() == 0.0:
+            # Whole seconds, say: the span is known to one of them.
+            slack = float(steps.max()) * span / float(ends[1] - ends[0])
         if abs(start) > EPOCH:
             start -= last_midnight(start, 1.0)
     elif channel.samples is None:
@@ -417,7 +427,8 @@ def _even(
         start, span = float(stamps[0]), float(stamps[-1] - stamps[0])
     if (name or channel.samples is None) and values.size > 1:
         recorded = (values.size - 1) / span if span > 0.0 else math.inf
-        if not abs(recorded / rate_hz - 1.0) <= RATE_AGREES:
+        within = abs(span - (values.size - 1) / rate_hz) <= slack
+        if not (within or abs(recorded / rate_hz - 1.0) <= RATE_AGREES):
             raise ConfigError(
                 "io.rate-hz-stated-stamps-record",
                 file=record.path.name,

@@ -118,7 +118,8 @@ def crash_json(result: CaseResult) -> dict[str, Any]:
     Returns
     -------
     dict
-        Bounds are 95 % bounds. NaN and infinity are null.
+        Bounds are 95 % bounds. NaN and infinity are null: ``high`` where a change of velocity is
+        ``at_least`` so much.
     """
     made = result.reconstruction
     found: dict[str, Any] = {
@@ -159,6 +160,10 @@ def _pairs(rows: Sequence[tuple[str, str]]) -> list[dict[str, str]]:
 
 def _about(value: float, half: float) -> dict[str, float]:
     return {"value": value, "low": value - half, "high": value + half}
+
+
+def _between(value: float, low: float, high: float) -> dict[str, float]:
+    return {"value": value, "low": low, "high": high}
 
 
 def _unit(unit: UnitReconstruction) -> dict[str, Any]:
@@ -207,6 +212,10 @@ def _event(
         "time_zero_s": event.time_zero,
         "time_zero_sd_s": event.time_zero_sd,
         "time_zero_by": event.basis,
+        "onset_s": changes.contact.start.time,
+        "onset_sd_s": changes.contact.start.sd,
+        "contact_end_s": changes.contact.end.time,
+        "contact_end_sd_s": changes.contact.end.sd,
         "end_s": event.end,
         "lasts_beyond_record": event.lasts_beyond_record,
         "starts_before_record": event.starts_before_record,
@@ -226,10 +235,14 @@ def _change(change: VelocityChange) -> dict[str, Any]:
         "start_s": change.delta_v.start,
         "end_s": change.delta_v.end,
         **{
-            f"{axis}_m_per_s": _about(float(v), h)
-            for axis, v, h in zip(axes, change.delta_v.vector, change.bound.half_width, strict=True)
+            f"{axis}_m_per_s": _between(float(v), *ends)
+            for axis, v, ends in zip(
+                axes, change.delta_v.vector, change.ranges.tolist(), strict=True
+            )
         },
-        "resultant_m_per_s": _about(change.resultant, change.resultant_bound),
+        "resultant_m_per_s": _between(change.resultant, *change.resultant_range),
+        "at_least": change.at_least,
+        "missing": list(change.missing),
         "direction_of_force": {
             **(
                 {"azimuth_deg": angle.azimuth_deg, "relative_deg": angle.relative_deg}
@@ -321,7 +334,8 @@ def _severity(answer: SeverityAnswer) -> dict[str, Any]:
         "source": answer.model.source,
         "probability": None if risk is None else risk.probability,
         "low": None if risk is None else risk.low,
-        "high": None if risk is None else risk.high,
+        "high": None if risk is None or answer.at_least else risk.high,
+        "at_least": answer.at_least,
         "because": "" if answer.because is None else answer.because.sentence("file"),
     }
 

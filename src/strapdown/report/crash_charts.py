@@ -12,7 +12,8 @@ from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.crash.acceleration import Acceleration, window_weights
 from strapdown.crash.case import ReferenceAnswer
 from strapdown.crash.consistency import UnitComparison
-from strapdown.crash.delta_v import VelocityCourse, cumulative_delta_v
+from strapdown.crash.contact import Edge
+from strapdown.crash.delta_v import cumulative_delta_v
 from strapdown.crash.delta_v_bound import DeltaVBound, VelocityChange, body_delta_v_bound
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import CrashPath
@@ -86,18 +87,17 @@ def delta_v_course(acceleration: Acceleration, zero: float, low: float, high: fl
 
 def delta_v_half_widths(
     unit: UnitReconstruction,
-    zero: float,
-    zero_sd: float,
+    onset: Edge,
     instants: Array,
     gravity: float = STANDARD_GRAVITY,
 ) -> Array:
-    """95 % half widths of the change of velocity since time zero.
+    """95 % half widths of the change of velocity since the onset of a contact.
 
     Parameters
     ----------
-    zero, zero_sd : float, s
+    onset : Edge
     instants : ndarray, (n,), s
-        After `zero`; taken as exact, as clock times.
+        After the onset; taken as exact, as clock times.
     gravity : float, m/s²
 
     Returns
@@ -107,11 +107,10 @@ def delta_v_half_widths(
     """
     of, acceleration = unit.at_point, unit.acceleration
     rest_sd = of.resting_force(gravity)[1]
-    course = VelocityCourse(acceleration)
-    moved = -course.rate(np.array([zero])) * zero_sd
+    moved = (onset.sd * onset.rate)[None]
     rows = []
     for at in instants.tolist():
-        weights = window_weights(acceleration.time, zero, at, acceleration.sampling)
+        weights = window_weights(acceleration.time, onset.time, at, acceleration.sampling)
         bound = body_delta_v_bound(of.effects, weights, rest_sd=rest_sd, at_ends=moved)
         rows.append([*bound.half_width, _along(bound, weights @ acceleration.values)])
     return np.array(rows, dtype=np.float64).reshape(-1, 4)
@@ -131,7 +130,7 @@ def delta_v_chart(
     gravity: float = STANDARD_GRAVITY,
     stated: Sequence[ReferenceAnswer] = (),
 ) -> Chart | None:
-    """Chart the change of velocity since time zero of an event.
+    """Chart the change of velocity since the onset of the contact of an event.
 
     Parameters
     ----------
@@ -152,7 +151,8 @@ def delta_v_chart(
     if not 0 <= event < len(main.events.events):
         return None
     found = main.events.events[event]
-    zero, end = found.time_zero, min(found.end, main.acceleration.end)
+    whole, onset = main.body[event].event, main.body[event].contact.start
+    zero, end = whole.delta_v.start, whole.delta_v.end
     span = (zero - 0.4 * AROUND[0], end + AROUND[1])
     lines: list[list[Line]] = [[] for _ in _PARTS]
     for unit, name, drawn in answers_of(units, combined):
@@ -165,11 +165,11 @@ def delta_v_chart(
     own = unit_look(None if combined is not None else 0)["colour"]
     last = min(span[1], main.acceleration.end)
     instants = np.unique(np.r_[np.linspace(zero, last, _INSTANTS)[1:], end])
-    half = KMH * delta_v_half_widths(main, zero, found.time_zero_sd, instants, gravity)
+    half = KMH * delta_v_half_widths(main, onset, instants, gravity)
     course = delta_v_course(main.acceleration, zero, *span)
-    whole = main.body[event].event
     values = [*whole.delta_v.vector.tolist(), whole.resultant]
     halves = [*whole.bound.half_width, whole.resultant_bound]
+    part = ", recorded part" if whole.at_least else ""
     panels = []
     of = "of the mean" if combined is not None else f"of {main.name}"
     for k, axis in enumerate(_PARTS):
@@ -183,14 +183,14 @@ def delta_v_chart(
             own,
             0.15,
         )
-        words = f"{axis}: {plain(KMH * values[k], 1)} ± {plain(KMH * halves[k], 1)} km/h "
+        words = f"{axis}{part}: {plain(KMH * values[k], 1)} ± {plain(KMH * halves[k], 1)} km/h "
         words += f"({plain(values[k], 2)} ± {plain(halves[k], 2)} m/s)"
         ends = KMH * np.array([values[k] - halves[k], values[k] + halves[k]])
         at = np.array([1e3 * end])
         marks = [
             Line("bar", np.repeat(at, 2), ends, own, width=2.4, legend=False),
             Line(
-                f"end of the event, 95 % {of}",
+                f"end of the contact, 95 % {of}",
                 at,
                 np.array([KMH * values[k]]),
                 own,
@@ -219,10 +219,10 @@ def delta_v_chart(
 
 def _caption(stated: bool) -> str:
     return (
-        "Change of velocity of the reference point since time zero, integrated in the axes of the "
-        "vehicle, less the specific force at rest; forward, right, down are positive, so braking "
-        "is negative; 1 m/s = 3.6 km/h. Shaded: 95 % at an exact time; the bar at the end of the "
-        "event includes the uncertainty of that end."
+        "Change of velocity of the reference point since the onset of the contact, in the axes of "
+        "the vehicle, less the specific force at rest; forward, right, down are positive, so "
+        "braking is negative; 1 m/s = 3.6 km/h. Shaded: 95 % at an exact time; the bar at the end "
+        "of the contact includes the uncertainty of that end."
         + (" Symbols with bars: stated by others, with their 95 % bounds." if stated else "")
     )
 
@@ -377,7 +377,7 @@ def pdof_charts(
     """
     main = units[0] if combined is None else combined
     whole = main.body[event].event.delta_v
-    zero = main.events.events[event].time_zero
+    zero = whole.start
     length = whole.end - zero
     windows = sorted({*WINDOWS, length})
 
@@ -404,19 +404,19 @@ def pdof_charts(
         chart(
             "pdof-by-window",
             "the length of the window",
-            "the delta-V over windows from time zero",
-            "length of the window from time zero, ms",
+            "the delta-V over windows from the onset of the contact",
+            "length of the window from the onset, ms",
             lambda unit: pdof_by_window(unit.acceleration, zero, windows),
-            (length, "the event's own window, 95 %", "the whole event"),
+            (length, "the contact's own window, 95 %", "the whole contact"),
         ),
         chart(
             "pdof-by-time-zero",
             "time zero",
-            "windows that begin earlier (negative) or later than the detected time zero and end "
-            "with the event",
-            "shift of time zero, ms",
+            "windows that begin earlier (negative) or later than the onset of the contact and end "
+            "with it",
+            "shift of the onset, ms",
             lambda unit: pdof_by_shift(unit.acceleration, whole.start, whole.end, SHIFTS),
-            (0.0, "detected time zero, 95 %", "detected"),
+            (0.0, "detected onset, 95 %", "detected"),
         ),
     )
 
@@ -572,6 +572,8 @@ def risk_chart(
     delta_v: float,
     sd: float,
     inputs: Mapping[str, float | str] | None = None,
+    *,
+    at_least: bool = False,
 ) -> Chart | None:
     """Chart the injury-risk models that gave an answer, each within its range.
 
@@ -581,6 +583,8 @@ def risk_chart(
         Inputs of the models.
     inputs : mapping, optional
         Further inputs of the models.
+    at_least : bool
+        Whether the change of velocity has no upper bound; its bar then reaches to the model's end.
 
     Returns
     -------
@@ -612,7 +616,7 @@ def risk_chart(
                 points=True,
                 symbol=style["symbol"],
                 low=np.array([KMH * max(delta_v - reach, 0.0)]),
-                high=np.array([KMH * (delta_v + reach)]),
+                high=np.array([x[-1] if at_least else KMH * (delta_v + reach)]),
                 legend=False,
             )
         )

@@ -304,6 +304,7 @@ def _severity(result: CaseResult, which: int | None) -> tuple[Block | None, ...]
             change.resultant,
             change.resultant_bound / TWO_SIDED_95,
             {"crash_type": main.types[which].name, **result.spec.options.severity_inputs},
+            at_least=change.at_least,
         )
     return table, chart, *(Paragraph(remark, "note") for remark in remarks)
 

@@ -19,11 +19,13 @@ from strapdown.report.values import (
     MEAN,
     about,
     axis_names,
+    component_words,
     instant,
     over_ground,
     plain,
     probability_words,
     recorder,
+    resultant_words,
     speed,
 )
 from strapdown.rotation import within_half_turn
@@ -45,22 +47,16 @@ def answers_table(result: CaseResult) -> TableBlock | None:
     strong = []
     for unit in result.reconstruction.answers:
         for k, (changes, kind) in enumerate(zip(unit.body, unit.types, strict=True)):
-            event, whole = unit.events.events[k], changes.event
+            whole = changes.event
             if unit is result.reconstruction.main and k == main_event(unit):
                 strong.append(len(rows))
             rows.append(
                 (
                     recorder(unit, result),
                     f"{k + 1}, {kind.name}",
-                    f"{plain(event.time_zero, 4)} to {plain(event.end, 4)}",
-                    *(
-                        about(KMH * v, KMH * h, "")
-                        for v, h in zip(
-                            whole.delta_v.vector.tolist(), whole.bound.half_width, strict=True
-                        )
-                    ),
-                    about(KMH * whole.resultant, KMH * whole.resultant_bound, ""),
-                    about(KMH * changes.peak.resultant, KMH * changes.peak.resultant_bound, ""),
+                    f"{plain(whole.delta_v.start, 4)} to {plain(whole.delta_v.end, 4)}",
+                    *component_words(whole),
+                    resultant_words(changes.peak),
                 )
             )
     if not rows:
@@ -103,7 +99,8 @@ def direction_table(result: CaseResult) -> TableBlock | None:
                     (
                         recorder(unit, result),
                         str(k + 1),
-                        "event" if window == "event" else "largest",
+                        ("event" if window == "event" else "largest")
+                        + (", recorded part" if change.at_least else ""),
                         f"{plain(angle.horizontal_deg, 1)}°" if known else "not determined",
                         _ends(across) if known else "all",
                         str(angle.clock) if known else "–",
@@ -339,9 +336,13 @@ def severity_table(result: CaseResult) -> TableBlock | None:
         rows.append(
             (
                 answer.model.outcome,
-                "–" if risk is None else f"{100.0 * risk.probability:.2g} %",
+                "–"
+                if risk is None
+                else f"{'at least ' if answer.at_least else ''}{100.0 * risk.probability:.2g} %",
                 ("" if answer.because is None else answer.because.sentence("file"))
                 if risk is None
+                else f"above {100.0 * risk.low:.2g} %"
+                if answer.at_least
                 else f"{100.0 * risk.low:.2g} to {100.0 * risk.high:.2g} %",
                 *((answer.model.source,) if len(sources) > 1 else ()),
             )

@@ -10,6 +10,7 @@ import numpy as np
 
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.case import CaseResult, main_event
+from strapdown.crash.delta_v_bound import VelocityChange
 from strapdown.crash.pdof import Pdof
 from strapdown.crash.reconstruction import UnitReconstruction
 from strapdown.errors import Finding
@@ -23,6 +24,8 @@ from strapdown.report.values import (
     about,
     angle_range,
     axis_names,
+    change_range,
+    change_words,
     instant,
     moment,
     over_ground,
@@ -30,7 +33,6 @@ from strapdown.report.values import (
     probability_words,
     side_words,
     speed,
-    speed_range,
 )
 from strapdown.sensors.pre_crash import PreparedUnit
 from strapdown.tables import NED
@@ -58,10 +60,16 @@ def headline(result: CaseResult) -> str:
             "at most within 150 ms; an event requires 8 km/h."
         )
     whole = unit.body[number].event
+    low = f" ({change_range(whole)})" if whole.at_least else ""
     return (
-        f"Delta-V {speed(whole.resultant, whole.resultant_bound)}; direction of force "
+        f"Delta-V {change_words(whole)}{low}; {direction_name(whole)} "
         f"{direction(unit, number)}; {TYPES[unit.types[number].name]}."
     )
+
+
+def direction_name(change: VelocityChange) -> str:
+    """Return what a direction is of: of a change that is a part, of that part."""
+    return "direction of force" + (" of the recorded part" if change.at_least else "")
 
 
 def direction(unit: UnitReconstruction, number: int) -> str:
@@ -89,15 +97,14 @@ def key_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
     else:
         changes = unit.body[number]
         whole, peak = changes.event, changes.peak
-        event = unit.events.events[number]
         ms = 1e3 * (peak.delta_v.end - peak.delta_v.start)
         figures.append(
             KeyFigure(
                 "Delta-V",
-                speed(whole.resultant, whole.resultant_bound),
-                speed_range(whole.resultant, whole.resultant_bound),
-                f"over the event, {instant(event.time_zero)} to {instant(event.end)}; largest in "
-                f"{ms:.3g} ms {speed(peak.resultant, peak.resultant_bound)}",
+                change_words(whole),
+                change_range(whole),
+                f"over the contact, {instant(whole.delta_v.start)} to "
+                f"{instant(whole.delta_v.end)}; largest in {ms:.3g} ms {change_words(peak)}",
             )
         )
         across = whole.interval.horizontal
@@ -107,7 +114,7 @@ def key_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
             value = f"{plain(getattr(angle, 'horizontal_deg', np.nan), 1)}°, {angle.clock} o'clock"
         figures.append(
             KeyFigure(
-                "Direction of force",
+                direction_name(whole).capitalize(),
                 value,
                 angle_range(across),
                 "0° the front, clockwise from above",
@@ -142,17 +149,17 @@ def lead(result: CaseResult) -> str:
     else:
         changes = unit.body[number]
         whole, peak = changes.event, changes.peak
-        event = unit.events.events[number]
         forward, right = float(whole.delta_v.vector[0]), float(whole.delta_v.vector[1])
-        length = 1e3 * (event.end - event.time_zero)
+        length = 1e3 * (whole.delta_v.end - whole.delta_v.start)
         parts.append(
-            f"Within {length:.0f} ms from {moment(event.time_zero)}, the velocity of the "
-            f"{result.spec.point.name} changed by "
-            f"{speed(whole.resultant, whole.resultant_bound)} ("
-            f"{about(whole.resultant, whole.resultant_bound, 'm/s')}; all bounds are 95 %), "
-            f"{side_words(forward, right)}. Direction of force: "
+            f"Within {length:.0f} ms from {moment(whole.delta_v.start)}, the velocity of the "
+            f"{result.spec.point.name} changed by {change_words(whole)} ("
+            f"{change_words(whole, unit='m/s')}; all bounds are 95 %), "
+            f"{side_words(forward, right)}. {direction_name(whole).capitalize()}: "
             f"{direction(unit, number)}; {TYPES[unit.types[number].name]}."
         )
+        if whole.at_least:
+            parts.append(f"{incomplete_words(whole)} The change is {change_range(whole)}.")
         others = len(unit.body) - 1
         if others:
             parts.append(
@@ -160,10 +167,24 @@ def lead(result: CaseResult) -> str:
             )
         parts.append(
             f"The largest change within {1e3 * (peak.delta_v.end - peak.delta_v.start):.3g} ms was "
-            f"{speed(peak.resultant, peak.resultant_bound)}."
+            f"{change_words(peak)}."
         )
     parts += [entry_words(result), path_words(result), units_words(result)]
     return " ".join(p for p in parts if p)
+
+
+#: Why the record holds only a part of a change of velocity.
+PART = {
+    "before": "the record begins within the contact",
+    "after": "the record ends within the contact",
+    "clipped": "a sensor was at the end of its range",
+}
+
+
+def incomplete_words(change: VelocityChange) -> str:
+    """Return why a change of velocity has no upper bound."""
+    why = " and ".join(PART[m] for m in change.missing)
+    return f"This is a part of the change: {why}."
 
 
 def entry_words(result: CaseResult) -> str:
@@ -255,6 +276,8 @@ def apart_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
     if spans:
         low, high = min(s[0] for s in spans), max(s[1] for s in spans)
         value = f"{plain(KMH * low, 1)} to {plain(KMH * high, 1)} km/h"
+        if not math.isfinite(high):
+            value = f"above {plain(KMH * low, 1)} km/h"
     return (
         KeyFigure(
             "Delta-V",
@@ -275,16 +298,14 @@ def _change(unit: UnitReconstruction) -> str:
     number = main_event(unit)
     if number is None:
         return "no event"
-    whole = unit.body[number].event
-    return speed(whole.resultant, whole.resultant_bound)
+    return change_words(unit.body[number].event)
 
 
 def _span(unit: UnitReconstruction) -> tuple[float, float] | None:
     number = main_event(unit)
     if number is None:
         return None
-    whole = unit.body[number].event
-    return whole.resultant - whole.resultant_bound, whole.resultant + whole.resultant_bound
+    return unit.body[number].event.resultant_range
 
 
 def _angle(unit: UnitReconstruction) -> float | None:
@@ -475,22 +496,22 @@ def _event(result: CaseResult) -> Iterator[tuple[str, str, str]]:
             f"defined; the path is reported.{alone if others else ''}",
         )
         return
-    event = unit.events.events[number]
-    if event.lasts_beyond_record:
+    whole = unit.body[number].event
+    if "after" in whole.missing:
         yield (
             "event-beyond-record",
-            "The event continues beyond the record",
-            f"The record ends at {instant(event.end)} while the velocity still changes: the "
-            "delta-V is that up to there; the complete one is larger or smaller.",
+            "The contact continues beyond the record",
+            f"The record ends at {instant(whole.delta_v.end)} while the velocity still changes by "
+            "more than the bound: delta-V is at least that up to there, and the direction of force "
+            "that of the recorded part.",
         )
-    if event.starts_before_record:
+    if "before" in whole.missing:
         yield (
             "event-before-record",
-            "The event begins before the record",
-            f"The record begins at {instant(event.time_zero)}, within the event: the change before "
-            "is missing.",
+            "The contact begins before the record",
+            f"The record begins at {instant(whole.delta_v.start)}, within the contact: the change "
+            "before is missing, and delta-V is at least what follows.",
         )
-    whole = unit.body[number].event
     if whole.interval.horizontal.undetermined:
         yield (
             "direction-undetermined",
@@ -793,6 +814,12 @@ CONVENTIONS = (
         "Event, time zero, end",
         "49 CFR 563.5(b): 8 km/h within 150 ms make an event; it begins with 0.8 km/h within 20 ms "
         "and ends when the resultant change within 20 ms becomes that or less",
+    ),
+    (
+        "Contact",
+        "delta-V is that of the whole contact: from its onset, where the acceleration leaves the "
+        "level before, to where it reaches the level after; time zero lies up to 20 ms before the "
+        "onset, and in a side impact up to 16 ms after it",
     ),
     (
         "Bounds",

@@ -9,6 +9,7 @@ from strapdown.constants import DEG_PER_HOUR, MICRO_G, STANDARD_GRAVITY, TWO_SID
 
 if TYPE_CHECKING:
     from strapdown.crash.case import CaseResult
+    from strapdown.crash.delta_v_bound import VelocityChange
     from strapdown.crash.pdof import AngleInterval
     from strapdown.crash.reconstruction import UnitReconstruction
 
@@ -86,6 +87,45 @@ def speed_range(value: float, half: float) -> str:
     low, high = KMH * (value - half), KMH * (value + half)
     ends = f"{plain(low, places)} to {plain(high, places)}{GAP}km/h with 95{GAP}%"
     return f"{ends}; {about(value, half, 'm/s')}"
+
+
+def change_words(change: VelocityChange, *, unit: str = "km/h") -> str:
+    """Format the resultant of a change of velocity: ``at least 28.4 km/h`` if it is a part."""
+    scale = KMH if unit == "km/h" else 1.0
+    value, half = scale * change.resultant, scale * change.resultant_bound
+    if not change.at_least:
+        return about(value, half, unit)
+    places = decimals(half, DIGITS, most=4)
+    return f"at least{GAP}{plain(value, places)}{GAP}{unit}"
+
+
+def change_range(change: VelocityChange) -> str:
+    """Format the bound of the resultant of a change of velocity; without upper end of a part."""
+    if not change.at_least:
+        return speed_range(change.resultant, change.resultant_bound)
+    places = decimals(KMH * change.resultant_bound, DIGITS, most=4)
+    low = plain(KMH * change.resultant_range[0], places)
+    return f"above {low}{GAP}km/h with 95{GAP}%, without an upper bound"
+
+
+def component_words(change: VelocityChange) -> tuple[str, str, str, str]:
+    """Format the components and the resultant of a change of velocity, in km/h without unit.
+
+    A component of which a part is missing: ``-28.4 ± 0.8 or beyond``.
+    """
+    x, y, z = (
+        about(KMH * v, KMH * h, "") + (" or beyond" if is_open else "")
+        for v, h, is_open in zip(
+            change.delta_v.vector.tolist(), change.bound.half_width, change.open_axes, strict=True
+        )
+    )
+    return x, y, z, resultant_words(change)
+
+
+def resultant_words(change: VelocityChange) -> str:
+    """Format the resultant of a change of velocity in km/h, without unit."""
+    said = about(KMH * change.resultant, KMH * change.resultant_bound, "")
+    return f"at least {said}" if change.at_least else said
 
 
 def instant(time: float) -> str:

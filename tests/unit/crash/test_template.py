@@ -178,9 +178,9 @@ def test_columns_axes_and_units_are_found(three):
 def test_mounting_and_range_are_found(three):
     _, draft, table = three
     assert [u["angles_deg"] for u in table["units"]] == [
-        [180.0, 0.0, 0.0],
-        [0.0] * 3,
-        [180.0, 0.0, 0.0],
+        [180.0, 0.0, "?"],
+        [0.0, 0.0, "?"],
+        [180.0, 0.0, "?"],
     ]
     # ±2 g is reached, and one part of the catalogue has it.
     assert table["units"][0]["accelerometers"][0]["sensor"] == "lis302dlh"
@@ -207,7 +207,7 @@ def test_only_what_a_person_knows_is_asked(three):
     keys = [a.key for a in draft.asked]
     assert keys == [
         *("title", "mass_kg", "speed_km_per_h", "speed_sd_km_per_h", "source"),
-        *("position_m", "position_m", "position_m"),
+        *("position_m", "angles_deg") * 3,
     ]
     lines = draft.text.splitlines()
     assert all(lines[a.line - 1].startswith(f"{a.key} = ") for a in draft.asked)

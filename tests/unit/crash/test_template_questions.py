@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import re
 import tomllib
 
 import numpy as np
 import pytest
 
-from strapdown.crash.template import draft_case, read_records
+from strapdown import rotation
+from strapdown.crash.template import TURNS, draft_case, read_records
+from strapdown.errors import DataError
+from strapdown.formats.crash_records import read_crash_record
+from strapdown.formats.crash_triad import triad_of_channels
 
 RATE = 500.0
 
@@ -61,7 +66,9 @@ def test_a_gyro_with_axes_is_given_to_confirm(crash, tmp_path):
     draft, _ = drafted(tmp_path, written(tmp_path, "r.csv", heads, [time, force, rates]))
     told = {c.key: c.what for c in draft.to_check}
     assert "deg to the right, seen from above" in told["channels"]
-    assert "the blow came from the front" in told["angles_deg"]
+    # That x is called x does not tell that it points forward.
+    (asked,) = [a for a in draft.asked if a.key == "angles_deg"]
+    assert "0 (its x points forward) makes it a blow from the front" in asked.what
     lines = draft.text.splitlines()
     for check in draft.to_check:
         assert lines[check.line - 1].startswith(f"{check.key} = ")
@@ -107,3 +114,108 @@ def test_a_path_on_another_clock_stays_a_comment(crash, tmp_path):
     draft, table = drafted(tmp_path, record, film)
     assert "references" not in table
     assert "must count from the trigger" in " ".join(draft.text.split("\n# "))
+
+
+def turned(force, heading_deg):
+    """What a unit at this heading measures, its z down."""
+    return force @ rotation.dcm_from_euler((0.0, 0.0, heading_deg))
+
+
+def angles_asked(draft, table):
+    (asked,) = [a.what for a in draft.asked if a.key == "angles_deg"] or [""]
+    return table["units"][0]["angles_deg"], asked
+
+
+@pytest.mark.parametrize("heading", TURNS)
+def test_the_heading_of_a_zeroed_record_is_asked_and_what_each_would_mean(crash, tmp_path, heading):
+    """No unit and no gravity: a unit turned by 90 deg was told as a blow from 8 o'clock."""
+    time, force, _ = crash
+    force = turned(force - [0.0, 0.0, -9.80665], heading)
+    path = written(tmp_path, "r.csv", ["t_s", "x", "y", "z"], [time, force])
+    found, asked = angles_asked(*drafted(tmp_path, path))
+    assert found == ["?", "?", "?"]
+    # The blow came from the front: the heading with which it does is the one it has.
+    assert "gravity is not in it" in asked
+    (front,) = re.findall(r"(-?\d+) makes it a blow from the front", asked)
+    assert float(front) == heading
+
+
+@pytest.mark.parametrize("heading", TURNS)
+def test_gravity_tells_roll_and_pitch_and_no_heading(crash, tmp_path, heading):
+    time, force, _ = crash
+    path = written(tmp_path, "r.csv", ["t_s", "ax", "ay", "az"], [time, turned(force, heading)])
+    found, asked = angles_asked(*drafted(tmp_path, path))
+    assert found == [0.0, 0.0, "?"]
+    assert re.search(rf"{heading:g} \(its x points [a-z ]+\) makes it a blow from the front", asked)
+
+
+def test_headings_that_name_directions_define_the_axes(crash, tmp_path):
+    time, force, _ = crash
+    heads = ["t_s", *(f"{w} acceleration [m/s2]" for w in ("longitudinal", "lateral", "vertical"))]
+    draft, table = drafted(tmp_path, written(tmp_path, "r.csv", heads, [time, force]))
+    assert angles_asked(draft, table) == ([0.0, 0.0, 0.0], "")
+    assert "found: its headings name directions of the vehicle" in " ".join(
+        draft.text.split("\n# ")
+    )
+    told = {c.key: c.what for c in draft.to_check}
+    assert "the blow came from the front" in told["angles_deg"]
+
+
+def of_day(seconds, part=12):
+    """Times of day, ``23:59:59.998``, to so many characters."""
+    return [
+        f"{int(s // 3600):02d}:{int(s % 3600 // 60):02d}:{s % 60:09.6f}"[:part]
+        for s in np.mod(seconds + 1e-7, 86400.0)
+    ]
+
+
+@pytest.mark.parametrize("base", [36930.0, 86398.5, 86397.0], ids=["morning", "before", "midnight"])
+@pytest.mark.parametrize(
+    ("head", "stamps"),
+    [
+        ("time", of_day),
+        ("time", lambda t: of_day(t, 8)),
+        ("time_s", lambda t: [f"{s:.3f}" for s in np.mod(t + 1e-7, 86400.0)]),
+        ("time_s", lambda t: [str(int(s)) for s in np.mod(t + 1e-7, 86400.0)]),
+        ("time_ms", lambda t: [str(round(1e3 * s)) for s in np.mod(t, 86400.0)]),
+        ("time_us", lambda t: [str(round(1e6 * s)) for s in np.mod(t, 86400.0)]),
+    ],
+    ids=["h:m:s.ms", "h:m:s", "seconds", "whole seconds", "ms", "us"],
+)
+def test_times_of_day_are_a_clock_with_the_trigger_inside(crash, tmp_path, head, stamps, base):
+    time, force, _ = crash
+    # Long enough for whole seconds to give a rate.
+    time = np.arange(0.0, 6.0, 1.0 / RATE)
+    force = np.vstack([force, np.tile([0.0, 0.0, -9.80665], (time.size - len(force), 1))])
+    told = stamps(base + time)
+    rows = [f"{t},{x:.5f},{y:.5f},{z:.5f}" for t, (x, y, z) in zip(told, force, strict=True)]
+    path = tmp_path / "r.csv"
+    path.write_text("\n".join([f"{head},ax [m/s2],ay [m/s2],az [m/s2]", *rows]) + "\n")
+    _, table = drafted(tmp_path, path)
+    (unit,) = table["units"]
+    part = unit["accelerometers"][0]
+    found = triad_of_channels(
+        read_crash_record(path),
+        part["channels"],
+        quantity="acceleration",
+        unit=part["unit"],
+        time=part["time"],
+        time_unit=part["time_unit"],
+        rate_hz=part.get("rate_hz"),
+    )
+    clock = found.index.to_numpy()
+    assert clock.size == time.size and (np.diff(clock) > 0.0).all()
+    # Whole seconds: the clock begins with the second of the first sample.
+    assert clock[0] == pytest.approx(base, abs=0.51 if len(told[0]) <= 8 else 1e-3)
+    # The blow begins 2 s after the first sample, and time zero up to 20 ms before it.
+    assert -0.021 <= unit["trigger_s"] - clock[0] - 2.0 <= 0.01
+    assert clock[0] < unit["trigger_s"] < clock[-1]
+
+
+def test_records_that_were_joined_are_no_midnight(crash, tmp_path):
+    time, force, _ = crash
+    path = written(tmp_path, "r.csv", ["time_s", "ax", "ay", "az"], [36930.0 + time, force])
+    rows = path.read_text().splitlines()
+    path.write_text("\n".join([*rows, *rows[1:]]) + "\n")
+    with pytest.raises(DataError):
+        drafted(tmp_path, path)

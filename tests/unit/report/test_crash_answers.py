@@ -15,6 +15,7 @@ from strapdown import simulate
 from strapdown.bundle.seal import to_json
 from strapdown.config.crash_case import AssumedSpec, CaseSpec, ReferenceSpec
 from strapdown.crash.case import case_severity, compare_reference, main_event, run_case
+from strapdown.crash.reconstruction import summary_table
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import read_raw
 from strapdown.report.crash_case import (
@@ -24,7 +25,8 @@ from strapdown.report.crash_case import (
     trajectory_table,
     write_table,
 )
-from strapdown.report.crash_words import limitations
+from strapdown.report.crash_tables import answers_table, severity_table
+from strapdown.report.crash_words import headline, key_figures, lead, limitations
 from strapdown.report.values import spaced
 from strapdown.report.verify import changed_case
 
@@ -84,9 +86,53 @@ def test_a_case_without_further_faults_has_the_usual_limits_alone(result):
     assert codes(result) == USUAL
 
 
+def with_change(result, **changes):
+    """The result with another change of velocity of its event."""
+    (body,) = result.reconstruction.main.body
+    return with_main(result, body=(replace(body, event=replace(body.event, **changes)),))
+
+
 def test_an_event_that_is_cut_by_the_record(result):
-    assert codes(with_event(result, lasts_beyond_record=True)) - USUAL == {"event-beyond-record"}
-    assert codes(with_event(result, starts_before_record=True)) - USUAL == {"event-before-record"}
+    # What the regulation calls its end does not matter: a tail that rings misses nothing.
+    assert codes(with_event(result, lasts_beyond_record=True)) == USUAL
+    every = (True, True, True)
+    for missing, code in (("after", "event-beyond-record"), ("before", "event-before-record")):
+        cut = with_change(result, missing=(missing,), open_axes=every)
+        assert codes(cut) - USUAL == {code}
+
+
+def test_a_part_is_told_as_at_least_everywhere(result):
+    whole = result.reconstruction.main.body[0].event
+    cut = with_change(result, missing=("after",), open_axes=(True, True, True))
+    size = f"{3.6 * whole.resultant:.2f}"
+    said = spaced(headline(cut))
+    assert said.startswith(f"Delta-V at least {size} km/h (above ")
+    assert "direction of force of the recorded part" in said and "±" not in said.split(";")[0]
+    assert spaced(headline(result)).startswith(f"Delta-V {size} ±")
+    first, second, *_ = key_figures(cut)
+    assert spaced(first.value) == f"at least {size} km/h"
+    assert "without an upper bound" in first.bound
+    assert second.name == "Direction of force of the recorded part"
+    assert "the record ends within the contact" in lead(cut)
+    table = answers_table(cut)
+    assert any(cell.startswith("at least ") for cell in table.rows[table.strong[0]])
+    rows = summary_table([cut.reconstruction.main])
+    quantity = rows.index.get_level_values("quantity")
+    assert rows[quantity == "delta-V resultant m/s"]["high"].tolist() == [math.inf]
+    assert "PDOF of the recorded part deg" in quantity
+    told = crash_json(cut)
+    main = next(a for a in told["answers"] if a["recorder"] == told["main"])
+    change = main["events"][0]["body"]["event"]
+    assert change["at_least"] and change["missing"] == ["after"]
+    assert change["resultant_m_per_s"]["high"] is None
+    # Backward, and beyond; to the side, where the sign is not determined, in either direction.
+    assert change["forward_m_per_s"]["low"] is None and change["forward_m_per_s"]["high"] < 0.0
+    found = case_severity(cut.spec, cut.reconstruction.main)
+    assert found and all(a.at_least for a in found if a.risk is not None)
+    risky = replace(cut, severity=found)
+    assert all(s["high"] is None and s["at_least"] for s in crash_json(risky)["severity"])
+    assert all(row[1].startswith("at least ") for row in severity_table(risky).rows)
+    assert "at least" in repr(cut.reconstruction.main)
 
 
 def test_no_event(result):
@@ -328,11 +374,9 @@ def test_a_change_of_velocity_is_held_against_another(result, main):
     ours = whole.resultant
     same = held(delta_v_m_per_s=ours, delta_v_sd_m_per_s=0.1)
     assert same.delta_v == pytest.approx(ours, rel=1e-12)
-    # The event's own bound has a share of time zero that a stated span has not.
     assert same.sd * 1.959963984540054 == pytest.approx(whole.resultant_bound, rel=1e-6)
     assert same.consistent
-    event = main.events.events[0]
-    assert same.span == (event.time_zero, event.end)
+    assert same.span == (whole.delta_v.start, whole.delta_v.end)
     limit = 1.959963984540054 * math.hypot(same.sd, 0.1)
     assert held(delta_v_m_per_s=ours + 0.999 * limit, delta_v_sd_m_per_s=0.1).consistent
     assert not held(delta_v_m_per_s=ours + 1.001 * limit, delta_v_sd_m_per_s=0.1).consistent

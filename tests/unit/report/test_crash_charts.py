@@ -58,12 +58,10 @@ def test_the_curves_of_delta_v_end_at_the_answer():
 
 def test_the_band_of_delta_v_is_the_bound_at_an_exact_time():
     unit = crash_case(units=ALONE).reconstruction.main
-    event, change = unit.events.events[0], unit.body[0].event
-    (half,) = delta_v_half_widths(
-        unit, event.time_zero, event.time_zero_sd, np.array([change.delta_v.end])
-    )
+    onset, change = unit.body[0].contact.start, unit.body[0].event
+    (half,) = delta_v_half_widths(unit, onset, np.array([change.delta_v.end]))
     rest_sd = unit.at_point.resting_force(STANDARD_GRAVITY)[1]
-    moved = -change.delta_v.start_rate[None] * event.time_zero_sd
+    moved = onset.rate[None] * onset.sd
     bound = body_delta_v_bound(
         unit.at_point.effects, change.delta_v.weights, rest_sd=rest_sd, at_ends=moved
     )
