@@ -19,7 +19,11 @@ from strapdown.formats.mme_reader import (
     BODY_NOTE,
     CHANGE_NOTE,
     FILTER_NOTE,
+    NO_VEHICLE,
+    PLACE_NOTE,
+    POINT_NOTE,
     SAMPLING_NOTE,
+    VEHICLE_NOTE,
     even_stamps,
 )
 from strapdown.tables import ACCEL, EULER, GYRO, NED, POSITION_SD, VELOCITY
@@ -63,6 +67,7 @@ _PLACES = {
     "barrier": "FBAR",
     "sled": "SLED",
 }
+_NUMBERS = tuple("123456789MSHP")
 _FILE_NAME = re.compile(r"[^A-Za-z0-9_-]+")
 _SHORTEST = "record"
 LONGEST_FILE_NAME = 40
@@ -158,7 +163,8 @@ def _object_and_place(channel: CrashChannel) -> str:
     said = f"{body} {channel.place.lower()}" if body != "vehicle" else channel.place.lower()
     main = next((code for word, code in _PLACES.items() if word in said), "VEHC")
     seat = "1" if body.startswith("driver") else "3" if body.startswith("front passenger") else "0"
-    return f"{'B' if body == 'barrier' else '1'}{seat}{main}"
+    number = channel.vehicle if channel.vehicle in _NUMBERS else "1" if not channel.vehicle else "0"
+    return f"{'B' if body == 'barrier' else number}{seat}{main}"
 
 
 def _ending(channel: CrashChannel) -> str:
@@ -208,6 +214,12 @@ def _head(
         notes.append(AXIS_NOTE + channel.axis)
     if channel.body != known.body:
         notes.append(BODY_NOTE + clean(channel.body))
+    if channel.vehicle != known.vehicle:
+        notes.append(VEHICLE_NOTE + (clean(channel.vehicle) or NO_VEHICLE))
+    if channel.point != known.point and channel.point:
+        notes.append(POINT_NOTE + clean(channel.point))
+    if channel.place:
+        notes.append(PLACE_NOTE + clean(channel.place))
     if channel.low_pass and channel.low_pass != letter_says:
         notes.append(FILTER_NOTE + clean(channel.low_pass))
     # A velocity is noted as a change, so that a reader does not subtract its first value.
@@ -216,7 +228,7 @@ def _head(
     notes += [clean(r) for r in remarks]
     cut_off = channel.bandwidth
     return {
-        "Test object number": code[0],
+        "Test object number": clean(channel.vehicle) or code[0],
         "Name of the channel": clean(channel.place) or clean(channel.name),
         "Laboratory channel code": clean(channel.name),
         "Customer channel code": NOVALUE,
@@ -271,23 +283,25 @@ def _stamps_head(code: str, time: Array) -> dict[str, str]:
 
 
 def _test(record: CrashRecord) -> dict[str, str]:
-    facts = record.facts
-    mass, speed = facts.get("mass_kg", ""), facts.get("speed_m_per_s", "")
-    return {
+    numbers = [int(n) for n in record.vehicles if n.isdecimal()]
+    head = {
         "Data format edition number": "1.6",
         "Laboratory name": NOVALUE,
-        "Laboratory test ref. number": clean(facts.get("test", "")) or NOVALUE,
+        "Laboratory test ref. number": clean(record.facts.get("test", "")) or NOVALUE,
         "Customer name": NOVALUE,
         "Title": clean(record.title) or NOVALUE,
         "Medium No./number of media": "1/1",
         "Timestamp": NOVALUE,
         "Type of the test": NOVALUE,
         "Date of the test": NOVALUE,
-        "Number of test objects": "1",
-        "Name of test object 1": clean(facts.get("vehicle", "")) or NOVALUE,
-        "Velocity test object 1": clean(speed) or NOVALUE,
-        "Mass test object 1": clean(mass) or NOVALUE,
+        "Number of test objects": str(max(numbers, default=1)),
     }
+    for number, facts in sorted(record.vehicles.items()) or [("1", {})]:
+        spoken = {"vehicle": "Name of", "speed_m_per_s": "Velocity", "mass_kg": "Mass"}
+        more = {key: clean(key) for key in facts if key not in spoken}
+        for key, name in (spoken | more).items():
+            head[f"{name} test object {number}"] = clean(facts.get(key, "")) or NOVALUE
+    return head
 
 
 def _file(head: Mapping[str, str], values: Array) -> str:
