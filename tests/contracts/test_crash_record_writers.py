@@ -55,7 +55,8 @@ def record():
     decimal = np.array([float(f"{1e-4 * k:.4f}") for k in range(-100, 300)])
     channels = (
         channel("ax, \"high\" [1]", "acceleration", "x", even, values, unit="m/s2",
-                sampling="mean", place="left sill", vehicle="2", point="DSLF", low_pass="CFC 180", full_scale=1961.33),
+                sampling="mean", place="left sill", vehicle="2", point="DSLF", low_pass="CFC 180",
+                full_scale=1961.33),
         channel("-ay", "acceleration", "-y", even, -values, unit="m/s2", sampling="instantaneous",
                 place="left sill", bandwidth=1650.0, low_pass="1650 Hz before the sampler"),
         channel("ω", "rate", "z", uneven, values, unit="rad/s", body="driver's head",

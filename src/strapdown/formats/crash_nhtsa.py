@@ -28,7 +28,7 @@ from strapdown.formats.nhtsa import UNITS, Channel, CrashTest, Vehicle, read_nht
 from strapdown.formats.signs import Signs
 from strapdown.tables import imu_table
 
-__all__ = ["accelerations", "detect", "imu_of", "read"]
+__all__ = ["accelerations", "code_of_place", "detect", "imu_of", "read"]
 
 
 Array = NDArray[np.float64]
@@ -187,6 +187,30 @@ def _points(channels: Sequence[Channel], vehicles: set[int]) -> dict[int, _Point
                 vehicle, body, clean(point), clean(place or words or point)
             )
     return out
+
+
+def code_of_place(point: str, body: str, place: str) -> tuple[str, str]:
+    """Location code and seat for a channel, as `CrashChannel` has its point, body and position.
+
+    The code is ``OTHR`` for the structure at a position without a code; empty for a moving part
+    without one.
+    """
+    location, seat = (*point.split("/"), "")[:2]
+    if re.fullmatch(r"[A-Z0-9]{4}", location) and (location in _PLACES or body == "vehicle"):
+        return location, seat if re.fullmatch(r"[A-Z0-9]{2}", seat) else ""
+    if body == "vehicle":
+        words = {compact(text): code for code, (text, _) in _STRUCTURE.items()}
+        return words.get(compact(place), "OTHR"), ""
+    if body in ("barrier", "fixed barrier"):
+        return "OTHR", ""
+    for code, text in _MOVING.items():
+        if text == body:
+            return code, ""
+    for number, who in _SEATS.items():
+        for code, text in _OCCUPANT.items():
+            if body == f"{who}'s {text}":
+                return code, number
+    return "", ""
 
 
 def _code(channel: Channel) -> tuple[str, str]:

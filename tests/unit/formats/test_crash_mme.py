@@ -109,6 +109,34 @@ def test_a_redundant_sensor_is_at_the_point_of_the_primary_one():
     assert [s.redundant for s in said] == [False, True, False]
 
 
+BARRIER = "M0MBARCG0000ACXC"
+
+
+@pytest.mark.parametrize(
+    ("codes", "objects", "own", "vehicle"),
+    [
+        # By the header of its channels; as the only object that is left; else by its letter.
+        ((CAR, BARRIER), 3, "3", "3"),
+        ((CAR, BARRIER), 2, None, "2"),
+        ((CAR, BARRIER), 2, "M", "2"),
+        ((CAR, BARRIER), 3, None, "M"),
+        ((CAR, BARRIER), 1, None, "M"),
+        ((CAR, BARRIER), 2, "1", "2"),
+        ((CAR, BARRIER, "B0FBAR000000FOXX"), 2, None, "M"),
+        ((CAR, BARRIER, "S0SLED000000ACXD"), 2, None, "M"),
+    ],
+)
+def test_the_number_of_a_mobile_barrier(test_of, codes, objects, own, vehicle):
+    record = test_of(
+        *(channel(c, Test_object_number=own if c == BARRIER else None) for c in codes),
+        mme=f"Title :x\nNumber of test objects :{objects}\nName of test object 2 :trolley\n",
+    )
+    assert record.channel(BARRIER).vehicle == vehicle
+    assert record.channel(CAR).vehicle == "1"
+    assert record.vehicles == {"2": {"vehicle": "trolley"}}
+    assert record.facts == {"title": "x", "number of test objects": str(objects)}
+
+
 def test_unknown_fields_are_shown_as_they_are():
     said = decode_mme("1_QQQQ00ZZH3ACXA".replace("_", "1"))
     assert said.location == "'QQQQ'"
