@@ -215,6 +215,9 @@ def _labels(
     Vehicles of two records with one number are one, unless their facts name two.
     """
     known = {"": ""}
+    if len(record.vehicles) == 1:
+        # What states no vehicle is of the only one.
+        labels.setdefault("", next(iter(record.vehicles.values())))
     for vehicle in dict.fromkeys(p.vehicle for p in parts if p.vehicle):
         facts = record.vehicles.get(vehicle, {})
         free = (str(k) for k in itertools.count(1) if str(k) not in labels)

@@ -202,6 +202,7 @@ def _numbered(head: Path, findings: list[Finding]) -> dict[int, Path]:
 
 _OF_OBJECT = re.compile(r"(.*?\S)(?: of)? test object (\d+)")
 # Keys of the header about a test object, in SI units, as `CrashRecord.vehicles` names them.
+_SI_OF = {"mass": ("", "kg"), "velocity": ("", "m/s")}
 _SPOKEN = {"name": "vehicle", "mass": "mass_kg", "velocity": "speed_m_per_s"}
 
 
@@ -233,7 +234,7 @@ def _vehicles(header: MmeHeader, findings: list[Finding]) -> dict[str, dict[str,
             facts[name] = header.text(key)
             continue
         try:
-            facts[name] = f"{header.number(key):.10g}"
+            facts[name] = f"{_in_si(header, key):.10g}"
         except DataError as error:
             # Unusable data of the vehicle only affects the report: keep the record.
             fault = error.finding
@@ -247,6 +248,22 @@ def _vehicles(header: MmeHeader, findings: list[Finding]) -> dict[str, dict[str,
                 )
             )
     return vehicles
+
+
+def _in_si(header: MmeHeader, key: str) -> float:
+    """Return a mass or velocity of the header, which is in SI units if it states none."""
+    value, text = header.number(key), header.text(key).partition(" ")[2].strip().lower()
+    unit = find_unit(text, ("velocity",)) if text and key.startswith("velocity") else None
+    factor = FACTORS[unit[0]][unit[1]] if unit else 1.0 if text in _SI_OF[key.split()[0]] else None
+    if value is None or factor is None:
+        raise DataError(
+            "io.no-number",
+            file=header.file,
+            row=header.line(key),
+            quantity=key,
+            text=header.text(key)[:60],
+        )
+    return value * factor
 
 
 def _numbers(files: list[MmeFile], header: MmeHeader) -> list[str]:

@@ -284,6 +284,16 @@ def test_damaged_headers(test_of, tmp_path):
         read_crash_record(tmp_path / "T2.mme")
 
 
+def test_facts_of_a_vehicle_are_in_si(test_of):
+    stated = (
+        "Velocity test object 1 :54 km/h\nMass test object 1 :3000 lb\nClass of test object 1 :M1\n"
+    )
+    record = test_of(channel(), mme=f"Title :x\n{stated}")
+    assert record.vehicles == {"1": {"speed_m_per_s": "15", "class": "M1"}}
+    (finding,) = record.findings
+    assert (finding.code, finding.quantity) == ("io.left-out-unusable", "mass test object 1")
+
+
 def test_failed_missing_and_renamed_channels_are_told(test_of, tmp_path):
     record = test_of(channel(Data_status="failed"), channel(CAR))
     assert "status as failed" in record.findings[0].what
