@@ -201,6 +201,57 @@ def test_an_unknown_code_is_a_point_and_it_is_said(tmp_path):
     assert [u["name"] for u in tomllib.loads(first.text)["units"]][-1] == "ZZZZ"
 
 
+def of_one(record, change):
+    """The first vehicle of a record, its channels changed."""
+    return replace(record, channels=tuple(change(c) for c in record.channels if c.vehicle == "1"))
+
+
+def test_points_stay_two_under_one_name():
+    record = of_one(
+        recorded("car to car", "nhtsa"),
+        lambda c: replace(c, place="floor") if c.point in ("FLLR", "FLRR") else c,
+    )
+    (draft,) = draft_cases([record])
+    units = {
+        u["name"]: u["accelerometers"][0]["channels"] for u in tomllib.loads(draft.text)["units"]
+    }
+    assert units["floor"] == {"x": "1", "y": "2", "z": "3"}
+    assert units["floor 2"] == {"x": "4", "y": "5", "z": "6"}
+
+
+def test_a_point_that_is_clipped_is_no_low_range_of_another():
+    def clipped(c):
+        time, values = c.load()
+        limit = 0.4 * np.abs(values).max()
+        return replace(c, load=lambda: (time, np.clip(values, -limit, limit)))
+
+    record = of_one(
+        recorded("car to car", "nhtsa"), lambda c: clipped(c) if c.point == "FLLR" else c
+    )
+    (draft,) = draft_cases([record])
+    units = tomllib.loads(draft.text)["units"]
+    assert [len(u["accelerometers"]) for u in units] == [1, 1, 1]
+
+
+def test_a_gyro_belongs_to_its_point_and_is_lent_to_the_others():
+    record = recorded("car to car", "nhtsa")
+    gyros = tuple(
+        replace(c, name=f"g{c.axis}", quantity="rate", unit="rad/s", full_scale=None)
+        for c in record.channels
+        if c.point == "VECG"
+    )
+    whole = replace(record, channels=(*record.channels, *gyros))
+    first, second = (tomllib.loads(d.text)["units"] for d in draft_cases([whole]))
+    center = "vehicle center of gravity"
+    assert {u["name"]: u.get("gyro_from") for u in first} == {
+        "left rear floorpan": center,
+        "right rear floorpan": center,
+        center: None,
+    }
+    # That of another vehicle is of no use.
+    assert all("gyro_from" not in u and "gyro" not in u for u in second)
+
+
 def test_a_fixed_barrier_is_no_vehicle(tmp_path):
     record = recorded("car to car", "nhtsa")
     channels = tuple(
