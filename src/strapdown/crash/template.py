@@ -168,8 +168,12 @@ def draft_cases(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> 
     if not units:
         told = [f"{', '.join(p.channels.values())}: {p.kind}" for p in settled]
         told += [f"{s.what}: {s.why}" for s in skipped]
+        numbered = any(c.vehicle or c.point for r in records for c in r.channels)
+        none = "crash.no-accelerometer-found"
+        if numbered:
+            none = "crash.no-accelerometer-on-structure"
         raise DataError(
-            "crash.no-accelerometer-found" if told else "crash.nothing-in-record",
+            none if told else "crash.nothing-in-record",
             file=", ".join(r.path.name for r in records[:3]),
             parts=told[:8] + ["…"] * (len(told) > 8),
         )
@@ -201,7 +205,7 @@ def draft_cases(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> 
                 left_out,
                 tuple(findings),
                 vehicle,
-                name,
+                plain(name),
             )
         )
     return tuple(drafts)

@@ -206,6 +206,14 @@ def of_one(record, change):
     return replace(record, channels=tuple(change(c) for c in record.channels if c.vehicle == "1"))
 
 
+def test_a_record_of_moving_parts_alone_is_no_case():
+    record = recorded("car to car", "nhtsa")
+    moving = tuple(c for c in record.channels if c.body != "vehicle")
+    with pytest.raises(DataError, check=coded("crash.no-accelerometer-on-structure")) as caught:
+        draft_cases([replace(record, channels=moving)])
+    assert "it moves with the engine" in str(caught.value)
+
+
 def test_points_stay_two_under_one_name():
     record = of_one(
         recorded("car to car", "nhtsa"),
