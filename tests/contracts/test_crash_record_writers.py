@@ -138,3 +138,15 @@ def test_a_recorded_crash_goes_through_every_format(writer, recordings, tmp_path
         for mine, back in zip(one.load(), other.load(), strict=True):
             np.testing.assert_array_equal(mine, back)
         assert (other.axis, other.body, other.low_pass) == (one.axis, one.body, one.low_pass)
+
+
+def test_positions_of_one_word_stay_points_of_their_own_in_mme(tmp_path):
+    time = np.arange(4.0)
+    channels = tuple(
+        channel(f"{place} {axis}", "acceleration", axis, time, time, unit="m/s2", place=place)
+        for place, axes in (("front rail", "xy"), ("rear rail", "z"))
+        for axis in axes
+    )
+    read = _mme(tmp_path, CrashRecord(Path("a"), "csv", "", {}, channels, ()))
+    front, same, rear = (read[c.name].point for c in channels)
+    assert front == same != rear

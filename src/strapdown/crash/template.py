@@ -169,11 +169,15 @@ def draft_cases(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> 
         told = [f"{', '.join(p.channels.values())}: {p.kind}" for p in settled]
         told += [f"{s.what}: {s.why}" for s in skipped]
         numbered = any(c.vehicle or c.point for r in records for c in r.channels)
-        none = "crash.no-accelerometer-found"
-        if numbered:
-            none = "crash.no-accelerometer-on-structure"
+        code = (
+            "crash.nothing-in-record"
+            if not told
+            else "crash.no-accelerometer-on-structure"
+            if numbered
+            else "crash.no-accelerometer-found"
+        )
         raise DataError(
-            none if told else "crash.nothing-in-record",
+            code,
             file=", ".join(r.path.name for r in records[:3]),
             parts=told[:8] + ["…"] * (len(told) > 8),
         )
@@ -244,7 +248,8 @@ def _units_by_vehicle(
 ) -> tuple[dict[str, list[Unit]], list[Skipped]]:
     """Units of each vehicle that has an accelerometer, and what is left out."""
     out = list(skipped)
-    numbers = sorted({p.vehicle for p in parts if p.vehicle and p.kind == "acceleration"})
+    found = {p.vehicle for p in parts if p.vehicle and p.kind == "acceleration"}
+    numbers = sorted(found, key=lambda number: (len(number), number))
     if len(numbers) == 1:
         # What states no vehicle is of the only one.
         parts = [replace(p, vehicle=p.vehicle or numbers[0]) for p in parts]

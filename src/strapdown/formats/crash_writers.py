@@ -13,7 +13,13 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError
 from strapdown.formats import csv, nhtsa
 from strapdown.formats.crash_nhtsa import code_of_place
-from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord, clean
+from strapdown.formats.crash_record import (
+    QUANTITIES,
+    CrashChannel,
+    CrashRecord,
+    clean,
+    position_of,
+)
 from strapdown.formats.mme_codes import FILTERS, LENGTH, NO_CLASS, decode_mme
 from strapdown.formats.mme_reader import (
     AXIS_NOTE,
@@ -143,11 +149,17 @@ def _codes(channels: list[CrashChannel]) -> dict[str, str]:
     """Assign a unique code to each channel; names that are codes are kept."""
     codes = {c.name: c.name for c in channels if _is_code(c.name)}
     taken = {code.upper() for code in codes.values()}
+    points: dict[str, list[str]] = {}
     for channel in channels:
         if channel.name in codes:
             continue
         start, end = _object_and_place(channel), _ending(channel)
-        number = 0
+        # Points of one location differ in their numbers, whatever axes each has.
+        of_start = points.setdefault(start, [])
+        point = channel.point or position_of(channel.place)
+        if point not in of_start:
+            of_start.append(point)
+        number = of_start.index(point)
         while (code := f"{start}{number // 100:02d}{number % 100:02d}00{end}") in taken:
             number += 1
         taken.add(code)

@@ -275,15 +275,15 @@ def _numbers(files: list[MmeFile], header: MmeHeader) -> list[str]:
     objects = [f.known.vehicle if f.known else "" for f in files]
     stated = _plain_number(header, "number of test objects") or 0.0
     free = {str(k) for k in range(1, int(min(stated, 9.0)) + 1)} - set(objects)
-    # An object that does not move, such as a fixed barrier, may be the one that is left.
+    # A fixed barrier, component or test rig may be the object that is left.
     alone = len(free) == len({o for o in objects if o.isalpha()}) == 1
-    alone = alone and all(f.known is None or f.known.vehicle for f in files)
+    alone = alone and not any(f.known and f.known.code[0] in "BCT" for f in files)
     numbers = {o: o for o in objects}
     for letter in (o for o in numbers if o.isalpha()):
         of_letter = (f for f, o in zip(files, objects, strict=True) if o == letter)
         own = {f.header.text("test object number") for f in of_letter}
         number = own.pop() if len(own) == 1 else ""
-        if number.isdecimal() and number not in objects:
+        if number.isdecimal() and number not in (*objects, *numbers.values()):
             numbers[letter] = number
         elif alone:
             numbers[letter] = free.pop()

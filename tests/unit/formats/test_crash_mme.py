@@ -121,6 +121,8 @@ BARRIER = "M0MBARCG0000ACXC"
         ((CAR, BARRIER), 2, "M", "2"),
         ((CAR, BARRIER), 3, None, "M"),
         ((CAR, BARRIER), 1, None, "M"),
+        ((CAR, BARRIER, "T0TIRS000000TI00"), 2, None, "M"),
+        ((CAR, BARRIER, "00TIRS000000TI00"), 2, None, "2"),
         ((CAR, BARRIER), 2, "1", "2"),
         ((CAR, BARRIER, "B0FBAR000000FOXX"), 2, None, "M"),
         ((CAR, BARRIER, "S0SLED000000ACXD"), 2, None, "M"),
@@ -135,6 +137,12 @@ def test_the_number_of_a_mobile_barrier(test_of, codes, objects, own, vehicle):
     assert record.channel(CAR).vehicle == "1"
     assert record.vehicles == {"2": {"vehicle": "trolley"}}
     assert record.facts == {"title": "x", "number of test objects": str(objects)}
+
+
+def test_two_objects_of_one_number_stay_two(test_of):
+    sled = "S0SLED000000ACXD"
+    record = test_of(*(channel(c, Test_object_number="2") for c in (BARRIER, sled)))
+    assert len({record.channel(c).vehicle for c in (BARRIER, sled)}) == 2
 
 
 def test_unknown_fields_are_shown_as_they_are():
