@@ -169,3 +169,31 @@ def test_fixes_of_another_time_are_refused_as_the_run_refuses_them(run_cli, ride
             start={"heading_deg": 0.0},
         )
     assert proposed.value.finding.code == run.value.finding.code == "navigation.no-fix-in-record"
+
+
+def test_a_test_of_two_vehicles_gives_a_case_for_each(run_cli, tmp_path):
+    from tests.unit.crash.two_vehicles import recorded
+
+    from strapdown.formats.crash_writers import write_nhtsa
+
+    write_nhtsa(tmp_path / "test", recorded("car to car", "nhtsa"))
+    out = tmp_path / "case.toml"
+    (tmp_path / "case-2.toml").write_text("mine")
+    done = run_cli("init", "crash", tmp_path / "test", "--out", out)
+    # Nothing is written where one of the files exists.
+    assert done.code == 4
+    assert not (tmp_path / "case-1.toml").exists()
+    done = run_cli("init", "crash", tmp_path / "test", "--out", out, "--force")
+    assert (done.code, done.err, out.exists()) == (0, "", False)
+    files = [tmp_path / f"case-{k}.toml" for k in (1, 2)]
+    for name, file in zip(("Car A, 2018", "Car B"), files, strict=True):
+        text = file.read_text(encoding="utf-8")
+        assert tomllib.loads(text)["vehicle"]["name"] == name
+        told = done.out.partition(f"Wrote {file}")[2].partition("Wrote ")[0]
+        for k, line in enumerate(text.splitlines(), 1):
+            if '"?"' in line and not line.startswith("#"):
+                assert f"line {k:>3}  {line.split(' = ')[0]}: " in told
+    assert "Vehicle 1: Car A, 2018" in done.out
+    assert "channels 10, 11, 12: it moves with the engine" in done.out
+    assert "channels 13, 14, 15: it moves with the driver's head" in done.out
+    assert done.out.rstrip().endswith(f"Then   strapdown crash {files[0]} {files[1]}")

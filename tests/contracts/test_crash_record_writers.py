@@ -16,7 +16,8 @@ from strapdown.formats.crash_records import read_crash_record
 from strapdown.formats.crash_table import write_crash_csv
 from strapdown.formats.crash_writers import write_mme
 
-KEPT = ("quantity", "axis", "unit", "sampling", "place", "body", "low_pass", "full_scale")
+KEPT = ("quantity", "axis", "unit", "sampling", "place", "body", "vehicle", "point",
+        "low_pass", "full_scale")  # fmt: skip
 
 
 def _csv(folder, record):
@@ -54,10 +55,12 @@ def record():
     decimal = np.array([float(f"{1e-4 * k:.4f}") for k in range(-100, 300)])
     channels = (
         channel("ax, \"high\" [1]", "acceleration", "x", even, values, unit="m/s2",
-                sampling="mean", place="left sill", low_pass="CFC 180", full_scale=1961.33),
+                sampling="mean", place="left sill", vehicle="2", point="DSLF", low_pass="CFC 180",
+                full_scale=1961.33),
         channel("-ay", "acceleration", "-y", even, -values, unit="m/s2", sampling="instantaneous",
                 place="left sill", bandwidth=1650.0, low_pass="1650 Hz before the sampler"),
-        channel("ω", "rate", "z", uneven, values, unit="rad/s", body="driver's head"),
+        channel("ω", "rate", "z", uneven, values, unit="rad/s", body="driver's head",
+                vehicle="1"),
         channel("11HEAD0000H3ACXA", "acceleration", "x", decimal, values, unit="m/s2",
                 sampling="instantaneous", place="head", body="front left occupant's head",
                 low_pass="CFC 1000"),
@@ -83,9 +86,10 @@ def test_every_writer_gives_back_what_it_was_given(writer, record, tmp_path):
             if (key, writer) == ("sampling", "mme") and one.sampling is None:
                 # Samples of a laboratory are taken at their stamps, where nothing else is said.
                 continue
-            # Without a place, ISO MME has the name there.
-            mine = getattr(one, key) or (one.name if (key, writer) == ("place", "mme") else None)
-            assert (getattr(other, key) or None) == (mine or None), (one.name, key)
+            if (key, writer) in (("place", "mme"), ("point", "mme")) and not getattr(one, key):
+                # Every code of ISO MME has a position.
+                continue
+            assert (getattr(other, key) or None) == (getattr(one, key) or None), (one.name, key)
         assert set(one.remarks) <= set(other.remarks)
 
 
@@ -134,3 +138,15 @@ def test_a_recorded_crash_goes_through_every_format(writer, recordings, tmp_path
         for mine, back in zip(one.load(), other.load(), strict=True):
             np.testing.assert_array_equal(mine, back)
         assert (other.axis, other.body, other.low_pass) == (one.axis, one.body, one.low_pass)
+
+
+def test_positions_of_one_word_stay_points_of_their_own_in_mme(tmp_path):
+    time = np.arange(4.0)
+    channels = tuple(
+        channel(f"{place} {axis}", "acceleration", axis, time, time, unit="m/s2", place=place)
+        for place, axes in (("front rail", "xy"), ("rear rail", "z"))
+        for axis in axes
+    )
+    read = _mme(tmp_path, CrashRecord(Path("a"), "csv", "", {}, channels, ()))
+    front, same, rear = (read[c.name].point for c in channels)
+    assert front == same != rear

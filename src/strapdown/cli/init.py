@@ -38,8 +38,8 @@ ALIGN_EPILOG = "Example: strapdown init align log.imu, then strapdown align alig
 NAVIGATE_EPILOG = "Example: strapdown init navigate log.csv --gnss fixes.csv"
 CRASH_EPILOG = "Example: strapdown init crash left.csv right.csv --out case.toml"
 
-# Most unused parts to print.
-SHOWN = 6
+# Longest number of a vehicle in the name of its file.
+SHORT = 20
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -78,17 +78,17 @@ def crash(
 ) -> None:
     """Propose the case file of a crash from its records, with questions for missing data.
 
-    Each line states whether a value was found, is assumed, or is to be filled in ("?"). Then:
-    strapdown crash case.toml
+    Each line states whether a value was found, is assumed, or is to be filled in ("?"). Records of
+    several vehicles give a file for each: case-1.toml, case-2.toml. Then: strapdown crash case.toml
     """
-    from strapdown.crash.template import draft_case, read_records
+    from strapdown.crash.template import draft_cases, read_records
 
     def draft(folder: Path, report: Progress) -> Any:
         there = read_records(records)
         report("looking through", 0.5)
-        return draft_case(there, folder=folder)
+        return draft_cases(there, folder=folder)
 
-    question = f"Check; correct it in {out} if wrong:"
+    question = "Check; correct it in {} if wrong:"
     _propose("crash", records, draft, question, out, force=force, quiet=quiet)
 
 
@@ -115,7 +115,7 @@ def align(
     from strapdown.systems.alignment_draft import draft_alignment
 
     def draft(folder: Path, _: Progress) -> Any:
-        return draft_alignment(_table(log, flags), folder=folder, axes=flags.axes)
+        return (draft_alignment(_table(log, flags), folder=folder, axes=flags.axes),)
 
     _propose("align", [log], draft, "", out, force=force, quiet=quiet)
 
@@ -163,7 +163,7 @@ def navigate(
     def draft(folder: Path, _: Progress) -> Any:
         keys = fix_keys(fixes.given(), gnss or beside)
         receiver = specify(FixesTable, **{"path": str(log), **keys}) if keys else None
-        return draft_navigation(
+        proposed = draft_navigation(
             _table(log, flags),
             folder=folder,
             axes=flags.axes,
@@ -171,8 +171,9 @@ def navigate(
             sensor=sensor,
             foot=foot,
         )
+        return (proposed,)
 
-    question = f"Assumed; correct it in {out} if wrong:"
+    question = "Assumed; correct it in {} if wrong:"
     _propose("navigate", [log], draft, question, out, force=force, quiet=quiet)
 
 
@@ -193,43 +194,71 @@ def _propose(
     force: bool,
     quiet: bool,
 ) -> None:
-    """Write the draft of a configuration, and print what was found and what the user must say.
+    """Write the drafts of a configuration, and print what was found and what the user must say.
 
-    `draft`: called with the folder of the file, and progress. `question`: above what the user is to
-    confirm; nothing is listed if empty.
+    `draft`: called with the folder of the files, and progress; returns one draft, or one for each
+    vehicle. `question`: above what the user is to confirm, with braces for the file; nothing is
+    listed if empty.
     """
     from strapdown.cli.console import console, print_findings, progress
     from strapdown.cli.result_folder import refuse_result
 
     usual = "case.toml" if command == "crash" else f"{command}.toml"
-    _check_free(out, usual, force=force)
+    if out.is_dir() or command != "crash":
+        _check_free(out, usual, force=force)
     for record in records:
         refuse_result(record, "record" if command == "crash" else "log")
     with progress(quiet) as report:
         report("reading", 0.1)
         made = draft(out.absolute().parent, report)
-        _write_file(out, made.text, usual, force=force)
+        files = _files(out, [getattr(one, "vehicle", "") for one in made])
+        for file in files:
+            _check_free(file, usual, force=force)
+        for file, one in zip(files, made, strict=True):
+            _write_file(file, one.text, usual, force=force)
     if quiet:
         return
-    print_findings(made.findings)
+    # Findings about the records are those of each draft.
+    print_findings(made[0].findings)
     page = console()
+    told: list[Any] = []
+    for file, one in zip(files, made, strict=True):
+        if len(made) > 1:
+            name = f": {one.name}" if one.name else ""
+            page.print(f"\nVehicle {one.vehicle}{name}", style="bold")
+        _print_draft(page, command, file, one, question, told)
+    page.print(f"\nThen   strapdown {command} {' '.join(str(file) for file in files)}")
+
+
+def _files(out: Path, vehicles: Sequence[str]) -> list[Path]:
+    """File of each draft: that of the user for one; with the vehicle's number for several."""
+    if len(vehicles) == 1:
+        return [out]
+    plain = all(v.isascii() and v.isalnum() and len(v) < SHORT for v in vehicles)
+    if not plain or len({v.lower() for v in vehicles}) < len(vehicles):
+        vehicles = [str(k) for k in range(1, len(vehicles) + 1)]
+    return [out.with_stem(f"{out.stem}-{v}") for v in vehicles]
+
+
+def _print_draft(
+    page: Console, command: str, out: Path, made: Any, question: str, told: list[Any]
+) -> None:
+    """Print what was found for one file; `told`: what was left out and is listed already."""
     page.print("Found", style="bold")
     for line in made.found:
         page.print(f"  {line}")
-    left_out = made.left_out if command == "crash" else ()
+    left_out = [s for s in made.left_out if s not in told] if command == "crash" else []
+    told += left_out
     if left_out:
         page.print("Left out", style="bold")
-        for gone in left_out[:SHOWN]:
+        for gone in left_out:
             page.print(f"  {gone.path}, {gone.what}: {gone.why}")
-        if len(left_out) > SHOWN:
-            page.print(f"  and {len(left_out) - SHOWN} more: at the end of {out}")
     page.print(f"\nWrote {out}")
     _list(page, f'To be filled in; replace each "?" in {out}:', made.asked)
     if question:
-        _list(page, question, made.to_check)
+        _list(page, question.format(out), made.to_check)
     if command == "crash":
         page.print("\nCheck the lines marked 'assumed' as well.")
-    page.print(f"\nThen   strapdown {command} {out}")
 
 
 def _list(page: Console, head: str, lines: Sequence[Asked]) -> None:

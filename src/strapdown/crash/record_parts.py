@@ -17,7 +17,7 @@ from strapdown.formats.aid_table import read_reference_path
 from strapdown.formats.clocks import EPOCH
 from strapdown.formats.columns import ABROAD, DIRECTIONS, TURNS, read_name, without_accents
 from strapdown.formats.crash_edr import KMH, rounding
-from strapdown.formats.crash_record import CrashChannel, CrashRecord
+from strapdown.formats.crash_record import CrashChannel, CrashRecord, position_of
 from strapdown.formats.crash_samples import (
     last_midnight,
     mean_accelerations_of,
@@ -69,7 +69,8 @@ class Part:
     record; `zeroed`: gravity at rest has been subtracted; `named`: the record names the axes;
     `of_vehicle`: why they are the vehicle's, where the record defines them so, else empty;
     `uncertainty`: error model by keys of the sensor catalogue, with its grounds `basis`;
-    `velocities`: the channels of delta-V of which the accelerations are means.
+    `velocities`: the channels of delta-V of which the accelerations are means; `vehicle` and
+    `point` as of `CrashChannel`.
     """
 
     path: str
@@ -93,6 +94,8 @@ class Part:
     notes: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
     velocities: tuple[CrashChannel, ...] = ()
+    vehicle: str = ""
+    point: str = ""
 
     @property
     def axes(self) -> list[int]:
@@ -114,12 +117,13 @@ class Part:
 
 @dataclass(frozen=True)
 class Skipped:
-    """Unused part of a record, with the reason."""
+    """Unused part of a record, with the reason; `vehicle` as of `CrashChannel`, empty of none."""
 
     path: str
     what: str
     reason: str | Finding
     names: tuple[str, ...] = ()
+    vehicle: str = ""
 
     @property
     def why(self) -> str:
@@ -1142,9 +1146,28 @@ def _as_accelerations(part: Part) -> Part:
     )
 
 
+def record_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skipped], bool]:
+    """Find the triads of a record; also whether kind and unit are still to be settled.
+
+    A record that names measuring points and has stamps is one of a laboratory; a table is searched
+    by its headings, each vehicle by itself.
+    """
+    sensed = [c for c in record.channels if c.quantity != "time"]
+    coded = all((c.vehicle or c.point) and c.clock for c in sensed)
+    if coded or any(c.samples is None for c in record.channels):
+        return *laboratory_parts(path, record), False
+    parts: list[Part] = []
+    skipped: list[Skipped] = []
+    for vehicle in dict.fromkeys(c.vehicle for c in sensed):
+        kept = tuple(c for c in record.channels if c.quantity == "time" or c.vehicle == vehicle)
+        found, left = table_parts(path, replace(record, channels=kept))
+        parts += [replace(part, vehicle=vehicle) for part in found]
+        skipped += [replace(one, vehicle=vehicle) for one in left]
+    return parts, skipped, True
+
+
 # Triads of a laboratory test: one per sensor position on the vehicle, of primary channels.
 
-_AXIS_WORD = re.compile(r"(?<![A-Za-z])([XYZ])[RGL]?(?![A-Za-z])(?:[ -]?AXIS)?", re.I)
 _FAILED = ("failed", "no data", "questionable", "meaningless")
 # Sensors of crash laboratories, after calibration by SAE J211: unit of the full scale, and error
 # model. Zeroed channels have lost gravity with their bias.
@@ -1162,55 +1185,80 @@ LABORATORY = {
 }
 
 
+class _Place(NamedTuple):
+    """What the channels of one triad have in common."""
+
+    vehicle: str
+    quantity: str
+    point: str
+
+
 def laboratory_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skipped]]:
-    """Find the triads of a test, and the failed, redundant and foreign channels."""
-    places: dict[tuple[str, str], list[CrashChannel]] = {}
+    """Find the triads of a test, and the failed, redundant and foreign channels.
+
+    A triad is one quantity at one measuring point of one vehicle.
+    """
+    places: dict[_Place, list[CrashChannel]] = {}
     skipped: list[Skipped] = []
-    elsewhere: dict[str, list[str]] = {}
+    elsewhere: dict[tuple[str, str], list[str]] = {}
     for channel in record.channels:
         sensed = channel.quantity in LABORATORY
         failed = (r for r in channel.remarks if any(f in r.lower() for f in _FAILED))
         if not sensed or not channel.axis:
             what = "no axis" if sensed else channel.quantity
             why = f"no sensor of a vehicle's motion ({what})"
-            elsewhere.setdefault(why, []).append(channel.name)
+            elsewhere.setdefault((channel.vehicle, why), []).append(channel.name)
         elif channel.body != "vehicle":
-            elsewhere.setdefault(f"it moves with the {channel.body}", []).append(channel.name)
+            why = f"it {'moves with' if channel.vehicle else 'is fixed to'} the {channel.body}"
+            elsewhere.setdefault((channel.vehicle, why), []).append(channel.name)
         elif failure := next(failed, ""):
             why = f"the laboratory says so: {failure}"
-            skipped.append(Skipped(path, f"channel {channel.name}", why, (channel.name,)))
+            skipped.append(
+                Skipped(path, f"channel {channel.name}", why, (channel.name,), channel.vehicle)
+            )
         else:
-            # Without the axis, the position is common to the channels of one block.
-            place = " ".join(_AXIS_WORD.sub(" ", channel.place).split()).strip(" ,-") or "vehicle"
-            places.setdefault((channel.quantity, place), []).append(channel)
-    for why, names in elsewhere.items():
-        skipped.append(Skipped(path, f"channels {', '.join(names)}", why, tuple(names)))
-    found = (_block(path, *key, channels, skipped) for key, channels in places.items())
+            # Without codes, the position is common to the channels of one block.
+            point = channel.point or position_of(channel.place) or "vehicle"
+            place = _Place(channel.vehicle, channel.quantity, point)
+            places.setdefault(place, []).append(channel)
+    for (vehicle, why), names in elsewhere.items():
+        what = f"channels {', '.join(names)}"
+        skipped.append(Skipped(path, what, why, tuple(names), vehicle))
+    found = (_block(path, place, channels, skipped) for place, channels in places.items())
     return [part for part in found if part is not None], skipped
 
 
 def _block(
-    path: str, quantity: str, place: str, channels: Sequence[CrashChannel], skipped: list[Skipped]
+    path: str, at: _Place, channels: Sequence[CrashChannel], skipped: list[Skipped]
 ) -> Part | None:
     chosen: dict[str, CrashChannel] = {}
     curves: dict[str, tuple[Array, Array]] = {}
+    # Without a position in words, such as the one word for all, its code names it.
+    place = position_of(channels[0].place) or at.point
     spare: list[str] = []
+    twins: list[str] = []
     unread: list[Skipped] = []
     for channel in sorted(channels, key=lambda c: "redundant" in c.remarks):
         axis = channel.axis.lstrip("-")
         if axis in chosen:
-            spare.append(channel.name)
+            (spare if "redundant" in channel.remarks else twins).append(channel.name)
             continue
         try:
             curves[axis] = channel.load()
         except DataError as error:
-            unread.append(Skipped(path, f"channel {channel.name}", error.finding, (channel.name,)))
+            what = f"channel {channel.name}"
+            unread.append(Skipped(path, what, error.finding, (channel.name,), at.vehicle))
             continue
         chosen[axis] = channel
     skipped += unread
-    if spare:
-        why = f"redundant at '{place}'; to use it, write it in place of the primary one"
-        skipped.append(Skipped(path, f"channels {', '.join(spare)}", why, tuple(spare)))
+    for names, why in (
+        (spare, "redundant"),
+        (twins, "another sensor of the same axis, which the record does not tell from the first,"),
+    ):
+        if names:
+            why = f"{why} at '{place}'; to use it, write it in place of the primary one"
+            what = f"channels {', '.join(names)}"
+            skipped.append(Skipped(path, what, why, tuple(names), at.vehicle))
     if not chosen:
         return None
     axes = [a for a in "xyz" if a in chosen]
@@ -1221,11 +1269,11 @@ def _block(
         sign = -1.0 if signs[axis] else 1.0
         values[:, "xyz".index(axis)] = sign * np.interp(time, *curves[axis])
     step = float(np.median(np.diff(time))) if time.size > 1 else math.nan
-    key, unit, model = LABORATORY[quantity]
+    key, unit, model = LABORATORY[at.quantity]
     scales = [c.full_scale for c in chosen.values() if c.full_scale]
     return Part(
         path,
-        quantity,
+        at.quantity,
         {a: f"{signs[a]}{chosen[a].name}" for a in axes},
         Clock("", "s", "the record has its own", step, 1.0 / step),
         chosen[axes[0]].unit,
@@ -1233,7 +1281,7 @@ def _block(
         time,
         values,
         label=place,
-        zeroed=quantity == "acceleration",
+        zeroed=at.quantity == "acceleration",
         named=True,
         of_vehicle="its format defines x, y, z as forward, right, down of the vehicle (SAE J211)",
         place=place,
@@ -1245,6 +1293,8 @@ def _block(
             + (f"; {chosen[a].low_pass}" if chosen[a].low_pass else "")
             for a in axes
         ),
+        vehicle=at.vehicle,
+        point=at.point,
     )
 
 

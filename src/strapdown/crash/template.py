@@ -41,13 +41,12 @@ from strapdown.crash.record_parts import (
     Skipped,
     agreement,
     known_path,
-    laboratory_parts,
     quiet_part,
+    record_parts,
     settle_units,
-    table_parts,
 )
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.formats.crash_record import CrashRecord
+from strapdown.formats.crash_record import CrashRecord, compact
 from strapdown.formats.crash_records import read_crash_record
 from strapdown.rotation import within_half_turn
 from strapdown.sensors.catalogue import SENSORS, load_sensor
@@ -61,7 +60,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Draft:
-    """Proposed case file: text, lines for the user, questions, consequences to confirm."""
+    """Proposed case file: text, lines for the user, questions, consequences to confirm.
+
+    `vehicle`: its number, empty where the records do not number vehicles; `name` as they state it.
+    """
 
     text: str
     found: tuple[str, ...]
@@ -69,6 +71,8 @@ class Draft:
     to_check: tuple[Asked, ...] = ()
     left_out: tuple[Skipped, ...] = ()
     findings: tuple[Finding, ...] = ()
+    vehicle: str = ""
+    name: str = ""
 
 
 def read_records(paths: Sequence[str | Path]) -> list[CrashRecord]:
@@ -93,7 +97,7 @@ def read_records(paths: Sequence[str | Path]) -> list[CrashRecord]:
 
 
 def draft_case(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> Draft:
-    """Write a proposed case from records.
+    """Write a proposed case from records of one vehicle.
 
     Parameters
     ----------
@@ -109,6 +113,37 @@ def draft_case(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> D
     ------
     DataError
         No record, or none with an accelerometer; the message lists the findings.
+    ConfigError
+        The records are of several vehicles.
+    """
+    drafts = draft_cases(records, folder=folder)
+    if len(drafts) > 1:
+        raise ConfigError(
+            "crash.records-of-several-vehicles",
+            file=", ".join(r.path.name for r in records[:3]),
+            quantity="vehicle",
+            numbers=[d.vehicle for d in drafts],
+        )
+    return drafts[0]
+
+
+def draft_cases(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> tuple[Draft, ...]:
+    """Write a proposed case for each vehicle of the records.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Folder of the case files; record paths are relative to it.
+
+    Returns
+    -------
+    tuple of Draft
+        In the order of the vehicles' numbers. Records that number no vehicles are of one.
+
+    Raises
+    ------
+    DataError
+        No record, or none with an accelerometer; the message lists the findings.
     """
     tables: list[Part] = []
     settled: list[Part] = []
@@ -116,6 +151,7 @@ def draft_case(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> D
     findings: list[Finding] = []
     paths: list[KnownPath] = []
     entries: list[IndicatedEntry] = []
+    labels: dict[str, Mapping[str, str]] = {}
     for record in records:
         path = named_from(record.path, Path(folder))
         # The case states the reader's finding about the clock.
@@ -125,46 +161,131 @@ def draft_case(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> D
             paths.append(known)
             continue
         if record.format == "edr":
-            own = recorder_parts(path, record)
-            tables += own.parts
-            skipped += own.skipped
-            findings += own.findings
-            entries += [own.entry] if own.entry else []
+            recorder = recorder_parts(path, record)
+            tables += recorder.parts
+            skipped += recorder.skipped
+            findings += recorder.findings
+            entries += [recorder.entry] if recorder.entry else []
             continue
-        tabular = all(c.samples is not None for c in record.channels)
-        found, left = (table_parts if tabular else laboratory_parts)(path, record)
-        skipped += left
-        (tables if tabular else settled).extend(found)
+        found, left, open_units = record_parts(path, record)
+        own = _labels(record, found, labels)
+        skipped += [replace(s, vehicle=own.get(s.vehicle, s.vehicle)) for s in left]
+        parts = [replace(p, vehicle=own[p.vehicle]) for p in found]
+        (tables if open_units else settled).extend(parts)
     tables, copies, told_of = drop_copies(tables)
     skipped += copies
     findings += told_of
     settled += settle_units(tables)
-    units, more = group_units(settled)
-    skipped += more
+    units, skipped = _units_by_vehicle(settled, skipped)
     if not units:
         told = [f"{', '.join(p.channels.values())}: {p.kind}" for p in settled]
         told += [f"{s.what}: {s.why}" for s in skipped]
+        numbered = any(c.vehicle or c.point for r in records for c in r.channels)
+        code = (
+            "crash.nothing-in-record"
+            if not told
+            else "crash.no-accelerometer-on-structure"
+            if numbered
+            else "crash.no-accelerometer-found"
+        )
         raise DataError(
-            "crash.no-accelerometer-found" if told else "crash.nothing-in-record",
+            code,
             file=", ".join(r.path.name for r in records[:3]),
             parts=told[:8] + ["…"] * (len(told) > 8),
         )
-    facts = next((r.facts for r in records if r.facts), {})
-    title = next((r.title for r in records if r.facts and r.title), "")
-    page = _filled(_face(units), skipped, title, facts, paths, entries[:1])
-    lines = [_told(unit) for unit in units]
-    lines += [
+    if len(units) > 1:
+        why = "nothing says which of the vehicles it is of; add it to the case of its own"
+        skipped += [Skipped(p.path, f"the path {plain(p.name)}", why) for p in paths]
+        paths = []
+    of_test = next((r for r in records if r.facts or r.vehicles), None)
+    lines = [
         f"{plain(p.name)}: a path from {instant(p.start)} to {instant(p.end)} s, a reference"
         for p in paths
     ]
-    return Draft(
-        page.text,
-        tuple(lines),
-        tuple(page.asked),
-        tuple(page.to_check),
-        tuple(skipped),
-        tuple(findings),
-    )
+    drafts = []
+    for vehicle, of_vehicle in units.items():
+        facts = {**(of_test.facts if of_test else {}), **labels.get(vehicle, {})}
+        name = facts.get("vehicle", "")
+        title = of_test.title if of_test else ""
+        if title and len(units) > 1:
+            title = f"{title}, vehicle {vehicle}"
+        # What belongs to no vehicle that has a case is stated in each.
+        left_out = tuple(s for s in skipped if s.vehicle == vehicle or s.vehicle not in units)
+        # A recorder's table states no vehicle, so that its speed is of the only one.
+        speeds = entries[:1] if len(units) == 1 else []
+        page = _filled(_face(of_vehicle), left_out, title, facts, paths, speeds)
+        drafts.append(
+            Draft(
+                page.text,
+                (*map(_told, of_vehicle), *lines),
+                tuple(page.asked),
+                tuple(page.to_check),
+                left_out,
+                tuple(findings),
+                vehicle,
+                plain(name),
+            )
+        )
+    return tuple(drafts)
+
+
+def _labels(
+    record: CrashRecord, parts: Sequence[Part], labels: dict[str, Mapping[str, str]]
+) -> dict[str, str]:
+    """Number of each vehicle of a record among those of all records, whose facts are in `labels`.
+
+    Vehicles of two records with one number are one, unless their facts name two.
+    """
+    known = {"": ""}
+    if len(record.vehicles) == 1:
+        # What states no vehicle is of the only one.
+        labels.setdefault("", next(iter(record.vehicles.values())))
+    for vehicle in dict.fromkeys(p.vehicle for p in parts if p.vehicle):
+        facts = record.vehicles.get(vehicle, {})
+        free = (str(k) for k in itertools.count(1) if str(k) not in labels)
+        same = vehicle not in labels or not _differ(labels[vehicle], facts)
+        label = vehicle if same else next(free)
+        labels[label] = {**facts, **labels.get(label, {})}
+        known[vehicle] = label
+    return known
+
+
+def _differ(one: Mapping[str, str], other: Mapping[str, str]) -> bool:
+    """Whether facts are of two vehicles: by the numbers of their chassis, or by their names."""
+    key = "vin" if "vin" in one and "vin" in other else "vehicle"
+    named = compact(one.get(key, "")), compact(other.get(key, ""))
+    return all(named) and named[0] != named[1]
+
+
+def _units_by_vehicle(
+    parts: Sequence[Part], skipped: Sequence[Skipped]
+) -> tuple[dict[str, list[Unit]], list[Skipped]]:
+    """Units of each vehicle that has an accelerometer, and what is left out."""
+    out = list(skipped)
+    found = {p.vehicle for p in parts if p.vehicle and p.kind == "acceleration"}
+    numbers = sorted(found, key=lambda number: (len(number), number))
+    if len(numbers) == 1:
+        # What states no vehicle is of the only one.
+        parts = [replace(p, vehicle=p.vehicle or numbers[0]) for p in parts]
+    elif numbers:
+        why = "nothing says which of the vehicles it is of; make the case of one from its records"
+        out += [
+            Skipped(p.path, _of(p), why, tuple(p.channels.values())) for p in parts if not p.vehicle
+        ]
+        parts = [p for p in parts if p.vehicle]
+    units: dict[str, list[Unit]] = {}
+    for vehicle in numbers or [""]:
+        own, left = group_units([p for p in parts if p.vehicle == vehicle])
+        out += [replace(one, vehicle=vehicle) for one in left]
+        if own:
+            units[vehicle] = own
+    why = "its vehicle has no accelerometer"
+    out += [
+        Skipped(p.path, _of(p), why, tuple(p.channels.values()), p.vehicle)
+        for p in parts
+        if p.vehicle not in units and units
+    ]
+    return units, out
 
 
 # The file from its template.
@@ -215,6 +336,7 @@ def _filled(
         title=title,
         facts=facts,
         fact=lambda key: _positive(facts.get(key, "")),
+        stands=_number(facts.get("speed_m_per_s", "")) == 0.0,
         late=late if timed and late > 0.0 else None,
         # The speed before time zero of a recorder, if the case counts from there.
         indicated=entries[0] if entries and any(u.impact.at_zero for u in units) else None,
@@ -256,12 +378,17 @@ def _filled(
     return page
 
 
-def _positive(text: str) -> float | None:
+def _number(text: str) -> float | None:
     try:
         value = float(text)
     except ValueError:
         return None
-    return value if value > 0.0 else None
+    return value if math.isfinite(value) else None
+
+
+def _positive(text: str) -> float | None:
+    value = _number(text)
+    return value if value is not None and value > 0.0 else None
 
 
 def _blow(unit: Unit) -> str:
@@ -335,6 +462,11 @@ class Unit:
     why: tuple[str, ...] = ()
     heading_deg: float | None = None
     heading_why: str = ""
+
+    @property
+    def vehicle(self) -> str:
+        """Number of its vehicle; empty where the records number none."""
+        return self.strong.vehicle
 
     @property
     def strong(self) -> Part:
@@ -427,6 +559,9 @@ def _one_recorder(group: Sequence[Part], part: Part) -> str:
             continue
         if one_file and other.clock.column != part.clock.column:
             continue
+        if other.point != part.point:
+            # Two measuring points, as the record names them.
+            continue
         low, high = sorted((other, part), key=_reach)
         end, reached = _reach(low), float(np.nanmax(np.abs(high.values)))
         apart = abs(_instant(low, end) - _instant(high, end))
@@ -470,9 +605,10 @@ def _owner(
     gyro: Part, free: Mapping[int, Sequence[Part]], impacts: Sequence[Impact]
 ) -> tuple[int | None, str]:
     """Unit without a gyro that a gyro belongs to, and why."""
-    for k, parts in free.items():
-        if any(p.path == gyro.path for p in parts):
-            return k, ""
+    beside = [k for k, parts in free.items() if any(p.path == gyro.path for p in parts)]
+    if beside:
+        # Every point of a rigid vehicle turns alike; that of the gyro itself comes first.
+        return min(beside, key=lambda k: free[k][0].point != gyro.point), ""
     near = [
         k
         for k, parts in free.items()

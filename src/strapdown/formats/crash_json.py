@@ -73,6 +73,7 @@ def write_crash_json(path: str | Path, record: CrashRecord) -> None:
         "version": VERSION,
         "title": record.title,
         "facts": dict(record.facts),
+        "vehicles": {number: dict(facts) for number, facts in record.vehicles.items()},
         "stamps_s": stamps,
         "channels": channels,
     }
@@ -119,18 +120,28 @@ def read(path: Path) -> CrashRecord:
         channels.append(
             CrashChannel(name=names[k], load=_loader(stamps[at], values), file=path.name, **kept)
         )
-    facts = whole.get("facts", {})
-    if not isinstance(facts, dict):
-        raise _form(path, "facts", "io.crash-json-no-table")
+    vehicles = whole.get("vehicles", {})
+    if not isinstance(vehicles, dict):
+        raise _form(path, "vehicles", "io.crash-json-no-table")
     title = whole.get("title", "")
     return CrashRecord(
         path=path,
         format="json",
         title=clean(title) if isinstance(title, str) else "",
-        facts={clean(k, LONGEST_NAME): clean(str(v)) for k, v in facts.items()},
+        facts=_texts(whole.get("facts", {}), path, "facts"),
         channels=tuple(channels),
         files=(path,),
+        vehicles={
+            clean(number, LONGEST_NAME): _texts(facts, path, f"vehicles {clean(number, 20)}")
+            for number, facts in vehicles.items()
+        },
     )
+
+
+def _texts(table: object, path: Path, quantity: str) -> dict[str, str]:
+    if not isinstance(table, dict):
+        raise _form(path, quantity, "io.crash-json-no-table")
+    return {clean(k, LONGEST_NAME): clean(str(v)) for k, v in table.items()}
 
 
 def _loader(time: Array, values: Array) -> Callable[[], tuple[Array, Array]]:

@@ -3,21 +3,32 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+import re
+import tomllib
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.errors import DataError
-from strapdown.formats.crash_record import LONGEST_NAME, CrashChannel, CrashRecord, clean
+from strapdown.errors import DataError, Finding
+from strapdown.formats.crash_record import (
+    DEFORMS,
+    LONGEST_NAME,
+    CrashChannel,
+    CrashRecord,
+    clean,
+    compact,
+    position_of,
+)
 from strapdown.formats.nhtsa import UNITS, Channel, CrashTest, Vehicle, read_nhtsa
 from strapdown.formats.signs import Signs
 from strapdown.tables import imu_table
 
-__all__ = ["accelerations", "detect", "imu_of", "read"]
+__all__ = ["accelerations", "code_of_place", "detect", "imu_of", "read"]
 
 
 Array = NDArray[np.float64]
@@ -38,27 +49,27 @@ _SPELLED = {"G'S": "g", "G": "g", "M/S2": "m/s2", "DPS": "deg/s", "DEG/SEC": "de
     "MM": "mm",
     "KPH": "km/h",
 }
-# Seats and locations of the NHTSA Test Reference Guide, Version 5, Volume I, tables of codes, where
-# the meaning is plain; other codes are shown unchanged.
-_SEATS = {"01": "driver", "02": "front passenger", "03": "front centre passenger"} | {
-    "04": "left rear passenger",
-    "05": "centre rear passenger",
-    "06": "right rear passenger",
+_CODES = tomllib.loads(Path(__file__).with_name("nhtsa_codes.toml").read_text(encoding="utf-8"))
+_SEATS, _OCCUPANT, _MOVING = (_CODES[table] for table in ("seats", "occupant", "moving"))
+#: Parts of the structure by their codes: in words, and which crash pushes them in, if any.
+_STRUCTURE: dict[str, tuple[str, str]] = {
+    code: (words, group)
+    for group, parts in _CODES["structure"].items()
+    for code, words in parts.items()
 }
-_PLACES = {
-    "HDCG": "head",
-    "CHST": "chest",
-    "PVCN": "pelvis",
-    "NEKU": "upper neck",
-    "NEKL": "lower neck",
-    "FMRL": "left femur",
-    "FMRR": "right femur",
-    "ENGN": "engine",
-    "FLLR": "floor, left rear",
-    "FLRR": "floor, right rear",
-    "VECG": "centre of gravity",
-}
-_STATUS = {"AM": "as measured", "CF": "channel failed", "NO": "no data"}
+_PLACES = {**_OCCUPANT, **_MOVING, **{code: words for code, (words, _) in _STRUCTURE.items()}}
+# Objects with their own motion beside the numbered vehicles.
+_OBJECTS = ("SLED", "IMCG", "PEND", "ROLC")
+# A comment states a position if it has a word of those of the codes.
+_WORDS = {
+    word
+    for words in (*_PLACES.values(), "seat rear crossmember rocker tunnel trunk cg top bottom base")
+    for word in re.findall(r"[a-z]{2,}", words.replace("-pillar", " pillar"))
+} - {"of", "and", "the", "vehicle", "other", "nine", "arm", "event", "signal", "test", "device"}
+# Codes that name no position.
+_NO_CODE = ("", "NA", "OTHR", "OTHER", "UN")
+_NO_SEAT = ("", "NA", "00", "OT", "AP")
+_STATUS = _CODES["status"]
 
 
 detect = Signs(named=(".ev5",), first=rb"\A.{0,4081}?----- EV5 -----", inside="*.ev5")
@@ -80,45 +91,54 @@ def read(path: Path) -> CrashRecord:
     test = read_nhtsa(path)
     there = [c for c in test.channels if c.path is not None]
     vehicles = {v.number for v in test.vehicles} or {c.vehicle for c in there} - {0}
+    points = _points(there, vehicles)
     return CrashRecord(
         path=path,
         format="nhtsa",
         title=clean(test.title),
         facts=_facts(test),
-        channels=tuple(_channel(c, vehicles) for c in there),
+        channels=tuple(_channel(c, points[c.number]) for c in there),
         files=(test.path, *(c.path for c in there if c.path is not None)),
-        findings=test.findings,
+        findings=(*test.findings, *_unknown_codes(there, test.path)),
+        vehicles={str(v.number): _stated(_vehicle(v)) for v in test.vehicles},
     )
 
 
 def _facts(test: CrashTest) -> dict[str, str]:
     number = "".join(c for c in test.path.stem if c.isdigit())
-    facts = {
-        "test": number.lstrip("0"),
-        "objective": test.objective,
-        "date": test.date,
-        "laboratory": test.performer,
-        "contract": test.reference,
-        "recorder": test.comment,
-        "closing speed, m/s": _plain(test.closing_speed),
-        "impact angle, deg": _plain(test.impact_angle_deg),
-    }
-    for vehicle in test.vehicles:
-        one = "" if len(test.vehicles) == 1 else f"vehicle {vehicle.number}: "
-        facts |= {one + key: value for key, value in _vehicle(vehicle).items()}
+    return _stated(
+        {
+            "test": number.lstrip("0"),
+            "objective": test.objective,
+            "date": test.date,
+            "laboratory": test.performer,
+            "contract": test.reference,
+            "recorder": test.comment,
+            "closing speed, m/s": _plain(test.closing_speed),
+            "impact angle, deg": _plain(test.impact_angle_deg),
+        }
+    )
+
+
+def _stated(facts: dict[str, str]) -> dict[str, str]:
     return {k: clean(v) for k, v in facts.items() if v not in ("", "nan")}
 
 
 def _vehicle(vehicle: Vehicle) -> dict[str, str]:
+    name = f"make {vehicle.make}, model {vehicle.model}, {vehicle.year or 'year unknown'}"
+    if not vehicle.model and vehicle.year is None:
+        # Words, not codes of the database.
+        name = vehicle.make
     return {
-        "vehicle": f"make {vehicle.make}, model {vehicle.model}, {vehicle.year or 'year unknown'}",
-        "vin": vehicle.vin,
+        "vehicle": name,
+        "vin": "" if vehicle.vin.upper() in ("NA", "UN", "UNKNOWN") else vehicle.vin,
         "mass_kg": _plain(vehicle.mass),
         "length_m": _plain(vehicle.length),
         "width_m": _plain(vehicle.width),
         "wheelbase_m": _plain(vehicle.wheelbase),
         "cg_behind_front_axle_m": _plain(vehicle.cg_behind_front_axle),
         "speed_m_per_s": _plain(vehicle.speed),
+        "crab_deg": _plain(vehicle.crab_deg) if vehicle.crab_deg else "",
     }
 
 
@@ -127,7 +147,118 @@ def _plain(value: float) -> str:
     return "" if math.isnan(value) else f"{value:.10g}"
 
 
-def _channel(channel: Channel, vehicles: set[int]) -> CrashChannel:
+class _Point(NamedTuple):
+    """Where a channel was measured: vehicle and point as in `CrashChannel`, position in words."""
+
+    vehicle: str
+    body: str
+    point: str
+    place: str
+
+
+def _points(channels: Sequence[Channel], vehicles: set[int]) -> dict[int, _Point]:
+    """Measuring point of each channel, by its number.
+
+    Channels with one location code are at one point, unless their comments name several positions.
+    """
+    comments = _positions(channels)
+    blocks: dict[tuple[int, str, str], list[Channel]] = {}
+    for channel in channels:
+        blocks.setdefault((channel.vehicle, *_code(channel)), []).append(channel)
+    out = {}
+    for (_, location, seat), block in blocks.items():
+        spelled: dict[str, str] = {}
+        for channel in block:
+            spelled.setdefault(compact(comments[channel.number]), comments[channel.number])
+        named = [key for key in spelled if key]
+        for channel in block:
+            place = comments[channel.number]
+            point = f"{location}/{seat}" if seat else location
+            if location in _NO_CODE and not place:
+                # Nothing says what it has in common with another channel.
+                point = f"{point or 'channel'} {channel.number}"
+            elif len(named) > 1 or location in _NO_CODE:
+                point += f"/{compact(place)}"
+            elif named:
+                place = spelled[named[0]]
+            words = _PLACES.get(location, "" if location in _NO_CODE else location)
+            vehicle, body = _body(channel, vehicles)
+            out[channel.number] = _Point(
+                vehicle, body, clean(point), clean(place or words or point)
+            )
+    return out
+
+
+def code_of_place(point: str, body: str, place: str) -> tuple[str, str]:
+    """Location code and seat for a channel, as `CrashChannel` has its point, body and position.
+
+    The code is ``OTHR`` for the structure at a position without a code; empty for a moving part
+    without one.
+    """
+    location, seat = (*point.split("/"), "")[:2]
+    if re.fullmatch(r"[A-Z0-9]{4}", location) and (location in _PLACES or body == "vehicle"):
+        return location, seat if re.fullmatch(r"[A-Z0-9]{2}", seat) else ""
+    if body == "vehicle":
+        words = {compact(text): code for code, (text, _) in _STRUCTURE.items()}
+        return words.get(compact(place), "OTHR"), ""
+    if body in ("barrier", "fixed barrier"):
+        return "OTHR", ""
+    for code, text in _MOVING.items():
+        if text == body:
+            return code, ""
+    for number, who in _SEATS.items():
+        for code, text in _OCCUPANT.items():
+            if body == f"{who}'s {text}":
+                return code, number
+    return "", ""
+
+
+def _code(channel: Channel) -> tuple[str, str]:
+    """Location and seat of a channel; the seat is empty where it has none."""
+    seat = channel.occupant.upper()
+    return channel.location.upper(), "" if seat in _NO_SEAT else seat
+
+
+def _positions(channels: Sequence[Channel]) -> dict[int, str]:
+    """Position that the comment of each channel names; empty where it names none.
+
+    A text that stands at several location codes of a vehicle names no position.
+    """
+    texts: dict[int, str] = {}
+    codes: dict[tuple[int, str], set[tuple[str, str]]] = {}
+    for channel in channels:
+        text = position_of(channel.comment)
+        if _WORDS.isdisjoint(re.findall(r"[a-z]{2,}", text.lower())):
+            text = ""
+        texts[channel.number] = text
+        codes.setdefault((channel.vehicle, compact(text)), set()).add(_code(channel))
+    shared = {key for key, used in codes.items() if len(used) > 1}
+    for channel in channels:
+        if (channel.vehicle, compact(texts[channel.number])) in shared:
+            texts[channel.number] = ""
+    return texts
+
+
+def _unknown_codes(channels: Sequence[Channel], file: Path) -> list[Finding]:
+    """Say which sensors of motion are fixed to parts that may not be rigid."""
+    codes: dict[str, list[str]] = {}
+    for c in channels:
+        location, seat = _code(c)
+        if c.kind in ("AC", "AV") and location not in _PLACES and not seat and c.vehicle:
+            codes.setdefault(location or "none", []).append(str(c.number))
+    return [
+        Finding(
+            "io.location-code-unknown",
+            severity="note",
+            file=file.name,
+            quantity=f"channels {', '.join(numbers)}",
+            word=clean(code, LONGEST_NAME),
+        )
+        for code, numbers in codes.items()
+    ]
+
+
+def _channel(channel: Channel, at: _Point) -> CrashChannel:
     assert channel.path is not None
     unit = channel.unit.upper()
     si, factor = UNITS.get(unit, ("", 1.0))
@@ -141,8 +272,10 @@ def _channel(channel: Channel, vehicles: set[int]) -> CrashChannel:
         unit=_SPELLED.get(unit, clean(channel.unit, LONGEST_NAME)),
         load=_loader(channel),
         sampling="instantaneous",
-        place=clean(channel.comment) or clean(channel.location),
-        body=_body(channel, vehicles),
+        place=at.place,
+        body=at.body,
+        vehicle=at.vehicle,
+        point=at.point,
         low_pass=low_pass,
         remarks=tuple(clean(r) for r in _remarks(channel)),
         full_scale=None if math.isnan(channel.rating) else channel.rating * factor,
@@ -151,29 +284,39 @@ def _channel(channel: Channel, vehicles: set[int]) -> CrashChannel:
     )
 
 
-def _body(channel: Channel, vehicles: set[int]) -> str:
+def _body(channel: Channel, vehicles: set[int]) -> tuple[str, str]:
+    """Vehicle of a channel, empty for what is fixed to the ground, and the body of it."""
+    location, seat = _code(channel)
+    place = _PLACES.get(location, f"part {channel.location}")
     if channel.vehicle not in vehicles:
-        return "barrier" if channel.vehicle == 0 else f"vehicle {channel.vehicle}"
-    whole = "vehicle" if len(vehicles) == 1 else f"vehicle {channel.vehicle}"
-    place = _PLACES.get(channel.location, f"part {channel.location}")
-    if channel.occupant not in ("", "NA", "00"):
-        who = _SEATS.get(channel.occupant, f"occupant {channel.occupant}")
-        return clean(f"{who}'s {place}" + ("" if whole == "vehicle" else f", {whole}"))
-    # An engine moves in its mounts and is pushed back.
-    return clean(f"engine of {whole}") if channel.location == "ENGN" else whole
+        # Objects that the header does not list as vehicles move where their codes say so.
+        if location in _OBJECTS:
+            return str(channel.vehicle), "vehicle"
+        zero = channel.vehicle == 0
+        return "", "barrier" if zero else f"object {channel.vehicle}, which is no listed vehicle"
+    number = str(channel.vehicle)
+    if location in _OCCUPANT or (seat and location not in _PLACES):
+        who = _SEATS.get(seat, f"occupant {seat}".strip())
+        return number, clean(f"{who}'s {place}")
+    return number, place if location in _MOVING else "vehicle"
 
 
 def _remarks(channel: Channel) -> list[str]:
-    known = _STATUS.get(channel.status, "")
+    known = _STATUS.get(channel.status.upper(), "")
     remarks = [f"status {channel.status}" + (f", {known}" if known else "")]
     remarks.append("primary" if channel.primary else "redundant")
-    remarks.append(f"location {channel.location}, axis {channel.axis}")
+    location = _code(channel)[0]
+    words = f" ({_PLACES[location]})" if location in _PLACES else ""
+    remarks.append(f"location {channel.location}{words}, axis {channel.axis}")
+    if DEFORMS.get(_STRUCTURE.get(location, ("", ""))[1]):
+        remarks.append(DEFORMS[_STRUCTURE[location][1]])
     if channel.maker:
         remarks.append(channel.maker)
     if channel.calibrated:
         remarks.append(f"calibrated {channel.calibrated}")
-    if channel.status != "AM" and channel.comment:
-        remarks.append(f"the laboratory says: {channel.comment}")
+    if channel.comment:
+        bad = channel.status != "AM"
+        remarks.append(f"{'the laboratory says' if bad else 'comment'}: {channel.comment}")
     return remarks
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import unicodedata
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -17,6 +18,7 @@ from strapdown.tables import SAMPLINGS
 
 __all__ = [
     "CHANGE_NOTE",
+    "DEFORMS",
     "LONGEST_NAME",
     "LONGEST_TEXT",
     "QUANTITIES",
@@ -25,6 +27,8 @@ __all__ = [
     "attributes_of",
     "check_attributes",
     "clean",
+    "compact",
+    "position_of",
     "unique",
 ]
 
@@ -69,7 +73,13 @@ class CrashChannel:
     place : str
         Position of the sensor, in words, as far as the record states it.
     body : str
-        Body that it is fixed to: ``vehicle``, or another body in words.
+        Body of that vehicle that it is fixed to: ``vehicle`` for its structure as long as that is
+        rigid, or another body in words: ``engine``, ``front left occupant's head``.
+    vehicle : str
+        Number of the test object that it belongs to: ``1``, ``2``; also of a mobile barrier, sled
+        or impactor. Empty where the record has none, as for a fixed barrier or a table.
+    point : str
+        Code of the measuring point, common to the channels of one triad; empty if unknown.
     low_pass : str
         Filters applied, in words: ``CFC 180``, ``1650 Hz before the sampler``.
     remarks : tuple of str
@@ -104,6 +114,8 @@ class CrashChannel:
     sampling: str | None = None
     place: str = ""
     body: str = "vehicle"
+    vehicle: str = ""
+    point: str = ""
     low_pass: str = ""
     remarks: tuple[str, ...] = ()
     full_scale: float | None = None
@@ -128,14 +140,17 @@ class CrashRecord:
         Key of the reader.
     title : str
     facts : dict of str to str
-        Facts of the test for a report: vehicle, date, laboratory. With the keys ``mass_kg``,
-        ``length_m``, ``width_m``, ``speed_m_per_s`` where stated.
+        Facts of the test for a report: date, laboratory.
     channels : tuple of CrashChannel
     files : tuple of Path
         All files of the record.
     findings : tuple of Finding
     remarks : tuple of str
         Further text for people: lines above a table, which may state rate and axes.
+    vehicles : dict of str to dict of str to str
+        Facts of each vehicle by its number (`CrashChannel.vehicle`), for a report. With the keys
+        ``vehicle`` (its name), ``vin``, ``mass_kg``, ``length_m``, ``width_m``, ``speed_m_per_s``,
+        ``crab_deg`` where stated.
     """
 
     path: Path
@@ -146,6 +161,7 @@ class CrashRecord:
     files: tuple[Path, ...]
     findings: tuple[Finding, ...] = ()
     remarks: tuple[str, ...] = ()
+    vehicles: Mapping[str, Mapping[str, str]] = field(default_factory=dict)
 
     def channel(self, name: str) -> CrashChannel:
         """Return a channel by its name.
@@ -225,13 +241,50 @@ def unique(names: list[str]) -> list[str]:
     return out
 
 
+# Positions in words: without what differs between the channels of one block.
+
+#: Parts of the structure that some crashes push in: by the side of the vehicle that is struck.
+DEFORMS: dict[str, str] = {
+    "front": "part of the structure; a frontal crash may push it back on its own",
+    "side": "part of the structure; a crash against this side may push it in on its own",
+    "rear": "part of the structure; a crash from the rear may push it forward on its own",
+    "roof": "part of the structure; a rollover may push it in on its own",
+    "seat": "bolted to the structure; the upper rail moves with the seat",
+}
+_AXIS_WORD = re.compile(
+    r"(?<![A-Za-z0-9])[XYZ](?:[RGL]|[ -]?(?:AXIS|DIR(?:ECTION)?))?(?![A-Za-z0-9])", re.I
+)
+# What distinguishes the channels of one block in the comments of laboratories.
+_CHANNEL_WORD = re.compile(
+    r"(?<![A-Za-z])(?:AXIS|PRIMARY|PRIM|REDUNDANT|REDUND|RED|BACK-?UP|ACCELERATIONS?|"
+    r"ACCELEROMETER|ACCEL|ACC|ANGULAR|VELOCITY|RATE|YAW|ROLL|PITCH|LONGITUDINAL|LATERAL|VERTICAL|"
+    r"CHANNEL)(?![A-Za-z])\.?",
+    re.I,
+)
+
+
+def position_of(comment: str) -> str:
+    """Position in a comment, which the channels of one block have in common.
+
+    Without the axis, what is measured, and what follows a colon:
+    ``BOTTOM OF ENGINE X: no data after 67 ms`` is at ``BOTTOM OF ENGINE``.
+    """
+    text = _AXIS_WORD.sub(" ", comment.partition(":")[0])
+    return " ".join(_CHANNEL_WORD.sub(" ", text).split()).strip(" ,;-_/()")
+
+
+def compact(text: str) -> str:
+    """Letters and digits of a text in lower case, to compare spellings."""
+    return "".join(c for c in text.casefold() if c.isalnum())
+
+
 # Metadata of a crash channel as plain data, for files that store it beside the samples.
 
 
 #: Remark of velocities that count from time zero, in files without `from_zero`.
 CHANGE_NOTE = "change of velocity since time zero of the recorder"
 _AXES = ("", "x", "y", "z", "-x", "-y", "-z")
-_TEXTS = ("name", "quantity", "axis", "unit", "place", "body", "low_pass")
+_TEXTS = ("name", "quantity", "axis", "unit", "place", "body", "vehicle", "point", "low_pass")
 _NUMBERS = ("full_scale", "bandwidth")
 MOST_REMARKS = 50
 
@@ -249,6 +302,8 @@ def attributes_of(channel: CrashChannel) -> dict[str, Any]:
         "sampling": channel.sampling,
         "place": channel.place,
         "body": channel.body,
+        "vehicle": channel.vehicle,
+        "point": channel.point,
         "low_pass": channel.low_pass,
         "remarks": list(channel.remarks),
         "full_scale": channel.full_scale,

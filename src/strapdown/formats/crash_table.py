@@ -179,8 +179,9 @@ def _noted(note: Mapping[str, Any]) -> ChannelName:
 def _with_notes(channel: CrashChannel, note: Mapping[str, Any] | None) -> CrashChannel:
     if note is None:
         return channel
-    kept = ("sampling", "place", "low_pass", "remarks", "full_scale", "bandwidth")
-    return replace(channel, body=note["body"] or "vehicle", **{k: note[k] for k in kept})
+    of_heading = ("name", "quantity", "axis", "unit", "body")
+    kept = {k: v for k, v in note.items() if k not in of_heading}
+    return replace(channel, body=note["body"] or "vehicle", **kept)
 
 
 def _clock(

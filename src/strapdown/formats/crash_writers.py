@@ -1,4 +1,4 @@
-"""Writers of crash records: ISO MME (ISO/TS 13499), and text tables of recorders and paths."""
+"""Writers of crash records: ISO MME (ISO/TS 13499), tests of NHTSA, tables of recorders, paths."""
 
 from __future__ import annotations
 
@@ -11,14 +11,26 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError
-from strapdown.formats import csv
-from strapdown.formats.crash_record import CHANGE_NOTE, QUANTITIES, CrashChannel, CrashRecord, clean
+from strapdown.formats import csv, nhtsa
+from strapdown.formats.crash_nhtsa import code_of_place
+from strapdown.formats.crash_record import (
+    CHANGE_NOTE,
+    QUANTITIES,
+    CrashChannel,
+    CrashRecord,
+    clean,
+    position_of,
+)
 from strapdown.formats.mme_codes import FILTERS, LENGTH, NO_CLASS, decode_mme
 from strapdown.formats.mme_reader import (
     AXIS_NOTE,
     BODY_NOTE,
     FILTER_NOTE,
+    NO_VEHICLE,
+    PLACE_NOTE,
+    POINT_NOTE,
     SAMPLING_NOTE,
+    VEHICLE_NOTE,
     even_stamps,
 )
 from strapdown.tables import ACCEL, EULER, GYRO, NED, POSITION_SD, VELOCITY
@@ -29,6 +41,7 @@ __all__ = [
     "GYRO_HEADINGS",
     "TIME",
     "write_mme",
+    "write_nhtsa",
     "write_path_csv",
     "write_recorder_csv",
 ]
@@ -62,6 +75,7 @@ _PLACES = {
     "barrier": "FBAR",
     "sled": "SLED",
 }
+_NUMBERS = tuple("123456789MSHP")
 _FILE_NAME = re.compile(r"[^A-Za-z0-9_-]+")
 _SHORTEST = "record"
 LONGEST_FILE_NAME = 40
@@ -135,11 +149,17 @@ def _codes(channels: list[CrashChannel]) -> dict[str, str]:
     """Assign a unique code to each channel; names that are codes are kept."""
     codes = {c.name: c.name for c in channels if _is_code(c.name)}
     taken = {code.upper() for code in codes.values()}
+    points: dict[str, list[str]] = {}
     for channel in channels:
         if channel.name in codes:
             continue
         start, end = _object_and_place(channel), _ending(channel)
-        number = 0
+        # Points of one location differ in their numbers, whatever axes each has.
+        of_start = points.setdefault(start, [])
+        point = channel.point or position_of(channel.place)
+        if point not in of_start:
+            of_start.append(point)
+        number = of_start.index(point)
         while (code := f"{start}{number // 100:02d}{number % 100:02d}00{end}") in taken:
             number += 1
         taken.add(code)
@@ -157,7 +177,8 @@ def _object_and_place(channel: CrashChannel) -> str:
     said = f"{body} {channel.place.lower()}" if body != "vehicle" else channel.place.lower()
     main = next((code for word, code in _PLACES.items() if word in said), "VEHC")
     seat = "1" if body.startswith("driver") else "3" if body.startswith("front passenger") else "0"
-    return f"{'B' if body == 'barrier' else '1'}{seat}{main}"
+    number = channel.vehicle if channel.vehicle in _NUMBERS else "1" if not channel.vehicle else "0"
+    return f"{'B' if body == 'barrier' else number}{seat}{main}"
 
 
 def _ending(channel: CrashChannel) -> str:
@@ -207,6 +228,12 @@ def _head(
         notes.append(AXIS_NOTE + channel.axis)
     if channel.body != known.body:
         notes.append(BODY_NOTE + clean(channel.body))
+    if channel.vehicle != known.vehicle:
+        notes.append(VEHICLE_NOTE + (clean(channel.vehicle) or NO_VEHICLE))
+    if channel.point != known.point and channel.point:
+        notes.append(POINT_NOTE + clean(channel.point))
+    if channel.place:
+        notes.append(PLACE_NOTE + clean(channel.place))
     if channel.low_pass and channel.low_pass != letter_says:
         notes.append(FILTER_NOTE + clean(channel.low_pass))
     # A velocity is noted as a change, so that a reader does not subtract its first value.
@@ -215,7 +242,7 @@ def _head(
     notes += [clean(r) for r in remarks]
     cut_off = channel.bandwidth
     return {
-        "Test object number": code[0],
+        "Test object number": clean(channel.vehicle) or code[0],
         "Name of the channel": clean(channel.place) or clean(channel.name),
         "Laboratory channel code": clean(channel.name),
         "Customer channel code": NOVALUE,
@@ -270,23 +297,25 @@ def _stamps_head(code: str, time: Array) -> dict[str, str]:
 
 
 def _test(record: CrashRecord) -> dict[str, str]:
-    facts = record.facts
-    mass, speed = facts.get("mass_kg", ""), facts.get("speed_m_per_s", "")
-    return {
+    numbers = [int(n) for n in record.vehicles if n.isdecimal()]
+    head = {
         "Data format edition number": "1.6",
         "Laboratory name": NOVALUE,
-        "Laboratory test ref. number": clean(facts.get("test", "")) or NOVALUE,
+        "Laboratory test ref. number": clean(record.facts.get("test", "")) or NOVALUE,
         "Customer name": NOVALUE,
         "Title": clean(record.title) or NOVALUE,
         "Medium No./number of media": "1/1",
         "Timestamp": NOVALUE,
         "Type of the test": NOVALUE,
         "Date of the test": NOVALUE,
-        "Number of test objects": "1",
-        "Name of test object 1": clean(facts.get("vehicle", "")) or NOVALUE,
-        "Velocity test object 1": clean(speed) or NOVALUE,
-        "Mass test object 1": clean(mass) or NOVALUE,
+        "Number of test objects": str(max(numbers, default=1)),
     }
+    for number, facts in sorted(record.vehicles.items()) or [("1", {})]:
+        spoken = {"vehicle": "Name of", "speed_m_per_s": "Velocity", "mass_kg": "Mass"}
+        more = {key: clean(key) for key in facts if key not in spoken}
+        for key, name in (spoken | more).items():
+            head[f"{name} test object {number}"] = clean(facts.get(key, "")) or NOVALUE
+    return head
 
 
 def _file(head: Mapping[str, str], values: Array) -> str:
@@ -301,6 +330,218 @@ def _lines(head: Mapping[str, str]) -> bytes:
 def _number(value: float) -> str:
     """Format a number with the fewest digits that reproduce it exactly."""
     return repr(float(value))
+
+
+# Tests of the NHTSA vehicle database: the EV5 header, and a file of stamps and values per channel.
+
+# Sensor and unit by quantity. Units with the factor 1 keep every bit.
+_EV5_KINDS = {
+    "acceleration": ("AC", "M/S2"),
+    "rate": ("AV", "RAD/S"),
+    "velocity": ("VL", "KPH"),
+    "displacement": ("DS", "MM"),
+    "force": ("LC", "NWT"),
+    "other": ("OT", "OTH"),
+}
+_EV5_NAME = re.compile(r"make (.*), model (.*), (\d{4}|year unknown)")
+
+
+def write_nhtsa(
+    folder: str | Path, record: CrashRecord, *, name: str | None = None
+) -> dict[str, str]:
+    """Write a record as a test of the NHTSA vehicle database.
+
+    Parameters
+    ----------
+    folder : str or Path
+        Output folder: ``NAME.EV5``, and ``NAME.001`` and so on.
+    record : CrashRecord
+        Evenly sampled, with a sample at zero or a whole number of steps from it. Accelerations,
+        rates, forces and stamps keep every bit; a channel along a negative axis is reversed. The
+        layout has no field for classes of filters and for points beyond location codes.
+    name : str, optional
+        Base name of the files; by default ``v`` and the number of the test.
+
+    Returns
+    -------
+    dict of str to str
+        Name of each channel to its number in the test.
+
+    Raises
+    ------
+    DataError
+        The record has no channels, more than 999, a value that is not finite, uneven stamps, or a
+        channel on a moving part for which the database has no code.
+    """
+    channels = [c for c in record.channels if c.quantity != "time"]
+    if not channels or len(channels) > MOST_CHANNELS:
+        raise DataError(
+            "io.channels-iso-mme-holds",
+            file=record.path.name,
+            quantity="channels",
+            count=len(channels),
+            most_channels=MOST_CHANNELS,
+        )
+    test = "".join(c for c in record.facts.get("test", "") if c.isdecimal())
+    stem = _FILE_NAME.sub("_", name or f"v{int(test or 1):05d}").strip("_") or _SHORTEST
+    numbers = _curves(channels)
+    objects = _object_numbers(record, channels)
+    rows = []
+    Path(folder).mkdir(parents=True, exist_ok=True)
+    for channel in channels:
+        time, values = channel.load()
+        number = numbers[channel.name]
+        grounded = not channel.vehicle and channel.body != "vehicle"
+        vehicle = 0 if grounded else objects[channel.vehicle]
+        rows.append(_ev5_channel(channel, number, vehicle, time, values))
+        factor = nhtsa.UNITS.get(_EV5_KINDS[channel.quantity][1], ("", 1.0))[1]
+        written = (-values if channel.axis.startswith("-") else values) / factor
+        pairs = zip(time.tolist(), written.tolist(), strict=True)
+        text = "".join(f"{_number(t)}\t{_number(v)}\n" for t, v in pairs)
+        (Path(folder) / f"{stem}.{number:03d}").write_bytes(text.encode())
+    sections = {
+        "EV5": [],
+        "TEST": [_ev5_test(record, len(rows))],
+        "VEHICLE": [
+            _ev5_vehicle(number, record.vehicles.get(vehicle, {}))
+            for vehicle, number in objects.items()
+        ],
+        "INSTRUMENTATION": [row for _, row in sorted(zip(numbers.values(), rows, strict=True))],
+        "END": [],
+    }
+    lines = [
+        line
+        for section, held in sections.items()
+        for line in (f"----- {section} -----", *("|".join(map(_field, row)) for row in held))
+    ]
+    head = "".join(f"{line}\n" for line in lines)
+    (Path(folder) / f"{stem}.EV5").write_bytes(head.encode("latin-1", "replace"))
+    return {name: str(number) for name, number in numbers.items()}
+
+
+def _field(text: str) -> str:
+    return clean(text).replace("|", "/")
+
+
+def _curves(channels: list[CrashChannel]) -> dict[str, int]:
+    """Number of each channel: its name where that is one, else the next that is free."""
+    numbers = {
+        c.name: int(c.name)
+        for c in channels
+        if c.name.isdecimal() and str(int(c.name)) == c.name and 0 < int(c.name) <= MOST_CHANNELS
+    }
+    free = (k for k in range(1, MOST_CHANNELS + 1) if k not in set(numbers.values()))
+    return {c.name: numbers.get(c.name) or next(free) for c in channels}
+
+
+def _object_numbers(record: CrashRecord, channels: list[CrashChannel]) -> dict[str, int]:
+    """Number of each vehicle."""
+    named = sorted({c.vehicle for c in channels if c.vehicle} | set(record.vehicles))
+    numbers = {v: int(v) for v in named if v.isdecimal() and 0 < int(v) < MOST_CHANNELS}
+    free = (k for k in range(1, MOST_CHANNELS) if k not in set(numbers.values()))
+    # What moves with a vehicle that has no number gets one; 0 is what belongs to none.
+    moving = any(not c.vehicle and c.body == "vehicle" for c in channels)
+    return {v: numbers.get(v) or next(free) for v in ([""] if moving else []) + named}
+
+
+def _ev5_channel(
+    channel: CrashChannel, number: int, vehicle: int, time: Array, values: Array
+) -> list[str]:
+    _check(channel, time, values)
+    if np.isnan(values).any():
+        k = int(np.flatnonzero(np.isnan(values))[0])
+        raise DataError(
+            "io.not-finite-number",
+            file=channel.file or None,
+            row=channel.row(k),
+            quantity=f"channel {channel.name}",
+            values=values[k],
+        )
+    first, interval = _ev5_steps(channel, time)
+    location, seat = code_of_place(channel.point, channel.body, channel.place)
+    if not location:
+        raise DataError(
+            "io.part-without-location-code",
+            file=channel.file or None,
+            quantity=f"channel {channel.name}",
+            body=channel.body,
+        )
+    kind, unit = _EV5_KINDS[channel.quantity]
+    factor = nhtsa.UNITS.get(unit, ("", 1.0))[1]
+    axis = channel.axis.lstrip("-").upper()
+    status = next((r.split()[1].strip(",") for r in channel.remarks if _STATUS.match(r)), "AM")
+    numbers = {
+        "prefilter": "" if channel.bandwidth is None else f"{channel.bandwidth:.10g}",
+        "rating": "" if channel.full_scale is None else _number(channel.full_scale / factor),
+    }
+    return [
+        *(str(vehicle), str(number), kind, seat or "NA", location),
+        *(f"{axis}{'L' if seat else 'G'}" if axis else "NA", "SEC", unit, numbers["prefilter"]),
+        *("", "", numbers["rating"], "", "", str(first), str(first + time.size - 1), interval),
+        *(status, "R" if "redundant" in channel.remarks else "P"),
+        f"{channel.place} {axis}".strip() or "NO COMMENTS",
+    ]
+
+
+_STATUS = re.compile(r"status [A-Z]{2}\b")
+
+
+def _ev5_steps(channel: CrashChannel, time: Array) -> tuple[int, str]:
+    """Number of the first sample, and the interval in µs, that give every stamp."""
+    mean = float(time[-1] - time[0]) / (time.size - 1) if time.size > 1 else 0.0
+    if mean > 0.0:
+        for digits in (3, 6, 9, 12):
+            interval = _number(float(f"{mean * 1e6:.{digits}g}"))
+            step = float(interval) * 1e-6
+            first = round(float(time[0]) / step)
+            off = np.abs(time - step * (first + np.arange(time.size)))
+            if off.max() <= nhtsa.STAMP_ROUNDING:
+                return first, interval
+    raise DataError(
+        "io.stamps-not-even",
+        file=channel.file or None,
+        quantity=f"channel {channel.name}",
+        interval=mean,
+    )
+
+
+def _ev5_test(record: CrashRecord, count: int) -> list[str]:
+    facts = record.facts
+    row = [""] * nhtsa.TEST_FIELDS
+    row[0], row[1], row[18] = "V5", record.title, str(count)
+    for at, key in (
+        (2, "objective"),
+        (3, "date"),
+        (4, "laboratory"),
+        (6, "contract"),
+        (15, "impact angle, deg"),
+        (19, "recorder"),
+    ):
+        row[at] = facts.get(key, "")
+    row[14] = _in_unit(facts.get("closing speed, m/s", ""), nhtsa.KMH)
+    return row
+
+
+def _ev5_vehicle(number: int, facts: Mapping[str, str]) -> list[str]:
+    row = [""] * (nhtsa.VEHICLE_FIELDS + 1)
+    row[0], row[1] = str(number), facts.get("vehicle", "")
+    if match := _EV5_NAME.fullmatch(row[1]):
+        row[1], row[2], row[3] = match[1], match[2], match[3] if match[3].isdecimal() else ""
+    row[6], row[10], row[42] = (facts.get(key, "") for key in ("vin", "mass_kg", "crab_deg"))
+    for at, key in (
+        (12, "wheelbase_m"),
+        (13, "length_m"),
+        (14, "width_m"),
+        (15, "cg_behind_front_axle_m"),
+    ):
+        row[at] = _in_unit(facts.get(key, ""), nhtsa.MM)
+    row[41] = _in_unit(facts.get("speed_m_per_s", ""), nhtsa.KMH)
+    return row
+
+
+def _in_unit(text: str, unit: float) -> str:
+    """Write a number in SI in another unit; facts have ten digits."""
+    return f"{float(text) / unit:.12g}" if text else ""
 
 
 # Recorder exports: one text table per triad or path, with units in the headings.

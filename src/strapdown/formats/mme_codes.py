@@ -33,12 +33,11 @@ DIMENSIONS: dict[str, tuple[str, str]] = {
     code: (said, "other") if isinstance(said, str) else (said[0], said[1])
     for code, said in _WORDS["DIMENSIONS"].items()
 }
-# Parts fixed to the body as long as it is rigid; all others move on their own.
-_FIXED = (
-    "VEHC APIL BPIL CPIL DPIL CRME SECM SILB TUNN ROOF ROFR FORA FRAM FOWE CEUN CTUN ABSE SERM "
-    "SUDO WARC TRCM CCBE DASH SIME"
-)
+#: Parts of the structure, each with the kind of crash that pushes it in (`crash_record.DEFORMS`).
+_STRUCTURE = {code: kind for kind, codes in _WORDS["STRUCTURE"].items() for code in codes.split()}
 _VEHICLES = "123456789"
+# Mobile barrier, sled, linear impactor and pendulum move as vehicles do.
+_OBJECTS_IN_MOTION = "MSHP"
 _LOCATIONS = ("BODY_PARTS", "VEHICLE_PARTS", "CRITERIA", "OTHER_PLACES")
 
 
@@ -58,9 +57,18 @@ class MmeCode:
         A key of `crash_record.QUANTITIES`.
     axis : str
         ``x y z`` for the directions X, Y, Z; else empty.
+    vehicle : str
+        Test object with its own motion, by its code: ``1``, ``M``; else empty.
     body : str
-        Body that the sensor is fixed to, if the object is vehicle 1 and the only one:
-        ``vehicle``, ``front left occupant's head``, ``engine of the vehicle``.
+        Body of that object that the sensor is fixed to: ``vehicle`` for its structure, or another
+        in words: ``front left occupant's head``, ``engine``.
+    point : str
+        Position and locations as coded, of a redundant sensor those of the primary one.
+    deforms : str
+        Key of `crash_record.DEFORMS` for a part that some crash pushes in; else empty.
+    redundant : bool
+    listed : bool
+        Whether the main location is in the tables.
     unknown : tuple of str
         Fields not in the tables, as ``main location 'QQQQ'``.
     """
@@ -75,7 +83,12 @@ class MmeCode:
     filter: str
     quantity: str
     axis: str
+    vehicle: str
     body: str
+    point: str
+    deforms: str
+    redundant: bool
+    listed: bool
     unknown: tuple[str, ...]
 
     @property
@@ -84,12 +97,8 @@ class MmeCode:
         return ", ".join(p for p in (self.position, self.location, *self.fine) if p)
 
 
-def decode_mme(code: str, *, objects: int = 1) -> MmeCode | None:
-    """Decode a channel code.
-
-    `objects`: number of test objects: with more than one, the body names the object. Returns none
-    unless the code has sixteen letters and digits.
-    """
+def decode_mme(code: str) -> MmeCode | None:
+    """Decode a channel code; None unless it has sixteen letters and digits."""
     text = code.strip().upper()
     if len(text) != LENGTH or not (text.isascii() and text.isalnum()):
         return None
@@ -119,6 +128,10 @@ def decode_mme(code: str, *, objects: int = 1) -> MmeCode | None:
         unknown.append(f"physical dimension '{text[12:14]}'")
         dimension = f"'{text[12:14]}'"
     direction = text[14]
+    # The fine locations are the fields of two after position and main location.
+    point = text[1:6] + "".join(
+        _WORDS["PRIMARY"].get(field, field) for field in (text[6:8], text[8:10], text[10:12])
+    )
     return MmeCode(
         code=text,
         test_object=test_object,
@@ -130,20 +143,28 @@ def decode_mme(code: str, *, objects: int = 1) -> MmeCode | None:
         filter=words("filter class", text[15], FILTERS),
         quantity=quantity,
         axis=direction.lower() if direction in "XYZ" else "",
-        body=_body(text, test_object, position, location, objects),
+        vehicle=text[0] if text[0] in _VEHICLES + _OBJECTS_IN_MOTION else "",
+        body=_body(text, test_object, position, location),
+        point=point,
+        deforms="" if (kind := _STRUCTURE.get(main, "rigid")) == "rigid" else kind,
+        redundant=point != text[1:12],
+        listed=any(main in _WORDS[table] for table in _LOCATIONS),
         unknown=tuple(unknown),
     )
 
 
-def _body(text: str, test_object: str, position: str, location: str, objects: int) -> str:
-    main = text[2:6]
-    vehicle = text[0] in _VEHICLES
-    whole = "vehicle" if vehicle and objects == 1 else test_object
-    if main in _WORDS["BODY_PARTS"] and vehicle:
-        who = f"{position} occupant" if position else "occupant"
-        return f"{who}'s {location}" + ("" if objects == 1 else f", {whole}")
+def _body(text: str, test_object: str, position: str, location: str) -> str:
+    main, numbered = text[2:6], text[0] in _VEHICLES
     if main in _WORDS["BODY_PARTS"]:
-        return f"{location} of the {whole}"
-    if main in _FIXED or main == "0000" or location == test_object:
-        return whole
-    return f"{location} of the {whole}" if vehicle and objects == 1 else f"{location}, {whole}"
+        who = f"{position} occupant" if position else "occupant"
+        return f"{who}'s {location}" if numbered else f"{location} of the {test_object}"
+    if numbered or text[0] in _OBJECTS_IN_MOTION:
+        # A part that is not in the tables is fixed to the structure, as far as is known, unless it
+        # belongs to a seat.
+        unlisted = not position and not any(main in _WORDS[table] for table in _LOCATIONS)
+        fixed = main in _STRUCTURE or unlisted
+        return "vehicle" if fixed else " ".join(f"{position} {location}".split())
+    # On the ground, or on an object of which nothing says how it moves.
+    return (
+        test_object if main == "0000" or location == test_object else f"{location}, {test_object}"
+    )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from pathlib import Path
 
@@ -15,11 +15,14 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.crash_record import (
     CHANGE_NOTE,
+    DEFORMS,
     LONGEST_NAME,
     CrashChannel,
     CrashRecord,
     clean,
+    compact,
     header_of,
+    position_of,
     unique,
 )
 from strapdown.formats.mme_codes import DIMENSIONS, NO_CLASS, MmeCode, decode_mme
@@ -70,7 +73,6 @@ def read(path: Path) -> CrashRecord:
     head = header_of(path, ".mme", "io.folder-holds-tests", "io.no-mme-file")
     header = read_header(head)
     findings: list[Finding] = []
-    objects = _objects(header)
     index, listed = _index(head, findings)
     numbered = _numbered(head, findings)
     absent = [n for n in listed if n not in numbered]
@@ -89,21 +91,27 @@ def read(path: Path) -> CrashRecord:
         )
     if not numbered:
         raise DataError("io.test-no-channel-files", file=head.name, quantity="channels")
-    files = [read_mme_file(p, listed.get(n, ""), objects) for n, p in sorted(numbered.items())]
+    files = [read_mme_file(p, listed.get(n, "")) for n, p in sorted(numbered.items())]
     names = unique([f.code or f.path.name for f in files])
     others = {
         f.code.upper(): (n, f) for n, f in reversed(list(zip(names, files, strict=True))) if f.code
     }
-    facts = _facts(header, findings)
+    vehicles = _vehicles(header, findings)
+    numbers = _numbers(files, header)
+    places = _places(files)
     findings += [f for file in files for f in _told(file, listed)]
     return CrashRecord(
         path=path,
         format="mme",
         title=next((t for k in _TITLES if (t := header.text(k))), clean(head.stem)),
-        facts=facts,
-        channels=tuple(channel_of(f, n, others) for n, f in zip(names, files, strict=True)),
+        facts=_facts(header),
+        channels=tuple(
+            replace(channel_of(f, n, others), vehicle=number, place=place)
+            for n, f, number, place in zip(names, files, numbers, places, strict=True)
+        ),
         files=(head, *([index] if index else []), *(f.path for f in files)),
         findings=tuple(findings),
+        vehicles=vehicles,
     )
 
 
@@ -193,44 +201,123 @@ def _numbered(head: Path, findings: list[Finding]) -> dict[int, Path]:
     return {}
 
 
-def _objects(header: MmeHeader) -> int:
-    stated = header.number("number of test objects")
-    return 1 if stated is None or stated < 1 else int(min(stated, 99))
+_OF_OBJECT = re.compile(r"(.*?\S)(?: of)? test object (\d+)")
+# Keys of the header about a test object, in SI units, as `CrashRecord.vehicles` names them.
+_SI_OF = {"mass": ("", "kg"), "velocity": ("", "m/s")}
+_SPOKEN = {"name": "vehicle", "mass": "mass_kg", "velocity": "speed_m_per_s"}
 
 
-def _facts(header: MmeHeader, findings: list[Finding]) -> dict[str, str]:
-    facts = {clean(key, LONGEST_NAME): header.text(key) for key in header.values}
+def _facts(header: MmeHeader) -> dict[str, str]:
+    facts = {
+        clean(key, LONGEST_NAME): header.text(key)
+        for key in header.values
+        if not _OF_OBJECT.fullmatch(key)
+    }
     spoken = {
         "test": "laboratory test ref. number",
         "date": "date of the test",
         "laboratory": "laboratory name",
     }
     facts |= {name: header.text(key) for name, key in spoken.items()}
-    if _objects(header) == 1:
-        # The header's quantities are in SI units.
-        for name, key in (
-            ("mass_kg", "mass test object 1"),
-            ("speed_m_per_s", "velocity test object 1"),
-        ):
-            try:
-                value = header.number(key)
-            except DataError as error:
-                # Unusable data of the vehicle only affects the report: keep the record.
-                fault = error.finding
-                findings.append(
-                    Finding(
-                        "io.left-out-unusable",
-                        file=fault.file,
-                        row=fault.row,
-                        quantity=fault.quantity,
-                        reason=fault,
-                    )
-                )
-                continue
-            if value is not None:
-                facts[name] = f"{value:.10g}"
-        facts["vehicle"] = header.text("name of test object 1")
     return {k: v for k, v in facts.items() if v}
+
+
+def _vehicles(header: MmeHeader, findings: list[Finding]) -> dict[str, dict[str, str]]:
+    """Facts of each test object, by its number."""
+    vehicles: dict[str, dict[str, str]] = {}
+    for key in header.values:
+        match = _OF_OBJECT.fullmatch(key)
+        if not match or not header.text(key):
+            continue
+        facts = vehicles.setdefault(clean(match[2].lstrip("0"), LONGEST_NAME), {})
+        name = _SPOKEN.get(match[1], clean(match[1], LONGEST_NAME))
+        if match[1] not in ("mass", "velocity"):
+            facts[name] = header.text(key)
+            continue
+        try:
+            facts[name] = f"{_in_si(header, key):.10g}"
+        except DataError as error:
+            # Unusable data of the vehicle only affects the report: keep the record.
+            fault = error.finding
+            findings.append(
+                Finding(
+                    "io.left-out-unusable",
+                    file=fault.file,
+                    row=fault.row,
+                    quantity=fault.quantity,
+                    reason=fault,
+                )
+            )
+    return vehicles
+
+
+def _in_si(header: MmeHeader, key: str) -> float:
+    """Return a mass or velocity of the header, which is in SI units if it states none."""
+    value, text = header.number(key), header.text(key).partition(" ")[2].strip().lower()
+    unit = find_unit(text, ("velocity",)) if text and key.startswith("velocity") else None
+    factor = FACTORS[unit[0]][unit[1]] if unit else 1.0 if text in _SI_OF[key.split()[0]] else None
+    if value is None or factor is None:
+        raise DataError(
+            "io.no-number",
+            file=header.file,
+            row=header.line(key),
+            quantity=key,
+            text=header.text(key)[:60],
+        )
+    return value * factor
+
+
+def _numbers(files: list[MmeFile], header: MmeHeader) -> list[str]:
+    """Number of the test object of each channel; empty without one that moves.
+
+    Codes have a letter for a mobile barrier, sled or impactor. Its number is that of the header of
+    its channels, or the only one that the test has and no other object takes.
+    """
+    objects = [f.known.vehicle if f.known else "" for f in files]
+    stated = _plain_number(header, "number of test objects") or 0.0
+    free = {str(k) for k in range(1, int(min(stated, 9.0)) + 1)} - set(objects)
+    # A fixed barrier, component or test rig may be the object that is left.
+    alone = len(free) == len({o for o in objects if o.isalpha()}) == 1
+    alone = alone and not any(f.known and f.known.code[0] in "BCT" for f in files)
+    numbers = {o: o for o in objects}
+    for letter in (o for o in numbers if o.isalpha()):
+        of_letter = (f for f, o in zip(files, objects, strict=True) if o == letter)
+        own = {f.header.text("test object number") for f in of_letter}
+        number = own.pop() if len(own) == 1 else ""
+        if number.isdecimal() and number not in (*objects, *numbers.values()):
+            numbers[letter] = number
+        elif alone:
+            numbers[letter] = free.pop()
+    noted = (_note(f.header.all("comments"), VEHICLE_NOTE) for f in files)
+    return [
+        "" if note == NO_VEHICLE else note or numbers[o]
+        for note, o in zip(noted, objects, strict=True)
+    ]
+
+
+def _places(files: list[MmeFile]) -> list[str]:
+    """Position of each channel: its own name where that is of one point only, else by its code."""
+    names = [position_of(f.header.text("name of the channel")) for f in files]
+    points: dict[str, set[str]] = {}
+    for file, name in zip(files, names, strict=True):
+        points.setdefault(compact(name), set()).add(file.code[:1] + _point(file))
+    out = []
+    for file, name in zip(files, names, strict=True):
+        noted = _note(file.header.all("comments"), PLACE_NOTE)
+        words = any(len(w) > 2 and w.isalpha() for w in re.split(r"[\W_]+", name))
+        own = words and len(points[compact(name)]) == 1 and compact(name) not in _NO_NAME
+        known = file.known.place if file.known else ""
+        out.append(noted or (name if own or not known else known))
+    return out
+
+
+def _point(file: MmeFile) -> str:
+    noted = _note(file.header.all("comments"), POINT_NOTE)
+    return noted or (file.known.point if file.known else "")
+
+
+def _moves(known: MmeCode) -> bool:
+    return known.quantity in ("acceleration", "rate")
 
 
 def _told(file: MmeFile, listed: dict[int, str]) -> list[Finding]:
@@ -245,6 +332,17 @@ def _told(file: MmeFile, listed: dict[int, str]) -> list[Finding]:
                 row=file.header.line("channel code"),
                 quantity="channel code",
                 word=file.code,
+            )
+        )
+    elif not file.known.listed and file.known.body == "vehicle" and _moves(file.known):
+        told.append(
+            Finding(
+                "io.location-code-unknown",
+                severity="note",
+                file=name,
+                row=file.header.line("channel code"),
+                quantity=f"channel {file.code}",
+                word=file.code[2:6],
             )
         )
     if is_bad(file):
@@ -298,14 +396,14 @@ class MmeFile:
     known: MmeCode | None
 
 
-def read_mme_file(path: Path, indexed: str, objects: int) -> MmeFile:
+def read_mme_file(path: Path, indexed: str) -> MmeFile:
     """Read the header of a channel file.
 
-    `indexed`: code from the index; empty if the index lacks it. `objects`: number of test objects.
+    `indexed`: code from the index; empty if the index lacks it.
     """
     header = read_header(path)
     code = header.text("channel code") or indexed
-    return MmeFile(path, header, clean(code, LONGEST_NAME), decode_mme(code, objects=objects))
+    return MmeFile(path, header, clean(code, LONGEST_NAME), decode_mme(code))
 
 
 def clock_of(file: MmeFile, others: Mapping[str, tuple[str, MmeFile]]) -> str:
@@ -399,8 +497,14 @@ def stamps_of(
 SAMPLING_NOTE = "sampling "
 AXIS_NOTE = "axis "
 BODY_NOTE = "fixed to "
+VEHICLE_NOTE = "of test object "
+NO_VEHICLE = "none"
+POINT_NOTE = "measuring point "
+PLACE_NOTE = "position "
 FILTER_NOTE = "low-pass "
 AXES = ("x", "y", "z", "-x", "-y", "-z")
+# Names of channels that name nothing.
+_NO_NAME = ("nocomment", "nocomments", "none", "notapplicable", "notavailable", "unknown")
 _GOOD = ("ok", "o.k.", "good", "valid", "as measured")
 _REMARKS = (
     "location",
@@ -453,8 +557,8 @@ def channel_of(file: MmeFile, name: str, others: Mapping[str, tuple[str, MmeFile
         load=load,
         sampling=_note(notes, SAMPLING_NOTE, SAMPLINGS)
         or ("instantaneous" if quantity in ("acceleration", "rate") else None),
-        place=_place(file),
         body=_note(notes, BODY_NOTE) or (known.body if known else "not known"),
+        point=_point(file),
         low_pass=_note(notes, FILTER_NOTE) or _low_pass(file, cut_off),
         remarks=_remarks(file, against, notes),
         full_scale=None if full_scale is None else full_scale * (factor or 1.0),
@@ -490,12 +594,6 @@ def _note(notes: list[str], key: str, known: tuple[str, ...] = ()) -> str:
     return said if not known or said in known else ""
 
 
-def _place(file: MmeFile) -> str:
-    given = file.header.text("name of the channel")
-    place = file.known.place if file.known else ""
-    return given or place
-
-
 def _plain_number(header: MmeHeader, key: str) -> float | None:
     """Return a number of the header whose field may also hold a word."""
     try:
@@ -527,6 +625,10 @@ def _remarks(file: MmeFile, against: str, notes: list[str]) -> tuple[str, ...]:
         )
     else:
         remarks.append(f"{known.test_object}, {known.dimension}, {known.direction}")
+        if known.redundant:
+            remarks.append("redundant")
+        if known.deforms:
+            remarks.append(DEFORMS[known.deforms])
         if header.text("name of the channel") and known.place:
             remarks.append(f"place by its code: {known.place}")
         if known.unknown:
@@ -538,7 +640,7 @@ def _remarks(file: MmeFile, against: str, notes: list[str]) -> tuple[str, ...]:
     if status := header.text("data status"):
         remarks.append(f"status {status}")
     remarks += [f"{key}: {header.text(key)}" for key in _REMARKS if header.text(key)]
-    own = (SAMPLING_NOTE, AXIS_NOTE, BODY_NOTE, FILTER_NOTE)
+    own = (SAMPLING_NOTE, AXIS_NOTE, BODY_NOTE, FILTER_NOTE, VEHICLE_NOTE, POINT_NOTE, PLACE_NOTE)
     remarks += [n for n in notes if not n.startswith(own)]
     return tuple(remarks)
 

@@ -45,6 +45,8 @@ class Vehicle:
     cg_behind_front_axle : float, m
     speed : float, m/s
         Before the impact.
+    crab_deg : float, deg
+        Between its heading and its direction of travel.
     """
 
     number: int
@@ -59,6 +61,7 @@ class Vehicle:
     width: float
     cg_behind_front_axle: float
     speed: float
+    crab_deg: float
 
 
 @dataclass(frozen=True)
@@ -241,6 +244,7 @@ def _vehicle(fields: list[str], file: Path, line: int) -> Vehicle:
         width=number(14, "width", MM),
         cg_behind_front_axle=number(15, "centre of gravity", MM),
         speed=number(41, "speed", KMH),
+        crab_deg=number(42, "crab angle") if len(fields) > VEHICLE_FIELDS else math.nan,
     )
 
 

@@ -429,7 +429,11 @@ def record_facts(record: CrashRecord) -> tuple[tuple[str, str], ...]:
     rows = []
     if record.title and record.title != record.path.stem:
         rows.append(("title", record.title))
-    for key, value in record.facts.items():
+    facts = list(record.facts.items())
+    for number, own in record.vehicles.items():
+        of = f"vehicle {number}: " if len(record.vehicles) > 1 else ""
+        facts += [(f"{of}{key}", value) for key, value in own.items()]
+    for key, value in facts:
         name, unit = str(key), ""
         for ending, symbol in UNITS.items():
             if name.endswith(ending):

@@ -66,8 +66,8 @@ def test_a_code_in_words():
     ("code", "body", "axis", "words"),
     [
         ("10VEHC0000CGACYC", "vehicle", "y", "CFC 180"),
-        ("10ENGN0000TPACX0", "engine of the vehicle", "x", "unfiltered"),
-        ("S0SLED000000ACXD", "sled", "x", "CFC 60"),
+        ("10ENGN0000TPACX0", "engine", "x", "unfiltered"),
+        ("S0SLED000000ACXD", "vehicle", "x", "CFC 60"),
         # RED B keeps figures for signs that differ from those of SAE J211: no axis is known.
         ("10VEHC000000AC1P", "vehicle", "", "filtered before the sampler, above CFC 1000"),
         ("10VEHC000000ACRS", "vehicle", "", "special filter"),
@@ -79,9 +79,70 @@ def test_bodies_axes_and_filters(code, body, axis, words):
     assert (said.body, said.axis, said.filter) == (body, axis, words)
 
 
-def test_of_two_objects_the_body_says_which():
-    assert decode_mme("20VEHC000000ACXC", objects=2).body == "vehicle 2"
-    assert decode_mme(HEAD, objects=2).body == "front left occupant's head, vehicle 1"
+@pytest.mark.parametrize(
+    ("code", "vehicle", "body"),
+    [
+        ("20VEHC000000ACXC", "2", "vehicle"),
+        ("10SILBLERE00ACXC", "1", "vehicle"),
+        ("11SETR000000ACXC", "1", "vehicle"),
+        ("10MSME000000ACXC", "1", "vehicle"),
+        ("11SEAT000000ACXC", "1", "front left seat"),
+        (HEAD, "1", "front left occupant's head"),
+        ("M0MBARCG0000ACXC", "M", "vehicle"),
+        ("M0DEFO000000ACXC", "M", "deformable element"),
+        ("H0IMPA000000ACXC", "H", "vehicle"),
+        ("B0FBAR000000ACXC", "", "fixed barrier"),
+        ("D0HEAD000000ACXC", "", "head of the dummy or impactor"),
+        # Nothing says that an unlisted part moves on its own, unless it belongs to a seat.
+        ("10QQQQ000000ACXC", "1", "vehicle"),
+        ("11QQQQ000000ACXC", "1", "front left 'QQQQ'"),
+    ],
+)
+def test_the_object_and_its_body(code, vehicle, body):
+    said = decode_mme(code)
+    assert (said.vehicle, said.body) == (vehicle, body)
+
+
+def test_a_redundant_sensor_is_at_the_point_of_the_primary_one():
+    said = [decode_mme(f"10SILBLE{fine}00ACXC") for fine in ("00", "RD", "RE")]
+    assert [s.point for s in said] == ["0SILBLE0000", "0SILBLE0000", "0SILBLERE00"]
+    assert [s.redundant for s in said] == [False, True, False]
+
+
+BARRIER = "M0MBARCG0000ACXC"
+
+
+@pytest.mark.parametrize(
+    ("codes", "objects", "own", "vehicle"),
+    [
+        # By the header of its channels; as the only object that is left; else by its letter.
+        ((CAR, BARRIER), 3, "3", "3"),
+        ((CAR, BARRIER), 2, None, "2"),
+        ((CAR, BARRIER), 2, "M", "2"),
+        ((CAR, BARRIER), 3, None, "M"),
+        ((CAR, BARRIER), 1, None, "M"),
+        ((CAR, BARRIER, "T0TIRS000000TI00"), 2, None, "M"),
+        ((CAR, BARRIER, "00TIRS000000TI00"), 2, None, "2"),
+        ((CAR, BARRIER), 2, "1", "2"),
+        ((CAR, BARRIER, "B0FBAR000000FOXX"), 2, None, "M"),
+        ((CAR, BARRIER, "S0SLED000000ACXD"), 2, None, "M"),
+    ],
+)
+def test_the_number_of_a_mobile_barrier(test_of, codes, objects, own, vehicle):
+    record = test_of(
+        *(channel(c, Test_object_number=own if c == BARRIER else None) for c in codes),
+        mme=f"Title :x\nNumber of test objects :{objects}\nName of test object 2 :trolley\n",
+    )
+    assert record.channel(BARRIER).vehicle == vehicle
+    assert record.channel(CAR).vehicle == "1"
+    assert record.vehicles == {"2": {"vehicle": "trolley"}}
+    assert record.facts == {"title": "x", "number of test objects": str(objects)}
+
+
+def test_two_objects_of_one_number_stay_two(test_of):
+    sled = "S0SLED000000ACXD"
+    record = test_of(*(channel(c, Test_object_number="2") for c in (BARRIER, sled)))
+    assert len({record.channel(c).vehicle for c in (BARRIER, sled)}) == 2
 
 
 def test_unknown_fields_are_shown_as_they_are():
@@ -96,7 +157,7 @@ def test_unknown_fields_are_shown_as_they_are():
 def test_a_test_is_read_in_si_with_its_facts(test_of):
     record = test_of(channel(), channel(CAR, "deg/s"))
     assert (record.format, record.title) == ("mme", "A test: of two")
-    assert float(record.facts["mass_kg"]) == 1400.5
+    assert float(record.vehicles["1"]["mass_kg"]) == 1400.5
     assert record.findings == ()
     time, values = record.channel(HEAD).load()
     np.testing.assert_array_equal(time, [-0.01, -0.0099, -0.0098])
@@ -220,7 +281,7 @@ def test_damaged_headers(test_of, tmp_path):
     assert error.value.finding.row == 2
     record = test_of(channel(), mme="Title :x\nMass test object 1 :heavy\n")
     assert "left out: 'heavy' is not a number" in record.findings[0].what
-    assert "mass_kg" not in record.facts
+    assert "mass_kg" not in record.vehicles.get("1", {})
     (tmp_path / "T2.mme").write_text(MME)
     with pytest.raises(
         DataError, match=r"test_damaged_headers0: the folder has 2 tests: T1\.mme, T2\.mme"
@@ -229,6 +290,16 @@ def test_damaged_headers(test_of, tmp_path):
     assert read_crash_record(tmp_path / "T1.mme").format == "mme"
     with pytest.raises(DataError, match="belong to other tests: T1"):
         read_crash_record(tmp_path / "T2.mme")
+
+
+def test_facts_of_a_vehicle_are_in_si(test_of):
+    stated = (
+        "Velocity test object 1 :54 km/h\nMass test object 1 :3000 lb\nClass of test object 1 :M1\n"
+    )
+    record = test_of(channel(), mme=f"Title :x\n{stated}")
+    assert record.vehicles == {"1": {"speed_m_per_s": "15", "class": "M1"}}
+    (finding,) = record.findings
+    assert (finding.code, finding.quantity) == ("io.left-out-unusable", "mass test object 1")
 
 
 def test_failed_missing_and_renamed_channels_are_told(test_of, tmp_path):
