@@ -219,7 +219,7 @@ def test_aids_together_with_an_estimated_time_offset():
         Gnss(name="rtk", lever_arm=ARM, lever_arm_sd=0.1, time_offset_sd=0.05),
         Gnss(name="old", use_velocity=False),
         AIDS["odometer"](name="wheel"),
-        AIDS["no_slip"](name="tyres", mounting_sd_deg=(1.0, 2.0)),
+        AIDS["no_slip"](name="tires", mounting_sd_deg=(1.0, 2.0)),
     )
     told = {"rtk": fixes(), "old": fixes(seed=7), "wheel": tables()["odometer"]}
     assert_cuts(driving(navigation(aids=aids)), drive(), told)

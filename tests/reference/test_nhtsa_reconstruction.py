@@ -14,10 +14,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from strapdown.crash.combine_units import combine_units
 from strapdown.crash.delta_v import delta_v
 from strapdown.crash.entry import Entry
-from strapdown.crash.reconstruction import CrashOptions, reconstruct_crash, reconstruct_unit
+from strapdown.crash.reconstruction import CrashOptions, reconstruct_crash
 from strapdown.errors import DataError
 from strapdown.formats.nhtsa import read_nhtsa
 from strapdown.sensors.catalogue import load_sensor
@@ -91,13 +90,10 @@ def crash(units, request):
 
 
 def mean_of(crash):
-    """Of units that ring, and so disagree by what they state: it is not told, but can be made."""
-    assert not crash.comparison.agree
-    assert crash.combined is None
-    assert any("no mean is given" in f.what for f in crash.findings)
-    return reconstruct_unit(
-        combine_units([u.at_point for u in crash.units]), ENTRY, CrashOptions(window=(-0.03, 0.2))
-    )
+    """Of points that ring against one another: they agree with a structural term between them."""
+    assert crash.comparison.agree
+    assert all(pair.structure for pair in crash.comparison.pairs)
+    return crash.combined
 
 
 def test_each_unit_comes_to_its_known_change_of_velocity(crash):

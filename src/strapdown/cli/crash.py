@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from strapdown.crash.case import CaseResult
 
 EPILOG = (
-    "Examples: strapdown crash case.toml (strapdown init crash RECORD writes one); of two vehicles "
+    "Example: strapdown crash case.toml (strapdown init crash RECORD writes it); of two vehicles: "
     "strapdown crash case-1.toml case-2.toml"
 )
 

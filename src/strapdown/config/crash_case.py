@@ -263,8 +263,8 @@ class OptionsSpec(Spec):
     monte_carlo_runs: StrictInt = Field(default=2000, ge=0, le=100_000)
     seed: StrictInt = Field(default=0, ge=0)
     #: The largest that is possible: dry asphalt.
-    tyre_friction: Annotated[Number, Field(ge=0.0, le=2.0)] = Field(
-        default=0.8, description="largest coefficient of friction of the tyres on the road"
+    tire_friction: Annotated[Number, Field(ge=0.0, le=2.0)] = Field(
+        default=0.8, description="largest coefficient of friction of the tires on the road"
     )
     #: None selects those that apply to the crash type.
     severity: Annotated[tuple[Word, ...] | None, Several] = Field(

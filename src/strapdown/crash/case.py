@@ -369,7 +369,7 @@ def _closed(first: CaseResult, second: CaseResult) -> tuple[CaseResult, CaseResu
             pair.append(vehicle)
     closure = blamed = None
     if len(pair) == 2:
-        friction = max(r.spec.options.tyre_friction for r in (first, second))
+        friction = max(r.spec.options.tire_friction for r in (first, second))
         depths = [r.spec.vehicle for r in (first, second) if r.spec.vehicle.crush_m is not None]
         share = None
         if len(depths) == 2:

@@ -1,7 +1,7 @@
 """Closure between the vehicles of one crash: momentum, restitution, energy, and what fails it.
 
 Planar impact mechanics. Let vehicle i have mass m_i, change of velocity of its centre of mass
-``w_i = R(psi_i) dV_i - t_i`` over ground, t_i the part that the tyres made, and let P be the
+``w_i = R(psi_i) dV_i - t_i`` over ground, t_i the part that the tires made, and let P be the
 impulse of the contact on the first::
 
     m_1 w_1 = P = -m_2 w_2                                   momentum
@@ -18,7 +18,7 @@ includes the work of friction between the vehicles.
 
 Linear propagation: where the direction of the impulse is known to several degrees only and the
 vehicles slide past each other (sideswipe), the 95 % bound of the closing speed along it holds in
-about 94 %. Where the tyres' bound dominates, bounds hold in up to 97 %.
+about 94 %. Where the tires' bound dominates, bounds hold in up to 97 %.
 
 The vertical is left out: the road takes vertical impulse without a bound.
 """
@@ -116,7 +116,7 @@ class ImpactVehicle:
         `point` and `rate_change`, it does not close.
     covariance : array_like, (3, 3), (m/s)²
     duration : float, s
-        Of the event; bounds what the tyres contribute.
+        Of the event; bounds what the tires contribute.
     mass : pair, kg, optional
     heading_deg : pair, deg, optional
         At time zero, clockwise from north. A relative heading does as well: 0 with 0 for the
@@ -186,14 +186,14 @@ class ImpactVehicle:
         change, covariance = np.asarray(self.delta_v), np.asarray(self.covariance)
         return replace(self, delta_v=whole @ change, covariance=whole @ covariance @ whole.T)
 
-    def tyre_limit(self, friction: float) -> float:
-        """Largest change of velocity that the tyres can make, m/s: friction times g times time."""
+    def tire_limit(self, friction: float) -> float:
+        """Largest change of velocity that the tires can make, m/s: friction times g times time."""
         return friction * STANDARD_GRAVITY * self.duration
 
     def contact_change(self, friction: float) -> tuple[Array, Array]:
         """Change of velocity of the centre of mass from contact, (2,), vehicle axes, covariance.
 
-        The impulse of the tyres is bounded by friction times weight times duration and has an
+        The impulse of the tires is bounded by friction times weight times duration and has an
         unknown direction: uniform over the disc of that radius (GUM, JCGM 100:2008, 4.3.7, takes
         what has only a bound as uniform within it), a quarter of the radius squared per axis.
         """
@@ -206,7 +206,7 @@ class ImpactVehicle:
         x, covariance = np.zeros(SIZE), np.zeros((SIZE, SIZE))
         x[DELTA_V] = np.asarray(self.delta_v)[:2]
         covariance[DELTA_V, DELTA_V] = np.asarray(self.covariance)[:2, :2]
-        covariance[TYRES, TYRES] = np.eye(2) * 0.25 * self.tyre_limit(friction) ** 2
+        covariance[TYRES, TYRES] = np.eye(2) * 0.25 * self.tire_limit(friction) ** 2
         if self.entry is not None:
             x[ENTRY] = self.entry
             covariance[ENTRY, ENTRY] = self.entry_covariance
@@ -256,7 +256,7 @@ def _by_rate(rate: Array, arm: Array) -> Array:
 
 
 def _centre_change(x: Array) -> Array:
-    """Change of velocity of the centre of mass, over ground, tyres included."""
+    """Change of velocity of the centre of mass, over ground, tires included."""
     own = x[..., DELTA_V] - _by_rate(x[..., RATE_CHANGE], x[..., POINT])
     return _turned(x[..., HEADING], own)
 
@@ -301,7 +301,7 @@ class _Impact:
     at_contact: bool
 
     def momentum(self, x: Array) -> Array:
-        """Impulse left over, N s, (..., 2), over ground: from outside beyond the tyres."""
+        """Impulse left over, N s, (..., 2), over ground: from outside beyond the tires."""
         first, second = x[..., :SIZE], x[..., SIZE : 2 * SIZE]
         return np.asarray(
             first[..., MASS, None] * _contact_change(first)
@@ -550,7 +550,7 @@ def close_vehicles(
         `delta_v` has to hold at the stated point, by default the centre of mass; one of a rotating
         vehicle measured elsewhere does not close.
     friction : float
-        Coefficient of friction of tyres on the road: the largest that is possible.
+        Coefficient of friction of tires on the road: the largest that is possible.
     energy_share : pair, optional
         Share of the energy that the first absorbed, 0 to 1, and its sd (`equal_force_share`).
         Without it there is no energy-equivalent speed.

@@ -518,7 +518,7 @@ def draw_behind(out: Drawing, outline: Outline, view: Project) -> None:
     for y in (-0.82, 0.82):
         x = view((0.0, middle + half * y, 0.0))[0]
         top = view((0.0, 0.0, 0.5 - 2.0 * _WHEEL))[1]
-        tyre = [(x - 5.0, top), (x + 5.0, top), (x + 5.0, ground), (x - 5.0, ground)]
-        out.shape(tyre, _BODY, 1.0, fill="#c5cdd6")
+        tire = [(x - 5.0, top), (x + 5.0, top), (x + 5.0, ground), (x - 5.0, ground)]
+        out.shape(tire, _BODY, 1.0, fill="#c5cdd6")
     out.shape(whole(_REAR), _BODY, 1.4, fill="#eef1f5")
     out.shape(whole(_REAR_GLASS), _BODY, 0.6, fill=_BODY, opacity=0.25)

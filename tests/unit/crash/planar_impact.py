@@ -1,8 +1,8 @@
 """Planar impacts of two vehicles by impulse at a point of contact, in steps, as exact truth.
 
-Restitution along the normal, friction along the tangent, tyre forces in proportion to the force of
+Restitution along the normal, friction along the tangent, tire forces in proportion to the force of
 contact. Everything that the closure computes in closed form is here summed over the steps of the
-impulse: energy as the balance of kinetic energy and the work of the tyres, the common velocity at
+impulse: energy as the balance of kinetic energy and the work of the tires, the common velocity at
 the step where the approach along the impulse ends.
 """
 
@@ -43,15 +43,15 @@ def turned(angle, vector):
     return np.array([c * vector[0] - s * vector[1], s * vector[0] + c * vector[1]])
 
 
-def solve(mass, inertia, arms, velocity, rate, tyres, normal, restitution, friction):
-    """Impulse on the first; tyres add their change of velocity to the centres of mass."""
+def solve(mass, inertia, arms, velocity, rate, tires, normal, restitution, friction):
+    """Impulse on the first; tires add their change of velocity to the centres of mass."""
     cross = [np.array([-r[1], r[0]]) for r in arms]
     before = [velocity[i] + rate[i] * cross[i] for i in (0, 1)]
     u = before[0] - before[1]
     compliance = sum(
         np.eye(2) / mass[i] + np.outer(cross[i], cross[i]) / inertia[i] for i in (0, 1)
     )
-    outside = tyres[0] - tyres[1]
+    outside = tires[0] - tires[1]
     tangent = np.array([-normal[1], normal[0]])
     # Sticking: no sliding at the end.
     frame = np.array([normal, tangent])
@@ -66,7 +66,7 @@ def solve(mass, inertia, arms, velocity, rate, tyres, normal, restitution, frict
 
 
 def draw(rng, kind, *, central=False, restitution=None, road=FRICTION):
-    """Draw an impact of a kind; `central`: without arms, friction, yaw and tyre forces."""
+    """Draw an impact of a kind; `central`: without arms, friction, yaw and tire forces."""
     normal_deg, headings, contacts, speeds, friction = KINDS[kind]
     mass = rng.uniform(1000.0, 2200.0, 2)
     gyration = rng.uniform(1.2, 1.45, 2)
@@ -81,26 +81,26 @@ def draw(rng, kind, *, central=False, restitution=None, road=FRICTION):
     entry = [np.array([rng.uniform(*speeds[i]), rng.uniform(-0.3, 0.3)]) for i in (0, 1)]
     velocity = [turned(heading[i], entry[i]) for i in (0, 1)]
     limit = road * G * duration
-    tyres = []
+    tires = []
     for _ in range(2):
         angle, size = rng.uniform(0, 2 * math.pi), limit * math.sqrt(rng.uniform())
-        tyres.append(np.zeros(2) if central else turned(angle, [size, 0.0]))
+        tires.append(np.zeros(2) if central else turned(angle, [size, 0.0]))
     e = rng.uniform(0.02, 0.35) if restitution is None else restitution
     inertia = mass * gyration**2
-    impulse = solve(mass, inertia, arms, velocity, rate, tyres, normal, e, friction)
+    impulse = solve(mass, inertia, arms, velocity, rate, tires, normal, e, friction)
     signs = (1.0, -1.0)
     # Steps of the impulse, from which the truth is read.
     part = np.linspace(0.0, 1.0, 4001)[:, None]
     p = impulse / np.linalg.norm(impulse)
     points, work, centres, rates = [], 0.0, [], []
     for i in (0, 1):
-        gained = signs[i] * impulse / mass[i] + tyres[i]
+        gained = signs[i] * impulse / mass[i] + tires[i]
         path = velocity[i] + part * gained
         turn = signs[i] * (arms[i][0] * impulse[1] - arms[i][1] * impulse[0]) / inertia[i]
         spin = rate[i] + part * turn
         points.append(path + spin * np.array([-arms[i][1], arms[i][0]]))
         middle = 0.5 * (path[1:] + path[:-1])
-        work += float((mass[i] * tyres[i] * middle).sum() / (len(part) - 1))
+        work += float((mass[i] * tires[i] * middle).sum() / (len(part) - 1))
         centres.append(path)
         rates.append(spin[:, 0])
     kinetic = [

@@ -72,7 +72,7 @@ def _count(kinds, draws, seed, known=lambda first, second: (first, second)):
     return held, counted, reported
 
 
-# Mostly tyre forces: what is uniform within a bound has no tails, and a normal bound of 1.96
+# Mostly tire forces: what is uniform within a bound has no tails, and a normal bound of 1.96
 # standard deviations holds up to all of it.
 CONSERVATIVE = ("momentum", "mass_ratio", "magnitude")
 
@@ -128,7 +128,7 @@ def test_bounds_hold_the_truth_where_something_is_not_known(missing):
 def test_what_is_not_known_costs_a_degree_of_freedom(missing):
     freedom, known = PARTLY[missing]
     impact = draw(np.random.default_rng(1), "offset")
-    # Without errors and with the tyres accounted for by their bound.
+    # Without errors and with the tires accounted for by their bound.
     closure = close_vehicles(*known(*impact.exact), friction=FRICTION)
     assert closure.freedom == freedom and not closure.contradicted
     assert "crash.momentum-partly-tested" in {f.code for f in closure.findings}
@@ -233,9 +233,9 @@ def _barrier(rng, kept=0.15):
     angle, size = rng.uniform(0, 2 * math.pi), FRICTION * 9.80665 * duration
     size *= math.sqrt(rng.uniform())
     change = -(1.0 + kept) * speed
-    # The barrier takes what the tyres do not; its impulse is along its normal.
-    tyres = size * math.cos(angle)
-    energy = 0.5 * mass * abs(change - tyres) * speed * (1.0 - kept)
+    # The barrier takes what the tires do not; its impulse is along its normal.
+    tires = size * math.cos(angle)
+    energy = 0.5 * mass * abs(change - tires) * speed * (1.0 - kept)
     sd = np.array([0.2, 0.2, 0.2])
     vehicle = ImpactVehicle(
         "car",
@@ -390,7 +390,7 @@ FAULTS = {
     "records swapped": ("crash.closes-if-records-swapped", _swapped),
 }
 # Least share of faulty pairs that is reported, by kind and fault; what is below is not told apart
-# from errors and tyre forces by any test: see the power of momentum in the test.
+# from errors and tire forces by any test: see the power of momentum in the test.
 STATED = {kind: dict.fromkeys(FAULTS, 0.95) for kind in KINDS}
 for _kind in ("head-on", "offset", "rear-end"):
     # Vehicles of similar mass that face each other, or follow: either record fits either.
@@ -401,7 +401,7 @@ STATED["sideswipe"] |= {"forward reversed": 0.65, "g as m/s²": 0.6, "records sw
 def _power(exact, measured, fault):
     """Probability that momentum reports the fault, from the residual without errors."""
     left = _impact(*fault(*exact), FRICTION)[0].residual()[0]
-    # Tyre forces are part of the exact changes: their mean effect is that of their true values.
+    # Tire forces are part of the exact changes: their mean effect is that of their true values.
     covariance = _impact(*fault(*measured), FRICTION)[0].residual()[1]
     shift = float(left @ np.linalg.solve(covariance, left))
     return float(ncx2.sf(chi_square_exceeded(LEVEL, 2), 2, shift))

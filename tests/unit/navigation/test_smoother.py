@@ -194,7 +194,7 @@ def test_quaternions_have_no_height_and_the_rest_is_smoothed():
 
 @pytest.mark.parametrize("pieces", [2, 17])
 def test_a_run_cut_anywhere_is_smoothed_to_the_same_numbers(pieces):
-    made = smoothing(navigator_of((*gnss(lever_arm=(1.0, 0.2, -0.5)), NoSlip(name="tyres"))))
+    made = smoothing(navigator_of((*gnss(lever_arm=(1.0, 0.2, -0.5)), NoSlip(name="tires"))))
     _, whole = both(made)
     _, cut = both(made, pieces=pieces)
     np.testing.assert_array_equal(cut.trajectory.to_numpy(), whole.trajectory.to_numpy())
@@ -225,7 +225,7 @@ def test_where_a_large_tilt_was_corrected_less_is_known_of_what_it_told(mechaniz
     assert forward.covariance[0] == pytest.approx(linear.covariance[0])
 
 
-@pytest.mark.parametrize("aids", [gnss(), (*gnss(), NoSlip(name="tyres"))])
+@pytest.mark.parametrize("aids", [gnss(), (*gnss(), NoSlip(name="tires"))])
 def test_rows_that_are_full_at_every_turn_change_nothing(monkeypatch, aids):
     made = smoothing(navigator_of(aids))
     forward, smoothed = both(made)

@@ -125,9 +125,9 @@ def test_a_stretch_is_scored_with_less_than_its_filter_states():
 
 
 def test_it_does_not_matter_which_aid_comes_first():
-    tyres, receiver = NoSlip(name="tyres"), town.gnss(**UNKNOWN)
+    tires, receiver = NoSlip(name="tires"), town.gnss(**UNKNOWN)
     scores = []
-    for aids in ((tyres, receiver), (receiver, tyres)):
+    for aids in ((tires, receiver), (receiver, tires)):
         navigator, state = begun(*aids)
         (score,) = score_withheld_smoothed(navigator, state, *town.increments(), "gnss", [SPAN])
         scores.append(score)

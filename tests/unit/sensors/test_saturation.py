@@ -58,7 +58,7 @@ def test_more_than_the_stated_full_scale_is_seen():
 
 
 def test_a_fast_rise_that_meets_a_slow_fall_is_no_end():
-    # A car that is turned by a blow and slowed by its tyres: coarse steps hold the top for a few
+    # A car that is turned by a blow and slowed by its tires: coarse steps hold the top for a few
     # samples, of which one side is far below.
     rate = np.where(TIME < 0.5, 0.0, np.maximum(1.695 - 0.3 * (TIME - 0.5), 0.0))
     y = np.zeros((TIME.size, 3))

@@ -1,4 +1,4 @@
-"""How much springs and tyres yield is found."""
+"""How much springs and tires yield is found."""
 
 from __future__ import annotations
 
