@@ -7,6 +7,7 @@ import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 
@@ -72,7 +73,7 @@ from strapdown.formats.find_columns import names_of_quantities
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.quantity_columns import names_of_fixes
 from strapdown.formats.recording import NoStreamError, RawLog, ReadOptions, Recording
-from strapdown.formats.signs import HEAD, Signs, first_bytes
+from strapdown.formats.signs import HEAD, Signs, first_bytes, state_of
 from strapdown.plugins import plugin, plugins
 
 _log = logging.getLogger("strapdown")
@@ -404,9 +405,28 @@ def readers_of(path: Path) -> Iterator[tuple[str, Reader]]:
         _log.warning("%s", one)
 
 
+#: Newest detections, by path: what it was made from, and its result.
+_DETECTED: dict[Path, tuple[tuple[Any, ...], tuple[str, Reader]]] = {}
+#: Detections that are kept.
+_MOST_DETECTED = 64
+
+
 def reader_of(path: Path) -> tuple[str, Reader | None]:
-    """Return the reader that reads a file or folder, the first that recognizes it, and its name."""
-    return next(readers_of(path), ("", None))
+    """Return the reader that reads a file or folder, the first that recognizes it, and its name.
+
+    A file or folder that did not change since is not detected again.
+    """
+    state = state_of(path)
+    made_from = (state, tuple(READERS.values()))
+    if state and path in _DETECTED and _DETECTED[path][0] == made_from:
+        return _DETECTED[path][1]
+    for name, reader in readers_of(path):
+        if state and READERS.get(name) is reader:
+            if len(_DETECTED) >= _MOST_DETECTED:
+                _DETECTED.clear()
+            _DETECTED[path] = (made_from, (name, reader))
+        return name, reader
+    return "", None
 
 
 def open_stream(path: str | Path, stream: str, form: str | None = None) -> Raw:
@@ -557,6 +577,8 @@ MOST_BYTES = 64 * 1024 * 1024
 def _not_recognized(path: Path) -> DataError:
     """Make the error for a file or folder of no known format; it names the logs in a folder."""
     if path.is_file():
+        if path.suffix.lower() == ".zip":
+            sensor_folder.members_of(path)  # refuses an archive of too many tables
         if (other := _foreign(path)) is not None:
             return DataError("io.foreign-format", file=path.name, what=other.what, way=other.way)
         head = first_bytes(path, 8).hex(" ")
