@@ -206,11 +206,11 @@ def navigation_of_flags(log: Path, given: Mapping[str, Any]) -> NavigationSpec:
     from strapdown.api.reading import ImuFile
     from strapdown.config.alignment import LogTable
     from strapdown.config.spec import specify
-    from strapdown.formats.gnss_files import has_fixes
+    from strapdown.formats.gnss_files import open_fixes
 
     aids: dict[str, dict[str, Any]] = {}
     fixes = fix_keys(given, given["gnss"])
-    if fixes or has_fixes(log):
+    if fixes or open_fixes(log) is not None:
         arm = given["lever_arm"]
         aids["gnss"] = {"kind": "gnss", "path": str(log), **fixes}
         aids["gnss"] |= {} if arm is None else {"lever_arm_m": _arm(arm)}

@@ -7,6 +7,8 @@ import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from types import ModuleType
+from typing import Any
 
 import pandas as pd
 
@@ -72,7 +74,7 @@ from strapdown.formats.find_columns import names_of_quantities
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.quantity_columns import names_of_fixes
 from strapdown.formats.recording import NoStreamError, RawLog, ReadOptions, Recording
-from strapdown.formats.signs import HEAD, Signs, first_bytes
+from strapdown.formats.signs import HEAD, Signs, first_bytes, state_of
 from strapdown.plugins import plugin, plugins
 
 _log = logging.getLogger("strapdown")
@@ -100,6 +102,10 @@ __all__ = [
 Raw = RawLog | Fixes | pd.DataFrame
 #: Names of streams, in the order in which they are shown.
 STREAMS = ("imu", "gnss", "reference", "magnetometer", "barometer", "wheel")
+#: Function of a module that reads each of them.
+_FUNCTIONS = dict(
+    zip(STREAMS, ("read", *(f"read_{s}" for s in ("fixes", *STREAMS[2:]))), strict=True)
+)
 #: In `Reader.streams`: one table of named columns, which hold any of `STREAMS`.
 TABLE = "table"
 
@@ -130,54 +136,23 @@ class Reader:
     files: Callable[[Path], tuple[Path, ...]] | None = None
     parts: bool = False
 
+    @classmethod
+    def of(cls, module: ModuleType, title: str = "", parts: bool = False) -> Reader:
+        """Make the reader of a module whose functions have the names of `_FUNCTIONS`.
+
+        `title`: its ``TITLE`` if not given. Its ``files_of``, if there is one, lists the files.
+        """
+        have = vars(module)
+        streams = {stream: have[name] for stream, name in _FUNCTIONS.items() if name in have}
+        return cls(title or have["TITLE"], have["detect"], streams, have.get("files_of"), parts)
+
 
 #: In the order of detection: formats of known recordings first, general formats last.
 READERS: dict[str, Reader] = {
-    "px4": Reader(
-        px4.TITLE,
-        px4.detect,
-        {
-            "imu": px4.read,
-            "gnss": px4.read_fixes,
-            "reference": px4.read_reference,
-            "magnetometer": px4.read_magnetometer,
-            "barometer": px4.read_barometer,
-        },
-    ),
-    "dataflash": Reader(
-        dataflash.TITLE,
-        dataflash.detect,
-        {
-            "imu": dataflash.read,
-            "gnss": dataflash.read_fixes,
-            "reference": dataflash.read_reference,
-            "magnetometer": dataflash.read_magnetometer,
-            "barometer": dataflash.read_barometer,
-        },
-    ),
-    "mavlink": Reader(
-        mavlink.TITLE,
-        mavlink.detect,
-        {
-            "imu": mavlink.read,
-            "gnss": mavlink.read_fixes,
-            "reference": mavlink.read_reference,
-            "barometer": mavlink.read_barometer,
-        },
-    ),
-    "ros": Reader(
-        ros.TITLE,
-        ros.detect,
-        {
-            "imu": ros.read,
-            "gnss": ros.read_fixes,
-            "reference": ros.read_reference,
-            "magnetometer": ros.read_magnetometer,
-            "barometer": ros.read_barometer,
-        },
-        ros.files_of,
-        parts=True,
-    ),
+    "px4": Reader.of(px4),
+    "dataflash": Reader.of(dataflash),
+    "mavlink": Reader.of(mavlink),
+    "ros": Reader.of(ros, parts=True),
     "novatel": Reader(
         novatel.TITLE,
         novatel.detect,
@@ -198,49 +173,29 @@ READERS: dict[str, Reader] = {
             "wheel": ubx.read_wheel,
         },
     ),
-    "mpu6050": Reader(
-        "folder of an MPU-6050 in MATLAB files", mpu6050.detect, {"imu": mpu6050.read}
-    ),
-    "broad": Reader("BROAD trial, HDF5 with optical truth", broad.detect, {"imu": broad.read}),
-    "comma2k19": Reader(
-        "comma2k19 segment, with its pose as truth",
-        comma2k19.detect,
-        {"imu": comma2k19.read, "gnss": comma2k19.read_fixes},
-        comma2k19.files_of,
-    ),
+    "mpu6050": Reader.of(mpu6050, "folder of an MPU-6050 in MATLAB files"),
+    "broad": Reader.of(broad, "BROAD trial, HDF5 with optical truth"),
+    "comma2k19": Reader.of(comma2k19, "comma2k19 segment, with its pose as truth"),
     "kitti": Reader(
         "KITTI raw, folder oxts",
         kitti.detect,
         {"imu": kitti.read, "gnss": kitti.read_fixes, "reference": kitti.read_trajectory},
         kitti.files_of,
     ),
-    "ronin": Reader("RoNIN, HDF5 of a phone", ronin.detect, {"imu": ronin.read}),
-    "asl": Reader("EuRoC, TUM VI: data.csv of imu0, or folder mav0", asl.detect, {"imu": asl.read}),
+    "ronin": Reader.of(ronin, "RoNIN, HDF5 of a phone"),
+    "asl": Reader.of(asl, "EuRoC, TUM VI: data.csv of imu0, or folder mav0"),
     "xsens": Reader(
         "Xsens MT Manager export (.txt .csv)", xsens.detect, {"imu": xsens.read, TABLE: csv.read}
     ),
-    "sensorstream": Reader("Sensorstream IMU+GPS", sensorstream.detect, {"imu": sensorstream.read}),
-    "sensor-logger": Reader(
-        "Sensor Logger: zip, folder, CSV, JSON",
-        sensor_logger.detect,
-        {
-            "imu": sensor_logger.read,
-            "gnss": sensor_logger.read_fixes,
-            "magnetometer": sensor_logger.read_magnetometer,
-            "barometer": sensor_logger.read_barometer,
-        },
-    ),
+    "sensorstream": Reader.of(sensorstream, "Sensorstream IMU+GPS"),
+    "sensor-logger": Reader.of(sensor_logger, "Sensor Logger: zip, folder, CSV, JSON"),
     "sensorlog": Reader(
         "SensorLog of iOS, wide CSV",
         sensorlog.detect,
         {"imu": sensorlog.read, "gnss": sensorlog.read_fixes, TABLE: csv.read},
     ),
-    "core-motion": Reader("table of Core Motion", core_motion.detect, {"imu": core_motion.read}),
-    "gnss-logger": Reader(
-        "GnssLogger of Android, device_imu.csv",
-        gnss_logger.detect,
-        {"imu": gnss_logger.read, "gnss": gnss_logger.read_fixes},
-    ),
+    "core-motion": Reader.of(core_motion, "table of Core Motion"),
+    "gnss-logger": Reader.of(gnss_logger, "GnssLogger of Android, device_imu.csv"),
     "gsdc": Reader(
         "Smartphone Decimeter Challenge, ground_truth.csv of 2021",
         gsdc.detect,
@@ -252,76 +207,26 @@ READERS: dict[str, Reader] = {
         dict.fromkeys(("imu", "gnss", "reference"), gsdc.refuse),
     ),
     "smartloc": Reader("smartLoc, CSV of raw GNSS data", smartloc.detect, {"gnss": smartloc.read}),
-    "racechrono": Reader(
-        racechrono.TITLE,
-        racechrono.detect,
-        {"imu": racechrono.read, "gnss": racechrono.read_fixes},
-    ),
-    "microstrain": Reader(
-        microstrain.TITLE,
-        microstrain.detect,
-        {"imu": microstrain.read, "barometer": microstrain.read_barometer},
-    ),
-    "apdm": Reader(apdm.TITLE, apdm.detect, {"imu": apdm.read}),
-    "x-imu3": Reader("x-IMU3: CSV, folder", xio.detect, {"imu": xio.read}, xio.files_of),
-    "physics-toolbox": Reader(
-        physics_toolbox.TITLE,
-        physics_toolbox.detect,
-        {"imu": physics_toolbox.read, "barometer": physics_toolbox.read_barometer},
-    ),
-    "matlab-mobile": Reader(
-        matlab_mobile.TITLE,
-        matlab_mobile.detect,
-        {"imu": matlab_mobile.read, "gnss": matlab_mobile.read_fixes},
-        matlab_mobile.files_of,
-    ),
+    "racechrono": Reader.of(racechrono),
+    "microstrain": Reader.of(microstrain),
+    "apdm": Reader.of(apdm),
+    "x-imu3": Reader.of(xio, "x-IMU3: CSV, folder"),
+    "physics-toolbox": Reader.of(physics_toolbox),
+    "matlab-mobile": Reader.of(matlab_mobile),
     "matlab-objects": Reader(
         "objects of MATLAB (.mat)",
         matlab_mobile.detect_objects,
         dict.fromkeys(("imu", "gnss", "reference"), matlab_mobile.refuse),
     ),
-    "navego": Reader(
-        navego.TITLE,
-        navego.detect,
-        {"imu": navego.read, "gnss": navego.read_fixes, "reference": navego.read_reference},
-    ),
-    "phyphox": Reader(
-        "phyphox: CSV, zip, folder",
-        phyphox.detect,
-        {"imu": phyphox.read, "gnss": phyphox.read_fixes, "barometer": phyphox.read_barometer},
-    ),
-    "gnss-ins-sim": Reader(
-        gnss_ins_sim.TITLE,
-        gnss_ins_sim.detect,
-        {
-            "imu": gnss_ins_sim.read,
-            "gnss": gnss_ins_sim.read_fixes,
-            "reference": gnss_ins_sim.read_reference,
-        },
-        gnss_ins_sim.files_of,
-    ),
-    "gopro": Reader(
-        "GoPro telemetry: GPMF, MP4, JSON",
-        gopro.detect,
-        {"imu": gopro.read, "gnss": gopro.read_fixes},
-    ),
-    "garmin-fit": Reader(
-        "Garmin FIT (.fit)",
-        garmin_fit.detect,
-        {"imu": garmin_fit.read, "gnss": garmin_fit.read_fixes},
-    ),
+    "navego": Reader.of(navego),
+    "phyphox": Reader.of(phyphox, "phyphox: CSV, zip, folder"),
+    "gnss-ins-sim": Reader.of(gnss_ins_sim),
+    "gopro": Reader.of(gopro, "GoPro telemetry: GPMF, MP4, JSON"),
+    "garmin-fit": Reader.of(garmin_fit, "Garmin FIT (.fit)"),
     "gpx": Reader("GPX track (.gpx)", gpx.detect, {"gnss": gpx.read}),
     "dji-srt": Reader("subtitles of a DJI drone (.SRT)", dji_srt.detect, {"gnss": dji_srt.read}),
-    "sensor-folder": Reader(
-        "folder or zip of one text table a sensor",
-        sensor_folder.detect,
-        {"imu": sensor_folder.read},
-    ),
-    "android-events": Reader(
-        "log of Android sensor events, one a row",
-        android_events.detect,
-        {"imu": android_events.read},
-    ),
+    "sensor-folder": Reader.of(sensor_folder, "folder or zip of one text table a sensor"),
+    "android-events": Reader.of(android_events, "log of Android sensor events, one a row"),
     "labview": Reader("measurement file of LabVIEW (.lvm)", labview.detect, {TABLE: labview.read}),
     "json": Reader("JSON of samples: lines, list", json_objects.detect, {TABLE: json_objects.read}),
     "excel": Reader("Excel workbook (.xlsx)", excel.detect, {TABLE: excel.read}),
@@ -362,7 +267,7 @@ READERS: dict[str, Reader] = {
         },
         kf_gins.files_of_folder,
     ),
-    "psins": Reader("PSINS increments (.imu)", psins.detect, {"imu": psins.read}),
+    "psins": Reader.of(psins, "PSINS increments (.imu)"),
     "npy-folder": Reader(
         "folder of NumPy arrays (.npy)", numpy_files.detect_folder, {TABLE: numpy_files.read_folder}
     ),
@@ -376,11 +281,7 @@ READERS: dict[str, Reader] = {
     "npz": Reader("NumPy archive (.npz)", numpy_files.detect, {TABLE: numpy_files.read}),
     "parquet": Reader("Parquet (.parquet .pq)", parquet.detect, {TABLE: parquet.read}),
     "hdf5": Reader("HDF5 (.h5 .hdf5) and MATLAB v7.3 (.mat)", hdf5.detect, {TABLE: hdf5.read}),
-    "foot-mounted": Reader(
-        "unit on a shoe: timestamps, imu_data (.mat)",
-        foot_mounted.detect,
-        {"imu": foot_mounted.read},
-    ),
+    "foot-mounted": Reader.of(foot_mounted, "unit on a shoe: timestamps, imu_data (.mat)"),
     "matlab": Reader("MATLAB up to v7 (.mat)", hdf5.detect_matlab, {TABLE: hdf5.read_matlab}),
 }
 
@@ -404,9 +305,28 @@ def readers_of(path: Path) -> Iterator[tuple[str, Reader]]:
         _log.warning("%s", one)
 
 
+#: Newest detections, by path: what it was made from, and its result.
+_DETECTED: dict[Path, tuple[tuple[Any, ...], tuple[str, Reader]]] = {}
+#: Detections that are kept.
+_MOST_DETECTED = 64
+
+
 def reader_of(path: Path) -> tuple[str, Reader | None]:
-    """Return the reader that reads a file or folder, the first that recognizes it, and its name."""
-    return next(readers_of(path), ("", None))
+    """Return the reader that reads a file or folder, the first that recognizes it, and its name.
+
+    A file or folder that did not change since is not detected again.
+    """
+    state = state_of(path)
+    made_from = (state, tuple(READERS.values()))
+    if state and path in _DETECTED and _DETECTED[path][0] == made_from:
+        return _DETECTED[path][1]
+    for name, reader in readers_of(path):
+        if state and READERS.get(name) is reader:
+            if len(_DETECTED) >= _MOST_DETECTED:
+                _DETECTED.clear()
+            _DETECTED[path] = (made_from, (name, reader))
+        return name, reader
+    return "", None
 
 
 def open_stream(path: str | Path, stream: str, form: str | None = None) -> Raw:
@@ -557,6 +477,8 @@ MOST_BYTES = 64 * 1024 * 1024
 def _not_recognized(path: Path) -> DataError:
     """Make the error for a file or folder of no known format; it names the logs in a folder."""
     if path.is_file():
+        if path.suffix.lower() == ".zip":
+            sensor_folder.members_of(path)  # refuses an archive of too many tables
         if (other := _foreign(path)) is not None:
             return DataError("io.foreign-format", file=path.name, what=other.what, way=other.way)
         head = first_bytes(path, 8).hex(" ")

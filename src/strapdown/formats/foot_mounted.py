@@ -86,16 +86,9 @@ def read(path: Path) -> RawLog:
         The file is damaged, or its arrays have the wrong shapes.
     """
     time, imu = _log(path)
-    stated: dict[str, tuple[str, str | None]] = {"time": ("time", "s")}
-    stated |= {n: (n, "rad/s" if n.startswith("gyro") else "m/s2") for n in COLUMNS}
-    return RawLog(
-        name=path.name,
-        files=(path,),
-        columns={"time": time} | {n: imu[:, k] for k, n in enumerate(COLUMNS)},
-        stated=stated,
-        sampling="instantaneous",
-        axes="x,y,z",
-    )
+    units = {"gyro": "rad/s", "accel": "m/s2"}
+    columns = {n: (imu[:, k], units[n.partition("_")[0]]) for k, n in enumerate(COLUMNS)}
+    return RawLog.of(path, {"time": (time, "s"), **columns}, sampling="instantaneous", axes="x,y,z")
 
 
 def read_points(path: Path) -> tuple[Array, Array]:

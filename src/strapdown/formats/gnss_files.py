@@ -35,7 +35,7 @@ from strapdown.units import OF_TABLES, SPEEDS, TIME_UNITS, unit_of
 __all__ = [
     "GnssOptions",
     "fixes_of_columns",
-    "has_fixes",
+    "open_fixes",
     "read_gnss",
 ]
 
@@ -430,24 +430,29 @@ def _quality(raw: RawLog, found: dict[str, Found], values: Callable[[str], Array
     return np.array([QUALITY[int(q)] for q in codes], dtype=np.float64)
 
 
-def has_fixes(path: str | Path) -> bool:
-    """Whether a recording has a stream of fixes."""
+def open_fixes(path: str | Path) -> RawLog | Fixes | None:
+    """Open the stream of fixes of a recording, for `read_gnss`; None if it has none."""
     try:
         raw = open_stream(path, "gnss")
-        if not isinstance(raw, RawLog):
-            return True
-        return {"time", "lat", "lon"} <= fix_columns(raw, {}).keys()
+        if isinstance(raw, RawLog) and not {"time", "lat", "lon"} <= fix_columns(raw, {}).keys():
+            return None
     except StrapdownError:
-        return False
+        return None
+    assert isinstance(raw, RawLog | Fixes)
+    return raw
 
 
-def read_gnss(path: str | Path, options: GnssOptions | None = None) -> pd.DataFrame:
+def read_gnss(
+    path: str | Path, options: GnssOptions | None = None, raw: RawLog | Fixes | None = None
+) -> pd.DataFrame:
     """Read the fixes of a GNSS receiver.
 
     Parameters
     ----------
     options : GnssOptions, optional
         User's statements about the file.
+    raw : RawLog or Fixes, optional
+        Its stream of fixes, if it was opened before (`open_fixes`), which is used up.
 
     Returns
     -------
@@ -465,8 +470,7 @@ def read_gnss(path: str | Path, options: GnssOptions | None = None) -> pd.DataFr
     path, asked = Path(path), options or GnssOptions()
     if path.is_file() and comma2k19.belongs(path):
         raise DataError("io.fixes-comma-k-segment-two", file=path.name, parent=path.parent)
-    raw = open_stream(path, "gnss", asked.format)
-    if isinstance(raw, RawLog):
-        raw = fixes_of_columns(raw, asked)
-    assert isinstance(raw, Fixes)  # of a format with fixes
-    return table_of_fixes(raw, asked)
+    stream = open_stream(path, "gnss", asked.format) if raw is None else raw
+    fixes = fixes_of_columns(stream, asked) if isinstance(stream, RawLog) else stream
+    assert isinstance(fixes, Fixes)  # of a format with fixes
+    return table_of_fixes(fixes, asked)

@@ -30,8 +30,16 @@ def _has_gyro(folder: Path) -> bool:
     return any(_triad(m) == "gyro" for m in peek(folder))
 
 
-#: Any archive is accepted.
-detect = Signs(named=(".zip",), folder=_has_gyro)
+def _is_of_one_recording(archive: Path) -> bool:
+    """Whether an archive has no more tables than a recording; one that is damaged may have."""
+    try:
+        return _tables_in(_listed(archive)) <= MOST_TABLES
+    except DataError:
+        return True
+
+
+#: Any archive of that size is accepted.
+detect = Signs(suffixes=(".zip",), also=_is_of_one_recording, folder=_has_gyro)
 
 
 def read(path: Path) -> RawLog:
@@ -84,6 +92,8 @@ def _log(member: Member) -> RawLog:
 
 
 HEAD = 4096  # bytes in which the first line is searched
+#: Most tables of a recording. Loggers write one a sensor, some forty; each is opened several times.
+MOST_TABLES = 200
 
 
 @dataclass(frozen=True)
@@ -160,8 +170,22 @@ def members_of(path: Path) -> list[Member]:
     """List the files of a folder and of its folder ``meta``, or the members of an archive.
 
     Returns sorted by name; files that macOS adds to archives are left out. DataError: the archive
-    is damaged.
+    is damaged, or there are more than `MOST_TABLES` tables.
     """
+    found = _listed(path)
+    tables = _tables_in(found)
+    if tables > MOST_TABLES:
+        raise DataError(
+            "io.too-many-members", file=path.resolve().name, count=tables, most=MOST_TABLES
+        )
+    return found
+
+
+def _tables_in(members: list[Member]) -> int:
+    return sum(m.suffix in csv.SUFFIXES for m in members)
+
+
+def _listed(path: Path) -> list[Member]:
     whole = path.resolve().name
     if path.is_dir():
         found = sorted(p for f in (path, path / "meta") if f.is_dir() for p in f.iterdir())

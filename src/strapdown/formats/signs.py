@@ -6,14 +6,16 @@ a function of the format is called only where the signs leave it open.
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from functools import lru_cache
 from pathlib import Path
+from typing import Any
 
-__all__ = ["HEAD", "Signs", "first_bytes", "head"]
+__all__ = ["HEAD", "Signs", "first_bytes", "head", "state_of"]
 
 #: Bytes of a file that are looked at.
 HEAD = 1 << 16
@@ -81,6 +83,28 @@ def first_bytes(path: Path, count: int) -> bytes:
             return stream.read(count)
     except OSError:
         return b""
+
+
+#: Most entries of a folder by which its state is known.
+_MOST_ENTRIES = 200
+
+
+def state_of(path: Path) -> tuple[Any, ...]:
+    """Return what shows whether a file or folder was changed; empty where it cannot be known.
+
+    Of a file: its size, its time of change and its first bytes, as a clock of files may be too
+    coarse for a file that is written twice. Of a folder: those of all entries in it, without bytes.
+    """
+    try:
+        if not path.is_dir():
+            about = path.stat()
+            return about.st_ino, about.st_size, about.st_mtime_ns, first_bytes(path, HEAD)
+        inside = sorted(itertools.islice(path.rglob("*"), _MOST_ENTRIES + 1))
+        if len(inside) > _MOST_ENTRIES:
+            return ()
+        return tuple((str(p), (at := p.stat()).st_size, at.st_mtime_ns) for p in inside)
+    except OSError:
+        return ()
 
 
 def head(path: Path, count: int = 1 << 14) -> str:

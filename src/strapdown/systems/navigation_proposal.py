@@ -23,7 +23,7 @@ from strapdown.constants import DEG_PER_HOUR, STANDARD_GRAVITY
 from strapdown.errors import DataError, DivergenceError, Finding
 from strapdown.formats.assemble import require_accel
 from strapdown.formats.clocks import on_clock_of
-from strapdown.formats.gnss_files import has_fixes, read_gnss
+from strapdown.formats.gnss_files import open_fixes, read_gnss
 from strapdown.formats.recording import Recording
 from strapdown.frames import ways_between
 from strapdown.navigation.measurements.clock_windows import (
@@ -212,7 +212,8 @@ def propose(
     require_accel(recording)
     table: dict[str, Any] = {"log": log.model_dump(exclude_none=True), "axes": {"axes": axes}}
     fixes = None
-    if gnss is None and has_fixes(log.path):
+    opened = open_fixes(log.path) if gnss is None else None
+    if opened is not None:
         gnss = FixesTable(path=log.path)
     if gnss is not None:
         asked = replace(
@@ -220,7 +221,7 @@ def propose(
             unstated_position_sd=CODE_POSITION_SD,
             unstated_velocity_sd=CODE_VELOCITY_SD,
         )
-        fixes, shifted = on_clock_of(read_gnss(gnss.path, asked), recording.imu)
+        fixes, shifted = on_clock_of(read_gnss(gnss.path, asked, opened), recording.imu)
         findings = (*findings, *fixes.attrs["findings"], *([shifted] if shifted else []))
         fixes, repeats = without_repeats(fixes)
         findings = (*findings, *repeats)

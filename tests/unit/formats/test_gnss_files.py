@@ -9,7 +9,7 @@ from tests.coded import coded
 
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import ReadOptions, read_log
-from strapdown.formats.gnss_files import GnssOptions, has_fixes, read_gnss
+from strapdown.formats.gnss_files import GnssOptions, open_fixes, read_gnss
 from strapdown.tables import GNSS, check_gnss
 from strapdown.tables.checks import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD
 
@@ -277,7 +277,7 @@ def test_fixes_as_other_people_name_them(tmp_path, before):
     table = read_gnss(path)
     assert table[["lat", "lon", "alt"]].iloc[0].tolist() == pytest.approx([47, 9, 400], abs=1e-3)
     assert table["VN"].iloc[0] == pytest.approx(10.0)
-    assert has_fixes(path)
+    assert open_fixes(path) is not None
     # What a fix takes is not listed as unused by the inertial sensors.
     log = read_log(path, ReadOptions(time_unit="s"))
     assert "io.columns-not-used" not in {f.code for f in log.findings}

@@ -16,7 +16,7 @@ from strapdown.errors import DataError
 from strapdown.formats import ReadOptions, read_log, reader_of
 from strapdown.formats.assemble import assemble
 from strapdown.formats.columns import read_name
-from strapdown.formats.gnss_files import has_fixes
+from strapdown.formats.gnss_files import open_fixes
 from strapdown.formats.recording import RawLog
 from strapdown.tables import ACCEL, GYRO
 
@@ -389,7 +389,7 @@ def test_a_log_with_fixes_in_its_rows_gives_both(tmp_path):
     streams = sd.read(path)
     assert len(streams["imu"]) == 400
     assert streams["gnss"].index.tolist() == pytest.approx([0.5, 1.0, 2.0, 3.0])
-    assert has_fixes(path)
+    assert open_fixes(path) is not None
     check(read_log(path), 400)
 
 
