@@ -66,7 +66,7 @@ from strapdown.report.verdict import (
     promise,
     repeated_words,
 )
-from strapdown.systems.navigation_run import NavigationRun, run_navigation
+from strapdown.systems.navigation_run import NavigationRun, run_navigation, withheld_aid
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
 from strapdown.tables.checks import index_of
 
@@ -202,15 +202,17 @@ def navigation_json(found: NavigationEvaluation) -> dict[str, Any]:
         ],
         "gnss_outage_tests": [
             {
-                "measurement": w.aid,
-                "from_s": w.begin,
-                "to_s": w.end,
-                "largest_horizontal_error_m": w.error_m,
-                "bound_95_m": w.bound_m,
-                "inside": w.inside,
-                "largest_horizontal_error_forward_m": (w.forward_m),
+                "measurement": withheld_aid(result.spec),
+                "from_s": w.result.span.begin,
+                "to_s": w.result.span.end,
+                "largest_horizontal_error_m": w.result.largest,
+                "bound_95_m": w.result.bound_at_largest,
+                "inside": w.result.inside,
+                "largest_horizontal_error_forward_m": None
+                if w.smoothed is None
+                else w.forward.largest,
             }
-            for w in found.withheld
+            for w in result.withheld
         ],
         "modes": [{"mode": s.name, "from_s": s.begin, "to_s": s.end} for s in record.modes],
         "events": [

@@ -62,7 +62,7 @@ from strapdown.report.values import (
 from strapdown.report.values import stamp as instant
 from strapdown.report.verdict import integrity_sections, status_words
 from strapdown.rotation import within_half_turn
-from strapdown.systems.navigation_run import NavigationRun
+from strapdown.systems.navigation_run import NavigationRun, withheld_aid
 from strapdown.tables import EULER, NED, VELOCITY
 
 # 95 % bound in deg from which a heading is unknown.
@@ -561,15 +561,15 @@ def withheld_table(found: NavigationEvaluation) -> TableBlock | None:
     """GNSS outage tests with the resulting errors."""
     rows = [
         (
-            w.aid,
-            instant(w.begin),
-            duration_words(w.end - w.begin),
-            length_words(w.error_m),
-            length_words(w.bound_m),
-            "yes" if w.inside else "no",
-            *(() if w.forward_m is None else (length_words(w.forward_m),)),
+            withheld_aid(found.run.spec),
+            instant(w.result.span.begin),
+            duration_words(w.result.span.end - w.result.span.begin),
+            length_words(w.result.largest),
+            length_words(w.result.bound_at_largest),
+            "yes" if w.result.inside else "no",
+            *(() if w.smoothed is None else (length_words(w.forward.largest),)),
         )
-        for w in found.withheld
+        for w in found.run.withheld
     ]
     if not rows:
         return None
@@ -584,7 +584,7 @@ def withheld_table(found: NavigationEvaluation) -> TableBlock | None:
         caption="Measurements withheld on purpose: the largest horizontal error, and the run's "
         "95 % bound at that instant"
         + ("; smoothed, and by the filter alone." if smoothed else "."),
-        strong=tuple(k for k, w in enumerate(found.withheld) if not w.inside),
+        strong=tuple(k for k, w in enumerate(found.run.withheld) if not w.result.inside),
     )
 
 
