@@ -578,10 +578,10 @@ _ENOUGH = 0.8
 _MANY = 0.1
 
 
-def trust(found: NavigationEvaluation) -> Trust:
+def trust(evaluation: NavigationEvaluation) -> Trust:
     """Judge a run by its consistency."""
-    known = _against_known(found)
-    used = [one for one in found.agreements if one.used.any()]
+    known = _against_known(evaluation)
+    used = [one for one in evaluation.agreements if one.used.any()]
     reasons = known + [_innovations(one) for one in used]
     reasons += [
         reason(
@@ -591,40 +591,40 @@ def trust(found: NavigationEvaluation) -> Trust:
             correlation=one.correlation,
             by_chance=one.correlation_bound,
         )
-        for one in found.agreements
+        for one in evaluation.agreements
         if one.remembers
     ]
-    reasons += _rejected(found)
+    reasons += _rejected(evaluation)
     # Notes appear among the findings and do not count against the run.
-    reasons += [f for f in found.run.findings if f.severity == "warning"]
-    if not used and found.errors is None and not found.run.withheld:
+    reasons += [f for f in evaluation.run.findings if f.severity == "warning"]
+    if not used and evaluation.errors is None and not evaluation.run.withheld:
         reasons.append(reason(False, "navigation.nothing-observed"))
     wrong = any(one.severity == "warning" for one in known)
-    wrong |= any(one.refutes for one in found.agreements)
+    wrong |= any(one.refutes for one in evaluation.agreements)
     against = any(one.severity == "warning" for one in reasons)
     verdict = "trusted" if not against else "distrusted" if wrong else "reserve"
-    return Trust(verdict, tuple(reasons), _short(found))
+    return Trust(verdict, tuple(reasons), _short(evaluation))
 
 
-def _short(found: NavigationEvaluation) -> tuple[Finding, ...]:
+def _short(evaluation: NavigationEvaluation) -> tuple[Finding, ...]:
     parts = []
-    if found.errors is not None:
-        score = found.errors.score("horizontal")
+    if evaluation.errors is not None:
+        score = evaluation.errors.score("horizontal")
         parts.append(
             reason(
                 True,
                 "navigation.position-within-bound",
-                reference=found.truth_name,
+                reference=evaluation.truth_name,
                 share=score.share,
             )
         )
-    if count := len(found.run.withheld):
+    if count := len(evaluation.run.withheld):
         parts.append(
             reason(True, "navigation.outage-test-passed")
             if count == 1
             else reason(True, "navigation.outage-tests-passed", count=count)
         )
-    used = [one for one in found.agreements if one.used.any()]
+    used = [one for one in evaluation.agreements if one.used.any()]
     if used:
         worst = max(used, key=lambda a: abs(a.ratio - 1.0))
         parts.append(
@@ -640,12 +640,12 @@ def _short(found: NavigationEvaluation) -> tuple[Finding, ...]:
     return tuple(parts)
 
 
-def _against_known(found: NavigationEvaluation) -> list[Finding]:
+def _against_known(evaluation: NavigationEvaluation) -> list[Finding]:
     """Compare the run with the truth and with withheld fixes."""
     out = []
     quantities = (("horizontal", "horizontal position"), ("down", "height"))
     for name, word in (*quantities, *((a, a) for a in reversed(EULER))):
-        score = None if found.errors is None else found.errors.score(name)
+        score = None if evaluation.errors is None else evaluation.errors.score(name)
         if score is None or np.isnan(score.share):
             continue
         out.append(
@@ -659,7 +659,7 @@ def _against_known(found: NavigationEvaluation) -> list[Finding]:
                 share=score.share,
             )
         )
-    tests = [one.result for one in found.run.withheld]
+    tests = [one.result for one in evaluation.run.withheld]
     if tests:
         inside = sum(one.inside for one in tests)
         bounds = [(one, one.bound_at_largest) for one in tests]
@@ -697,9 +697,9 @@ def _innovations(one: Agreement) -> Finding:
     return reason(good, code, name=one.name, ratio=one.ratio, independent=one.lasting)
 
 
-def _rejected(found: NavigationEvaluation) -> list[Finding]:
+def _rejected(evaluation: NavigationEvaluation) -> list[Finding]:
     out = []
-    for one in found.agreements:
+    for one in evaluation.agreements:
         if one.rejected > _MANY * one.epochs:
             out.append(
                 reason(

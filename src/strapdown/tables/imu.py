@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from strapdown.errors import DataError
+from strapdown.errors import DataError, check_choice
 from strapdown.tables.checks import (
     ACCEL,
     DR,
@@ -30,6 +30,11 @@ from strapdown.tables.checks import (
 )
 
 SAMPLINGS = ("instantaneous", "mean")
+
+
+def check_sampling_kind(sampling: str) -> None:
+    """Raise ConfigError unless it is one of `SAMPLINGS`."""
+    check_choice("tables.no-kind-sampling", SAMPLINGS, quantity="sampling", sampling=sampling)
 
 
 def imu_table(
