@@ -79,7 +79,7 @@ def export_c(
 
 def _kind(interpolation: str, sampling: str | None, imu: pd.DataFrame | None) -> str:
     check_choice(
-        "attitude.no-interpolation",
+        "mechanization.no-interpolation",
         INTERPOLATIONS,
         quantity="interpolation",
         interpolation=interpolation,
