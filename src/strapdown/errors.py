@@ -119,6 +119,11 @@ class Finding:
         severity = changes.pop("severity", self.severity)
         return Finding(code, severity=severity, data={**self.data, **changes}, **kept)
 
+    def explains(self, code: str, **data: Any) -> Finding:
+        """Return another finding at its location, of which it is the reason."""
+        where = {name: getattr(self, name) for name in _LOCATION}
+        return Finding(code, severity=self.severity, data={"reason": self}, **{**where, **data})
+
     def sentence(self, words: Words = "python") -> str:
         """Return what was found, with the numbers that show it."""
         text = _text(self, "what", words)

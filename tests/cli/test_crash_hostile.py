@@ -178,12 +178,12 @@ def test_it_verifies_with_such_names_of_files(hostile, monkeypatch):
     class RunAgainError(Exception):
         pass
 
-    def refuse(configuration, out, sealed):
+    def refuse(command, configuration, out, sealed):
         for unit in configuration["case"]["units"]:
             for triad in unit["accelerometers"]:
                 assert Path(triad["path"]).exists()
         raise RunAgainError
 
-    monkeypatch.setitem(module.RERUNS, "crash", refuse)
+    monkeypatch.setattr(module, "_rerun", refuse)
     with pytest.raises(RunAgainError):
         module.verify(hostile[0])

@@ -24,10 +24,10 @@ class RunAgainError(Exception):
 
 @pytest.fixture
 def no_run(monkeypatch):
-    def refuse(configuration, out, sealed):
+    def refuse(command, configuration, out, sealed):
         raise RunAgainError
 
-    monkeypatch.setitem(module.RERUNS, "crash", refuse)
+    monkeypatch.setattr(module, "_rerun", refuse)
 
 
 @pytest.fixture
@@ -250,14 +250,14 @@ def test_whatever_is_changed_in_the_manifest_changes_the_printed_seal(copy, no_r
 def test_what_the_second_run_finds_is_named(copy, sealed_crash, monkeypatch, place, value, named):
     """The second run is stood in for by what was sealed, as the configuration says it now."""
 
-    def again(configuration, out, sealed):
+    def again(command, configuration, out, sealed):
         shutil.copytree(sealed_crash.folder, out)
         if configuration["name"] == "another":
             (out / "report.html").write_text("strapdown verify another")
         if configuration["case"]["name"] == "another":
             (out / "crash.json").write_text('{"name": "another"}')
 
-    monkeypatch.setitem(module.RERUNS, "crash", again)
+    monkeypatch.setattr(module, "_rerun", again)
     assert verify(copy).verdict == "identical"
     whole = change_manifest(copy, lambda m: put(m, place, value))
     details = found(copy)

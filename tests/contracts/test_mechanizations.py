@@ -373,7 +373,7 @@ def test_a_tracker_takes_what_numpy_takes():
 
 
 def test_a_tracker_knows_its_samplings():
-    with pytest.raises(ConfigError, check=coded("mechanization.no-kind-sampling")):
+    with pytest.raises(ConfigError, check=coded("tables.no-kind-sampling")):
         NavTracker(START, sampling="averaged")
 
 

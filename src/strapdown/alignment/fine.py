@@ -475,19 +475,16 @@ def telling_record(imu: pd.DataFrame) -> Iterator[None]:
         # The remedy of the mechanization is an argument that an alignment lacks.
         if f.code not in GAPS:
             raise
-        raise DataError(
-            "alignment.gap-in-fine-record", file=f.file, row=f.row, quantity="time", reason=f
-        ) from None
+        raise DataError(f.explains("alignment.gap-in-fine-record", quantity="time")) from None
     except DivergenceError as error:
         f = error.finding
         rate = float(np.linalg.norm(values_of(imu, GYRO).mean(axis=0)))
         raise DivergenceError(
-            "alignment.fine-alignment-diverged",
-            file=imu.attrs.get("source"),
-            row=f.row,
-            quantity=f.quantity,
-            reason=f,
-            rate_deg=math.degrees(3600.0 * rate),
+            f.explains(
+                "alignment.fine-alignment-diverged",
+                file=imu.attrs.get("source"),
+                rate_deg=math.degrees(3600.0 * rate),
+            )
         ) from None
 
 

@@ -151,14 +151,7 @@ def _refuse_travel(
     # A burst of outliers or a gap is a likelier cause than a drive.
     known = [f for f in findings if f.row is not None]
     if known:
-        raise DataError(
-            "alignment.heading-lost",
-            file=known[0].file,
-            row=known[0].row,
-            quantity=known[0].quantity,
-            reason=known[0],
-            sd_deg=np.degrees(sd[2]),
-        )
+        raise DataError(known[0].explains("alignment.heading-lost", sd_deg=np.degrees(sd[2])))
     raise DataError(
         "alignment.body-travelled-or-gyros-in-deg-per-s"
         if seems_in_deg_per_s(rate, site)

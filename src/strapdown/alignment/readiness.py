@@ -191,39 +191,6 @@ class Manoeuvre:
     accel_bias_sd: Array
 
 
-def null_space(lat_deg: float, q_nb: Array, gravity: float, earth_rate: float) -> Array:
-    """Return the errors that no observation of a rest reveals.
-
-    Any constant rotation psi of the computed attitude, with ``C_nb b_a = f x psi`` and
-    ``C_nb b_g = omega_ie x psi``, leaves velocity and attitude relative to the Earth constant. So
-    a horizontal bias cannot be separated from a tilt, nor an east drift from the heading.
-
-    Parameters
-    ----------
-    lat_deg : float, deg
-    q_nb : ndarray, (4,)
-    gravity : float, m/s²
-    earth_rate : float, rad/s
-
-    Returns
-    -------
-    ndarray, (15, 3)
-        Columns of physical errors in north-east-down and body axes: displacement, velocity,
-        rotation, gyro bias, accelerometer bias; one for a rotation about each of north, east, down.
-    """
-    lat = math.radians(lat_deg)
-    spin = earth_rate * np.array([math.cos(lat), 0.0, -math.sin(lat)])
-    force = np.array([0.0, 0.0, -gravity])
-    C = rotation.dcm_from_quaternion(q_nb)
-    out = np.zeros((15, 3))
-    for i in range(3):
-        psi = np.eye(3)[i]
-        out[6:9, i] = psi
-        out[9:12, i] = C.T @ np.cross(spin, psi)
-        out[12:15, i] = C.T @ np.cross(force, psi)
-    return out
-
-
 def manoeuvres_after(
     result: FineResult, site: Site, rest: float | None = None
 ) -> tuple[Manoeuvre, ...]:

@@ -102,13 +102,8 @@ class TwoVector(CoarseAlignment):
             disturbed = _disturbed(means, site, loud_rate, loud_force, swing, source)
             findings.append(disturbed)
             if heading_sd > LARGEST_SD:
-                raise DataError(
-                    "alignment.heading-lost",
-                    file=source,
-                    quantity=disturbed.quantity,
-                    reason=disturbed,
-                    sd_deg=np.degrees(heading_sd),
-                )
+                sd_deg = np.degrees(heading_sd)
+                raise DataError(disturbed.explains("alignment.heading-lost", sd_deg=sd_deg))
         findings += north_findings(site, heading_sd, sensors, source)
         findings += still_by_gnss(gnss, imu, site, heading_sd)
         turned = C_nb @ means.whole_force

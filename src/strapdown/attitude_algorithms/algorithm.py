@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown import rotation
 from strapdown._kernels import rotation as kernel
 from strapdown._kernels.increments import HEAD, LARGEST, MEAN, OPTIONS, SAMPLES, TIME
-from strapdown.errors import ConfigError, DataError, DivergenceError
-from strapdown.tables import DTHETA, SAMPLINGS, THETA, attitude_table
+from strapdown.errors import DataError, DivergenceError
+from strapdown.tables import DTHETA, THETA, attitude_table, check_sampling_kind
 
 Array = NDArray[np.float64]
 
@@ -290,13 +290,7 @@ class AttitudeTracker:
         q_nb: ArrayLike = (1.0, 0.0, 0.0, 0.0),
         sampling: str = "instantaneous",
     ) -> None:
-        if sampling not in SAMPLINGS:
-            raise ConfigError(
-                "attitude.no-kind-sampling",
-                quantity="sampling",
-                sampling=sampling,
-                samplings=SAMPLINGS,
-            )
+        check_sampling_kind(sampling)
         unit = rotation.normalise(q_nb)
         head = np.zeros(HEAD)
         head[MEAN] = float(sampling == "mean")

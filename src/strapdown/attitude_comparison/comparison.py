@@ -42,7 +42,6 @@ from strapdown.attitude_comparison.references import (
 from strapdown.attitude_comparison.source import (
     Source,
     describe,
-    read_options,
     read_source,
     with_truth,
 )
@@ -61,6 +60,7 @@ from strapdown.attitude_comparison.sweep import (
 )
 from strapdown.bundle.seal import InputFiles, Seal, check_destination, input_files
 from strapdown.config import LogSpec
+from strapdown.config.sources import read_options
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.evaluation.differences import known_at, largest_differences
 from strapdown.evaluation.reference_points import SamePose, Score, score_references
@@ -429,7 +429,8 @@ def _gyro_bias(
     bias: Sequence[float]
     choice = spec.gyro_bias.lower()
     if spec.gyro_bias_path is not None:
-        options = read_options(spec.source) if isinstance(spec.source, LogSpec) else None
+        log = spec.source
+        options = read_options(log, log.axes) if isinstance(log, LogSpec) else None
         other = read_log(spec.gyro_bias_path, options)
         found = find_rests(other.imu)
         if not found:

@@ -14,10 +14,11 @@ from strapdown.attitude_algorithms import Quaternion, run_attitude
 from strapdown.attitude_comparison.options import AttitudeSpec
 from strapdown.bundle.seal import InputFiles, input_files, sensor_file
 from strapdown.config import LogSpec, ScenarioSpec
+from strapdown.config.sources import read_options
 from strapdown.errors import DataError, Finding
 from strapdown.evaluation.differences import error_angles
 from strapdown.formats import read_log
-from strapdown.formats.recording import Origin, Reading, ReadOptions, Recording
+from strapdown.formats.recording import Origin, Reading, Recording
 from strapdown.increments import increments_from_imu
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.tables import QUATERNION
@@ -67,26 +68,11 @@ def scenario_errors(spec: ScenarioSpec) -> ImuErrors:
     return load_sensor(spec.sensor).draw(spec.seed)
 
 
-def read_options(spec: LogSpec) -> ReadOptions:
-    """Return the options of a specification for reading its log."""
-    return ReadOptions(
-        format=spec.format,
-        columns=dict(spec.columns),
-        gyro_unit=spec.gyro_unit,
-        accel_unit=spec.accel_unit,
-        time_unit=spec.time_unit,
-        axes=spec.axes,
-        sampling=spec.sampling,
-        rate=spec.rate_hz,
-        repair=spec.repair,
-    )
-
-
 def read_source(spec: AttitudeSpec) -> Source:
     """Read the log, or simulate the scenario, of a specification."""
     asked = spec.source
     if isinstance(asked, LogSpec):
-        log = read_log(asked.path, read_options(asked))
+        log = read_log(asked.path, read_options(asked, asked.axes))
         return Source(
             log.name,
             "recorded log",
@@ -148,7 +134,8 @@ def with_truth(source: Source, spec: AttitudeSpec) -> Source:
     if stated is not None:
         from strapdown.formats.references import read_truth
 
-        options = read_options(spec.source) if isinstance(spec.source, LogSpec) else None
+        log = spec.source
+        options = read_options(log, log.axes) if isinstance(log, LogSpec) else None
         truth = read_truth(Path(stated), options, source.origin)
         scored = np.ones(len(truth), dtype=bool)
     if truth is None or scored is None:

@@ -8,18 +8,14 @@ a failed run leaves no files. ``timing.json`` is outside the seal, because clock
 
 from __future__ import annotations
 
-from strapdown.bundle.configuration_paths import resolved
 from strapdown.bundle.reading import read_manifest, unsealed_changes
-from strapdown.bundle.seal import Seal, sha256, write_latency, write_timing
+from strapdown.bundle.seal import Seal, sha256
 from strapdown.bundle.writing import write_bundle
 
 __all__ = [
     "Seal",
     "read_manifest",
-    "resolved",
     "sha256",
     "unsealed_changes",
     "write_bundle",
-    "write_latency",
-    "write_timing",
 ]

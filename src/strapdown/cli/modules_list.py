@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, fields
 from typing import Any
 
 from strapdown.attitude_algorithms import ALGORITHMS, AttitudeAlgorithm
-from strapdown.config.choice import SLOTS, Slot, options_of
+from strapdown.config.choice import SLOTS, options_of
 from strapdown.config.motions import KINDS
 from strapdown.ellipsoids import ELLIPSOIDS
 from strapdown.errors import Finding
@@ -75,6 +75,9 @@ _PLUGINS: dict[str, tuple[str, type]] = {
     "formats": ("reader", Reader),
 }
 
+#: Columns of a list: each cell from an entry and its name.
+Columns = Mapping[str, Callable[[str, Any], Any]]
+
 
 def listed_modules() -> tuple[tuple[Listed, ...], tuple[Finding, ...]]:
     """Return every list in printing order, including plug-ins.
@@ -83,203 +86,131 @@ def listed_modules() -> tuple[tuple[Listed, ...], tuple[Finding, ...]]:
     """
     lists: list[Listed] = []
     findings: list[Finding] = []
-    for one in _literal():
-        if one.key not in _PLUGINS:
-            lists.append(one)
-            continue
-        found, broken = plugins(*_PLUGINS[one.key])
-        findings += broken
-        added = {
-            "attitude_algorithms": _algorithm_rows,
-            "aiding": _module_rows,
-            "formats": _formats,
-        }[one.key](found)
-        lists.append(replace(one, rows=(*one.rows, *added)))
+    for key, title, entries, columns in _tables():
+        known = dict(entries)
+        if key in _PLUGINS:
+            found, broken = plugins(*_PLUGINS[key])
+            findings += broken
+            known |= found
+        rows = tuple(
+            {"name": name, **{column: cell(name, entry) for column, cell in columns.items()}}
+            for name, entry in known.items()
+        )
+        lists.append(Listed(key, title, rows, tuple(c for c in columns if c in _NUMBERS)))
     return tuple(lists), tuple(findings)
 
 
-def _literal() -> tuple[Listed, ...]:
-    slots = {name: slot for name, slot in SLOTS.items() if name != "mechanization"}
-    return (
-        _algorithms(),
-        _mechanizations(),
-        *(_slot(name, slot) for name, slot in slots.items()),
-        Listed(
-            "standstill_detectors",
-            "Detectors of a standstill (detector = … of a measurement)",
-            _summaries(STANDSTILL_DETECTORS),
-        ),
-        Listed(
-            "standstill_thresholds",
-            "What becomes of its threshold (threshold_rule = …)",
-            _summaries(STANDSTILL_THRESHOLDS),
-        ),
-        Listed(
-            "ellipsoids",
-            "Ellipsoids",
-            tuple(
-                {
-                    "name": name,
-                    "semi_major_axis_m": float(e.semi_major_axis),
-                    "inverse_flattening": float(f"{e.inverse_flattening:.12g}"),
-                    "source": e.source,
-                }
-                for name, e in ELLIPSOIDS.items()
-            ),
-            ("semi_major_axis_m", "inverse_flattening"),
-        ),
-        Listed(
-            "motions", "Motions of a trajectory's file", tuple({"name": kind} for kind in KINDS)
-        ),
-        *_scenarios(),
-        Listed(
-            "sensors",
-            "Sensors that can be simulated",
-            tuple(
-                {"name": s.name, "class": s.grade, "summary": f"{s.title}: {s.summary}"}
-                for s in map(load_sensor, SENSORS)
-            ),
-        ),
-        Listed("formats", "Formats that are read", _formats(READERS)),
-        Listed("crash_formats", "Formats of crash records that are read", _titles(CRASH_READERS)),
-        Listed(
-            "writers",
-            "Formats that are written",
-            tuple(
-                {
-                    "name": name,
-                    "streams": list(one.streams),
-                    "ending": list(one.endings) or ["folder"],
-                    "read as": one.reader,
-                    "summary": one.title,
-                }
-                for name, one in WRITERS.items()
-            ),
-        ),
-    )
+_NUMBERS = ("semi_major_axis_m", "inverse_flattening", "duration_s")
+_TITLE: Columns = {"summary": lambda _, one: one.title}
+_SUMMARY: Columns = {
+    "source": lambda _, one: one.source,
+    "summary": lambda _, one: one.summary,
+}
+_MODULE: Columns = {
+    "source": lambda _, one: getattr(one, "source", "") or None,
+    "options": lambda _, one: [o.key for o in options_of(one)],
+    "summary": lambda _, one: getattr(one, "summary", "") or (one.__doc__ or "").partition("\n")[0],
+}
 
 
-def _algorithms() -> Listed:
-    return Listed(
+def _tables() -> Iterator[tuple[str, str, Mapping[str, Any], Columns]]:
+    """Key, title, entries and columns of each list, in printing order."""
+    yield (
         "attitude_algorithms",
         "Attitude algorithms",
-        _algorithm_rows(ALGORITHMS),
-    )
-
-
-def _algorithm_rows(entries: Mapping[str, Any]) -> tuple[Mapping[str, Any], ...]:
-    return tuple(
+        ALGORITHMS,
         {
-            "name": name,
-            "source": f"{cls.source} {cls.equations}".strip(),
-            "options": [f"{f.name}={f.default}".lower() for f in fields(cls)],
-            "summary": cls.summary,
-        }
-        for name, cls in entries.items()
+            "source": lambda _, cls: f"{cls.source} {cls.equations}".strip(),
+            "options": lambda _, cls: [f"{f.name}={f.default}".lower() for f in fields(cls)],
+            "summary": lambda _, cls: cls.summary,
+        },
     )
-
-
-def _mechanizations() -> Listed:
     shared = len(fields(Mechanization))
-    return Listed(
-        "mechanization",
-        "Mechanizations",
-        tuple(
-            {
-                "name": name,
-                "source": cls.source,
-                "options": [f.name for f in fields(cls)[shared:]],
-                "summary": cls.summary,
-            }
-            for name, cls in MECHANIZATIONS.items()
-        ),
+    options = {"options": lambda _, cls: [f.name for f in fields(cls)[shared:]]}
+    columns = {"source": _SUMMARY["source"], **options, "summary": _SUMMARY["summary"]}
+    yield "mechanization", "Mechanizations", MECHANIZATIONS, columns
+    for name, slot in SLOTS.items():
+        if name != "mechanization":
+            title = f"{slot.title} ([{name}] of a chain{_UNSAID.get(name, '')})"
+            yield name, title, slot.entries, _MODULE
+    yield (
+        "standstill_detectors",
+        "Detectors of a standstill (detector = … of a measurement)",
+        STANDSTILL_DETECTORS,
+        _SUMMARY,
     )
-
-
-def _slot(name: str, slot: Slot) -> Listed:
-    return Listed(
-        name,
-        f"{slot.title} ([{name}] of a chain{_UNSAID.get(name, '')})",
-        _module_rows(slot.entries),
+    yield (
+        "standstill_thresholds",
+        "What becomes of its threshold (threshold_rule = …)",
+        STANDSTILL_THRESHOLDS,
+        _SUMMARY,
     )
-
-
-def _module_rows(entries: Mapping[str, Any]) -> tuple[Mapping[str, Any], ...]:
-    return tuple(
+    yield (
+        "ellipsoids",
+        "Ellipsoids",
+        ELLIPSOIDS,
         {
-            "name": kind,
-            "source": getattr(entry, "source", "") or None,
-            "options": [o.key for o in options_of(entry)],
-            "summary": getattr(entry, "summary", "") or (entry.__doc__ or "").partition("\n")[0],
-        }
-        for kind, entry in entries.items()
+            "semi_major_axis_m": lambda _, e: float(e.semi_major_axis),
+            "inverse_flattening": lambda _, e: float(f"{e.inverse_flattening:.12g}"),
+            "source": lambda _, e: e.source,
+        },
     )
-
-
-def _scenarios() -> tuple[Listed, ...]:
-    return (
-        Listed(
-            "scenarios",
-            "Scenarios with exact attitude",
-            tuple(
-                {
-                    "name": name,
-                    "duration_s": float(f"{s.motion.duration:g}"),
-                    "summary": f"{s.title} ({s.origin})",
-                }
-                for name, s in SCENARIOS.items()
-            ),
-            ("duration_s",),
-        ),
-        Listed(
-            "crashes",
-            "Crashes with exact truth, and what is none",
-            tuple(
-                {
-                    "name": name,
-                    "duration_s": float(f"{c.motion.duration:.3g}"),
-                    "kind": c.kind,
-                    "summary": f"{c.summary} ({c.source})",
-                }
-                for name, c in CRASHES.items()
-            ),
-            ("duration_s",),
-        ),
-        Listed(
-            "crash_cases",
-            "The same crashes with recorders of their own",
-            tuple(
-                {
-                    "name": name,
-                    "crash": c.crash.name,
-                    "recorders": list(c.usual),
-                    "summary": c.summary,
-                }
-                for name, c in CASES.items()
-                if name not in CRASHES
-            ),
-        ),
-    )
-
-
-def _summaries(entries: Mapping[str, Any]) -> tuple[Mapping[str, Any], ...]:
-    return tuple(
-        {"name": name, "source": one.source, "summary": one.summary}
-        for name, one in entries.items()
-    )
-
-
-def _formats(readers: Mapping[str, Reader]) -> tuple[Mapping[str, Any], ...]:
-    return tuple(
+    yield "motions", "Motions of a trajectory's file", dict.fromkeys(KINDS), {}
+    yield (
+        "scenarios",
+        "Scenarios with exact attitude",
+        SCENARIOS,
         {
-            "name": name,
-            "streams": list(one.streams),
-            "written as": next((n for n, w in WRITERS.items() if w.reader == name), None),
-            "summary": one.title,
-        }
-        for name, one in readers.items()
+            "duration_s": lambda _, s: float(f"{s.motion.duration:g}"),
+            "summary": lambda _, s: f"{s.title} ({s.origin})",
+        },
     )
-
-
-def _titles(readers: Mapping[str, Any]) -> tuple[Mapping[str, Any], ...]:
-    return tuple({"name": name, "summary": one.title} for name, one in readers.items())
+    yield (
+        "crashes",
+        "Crashes with exact truth, and what is none",
+        CRASHES,
+        {
+            "duration_s": lambda _, c: float(f"{c.motion.duration:.3g}"),
+            "kind": lambda _, c: c.kind,
+            "summary": lambda _, c: f"{c.summary} ({c.source})",
+        },
+    )
+    yield (
+        "crash_cases",
+        "The same crashes with recorders of their own",
+        {name: c for name, c in CASES.items() if name not in CRASHES},
+        {
+            "crash": lambda _, c: c.crash.name,
+            "recorders": lambda _, c: list(c.usual),
+            "summary": lambda _, c: c.summary,
+        },
+    )
+    yield (
+        "sensors",
+        "Sensors that can be simulated",
+        {s.name: s for s in map(load_sensor, SENSORS)},
+        {"class": lambda _, s: s.grade, "summary": lambda _, s: f"{s.title}: {s.summary}"},
+    )
+    written = {w.reader: n for n, w in reversed(WRITERS.items())}
+    yield (
+        "formats",
+        "Formats that are read",
+        READERS,
+        {
+            "streams": lambda _, one: list(one.streams),
+            "written as": lambda name, _: written.get(name),
+            **_TITLE,
+        },
+    )
+    yield "crash_formats", "Formats of crash records that are read", CRASH_READERS, _TITLE
+    yield (
+        "writers",
+        "Formats that are written",
+        WRITERS,
+        {
+            "streams": lambda _, one: list(one.streams),
+            "ending": lambda _, one: list(one.endings) or ["folder"],
+            "read as": lambda _, one: one.reader,
+            **_TITLE,
+        },
+    )

@@ -62,8 +62,8 @@ def print_navigation(
     start's and the sensors' tables, every caution and every finding.
     """
     out = console()
-    found = NavigationEvaluation(result)
-    verdict = trust(found)
+    evaluation = NavigationEvaluation(result)
+    verdict = trust(evaluation)
     trajectory = result.record.trajectory
     time = trajectory.index
     duration = duration_words(float(time[-1] - time[0]))
@@ -72,15 +72,24 @@ def print_navigation(
     out.print(spaced(f"{name}, {duration}, {distance}, {len(time)} samples"))
     tables: list[TableBlock | None]
     if verbose:
-        tables = [end_table(found), error_table(found), paired_table(found), point_table(found)]
-        tables += [observation_table(found), outage_table(found), withheld_table(found)]
-        tables += [state_table(found)]
+        tables = [
+            end_table(evaluation),
+            error_table(evaluation),
+            paired_table(evaluation),
+            point_table(evaluation),
+        ]
+        tables += [
+            observation_table(evaluation),
+            outage_table(evaluation),
+            withheld_table(evaluation),
+        ]
+        tables += [state_table(evaluation)]
     else:
-        tables = [_end(found), paired_table(found), point_table(found)]
-        tables += [observation_table(found), withheld_table(found)]
+        tables = [_end(evaluation), paired_table(evaluation), point_table(evaluation)]
+        tables += [observation_table(evaluation), withheld_table(evaluation)]
     lines = [(verdict.sentence, STYLES[verdict.verdict])]
-    lines += [(f"{head}: {said}", "") for head, said in cautions(found, brief=not verbose)]
-    lines += terminal_lines(found, brief=not verbose)
+    lines += [(f"{head}: {said}", "") for head, said in cautions(evaluation, brief=not verbose)]
+    lines += terminal_lines(evaluation, brief=not verbose)
     room = LINES - PATHS - 1
     for k, block in enumerate(tables):
         if block is not None:
@@ -103,20 +112,20 @@ def print_navigation(
     print_findings(others, _fitting(others, room, out.width))
 
 
-def _end(found: NavigationEvaluation) -> TableBlock:
+def _end(evaluation: NavigationEvaluation) -> TableBlock:
     """Start and end with 95 % bounds, and the errors of the run where the truth is known."""
-    block = end_table(found)
-    errors = error_table(found)
+    block = end_table(evaluation)
+    errors = error_table(evaluation)
     of: dict[str, tuple[str, ...]] = {}
-    if found.errors is not None and errors is not None:
-        of = dict(zip((s.quantity for s in found.errors.scores), errors.rows, strict=True))
+    if evaluation.errors is not None and errors is not None:
+        of = dict(zip((s.quantity for s in evaluation.errors.scores), errors.rows, strict=True))
     rows = []
     for name, *cells in block.rows:
         shown = of.get(SCORES.get(name, ""), ("",) * 6)
         if name == "position":
             # The height has a row of its own.
             name = "latitude, longitude"
-            ends = found.record.trajectory[["lat", "lon"]].iloc[[0, -1]].to_numpy()
+            ends = evaluation.record.trajectory[["lat", "lon"]].iloc[[0, -1]].to_numpy()
             cells = [
                 f"{plain(float(lat), 6)}°, {plain(float(within_half_turn(lon)), 6)}°"
                 for lat, lon in ends

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from pydantic import Field, FiniteFloat
 
 from strapdown.config.spec import Spec
+from strapdown.formats.recording import ReadOptions
 
-__all__ = ["CrashSimulationSpec", "LogSpec", "ScenarioSpec", "SimulateSpec"]
+if TYPE_CHECKING:
+    from strapdown.config.alignment import LogTable
+
+__all__ = ["CrashSimulationSpec", "LogSpec", "ScenarioSpec", "SimulateSpec", "read_options"]
 
 
 class ScenarioSpec(Spec):
@@ -36,6 +40,21 @@ class LogSpec(Spec):
     sampling: str | None = None
     rate_hz: FiniteFloat | None = None
     repair: bool = False
+
+
+def read_options(log: LogSpec | LogTable, axes: str | None) -> ReadOptions:
+    """Return the options with which the file of a log is read, its axes as letters."""
+    return ReadOptions(
+        format=log.format,
+        columns=dict(log.columns),
+        gyro_unit=log.gyro_unit,
+        accel_unit=log.accel_unit,
+        time_unit=log.time_unit,
+        axes=axes,
+        sampling=log.sampling,
+        rate=log.rate_hz,
+        repair=log.repair,
+    )
 
 
 class SimulateSpec(Spec):

@@ -510,26 +510,9 @@ class DifferenceSummary:
 
     def _repr_html_(self) -> str:
         """The table for a notebook."""
-        head = "".join(f"<th>{h}</th>" for h in ("", "rms", "largest", "at s", "final"))
-        rows = "".join(
-            f"<tr><th>{escape(e.quantity)} {escape(e.unit)}</th>"
-            + "".join(
-                f"<td>{v}</td>"
-                for v in (
-                    f"{e.rms:.4g}",
-                    f"{e.largest:.4g}",
-                    f"{e.largest_at:.6g}",
-                    f"{e.final:.4g}",
-                )
-            )
-            + "</tr>"
-            for e in self.errors
-        )
+        table = self.to_pandas().to_html(float_format="{:.6g}".format)
         notes = "".join(f"<div><small>{escape(str(f))}</small></div>" for f in self.findings)
-        return (
-            f"<div><div><b>{escape(self.title)}</b></div><table><thead><tr>{head}</tr></thead>"
-            f"<tbody>{rows}</tbody></table>{notes}</div>"
-        )
+        return f"<div><div><b>{escape(self.title)}</b></div>{table}{notes}</div>"
 
 
 def summarise_differences(differences: pd.DataFrame) -> DifferenceSummary:

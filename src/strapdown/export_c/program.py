@@ -22,8 +22,7 @@ from strapdown.errors import ConfigError, check_choice
 from strapdown.export_c.kernels import Function, Kernels
 from strapdown.export_c.translate import WIDTH, Translator, comment, number
 from strapdown.increments.angle import INTERPOLATIONS
-from strapdown.tables import GYRO, check_imu
-from strapdown.tables import SAMPLINGS as KINDS
+from strapdown.tables import GYRO, check_imu, check_sampling_kind
 
 # Math functions with a macro for each precision.
 MACROS = ("SQRT", "SIN", "COS", "ATAN2", "HYPOT", "FABS", "FMOD", "FMAX", "COPYSIGN")
@@ -80,7 +79,7 @@ def export_c(
 
 def _kind(interpolation: str, sampling: str | None, imu: pd.DataFrame | None) -> str:
     check_choice(
-        "attitude.no-interpolation",
+        "mechanization.no-interpolation",
         INTERPOLATIONS,
         quantity="interpolation",
         interpolation=interpolation,
@@ -95,8 +94,8 @@ def _kind(interpolation: str, sampling: str | None, imu: pd.DataFrame | None) ->
                 sampling=sampling,
                 attrs=imu.attrs["sampling"],
             )
-    sampling = sampling or KINDS[0]
-    check_choice("attitude.no-kind-sampling-2", KINDS, quantity="sampling", sampling=sampling)
+    sampling = sampling or "instantaneous"
+    check_sampling_kind(sampling)
     return "mean" if sampling == "mean" else interpolation
 
 

@@ -3,7 +3,6 @@
 from strapdown.increments.angle import increments_from_imu
 from strapdown.increments.motion import (
     IncrementStream,
-    IncrementStreamState,
     MotionAccuracy,
     imu_from_increments,
     motion_accuracy,
@@ -12,7 +11,6 @@ from strapdown.increments.motion import (
 
 __all__ = [
     "IncrementStream",
-    "IncrementStreamState",
     "MotionAccuracy",
     "imu_from_increments",
     "increments_from_imu",

@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown._kernels import increments as kernel
-from strapdown.errors import ConfigError
+from strapdown.errors import check_choice
 from strapdown.tables import GYRO, check_imu, increments_table
 
 INTERPOLATIONS = ("linear", "cubic")
@@ -39,13 +39,12 @@ def increments_from_imu(imu: pd.DataFrame, interpolation: str = "linear") -> pd.
     ConfigError
         `interpolation` is unknown.
     """
-    if interpolation not in INTERPOLATIONS:
-        raise ConfigError(
-            "mechanization.no-interpolation",
-            quantity="interpolation",
-            interpolation=interpolation,
-            interpolations=INTERPOLATIONS,
-        )
+    check_choice(
+        "mechanization.no-interpolation",
+        INTERPOLATIONS,
+        quantity="interpolation",
+        interpolation=interpolation,
+    )
     check_imu(imu)
     time = np.ascontiguousarray(imu.index.to_numpy(dtype=np.float64))
     rate = np.ascontiguousarray(imu[GYRO].to_numpy(dtype=np.float64))

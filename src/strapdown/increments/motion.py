@@ -159,7 +159,7 @@ class IncrementStream:
 
     def __post_init__(self) -> None:
         check_choice(
-            "mechanization.no-choice-2",
+            "mechanization.no-interpolation",
             STREAMED,
             quantity="interpolation",
             interpolation=self.interpolation,

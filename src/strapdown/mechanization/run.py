@@ -20,7 +20,15 @@ from strapdown.increments.motion import IncrementStream, IncrementStreamState
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.mechanization.ned import NorthEastDown
 from strapdown.nav_state import NavState
-from strapdown.tables import ACCEL, GYRO, MOTION, PHI, SAMPLINGS, check_imu, check_motion_increments
+from strapdown.tables import (
+    ACCEL,
+    GYRO,
+    MOTION,
+    PHI,
+    check_imu,
+    check_motion_increments,
+    check_sampling_kind,
+)
 from strapdown.tables.checks import (
     check_columns,
     check_rows,
@@ -334,13 +342,7 @@ class NavTracker:
         longest_step: float = LONGEST_STEP,
     ) -> None:
         check_longest_step(longest_step)
-        if sampling not in SAMPLINGS:
-            raise ConfigError(
-                "mechanization.no-kind-sampling",
-                quantity="sampling",
-                sampling=sampling,
-                samplings=SAMPLINGS,
-            )
+        check_sampling_kind(sampling)
         used: object = NorthEastDown() if mechanization is None else mechanization
         update = used.sample_kernel() if isinstance(used, Mechanization) else None
         if not isinstance(used, Mechanization) or update is None:

@@ -95,6 +95,11 @@ class WithheldScore:
         return plane_reach(self.horizontal, self.distance, self.covariance)
 
     @property
+    def bound_at_largest(self) -> float:
+        """95 % bound at the instant of the largest horizontal error, m."""
+        return float(self.bound[int(np.argmax(self.horizontal))])
+
+    @property
     def distance(self) -> Array:
         """Mahalanobis distance of the horizontal error, (n,): 2.45 is the 95 % bound."""
         e = self.error[:, :2]
@@ -273,7 +278,7 @@ class Withheld:
     smoothed: WithheldScore | None
 
     @property
-    def told(self) -> WithheldScore:
+    def result(self) -> WithheldScore:
         """Score of the run: smoothed if available."""
         return self.smoothed or self.forward
 

@@ -12,9 +12,7 @@ if TYPE_CHECKING:
         CHANNELS,
         Grid,
         NoPrefilter,
-        Portion,
         Prefilter,
-        Prefiltered,
         PrefilterReport,
     )
     from strapdown.prefilter.robust_fir import RobustFir
@@ -26,10 +24,8 @@ __all__ = [
     "PREFILTERS",
     "Grid",
     "NoPrefilter",
-    "Portion",
     "Prefilter",
     "PrefilterReport",
-    "Prefiltered",
     "RobustFir",
     "RobustWd",
     "Summed",
@@ -38,7 +34,7 @@ __all__ = [
 load_on_first_use(
     __name__,
     {
-        "prefilter": "CHANNELS Grid NoPrefilter Portion Prefilter PrefilterReport Prefiltered",
+        "prefilter": "CHANNELS Grid NoPrefilter Prefilter PrefilterReport",
         "robust_fir": "RobustFir",
         "summed": "Summed",
         "w_d": "RobustWd",

@@ -46,10 +46,10 @@ def _run(configuration: dict[str, Any]) -> AlignmentRun:
 
 def _write(result: AlignmentRun, folder: Path, name: str, report: bool, progress: Progress) -> None:
     write_json(folder / "align.json", alignment_json(result))
-    told = as_comments(CONVENTIONS)
-    write_table(_attitude(result), folder / "attitude.csv", told)
+    comments = as_comments(CONVENTIONS)
+    write_table(_attitude(result), folder / "attitude.csv", comments)
     if result.fine is not None:
-        write_table(_history(result.fine.history), folder / "fine.csv", told)
+        write_table(_history(result.fine.history), folder / "fine.csv", comments)
     if report:
         write_report(alignment_document(result, name), folder, progress)
 
@@ -92,9 +92,9 @@ def alignment_json(result: AlignmentRun) -> dict[str, Any]:
     dict
         Angles and their standard deviations in degrees, biases in rad/s and m/s².
     """
-    known = answer_error(result)
+    error = answer_error(result)
     spec = result.spec
-    made = {
+    data = {
         "record": {
             "name": result.source.name,
             "what": result.source.what,
@@ -116,11 +116,11 @@ def alignment_json(result: AlignmentRun) -> dict[str, Any]:
         "coarse": {"method": result.coarse.method, **_attitude_alignment_json(result.coarse)},
         "fine": None if result.fine is None else _fine(result),
         "compared_with": None
-        if known is None
+        if error is None
         else {
-            "name": known[0],
-            "sd_deg": known[2],
-            "off_deg": dict(zip(EULER, known[1], strict=True)),
+            "name": error[0],
+            "sd_deg": error[2],
+            "off_deg": dict(zip(EULER, error[1], strict=True)),
         },
         "prefilter": _prefilter(result),
         "readiness": {
@@ -147,7 +147,7 @@ def alignment_json(result: AlignmentRun) -> dict[str, Any]:
         ),
         "findings": [finding_json(f) for f in result.findings],
     }
-    return finite(made)
+    return finite(data)
 
 
 def _attitude_alignment_json(one: Alignment) -> dict[str, Any]:

@@ -117,7 +117,7 @@ def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
     """Return a bench as plain data; every key carries its unit."""
     costs = {cost.algorithm: _cost(cost) for cost in bench.costs}
     shares = {share.algorithm: _share(share) for share in bench.shares}
-    made = {
+    data = {
         "schema": "strapdown attitude 1",
         "source": bench.source,
         "description": bench.description,
@@ -125,7 +125,7 @@ def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
         "initial": bench.initial,
         "gyro_bias": bench.gyro_bias,
         "headline": words.headline(bench),
-        "answer": _answer(bench),
+        "answer": vars(bench.answer),
         "algorithms": [
             {
                 "algorithm": run.algorithm,
@@ -141,7 +141,13 @@ def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
         ],
         "share_basis": share_basis(bench),
         "sweep": bench.sweep.to_dict("records"),
-        "trials": _trials(bench),
+        "trials": None
+        if bench.trials is None
+        else {
+            "names": list(bench.trials.names),
+            "errors": bench.trials.errors.to_dict("records"),
+            "ranking": bench.trials.ranking.to_dict("records"),
+        },
         "peers": [
             {
                 "peer": peer.peer,
@@ -152,7 +158,9 @@ def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
             for peer in bench.peers
         ],
         **places_json(bench),
-        "sampling_error_deg": _sampling_error(bench),
+        "sampling_error_deg": None
+        if bench.sampling_error_deg is None
+        else dict(zip(("final", "max"), bench.sampling_error_deg, strict=True)),
         "largest_difference_deg": {
             name: {other: float(v) for other, v in row.items()}
             for name, row in bench.differences_deg.iterrows()
@@ -170,13 +178,7 @@ def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
         "readings": [vars(r) for r in bench.readings],
         "findings": [finding_json(f, "python") for f in bench.findings],
     }
-    return finite(made)
-
-
-def _sampling_error(bench: AttitudeComparison) -> dict[str, float] | None:
-    if bench.sampling_error_deg is None:
-        return None
-    return dict(zip(("final", "max"), bench.sampling_error_deg, strict=True))
+    return finite(data)
 
 
 def _final(row: Any, time: float) -> dict[str, float]:
@@ -185,20 +187,6 @@ def _final(row: Any, time: float) -> dict[str, float]:
         | {q: float(row[q]) for q in QUATERNION}
         | {f"{e}_deg": float(row[e]) for e in EULER}
     )
-
-
-def _answer(bench: AttitudeComparison) -> dict[str, Any]:
-    answer = bench.answer
-    return {
-        "verdict": answer.verdict,
-        "sentence": answer.sentence,
-        "tolerance_deg": answer.tolerance_deg,
-        "algorithm": answer.algorithm,
-        "meaning": answer.meaning,
-        "rate_hz": answer.rate_hz,
-        "why": list(answer.why),
-        "helps": list(answer.helps),
-    }
 
 
 def _score(score: Score) -> dict[str, Any]:
@@ -235,16 +223,6 @@ def _share(share: Share) -> dict[str, Any]:
         "own_deg": named(share.own_deg),
         "sensor_deg": None if share.sensor_deg is None else named(share.sensor_deg),
         "single_deg": named(share.single_deg),
-    }
-
-
-def _trials(bench: AttitudeComparison) -> dict[str, Any] | None:
-    if bench.trials is None:
-        return None
-    return {
-        "names": list(bench.trials.names),
-        "errors": bench.trials.errors.to_dict("records"),
-        "ranking": bench.trials.ranking.to_dict("records"),
     }
 
 

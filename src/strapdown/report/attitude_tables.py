@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pandas as pd
 
@@ -14,9 +14,11 @@ from strapdown.attitude_algorithms.algorithm import AttitudeRun
 from strapdown.attitude_comparison.comparison import AttitudeComparison
 from strapdown.attitude_comparison.references import PeerRun, passed_pole
 from strapdown.evaluation.reference_points import Score, in_words
-from strapdown.evaluation.second_log import SecondLog
 from strapdown.formats.recording import Reading
 from strapdown.report.document import TableBlock
+
+if TYPE_CHECKING:
+    from strapdown.evaluation.second_log import SecondLog
 
 CONVENTIONS = (
     ("Body axes", "x forward, y right, z down"),

@@ -21,7 +21,6 @@ from strapdown.navigation.outage import QUANTITIES
 from strapdown.progress import Progress
 from strapdown.report.coast_document import (
     coast_document,
-    course,
     drifts_of,
     end_bound,
     headline,
@@ -153,24 +152,24 @@ def coast_json(result: OutageRun) -> dict[str, Any]:
     dict
         Lengths in m, times in s, angles in deg; sizes of error sources in SI.
     """
-    found, variances = result.forecast, course(result)[2]
+    predicted, variances = result.forecast, result.cone[2]
     whole = {q: float(v[-1]) for q, v in variances.items()}
-    budget = found.variance("horizontal")[-1]
-    made = {
+    budget = predicted.variance("horizontal")[-1]
+    data = {
         "name": result.name,
         "what": result.what,
         "answer": spaced(headline(result)),
         "remedy": spaced(remedy(result)),
         "outage_s": result.spec.outage_s,
         "start": spaced(start_words(result)),
-        "begin_s": found.begin,
+        "begin_s": predicted.begin,
         "remaining_measurements": list(result.stays),
         "at_the_end": {
             "horizontal_95_m": end_bound(result),
             **{SHOWN[q][0]: SHOWN[q][1] * math.sqrt(max(v, 0.0)) for q, v in whole.items()},
         },
         "budget": {
-            "outage_from_s": found.begin,
+            "outage_from_s": predicted.begin,
             "horizontal_sd_m": float(math.sqrt(budget)),
             "sources": [
                 {
@@ -178,15 +177,15 @@ def coast_json(result: OutageRun) -> dict[str, Any]:
                     "sd_at_start": one.sd.tolist(),
                     "unit": one.source.unit,
                     "share": {
-                        q: one.variance[q][-1] / _positive(found.variance(q)[-1])
+                        q: one.variance[q][-1] / _positive(predicted.variance(q)[-1])
                         for q in QUANTITIES
                     },
                     "alone_m": float(one.alone["horizontal"][-1]),
                 }
-                for one in found.shares
+                for one in predicted.shares
             ],
             "measurements": {
-                q: v[-1] / _positive(found.variance(q)[-1]) for q, v in found.aids.items()
+                q: v[-1] / _positive(predicted.variance(q)[-1]) for q, v in predicted.aids.items()
             },
         },
         "measured": spaced(inside_words(result)),
@@ -206,7 +205,7 @@ def coast_json(result: OutageRun) -> dict[str, Any]:
         ],
         "findings": [finding_json(f) for f in result.findings],
     }
-    return finite(made)
+    return finite(data)
 
 
 def write_coast_tables(result: OutageRun, folder: Path) -> None:
@@ -217,20 +216,24 @@ def write_coast_tables(result: OutageRun, folder: Path) -> None:
     folder : Path
         ``cone.csv``, ``budget.csv``, and ``drifts.csv`` if there were fixes.
     """
-    told = {"outage_of": result.name, "outage_s": f"{result.spec.outage_s:g}"}
-    time, bound, variances = course(result)
+    comments = {"outage_of": result.name, "outage_s": f"{result.spec.outage_s:g}"}
+    time, bound, variances = result.cone
     sds = {SHOWN[q][0]: SHOWN[q][1] * np.sqrt(np.maximum(v, 0.0)) for q, v in variances.items()}
-    csv.write(folder / "cone.csv", {"time_s": time, "horizontal_95_m": bound, **sds}, told)
-    found = result.forecast
+    csv.write(folder / "cone.csv", {"time_s": time, "horizontal_95_m": bound, **sds}, comments)
+    predicted = result.forecast
     parts = {
         f"{one.source.name.replace('.', '_')}_m2": one.variance["horizontal"]
-        for one in found.shares
+        for one in predicted.shares
     }
-    if found.aids:
-        parts["measurements_m2"] = found.aids["horizontal"]
-    parts["all_m2"] = found.variance("horizontal")
-    of = {**told, "of": "variance of the horizontal drift", "outage_from_s": f"{found.begin:.9g}"}
-    csv.write(folder / "budget.csv", {"time_s": found.time, **parts}, of)
+    if predicted.aids:
+        parts["measurements_m2"] = predicted.aids["horizontal"]
+    parts["all_m2"] = predicted.variance("horizontal")
+    of = {
+        **comments,
+        "of": "variance of the horizontal drift",
+        "outage_from_s": f"{predicted.begin:.9g}",
+    }
+    csv.write(folder / "budget.csv", {"time_s": predicted.time, **parts}, of)
     drifts = drifts_of(result)
     if drifts:
         columns = {
@@ -241,7 +244,7 @@ def write_coast_tables(result: OutageRun, folder: Path) -> None:
             "down_m": np.concatenate([d.down for d in drifts]),
             "inside_95": np.concatenate([d.inside.astype(np.float64) for d in drifts]),
         }
-        csv.write(folder / "drifts.csv", columns, {**told, "sign": "computed minus fix"})
+        csv.write(folder / "drifts.csv", columns, {**comments, "sign": "computed minus fix"})
 
 
 def _positive(value: float) -> float:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from strapdown import __version__
 from strapdown.constants import DEG_PER_HOUR, MICRO_G, TWO_SIDED_95
-from strapdown.navigation.outage import QUANTITIES, Share
+from strapdown.navigation.outage import Share
 from strapdown.report.chart import (
     BLACK,
     BLUE,
@@ -134,22 +134,14 @@ def at_start(share: Share, result: OutageRun) -> str:
     return f"{three_digits(factor * low)} to {three_digits(factor * high)}{GAP}{unit}"
 
 
-def course(result: OutageRun) -> tuple[Array, Array, Mapping[str, Array]]:
-    """Return time, s, 95 % bound, m, and variances of the drift; of all outage tests, if any."""
-    found, recorded = result.forecast, result.recorded
-    if recorded is None:
-        return found.time, found.bound, {q: found.variance(q) for q in QUANTITIES}
-    return recorded.time, recorded.bound, recorded.variance
-
-
 def drifts_of(result: OutageRun) -> list[Drift]:
     """Return the observed drifts."""
-    return [] if result.recorded is None else [d for d in result.recorded.drifts if d.time.size]
+    return [d for d in result.drifts if d.time.size]
 
 
 def end_bound(result: OutageRun) -> float:
     """95 % bound at the end of the outage, m; over all outage tests, if there were any."""
-    return float(course(result)[1][-1])
+    return float(result.cone[1][-1])
 
 
 def motion_words(result: OutageRun) -> str:
@@ -175,7 +167,7 @@ def _speed(value: float) -> str:
 
 def start_words(result: OutageRun) -> str:
     """Knowledge of the state at the start of the outage, and its origin."""
-    if result.recorded is not None:
+    if result.drifts:
         return "the filter's covariance at each outage"
     start, begin = result.spec.start, result.forecast.begin
     stated = [
@@ -251,7 +243,7 @@ def inside_words(result: OutageRun) -> str:
 def key_figures(result: OutageRun) -> tuple[KeyFigure, ...]:
     """Return the key figures."""
     said = "95 % at the end"
-    variances = course(result)[2]
+    variances = result.cone[2]
 
     def sd(quantity: str) -> float:
         return math.sqrt(max(float(variances[quantity][-1]), 0.0))
@@ -356,8 +348,7 @@ _LEAST = 5e-4
 
 def time_table(result: OutageRun) -> TableBlock:
     """Drift over the outage."""
-    recorded = result.recorded
-    grid, bound, variances = course(result)
+    grid, bound, variances = result.cone
 
     def sd(quantity: str, at: float) -> float:
         return math.sqrt(max(float(np.interp(at, grid, variances[quantity])), 0.0))
@@ -375,11 +366,7 @@ def time_table(result: OutageRun) -> TableBlock:
                 f"{plain(math.degrees(half(sd('heading', at))), 3)}°",
             )
         )
-    said = (
-        ""
-        if recorded is None or len(recorded.drifts) < 2
-        else f" Root mean square over {len(recorded.drifts)} outages."
-    )
+    said = "" if len(result.drifts) < 2 else f" Root mean square over {len(result.drifts)} outages."
     return TableBlock(
         (
             "after",
@@ -484,8 +471,8 @@ _INSIDE, _OUTSIDE = "measured drift, within its 95 % bound", "beyond its 95 % bo
 
 def cone_chart(result: OutageRun) -> Chart:
     """Cone over time with the observed drifts, and its error budget."""
-    found, recorded = result.forecast, result.recorded
-    time, bound, variances = course(result)
+    found = result.forecast
+    time, bound, variances = result.cone
     sd = np.sqrt(np.maximum(variances["horizontal"], 0.0))
     lines = [
         *_came(result, lambda d: d.horizontal),
@@ -505,7 +492,7 @@ def cone_chart(result: OutageRun) -> Chart:
         fills=fills,
         title="Shares of the drift",
     )
-    tried = "" if recorded is None else _tried(recorded.drifts)
+    tried = _tried(result.drifts) if result.drifts else ""
     return Chart(
         "cone",
         "Horizontal drift over the outage",
@@ -575,25 +562,23 @@ def _stack(result: OutageRun) -> tuple[tuple[Fill, ...], str]:
         below = above
     cancels = any(float(np.min(v)) < -_LEAST_PART for _, v in signed)
     note = " Negative shares, of errors that cancel, are not drawn." if cancels else ""
-    if result.recorded is not None and len(result.recorded.drifts) > 1:
+    if len(result.drifts) > 1:
         note += f" Outage from {result.forecast.begin:.1f} s, the median one by its bound."
     return tuple(fills), note
 
 
 def plane_chart(result: OutageRun) -> Chart:
     """Possible drift seen from above, relative to the true position."""
-    found, recorded = result.forecast, result.recorded
-    if recorded is None:
-        time = found.time
+    found, (time, _, variance) = result.forecast, result.cone
+    if not result.drifts:
         c, s = np.cos(found.course), np.sin(found.course)
         P = found.covariance[:, :2, :2]
         turn = np.array([[c, s], [-s, c]]).transpose(2, 0, 1)
         planes = turn @ P @ turn.transpose(0, 2, 1)
     else:
-        time = recorded.time
         planes = np.zeros((len(time), 2, 2))
-        planes[:, 0, 0] = recorded.variance["along"]
-        planes[:, 1, 1] = recorded.variance["across"]
+        planes[:, 0, 0] = variance["along"]
+        planes[:, 1, 1] = variance["across"]
     lines = []
     for k, share in enumerate(_RINGS):
         at = share * result.spec.outage_s
@@ -630,7 +615,7 @@ def plane_chart(result: OutageRun) -> Chart:
 
 def parts_chart(result: OutageRun) -> Chart:
     """Along-track, cross-track, height, speed and heading over the outage."""
-    time, _, variances = course(result)
+    time, _, variances = result.cone
 
     def bound(quantity: str, factor: float = 1.0) -> Array:
         values = np.maximum(variances[quantity], 0.0)

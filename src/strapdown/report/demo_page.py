@@ -69,13 +69,13 @@ def shown_answer(bundle: Path) -> str:
     bundle : Path
         From `attitude`, `crash`, `navigate` or `coast`.
     """
-    kind, told = _told(bundle)
+    kind, result = _result_of(bundle)
     if kind == "attitude":
-        return str(told["answer"]["sentence"] if told["answer"] else told["headline"])
+        return str(result["answer"]["sentence"] if result["answer"] else result["headline"])
     if kind == "crash":
-        return str(told["headline"])
+        return str(result["headline"])
     if kind == "coast":
-        answer = str(told["answer"]).removeprefix(f"{told['name']}: ")
+        answer = str(result["answer"]).removeprefix(f"{result['name']}: ")
         return f"{answer[:1].upper()}{answer[1:]}."
     return str(_json(bundle / "verdict.json")["answer"])
 
@@ -93,14 +93,14 @@ def shown_truth(bundle: Path, records: Path | None = None) -> str | None:
     str or None
         None without a truth or reference.
     """
-    kind, told = _told(bundle)
+    kind, result = _result_of(bundle)
     if kind == "attitude":
-        return _attitude_truth(told)
+        return _attitude_truth(result)
     if kind == "crash":
         return None if records is None else _crash_truth(_json(records / "scenario.json"))
     if kind == "coast":
-        return str(told["measured"]) if told["measured"] else None
-    return _navigation_truth(told)
+        return str(result["measured"]) if result["measured"] else None
+    return _navigation_truth(result)
 
 
 def demo_page(shown: Sequence[Shown], folder: Path, missing: str | None = None) -> str:
@@ -153,17 +153,17 @@ def _blocks(run: Shown, folder: Path) -> Iterator[Block]:
     yield Paragraph(run.command, "mono")
 
 
-def _attitude_truth(told: dict[str, Any]) -> str | None:
+def _attitude_truth(result: dict[str, Any]) -> str | None:
     full = {
         s["algorithm"]: s["error_deg"]
-        for s in told["sweep"]
+        for s in result["sweep"]
         if s["factor"] == 1 and s["meaning"] == "drop" and s["error_deg"] is not None
     }
     if not full:
         return None
-    exact = any(s["max_deg"] is not None for s in told["sweep"])
+    exact = any(s["max_deg"] is not None for s in result["sweep"])
     known = "True attitude known" if exact else "Final attitude known"
-    rate = max(s["rate_hz"] for s in told["sweep"])
+    rate = max(s["rate_hz"] for s in result["sweep"])
     errors = ", ".join(f"{name} {_degrees(error)}" for name, error in full.items())
     return f"{known}. Errors at {plain(rate, 0)} Hz: {errors}."
 
@@ -184,20 +184,20 @@ def _crash_truth(scenario: dict[str, Any]) -> str:
     )
 
 
-def _navigation_truth(told: dict[str, Any]) -> str | None:
-    if told["control_points"]:
-        points = told["control_points"]
+def _navigation_truth(result: dict[str, Any]) -> str | None:
+    if result["control_points"]:
+        points = result["control_points"]
         return (
             f"{points['points']} control points, after a fit of origin and heading: error "
             f"{plain(points['rms_m'], 2)} m (RMS), {plain(points['largest_m'], 2)} m at most, over "
             f"{plain(points['path_length_m'], 1)} m: "
             f"{plain(100.0 * points['rms_m'] / points['path_length_m'], 2)} %."
         )
-    if told["against"]:
-        errors = told["against"]["errors"]
+    if result["against"]:
+        errors = result["against"]["errors"]
         sides = (("horizontal", "horizontal position"), ("down", "height"))
         return (
-            f"Against {told['against']['name']} "
+            f"Against {result['against']['name']} "
             + "; ".join(
                 f"{name}: error {plain(errors[key]['rms_m'], 3)} m (RMS), "
                 f"{plain(errors[key]['largest_m'], 3)} m at most, within its 95 % bound for "
@@ -206,8 +206,8 @@ def _navigation_truth(told: dict[str, Any]) -> str | None:
             )
             + "."
         )
-    if told["gnss_outage_tests"]:
-        return _withheld_truth(told["gnss_outage_tests"])
+    if result["gnss_outage_tests"]:
+        return _withheld_truth(result["gnss_outage_tests"])
     return None
 
 
@@ -227,7 +227,7 @@ def _withheld_truth(withheld: list[dict[str, Any]]) -> str:
     )
 
 
-def _told(bundle: Path) -> tuple[str, dict[str, Any]]:
+def _result_of(bundle: Path) -> tuple[str, dict[str, Any]]:
     manifest = _json(bundle / "manifest.json")
     name = {"navigate": "navigation"}.get(manifest["command"], manifest["command"])
     return manifest["command"], _json(bundle / f"{name}.json")

@@ -511,23 +511,25 @@ class _Writer:
 
     def block(self, block: Block) -> dict[str, Any]:
         """Return one block."""
-        if isinstance(block, Paragraph):
-            return {"kind": "paragraph", "style": block.kind, "text": block.text}
-        if isinstance(block, Items):
-            return {"kind": "items", "rows": block.rows, "numbered": block.numbered}
-        if isinstance(block, Links):
-            return {"kind": "links", "rows": block.rows}
-        if isinstance(block, Facts):
-            return {"kind": "facts", "rows": block.rows}
-        if isinstance(block, TableBlock):
-            return self._table(block)
-        if isinstance(block, Chart):
-            return self._chart(block)
-        if isinstance(block, Picture):
-            return self._picture(block) | {"kind": "picture", "number": next(self._figures)}
-        if isinstance(block, Animation):
-            return self._animation(block)
-        return self._key_figures(block)
+        match block:
+            case Paragraph():
+                return {"kind": "paragraph", "style": block.kind, "text": block.text}
+            case Items():
+                return {"kind": "items", "rows": block.rows, "numbered": block.numbered}
+            case Links() | Facts():
+                return {"kind": type(block).__name__.lower(), "rows": block.rows}
+            case TableBlock():
+                return self._table(block)
+            case Chart():
+                return self._chart(block)
+            case Picture():
+                return self._picture(block) | {"kind": "picture", "number": next(self._figures)}
+            case Animation():
+                return self._animation(block)
+            case KeyFigures():
+                pictures = [self._picture(picture) for picture in block.pictures]
+                figures = [vars(one) for one in block.figures]
+                return {"kind": "key_figures", "figures": figures, "pictures": pictures}
 
     def _table(self, table: TableBlock) -> dict[str, Any]:
         if any(len(row) != len(table.columns) for row in table.rows):
@@ -551,7 +553,9 @@ class _Writer:
 
     def _chart(self, chart: Chart) -> dict[str, Any]:
         number = next(self._figures)
-        data: dict[str, Any] = {
+        drawn = next(self._stills)
+        shown = {"svg": drawn, "x_label": chart.x_label}
+        return {
             "kind": "chart",
             "number": number,
             "title": chart.title,
@@ -560,11 +564,8 @@ class _Writer:
             "width_mm": 170.0,
             "still_caption": "",
             "live_caption": "",
+            **(shown if self._alive else {"still": self._place(drawn)}),
         }
-        drawn = next(self._stills)
-        if self._alive:
-            return data | {"svg": drawn, "x_label": chart.x_label}
-        return data | {"still": self._place(drawn)}
 
     def _picture(self, picture: Picture) -> dict[str, Any]:
         try:
@@ -602,16 +603,6 @@ class _Writer:
             "live_caption": animation.live_caption,
         }
         return data | {"scene": animation.scene} if self._alive else data
-
-    def _key_figures(self, block: KeyFigures) -> dict[str, Any]:
-        return {
-            "kind": "key_figures",
-            "figures": [
-                {"name": f.name, "value": f.value, "bound": f.bound, "note": f.note}
-                for f in block.figures
-            ],
-            "pictures": [self._picture(picture) for picture in block.pictures],
-        }
 
 
 # Drawings of a document as files beside the page.

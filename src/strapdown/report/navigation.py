@@ -66,7 +66,7 @@ from strapdown.report.verdict import (
     promise,
     repeated_words,
 )
-from strapdown.systems.navigation_run import NavigationRun, run_navigation
+from strapdown.systems.navigation_run import NavigationRun, run_navigation, withheld_aid
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
 from strapdown.tables.checks import index_of
 
@@ -83,12 +83,12 @@ def _run(configuration: dict[str, Any]) -> NavigationRun:
 def _write_all(
     result: NavigationRun, folder: Path, name: str, report: bool, progress: Progress
 ) -> None:
-    found = NavigationEvaluation(result)
-    write_json(folder / "navigation.json", navigation_json(found))
-    write_navigation_files(found, folder)
+    evaluation = NavigationEvaluation(result)
+    write_json(folder / "navigation.json", navigation_json(evaluation))
+    write_navigation_files(evaluation, folder)
     if report:
-        write_integrity(found, folder)
-        document = navigation_document(found, name)
+        write_integrity(evaluation, folder)
+        document = navigation_document(evaluation, name)
         write_report(document, folder, progress, figures=result.spec.output.figures)
 
 
@@ -122,15 +122,15 @@ def plot(result: NavigationRun, kind: str) -> ChartFigure:
     ConfigError
         The chart does not exist.
     """
-    found = NavigationEvaluation(result)
-    observed = {one.name: one for one in found.agreements}
+    evaluation = NavigationEvaluation(result)
+    observed = {one.name: one for one in evaluation.agreements}
     if kind in observed:
         return ChartFigure(innovation_chart(result.record, observed[kind]))
-    known = [one for one in KINDS if one != "paired" or found.pair]
+    known = [one for one in KINDS if one != "paired" or evaluation.pair]
     if kind not in known:
         known += observed
         raise ConfigError("report.unknown-chart", quantity="kind", word=kind, known=known)
-    chart = KINDS[kind](found)
+    chart = KINDS[kind](evaluation)
     if chart is None:
         raise ConfigError("report.no-path-to-draw", quantity=f"kind '{kind}'")
     return ChartFigure(chart)
@@ -142,7 +142,7 @@ def plot(result: NavigationRun, kind: str) -> ChartFigure:
 MODULES = (*STAGES, "aiding")
 
 
-def navigation_json(found: NavigationEvaluation) -> dict[str, Any]:
+def navigation_json(evaluation: NavigationEvaluation) -> dict[str, Any]:
     """Return a navigation run as plain data for programs.
 
     Returns
@@ -150,14 +150,14 @@ def navigation_json(found: NavigationEvaluation) -> dict[str, Any]:
     dict
         Angles and their standard deviations in degrees; estimated sensor errors in SI.
     """
-    result, record, source = found.run, found.record, found.run.source
+    result, record, source = evaluation.run, evaluation.record, evaluation.run.source
     time = record.trajectory.index
     clock = clock_of(source.imu)
-    made = {
+    data = {
         "conventions": as_comments(CONVENTIONS),
-        "answer": spaced(headline(found)),
-        "trust": trust(found).json(),
-        "cautions": [spaced(f"{head}: {text}") for head, text in cautions(found)],
+        "answer": spaced(headline(evaluation)),
+        "trust": trust(evaluation).json(),
+        "cautions": [spaced(f"{head}: {text}") for head, text in cautions(evaluation)],
         "record": {
             "name": source.name,
             "what": source.what,
@@ -178,8 +178,8 @@ def navigation_json(found: NavigationEvaluation) -> dict[str, Any]:
             "coarse": _alignment(result.coarse),
             "fine": None if result.fine is None else _alignment(result.fine.alignment),
         },
-        "start": _state(found, 0),
-        "end": _state(found, -1),
+        "start": _state(evaluation, 0),
+        "end": _state(evaluation, -1),
         "not_estimated": list(record.not_estimated),
         "sensors": {
             str(name): {
@@ -189,8 +189,8 @@ def navigation_json(found: NavigationEvaluation) -> dict[str, Any]:
             }
             for name in record.sensors.columns
         },
-        "smoothing": _smoothing(found),
-        "observations": {one.name: _innovations(one) for one in found.agreements},
+        "smoothing": _smoothing(evaluation),
+        "observations": {one.name: _innovations(one) for one in evaluation.agreements},
         "outages": [
             {
                 "measurement": aid,
@@ -198,36 +198,38 @@ def navigation_json(found: NavigationEvaluation) -> dict[str, Any]:
                 "to_s": span.end,
                 "largest_horizontal_bound_95_m": bound,
             }
-            for aid, span, bound in found.outages
+            for aid, span, bound in evaluation.outages
         ],
         "gnss_outage_tests": [
             {
-                "measurement": w.aid,
-                "from_s": w.begin,
-                "to_s": w.end,
-                "largest_horizontal_error_m": w.error_m,
-                "bound_95_m": w.bound_m,
-                "inside": w.inside,
-                "largest_horizontal_error_forward_m": (w.forward_m),
+                "measurement": withheld_aid(result.spec),
+                "from_s": w.result.span.begin,
+                "to_s": w.result.span.end,
+                "largest_horizontal_error_m": w.result.largest,
+                "bound_95_m": w.result.bound_at_largest,
+                "inside": w.result.inside,
+                "largest_horizontal_error_forward_m": None
+                if w.smoothed is None
+                else w.forward.largest,
             }
-            for w in found.withheld
+            for w in result.withheld
         ],
         "modes": [{"mode": s.name, "from_s": s.begin, "to_s": s.end} for s in record.modes],
         "events": [
             {"time_s": e.time, "kind": e.kind, "what": e.finding.what} for e in record.events
         ],
-        "against": _against(found),
-        "control_points": _points(found),
-        "paired": paired_json(found),
+        "against": _against(evaluation),
+        "control_points": _points(evaluation),
+        "paired": paired_json(evaluation),
         "method": _method(result),
         "findings": [finding_json(f) for f in result.findings],
     }
-    return finite(made)
+    return finite(data)
 
 
-def _smoothing(found: NavigationEvaluation) -> dict[str, Any] | None:
+def _smoothing(evaluation: NavigationEvaluation) -> dict[str, Any] | None:
     """Agreement of filter and smoother; None for a run without smoothing."""
-    one = found.smoother
+    one = evaluation.smoother
     if one is None:
         return None
     return {
@@ -253,13 +255,13 @@ def _method(result: NavigationRun) -> dict[str, Any]:
     return chosen
 
 
-def _against(found: NavigationEvaluation) -> dict[str, Any] | None:
+def _against(evaluation: NavigationEvaluation) -> dict[str, Any] | None:
     """Errors against the truth, at the samples after the covariance marks."""
-    errors = found.errors
+    errors = evaluation.errors
     if errors is None:
         return None
     return {
-        "name": found.truth_name,
+        "name": evaluation.truth_name,
         "instants": len(errors.time),
         "from_s": float(errors.time[0]),
         "to_s": float(errors.time[-1]),
@@ -269,9 +271,9 @@ def _against(found: NavigationEvaluation) -> dict[str, Any] | None:
     }
 
 
-def _points(found: NavigationEvaluation) -> dict[str, Any] | None:
+def _points(evaluation: NavigationEvaluation) -> dict[str, Any] | None:
     """Errors at the control points, after the best fit of origin and heading."""
-    score = found.run.points
+    score = evaluation.run.points
     if score is None:
         return None
     return {
@@ -297,9 +299,9 @@ def _score(score: Score) -> dict[str, Any]:
     }
 
 
-def _state(found: NavigationEvaluation, row: int) -> dict[str, Any]:
+def _state(evaluation: NavigationEvaluation, row: int) -> dict[str, Any]:
     """Position, velocity and attitude with the standard deviations of the nearest mark."""
-    record = found.record
+    record = evaluation.record
     at, how = record.trajectory.iloc[row], record.sd.iloc[row]
     units = dict.fromkeys(VELOCITY, "m_per_s") | dict.fromkeys(EULER, "deg")
     units |= {"lat": "deg", "lon": "deg", "alt": "m"} | dict.fromkeys(NED, "m")
@@ -309,7 +311,7 @@ def _state(found: NavigationEvaluation, row: int) -> dict[str, Any]:
         **{f"{n}_{units[n]}": at[n] for n in names},
         "sd_at_s": float(record.sd.index[row]),
         **{f"{n}_sd_{units[n]}": how[n] for n in [*NED, *VELOCITY, *EULER]},
-        "horizontal_bound_95_m": found.bounds[row],
+        "horizontal_bound_95_m": evaluation.bounds[row],
     }
 
 
@@ -356,7 +358,7 @@ _WORDS = {"rad/s": "rad_s", "m/s²": "m_s2", "1": "", "(rad/s)/(m/s²)": "rad_s_
 MOST_POINTS = 10_000
 
 
-def write_navigation_files(found: NavigationEvaluation, folder: Path) -> None:
+def write_navigation_files(evaluation: NavigationEvaluation, folder: Path) -> None:
     """Write the tables of a run.
 
     Parameters
@@ -366,17 +368,19 @@ def write_navigation_files(found: NavigationEvaluation, folder: Path) -> None:
         ``innovations/NAME.csv``, ``events.csv``, and ``errors.csv`` if the truth is known; for a
         smoothed run also the first three from the filter alone, in ``forward``.
     """
-    result, record = found.run, found.record
-    told = {"run": result.source.name, "ellipsoid": result.ellipsoid.name}
-    _write_states(result, record, folder, told)
+    result, record = evaluation.run, evaluation.record
+    comments = {"run": result.source.name, "ellipsoid": result.ellipsoid.name}
+    _write_states(result, record, folder, comments)
     if result.forward is not None:
         (folder / "forward").mkdir()
-        _write_states(result, result.forward, folder / "forward", {**told, "by": "filter alone"})
+        _write_states(
+            result, result.forward, folder / "forward", {**comments, "by": "filter alone"}
+        )
     if record.innovations:
         (folder / "innovations").mkdir()
         for name, table in record.innovations.items():
             renamed = table.rename(columns={c: _column(str(c)) for c in table.columns})
-            write_table(renamed, folder / "innovations" / f"{name}.csv", {**told, "of": name})
+            write_table(renamed, folder / "innovations" / f"{name}.csv", {**comments, "of": name})
     events = record.events
     csv.write(
         folder / "events.csv",
@@ -385,7 +389,7 @@ def write_navigation_files(found: NavigationEvaluation, folder: Path) -> None:
             "kind": np.array([e.kind for e in events], dtype=np.str_),
             "what": np.array([e.finding.what for e in events], dtype=np.str_),
         },
-        told,
+        comments,
     )
     if result.points is not None:
         score = result.points
@@ -396,19 +400,22 @@ def write_navigation_files(found: NavigationEvaluation, folder: Path) -> None:
             "north_error_m": score.error[:, 0],
             "east_error_m": score.error[:, 1],
         }
-        told_points = {**told, "sign": "computed minus point, after the fit of origin and heading"}
-        csv.write(folder / "control_points.csv", columns, told_points)
+        of_points = {
+            **comments,
+            "sign": "computed minus point, after the fit of origin and heading",
+        }
+        csv.write(folder / "control_points.csv", columns, of_points)
     if result.differences is not None:
         errors = result.differences.rename(
             columns={c: f"{c}_{UNITS.get(str(c), 'deg')}" for c in result.differences.columns}
         )
-        against = {**told, "against": result.source.truth_name, "sign": "computed minus truth"}
+        against = {**comments, "against": result.source.truth_name, "sign": "computed minus truth"}
         write_table(errors, folder / "errors.csv", against)
-    write_paired(found, folder, told)
+    write_paired(evaluation, folder, comments)
 
 
 def _write_states(
-    result: NavigationRun, record: NavigationRecord, folder: Path, told: dict[str, str]
+    result: NavigationRun, record: NavigationRecord, folder: Path, comments: dict[str, str]
 ) -> None:
     """Write a trajectory, its standard deviations, and the estimated sensor errors."""
     options = FileOptions(ellipsoid=result.ellipsoid, most_points=MOST_POINTS)
@@ -417,8 +424,8 @@ def _write_states(
         write_trajectory(path, record.trajectory, name=result.source.name, options=options)
     sd = record.sd.rename(columns={c: f"{c}_sd_{UNITS[str(c)]}" for c in record.sd.columns})
     without = {"not_estimated": " ".join(record.not_estimated)} if record.not_estimated else {}
-    write_table(sd, folder / "sd.csv", {**told, **without})
-    write_table(_sensors(record), folder / "sensor_errors.csv", told)
+    write_table(sd, folder / "sd.csv", {**comments, **without})
+    write_table(_sensors(record), folder / "sensor_errors.csv", comments)
 
 
 def _sensors(record: NavigationRecord) -> pd.DataFrame:
@@ -442,10 +449,10 @@ def _column(name: str) -> str:
 # Integrity as files: its values for programs, and the heading status over time.
 
 
-def write_integrity(found: NavigationEvaluation, folder: Path) -> None:
+def write_integrity(evaluation: NavigationEvaluation, folder: Path) -> None:
     """Write ``verdict.json`` and ``heading_integrity.csv``."""
-    write_json(folder / "verdict.json", verdict_json(found))
-    result, heading = found.run, found.run.trust.heading
+    write_json(folder / "verdict.json", verdict_json(evaluation))
+    result, heading = evaluation.run, evaluation.run.trust.heading
     table = heading.table
     status = [STATUSES[k] for k in table["status"].to_numpy(dtype=np.int64)]
     csv.write(
@@ -470,16 +477,16 @@ def write_integrity(found: NavigationEvaluation, folder: Path) -> None:
     )
 
 
-def verdict_json(found: NavigationEvaluation) -> dict[str, Any]:
+def verdict_json(evaluation: NavigationEvaluation) -> dict[str, Any]:
     """Return a verdict for programs; angles in degrees, lengths in meters, times in s."""
-    result, trust = found.run, found.run.trust
+    result, trust = evaluation.run, evaluation.run.trust
     heading = trust.heading
     spans = heading.spans
-    made = {
-        "answer": spaced(answer(found)),
+    data = {
+        "answer": spaced(answer(evaluation)),
         "position": {
-            "bound_95_at_end_m": found.bounds[-1],
-            "largest_bound_95_m": found.bounds.max(),
+            "bound_95_at_end_m": evaluation.bounds[-1],
+            "largest_bound_95_m": evaluation.bounds.max(),
             "confirmed": bool(trust.consistency) and trust.against_bounds is None,
         },
         "heading": {
@@ -536,7 +543,7 @@ def verdict_json(found: NavigationEvaluation) -> dict[str, Any]:
         "first": spaced(first_words(trust)),
         "repeated": None if trust.repeated is None else _repeated(trust.repeated, result),
     }
-    return finite(made)
+    return finite(data)
 
 
 def _repeated(repeated: Repeated, result: NavigationRun) -> dict[str, Any]:

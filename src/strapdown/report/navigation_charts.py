@@ -67,16 +67,16 @@ def over_time(
     )
 
 
-def bound_chart(found: NavigationEvaluation) -> Chart:
+def bound_chart(evaluation: NavigationEvaluation) -> Chart:
     """95 % bounds of position, velocity and attitude over the run."""
-    record = found.record
+    record = evaluation.record
     time = index_of(record.sd)
     groups = (
         (
             "Position",
             "m",
             (
-                ("horizontal", found.bounds, BLUE),
+                ("horizontal", evaluation.bounds, BLUE),
                 _bound(record, "down", "height"),
             ),
         ),
@@ -117,38 +117,38 @@ def _bound(record: NavigationRecord, column: str, name: str) -> tuple[str, Array
     return name, TWO_SIDED_95 * record.sd[column].to_numpy(dtype=np.float64), colours[column]
 
 
-def height_chart(found: NavigationEvaluation) -> Chart:
+def height_chart(evaluation: NavigationEvaluation) -> Chart:
     """Height above the ellipsoid with its bound."""
-    panel = _state_panel(found, "alt", "down", "height, m")
+    panel = _state_panel(evaluation, "alt", "down", "height, m")
     return over_time(
         "height",
         "Height",
-        f"Above the ellipsoid ({found.run.ellipsoid.name}).",
+        f"Above the ellipsoid ({evaluation.run.ellipsoid.name}).",
         (panel,),
-        found.record,
+        evaluation.record,
     )
 
 
-def velocity_chart(found: NavigationEvaluation) -> Chart:
+def velocity_chart(evaluation: NavigationEvaluation) -> Chart:
     """Velocity over ground with its bounds."""
     panels = tuple(
-        _state_panel(found, name, name, f"{words}, m/s")
+        _state_panel(evaluation, name, name, f"{words}, m/s")
         for name, words in zip(VELOCITY, NED, strict=True)
     )
-    return over_time("velocity", "Velocity", "Relative to the Earth.", panels, found.record)
+    return over_time("velocity", "Velocity", "Relative to the Earth.", panels, evaluation.record)
 
 
-def attitude_chart(found: NavigationEvaluation) -> Chart:
+def attitude_chart(evaluation: NavigationEvaluation) -> Chart:
     """Roll, pitch and heading with their bounds."""
-    heading, marks, said = heading_shown(found.record)
-    panels = [_state_panel(found, name, name, f"{name}, deg") for name in EULER[:2]]
-    panels.append(_state_panel(found, "heading", "heading", "heading, deg", (heading, marks)))
+    heading, marks, said = heading_shown(evaluation.record)
+    panels = [_state_panel(evaluation, name, name, f"{name}, deg") for name in EULER[:2]]
+    panels.append(_state_panel(evaluation, "heading", "heading", "heading, deg", (heading, marks)))
     return over_time(
         "attitude",
         "Attitude",
         said,
         tuple(panels),
-        found.record,
+        evaluation.record,
     )
 
 
@@ -190,7 +190,7 @@ def at_marks(record: NavigationRecord, column: str) -> Array:
 
 
 def _state_panel(
-    found: NavigationEvaluation,
+    evaluation: NavigationEvaluation,
     column: str,
     error: str,
     label: str,
@@ -200,14 +200,14 @@ def _state_panel(
 
     `shown` holds the values over the trajectory and at the marks, if not those of the column.
     """
-    record = found.record
+    record = evaluation.record
     time = index_of(record.trajectory)
     if shown is None:
         shown = record.trajectory[column].to_numpy(dtype=np.float64), at_marks(record, column)
     values, here = shown
     lines = [curve("navigated", time, values, BLUE, width=1.3, buckets=BUCKETS)]
-    if found.run.source.truth is not None:
-        lines.append(_true(found, column, values))
+    if evaluation.run.source.truth is not None:
+        lines.append(_true(evaluation, column, values))
     at = index_of(record.sd)
     half = TWO_SIDED_95 * record.sd[error].to_numpy(dtype=np.float64)
     if np.isnan(half).all():
@@ -216,10 +216,10 @@ def _state_panel(
     return Panel(label, tuple(lines), fills=(fill,), height=0.8)
 
 
-def _true(found: NavigationEvaluation, column: str, navigated: Array) -> Line:
-    truth = found.run.source.truth
+def _true(evaluation: NavigationEvaluation, column: str, navigated: Array) -> Line:
+    truth = evaluation.run.source.truth
     assert truth is not None
-    time = found.record.trajectory.index
+    time = evaluation.record.trajectory.index
     within = truth[(truth.index >= time[0]) & (truth.index <= time[-1])]
     values = within[column].to_numpy(dtype=np.float64)
     if column == "heading" and np.isnan(navigated).any():
@@ -232,9 +232,9 @@ def _true(found: NavigationEvaluation, column: str, navigated: Array) -> Line:
     return curve("truth", stamps, values, BLACK, "dot", 1.1, buckets=BUCKETS)
 
 
-def state_charts(found: NavigationEvaluation) -> tuple[Chart, ...]:
+def state_charts(evaluation: NavigationEvaluation) -> tuple[Chart, ...]:
     """Estimated sensor and measurement errors, with their bounds."""
-    return tuple(_block_chart(found.run.filtered, block) for block in found.states)
+    return tuple(_block_chart(evaluation.run.filtered, block) for block in evaluation.states)
 
 
 def _block_chart(record: NavigationRecord, block: ShownStates) -> Chart:
@@ -424,9 +424,9 @@ _LEAST = 1e-2
 _NAMES = dict(zip(VELOCITY, NED, strict=True))
 
 
-def error_charts(found: NavigationEvaluation) -> tuple[Chart, ...]:
+def error_charts(evaluation: NavigationEvaluation) -> tuple[Chart, ...]:
     """Errors of position, velocity and attitude within their bounds; none without a truth."""
-    errors = found.errors
+    errors = evaluation.errors
     if errors is None:
         return ()
     out = []
@@ -445,14 +445,14 @@ def error_charts(found: NavigationEvaluation) -> tuple[Chart, ...]:
                 continue
             fills = (thin_fill(BOUND, errors.time, -half, half, AXIS_COLOURS[k]),)
             panels.append(Panel(label, lines, fills=fills, height=0.8))
-        caption = f"Computed − {found.truth_name}, with the run's 95 % bounds."
-        out.append(over_time(slug, title, caption, tuple(panels), found.record))
+        caption = f"Computed − {evaluation.truth_name}, with the run's 95 % bounds."
+        out.append(over_time(slug, title, caption, tuple(panels), evaluation.record))
     return tuple(out)
 
 
-def nees_chart(found: NavigationEvaluation) -> Chart | None:
+def nees_chart(evaluation: NavigationEvaluation) -> Chart | None:
     """NEES of position, velocity and attitude; None without a truth or without bounds."""
-    errors = found.errors
+    errors = evaluation.errors
     if errors is None or not errors.freedom:
         return None
     low, high = bounds(errors.freedom)
@@ -469,7 +469,7 @@ def nees_chart(found: NavigationEvaluation) -> Chart | None:
         f"Expected value {errors.freedom}; at one instant 95 % of many runs lie between the "
         "levels. The errors of one run are correlated in time.",
         (panel,),
-        found.record,
+        evaluation.record,
     )
 
 

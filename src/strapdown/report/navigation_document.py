@@ -62,7 +62,7 @@ from strapdown.report.values import (
 from strapdown.report.values import stamp as instant
 from strapdown.report.verdict import integrity_sections, status_words
 from strapdown.rotation import within_half_turn
-from strapdown.systems.navigation_run import NavigationRun
+from strapdown.systems.navigation_run import NavigationRun, withheld_aid
 from strapdown.tables import EULER, NED, VELOCITY
 
 # 95 % bound in deg from which a heading is unknown.
@@ -71,37 +71,37 @@ _NO_HEADING = 180.0
 _FELL = 0.1
 
 
-def headline(found: NavigationEvaluation) -> str:
+def headline(evaluation: NavigationEvaluation) -> str:
     """Return the end position, the distance traveled, and the bounds."""
-    record = found.record
+    record = evaluation.record
     return (
-        f"Ended at {position_words(found)} after {duration_words(_duration(found))} and "
+        f"Ended at {position_words(evaluation)} after {duration_words(_duration(evaluation))} and "
         f"{length_words(distance_over_ground(record.trajectory))}; 95 % bounds: position "
-        f"{length_words(float(found.bounds[-1]))}, heading {_heading(found)}."
+        f"{length_words(float(evaluation.bounds[-1]))}, heading {_heading(evaluation)}."
     )
 
 
-def position_words(found: NavigationEvaluation, row: int = -1) -> str:
+def position_words(evaluation: NavigationEvaluation, row: int = -1) -> str:
     """Latitude, longitude and height of a row: ``40.096627°, −105.147448°, 1601.5 m``."""
-    last = found.record.trajectory.iloc[row]
+    last = evaluation.record.trajectory.iloc[row]
     lon = float(within_half_turn(last["lon"]))
     return (
         f"{plain(float(last['lat']), 6)}°, {plain(lon, 6)}°, {plain(float(last['alt']), 1)}{GAP}m"
     )
 
 
-def key_figures(found: NavigationEvaluation) -> tuple[KeyFigure, ...]:
+def key_figures(evaluation: NavigationEvaluation) -> tuple[KeyFigure, ...]:
     """Return the key figures at the top of the page."""
-    record = found.record
+    record = evaluation.record
     sd = record.sd.iloc[-1]
     last = record.trajectory.iloc[-1]
-    plane = float(found.bounds[-1])
+    plane = float(evaluation.bounds[-1])
     heading = half(sd["heading"])
     out = [
         KeyFigure(
             "Distance and time",
             length_words(distance_over_ground(record.trajectory)),
-            f"in {duration_words(_duration(found))}",
+            f"in {duration_words(_duration(evaluation))}",
             f"from {instant(float(record.trajectory.index[0]))} to "
             f"{instant(float(record.trajectory.index[-1]))}",
         ),
@@ -109,34 +109,34 @@ def key_figures(found: NavigationEvaluation) -> tuple[KeyFigure, ...]:
             "Final position",
             f"±{GAP}{length_words(plane)}",
             f"horizontal, 95{GAP}%; height {_stated(float(last['alt']), sd['down'], 'm')}",
-            position_words(found),
+            position_words(evaluation),
         ),
         KeyFigure(
             "Final heading",
             "unknown"
             if heading >= _NO_HEADING
             else about(float(last["heading"]) % 360.0, heading, "°"),
-            f"95{GAP}% bound; {status_words(found.run.trust)}",
+            f"95{GAP}% bound; {status_words(evaluation.run.trust)}",
             f"roll {about(float(last['roll']), half(sd['roll']), '°')}, pitch "
             f"{about(float(last['pitch']), half(sd['pitch']), '°')}",
         ),
     ]
-    out.append(_known(found))
+    out.append(_known(evaluation))
     return tuple(out)
 
 
-def _known(found: NavigationEvaluation) -> KeyFigure:
+def _known(evaluation: NavigationEvaluation) -> KeyFigure:
     """The main figure besides the end: the error, the worst outage, or the worst bound."""
-    if found.errors is not None:
-        score = found.errors.score("horizontal")
-        up = found.errors.score("down")
+    if evaluation.errors is not None:
+        score = evaluation.errors.score("horizontal")
+        up = evaluation.errors.score("down")
         return KeyFigure(
-            f"Error against {found.truth_name}",
+            f"Error against {evaluation.truth_name}",
             length_words(score.rms),
             f"horizontal, RMS; at most {length_words(score.largest)}",
             f"height {length_words(up.rms)}, at most {length_words(up.largest)}",
         )
-    outages = longest_outages(found)
+    outages = longest_outages(evaluation)
     if outages:
         aid, span, bound = max(outages, key=lambda o: o[2])
         return KeyFigure(
@@ -145,36 +145,38 @@ def _known(found: NavigationEvaluation) -> KeyFigure:
             f"horizontal, 95{GAP}%, after {duration_words(span.end - span.begin)} without {aid}",
             f"{len(outages)} {'outage' if len(outages) == 1 else 'outages'} in all",
         )
-    bounds = found.bounds
+    bounds = evaluation.bounds
     worst = int(np.argmax(bounds))
     return KeyFigure(
         "Largest bound",
         f"±{GAP}{length_words(float(bounds[worst]))}",
-        f"horizontal, 95{GAP}%, at {instant(float(found.record.sd.index[worst]))}",
+        f"horizontal, 95{GAP}%, at {instant(float(evaluation.record.sd.index[worst]))}",
         "no outage",
     )
 
 
-def longest_outages(found: NavigationEvaluation) -> list[tuple[str, Span, float]]:
+def longest_outages(evaluation: NavigationEvaluation) -> list[tuple[str, Span, float]]:
     """Source, span and largest horizontal bound in m of each outage, in time order."""
-    known = [(aid, span, bound) for aid, span, bound in found.outages if bound is not None]
+    known = [(aid, span, bound) for aid, span, bound in evaluation.outages if bound is not None]
     return sorted(known, key=lambda o: (o[1].begin, o[0]))
 
 
-def cautions(found: NavigationEvaluation, *, brief: bool = False) -> tuple[tuple[str, str], ...]:
+def cautions(
+    evaluation: NavigationEvaluation, *, brief: bool = False
+) -> tuple[tuple[str, str], ...]:
     """Return the cautions, each with its number; brief, without those that the tables show."""
-    shown = () if brief else (*_memory(found), *_refused(found), *_not_told(found))
+    shown = () if brief else (*_memory(evaluation), *_refused(evaluation), *_not_told(evaluation))
     return (
-        *_outages(found),
-        *_ended_without(found),
-        *_heading_caution(found),
+        *_outages(evaluation),
+        *_ended_without(evaluation),
+        *_heading_caution(evaluation),
         *shown,
-        *agreement_words(found),
+        *agreement_words(evaluation),
     )
 
 
-def _outages(found: NavigationEvaluation) -> list[tuple[str, str]]:
-    outages = longest_outages(found)
+def _outages(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
+    outages = longest_outages(evaluation)
     if not outages:
         return []
     total = sum(s.end - s.begin for _, s, _ in outages)
@@ -190,9 +192,9 @@ def _outages(found: NavigationEvaluation) -> list[tuple[str, str]]:
     ]
 
 
-def _ended_without(found: NavigationEvaluation) -> list[tuple[str, str]]:
-    end = float(found.record.trajectory.index[-1])
-    late = [(a, s) for a, s, _ in longest_outages(found) if s.end >= end - 1e-6]
+def _ended_without(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
+    end = float(evaluation.record.trajectory.index[-1])
+    late = [(a, s) for a, s, _ in longest_outages(evaluation) if s.end >= end - 1e-6]
     return [
         (
             f"It ended without {aid}",
@@ -203,8 +205,8 @@ def _ended_without(found: NavigationEvaluation) -> list[tuple[str, str]]:
     ]
 
 
-def _heading_caution(found: NavigationEvaluation) -> list[tuple[str, str]]:
-    bound = half(found.record.sd["heading"].iloc[-1])
+def _heading_caution(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
+    bound = half(evaluation.record.sd["heading"].iloc[-1])
     if bound < 2.0:
         return []
     how = "is unknown" if bound >= _NO_HEADING else f"has a 95 % bound of {plain(bound, 1)}°"
@@ -218,9 +220,9 @@ def _heading_caution(found: NavigationEvaluation) -> list[tuple[str, str]]:
     ]
 
 
-def _memory(found: NavigationEvaluation) -> list[tuple[str, str]]:
+def _memory(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
     out = []
-    for one in found.agreements:
+    for one in evaluation.agreements:
         if one.remembers:
             out.append(
                 (
@@ -234,10 +236,10 @@ def _memory(found: NavigationEvaluation) -> list[tuple[str, str]]:
     return out
 
 
-def _refused(found: NavigationEvaluation) -> list[tuple[str, str]]:
+def _refused(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
     rows = [
         f"{one.rejected} of {one.epochs} epochs of {one.name}"
-        for one in found.agreements
+        for one in evaluation.agreements
         if one.rejected
     ]
     if not rows:
@@ -245,13 +247,13 @@ def _refused(found: NavigationEvaluation) -> list[tuple[str, str]]:
     return [("Rejected", f"{', '.join(rows)}; shown as crosses.")]
 
 
-def _not_told(found: NavigationEvaluation) -> list[tuple[str, str]]:
+def _not_told(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
     """States whose bounds hardly decreased."""
-    sd = found.run.filtered.sensors_sd
+    sd = evaluation.run.filtered.sensors_sd
     if len(sd) < 2:
         return []
     names = []
-    for block in found.states:
+    for block in evaluation.states:
         first = sd[list(block.columns)].iloc[0].to_numpy()
         last = sd[list(block.columns)].iloc[-1].to_numpy()
         some = [
@@ -271,13 +273,13 @@ def _not_told(found: NavigationEvaluation) -> list[tuple[str, str]]:
     ]
 
 
-def _heading(found: NavigationEvaluation) -> str:
-    bound = half(found.record.sd["heading"].iloc[-1])
+def _heading(evaluation: NavigationEvaluation) -> str:
+    bound = half(evaluation.record.sd["heading"].iloc[-1])
     return "unknown" if bound >= _NO_HEADING else plus_minus(bound, "°").removeprefix(f"±{GAP}")
 
 
-def _duration(found: NavigationEvaluation) -> float:
-    time = found.record.trajectory.index
+def _duration(evaluation: NavigationEvaluation) -> float:
+    time = evaluation.record.trajectory.index
     return float(time[-1] - time[0])
 
 
@@ -289,9 +291,9 @@ SHARE = 0.95
 UNITS = dict.fromkeys(NED, "m") | dict.fromkeys(VELOCITY, "m/s") | dict.fromkeys(EULER, "°")
 
 
-def smoothing_chart(found: NavigationEvaluation) -> Chart | None:
+def smoothing_chart(evaluation: NavigationEvaluation) -> Chart | None:
     """Bounds of position, height and heading over time, filter and smoother."""
-    forward, record = found.run.forward, found.record
+    forward, record = evaluation.run.forward, evaluation.record
     if forward is None:
         return None
     panels = []
@@ -327,23 +329,25 @@ def smoothing_chart(found: NavigationEvaluation) -> Chart | None:
     )
 
 
-def smoothing_table(found: NavigationEvaluation) -> TableBlock | None:
+def smoothing_table(evaluation: NavigationEvaluation) -> TableBlock | None:
     """Median bounds and errors against the truth, filter and smoother."""
-    forward, agreement = found.run.forward, found.smoother
+    forward, agreement = evaluation.run.forward, evaluation.smoother
     if forward is None or agreement is None:
         return None
     rows = []
     for k, column in enumerate(agreement.columns):
-        before, after = (float(np.median(_bound(one, column))) for one in (forward, found.record))
+        before, after = (
+            float(np.median(_bound(one, column))) for one in (forward, evaluation.record)
+        )
         rows.append(
             (
                 f"{column}, {UNITS[column]}",
                 _figure(before),
                 _figure(after),
                 plain(before / after, 1) if after > 0.0 else "–",
-                *_errors(found, column),
+                *_errors(evaluation, column),
                 NOT_ESTIMATED
-                if column in found.record.not_estimated
+                if column in evaluation.record.not_estimated
                 else share_words(float(agreement.share[k]))
                 if agreement.instants[k]
                 else "–",
@@ -352,35 +356,37 @@ def smoothing_table(found: NavigationEvaluation) -> TableBlock | None:
     return TableBlock(
         (
             *("", "filter", "smoothed", "ratio"),
-            *(() if found.errors is None else ("error of filter", "smoothed")),
+            *(() if evaluation.errors is None else ("error of filter", "smoothed")),
             "consistent",
         ),
         tuple(rows),
         text=(0,),
         caption="95 % bounds, medians over the run"
-        + ("" if found.errors is None else "; RMS errors against the truth")
+        + ("" if evaluation.errors is None else "; RMS errors against the truth")
         + ". Consistent: share of the differences within three standard deviations by both "
         "covariances (99.7 % for a correct model).",
         strong=tuple(k for k in range(len(rows)) if _apart(agreement, k)),
     )
 
 
-def _errors(found: NavigationEvaluation, column: str) -> tuple[str, ...]:
+def _errors(evaluation: NavigationEvaluation, column: str) -> tuple[str, ...]:
     """RMS errors of filter and smoother, if the truth is known."""
-    if found.errors is None or found.forward_errors is None:
+    if evaluation.errors is None or evaluation.forward_errors is None:
         return ()
-    return tuple(_figure(one.score(column).rms) for one in (found.forward_errors, found.errors))
+    return tuple(
+        _figure(one.score(column).rms) for one in (evaluation.forward_errors, evaluation.errors)
+    )
 
 
-def smoothing_words(found: NavigationEvaluation) -> str | None:
+def smoothing_words(evaluation: NavigationEvaluation) -> str | None:
     """Effect of the smoother in a sentence."""
-    forward = found.run.forward
+    forward = evaluation.run.forward
     if forward is None:
         return None
     before, after = (
-        float(np.median(plane_bound(one.covariance))) for one in (forward, found.record)
+        float(np.median(plane_bound(one.covariance))) for one in (forward, evaluation.record)
     )
-    heading = [float(np.median(_bound(one, "heading"))) for one in (forward, found.record)]
+    heading = [float(np.median(_bound(one, "heading"))) for one in (forward, evaluation.record)]
     return (
         "Smoothed: every state is estimated from all measurements. Median 95 % bounds, filter and "
         f"smoothed: position {_figure(before)} m and {_figure(after)} m, heading "
@@ -388,9 +394,9 @@ def smoothing_words(found: NavigationEvaluation) -> str | None:
     )
 
 
-def agreement_words(found: NavigationEvaluation) -> tuple[tuple[str, str], ...]:
+def agreement_words(evaluation: NavigationEvaluation) -> tuple[tuple[str, str], ...]:
     """Cautions where filter and smoother are inconsistent."""
-    agreement = found.smoother
+    agreement = evaluation.smoother
     if agreement is None:
         return ()
     apart = [k for k in range(len(agreement.columns)) if _apart(agreement, k)]
@@ -432,14 +438,14 @@ def _figure(value: float) -> str:
 _MOST_EVENTS = 40
 
 
-def end_table(found: NavigationEvaluation) -> TableBlock:
+def end_table(evaluation: NavigationEvaluation) -> TableBlock:
     """Position, velocity and attitude at the start and at the end, with bounds."""
-    record = found.record
+    record = evaluation.record
     rows = [
         ("time", *(instant(float(record.trajectory.index[k])) for k in (0, -1))),
-        ("position", position_words(found, 0), position_words(found, -1)),
+        ("position", position_words(evaluation, 0), position_words(evaluation, -1)),
     ]
-    rows.append(("horizontal ±", *(length_words(float(found.bounds[k])) for k in (0, -1))))
+    rows.append(("horizontal ±", *(length_words(float(evaluation.bounds[k])) for k in (0, -1))))
     for name, column, sd, unit in (
         ("height", "alt", "down", "m"),
         *(
@@ -466,13 +472,13 @@ def _stated(value: float, sd: float, unit: str) -> str:
     return about(value, half(sd), unit)
 
 
-def state_table(found: NavigationEvaluation) -> TableBlock | None:
+def state_table(evaluation: NavigationEvaluation) -> TableBlock | None:
     """Sensor and measurement errors: uncertainty before and after the run."""
-    record = found.run.filtered
+    record = evaluation.run.filtered
     if record.sensors.empty or not len(record.sensors.columns):
         return None
     rows = []
-    for block in found.states:
+    for block in evaluation.states:
         for column, label in zip(block.columns, block.labels, strict=True):
             value = block.factor * float(record.sensors[column].iloc[-1])
             first, last = (block.factor * half(record.sensors_sd[column].iloc[k]) for k in (0, -1))
@@ -493,10 +499,10 @@ def state_table(found: NavigationEvaluation) -> TableBlock | None:
     )
 
 
-def observation_table(found: NavigationEvaluation) -> TableBlock | None:
+def observation_table(evaluation: NavigationEvaluation) -> TableBlock | None:
     """Observations with their innovation statistics and rejected epochs."""
     rows = []
-    for one in found.agreements:
+    for one in evaluation.agreements:
         band = "–"
         if one.used.any():
             band = f"{plain(one.band[0], 2)} to {plain(one.band[1], 2)}"
@@ -536,7 +542,7 @@ def observation_table(found: NavigationEvaluation) -> TableBlock | None:
     )
 
 
-def outage_table(found: NavigationEvaluation) -> TableBlock | None:
+def outage_table(evaluation: NavigationEvaluation) -> TableBlock | None:
     """Outages, each with its largest bound."""
     rows = [
         (
@@ -545,7 +551,7 @@ def outage_table(found: NavigationEvaluation) -> TableBlock | None:
             duration_words(span.end - span.begin),
             length_words(bound),
         )
-        for aid, span, bound in longest_outages(found)
+        for aid, span, bound in longest_outages(evaluation)
     ]
     if not rows:
         return None
@@ -557,23 +563,23 @@ def outage_table(found: NavigationEvaluation) -> TableBlock | None:
     )
 
 
-def withheld_table(found: NavigationEvaluation) -> TableBlock | None:
+def withheld_table(evaluation: NavigationEvaluation) -> TableBlock | None:
     """GNSS outage tests with the resulting errors."""
     rows = [
         (
-            w.aid,
-            instant(w.begin),
-            duration_words(w.end - w.begin),
-            length_words(w.error_m),
-            length_words(w.bound_m),
-            "yes" if w.inside else "no",
-            *(() if w.forward_m is None else (length_words(w.forward_m),)),
+            withheld_aid(evaluation.run.spec),
+            instant(w.result.span.begin),
+            duration_words(w.result.span.end - w.result.span.begin),
+            length_words(w.result.largest),
+            length_words(w.result.bound_at_largest),
+            "yes" if w.result.inside else "no",
+            *(() if w.smoothed is None else (length_words(w.forward.largest),)),
         )
-        for w in found.withheld
+        for w in evaluation.run.withheld
     ]
     if not rows:
         return None
-    smoothed = found.run.forward is not None
+    smoothed = evaluation.run.forward is not None
     return TableBlock(
         (
             *("GNSS outage test", "from", "for", "largest error", "95 % bound", "within bound"),
@@ -584,13 +590,13 @@ def withheld_table(found: NavigationEvaluation) -> TableBlock | None:
         caption="Measurements withheld on purpose: the largest horizontal error, and the run's "
         "95 % bound at that instant"
         + ("; smoothed, and by the filter alone." if smoothed else "."),
-        strong=tuple(k for k, w in enumerate(found.withheld) if not w.inside),
+        strong=tuple(k for k, w in enumerate(evaluation.run.withheld) if not w.result.inside),
     )
 
 
-def point_table(found: NavigationEvaluation) -> TableBlock | None:
+def point_table(evaluation: NavigationEvaluation) -> TableBlock | None:
     """Errors at the control points."""
-    score = found.run.points
+    score = evaluation.run.points
     if score is None:
         return None
     row = (
@@ -610,14 +616,14 @@ def point_table(found: NavigationEvaluation) -> TableBlock | None:
     )
 
 
-def error_table(found: NavigationEvaluation) -> TableBlock | None:
+def error_table(evaluation: NavigationEvaluation) -> TableBlock | None:
     """Errors against the truth with their bounds."""
-    if found.errors is None:
+    if evaluation.errors is None:
         return None
     names = {"horizontal": "horizontal", "down": "down (height)"}
     names |= {v: f"velocity {w}" for v, w in zip(VELOCITY, ("north", "east", "down"), strict=True)}
     rows = []
-    for score in found.errors.scores:
+    for score in evaluation.errors.scores:
         places = decimals(score.rms) if score.rms > 0.0 else 3
         rows.append(
             (
@@ -633,14 +639,15 @@ def error_table(found: NavigationEvaluation) -> TableBlock | None:
         ("error", "rms", "largest", "at", "95 % bound, rms", "within bound"),
         tuple(rows),
         text=(0,),
-        caption=f"Errors against {found.truth_name}, at {len(found.errors.time)} instants.",
+        caption=f"Errors against {evaluation.truth_name}, at "
+        f"{len(evaluation.errors.time)} instants.",
         strong=(0,),
     )
 
 
-def event_table(found: NavigationEvaluation) -> TableBlock | None:
+def event_table(evaluation: NavigationEvaluation) -> TableBlock | None:
     """Events; only the first ones if there are many."""
-    events = found.record.events
+    events = evaluation.record.events
     if not events:
         return None
     shown = events[:_MOST_EVENTS]
@@ -657,7 +664,7 @@ def event_table(found: NavigationEvaluation) -> TableBlock | None:
 # Report of a navigation run: the answer first, then its basis.
 
 
-def navigation_document(found: NavigationEvaluation, name: str) -> Document:
+def navigation_document(evaluation: NavigationEvaluation, name: str) -> Document:
     """Return the report of a navigation run.
 
     Parameters
@@ -665,54 +672,54 @@ def navigation_document(found: NavigationEvaluation, name: str) -> Document:
     name : str
         Folder name, for the verification command; no command if empty.
     """
-    run = found.run
-    verdict = trust(found)
-    plan = plan_chart(found)
-    said = cautions(found)
+    run = evaluation.run
+    verdict = trust(evaluation)
+    plan = plan_chart(evaluation)
+    said = cautions(evaluation)
     aids = dict.fromkeys(
-        [*found.record.outages, *(a.name.partition(".")[0] for a in found.agreements)]
+        [*evaluation.record.outages, *(a.name.partition(".")[0] for a in evaluation.agreements)]
     )
     sections = (
-        section("answer", "The answer", end_table(found), *verdict.blocks),
-        *integrity_sections(found),
+        section("answer", "The answer", end_table(evaluation), *verdict.blocks),
+        *integrity_sections(evaluation),
         section(
             "state",
             "Height, velocity, attitude",
-            charts.height_chart(found),
-            charts.velocity_chart(found),
-            charts.attitude_chart(found),
+            charts.height_chart(evaluation),
+            charts.velocity_chart(evaluation),
+            charts.attitude_chart(evaluation),
         ),
         section(
             "truth",
-            f"Against {found.truth_name}",
-            error_table(found),
-            *error_charts(found),
-            nees_chart(found),
+            f"Against {evaluation.truth_name}",
+            error_table(evaluation),
+            *error_charts(evaluation),
+            nees_chart(evaluation),
         ),
         section(
             "paired",
             "With two corrections of the estimated errors",
-            paired_table(found),
-            paired_chart(found),
+            paired_table(evaluation),
+            paired_chart(evaluation),
         ),
-        section("points", "At the control points", point_table(found)),
+        section("points", "At the control points", point_table(evaluation)),
         section(
             "smoothing",
             "Smoothed",
-            paragraph(smoothing_words(found)),
-            smoothing_table(found),
-            smoothing_chart(found),
+            paragraph(smoothing_words(evaluation)),
+            smoothing_table(evaluation),
+            smoothing_chart(evaluation),
         ),
         section(
             "sensors",
             "Sensor and measurement errors",
-            state_table(found),
-            *charts.state_charts(found),
+            state_table(evaluation),
+            *charts.state_charts(evaluation),
         ),
-        section("observations", "Innovations", *_observations(found)),
-        section("outages", "Outages", withheld_table(found), outage_table(found)),
-        section("events", "Events", event_table(found)),
-        section("findings", "Findings", findings_list(found.all_findings)),
+        section("observations", "Innovations", *_observations(evaluation)),
+        section("outages", "Outages", withheld_table(evaluation), outage_table(evaluation)),
+        section("events", "Events", event_table(evaluation)),
+        section("findings", "Findings", findings_list(evaluation.all_findings)),
         section(
             "method",
             "Method and assumptions",
@@ -730,20 +737,20 @@ def navigation_document(found: NavigationEvaluation, name: str) -> Document:
     title = run.spec.title or f"Navigation of {run.source.name}"
     return Document(
         title,
-        headline(found),
+        headline(evaluation),
         (
             ("Record", f"{run.source.name}, {run.source.what}"),
-            ("Start", position_words(found, 0)),
+            ("Start", position_words(evaluation, 0)),
             ("Measurements", ", ".join(aids) or "none"),
             ("Software", f"strapdown {__version__}"),
         ),
         blocks(
-            KeyFigures(key_figures(found)),
+            KeyFigures(key_figures(evaluation)),
             verdict.paragraph,
             Items(said) if said else None,
-            Paragraph(f"Stationary at {position_words(found, 0)}.") if plan is None else None,
+            Paragraph(f"Stationary at {position_words(evaluation, 0)}.") if plan is None else None,
             plan,
-            charts.bound_chart(found),
+            charts.bound_chart(evaluation),
         ),
         sections,
         title,
@@ -780,11 +787,11 @@ def _kind(module: ChoiceSpec, slot: str) -> str:
     return str(getattr(getattr(module, slot, None), "kind", ""))
 
 
-def _observations(found: NavigationEvaluation) -> tuple[Block | None, ...]:
-    if not found.agreements:
+def _observations(evaluation: NavigationEvaluation) -> tuple[Block | None, ...]:
+    if not evaluation.agreements:
         return (Paragraph("No measurement was processed: inertial sensors alone."),)
     rows: list[tuple[str, str]] = []
-    for one in found.agreements:
+    for one in evaluation.agreements:
         for kind in dict.fromkeys(v.kind for v in one.consistency.verdicts):
             alike = [v for v in one.consistency.verdicts if v.kind == kind]
             said = "; ".join(v.finding.what for v in alike)
@@ -792,11 +799,11 @@ def _observations(found: NavigationEvaluation) -> tuple[Block | None, ...]:
     against = "Inconsistencies that exceed chance, and their possible causes:"
     agree = "The innovations are consistent with the stated sensor and measurement errors."
     return (
-        observation_table(found),
+        observation_table(evaluation),
         Paragraph(against if rows else agree),
         Items(tuple(rows)) if rows else None,
-        nis_chart(found.record, found.agreements),
-        *(innovation_chart(found.record, one) for one in found.agreements),
+        nis_chart(evaluation.record, evaluation.agreements),
+        *(innovation_chart(evaluation.record, one) for one in evaluation.agreements),
     )
 
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -36,12 +35,9 @@ from strapdown.navigation.truth_comparison import (
 from strapdown.report.chart import Array
 from strapdown.report.document import Trust, reason
 from strapdown.report.values import shown_unit
-from strapdown.systems.navigation_run import NavigationRun, withheld_aid
+from strapdown.systems.navigation_run import NavigationRun
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
 from strapdown.tables.checks import index_of, values_of
-
-if TYPE_CHECKING:
-    from strapdown.navigation.outage_test import Withheld as WithheldScores
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,12 +99,6 @@ class NavigationEvaluation:
         if self.run.forward is None:
             return None
         return smoother_consistency(self.run.forward, self.record, self.run.ellipsoid)
-
-    @cached_property
-    def withheld(self) -> tuple[Withheld, ...]:
-        """GNSS outage tests."""
-        run = self.run
-        return () if not run.withheld else withheld_of(withheld_aid(run.spec), run.withheld)
 
     @cached_property
     def pair(self) -> tuple[HorizontalErrors, ...]:
@@ -420,52 +410,6 @@ class NavigationErrors:
         )
 
 
-@dataclass(frozen=True)
-class Withheld:
-    """A GNSS outage test: an interval of withheld measurements, and the resulting error.
-
-    Attributes
-    ----------
-    begin, end : float, s
-    error_m : float
-        Largest horizontal distance from the withheld fixes.
-    bound_m : float
-        The run's own 95 % bound at that instant: the semi-major axis of its ellipse.
-    forward_m : float, optional
-        For a smoothed run, the largest distance before smoothing.
-    """
-
-    aid: str
-    begin: float
-    end: float
-    error_m: float
-    bound_m: float
-    forward_m: float | None = None
-
-    @property
-    def inside(self) -> bool:
-        """Whether the error is within the bound."""
-        return self.error_m <= self.bound_m
-
-
-def withheld_of(aid: str, scores: Sequence[WithheldScores]) -> tuple[Withheld, ...]:
-    """Return the GNSS outage tests of a measurement source as a report shows them.
-
-    Returns
-    -------
-    tuple of Withheld
-        The largest error of each, and the bound in its direction at that instant.
-    """
-    out = []
-    for one in scores:
-        told = one.told
-        worst = int(np.argmax(told.horizontal))
-        forward = None if one.smoothed is None else one.forward.largest
-        bound = float(told.bound[worst])
-        out.append(Withheld(aid, told.span.begin, told.span.end, told.largest, bound, forward))
-    return tuple(out)
-
-
 # A record navigated twice, with two corrections of the estimated errors: errors of both.
 
 
@@ -634,51 +578,53 @@ _ENOUGH = 0.8
 _MANY = 0.1
 
 
-def trust(found: NavigationEvaluation) -> Trust:
+def trust(evaluation: NavigationEvaluation) -> Trust:
     """Judge a run by its consistency."""
-    known = [*_errors(found), *_withheld(found)]
-    reasons = known + [_innovations(one) for one in found.agreements if one.used.any()]
-    reasons += [_memory(one) for one in found.agreements if one.remembers]
-    reasons += _rejected(found)
+    known = _against_known(evaluation)
+    used = [one for one in evaluation.agreements if one.used.any()]
+    reasons = known + [_innovations(one) for one in used]
+    reasons += [
+        reason(
+            False,
+            "navigation.innovations-correlated",
+            name=one.name,
+            correlation=one.correlation,
+            by_chance=one.correlation_bound,
+        )
+        for one in evaluation.agreements
+        if one.remembers
+    ]
+    reasons += _rejected(evaluation)
     # Notes appear among the findings and do not count against the run.
-    reasons += [f for f in found.run.findings if f.severity == "warning"]
-    reasons += _silence(found)
+    reasons += [f for f in evaluation.run.findings if f.severity == "warning"]
+    if not used and evaluation.errors is None and not evaluation.run.withheld:
+        reasons.append(reason(False, "navigation.nothing-observed"))
     wrong = any(one.severity == "warning" for one in known)
-    wrong |= any(one.refutes for one in found.agreements)
+    wrong |= any(one.refutes for one in evaluation.agreements)
     against = any(one.severity == "warning" for one in reasons)
     verdict = "trusted" if not against else "distrusted" if wrong else "reserve"
-    return Trust(verdict, tuple(reasons), _short(found))
+    return Trust(verdict, tuple(reasons), _short(evaluation))
 
 
-def _silence(found: NavigationEvaluation) -> list[Finding]:
-    """Reason against a run without measurements, truth or outage test: it cannot be confirmed."""
-    if found.errors is not None or found.withheld:
-        return []
-    if any(one.used.any() for one in found.agreements):
-        return []
-    return [reason(False, "navigation.nothing-observed")]
-
-
-def _short(found: NavigationEvaluation) -> tuple[Finding, ...]:
+def _short(evaluation: NavigationEvaluation) -> tuple[Finding, ...]:
     parts = []
-    if found.errors is not None:
-        score = found.errors.score("horizontal")
+    if evaluation.errors is not None:
+        score = evaluation.errors.score("horizontal")
         parts.append(
             reason(
                 True,
                 "navigation.position-within-bound",
-                reference=found.truth_name,
+                reference=evaluation.truth_name,
                 share=score.share,
             )
         )
-    if found.withheld:
-        count = len(found.withheld)
+    if count := len(evaluation.run.withheld):
         parts.append(
             reason(True, "navigation.outage-test-passed")
             if count == 1
             else reason(True, "navigation.outage-tests-passed", count=count)
         )
-    used = [one for one in found.agreements if one.used.any()]
+    used = [one for one in evaluation.agreements if one.used.any()]
     if used:
         worst = max(used, key=lambda a: abs(a.ratio - 1.0))
         parts.append(
@@ -694,17 +640,13 @@ def _short(found: NavigationEvaluation) -> tuple[Finding, ...]:
     return tuple(parts)
 
 
-def _errors(found: NavigationEvaluation) -> list[Finding]:
-    if found.errors is None:
-        return []
+def _against_known(evaluation: NavigationEvaluation) -> list[Finding]:
+    """Compare the run with the truth and with withheld fixes."""
     out = []
-    for name, word in (
-        ("horizontal", "horizontal position"),
-        ("down", "height"),
-        *((a, a) for a in reversed(EULER)),
-    ):
-        score = found.errors.score(name)
-        if np.isnan(score.share):
+    quantities = (("horizontal", "horizontal position"), ("down", "height"))
+    for name, word in (*quantities, *((a, a) for a in reversed(EULER))):
+        score = None if evaluation.errors is None else evaluation.errors.score(name)
+        if score is None or np.isnan(score.share):
             continue
         out.append(
             reason(
@@ -717,26 +659,23 @@ def _errors(found: NavigationEvaluation) -> list[Finding]:
                 share=score.share,
             )
         )
-    return out
-
-
-def _withheld(found: NavigationEvaluation) -> list[Finding]:
-    those = found.withheld
-    if not those:
-        return []
-    inside = sum(w.inside for w in those)
-    worst = max(those, key=lambda w: w.error_m / w.bound_m if w.bound_m > 0.0 else 0.0)
-    return [
-        reason(
-            bool(inside >= _ENOUGH * len(those)),
-            "navigation.outage-tests",
-            inside=inside,
-            count=len(those),
-            error_m=worst.error_m,
-            bound_m=worst.bound_m,
-            length_s=worst.end - worst.begin,
+    tests = [one.result for one in evaluation.run.withheld]
+    if tests:
+        inside = sum(one.inside for one in tests)
+        bounds = [(one, one.bound_at_largest) for one in tests]
+        worst, bound = max(bounds, key=lambda w: w[0].largest / w[1] if w[1] > 0.0 else 0.0)
+        out.append(
+            reason(
+                bool(inside >= _ENOUGH * len(tests)),
+                "navigation.outage-tests",
+                inside=inside,
+                count=len(tests),
+                error_m=worst.largest,
+                bound_m=bound,
+                length_s=worst.span.end - worst.span.begin,
+            )
         )
-    ]
+    return out
 
 
 def _innovations(one: Agreement) -> Finding:
@@ -758,19 +697,9 @@ def _innovations(one: Agreement) -> Finding:
     return reason(good, code, name=one.name, ratio=one.ratio, independent=one.lasting)
 
 
-def _memory(one: Agreement) -> Finding:
-    return reason(
-        False,
-        "navigation.innovations-correlated",
-        name=one.name,
-        correlation=one.correlation,
-        by_chance=one.correlation_bound,
-    )
-
-
-def _rejected(found: NavigationEvaluation) -> list[Finding]:
+def _rejected(evaluation: NavigationEvaluation) -> list[Finding]:
     out = []
-    for one in found.agreements:
+    for one in evaluation.agreements:
         if one.rejected > _MANY * one.epochs:
             out.append(
                 reason(
@@ -783,7 +712,10 @@ def _rejected(found: NavigationEvaluation) -> list[Finding]:
                 )
             )
         for label, column in zip(one.labels, one.weight.T, strict=True):
-            ends = [k for k in true_runs(~(column > 0.0)) if _long(k)]
+            # After so many in a row the adaptive rule processed the next one.
+            ends = [
+                k for k in true_runs(~(column > 0.0)) if k.stop - k.start >= AdaptiveScale.patience
+            ]
             if ends:
                 out.append(
                     reason(
@@ -796,8 +728,3 @@ def _rejected(found: NavigationEvaluation) -> list[Finding]:
                     )
                 )
     return out
-
-
-def _long(rejected: slice) -> bool:
-    """Whether so many were rejected in a row that the adaptive rule took the next."""
-    return bool(rejected.stop - rejected.start >= AdaptiveScale.patience)

@@ -35,7 +35,7 @@ _TALL = 0.9
 NO_PATH = 0.05
 
 
-def plan_chart(found: NavigationEvaluation) -> Chart | None:
+def plan_chart(evaluation: NavigationEvaluation) -> Chart | None:
     """Draw the path to one scale, with its fixes and 95 % ellipses.
 
     Returns
@@ -43,16 +43,16 @@ def plan_chart(found: NavigationEvaluation) -> Chart | None:
     Chart or None
         None for a run without motion.
     """
-    record = found.record
+    record = evaluation.record
     table = record.trajectory
-    rows = _rows(found)
+    rows = _rows(evaluation)
     kept = table.iloc[rows]
     origin = places_of(table.iloc[:1])[0]
-    ned = ned_from_geodetic(places_of(kept), origin, ellipsoid=found.run.ellipsoid)
+    ned = ned_from_geodetic(places_of(kept), origin, ellipsoid=evaluation.run.ellipsoid)
     reach = float(np.ptp(ned[:, :2], axis=0).max())
     if reach < NO_PATH:
         return None
-    plane = Plane(origin, found, *(("km", 1e-3) if reach >= _FAR else ("m", 1.0)))
+    plane = Plane(origin, evaluation, *(("km", 1e-3) if reach >= _FAR else ("m", 1.0)))
     path = (plane.scale * ned[:, 1], plane.scale * ned[:, 0])
     time = index_of(kept)
     tight = View.of([path, *_around(plane)], most=_TALL)
@@ -89,20 +89,20 @@ def plan_chart(found: NavigationEvaluation) -> Chart | None:
     )
 
 
-def _rows(found: NavigationEvaluation) -> NDArray[np.intp]:
+def _rows(evaluation: NavigationEvaluation) -> NDArray[np.intp]:
     """Rows that preserve the course, and those at the ends of modes and outages."""
-    table = found.record.trajectory
-    rows = _course(table, found)
-    spans = [*found.record.modes, *(s for v in found.record.outages.values() for s in v)]
+    table = evaluation.record.trajectory
+    rows = _course(table, evaluation)
+    spans = [*evaluation.record.modes, *(s for v in evaluation.record.outages.values() for s in v)]
     edges = np.searchsorted(table.index.to_numpy(), [t for s in spans for t in (s.begin, s.end)])
     return np.unique(np.concatenate([rows, np.clip(edges, 0, len(table) - 1)]))
 
 
-def _course(table: pd.DataFrame, found: NavigationEvaluation) -> NDArray[np.intp]:
+def _course(table: pd.DataFrame, evaluation: NavigationEvaluation) -> NDArray[np.intp]:
     """Rows that preserve the course, including the last one."""
     # At this sampling no vehicle leaves its course between samples.
     step = max(1, len(table) // MOST_SAMPLES)
-    rows = step * thin(table.iloc[::step], MOST_POINTS, found.run.ellipsoid).rows
+    rows = step * thin(table.iloc[::step], MOST_POINTS, evaluation.run.ellipsoid).rows
     return np.append(rows, len(table) - 1) if rows[-1] < len(table) - 1 else rows
 
 
@@ -262,7 +262,7 @@ _AT_OUTAGES, _ALONG, _LARGEST = 8, 6, 0.05
 _LETTER, _TEXT = 0.0082, 0.04
 
 
-def ellipse_rows(found: NavigationEvaluation) -> tuple[list[int], list[tuple[int, Span]]]:
+def ellipse_rows(evaluation: NavigationEvaluation) -> tuple[list[int], list[tuple[int, Span]]]:
     """Covariance marks at which ellipses are drawn: along the path, and at the ends of outages.
 
     Returns
@@ -272,7 +272,7 @@ def ellipse_rows(found: NavigationEvaluation) -> tuple[list[int], list[tuple[int
     at_outages : list of (int, Span)
         The last mark before the end of each; if there are many, those of largest uncertainty.
     """
-    record, bounds = found.record, found.bounds
+    record, bounds = evaluation.record, evaluation.bounds
     time = index_of(record.sd)
     ends: list[tuple[int, Span]] = []
     for span in sorted({s for v in record.outages.values() for s in v}, key=lambda s: s.begin):

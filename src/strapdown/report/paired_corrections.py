@@ -24,9 +24,9 @@ AT = (60.0, 120.0, 300.0, 1200.0, 3600.0)
 COLOURS = (BLUE, VERMILLION)
 
 
-def paired_table(found: NavigationEvaluation) -> TableBlock | None:
+def paired_table(evaluation: NavigationEvaluation) -> TableBlock | None:
     """Errors of both solutions at some times after the begin, and their ratio."""
-    pair = found.pair
+    pair = evaluation.pair
     if not pair or not len(pair[0].time):
         return None
     one, other = pair
@@ -64,14 +64,14 @@ def paired_table(found: NavigationEvaluation) -> TableBlock | None:
         tuple(rows),
         text=(0,),
         caption="Horizontal errors of the same record with both corrections of the estimated "
-        f"errors, relative to {reference_words(found.run)}.",
+        f"errors, relative to {reference_words(evaluation.run)}.",
         strong=(len(rows) - 1,),
     )
 
 
-def paired_chart(found: NavigationEvaluation) -> Chart | None:
+def paired_chart(evaluation: NavigationEvaluation) -> Chart | None:
     """Errors of ground velocity and of position over time, both solutions in one chart."""
-    pair = found.pair
+    pair = evaluation.pair
     if not pair:
         return None
     panels = []
@@ -86,20 +86,20 @@ def paired_chart(found: NavigationEvaluation) -> Chart | None:
     return over_time(
         "paired",
         "With two corrections of the estimated errors",
-        f"Lengths of the horizontal errors relative to {reference_words(found.run)}: with "
+        f"Lengths of the horizontal errors relative to {reference_words(evaluation.run)}: with "
         f"{pair[0].kind} and with {pair[1].kind}. Dotted: as stated, one standard deviation.",
         tuple(panels),
-        found.run.filtered,
+        evaluation.run.filtered,
     )
 
 
-def paired_json(found: NavigationEvaluation) -> dict[str, Any] | None:
+def paired_json(evaluation: NavigationEvaluation) -> dict[str, Any] | None:
     """Return the errors of both solutions as plain data."""
-    pair = found.pair
+    pair = evaluation.pair
     if not pair:
         return None
     return {
-        "relative_to": reference_words(found.run),
+        "relative_to": reference_words(evaluation.run),
         "horizontal_errors": {
             one.kind: {
                 "velocity_rms_m_per_s": rms(one.velocity),
@@ -114,9 +114,9 @@ def paired_json(found: NavigationEvaluation) -> dict[str, Any] | None:
     }
 
 
-def write_paired(found: NavigationEvaluation, folder: Path, comments: dict[str, str]) -> None:
+def write_paired(evaluation: NavigationEvaluation, folder: Path, comments: dict[str, str]) -> None:
     """Write ``paired.csv``: errors of both solutions over time, if there are two."""
-    pair = found.pair
+    pair = evaluation.pair
     if not pair:
         return
     one = pair[0]
@@ -130,7 +130,9 @@ def write_paired(found: NavigationEvaluation, folder: Path, comments: dict[str, 
             ("position_sd_m", each.position_sd),
         ):
             columns[f"{each.kind}_{name}"] = np.interp(one.time, at, values)
-    csv.write(folder / "paired.csv", columns, {**comments, "against": reference_words(found.run)})
+    csv.write(
+        folder / "paired.csv", columns, {**comments, "against": reference_words(evaluation.run)}
+    )
 
 
 def _ratio(more: float, less: float) -> str:

@@ -68,14 +68,14 @@ _KINDS = {
 STATUS_STYLES = {"trusted": "green", "unverified": "yellow", "rejected": "red"}
 
 
-def answer(found: NavigationEvaluation) -> str:
+def answer(evaluation: NavigationEvaluation) -> str:
     """Return the first sentence of a verdict."""
-    return f"{bound_words(found)} {heading_words(found.run.trust)}"
+    return f"{bound_words(evaluation)} {heading_words(evaluation.run.trust)}"
 
 
-def bound_words(found: NavigationEvaluation) -> str:
+def bound_words(evaluation: NavigationEvaluation) -> str:
     """Return the 95 % bound of the position, at the end and at its worst."""
-    result, bounds = found.run, found.bounds
+    result, bounds = evaluation.run, evaluation.bounds
     end, worst = float(bounds[-1]), int(np.argmax(bounds))
     most, at = float(bounds[worst]), float(result.record.sd.index[worst])
     # A run whose bound is largest at the end needs only one number.
@@ -264,12 +264,14 @@ def repeated_words(result: NavigationRun) -> str:
     )
 
 
-def terminal_lines(found: NavigationEvaluation, *, brief: bool = False) -> list[tuple[str, str]]:
+def terminal_lines(
+    evaluation: NavigationEvaluation, *, brief: bool = False
+) -> list[tuple[str, str]]:
     """Up to five lines for the terminal, each with its style; brief, without the position."""
-    result, trust = found.run, found.run.trust
+    result, trust = evaluation.run, evaluation.run.trust
     last = trust.heading.spans[-1].status if trust.heading.spans else "rejected"
     style = STATUS_STYLES[last]
-    lines = [(heading_words(trust) if brief else answer(found), style)]
+    lines = [(heading_words(trust) if brief else answer(evaluation), style)]
     if said := worst_words(trust):
         lines.insert(0, (said, STATUS_STYLES["rejected"]))
     if trust.first is not None:
@@ -309,11 +311,11 @@ def degrees_words(value: float) -> str:
 _MOST = 12
 
 
-def integrity_sections(found: NavigationEvaluation) -> tuple[Section, ...]:
+def integrity_sections(evaluation: NavigationEvaluation) -> tuple[Section, ...]:
     """Return the sections on heading, position and velocity, and the first inconsistency."""
-    result = found.run
+    result = evaluation.run
     return (
-        section("integrity", "Integrity", Paragraph(answer(found)), *_heading(result)),
+        section("integrity", "Integrity", Paragraph(answer(evaluation)), *_heading(result)),
         section("quantities", "Status of position and velocity", *_quantities(result)),
         section("first", "First inconsistency, and the re-run without it", *_first(result)),
     )

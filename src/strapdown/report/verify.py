@@ -6,9 +6,8 @@ import json
 import math
 import re
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +19,7 @@ from strapdown.attitude_comparison.comparison import run_comparison
 from strapdown.attitude_comparison.options import AttitudeSpec
 from strapdown.bundle.configuration_paths import names_file, resolved
 from strapdown.bundle.reading import read_manifest, unsealed_changes
-from strapdown.bundle.seal import MANIFEST, Seal, sha256
+from strapdown.bundle.seal import MANIFEST, sha256
 from strapdown.bundle.writing import machine, versions
 from strapdown.config import CrashSimulationSpec, SimulateSpec, TrajectorySpec
 from strapdown.config.crash_case import CaseSpec
@@ -65,41 +64,31 @@ class Verification:
     details: tuple[str, ...]
 
 
-def _with_page(configuration: dict[str, Any]) -> bool:
-    """Whether the bundle was written with its page and figures, which change no number."""
-    return bool(configuration.get("report", True))
-
-
-def _rerun_attitude(configuration: dict[str, Any], out: Path, sealed: set[str]) -> Seal:
-    # Additional PNG figures change no number and are not part of the configuration.
-    png = any(name.endswith(".png") for name in sealed)
-    asked = {key: value for key, value in configuration.items() if key != "report"}
-    bench = run_comparison(AttitudeSpec.model_validate(asked))
-    return write_attitude(bench, out, png=png, report=_with_page(configuration))
-
-
-def _rerun_simulation(configuration: dict[str, Any], out: Path, sealed: set[str]) -> Seal:
-    if "trajectory" in configuration:
-        trajectory = TrajectorySpec.model_validate(configuration["trajectory"])
-        return write_trajectory_simulation(trajectory, out)
-    if "crash" in configuration:
-        crash = CrashSimulationSpec.model_validate(configuration["crash"])
-        return write_crash_simulation(crash, out)
-    return write_simulation(SimulateSpec.model_validate(configuration), out)
-
-
-def _rerun_report(
-    bundle: ReportBundle[Any], configuration: dict[str, Any], out: Path, sealed: set[str]
-) -> Seal:
-    return bundle.rerun(configuration, out, report=_with_page(configuration))
-
-
-BUNDLES: tuple[ReportBundle[Any], ...] = (ALIGNMENT, COAST, CRASH, DOCTOR, NAVIGATION)
-RERUNS: dict[str, Callable[[dict[str, Any], Path, set[str]], Seal]] = {
-    "attitude": _rerun_attitude,
-    "simulate": _rerun_simulation,
-    **{b.command: partial(_rerun_report, b) for b in BUNDLES},
+#: Commands with a `ReportBundle`; ``attitude`` and ``simulate`` write theirs.
+BUNDLES: dict[str, ReportBundle[Any]] = {
+    bundle.command: bundle for bundle in (ALIGNMENT, COAST, CRASH, DOCTOR, NAVIGATION)
 }
+
+
+def _rerun(command: str, configuration: dict[str, Any], out: Path, sealed: set[str]) -> None:
+    """Repeat a run from its configuration; `sealed`: names of the sealed files."""
+    # Page and figures change no number; PNG figures are not part of the configuration.
+    report = bool(configuration.get("report", True))
+    if command in BUNDLES:
+        BUNDLES[command].rerun(configuration, out, report=report)
+    elif command == "attitude":
+        keys = {key: value for key, value in configuration.items() if key != "report"}
+        png = any(name.endswith(".png") for name in sealed)
+        bench = run_comparison(AttitudeSpec.model_validate(keys))
+        write_attitude(bench, out, png=png, report=report)
+    elif "trajectory" in configuration:
+        trajectory = TrajectorySpec.model_validate(configuration["trajectory"])
+        write_trajectory_simulation(trajectory, out)
+    elif "crash" in configuration:
+        crash = CrashSimulationSpec.model_validate(configuration["crash"])
+        write_crash_simulation(crash, out)
+    else:
+        write_simulation(SimulateSpec.model_validate(configuration), out)
 
 
 def verify(bundle: str | Path) -> Verification:
@@ -131,14 +120,14 @@ def verify(bundle: str | Path) -> Verification:
         return Verification("changed", math.inf, digest, tuple(changes))
     if manifest["command"] == "reproduce":
         raise DataError("report.reproduced-paper", file=MANIFEST)
-    if manifest["command"] not in RERUNS:
+    if manifest["command"] not in (*BUNDLES, "attitude", "simulate"):
         raise DataError("report.command-not-known", file=MANIFEST, manifest=manifest["command"])
     with tempfile.TemporaryDirectory(prefix="strapdown-verify-") as folder:
         again = Path(folder) / "again"
         configuration = resolved(manifest["configuration"], root)
         try:
             sealed = {item["name"] for item in manifest["outputs"]}
-            RERUNS[manifest["command"]](configuration, again, sealed)
+            _rerun(manifest["command"], configuration, again, sealed)
         except ValidationError as error:
             raise DataError(
                 "report.configuration-not-understood",
@@ -299,18 +288,21 @@ def changed_case(root: Path, manifest: dict[str, Any]) -> list[str]:
     if not path.is_file():
         return []
     try:
-        told = CaseSpec.read(path, files=False).model_dump(mode="json", exclude_none=True)
+        stated = CaseSpec.read(path, files=False).model_dump(mode="json", exclude_none=True)
     except StrapdownError as error:
         return [f"{name}: it is not a valid case: {error.finding.what}"]
-    told.pop("name", None)
+    stated.pop("name", None)
     sealed = {k: v for k, v in configuration.get("case", {}).items() if k != "name"}
-    return [f"{name}: {what}" for what in changed_options(_told(sealed), _told(told))]
+    return [
+        f"{name}: {what}"
+        for what in changed_options(_without_files(sealed), _without_files(stated))
+    ]
 
 
-def _told(value: Any) -> Any:
+def _without_files(value: Any) -> Any:
     """Remove file names, which differ in a bundle."""
     if isinstance(value, dict):
-        return {k: _told(v) for k, v in value.items() if not names_file(k, v)}
+        return {k: _without_files(v) for k, v in value.items() if not names_file(k, v)}
     if isinstance(value, list):
-        return [_told(v) for v in value]
+        return [_without_files(v) for v in value]
     return value

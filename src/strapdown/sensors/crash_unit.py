@@ -23,7 +23,7 @@ from strapdown.sensors.triad_errors import (
     triple,
 )
 from strapdown.sensors.uncertainty import TriadUncertainty
-from strapdown.tables import ACCEL, GYRO, SAMPLINGS, find_gaps
+from strapdown.tables import ACCEL, GYRO, check_table_sampling, find_gaps
 from strapdown.tables.checks import check_rows, check_time, index_of
 
 Array = NDArray[np.float64]
@@ -260,14 +260,7 @@ def _values(unit: CrashUnit, triad: RecordedTriad, columns: list[str]) -> Array:
             quantity=missing[0],
             missing=missing,
         )
-    if triad.table.attrs.get("sampling") not in SAMPLINGS:
-        raise DataError(
-            "sensors.attrs-sampling",
-            file=source,
-            quantity="sampling",
-            get=triad.table.attrs.get("sampling"),
-            samplings=SAMPLINGS,
-        )
+    check_table_sampling(triad.table, source)
     if len(triad.table) < 2:
         raise DataError(
             "sensors.too-few-samples-of-unit", file=source, quantity="time", count=len(triad.table)

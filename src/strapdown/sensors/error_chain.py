@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.triad_errors import Triad, TriadErrors
-from strapdown.tables import SAMPLINGS
+from strapdown.tables import check_sampling_kind
 
 Array = NDArray[np.float64]
 
@@ -182,10 +182,7 @@ def _rows(time: ArrayLike, values: ArrayLike, name: str) -> tuple[Array, Array]:
 
 
 def _is_mean(sampling: str) -> bool:
-    if sampling not in SAMPLINGS:
-        raise ConfigError(
-            "sensors.no-kind-sampling", quantity="sampling", sampling=sampling, samplings=SAMPLINGS
-        )
+    check_sampling_kind(sampling)
     return sampling == "mean"
 
 

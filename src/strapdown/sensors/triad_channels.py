@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
-from strapdown.tables import ACCEL, GYRO, SAMPLINGS, find_gaps
+from strapdown.tables import ACCEL, GYRO, check_table_sampling, find_gaps
 from strapdown.tables.checks import check_rows, check_time
 
 Array = NDArray[np.float64]
@@ -90,15 +90,7 @@ def triad_channels(unit: CrashUnit, triad: RecordedTriad, columns: list[str]) ->
             columns=table.columns,
             assumed=_ASSUMED[columns[0]],
         )
-    sampling = table.attrs.get("sampling")
-    if sampling not in SAMPLINGS:
-        raise DataError(
-            "sensors.table-attrs-sampling",
-            file=source,
-            quantity="sampling",
-            sampling=sampling,
-            map=map(repr, SAMPLINGS),
-        )
+    check_table_sampling(table, source)
     if table.index.dtype.kind not in "fiu":
         raise DataError(
             "sensors.table-index-holds-not-seconds",
@@ -113,7 +105,7 @@ def triad_channels(unit: CrashUnit, triad: RecordedTriad, columns: list[str]) ->
     groups, findings = _groups(source, stamps, values, columns)
     judge = _judge_force if columns == ACCEL else _judge_rate
     return TriadChannels(
-        source, groups, str(sampling), (*findings, *judge(source, unit, triad, groups))
+        source, groups, table.attrs["sampling"], (*findings, *judge(source, unit, triad, groups))
     )
 
 

@@ -46,7 +46,6 @@ if TYPE_CHECKING:
     from strapdown.simulation.mounted_motion import (
         ExactAnswers,
         MountedMotion,
-        PointKinematics,
         Ringing,
         point_kinematics,
         point_path,
@@ -68,7 +67,7 @@ if TYPE_CHECKING:
         car,
         ship,
     )
-    from strapdown.simulation.walking import GAITS, Gait, Stride, WalkingMotion, walk
+    from strapdown.simulation.walking import GAITS, Stride, WalkingMotion, walk
 
 __all__ = [
     "ACCEL_SEED",
@@ -82,7 +81,6 @@ __all__ = [
     "CrashScenario",
     "EarthMotion",
     "ExactAnswers",
-    "Gait",
     "Gesture",
     "GnssReceiver",
     "Handling",
@@ -94,7 +92,6 @@ __all__ = [
     "MountedMotion",
     "Origin",
     "PathMotion",
-    "PointKinematics",
     "Pulse",
     "PulseMotion",
     "RecorderDesign",
@@ -151,12 +148,11 @@ load_on_first_use(
         "imu": "ImuErrors TriadErrors ACCEL_SEED GYRO_SEED sample_accelerometer sample_gyro "
         "simulate_imu",
         "motion": "Motion Pulse PulseMotion Track",
-        "mounted_motion": "ExactAnswers MountedMotion PointKinematics Ringing "
-        "point_kinematics point_path",
+        "mounted_motion": "ExactAnswers MountedMotion Ringing point_kinematics point_path",
         "path_motion": "Manoeuvre PathMotion Wave",
         "scenarios": "SCENARIOS Scenario find_scenario",
         "spline_motion": "SineVelocityMotion SplineMotion through_waypoints",
         "vehicles": "Accelerate LaneChange Stop Straight Turn aircraft car ship",
-        "walking": "GAITS Gait Stride WalkingMotion walk",
+        "walking": "GAITS Stride WalkingMotion walk",
     },
 )

@@ -22,7 +22,7 @@ from strapdown.sensors.triad_errors import Triad, TriadErrors
 from strapdown.sensors.uncertainty import TriadUncertainty, draw_errors, uncertainty_of
 from strapdown.simulation.imu import mean_over, sample_accelerometer, sample_gyro
 from strapdown.simulation.motion import Motion, check_numbers
-from strapdown.tables import ACCEL, GYRO, SAMPLINGS
+from strapdown.tables import ACCEL, GYRO, check_sampling_kind
 from strapdown.units import GYRO_UNITS
 
 Array = NDArray[np.float64]
@@ -141,13 +141,7 @@ def _bounds(
 ) -> tuple[float, float]:
     begin = 0.0 if start is None else float(start)
     stop = motion.duration if end is None else float(end)
-    if sampling not in SAMPLINGS:
-        raise ConfigError(
-            "simulation.no-kind-sampling",
-            quantity="sampling",
-            sampling=sampling,
-            samplings=SAMPLINGS,
-        )
+    check_sampling_kind(sampling)
     if not 0.0 <= begin < stop <= motion.duration:
         raise ConfigError(
             "simulation.recorder-record-not-within-motion",

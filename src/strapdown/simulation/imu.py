@@ -20,7 +20,7 @@ from strapdown.sensors.error_chain import (
 )
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation.motion import Motion
-from strapdown.tables import SAMPLINGS, attitude_table, imu_table
+from strapdown.tables import attitude_table, check_sampling_kind, imu_table
 
 Array = NDArray[np.float64]
 
@@ -171,13 +171,7 @@ def sample_accelerometer(
 
 
 def _stamps(motion: Motion, rate: float, sampling: str) -> Array:
-    if sampling not in SAMPLINGS:
-        raise ConfigError(
-            "simulation.no-kind-sampling",
-            quantity="sampling",
-            sampling=sampling,
-            samplings=SAMPLINGS,
-        )
+    check_sampling_kind(sampling)
     if not (np.isfinite(rate) and rate * motion.duration >= 1.0):
         raise ConfigError(
             "simulation.hz-gives-fewer-than-two",

@@ -50,7 +50,7 @@ __all__ = [
     "channel_findings",
     "reference_offset",
     "run_alignment",
-    "saying_outliers",
+    "with_record_as_reason",
 ]
 
 
@@ -187,7 +187,7 @@ def run_alignment(
     progress("coarse alignment", 0.15)
     part = imu if spec.coarse.duration_s is None else _first(imu, spec.coarse.duration_s)
     fine: FineResult | None = None
-    with saying_outliers(imu, report):
+    with with_record_as_reason(imu, report):
         coarse = coarse_way.align(part, site, sensors, source.gnss)
         if fine_way is not None:
             rest = imu if spec.coarse.duration_s is None else _after(imu, part)
@@ -318,7 +318,6 @@ def channel_findings(imu: pd.DataFrame, sensors: ImuUncertainty) -> tuple[Findin
         whole = lost == len(imu)
         if lost > MOST * len(imu) and not (whole and _alone(channel, faults)):
             worst = max(own, key=lambda f: f.last - f.first)
-            said = worst.finding
             time = index_of(imu)
             before, after = worst.begin - float(time[0]), float(time[-1]) - worst.end
             part = (
@@ -327,14 +326,12 @@ def channel_findings(imu: pd.DataFrame, sensors: ImuUncertainty) -> tuple[Findin
                 else "alignment.channel-lost-align-after"
             )
             raise DataError(
-                "alignment.channel-lost" if whole else part,
-                file=said.file,
-                row=said.row,
-                quantity=said.quantity,
-                reason=said,
-                share=lost / len(imu),
-                before=before,
-                end=worst.end,
+                worst.finding.explains(
+                    "alignment.channel-lost" if whole else part,
+                    share=lost / len(imu),
+                    before=before,
+                    end=worst.end,
+                )
             )
     return (*(f.finding for f in faults), *_made_up(imu))
 
@@ -372,7 +369,7 @@ LEAST_SECONDS = 8
 
 
 @contextmanager
-def saying_outliers(imu: pd.DataFrame, report: PrefilterReport | None) -> Iterator[None]:
+def with_record_as_reason(imu: pd.DataFrame, report: PrefilterReport | None) -> Iterator[None]:
     """Add outliers to an error message: those after the pre-filter, or all without one.
 
     Parameters
@@ -385,63 +382,29 @@ def saying_outliers(imu: pd.DataFrame, report: PrefilterReport | None) -> Iterat
     try:
         yield
     except DataError as error:
-        faults = () if report is None else _faults(report)
-        if faults:
-            raise _after_prefilter(error, faults[0]) from None
-        found = None if report is not None else _outliers(imu)
-        if found is None:
-            raise _with_unquiet(error, imu) from None
-        channel, rows = found
-        f = error.finding
-        first = float(imu.index[rows[0]])
-        raise DataError(
-            "alignment.outliers",
-            file=f.file,
-            row=f.row,
-            quantity=f.quantity,
-            reason=f,
-            count=len(rows),
-            channel=channel,
-            first=first,
-        ) from None
-
-
-def _faults(report: PrefilterReport) -> tuple[Finding, ...]:
-    """Findings of a pre-filter, except for the caution about a low rate."""
-    return tuple(f for f in report.findings if f.code != LOW_RATE)
-
-
-def _after_prefilter(error: DataError, said: Finding) -> DataError:
-    f = error.finding
-    return DataError(
-        "alignment.fails-after-prefilter",
-        file=f.file,
-        row=f.row if said.row is None else said.row,
-        quantity=f.quantity,
-        reason=f,
-        of_what=said.quantity,
-        reason_2=said,
-    )
-
-
-def _with_unquiet(error: DataError, imu: pd.DataFrame) -> DataError:
-    """The error with the most unusual interval of the record."""
-    found = _unquiet(imu)
-    if found is None:
-        return error
-    channel, begin, end, ratio = found
-    f = error.finding
-    return DataError(
-        "alignment.channel-scatters",
-        file=f.file,
-        row=f.row,
-        quantity=f.quantity,
-        reason=f,
-        channel=channel,
-        begin=begin,
-        end=end,
-        ratio=ratio,
-    )
+        reason = error.finding
+        if report is None:
+            screened = _outliers(imu)
+            if screened is not None:
+                channel, rows = screened
+                first = float(imu.index[rows[0]])
+                values = {"count": len(rows), "channel": channel, "first": first}
+                raise DataError(reason.explains("alignment.outliers", **values)) from None
+        # A low rate is a caution, not a fault.
+        elif fault := next((f for f in report.findings if f.code != LOW_RATE), None):
+            raise DataError(
+                reason.explains(
+                    "alignment.fails-after-prefilter",
+                    row=reason.row if fault.row is None else fault.row,
+                    of_what=fault.quantity,
+                    reason_2=fault,
+                )
+            ) from None
+        loud = _unquiet(imu)
+        if loud is None:
+            raise
+        values = dict(zip(("channel", "begin", "end", "ratio"), loud, strict=True))
+        raise DataError(reason.explains("alignment.channel-scatters", **values)) from None
 
 
 def _unquiet(imu: pd.DataFrame) -> tuple[str, float, float, float] | None:

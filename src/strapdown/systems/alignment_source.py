@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 
 from strapdown.bundle.seal import InputFiles, input_files, sensor_file
 from strapdown.config.alignment import AlignmentSpec, AxesTable, LogTable
+from strapdown.config.sources import read_options
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import Finding
 from strapdown.formats import files_of, read_log
 from strapdown.formats.assemble import require_accel
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import read_gnss
-from strapdown.formats.recording import Reading, ReadOptions, Recording, StatedStart
+from strapdown.formats.recording import Reading, Recording, StatedStart
 from strapdown.rotation import euler_from_dcm
 from strapdown.sensors.triad_errors import (
     NAMED_AXES,
@@ -102,7 +103,7 @@ def body_record(
     """
     gyro, accel = axes_matrices(axes)
     letters, turn = axes_letters(gyro) if gyro is not None else (axes.axes, None)
-    recording = read_log(log.path, _options(log, letters))
+    recording = read_log(log.path, read_options(log, letters))
     findings = list(recording.findings)
     imu = recording.imu
     if gyro is not None and accel is not None and turn is not None:
@@ -114,20 +115,6 @@ def body_record(
             findings += report_transposed(accel, force, recording.name)
     part = part_of_log(imu, log.from_s, log.to_s, log.duration_s, recording.name)
     return recording, part, tuple(findings)
-
-
-def _options(log: LogTable, axes: str | None) -> ReadOptions:
-    return ReadOptions(
-        format=log.format,
-        columns=dict(log.columns),
-        gyro_unit=log.gyro_unit,
-        accel_unit=log.accel_unit,
-        time_unit=log.time_unit,
-        axes=axes,
-        sampling=log.sampling,
-        rate=log.rate_hz,
-        repair=log.repair,
-    )
 
 
 def axes_matrices(axes: AxesTable) -> tuple[Array | None, Array | None]:

@@ -186,22 +186,16 @@ def channel_findings(
     if len(imu) < LEAST_SAMPLES:
         return ()
     _refuse_degrees(imu, sensors)
-    return _told(imu, check_imu_channels(imu, sensors).faults)
+    return _usable(imu, check_imu_channels(imu, sensors).faults)
 
 
-def _told(imu: pd.DataFrame, faults: Sequence[ChannelFault]) -> tuple[Finding, ...]:
+def _usable(imu: pd.DataFrame, faults: Sequence[ChannelFault]) -> tuple[Finding, ...]:
     """The longest stretch of each channel and kind of fault; DataError: a channel is lost."""
     for (channel, kind), count in unusable_samples(imu, faults).items():
         if count > MOST.get(kind, 1.0) * len(imu):
             of_kind = [f for f in faults if (f.channel, f.kind) == (channel, kind)]
-            said = max(of_kind, key=lambda f: f.last - f.first).finding
-            raise DataError(
-                "navigation.channel-lost",
-                file=said.file,
-                row=said.row,
-                quantity=said.quantity,
-                reason=said,
-            )
+            longest = max(of_kind, key=lambda f: f.last - f.first).finding
+            raise DataError(longest.explains("navigation.channel-lost"))
     return longest_faults(imu, faults)
 
 
@@ -214,15 +208,8 @@ def longest_faults(imu: pd.DataFrame, faults: Sequence[ChannelFault]) -> tuple[F
             worst[key] = fault
     lost = unusable_samples(imu, faults)
     return tuple(
-        Finding(
-            "navigation.channel-fault",
-            severity=one.finding.severity,
-            file=one.finding.file,
-            row=one.finding.row,
-            quantity=one.finding.quantity,
-            reason=one.finding,
-            percent=100.0 * lost[key] / len(imu),
-            kind=one.kind,
+        one.finding.explains(
+            "navigation.channel-fault", percent=100.0 * lost[key] / len(imu), kind=one.kind
         )
         for key, one in worst.items()
     )
@@ -250,7 +237,7 @@ def saturated_findings(imu: pd.DataFrame, sensors: ImuUncertainty) -> tuple[Find
     if len(imu) < LEAST_SAMPLES:
         return ()
     faults = check_imu_channels(imu, sensors).faults
-    return _told(imu, [one for one in faults if one.kind == "saturated"])
+    return _usable(imu, [one for one in faults if one.kind == "saturated"])
 
 
 def _without(imu: pd.DataFrame, fault: ChannelFault) -> int:

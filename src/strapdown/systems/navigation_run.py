@@ -145,12 +145,12 @@ def run_navigation(
     chain = make_chain(spec, sensors)
     recorder: Recorder = spec.recorder.make(ellipsoid=spec.ellipsoid)
 
-    def told(mode: str, share: float) -> None:
+    def show_mode(mode: str, share: float) -> None:
         progress(mode, BEGUN + (ENDED - BEGUN) * share)
 
     progress("aligning" if spec.start is None else "navigating", BEGUN)
     with said_of_file(*tables):
-        run = drive(chain, source.imu, source.tables, recorder, told)
+        run = drive(chain, source.imu, source.tables, recorder, show_mode)
     beside = None
     if spec.damping.beside is not None:
         with said_of_file(*tables):
@@ -162,8 +162,8 @@ def run_navigation(
                 lambda mode, share: progress(f"{spec.damping.beside}: {mode}", ENDED),
             ).record
     progress("comparing", ENDED)
-    told_by = run.smoothed or run.record
-    differences, errors = _against_truth(told_by.trajectory, source, spec)
+    best = run.smoothed or run.record
+    differences, errors = _against_truth(best.trajectory, source, spec)
     forward_differences = None
     if run.smoothed is not None:
         forward_differences, _ = _against_truth(run.record.trajectory, source, spec)
@@ -172,7 +172,7 @@ def run_navigation(
         from strapdown.evaluation.control_points import score_control_points
 
         points = score_control_points(
-            told_by.trajectory, source.points, find_ellipsoid(spec.ellipsoid)
+            best.trajectory, source.points, find_ellipsoid(spec.ellipsoid)
         )
 
     def after(stage: str, share: float) -> None:
@@ -214,7 +214,7 @@ def run_navigation(
         *looked,
         *(f for one in run.aligned for f in one.alignment.findings),
         *(() if fine is None or fine.fine is None else fine.fine.findings),
-        *_lost_start(chain, source.imu, told_by.trajectory),
+        *_lost_start(chain, source.imu, best.trajectory),
         *by_grade,
     ]
     return NavigationRun(
@@ -224,7 +224,7 @@ def run_navigation(
         sensors=sensors,
         coarse=None if coarse is None else coarse.alignment,
         fine=None if fine is None else fine.fine,
-        record=told_by,
+        record=best,
         forward=None if run.smoothed is None else run.record,
         differences=differences,
         errors=errors,

@@ -72,7 +72,6 @@ if TYPE_CHECKING:
 __all__ = [
     "Drift",
     "OutageRun",
-    "RecordedCoast",
     "coast_navigator",
     "coast_of_run",
     "forecast_of_sensor",
@@ -92,6 +91,10 @@ class OutageRun(SavedRun):
         The run with outages; None for a sensor along a stated motion.
     name, what : str
         Sensor or record, in words.
+    forecast : Forecast
+        Of a run, that of the outage with the median bound at its end.
+    drifts : tuple of Drift
+        Of a run, its outages in order of time; without fixes if it has no receiver.
     stays : tuple of str
         Remaining measurements.
     memory : Memory
@@ -106,11 +109,24 @@ class OutageRun(SavedRun):
     what: str
     sensors: ImuUncertainty
     forecast: Forecast
-    recorded: RecordedCoast | None
+    drifts: tuple[Drift, ...]
     stays: tuple[str, ...]
     inputs: tuple[InputFiles, ...]
     findings: tuple[Finding, ...]
     memory: Memory = field(default=Memory({}))
+
+    @property
+    def cone(self) -> tuple[Array, Array, dict[str, Array]]:
+        """Time, s, 95 % bound, m, and variance by quantity; means of squares over the outages."""
+        drifts = self.drifts
+        if not drifts:
+            found = self.forecast
+            return found.time, found.bound, {q: found.variance(q) for q in QUANTITIES}
+        return (
+            np.linspace(0.0, self.spec.outage_s, INSTANTS + 1),
+            np.sqrt(np.mean([d.bound**2 for d in drifts], axis=0)),
+            {q: np.mean([d.variance[q] for d in drifts], axis=0) for q in QUANTITIES},
+        )
 
     @property
     def bound_m(self) -> pd.Series:
@@ -187,23 +203,23 @@ def run_coast(
             sensor.title,
             sensors,
             forecast_of_sensor(spec, sensors, progress),
-            None,
+            (),
             tuple(spec.aiding),
             sensor_file(spec.sensor),
             (),
         )
     progress("reading", 0.02)
     source = read_navigation_source(navigation)
-    recorded = coast_of_run(spec, navigation, source, progress)
+    predicted, drifts = coast_of_run(spec, navigation, source, progress)
     return OutageRun(
         spec,
         navigation,
         source.name,
         source.what,
         sensors_of(navigation),
-        recorded.forecast,
-        recorded,
-        recorded.stays,
+        predicted,
+        drifts,
+        tuple(name for name, aid in navigation.aiding.items() if aid.kind != "gnss"),
         (*configuration_file(file), *source.inputs),
         tuple(source.findings),
     )
@@ -253,45 +269,24 @@ class Drift:
         return np.asarray(np.hypot(self.along, self.across))
 
 
-@dataclass(frozen=True, eq=False)
-class RecordedCoast:
-    """Result of the outages of a run.
-
-    Attributes
-    ----------
-    forecast : Forecast
-        Of the outage with the median bound at its end.
-    time : ndarray, (m,), s
-        Instants of the cone, since the begin of an outage.
-    variance : mapping of str to ndarray, (m,)
-        By quantity: the mean over the outages.
-    bound : ndarray, (m,), m
-        Root mean square of their 95 % bounds.
-    drifts : tuple of Drift
-        In order of time; without fixes if the run has no receiver.
-    stays : tuple of str
-        Names of the remaining measurements.
-    """
-
-    forecast: Forecast
-    time: Array
-    variance: dict[str, Array]
-    bound: Array
-    drifts: tuple[Drift, ...]
-    stays: tuple[str, ...]
-
-
 def coast_of_run(
     spec: CoastSpec,
     navigation: NavigationSpec,
     source: NavigationSource,
     progress: Progress = silent,
-) -> RecordedCoast:
+) -> tuple[Forecast, tuple[Drift, ...]]:
     """Navigate over a record with outages of its receivers at even intervals.
 
     Parameters
     ----------
     progress : callable, optional
+
+    Returns
+    -------
+    forecast : Forecast
+        Of the outage with the median bound at its end.
+    drifts : tuple of Drift
+        In order of time; without fixes if the run has no receiver.
 
     Raises
     ------
@@ -304,7 +299,6 @@ def coast_of_run(
     # Measurements after an outage do not affect the solution during it.
     chain = replace(chain, navigator=replace(chain.navigator, smoother=None))
     receivers = [name for name, aid in navigation.aiding.items() if aid.kind == "gnss"]
-    stays = tuple(name for name in navigation.aiding if name not in receivers)
     time, values = index_of(source.imu), values_of(source.imu, [*GYRO, *ACCEL])
     state = chain.begin(source.imu.attrs["sampling"], source.name)
     for aid, table in source.tables.items():
@@ -329,24 +323,16 @@ def coast_of_run(
     order = sorted(range(len(runs)), key=lambda k: float(runs[k][1].bound[-1]))
     middle, _ = runs[order[len(order) // 2]]
     rows = slice(at + middle.rows.start, at + middle.rows.stop)
-    foretold = _foretold(
+    predicted = _predict(
         chain,
         middle.state,
         (time[rows], values[rows]),
         receivers,
         spec.outage_s,
-        bool(stays),
+        len(receivers) < len(navigation.aiding),
         lambda stage, share: progress(stage, 0.5 + 0.25 * share),
     )
-    drifts = tuple(drift for _, drift in runs)
-    return RecordedCoast(
-        forecast=foretold,
-        time=grid,
-        variance={q: np.mean([d.variance[q] for d in drifts], axis=0) for q in QUANTITIES},
-        bound=np.sqrt(np.mean([d.bound**2 for d in drifts], axis=0)),
-        drifts=drifts,
-        stays=stays,
-    )
+    return predicted, tuple(drift for _, drift in runs)
 
 
 def _spans(
@@ -450,7 +436,7 @@ def _aligns_anew(begin: float, end: float) -> ConfigError:
     )
 
 
-def _foretold(
+def _predict(
     chain: NavigationPipeline,
     state: PipelineState,
     samples: tuple[Array, Array],

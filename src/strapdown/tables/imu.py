@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
-from strapdown.errors import DataError
+from strapdown.errors import DataError, check_choice
 from strapdown.tables.checks import (
     ACCEL,
     DR,
@@ -30,6 +30,11 @@ from strapdown.tables.checks import (
 )
 
 SAMPLINGS = ("instantaneous", "mean")
+
+
+def check_sampling_kind(sampling: str) -> None:
+    """Raise ConfigError unless it is one of `SAMPLINGS`."""
+    check_choice("tables.no-kind-sampling", SAMPLINGS, quantity="sampling", sampling=sampling)
 
 
 def imu_table(
@@ -92,6 +97,15 @@ def imu_table(
     return table
 
 
+def check_table_sampling(table: pd.DataFrame, source: str | None) -> None:
+    """Raise DataError unless ``attrs["sampling"]`` is one of `SAMPLINGS`."""
+    sampling = table.attrs.get("sampling")
+    if sampling not in SAMPLINGS:
+        raise DataError(
+            "tables.attrs-sampling", file=source, quantity="sampling", sampling=sampling
+        )
+
+
 def check_imu(table: pd.DataFrame) -> None:
     """Check an Imu table.
 
@@ -100,13 +114,7 @@ def check_imu(table: pd.DataFrame) -> None:
     """
     source = source_of(table)
     check_columns(table, GYRO, source)
-    if table.attrs.get("sampling") not in SAMPLINGS:
-        raise DataError(
-            "tables.attrs-sampling",
-            file=source,
-            quantity="sampling",
-            get=table.attrs.get("sampling"),
-        )
+    check_table_sampling(table, source)
     columns = list(GYRO)
     for triad in (ACCEL, MAG):
         there = [c for c in triad if c in table.columns]

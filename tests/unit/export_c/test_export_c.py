@@ -368,9 +368,9 @@ def test_a_kernel_outside_the_subset_is_refused():
 
 def test_what_is_not_understood_is_named():
     algorithm = make_algorithm("quaternion")
-    with pytest.raises(ConfigError, check=coded("attitude.no-interpolation")):
+    with pytest.raises(ConfigError, check=coded("mechanization.no-interpolation")):
         export_c(algorithm, interpolation="cubik")
-    with pytest.raises(ConfigError, check=coded("attitude.no-kind-sampling-2")):
+    with pytest.raises(ConfigError, check=coded("tables.no-kind-sampling")):
         export_c(algorithm, sampling="meen")
     with pytest.raises(DataError):
         export_c(algorithm, q_nb=(0.0, 0.0, 0.0, 0.0))

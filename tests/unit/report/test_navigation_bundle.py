@@ -15,7 +15,7 @@ from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.report.document import draw_stills, drawings, write_drawings
 from strapdown.report.navigation import navigation_json
 from strapdown.report.navigation_document import navigation_document
-from strapdown.report.navigation_evaluation import NavigationEvaluation, trust, withheld_of
+from strapdown.report.navigation_evaluation import NavigationEvaluation, trust
 from strapdown.report.verdict import answer, heading_words
 from strapdown.systems.navigation_run import run_navigation
 
@@ -156,8 +156,8 @@ def test_the_answer_on_the_terminal_fits_40_lines(result, capsys):
     assert "more; see the report" in printed.err
 
 
-def test_scores_of_what_was_withheld_are_told_as_they_are():
-    from strapdown.navigation.outage_test import Withheld, WithheldScore
+def test_the_bound_of_a_test_outage_is_that_at_its_largest_error():
+    from strapdown.navigation.outage_test import WithheldScore
     from strapdown.navigation.record import Span
 
     score = WithheldScore(
@@ -167,8 +167,7 @@ def test_scores_of_what_was_withheld_are_told_as_they_are():
         np.ones((2, 3)),
         np.array([np.diag([1.0, 9.0])] * 2),
     )
-    (one,) = withheld_of("rtk", [Withheld(score, None)])
-    assert (one.aid, one.begin, one.end, one.error_m) == ("rtk", 10.0, 20.0, 4.0)
+    assert score.largest == 4.0
     # East the ellipse of 95 % reaches 2.4477 times 3 m.
-    assert one.bound_m == pytest.approx(3.0 * math.sqrt(-2.0 * math.log(0.05)))
-    assert one.inside
+    assert score.bound_at_largest == pytest.approx(3.0 * math.sqrt(-2.0 * math.log(0.05)))
+    assert score.inside

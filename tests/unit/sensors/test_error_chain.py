@@ -226,7 +226,7 @@ def test_what_makes_no_sensor_is_refused_by_name(values, quantity):
 
 def test_what_cannot_be_applied_is_refused():
     t, u = stamps(), truth()
-    with pytest.raises(ConfigError, check=coded("sensors.no-kind-sampling", quantity="sampling")):
+    with pytest.raises(ConfigError, check=coded("tables.no-kind-sampling", quantity="sampling")):
         apply(TriadErrors(), t, u, sampling="average")
     with pytest.raises(ConfigError, check=coded("sensors.triad-feels-specific-force-none")):
         apply(KNOWN, t, u)
