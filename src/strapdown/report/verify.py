@@ -30,6 +30,7 @@ from strapdown.formats import read_raw
 from strapdown.report.alignment import ALIGNMENT
 from strapdown.report.attitude import write_attitude
 from strapdown.report.coast import COAST
+from strapdown.report import crash_live
 from strapdown.report.crash_case import CRASH
 from strapdown.report.crash_simulation import write_crash_simulation
 from strapdown.report.doctor import DOCTOR
@@ -98,6 +99,7 @@ BUNDLES: tuple[ReportBundle[Any], ...] = (ALIGNMENT, COAST, CRASH, DOCTOR, NAVIG
 RERUNS: dict[str, Callable[[dict[str, Any], Path, set[str]], Seal]] = {
     "attitude": _rerun_attitude,
     "simulate": _rerun_simulation,
+    crash_live.COMMAND: crash_live.rerun,
     **{b.command: partial(_rerun_report, b) for b in BUNDLES},
 }
 
