@@ -229,10 +229,13 @@ def _interface(shape: Shape, around: Sampling, size: int) -> str:
 
 
 def constant_lines(kernels: Kernels) -> str:
+    """Definitions of the constants in use; a comment on several stands above the first."""
     lines: list[str] = []
+    before = ""
     for constant in kernels.constants():
-        if constant.comment:
+        if constant.comment and constant.comment != before:
             lines += comment(constant.comment)
+        before = constant.comment
         lines.append(f"#define {constant.name} {number(constant.value)}")
     return "\n".join([*lines, ""]) if lines else ""
 
