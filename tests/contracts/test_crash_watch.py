@@ -9,7 +9,7 @@ from tests.coded import coded
 
 from strapdown._kernels import crash_trigger as kernel
 from strapdown.crash.events import PART_563, EventDetector
-from strapdown.crash.watch import Z95, CrashLog, CrashWatch, WatchOptions
+from strapdown.crash.watch import Z95, CrashLog, WatchOptions
 from strapdown.errors import DataError
 from strapdown.report.crash_live import watch_rows
 
@@ -31,7 +31,9 @@ def pulse(time, begin, length, change):
     """Mean forces over the steps of a half sine, so that their integral has no error."""
     u = np.clip((time - begin) / length, 0.0, 1.0)
     velocity = np.outer(0.5 - 0.5 * np.cos(np.pi * u), change)
-    return np.diff(velocity, axis=0, prepend=0.0) / np.diff(time, prepend=time[0] - time[1])[:, None]
+    return (
+        np.diff(velocity, axis=0, prepend=0.0) / np.diff(time, prepend=time[0] - time[1])[:, None]
+    )
 
 
 def estimates(options, time, rows, every=0.0):
@@ -45,8 +47,8 @@ def crash(seed=1, change=(-12.0, 4.0), rate=1000, mean=True):
 
 
 def test_thresholds_are_those_of_the_regulation():
-    assert (kernel.TRIGGER, kernel.WINDOW) == (PART_563.trigger, PART_563.trigger_window)
-    assert (kernel.WAKE, kernel.WAKE_WINDOW) == (PART_563.wake, PART_563.wake_window)
+    assert (PART_563.trigger, PART_563.trigger_window) == (kernel.TRIGGER, kernel.WINDOW)
+    assert (PART_563.wake, PART_563.wake_window) == (kernel.WAKE, kernel.WAKE_WINDOW)
 
 
 def test_no_later_sample_counts_and_a_cut_anywhere_gives_the_same_bits():
@@ -186,8 +188,8 @@ def test_what_is_no_crash_does_not_trigger(rate):
 def test_the_bounds_hold_the_truth_in_95_percent(rate):
     """Drawn crashes with the errors that are stated and assumed: coverage of 1000 draws.
 
-    The record begins 0.1 s before: nothing was learnt of bias and slope, so that their bound is that
-    of the draw.
+    The record begins 0.1 s before: nothing was learnt of bias and slope, so that their bound is
+    that of the draw.
     """
     from scipy.stats import binom
 
@@ -223,4 +225,4 @@ def test_the_bounds_hold_the_truth_in_95_percent(rate):
     low, high = binom.interval(0.99, count, 0.95)
     print(rate, inside / count)
     assert ((low <= inside) & (inside <= high)).all(), (inside, low, high)
-    assert Z95 == pytest.approx(1.959964, abs=1e-6)
+    assert pytest.approx(1.959964, abs=1e-6) == Z95

@@ -7,7 +7,7 @@ import tempfile
 from collections.abc import Sequence
 from contextlib import redirect_stdout
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -30,18 +30,16 @@ if TYPE_CHECKING:
 EVERY = 0.01
 
 
-def crash_live(
-    cases: Sequence[Path], out: Path | None, write: OutFlags, flags: LiveFlags
-) -> None:
+def crash_live(cases: Sequence[Path], out: Path | None, write: OutFlags, flags: LiveFlags) -> None:
     """Detect crashes in lines, or write the detection as C.
 
     Standard output holds the estimates only; all else goes to standard error.
     """
     if flags.live is not None and (flags.export_c is not None or write.json):
         option = "--json" if write.json else "--export-c"
-        raise ConfigError("live.not-together", quantity="--live", option=option)
+        raise ConfigError("live.not-together", beside="--live", option=option)
     if flags.live is None and flags.every is not None:
-        raise ConfigError("live.only-with", option="--every", quantity="--live")
+        raise ConfigError("live.only-with", option="--every", beside="--live")
     name = "--live" if flags.live is not None else "--export-c"
     if len(cases) != 1:
         raise ConfigError("live.one-case", option=name, count=len(cases))
@@ -73,7 +71,7 @@ def crash_live(
         seal = write_crash_live(
             options, record, folder, every=every, log=got.log, force=write.force
         )
-    told = {
+    told: dict[str, Any] = {
         **({} if latency is None else latency.told()),
         "lines": got.lines,
         "not_used": dict(got.unused),

@@ -117,6 +117,7 @@ def line_writer(text: str) -> None:
 
 def warner(quiet: bool) -> Callable[[Finding], None]:
     """Return a function that writes a finding to standard error."""
+
     def warn(finding: Finding) -> None:
         if not quiet:
             typer.echo(f"note: {finding.text(WORDS.get())}", err=True)

@@ -254,9 +254,7 @@ class CrashWatch:
         told["at_least"] = least
         told |= _direction(change, covariance, clipped)
         told["risk"] = {
-            name: _risk(name, size, sd, least)
-            for name in self.options.severity
-            if size > 0.0
+            name: _risk(name, size, sd, least) for name in self.options.severity if size > 0.0
         }
         return told
 

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 HOME = "strapdown._kernels.crash_trigger"
 #: Samples of the test, and those before its crash; the step is exact in single precision.
-SAMPLES, BEFORE, STEP = 224, 164, 0.00390625
+SAMPLES, BEFORE, STEP = 340, 300, 0.0078125
 #: Terms of the expected rows: delta-V forward and right, their variances and covariance.
 TERMS = 5
 
@@ -89,10 +89,10 @@ struct crash {{
 /* Before the first sample. */
 void crash_init(struct crash *c);
 
-/* Take a sample: returns QUIET, AWAKE (a change that may become a crash), TRIGGERED from the trigger
- * on, ENDED once at its end, INTERRUPTED where more than 150 ms of samples are missing in it; or -1
- * for a sample that is refused (dt not above zero, or not finite) and has changed nothing. The dt of
- * the first sample only has to be above zero.
+/* Take a sample: returns QUIET, AWAKE (a change that may become a crash), TRIGGERED from the
+ * trigger on, ENDED once at its end, INTERRUPTED where more than 150 ms of samples are missing in it; or -1
+ * for a sample that is refused (dt not above zero, or not finite) and has changed nothing. The dt
+ * of the first sample only has to be above zero.
  */
 int crash_update(struct crash *c, real_t dt, const real_t sample[6]);
 
@@ -137,17 +137,19 @@ int crash_delta_v(const struct crash *c, real_t delta_v[2], real_t variance[3])
 def crash_samples() -> Array:
     """Samples of the test, (n, 7): dt, forces, yaw rate, clipped forward and right.
 
-    A drive with slight noise and a slope, then an oblique crash of 40 ms that turns the vehicle,
+    A drive with slight noise and a slope, then an oblique crash of 86 ms that turns the vehicle,
     clipped in one sample, and what follows until the event ends. Each number is one of single
     precision.
     """
     rng = np.random.default_rng(563)
     rows = np.zeros((SAMPLES, 7))
     rows[:, 0] = STEP
-    rows[:, 1:4] = rng.normal((0.3, -0.2, -9.8), 0.05, (SAMPLES, 3))
+    rows[:, 1:4] = rng.normal((1.3, -0.9, -9.8), 0.05, (SAMPLES, 3))
     rows[BEFORE : BEFORE + 11, 1] -= 240.0 * np.sin(np.linspace(0.0, np.pi, 11))
     rows[BEFORE : BEFORE + 11, 2] += 90.0 * np.sin(np.linspace(0.0, np.pi, 11))
     rows[BEFORE:, 4] = np.minimum(2.0, 0.25 * np.arange(SAMPLES - BEFORE))
+    # Few digits, so that the file is short.
+    rows[:, 1:4] = np.round(64.0 * rows[:, 1:4]) / 64.0
     rows[BEFORE + 5, 5] = 1.0
     return rows.astype(np.float32).astype(np.float64)
 

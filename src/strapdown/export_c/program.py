@@ -189,6 +189,7 @@ def _header(algorithm: AttitudeAlgorithm, around: Sampling, size: int) -> str:
 
 
 def precision_lines(body: str) -> str:
+    """Type of a number and the functions of the math library in use, for each precision."""
     used = [m for m in MACROS if re.search(rf"\b{m}\(", body)]
     single = "\n".join(f"#define {m} {m.lower()}f" for m in used)
     double = "\n".join(f"#define {m} {m.lower()}" for m in used)
@@ -615,7 +616,7 @@ def _run(
 
     def module(name: str) -> Any:
         if single:
-            return arithmetic.singleprecision_lines(name)
+            return arithmetic.single_precision(name)
         return arithmetic.kernel_module(name)
 
     dt, rate = rows[:, 0].astype(number), rows[:, 1:].astype(number)

@@ -142,6 +142,8 @@ def receive_crash(
         _warm_up(options)
         with until_a_signal() as wanted:
             warn(Finding("live.listening", severity="note", source=source.name))
+            if None in options.full_scale:
+                warn(Finding("live.range-not-stated", quantity="full_scale_g"))
             source.begin()
             while wanted():
                 try:

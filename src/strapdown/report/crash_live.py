@@ -93,11 +93,9 @@ def _write_record(path: Path, table: Any) -> None:
 
 def rerun(configuration: dict[str, Any], out: Path, sealed: set[str]) -> Seal:
     """Repeat a live detection from its bundle."""
-    recorder = {
+    recorder: dict[str, Any] = {
         key: tuple(value) if isinstance(value, list) else value
         for key, value in configuration["recorder"].items()
     }
     record = Path(configuration["log"]["path"])
-    return write_crash_live(
-        WatchOptions(**recorder), record, out, every=configuration["every_s"]
-    )
+    return write_crash_live(WatchOptions(**recorder), record, out, every=configuration["every_s"])

@@ -27,10 +27,10 @@ from strapdown.config.crash_case import CaseSpec
 from strapdown.config.reading import changed_options
 from strapdown.errors import DataError, StrapdownError
 from strapdown.formats import read_raw
+from strapdown.report import crash_live
 from strapdown.report.alignment import ALIGNMENT
 from strapdown.report.attitude import write_attitude
 from strapdown.report.coast import COAST
-from strapdown.report import crash_live
 from strapdown.report.crash_case import CRASH
 from strapdown.report.crash_simulation import write_crash_simulation
 from strapdown.report.doctor import DOCTOR
