@@ -1,4 +1,4 @@
-"""A crash detected while samples arrive: the same bits however they come, and the truth in bounds."""
+"""A crash detected while samples arrive: the same bits however cut, the truth in bounds."""
 
 import json
 import math

@@ -90,9 +90,9 @@ struct crash {{
 void crash_init(struct crash *c);
 
 /* Take a sample: returns QUIET, AWAKE (a change that may become a crash), TRIGGERED from the
- * trigger on, ENDED once at its end, INTERRUPTED where more than 150 ms of samples are missing in it; or -1
- * for a sample that is refused (dt not above zero, or not finite) and has changed nothing. The dt
- * of the first sample only has to be above zero.
+ * trigger on, ENDED once at its end, INTERRUPTED where more than 150 ms of samples are missing
+ * in it; or -1 for a sample that is refused (dt not above zero, or not finite) and has changed
+ * nothing. The dt of the first sample only has to be above zero.
  */
 int crash_update(struct crash *c, real_t dt, const real_t sample[6]);
 
