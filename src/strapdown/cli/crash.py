@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from strapdown.cli.shared_options import OutFlags, folder_to_make, spread
+from strapdown.cli.shared_options import OutFlags, folder_to_make, running, spread, writing
 
 if TYPE_CHECKING:
     from strapdown.crash.case import CaseResult
@@ -16,6 +17,32 @@ EPILOG = (
     "Example: strapdown crash case.toml (strapdown init crash RECORD writes it); of two vehicles: "
     "strapdown crash case-1.toml case-2.toml"
 )
+
+
+@dataclass(frozen=True)
+class LiveFlags:
+    """Detection while samples arrive, and on a microcontroller."""
+
+    live: Annotated[
+        str | None,
+        running(
+            "-|udp://HOST:PORT",
+            "Detect a crash in samples as they come, as lines of standard input or of datagrams, "
+            "by the recorder of the case.",
+        ),
+    ] = None
+    every: Annotated[
+        float | None,
+        running("S", "With --live: an estimate of an event so often (0.01).", show_default=False),
+    ] = None
+    export_c: Annotated[
+        Path | None,
+        writing(
+            "FILE.c",
+            "Write the detection of --live for the recorder of the case as C99, with a test "
+            "vector, and nothing else.",
+        ),
+    ] = None
 
 
 @spread
@@ -28,6 +55,7 @@ def crash(
         ),
     ],
     *,
+    flags: LiveFlags,
     out: Annotated[Path | None, folder_to_make("CASE-crash")] = None,
     write: OutFlags,
 ) -> None:
@@ -36,7 +64,15 @@ def crash(
     Reads the records that the case names and writes a report (HTML and PDF), JSON, CSV and
     figures, sealed so that any change is found. Two vehicles are held against each other as well:
     momentum, closing speed, restitution and energy; each has its report in a folder of its own.
+
+    With --live, samples are watched as they arrive, and delta-V so far, direction of force and
+    severity of a crash are written as lines of JSON.
     """
+    if flags.live is not None or flags.export_c is not None or flags.every is not None:
+        from strapdown.cli.crash_live import crash_live
+
+        crash_live(cases, out, write, flags)
+        return
     from strapdown.api.crash import reconstruct
     from strapdown.bundle.seal import MANIFEST, Seal, check_destination, sha256, write_timing
     from strapdown.cli.console import (

@@ -60,8 +60,8 @@ def navigate_live(
         spec,
         open_source(where, clock, sys.stdin.buffer),
         clock,
-        _write,
-        _warner(write.quiet),
+        line_writer,
+        warner(write.quiet),
         lines,
         every,
     )
@@ -105,7 +105,8 @@ def _sealed(
     return seal
 
 
-def _write(text: str) -> None:
+def line_writer(text: str) -> None:
+    """Write a line to standard output at once; BrokenPipeError: its reader has closed."""
     try:
         sys.stdout.write(text)
         sys.stdout.flush()
@@ -114,7 +115,9 @@ def _write(text: str) -> None:
         raise
 
 
-def _warner(quiet: bool) -> Callable[[Finding], None]:
+def warner(quiet: bool) -> Callable[[Finding], None]:
+    """Return a function that writes a finding to standard error."""
+
     def warn(finding: Finding) -> None:
         if not quiet:
             typer.echo(f"note: {finding.text(WORDS.get())}", err=True)

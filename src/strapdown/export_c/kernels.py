@@ -303,6 +303,9 @@ class Specialiser:
             if decides in known:
                 return decides
             return None if None in known else not decides
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+            inside = self.truth(node.operand)
+            return None if inside is None else not inside
         if isinstance(node, ast.Compare) and len(node.ops) == 1 and self.depends(node):
             a, b = self.span(node.left), self.span(node.comparators[0])
             if a and b:

@@ -68,9 +68,9 @@ def export_c(
     vector = make_vector(algorithm, rotation.normalise(q_nb), kind, imu)
     parts = [
         _header(algorithm, around, translator.state_size),
-        _precision(body),
+        precision_lines(body),
         _interface(shape, around, translator.state_size),
-        _constants(kernels),
+        constant_lines(kernels),
         body,
         main_program(vector, rotation.normalise(q_nb), around.lag),
     ]
@@ -187,7 +187,8 @@ def _header(algorithm: AttitudeAlgorithm, around: Sampling, size: int) -> str:
     return "\n".join(comment("\n\n".join(lines))) + "\n"
 
 
-def _precision(body: str) -> str:
+def precision_lines(body: str) -> str:
+    """Type of a number and the functions of the math library in use, for each precision."""
     used = [m for m in MACROS if re.search(rf"\b{m}\(", body)]
     single = "\n".join(f"#define {m} {m.lower()}f" for m in used)
     double = "\n".join(f"#define {m} {m.lower()}" for m in used)
@@ -227,11 +228,14 @@ def _interface(shape: Shape, around: Sampling, size: int) -> str:
     )
 
 
-def _constants(kernels: Kernels) -> str:
+def constant_lines(kernels: Kernels) -> str:
+    """Definitions of the constants in use; a comment on several stands above the first."""
     lines: list[str] = []
+    before = ""
     for constant in kernels.constants():
-        if constant.comment:
+        if constant.comment and constant.comment != before:
             lines += comment(constant.comment)
+        before = constant.comment
         lines.append(f"#define {constant.name} {number(constant.value)}")
     return "\n".join([*lines, ""]) if lines else ""
 
@@ -757,9 +761,9 @@ def main_program(vector: Vector, q_nb: Array, lag: int) -> str:
         n=len(vector.samples),
         lag=lag,
         start=f"static const real_t start[4] = {{{from_}}};\n".replace("R(", "\n    R("),
-        samples=_braced(vector.samples),
-        single=_braced(vector.single),
-        double=_braced(vector.double),
+        samples=braced(vector.samples),
+        single=braced(vector.single),
+        double=braced(vector.double),
         bound="\n".join(comment(f"{bound}.")),
         roundings=f"{vector.roundings:.4g}".replace("e+0", "e"),
         finish=_FINISH if lag else "",
@@ -768,7 +772,8 @@ def main_program(vector: Vector, q_nb: Array, lag: int) -> str:
     )
 
 
-def _braced(values: Array) -> str:
+def braced(values: Array) -> str:
+    """Rows of numbers in braces, as C reads them."""
     # Hexadecimal is exact.
     return "\n".join(f"    {{{', '.join(_hex(v) for v in row)}}}," for row in values)
 

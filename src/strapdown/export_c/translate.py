@@ -72,6 +72,8 @@ class _Body:
             return f"{self.text(node.value)}[{self.text(node.slice)}]", _ATOM
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
             return f"-{self.text(node.operand, over=_UNARY)}", _UNARY
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
+            return f"!{self.text(node.operand, over=_UNARY)}", _UNARY
         if isinstance(node, ast.BinOp):
             sign, strength = BINARY[type(node.op)]
             left = self.text(node.left, over=strength)
@@ -116,6 +118,8 @@ class _Body:
         if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Mult):
             a, b = self.highest(node.left), self.highest(node.right)
             return a + b if isinstance(node.op, ast.Add) else a * b
+        if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Mod):
+            return self.highest(node.right) - 1
         if isinstance(node, ast.Name):
             span = self.all.kernels.span(node.id) or self.all.kernels.ranges.get(node.id)
             if span:

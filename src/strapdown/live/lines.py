@@ -6,6 +6,7 @@
     NAME,TIME,COLUMN=VALUE,…          measurement of the aid NAME
     command,WORD                      next, fine, navigation; end
     TIME,4,GX,GY,GZ,3,AX,AY,AZ,…      as sent by Sensorstream
+    accel,TIME,AX,AY,AZ               to detect a crash without gyros
 
 Blanks around commas, empty lines and lines that begin with ``#`` are ignored.
 """
@@ -50,10 +51,10 @@ __all__ = [
 
 #: Command that ends a run.
 END = "end"
-IMU, COMMAND = "imu", "command"
+IMU, COMMAND, FORCE = "imu", "command", "accel"
 #: Block numbers of Sensorstream.
 _ACCEL, _GYRO = 3, 4
-_FORM = "imu,TIME,GX,GY,GZ,AX,AY,AZ"
+_FORM, _FORCE_FORM = "imu,TIME,GX,GY,GZ,AX,AY,AZ", "accel,TIME,AX,AY,AZ"
 #: Most characters of a line in a message.
 LONGEST = 40
 
@@ -79,7 +80,7 @@ class BadLineError(Exception):
 
 @dataclass(frozen=True)
 class Sample:
-    """Rates in rad/s and specific forces in m/s², axes of the sensors."""
+    """Rates in rad/s, if any, and specific forces in m/s², axes of the sensors."""
 
     time: float
     values: tuple[float, ...]
@@ -101,13 +102,17 @@ class Word:
     word: str
 
 
-def parse_line(text: str, aids: Sequence[str]) -> Sample | Measured | Word | None:
+def parse_line(
+    text: str, aids: Sequence[str], *, without_gyro: bool = False
+) -> Sample | Measured | Word | None:
     """Parse a line.
 
     Parameters
     ----------
     aids : sequence of str
         Names of the measurements that lines may hold.
+    without_gyro : bool
+        Whether samples without rates are accepted.
 
     Returns
     -------
@@ -122,6 +127,13 @@ def parse_line(text: str, aids: Sequence[str]) -> Sample | Measured | Word | Non
         if len(fields) != 7:
             raise BadLineError("imu", "live.wrong-number-of-values", count=len(fields), form=_FORM)
         time, *values = (_number(field, IMU) for field in fields)
+        return Sample(time, tuple(values))
+    if head == FORCE and without_gyro:
+        if len(fields) != 4:
+            raise BadLineError(
+                FORCE, "live.wrong-number-of-forces", count=len(fields), form=_FORCE_FORM
+            )
+        time, *values = (_number(field, FORCE) for field in fields)
         return Sample(time, tuple(values))
     if head == COMMAND:
         if len(fields) != 1 or not fields[0]:

@@ -114,7 +114,7 @@ def receive(
         lines = StateLines(chain.navigator, reader.write, form, every)
         recording = Recording(chain, recorder)
         got = Reception(chain, spec, recording, clock, lines.take, warn)
-        with _until_a_signal() as wanted:
+        with until_a_signal() as wanted:
             warm_up(chain, got.sampling)
             warn(Finding("live.listening", severity="note", source=source.name))
             source.begin()
@@ -186,7 +186,7 @@ class _Reader:
 
 
 @contextmanager
-def _until_a_signal() -> Iterator[Callable[[], bool]]:
+def until_a_signal() -> Iterator[Callable[[], bool]]:
     """End the run in order at the first SIGINT or SIGTERM, and at once at the next one."""
     came: list[int] = []
     before: dict[int, Any] = {}

@@ -26,6 +26,7 @@ from strapdown.config.crash_case import CaseSpec
 from strapdown.config.reading import changed_options
 from strapdown.errors import DataError, StrapdownError
 from strapdown.formats import read_raw
+from strapdown.report import crash_live
 from strapdown.report.alignment import ALIGNMENT
 from strapdown.report.attitude import write_attitude
 from strapdown.report.coast import COAST
@@ -64,7 +65,7 @@ class Verification:
     details: tuple[str, ...]
 
 
-#: Commands with a `ReportBundle`; ``attitude`` and ``simulate`` write theirs.
+#: Commands with a `ReportBundle`; ``attitude``, ``simulate`` and ``crash --live`` write theirs.
 BUNDLES: dict[str, ReportBundle[Any]] = {
     bundle.command: bundle for bundle in (ALIGNMENT, COAST, CRASH, DOCTOR, NAVIGATION)
 }
@@ -81,6 +82,8 @@ def _rerun(command: str, configuration: dict[str, Any], out: Path, sealed: set[s
         png = any(name.endswith(".png") for name in sealed)
         bench = run_comparison(AttitudeSpec.model_validate(keys))
         write_attitude(bench, out, png=png, report=report)
+    elif command == crash_live.COMMAND:
+        crash_live.rerun(configuration, out)
     elif "trajectory" in configuration:
         trajectory = TrajectorySpec.model_validate(configuration["trajectory"])
         write_trajectory_simulation(trajectory, out)
@@ -120,7 +123,7 @@ def verify(bundle: str | Path) -> Verification:
         return Verification("changed", math.inf, digest, tuple(changes))
     if manifest["command"] == "reproduce":
         raise DataError("report.reproduced-paper", file=MANIFEST)
-    if manifest["command"] not in (*BUNDLES, "attitude", "simulate"):
+    if manifest["command"] not in (*BUNDLES, "attitude", "simulate", crash_live.COMMAND):
         raise DataError("report.command-not-known", file=MANIFEST, manifest=manifest["command"])
     with tempfile.TemporaryDirectory(prefix="strapdown-verify-") as folder:
         again = Path(folder) / "again"

@@ -1,0 +1,165 @@
+"""`strapdown crash --live` and `--export-c`: the command itself, its bundle, and what follows."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from tests.coded import coded
+
+from strapdown.crash.watch import CrashLog
+from strapdown.errors import ConfigError
+from strapdown.formats.crash_records import read_crash_record
+from strapdown.live.crash import CrashReception, recorder_of_case
+from strapdown.live.sources import Line, open_source
+from strapdown.report.crash_live import watch_rows
+from strapdown.report.verify import verify
+
+CASE = """
+title = "live"
+[entry]
+kind = "standstill"
+[[units]]
+name = "recorder"
+angles_deg = [0.0, 0.0, 90.0]
+angles_sd_deg = 1.0
+[[units.accelerometers]]
+path = "record.csv"
+uncertainty = { full_scale_g = 50.0, bias_sd_mg = 20.0, scale_sd_ppm = 5000 }
+"""
+GYRO = """
+[units.gyro]
+path = "record.csv"
+uncertainty = { bias_sd_deg_per_s = 1.0 }
+"""
+
+
+def samples():
+    """A blow from the front, 36 km/h in 0.1 s, of a recorder whose x points to the right."""
+    time = np.arange(1600) / 500
+    rows = np.zeros((len(time), 6))
+    rows[:, 5] = -9.80665
+    pulse = (time >= 2.0) & (time < 2.1)
+    # The forward axis of the vehicle is the -y of the recorder.
+    rows[pulse, 4] = 50.0 * np.pi * np.sin(np.pi * (time[pulse] - 2.0) / 0.1)
+    return np.column_stack([time, rows])
+
+
+def line(row, kind="imu"):
+    return ",".join([kind, *(repr(float(v)) for v in row)])
+
+
+@pytest.fixture
+def case(tmp_path):
+    path = tmp_path / "case.toml"
+    path.write_text(CASE + GYRO)
+    return path
+
+
+def run(case, given, *options):
+    return subprocess.run(
+        [sys.executable, "-m", "strapdown", "crash", case.name, *options],
+        cwd=case.parent,
+        input=given,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_from_lines_to_the_bundle_and_to_the_next_case(case):
+    rows = samples().tolist()
+    given = [line(row) for row in rows]
+    given.insert(100, "imu,1,2,3")
+    given.insert(200, given[50])
+    given += ["command,end", line([99.0] * 7)]
+    done = run(case, "\n".join(given) + "\n", "--live", "-", "--out", "out", "--quiet")
+    assert (done.returncode, done.stderr) == (0, "")
+    found = [json.loads(text) for text in done.stdout.splitlines()]
+    # What was written as it came is what a batch over the same rows finds, to the last digit.
+    log = watch_rows(recorder_of_case(case), rows, 0.01)
+    assert found == json.loads(json.dumps(log.lines))
+    assert [found[0]["status"], found[-1]["status"]] == ["trigger", "ended"]
+    assert found[-1]["pdof_clock"] == 12
+    low, high = found[-1]["delta_v_m_per_s_bound"]
+    assert low <= 10.0 <= high
+    out = case.parent / "out"
+    sealed = json.loads((out / "detections.json").read_text())
+    assert sealed["estimates"] == found
+    assert (sealed["events"], sealed["samples"], sealed["samples_refused"]) == (1, len(rows), 1)
+    latency = json.loads((out / "latency.json").read_text())
+    assert (latency["samples"], latency["not_used"]) == (len(rows), {"imu": 1, "time": 1})
+    assert latency["processing"]["samples"] == len(rows)
+    assert verify(out).verdict == "identical"
+    record = read_crash_record(out / "record.csv")
+    channel = next(c for c in record.channels if c.name.startswith("ay"))
+    np.testing.assert_array_equal(channel.load()[1], np.array(rows)[:, 5])
+
+
+def test_without_a_gyro_and_with_datagrams_the_same_lines(case):
+    case.write_text(CASE)
+    options = recorder_of_case(case)
+    written, warned = [], []
+    got = CrashReception(CrashLog(options), Clock(), written.append, warned.append)
+    for k, row in enumerate(samples()):
+        # Rates that come all the same are not looked at.
+        text = line(row[[0, 4, 5, 6]], "accel") if k % 2 else line(row)
+        assert got.take(Line(k, text, 0.0))
+    assert json.loads(written[-1])["status"] == "ended"
+    assert warned == []
+    case.write_text(CASE + GYRO)
+    other = CrashReception(CrashLog(recorder_of_case(case)), Clock(), written.append, warned.append)
+    assert other.take(Line(1, "accel,0.0,1,2,3", 0.0))
+    assert other.rows == []
+    assert warned[0].data["reason"].code == "live.samples-without-gyro"
+    assert other.take(Line(2, "accel,0.0,1,2", 0.0))
+    assert (got.unused, other.unused) == ({}, {"accel": 2})
+    with pytest.raises(ConfigError, check=coded("live.not-a-source")):
+        open_source("elsewhere", Clock(), sys.stdin)
+
+
+class Clock:
+    def now(self):
+        return 0.0
+
+    def wait_until(self, instant):
+        """Never waits."""
+
+
+def test_the_end_of_the_reader_ends_the_run(case):
+    def closed(text):
+        raise BrokenPipeError
+
+    got = CrashReception(CrashLog(recorder_of_case(case)), Clock(), closed, print)
+    taken = [got.take(Line(k, line(row), 0.0)) for k, row in enumerate(samples())]
+    assert all(taken[:1000])
+    assert not taken[-1]
+
+
+@pytest.mark.parametrize(
+    ("options", "code"),
+    [
+        (("--live", "-", "--json"), "leave out --json"),
+        (("--live", "-", "--export-c", "a.c"), "leave out --export-c"),
+        (("--every", "1"), "leave out --every"),
+        (("case.toml", "--live", "-"), "not 2"),
+        (("--export-c", "a.txt"), "a.txt"),
+        (("--live", "-", "--every", "-1"), "--every"),
+    ],
+)
+def test_options_that_do_not_fit_are_refused(case, options, code):
+    done = run(case, "", *options)
+    assert done.returncode == 4
+    assert code in done.stderr
+
+
+def test_the_detection_is_written_as_c(case):
+    done = run(case, "", "--export-c", "crash.c")
+    assert done.returncode == 0
+    text = (case.parent / "crash.c").read_text()
+    errors = recorder_of_case(case).errors
+    assert all(f"R({value!r})" in text for value in errors)
+    assert run(case, "", "--export-c", "crash.c").returncode == 4, "it is there already"
