@@ -22,6 +22,8 @@ ALLOWANCE = 0.1
 RESOLUTION = 0.005  # s
 # Scale of a normal distribution from its median absolute deviation.
 OF_MEDIAN = 1.4826
+# Ringing of structure has passed some periods within this time after a contact.
+SETTLING = 0.04  # s
 # Any finite change of velocity, m/s.
 UNLIMITED = 1e300
 
@@ -112,6 +114,9 @@ def find_contact(
     of parabola and straight rise, 2 t / 3 outward, with half their distance as its standard
     deviation. The velocity gained below nu is nu t / 3 or nu t / 6, within its effect.
 
+    Where the velocity swings on after the contact, its end is the first instant from there at which
+    the velocity has its mean over the next 40 ms, less the level.
+
     A record that ends before the contact misses at most what follows if the acceleration continues
     to decay as it has since its peak, exponentially: the last mean over 20 ms times its time
     constant. Means over 20 ms do not contain ringing, which therefore does not count. A record
@@ -191,7 +196,36 @@ def _edge(
     spread = math.hypot(late / 3.0, density / nu**2, step / math.sqrt(12.0))
     moved = edge + sign * 2.0 / 3.0 * late
     moved = min(moved, far) if sign > 0.0 else max(moved, far)
+    if sign > 0.0:
+        moved = _settled(course, stamps, (moved, far), force, (level_along, nu))
     return Edge(float(moved), spread, level + nu * force, force, missing)
+
+
+def _settled(
+    course: VelocityCourse,
+    stamps: Array,
+    span: tuple[float, float],
+    force: Array,
+    beside: tuple[float, float],
+) -> float:
+    """Instant from the end of a contact on at which the velocity has its mean of the next 40 ms.
+
+    `span`, s: the end and the farthest instant; `beside`: the level after it and the allowance.
+    The cumulative sum ends where the velocity is largest: in structure that rings, at a crest.
+    """
+    end, far = span
+    length = min(SETTLING, far - end)
+    if length < 0.5 * SETTLING:
+        return end
+    level, nu = beside
+    at = np.concatenate([[end], stamps[(stamps > end) & (stamps < end + length)], [end + length]])
+    gained = (course.velocity(at) - course.velocity(at[:1])) @ force - level * (at - end)
+    mean = float(np.trapezoid(gained, at)) / length
+    if abs(mean) <= 0.5 * nu * length:
+        return end
+    k = int(np.argmax(gained / mean >= 1.0))
+    part = (mean - gained[k - 1]) / (gained[k] - gained[k - 1])
+    return float(at[k - 1] + part * (at[k] - at[k - 1]))
 
 
 def _direction(course: VelocityCourse, over: tuple[float, float]) -> Array:

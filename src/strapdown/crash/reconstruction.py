@@ -28,6 +28,7 @@ from strapdown.crash.delta_v_bound import (
     resolved_delta_v_bound,
     velocity_change,
 )
+from strapdown.crash.detectability import undetectable
 from strapdown.crash.entry import Entry
 from strapdown.crash.events import KMH, PART_563, CrashEvents, EventRule, detect_events
 from strapdown.crash.measuring_point import PointKinematics
@@ -701,7 +702,9 @@ def reconstruct_crash(
         findings += () if of.prepared is None else of.prepared.findings
     # Before each unit estimates its own biases, which absorbs part of the differences.
     comparison = compare_units(there) if len(there) > 1 else None
+    hidden: list[Finding] = []
     if comparison is not None:
+        hidden = undetectable(there, comparison)
         there = [comparison.structure.within(of) for of in there]
     tied = [entry if isinstance(entry, Entry) else None] * len(there)
     if of_fixes is not None:
@@ -718,7 +721,7 @@ def reconstruct_crash(
     for reconstruction in (*found, *(() if combined is None else (combined,))):
         findings += reconstruction.findings
     if comparison is not None:
-        findings += comparison.findings
+        findings += [*comparison.findings, *hidden]
         if combine and not comparison.agree:
             names = ", ".join(u.name for u in there)
             findings.append(
