@@ -22,8 +22,8 @@ ALLOWANCE = 0.1
 RESOLUTION = 0.005  # s
 # Scale of a normal distribution from its median absolute deviation.
 OF_MEDIAN = 1.4826
-# Ringing of structure has passed some periods within this time after a contact.
-SETTLING = 0.04  # s
+# Structure swings on with a memory of about this time; tires and a rebound take as much longer.
+SETTLING = 0.02  # s
 # Any finite change of velocity, m/s.
 UNLIMITED = 1e300
 
@@ -42,6 +42,8 @@ class Edge:
     missing : float, m/s
         Change of velocity along `force` that may lie outside the record: zero where the record
         reaches the edge, infinite where nothing in it limits that.
+    settled : (float, float), s, optional
+        Of an end: where the velocity has its mean of this interval, less the level.
     """
 
     time: float
@@ -49,6 +51,7 @@ class Edge:
     rate: Array = field(repr=False)
     force: Array = field(repr=False)
     missing: float = 0.0
+    settled: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +118,7 @@ def find_contact(
     deviation. The velocity gained below nu is nu t / 3 or nu t / 6, within its effect.
 
     Where the velocity swings on after the contact, its end is the first instant from there at which
-    the velocity has its mean over the next 40 ms, less the level.
+    the velocity has its mean over the next 20 ms, less the level.
 
     A record that ends before the contact misses at most what follows if the acceleration continues
     to decay as it has since its peak, exponentially: the last mean over 20 ms times its time
@@ -196,9 +199,11 @@ def _edge(
     spread = math.hypot(late / 3.0, density / nu**2, step / math.sqrt(12.0))
     moved = edge + sign * 2.0 / 3.0 * late
     moved = min(moved, far) if sign > 0.0 else max(moved, far)
-    if sign > 0.0:
-        moved = _settled(course, stamps, (moved, far), force, (level_along, nu))
-    return Edge(float(moved), spread, level + nu * force, force, missing)
+    settled = None
+    if sign > 0.0 and far - moved >= 0.5 * SETTLING:
+        settled = float(moved), float(min(moved + SETTLING, far))
+        moved = _settled(course, stamps, settled, force, (level_along, nu))
+    return Edge(float(moved), spread, level + nu * force, force, missing, settled)
 
 
 def _settled(
@@ -208,15 +213,12 @@ def _settled(
     force: Array,
     beside: tuple[float, float],
 ) -> float:
-    """Instant from the end of a contact on at which the velocity has its mean of the next 40 ms.
+    """Instant within a span from the end of a contact on at which the velocity has its mean of it.
 
-    `span`, s: the end and the farthest instant; `beside`: the level after it and the allowance.
-    The cumulative sum ends where the velocity is largest: in structure that rings, at a crest.
+    `beside`: the level after the contact and the allowance. The cumulative sum ends where the
+    velocity is largest: in structure that rings, at a crest.
     """
-    end, far = span
-    length = min(SETTLING, far - end)
-    if length < 0.5 * SETTLING:
-        return end
+    end, length = span[0], span[1] - span[0]
     level, nu = beside
     at = np.concatenate([[end], stamps[(stamps > end) & (stamps < end + length)], [end + length]])
     gained = (course.velocity(at) - course.velocity(at[:1])) @ force - level * (at - end)

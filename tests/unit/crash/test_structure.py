@@ -9,6 +9,7 @@ from tests.unit.crash.folding_crash import KINDS, RATE, Crash, G
 
 from strapdown import CrashOptions, Entry, reconstruct, reconstruct_crash
 from strapdown.crash.consistency import UnitComparison, compare_units
+from strapdown.crash.indices import olc
 from strapdown.crash.preparation import prepare_together
 from strapdown.crash.structure import learn_share, unlearnt
 from strapdown.crash.template import draft_case, read_records
@@ -105,32 +106,6 @@ def test_pairs_with_a_fault_are_found(gyro, wrong):
     assert np.mean(said) >= FOUND[gyro, wrong]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("gyro", [True, False])
-def test_bounds_of_points_and_of_their_mean_hold(gyro):
-    inside, alone = {"single": [], "mean": []}, 0
-    for kind in KINDS:
-        for seed in range(40):
-            crash = Crash(500 + seed, kind)
-            units = [crash.unit(k, gyro=gyro) for k in range(2)]
-            found = reconstruct_crash(
-                units,
-                Entry.from_speed(20.0, 0.1),
-                CrashOptions(rate=RATE, sampling="mean", preparation=LEVEL),
-            )
-            if found.combined is None:
-                alone += 1
-                continue
-            for name, unit in (("single", found.units[0]), ("mean", found.combined)):
-                event = unit.delta_v
-                off = event.delta_v.vector - crash.truth(event.delta_v.start, event.delta_v.end)
-                inside[name].append(np.abs(off[:2]) <= event.bound.half_width[:2])
-    assert alone <= 6  # of 200, at 1 %
-    for name, rows in inside.items():
-        interval = binomtest(int(np.sum(rows)), np.size(rows)).proportion_ci(0.99)
-        assert interval.high >= 0.95, (name, interval)
-
-
 def test_both_sides_of_a_real_car_agree_as_proposed(recordings, tmp_path):
     header = recordings("crash_nhtsa_10146") / "v10146.EV5"
     text = draft_case(read_records([header]), folder=tmp_path).text
@@ -156,6 +131,11 @@ def test_both_sides_of_a_real_car_agree_as_proposed(recordings, tmp_path):
     mean = found.combined.delta_v
     assert abs(-mean.delta_v.vector[0] - 18.53) < mean.bound.half_width[0]
     assert mean.bound.half_width[0] < 0.6
+    # The crush of others is 0.73 to 0.75 m; the wall's impulse is 2 to 4.5 % more than the rear's.
+    assert abs(found.combined.path.table["north"].max() - 0.74) < 0.02
+    assert 0.015 < 32853.0 / 1719.0 / -mean.delta_v.vector[0] - 1.0 < 0.045
+    felt = found.combined.acceleration
+    assert olc(felt.time, felt.values[:, 0]).value_g == pytest.approx(29.6, abs=0.6)
 
 
 def turned(crash, gyro=False):
