@@ -20,7 +20,7 @@ from strapdown.crash.closure import ImpactVehicle, close_vehicles
 from strapdown.errors import DataError
 
 MANUAL = Path(__file__).parents[3] / "docs" / "crash.md"
-DRAWS = 24
+DRAWS = 12
 
 
 def turned(vehicle):
@@ -71,13 +71,13 @@ CONDITIONS = (
     Condition(
         "sign of the yaw rate",
         lambda c: Fault(gyro=-1.0),
-        "a car that hardly turns has none",
+        "only as far as the car turns and the points are apart",
         turning_back,
     ),
     Condition(
         "trigger 20 ms late",
         lambda c: Fault(late=-0.02),
-        "both alike: a path from 20 ms later; delta-V is the same",
+        "one: structure may do as much; both: the crash began before the entry",
     ),
     Condition(
         "record cut at 0.6 of the pulse",
@@ -185,7 +185,7 @@ def test_the_table_of_the_manual_is_that_of_the_draws():
     for row in rows:
         name = row.split("|")[1]
         (written,) = [line for line in text.splitlines() if line.startswith(f"|{name}|")]
-        # A draw on another processor may tip over: two of them.
+        # A draw on another processor may tip over: one of them.
         assert number.sub("in some", row) == number.sub("in some", written)
         for mine, said in zip(number.findall(row), number.findall(written), strict=True):
             assert abs(int(mine) - int(said)) <= 9
