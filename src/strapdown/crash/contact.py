@@ -22,8 +22,8 @@ ALLOWANCE = 0.1
 RESOLUTION = 0.005  # s
 # Scale of a normal distribution from its median absolute deviation.
 OF_MEDIAN = 1.4826
-# Structure swings on with a memory of about this time; tires and a rebound take as much longer.
-SETTLING = 0.02  # s
+# A swing of 30 Hz passes within this time; tires build up no more than a tenth of their force.
+SETTLING = 0.03  # s
 # Any finite change of velocity, m/s.
 UNLIMITED = 1e300
 
@@ -118,7 +118,7 @@ def find_contact(
     deviation. The velocity gained below nu is nu t / 3 or nu t / 6, within its effect.
 
     Where the velocity swings on after the contact, its end is the first instant from there at which
-    the velocity has its mean over the next 20 ms, less the level.
+    the velocity has its mean over the next 30 ms, less the level.
 
     A record that ends before the contact misses at most what follows if the acceleration continues
     to decay as it has since its peak, exponentially: the last mean over 20 ms times its time
