@@ -219,7 +219,7 @@ class Crash:
             assumed=assumed,
         )
 
-    def reconstructed(self, units, entry=None) -> CrashReconstruction:
+    def reconstructed(self, units, entry=None, until=None) -> CrashReconstruction:
         """By some units, with a stated attitude and entry that err as they say."""
         rng = np.random.default_rng([self.seed, self.kind, 99])
         roll, pitch, speed = rng.normal(size=3) * [LEVEL_SD, LEVEL_SD, SPEED_SD]
@@ -228,7 +228,7 @@ class Crash:
             units,
             entry or Entry.from_speed(self.speed + speed, SPEED_SD),
             CrashOptions(
-                window=(-0.09, ASSUMED_END if blind else END - 0.002),
+                window=(-0.09, until or (ASSUMED_END if blind else END - 0.002)),
                 rate=RATE,
                 sampling="mean",
                 preparation={"levelling": (roll, pitch, LEVEL_SD)},
