@@ -12,7 +12,15 @@ import numpy as np
 import pandas as pd
 
 from strapdown.bundle.seal import InputFiles, sha256
-from strapdown.config.crash_case import CaseSpec, ReferenceSpec, TriadSpec, UnitSpec
+from strapdown.config.crash_case import (
+    CaseSpec,
+    EntrySpec,
+    PointSpec,
+    ReferenceSpec,
+    TriadSpec,
+    UnitSpec,
+    VehicleSpec,
+)
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.closure import (
     Blame,
@@ -355,6 +363,8 @@ def _samples(path: CrashPath, runs: int, seed: int) -> tuple[PathSamples | None,
 
 #: Standard deviation of a stated mass without one: fuel, load and passengers.
 MASS_SD = 0.03
+#: Line of the error budget: of an entry's stated heading.
+ENTRY_HEADING = "heading"
 
 
 def _closed(first: CaseResult, second: CaseResult) -> tuple[CaseResult, CaseResult]:
@@ -362,7 +372,7 @@ def _closed(first: CaseResult, second: CaseResult) -> tuple[CaseResult, CaseResu
     names = first.vehicle_names
     pair, findings = [], []
     for result, name in zip((first, second), names, strict=True):
-        vehicle = _impact_vehicle(result, result.reconstruction.main, name)
+        vehicle = _vehicle_of(result, result.reconstruction.main, name)
         if vehicle is None:
             findings.append(Finding("crash.closure-without-change", quantity="closure", name=name))
         else:
@@ -380,7 +390,7 @@ def _closed(first: CaseResult, second: CaseResult) -> tuple[CaseResult, CaseResu
         findings += [one.finding for one in blamed.candidates] if blamed is not None else []
         for result, other in ((first, pair[1]), (second, pair[0])):
             units = result.reconstruction.units
-            points = [_impact_vehicle(result, unit, unit.name) for unit in units]
+            points = [_vehicle_of(result, unit, unit.name) for unit in units]
             known = [p for p in points if p is not None]
             if len(known) > 1:
                 findings += blame_points(known, other, friction=friction)
@@ -396,46 +406,56 @@ def _once(findings: Sequence[Finding]) -> tuple[Finding, ...]:
     return tuple(dict.fromkeys(findings))
 
 
-def _impact_vehicle(
-    result: CaseResult, unit: UnitReconstruction, name: str
+def _vehicle_of(result: CaseResult, unit: UnitReconstruction, name: str) -> ImpactVehicle | None:
+    spec = result.spec
+    return impact_vehicle(unit, name, spec.vehicle, spec.entry, spec.point)
+
+
+def impact_vehicle(
+    unit: UnitReconstruction, name: str, vehicle: VehicleSpec, entry: EntrySpec, point: PointSpec
 ) -> ImpactVehicle | None:
-    """A vehicle by one of its answers, at the reference point; None without a resolved change."""
+    """A vehicle by one of its answers, at the reference point; None without a resolved change.
+
+    Its axes are those at the onset of the contact, over which its change of velocity is. The bound
+    of that is of the resolved change, with what the vehicle may have turned since, but for the
+    heading of the entry, which turns the entry velocity, too, and is an unknown of its own.
+    """
     number = main_event(unit)
     over_ground = None if number is None else unit.ned[number]
     if number is None or over_ground is None:
         return None
-    spec, event, path = result.spec, unit.events.events[number], unit.path
-    start = event.time_zero
+    change, path = over_ground.event, unit.path
+    start, end = change.delta_v.start, change.delta_v.end
     heading = float(np.interp(start, path.time, np.unwrap(path.table["heading"], period=360.0)))
     turned = np.radians(heading)
     into_body = np.array(
         [[np.cos(turned), np.sin(turned), 0.0], [-np.sin(turned), np.cos(turned), 0.0], [0, 0, 1.0]]
     )
     velocity = np.array([np.interp(start, path.time, path.table[axis]) for axis in ("VN", "VE")])
-    entry = into_body[:2, :2] @ velocity
     speed = float(np.linalg.norm(velocity))
-    sd = spec.entry.speed_sd_m_per_s or 0.0
-    across = speed * math.radians(spec.entry.slip_sd_deg)
-    heading_sd: float | None = spec.entry.heading_sd_deg
-    if spec.entry.kind == "gnss":
+    sd = entry.speed_sd_m_per_s or 0.0
+    across = speed * math.radians(entry.slip_sd_deg)
+    heading_sd: float | None = entry.heading_sd_deg
+    if entry.kind == "gnss":
         sd = across = float(path.sd[["VN", "VE"]].iloc[path.anchor].max())
         heading_sd = float(path.sd["heading"].iloc[path.anchor])
-    rate = change = None
+    rate = rate_change = None
     if "heading" not in unit.at_point.assumed_axes:
-        rate, change = _yaw_rates(unit, start, event.end)
-    vehicle, origin = spec.vehicle, spec.point.position_m
-    mass = vehicle.mass_kg
+        rate, rate_change = _yaw_rates(unit, start, end)
+    parts = change.bound.by_contributor.drop(index=ENTRY_HEADING, errors="ignore")
+    covariance = parts.to_numpy().sum(axis=0).reshape(3, 3)
+    mass, origin = vehicle.mass_kg, point.position_m
     return ImpactVehicle(
         name,
-        into_body @ over_ground.event.delta_v.vector,
-        unit.body[number].event.bound.covariance,
-        event.end - start,
+        into_body @ change.delta_v.vector,
+        into_body @ covariance @ into_body.T,
+        end - start,
         mass=None if mass is None else (mass, vehicle.mass_sd_kg or MASS_SD * mass),
         heading_deg=(heading, heading_sd) if heading_sd else None,
-        entry=entry,
+        entry=into_body[:2, :2] @ velocity,
         entry_covariance=np.diag([sd**2, across**2]),
         rate=rate,
-        rate_change=change,
+        rate_change=rate_change,
         contact=None
         if vehicle.contact_m is None
         else (

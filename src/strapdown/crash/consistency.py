@@ -662,7 +662,9 @@ def compare_units(
     cut = [clipped_pieces(u, edges) for u in units]
     rigid = unlearnt(units)
     pairs = tuple(
-        _pair(units[i], units[j], increments[i], increments[j], ~(cut[i] | cut[j]), level, rigid)
+        compare_pair(
+            units[i], units[j], increments[i], increments[j], ~(cut[i] | cut[j]), level, rigid
+        )
         for i, j in itertools.combinations(range(len(units)), 2)
     )
     kept = ~np.any(cut, axis=0)
@@ -731,7 +733,7 @@ def _of_vehicle(
     )
 
 
-def _pair(
+def compare_pair(
     first: PointKinematics,
     second: PointKinematics,
     a: VelocityIncrements,
@@ -740,6 +742,10 @@ def _pair(
     level: float,
     rigid: Structure,
 ) -> UnitPair:
+    """Compare two units over the `kept` intervals of their increments `a` and `b`.
+
+    `level` as `compare_units`; `rigid`: the structural process of the vehicle, without size.
+    """
     edges = a.edges
     a, b = a.of_pieces(kept), b.of_pieces(kept)
     difference, covariance = (a.values - b.values).ravel(), difference_covariance(a, b)

@@ -22,6 +22,8 @@ ALLOWANCE = 0.1
 RESOLUTION = 0.005  # s
 # Scale of a normal distribution from its median absolute deviation.
 OF_MEDIAN = 1.4826
+# A swing of 30 Hz passes within this time; tires build up no more than a tenth of their force.
+SETTLING = 0.03  # s
 # Any finite change of velocity, m/s.
 UNLIMITED = 1e300
 
@@ -40,6 +42,8 @@ class Edge:
     missing : float, m/s
         Change of velocity along `force` that may lie outside the record: zero where the record
         reaches the edge, infinite where nothing in it limits that.
+    settled : (float, float), s, optional
+        Of an end: where the velocity has its mean of this interval, less the level.
     """
 
     time: float
@@ -47,6 +51,7 @@ class Edge:
     rate: Array = field(repr=False)
     force: Array = field(repr=False)
     missing: float = 0.0
+    settled: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,6 +116,9 @@ def find_contact(
     t, a straight rise by t / 3 and a step, with t zero, not at all. The edge is put into the middle
     of parabola and straight rise, 2 t / 3 outward, with half their distance as its standard
     deviation. The velocity gained below nu is nu t / 3 or nu t / 6, within its effect.
+
+    Where the velocity swings on after the contact, its end is the first instant from there at which
+    the velocity has its mean over the next 30 ms, less the level.
 
     A record that ends before the contact misses at most what follows if the acceleration continues
     to decay as it has since its peak, exponentially: the last mean over 20 ms times its time
@@ -191,7 +199,35 @@ def _edge(
     spread = math.hypot(late / 3.0, density / nu**2, step / math.sqrt(12.0))
     moved = edge + sign * 2.0 / 3.0 * late
     moved = min(moved, far) if sign > 0.0 else max(moved, far)
-    return Edge(float(moved), spread, level + nu * force, force, missing)
+    settled = None
+    if sign > 0.0 and far - moved >= 0.5 * SETTLING:
+        settled = float(moved), float(min(moved + SETTLING, far))
+        moved = _settled(course, stamps, settled, force, (level_along, nu))
+    return Edge(float(moved), spread, level + nu * force, force, missing, settled)
+
+
+def _settled(
+    course: VelocityCourse,
+    stamps: Array,
+    span: tuple[float, float],
+    force: Array,
+    beside: tuple[float, float],
+) -> float:
+    """Instant within a span from the end of a contact on at which the velocity has its mean of it.
+
+    `beside`: the level after the contact and the allowance. The cumulative sum ends where the
+    velocity is largest: in structure that rings, at a crest.
+    """
+    end, length = span[0], span[1] - span[0]
+    level, nu = beside
+    at = np.concatenate([[end], stamps[(stamps > end) & (stamps < end + length)], [end + length]])
+    gained = (course.velocity(at) - course.velocity(at[:1])) @ force - level * (at - end)
+    mean = float(np.trapezoid(gained, at)) / length
+    if abs(mean) <= 0.5 * nu * length:
+        return end
+    k = int(np.argmax(gained / mean >= 1.0))
+    part = (mean - gained[k - 1]) / (gained[k] - gained[k - 1])
+    return float(at[k - 1] + part * (at[k] - at[k - 1]))
 
 
 def _direction(course: VelocityCourse, over: tuple[float, float]) -> Array:

@@ -13,7 +13,12 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
-from strapdown.crash.acceleration import Acceleration, body_acceleration, resolved_acceleration
+from strapdown.crash.acceleration import (
+    Acceleration,
+    body_acceleration,
+    resolved_acceleration,
+    window_weights,
+)
 from strapdown.crash.combine_units import combine_units
 from strapdown.crash.consistency import UnitComparison, clipped_axes, compare_units
 from strapdown.crash.contact import Contact, find_contact
@@ -28,6 +33,7 @@ from strapdown.crash.delta_v_bound import (
     resolved_delta_v_bound,
     velocity_change,
 )
+from strapdown.crash.detectability import undetectable
 from strapdown.crash.entry import Entry
 from strapdown.crash.events import KMH, PART_563, CrashEvents, EventRule, detect_events
 from strapdown.crash.measuring_point import PointKinematics
@@ -128,6 +134,8 @@ def _size(change: VelocityChange) -> str:
 
 Array = NDArray[np.float64]
 
+# Instants that stand for the mean over which a velocity settles.
+SETTLED_ENDS = 9
 NO_ROLL = "whether it rolled over cannot be determined without a gyro about the forward axis"
 
 
@@ -339,7 +347,10 @@ def reconstruct_unit(
         low = min(start + peak_window, end)
         peak = trailing_delta_v(acceleration, peak_window, low, end).peak
         whole = delta_v(acceleration, start, end, across_gaps=True)
-        plain = body_delta_v_bound(effects, whole.weights, rest_sd=rest_sd, at_ends=contact.moved)
+        settled = _settled(acceleration, contact)
+        plain = body_delta_v_bound(
+            effects, whole.weights, rest_sd=rest_sd, at_ends=contact.moved, settled=settled
+        )
         # What the record misses is within the bound, or leaves the change without an upper one.
         least = contact.beyond(TWO_SIDED_95 * plain.along(whole.vector))
         ends_of = {"event": contact.at_ends(least), "peak": _at_peak(peak, contact)}
@@ -350,7 +361,11 @@ def reconstruct_unit(
         changes = []
         for window, change in (("peak", peak), ("event", whole)):
             bound = body_delta_v_bound(
-                effects, change.weights, rest_sd=rest_sd, at_ends=ends_of[window]
+                effects,
+                change.weights,
+                rest_sd=rest_sd,
+                at_ends=ends_of[window],
+                settled=settled if window == "event" else None,
             )
             why, of = missing[window]
             changes.append(velocity_change(window, change, bound, missing=why, open_axes=of))
@@ -444,6 +459,19 @@ def _missing(
         clipped = (cut & measured).any(axis=0) & (cut | ~measured).all(axis=0)
     x, y, z = (bool(c) or bool(beyond) for c in clipped)
     return (*beyond, *(("clipped",) if clipped.any() else ())), (x, y, z)
+
+
+def _settled(acceleration: Acceleration, contact: Contact) -> tuple[Array, Array] | None:
+    """Weights of the velocity's mean where it settles after a contact, and the direction of that.
+
+    None where the record ends before. For `body_delta_v_bound`.
+    """
+    if contact.end.settled is None:
+        return None
+    ends = np.linspace(*contact.end.settled, SETTLED_ENDS)
+    time, sampling = acceleration.time, acceleration.sampling
+    weights = [window_weights(time, contact.start.time, end, sampling) for end in ends]
+    return np.mean(weights, axis=0), contact.end.force
 
 
 def _at_least(change: VelocityChange, name: str) -> Finding:
@@ -701,7 +729,9 @@ def reconstruct_crash(
         findings += () if of.prepared is None else of.prepared.findings
     # Before each unit estimates its own biases, which absorbs part of the differences.
     comparison = compare_units(there) if len(there) > 1 else None
+    hidden: list[Finding] = []
     if comparison is not None:
+        hidden = undetectable(there, comparison)
         there = [comparison.structure.within(of) for of in there]
     tied = [entry if isinstance(entry, Entry) else None] * len(there)
     if of_fixes is not None:
@@ -718,7 +748,7 @@ def reconstruct_crash(
     for reconstruction in (*found, *(() if combined is None else (combined,))):
         findings += reconstruction.findings
     if comparison is not None:
-        findings += comparison.findings
+        findings += [*comparison.findings, *hidden]
         if combine and not comparison.agree:
             names = ", ".join(u.name for u in there)
             findings.append(

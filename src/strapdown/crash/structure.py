@@ -213,25 +213,36 @@ def _likeliest(
     of the half-normal prior of each. The cost is the negative logarithm of the posterior.
     """
     sizes = np.zeros(len(unknowns))
-    prior = np.array([sd for _, _, sd in unknowns])
 
-    def cost(tried: Array) -> float:
-        whole = covariance + sum(x**2 * one for x, (one, _, _) in zip(tried, unknowns, strict=True))
-        factor = np.linalg.cholesky(whole)
-        left = np.linalg.solve(factor, difference)
-        logarithm = 2.0 * float(np.log(np.diagonal(factor)).sum())
-        return logarithm + float(left @ left) + float(np.square(tried / prior).sum())
+    def costs(k: int, grid: Array) -> Array:
+        """With each size of a grid for one unknown, the others as they are."""
+        others = covariance + sum(
+            x**2 * one
+            for j, (x, (one, _, _)) in enumerate(zip(sizes, unknowns, strict=True))
+            if j != k
+        )
+        factor = np.linalg.cholesky(others + np.square(grid)[:, None, None] * unknowns[k][0])
+        left = np.linalg.solve(factor, np.broadcast_to(difference, factor.shape[:2])[..., None])
+        logarithm = 2.0 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
+        prior = sum(
+            (x / sd) ** 2
+            for j, (x, (_, _, sd)) in enumerate(zip(sizes, unknowns, strict=True))
+            if j != k
+        )
+        return np.asarray(
+            logarithm + np.square(left).sum(axis=(1, 2)) + prior + (grid / unknowns[k][2]) ** 2
+        )
 
-    least = cost(sizes)
     if not difference.size:
-        return sizes, least
+        return sizes, 0.0
+    least = math.inf
     for _ in range(ROUNDS):
+        before = sizes.copy()
         for k, (_, grid, _) in enumerate(unknowns):
-            costs = []
-            for size in grid:
-                sizes[k] = size
-                costs.append(cost(sizes))
-            j = int(np.argmin(costs))
-            j = j if costs[0] - costs[j] > SIGNIFICANT else 0
-            sizes[k], least = grid[j], costs[j]
+            tried = costs(k, grid)
+            j = int(np.argmin(tried))
+            j = j if tried[0] - tried[j] > SIGNIFICANT else 0
+            sizes[k], least = grid[j], float(tried[j])
+        if np.array_equal(sizes, before):
+            break
     return sizes, least

@@ -1,143 +1,19 @@
-"""Points of a car that folds and rings: what agrees, what does not, and whether bounds hold.
-
-The crashes are made here and know nothing of the term that is learnt: a rigid body under two
-overlapping pulses that turns and goes on turning, whose points have humps of a local deformation
-and ringing of some frequencies on top.
-"""
+"""Points of a car that folds and rings: what agrees, what does not, and whether bounds hold."""
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 import pytest
 from scipy.stats import binomtest
+from tests.unit.crash.folding_crash import KINDS, RATE, Crash, G
 
 from strapdown import CrashOptions, Entry, reconstruct, reconstruct_crash
 from strapdown.crash.consistency import UnitComparison, compare_units
+from strapdown.crash.indices import olc
 from strapdown.crash.preparation import prepare_together
 from strapdown.crash.structure import learn_share, unlearnt
 from strapdown.crash.template import draft_case, read_records
-from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.synchronise import synchronise
-from strapdown.sensors.uncertainty import TriadUncertainty
-from strapdown.tables import ACCEL, GYRO, imu_table
-
-G, RATE, FINE = 9.80665, 1000.0, 10
-#: Direction of the force, deg, and standard deviation of the yaw rate after it, rad/s at 15 m/s.
-KINDS = {
-    "front": (0, 0.09),
-    "offset": (0, 1.5),
-    "side": (90, 0.45),
-    "rear": (180, 0.09),
-    "oblique": (40, 1.2),
-}
-NOISE, BIAS, SCALE, GYRO_NOISE = 0.3, 0.1, 0.01, 0.002
-
-
-def pulse(time, start, length):
-    """A haversine of area one."""
-    return 2.0 / length * np.sin(np.pi * np.clip((time - start) / length, 0, 1)) ** 2
-
-
-class Crash:
-    """A drawn crash: force of the rigid body and rates, vehicle axes."""
-
-    def __init__(self, seed, kind):
-        rng = np.random.default_rng([seed, list(KINDS).index(kind)])
-        came = math.radians(KINDS[kind][0] + rng.normal(0, 5))
-        self.length = rng.uniform(0.07, 0.13)
-        self.share, self.second = rng.uniform(0.2, 0.6), rng.uniform(0.1, 0.4) * self.length
-        size = rng.uniform(4, 20)
-        self.change = -size * np.array([math.cos(came), math.sin(came), 0.02 * rng.normal()])
-        self.turn_sd = size / 15.0 * np.array([0.3, 0.3, KINDS[kind][1]])
-        self.turned = self.turn_sd * rng.normal(size=3)
-        self.bent = math.exp(rng.uniform(math.log(0.01), math.log(0.12)))
-        self.size, self.seed, self.kind = size, seed, list(KINDS).index(kind)
-
-    def shape(self, time):
-        first = pulse(time, 0.0, 0.6 * self.length)
-        second = pulse(time, self.second, self.length - self.second)
-        return self.share * first + (1 - self.share) * second
-
-    def structure(self, rng, time):
-        """Velocity of a point against the rigid body, (n, 3), m/s."""
-        out = np.zeros((len(time), 3))
-        for axis in range(3):
-            own = 1.0 if axis == np.argmax(np.abs(self.change)) else 0.5
-            humps = np.zeros(len(time))
-            for _ in range(rng.integers(1, 4)):
-                length, start = rng.uniform(0.015, 0.06), rng.uniform(0, self.length - 0.0075)
-                humps += rng.normal() * np.sin(np.pi * np.clip((time - start) / length, 0, 1)) ** 2
-            size = self.bent * self.size * rng.uniform(0.3, 1) * own
-            out[:, axis] += size * humps / max(np.abs(humps).max(), 1e-9)
-            for _ in range(3):
-                frequency, quality = rng.uniform(25, 150), rng.uniform(2, 8)
-                since = np.maximum(time - rng.uniform(0, 0.6 * self.length), 0)
-                fades = (1 - np.exp(-since / 0.01)) * np.exp(-since * np.pi * frequency / quality)
-                rings = np.sin(2 * np.pi * frequency * since)
-                out[:, axis] += 0.15 * self.bent * self.size * rng.normal() * fades * rings
-        return out
-
-    def truth(self, start, end):
-        """Change of velocity of the rigid body, (3,)."""
-        time = np.linspace(start, end, 20001)
-        return self.change * np.trapezoid(self.shape(time), time)
-
-    def unit(self, number, *, gyro, wrong=""):
-        """A recorder with drawn errors and place; `wrong` is what its case states falsely."""
-        rng = np.random.default_rng([self.seed, number, self.kind])
-        place = np.array(
-            [
-                rng.uniform(-1, 0.6),
-                (-1) ** (number + 1) * rng.uniform(0.4, 0.75),
-                rng.uniform(-0.1, 0.3),
-            ]
-        )
-        time = np.arange(-100, 351) / RATE
-        fine = np.arange(-101 * FINE, 351 * FINE) / (RATE * FINE)
-        shape = self.shape(fine)
-        rates = np.outer(np.cumsum(shape) / (RATE * FINE), self.turned)
-        rates *= np.exp(-np.maximum(fine - 0.12, 0))[:, None]
-        spin = np.gradient(rates, fine, axis=0)
-        force = np.outer(shape, self.change) + np.array([0, 0, -G])
-        force += np.cross(spin, place) + np.cross(rates, np.cross(rates, place))
-        force += np.gradient(self.structure(rng, fine), fine, axis=0)
-
-        def means(x):
-            return x.reshape(-1, FINE, 3).mean(axis=1)[1:]
-
-        felt, turned = means(force), means(rates)
-        n = min(len(felt), len(time))
-        read = felt[:n] * (1 + SCALE * rng.normal(size=3)) + BIAS * rng.normal(size=3)
-        read = read + NOISE * rng.normal(size=(n, 3))
-        turned = turned[:n] + GYRO_NOISE * rng.normal(size=(n, 3))
-        main = int(np.argmax(np.abs(self.change)))
-        if wrong == "sign":
-            read[:, main] *= -1
-        elif wrong == "axes":
-            read = read[:, [1, 0, 2]]
-        elif wrong == "scale":
-            read = read * [1.25, 1.25, 1.0]
-        elif wrong == "lever arm":
-            place = place - 0.8 * np.sign(place) * [1, 1, 0]
-        elif wrong == "turns back":
-            read[:, main] -= 0.6 * self.change[main] * pulse(time[:n], 0.09, 0.05)
-        table = imu_table(time[:n], turned, read, sampling="mean")
-        model = TriadUncertainty(noise_density=NOISE / RATE**0.5, bias=BIAS, scale=SCALE)
-        of_gyro = TriadUncertainty(noise_density=GYRO_NOISE / RATE**0.5)
-        # By 0.15 s a rate that grows over the crash has turned it by about 0.08 s of its end.
-        turn = tuple(max(2.0, math.degrees(0.08 * x)) for x in self.turn_sd)
-        return CrashUnit(
-            "ABCDEF"[number],
-            (RecordedTriad(table[ACCEL], model, "accelerometer"),),
-            RecordedTriad(table[GYRO], of_gyro, "gyro") if gyro else None,
-            Mounting(tuple(place), position_sd=0.02),
-            trigger=0.0,
-            trigger_sd=1e-5,
-            assumed=None if gyro else Assumed(turn_sd_deg=turn, over=(0.0, 0.15)),
-        )
-
 
 LEVEL = {"levelling": (0.0, 0.0, 0.5)}
 
@@ -230,32 +106,6 @@ def test_pairs_with_a_fault_are_found(gyro, wrong):
     assert np.mean(said) >= FOUND[gyro, wrong]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("gyro", [True, False])
-def test_bounds_of_points_and_of_their_mean_hold(gyro):
-    inside, alone = {"single": [], "mean": []}, 0
-    for kind in KINDS:
-        for seed in range(40):
-            crash = Crash(500 + seed, kind)
-            units = [crash.unit(k, gyro=gyro) for k in range(2)]
-            found = reconstruct_crash(
-                units,
-                Entry.from_speed(20.0, 0.1),
-                CrashOptions(rate=RATE, sampling="mean", preparation=LEVEL),
-            )
-            if found.combined is None:
-                alone += 1
-                continue
-            for name, unit in (("single", found.units[0]), ("mean", found.combined)):
-                event = unit.delta_v
-                off = event.delta_v.vector - crash.truth(event.delta_v.start, event.delta_v.end)
-                inside[name].append(np.abs(off[:2]) <= event.bound.half_width[:2])
-    assert alone <= 6  # of 200, at 1 %
-    for name, rows in inside.items():
-        interval = binomtest(int(np.sum(rows)), np.size(rows)).proportion_ci(0.99)
-        assert interval.high >= 0.95, (name, interval)
-
-
 def test_both_sides_of_a_real_car_agree_as_proposed(recordings, tmp_path):
     header = recordings("crash_nhtsa_10146") / "v10146.EV5"
     text = draft_case(read_records([header]), folder=tmp_path).text
@@ -281,6 +131,11 @@ def test_both_sides_of_a_real_car_agree_as_proposed(recordings, tmp_path):
     mean = found.combined.delta_v
     assert abs(-mean.delta_v.vector[0] - 18.53) < mean.bound.half_width[0]
     assert mean.bound.half_width[0] < 0.6
+    # The crush of others is 0.73 to 0.75 m; the wall's impulse is 2 to 4.5 % more than the rear's.
+    assert abs(found.combined.path.table["north"].max() - 0.74) < 0.02
+    assert 0.015 < 32853.0 / 1719.0 / -mean.delta_v.vector[0] - 1.0 < 0.045
+    felt = found.combined.acceleration
+    assert olc(felt.time, felt.values[:, 0]).value_g == pytest.approx(29.6, abs=0.6)
 
 
 def turned(crash, gyro=False):

@@ -1,0 +1,105 @@
+"""Errors of one measuring point that a comparison with the others would not show."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from strapdown import rotation
+from strapdown.crash.consistency import (
+    UnitComparison,
+    VelocityIncrements,
+    clipped_pieces,
+    compare_pair,
+    velocity_increments,
+)
+from strapdown.crash.measuring_point import PointKinematics
+from strapdown.crash.structure import unlearnt
+from strapdown.errors import Finding
+
+Wrong = Callable[[VelocityIncrements], VelocityIncrements]
+
+#: A gross scale factor, a position and a mounting that a tape and an eye would make.
+SCALE, POSITION, TURNED_DEG = 1.25, 0.25, 5.0
+
+
+def _times(matrix: np.ndarray) -> Wrong:
+    return lambda one: replace(one, values=one.values @ matrix.T)
+
+
+def _opposite(one: VelocityIncrements) -> VelocityIncrements:
+    """With the sign of the horizontal axis that changed most reversed."""
+    matrix = np.eye(3)
+    main = int(np.argmax(np.abs(one.values[:, :2].sum(axis=0))))
+    matrix[main, main] = -1.0
+    return _times(matrix)(one)
+
+
+def _moved(one: VelocityIncrements) -> VelocityIncrements:
+    off = (one.lever @ (POSITION * np.array([1.0, 1.0, 0.0]))).reshape(-1, 3)
+    return replace(one, values=one.values + off)
+
+
+#: What is tried, by the code of its name.
+WRONG: Mapping[str, Wrong] = {
+    "crash.wrong-sign": _opposite,
+    "crash.wrong-axes": _times(np.eye(3)[[1, 0, 2]]),
+    "crash.wrong-scale": _times(np.diag([SCALE, SCALE, 1.0])),
+    "crash.wrong-position": _moved,
+    "crash.wrong-heading": _times(
+        rotation.dcm_from_rotation_vector([0.0, 0.0, np.radians(TURNED_DEG)])
+    ),
+}
+
+
+def undetectable(
+    units: Sequence[PointKinematics], comparison: UnitComparison, level: float = 1e-3
+) -> list[Finding]:
+    """What the comparison of units that agree would not show if it were wrong.
+
+    Each of `WRONG` is put into the record of one unit after another, which is then compared with
+    the others as in `compare_units`, structure and turning learnt anew. One that a unit could have
+    without a contradiction is listed. Errors common to all units never show: their records are
+    those of another crash.
+
+    Parameters
+    ----------
+    units : sequence of PointKinematics
+        As compared.
+    comparison : UnitComparison
+    level : float
+        Probability below which a pair disagrees.
+
+    Returns
+    -------
+    list of Finding
+        One note, or none where the units disagree.
+    """
+    if not comparison.agree:
+        return []
+    edges, rigid = comparison.edges, unlearnt(units)
+    increments = [velocity_increments(u, edges) for u in units]
+    cut = [clipped_pieces(u, edges) for u in units]
+    hidden = []
+    for code, wrong in WRONG.items():
+        for k, unit in enumerate(units):
+            tried = wrong(increments[k])
+            pairs = (
+                compare_pair(unit, other, tried, increments[j], ~(cut[k] | cut[j]), level, rigid)
+                for j, other in enumerate(units)
+                if j != k
+            )
+            if all(p.agree and all(f.severity == "note" for f in p.findings) for p in pairs):
+                hidden.append(Finding(code, severity="note"))
+                break
+    return [
+        Finding(
+            "crash.not-detectable-with-these-points",
+            severity="note",
+            file=", ".join(u.name for u in units),
+            quantity="comparison",
+            hidden=[*hidden, Finding("crash.wrong-alike", severity="note")],
+        )
+    ]

@@ -1,0 +1,133 @@
+"""Bounds of cars that fold, by kind of crash: points, their mean, direction, position, closure.
+
+`STRAPDOWN_CRASH_DRAWS` draws of each kind (500: an hour of processor time and more).
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections import Counter
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.stats import binomtest, chi2
+from tests.unit.crash import planar_impact
+from tests.unit.crash.folding_crash import END, FIGURES, KINDS, Crash, errors
+
+from strapdown import Entry
+from strapdown.config.crash_case import EntrySpec, PointSpec, VehicleSpec
+from strapdown.crash.case import impact_vehicle
+from strapdown.crash.closure import close_vehicles
+from strapdown.dsp.chi_square import normal_quantile
+
+DRAWS = int(os.environ.get("STRAPDOWN_CRASH_DRAWS", "30"))
+LEVEL = 0.99
+#: Points of a vehicle, draw by draw.
+COUNTS = (2, 2, 3, 2, 4, 2, 3, 5, 2, 6)
+
+
+@cache
+def drawn(kind, gyro, draws, seed=2000):
+    """Errors over the half widths of single points and of means, and how many had no mean."""
+    single, mean, alone = [], [], 0
+    for k in range(draws):
+        crash = Crash(seed + k, kind)
+        units = [crash.unit(j, gyro=gyro) for j in range(COUNTS[k % len(COUNTS)])]
+        found = crash.reconstructed(units)
+        single.append(errors(found.units[0], crash))
+        if found.combined is None:
+            alone += 1
+        else:
+            mean.append(errors(found.combined, crash))
+    return np.array(single), np.array(mean), alone
+
+
+def test_errors_of_a_point_and_of_a_mean_are_as_large_as_stated():
+    z = np.concatenate(drawn("oblique", True, 1)[:2])[:, [0, 1, 4, 5]]
+    z = z * normal_quantile(0.975)
+    # Not more than a mean of squares can be; the errors of one answer belong together.
+    assert np.square(z).sum() < chi2.ppf(1.0 - 1e-4, z.size)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("gyro", [True, False])
+@pytest.mark.parametrize("kind", KINDS)
+def test_bounds_hold_by_kind(kind, gyro):
+    single, mean, alone = drawn(kind, gyro, DRAWS)
+    assert binomtest(alone, DRAWS).proportion_ci(LEVEL).low <= 0.01
+    for who, rows in (("single", single), ("mean", mean)):
+        for figure, column in zip(FIGURES, rows.T, strict=True):
+            inside = int((np.abs(column) <= 1.0).sum())
+            interval = binomtest(inside, len(column)).proportion_ci(LEVEL)
+            assert interval.low <= 0.95 <= interval.high, (kind, who, figure, inside, len(column))
+
+
+#: Standard deviation of the change of yaw rate by kind, deg/s, of which a case states a turning.
+TURNS = {"head-on": 51.0, "offset": 99.0, "rear-end": 44.0, "side": 104.0, "sideswipe": 83.0}
+
+
+def closed(kind, number, gyro):
+    """Closure of a drawn impact by the points of both cars, and the impact."""
+    impact = planar_impact.draw(np.random.default_rng([11, number]), kind)
+    vehicles = []
+    for i, (true, said) in enumerate(zip(impact.exact, impact.measured, strict=True)):
+        sds = np.radians([20.0, 20.0, TURNS[kind]])
+        rates = [[0.0, 0.0, math.radians(x[0])] for x in (true.rate, true.rate_change)]
+        crash = Crash.of(2 * number + i, true.delta_v, rates, true.duration, sds)
+        units = [crash.unit(j, gyro=gyro) for j in range(COUNTS[number % 5])]
+        speed = float(np.hypot(*said.entry))
+        slip_sd = min(math.degrees(0.2 / max(speed, 1.0)), 40.0)
+        heading, sd = said.heading_deg
+        entry = Entry.from_speed(
+            speed,
+            0.4,
+            heading_deg=heading,
+            heading_sd_deg=sd,
+            slip_deg=math.degrees(math.atan2(said.entry[1], said.entry[0])),
+            slip_sd_deg=slip_sd,
+        )
+        vehicle = VehicleSpec(
+            mass_kg=said.mass[0],
+            mass_sd_kg=said.mass[1],
+            contact_m=said.contact[:2],
+            contact_sd_m=said.contact[2],
+        )
+        stated = EntrySpec(
+            speed_m_per_s=speed, speed_sd_m_per_s=0.4, heading_sd_deg=sd, slip_sd_deg=slip_sd
+        )
+        answer = crash.reconstructed(units, entry, until=END - 0.002).main
+        vehicles.append(impact_vehicle(answer, f"car {i}", vehicle, stated, PointSpec()))
+    if None in vehicles:
+        return impact, None
+    return impact, close_vehicles(
+        *vehicles, friction=planar_impact.FRICTION, energy_share=impact.share
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("gyro", [True, False])
+@pytest.mark.parametrize("kind", TURNS)
+def test_closure_by_the_points_of_both_cars_holds(kind, gyro):
+    from tests.unit.crash.test_closure import CONSERVATIVE, _held
+
+    held, counted, reported, none = Counter(), Counter(), 0, 0
+    for number in range(DRAWS):
+        impact, closure = closed(kind, number, gyro)
+        if closure is None:
+            none += 1
+            continue
+        reported += closure.contradicted
+        for name, holds in _held(impact, closure).items():
+            # Without gyros velocities are those of the centers, and the truth is of the contact.
+            if closure.basis == "contact" or name in (*CONSERVATIVE, "direction_deg"):
+                held[name] += holds
+                counted[name] += 1
+    # A sideswipe may change less than an event needs.
+    assert none <= (DRAWS // 2 if kind == "sideswipe" else 0)
+    assert binomtest(reported, DRAWS).proportion_ci(LEVEL).low <= 0.01
+    for name, number in counted.items():
+        interval = binomtest(held[name], number).proportion_ci(LEVEL)
+        assert interval.high >= 0.95, (kind, name, held[name], number)
+        assert name in CONSERVATIVE or interval.low <= 0.97, (kind, name, held[name], number)
