@@ -88,12 +88,18 @@ def crash(
 def print_crash(result: CaseResult) -> None:
     """Print the results of a case, and their limits."""
     from strapdown.cli.console import console, print_block
-    from strapdown.report.crash_tables import answers_table, comparison_table, path_table
+    from strapdown.report.crash_tables import (
+        answers_table,
+        comparison_table,
+        indices_table,
+        path_table,
+    )
     from strapdown.report.crash_words import headline, limitations
     from strapdown.report.values import spaced
 
     out = console()
-    for block in (answers_table(result), path_table(result), comparison_table(result)):
+    tables = (answers_table, path_table, comparison_table, indices_table)
+    for block in (table(result) for table in tables):
         if block is not None and block.rows:
             print_block(block)
     out.print(spaced(headline(result)), style="bold")

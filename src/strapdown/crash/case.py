@@ -14,6 +14,7 @@ import pandas as pd
 from strapdown.bundle.seal import InputFiles, sha256
 from strapdown.config.crash_case import CaseSpec, ReferenceSpec, TriadSpec, UnitSpec
 from strapdown.constants import TWO_SIDED_95
+from strapdown.crash.case_indices import CrashIndex, occupant_indices, vehicle_indices
 from strapdown.crash.closure import (
     Blame,
     Closure,
@@ -97,6 +98,9 @@ class CaseResult:
         With the other vehicle, the first being that of the first case.
     blame : Blame or None
         What would explain that the two do not close.
+    indices : tuple of CrashIndex
+        Of the vehicle in its severest event, by the main answer; then of the occupants whose
+        channels the records have.
     """
 
     spec: CaseSpec
@@ -112,6 +116,7 @@ class CaseResult:
     partners: tuple[CaseSpec, ...] = ()
     closure: Closure | None = None
     blame: Blame | None = None
+    indices: tuple[CrashIndex, ...] = ()
 
     @property
     def vehicle_names(self) -> tuple[str, ...]:
@@ -236,7 +241,20 @@ def run_case(
         case_severity(spec, made.main),
         references,
         tuple(dict.fromkeys(findings)),
+        indices=_indices(spec, records, made.main),
     )
+
+
+def _indices(
+    spec: CaseSpec, records: Mapping[str, CrashRecord], main: UnitReconstruction
+) -> tuple[CrashIndex, ...]:
+    """Indices of the vehicle, and of the occupants of that vehicle in its records."""
+    number = main_event(main)
+    of_vehicle = () if number is None else vehicle_indices(main, number)
+    names = {(t.path, name.lstrip("-")) for t in _triads(spec) for name in t.channels.values()}
+    channels = [c for path, r in records.items() for c in r.channels if (path, c.name) in names]
+    vehicles = {c.vehicle for c in channels}
+    return of_vehicle + occupant_indices(tuple(records.values()), tuple(vehicles))
 
 
 def whole_records(spec: CaseSpec) -> tuple[dict[str, CrashRecord], CaseSpec]:

@@ -15,6 +15,7 @@ from strapdown.bundle.seal import write_json
 from strapdown.config.crash_case import CaseSpec
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.case import CaseResult, ReferenceAnswer, SeverityAnswer, main_event, run_cases
+from strapdown.crash.case_indices import CrashIndex
 from strapdown.crash.closure import Closure, Figure
 from strapdown.crash.consistency import UnitComparison
 from strapdown.crash.crash_type import CrashType
@@ -134,6 +135,7 @@ def crash_json(result: CaseResult) -> dict[str, Any]:
         "comparison": None if made.comparison is None else _comparison(made.comparison),
         "closure": None if result.closure is None else _closure(result, result.closure),
         "severity": [_severity(s) for s in result.severity],
+        "indices": [_index(one) for one in result.indices],
         "references": [_reference(r) for r in result.references],
         "assumptions": _pairs(crash_words.assumptions(result)),
         "limitations": _pairs([one[1:] for one in crash_words.limitations(result)]),
@@ -337,6 +339,23 @@ def _severity(answer: SeverityAnswer) -> dict[str, Any]:
         "high": None if risk is None or answer.at_least else risk.high,
         "at_least": answer.at_least,
         "because": "" if answer.because is None else answer.because.sentence("file"),
+    }
+
+
+def _index(index: CrashIndex) -> dict[str, Any]:
+    return {
+        "index": index.name,
+        "of": index.of,
+        "value": index.value,
+        "low": index.low,
+        "high": index.high,
+        "at_least": index.at_least,
+        "unit": index.unit,
+        "limit": index.limit,
+        "standard": index.standard,
+        "detail": index.detail,
+        "channels": list(index.channels),
+        "because": "" if index.because is None else index.because.sentence("file"),
     }
 
 

@@ -149,6 +149,7 @@ def crash_document(result: CaseResult, name: str) -> Document:
             crash_tables.budget_table(result),
         ),
         section("severity", "Severity", *_severity(result, which)),
+        section("indices", "Occupant and barrier indices", crash_tables.indices_table(result)),
         section(
             "references",
             "Reference comparison",

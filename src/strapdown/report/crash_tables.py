@@ -20,6 +20,7 @@ from strapdown.report.values import (
     about,
     axis_names,
     component_words,
+    decimals,
     instant,
     over_ground,
     plain,
@@ -322,6 +323,51 @@ def closure_table(result: CaseResult) -> TableBlock | None:
         text=(0, 3),
         caption=f"{first} and {second} together, each by its own recorders at its "
         f"{result.spec.point.name}, taken for its centre of mass. {tested}",
+    )
+
+
+def indices_table(result: CaseResult) -> TableBlock | None:
+    """Indices of the vehicle and of the occupants, each with its standard and bound."""
+    combined = result.reconstruction.combined
+    mean = None if combined is None else combined.name
+    rows = []
+    for index in result.indices:
+        factor = KMH if index.unit == "m/s" else 1.0
+        unit = "km/h" if index.unit == "m/s" else index.unit
+        value, bound = "–", "" if index.because is None else index.because.sentence("file")
+        if index.value is not None:
+            half = math.inf if index.high is None else factor * (index.high - index.value)
+            places = decimals(half, 2, most=3) if math.isfinite(half) else decimals(index.value)
+            value = f"{plain(factor * index.value, places)} {unit}".strip()
+            if index.at_least:
+                value = f"at least {value}"
+            bound = "not stated by the record" if index.channels else "not determined"
+            if index.low is not None and index.high is not None:
+                ends = (plain(factor * x, places) for x in (index.low, index.high))
+                bound = " to ".join(ends)
+        detail = [index.detail] if index.detail else []
+        if index.channels:
+            detail.append(f"channels {', '.join(index.channels)}")
+        rows.append(
+            (
+                MEAN if index.of == mean else index.of,
+                index.name,
+                value,
+                bound,
+                "" if index.limit is None else f"{index.limit:g} {index.unit}".strip(),
+                index.standard,
+                "; ".join(detail),
+            )
+        )
+    if not rows:
+        return None
+    return TableBlock(
+        ("of", "index", "value", "95 % bound", "limit", "standard", "by"),
+        tuple(rows),
+        text=(0, 1, 3, 5, 6),
+        caption=f"Indices of the vehicle at its {result.spec.point.name} in the severest event, "
+        "from the common stamps, with the bound by the error budget and the onset; and of occupants "
+        "by channels of the records. Limits are of the standard named.",
     )
 
 
