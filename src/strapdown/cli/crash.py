@@ -93,12 +93,13 @@ def print_crash(result: CaseResult) -> None:
         comparison_table,
         indices_table,
         path_table,
+        severity_table,
     )
     from strapdown.report.crash_words import headline, limitations
     from strapdown.report.values import spaced
 
     out = console()
-    tables = (answers_table, path_table, comparison_table, indices_table)
+    tables = (answers_table, path_table, comparison_table, severity_table, indices_table)
     for block in (table(result) for table in tables):
         if block is not None and block.rows:
             print_block(block)

@@ -267,8 +267,8 @@ class OptionsSpec(Spec):
         default=0.8, description="largest coefficient of friction of the tires on the road"
     )
     #: None selects those that apply to the crash type.
-    severity: Annotated[tuple[Word, ...] | None, Several] = Field(
-        default=None, description="names of models of injury risk"
+    severity: Annotated[tuple[FileName, ...] | None, Several] = Field(
+        default=None, description="names of models of injury risk, or .toml files of your own"
     )
     severity_inputs: dict[Word, Input] = Field(default_factory=dict)
     formats: Annotated[tuple[Literal["csv", "mme"], ...], Several] = ("csv",)

@@ -299,6 +299,8 @@ def _inputs(
     given += [("record", path, record.files) for path, record in records.items()]
     # Only the files of sensors that are not of the catalogue.
     given += [("sensor", s, (Path(s),)) for s in dict.fromkeys(sensors) if s.lower() not in SENSORS]
+    models = (m for m in spec.options.severity or () if m not in SEVERITY_MODELS)
+    given += [("severity", m, (Path(m),)) for m in dict.fromkeys(models)]
     others = [("reference", r.path) for r in spec.references if r.path is not None]
     others += [("fixes", spec.entry.path)] if spec.entry.path is not None else []
     given += [(role, path, files_of(path)) for role, path in dict.fromkeys(others)]
@@ -646,12 +648,14 @@ class SeverityAnswer:
     """Severity by one model, or the finding because of which it does not apply.
 
     `at_least`: delta-V is a lower bound, and so is the probability; its upper bound does not hold.
+    `of`: the recorder, or the mean, whose delta-V it takes.
     """
 
     model: SeverityModel
     risk: InjuryRisk | None
     because: Finding | None = None
     at_least: bool = False
+    of: str = ""
 
 
 def main_event(unit: UnitReconstruction) -> int | None:
@@ -687,8 +691,8 @@ def case_severity(spec: CaseSpec, unit: UnitReconstruction) -> tuple[SeverityAns
         try:
             risk = injury_risk(model, inputs, sd)
         except DataError as error:
-            answers.append(SeverityAnswer(model, None, error.finding))
+            answers.append(SeverityAnswer(model, None, error.finding, of=unit.name))
         else:
             least = whole.at_least and "delta_v" in model.inputs
-            answers.append(SeverityAnswer(model, risk, at_least=least))
+            answers.append(SeverityAnswer(model, risk, at_least=least, of=unit.name))
     return tuple(answers)

@@ -150,7 +150,7 @@ def _named(value: Any, key: str = "") -> Any:
     if isinstance(value, dict):
         return {k: _named(v, k) for k, v in value.items()}
     if isinstance(value, list):
-        return [_named(v) for v in value]
+        return [_named(v, key) for v in value]
     if names_file(key, value):
         return str(value).replace("\\", "/").rstrip("/").rsplit("/", 1)[-1]
     return value
@@ -334,6 +334,11 @@ def _severity(answer: SeverityAnswer) -> dict[str, Any]:
         "model": answer.model.name,
         "outcome": answer.model.outcome,
         "source": answer.model.source,
+        "of": answer.of,
+        "model_uncertainty_in_bound": risk is not None and risk.model_sd is not None,
+        "logit": None if risk is None else risk.logit,
+        "logit_sd": None if risk is None else risk.logit_sd,
+        "logit_sd_of_model": None if risk is None else risk.model_sd,
         "probability": None if risk is None else risk.probability,
         "low": None if risk is None else risk.low,
         "high": None if risk is None or answer.at_least else risk.high,

@@ -626,8 +626,12 @@ def risk_chart(
         "severity",
         "Risk of injury against the change of velocity",
         "Published logistic models, each within its range of validity; marked: this crash with the "
-        "95 % bound of its delta-V, and the resulting bound of the risk. The uncertainty of the "
-        "model is not included.",
+        "95 % bound of its delta-V, and the resulting bound of the risk"
+        + (
+            "; the uncertainty of the model is not included."
+            if any(risk.model_sd is None for risk in risks)
+            else ", with the uncertainty of the model."
+        ),
         "change of velocity (resultant of the main event), km/h",
         (Panel("probability, %", tuple(lines)),),
     )

@@ -378,30 +378,35 @@ def severity_table(result: CaseResult) -> TableBlock | None:
     rows = []
     sources = list(dict.fromkeys(answer.model.source for answer in result.severity))
     for answer in result.severity:
-        risk = answer.risk
+        risk, words = answer.risk, "–"
+        bound = "" if answer.because is None else answer.because.sentence("file")
+        if risk is not None:
+            low, high = (f"{100.0 * p:.2g}" for p in (risk.low, risk.high))
+            words = f"{'at least ' if answer.at_least else ''}{100.0 * risk.probability:.2g} %"
+            bound = f"above {low} %" if answer.at_least else f"{low} to {high} %"
         rows.append(
             (
                 answer.model.outcome,
-                "–"
-                if risk is None
-                else f"{'at least ' if answer.at_least else ''}{100.0 * risk.probability:.2g} %",
-                ("" if answer.because is None else answer.because.sentence("file"))
-                if risk is None
-                else f"above {100.0 * risk.low:.2g} %"
-                if answer.at_least
-                else f"{100.0 * risk.low:.2g} to {100.0 * risk.high:.2g} %",
+                words,
+                bound,
+                "yes" if answer.model.covariance else "NO",
                 *((answer.model.source,) if len(sources) > 1 else ()),
             )
         )
+    combined = result.reconstruction.combined
+    of = {answer.of for answer in result.severity}.pop()
+    name = MEAN if combined is not None and of == combined.name else of
     return TableBlock(
         (
-            *("outcome", "probability", "by the bounds of delta-V"),
+            *("outcome", "probability", "95 % bound", "with the model's uncertainty"),
             *(("source",) if len(sources) > 1 else ()),
         ),
         tuple(rows),
-        text=(0, 2, 3),
-        caption="Probability of at least this injury, by published models; the bounds are due to "
-        "delta-V and do not include the model's uncertainty."
+        text=(0, 2, 3, 4),
+        caption="Probability of at least this injury, by published models, from the resultant "
+        f"delta-V by {name} at the {result.spec.point.name}. The bound is due to delta-V and, where "
+        "the model states their covariance or standard errors, to its coefficients; else it leaves "
+        "the uncertainty of the model out."
         + (f" Source: {sources[0]}" if len(sources) == 1 else ""),
     )
 

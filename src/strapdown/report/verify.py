@@ -307,10 +307,10 @@ def changed_case(root: Path, manifest: dict[str, Any]) -> list[str]:
     return [f"{name}: {what}" for what in changed_options(_told(sealed), _told(told))]
 
 
-def _told(value: Any) -> Any:
+def _told(value: Any, key: str = "") -> Any:
     """Remove file names, which differ in a bundle."""
     if isinstance(value, dict):
-        return {k: _told(v) for k, v in value.items() if not names_file(k, v)}
+        return {k: _told(v, k) for k, v in value.items() if not names_file(k, v)}
     if isinstance(value, list):
-        return [_told(v) for v in value]
+        return [_told(v, key) for v in value if not names_file(key, v)]
     return value
