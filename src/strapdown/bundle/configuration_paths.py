@@ -10,8 +10,8 @@ from typing import Any
 def names_file(key: str, value: Any) -> bool:
     """Whether a value of a configuration is the path of an input.
 
-    `key`: name of the field, of a list that of the list. `value`: a path; for a sensor or a model of
-    severity, a file path with its suffix, or a name of the catalogue.
+    `key`: name of the field, of a list that of the list. `value`: a path; for a sensor or a model
+    of severity, a file path with its suffix, or a name of the catalogue.
     """
     if not isinstance(value, str):
         return False

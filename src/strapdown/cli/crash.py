@@ -95,7 +95,7 @@ def print_crash(result: CaseResult) -> None:
         path_table,
         severity_table,
     )
-    from strapdown.report.crash_words import headline, limitations
+    from strapdown.report.crash_words import contradictions, headline, limitations
     from strapdown.report.values import spaced
 
     out = console()
@@ -104,6 +104,11 @@ def print_crash(result: CaseResult) -> None:
         if block is not None and block.rows:
             print_block(block)
     out.print(spaced(headline(result)), style="bold")
+    against = contradictions(result)
+    if against:
+        out.print("\nThese contradict the answer:")
+        for source, text in against:
+            out.print(f"  - {spaced(f'{source}: {text}' if source else text)}")
     found = limitations(result)
     if found:
         out.print("\nLimitations (details in the report):")

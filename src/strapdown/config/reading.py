@@ -143,7 +143,7 @@ MOST_NAMES = 10_000
 
 
 def _with_absolute_paths(file: TomlFile) -> tuple[dict[str, Any], list[Fault]]:
-    """The table with every ``path``, ``sensor`` and ``severity`` that is a file as absolute path."""
+    """The table, with an absolute path for every key that names a file."""
     faults: list[Fault] = []
 
     def resolved(node: Any, path: KeyPath) -> Any:

@@ -102,9 +102,9 @@ _VEHICLE = (
 
 def _evaluate(
     time: Array, accel: Array, rate: Array, start: float
-) -> dict[str, float | None | Finding]:
+) -> dict[str, float | Finding | None]:
     """All indices of a vehicle: each a number, None, or the error that prevents it."""
-    found: dict[str, float | None | Finding] = {}
+    found: dict[str, float | Finding | None] = {}
 
     def of(keys: Sequence[str], call: Callable[[], Sequence[float | None]]) -> None:
         try:
@@ -267,18 +267,27 @@ def _accelerations(part: str, channels: Sequence[CrashChannel]) -> Iterator[Cras
         return
     accel = np.column_stack([signal.values[axis] for axis in "xyz"])
     detail = f"CFC {cfc}"
-    told = {"channels": signal.channels}
     if head:
         for name, longest, limit in (("HIC15", 0.015, 700.0), ("HIC36", 0.036, 1000.0)):
             hic = indices.hic(signal.time, accel, longest=longest)
             window = f"{detail}, {1e3 * hic.begin:.1f} to {1e3 * hic.end:.1f} ms"
             yield CrashIndex(
-                name, "", hic.value, "", f"{_FMVSS}, S6.2", limit=limit, detail=window, **told
+                name,
+                "",
+                hic.value,
+                "",
+                f"{_FMVSS}, S6.2",
+                limit=limit,
+                detail=window,
+                channels=signal.channels,
             )
     size = np.sqrt((accel * accel).sum(axis=1)) / STANDARD_GRAVITY
     level = indices.exceeded_level(signal.time, size)
-    limit, where = (None, "ECE R94, 5.2.1") if head else (60.0, f"{_FMVSS}, S6.3")
-    yield CrashIndex(names[-1], "", level, "g", where, limit=limit, detail=detail, **told)
+    where = "ECE R94, 5.2.1" if head else f"{_FMVSS}, S6.3"
+    most = None if head else 60.0
+    yield CrashIndex(
+        names[-1], "", level, "g", where, limit=most, detail=detail, channels=signal.channels
+    )
 
 
 def _deflection(channels: Sequence[CrashChannel]) -> Iterator[CrashIndex]:

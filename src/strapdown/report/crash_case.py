@@ -139,6 +139,8 @@ def crash_json(result: CaseResult) -> dict[str, Any]:
         "references": [_reference(r) for r in result.references],
         "assumptions": _pairs(crash_words.assumptions(result)),
         "limitations": _pairs([one[1:] for one in crash_words.limitations(result)]),
+        "contradictions": _pairs(crash_words.contradictions(result)),
+        "not_shown": _pairs(crash_words.not_shown(result)),
         "findings": [finding_json(f) for f in result.findings],
         "case": _named(result.spec.model_dump(mode="json", exclude_none=True)),
     }
@@ -255,6 +257,8 @@ def _change(change: VelocityChange) -> dict[str, Any]:
             "high_deg": across.high_deg,
             "undetermined": across.undetermined,
             "vertical_deg": angle.vertical_deg,
+            "vertical_low_deg": change.interval.vertical.low_deg,
+            "vertical_high_deg": change.interval.vertical.high_deg,
             "clock": angle.clock,
         },
     }

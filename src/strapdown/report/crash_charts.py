@@ -13,7 +13,7 @@ from strapdown.crash.acceleration import Acceleration, window_weights
 from strapdown.crash.case import ReferenceAnswer
 from strapdown.crash.consistency import UnitComparison
 from strapdown.crash.contact import Edge
-from strapdown.crash.delta_v import cumulative_delta_v
+from strapdown.crash.delta_v import cumulative_delta_v, trailing_delta_v
 from strapdown.crash.delta_v_bound import DeltaVBound, VelocityChange, body_delta_v_bound
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import CrashPath
@@ -241,6 +241,53 @@ def _stated_lines(stated: Sequence[ReferenceAnswer]) -> list[Line]:
             Line(one.spec.name, at, value_at, colour, points=True, symbol=symbol, hollow=True)
         )
     return out
+
+
+def sliding_chart(
+    units: Sequence[UnitReconstruction],
+    combined: UnitReconstruction | None,
+    window: float,
+) -> Chart | None:
+    """Chart the change of velocity over a window that slides along the record, by every unit.
+
+    Parameters
+    ----------
+    window : float, s
+
+    Returns
+    -------
+    Chart or None
+        Each value at the end of its window; None where no record is as long as the window.
+    """
+    main = units[0] if combined is None else combined
+    events = main.events.events
+    low, high = crash_span(events, main.acceleration.begin, main.acceleration.end)
+    lines: list[list[Line]] = [[] for _ in _PARTS]
+    for unit, name, drawn in answers_of(units, combined):
+        try:
+            found = trailing_delta_v(unit.acceleration, window)
+        except DataError:
+            continue
+        inside = (found.time >= low) & (found.time <= high + window)
+        vector = KMH * found.vector[inside]
+        at, style = 1e3 * found.time[inside], (drawn["colour"], drawn["dash"])
+        for k in range(len(_PARTS)):
+            values = vector[:, k] if k < 3 else np.sqrt((vector**2).sum(axis=1))
+            lines[k].append(curve(name, at, values, *style, 2.2 if unit is main else 1.3))
+    if not lines[0]:
+        return None
+    ms = f"{1e3 * window:.3g} ms"
+    return Chart(
+        "delta-v-sliding",
+        f"Change of velocity within {ms}",
+        f"Change of velocity of the reference point over the {ms} that end at each instant, in the "
+        "axes of the vehicle: the rate of change by which severity and direction of force are "
+        "often rated (Tadic and Vukajlovic 2016, Fig. 8). Recorders that differ here differ in "
+        "their direction of force.",
+        SINCE_TRIGGER,
+        tuple(Panel(f"{axis}, km/h", tuple(lines[k]), height=0.7) for k, axis in enumerate(_PARTS)),
+        marks=event_marks(events, low, high),
+    )
 
 
 # Error budget of delta-V and of the end position.

@@ -93,19 +93,20 @@ def direction_table(result: CaseResult) -> TableBlock | None:
                 angle, across = change.pdof, change.interval.horizontal
                 assert isinstance(angle, Pdof)
                 known = not across.undetermined
-                path = ("–", "–")
+                up = change.interval.vertical
+                path = ("–", "–", "–")
                 if ned is not None:
                     path = _over_ground(getattr(ned, window), ground)
                 rows.append(
                     (
                         recorder(unit, result),
-                        str(k + 1),
-                        ("event" if window == "event" else "largest")
+                        f"{k + 1}, {'event' if window == 'event' else 'largest'}"
                         + (", recorded part" if change.at_least else ""),
                         f"{plain(angle.horizontal_deg, 1)}°" if known else "not determined",
                         _ends(across) if known else "all",
                         str(angle.clock) if known else "–",
                         f"{plain(angle.vertical_deg, 1)}°" if known else "–",
+                        "all" if up.undetermined else _ends(up),
                         *path,
                     )
                 )
@@ -120,26 +121,26 @@ def direction_table(result: CaseResult) -> TableBlock | None:
     ms = 1e3 * result.spec.options.peak_window_s
     return TableBlock(
         (
-            *("recorder", "event", "window", "horizontal", "95 %", "o'clock", "vertical"),
-            *(axes, "95 %"),
+            *("recorder", "window", "horizontal", "95 %", "o'clock"),
+            *("vertical", "95 %", axes, "95 %", "vertical there"),
         ),
         tuple(rows),
-        text=(0, 1, 2),
+        text=(0, 1),
         caption="Principal direction of force over the event, and over the "
         f"{ms:.3g} ms of the largest change. Horizontal: from the front of the vehicle, clockwise "
-        f"from above; vertical: positive from above; {axes}: {told}.",
+        f"from above; vertical: positive from above; {axes} and vertical there: {told}.",
     )
 
 
-def _over_ground(change: VelocityChange, azimuth: bool) -> tuple[str, str]:
-    """Direction and its interval: an azimuth, or an angle from the entry's heading."""
+def _over_ground(change: VelocityChange, azimuth: bool) -> tuple[str, str, str]:
+    """Direction, its interval and elevation: an azimuth, or an angle from the entry's heading."""
     angle, across = change.pdof, change.interval.horizontal
     if across.undetermined:
-        return "not determined", "all"
+        return "not determined", "all", "–"
     at = math.remainder(getattr(angle, "azimuth_deg", math.nan), 360.0)
     at += 360.0 * (azimuth and at < 0.0)
     shift = 360.0 * round((at - 0.5 * (across.low_deg + across.high_deg)) / 360.0)
-    return f"{plain(at, 1)}°", _ends(across, shift)
+    return f"{plain(at, 1)}°", _ends(across, shift), f"{plain(angle.vertical_deg, 1)}°"
 
 
 def _ends(interval: AngleInterval, shift: float = 0.0) -> str:
@@ -366,8 +367,8 @@ def indices_table(result: CaseResult) -> TableBlock | None:
         tuple(rows),
         text=(0, 1, 3, 5, 6),
         caption=f"Indices of the vehicle at its {result.spec.point.name} in the severest event, "
-        "from the common stamps, with the bound by the error budget and the onset; and of occupants "
-        "by channels of the records. Limits are of the standard named.",
+        "from the common stamps, with the bound by the error budget and the onset; and of "
+        "occupants by channels of the records. Limits are of the standard named.",
     )
 
 
@@ -404,9 +405,9 @@ def severity_table(result: CaseResult) -> TableBlock | None:
         tuple(rows),
         text=(0, 2, 3, 4),
         caption="Probability of at least this injury, by published models, from the resultant "
-        f"delta-V by {name} at the {result.spec.point.name}. The bound is due to delta-V and, where "
-        "the model states their covariance or standard errors, to its coefficients; else it leaves "
-        "the uncertainty of the model out."
+        f"delta-V by {name} at the {result.spec.point.name}. The bound is due to delta-V and, "
+        "where the model states their covariance or standard errors, to its coefficients; else it "
+        "leaves the uncertainty of the model out."
         + (f" Source: {sources[0]}" if len(sources) == 1 else ""),
     )
 

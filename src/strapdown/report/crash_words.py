@@ -447,6 +447,153 @@ def _short(found: re.Match[str]) -> str:
     return f"{float(found.group()):.6g}"
 
 
+# What contradicts the answers, for page one.
+
+
+#: Findings by which a record, a case or a second vehicle speaks against an answer.
+AGAINST = frozenset(
+    f"crash.{code}"
+    for code in (
+        "bias-against-times-stated",
+        "direction-their-forces-stated",
+        "disagree-their-common-point-chi",
+        "momentum-not-closed",
+        "no-point-closes",
+        "others-agree-another-not",
+        "point-does-not-close",
+        "reads-more-than-stated-full",
+        "rest-until-record-itself-comes",
+        "specific-force-rest-along-vehicle",
+        "specific-force-rest-long-off",
+        "stated-crash-began-ms-before",
+        "turned-against-about-forward-right",
+        "turned-more-than-assumed",
+        "velocity-turns-back",
+        "vertical-velocity-upward-vehicle-points",
+        "window-exceeds-event",
+    )
+) | {"io.edr-maximum-beyond-table"}
+
+
+def contradictions(result: CaseResult) -> tuple[tuple[str, str], ...]:
+    """Return what speaks against the answers: references, records and the other vehicle.
+
+    Returns
+    -------
+    tuple of (str, str)
+        Source, and what it says.
+    """
+    rows = []
+    for answer in result.references:
+        spec = answer.spec
+        if answer.consistent or answer.unit != result.reconstruction.main.name:
+            continue
+        if answer.path is not None:
+            at = f"at {instant(answer.path.errors.index[-1])}"
+            off = answer.path.errors[NED].iloc[-1].to_numpy()
+            half = answer.path.bound[NED].iloc[-1].to_numpy()
+            differs = ", ".join(
+                f"{name} {about(float(d), float(h), 'm')}"
+                for name, d, h in zip(axis_names(result), off, half, strict=True)
+            )
+            text = f"Its path differs {at} by {differs} (this report less the reference)."
+        else:
+            assert spec.delta_v_m_per_s is not None
+            own = speed(answer.delta_v, TWO_SIDED_95 * answer.sd)
+            given = speed(spec.delta_v_m_per_s, TWO_SIDED_95 * spec.delta_v_sd_m_per_s)
+            text = f"Its {spec.axis} delta-V is {given}; this report has {own}."
+        rows.append((spec.name, text))
+    found = [f for f in result.findings if f.code in AGAINST]
+    return (*rows, *notes(found, result, remedies=False))
+
+
+def not_shown(result: CaseResult) -> tuple[tuple[str, str], ...]:
+    """Return what the records of this case cannot show."""
+    spec, made = result.spec, result.reconstruction
+    unit = made.main
+    begin, end = unit.acceleration.begin, unit.acceleration.end
+    assumed_axes = list(dict.fromkeys(a for u in made.units for a in u.at_point.assumed_axes))
+    others = bool(result.partners)
+    rows = [
+        (
+            "Before and after the records",
+            f"They cover {instant(begin)} to {instant(end)} from the trigger; what the vehicle did "
+            "before and after is in no answer and in no bound.",
+        ),
+        (
+            "The cause",
+            "Who steered, braked or gave way, visibility, the road and its grip are not in an "
+            "acceleration.",
+        ),
+        (
+            "The people",
+            "Indices are those of dummies or of a model occupant, and a probability of injury is "
+            "that of many crashes of this severity: neither says how this person was injured.",
+        ),
+        (
+            "Deformation that all recorders share",
+            "A recorder has the motion of its mounting. Where all mountings were pushed in with "
+            "the structure, their agreement does not show it.",
+        ),
+    ]
+    if spec.entry.kind == "speed":
+        rows.append(
+            (
+                "The speed before the impact",
+                "It is stated, not measured by these records; delta-V is the change alone.",
+            )
+        )
+    if not over_ground(result):
+        rows.append(
+            (
+                "The place on the road",
+                "Without a stated heading the path is relative to the vehicle at the entry; where "
+                "on the road it lies is not known.",
+            )
+        )
+    if not others:
+        rows.append(
+            (
+                "The other vehicle or obstacle",
+                "Its mass, speed, stiffness and change of velocity are not known from these "
+                "records; a closing speed needs its case as well.",
+            )
+        )
+    if assumed_axes:
+        rows.append(
+            (
+                "Axes that were not measured",
+                f"{', '.join(assumed_axes)}: an impact or a turn along them appears only as the "
+                "bound that was assumed.",
+            )
+        )
+    if len(made.units) == 1:
+        rows.append(
+            (
+                "An error of the one recorder",
+                "A wrong sign, axis, scale factor or clock, or a loose bracket, looks like another "
+                "crash.",
+            )
+        )
+    else:
+        rows.append(
+            (
+                "Errors that the recorders share",
+                "The same wrong angle, lever arm or trigger in every recorder moves all answers "
+                "together, and their comparison does not see it.",
+            )
+        )
+    rate = spec.options.rate_hz
+    rows.append(
+        (
+            "Fast motion",
+            f"Answers are at {rate:g} Hz: motion above {rate / 2.0:g} Hz, such as ringing of the "
+            "structure, is in their sum and not in their shape.",
+        )
+    )
+    return tuple(rows)
+
+
 # Limitations of the answers of a case, from its own events, most serious first.
 
 
@@ -458,6 +605,7 @@ GRAVE = frozenset(
         "direction-undetermined",
         "recorders-disagree",
         "vehicles-do-not-close",
+        "reference-contradicts",
         "clipped-accelerometer",
         "clipped-gyro",
         "assumed",

@@ -255,12 +255,13 @@ COVARIANCE = (
 )
 
 
-class TestModelUncertainty:
-    INPUTS = {"delta_v": 20.0 * MPH, "age": 50.0, "crash_type": "side"}
+SIDE = {"delta_v": 20.0 * MPH, "age": 50.0, "crash_type": "side"}
 
+
+class TestModelUncertainty:
     def test_covariance_of_the_coefficients_is_in_the_bound(self, write):
         model = load_severity_model(write(f"{COVARIANCE}\n{FILE}"))
-        risk = injury_risk(model, self.INPUTS, {"delta_v": 2.0 * MPH})
+        risk = injury_risk(model, SIDE, {"delta_v": 2.0 * MPH})
         # x = (1, 20, 50, 1): 0.04 - 2·20·0.001 + 400·4e-5 + 2500e-4 + 0.01.
         own = 0.04 - 0.04 + 0.016 + 0.25 + 0.01
         assert risk.model_sd == pytest.approx(own**0.5)
@@ -272,7 +273,7 @@ class TestModelUncertainty:
         ).replace("coefficient = 0.02", "coefficient = 0.02\nstandard_error = 0.001").replace(
             "coefficient = 0.5", "coefficient = 0.5\nstandard_error = 0.1"
         )
-        risk = injury_risk(load_severity_model(write(text)), self.INPUTS)
+        risk = injury_risk(load_severity_model(write(text)), SIDE)
         assert risk.model_sd == pytest.approx((0.04 + 0.04 + 0.0025 + 0.01) ** 0.5)
 
     def test_a_published_table_without_them_says_so(self):
