@@ -278,7 +278,7 @@ def sliding_chart(
         return None
     ms = f"{1e3 * window:.3g} ms"
     return Chart(
-        "delta-v-sliding",
+        "sliding-change",
         f"Change of velocity within {ms}",
         f"Change of velocity of the reference point over the {ms} that end at each instant, in the "
         "axes of the vehicle: the rate of change by which severity and direction of force are "

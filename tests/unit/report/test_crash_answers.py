@@ -248,6 +248,7 @@ def test_a_rest_that_is_none_or_short(result, change, code):
 UNITS = ("_s", "_deg", "_m", "_m2", "_m_per_s", "_m_per_s2")
 # Numbers without a unit: counts, probabilities, a chi-square, a clock's hour, and the case's own.
 BARE = {
+    *("limit", "logit", "logit_sd", "logit_sd_of_model"),
     "main_event", "event", "clock", "probability", "chi_square", "freedom", "value", "low", "high",
     "share_of_delta_v", "turning_of_assumed",
 }  # fmt: skip
