@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError
@@ -29,8 +30,10 @@ __all__ = [
     "OF_LOGS",
     "OF_TABLES",
     "PRESSURES",
+    "SHOWN_UNITS",
     "SPEEDS",
     "TIME_UNITS",
+    "ShownUnits",
     "factor_of",
     "find_unit",
     "parse_unit",
@@ -107,6 +110,24 @@ MOMENTS: dict[str, float] = {
 }
 MASSES: dict[str, float] = {"kg": 1.0, "lb": 0.45359237, "t": 1e3}
 PRESSURES: dict[str, float] = {"Pa": 1.0, "hPa": 100.0, "kPa": 1000.0, "mbar": 100.0, "bar": 1e5}
+
+
+@dataclass(frozen=True)
+class ShownUnits:
+    """Units of a crash report: of speeds, with another beside it, lengths and masses."""
+
+    speed: str
+    beside: str
+    length: str
+    mass: str
+
+
+#: Systems that a case may choose.
+SHOWN_UNITS: dict[str, ShownUnits] = {
+    "metric": ShownUnits("km/h", "m/s", "m", "kg"),
+    "si": ShownUnits("m/s", "km/h", "m", "kg"),
+    "us": ShownUnits("mph", "ft/s", "ft", "lb"),
+}
 
 #: Units of each quantity, with their factors.
 FACTORS: dict[str, dict[str, float]] = {

@@ -50,6 +50,7 @@ def crash(
     )
     from strapdown.cli.result_folder import default_folder, refuse_result
     from strapdown.report.crash_tables import closure_table
+    from strapdown.report.values import shown_in
 
     for case in cases:
         refuse_result(case, "case")
@@ -76,10 +77,12 @@ def crash(
         console().print(run.spec.title, style="bold")
         if several:
             console().print(run.vehicle_names[run.number - 1], style="bold")
-        print_crash(run)
+        with shown_in(run.spec.options.units):
+            print_crash(run)
         print_findings(run.findings)
         print_seal(seal, "report.html")
-    both = closure_table(result)
+    with shown_in(result.spec.options.units):
+        both = closure_table(result)
     if both is not None:
         console().print("Closure of both vehicles", style="bold")
         print_block(both)

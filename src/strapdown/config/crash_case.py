@@ -271,6 +271,9 @@ class OptionsSpec(Spec):
         default=None, description="names of models of injury risk, or .toml files of your own"
     )
     severity_inputs: dict[Word, Input] = Field(default_factory=dict)
+    units: Literal["metric", "si", "us"] = Field(
+        default="metric", description="units of the report: metric (km/h, m), si (m/s, m) or us"
+    )
     formats: Annotated[tuple[Literal["csv", "mme"], ...], Several] = ("csv",)
 
 

@@ -44,10 +44,10 @@ from strapdown.report.crash_signals import (
     velocity_chart,
 )
 from strapdown.report.crash_words import (
-    CONVENTIONS,
     GRAVE,
     assumptions,
     contradictions,
+    conventions,
     headline,
     how_to_verify,
     key_figures,
@@ -68,7 +68,15 @@ from strapdown.report.document import (
     blocks,
     section,
 )
-from strapdown.report.values import GAP, axis_names, plain
+from strapdown.report.values import (
+    GAP,
+    axis_names,
+    length_factor,
+    length_unit,
+    mass_words,
+    plain,
+    shown_in,
+)
 from strapdown.tables import NED
 from strapdown.tables.checks import index_of
 
@@ -86,8 +94,13 @@ def crash_document(result: CaseResult, name: str) -> Document:
 
     Time is from the trigger, ms (s in overviews). Axes are the turning axes of the vehicle; those
     of the path are north, east, down or, without a stated heading, forward, right, down of the
-    vehicle at the entry. Every bound holds 95 %.
+    vehicle at the entry. Every bound holds 95 %. Units are those that the case chooses.
     """
+    with shown_in(result.spec.options.units):
+        return _document(result, name)
+
+
+def _document(result: CaseResult, name: str) -> Document:
     spec, found = result.spec, result.reconstruction
     main, which = found.main, main_event(found.main)
     path, events, units = main.path, main.events.events, (found.units, found.combined)
@@ -201,7 +214,7 @@ def crash_document(result: CaseResult, name: str) -> Document:
                 point=point,
                 point_name=spec.point.name,
             ),
-            Facts(CONVENTIONS),
+            Facts(conventions()),
         ),
         section(
             "limitations",
@@ -267,15 +280,17 @@ def _signals(result: CaseResult) -> Iterator[Block]:
 def _place(position: tuple[float, float, float]) -> str:
     if not any(position):
         return ""
-    return f" ({', '.join(plain(v, 2) for v in position)} m from the origin)"
+    there = ", ".join(plain(length_factor() * v, 2) for v in position)
+    return f" ({there} {length_unit()} from the origin)"
 
 
 def _vehicle(result: CaseResult) -> str:
     vehicle = result.spec.vehicle
     size = ""
     if not vehicle.outline_m:
-        size = f"{vehicle.length_m:g} m × {vehicle.width_m:g} m".replace(" ", GAP)
-    mass = "" if vehicle.mass_kg is None else f"{vehicle.mass_kg:g} kg"
+        sides = (length_factor() * v for v in (vehicle.length_m, vehicle.width_m))
+        size = " × ".join(f"{v:.4g} {length_unit()}" for v in sides).replace(" ", GAP)
+    mass = "" if vehicle.mass_kg is None else mass_words(vehicle.mass_kg)
     return ", ".join(part for part in (vehicle.name, mass, size) if part)
 
 

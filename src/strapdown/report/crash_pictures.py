@@ -14,7 +14,14 @@ from strapdown.report.crash_outline import Outline, draw_outline, interval_words
 from strapdown.report.document import Picture
 from strapdown.report.plan import ellipse
 from strapdown.report.svg_drawing import INK, SMALL, Drawing, nice_step, shortened
-from strapdown.report.values import KMH, plain
+from strapdown.report.values import (
+    length_factor,
+    length_unit,
+    plain,
+    speed_both,
+    speed_factor,
+    speed_unit,
+)
 
 _WIDTH, _SMALL_WIDTH, _RADIUS, _TOP = 330.0, 304.0, 118.0, 142.0
 _CAR = 0.53  # distance of the vehicle's farthest corner, as a share of the dial's radius
@@ -336,10 +343,10 @@ def points_picture(outline: Outline, changes: Sequence[PointChange]) -> Picture:
         out.arrow((x, y), tip, colour, 2.6)
     _points(out, above, [one.unit for one in changes], None)
     at = top + bottom + 18.0
-    step = nice_step(0.35 * _POINTS_ARROW * KMH / per)
-    length = per * step / KMH
+    step = nice_step(0.35 * _POINTS_ARROW * speed_factor() / per)
+    length = per * step / speed_factor()
     out.line((20.0, at - 14.0), (20.0 + length, at - 14.0), INK, 2.0)
-    out.text((26.0 + length, at - 14.0), f"{step:g} km/h", SMALL, INK)
+    out.text((26.0 + length, at - 14.0), f"{step:g} {speed_unit()}", SMALL, INK)
     for k, (one, words) in enumerate(zip(changes, told, strict=True)):
         _numbered(out, (22.0, at + 8.0 + 16.0 * k), one.unit.number)
         row = shortened(words, _PICTURE_WIDTH - 40.0, SMALL)
@@ -353,12 +360,12 @@ def points_picture(outline: Outline, changes: Sequence[PointChange]) -> Picture:
 
 
 def _change_words(one: PointChange) -> str:
-    x, y, z = (KMH * v for v in one.delta_v)
+    x, y, z = (speed_factor() * v for v in one.delta_v)
     least = "at least " if one.at_least else ""
     size = math.sqrt(x * x + y * y + z * z)
     place = _place(one.unit.position)
     return (
-        f"{one.unit.name} {place}: {least}{plain(size, 1)} km/h; forward, right, down "
+        f"{one.unit.name} {place}: {least}{plain(size, 1)} {speed_unit()}; forward, right, down "
         f"{plain(x, 1)}, {plain(y, 1)}, {plain(z, 1)}"
     )
 
@@ -461,7 +468,7 @@ def _where(d: Direction) -> str:
 
 def _numbers(out: Drawing, at: float, d: Direction, many: bool) -> float:
     angle, ends = interval_words(d.horizontal_deg, d.interval)
-    speed = f"{plain(d.delta_v, 1)} m/s ({plain(3.6 * d.delta_v, 1)} km/h)"
+    speed = speed_both(d.delta_v)
     if not d.main:
         out.text((14.0, at), _words(d), SMALL, _SOFT)
         out.text((14.0, at + 14.0), f"change of velocity {speed}", SMALL, _SOFT)
@@ -577,8 +584,9 @@ def conventions_picture(
 
 
 def _place(position: Sequence[float]) -> str:
-    values = (f"{v:.2f}" if round(v, 2) else "0.00" for v in position)
-    return "(" + ", ".join(values).replace("-", "−") + ") m"
+    scaled = (length_factor() * v for v in position)
+    values = (f"{v:.2f}" if round(v, 2) else "0.00" for v in scaled)
+    return "(" + ", ".join(values).replace("-", "−") + f") {length_unit()}"
 
 
 def _draw_above(out: Drawing, outline: Outline, view: Project, point: Sequence[float]) -> None:

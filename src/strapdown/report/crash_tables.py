@@ -15,19 +15,22 @@ from strapdown.crash.pdof import AngleInterval, Pdof
 from strapdown.report.document import TableBlock
 from strapdown.report.values import (
     GAP,
-    KMH,
     MEAN,
     about,
     axis_names,
     component_words,
     decimals,
     instant,
+    length_factor,
+    length_unit,
     over_ground,
     plain,
     probability_words,
     recorder,
     resultant_words,
     speed,
+    speed_factor,
+    speed_unit,
 )
 from strapdown.rotation import within_half_turn
 from strapdown.sensors.crash_unit import RecordedTriad
@@ -68,11 +71,11 @@ def answers_table(result: CaseResult) -> TableBlock | None:
             "recorder",
             "event",
             "from, to, s",
-            "forward, km/h",
-            "right, km/h",
-            "down, km/h",
-            "resultant, km/h",
-            f"largest in {ms:.3g} ms, km/h",
+            f"forward, {speed_unit()}",
+            f"right, {speed_unit()}",
+            f"down, {speed_unit()}",
+            f"resultant, {speed_unit()}",
+            f"largest in {ms:.3g} ms, {speed_unit()}",
         ),
         tuple(rows),
         text=(0, 1, 2),
@@ -150,7 +153,7 @@ def _ends(interval: AngleInterval, shift: float = 0.0) -> str:
 
 def path_table(result: CaseResult) -> TableBlock:
     """Positions at the end of the path, by every recorder."""
-    rows = []
+    rows, size = [], length_factor()
     for unit in result.reconstruction.answers:
         table, sd = unit.path.table.iloc[-1].copy(), unit.path.sd.iloc[-1]
         if not over_ground(result):
@@ -160,7 +163,10 @@ def path_table(result: CaseResult) -> TableBlock:
             (
                 recorder(unit, result),
                 instant(unit.path.time[-1]),
-                *(about(float(table[a]), TWO_SIDED_95 * float(sd[a]), "") for a in NED),
+                *(
+                    about(size * float(table[a]), size * TWO_SIDED_95 * float(sd[a]), "")
+                    for a in NED
+                ),
                 *(
                     about(float(table[a]), TWO_SIDED_95 * float(sd[a]), "")
                     for a in ("roll", "pitch", "heading")
@@ -168,7 +174,7 @@ def path_table(result: CaseResult) -> TableBlock:
             )
         )
     return TableBlock(
-        ("recorder", "at", *(f"{name}, m" for name in axis_names(result)), *ANGLES),
+        ("recorder", "at", *(f"{name}, {length_unit()}" for name in axis_names(result)), *ANGLES),
         tuple(rows),
         text=(0,),
         caption="Position of the reference point from that at the entry, and attitude, with 95 % "
@@ -201,9 +207,9 @@ def budget_table(result: CaseResult) -> TableBlock | None:
     return TableBlock(
         (
             "contributor",
-            "delta-V forward, km/h",
-            "delta-V right, km/h",
-            *(f"{name} at the end, m" for name in axis_names(result)),
+            f"delta-V forward, {speed_unit()}",
+            f"delta-V right, {speed_unit()}",
+            *(f"{name} at the end, {length_unit()}" for name in axis_names(result)),
         ),
         (*lines, ("total", *_sizes(np.sqrt(sums)))),
         caption=f"{recorder(unit, result)}: one standard deviation; squares add up to that of the "
@@ -213,7 +219,7 @@ def budget_table(result: CaseResult) -> TableBlock | None:
 
 
 def _sizes(sizes: np.ndarray[tuple[int], np.dtype[np.float64]]) -> tuple[str, ...]:
-    scaled = sizes * np.array([KMH, KMH, 1.0, 1.0, 1.0])
+    scaled = sizes * np.repeat([speed_factor(), length_factor()], [2, 3])
     return tuple("–" if s < 5e-4 else plain(float(s), 3) for s in scaled)
 
 
@@ -232,7 +238,7 @@ def comparison_table(result: CaseResult) -> TableBlock | None:
             (
                 f"{pair.first} − {pair.second}",
                 *(
-                    about(KMH * float(d), KMH * TWO_SIDED_95 * float(s), "")
+                    about(speed_factor() * float(d), speed_factor() * TWO_SIDED_95 * float(s), "")
                     if math.isfinite(float(d))
                     else "not measured"
                     for d, s in zip(difference, sd, strict=True)
@@ -246,9 +252,9 @@ def comparison_table(result: CaseResult) -> TableBlock | None:
     return TableBlock(
         (
             "recorders",
-            "forward, km/h",
-            "right, km/h",
-            "down, km/h",
+            f"forward, {speed_unit()}",
+            f"right, {speed_unit()}",
+            f"down, {speed_unit()}",
             "chi-square per degree of freedom",
             "probability",
             "consistent",
@@ -296,19 +302,23 @@ def closure_table(result: CaseResult) -> TableBlock | None:
         low, high = (plain(factor * x, places) for x in (figure.low, figure.high))
         return what, plain(factor * figure.value, places), f"{low} to {high}", unit
 
+    per, per_unit = speed_factor(), speed_unit()
     at = "at the contact" if closure.basis == "contact" else "of the centres of mass"
     equivalent = zip((first, second), closure.energy_equivalent_speed, strict=True)
     rows = (
-        row(f"closing speed {at}, along the impulse", closure.closing_speed, KMH, 1, "km/h"),
-        row(f"separation speed {at}", closure.separation_speed, KMH, 1, "km/h"),
+        row(f"closing speed {at}, along the impulse", closure.closing_speed, per, 1, per_unit),
+        row(f"separation speed {at}", closure.separation_speed, per, 1, per_unit),
         row("restitution", closure.restitution, 1.0, 2, ""),
-        row("common velocity along the impulse", closure.common_velocity, KMH, 1, "km/h"),
+        row("common velocity along the impulse", closure.common_velocity, per, 1, per_unit),
         row(f"direction of the impulse on {first}", closure.direction_deg, 1.0, 1, "deg"),
         row(f"mass of {second} over that of {first}", closure.mass_ratio, 1.0, 3, ""),
         row(f"impulse of {first} less that of {second}", closure.magnitude, 1e-3, 2, "kN s"),
         row("heading of the second less the first", closure.relative_heading_deg, 1.0, 1, "deg"),
         row("kinetic energy lost in the contact", closure.energy, 1e-3, 1, "kJ"),
-        *(row(f"energy-equivalent speed of {name}", of, KMH, 1, "km/h") for name, of in equivalent),
+        *(
+            row(f"energy-equivalent speed of {name}", of, per, 1, per_unit)
+            for name, of in equivalent
+        ),
     )
     tested = (
         f"Momentum closes with a probability of {probability_words(closure.probability)} "
@@ -333,8 +343,8 @@ def indices_table(result: CaseResult) -> TableBlock | None:
     mean = None if combined is None else combined.name
     rows = []
     for index in result.indices:
-        factor = KMH if index.unit == "m/s" else 1.0
-        unit = "km/h" if index.unit == "m/s" else index.unit
+        factor = speed_factor() if index.unit == "m/s" else 1.0
+        unit = speed_unit() if index.unit == "m/s" else index.unit
         value, bound = "–", "" if index.because is None else index.because.sentence("file")
         if index.value is not None:
             half = math.inf if index.high is None else factor * (index.high - index.value)
@@ -420,7 +430,7 @@ def reference_tables(result: CaseResult) -> tuple[TableBlock, ...]:
         spec, verdict = answer.spec, "yes" if answer.consistent else "NO"
         who = (spec.name, _name(answer, result))
         if answer.path is not None:
-            errors = (*answer.path.rms, *answer.path.largest)
+            errors = [length_factor() * v for v in (*answer.path.rms, *answer.path.largest)]
             paths.append((*who, *(plain(float(v), 3) for v in errors), verdict))
             continue
         assert spec.delta_v_m_per_s is not None
@@ -450,7 +460,7 @@ def reference_tables(result: CaseResult) -> tuple[TableBlock, ...]:
             ),
             tuple(paths),
             text=(0, 1, 8),
-            caption="Errors of the path, m: this report − reference.",
+            caption=f"Errors of the path, {length_unit()}: this report − reference.",
         ),
     )
     return tuple(table for table in tables if table.rows)
@@ -511,14 +521,14 @@ def _rate(triad: RecordedTriad) -> str:
 
 def units_table(result: CaseResult) -> TableBlock:
     """Mounting position and clock synchronization of each recorder."""
-    rows = []
+    rows, size = [], length_factor()
     for unit, at in zip(result.units, result.reconstruction.synchronised.units, strict=True):
         mounting = unit.mounting
         rows.append(
             (
                 unit.name,
-                " ".join(plain(v, 3) for v in mounting.position)
-                + f" ± {TWO_SIDED_95 * mounting.position_sd:.2g}",
+                " ".join(plain(size * v, 3) for v in mounting.position)
+                + f" ± {size * TWO_SIDED_95 * mounting.position_sd:.2g}",
                 " ".join(plain(v, 1) for v in mounting.angles_deg)
                 + f" ± {TWO_SIDED_95 * mounting.angles_sd_deg:.2g}",
                 "–" if unit.trigger is None else instant(unit.trigger),
@@ -530,7 +540,7 @@ def units_table(result: CaseResult) -> TableBlock:
     return TableBlock(
         (
             "recorder",
-            "forward right down, m",
+            f"forward right down, {length_unit()}",
             "roll pitch heading, deg",
             "trigger on its clock",
             "± ms",

@@ -19,20 +19,26 @@ from strapdown.report.document import KeyFigure
 from strapdown.report.values import (
     AXES,
     GAP,
-    KMH,
     MEAN,
+    SHOWN,
     about,
     angle_range,
     axis_names,
     change_range,
     change_words,
     instant,
+    length_about,
+    length_factor,
+    length_unit,
     moment,
     over_ground,
     plain,
     probability_words,
     side_words,
     speed,
+    speed_factor,
+    speed_unit,
+    speed_words,
 )
 from strapdown.sensors.pre_crash import PreparedUnit
 from strapdown.tables import NED
@@ -56,7 +62,7 @@ def headline(result: CaseResult) -> str:
     if number is None:
         size, axis = unit.events.largest_change, unit.events.largest_axis
         return (
-            f"No event by 49 CFR 563: the {axis} velocity changed by {plain(KMH * size, 1)} km/h "
+            f"No event by 49 CFR 563: the {axis} velocity changed by {speed_words(size)} "
             "at most within 150 ms; an event requires 8 km/h."
         )
     whole = unit.body[number].event
@@ -124,9 +130,9 @@ def key_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
     figures.append(
         KeyFigure(
             f"Final position{of}",
-            f"{plain(math.hypot(place[0], place[1]), 2)} m",
+            f"{plain(length_factor() * math.hypot(place[0], place[1]), 2)} {length_unit()}",
             ", ".join(
-                f"{name}{GAP}{about(p, h, 'm')}"
+                f"{name}{GAP}{length_about(p, h)}"
                 for name, p, h in zip(axis_names(result), place, half, strict=True)
             )
             + f" with 95{GAP}%",
@@ -154,7 +160,7 @@ def lead(result: CaseResult) -> str:
         parts.append(
             f"Within {length:.0f} ms from {moment(whole.delta_v.start)}, the velocity of the "
             f"{result.spec.point.name} changed by {change_words(whole)} ("
-            f"{change_words(whole, unit='m/s')}; all bounds are 95 %), "
+            f"{change_words(whole, unit=SHOWN.get().beside)}; all bounds are 95 %), "
             f"{side_words(forward, right)}. {direction_name(whole).capitalize()}: "
             f"{direction(unit, number)}; {TYPES[unit.types[number].name]}."
         )
@@ -196,8 +202,8 @@ def entry_words(result: CaseResult) -> str:
         at = result.reconstruction.main.path.entry
         size = float(np.linalg.norm(at.velocity))
         return (
-            f"At {instant(at.time)} it moved at {plain(KMH * size, 1)} km/h, by GNSS fixes before "
-            "the impact."
+            f"At {instant(at.time)} it moved at {speed_words(size)}, by GNSS "
+            "fixes before the impact."
         )
     assert entry.speed_m_per_s is not None and entry.speed_sd_m_per_s is not None
     half = TWO_SIDED_95 * entry.speed_sd_m_per_s
@@ -212,8 +218,8 @@ def path_words(result: CaseResult) -> str:
     (ahead, aside, _), (first, second, _) = (axis_names(result), place)
     return (
         f"{instant(unit.path.time[-1])} after the trigger the {result.spec.point.name} was "
-        f"{about(first, half[0], 'm')} {ahead} and {about(second, half[1], 'm')} {aside} of its "
-        f"position at the entry, {_axes(result)}."
+        f"{length_about(first, half[0])} {ahead} and {length_about(second, half[1])} {aside} of "
+        f"its position at the entry, {_axes(result)}."
     )
 
 
@@ -275,9 +281,10 @@ def apart_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
     value = "no event"
     if spans:
         low, high = min(s[0] for s in spans), max(s[1] for s in spans)
-        value = f"{plain(KMH * low, 1)} to {plain(KMH * high, 1)} km/h"
+        ends = [plain(speed_factor() * end, 1) for end in (low, high)]
+        value = f"{' to '.join(ends)} {speed_unit()}"
         if not math.isfinite(high):
-            value = f"above {plain(KMH * low, 1)} km/h"
+            value = f"above {ends[0]} {speed_unit()}"
     return (
         KeyFigure(
             "Delta-V",
@@ -493,7 +500,7 @@ def contradictions(result: CaseResult) -> tuple[tuple[str, str], ...]:
             off = answer.path.errors[NED].iloc[-1].to_numpy()
             half = answer.path.bound[NED].iloc[-1].to_numpy()
             differs = ", ".join(
-                f"{name} {about(float(d), float(h), 'm')}"
+                f"{name} {length_about(float(d), float(h))}"
                 for name, d, h in zip(axis_names(result), off, half, strict=True)
             )
             text = f"Its path differs {at} by {differs} (this report less the reference)."
@@ -733,11 +740,12 @@ def _levers(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     comparison = result.reconstruction.comparison
     bent = np.zeros(3) if comparison is None else comparison.structure.sd
     if longest > 0.0:
-        told = f"{result.spec.point.name}, up to {plain(longest, 2)} m ({name})"
+        far = f"{plain(length_factor() * longest, 2)} {length_unit()}"
+        told = f"{result.spec.point.name}, up to {far} ({name})"
         learnt = (
             f" By their differences the recorders moved against each other with a standard "
-            f"deviation of up to {plain(KMH * float(bent.max()), 1)} km/h while the force acted; "
-            "that is in the bounds, a deformation that all of them share is not."
+            f"deviation of up to {speed_words(float(bent.max()))} while the "
+            "force acted; that is in the bounds, a deformation that all of them share is not."
         )
         yield (
             "rigid-vehicle",
@@ -978,8 +986,15 @@ CONVENTIONS = (
         "95 % (1.96 standard deviations), if the stated and assumed values are right; of a "
         "direction, Fieller's interval",
     ),
-    ("Units", "SI, with km/h for changes of velocity and g = 9.80665 m/s² for accelerations"),
 )
+
+
+def conventions() -> tuple[tuple[str, str], ...]:
+    """Return the conventions, with the units that are shown."""
+    units = SHOWN.get()
+    shown = f"{units.speed} for speeds, {units.length} for lengths, g = 9.80665 m/s² for "
+    shown += "accelerations; drawings of the path, and what is not named, in SI"
+    return (*CONVENTIONS, ("Units", shown))
 
 
 def assumptions(result: CaseResult) -> tuple[tuple[str, str], ...]:
