@@ -172,9 +172,8 @@ def _table_in(system: str, table: pd.DataFrame) -> pd.DataFrame:
     """Table with the columns of a system of units."""
     labels = {str(column): _label(system, str(column)) for column in table.columns}
     factors = {column: factor for column, (_, factor) in labels.items() if factor != 1.0}
-    for column, factor in factors.items():
-        table[column] = factor * table[column]
-    return table.rename(columns={column: name for column, (name, _) in labels.items()})
+    changed = table.assign(**{column: f * table[column] for column, f in factors.items()})
+    return changed.rename(columns={column: name for column, (name, _) in labels.items()})
 
 
 def _json(result: CaseResult) -> dict[str, Any]:
