@@ -143,7 +143,9 @@ def vehicle_indices(unit: UnitReconstruction, number: int) -> tuple[CrashIndex, 
     -----
     The bound is linear in each unknown of the error budget: the difference of the index with the
     acceleration and yaw rate of one standard deviation more, and with the onset of the contact one
-    later. White noise of single samples is not in it. An index that is then undefined has none.
+    later. To ORA and PHD, each the greatest of many means over 10 ms, what the greatest of as many
+    means of white noise is expected to reach is added: sqrt(2 ln m) standard deviations of m. An
+    index that is undefined after a shift has no bound.
     """
     contact = unit.body[number].contact
     time, accel = unit.acceleration.time, unit.acceleration.values
@@ -172,6 +174,11 @@ def vehicle_indices(unit: UnitReconstruction, number: int) -> tuple[CrashIndex, 
     ]
     shifted.append(_evaluate(time, accel, rate, start + contact.start.sd))
     frontal = unit.types[number].name == "front"
+    noise = np.median(effects.force_noise[part], axis=0) / STANDARD_GRAVITY
+    window, step = indices.RIDEDOWN_WINDOW, float(np.median(np.diff(time)))
+    count = max((float(time[-1]) - start) / window, 2.0)
+    greatest = noise * math.sqrt(min(step / window, 1.0) * 2.0 * math.log(count))
+    of_noise = {"ora_x_g": greatest[0], "ora_y_g": greatest[1], "phd": float(max(greatest[:2]))}
     found = []
     for each in _VEHICLE:
         index = CrashIndex(each.name, unit.name, None, each.unit, each.standard, detail=each.detail)
@@ -187,7 +194,11 @@ def vehicle_indices(unit: UnitReconstruction, number: int) -> tuple[CrashIndex, 
         low = high = None
         if all(isinstance(other, float) for other in others):
             half = TWO_SIDED_95 * math.dist([value] * len(others), others)  # type: ignore[arg-type]
+            half += float(of_noise.get(each.key, 0.0))
             low, high = value - half, value + half
+            if each.signed and each.key in of_noise and half >= abs(value):
+                # The greatest by size may be that of the other sign.
+                low, high = -abs(value) - half, abs(value) + half
             low = low if each.signed else max(low, 0.0)
         least = unit.body[number].event.at_least
         found.append(replace(index, value=value, low=low, high=high, at_least=least))

@@ -231,8 +231,9 @@ def elevation_dial(
             out.text(at, f"{plain(elevation, 0)}°", SMALL, _SOFT, anchor="middle")
     out.line(centre, _at(centre, _RADIUS, turned(0.0)), "#c3cad2", 1.0, "dash")
     if math.isfinite(main.vertical_deg):
-        at = turned(main.vertical_deg)
-        out.arrow(_at(centre, 0.85 * _RADIUS, at), _at(centre, 0.15 * _RADIUS, at), VERMILLION, 4.0)
+        there = turned(main.vertical_deg)
+        tail, tip = (_at(centre, share * _RADIUS, there) for share in (0.85, 0.15))
+        out.arrow(tail, tip, VERMILLION, 4.0)
     _recorders(
         out,
         centre,
