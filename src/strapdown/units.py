@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError
@@ -23,12 +24,16 @@ __all__ = [
     "GYRO_UNITS",
     "LENGTHS",
     "MAG_UNITS",
+    "MASSES",
+    "MOMENTS",
     "OF_CRASHES",
     "OF_LOGS",
     "OF_TABLES",
     "PRESSURES",
+    "SHOWN_UNITS",
     "SPEEDS",
     "TIME_UNITS",
+    "ShownUnits",
     "factor_of",
     "find_unit",
     "parse_unit",
@@ -52,6 +57,7 @@ ACCEL_UNITS: dict[str, float] = {
     "m/s2": 1.0,
     "g": STANDARD_GRAVITY,
     "mg": 1e-3 * STANDARD_GRAVITY,
+    "ft/s2": 0.3048,
     # Sensors that report gravity instead of specific force, as iOS does.
     "-m/s2": -1.0,
     "-g": -STANDARD_GRAVITY,
@@ -94,8 +100,34 @@ LENGTHS: dict[str, float] = {
 }
 
 #: Factors to N, and to Pa.
-FORCES: dict[str, float] = {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605}
+FORCES: dict[str, float] = {"N": 1.0, "kN": 1e3, "lbf": 4.4482216152605, "kip": 4448.2216152605}
+#: Factors to N m, and to kg.
+MOMENTS: dict[str, float] = {
+    "N*m": 1.0,
+    "kN*m": 1e3,
+    "lbf*ft": 4.4482216152605 * 0.3048,
+    "lbf*in": 4.4482216152605 * 0.0254,
+}
+MASSES: dict[str, float] = {"kg": 1.0, "lb": 0.45359237, "t": 1e3}
 PRESSURES: dict[str, float] = {"Pa": 1.0, "hPa": 100.0, "kPa": 1000.0, "mbar": 100.0, "bar": 1e5}
+
+
+@dataclass(frozen=True)
+class ShownUnits:
+    """Units of a crash report: of speeds, with another beside it, lengths and masses."""
+
+    speed: str
+    beside: str
+    length: str
+    mass: str
+
+
+#: Systems that a case may choose.
+SHOWN_UNITS: dict[str, ShownUnits] = {
+    "metric": ShownUnits("km/h", "m/s", "m", "kg"),
+    "si": ShownUnits("m/s", "km/h", "m", "kg"),
+    "us": ShownUnits("mph", "ft/s", "ft", "lb"),
+}
 
 #: Units of each quantity, with their factors.
 FACTORS: dict[str, dict[str, float]] = {
@@ -108,6 +140,7 @@ FACTORS: dict[str, dict[str, float]] = {
     "velocity": SPEEDS,
     "displacement": LENGTHS,
     "force": FORCES,
+    "moment": MOMENTS,
     "pressure": PRESSURES,
 }
 #: Quantities whose units a log, a table of positions and a crash record may state. Where two have
@@ -128,6 +161,7 @@ _SPELLINGS = {
     "deg/h": "deg/h deg/hr °/h °/hr",
     "m/s2": "m/s2 m/s^2 m/s² m/s**2 m/s/s m/sec2 m/sec^2 m/(s*s) m/(s^2) m/s*s m/ss ms2 ms^2 ms-2 "
     "mps2 m_per_s_2 m·s-2 m*s^-2 meters/sec/sec meters/s2 meters/s^2",
+    "ft/s2": "ft/s2 ft/s^2 ft/s² ft/s**2 ft/sec2 ft/sec^2 ft/s/s fps2 feet/s2",
     "g": "g g0 gs g's g`s g-force gn g_n",
     "mg": "mg milli-g",
     "m/s": "m/s m/sec mps m·s-1 meter/s meters/s meters/second metres/s metres/second",
@@ -159,6 +193,11 @@ _SPELLINGS = {
     "N": "n newton newtons nwt",
     "kN": "kn kilonewton kilonewtons",
     "lbf": "lbf lbs",
+    "kip": "kip kips",
+    "N*m": "n*m nm n-m n·m newtonmeter newtonmeters nwm",
+    "kN*m": "kn*m knm kn-m kn·m",
+    "lbf*ft": "lbf*ft lbf-ft lbfft ft-lbf ft-lb ftlb lb-ft lbft",
+    "lbf*in": "lbf*in lbf-in lbfin in-lbf in-lb inlb lb-in lbin",
     "Pa": "pa",
     "hPa": "hpa",
     "kPa": "kpa",

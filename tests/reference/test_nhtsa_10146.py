@@ -15,7 +15,16 @@ import pymap3d
 import pytest
 
 from strapdown import rotation
-from strapdown.crash.indices import asi, flail_space, from_start, hic, integrals, olc, thiv
+from strapdown.crash.indices import (
+    asi,
+    exceeded_level,
+    flail_space,
+    from_start,
+    hic,
+    integrals,
+    olc,
+    thiv,
+)
 from strapdown.crash.severity import find_severity_model, injury_risk
 from strapdown.dsp.channel_class import cfc_filter
 from strapdown.formats.crash_nhtsa import accelerations, imu_of
@@ -299,6 +308,60 @@ class TestHeads:
         # Far below the limit of 700 of FMVSS 208, as in every car of its year; twins differ by
         # 2.5 times what their gains do.
         assert found == pytest.approx([hic15, hic15], rel=0.01)
+
+    @pytest.mark.parametrize(
+        ("numbers", "hic15", "hic36", "clip"),
+        [
+            (DRIVER, 139.1478979007297, 268.3036430006184, 41.866199078135445),
+            (DRIVER_TWIN, 139.13344058399156, 269.38446883251737, 41.988650436136616),
+            (PASSENGER, 333.1044978380418, 547.8043836095833, 57.259242121458236),
+            (PASSENGER_TWIN, 329.87871450530747, 543.9780609149768, 56.72343546070451),
+        ],
+    )
+    def test_indices_of_the_heads_by_pyisomme(self, test, numbers, hic15, hic36, clip):
+        """Values of pyisomme 1.1.0 (MIT licence), from the same files by its own filter."""
+        channels = [test.channel(n).table["value"] for n in numbers]
+        time = channels[0].index.to_numpy()
+        accel = np.column_stack([cfc_filter(c.to_numpy(), STEP, 1000) for c in channels])
+        for longest, value in ((0.015, hic15), (0.036, hic36)):
+            # Its longest window ends a sample before ours wherever the stamps are so rounded.
+            shorter, whole = (hic(time, accel, longest=s).value for s in (longest - STEP, longest))
+            assert shorter * (1.0 - 1e-6) <= value <= whole * (1.0 + 1e-6)
+            assert shorter == pytest.approx(whole, rel=0.01)
+        size = np.sqrt((accel**2).sum(axis=1)) / G
+        assert exceeded_level(time, size) == pytest.approx(clip, rel=1e-6)
+
+    def test_occupant_load_criterion_by_pyisomme(self, pulse):
+        # pyisomme 1.1.0: 29.671 g, at samples; a sample of 0.1 ms of some 30 ms is 0.3 %.
+        assert olc(*pulse).value_g == pytest.approx(29.671, rel=0.004)
+
+
+def test_the_case_has_the_indices_of_vehicle_and_occupants(recordings, tmp_path):
+    from strapdown import reconstruct
+
+    folder = recordings("crash_nhtsa_10146")
+    text = (Path(__file__).parent / "cases" / "nhtsa_10146.toml").read_text(encoding="utf-8")
+    case = tmp_path / "case.toml"
+    case.write_text(text.replace("STRAPDOWN_DATA", folder.parent.as_posix()), encoding="utf-8")
+    found = reconstruct(case).indices
+    head = {i.channels: i.value for i in found if i.name == "HIC15"}
+    assert set(head) == {
+        tuple(str(n) for n in numbers)
+        for numbers in (DRIVER, DRIVER_TWIN, PASSENGER, PASSENGER_TWIN)
+    }
+    # As recorded, instead of less the mean before the impact: 0.05 g of some 40 g.
+    assert head["1", "2", "3"] == pytest.approx(140.0, rel=0.005)
+    vehicle = {(i.name, i.standard): i for i in found if not i.channels}
+    # At the common stamps of 200 Hz, beside those of all samples in CFC 180 above.
+    for key, value in (
+        (("OLC", "Euro NCAP TB 027"), 29.6),
+        (("ASI", "EN 1317-1:2010"), 2.73),
+        (("ASI", "EN 1317-1:1998"), 2.37),
+        (("THIV", "EN 1317-1; MASH"), 64.6 / 3.6),
+    ):
+        index = vehicle[key]
+        assert index.low < value < index.high
+        assert index.value == pytest.approx(value, rel=0.015)
 
 
 def test_a_case_that_names_the_header_is_the_same_from_its_sealed_copy(recordings, tmp_path):

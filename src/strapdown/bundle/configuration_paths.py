@@ -10,37 +10,39 @@ from typing import Any
 def names_file(key: str, value: Any) -> bool:
     """Whether a value of a configuration is the path of an input.
 
-    `key`: name of the field. `value`: a path; for a sensor, a file path with its suffix, or a name
-    of the catalogue.
+    `key`: name of the field, of a list that of the list. `value`: a path; for a sensor or a model
+    of severity, a file path with its suffix, or a name of the catalogue.
     """
     if not isinstance(value, str):
         return False
-    return key.endswith("path") or (key == "sensor" and value.lower().endswith(".toml"))
+    return key.endswith("path") or (
+        key in ("sensor", "severity") and value.lower().endswith(".toml")
+    )
 
 
-def named_paths(value: Any) -> Iterator[str]:
-    """Every path of an input in a configuration."""
+def named_paths(value: Any, key: str = "") -> Iterator[str]:
+    """Every path of an input in a configuration; `key`: that of the value."""
     if isinstance(value, list):
         for item in value:
-            yield from named_paths(item)
-    for key, item in value.items() if isinstance(value, dict) else ():
-        if names_file(key, item):
-            yield item
-        yield from named_paths(item)
+            yield from named_paths(item, key)
+    elif isinstance(value, dict):
+        for name, item in value.items():
+            yield from named_paths(item, name)
+    elif names_file(key, value):
+        yield value
 
 
-def with_paths(value: Any, change: Callable[[str], str]) -> Any:
+def with_paths(value: Any, change: Callable[[str], str], key: str = "") -> Any:
     """Return a configuration with every path of an input replaced.
 
-    `value`: the configuration, or a part. `change`: maps a path to its replacement.
+    `value`: the configuration, or a part. `change`: maps a path to its replacement. `key`: that of
+    the value.
     """
     if isinstance(value, dict):
-        return {
-            k: change(v) if names_file(k, v) else with_paths(v, change) for k, v in value.items()
-        }
+        return {k: with_paths(v, change, k) for k, v in value.items()}
     if isinstance(value, list):
-        return [with_paths(v, change) for v in value]
-    return value
+        return [with_paths(v, change, key) for v in value]
+    return change(value) if names_file(key, value) else value
 
 
 def resolved(value: Any, root: Path) -> Any:

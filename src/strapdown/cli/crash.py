@@ -86,6 +86,7 @@ def crash(
     )
     from strapdown.cli.result_folder import default_folder, refuse_result
     from strapdown.report.crash_tables import closure_table
+    from strapdown.report.values import shown_in
 
     for case in cases:
         refuse_result(case, "case")
@@ -112,10 +113,12 @@ def crash(
         console().print(run.spec.title, style="bold")
         if several:
             console().print(run.vehicle_names[run.number - 1], style="bold")
-        print_crash(run)
+        with shown_in(run.spec.options.units):
+            print_crash(run)
         print_findings(run.findings)
         print_seal(seal, "report.html")
-    both = closure_table(result)
+    with shown_in(result.spec.options.units):
+        both = closure_table(result)
     if both is not None:
         console().print("Closure of both vehicles", style="bold")
         print_block(both)
@@ -124,15 +127,27 @@ def crash(
 def print_crash(result: CaseResult) -> None:
     """Print the results of a case, and their limits."""
     from strapdown.cli.console import console, print_block
-    from strapdown.report.crash_tables import answers_table, comparison_table, path_table
-    from strapdown.report.crash_words import headline, limitations
+    from strapdown.report.crash_tables import (
+        answers_table,
+        comparison_table,
+        indices_table,
+        path_table,
+        severity_table,
+    )
+    from strapdown.report.crash_words import contradictions, headline, limitations
     from strapdown.report.values import spaced
 
     out = console()
-    for block in (answers_table(result), path_table(result), comparison_table(result)):
+    tables = (answers_table, path_table, comparison_table, severity_table, indices_table)
+    for block in (table(result) for table in tables):
         if block is not None and block.rows:
             print_block(block)
     out.print(spaced(headline(result)), style="bold")
+    against = contradictions(result)
+    if against:
+        out.print("\nThese contradict the answer:")
+        for source, text in against:
+            out.print(f"  - {spaced(f'{source}: {text}' if source else text)}")
     found = limitations(result)
     if found:
         out.print("\nLimitations (details in the report):")

@@ -267,10 +267,13 @@ class OptionsSpec(Spec):
         default=0.8, description="largest coefficient of friction of the tires on the road"
     )
     #: None selects those that apply to the crash type.
-    severity: Annotated[tuple[Word, ...] | None, Several] = Field(
-        default=None, description="names of models of injury risk"
+    severity: Annotated[tuple[FileName, ...] | None, Several] = Field(
+        default=None, description="names of models of injury risk, or .toml files of your own"
     )
     severity_inputs: dict[Word, Input] = Field(default_factory=dict)
+    units: Literal["metric", "si", "us"] = Field(
+        default="metric", description="units of the report: metric (km/h, m), si (m/s, m) or us"
+    )
     formats: Annotated[tuple[Literal["csv", "mme"], ...], Several] = ("csv",)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 from strapdown.config.crash_case import AssumedSpec, CaseSpec, TriadSpec, UnitSpec, VehicleSpec
 from strapdown.config.spec import At, Fault, missing
 from strapdown.config.toml_file import KeyPath
-from strapdown.crash.severity import SEVERITY_MODELS
+from strapdown.crash.severity import SEVERITY_MODELS, load_severity_model
 from strapdown.errors import Finding, StrapdownError
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.crash_unit import LONGEST as LONGEST_ASSUMED
@@ -496,7 +496,20 @@ def _options(spec: CaseSpec) -> Iterator[Fault]:
     names = options.severity or ()
     for k, name in enumerate(names):
         path = ("options", "severity", k)
-        if name not in SEVERITY_MODELS:
+        if name.lower().endswith(".toml"):
+            try:
+                load_severity_model(name)
+            except StrapdownError as error:
+                of = error.finding
+                if of.quantity and of.line:
+                    told = {"line": of.line, "part": of.quantity, "reason": of}
+                    yield fault(path, "config.severity-key-refused", **told)
+                else:
+                    yield fault(path, "config.severity-file-refused", reason=of)
+                continue
+            if name in names[:k]:
+                yield fault(path, "config.severity-model-repeated")
+        elif name not in SEVERITY_MODELS:
             data = {"word": name, "known": SEVERITY_MODELS}
             yield fault(path, "config.unknown-severity-model", **data)
         elif name in names[:k]:

@@ -143,7 +143,7 @@ MOST_NAMES = 10_000
 
 
 def _with_absolute_paths(file: TomlFile) -> tuple[dict[str, Any], list[Fault]]:
-    """The table with every ``path``, and every ``sensor`` that is a file, as an absolute path."""
+    """The table, with an absolute path for every key that names a file."""
     faults: list[Fault] = []
 
     def resolved(node: Any, path: KeyPath) -> Any:
@@ -154,7 +154,9 @@ def _with_absolute_paths(file: TomlFile) -> tuple[dict[str, Any], list[Fault]]:
         # What cannot name a file is refused by the form.
         if not isinstance(node, str) or not node.isprintable() or not node.strip():
             return node
-        if path[-1] != "path" and not (path[-1] == "sensor" and node.lower().endswith(".toml")):
+        key = next((k for k in reversed(path) if isinstance(k, str)), "")
+        own = key in ("sensor", "severity") and node.lower().endswith(".toml")
+        if key != "path" and not own:
             return node
         found = _find(file.path, path, node)
         if isinstance(found, str):

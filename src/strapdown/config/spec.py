@@ -40,7 +40,12 @@ from strapdown.errors import ConfigError, Finding
 #: with and the one to divide by: 600 mm are 0.6 m to the last bit.
 UNITS: dict[str, dict[str, tuple[float, float]]] = {
     "_m_per_s2": {"_m_per_s2": (1.0, 1.0), "_g": (STANDARD_GRAVITY, 1.0)},
-    "_m_per_s": {"_m_per_s": (1.0, 1.0), "_km_per_h": (1.0, 3.6), "_mph": (0.44704, 1.0)},
+    "_m_per_s": {
+        "_m_per_s": (1.0, 1.0),
+        "_km_per_h": (1.0, 3.6),
+        "_mph": (0.44704, 1.0),
+        "_ft_per_s": (0.3048, 1.0),
+    },
     "_m": {
         "_m": (1.0, 1.0),
         "_mm": (1.0, 1000.0),
@@ -55,7 +60,7 @@ UNITS: dict[str, dict[str, tuple[float, float]]] = {
     "_hz": {"_hz": (1.0, 1.0)},
 }
 #: Units that are accepted and not suggested.
-_SELDOM = ("_in", "_ft", "_lb", "_g")
+_SELDOM = ("_in", "_ft", "_ft_per_s", "_lb", "_g")
 
 
 @cache

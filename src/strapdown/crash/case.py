@@ -22,6 +22,7 @@ from strapdown.config.crash_case import (
     VehicleSpec,
 )
 from strapdown.constants import TWO_SIDED_95
+from strapdown.crash.case_indices import CrashIndex, occupant_indices, vehicle_indices
 from strapdown.crash.closure import (
     Blame,
     Closure,
@@ -105,6 +106,9 @@ class CaseResult:
         With the other vehicle, the first being that of the first case.
     blame : Blame or None
         What would explain that the two do not close.
+    indices : tuple of CrashIndex
+        Of the vehicle in its severest event, by the main answer; then of the occupants whose
+        channels the records have.
     """
 
     spec: CaseSpec
@@ -120,6 +124,7 @@ class CaseResult:
     partners: tuple[CaseSpec, ...] = ()
     closure: Closure | None = None
     blame: Blame | None = None
+    indices: tuple[CrashIndex, ...] = ()
 
     @property
     def vehicle_names(self) -> tuple[str, ...]:
@@ -244,7 +249,20 @@ def run_case(
         case_severity(spec, made.main),
         references,
         tuple(dict.fromkeys(findings)),
+        indices=_indices(spec, records, made.main),
     )
+
+
+def _indices(
+    spec: CaseSpec, records: Mapping[str, CrashRecord], main: UnitReconstruction
+) -> tuple[CrashIndex, ...]:
+    """Indices of the vehicle, and of the occupants of that vehicle in its records."""
+    number = main_event(main)
+    of_vehicle = () if number is None else vehicle_indices(main, number)
+    names = {(t.path, name.lstrip("-")) for t in _triads(spec) for name in t.channels.values()}
+    channels = [c for path, r in records.items() for c in r.channels if (path, c.name) in names]
+    vehicles = {c.vehicle for c in channels}
+    return of_vehicle + occupant_indices(tuple(records.values()), tuple(vehicles))
 
 
 def whole_records(spec: CaseSpec) -> tuple[dict[str, CrashRecord], CaseSpec]:
@@ -289,6 +307,8 @@ def _inputs(
     given += [("record", path, record.files) for path, record in records.items()]
     # Only the files of sensors that are not of the catalogue.
     given += [("sensor", s, (Path(s),)) for s in dict.fromkeys(sensors) if s.lower() not in SENSORS]
+    models = (m for m in spec.options.severity or () if m not in SEVERITY_MODELS)
+    given += [("severity", m, (Path(m),)) for m in dict.fromkeys(models)]
     others = [("reference", r.path) for r in spec.references if r.path is not None]
     others += [("fixes", spec.entry.path)] if spec.entry.path is not None else []
     given += [(role, path, files_of(path)) for role, path in dict.fromkeys(others)]
@@ -648,12 +668,14 @@ class SeverityAnswer:
     """Severity by one model, or the finding because of which it does not apply.
 
     `at_least`: delta-V is a lower bound, and so is the probability; its upper bound does not hold.
+    `of`: the recorder, or the mean, whose delta-V it takes.
     """
 
     model: SeverityModel
     risk: InjuryRisk | None
     because: Finding | None = None
     at_least: bool = False
+    of: str = ""
 
 
 def main_event(unit: UnitReconstruction) -> int | None:
@@ -689,8 +711,8 @@ def case_severity(spec: CaseSpec, unit: UnitReconstruction) -> tuple[SeverityAns
         try:
             risk = injury_risk(model, inputs, sd)
         except DataError as error:
-            answers.append(SeverityAnswer(model, None, error.finding))
+            answers.append(SeverityAnswer(model, None, error.finding, of=unit.name))
         else:
             least = whole.at_least and "delta_v" in model.inputs
-            answers.append(SeverityAnswer(model, risk, at_least=least))
+            answers.append(SeverityAnswer(model, risk, at_least=least, of=unit.name))
     return tuple(answers)

@@ -1,4 +1,4 @@
-"""Crash indices: ASI, HIC, OLC, flail space, THIV and PHD."""
+"""Crash indices: ASI, HIC, 3 ms level, Nij, OLC, flail space, THIV and PHD."""
 
 from __future__ import annotations
 
@@ -378,6 +378,144 @@ def hic(time: ArrayLike, accel: ArrayLike, *, longest: float = 0.015) -> Hic:
         if values[k] > best[0]:
             best = (float(values[k]), k, k + apart)
     return Hic(best[0], float(t[best[1]]), float(t[best[2]]), longest)
+
+
+# Level exceeded for 3 ms.
+
+
+def exceeded_level(time: ArrayLike, values: ArrayLike, *, duration: float = 0.003) -> float:
+    """Highest level that a quantity reaches or exceeds for a cumulative duration.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+    values : array_like, (n,)
+        As the resultant acceleration of head (class CFC 1000) or chest (CFC 180).
+    duration : float, s
+        Sum of all intervals above the level.
+
+    Returns
+    -------
+    float
+        In the unit of the values.
+
+    Raises
+    ------
+    DataError
+        The shapes, values or times are not valid; the record is shorter than the duration.
+    ConfigError
+        `duration` is not a positive, finite time.
+
+    Notes
+    -----
+    "shall not exceed 60 g's except for intervals whose cumulative duration is not more than 3
+    milliseconds" (49 CFR 571.208, S6.3). Exact for values that are linear between samples.
+    """
+    if not (math.isfinite(duration) and duration > 0.0):
+        raise ConfigError("crash.no-length-window", quantity="duration", longest=duration)
+    t, v = checked(time, values, None, "values")
+    if t[-1] - t[0] < duration * (1.0 - 1e-9):
+        raise DataError(
+            "crash.record-shorter-than-window", quantity="time", time=t[-1] - t[0], width=duration
+        )
+    step = np.diff(t)
+    low, high = np.minimum(v[:-1], v[1:]), np.maximum(v[:-1], v[1:])
+    rise = np.where(high > low, high - low, 1.0)
+
+    def above(level: float) -> float:
+        share = np.where(high > low, np.clip((high - level) / rise, 0.0, 1.0), high >= level)
+        return float((step * share).sum())
+
+    # The time above falls with the level, between two sample values along a straight line, and by a
+    # jump at a value that lasts.
+    levels = np.unique(v)
+    first, last = 0, levels.size
+    while last - first > 1:
+        middle = (first + last) // 2
+        first, last = (middle, last) if above(levels[middle]) >= duration else (first, middle)
+    if last == levels.size:
+        return float(levels[first])
+    lower, upper = float(levels[first]), float(levels[last])
+    span = upper - lower
+    near, far = above(lower + 0.25 * span), above(lower + 0.75 * span)
+    if near <= far:
+        return lower
+    return float(
+        np.clip(lower + span * (0.25 + 0.5 * (near - duration) / (near - far)), lower, upper)
+    )
+
+
+# Normalized neck injury criterion.
+
+
+#: Critical values of an in-position dummy: tension N, compression N, flexion N m, extension N m.
+#: Hybrid III of a mid-sized man (49 CFR 571.208, S6.6) and of a small woman (S15.3.6).
+NECK_INTERCEPTS: dict[str, tuple[float, float, float, float]] = {
+    "H3": (6806.0, 6160.0, 310.0, 135.0),
+    "HF": (4287.0, 3880.0, 155.0, 67.0),
+}
+#: From the upper neck load cell down to the occipital condyle of both, m.
+CONDYLE = 0.01778
+
+
+@dataclass(frozen=True)
+class Nij:
+    """Normalized neck injury criterion of a record.
+
+    Attributes
+    ----------
+    value : float
+    kind : {'tension-flexion', 'tension-extension', 'compression-flexion', 'compression-extension'}
+        Load that gives the maximum.
+    at : float, s
+    """
+
+    value: float
+    kind: str
+    at: float
+
+
+def nij(
+    time: ArrayLike,
+    force_x: ArrayLike,
+    force_z: ArrayLike,
+    moment_y: ArrayLike,
+    *,
+    intercepts: tuple[float, float, float, float] = NECK_INTERCEPTS["H3"],
+) -> Nij:
+    """Normalized neck injury criterion of an upper neck load cell.
+
+    Parameters
+    ----------
+    time : array_like, (n,), s
+    force_x, force_z : array_like, (n,), N
+        Shear and axial force by the signs of SAE J211: tension is positive. Of class CFC 600.
+    moment_y : array_like, (n,), N m
+        At the load cell; flexion is positive. Of class CFC 600.
+    intercepts : tuple of float
+        As `NECK_INTERCEPTS`.
+
+    Raises
+    ------
+    DataError
+        The shapes, values or times are not valid.
+
+    Notes
+    -----
+    ``|Fz|/Fzc + |Mocy|/Myc`` with the moment about the occipital condyle ``Mocy = My - 0.01778 m
+    Fx`` (49 CFR 571.208, S6.6). At every instant one of the four has its critical values.
+    """
+    t, fz = checked(time, force_z, None, "force_z")
+    fx = checked(time, force_x, None, "force_x")[1]
+    moment = checked(time, moment_y, None, "moment_y")[1] - CONDYLE * fx
+    tension, compression, flexion, extension = intercepts
+    values = np.where(fz >= 0.0, fz / tension, -fz / compression)
+    values += np.where(moment >= 0.0, moment / flexion, -moment / extension)
+    k = int(np.argmax(values))
+    kind = f"{'tension' if fz[k] >= 0.0 else 'compression'}-"
+    return Nij(
+        float(values[k]), kind + ("flexion" if moment[k] >= 0.0 else "extension"), float(t[k])
+    )
 
 
 # Occupant load criterion.

@@ -1168,7 +1168,6 @@ def record_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skipp
 
 # Triads of a laboratory test: one per sensor position on the vehicle, of primary channels.
 
-_FAILED = ("failed", "no data", "questionable", "meaningless")
 # Sensors of crash laboratories, after calibration by SAE J211: unit of the full scale, and error
 # model. Zeroed channels have lost gravity with their bias.
 LABORATORY = {
@@ -1203,7 +1202,6 @@ def laboratory_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[S
     elsewhere: dict[tuple[str, str], list[str]] = {}
     for channel in record.channels:
         sensed = channel.quantity in LABORATORY
-        failed = (r for r in channel.remarks if any(f in r.lower() for f in _FAILED))
         if not sensed or not channel.axis:
             what = "no axis" if sensed else channel.quantity
             why = f"no sensor of a vehicle's motion ({what})"
@@ -1211,8 +1209,8 @@ def laboratory_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[S
         elif channel.body != "vehicle":
             why = f"it {'moves with' if channel.vehicle else 'is fixed to'} the {channel.body}"
             elsewhere.setdefault((channel.vehicle, why), []).append(channel.name)
-        elif failure := next(failed, ""):
-            why = f"the laboratory says so: {failure}"
+        elif channel.failure:
+            why = f"the laboratory says so: {channel.failure}"
             skipped.append(
                 Skipped(path, f"channel {channel.name}", why, (channel.name,), channel.vehicle)
             )

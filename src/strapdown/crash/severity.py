@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
+import numpy as np
+
+from strapdown.config.toml_file import KeyPath, TomlFile, read_toml
 from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.units import SPEEDS as ALL_SPEEDS
 
@@ -53,6 +55,9 @@ class SeverityModel:
         By input, the categories for which the model is valid: ``{"crash_type": ("front",)}``.
     note : str
         Origin of the coefficients and of the validity range.
+    covariance : tuple of tuple of float
+        Of the intercept and of the coefficients in the order of the terms; empty where the source
+        states none. Of standard errors alone it is diagonal.
     """
 
     name: str
@@ -66,6 +71,7 @@ class SeverityModel:
     validity: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     applies: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     note: str = ""
+    covariance: tuple[tuple[float, ...], ...] = ()
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -91,10 +97,14 @@ class InjuryRisk:
     model : SeverityModel
     probability : float
     low, high : float
-        Bound from the uncertainty of the inputs alone, without that of the coefficients.
+        Bound from the uncertainty of the inputs and, where the model has their covariance, of the
+        coefficients.
     coverage : float
         Of the bound.
     logit, logit_sd : float
+    model_sd : float or None
+        Part of the logit's standard deviation that is the model's; None where its source states
+        none, and the bound leaves it out.
     findings : tuple of Finding
     """
 
@@ -106,6 +116,7 @@ class InjuryRisk:
     logit: float
     logit_sd: float
     findings: tuple[Finding, ...] = ()
+    model_sd: float | None = None
 
 
 def injury_risk(
@@ -140,7 +151,8 @@ def injury_risk(
     Notes
     -----
     The logistic function is monotone, so the bound is that of the logit transformed by it; for
-    untransformed inputs (no log, no square) and normal errors it is exact.
+    untransformed inputs (no log, no square) and normal errors it is exact. The variance of the
+    logit by the coefficients is ``x' V x`` with their covariance V and x = (1, transformed inputs).
     """
     from scipy.special import expit, ndtri
 
@@ -149,18 +161,26 @@ def injury_risk(
     findings = list(_validity(model, inputs, spread, float(ndtri(0.5 + 0.5 * coverage)), outside))
     logit, variance = model.intercept, 0.0
     slopes: dict[str, float] = {}
+    regressors = [1.0]
     for term in model.terms:
         given = _given(model, inputs, term.input)
         if term.equals is not None:
-            logit += term.coefficient if given == term.equals else 0.0
+            regressors.append(1.0 if given == term.equals else 0.0)
+            logit += term.coefficient * regressors[-1]
             continue
         value = _value(model, term.input, given)
         made, slope = _transformed(model, term, value)
+        regressors.append(made)
         logit += term.coefficient * made
         slopes[term.input] = slopes.get(term.input, 0.0) + term.coefficient * slope
     for name, slope in slopes.items():
         factor = SPEEDS.get(model.unit(name), 1.0)
         variance += (slope * spread.get(name, 0.0) / factor) ** 2
+    own = None
+    if model.covariance:
+        x = np.array(regressors)
+        own = float(x @ np.array(model.covariance) @ x)
+        variance += own
     reach = float(ndtri(0.5 + 0.5 * coverage)) * math.sqrt(variance)
     return InjuryRisk(
         model,
@@ -171,6 +191,7 @@ def injury_risk(
         logit,
         math.sqrt(variance),
         tuple(findings),
+        None if own is None else math.sqrt(max(own, 0.0)),
     )
 
 
@@ -326,13 +347,16 @@ SEVERITY_MODELS: dict[str, SeverityModel] = {
 
 
 def find_severity_model(name: str) -> SeverityModel:
-    """Return a model by its name.
+    """Return a model by its name, or that of a file that ends in ``.toml``.
 
     Raises
     ------
     ConfigError
-        There is none of that name; the message suggests the nearest.
+        There is none of that name, and the message suggests the nearest; or as
+        `load_severity_model`.
     """
+    if name.lower().endswith(".toml"):
+        return load_severity_model(name)
     check_choice("crash.no-severity-model", SEVERITY_MODELS, quantity="severity model", name=name)
     return SEVERITY_MODELS[name]
 
@@ -341,9 +365,13 @@ def find_severity_model(name: str) -> SeverityModel:
 
 
 TEXTS = ("title", "author", "table", "outcome")
-TOP = (*TEXTS, "year", "intercept", "terms", "validity", "applies", "note")
-NUMBER_TERM = ("input", "unit", "coefficient", "transform")
-CATEGORY_TERM = ("input", "equals", "coefficient")
+TOP = (
+    *TEXTS,
+    *("year", "intercept", "terms", "validity", "applies", "note"),
+    *("covariance", "intercept_standard_error"),
+)
+NUMBER_TERM = ("input", "unit", "coefficient", "transform", "standard_error")
+CATEGORY_TERM = ("input", "equals", "coefficient", "standard_error")
 
 
 def load_severity_model(path: str | Path) -> SeverityModel:
@@ -357,15 +385,17 @@ def load_severity_model(path: str | Path) -> SeverityModel:
         Each term has ``input``, ``unit`` and ``coefficient`` (and ``transform``: identity, log or
         square), or, for a category, ``input``, ``equals`` and ``coefficient``. ``[validity]`` gives
         ``input = [least, greatest]`` in the unit of its term, ``[applies]`` gives
-        ``input = ["category", ...]``.
+        ``input = ["category", ...]``. For the bound, ``covariance`` is the matrix of the intercept
+        and of the coefficients in the order of the terms; or ``intercept_standard_error`` and the
+        ``standard_error`` of every term, whose correlations are then taken as zero.
 
     Raises
     ------
     ConfigError
-        The file is missing or not in this form; the message names the key.
+        The file is missing or not in this form; the message names the line and the key.
     """
-    file = Path(path)
-    table = _table(file)
+    file = read_toml(Path(path))
+    table = file.table
     _known(file, table, TOP, "")
     texts = {key: _text(file, table, key) for key in TEXTS}
     year = table.get("year")
@@ -376,27 +406,56 @@ def load_severity_model(path: str | Path) -> SeverityModel:
         raise _bad(file, "note", "crash.no-text")
     terms = _terms(file, table)
     return SeverityModel(
-        name=file.stem,
+        name=file.path.stem,
         year=year,
         intercept=_number(file, table.get("intercept"), "intercept"),
         terms=terms,
         validity=_ranges(file, table.get("validity", {}), terms),
         applies=_applies(file, table.get("applies", {})),
         note=note,
+        covariance=_covariance(file, table),
         **texts,
     )
 
 
-def _table(file: Path) -> dict[str, Any]:
-    if not file.is_file():
-        raise ConfigError("crash.no-such-file", file=str(file))
-    try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ConfigError("crash.no-toml", file=file.name, error=error) from None
+def _covariance(file: TomlFile, table: Mapping[str, Any]) -> tuple[tuple[float, ...], ...]:
+    """Covariance of the coefficients: as stated, or of standard errors; empty without either."""
+    rows = table["terms"]
+    names = [
+        "intercept_standard_error",
+        *(f"terms {k + 1}.standard_error" for k in range(len(rows))),
+    ]
+    given = [table.get(names[0]), *(row.get("standard_error") for row in rows)]
+    known = [name for name, value in zip(names, given, strict=True) if value is not None]
+    if "covariance" not in table:
+        if not known:
+            return ()
+        if len(known) < len(names):
+            lacks = next(name for name in names if name not in known)
+            raise _bad(file, lacks, "crash.standard-error-missing", given=known[0])
+        errors = [_number(file, v, n) for n, v in zip(names, given, strict=True)]
+        for name, error in zip(names, errors, strict=True):
+            if error < 0.0:
+                raise _bad(file, name, "crash.standard-error-negative", value=error)
+        return tuple(tuple(row) for row in np.diag(np.square(errors)).tolist())
+    if known:
+        raise _bad(file, known[0], "crash.covariance-and-standard-errors")
+    stated = table["covariance"]
+    size = len(names)
+    square = isinstance(stated, list) and len(stated) == size
+    if not square or not all(isinstance(row, list) and len(row) == size for row in stated):
+        raise _bad(file, "covariance", "crash.covariance-not-square", size=size)
+    matrix = np.array([[_number(file, v, "covariance") for v in row] for row in stated])
+    # Published matrices are rounded.
+    scale = float(np.abs(matrix).max())
+    if not np.allclose(matrix, matrix.T, rtol=0.0, atol=1e-6 * scale) or (
+        float(np.linalg.eigvalsh(matrix)[0]) < -1e-3 * scale
+    ):
+        raise _bad(file, "covariance", "crash.covariance-not-valid")
+    return tuple(tuple(row) for row in matrix.tolist())
 
 
-def _terms(file: Path, table: Mapping[str, Any]) -> tuple[Term, ...]:
+def _terms(file: TomlFile, table: Mapping[str, Any]) -> tuple[Term, ...]:
     rows = table.get("terms")
     if not isinstance(rows, list) or not rows or not all(isinstance(r, dict) for r in rows):
         raise _bad(file, "terms", "crash.terms-missing")
@@ -427,7 +486,7 @@ def _terms(file: Path, table: Mapping[str, Any]) -> tuple[Term, ...]:
     return tuple(terms)
 
 
-def _refuse_clash(file: Path, place: str, term: Term, other: Term) -> None:
+def _refuse_clash(file: TomlFile, place: str, term: Term, other: Term) -> None:
     if term.input != other.input:
         return
     if (term.equals is None) != (other.equals is None):
@@ -442,7 +501,7 @@ def _refuse_clash(file: Path, place: str, term: Term, other: Term) -> None:
     raise _bad(file, place, code, input=term.input, **units)
 
 
-def _ranges(file: Path, given: Any, terms: tuple[Term, ...]) -> dict[str, tuple[float, float]]:
+def _ranges(file: TomlFile, given: Any, terms: tuple[Term, ...]) -> dict[str, tuple[float, float]]:
     if not isinstance(given, dict):
         raise _bad(file, "validity", "crash.validity-not-a-table")
     numbers = {t.input: t for t in terms if t.equals is None}
@@ -460,7 +519,7 @@ def _ranges(file: Path, given: Any, terms: tuple[Term, ...]) -> dict[str, tuple[
     return ranges
 
 
-def _applies(file: Path, given: Any) -> dict[str, tuple[str, ...]]:
+def _applies(file: TomlFile, given: Any) -> dict[str, tuple[str, ...]]:
     if not isinstance(given, dict):
         raise _bad(file, "applies", "crash.applies-not-a-table")
     for name, words in given.items():
@@ -471,13 +530,13 @@ def _applies(file: Path, given: Any) -> dict[str, tuple[str, ...]]:
     return {name: tuple(words) for name, words in given.items()}
 
 
-def _number(file: Path, value: Any, key: str) -> float:
+def _number(file: TomlFile, value: Any, key: str) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise _bad(file, key, "crash.coefficient-not-a-number", value=value)
     return float(value)
 
 
-def _text(file: Path, table: Mapping[str, Any], key: str, prefix: str = "") -> str:
+def _text(file: TomlFile, table: Mapping[str, Any], key: str, prefix: str = "") -> str:
     value = table.get(key)
     if not isinstance(value, str) or not value.strip():
         code = {"table": "crash.table-missing", "unit": "crash.unit-missing"}
@@ -486,11 +545,16 @@ def _text(file: Path, table: Mapping[str, Any], key: str, prefix: str = "") -> s
     return value
 
 
-def _known(file: Path, table: Mapping[str, Any], known: tuple[str, ...], prefix: str) -> None:
+def _known(file: TomlFile, table: Mapping[str, Any], known: tuple[str, ...], prefix: str) -> None:
     for key in table:
         if key not in known:
             raise _bad(file, f"{prefix}{key}", "crash.no-such-key", word=key, known=known)
 
 
-def _bad(file: Path, key: str, code: str, **values: Any) -> ConfigError:
-    return ConfigError(code, file=file.name, quantity=key, data=values)
+def _bad(file: TomlFile, key: str, code: str, **values: Any) -> ConfigError:
+    path: list[str | int] = []
+    for part in key.split("."):
+        name, _, number = part.partition(" ")
+        path += [name, int(number) - 1] if number.isdecimal() else [part]
+    line = file.line(cast(KeyPath, tuple(path)))
+    return ConfigError(code, file=file.path.name, line=line, quantity=key, data=values)

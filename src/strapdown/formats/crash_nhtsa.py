@@ -46,6 +46,8 @@ _SPELLED = {"G'S": "g", "G": "g", "M/S2": "m/s2", "DPS": "deg/s", "DEG/SEC": "de
     "RAD/S": "rad/s",
     "NWT": "N",
     "N": "N",
+    "NWM": "N*m",
+    "NM": "N*m",
     "MM": "mm",
     "KPH": "km/h",
 }
@@ -92,12 +94,20 @@ def read(path: Path) -> CrashRecord:
     there = [c for c in test.channels if c.path is not None]
     vehicles = {v.number for v in test.vehicles} or {c.vehicle for c in there} - {0}
     points = _points(there, vehicles)
+    dummies = {
+        (fields[0], fields[1]): _DUMMIES.get((fields[2], fields[8]), "")
+        for fields in test.occupants
+        if len(fields) > 8
+    }
     return CrashRecord(
         path=path,
         format="nhtsa",
         title=clean(test.title),
         facts=_facts(test),
-        channels=tuple(_channel(c, points[c.number]) for c in there),
+        channels=tuple(
+            _channel(c, points[c.number], dummies.get((str(c.vehicle), c.occupant), ""))
+            for c in there
+        ),
         files=(test.path, *(c.path for c in there if c.path is not None)),
         findings=(*test.findings, *_unknown_codes(there, test.path)),
         vehicles={str(v.number): _stated(_vehicle(v)) for v in test.vehicles},
@@ -258,7 +268,11 @@ def _unknown_codes(channels: Sequence[Channel], file: Path) -> list[Finding]:
     ]
 
 
-def _channel(channel: Channel, at: _Point) -> CrashChannel:
+# Type and percentile of a dummy in the header, and its code of ISO MME.
+_DUMMIES = {("H3", "50"): "H3", ("H3", "05"): "HF", ("H3", "95"): "HM", ("TH", "50"): "TH"}
+
+
+def _channel(channel: Channel, at: _Point, dummy: str) -> CrashChannel:
     assert channel.path is not None
     unit = channel.unit.upper()
     si, factor = UNITS.get(unit, ("", 1.0))
@@ -281,6 +295,7 @@ def _channel(channel: Channel, at: _Point) -> CrashChannel:
         full_scale=None if math.isnan(channel.rating) else channel.rating * factor,
         bandwidth=None if math.isnan(hz) or hz <= 0.0 else hz,
         file=channel.path.name,
+        dummy=dummy,
     )
 
 

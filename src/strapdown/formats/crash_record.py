@@ -40,6 +40,8 @@ def _sample_row(sample: int) -> int:
     return sample + 1
 
 
+# Words of a laboratory about a channel without valid data.
+_FAILED = ("failed", "no data", "questionable", "meaningless")
 #: Quantities of a channel, with their SI units.
 QUANTITIES: dict[str, str] = {
     "acceleration": "m/s2",
@@ -104,6 +106,9 @@ class CrashChannel:
         Of a velocity: the change since time zero of the recorder, where it was zero.
     event : int
         Number of the event of an event data recorder; 0 where none is stated.
+    dummy : str
+        Of an occupant's channel: its dummy by the codes of ISO MME (``H3``, ``HF``); empty where
+        unknown.
     """
 
     name: str
@@ -126,6 +131,12 @@ class CrashChannel:
     samples: Callable[[], NDArray[Any]] | None = field(default=None, repr=False)
     from_zero: bool = False
     event: int = 0
+    dummy: str = ""
+
+    @property
+    def failure(self) -> str:
+        """Remark by which the laboratory says that the channel failed; empty if none."""
+        return next((r for r in self.remarks if any(f in r.lower() for f in _FAILED)), "")
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,7 +295,10 @@ def compact(text: str) -> str:
 #: Remark of velocities that count from time zero, in files without `from_zero`.
 CHANGE_NOTE = "change of velocity since time zero of the recorder"
 _AXES = ("", "x", "y", "z", "-x", "-y", "-z")
-_TEXTS = ("name", "quantity", "axis", "unit", "place", "body", "vehicle", "point", "low_pass")
+_TEXTS = (
+    *("name", "quantity", "axis", "unit", "place", "body", "vehicle", "point", "low_pass"),
+    "dummy",
+)
 _NUMBERS = ("full_scale", "bandwidth")
 MOST_REMARKS = 50
 
@@ -305,6 +319,7 @@ def attributes_of(channel: CrashChannel) -> dict[str, Any]:
         "vehicle": channel.vehicle,
         "point": channel.point,
         "low_pass": channel.low_pass,
+        "dummy": channel.dummy,
         "remarks": list(channel.remarks),
         "full_scale": channel.full_scale,
         "bandwidth": channel.bandwidth,

@@ -16,7 +16,7 @@ import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
-__all__ = ["DIMENSIONS", "FILTERS", "LENGTH", "NO_CLASS", "MmeCode", "decode_mme"]
+__all__ = ["DIMENSIONS", "DUMMIES", "FILTERS", "LENGTH", "NO_CLASS", "MmeCode", "decode_mme"]
 
 
 LENGTH = 16
@@ -27,6 +27,8 @@ _POSITIONS = _WORDS["POSITIONS"] | {k: f"seat {k}" for k in string.ascii_upperca
 _FINE = _WORDS["FINE"] | {f"{k:02d}": f"no. {k}" for k in range(1, 100)}
 #: Filter class of the samples.
 FILTERS: dict[str, str] = _WORDS["FILTERS"]
+#: Third fine location of a channel of a dummy.
+DUMMIES: tuple[str, ...] = tuple(code for code in _WORDS["FINE_3"] if code != "PO")
 _OBJECTS = _WORDS["OBJECTS"] | {str(k): f"vehicle {k}" for k in range(1, 10)}
 #: Physical dimension: in words, and as a quantity of a crash record.
 DIMENSIONS: dict[str, tuple[str, str]] = {

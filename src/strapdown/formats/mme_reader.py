@@ -25,7 +25,7 @@ from strapdown.formats.crash_record import (
     position_of,
     unique,
 )
-from strapdown.formats.mme_codes import DIMENSIONS, NO_CLASS, MmeCode, decode_mme
+from strapdown.formats.mme_codes import DIMENSIONS, DUMMIES, NO_CLASS, MmeCode, decode_mme
 from strapdown.formats.signs import Signs
 from strapdown.tables import SAMPLINGS
 from strapdown.units import FACTORS, OF_CRASHES, TIME_UNITS, find_unit
@@ -568,6 +568,8 @@ def channel_of(file: MmeFile, name: str, others: Mapping[str, tuple[str, MmeFile
         clock=others[clock.upper()][0] if clock else "",
         samples=samples if open_stamps else None,
         from_zero=change and quantity == "velocity",
+        # Fine location 3; that of a part of the structure is no dummy.
+        dummy=known.code[10:12] if known and known.code[10:12] in DUMMIES else "",
     )
 
 

@@ -13,8 +13,9 @@ from strapdown import __version__
 from strapdown.bundle.configuration_paths import names_file
 from strapdown.bundle.seal import write_json
 from strapdown.config.crash_case import CaseSpec
-from strapdown.constants import TWO_SIDED_95
+from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.crash.case import CaseResult, ReferenceAnswer, SeverityAnswer, main_event, run_cases
+from strapdown.crash.case_indices import CrashIndex
 from strapdown.crash.closure import Closure, Figure
 from strapdown.crash.consistency import UnitComparison
 from strapdown.crash.crash_type import CrashType
@@ -29,7 +30,6 @@ from strapdown.progress import Progress
 from strapdown.report import crash_words
 from strapdown.report.chart import Array
 from strapdown.report.crash_document import crash_document
-from strapdown.report.crash_words import CONVENTIONS
 from strapdown.report.document import finding_json
 from strapdown.report.document_pdf import write_pdf
 from strapdown.report.report_bundle import (
@@ -41,9 +41,10 @@ from strapdown.report.report_bundle import (
     write_report,
     write_table,
 )
-from strapdown.report.values import AXES, spaced
+from strapdown.report.values import AXES, shown_in, spaced
 from strapdown.tables import ACCEL, EULER, GYRO, NED, VELOCITY
 from strapdown.tables.checks import index_of
+from strapdown.units import FORCES, LENGTHS, MOMENTS, SPEEDS
 
 
 def _configuration(result: CaseResult) -> dict[str, Any]:
@@ -77,15 +78,18 @@ CRASH = ReportBundle("crash", _configuration, _run, _write)
 
 
 def _write_numbers(result: CaseResult, folder: Path) -> None:
+    system = result.spec.options.units
     write_json(folder / "crash.json", crash_json(result))
-    told = as_comments(CONVENTIONS)
+    with shown_in(system):
+        told = as_comments(crash_words.conventions())
     main = result.reconstruction.main
-    write_table(trajectory_table(main.path), folder / "trajectory.csv", told)
+    table = _table_in(system, trajectory_table(main.path))
+    write_table(table, folder / "trajectory.csv", told)
     answers, formats = result.reconstruction.answers, result.spec.options.formats
     made: set[str] = set()
     for unit in answers if "csv" in formats else ():
         own = file_name(unit.name, made)
-        write_table(signals_table(unit), folder / f"signals-{own}.csv", told)
+        write_table(_table_in(system, signals_table(unit)), folder / f"signals-{own}.csv", told)
     if "mme" in formats:
         spec = result.spec
         record = signal_record(spec.title, spec.point.name, answers, spec.options.rate_hz)
@@ -121,26 +125,81 @@ def crash_json(result: CaseResult) -> dict[str, Any]:
         Bounds are 95 % bounds. NaN and infinity are null: ``high`` where a change of velocity is
         ``at_least`` so much.
     """
+    with shown_in(result.spec.options.units):
+        found = _json(result)
+    case = found.pop("case")
+    return finite({**_labelled(result.spec.options.units, found), "case": case})
+
+
+# Endings of keys and columns, with those in which a system of units has them and their factors; the
+# longest first. Of other systems they are SI.
+_LABELS: dict[str, dict[str, tuple[str, float]]] = {
+    "us": {
+        "_m_per_s2": ("_g", 1.0 / STANDARD_GRAVITY),
+        "_m_per_s": ("_mph", 1.0 / SPEEDS["mph"]),
+        "_m2": ("_ft2", 1.0 / LENGTHS["ft"] ** 2),
+        "_n_s": ("_lbf_s", 1.0 / FORCES["lbf"]),
+        "_j": ("_ft_lbf", 1.0 / MOMENTS["lbf*ft"]),
+        "_m": ("_ft", 1.0 / LENGTHS["ft"]),
+    }
+}
+
+
+def _label(system: str, key: str) -> tuple[str, float]:
+    """Key in a system of units, and the factor of its values."""
+    for ending, (other, factor) in _LABELS.get(system, {}).items():
+        if key.endswith(ending):
+            return key.removesuffix(ending) + other, factor
+    return key, 1.0
+
+
+def _labelled(system: str, value: Any, factor: float = 1.0) -> Any:
+    """Data with the keys and numbers of a system of units."""
+    if isinstance(value, dict):
+        found = {}
+        for key, item in value.items():
+            name, own = _label(system, key)
+            found[name] = _labelled(system, item, factor * own)
+        return found
+    if isinstance(value, list):
+        return [_labelled(system, item, factor) for item in value]
+    if isinstance(value, float) and factor != 1.0:
+        return factor * value
+    return value
+
+
+def _table_in(system: str, table: pd.DataFrame) -> pd.DataFrame:
+    """Table with the columns of a system of units."""
+    labels = {str(column): _label(system, str(column)) for column in table.columns}
+    factors = {column: factor for column, (_, factor) in labels.items() if factor != 1.0}
+    changed = table.assign(**{column: f * table[column] for column, f in factors.items()})
+    return changed.rename(columns={column: name for column, (name, _) in labels.items()})
+
+
+def _json(result: CaseResult) -> dict[str, Any]:
     made = result.reconstruction
-    found: dict[str, Any] = {
+    return {
         "schema": "strapdown crash 1",
         "strapdown": __version__,
         "title": result.spec.title,
         "number": result.spec.number,
-        "conventions": dict(crash_words.CONVENTIONS),
+        "units": result.spec.options.units,
+        "conventions": dict(crash_words.conventions()),
         "headline": spaced(crash_words.headline(result)),
         "main": made.main.name,
         "answers": [_unit(unit) for unit in made.answers],
         "comparison": None if made.comparison is None else _comparison(made.comparison),
         "closure": None if result.closure is None else _closure(result, result.closure),
         "severity": [_severity(s) for s in result.severity],
+        "indices": [_index(one, result.spec.options.units) for one in result.indices],
         "references": [_reference(r) for r in result.references],
         "assumptions": _pairs(crash_words.assumptions(result)),
         "limitations": _pairs([one[1:] for one in crash_words.limitations(result)]),
+        "contradictions": _pairs(crash_words.contradictions(result)),
+        "not_shown": _pairs(crash_words.not_shown(result)),
         "findings": [finding_json(f) for f in result.findings],
         "case": _named(result.spec.model_dump(mode="json", exclude_none=True)),
     }
-    return finite(found)
 
 
 def _named(value: Any, key: str = "") -> Any:
@@ -148,7 +207,7 @@ def _named(value: Any, key: str = "") -> Any:
     if isinstance(value, dict):
         return {k: _named(v, k) for k, v in value.items()}
     if isinstance(value, list):
-        return [_named(v) for v in value]
+        return [_named(v, key) for v in value]
     if names_file(key, value):
         return str(value).replace("\\", "/").rstrip("/").rsplit("/", 1)[-1]
     return value
@@ -253,6 +312,8 @@ def _change(change: VelocityChange) -> dict[str, Any]:
             "high_deg": across.high_deg,
             "undetermined": across.undetermined,
             "vertical_deg": angle.vertical_deg,
+            "vertical_low_deg": change.interval.vertical.low_deg,
+            "vertical_high_deg": change.interval.vertical.high_deg,
             "clock": angle.clock,
         },
     }
@@ -332,11 +393,40 @@ def _severity(answer: SeverityAnswer) -> dict[str, Any]:
         "model": answer.model.name,
         "outcome": answer.model.outcome,
         "source": answer.model.source,
+        "of": answer.of,
+        "model_uncertainty_in_bound": risk is not None and risk.model_sd is not None,
+        "logit": None if risk is None else risk.logit,
+        "logit_sd": None if risk is None else risk.logit_sd,
+        "logit_sd_of_model": None if risk is None else risk.model_sd,
         "probability": None if risk is None else risk.probability,
         "low": None if risk is None else risk.low,
         "high": None if risk is None or answer.at_least else risk.high,
         "at_least": answer.at_least,
         "because": "" if answer.because is None else answer.because.sentence("file"),
+    }
+
+
+def _index(index: CrashIndex, system: str) -> dict[str, Any]:
+    label, factor = _label(system, "_m_per_s")
+    unit = index.unit
+    if unit != "m/s" or factor == 1.0:
+        factor = 1.0
+    else:
+        unit = label.removeprefix("_")
+    return {
+        "index": index.name,
+        "of": index.of,
+        **{
+            name: None if value is None else factor * value
+            for name, value in (("value", index.value), ("low", index.low), ("high", index.high))
+        },
+        "at_least": index.at_least,
+        "unit": unit,
+        "limit": index.limit,
+        "standard": index.standard,
+        "detail": index.detail,
+        "channels": list(index.channels),
+        "because": "" if index.because is None else index.because.sentence("file"),
     }
 
 

@@ -13,7 +13,7 @@ from strapdown.crash.acceleration import Acceleration, window_weights
 from strapdown.crash.case import ReferenceAnswer
 from strapdown.crash.consistency import UnitComparison
 from strapdown.crash.contact import Edge
-from strapdown.crash.delta_v import cumulative_delta_v
+from strapdown.crash.delta_v import cumulative_delta_v, trailing_delta_v
 from strapdown.crash.delta_v_bound import DeltaVBound, VelocityChange, body_delta_v_bound
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import CrashPath
@@ -40,7 +40,15 @@ from strapdown.report.chart import (
     look,
 )
 from strapdown.report.crash_outline import AROUND, SINCE_TRIGGER, crash_span, event_marks, unit_look
-from strapdown.report.values import AXES, KMH, MEAN, decimals, plain
+from strapdown.report.values import (
+    AXES,
+    MEAN,
+    SHOWN,
+    decimals,
+    plain,
+    speed_factor,
+    speed_unit,
+)
 from strapdown.rotation import within_half_turn
 from strapdown.tables import NED
 from strapdown.tables.checks import index_of
@@ -161,19 +169,21 @@ def delta_v_chart(
             at, style = 1e3 * course[:, 0], (drawn["colour"], drawn["dash"])
             width = 2.2 if unit is main else 1.3
             for k in range(len(_PARTS)):
-                lines[k].append(curve(name, at, KMH * course[:, 1 + k], *style, width))
+                lines[k].append(curve(name, at, speed_factor() * course[:, 1 + k], *style, width))
     own = unit_look(None if combined is not None else 0)["colour"]
     last = min(span[1], main.acceleration.end)
     instants = np.unique(np.r_[np.linspace(zero, last, _INSTANTS)[1:], end])
-    half = KMH * delta_v_half_widths(main, onset, instants, gravity)
+    half = speed_factor() * delta_v_half_widths(main, onset, instants, gravity)
     course = delta_v_course(main.acceleration, zero, *span)
     values = [*whole.delta_v.vector.tolist(), whole.resultant]
     halves = [*whole.bound.half_width, whole.resultant_bound]
     part = ", recorded part" if whole.at_least else ""
     panels = []
+    beside = SHOWN.get().beside
+    shown = ((speed_factor(), 1, speed_unit()), (speed_factor(beside), 2, beside))
     of = "of the mean" if combined is not None else f"of {main.name}"
     for k, axis in enumerate(_PARTS):
-        middle = KMH * np.interp(instants, course[:, 0], course[:, 1 + k])
+        middle = speed_factor() * np.interp(instants, course[:, 0], course[:, 1 + k])
         low = middle - half[:, k]
         fill = Fill(
             f"95 % {of}",
@@ -183,16 +193,19 @@ def delta_v_chart(
             own,
             0.15,
         )
-        words = f"{axis}{part}: {plain(KMH * values[k], 1)} ± {plain(KMH * halves[k], 1)} km/h "
-        words += f"({plain(values[k], 2)} ± {plain(halves[k], 2)} m/s)"
-        ends = KMH * np.array([values[k] - halves[k], values[k] + halves[k]])
+        told = [
+            f"{plain(factor * values[k], places)} ± {plain(factor * halves[k], places)} {unit}"
+            for factor, places, unit in shown
+        ]
+        words = f"{axis}{part}: {told[0]} ({told[1]})"
+        ends = speed_factor() * np.array([values[k] - halves[k], values[k] + halves[k]])
         at = np.array([1e3 * end])
         marks = [
             Line("bar", np.repeat(at, 2), ends, own, width=2.4, legend=False),
             Line(
                 f"end of the contact, 95 % {of}",
                 at,
-                np.array([KMH * values[k]]),
+                np.array([speed_factor() * values[k]]),
                 own,
                 points=True,
                 symbol="circle",
@@ -202,7 +215,11 @@ def delta_v_chart(
         given = _stated_lines([s for s in stated if s.spec.axis == axis])
         panels.append(
             Panel(
-                f"{axis}, km/h", (*lines[k], *marks, *given), title=words, fills=(fill,), height=0.8
+                f"{axis}, {speed_unit()}",
+                (*lines[k], *marks, *given),
+                title=words,
+                fills=(fill,),
+                height=0.8,
             )
         )
     many = len(main.events.events) > 1
@@ -221,7 +238,7 @@ def _caption(stated: bool) -> str:
     return (
         "Change of velocity of the reference point since the onset of the contact, in the axes of "
         "the vehicle, less the specific force at rest; forward, right, down are positive, so "
-        "braking is negative; 1 m/s = 3.6 km/h. Shaded: 95 % at an exact time; the bar at the end "
+        "braking is negative. Shaded: 95 % at an exact time; the bar at the end "
         "of the contact includes the uncertainty of that end."
         + (" Symbols with bars: stated by others, with their 95 % bounds." if stated else "")
     )
@@ -232,15 +249,65 @@ def _stated_lines(stated: Sequence[ReferenceAnswer]) -> list[Line]:
     for k, one in enumerate(stated):
         value, reach = one.spec.delta_v_m_per_s or 0.0, TWO_SIDED_95 * one.spec.delta_v_sd_m_per_s
         at = np.array([1e3 * one.span[1]])
-        ends = KMH * np.array([value - reach, value + reach])
+        ends = speed_factor() * np.array([value - reach, value + reach])
         colour = PURPLE if k == 0 else GREY
         out.append(Line("bar", np.repeat(at, 2), ends, colour, width=1.8, legend=False))
         symbol = _SYMBOLS[k % len(_SYMBOLS)]
-        value_at = np.array([KMH * value])
+        value_at = np.array([speed_factor() * value])
         out.append(
             Line(one.spec.name, at, value_at, colour, points=True, symbol=symbol, hollow=True)
         )
     return out
+
+
+def sliding_chart(
+    units: Sequence[UnitReconstruction],
+    combined: UnitReconstruction | None,
+    window: float,
+) -> Chart | None:
+    """Chart the change of velocity over a window that slides along the record, by every unit.
+
+    Parameters
+    ----------
+    window : float, s
+
+    Returns
+    -------
+    Chart or None
+        Each value at the end of its window; None where no record is as long as the window.
+    """
+    main = units[0] if combined is None else combined
+    events = main.events.events
+    low, high = crash_span(events, main.acceleration.begin, main.acceleration.end)
+    lines: list[list[Line]] = [[] for _ in _PARTS]
+    for unit, name, drawn in answers_of(units, combined):
+        try:
+            found = trailing_delta_v(unit.acceleration, window)
+        except DataError:
+            continue
+        inside = (found.time >= low) & (found.time <= high + window)
+        vector = speed_factor() * found.vector[inside]
+        at, style = 1e3 * found.time[inside], (drawn["colour"], drawn["dash"])
+        for k in range(len(_PARTS)):
+            values = vector[:, k] if k < 3 else np.sqrt((vector**2).sum(axis=1))
+            lines[k].append(curve(name, at, values, *style, 2.2 if unit is main else 1.3))
+    if not lines[0]:
+        return None
+    ms = f"{1e3 * window:.3g} ms"
+    return Chart(
+        "sliding-change",
+        f"Change of velocity within {ms}",
+        f"Change of velocity of the reference point over the {ms} that end at each instant, in the "
+        "axes of the vehicle: the rate of change by which severity and direction of force are "
+        "often rated (Tadic and Vukajlovic 2016, Fig. 8). Recorders that differ here differ in "
+        "their direction of force.",
+        SINCE_TRIGGER,
+        tuple(
+            Panel(f"{axis}, {speed_unit()}", tuple(lines[k]), height=0.7)
+            for k, axis in enumerate(_PARTS)
+        ),
+        marks=event_marks(events, low, high),
+    )
 
 
 # Error budget of delta-V and of the end position.
@@ -602,7 +669,7 @@ def risk_chart(
             continue
         style = look(len(lines) // 3)
         lines.append(Line(_name(model), x, 100.0 * y, style["colour"], style["dash"], 1.8))
-        at = np.array([KMH * delta_v])
+        at = np.array([speed_factor() * delta_v])
         bound = 100.0 * np.array([risk.low, risk.high])
         upright = np.repeat(at, 2)
         lines.append(Line("bar", upright, bound, style["colour"], width=2.4, legend=False))
@@ -615,8 +682,8 @@ def risk_chart(
                 style["colour"],
                 points=True,
                 symbol=style["symbol"],
-                low=np.array([KMH * max(delta_v - reach, 0.0)]),
-                high=np.array([x[-1] if at_least else KMH * (delta_v + reach)]),
+                low=np.array([speed_factor() * max(delta_v - reach, 0.0)]),
+                high=np.array([x[-1] if at_least else speed_factor() * (delta_v + reach)]),
                 legend=False,
             )
         )
@@ -626,9 +693,13 @@ def risk_chart(
         "severity",
         "Risk of injury against the change of velocity",
         "Published logistic models, each within its range of validity; marked: this crash with the "
-        "95 % bound of its delta-V, and the resulting bound of the risk. The uncertainty of the "
-        "model is not included.",
-        "change of velocity (resultant of the main event), km/h",
+        "95 % bound of its delta-V, and the resulting bound of the risk"
+        + (
+            "; the uncertainty of the model is not included."
+            if any(risk.model_sd is None for risk in risks)
+            else ", with the uncertainty of the model."
+        ),
+        f"change of velocity (resultant of the main event), {speed_unit()}",
         (Panel("probability, %", tuple(lines)),),
     )
 
@@ -636,7 +707,7 @@ def risk_chart(
 def _curve(
     model: SeverityModel, delta_v: float, inputs: dict[str, float | str]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Change of velocity in km/h and probability, within the model's range."""
+    """Change of velocity in the shown unit and probability, within the model's range."""
     factor = SPEEDS.get(model.unit("delta_v"), 1.0)
     low, high = model.validity.get("delta_v", (0.0, _BEYOND * delta_v / factor))
     at = np.linspace(low * factor, high * factor, _POINTS)
@@ -649,7 +720,7 @@ def _curve(
         except StrapdownError:
             # A logarithm is undefined at zero, or an input is missing.
             continue
-        x.append(KMH * value)
+        x.append(speed_factor() * value)
         y.append(risk.probability)
     return np.array(x), np.array(y)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
 from strapdown import __version__
@@ -22,9 +23,18 @@ from strapdown.report.crash_charts import (
     pdof_charts,
     place_budget_chart,
     risk_chart,
+    sliding_chart,
 )
-from strapdown.report.crash_outline import vehicle_outline
-from strapdown.report.crash_pictures import Direction, MountingPoint, conventions_picture, pdof_dial
+from strapdown.report.crash_outline import Outline, vehicle_outline
+from strapdown.report.crash_pictures import (
+    Direction,
+    MountingPoint,
+    PointChange,
+    conventions_picture,
+    elevation_dial,
+    pdof_dial,
+    points_picture,
+)
 from strapdown.report.crash_plan import path_plan
 from strapdown.report.crash_signals import (
     attitude_chart,
@@ -34,15 +44,17 @@ from strapdown.report.crash_signals import (
     velocity_chart,
 )
 from strapdown.report.crash_words import (
-    CONVENTIONS,
     GRAVE,
     assumptions,
+    contradictions,
+    conventions,
     headline,
     how_to_verify,
     key_figures,
     lead,
     limitations,
     method,
+    not_shown,
     notes,
     record_facts,
 )
@@ -56,7 +68,15 @@ from strapdown.report.document import (
     blocks,
     section,
 )
-from strapdown.report.values import GAP, axis_names, plain
+from strapdown.report.values import (
+    GAP,
+    axis_names,
+    length_factor,
+    length_unit,
+    mass_words,
+    plain,
+    shown_in,
+)
 from strapdown.tables import NED
 from strapdown.tables.checks import index_of
 
@@ -74,8 +94,13 @@ def crash_document(result: CaseResult, name: str) -> Document:
 
     Time is from the trigger, ms (s in overviews). Axes are the turning axes of the vehicle; those
     of the path are north, east, down or, without a stated heading, forward, right, down of the
-    vehicle at the entry. Every bound holds 95 %.
+    vehicle at the entry. Every bound holds 95 %. Units are those that the case chooses.
     """
+    with shown_in(result.spec.options.units):
+        return _document(result, name)
+
+
+def _document(result: CaseResult, name: str) -> Document:
     spec, found = result.spec, result.reconstruction
     main, which = found.main, main_event(found.main)
     path, events, units = main.path, main.events.events, (found.units, found.combined)
@@ -93,6 +118,9 @@ def crash_document(result: CaseResult, name: str) -> Document:
     }
     sampled: Any = {"samples": result.samples, "events": events}
     directions = _directions(main, which)
+    recorders = _recorders(result)
+    around: Any = {"recorders": recorders, "point": point, "point_name": spec.point.name}
+    points = _points(result)
     happened = any(unit.body for unit in found.answers)
     described = [Paragraph(text) for text in spec.description.split("\n\n") if text.strip()]
     limits = limitations(result)
@@ -114,12 +142,15 @@ def crash_document(result: CaseResult, name: str) -> Document:
                 )
                 for k in range(len(events))
             ),
+            sliding_chart(*units, spec.options.peak_window_s) if happened else None,
+            points_picture(outline, points) if points else None,
             None if happened else Paragraph(headline(result)),
         ),
         section(
             "direction",
             "Direction of force",
             crash_tables.direction_table(result),
+            *(() if which is None else _dials(outline, directions, which, around)),
             *(() if which is None else pdof_charts(*units, which)),
             None
             if happened
@@ -149,6 +180,7 @@ def crash_document(result: CaseResult, name: str) -> Document:
             crash_tables.budget_table(result),
         ),
         section("severity", "Severity", *_severity(result, which)),
+        section("indices", "Occupant and barrier indices", crash_tables.indices_table(result)),
         section(
             "references",
             "Reference comparison",
@@ -182,13 +214,19 @@ def crash_document(result: CaseResult, name: str) -> Document:
                 point=point,
                 point_name=spec.point.name,
             ),
-            Facts(CONVENTIONS),
+            Facts(conventions()),
         ),
         section(
             "limitations",
             "Limitations",
             Paragraph("Those that apply to this case, most serious first."),
             Items(tuple((head, text) for _, head, text in limits)),
+        ),
+        section(
+            "not-shown",
+            "What this does not show",
+            Paragraph("What no evaluation of these records can answer."),
+            Items(not_shown(result)),
         ),
         section("findings", "Notes on the records", *_findings(result)),
         section(
@@ -207,7 +245,8 @@ def crash_document(result: CaseResult, name: str) -> Document:
         ("Author", spec.author),
         ("Software", f"strapdown {__version__}"),
     )
-    dial = pdof_dial(outline, directions, point=point, point_name=spec.point.name, small=True)
+    dial = pdof_dial(outline, directions, **around, small=True)
+    against = contradictions(result)
     grave = [head for code, head, _ in limits if code in GRAVE]
     return Document(
         title=spec.title,
@@ -222,6 +261,8 @@ def crash_document(result: CaseResult, name: str) -> Document:
             Paragraph(f"Caution: {'; '.join(grave)} (see Limitations).", "warning")
             if grave
             else None,
+            Paragraph("These contradict the answer:", "warning") if against else None,
+            Items(against) if against else None,
         ),
         sections=sections,
         footer=spec.number or spec.title,
@@ -239,15 +280,17 @@ def _signals(result: CaseResult) -> Iterator[Block]:
 def _place(position: tuple[float, float, float]) -> str:
     if not any(position):
         return ""
-    return f" ({', '.join(plain(v, 2) for v in position)} m from the origin)"
+    there = ", ".join(plain(length_factor() * v, 2) for v in position)
+    return f" ({there} {length_unit()} from the origin)"
 
 
 def _vehicle(result: CaseResult) -> str:
     vehicle = result.spec.vehicle
     size = ""
     if not vehicle.outline_m:
-        size = f"{vehicle.length_m:g} m × {vehicle.width_m:g} m".replace(" ", GAP)
-    mass = "" if vehicle.mass_kg is None else f"{vehicle.mass_kg:g} kg"
+        sides = (length_factor() * v for v in (vehicle.length_m, vehicle.width_m))
+        size = " × ".join(f"{v:.4g} {length_unit()}" for v in sides).replace(" ", GAP)
+    mass = "" if vehicle.mass_kg is None else mass_words(vehicle.mass_kg)
     return ", ".join(part for part in (vehicle.name, mass, size) if part)
 
 
@@ -321,15 +364,18 @@ def _findings(result: CaseResult) -> tuple[Block, ...]:
     told = () if comparison is None else comparison.findings
     rows = notes([f for f in result.findings if f not in told], result)
     if not rows:
-        return (Paragraph("No findings on the records."),)
-    more = (Paragraph("Differences between recorders are under Consistency of the recorders."),)
+        more = " What contradicts the answer is on page one." if contradictions(result) else ""
+        return (Paragraph(f"No findings from reading and processing the records.{more}"),)
+    told_there = (
+        Paragraph("Differences between recorders are under Consistency of the recorders."),
+    )
     return (
         Paragraph(
             "Findings from reading and processing the records, in this order, with remedies. "
             "Those that affect the answers are under Limitations."
         ),
         Items(rows),
-        *(more if told else ()),
+        *(told_there if told else ()),
     )
 
 
@@ -358,17 +404,66 @@ def reference_in_path_axes(path: CrashPath, answer: ReferenceAnswer) -> pd.DataF
 
 
 def _directions(main: UnitReconstruction, which: int | None) -> list[Direction]:
+    return [_direction(main, k, f"event {k + 1}", main=k == which) for k in range(len(main.body))]
+
+
+def _direction(unit: UnitReconstruction, k: int, name: str, **more: Any) -> Direction:
+    change, angle = unit.body[k].event, unit.types[k].direction
+    return Direction(
+        name,
+        angle.horizontal_deg,
+        change.interval.horizontal,
+        angle.clock,
+        change.resultant,
+        vertical_deg=angle.vertical_deg,
+        vertical=change.interval.vertical,
+        **more,
+    )
+
+
+def _recorders(result: CaseResult) -> list[Direction]:
+    """Direction of force of the severest event of every recorder; none of a single one."""
+    units = result.reconstruction.units
+    if len(units) == 1:
+        return []
+    found = [(number, unit, main_event(unit)) for number, unit in enumerate(units)]
     return [
-        Direction(
-            f"event {k + 1}",
-            kind.direction.horizontal_deg,
-            changes.event.interval.horizontal,
-            kind.direction.clock,
-            changes.event.resultant,
-            k == which,
-        )
-        for k, (changes, kind) in enumerate(zip(main.body, main.types, strict=True))
+        _direction(unit, k, unit.name, main=False, number=number)
+        for number, unit, k in found
+        if k is not None
     ]
+
+
+def _dials(
+    outline: Outline, directions: list[Direction], which: int, around: dict[str, Any]
+) -> Iterator[Block]:
+    """Clock face and elevation of the force, with every recorder."""
+    yield pdof_dial(outline, directions, **around)
+    yield elevation_dial(outline, directions[which], around["recorders"])
+
+
+def _points(result: CaseResult) -> list[PointChange]:
+    """Change of velocity of every recorder at its own position, over its severest contact."""
+    found = []
+    for number, unit in enumerate(result.reconstruction.units):
+        k = main_event(unit)
+        if k is None:
+            continue
+        change = unit.body[k].event
+        name, position = unit.name, result.units[number].mounting.position
+        lever = np.asarray(position) - np.asarray(result.reconstruction.point)
+        # The point moves against the reference point by ω × r, and along turning axes the integral
+        # of its acceleration has ω × (ω × r) as well.
+        time, rate = unit.at_point.time, unit.at_point.rate
+        inside = (time >= change.delta_v.start) & (time <= change.delta_v.end)
+        rate, steps = rate[inside], np.diff(time[inside])[:, None]
+        inward = np.cross(rate, np.cross(rate, lever))
+        moved = np.cross(rate[-1] - rate[0], lever)
+        moved = moved + (0.5 * steps * (inward[1:] + inward[:-1])).sum(axis=0)
+        x, y, z = (change.delta_v.vector + moved).tolist()
+        at = MountingPoint(name, position, number)
+        found.append(PointChange(at, (x, y, z), change.bound.covariance, change.at_least))
+    return found
 
 
 def _stated(result: CaseResult, main: UnitReconstruction) -> list[ReferenceAnswer]:

@@ -12,8 +12,16 @@ from strapdown.crash.pdof import AngleInterval
 from strapdown.report.chart import AXIS_COLOURS, BLUE, GREY, ORANGE, VERMILLION
 from strapdown.report.crash_outline import Outline, draw_outline, interval_words, unit_look
 from strapdown.report.document import Picture
-from strapdown.report.svg_drawing import INK, SMALL, Drawing, shortened
-from strapdown.report.values import plain
+from strapdown.report.plan import ellipse
+from strapdown.report.svg_drawing import INK, SMALL, Drawing, nice_step, shortened
+from strapdown.report.values import (
+    length_factor,
+    length_unit,
+    plain,
+    speed_both,
+    speed_factor,
+    speed_unit,
+)
 
 _WIDTH, _SMALL_WIDTH, _RADIUS, _TOP = 330.0, 304.0, 118.0, 142.0
 _CAR = 0.53  # distance of the vehicle's farthest corner, as a share of the dial's radius
@@ -39,6 +47,12 @@ class Direction:
         Length of the change of velocity.
     main : bool
         Drawn with a strong line; the others thin.
+    number : int or None
+        Index of the unit whose answer it is, from 0; None for the main answer.
+    vertical_deg : float, deg
+        Positive from above.
+    vertical : AngleInterval or None
+        Its 95 % interval.
     """
 
     name: str
@@ -47,12 +61,16 @@ class Direction:
     clock: int
     delta_v: float
     main: bool = True
+    number: int | None = None
+    vertical_deg: float = math.nan
+    vertical: AngleInterval | None = None
 
 
 def pdof_dial(
     outline: Outline,
     directions: Sequence[Direction],
     *,
+    recorders: Sequence[Direction] = (),
     point: Sequence[float] = (0.0, 0.0),
     point_name: str = "reference point",
     small: bool = False,
@@ -65,6 +83,8 @@ def pdof_dial(
         In vehicle axes.
     directions : sequence of Direction
         One per event, in time order.
+    recorders : sequence of Direction
+        Of the main event by each recorder, marked by its number.
     point : sequence of float, m
         Reference point in vehicle axes, at the center of the dial.
     small : bool
@@ -82,7 +102,8 @@ def pdof_dial(
     width = _SMALL_WIDTH if small else _WIDTH
     if small:
         height = 2.0 * _TOP + 14.0
-    said = [_words(d) for d in directions]
+    height += _KEY_ROW * len(recorders) + (14.0 if recorders and not small else 0.0)
+    said = [_words(d) for d in (*directions, *recorders)]
     alt = "Direction of force on a clock about the vehicle: " + "; ".join(said or ["no event"])
     out = Drawing(width, height, alt)
     centre = (0.5 * width, _TOP)
@@ -92,18 +113,21 @@ def pdof_dial(
     _vehicle(out, centre, outline, point)
     for d in sorted(directions, key=lambda d: d.main):
         _arrow(out, centre, outline, point, d)
+    _recorders(out, centre, [(d, d.horizontal_deg, d.interval) for d in recorders])
     out.circle(centre, 3.6, "#ffffff", 1.0, fill=INK)
     at = 2.0 * _TOP + 2.0
     out.circle((14.0, at), 3.6, None, fill=INK)
     name = shortened(point_name, 160.0, SMALL)
     out.text((23.0, at), f"{name}; the front is up", SMALL, _SOFT)
     if small:
+        _key(out, at + 17.0, [(d, _where(d)) for d in recorders])
         return Picture("pdof-front", out.svg(), "Direction of force", _SMALL_CAPTION, alt, 74.0)
     at += 26.0
     if not rows:
         out.text((14.0, at), "no event, no direction of force", 13.0, INK, bold=True)
     for d in rows:
         at = _numbers(out, at, d, len(directions) > 1)
+    _key(out, at, [(d, _where(d)) for d in recorders])
     caption = (
         "Where the force came from, seen from above, in vehicle axes: 0° the front, positive "
         f"clockwise, +90° the right side. The arrow pushes at the {point_name}; wedge and numbers "
@@ -111,6 +135,240 @@ def pdof_dial(
         "zero and the end of the event along the turning axes."
     )
     return Picture("pdof", out.svg(), "Direction of force", caption, alt, width_mm=84.0)
+
+
+# Recorders on a face: one beside another of nearly the same direction is further inside.
+_KEY_ROW, _FARTHEST, _BESIDE = 29.0, 0.76, 15.0
+
+
+def _recorders(
+    out: Drawing, centre: Point, marks: Sequence[tuple[Direction, float, AngleInterval | None]]
+) -> None:
+    """Mark the direction of each recorder by its number, with its interval as an arc."""
+    taken: list[Point] = []
+    for d, angle, interval in marks:
+        if not math.isfinite(angle) or (interval is not None and interval.undetermined):
+            continue
+        radius = _FARTHEST * _RADIUS
+        while radius > 20.0 and any(
+            math.dist(_at(centre, radius, angle), other) < _BESIDE for other in taken
+        ):
+            radius -= _BESIDE
+        colour = unit_look(d.number)["colour"]
+        if interval is not None:
+            arc = _arc(centre, radius, interval.low_deg, interval.high_deg)
+            out.shape(arc, colour, 1.6, closed=False)
+        at = _at(centre, radius, angle)
+        taken.append(at)
+        _numbered(out, at, d.number or 0)
+
+
+def _key(out: Drawing, at: float, rows: Sequence[tuple[Direction, str]]) -> None:
+    """List the recorders by their numbers below a drawing, with their directions."""
+    for k, (d, words) in enumerate(rows):
+        y = at + _KEY_ROW * k
+        _numbered(out, (14.0, y + 6.0), d.number or 0)
+        out.text((25.0, y), shortened(d.name, out.width - 30.0, SMALL), SMALL, INK)
+        out.text((25.0, y + 12.0), shortened(words, out.width - 30.0, SMALL), SMALL, _SOFT)
+
+
+def elevation_dial(
+    outline: Outline, main: Direction, recorders: Sequence[Direction] = ()
+) -> Picture:
+    """Draw the vertical angle of a force in its own vertical plane.
+
+    Parameters
+    ----------
+    outline : Outline
+        In vehicle axes; drawn from the right for a force from the front or the rear, and from
+        behind for one from a side.
+    main : Direction
+    recorders : sequence of Direction
+        Of the same event, marked by their numbers.
+
+    Returns
+    -------
+    Picture
+        The angle above the horizontal, with its 95 % interval as a wedge.
+    """
+    angle = math.remainder(main.horizontal_deg, 360.0)
+    aside = 45.0 < abs(angle) < 135.0
+    # From the right of the picture: the front from the right side, the right from behind.
+    sign = 1.0 if (angle > 0.0 if aside else abs(angle) <= 45.0) else -1.0
+    words = _elevation_words(main)
+    alt = f"Vertical angle of the force: {words}"
+    alt += "".join(f"; {d.name}: {_elevation_words(d)}" for d in recorders)
+    height = 2.0 * _TOP + 52.0 + _KEY_ROW * len(recorders)
+    out = Drawing(_WIDTH, height, alt)
+    centre = (0.5 * _WIDTH, _TOP)
+    low, high = outline.low, outline.high
+    scale = _CAR * _RADIUS / (0.5 * float((high - low)[1 if aside else 0]))
+
+    def view(p: Sequence[float]) -> tuple[float, float]:
+        middle = 0.5 * (low + high)
+        across = p[1] - float(middle[1]) if aside else p[0] - float(middle[0])
+        return centre[0] + scale * across, centre[1] + scale * (p[2] + 0.2)
+
+    def turned(elevation: float) -> float:
+        """Clock angle of the picture at which an elevation is drawn."""
+        return sign * (90.0 - elevation)
+
+    (draw_behind(out, outline, view) if aside else draw_side(out, outline, view, scale))
+    interval = main.vertical
+    unsure = interval is None or interval.undetermined
+    if interval is not None and not unsure:
+        ends = sorted((turned(interval.low_deg), turned(interval.high_deg)))
+        wedge = [centre, *_arc(centre, _RADIUS, *ends)]
+        out.shape(wedge, None, fill=BLUE, opacity=0.18)
+    arc = sorted((turned(-90.0), turned(90.0)))
+    out.shape(_arc(centre, _RADIUS, *arc), "#c3cad2", 1.0, closed=False)
+    for elevation in range(-90, 91, 10):
+        long = elevation % 30 == 0
+        rim = _at(centre, _RADIUS - (7.0 if long else 3.5), turned(elevation))
+        out.line(_at(centre, _RADIUS, turned(elevation)), rim, _SOFT if long else "#c3cad2")
+        if long:
+            at = _at(centre, _RADIUS + 14.0, turned(elevation))
+            out.text(at, f"{plain(elevation, 0)}°", SMALL, _SOFT, anchor="middle")
+    out.line(centre, _at(centre, _RADIUS, turned(0.0)), "#c3cad2", 1.0, "dash")
+    if math.isfinite(main.vertical_deg):
+        there = turned(main.vertical_deg)
+        tail, tip = (_at(centre, share * _RADIUS, there) for share in (0.85, 0.15))
+        out.arrow(tail, tip, VERMILLION, 4.0)
+    _recorders(
+        out,
+        centre,
+        [(d, turned(d.vertical_deg), _mirrored(d.vertical, turned)) for d in recorders],
+    )
+    side = ("right" if sign > 0.0 else "left") if aside else ("front" if sign > 0.0 else "rear")
+    seen = "from behind" if aside else "from the right"
+    where = f"seen {seen}; the {side} is on the {'right' if sign > 0.0 else 'left'}"
+    out.text((14.0, 2.0 * _TOP + 2.0), where, SMALL, _SOFT)
+    out.text((14.0, 2.0 * _TOP + 22.0), words, 15.0, INK, bold=True)
+    _key(out, 2.0 * _TOP + 46.0, [(d, _elevation_words(d)) for d in recorders])
+    caption = (
+        "Vertical angle of the force in the axes of the vehicle, in the vertical plane of its "
+        "horizontal direction: 0° level, positive from above; wedge and brackets: 95 %."
+    )
+    return Picture("pdof-elevation", out.svg(), "Elevation of the force", caption, alt, 84.0)
+
+
+def _mirrored(
+    interval: AngleInterval | None, turned: Callable[[float], float]
+) -> AngleInterval | None:
+    if interval is None or interval.undetermined:
+        return interval
+    low, high = sorted((turned(interval.low_deg), turned(interval.high_deg)))
+    return AngleInterval(low, high)
+
+
+def _elevation_words(d: Direction) -> str:
+    if d.vertical is None or d.vertical.undetermined or not math.isfinite(d.vertical_deg):
+        return "undetermined"
+    ends = f"{plain(d.vertical.low_deg, 1)}° to {plain(d.vertical.high_deg, 1)}°"
+    above = "from above" if d.vertical_deg > 0.0 else "from below"
+    return f"{plain(d.vertical_deg, 1)}° ({ends}), {above}"
+
+
+@dataclass(frozen=True)
+class PointChange:
+    """Change of velocity at a measuring point.
+
+    Attributes
+    ----------
+    unit : MountingPoint
+    delta_v : sequence of float, (3,), m/s
+        At the point itself, along the axes of the vehicle.
+    covariance : ndarray, (3, 3)
+    at_least : bool
+        The record holds a part of it.
+    """
+
+    unit: MountingPoint
+    delta_v: tuple[float, float, float]
+    covariance: np.ndarray
+    at_least: bool = False
+
+
+# Pixels of the vehicle's longer side, and of the largest change beside it.
+_POINTS_CAR, _POINTS_ARROW = 210.0, 96.0
+
+
+def points_picture(outline: Outline, changes: Sequence[PointChange]) -> Picture:
+    """Draw the measuring points on the vehicle, each with its change of velocity as an arrow.
+
+    Parameters
+    ----------
+    outline : Outline
+        In vehicle axes, drawn with its front upward.
+    changes : sequence of PointChange
+
+    Returns
+    -------
+    Picture
+        Arrows at one scale, with the 95 % ellipse of each at its tip; numbers below.
+    """
+    low, high = outline.low, outline.high
+    scale = _POINTS_CAR / float(max(high - low))
+    sizes = [math.hypot(*one.delta_v[:2]) for one in changes]
+    per = _POINTS_ARROW / max(*sizes, 1e-3, 1e-3)
+    middle = 0.5 * (low + high)
+    half = 0.5 * scale * float((high - low)[0])
+    # Above and below the vehicle as far as an arrow reaches, with room for its ellipse.
+    tips = [
+        -scale * (one.unit.position[0] - float(middle[0])) - per * one.delta_v[0] for one in changes
+    ]
+    top, bottom = max(half, -min(tips) + 20.0) + 8.0, max(half, *tips, 0.0) + 28.0
+    centre = (0.5 * _PICTURE_WIDTH, top)
+    told = [_change_words(one) for one in changes]
+    alt = "Change of velocity at the measuring points: " + "; ".join(told)
+    out = Drawing(_PICTURE_WIDTH, top + bottom + 16.0 * len(changes) + 28.0, alt)
+
+    def above(p: Sequence[float]) -> tuple[float, float]:
+        return (
+            centre[0] + scale * (p[1] - float(middle[1])),
+            centre[1] - scale * (p[0] - float(middle[0])),
+        )
+
+    def pixels(points: np.ndarray) -> np.ndarray:
+        return np.array([above(p) for p in points.tolist()], dtype=np.float64)
+
+    draw_outline(out, outline.mapped(pixels), _BODY, 1.4, fill="#eef1f5", opacity=1.0)
+    for one in changes:
+        x, y = above(one.unit.position)
+        tip = (x + per * one.delta_v[1], y - per * one.delta_v[0])
+        colour = unit_look(one.unit.number)["colour"]
+        # Right and up of the picture, from forward and right.
+        turn = per * np.array([[0.0, 1.0], [-1.0, 0.0]])
+        around = ellipse(np.array(tip), turn @ one.covariance[:2, :2] @ turn.T)
+        out.shape(around, colour, 0.8, fill=colour, opacity=0.14)
+        out.arrow((x, y), tip, colour, 2.6)
+    _points(out, above, [one.unit for one in changes], None)
+    at = top + bottom + 18.0
+    step = nice_step(0.35 * _POINTS_ARROW * speed_factor() / per)
+    length = per * step / speed_factor()
+    out.line((20.0, at - 14.0), (20.0 + length, at - 14.0), INK, 2.0)
+    out.text((26.0 + length, at - 14.0), f"{step:g} {speed_unit()}", SMALL, INK)
+    for k, (one, words) in enumerate(zip(changes, told, strict=True)):
+        _numbered(out, (22.0, at + 8.0 + 16.0 * k), one.unit.number)
+        row = shortened(words, _PICTURE_WIDTH - 40.0, SMALL)
+        out.text((35.0, at + 8.0 + 16.0 * k), row, SMALL, INK)
+    caption = (
+        "The vehicle from above with its measuring points. Arrows: change of velocity over the "
+        "contact at each point itself, along the axes of the vehicle, with its 95 % ellipse. "
+        "Points of a vehicle that turns do not gain the same."
+    )
+    return Picture("measuring-points", out.svg(), "Measuring points", caption, alt)
+
+
+def _change_words(one: PointChange) -> str:
+    x, y, z = (speed_factor() * v for v in one.delta_v)
+    least = "at least " if one.at_least else ""
+    size = math.sqrt(x * x + y * y + z * z)
+    place = _place(one.unit.position)
+    return (
+        f"{one.unit.name} {place}: {least}{plain(size, 1)} {speed_unit()}; forward, right, down "
+        f"{plain(x, 1)}, {plain(y, 1)}, {plain(z, 1)}"
+    )
 
 
 def _at(centre: Point, radius: float, angle_deg: float) -> tuple[float, float]:
@@ -198,16 +456,20 @@ def _arrow(
 
 
 def _words(d: Direction) -> str:
+    return f"{d.name}: {_where(d)}"
+
+
+def _where(d: Direction) -> str:
     angle, ends = interval_words(d.horizontal_deg, d.interval)
     if ends == "undetermined":
-        return f"{d.name}: undetermined"
+        return "undetermined"
     around = f" ({ends})" if ends else ""
-    return f"{d.name}: {angle}{around}, {d.clock} o'clock"
+    return f"{angle}{around}, {d.clock} o'clock"
 
 
 def _numbers(out: Drawing, at: float, d: Direction, many: bool) -> float:
     angle, ends = interval_words(d.horizontal_deg, d.interval)
-    speed = f"{plain(d.delta_v, 1)} m/s ({plain(3.6 * d.delta_v, 1)} km/h)"
+    speed = speed_both(d.delta_v)
     if not d.main:
         out.text((14.0, at), _words(d), SMALL, _SOFT)
         out.text((14.0, at + 14.0), f"change of velocity {speed}", SMALL, _SOFT)
@@ -323,8 +585,9 @@ def conventions_picture(
 
 
 def _place(position: Sequence[float]) -> str:
-    values = (f"{v:.2f}" if round(v, 2) else "0.00" for v in position)
-    return "(" + ", ".join(values).replace("-", "−") + ") m"
+    scaled = (length_factor() * v for v in position)
+    values = (f"{v:.2f}" if round(v, 2) else "0.00" for v in scaled)
+    return "(" + ", ".join(values).replace("-", "−") + f") {length_unit()}"
 
 
 def _draw_above(out: Drawing, outline: Outline, view: Project, point: Sequence[float]) -> None:
@@ -404,7 +667,10 @@ def _through(out: Drawing, at: tuple[float, float], colour: str, towards: bool) 
 
 
 def _points(
-    out: Drawing, view: Project, units: Sequence[MountingPoint], point: Sequence[float]
+    out: Drawing,
+    view: Project,
+    units: Sequence[MountingPoint],
+    point: Sequence[float] | None,
 ) -> None:
     """Number the units at their positions; units at the same position share a label."""
     taken: list[tuple[float, float]] = []
@@ -413,17 +679,18 @@ def _points(
         while any(math.hypot(x - a, y - b) < 13.0 for a, b in taken):
             x += 13.5
         taken.append((x, y))
-        _numbered(out, (x, y), unit)
-    _target(out, view(point))
+        _numbered(out, (x, y), unit.number)
+    if point is not None:
+        _target(out, view(point))
 
 
 def _target(out: Drawing, at: tuple[float, float]) -> None:
     out.circle(at, 4.0, "#ffffff", 1.0, fill=INK)
 
 
-def _numbered(out: Drawing, at: tuple[float, float], unit: MountingPoint) -> None:
-    out.circle(at, 6.8, unit_look(unit.number)["colour"], 2.2, fill="#ffffff")
-    out.text(at, str(unit.number + 1), SMALL, INK, anchor="middle", bold=True)
+def _numbered(out: Drawing, at: tuple[float, float], number: int) -> None:
+    out.circle(at, 6.8, unit_look(number)["colour"], 2.2, fill="#ffffff")
+    out.text(at, str(number + 1), SMALL, INK, anchor="middle", bold=True)
 
 
 def _legend(
@@ -439,7 +706,7 @@ def _legend(
             words = f"{shortened(point_name, 150.0, SMALL)} {_place(point)}"
         else:
             unit = units[k - 2]
-            _numbered(out, (x, y), unit)
+            _numbered(out, (x, y), unit.number)
             words = f"{shortened(unit.name, 150.0, SMALL)} {_place(unit.position)}"
         out.text((x + 13.0, y), words, SMALL, INK)
 

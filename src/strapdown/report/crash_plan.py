@@ -26,7 +26,7 @@ from strapdown.report.svg_drawing import (
     text_width,
     tick_words,
 )
-from strapdown.report.values import plain
+from strapdown.report.values import SHOWN, plain, speed_both, speed_words
 from strapdown.tables import NED
 
 _WIDTH, _SMALL_WIDTH, _LEFT, _TOP = 640.0, 370.0, 58.0, 12.0
@@ -144,7 +144,7 @@ def path_plan(
         out.arrow(tail_at.tolist(), tip.tolist(), VERMILLION, 2.6)
         middle = (0.5 * (tail_at + tip)).tolist()
         bodies = [_box(view.pixels(car.body)) for car in cars]
-        words = f"{plain(math.hypot(*path.entry.velocity[:2]), 1)} m/s"
+        words = speed_words(math.hypot(*path.entry.velocity[:2]), SHOWN.get().beside)
         out.label(middle, words, 10.5, VERMILLION, away=9.0, avoid=bodies)
     if beside is not None:
         beside.draw_grid(out)
@@ -250,7 +250,7 @@ def _legend_rows(
 ) -> list[list[tuple[float, str, str, str]]]:
     """Rows of legend entries: position from the left, kind, color, text."""
     speed = math.hypot(*plan.path.entry.velocity[:2])
-    told = f"{plain(speed, 1)} m/s ({plain(3.6 * speed, 1)} km/h)" if speed >= _SLOW else "at rest"
+    told = speed_both(speed) if speed >= _SLOW else "at rest"
     entries = [
         ("path", INK, "path of the reference point"),
         ("band", _BAND_EDGE, "95 % bound"),

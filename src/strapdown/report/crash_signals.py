@@ -388,7 +388,7 @@ def velocity_chart(
         "velocity",
         "Velocity over time",
         f"Velocity of the reference point over ground, {names[0]}, {names[1]}, down, in axes that "
-        "do not turn with the vehicle; 1 m/s = 3.6 km/h.",
+        "do not turn with the vehicle.",
         _panels(path, VELOCITY, labels, _sampled(samples, 3)),
         (path, events),
         samples,

@@ -15,18 +15,22 @@ from strapdown.crash.pdof import AngleInterval, Pdof
 from strapdown.report.document import TableBlock
 from strapdown.report.values import (
     GAP,
-    KMH,
     MEAN,
     about,
     axis_names,
     component_words,
+    decimals,
     instant,
+    length_factor,
+    length_unit,
     over_ground,
     plain,
     probability_words,
     recorder,
     resultant_words,
     speed,
+    speed_factor,
+    speed_unit,
 )
 from strapdown.rotation import within_half_turn
 from strapdown.sensors.crash_unit import RecordedTriad
@@ -67,11 +71,11 @@ def answers_table(result: CaseResult) -> TableBlock | None:
             "recorder",
             "event",
             "from, to, s",
-            "forward, km/h",
-            "right, km/h",
-            "down, km/h",
-            "resultant, km/h",
-            f"largest in {ms:.3g} ms, km/h",
+            f"forward, {speed_unit()}",
+            f"right, {speed_unit()}",
+            f"down, {speed_unit()}",
+            f"resultant, {speed_unit()}",
+            f"largest in {ms:.3g} ms, {speed_unit()}",
         ),
         tuple(rows),
         text=(0, 1, 2),
@@ -92,19 +96,20 @@ def direction_table(result: CaseResult) -> TableBlock | None:
                 angle, across = change.pdof, change.interval.horizontal
                 assert isinstance(angle, Pdof)
                 known = not across.undetermined
-                path = ("–", "–")
+                up = change.interval.vertical
+                path = ("–", "–", "–")
                 if ned is not None:
                     path = _over_ground(getattr(ned, window), ground)
                 rows.append(
                     (
                         recorder(unit, result),
-                        str(k + 1),
-                        ("event" if window == "event" else "largest")
+                        f"{k + 1}, {'event' if window == 'event' else 'largest'}"
                         + (", recorded part" if change.at_least else ""),
                         f"{plain(angle.horizontal_deg, 1)}°" if known else "not determined",
                         _ends(across) if known else "all",
                         str(angle.clock) if known else "–",
                         f"{plain(angle.vertical_deg, 1)}°" if known else "–",
+                        "all" if up.undetermined else _ends(up),
                         *path,
                     )
                 )
@@ -119,26 +124,26 @@ def direction_table(result: CaseResult) -> TableBlock | None:
     ms = 1e3 * result.spec.options.peak_window_s
     return TableBlock(
         (
-            *("recorder", "event", "window", "horizontal", "95 %", "o'clock", "vertical"),
-            *(axes, "95 %"),
+            *("recorder", "window", "horizontal", "95 %", "o'clock"),
+            *("vertical", "95 %", axes, "95 %", "vertical there"),
         ),
         tuple(rows),
-        text=(0, 1, 2),
+        text=(0, 1),
         caption="Principal direction of force over the event, and over the "
         f"{ms:.3g} ms of the largest change. Horizontal: from the front of the vehicle, clockwise "
-        f"from above; vertical: positive from above; {axes}: {told}.",
+        f"from above; vertical: positive from above; {axes} and vertical there: {told}.",
     )
 
 
-def _over_ground(change: VelocityChange, azimuth: bool) -> tuple[str, str]:
-    """Direction and its interval: an azimuth, or an angle from the entry's heading."""
+def _over_ground(change: VelocityChange, azimuth: bool) -> tuple[str, str, str]:
+    """Direction, its interval and elevation: an azimuth, or an angle from the entry's heading."""
     angle, across = change.pdof, change.interval.horizontal
     if across.undetermined:
-        return "not determined", "all"
+        return "not determined", "all", "–"
     at = math.remainder(getattr(angle, "azimuth_deg", math.nan), 360.0)
     at += 360.0 * (azimuth and at < 0.0)
     shift = 360.0 * round((at - 0.5 * (across.low_deg + across.high_deg)) / 360.0)
-    return f"{plain(at, 1)}°", _ends(across, shift)
+    return f"{plain(at, 1)}°", _ends(across, shift), f"{plain(angle.vertical_deg, 1)}°"
 
 
 def _ends(interval: AngleInterval, shift: float = 0.0) -> str:
@@ -148,7 +153,7 @@ def _ends(interval: AngleInterval, shift: float = 0.0) -> str:
 
 def path_table(result: CaseResult) -> TableBlock:
     """Positions at the end of the path, by every recorder."""
-    rows = []
+    rows, size = [], length_factor()
     for unit in result.reconstruction.answers:
         table, sd = unit.path.table.iloc[-1].copy(), unit.path.sd.iloc[-1]
         if not over_ground(result):
@@ -158,7 +163,10 @@ def path_table(result: CaseResult) -> TableBlock:
             (
                 recorder(unit, result),
                 instant(unit.path.time[-1]),
-                *(about(float(table[a]), TWO_SIDED_95 * float(sd[a]), "") for a in NED),
+                *(
+                    about(size * float(table[a]), size * TWO_SIDED_95 * float(sd[a]), "")
+                    for a in NED
+                ),
                 *(
                     about(float(table[a]), TWO_SIDED_95 * float(sd[a]), "")
                     for a in ("roll", "pitch", "heading")
@@ -166,7 +174,7 @@ def path_table(result: CaseResult) -> TableBlock:
             )
         )
     return TableBlock(
-        ("recorder", "at", *(f"{name}, m" for name in axis_names(result)), *ANGLES),
+        ("recorder", "at", *(f"{name}, {length_unit()}" for name in axis_names(result)), *ANGLES),
         tuple(rows),
         text=(0,),
         caption="Position of the reference point from that at the entry, and attitude, with 95 % "
@@ -199,9 +207,9 @@ def budget_table(result: CaseResult) -> TableBlock | None:
     return TableBlock(
         (
             "contributor",
-            "delta-V forward, km/h",
-            "delta-V right, km/h",
-            *(f"{name} at the end, m" for name in axis_names(result)),
+            f"delta-V forward, {speed_unit()}",
+            f"delta-V right, {speed_unit()}",
+            *(f"{name} at the end, {length_unit()}" for name in axis_names(result)),
         ),
         (*lines, ("total", *_sizes(np.sqrt(sums)))),
         caption=f"{recorder(unit, result)}: one standard deviation; squares add up to that of the "
@@ -211,7 +219,7 @@ def budget_table(result: CaseResult) -> TableBlock | None:
 
 
 def _sizes(sizes: np.ndarray[tuple[int], np.dtype[np.float64]]) -> tuple[str, ...]:
-    scaled = sizes * np.array([KMH, KMH, 1.0, 1.0, 1.0])
+    scaled = sizes * np.repeat([speed_factor(), length_factor()], [2, 3])
     return tuple("–" if s < 5e-4 else plain(float(s), 3) for s in scaled)
 
 
@@ -230,7 +238,7 @@ def comparison_table(result: CaseResult) -> TableBlock | None:
             (
                 f"{pair.first} − {pair.second}",
                 *(
-                    about(KMH * float(d), KMH * TWO_SIDED_95 * float(s), "")
+                    about(speed_factor() * float(d), speed_factor() * TWO_SIDED_95 * float(s), "")
                     if math.isfinite(float(d))
                     else "not measured"
                     for d, s in zip(difference, sd, strict=True)
@@ -244,9 +252,9 @@ def comparison_table(result: CaseResult) -> TableBlock | None:
     return TableBlock(
         (
             "recorders",
-            "forward, km/h",
-            "right, km/h",
-            "down, km/h",
+            f"forward, {speed_unit()}",
+            f"right, {speed_unit()}",
+            f"down, {speed_unit()}",
             "chi-square per degree of freedom",
             "probability",
             "consistent",
@@ -294,19 +302,23 @@ def closure_table(result: CaseResult) -> TableBlock | None:
         low, high = (plain(factor * x, places) for x in (figure.low, figure.high))
         return what, plain(factor * figure.value, places), f"{low} to {high}", unit
 
+    per, per_unit = speed_factor(), speed_unit()
     at = "at the contact" if closure.basis == "contact" else "of the centres of mass"
     equivalent = zip((first, second), closure.energy_equivalent_speed, strict=True)
     rows = (
-        row(f"closing speed {at}, along the impulse", closure.closing_speed, KMH, 1, "km/h"),
-        row(f"separation speed {at}", closure.separation_speed, KMH, 1, "km/h"),
+        row(f"closing speed {at}, along the impulse", closure.closing_speed, per, 1, per_unit),
+        row(f"separation speed {at}", closure.separation_speed, per, 1, per_unit),
         row("restitution", closure.restitution, 1.0, 2, ""),
-        row("common velocity along the impulse", closure.common_velocity, KMH, 1, "km/h"),
+        row("common velocity along the impulse", closure.common_velocity, per, 1, per_unit),
         row(f"direction of the impulse on {first}", closure.direction_deg, 1.0, 1, "deg"),
         row(f"mass of {second} over that of {first}", closure.mass_ratio, 1.0, 3, ""),
         row(f"impulse of {first} less that of {second}", closure.magnitude, 1e-3, 2, "kN s"),
         row("heading of the second less the first", closure.relative_heading_deg, 1.0, 1, "deg"),
         row("kinetic energy lost in the contact", closure.energy, 1e-3, 1, "kJ"),
-        *(row(f"energy-equivalent speed of {name}", of, KMH, 1, "km/h") for name, of in equivalent),
+        *(
+            row(f"energy-equivalent speed of {name}", of, per, 1, per_unit)
+            for name, of in equivalent
+        ),
     )
     tested = (
         f"Momentum closes with a probability of {probability_words(closure.probability)} "
@@ -325,6 +337,51 @@ def closure_table(result: CaseResult) -> TableBlock | None:
     )
 
 
+def indices_table(result: CaseResult) -> TableBlock | None:
+    """Indices of the vehicle and of the occupants, each with its standard and bound."""
+    combined = result.reconstruction.combined
+    mean = None if combined is None else combined.name
+    rows = []
+    for index in result.indices:
+        factor = speed_factor() if index.unit == "m/s" else 1.0
+        unit = speed_unit() if index.unit == "m/s" else index.unit
+        value, bound = "–", "" if index.because is None else index.because.sentence("file")
+        if index.value is not None:
+            half = math.inf if index.high is None else factor * (index.high - index.value)
+            places = decimals(half, 2, most=3) if math.isfinite(half) else decimals(index.value)
+            value = f"{plain(factor * index.value, places)} {unit}".strip()
+            if index.at_least:
+                value = f"at least {value}"
+            bound = "not stated by the record" if index.channels else "not determined"
+            if index.low is not None and index.high is not None:
+                ends = (plain(factor * x, places) for x in (index.low, index.high))
+                bound = " to ".join(ends)
+        detail = [index.detail] if index.detail else []
+        if index.channels:
+            detail.append(f"channels {', '.join(index.channels)}")
+        rows.append(
+            (
+                MEAN if index.of == mean else index.of,
+                index.name,
+                value,
+                bound,
+                "" if index.limit is None else f"{index.limit:g} {index.unit}".strip(),
+                index.standard,
+                "; ".join(detail),
+            )
+        )
+    if not rows:
+        return None
+    return TableBlock(
+        ("of", "index", "value", "95 % bound", "limit", "standard", "by"),
+        tuple(rows),
+        text=(0, 1, 3, 5, 6),
+        caption=f"Indices of the vehicle at its {result.spec.point.name} in the severest event, "
+        "from the common stamps, with the bound by the error budget and the onset; and of "
+        "occupants by channels of the records. Limits are of the standard named.",
+    )
+
+
 def severity_table(result: CaseResult) -> TableBlock | None:
     """Return the results of the injury-risk models."""
     if not result.severity:
@@ -332,30 +389,35 @@ def severity_table(result: CaseResult) -> TableBlock | None:
     rows = []
     sources = list(dict.fromkeys(answer.model.source for answer in result.severity))
     for answer in result.severity:
-        risk = answer.risk
+        risk, words = answer.risk, "–"
+        bound = "" if answer.because is None else answer.because.sentence("file")
+        if risk is not None:
+            low, high = (f"{100.0 * p:.2g}" for p in (risk.low, risk.high))
+            words = f"{'at least ' if answer.at_least else ''}{100.0 * risk.probability:.2g} %"
+            bound = f"above {low} %" if answer.at_least else f"{low} to {high} %"
         rows.append(
             (
                 answer.model.outcome,
-                "–"
-                if risk is None
-                else f"{'at least ' if answer.at_least else ''}{100.0 * risk.probability:.2g} %",
-                ("" if answer.because is None else answer.because.sentence("file"))
-                if risk is None
-                else f"above {100.0 * risk.low:.2g} %"
-                if answer.at_least
-                else f"{100.0 * risk.low:.2g} to {100.0 * risk.high:.2g} %",
+                words,
+                bound,
+                "yes" if answer.model.covariance else "NO",
                 *((answer.model.source,) if len(sources) > 1 else ()),
             )
         )
+    combined = result.reconstruction.combined
+    of = {answer.of for answer in result.severity}.pop()
+    name = MEAN if combined is not None and of == combined.name else of
     return TableBlock(
         (
-            *("outcome", "probability", "by the bounds of delta-V"),
+            *("outcome", "probability", "95 % bound", "with the model's uncertainty"),
             *(("source",) if len(sources) > 1 else ()),
         ),
         tuple(rows),
-        text=(0, 2, 3),
-        caption="Probability of at least this injury, by published models; the bounds are due to "
-        "delta-V and do not include the model's uncertainty."
+        text=(0, 2, 3, 4),
+        caption="Probability of at least this injury, by published models, from the resultant "
+        f"delta-V by {name} at the {result.spec.point.name}. The bound is due to delta-V and, "
+        "where the model states their covariance or standard errors, to its coefficients; else it "
+        "leaves the uncertainty of the model out."
         + (f" Source: {sources[0]}" if len(sources) == 1 else ""),
     )
 
@@ -368,7 +430,7 @@ def reference_tables(result: CaseResult) -> tuple[TableBlock, ...]:
         spec, verdict = answer.spec, "yes" if answer.consistent else "NO"
         who = (spec.name, _name(answer, result))
         if answer.path is not None:
-            errors = (*answer.path.rms, *answer.path.largest)
+            errors = [length_factor() * v for v in (*answer.path.rms, *answer.path.largest)]
             paths.append((*who, *(plain(float(v), 3) for v in errors), verdict))
             continue
         assert spec.delta_v_m_per_s is not None
@@ -398,7 +460,7 @@ def reference_tables(result: CaseResult) -> tuple[TableBlock, ...]:
             ),
             tuple(paths),
             text=(0, 1, 8),
-            caption="Errors of the path, m: this report − reference.",
+            caption=f"Errors of the path, {length_unit()}: this report − reference.",
         ),
     )
     return tuple(table for table in tables if table.rows)
@@ -459,14 +521,14 @@ def _rate(triad: RecordedTriad) -> str:
 
 def units_table(result: CaseResult) -> TableBlock:
     """Mounting position and clock synchronization of each recorder."""
-    rows = []
+    rows, size = [], length_factor()
     for unit, at in zip(result.units, result.reconstruction.synchronised.units, strict=True):
         mounting = unit.mounting
         rows.append(
             (
                 unit.name,
-                " ".join(plain(v, 3) for v in mounting.position)
-                + f" ± {TWO_SIDED_95 * mounting.position_sd:.2g}",
+                " ".join(plain(size * v, 3) for v in mounting.position)
+                + f" ± {size * TWO_SIDED_95 * mounting.position_sd:.2g}",
                 " ".join(plain(v, 1) for v in mounting.angles_deg)
                 + f" ± {TWO_SIDED_95 * mounting.angles_sd_deg:.2g}",
                 "–" if unit.trigger is None else instant(unit.trigger),
@@ -478,7 +540,7 @@ def units_table(result: CaseResult) -> TableBlock:
     return TableBlock(
         (
             "recorder",
-            "forward right down, m",
+            f"forward right down, {length_unit()}",
             "roll pitch heading, deg",
             "trigger on its clock",
             "± ms",

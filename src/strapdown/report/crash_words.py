@@ -19,20 +19,26 @@ from strapdown.report.document import KeyFigure
 from strapdown.report.values import (
     AXES,
     GAP,
-    KMH,
     MEAN,
+    SHOWN,
     about,
     angle_range,
     axis_names,
     change_range,
     change_words,
     instant,
+    length_about,
+    length_factor,
+    length_unit,
     moment,
     over_ground,
     plain,
     probability_words,
     side_words,
     speed,
+    speed_factor,
+    speed_unit,
+    speed_words,
 )
 from strapdown.sensors.pre_crash import PreparedUnit
 from strapdown.tables import NED
@@ -56,7 +62,7 @@ def headline(result: CaseResult) -> str:
     if number is None:
         size, axis = unit.events.largest_change, unit.events.largest_axis
         return (
-            f"No event by 49 CFR 563: the {axis} velocity changed by {plain(KMH * size, 1)} km/h "
+            f"No event by 49 CFR 563: the {axis} velocity changed by {speed_words(size)} "
             "at most within 150 ms; an event requires 8 km/h."
         )
     whole = unit.body[number].event
@@ -124,9 +130,9 @@ def key_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
     figures.append(
         KeyFigure(
             f"Final position{of}",
-            f"{plain(math.hypot(place[0], place[1]), 2)} m",
+            f"{plain(length_factor() * math.hypot(place[0], place[1]), 2)} {length_unit()}",
             ", ".join(
-                f"{name}{GAP}{about(p, h, 'm')}"
+                f"{name}{GAP}{length_about(p, h)}"
                 for name, p, h in zip(axis_names(result), place, half, strict=True)
             )
             + f" with 95{GAP}%",
@@ -154,7 +160,7 @@ def lead(result: CaseResult) -> str:
         parts.append(
             f"Within {length:.0f} ms from {moment(whole.delta_v.start)}, the velocity of the "
             f"{result.spec.point.name} changed by {change_words(whole)} ("
-            f"{change_words(whole, unit='m/s')}; all bounds are 95 %), "
+            f"{change_words(whole, unit=SHOWN.get().beside)}; all bounds are 95 %), "
             f"{side_words(forward, right)}. {direction_name(whole).capitalize()}: "
             f"{direction(unit, number)}; {TYPES[unit.types[number].name]}."
         )
@@ -196,8 +202,8 @@ def entry_words(result: CaseResult) -> str:
         at = result.reconstruction.main.path.entry
         size = float(np.linalg.norm(at.velocity))
         return (
-            f"At {instant(at.time)} it moved at {plain(KMH * size, 1)} km/h, by GNSS fixes before "
-            "the impact."
+            f"At {instant(at.time)} it moved at {speed_words(size)}, by GNSS "
+            "fixes before the impact."
         )
     assert entry.speed_m_per_s is not None and entry.speed_sd_m_per_s is not None
     half = TWO_SIDED_95 * entry.speed_sd_m_per_s
@@ -212,8 +218,8 @@ def path_words(result: CaseResult) -> str:
     (ahead, aside, _), (first, second, _) = (axis_names(result), place)
     return (
         f"{instant(unit.path.time[-1])} after the trigger the {result.spec.point.name} was "
-        f"{about(first, half[0], 'm')} {ahead} and {about(second, half[1], 'm')} {aside} of its "
-        f"position at the entry, {_axes(result)}."
+        f"{length_about(first, half[0])} {ahead} and {length_about(second, half[1])} {aside} of "
+        f"its position at the entry, {_axes(result)}."
     )
 
 
@@ -275,9 +281,10 @@ def apart_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
     value = "no event"
     if spans:
         low, high = min(s[0] for s in spans), max(s[1] for s in spans)
-        value = f"{plain(KMH * low, 1)} to {plain(KMH * high, 1)} km/h"
+        ends = [plain(speed_factor() * end, 1) for end in (low, high)]
+        value = f"{' to '.join(ends)} {speed_unit()}"
         if not math.isfinite(high):
-            value = f"above {plain(KMH * low, 1)} km/h"
+            value = f"above {ends[0]} {speed_unit()}"
     return (
         KeyFigure(
             "Delta-V",
@@ -447,6 +454,153 @@ def _short(found: re.Match[str]) -> str:
     return f"{float(found.group()):.6g}"
 
 
+# What contradicts the answers, for page one.
+
+
+#: Findings by which a record, a case or a second vehicle speaks against an answer.
+AGAINST = frozenset(
+    f"crash.{code}"
+    for code in (
+        "bias-against-times-stated",
+        "direction-their-forces-stated",
+        "disagree-their-common-point-chi",
+        "momentum-not-closed",
+        "no-point-closes",
+        "others-agree-another-not",
+        "point-does-not-close",
+        "reads-more-than-stated-full",
+        "rest-until-record-itself-comes",
+        "specific-force-rest-along-vehicle",
+        "specific-force-rest-long-off",
+        "stated-crash-began-ms-before",
+        "turned-against-about-forward-right",
+        "turned-more-than-assumed",
+        "velocity-turns-back",
+        "vertical-velocity-upward-vehicle-points",
+        "window-exceeds-event",
+    )
+) | {"io.edr-maximum-beyond-table"}
+
+
+def contradictions(result: CaseResult) -> tuple[tuple[str, str], ...]:
+    """Return what speaks against the answers: references, records and the other vehicle.
+
+    Returns
+    -------
+    tuple of (str, str)
+        Source, and what it says.
+    """
+    rows = []
+    for answer in result.references:
+        spec = answer.spec
+        if answer.consistent or answer.unit != result.reconstruction.main.name:
+            continue
+        if answer.path is not None:
+            at = f"at {instant(answer.path.errors.index[-1])}"
+            off = answer.path.errors[NED].iloc[-1].to_numpy()
+            half = answer.path.bound[NED].iloc[-1].to_numpy()
+            differs = ", ".join(
+                f"{name} {length_about(float(d), float(h))}"
+                for name, d, h in zip(axis_names(result), off, half, strict=True)
+            )
+            text = f"Its path differs {at} by {differs} (this report less the reference)."
+        else:
+            assert spec.delta_v_m_per_s is not None
+            own = speed(answer.delta_v, TWO_SIDED_95 * answer.sd)
+            given = speed(spec.delta_v_m_per_s, TWO_SIDED_95 * spec.delta_v_sd_m_per_s)
+            text = f"Its {spec.axis} delta-V is {given}; this report has {own}."
+        rows.append((spec.name, text))
+    found = [f for f in result.findings if f.code in AGAINST]
+    return (*rows, *notes(found, result, remedies=False))
+
+
+def not_shown(result: CaseResult) -> tuple[tuple[str, str], ...]:
+    """Return what the records of this case cannot show."""
+    spec, made = result.spec, result.reconstruction
+    unit = made.main
+    begin, end = unit.acceleration.begin, unit.acceleration.end
+    assumed_axes = list(dict.fromkeys(a for u in made.units for a in u.at_point.assumed_axes))
+    others = bool(result.partners)
+    rows = [
+        (
+            "Before and after the records",
+            f"They cover {instant(begin)} to {instant(end)} from the trigger; what the vehicle did "
+            "before and after is in no answer and in no bound.",
+        ),
+        (
+            "The cause",
+            "Who steered, braked or gave way, visibility, the road and its grip are not in an "
+            "acceleration.",
+        ),
+        (
+            "The people",
+            "Indices are those of dummies or of a model occupant, and a probability of injury is "
+            "that of many crashes of this severity: neither says how this person was injured.",
+        ),
+        (
+            "Deformation that all recorders share",
+            "A recorder has the motion of its mounting. Where all mountings were pushed in with "
+            "the structure, their agreement does not show it.",
+        ),
+    ]
+    if spec.entry.kind == "speed":
+        rows.append(
+            (
+                "The speed before the impact",
+                "It is stated, not measured by these records; delta-V is the change alone.",
+            )
+        )
+    if not over_ground(result):
+        rows.append(
+            (
+                "The place on the road",
+                "Without a stated heading the path is relative to the vehicle at the entry; where "
+                "on the road it lies is not known.",
+            )
+        )
+    if not others:
+        rows.append(
+            (
+                "The other vehicle or obstacle",
+                "Its mass, speed, stiffness and change of velocity are not known from these "
+                "records; a closing speed needs its case as well.",
+            )
+        )
+    if assumed_axes:
+        rows.append(
+            (
+                "Axes that were not measured",
+                f"{', '.join(assumed_axes)}: an impact or a turn along them appears only as the "
+                "bound that was assumed.",
+            )
+        )
+    if len(made.units) == 1:
+        rows.append(
+            (
+                "An error of the one recorder",
+                "A wrong sign, axis, scale factor or clock, or a loose bracket, looks like another "
+                "crash.",
+            )
+        )
+    else:
+        rows.append(
+            (
+                "Errors that the recorders share",
+                "The same wrong angle, lever arm or trigger in every recorder moves all answers "
+                "together, and their comparison does not see it.",
+            )
+        )
+    rate = spec.options.rate_hz
+    rows.append(
+        (
+            "Fast motion",
+            f"Answers are at {rate:g} Hz: motion above {rate / 2.0:g} Hz, such as ringing of the "
+            "structure, is in their sum and not in their shape.",
+        )
+    )
+    return tuple(rows)
+
+
 # Limitations of the answers of a case, from its own events, most serious first.
 
 
@@ -458,6 +612,7 @@ GRAVE = frozenset(
         "direction-undetermined",
         "recorders-disagree",
         "vehicles-do-not-close",
+        "reference-contradicts",
         "clipped-accelerometer",
         "clipped-gyro",
         "assumed",
@@ -585,11 +740,12 @@ def _levers(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     comparison = result.reconstruction.comparison
     bent = np.zeros(3) if comparison is None else comparison.structure.sd
     if longest > 0.0:
-        told = f"{result.spec.point.name}, up to {plain(longest, 2)} m ({name})"
+        far = f"{plain(length_factor() * longest, 2)} {length_unit()}"
+        told = f"{result.spec.point.name}, up to {far} ({name})"
         learnt = (
             f" By their differences the recorders moved against each other with a standard "
-            f"deviation of up to {plain(KMH * float(bent.max()), 1)} km/h while the force acted; "
-            "that is in the bounds, a deformation that all of them share is not."
+            f"deviation of up to {speed_words(float(bent.max()))} while the "
+            "force acted; that is in the bounds, a deformation that all of them share is not."
         )
         yield (
             "rigid-vehicle",
@@ -830,8 +986,15 @@ CONVENTIONS = (
         "95 % (1.96 standard deviations), if the stated and assumed values are right; of a "
         "direction, Fieller's interval",
     ),
-    ("Units", "SI, with km/h for changes of velocity and g = 9.80665 m/s² for accelerations"),
 )
+
+
+def conventions() -> tuple[tuple[str, str], ...]:
+    """Return the conventions, with the units that are shown."""
+    units = SHOWN.get()
+    shown = f"{units.speed} for speeds, {units.length} for lengths, g = 9.80665 m/s² for "
+    shown += "accelerations; drawings of the path, and what is not named, in SI"
+    return (*CONVENTIONS, ("Units", shown))
 
 
 def assumptions(result: CaseResult) -> tuple[tuple[str, str], ...]:

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import TYPE_CHECKING
 
 from strapdown.constants import DEG_PER_HOUR, MICRO_G, STANDARD_GRAVITY, TWO_SIDED_95
+from strapdown.units import LENGTHS, MASSES, SHOWN_UNITS, SPEEDS, ShownUnits
 
 if TYPE_CHECKING:
     from strapdown.crash.case import CaseResult
@@ -16,6 +20,10 @@ if TYPE_CHECKING:
 
 #: km/h per m/s.
 KMH = 3.6
+#: Units in which crash results are shown: `shown_in`.
+SHOWN: ContextVar[ShownUnits] = ContextVar("shown units", default=SHOWN_UNITS["metric"])
+# Numbers of a unit in one of SI; of km/h 3.6 to the last bit.
+_PER = {"km/h": 3.6} | {u: 1.0 / f for u, f in (SPEEDS | LENGTHS | MASSES).items() if u != "km/h"}
 #: Name of the recorders' mean, in every table and chart.
 MEAN = "mean of the recorders"
 #: Axes of a vehicle.
@@ -76,22 +84,78 @@ def plus_minus(half: float, unit: str) -> str:
     return text[text.index("±") :]
 
 
+@contextmanager
+def shown_in(system: str) -> Iterator[None]:
+    """Show crash results in a system of `units.SHOWN_UNITS`."""
+    token = SHOWN.set(SHOWN_UNITS[system])
+    try:
+        yield
+    finally:
+        SHOWN.reset(token)
+
+
+def speed_unit() -> str:
+    """Unit in which speeds are shown."""
+    return SHOWN.get().speed
+
+
+def speed_factor(unit: str | None = None) -> float:
+    """Speed in the shown unit, or in another one, of 1 m/s."""
+    return _PER[unit or SHOWN.get().speed]
+
+
+def length_unit() -> str:
+    """Unit in which lengths are shown."""
+    return SHOWN.get().length
+
+
+def length_factor() -> float:
+    """Length in the shown unit of 1 m."""
+    return _PER[SHOWN.get().length]
+
+
+def mass_words(mass: float) -> str:
+    """Format a mass in kg."""
+    unit = SHOWN.get().mass
+    return f"{_PER[unit] * mass:.6g} {unit}" if unit != "kg" else f"{mass:g} kg"
+
+
+def length_about(value: float, half: float) -> str:
+    """Format a length in m with its bound."""
+    factor = length_factor()
+    return about(factor * value, factor * half, length_unit())
+
+
 def speed(value: float, half: float) -> str:
-    """Format a speed in m/s with its bound, in km/h."""
-    return about(KMH * value, KMH * half, "km/h")
+    """Format a speed in m/s with its bound."""
+    factor = speed_factor()
+    return about(factor * value, factor * half, speed_unit())
+
+
+def speed_words(value: float, unit: str | None = None) -> str:
+    """Format a speed in m/s without its bound, in the shown unit or another one."""
+    return f"{plain(speed_factor(unit) * value, 1)} {unit or speed_unit()}"
+
+
+def speed_both(value: float) -> str:
+    """Format a speed in m/s in the unit beside, and in the shown one: ``6.9 m/s (24.9 km/h)``."""
+    return f"{speed_words(value, SHOWN.get().beside)} ({speed_words(value)})"
 
 
 def speed_range(value: float, half: float) -> str:
-    """Format the bound of a speed in m/s as a range, in km/h and m/s."""
-    places = decimals(KMH * half, DIGITS, most=4)
-    low, high = KMH * (value - half), KMH * (value + half)
-    ends = f"{plain(low, places)} to {plain(high, places)}{GAP}km/h with 95{GAP}%"
-    return f"{ends}; {about(value, half, 'm/s')}"
+    """Format the bound of a speed in m/s as a range, and the speed in the unit beside."""
+    factor, beside = speed_factor(), SHOWN.get().beside
+    places = decimals(factor * half, DIGITS, most=4)
+    low, high = factor * (value - half), factor * (value + half)
+    ends = f"{plain(low, places)} to {plain(high, places)}{GAP}{speed_unit()} with 95{GAP}%"
+    other = speed_factor(beside)
+    return f"{ends}; {about(other * value, other * half, beside)}"
 
 
-def change_words(change: VelocityChange, *, unit: str = "km/h") -> str:
+def change_words(change: VelocityChange, *, unit: str = "") -> str:
     """Format the resultant of a change of velocity: ``at least 28.4 km/h`` if it is a part."""
-    scale = KMH if unit == "km/h" else 1.0
+    unit = unit or speed_unit()
+    scale = speed_factor(unit)
     value, half = scale * change.resultant, scale * change.resultant_bound
     if not change.at_least:
         return about(value, half, unit)
@@ -103,18 +167,20 @@ def change_range(change: VelocityChange) -> str:
     """Format the bound of the resultant of a change of velocity; without upper end of a part."""
     if not change.at_least:
         return speed_range(change.resultant, change.resultant_bound)
-    places = decimals(KMH * change.resultant_bound, DIGITS, most=4)
-    low = plain(KMH * change.resultant_range[0], places)
-    return f"above {low}{GAP}km/h with 95{GAP}%, without an upper bound"
+    factor = speed_factor()
+    places = decimals(factor * change.resultant_bound, DIGITS, most=4)
+    low = plain(factor * change.resultant_range[0], places)
+    return f"above {low}{GAP}{speed_unit()} with 95{GAP}%, without an upper bound"
 
 
 def component_words(change: VelocityChange) -> tuple[str, str, str, str]:
-    """Format the components and the resultant of a change of velocity, in km/h without unit.
+    """Format the components and the resultant of a change of velocity, without unit.
 
     A component of which a part is missing: ``-28.4 ± 0.8 or beyond``.
     """
+    factor = speed_factor()
     x, y, z = (
-        about(KMH * v, KMH * h, "") + (" or beyond" if is_open else "")
+        about(factor * v, factor * h, "") + (" or beyond" if is_open else "")
         for v, h, is_open in zip(
             change.delta_v.vector.tolist(), change.bound.half_width, change.open_axes, strict=True
         )
@@ -123,8 +189,9 @@ def component_words(change: VelocityChange) -> tuple[str, str, str, str]:
 
 
 def resultant_words(change: VelocityChange) -> str:
-    """Format the resultant of a change of velocity in km/h, without unit."""
-    said = about(KMH * change.resultant, KMH * change.resultant_bound, "")
+    """Format the resultant of a change of velocity, without unit."""
+    factor = speed_factor()
+    said = about(factor * change.resultant, factor * change.resultant_bound, "")
     return f"at least {said}" if change.at_least else said
 
 

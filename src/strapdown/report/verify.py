@@ -302,10 +302,10 @@ def changed_case(root: Path, manifest: dict[str, Any]) -> list[str]:
     ]
 
 
-def _without_files(value: Any) -> Any:
+def _without_files(value: Any, key: str = "") -> Any:
     """Remove file names, which differ in a bundle."""
     if isinstance(value, dict):
-        return {k: _without_files(v) for k, v in value.items() if not names_file(k, v)}
+        return {k: _without_files(v, k) for k, v in value.items() if not names_file(k, v)}
     if isinstance(value, list):
-        return [_without_files(v) for v in value]
+        return [_without_files(v, key) for v in value if not names_file(key, v)]
     return value

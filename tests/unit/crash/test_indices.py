@@ -11,12 +11,16 @@ from scipy.optimize import brentq, minimize
 from tests.coded import coded
 
 from strapdown.crash.indices import (
+    CONDYLE,
+    NECK_INTERCEPTS,
     asi,
+    exceeded_level,
     flail_space,
     four_pole,
     hic,
     largest_mean,
     moving_means,
+    nij,
     olc,
     thiv,
 )
@@ -408,3 +412,62 @@ class TestHic:
     def test_window_is_checked(self):
         with pytest.raises(ConfigError, match=r"longest: a window length of 0\.0 s is not valid"):
             hic(*constant(1.0), longest=0.0)
+
+
+class TestExceededLevel:
+    def test_of_a_triangle_and_of_two(self):
+        # Rises to 100 at 10 ms and falls: above 100 - 10 x for 2 x ms, so for 3 ms at 85.
+        time = np.array([0.0, 0.010, 0.020])
+        assert exceeded_level(time, [0.0, 100.0, 0.0]) == pytest.approx(85.0, rel=EXACT)
+        # Two of them reach it together for 3 ms at 92.5: the durations add up.
+        time = np.array([0.0, 0.010, 0.020, 0.030, 0.040])
+        twice = exceeded_level(time, [0.0, 100.0, 0.0, 100.0, 0.0])
+        assert twice == pytest.approx(92.5, rel=EXACT)
+
+    def test_of_a_plateau_and_its_spike(self):
+        # 50 for 10 ms, with a spike of 1 ms that counts only as part of it.
+        time = np.array([0.0, 1e-9, 0.004, 0.0045, 0.005, 0.010, 0.010 + 1e-9, 0.1])
+        values = [0.0, 50.0, 50.0, 200.0, 50.0, 50.0, 0.0, 0.0]
+        assert exceeded_level(time, values) == pytest.approx(50.0, rel=1e-6)
+
+    def test_of_samples_as_counted(self):
+        rng = np.random.default_rng(5)
+        time = np.arange(2001) * STEP
+        values = np.abs(rng.standard_normal(time.size).cumsum())
+        level = exceeded_level(time, values)
+        fine = np.linspace(0.0, time[-1], 400_001)
+        above = (np.interp(fine, time, values) >= level).mean() * time[-1]
+        # Counted to half a step of the fine grid at each of some hundred crossings.
+        assert above == pytest.approx(0.003, abs=100 * (fine[1] - fine[0]))
+
+    def test_short_record_and_no_duration(self):
+        with pytest.raises(DataError, check=coded("crash.record-shorter-than-window")):
+            exceeded_level([0.0, 0.001], [1.0, 1.0])
+        with pytest.raises(ConfigError, check=coded("crash.no-length-window", quantity="duration")):
+            exceeded_level([0.0, 1.0], [1.0, 1.0], duration=0.0)
+
+
+class TestNij:
+    @pytest.mark.parametrize(
+        ("force", "moment", "kind", "value"),
+        [
+            (3403.0, 155.0, "tension-flexion", 1.0),
+            (3403.0, -67.5, "tension-extension", 1.0),
+            (-3080.0, 155.0, "compression-flexion", 1.0),
+            (-3080.0, -67.5, "compression-extension", 1.0),
+        ],
+    )
+    def test_each_of_the_four(self, force, moment, kind, value):
+        pulse = np.array([0.0, 1.0, 0.0])
+        shear = 1000.0
+        # The moment at the condyle is that of the cell less 0.01778 m times the shear force.
+        found = nij(
+            [0.0, 0.01, 0.02], shear * pulse, force * pulse, (moment + CONDYLE * shear) * pulse
+        )
+        assert (found.kind, found.at) == (kind, 0.01)
+        assert found.value == pytest.approx(value, rel=EXACT)
+
+    def test_small_woman(self):
+        critical = NECK_INTERCEPTS["HF"]
+        found = nij([0.0, 1.0], [0.0, 0.0], [0.0, 4287.0], [0.0, 155.0], intercepts=critical)
+        assert found.value == pytest.approx(2.0)

@@ -224,7 +224,7 @@ class TestFile:
                 "[5.0, 50.0]",
                 "[50.0, 5.0]",
                 "validity.delta_v",
-                r"own\.toml, validity\.delta_v: from 50 to 5 is not a range",
+                r"own\.toml, line \d+, validity\.delta_v: from 50 to 5 is not a range",
             ),
             ("[5.0, 50.0]", "5.0", "validity.delta_v", "5.0"),
             ("delta_v = [5", "speed = [5", "validity.speed", "no term"),
@@ -244,7 +244,65 @@ class TestFile:
             ConfigError, check=coded("crash.terms-missing", quantity="terms", file="own.toml")
         ):
             load_severity_model(write(FILE[: FILE.index("[[terms]]")]))
-        with pytest.raises(ConfigError, check=coded("crash.no-toml")):
+        with pytest.raises(ConfigError, check=coded("config.not-toml")):
             load_severity_model(write("= 1"))
-        with pytest.raises(ConfigError, check=coded("crash.no-such-file")):
+        with pytest.raises(ConfigError, check=coded("config.no-such-file")):
             load_severity_model(tmp_path / "none.toml")
+
+
+COVARIANCE = (
+    "covariance = [[0.04, -0.001, 0, 0], [-0.001, 4e-5, 0, 0], [0, 0, 1e-4, 0], [0, 0, 0, 0.01]]"
+)
+
+
+SIDE = {"delta_v": 20.0 * MPH, "age": 50.0, "crash_type": "side"}
+
+
+class TestModelUncertainty:
+    def test_covariance_of_the_coefficients_is_in_the_bound(self, write):
+        model = load_severity_model(write(f"{COVARIANCE}\n{FILE}"))
+        risk = injury_risk(model, SIDE, {"delta_v": 2.0 * MPH})
+        # x = (1, 20, 50, 1): 0.04 - 2·20·0.001 + 400·4e-5 + 2500e-4 + 0.01.
+        own = 0.04 - 0.04 + 0.016 + 0.25 + 0.01
+        assert risk.model_sd == pytest.approx(own**0.5)
+        assert risk.logit_sd == pytest.approx((own + (0.15 * 2.0) ** 2) ** 0.5)
+
+    def test_standard_errors_are_independent(self, write):
+        text = "intercept_standard_error = 0.2\n" + FILE.replace(
+            "coefficient = 0.15", "coefficient = 0.15\nstandard_error = 0.01"
+        ).replace("coefficient = 0.02", "coefficient = 0.02\nstandard_error = 0.001").replace(
+            "coefficient = 0.5", "coefficient = 0.5\nstandard_error = 0.1"
+        )
+        risk = injury_risk(load_severity_model(write(text)), SIDE)
+        assert risk.model_sd == pytest.approx((0.04 + 0.04 + 0.0025 + 0.01) ** 0.5)
+
+    def test_a_published_table_without_them_says_so(self):
+        model = find_severity_model("wang_2022_front_mais3")
+        assert injury_risk(model, {"delta_v": 10.0, "crash_type": "front"}).model_sd is None
+
+    def test_a_file_is_found_by_its_path(self, write):
+        assert find_severity_model(str(write(FILE))).name == "own"
+
+    @pytest.mark.parametrize(
+        ("text", "code", "quantity"),
+        [
+            ("covariance = [[1.0]]", "covariance-not-square", "covariance"),
+            (COVARIANCE.replace("-0.001, 0", "0.9, 0", 1), "covariance-not-valid", "covariance"),
+            (COVARIANCE.replace("0.04", "-0.04"), "covariance-not-valid", "covariance"),
+            (
+                f"{COVARIANCE}\nintercept_standard_error = 0.1",
+                "covariance-and-standard-errors",
+                "intercept_standard_error",
+            ),
+            (
+                "intercept_standard_error = 0.1",
+                "standard-error-missing",
+                "terms 1.standard_error",
+            ),
+        ],
+    )
+    def test_what_is_no_covariance_is_refused(self, write, text, code, quantity):
+        check = coded(f"crash.{code}", quantity=quantity, file="own.toml")
+        with pytest.raises(ConfigError, check=check) as error:
+            load_severity_model(write(f"{text}\n{FILE}"))
+        assert error.value.finding.line is not None

@@ -16,7 +16,7 @@ from strapdown.bundle.seal import to_json
 from strapdown.config.crash_case import AssumedSpec, CaseSpec, ReferenceSpec
 from strapdown.crash.case import case_severity, compare_reference, main_event, run_case
 from strapdown.crash.reconstruction import summary_table
-from strapdown.errors import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats import read_raw
 from strapdown.report.crash_case import (
     crash_json,
@@ -25,9 +25,18 @@ from strapdown.report.crash_case import (
     trajectory_table,
     write_table,
 )
+from strapdown.report.crash_document import crash_document
 from strapdown.report.crash_tables import answers_table, severity_table
-from strapdown.report.crash_words import headline, key_figures, lead, limitations
-from strapdown.report.values import spaced
+from strapdown.report.crash_words import (
+    contradictions,
+    headline,
+    key_figures,
+    lead,
+    limitations,
+    not_shown,
+)
+from strapdown.report.document import Items
+from strapdown.report.values import shown_in, spaced
 from strapdown.report.verify import changed_case
 
 USUAL = {
@@ -248,6 +257,7 @@ def test_a_rest_that_is_none_or_short(result, change, code):
 UNITS = ("_s", "_deg", "_m", "_m2", "_m_per_s", "_m_per_s2")
 # Numbers without a unit: counts, probabilities, a chi-square, a clock's hour, and the case's own.
 BARE = {
+    *("limit", "logit", "logit_sd", "logit_sd_of_model"),
     "main_event", "event", "clock", "probability", "chi_square", "freedom", "value", "low", "high",
     "share_of_delta_v", "turning_of_assumed",
 }  # fmt: skip
@@ -273,6 +283,76 @@ def test_every_number_is_finite_and_its_key_says_its_unit(result):
         named = [key for key in place if str(key).endswith(UNITS)]
         assert named or place[-1] in BARE, place
     assert json.loads(to_json(told)) == json.loads(json.dumps(told))
+
+
+def test_units_of_the_united_states_are_those_of_labels_and_numbers(result):
+    options = result.spec.options.model_copy(update={"units": "us"})
+    other = replace(result, spec=result.spec.model_copy(update={"options": options}))
+    si, us = crash_json(result), crash_json(other)
+    assert (si["units"], us["units"]) == ("metric", "us")
+    first, second = (told["answers"][0]["path"]["end"] for told in (si, us))
+    for axis in ("value", "low", "high"):
+        assert second["north_ft"][axis] == pytest.approx(first["north_m"][axis] / 0.3048)
+        assert second["VN_mph"][axis] == pytest.approx(first["VN_m_per_s"][axis] / 0.44704)
+        assert second["roll_deg"] == first["roll_deg"]
+    variances = [told["answers"][0]["path"] for told in (si, us)]
+    some = next(iter(variances[0]["variances_at_the_end_m2"]))
+    assert variances[1]["variances_at_the_end_ft2"][some]["north"] == pytest.approx(
+        variances[0]["variances_at_the_end_m2"][some]["north"] / 0.3048**2
+    )
+    peaks = [told["answers"][0]["events"][0] for told in (si, us)]
+    assert peaks[1]["peak_g"] == pytest.approx(peaks[0]["peak_m_per_s2"] / 9.80665)
+    for place, _ in numbers({k: v for k, v in us.items() if k != "case"}):
+        assert not any(str(key).endswith(("_m", "_m2", "_m_per_s", "_m_per_s2")) for key in place)
+    thiv = (
+        [next(i for i in told["indices"] if i["index"] == "THIV") for told in (si, us)]
+        if si["indices"]
+        else []
+    )
+    for one in thiv[:1]:
+        assert thiv[1]["unit"] == "mph"
+        assert thiv[1]["value"] == pytest.approx(one["value"] / 0.44704)
+
+
+def test_units_are_those_of_tables_and_sentences(result):
+    with shown_in("us"):
+        table = answers_table(result)
+        assert table.columns[3] == "forward, mph"
+        assert "mph" in headline(result) and "ft" in lead(result)
+    assert "km/h" in headline(result) and "mph" not in lead(result)
+
+
+def test_a_reference_that_contradicts_is_on_page_one(result):
+    first = next(r for r in result.references if r.unit == result.reconstruction.main.name)
+    others = tuple(r for r in result.references if r is not first)
+    assert not contradictions(replace(result, references=others, findings=()))
+    wrong = replace(first, consistent=False)
+    told = contradictions(replace(result, references=(wrong, *others), findings=()))
+    assert [where for where, _ in told] == [first.spec.name]
+    front = crash_document(replace(result, references=(wrong, *others)), "").front
+    items = [row for block in front if isinstance(block, Items) for row in block.rows]
+    assert items[0] == told[0]
+
+
+def test_a_finding_against_the_answer_is_on_page_one_and_a_note_is_not(result):
+    known = replace(result, references=())
+    finding = Finding("crash.others-agree-another-not", file="IMU1")
+    note = Finding("crash.index-not-reached", severity="note", quantity="OLC")
+    told = contradictions(replace(known, findings=(note, finding)))
+    assert [where for where, _ in told] == ["IMU1"]
+
+
+def test_what_cannot_be_shown_depends_on_the_case(result):
+    heads = [head for head, _ in not_shown(result)]
+    single = replace(
+        result,
+        reconstruction=replace(
+            result.reconstruction, units=result.reconstruction.units[:1], combined=None
+        ),
+    )
+    alone = [head for head, _ in not_shown(single)]
+    assert len(set(heads)) == len(heads) >= 8
+    assert set(alone) != set(heads)
 
 
 def test_what_is_no_number_is_null(result):

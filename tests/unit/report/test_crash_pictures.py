@@ -18,14 +18,22 @@ from strapdown import rotation
 from strapdown.config.crash_case import PointSpec, VehicleSpec
 from strapdown.crash.pdof import AngleInterval
 from strapdown.report.crash_animation import MOST_FRAMES, path_animation, vehicle_body
-from strapdown.report.crash_document import crash_document, reference_in_path_axes
+from strapdown.report.crash_document import _points, crash_document, reference_in_path_axes
 from strapdown.report.crash_outline import (
     angle_words,
     interval_words,
     path_moments,
     vehicle_outline,
 )
-from strapdown.report.crash_pictures import Direction, MountingPoint, conventions_picture, pdof_dial
+from strapdown.report.crash_pictures import (
+    Direction,
+    MountingPoint,
+    PointChange,
+    conventions_picture,
+    elevation_dial,
+    pdof_dial,
+    points_picture,
+)
 from strapdown.report.crash_plan import PlanView, path_plan
 from strapdown.report.plan import ellipse, envelope, hull
 from strapdown.report.svg_drawing import (
@@ -38,7 +46,7 @@ from strapdown.report.svg_drawing import (
     tick_words,
 )
 from strapdown.report.values import plain
-from strapdown.tables import NED
+from strapdown.tables import ACCEL, NED
 
 CAR = vehicle_outline(VehicleSpec(length_m=4.4, width_m=1.8, front_m=2.0))
 SVG = "{http://www.w3.org/2000/svg}"
@@ -171,6 +179,82 @@ def test_an_undetermined_direction_is_a_ring_and_no_event_is_said():
     picture = pdof_dial(CAR, [])
     assert any("no event" in t for t, _, _ in texts(picture.svg))
     check_readable(picture)
+
+
+def test_every_recorder_is_on_the_dial_by_number_and_name():
+    units = [
+        replace(direction(a, a - 4.0, a + 4.0), name=n, number=k, main=False)
+        for k, (n, a) in enumerate([("IMU1", -9.0), ("B-pillar, left " * 4, -8.5), ("C", 91.0)])
+    ]
+    for small in (False, True):
+        picture = pdof_dial(CAR, [direction(-8.0, -12.0, -4.0)], recorders=units, small=small)
+        words = [t for t, _, _ in texts(picture.svg)]
+        # A number at its direction, and one beside its name.
+        assert [words.count(n) for n in ("1", "2", "3")] == [3, 3, 3]
+        assert "IMU1" in words and "C" in words
+        assert "91.0° (87.0° to 95.0°), 3 o'clock" in words
+        check_readable(picture)
+
+
+@pytest.mark.parametrize(
+    ("azimuth", "right"), [(0.0, True), (170.0, False), (92.0, True), (-88.0, False)]
+)
+def test_the_elevation_is_that_of_the_force(azimuth, right):
+    # From the front or the right it comes from the right of the picture, from above downward.
+    one = replace(
+        direction(azimuth, azimuth - 5.0, azimuth + 5.0),
+        vertical_deg=30.0,
+        vertical=AngleInterval(20.0, 40.0),
+    )
+    picture = elevation_dial(CAR, one, [replace(one, name="IMU1", number=0)])
+    (head,) = arrows(picture.svg)
+    tip, neck = np.array(head[0]), np.array(head[2])
+    along = tip - neck
+    assert math.degrees(math.atan2(along[1], abs(along[0]))) == pytest.approx(30.0, abs=0.2)
+    assert (along[0] < 0.0) == right
+    words = [t for t, _, _ in texts(picture.svg)]
+    assert "30.0° (20.0° to 40.0°), from above" in words
+    check_readable(picture)
+
+
+def test_measuring_points_have_their_change_of_velocity():
+    changes = [
+        PointChange(MountingPoint("IMU1", (0.6, -0.5, 0.0), 0), (-6.0, 1.0, 0.0), 0.01 * np.eye(3)),
+        PointChange(MountingPoint("IMU2", (0.6, 0.5, 0.0), 1), (-3.0, 0.5, 0.0), 0.01 * np.eye(3)),
+    ]
+    picture = points_picture(CAR, changes)
+    first, second = (np.array(head[0]) for head in arrows(picture.svg))
+    rings = [
+        np.array([float(one.get("cx")), float(one.get("cy"))])
+        for one in ElementTree.fromstring(picture.svg).iter(f"{SVG}circle")
+    ][:2]
+    # Down the page and to the right, at one scale.
+    np.testing.assert_allclose(first - rings[0], 2.0 * (second - rings[1]), atol=0.05)
+    assert (first - rings[0])[1] == pytest.approx(6.0 * (first - rings[0])[0], rel=1e-2)
+    assert any("21.9 km/h" in t for t, _, _ in texts(picture.svg))
+    check_readable(picture)
+
+
+def test_a_point_has_the_change_that_its_own_accelerometers_felt():
+    result = crash_case()
+    for one, unit in zip(_points(result), result.reconstruction.units, strict=True):
+        change = unit.body[0].event.delta_v
+        prepared = unit.at_point.prepared
+        time, force = prepared.imu.index.to_numpy(), prepared.imu[ACCEL].to_numpy()
+        at_rest = unit.at_point.resting_force(9.80665)[0]
+        own = np.array(
+            [
+                np.trapezoid(
+                    np.interp(grid := np.linspace(change.start, change.end, 4001), time, column),
+                    grid,
+                )
+                for column in (force - at_rest).T
+            ]
+        )
+        # The angular acceleration at the ends of the contact, between samples of 5 ms: some 0.1
+        # rad/s at a lever arm of 0.8 m.
+        np.testing.assert_allclose(one.delta_v, own, atol=0.08)
+        assert np.abs(own - change.vector).max() > 0.3
 
 
 def test_several_events_stand_below_each_other_the_main_one_first():
