@@ -166,10 +166,13 @@ def _recorders(
 def _key(out: Drawing, at: float, rows: Sequence[tuple[Direction, str]]) -> None:
     """List the recorders by their numbers below a drawing, with their directions."""
     for k, (d, words) in enumerate(rows):
-        y = at + _KEY_ROW * k
-        _numbered(out, (14.0, y + 6.0), d.number or 0)
-        out.text((25.0, y), shortened(d.name, out.width - 30.0, SMALL), SMALL, INK)
-        out.text((25.0, y + 12.0), shortened(words, out.width - 30.0, SMALL), SMALL, _SOFT)
+        _row(out, at + _KEY_ROW * k, d.number or 0, d.name, words)
+
+
+def _row(out: Drawing, at: float, number: int, name: str, words: str) -> None:
+    _numbered(out, (14.0, at + 6.0), number)
+    out.text((25.0, at), shortened(name, out.width - 30.0, SMALL), SMALL, INK)
+    out.text((25.0, at + 12.0), shortened(words, out.width - 30.0, SMALL), SMALL, _SOFT)
 
 
 def elevation_dial(
@@ -318,10 +321,11 @@ def points_picture(outline: Outline, changes: Sequence[PointChange]) -> Picture:
         -scale * (one.unit.position[0] - float(middle[0])) - per * one.delta_v[0] for one in changes
     ]
     top, bottom = max(half, -min(tips) + 20.0) + 8.0, max(half, *tips, 0.0) + 28.0
-    centre = (0.5 * _PICTURE_WIDTH, top)
+    centre = (0.5 * _WIDTH, top)
     told = [_change_words(one) for one in changes]
-    alt = "Change of velocity at the measuring points: " + "; ".join(told)
-    out = Drawing(_PICTURE_WIDTH, top + bottom + 16.0 * len(changes) + 28.0, alt)
+    alt = "Change of velocity at the measuring points: "
+    alt += "; ".join(f"{name}: {words}" for name, words in told)
+    out = Drawing(_WIDTH, top + bottom + _KEY_ROW * len(changes) + 28.0, alt)
 
     def above(p: Sequence[float]) -> tuple[float, float]:
         return (
@@ -348,27 +352,23 @@ def points_picture(outline: Outline, changes: Sequence[PointChange]) -> Picture:
     length = per * step / speed_factor()
     out.line((20.0, at - 14.0), (20.0 + length, at - 14.0), INK, 2.0)
     out.text((26.0 + length, at - 14.0), f"{step:g} {speed_unit()}", SMALL, INK)
-    for k, (one, words) in enumerate(zip(changes, told, strict=True)):
-        _numbered(out, (22.0, at + 8.0 + 16.0 * k), one.unit.number)
-        row = shortened(words, _PICTURE_WIDTH - 40.0, SMALL)
-        out.text((35.0, at + 8.0 + 16.0 * k), row, SMALL, INK)
+    for k, (one, (name, words)) in enumerate(zip(changes, told, strict=True)):
+        _row(out, at + 8.0 + _KEY_ROW * k, one.unit.number, name, words)
     caption = (
         "The vehicle from above with its measuring points. Arrows: change of velocity over the "
         "contact at each point itself, along the axes of the vehicle, with its 95 % ellipse. "
         "Points of a vehicle that turns do not gain the same."
     )
-    return Picture("measuring-points", out.svg(), "Measuring points", caption, alt)
+    return Picture("measuring-points", out.svg(), "Measuring points", caption, alt, 84.0)
 
 
-def _change_words(one: PointChange) -> str:
+def _change_words(one: PointChange) -> tuple[str, str]:
     x, y, z = (speed_factor() * v for v in one.delta_v)
     least = "at least " if one.at_least else ""
-    size = math.sqrt(x * x + y * y + z * z)
-    place = _place(one.unit.position)
-    return (
-        f"{one.unit.name} {place}: {least}{plain(size, 1)} {speed_unit()}; forward, right, down "
-        f"{plain(x, 1)}, {plain(y, 1)}, {plain(z, 1)}"
-    )
+    size = plain(math.sqrt(x * x + y * y + z * z), 1)
+    parts = ", ".join(plain(v, 1) for v in (x, y, z))
+    words = f"{least}{size} {speed_unit()}; forward, right, down {parts}"
+    return f"{one.unit.name} {_place(one.unit.position)}", words
 
 
 def _at(centre: Point, radius: float, angle_deg: float) -> tuple[float, float]:
