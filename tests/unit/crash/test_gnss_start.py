@@ -112,7 +112,8 @@ def test_units_that_find_their_own_biases_are_compared_with_them():
     assert len(found.comparison.pairs) == 1
     assert found.comparison.agree
     # Nor are ranges blamed, whose 13 g ahead come in part on the axis to the side.
-    assert {f.quantity for f in found.findings} <= {"rest"}
+    undetectable = "crash.not-detectable-with-these-points"
+    assert {f.quantity for f in found.findings if f.code != undetectable} <= {"rest"}
 
 
 @pytest.mark.parametrize(
