@@ -970,7 +970,8 @@ def _against_all(
         _curve(combined, kept) + told,
         _curve_sd(np.asarray(covariance), kept) + told,
         tuple(against),
-        chi_square_along(np.eye(3), left, joint)[0],
+        # No further floor: that of a joint with assumed axes would hide what the others measured.
+        float(left @ np.linalg.solve(joint, left)),
         pieces * (sum(b.shape[1] for b in bases) - several.shape[1]),
     )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.stats import binomtest
-from tests.unit.crash.folding_crash import KINDS, RATE, Crash, G
+from tests.unit.crash.folding_crash import KINDS, RATE, Crash, Fault, G
 
 from strapdown import CrashOptions, Entry, reconstruct, reconstruct_crash
 from strapdown.crash.consistency import UnitComparison, compare_units
@@ -163,3 +163,13 @@ def test_the_bound_of_a_yaw_by_points_holds():
     for column in z.T:
         interval = binomtest(int((np.abs(column) < 1.96).sum()), len(column)).proportion_ci(0.99)
         assert interval.high >= 0.95, interval
+
+
+def test_two_points_without_an_axis_agree_as_their_pair_does():
+    # Their mean and their difference are the same comparison; rounding is that of 1e8 in it.
+    crash = Crash(900, "rear")
+    units = [crash.unit(k, gyro=False, fault=Fault(missing="y")) for k in range(2)]
+    comparison = crash.reconstructed(units).comparison
+    (pair,) = comparison.pairs
+    assert comparison.freedom == pair.freedom == 2 * (len(comparison.edges) - 1)
+    assert comparison.chi_square == pytest.approx(pair.chi_square, rel=1e-4)
