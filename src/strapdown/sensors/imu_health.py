@@ -174,6 +174,8 @@ LASTING = 3
 WHITE = 0.8
 # Standard deviations of the channel's own noise ratio to the others over the record.
 OWN_SCATTER = 6.0
+# Share of the blocks whose noise is that of a quiet channel: at most half are faulty.
+QUIET_SHARE = 0.25
 # In noise all second differences are large, in a burst only those about the outliers: a quarter of
 # those of normal noise is below 0.3186 of their rms.
 OUTLIER, LEAST_OUTLIERS = 6.0, 3
@@ -287,7 +289,11 @@ def _relative(log: HealthLog) -> Array:
 
 
 def _past(log: HealthLog, k: int, relative: Array, slack: float) -> Array:
-    """Noise limit of each block from the channel's own past and the other channels."""
+    """Noise limit of each block from the channel's own past and the other channels.
+
+    Never below the limit of its own quiet blocks: where the other channels become quiet, as those
+    that feel the road when a car stops, a channel that does not change is no noisier.
+    """
     known = np.isfinite(relative)
     if known.sum() < 4 * LASTING:
         return np.full(relative.shape, np.inf)
@@ -296,7 +302,9 @@ def _past(log: HealthLog, k: int, relative: Array, slack: float) -> Array:
     room = max(math.log(slack), OWN_SCATTER * scatter)
     out = np.full(relative.shape, np.inf)
     # At noise e^(middle + room - relative) the ratio equals its limit.
-    out[known] = log.blocks.noise[known, k] * np.exp(middle + room - relative[known])
+    noise = log.blocks.noise[known, k]
+    quiet = slack * float(np.quantile(noise, QUIET_SHARE))
+    out[known] = np.maximum(noise * np.exp(middle + room - relative[known]), quiet)
     return out
 
 

@@ -156,6 +156,25 @@ def test_in_motion_a_gyro_that_sticks_stops_or_clips_is_found():
         assert {(f.channel, f.kind) for f in health.faults} == {("gyro_x", kind)}
 
 
+def test_a_channel_that_does_not_feel_the_road_is_no_noisier_where_the_car_stops():
+    # The others shake with the road, by twenty times their noise, in all but two rests.
+    rng = np.random.default_rng(7)
+    t = np.arange(30000) / RATE
+    driving = ~((t < 60.0) | ((t > 200.0) & (t < 240.0)))
+    noise = rng.standard_normal((t.size, 6))
+    noise[:, [0, 1, 2, 5]] *= np.where(driving, 20.0, 1.0)[:, None]
+    gyro, accel = 1e-3 * noise[:, :3], 7e-3 * noise[:, 3:]
+    assert check_imu_channels(imu_table(t, gyro, accel)).faults == ()
+    # A channel that does become noisier, in a rest and on the road, is named.
+    for begin, end in ((20.0, 40.0), (100.0, 120.0)):
+        at = (t >= begin) & (t < end)
+        faulty = accel.copy()
+        faulty[at, 0] += 0.2 * rng.standard_normal(int(at.sum()))
+        (fault,) = check_imu_channels(imu_table(t, gyro, faulty)).faults
+        assert (fault.channel, fault.kind) == ("accel_x", "noisy")
+        assert fault.begin == pytest.approx(begin, abs=1.0)
+
+
 def test_coarse_counts_of_a_quiet_rest_are_not_stuck():
     # Noise of a fifth of a step, which moves one sample in 80, between two stretches of motion:
     # runs of hundreds of samples are what such an output is.
