@@ -13,7 +13,7 @@ from strapdown.config.navigation import NavigationSpec, StartTable, make_aids
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError, Finding
 from strapdown.estimation.error_model import ERROR_MODELS
-from strapdown.frames import ecef_from_geodetic
+from strapdown.frames import ecef_from_geodetic, place_difference
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.gnss_readiness import gnss_readiness
 from strapdown.navigation.measurements.measurement import TabulatedMeasurement
@@ -165,7 +165,10 @@ FIRST, CHANNELS_FAR = 1.0, 60.0
 
 
 def channel_findings(
-    imu: pd.DataFrame, sensors: ImuUncertainty, start: StartTable | None
+    imu: pd.DataFrame,
+    sensors: ImuUncertainty,
+    start: StartTable | None,
+    tables: Mapping[str, pd.DataFrame],
 ) -> tuple[Finding, ...]:
     """Check the channels of a record.
 
@@ -175,6 +178,9 @@ def channel_findings(
         Recorded Imu table, body axes.
     start : StartTable or None
         Known state at its first sample.
+    tables : mapping of str to DataFrame
+        Measurements by name. Where their positions move, a smooth turn is not a gyro that reads too
+        much at rest.
 
     Returns
     -------
@@ -186,7 +192,36 @@ def channel_findings(
     if len(imu) < LEAST_SAMPLES:
         return ()
     _refuse_degrees(imu, sensors)
-    return _usable(imu, check_imu_channels(imu, sensors).faults)
+    return _usable(
+        imu,
+        [
+            fault
+            for fault in check_imu_channels(imu, sensors).faults
+            if fault.kind != "implausible" or not _moves(tables, fault.begin, fault.end)
+        ],
+    )
+
+
+#: Standard deviations of a position by which the second half of a stretch lies from the first.
+MOVES = 5.0
+
+
+def _moves(tables: Mapping[str, pd.DataFrame], begin: float, end: float) -> bool:
+    """Whether positions show that the body moves; medians, for single fixes may be wrong."""
+    for table in tables.values():
+        if not {*GEODETIC, *POSITION_SD} <= set(table.columns):
+            continue
+        part = table[(table.index >= begin) & (table.index <= end)]
+        place, sd = part[GEODETIC].to_numpy(), part[POSITION_SD[:2]].to_numpy()
+        known = np.isfinite(place).all(axis=1) & np.isfinite(sd).all(axis=1)
+        if known.sum() < 2:
+            continue
+        apart = place_difference(place[known], place[known][0])[:, :2]
+        first, second = np.array_split(apart, 2)
+        way = float(np.hypot(*(np.median(second, axis=0) - np.median(first, axis=0))))
+        if way > MOVES * float(np.median(sd[known])):
+            return True
+    return False
 
 
 def _usable(imu: pd.DataFrame, faults: Sequence[ChannelFault]) -> tuple[Finding, ...]:

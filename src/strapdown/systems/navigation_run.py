@@ -140,7 +140,7 @@ def run_navigation(
         if spec.log is None:
             channels = saturated_findings(source.imu, sensors)
         else:
-            channels = channel_findings(source.imu, sensors, spec.start)
+            channels = channel_findings(source.imu, sensors, spec.start, source.tables)
     looked, channels = in_file(looked, *tables), in_file(channels, *tables)
     chain = make_chain(spec, sensors)
     recorder: Recorder = spec.recorder.make(ellipsoid=spec.ellipsoid)
