@@ -35,7 +35,7 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
-from strapdown.formats.columns import read_name
+from strapdown.formats.columns import read_name, split_brackets
 from strapdown.formats.inference.conclusion import infer_accel
 from strapdown.formats.inference.infer import Signals, infer_signals
 from strapdown.formats.join import join
@@ -57,7 +57,6 @@ KINDS = {
 }
 UNITS = {"gyro": "rad/s", "accel": "m/s2", "mag": "uT"}
 _OF = {word: kind for kind, words in KINDS.items() for word in words}
-_UNIT = re.compile(r"\s*[\[(][^\])]*[\])]$")
 _STAMP = re.compile(r"\d+(?:\.\d+)?")
 #: Names of the column of kinds in a header, where the kinds are numbers.
 _HEADED = re.compile(r"(sensor|event)?[\s_-]*(type|kind|id|sensor|name|event)?", re.I)
@@ -70,7 +69,7 @@ TOP = 200
 
 def kind_of(field: str) -> str | None:
     """Return the kind of sensor that a field names, with or without its unit in brackets."""
-    word = _UNIT.sub("", field.strip(" \"'").lower())
+    word = split_brackets(field.strip(" \"'").lower())[0].strip()
     word = word.removeprefix("android.sensor.").removeprefix("type_")
     # Neither -4 nor 1.6 is a kind.
     letters = re.search("[a-z]", word)
