@@ -15,7 +15,8 @@ from strapdown.attitude_algorithms.algorithm import AttitudeRun
 from strapdown.errors import Finding
 from strapdown.increments import increments_from_imu
 from strapdown.rotation import unit_rotation_angle
-from strapdown.tables import EULER, QUATERNION
+from strapdown.tables import EULER, GYRO, QUATERNION
+from strapdown.tables.checks import values_of
 
 __all__ = ["attitude_at", "error_angles", "largest_differences", "rotation_contradicted"]
 
@@ -127,12 +128,13 @@ def rotation_contradicted(imu: pd.DataFrame, reference: pd.DataFrame) -> Finding
         None if they agree, the reference has no attitude, or fewer than five windows are common.
     """
     names = next((n for n in (QUATERNION, EULER) if set(n) <= set(reference.columns)), None)
-    if names is None or len(imu) < 2:
+    imu = imu[np.isfinite(values_of(imu, GYRO)).all(axis=1)]
+    if names is None or len(imu) < LEAST_WINDOWS:
         return None
-    known = reference.loc[np.isfinite(reference[names]).all(axis=1), names]
-    if names is EULER:
-        q_nb = rotation.quaternion_from_euler(known.to_numpy(dtype=np.float64))
-        known = pd.DataFrame(q_nb, known.index, QUATERNION)
+    values = reference[names].to_numpy(dtype=np.float64)
+    there = np.isfinite(values).all(axis=1)
+    q_nb = rotation.quaternion_from_euler(values[there]) if names is EULER else values[there]
+    known = pd.DataFrame(q_nb, reference.index[there], QUATERNION)
     if len(known) < LEAST_WINDOWS:
         return None
     start, end = max(imu.index[0], known.index[0]), min(imu.index[-1], known.index[-1])

@@ -47,12 +47,15 @@ def test_euler_angles_are_a_reference_and_rows_without_them_are_left_out():
     known = reference(0.0 * RATE)
     euler = pd.DataFrame(euler_from_quaternion(known.to_numpy()), known.index, EULER)
     euler.iloc[::3] = np.nan
-    assert rotation_contradicted(imu_of(RATE), euler) is not None
+    imu = imu_of(RATE)
+    imu.iloc[100:120, 0] = np.nan
+    assert rotation_contradicted(imu, euler) is not None
     assert rotation_contradicted(imu_of(0.0 * RATE), euler) is None
 
 
 def test_too_little_in_common_or_no_attitude_says_nothing():
     known = reference(0.0 * RATE)
     assert rotation_contradicted(imu_of(RATE), known.iloc[:400]) is None
+    assert rotation_contradicted(imu_of(RATE), pd.DataFrame(np.nan, known.index, EULER)) is None
     assert rotation_contradicted(imu_of(RATE), known[["q_w"]]) is None
     assert rotation_contradicted(imu_of(RATE), known.set_axis(known.index + 100.0)) is None
