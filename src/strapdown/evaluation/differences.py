@@ -128,7 +128,7 @@ def rotation_contradicted(imu: pd.DataFrame, reference: pd.DataFrame) -> Finding
         None if they agree, the reference has no attitude, or fewer than five windows are common.
     """
     names = next((n for n in (QUATERNION, EULER) if set(n) <= set(reference.columns)), None)
-    imu = imu[np.isfinite(values_of(imu, GYRO)).all(axis=1)]
+    imu = imu.iloc[np.flatnonzero(np.isfinite(values_of(imu, GYRO)).all(axis=1))]
     if names is None or len(imu) < LEAST_WINDOWS:
         return None
     values = reference[names].to_numpy(dtype=np.float64)
