@@ -45,7 +45,8 @@ shows is filled in from that solution.
 | `ardupilot` | EKF of ArduPilot, 45 samples in 1 s, in motion | down 2.8° off (stated: 6.0°) |
 | `rosbag1_loc` | orientation of its AHRS | the force as read, turned by it, is up within 0.1° ² |
 
-¹ Its heading stays zero while its gyro turns by 359.8°: it is not the truth of these samples.
+¹ Its heading stays zero while its gyro turns by 359.8°: it is not the truth of these samples,
+as `doctor` reports (`evaluation.reference-rotates-otherwise`).
 ² A robot that shakes, sampled at 30 Hz: navigated, the run rejects its own heading for 91 % of the
 time, and roll and pitch are off by 2.6° (root mean square; stated: 0.9°, 95 %).
 

@@ -10,11 +10,15 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
+from strapdown.attitude_algorithms import Quaternion, run_attitude
 from strapdown.attitude_algorithms.algorithm import AttitudeRun
+from strapdown.errors import Finding
+from strapdown.increments import increments_from_imu
 from strapdown.rotation import unit_rotation_angle
-from strapdown.tables import QUATERNION
+from strapdown.tables import EULER, GYRO, QUATERNION
+from strapdown.tables.checks import values_of
 
-__all__ = ["attitude_at", "error_angles", "largest_differences"]
+__all__ = ["attitude_at", "error_angles", "largest_differences", "rotation_contradicted"]
 
 
 Array = NDArray[np.float64]
@@ -94,6 +98,72 @@ def largest_differences(runs: tuple[AttitudeRun, ...]) -> pd.DataFrame:
         )
         table.iloc[a, b] = table.iloc[b, a] = float(angle.max())
     return table
+
+
+#: Windows in which the rotations of a gyro and of a reference are compared: their length, s, the
+#: fewest of them, and the largest angle, rad, beyond which a rotation may pass for a shorter one.
+WINDOW, LEAST_WINDOWS, LARGEST = 1.0, 5, 2.0
+#: Difference of their root mean squares that a gyro's bias allows, rad/s (MPU-6050 data sheet:
+#: within 20 deg/s, one sigma a third of it), and the share of the larger: offsets of clocks,
+#: scale factors and the noise of a reference change a root mean square by less.
+BIAS, SHARE = 0.12, 0.25
+
+
+def rotation_contradicted(imu: pd.DataFrame, reference: pd.DataFrame) -> Finding | None:
+    """Check whether a reference attitude rotates as the gyro does.
+
+    Angles of rotation are compared, which depend neither on axes nor on mounting, by their root
+    mean square, which changes little with an offset of the clocks.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        An Imu table.
+    reference : DataFrame
+        Attitudes or a trajectory, on the same clock or nearly so.
+
+    Returns
+    -------
+    Finding or None
+        None if they agree, the reference has no attitude, or fewer than five windows are common.
+    """
+    names = next((n for n in (QUATERNION, EULER) if set(n) <= set(reference.columns)), None)
+    imu = imu.iloc[np.flatnonzero(np.isfinite(values_of(imu, GYRO)).all(axis=1))]
+    if names is None or len(imu) < LEAST_WINDOWS:
+        return None
+    values = reference[names].to_numpy(dtype=np.float64)
+    there = np.isfinite(values).all(axis=1)
+    q_nb = rotation.quaternion_from_euler(values[there]) if names is EULER else values[there]
+    known = pd.DataFrame(q_nb, reference.index[there], QUATERNION)
+    if len(known) < LEAST_WINDOWS:
+        return None
+    start, end = max(imu.index[0], known.index[0]), min(imu.index[-1], known.index[-1])
+    step = max(WINDOW, 2.0 * float(np.median(np.diff(known.index))))
+    instants = np.arange(start, end, step)
+    if len(instants) <= LEAST_WINDOWS:
+        return None
+    turned = run_attitude(Quaternion(), increments_from_imu(imu)).attitude
+    angles = np.radians(
+        [
+            unit_rotation_angle(q[:-1], q[1:])
+            for q in (attitude_at(t, instants) for t in (turned, known))
+        ]
+    )
+    angles = angles[:, (angles < LARGEST).all(axis=0)]
+    if angles.shape[1] < LEAST_WINDOWS:
+        return None
+    gyro, other = np.sqrt(np.mean(angles**2, axis=1)) / step
+    if abs(gyro - other) < BIAS + SHARE * max(gyro, other):
+        return None
+    return Finding(
+        "evaluation.reference-rotates-otherwise",
+        quantity="reference",
+        severity="warning",
+        gyro_deg_s=float(np.degrees(gyro)),
+        reference_deg_s=float(np.degrees(other)),
+        windows=angles.shape[1],
+        step=step,
+    )
 
 
 # Known attitude at the samples of a log.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import logging
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -70,6 +71,7 @@ from strapdown.formats import (
 )
 from strapdown.formats.assemble import assemble
 from strapdown.formats.binary import or_sentences
+from strapdown.formats.columns import BODY_RATES
 from strapdown.formats.find_columns import names_of_quantities
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.quantity_columns import names_of_fixes
@@ -469,7 +471,7 @@ def _foreign(path: Path) -> Foreign | None:
 
 
 #: Most names of a folder that are searched, and that a message lists.
-MOST_NAMES, MOST_SHOWN = 1000, 6
+MOST_NAMES, MOST_SHOWN = 200, 6
 #: Largest file that is searched for a gyro or an accelerometer, bytes.
 MOST_BYTES = 64 * 1024 * 1024
 
@@ -484,8 +486,8 @@ def _not_recognized(path: Path) -> DataError:
         head = first_bytes(path, 8).hex(" ")
         return DataError("io.ending-no-known-format", file=path.name, suffix=path.suffix, head=head)
     inside = sorted(path.iterdir())[:MOST_NAMES]
-    may_be = [p for p in inside if reader_of(p)[1] is not None]
-    logs = [p.name for p in may_be if _has_sensors(p)]
+    found = (p.name for p in inside if reader_of(p)[1] is not None and _has_sensors(p))
+    logs = list(itertools.islice(found, MOST_SHOWN + 1))
     shown = logs or [p.name for p in inside]
     names = ", ".join(shown[:MOST_SHOWN]) + (" …" if len(shown) > MOST_SHOWN else "")
     if not logs:
@@ -495,7 +497,6 @@ def _not_recognized(path: Path) -> DataError:
     return DataError(
         "io.folder-of-one-recording" if len(logs) == 1 else "io.folder-of-recordings",
         file=path.resolve().name,
-        count=len(logs),
         names=names,
         path=path / logs[0],
     )
@@ -558,7 +559,8 @@ def read_log(path: str | Path, options: ReadOptions | None = None) -> Recording:
     """
     asked = options or ReadOptions()
     raw = read_raw(Path(path), asked.format)
-    if not any(q.startswith("gyro") for q in (*asked.columns, *names_of_quantities(raw))):
+    known = {*asked.columns, *names_of_quantities(raw)}
+    if not any(q.startswith("gyro") for q in known) and not known.issuperset(BODY_RATES):
         _refuse_other_table(raw)
     return assemble(raw, asked)
 

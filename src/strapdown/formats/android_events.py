@@ -8,9 +8,10 @@ axes and the sign of gravity are those of Android: rad/s, m/s² with gravity, µ
 out of the screen (developer.android.com/reference/android/hardware/SensorEvent). Linear
 acceleration and gravity are used only where there is no accelerometer: their sum. Short names are
 also those of other loggers, so that units and axes under them are left open; so are units under the
-names of Android where the accelerometer has no gravity in m/s², as of applications that write deg/s
-and g. A name may state its unit: ``Gyroscope (deg/s)``. The unit of the stamps is inferred unless
-the header states it; Android's own are ns.
+names of Android where the accelerometer has no gravity in m/s², or the rates are rather in another
+unit than rad/s, as of applications that write deg/s and g. A name may state its unit:
+``Gyroscope (deg/s)``. The unit of the stamps is inferred unless the header states it; Android's own
+are ns.
 
 A table of samples is none of these: its header names axes of sensors (``ax``, ``gyro_x``). Small
 whole numbers are kinds only under a name that says so or without a header, and only if the values
@@ -34,8 +35,9 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
-from strapdown.formats.columns import read_name
+from strapdown.formats.columns import read_name, split_brackets
 from strapdown.formats.inference.conclusion import infer_accel
+from strapdown.formats.inference.infer import Signals, infer_signals
 from strapdown.formats.join import join
 from strapdown.formats.judge import LIKELY
 from strapdown.formats.known_text import split
@@ -55,7 +57,6 @@ KINDS = {
 }
 UNITS = {"gyro": "rad/s", "accel": "m/s2", "mag": "uT"}
 _OF = {word: kind for kind, words in KINDS.items() for word in words}
-_UNIT = re.compile(r"\s*[\[(][^\])]*[\])]$")
 _STAMP = re.compile(r"\d+(?:\.\d+)?")
 #: Names of the column of kinds in a header, where the kinds are numbers.
 _HEADED = re.compile(r"(sensor|event)?[\s_-]*(type|kind|id|sensor|name|event)?", re.I)
@@ -68,7 +69,7 @@ TOP = 200
 
 def kind_of(field: str) -> str | None:
     """Return the kind of sensor that a field names, with or without its unit in brackets."""
-    word = _UNIT.sub("", field.strip(" \"'").lower())
+    word = split_brackets(field.strip(" \"'").lower())[0].strip()
     word = word.removeprefix("android.sensor.").removeprefix("type_")
     # Neither -4 nor 1.6 is a kind.
     letters = re.search("[a-z]", word)
@@ -239,13 +240,18 @@ def _columns(path: Path, kind: str, rows: list[tuple[Any, ...]]) -> dict[str, ND
 
 
 def _has_units_of_android(events: Mapping[str, dict[str, NDArray[Any]]]) -> bool:
-    """Whether an accelerometer, if there is one, has gravity in m/s².
+    """Whether gravity, if it was measured, is in m/s², and no other unit of the rates likelier.
 
     Applications write values in deg/s and g under the names of Android, too.
     """
     forces = [np.column_stack([events[k][a] for a in "xyz"]) for k in _FORCES if k in events]
     usual = [float(np.median(np.linalg.norm(force, axis=1))) for force in forces]
-    return all(_GRAVITY[0] <= size <= _GRAVITY[1] for size in usual)
+    if not all(_GRAVITY[0] <= size <= _GRAVITY[1] for size in usual):
+        return False
+    gyro = next(events[k] for k in ("gyro", "gyro uncalibrated") if k in events)
+    rates = np.column_stack([gyro[a] for a in "xyz"]).astype(np.float64)
+    told = infer_signals(Signals(gyro["time"], rates))
+    return all(i.value in (UNITS["gyro"], None) for i in told if i.quantity == "gyro_unit")
 
 
 def _has_gravity(events: Mapping[str, dict[str, NDArray[Any]]]) -> bool:

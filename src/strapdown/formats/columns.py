@@ -16,6 +16,7 @@ __all__ = [
     "parse_axes",
     "parse_column_option",
     "read_name",
+    "split_brackets",
 ]
 
 
@@ -164,7 +165,8 @@ _ABOUT = {
     *("bias", "offset", "scale", "cov", "covariance", "std", "stddev", "stdev", "sd", "sigma"),
     *("var", "variance", "error", "err", "accuracy", "setpoint", "desired", "noise"),
 }
-_BRACKETS = re.compile(r"[\[(]\s*([^\])]+?)\s*[\])]\s*$")
+# What is in brackets at the end, which may hold brackets: (m/(s*s)).
+_BRACKETS = re.compile(r"[\[(]\s*((?:[^\[\]()]|\([^()]*\))*?)\s*[\])]\s*$")
 
 
 @dataclass(frozen=True)
@@ -213,9 +215,8 @@ def read_name(name: str) -> ColumnName:
         return _ros_field(text)
     if index and text in _PX4:
         return _of_array(ColumnName(*_PX4[text], family=text), index)
-    bracket = _BRACKETS.search(text)
-    unit: str | None = unit_of(bracket.group(1)) if bracket else None
-    bare = text[: bracket.start()] if bracket else text
+    bare, bracket = split_brackets(text)
+    unit = unit_of(bracket) if bracket else None
     if unit is None:
         bare, unit = _without_unit(bare)
     said = ColumnName(None, unit)
@@ -240,13 +241,19 @@ def read_name(name: str) -> ColumnName:
     if str(quantity).startswith("mag") and said.unit in _MAGNETIC:
         said = replace(said, unit=_MAGNETIC[said.unit])
     elif quantity == "time" and (
-        (bracket and unit is None and bracket.group(1).lower() not in _OF_TIME)
+        (bracket and unit is None and bracket.lower() not in _OF_TIME)
         or (kind and kind[0] != "time")
     ):
         return ColumnName(None, said.unit)
     elif quantity in QUANTITIES[1:] and kind and kind[0] == "time":
         return ColumnName(None, said.unit)  # gyro_x_min
     return _of_array(said, index) if index else said
+
+
+def split_brackets(text: str) -> tuple[str, str]:
+    """Split what stands in brackets off the end of a name, as a unit; empty if there is none."""
+    bracket = _BRACKETS.search(text)
+    return (text[: bracket.start()], bracket.group(1)) if bracket else (text, "")
 
 
 def _of_array(said: ColumnName, index: str) -> ColumnName:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.arrays import numbers, ticks_of
-from strapdown.formats.columns import INDEXED, TRIADS, read_name
+from strapdown.formats.columns import INDEXED, TRIADS, TURNS, read_name, split_brackets
 from strapdown.formats.crash_record import (
     CHANGE_NOTE,
     LONGEST_NAME,
@@ -336,7 +336,6 @@ def _stamps(raw: RawLog, clock: str, stated: str) -> Callable[[], Array]:
 # (SAE J1698, SAE J211).
 
 
-_BRACKETS = re.compile(r"[\[(]\s*([^\[\]]+?)\s*[\])]\s*$")
 _AXIS = {
     "x": "x",
     "longitudinal": "x",
@@ -357,7 +356,6 @@ _AXIS = {
 }
 # Axes opposite to ours.
 _REVERSED = {"backward": "-x", "rearward": "-x", "left": "-y", "up": "-z"}
-_TURNS = {"roll": "x", "pitch": "y", "yaw": "z"}
 _WORDS = {
     "acceleration": ("acceleration", "accel", "acc", "accelerations", "accelerometer"),
     "rate": ("rate", "gyro", "gyr", "gyroscope", "angular"),
@@ -404,10 +402,8 @@ def read_channel_name(name: str, unit: str = "") -> ChannelName:
     unit, from the words.
     """
     said = read_name(name)
-    text = name.strip()
-    bracket = _BRACKETS.search(text)
-    if bracket:
-        unit, text = unit or bracket.group(1), text[: bracket.start()]
+    text, bracket = split_brackets(name.strip())
+    unit = unit or bracket
     known = find_unit(unit, OF_CRASHES) if unit else None
     if not unit and said.unit:
         known = find_unit(said.unit, OF_CRASHES)
@@ -466,7 +462,7 @@ def _quantity(words: list[str], triad: str | None, change: bool) -> str:
 
 def _axis(words: list[str], quantity: str, triad: str | None) -> str:
     if quantity == "rate":
-        for word, axis in _TURNS.items():
+        for word, axis in TURNS.items():
             if word in words:
                 return axis
     if triad and triad[-2:] in ("_x", "_y", "_z"):

@@ -571,7 +571,7 @@ def _whole_lines(
         odd = count != width
         # Names once more, as where logs were joined.
         first = line.lstrip(" \t\"'")[:1]
-        if odd or (numeric and (first.isalpha() or first in _MARKS)):
+        if odd or (numeric and (first.isalpha() or first in f"{_MARKS}_/")):
             fields = fields_of(line, separator)
             if (odd and is_comment(line)) or not any(is_data(f) for f in fields if f):
                 amid.append((row, line))

@@ -133,10 +133,14 @@ def report_contradictions(
     """
     for triad, unit in units.items():
         other = said.get(f"{triad}_unit")
-        # A gyro's numbers are evidence only if gravity rotated with it.
-        heard = triad != "gyro" or ("gyro_axes" in said and said["gyro_axes"].settled)
         form = said.get(f"{triad}_form")
-        if triad in asked or not heard or other is None or not other.settled:
+        if triad in asked or other is None or not other.settled:
+            continue
+        # Sizes of rates alone are no evidence against a statement: gravity that rotated with them
+        # is, and the steps of a sensor.
+        turned = "gyro_axes" in said and said["gyro_axes"].settled
+        stepped = any(e.code == "io.evidence-steps-of-sensor" for e in other.evidence)
+        if triad == "gyro" and not (turned or stepped):
             continue
         likely = str(other.value)
         kind = form.value if form is not None and form.settled else None

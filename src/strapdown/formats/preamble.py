@@ -32,7 +32,9 @@ _SENSOR = re.compile(
     re.I,
 )
 _IN = re.compile(
-    r"[\s:=(\[]*(?:\b(?:units?|in|is|are|data|values?)\b[\s:=(\[]*)*([^\s,;)\]]+)", re.I
+    r"[\s:=(\[]*(?:\b(?:units?|in|is|are|data|values?)\b[\s:=(\[]*)*"
+    r"([^\s,;)\]]+(?:[ ]s\^?(?:-|−|⁻)(?:\d|[¹²]))?)",
+    re.I,
 )
 _COUNT = r"(?:LSBs?|counts?|digits?)"
 _PER_UNIT = re.compile(rf"(\d+(?:\.\d*)?)\s*{_COUNT}\s*(?:/|per)\s*\(?([^\s,;)]+)", re.I)

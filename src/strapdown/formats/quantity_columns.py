@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from strapdown.errors import ConfigError, DataError, StrapdownError, check_choice
 from strapdown.formats.arrays import numbers, ticks_of
 from strapdown.formats.clocks import clock_of_name
-from strapdown.formats.columns import CLOCKS, TIMES
+from strapdown.formats.columns import CLOCKS, TIMES, split_brackets
 from strapdown.formats.recording import RawLog
 from strapdown.units import ANGLES, LENGTHS, OF_TABLES, SPEEDS, TIME_UNITS, unit_of, unit_words
 
@@ -28,7 +28,6 @@ __all__ = [
 
 
 Array = NDArray[np.float64]
-_BRACKETS = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]\s*$")
 
 
 @dataclass(frozen=True)
@@ -161,13 +160,10 @@ def read_words(name: str, known: Mapping[str, Quantity]) -> tuple[str, str | Non
 
     `known`: a name that is a word as a whole has no unit: ``h``, ``s``.
     """
-    text = name.strip()
-    bracket = _BRACKETS.search(text)
-    if bracket:
-        text = text[: bracket.start()]
+    text, bracket = split_brackets(name.strip())
     words = [w for w in re.split(r"[\s_\-/:.#]+", text.lower()) if w]
     if bracket:
-        return "".join(words), re.sub(r"\s+", "", bracket.group(1).lower()) or None
+        return "".join(words), re.sub(r"\s+", "", bracket.lower())
     whole = "".join(words)
     if any(whole in k.words or whole in k.negative for k in known.values()):
         return whole, None

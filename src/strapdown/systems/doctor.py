@@ -19,6 +19,7 @@ from strapdown.config.doctor import DoctorSpec, flags_of, flags_of_fixes
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.dsp.running_integral import running_integral
 from strapdown.errors import DataError, Finding, Severity, StrapdownError
+from strapdown.evaluation.differences import rotation_contradicted
 from strapdown.evaluation.second_log import align_second_log
 from strapdown.formats import (
     READERS,
@@ -240,6 +241,7 @@ def _diagnose(log: LogTable, axes: str | None, fixes: FixesTable | None) -> LogD
     if inertial.imu is not None:
         health, rests, found = _channels(inertial.imu)
         findings += found
+        findings += _reference_against(streams)
     clock, found = _fixes_against(streams)
     findings += found
     if missing is not None and not inertial.questions:
@@ -489,6 +491,18 @@ def _fixes_against(
     if offset is None:
         return None, found
     return {"offset_s": offset.offset, "sd_s": offset.sd, "explained": offset.share}, found
+
+
+def _reference_against(streams: Mapping[str, pd.DataFrame]) -> list[Finding]:
+    """Check whether the reference in a log rotates as its gyro does."""
+    if "reference" not in streams:
+        return []
+    try:
+        reference, shifted = on_clock_of(streams["reference"], streams["imu"])
+    except DataError as error:
+        return [error.finding.replace(severity="warning")]
+    contradicted = rotation_contradicted(streams["imu"], reference)
+    return [one for one in (shifted, contradicted) if one is not None]
 
 
 def _between(logs: Sequence[LogDiagnosis]) -> list[Finding]:

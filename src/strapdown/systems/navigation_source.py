@@ -18,6 +18,7 @@ from strapdown.config.choice import SLOTS
 from strapdown.config.navigation import AidSpec, NavigationSpec, ReceiverTable
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError, DataError, DivergenceError, Finding
+from strapdown.evaluation.differences import rotation_contradicted
 from strapdown.formats import files_of
 from strapdown.formats.aid_table import read_aid_table, read_control_points
 from strapdown.formats.assemble import require_accel
@@ -128,7 +129,8 @@ def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
         findings += [] if shifted is None else [shifted]
     if truth is not None:
         truth, shifted = on_clock_of(truth, recording.imu)
-        findings += [] if shifted is None else [shifted]
+        contradicted = rotation_contradicted(imu, truth)
+        findings += [one for one in (shifted, contradicted) if one is not None]
     return NavigationSource(
         name=recording.name,
         what="recorded log",

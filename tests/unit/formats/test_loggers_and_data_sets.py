@@ -669,6 +669,34 @@ def test_android_events_in_degrees_and_g(tmp_path, gyro, accel):
     np.testing.assert_allclose(imu[ACCEL], -FORCE[:, [1, 0, 2]] * [1.0, 1.0, -1.0])
 
 
+def test_steps_of_a_sensor_in_deg_s_speak_against_the_unit_of_android(tmp_path):
+    # At rest, gravity turns with no gyro; 0.061 rad/s would be the step of no sensor.
+    rng, count, step = np.random.default_rng(8), 400, 2000.0 / 32768.0
+    rate = np.round(step * np.round(rng.normal(0.0, 30.0, (count, 3))), 5)
+    force = rng.normal((0.0, 0.0, 9.81), 0.02, (count, 3))
+
+    def log(rate, names):
+        lines = [
+            f"{names[k]},{10_000_000 * row},{','.join(map(repr, values.tolist()))}"
+            for row in range(count)
+            for k, values in enumerate((rate[row], force[row]))
+        ]
+        return written(tmp_path / "a.csv", lines)
+
+    android = ("android.sensor.gyroscope", "android.sensor.accelerometer")
+    options = ReadOptions(time_unit="ns")
+    recording = read_log(log(rate, android), options)
+    np.testing.assert_allclose(recording.imu["gyro_x"], np.radians(rate[:, 1]))
+    assert any(f.code == "io.unit-inferred" for f in recording.findings)
+    recording = read_log(log(np.radians(rate), android), options)
+    np.testing.assert_allclose(recording.imu["gyro_x"], np.radians(rate[:, 1]))
+    assert not any(f.code == "io.unit-inferred" for f in recording.findings)
+    stated = ("Gyroscope (rad/s)", "Accelerometer (m/s2)")
+    with pytest.raises(DataError, check=coded("io.contradicts-unit")) as caught:
+        read_log(log(rate, stated), options)
+    assert dict(caught.value.finding.data["answers"]) == {"gyro_unit": "deg/s"}
+
+
 def test_android_events_without_an_accelerometer_sum_or_warn(tmp_path):
     kinds = {"gyroscope": RATE, "gravity": -FORCE, "linear_acceleration": RATE}
     path = written(tmp_path / "a.csv", events(kinds))

@@ -120,6 +120,30 @@ def test_a_linear_acceleration_by_its_short_name_is_none_with_gravity(tmp_path):
     assert log.imu[ACCEL].to_numpy()[:, 2].mean() == pytest.approx(9.8, abs=0.1)
 
 
+def test_body_rates_beside_an_attitude_are_a_gyro(tmp_path):
+    lines = [f"{row},0.1,0.2,0.3" for row in rows()]
+    log = read(
+        tmp_path, ["t [s],p,q,r,ax,ay,az,roll,pitch,yaw", *lines], gyro_unit="deg/s", accel_unit="g"
+    )
+    check(log)
+    with pytest.raises(DataError, check=coded("io.table-of-attitudes")):
+        read(tmp_path, ["t [s],a,b,c,ax,ay,az,roll,pitch,yaw", *lines])
+
+
+def test_names_with_slashes_are_no_row(tmp_path):
+    names = [
+        f"/imu/{group}/{axis}"
+        for group in ("angular_velocity", "linear_acceleration")
+        for axis in "xyz"
+    ]
+    header, lines = ",".join(["__time", *names]), rows()
+    log = read(
+        tmp_path, [header, *lines[:10], header, *lines[10:]], gyro_unit="deg/s", accel_unit="g"
+    )
+    check(log)
+    assert "io.comments-among-rows" in {f.code for f in log.findings}
+
+
 def test_lines_of_text_between_rows_are_left_out_and_said(tmp_path):
     lines = rows()
     text = "--- button pressed ---"

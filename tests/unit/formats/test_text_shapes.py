@@ -59,6 +59,7 @@ def test_counts_per_unit_above_the_table(tmp_path, said):
             {"gyro": "rad/s", "accel": "m/s2"},
         ),
         (["Gyroscope unit = deg/s", "Accelerometer unit = g"], {"gyro": "deg/s", "accel": "g"}),
+        (["Gyro: rad s^-1, accel in m s⁻²"], {"gyro": "rad/s", "accel": "m/s2"}),
         (
             ["acceleration m/s2, angular velocity deg/s, magnetic field uT"],
             {"gyro": "deg/s", "accel": "m/s2", "mag": "uT"},
