@@ -849,18 +849,7 @@ def _single_effects(
     levers = [v.lever for v in increments if v.lever.any()]
     if levers:
         effects["crash.off-position"] = np.mean(levers, axis=0)
-    late = np.mean([_forces_at(u, edges) for u in units], axis=0)
-    effects["crash.off-clock"] = np.diff(late, axis=0)[kept].reshape(-1, 1)
     return effects
-
-
-def _forces_at(unit: PointKinematics, edges: Array) -> Array:
-    """Mean force about instants, (m + 1, 3), over half of an interval between them."""
-    time, half = unit.time, 0.25 * float(np.diff(edges).min())
-    gained = np.cumsum(unit.force * np.gradient(time)[:, None], axis=0)
-    ends = np.clip([edges - half, edges + half], time[0], time[-1])
-    at = np.array([[np.interp(e, time, g) for g in gained.T] for e in ends])
-    return np.asarray((at[1] - at[0]).T / np.diff(ends, axis=0).T)
 
 
 def _turning(

@@ -9,17 +9,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.crash.structure import LARGEST_SHARE, Structure, likeliest, structural_unknowns
+from strapdown.crash.structure import Structure, likeliest, structural_unknowns
 from strapdown.errors import Finding
 
 Array = NDArray[np.float64]
 
-#: Standard deviations that are tried, zero first: of a scale factor, in m, rad and s.
+#: Standard deviations that are tried, zero first: of a scale factor, in m and rad.
 SIZES: Mapping[str, Array] = {
     "crash.off-scale": np.array([0.0, 0.05, 0.1, 0.2, 0.4]),
     "crash.off-position": np.array([0.0, 0.1, 0.2, 0.4, 0.8]),
     "crash.off-mounting": np.radians([0.0, 3.0, 6.0, 12.0, 24.0]),
-    "crash.off-clock": np.array([0.0, 0.003, 0.006, 0.012, 0.024]),
 }
 
 
@@ -33,8 +32,7 @@ class SingleError:
         A key of `SIZES`.
     size : ndarray, (r,)
         Its conditional mean, first point less second: of the scale factor along the force; of the
-        position, true less stated, m; rotation of the second into the first, rad; lateness of the
-        second's clock less the first's, s.
+        position, true less stated, m; rotation of the second into the first, rad.
     lead : float
         Twice the logarithm of the odds against structure alone.
     """
@@ -45,11 +43,8 @@ class SingleError:
 
     def finding(self, first: str, second: str) -> Finding:
         """The error as a finding on the second point."""
-        scaled = {"crash.off-scale": 100.0, "crash.off-clock": 1e3}
-        size = self.size * scaled.get(self.code, 1.0)
-        if self.code == "crash.off-mounting":
-            size = np.degrees(size)
-        x, y, z = (float(v) for v in np.resize(size, 3))
+        shown = {"crash.off-scale": 100.0, "crash.off-mounting": 180.0 / math.pi}
+        x, y, z = (float(v) for v in np.resize(shown.get(self.code, 1.0) * self.size, 3))
         return Finding(
             "crash.one-point-off",
             file=second,
@@ -88,8 +83,7 @@ def single_error(
     standard deviations has a probability of 1e-3. Here each error is one more Gaussian unknown
     whose size is learnt beside the structure's: the ratio of the two posteriors tells from about 4
     standard deviations on, and does not let structure grow to take the error's place. A late clock
-    makes the difference of a hump, as structure does: it is told where that hump would be more than
-    structure is ever let to do.
+    is not among them: it makes the difference of a hump, as structure does.
     """
     unknowns = structural_unknowns(structure, edges, kept, 1)
     _, alone = likeliest(unknowns, difference, covariance)
@@ -104,9 +98,5 @@ def single_error(
             x**2 * root @ root.T for x, (root, _, _) in zip(sizes, tried, strict=True)
         )
         size = sizes[0] ** 2 * effect.T @ np.linalg.solve(whole, difference)
-        if code == "crash.off-clock":
-            hump = np.cumsum((effect @ size).reshape(-1, 3), axis=0)
-            if np.linalg.norm(hump, axis=1).max() <= LARGEST_SHARE * structure.change:
-                continue
         best = SingleError(code, np.asarray(size), float(lead))
     return best

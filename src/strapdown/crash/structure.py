@@ -209,7 +209,8 @@ def structural_unknowns(
     both = np.linalg.cholesky(np.eye(count) + 1.0)
     own = structure.change**2 * structure.of_increments(edges)[np.ix_(kept, kept)]
     root = np.kron(both, _root(own))
-    return [(np.kron(root, e[:, None]), SHARES, USUAL_SHARE) for e in np.eye(3)]
+    roots = [np.asarray(np.kron(root, e[:, None]), dtype=np.float64) for e in np.eye(3)]
+    return [(one, SHARES, USUAL_SHARE) for one in roots]
 
 
 def _root(covariance: Array) -> Array:
