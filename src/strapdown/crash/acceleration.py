@@ -295,10 +295,9 @@ def by_contributor(
 
     `more`: additional values, (k,), without an unknown, by contributor.
     """
-    lines = pd.DataFrame(values, columns=list(columns))
-    table = lines.groupby(list(contributors), sort=False).sum()
-    for name, values_of_line in more.items():
-        already = table.loc[name].to_numpy() if name in table.index else np.zeros(len(columns))
-        table.loc[name] = already + values_of_line
-    table.index.name = "contributor"
-    return table
+    rows = {name: k for k, name in enumerate(dict.fromkeys([*contributors, *more]))}
+    sums = np.zeros((len(rows), len(columns)))
+    np.add.at(sums, [rows[name] for name in contributors], values)
+    for name, of_line in more.items():
+        sums[rows[name]] += of_line
+    return pd.DataFrame(sums, pd.Index(list(rows), name="contributor"), list(columns))

@@ -14,6 +14,7 @@ from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.acceleration import window_weights
 from strapdown.crash.measuring_point import LEVER_ARM, MOUNTING, NO_TURNING, PointKinematics
+from strapdown.crash.single_error import single_error
 from strapdown.crash.structure import LARGEST_SHARE, Structure, learn_share, unlearnt
 from strapdown.dsp.chi_square import chi_square_above
 from strapdown.errors import ConfigError, DataError, Finding
@@ -648,7 +649,8 @@ def compare_units(
     each would have less than two samples. With the difference d of the velocity increments and its
     covariance C from all stated uncertainties, ``dᵀ C⁻¹ d`` is chi-square distributed; common
     errors (a shared gyro, the leveling) cancel in both. A probability below `level` is a
-    disagreement: structural ringing at one position, or any unstated error. Assumed axes, and
+    disagreement: structural ringing at one position, or any unstated error; so is a single error
+    that explains their differences much better than structure (`single_error`). Assumed axes, and
     intervals in which a unit was clipped without a wider range, are left out. Each pair is checked
     for swapped axes, a rotated mounting and wrong positions. `DataError`, `ConfigError`: the window
     is not covered or too short, an option out of range.
@@ -754,7 +756,8 @@ def compare_pair(
         apart = np.hstack([np.eye(difference.size), -np.eye(difference.size)])
         turning = apart @ turning @ apart.T
         covariance = covariance + turning
-    structure = learn_share(rigid, edges, kept, difference[None], floored(covariance), turning)
+    plain = floored(covariance)
+    structure = learn_share(rigid, edges, kept, difference[None], plain, turning)
     stiff = a, b
     a, b = a.bent_by(structure, kept), b.bent_by(structure, kept)
     if turning is not None:
@@ -800,6 +803,14 @@ def compare_pair(
             first.name,
             second.name,
         )
+        # Without a gyro a turning makes the same differences.
+        error = None
+        if turning is None:
+            effects = _single_effects((first, second), stiff, kept)
+            error = single_error(effects, structure, edges, kept, difference, plain, level)
+        if error is not None:
+            agree = False
+            found.append(error.finding(first.name, second.name))
     return UnitPair(
         first.name,
         second.name,
@@ -818,6 +829,27 @@ def compare_pair(
         structure,
         tuple(findings + found),
     )
+
+
+def _single_effects(
+    units: tuple[PointKinematics, PointKinematics],
+    increments: tuple[VelocityIncrements, VelocityIncrements],
+    kept: Flags,
+) -> dict[str, Array]:
+    """Effects, (3 m, r), of errors of one of two units on their difference: `single_error`."""
+    felt = np.mean([v.values for v in increments], axis=0)
+    edges = increments[0].edges
+    rest = np.mean([u.resting_force(STANDARD_GRAVITY)[0] for u in units], axis=0)
+    along = (felt - np.diff(edges)[kept, None] * rest).sum(axis=0) * [1.0, 1.0, 0.0]
+    along = along / max(float(np.linalg.norm(along)), TINY)
+    effects = {
+        "crash.off-scale": np.outer(felt @ along, along).reshape(-1, 1),
+        "crash.off-mounting": -rotation.cross_matrix(felt).reshape(-1, 3),
+    }
+    levers = [v.lever for v in increments if v.lever.any()]
+    if levers:
+        effects["crash.off-position"] = np.mean(levers, axis=0)
+    return effects
 
 
 def _turning(

@@ -14,7 +14,13 @@ from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY as GRAVITY
 from strapdown.crash.acceleration import force_at_rest
 from strapdown.errors import DataError
-from strapdown.sensors.crash_unit import SHAPES, Assumed, RecordedTriad, assumed_shapes
+from strapdown.sensors.crash_unit import (
+    SHAPES,
+    Assumed,
+    RecordedTriad,
+    assumed_shapes,
+    turning_shapes,
+)
 from strapdown.sensors.lever_arm import MovedImu, move_unit
 from strapdown.sensors.pre_crash import FROM_GRAVITY, Levelling, PreparedUnit
 from strapdown.sensors.rest import RestStretch
@@ -296,7 +302,7 @@ AssumedEffect = tuple[str, str, Array | None, Array | None]
 def assumed_effects(prepared: PreparedUnit) -> Iterator[AssumedEffect]:
     """List the unknowns of a unit's assumptions, as unknowns of the vehicle.
 
-    For rotation, two time functions about each vehicle axis (`Assumed`) and the second-order
+    For rotation, three time functions about each vehicle axis (`Assumed`) and the second-order
     effect; for missing axes, two along each. A specific force f rotated by φ about e keeps ``f -
     φ²/2 (f - e (e·f))`` to second order: ``φ²/2`` has the mean ``sd²/2`` and the standard deviation
     ``sd²/√2``. The means of all axes are one unknown about zero, the deviations one each; as it is
@@ -314,7 +320,7 @@ def assumed_effects(prepared: PreparedUnit) -> Iterator[AssumedEffect]:
     if unit.assumed is not None and axes.any():
         shapes = assumed_shapes(time, unit.assumed.over, sampling)
         for name, along in _directions(unit.assumed.sd_of("delta_v_sd"), axes, AXES):
-            for shape, how in zip(shapes, SHAPES, strict=True):
+            for shape, how in zip(shapes, SHAPES, strict=False):
                 force = np.outer(shape, along)
                 yield f"assumed velocity {name} {how}", MISSING_AXIS, force, None
 
@@ -322,7 +328,7 @@ def assumed_effects(prepared: PreparedUnit) -> Iterator[AssumedEffect]:
 def _of_turning(
     assumed: Assumed, turns: Array, time: Array, sampling: str, force: Array
 ) -> Iterator[AssumedEffect]:
-    shapes = assumed_shapes(time, assumed.over, sampling)
+    shapes = turning_shapes(time, assumed.over, sampling)
     steps = np.diff(time, prepend=2.0 * time[0] - time[1])
     turned = (np.cumsum(shapes * steps, axis=1) ** 2).sum(axis=0)
     means = np.zeros_like(force)

@@ -34,6 +34,8 @@ SIGNIFICANT = 6.63
 KNOTS = 0.005
 #: Beyond this share of the largest the envelope counts as zero.
 LEAST_ENVELOPE = 1e-3
+#: Relative to the largest: smaller variances are rounding.
+ROUNDING = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,17 +188,12 @@ def learn_share(
     (`of_turning`). Largest posterior of Gaussian differences. A share is zero, and the turning as
     large as stated, unless another is significantly likelier.
     """
-    # The point of the other unit moves in every difference.
-    both = np.eye(len(difference)) + 1.0
+    of_turning = [] if turning is None else [(_root(turning), MORE_TURNING, USUAL_MORE)]
     best: tuple[float, Structure] | None = None
     for correlation_time in CORRELATION_TIMES:
         one = replace(structure, correlation_time=correlation_time)
-        own = np.kron(both, one.change**2 * one.of_increments(edges)[np.ix_(kept, kept)])
-        along = [np.asarray(np.kron(own, np.diag(e)), dtype=np.float64) for e in np.eye(3)]
-        unknowns = [(axis, SHARES, USUAL_SHARE) for axis in along]
-        if turning is not None:
-            unknowns.append((turning, MORE_TURNING, USUAL_MORE))
-        found, cost = _likeliest(unknowns, difference.ravel(), covariance)
+        along = structural_unknowns(one, edges, kept, len(difference))
+        found, cost = likeliest([*along, *of_turning], difference.ravel(), covariance)
         if best is None or cost < best[0]:
             more = float(found[3]) if turning is not None else 0.0
             best = cost, replace(one, share=found[:3], turning=math.hypot(1.0, more))
@@ -204,42 +201,72 @@ def learn_share(
     return best[1]
 
 
-def _likeliest(
+def structural_unknowns(
+    structure: Structure, edges: Array, kept: NDArray[np.bool_], count: int
+) -> list[tuple[Array, Array, float]]:
+    """The shares along the three axes as unknowns of `likeliest`, of `count` units less another."""
+    # The point of the other unit moves in every difference.
+    both = np.linalg.cholesky(np.eye(count) + 1.0)
+    own = structure.change**2 * structure.of_increments(edges)[np.ix_(kept, kept)]
+    root = np.kron(both, _root(own))
+    roots = [np.asarray(np.kron(root, e[:, None]), dtype=np.float64) for e in np.eye(3)]
+    return [(one, SHARES, USUAL_SHARE) for one in roots]
+
+
+def _root(covariance: Array) -> Array:
+    """Columns, (d, r), whose product with their transpose is a covariance of rank r."""
+    values, vectors = np.linalg.eigh(covariance)
+    seen = values > ROUNDING * max(float(values.max(initial=0.0)), 0.0)
+    return np.asarray(vectors[:, seen] * np.sqrt(values[seen]))
+
+
+def likeliest(
     unknowns: Sequence[tuple[Array, Array, float]], difference: Array, covariance: Array
 ) -> tuple[Array, float]:
     """Sizes of covariances that add to another, by coordinate search, and twice the cost.
 
-    `unknowns`: the covariance of size one, the sizes to try, from zero, and the standard deviation
-    of the half-normal prior of each. The cost is the negative logarithm of the posterior.
+    `unknowns`: the root of the covariance of size one, (d, r), the sizes to try, from zero, and the
+    standard deviation of the half-normal prior of each. The cost is the negative logarithm of the
+    posterior.
     """
+    from scipy.linalg import solve_triangular
+
     sizes = np.zeros(len(unknowns))
-
-    def costs(k: int, grid: Array) -> Array:
-        """With each size of a grid for one unknown, the others as they are."""
-        others = covariance + sum(
-            x**2 * one
-            for j, (x, (one, _, _)) in enumerate(zip(sizes, unknowns, strict=True))
-            if j != k
-        )
-        factor = np.linalg.cholesky(others + np.square(grid)[:, None, None] * unknowns[k][0])
-        left = np.linalg.solve(factor, np.broadcast_to(difference, factor.shape[:2])[..., None])
-        logarithm = 2.0 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
-        prior = sum(
-            (x / sd) ** 2
-            for j, (x, (_, _, sd)) in enumerate(zip(sizes, unknowns, strict=True))
-            if j != k
-        )
-        return np.asarray(
-            logarithm + np.square(left).sum(axis=(1, 2)) + prior + (grid / unknowns[k][2]) ** 2
-        )
-
     if not difference.size:
         return sizes, 0.0
+    squares = [root @ root.T for root, _, _ in unknowns]
+
+    def costs(k: int) -> Array:
+        """With each size of the grid for one unknown, the others as they are.
+
+        Determinant and inverse of ``S + x² G Gᵀ`` by the eigenvalues of ``Gᵀ S⁻¹ G``.
+        """
+        others = covariance + sum(
+            x**2 * square
+            for j, (x, square) in enumerate(zip(sizes, squares, strict=True))
+            if j != k
+        )
+        root, sizes_tried, sd = unknowns[k]
+        factor = np.linalg.cholesky(others)
+        left = solve_triangular(factor, np.column_stack([difference, root]), lower=True)
+        values, vectors = np.linalg.eigh(left[:, 1:].T @ left[:, 1:])
+        grid = np.square(sizes_tried)[:, None]
+        grown = 1.0 + grid * np.maximum(values, 0.0)
+        along = np.square(vectors.T @ (left[:, 1:].T @ left[:, 0]))
+        logarithm = 2.0 * np.log(np.diagonal(factor)).sum() + np.log(grown).sum(axis=1)
+        square = left[:, 0] @ left[:, 0] - (grid / grown) @ along
+        prior = sum(
+            (x / s) ** 2
+            for j, (x, (_, _, s)) in enumerate(zip(sizes, unknowns, strict=True))
+            if j != k
+        )
+        return np.asarray(logarithm + square + prior + (sizes_tried / sd) ** 2)
+
     least = math.inf
     for _ in range(ROUNDS):
         before = sizes.copy()
         for k, (_, grid, _) in enumerate(unknowns):
-            tried = costs(k, grid)
+            tried = costs(k)
             j = int(np.argmin(tried))
             j = j if tried[0] - tried[j] > SIGNIFICANT else 0
             sizes[k], least = grid[j], float(tried[j])

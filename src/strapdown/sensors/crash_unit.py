@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from numbers import Real
 from typing import Any
@@ -292,10 +293,13 @@ def _same_stamps(unit: CrashUnit, triad: RecordedTriad, time: Array) -> None:
 
 # Assumed motion of a vehicle on unmeasured axes, and its uncertainty.
 
-#: Names of the two time profiles, in the order of `assumed_shapes`, for the names of unknowns.
-SHAPES = ("by the end", "on the way")
+#: Names of the time profiles, in the order of `turning_shapes`, for the names of unknowns; those of
+#: a velocity, in the order of `assumed_shapes`, are the first two.
+SHAPES = ("by the end", "on the way", "going on")
 # Standard deviation at the midpoint of a random walk with known end, relative to that of its end.
 ON_THE_WAY = 0.5
+# The same of a turn, of which a half in variance is at 0.15 of its end by then, and not at a half.
+TURN_ON_THE_WAY = math.sqrt(0.5 * (0.75 - (0.25 - 1.0 / math.pi**2) ** 2))
 # Beyond this angle "not rotating" is a poor assumption, and linear bounds are invalid.
 MOST_TURN = 45.0  # deg
 # Velocity changes of road vehicles in crashes are smaller.
@@ -340,6 +344,12 @@ class Assumed:
     unknown therefore rises and returns as ``sin²(pi u)``, with half the standard deviation at the
     midpoint: the remaining uncertainty of a random walk at its midpoint when its end is known. The
     total standard deviation at the midpoint is then 0.71 of that at the end, as for a random walk.
+
+    A velocity has its end with the blow; a vehicle that was turned goes on turning. Half of the
+    variance of a rotation is therefore of a third unknown, ``u² - sin²(pi u) / pi²``, whose rate
+    grows as the integral of a haversine and is largest at the end of `over`; after it the rate
+    falls to zero within half of that time. Without it the rate, which moves a point beside the
+    reference point, would be zero at the end of `over` for certain.
     """
 
     turn_sd_deg: float | Triad | None = None
@@ -384,13 +394,27 @@ def assumed_shapes(time: Array, over: tuple[float, float], sampling: str) -> Arr
     (2, n), 1/s: means over the interval that ends at the stamp, or about it, so that their sum
     times the step is exact even with few samples in `over`.
     """
+    return _rates(_grown, time, over, sampling)
+
+
+def turning_shapes(time: Array, over: tuple[float, float], sampling: str) -> Array:
+    """Rates of the three profiles of a turn, (3, n), 1/s, as `assumed_shapes`."""
+    return _rates(_turned, time, over, sampling)
+
+
+def _rates(
+    grown: Callable[[Array, tuple[float, float]], Array],
+    time: Array,
+    over: tuple[float, float],
+    sampling: str,
+) -> Array:
     steps = np.diff(time, prepend=2.0 * time[0] - time[1])
     after = np.append(steps[1:], steps[-1])
     if sampling == "mean":
         begin, end = time - steps, time
     else:
         begin, end = time - 0.5 * steps, time + 0.5 * after
-    return np.asarray((_grown(end, over) - _grown(begin, over)) / (end - begin))
+    return np.asarray((grown(end, over) - grown(begin, over)) / (end - begin))
 
 
 def _grown(time: Array, over: tuple[float, float]) -> Array:
@@ -398,6 +422,18 @@ def _grown(time: Array, over: tuple[float, float]) -> Array:
     u = np.clip((time - over[0]) / (over[1] - over[0]), 0.0, 1.0)
     whole = u - np.sin(2.0 * np.pi * u) / (2.0 * np.pi)
     return np.array([whole, ON_THE_WAY * np.sin(np.pi * u) ** 2])
+
+
+def _turned(time: Array, over: tuple[float, float]) -> Array:
+    """Values of the three profiles of a turn, (3, n)."""
+    whole, way = _grown(time, over)
+    u = (time - over[0]) / (over[1] - over[0])
+    within, after = np.clip(u, 0.0, 1.0), np.clip(u - 1.0, 0.0, 0.5)
+    on = within**2 - (np.sin(np.pi * within) / np.pi) ** 2
+    on += after + np.sin(2.0 * np.pi * after) / (2.0 * np.pi)
+    return np.array(
+        [math.sqrt(0.5) * whole, TURN_ON_THE_WAY / ON_THE_WAY * way, math.sqrt(0.5) * on]
+    )
 
 
 def _sds(given: object, name: str, limits: dict[str, Any]) -> Triad:

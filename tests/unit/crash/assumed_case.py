@@ -17,7 +17,13 @@ from strapdown.crash.entry import Entry
 from strapdown.crash.measuring_point import at_point
 from strapdown.crash.path import reconstruct_path
 from strapdown.crash.preparation import Preparation, prepare_unit
-from strapdown.sensors.crash_unit import Assumed, CrashUnit, RecordedTriad, assumed_shapes
+from strapdown.sensors.crash_unit import (
+    Assumed,
+    CrashUnit,
+    RecordedTriad,
+    assumed_shapes,
+    turning_shapes,
+)
 from strapdown.sensors.uncertainty import TriadUncertainty
 
 G = 9.80665
@@ -114,7 +120,7 @@ def drawn_motion(count, seed, *, turn=TURN_SD, slide=0.8, spun=False):
     that is lost, and stays to the end of `OVER`; the turn by then is as assumed.
     """
     rng = np.random.default_rng(seed)
-    turns = np.radians(turn)[:, None] * rng.normal(size=(count, 3, 2))
+    turns = np.radians(turn)[:, None] * rng.normal(size=(count, 3, 3))
     slides = slide * rng.normal(size=(count, 2))
 
     def shapes(time):
@@ -129,6 +135,6 @@ def drawn_motion(count, seed, *, turn=TURN_SD, slide=0.8, spun=False):
     def rates(time):
         if spun:
             return turns[:, None, :, 0] * spinning(time)[:, None]
-        return np.einsum("kas,sm->kma", turns, shapes(time))
+        return np.einsum("kas,sm->kma", turns, turning_shapes(time, OVER, "instantaneous"))
 
     return move(rates, lambda time: slides @ shapes(time))

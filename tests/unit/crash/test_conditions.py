@@ -77,7 +77,7 @@ CONDITIONS = (
     Condition(
         "trigger 20 ms late",
         lambda c: Fault(late=-0.02),
-        "one: structure may do as much; both: the crash began before the entry",
+        "structure may do as much; where found, the crash began before the entry",
     ),
     Condition(
         "record cut at 0.6 of the pulse",

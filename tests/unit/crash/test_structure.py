@@ -37,6 +37,30 @@ def test_points_of_a_car_that_folds_agree_and_a_wrong_sign_does_not(kind, gyro):
     assert disagrees(1, kind, gyro=gyro, wrong="sign")
 
 
+@pytest.mark.parametrize(
+    ("fault", "code", "size"),
+    [
+        # The first less the second, relative to their mean.
+        (Fault(factor=(1.15, 1.15, 1.0)), "crash.off-scale", (-14.0, 1.5)),
+        (Fault(turned_deg=7.0), "crash.off-mounting", (7.0, 1.5)),
+        (Fault(moved=(0.0, 1.2, 0.0)), "crash.off-position", (-1.2, 0.25)),
+    ],
+)
+def test_a_single_error_is_named_with_its_size(fault, code, size):
+    crash = Crash(2, "offset")
+    pair = [crash.unit(0, gyro=True), crash.unit(1, gyro=True, fault=fault)]
+    found = compare(pair)
+    assert not found.agree
+    (said,) = [f for f in found.findings if f.code == "crash.one-point-off"]
+    assert said.file == "B"
+    error = said.data["error"]
+    axis = {"crash.off-scale": "x", "crash.off-mounting": "z", "crash.off-position": "y"}[code]
+    assert error.code == code
+    # To three of the stated standard deviations: 1 % and 0.5° of either; of the position to what
+    # the turning of this crash tells.
+    assert error.data[axis] == pytest.approx(size[0], abs=3.0 * size[1])
+
+
 def test_four_points_agree_together():
     assert not disagrees(4, "front", gyro=False, count=4)
 

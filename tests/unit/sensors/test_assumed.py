@@ -11,7 +11,14 @@ from tests.coded import coded
 
 from strapdown import rotation
 from strapdown.errors import ConfigError, DataError
-from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad, assumed_shapes
+from strapdown.sensors.crash_unit import (
+    Assumed,
+    CrashUnit,
+    Mounting,
+    RecordedTriad,
+    assumed_shapes,
+    turning_shapes,
+)
 from strapdown.sensors.synchronise import synchronise
 from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.sensors.unmeasured import (
@@ -91,6 +98,18 @@ class TestShapes:
         # Of both together that of a random walk half way: 1/√2.
         assert np.hypot(*grown[:, middle]) == pytest.approx(np.sqrt(0.5), abs=1e-9)
         assert (grown[:, time < 0.0] == 0.0).all()
+
+    def test_a_turn_is_known_as_a_random_walk_and_its_rate_does_not_end_with_the_stretch(self):
+        time = np.arange(-100, 1000) / 1000.0
+        rates = turning_shapes(time, (0.0, 0.2), "mean")
+        grown = np.cumsum(rates, axis=1) / 1000.0
+        size = np.linalg.norm(grown, axis=0)
+        middle, end = (int(np.searchsorted(time, t - 1e-9)) for t in (0.1, 0.2))
+        assert size[[middle, end]] == pytest.approx([np.sqrt(0.5), 1.0], abs=1e-9)
+        # A turn that has grown with a pulse of 0.1 s and goes on: 1 / 0.15 s.
+        speed = np.linalg.norm(rates, axis=0)[middle : end + 1]
+        assert speed.min() > 1.0 / 0.15 and speed.max() < 2.0 / 0.15
+        assert (rates[:, time > 0.31] == 0.0).all()
 
 
 class TestFilling:
