@@ -742,16 +742,20 @@ def _levers(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     if longest > 0.0:
         far = f"{plain(length_factor() * longest, 2)} {length_unit()}"
         told = f"{result.spec.point.name}, up to {far} ({name})"
-        learnt = (
-            f" By their differences the recorders moved against each other with a standard "
-            f"deviation of up to {speed_words(float(bent.max()))} while the "
-            "force acted; that is in the bounds, a deformation that all of them share is not."
-        )
+        if bent.any():
+            yield (
+                "shared-deformation",
+                "Deformation that all recorders share is not seen",
+                "By their differences they moved against each other with a standard deviation of "
+                f"up to {speed_words(float(bent.max()))} while the force acted; that is in the "
+                f"bounds. A deformation between all of them and the {told}, is not.",
+            )
+            return
         yield (
             "rigid-vehicle",
             "The vehicle is assumed to be rigid",
             f"This applies between each recorder and the {told}. A floor or pillar that deformed "
-            f"in between moved differently.{learnt if bent.any() else ''}",
+            "in between moved differently.",
         )
 
 
@@ -1001,8 +1005,16 @@ def assumptions(result: CaseResult) -> tuple[tuple[str, str], ...]:
     """Return the assumptions of this case."""
     spec = result.spec
     options, entry = spec.options, spec.entry
+    comparison = result.reconstruction.comparison
+    bent = comparison is not None and bool(comparison.structure.sd.any())
     found = [
         (
+            "Structure",
+            "The recorders move against each other while the force acts, as learnt from their "
+            "differences; their mean moves with the reference point.",
+        )
+        if bent
+        else (
             "Rigid vehicle",
             "The vehicle does not deform between the recorders and the reference point.",
         ),

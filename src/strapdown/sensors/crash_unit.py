@@ -294,6 +294,8 @@ def _same_stamps(unit: CrashUnit, triad: RecordedTriad, time: Array) -> None:
 
 #: Names of the two time profiles, in the order of `assumed_shapes`, for the names of unknowns.
 SHAPES = ("by the end", "on the way")
+#: The third is of a rotation alone, whose rate outlasts the impact.
+TURN_SHAPES = (*SHAPES, "going on")
 # Standard deviation at the midpoint of a random walk with known end, relative to that of its end.
 ON_THE_WAY = 0.5
 # Beyond this angle "not rotating" is a poor assumption, and linear bounds are invalid.
@@ -340,6 +342,11 @@ class Assumed:
     unknown therefore rises and returns as ``sin²(pi u)``, with half the standard deviation at the
     midpoint: the remaining uncertainty of a random walk at its midpoint when its end is known. The
     total standard deviation at the midpoint is then 0.71 of that at the end, as for a random walk.
+
+    A vehicle that is struck off its center goes on turning, so that its points away from the
+    center differ in velocity at the end. A rotation therefore has half of the variance at the end
+    from a third unknown, ``u² + (cos(2 pi u) - 1) / (2 pi²)``, whose rate grows as the integral of
+    a haversine and stays: 1.4 times the standard deviation over the length of `over`.
     """
 
     turn_sd_deg: float | Triad | None = None
@@ -377,12 +384,15 @@ class Assumed:
         return ZERO if value is None else value
 
 
-def assumed_shapes(time: Array, over: tuple[float, float], sampling: str) -> Array:
-    """Rates of the two profiles at the samples, for a standard deviation of one at the end.
+def assumed_shapes(
+    time: Array, over: tuple[float, float], sampling: str, *, turning: bool = False
+) -> Array:
+    """Rates of the profiles at the samples, for a standard deviation of one at the end.
 
-    `time` ((n,), s). `over` ((float, float), s). `sampling` ({'instantaneous', 'mean'}). Returns
-    (2, n), 1/s: means over the interval that ends at the stamp, or about it, so that their sum
-    times the step is exact even with few samples in `over`.
+    `time` ((n,), s). `over` ((float, float), s). `sampling` ({'instantaneous', 'mean'}). `turning`:
+    of a rotation, three profiles, else two. Returns (2 or 3, n), 1/s: means over the interval that
+    ends at the stamp, or about it, so that their sum times the step is exact even with few samples
+    in `over`.
     """
     steps = np.diff(time, prepend=2.0 * time[0] - time[1])
     after = np.append(steps[1:], steps[-1])
@@ -390,7 +400,8 @@ def assumed_shapes(time: Array, over: tuple[float, float], sampling: str) -> Arr
         begin, end = time - steps, time
     else:
         begin, end = time - 0.5 * steps, time + 0.5 * after
-    return np.asarray((_grown(end, over) - _grown(begin, over)) / (end - begin))
+    grown = _turned if turning else _grown
+    return np.asarray((grown(end, over) - grown(begin, over)) / (end - begin))
 
 
 def _grown(time: Array, over: tuple[float, float]) -> Array:
@@ -398,6 +409,14 @@ def _grown(time: Array, over: tuple[float, float]) -> Array:
     u = np.clip((time - over[0]) / (over[1] - over[0]), 0.0, 1.0)
     whole = u - np.sin(2.0 * np.pi * u) / (2.0 * np.pi)
     return np.array([whole, ON_THE_WAY * np.sin(np.pi * u) ** 2])
+
+
+def _turned(time: Array, over: tuple[float, float]) -> Array:
+    """Values of the three profiles of a rotation, (3, n)."""
+    u = np.clip((time - over[0]) / (over[1] - over[0]), 0.0, 1.0)
+    whole, back = _grown(time, over)
+    further = u * u + (np.cos(2.0 * np.pi * u) - 1.0) / (2.0 * np.pi**2)
+    return np.array([whole / math.sqrt(2.0), back, further / math.sqrt(2.0)])
 
 
 def _sds(given: object, name: str, limits: dict[str, Any]) -> Triad:

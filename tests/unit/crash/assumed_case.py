@@ -114,11 +114,11 @@ def drawn_motion(count, seed, *, turn=TURN_SD, slide=0.8, spun=False):
     that is lost, and stays to the end of `OVER`; the turn by then is as assumed.
     """
     rng = np.random.default_rng(seed)
-    turns = np.radians(turn)[:, None] * rng.normal(size=(count, 3, 2))
+    turns = np.radians(turn)[:, None] * rng.normal(size=(count, 3, 3))
     slides = slide * rng.normal(size=(count, 2))
 
-    def shapes(time):
-        return assumed_shapes(time, OVER, "instantaneous")
+    def shapes(time, turning=False):
+        return assumed_shapes(time, OVER, "instantaneous", turning=turning)
 
     def spinning(time):
         u = np.clip((time - OVER[0]) / PULSE, 0.0, 1.0)
@@ -129,6 +129,6 @@ def drawn_motion(count, seed, *, turn=TURN_SD, slide=0.8, spun=False):
     def rates(time):
         if spun:
             return turns[:, None, :, 0] * spinning(time)[:, None]
-        return np.einsum("kas,sm->kma", turns, shapes(time))
+        return np.einsum("kas,sm->kma", turns, shapes(time, turning=True))
 
     return move(rates, lambda time: slides @ shapes(time))

@@ -28,7 +28,14 @@ from strapdown.crash.path import sample_paths
 from strapdown.crash.preparation import Preparation, prepare_unit
 from strapdown.crash.reconstruction import CrashOptions, reconstruct_crash
 from strapdown.errors import ConfigError, DataError
-from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad, assumed_shapes
+from strapdown.sensors.crash_unit import (
+    TURN_SHAPES,
+    Assumed,
+    CrashUnit,
+    Mounting,
+    RecordedTriad,
+    assumed_shapes,
+)
 from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.sensors.unmeasured import TURNS
 from strapdown.simulation.crash_motion import CRASHES
@@ -125,12 +132,13 @@ class TestEffects:
         part = 1e-3
 
         def rates(time):
-            out = np.zeros((2, time.size, 3))
-            out[:, :, axis] = np.radians(4.0) * part * assumed_shapes(time, (0, 0.15), "mean")
+            out = np.zeros((3, time.size, 3))
+            shapes = assumed_shapes(time, (0, 0.15), "mean", turning=True)
+            out[:, :, axis] = np.radians(4.0) * part * shapes
             return out
 
-        truth = move(rates, lambda time: np.zeros((2, time.size)))
-        for k, how in enumerate(("by the end", "on the way")):
+        truth = move(rates, lambda time: np.zeros((3, time.size)))
+        for k, how in enumerate(TURN_SHAPES):
             _, path = path_of(unit_of(truth, k, "xyz", ASSUMED))
             row = path.errors[path.names.index(f"vehicle assumed {TURNS[axis]} {how}")]
             rows = np.searchsorted(truth.time, path.time - 1e-9)
@@ -194,7 +202,7 @@ def both(straight):
 class TestSeveral:
     def test_they_share_what_is_assumed(self, both):
         names = both.combined.at_point.effects.names
-        assert sum(name.startswith("vehicle assumed heading") for name in names) == 3
+        assert sum(name.startswith("vehicle assumed heading") for name in names) == 4
         # Shared, it does not average out; the scale factors do.
         for unit in both.units:
             single, mean = unit.path.variances(), both.combined.path.variances()

@@ -23,7 +23,7 @@ name = "{name}"
 mass_kg = {mass}
 crush_m = {crush}
 [point]
-name = "centre of mass"
+name = "center of mass"
 [entry]
 kind = "speed"
 speed_m_per_s = {speed}

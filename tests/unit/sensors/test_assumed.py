@@ -92,6 +92,20 @@ class TestShapes:
         assert np.hypot(*grown[:, middle]) == pytest.approx(np.sqrt(0.5), abs=1e-9)
         assert (grown[:, time < 0.0] == 0.0).all()
 
+    @pytest.mark.parametrize("rate", [100.0, 1000.0])
+    def test_a_rotation_goes_on_at_the_end_and_has_the_stated_size(self, rate):
+        time = np.arange(-round(rate), round(rate)) / rate
+        shapes = assumed_shapes(time, (0.0, 0.15), "mean", turning=True)
+        grown = np.cumsum(shapes, axis=1) / rate
+        assert np.square(grown[:, -1]).sum() == pytest.approx(1.0, abs=1e-12)
+        # The rate at the end: 2 / √2 over the length, of the third alone; its mean over the last
+        # step is that in the middle of it, by the second derivative of the profile.
+        last = int(np.searchsorted(time, 0.15 - 1e-9))
+        step = 1.0 / (0.15 * rate)
+        expected = np.sqrt(2.0) * (1.0 - 0.5 * step) / 0.15
+        assert shapes[2, last] == pytest.approx(expected, rel=2.0 * step)
+        assert (shapes[:, last + 1 :] == 0.0).all()
+
 
 class TestFilling:
     def test_a_missing_axis_has_a_column_and_no_error_of_its_own(self):
