@@ -175,7 +175,12 @@ def lead(result: CaseResult) -> str:
             f"The largest change within {1e3 * (peak.delta_v.end - peak.delta_v.start):.3g} ms was "
             f"{change_words(peak)}."
         )
-    parts += [entry_words(result), path_words(result), units_words(result)]
+    parts += [
+        entry_words(result),
+        path_words(result),
+        units_words(result),
+        closure_words(result),
+    ]
     return " ".join(p for p in parts if p)
 
 
@@ -208,7 +213,30 @@ def entry_words(result: CaseResult) -> str:
     assert entry.speed_m_per_s is not None and entry.speed_sd_m_per_s is not None
     half = TWO_SIDED_95 * entry.speed_sd_m_per_s
     source = f" ({entry.source})" if entry.source else ""
-    return f"Entry speed: {speed(entry.speed_m_per_s, half)}{source}, stated, not from the record."
+    return (
+        f"Entry speed: {speed(entry.speed_m_per_s, half)}{source}, not measured by the recorders."
+    )
+
+
+def closure_words(result: CaseResult) -> str:
+    """Return what the other vehicle says; empty without one."""
+    closure = result.closure
+    if closure is None:
+        return ""
+    other = result.vehicle_names[2 - result.number]
+    if closure.contradicted:
+        return f"It CONTRADICTS {other}: momentum does not close; see the closure."
+    told = "closes" if closure.freedom else "could not be tested"
+    parts = [f"With {other} momentum {told}"]
+    if closure.closing_speed is not None:
+        figure, per = closure.closing_speed, speed_factor()
+        value, low, high = (plain(per * x, 1) for x in (figure.value, figure.low, figure.high))
+        parts.append(f"the closing speed was {value} {speed_unit()} ({low} to {high})")
+    if closure.restitution is not None:
+        figure = closure.restitution
+        value, low, high = (plain(x, 2) for x in (figure.value, figure.low, figure.high))
+        parts.append(f"the restitution {value} ({low} to {high})")
+    return "; ".join(parts) + "."
 
 
 def path_words(result: CaseResult) -> str:
