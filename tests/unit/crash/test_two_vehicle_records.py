@@ -57,7 +57,7 @@ def answer_cases(files, made, runs=2000):
 
 
 def closed(folder, kind, number, fault=""):
-    """The impact of a draw, and the reconstruction by its cases."""
+    """The impact of a draw, and the reconstruction by its cases; None of what is no event."""
     layout = list(WRITERS)[number % 2]
     made = recorded_impact(kind, number, layout, gyros=number // 2 % 2 == 0, fault=fault)
     WRITERS[layout](folder / "record", made.record)
@@ -65,6 +65,11 @@ def closed(folder, kind, number, fault=""):
     for draft in draft_cases(read_records([folder / "record"]), folder=folder):
         files.append(folder / f"case-{draft.vehicle}.toml")
         files[-1].write_text(draft.text, encoding="utf-8")
+        if "trigger_s" in {a.key for a in draft.asked}:
+            # 8 km/h make an event of 49 CFR 563; ringing at a point may hide it to 10.
+            change = made.impact.exact[int(draft.vehicle) - 1].delta_v
+            assert np.hypot(*change[:2]) < 10.0 / 3.6
+            return made, None
     answer_cases(files, made, runs=0)
     return made, sd.reconstruct(*files)
 
@@ -127,7 +132,7 @@ def test_bounds_from_records_hold_the_exact_impacts_of_all_kinds(tmp_path):
     for kind in KINDS:
         for number in range(DRAWS):
             made, run = closed(tmp_path / kind / str(number), kind, number)
-            if run.closure is None:
+            if run is None or run.closure is None:
                 none[kind] += 1
                 continue
             reported += run.closure.contradicted
