@@ -66,9 +66,9 @@ def closed(folder, kind, number, fault=""):
         files.append(folder / f"case-{draft.vehicle}.toml")
         files[-1].write_text(draft.text, encoding="utf-8")
         if "trigger_s" in {a.key for a in draft.asked}:
-            # 8 km/h make an event of 49 CFR 563; ringing at a point may hide it to 10.
-            change = made.impact.exact[int(draft.vehicle) - 1].delta_v
-            assert np.hypot(*change[:2]) < 10.0 / 3.6
+            # A point near the center of rotation may change by less than the 8 km/h that make an
+            # event of 49 CFR 563; then the instant is asked.
+            assert kind == "sideswipe"
             return made, None
     answer_cases(files, made, runs=0)
     return made, sd.reconstruct(*files)
