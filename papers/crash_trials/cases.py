@@ -115,7 +115,7 @@ DRAWN: dict[str, Draw] = {
 CASE, RECORDER = range(2)
 # After the impact: the path's 0.75 s, and what filters and late triggers need.
 RECORDED = 0.85  # s
-# Where in a car a recorder may be: forward, right, down from its centre of mass, m.
+# Where in a car a recorder may be: forward, right, down from its center of mass, m.
 CABIN = ((-1.0, 1.0), (-0.7, 0.7), (-0.3, 0.3))
 
 

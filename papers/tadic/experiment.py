@@ -59,11 +59,11 @@ _SPEED, _RECORDERS, _CAMERAS = range(3)
 
 #: What was chosen, for every figure of this experiment.
 CHOSEN = (
-    "pole impact of the paper, 7.1 m/s, pole 0.4 m right of the centre of mass; chosen: "
+    "pole impact of the paper, 7.1 m/s, pole 0.4 m right of the center of mass; chosen: "
     "restitution 0.1, k² of the yaw 1.9 m², haversine of 113 ms (13 g), nose 2° down, no ringing; "
     "sensors of Table 1 with errors drawn from their data sheets, scale factors of MEMS to 2 %; "
     "IMUs 0.6 m ahead, ±0.5 m beside and 0.2 m below, LABs 0.3 m behind, ±0.7 m beside and 0.3 m "
-    "above the centre of mass, which is the common point; 1 is left, 2 is right"
+    "above the center of mass, which is the common point; 1 is left, 2 is right"
 )
 
 

@@ -122,7 +122,7 @@ class Candidates:
     Attributes
     ----------
     base : Turned
-        At the centre of mass, without anything.
+        At the center of mass, without anything.
     arms, turns, rings, rings_lab : tuple of Turned
         Arms that are not compensated; headings that are not known; ringing at 200 Hz; the same
         ringing at 10 kHz.
@@ -144,7 +144,7 @@ def candidates() -> Candidates:
     """Try each alone on the paper's crash, with perfect sensors."""
     none = Mounting()
     return Candidates(
-        turned_by("at the centre of mass", none),
+        turned_by("at the center of mass", none),
         tuple(
             turned_by(f"arm ({x:+g}, {y:+g}, {z:+g}) m left out", Mounting((x, y, z)))
             for x, y, z in ARMS
@@ -170,7 +170,7 @@ def table(found: Candidates) -> Table:
         "What turns a direction of force",
         "Horizontal angle in degrees, perfect sensors on the simulated crash; from and to over "
         f"{PHASES} instants between two samples at which the crash begins. Arms are from the "
-        "centre of mass, forward, right, down. The ringing is lateral, begins with the impact and "
+        "center of mass, forward, right, down. The ringing is lateral, begins with the impact and "
         "decays in 30 ms. Two at once add up.",
         (
             "what",
@@ -532,7 +532,7 @@ def pulses_from(changes: dict[tuple[float, float], float], pole: float, wall: fl
 
 
 def strain(name: str) -> tuple[float, float]:
-    """Largest acceleration, m/s², and jerk, m/s³, of a crash at the centre of mass."""
+    """Largest acceleration, m/s², and jerk, m/s³, of a crash at the center of mass."""
     crash = CRASHES[name]
     time = np.arange(0.0, crash.motion.duration, 0.001)
     found = crash.motion.kinematics(time).acceleration

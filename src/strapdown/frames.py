@@ -101,7 +101,7 @@ def geodetic_from_ecef(position: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> 
         (distance < NEAREST) | (distance >= FARTHEST),
         xyz,
         "position",
-        "geodesy.not-earth-centred",
+        "geodesy.not-earth-centered",
         nearest_m=NEAREST,
         farthest_m=FARTHEST,
     )

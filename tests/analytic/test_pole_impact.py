@@ -48,7 +48,7 @@ def test_restitution_and_angular_momentum_hold():
     flat = crash_scenario("pole", pitch_deg=0.0)
     k = flat.motion.kinematics(np.array([flat.start, END]))
     speed, yaw = k.velocity[:, 0], k.turning[:, 2]
-    # Along the force, at the contact beside the centre of mass, where it was when it began.
+    # Along the force, at the contact beside the center of mass, where it was when it began.
     closing = speed - yaw * OFFSET
     assert closing[1] == pytest.approx(-RESTITUTION * closing[0], abs=2e-14)
     # About the contact, per mass, the force has no moment.

@@ -266,7 +266,7 @@ def test_fixes_come_back(tmp_path, name, clock):
     apart = np.abs(place_difference(back[GEODETIC].to_numpy(), gnss[GEODETIC].to_numpy()))
     # NMEA: half a unit of the seventh decimal of a minute, and of 0.1 mm.
     limits = [1.852e3 / 2e7, 1.852e3 / 2e7, 0.5e-4] if name == "nmea" else [0.0] * 3
-    # Doubles of 1e2 deg and of Earth-centred metres, as the difference computes with them.
+    # Doubles of 1e2 deg and of Earth-centered metres, as the difference computes with them.
     assert (apart.max(axis=0) <= np.array(limits) + 2e-9).all()
     if name not in ("nmea", "gpx"):
         assert np.array_equal(back[GEODETIC], gnss[GEODETIC])
@@ -390,7 +390,7 @@ def test_a_trajectory_comes_back(tmp_path, name, clock):
     ).max()
     faster = np.abs(back[VELOCITY].to_numpy() - track[VELOCITY].to_numpy()).max()
     # Position m, attitude deg, velocity m/s. .nav: 1e-11 deg, 1e-9 deg, 1e-8 m/s; TUM: doubles of
-    # Earth-centred metres, and velocities by differences over 10 ms.
+    # Earth-centered metres, and velocities by differences over 10 ms.
     rounding = 1e-12
     limits = {
         "nav": (1.2e-6, 1e-9, 1e-8),

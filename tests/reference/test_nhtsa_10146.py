@@ -2,7 +2,7 @@
 
 United States government data, public. Known apart from the channels: the closing speed, the mass
 of 1719 kg, and the wall's own load cells, whose impulse over the mass is the change of velocity
-of the car's centre of mass. There is no vehicle rate gyro and no film.
+of the car's center of mass. There is no vehicle rate gyro and no film.
 """
 
 from __future__ import annotations
@@ -128,7 +128,7 @@ class TestVehicle:
         by_wall = impulse / test.vehicles[0].mass
         assert by_wall == pytest.approx(19.11, abs=0.005)
         _, lost, _ = motion(*pulse)
-        # The rear of the car is another point than its centre of mass: 2 to 4 % less.
+        # The rear of the car is another point than its center of mass: 2 to 4 % less.
         share = by_wall / lost[1150] - 1.0
         assert 0.02 <= share <= 0.045
 

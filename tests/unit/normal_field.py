@@ -47,7 +47,7 @@ class NormalField:
         return (n + alt) * c, (n * (1 - self.e2) + alt) * s
 
     def ecef(self, lat_deg, lon_deg, alt):
-        """Earth-centred x, y, z, rounded once."""
+        """Earth-centered x, y, z, rounded once."""
         p, z = self.meridian_place(lat_deg, mpf(alt))
         s, c = self._angles(lon_deg)
         return [float(p * c), float(p * s), float(z)]

@@ -186,25 +186,55 @@ def print_table(
     text: Sequence[int] | None = None,
     strong: Container[int] = (),
 ) -> None:
-    """Print a table.
+    """Print a table; on a terminal too narrow for it, row by row.
 
-    `text`: left-aligned columns of text; the first and the last if not given. The others are
-    right-aligned numbers, which are never wrapped. `strong` (container of int): highlighted rows.
+    `text`: left-aligned columns of text, wrapped between words; the first and the last if not
+    given. The others are right-aligned numbers, which are never wrapped nor cut. `strong`
+    (container of int): highlighted rows.
     """
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
     left = {0, len(columns) - 1} if text is None else set(text)
+    first = [_broken(row[0]) if len(columns) > _MANY_COLUMNS else row[0] for row in rows]
+    shown = [(name, *row[1:]) for name, row in zip(first, rows, strict=True)]
+    least = [
+        max(
+            len(part)
+            for cell in (name, *(row[k] for row in shown))
+            for part in ((cell.split() or [""]) if k in left else [cell])
+        )
+        for k, name in enumerate(columns)
+    ]
+    out = console()
+    # A column has a space on either side, and the frame another.
+    if sum(least) + 2 * len(least) + 2 > out.width:
+        _print_rows(columns, rows, strong)
+        return
     table = Table(box=SIMPLE_HEAD, pad_edge=False, padding=(0, 1, 0, 1), header_style="bold")
     for k, name in enumerate(columns):
         if k in left:
-            table.add_column(name, justify="left", overflow="fold")
+            table.add_column(name, justify="left", overflow="fold", min_width=least[k])
         else:
             table.add_column(name, justify="right", no_wrap=True)
+    for k, row in enumerate(shown):
+        table.add_row(*row, style="bold" if k in strong else None)
+    out.print(table, soft_wrap=False)
+
+
+def _print_rows(
+    columns: Sequence[str], rows: Sequence[Sequence[str]], strong: Container[int]
+) -> None:
+    """Print each row under its first cell, a line for each further cell that is not empty."""
+    out = console()
+    wide = max(map(len, columns[1:]), default=0)
+    out.print()
     for k, row in enumerate(rows):
-        first = _broken(row[0]) if len(columns) > _MANY_COLUMNS else row[0]
-        table.add_row(first, *row[1:], style="bold" if k in strong else None)
-    console().print(table, soft_wrap=False)
+        out.print(row[0], style="bold")
+        for name, cell in zip(columns[1:], row[1:], strict=True):
+            if cell:
+                out.print(f"  {name:<{wide}}  {cell}", style="bold" if k in strong else None)
+    out.print()
 
 
 def print_block(block: TableBlock) -> None:
@@ -222,8 +252,12 @@ def _broken(name: str) -> str:
 
 
 def print_findings(findings: Sequence[Finding], most: int | None = None) -> None:
-    """Print findings to stderr, in `WORDS`; at most the first `most`."""
+    """Print findings to stderr, in `WORDS`; at most the first `most`.
+
+    What is said of several files or recorders alike is one.
+    """
     out = console(err=True)
+    findings = _joined(findings)
     for finding in findings[:most]:
         head, _, remedy = finding.text(WORDS.get()).partition("\n")
         out.print(f"{finding.severity}: {head}", style="yellow")
@@ -232,6 +266,19 @@ def print_findings(findings: Sequence[Finding], most: int | None = None) -> None
     if most is not None and len(findings) > most:
         more = f"{len(findings) - most} more; see the report"
         out.print(f"note: {more}", style="yellow")
+
+
+def _joined(findings: Sequence[Finding]) -> list[Finding]:
+    alike: dict[object, list[Finding]] = {}
+    for k, finding in enumerate(findings):
+        # A row or a line belongs to one file.
+        placed = finding.file is None or finding.row is not None or finding.line is not None
+        words = finding.replace(file=None).text(WORDS.get())
+        alike.setdefault(k if placed else (finding.severity, words), []).append(finding)
+    return [
+        one[0] if len(one) == 1 else one[0].replace(file="; ".join(str(f.file) for f in one))
+        for one in alike.values()
+    ]
 
 
 def print_seal(seal: Seal, look_at: str) -> None:

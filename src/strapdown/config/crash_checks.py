@@ -159,7 +159,8 @@ _OF_FIXES = ("path", "antenna_m", "antenna_sd_m")
 #: Keys that each kind does not use; a value of zero is ignored.
 _NO_USE = {
     "speed": _OF_FIXES,
-    "standstill": (*_OF_SPEED, "time_s", *_OF_FIXES),
+    # Its heading is of use to the closure with the other vehicle.
+    "standstill": (*(k for k in _OF_SPEED if "heading" not in k), "time_s", *_OF_FIXES),
     "gnss": _OF_SPEED,
 }
 _NEEDED = {

@@ -459,6 +459,8 @@ def impact_vehicle(
     if entry.kind == "gnss":
         sd = across = float(path.sd[["VN", "VE"]].iloc[path.anchor].max())
         heading_sd = float(path.sd["heading"].iloc[path.anchor])
+    # The path of a vehicle that stood is in its own axes.
+    stated = entry.heading_deg if entry.kind == "standstill" else 0.0
     rate = rate_change = None
     if "heading" not in unit.at_point.assumed_axes:
         rate, rate_change = _yaw_rates(unit, start, end)
@@ -471,7 +473,7 @@ def impact_vehicle(
         into_body @ covariance @ into_body.T,
         end - start,
         mass=None if mass is None else (mass, vehicle.mass_sd_kg or MASS_SD * mass),
-        heading_deg=(heading, heading_sd) if heading_sd else None,
+        heading_deg=(heading + stated, heading_sd) if heading_sd else None,
         entry=into_body[:2, :2] @ velocity,
         entry_covariance=np.diag([sd**2, across**2]),
         rate=rate,

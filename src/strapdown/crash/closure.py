@@ -1,6 +1,6 @@
 """Closure between the vehicles of one crash: momentum, restitution, energy, and what fails it.
 
-Planar impact mechanics. Let vehicle i have mass m_i, change of velocity of its centre of mass
+Planar impact mechanics. Let vehicle i have mass m_i, change of velocity of its center of mass
 ``w_i = R(psi_i) dV_i - t_i`` over ground, t_i the part that the tires made, and let P be the
 impulse of the contact on the first::
 
@@ -13,7 +13,7 @@ impulse of the contact on the first::
 The last holds for non-central impacts with rotation and friction, as u changes linearly with the
 impulse (work of an impulse: Brach 1991, Mechanical Impact Dynamics; planar impact mechanics: Brach
 & Brach, Vehicle Accident Analysis and Reconstruction Methods). It becomes ``mu Vc² (1 - e²) / 2``,
-mu the reduced mass, where impulse and velocities lie on the line through both centres of mass. E
+mu the reduced mass, where impulse and velocities lie on the line through both centers of mass. E
 includes the work of friction between the vehicles.
 
 Linear propagation: where the direction of the impulse is known to several degrees only and the
@@ -112,7 +112,7 @@ class ImpactVehicle:
     delta_v : array_like, (3,), m/s
         Forward, right, down over the whole event, free of gravity, along the axes of the vehicle
         at time zero (frame ``impact``; along turning axes it does not close). It has to hold at
-        `point`. Measured away from the centre of mass of a vehicle that turns, without its
+        `point`. Measured away from the center of mass of a vehicle that turns, without its
         `point` and `rate_change`, it does not close.
     covariance : array_like, (3, 3), (m/s)²
     duration : float, s
@@ -122,16 +122,16 @@ class ImpactVehicle:
         At time zero, clockwise from north. A relative heading does as well: 0 with 0 for the
         first vehicle.
     entry : array_like, (2,), m/s, optional
-        Velocity over ground of the centre of mass at time zero: forward, right, or north, east.
+        Velocity over ground of the center of mass at time zero: forward, right, or north, east.
     entry_covariance : array_like, (2, 2), (m/s)²
     entry_frame : {'body', 'ned'}
         Whether an error of the heading turns the entry velocity too.
     rate, rate_change : pair, deg/s, optional
         Yaw rate at time zero, and its change over the event; clockwise positive.
     contact : (forward, right, sd), m, optional
-        Point at which the resultant force of contact acts, from the centre of mass.
+        Point at which the resultant force of contact acts, from the center of mass.
     point : (forward, right, sd), m
-        Where `delta_v` holds, from the centre of mass; by default there.
+        Where `delta_v` holds, from the center of mass; by default there.
 
     Raises
     ------
@@ -191,7 +191,7 @@ class ImpactVehicle:
         return friction * STANDARD_GRAVITY * self.duration
 
     def contact_change(self, friction: float) -> tuple[Array, Array]:
-        """Change of velocity of the centre of mass from contact, (2,), vehicle axes, covariance.
+        """Change of velocity of the center of mass from contact, (2,), vehicle axes, covariance.
 
         The impulse of the tires is bounded by friction times weight times duration and has an
         unknown direction: uniform over the disc of that radius (GUM, JCGM 100:2008, 4.3.7, takes
@@ -251,12 +251,12 @@ def _turned(angle: Array, vector: Array) -> Array:
 
 
 def _by_rate(rate: Array, arm: Array) -> Array:
-    """Velocity of a point at an arm from the centre of mass by a yaw rate."""
+    """Velocity of a point at an arm from the center of mass by a yaw rate."""
     return np.stack([-rate * arm[..., 1], rate * arm[..., 0]], axis=-1)
 
 
 def _centre_change(x: Array) -> Array:
-    """Change of velocity of the centre of mass, over ground, tires included."""
+    """Change of velocity of the center of mass, over ground, tires included."""
     own = x[..., DELTA_V] - _by_rate(x[..., RATE_CHANGE], x[..., POINT])
     return _turned(x[..., HEADING], own)
 
@@ -291,7 +291,7 @@ class _Impact:
     `x`, (n,): nominal, of each vehicle and, last, the share of the first in the energy; free masses
     and headings at the values that close momentum. `two`: not a barrier. `over_ground`: which entry
     velocities are north, east. `at_contact`: velocities at the point of contact, else of the
-    centres of mass.
+    centers of mass.
     """
 
     x: Array
@@ -492,9 +492,9 @@ class Closure:
         either change may be zero.
     direction_deg : Figure
         Of the impulse on the first, clockwise from north, adjusted under momentum.
-    basis : {'contact', 'centres'}
-        Where the velocities of the following hold. ``centres``: the point of contact or a yaw rate
-        is not known; restitution is then that between the centres of mass along the impulse,
+    basis : {'contact', 'centers'}
+        Where the velocities of the following hold. ``centers``: the point of contact or a yaw rate
+        is not known; restitution is then that between the centers of mass along the impulse,
         which for a non-central impact is below that of the contact, and the energy is that of
         translation, of which a part goes into rotation.
     closing_speed, separation_speed : Figure, m/s, optional
@@ -547,7 +547,7 @@ def close_vehicles(
     Parameters
     ----------
     first, second : ImpactVehicle
-        `delta_v` has to hold at the stated point, by default the centre of mass; one of a rotating
+        `delta_v` has to hold at the stated point, by default the center of mass; one of a rotating
         vehicle measured elsewhere does not close.
     friction : float
         Coefficient of friction of tires on the road: the largest that is possible.
@@ -605,7 +605,7 @@ def _closed(
         findings += _limits(vehicles, impact, values, spread, level)
         if not impact.at_contact:
             findings.append(
-                Finding("crash.closure-of-centres", severity="note", quantity="contact")
+                Finding("crash.closure-of-centers", severity="note", quantity="contact")
             )
 
     def figure(index: int) -> Figure | None:
@@ -633,7 +633,7 @@ def _closed(
         _mass_ratio(sizes),
         _relative_heading(vehicles, friction),
         Figure.from_sd(azimuth, math.degrees(math.sqrt(max(spread[DIRECTION, DIRECTION], 0.0)))),
-        "contact" if impact.at_contact else "centres",
+        "contact" if impact.at_contact else "centers",
         figure(CLOSING),
         separation,
         _ratio(values[pair], spread[np.ix_(pair, pair)]) if known else None,
@@ -891,7 +891,7 @@ def measured_crush_energy(
     """Energy from measured force, N, over measured dynamic crush, m: its integral, J.
 
     `force`, `crush`, (n,): samples in the order of time (barrier load cells, and displacement of
-    the centre of mass). To the largest crush the integral is what the structure took, over the
+    the center of mass). To the largest crush the integral is what the structure took, over the
     rebound too what it kept. sd: relative of the scales, and of the offset of the force, N.
 
     Raises

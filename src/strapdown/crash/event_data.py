@@ -164,6 +164,7 @@ def _part(path: str, record: CrashRecord, kind: str, channels: Sequence[CrashCha
         named=True,
         remarks=record.remarks,
         velocities=tuple(by_axis.values()) if kind == "velocity" else (),
+        of_vehicle="an event data recorder has the axes of its vehicle (49 CFR 563.5)",
     )
 
 

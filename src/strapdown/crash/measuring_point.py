@@ -94,7 +94,7 @@ class _UnitEffects:
         self._mounting()
         self._timing()
         self._levelling()
-        for name, contributor, force, rate in assumed_effects(self.prepared):
+        for name, contributor, force, rate in assumed_effects(self.prepared, self.moved.lever_arm):
             self._add(f"{VEHICLE} {name}", contributor, force, rate)
         count, n = len(self.names), len(self.time)
         noise = self.prepared.noise_covariance + self.moved.added
@@ -299,15 +299,18 @@ def _sd(covariances: Array) -> Array:
 AssumedEffect = tuple[str, str, Array | None, Array | None]
 
 
-def assumed_effects(prepared: PreparedUnit) -> Iterator[AssumedEffect]:
+def assumed_effects(prepared: PreparedUnit, lever_arm: Array) -> Iterator[AssumedEffect]:
     """List the unknowns of a unit's assumptions, as unknowns of the vehicle.
+
+    `lever_arm`, (3,), m: from the unit to the point.
 
     For rotation, three time functions about each vehicle axis (`Assumed`) and the second-order
     effect; for missing axes, two along each. A specific force f rotated by φ about e keeps ``f -
     φ²/2 (f - e (e·f))`` to second order: ``φ²/2`` has the mean ``sd²/2`` and the standard deviation
     ``sd²/√2``. The means of all axes are one unknown about zero, the deviations one each; as it is
-    one-sided, 6.5 % lie beyond the 95 % bound. Products of a rotation and a missing axis are
-    neglected: 4 deg and 0.8 m/s give 0.03 m/s.
+    one-sided, 6.5 % lie beyond the 95 % bound. The centripetal acceleration ``ω² (r - e (e·r))`` of
+    a lever arm r has the root mean square ``√3 sd²`` of a normal rate, and is one unknown. Products
+    of a rotation and a missing axis are neglected: 4 deg and 0.8 m/s give 0.03 m/s.
     """
     unit = prepared.unit
     time = prepared.imu.index.to_numpy(dtype=np.float64)
@@ -316,7 +319,7 @@ def assumed_effects(prepared: PreparedUnit) -> Iterator[AssumedEffect]:
     turns, axes = unmeasured_turns(unit), unmeasured_axes(unit)
     if turning is not None and turns.any():
         force = prepared.imu[ACCEL].to_numpy(dtype=np.float64)
-        yield from _of_turning(turning, turns, time, sampling, force)
+        yield from _of_turning(turning, turns, (time, sampling), force, lever_arm)
     if unit.assumed is not None and axes.any():
         shapes = assumed_shapes(time, unit.assumed.over, sampling)
         for name, along in _directions(unit.assumed.sd_of("delta_v_sd"), axes, AXES):
@@ -326,8 +329,9 @@ def assumed_effects(prepared: PreparedUnit) -> Iterator[AssumedEffect]:
 
 
 def _of_turning(
-    assumed: Assumed, turns: Array, time: Array, sampling: str, force: Array
+    assumed: Assumed, turns: Array, stamps: tuple[Array, str], force: Array, lever_arm: Array
 ) -> Iterator[AssumedEffect]:
+    time, sampling = stamps
     shapes = turning_shapes(time, assumed.over, sampling)
     steps = np.diff(time, prepend=2.0 * time[0] - time[1])
     turned = (np.cumsum(shapes * steps, axis=1) ** 2).sum(axis=0)
@@ -342,6 +346,15 @@ def _of_turning(
         mean = -0.5 * variance * turned[:, None] * across
         means += mean
         yield f"assumed {name} squared", NO_TURNING, math.sqrt(2.0) * mean, None
+        if lever_arm.any():
+            inward = lever_arm - (lever_arm @ axis) * axis
+            rates = variance * (shapes**2).sum(axis=0)
+            yield (
+                f"assumed {name} inward",
+                NO_TURNING,
+                math.sqrt(3.0) * np.outer(rates, inward),
+                None,
+            )
     if means.any():
         yield "assumed turns squared", NO_TURNING, means, None
 

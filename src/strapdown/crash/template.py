@@ -213,7 +213,8 @@ def draft_cases(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> 
         left_out = tuple(s for s in skipped if s.vehicle == vehicle or s.vehicle not in units)
         # A recorder's table states no vehicle, so that its speed is of the only one.
         speeds = entries[:1] if len(units) == 1 else []
-        page = _filled(_face(of_vehicle), left_out, title, facts, paths, speeds)
+        several = len(units) > 1
+        page = _filled(_face(of_vehicle), left_out, title, facts, paths, speeds, several)
         drafts.append(
             Draft(
                 page.text,
@@ -305,8 +306,9 @@ def _filled(
     facts: Mapping[str, str],
     paths: Sequence[KnownPath],
     entries: Sequence[IndicatedEntry],
+    several: bool,
 ) -> Page:
-    """Fill the template, and wrap its comments."""
+    """Fill the template, and wrap its comments; `several`: vehicles of one crash."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     class Marked(PackageLoader):
@@ -335,6 +337,7 @@ def _filled(
         KMH=KMH,
         title=title,
         facts=facts,
+        several=several,
         fact=lambda key: _positive(facts.get(key, "")),
         stands=_number(facts.get("speed_m_per_s", "")) == 0.0,
         late=late if timed and late > 0.0 else None,

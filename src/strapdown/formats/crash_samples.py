@@ -240,7 +240,8 @@ def means_from_zero(time: ArrayLike, velocity: ArrayLike, channel: CrashChannel)
         raise DataError("io.sample-no-change-velocity", size=t.size, **where)
     step = float(np.median(np.diff(t)))
     largest = float(np.max(np.abs(v)))
-    if t[0] > 0.5 * step and v[0] != 0.0:
+    # An axis that is still zero after one step has that step, too, as the others of its table.
+    if t[0] > 0.5 * step and (v[0] != 0.0 or t[0] <= ONE_STEP * step):
         count = max(round(t[0] / step), 1)
         late = float(t[0]) if t[0] > ONE_STEP * step else 0.0
         part = np.arange(count) / count

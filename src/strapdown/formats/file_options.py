@@ -17,7 +17,7 @@ __all__ = ["TUM_FRAMES", "FileOptions"]
 TUM_FRAMES = {
     "enu": ("east, north, up at the origin", "forward, left, up"),
     "ned": ("north, east, down at the origin", "forward, right, down"),
-    "ecef": ("earth-centred, earth-fixed", "forward, right, down"),
+    "ecef": ("earth-centered, earth-fixed", "forward, right, down"),
 }
 
 DIGITS = ("exact", "fixed")

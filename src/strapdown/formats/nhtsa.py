@@ -242,7 +242,7 @@ def _vehicle(fields: list[str], file: Path, line: int) -> Vehicle:
         wheelbase=number(12, "wheelbase", MM),
         length=number(13, "length", MM),
         width=number(14, "width", MM),
-        cg_behind_front_axle=number(15, "centre of gravity", MM),
+        cg_behind_front_axle=number(15, "center of gravity", MM),
         speed=number(41, "speed", KMH),
         crab_deg=number(42, "crab angle") if len(fields) > VEHICLE_FIELDS else math.nan,
     )

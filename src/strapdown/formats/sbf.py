@@ -3,7 +3,7 @@
 Blocks: SBF Reference Guide of the receivers (mosaic-G5, AsteRx). A block begins with ``$@``, a CRC
 of 16 bits, its number and its length, GPS time of week in ms and week. PVTGeodetic has rad, m over
 the ellipsoid and m/s north, east, up; PosCovGeodetic and VelCovGeodetic the variances; the
-Cartesian blocks the same in WGS 84, Earth-centred. ExtSensorMeas has angular rate in deg/s and
+Cartesian blocks the same in WGS 84, Earth-centered. ExtSensorMeas has angular rate in deg/s and
 acceleration in m/s² of an inertial unit, at the receiver's time, in the axes of the unit, which its
 setup relates to the vehicle. A value of -2e10 is not known.
 """

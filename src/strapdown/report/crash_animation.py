@@ -223,10 +223,9 @@ def crash_stills(
         out.svg(),
         "Motion in 3D",
         "The vehicle at instants of its path, in parallel projection from the right, ahead and "
-        "above of its attitude at the entry; one scale. Orange: front. Blue: path of the reference "
-        "point up to that instant, projected onto the ground; dashed: the whole path. Lines on the "
-        f"ground are {_step(places, corners):g} m apart. The height of the vehicle is "
-        "illustrative.",
+        "above of its attitude at the entry. Blue: path of the reference point up to that instant, "
+        "projected onto the ground; dashed: the whole path. Lines on the ground are "
+        f"{_step(places, corners):g} m apart.",
         out.alt,
     )
 

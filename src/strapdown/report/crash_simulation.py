@@ -195,7 +195,7 @@ def _description(spec: CrashSimulationSpec, recorded: RecordedCase) -> dict[str,
         "sampling": spec.sampling,
         "duration_s": crash.motion.duration,
         "trigger_s": crash.start,
-        "point": "centre of mass",
+        "point": "center of mass",
         "entry": {
             "speed_m_per_s": entry.speed,
             "stated_speed_m_per_s": entry.told_speed if entry.speed else None,
@@ -329,7 +329,7 @@ _HEAD = """\
 #{remark}
 # Run: strapdown crash case.toml
 #
-# Axes of the vehicle: forward, right, down. Lengths in m from one origin, here the centre of mass.
+# Axes of the vehicle: forward, right, down. Lengths in m from one origin, here the center of mass.
 # Each key ends in its unit. Every ..._sd is a standard deviation: two of three cases lie within it.
 
 title = {title}
@@ -345,7 +345,7 @@ width_m = 1.7
 front_m = 2.0  # from the origin forward to the bumper
 
 [point]  # the point whose motion is told
-name = "centre of mass"
+name = "center of mass"
 position_m = [0.0, 0.0, 0.0]
 """
 _SPEED = """

@@ -303,7 +303,7 @@ def closure_table(result: CaseResult) -> TableBlock | None:
         return what, plain(factor * figure.value, places), f"{low} to {high}", unit
 
     per, per_unit = speed_factor(), speed_unit()
-    at = "at the contact" if closure.basis == "contact" else "of the centres of mass"
+    at = "at the contact" if closure.basis == "contact" else "of the centers of mass"
     equivalent = zip((first, second), closure.energy_equivalent_speed, strict=True)
     rows = (
         row(f"closing speed {at}, along the impulse", closure.closing_speed, per, 1, per_unit),
@@ -333,7 +333,7 @@ def closure_table(result: CaseResult) -> TableBlock | None:
         tuple(one for one in rows if one is not None),
         text=(0, 3),
         caption=f"{first} and {second} together, each by its own recorders at its "
-        f"{result.spec.point.name}, taken for its centre of mass. {tested}",
+        f"{result.spec.point.name}, taken for its center of mass. {tested}",
     )
 
 
@@ -400,7 +400,7 @@ def severity_table(result: CaseResult) -> TableBlock | None:
                 answer.model.outcome,
                 words,
                 bound,
-                "yes" if answer.model.covariance else "NO",
+                "in the bound" if answer.model.covariance else "not stated",
                 *((answer.model.source,) if len(sources) > 1 else ()),
             )
         )
@@ -409,7 +409,7 @@ def severity_table(result: CaseResult) -> TableBlock | None:
     name = MEAN if combined is not None and of == combined.name else of
     return TableBlock(
         (
-            *("outcome", "probability", "95 % bound", "with the model's uncertainty"),
+            *("outcome", "probability", "95 % bound", "uncertainty of the model"),
             *(("source",) if len(sources) > 1 else ()),
         ),
         tuple(rows),

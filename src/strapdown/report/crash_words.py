@@ -175,7 +175,12 @@ def lead(result: CaseResult) -> str:
             f"The largest change within {1e3 * (peak.delta_v.end - peak.delta_v.start):.3g} ms was "
             f"{change_words(peak)}."
         )
-    parts += [entry_words(result), path_words(result), units_words(result)]
+    parts += [
+        entry_words(result),
+        path_words(result),
+        units_words(result),
+        closure_words(result),
+    ]
     return " ".join(p for p in parts if p)
 
 
@@ -208,7 +213,30 @@ def entry_words(result: CaseResult) -> str:
     assert entry.speed_m_per_s is not None and entry.speed_sd_m_per_s is not None
     half = TWO_SIDED_95 * entry.speed_sd_m_per_s
     source = f" ({entry.source})" if entry.source else ""
-    return f"Entry speed: {speed(entry.speed_m_per_s, half)}{source}, stated, not from the record."
+    return (
+        f"Entry speed: {speed(entry.speed_m_per_s, half)}{source}, not measured by the recorders."
+    )
+
+
+def closure_words(result: CaseResult) -> str:
+    """Return what the other vehicle says; empty without one."""
+    closure = result.closure
+    if closure is None:
+        return ""
+    other = result.vehicle_names[2 - result.number]
+    if closure.contradicted:
+        return f"It CONTRADICTS {other}: momentum does not close; see the closure."
+    told = "closes" if closure.freedom else "could not be tested"
+    parts = [f"With {other} momentum {told}"]
+    if closure.closing_speed is not None:
+        figure, per = closure.closing_speed, speed_factor()
+        value, low, high = (plain(per * x, 1) for x in (figure.value, figure.low, figure.high))
+        parts.append(f"the closing speed was {value} {speed_unit()} ({low} to {high})")
+    if closure.restitution is not None:
+        figure = closure.restitution
+        value, low, high = (plain(x, 2) for x in (figure.value, figure.low, figure.high))
+        parts.append(f"the restitution {value} ({low} to {high})")
+    return "; ".join(parts) + "."
 
 
 def path_words(result: CaseResult) -> str:
@@ -742,16 +770,20 @@ def _levers(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     if longest > 0.0:
         far = f"{plain(length_factor() * longest, 2)} {length_unit()}"
         told = f"{result.spec.point.name}, up to {far} ({name})"
-        learnt = (
-            f" By their differences the recorders moved against each other with a standard "
-            f"deviation of up to {speed_words(float(bent.max()))} while the "
-            "force acted; that is in the bounds, a deformation that all of them share is not."
-        )
+        if bent.any():
+            yield (
+                "shared-deformation",
+                "Deformation that all recorders share is not seen",
+                "By their differences they moved against each other with a standard deviation of "
+                f"up to {speed_words(float(bent.max()))} while the force acted; that is in the "
+                f"bounds. A deformation between all of them and the {told}, is not.",
+            )
+            return
         yield (
             "rigid-vehicle",
             "The vehicle is assumed to be rigid",
             f"This applies between each recorder and the {told}. A floor or pillar that deformed "
-            f"in between moved differently.{learnt if bent.any() else ''}",
+            "in between moved differently.",
         )
 
 
@@ -1001,8 +1033,16 @@ def assumptions(result: CaseResult) -> tuple[tuple[str, str], ...]:
     """Return the assumptions of this case."""
     spec = result.spec
     options, entry = spec.options, spec.entry
+    comparison = result.reconstruction.comparison
+    bent = comparison is not None and bool(comparison.structure.sd.any())
     found = [
         (
+            "Structure",
+            "The recorders move against each other while the force acts, as learnt from their "
+            "differences; their mean moves with the reference point.",
+        )
+        if bent
+        else (
             "Rigid vehicle",
             "The vehicle does not deform between the recorders and the reference point.",
         ),

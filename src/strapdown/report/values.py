@@ -246,7 +246,7 @@ def side_words(forward: float, right: float) -> str:
 def over_ground(result: CaseResult) -> bool:
     """Whether a heading is known, so that the path is given over ground."""
     entry = result.spec.entry
-    return entry.kind == "gnss" or bool(entry.heading_deg)
+    return entry.kind == "gnss" or (entry.kind == "speed" and bool(entry.heading_deg))
 
 
 def axis_names(result: CaseResult) -> tuple[str, str, str]:

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError, Finding
 from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.tables import ACCEL, GYRO, check_table_sampling, find_gaps
@@ -230,7 +231,8 @@ def _judge_force(
                 "sensors.specific-force-in-g-or-bias", file=source, quantity="accel", length=length
             )
         )
-    elif length < NO_GRAVITY:
+    elif length < NO_GRAVITY and max(triad.uncertainty.axis("bias")) < STANDARD_GRAVITY:
+        # Of channels that were zeroed, gravity is in the bias, if that is stated so large.
         found.append(
             Finding(
                 "sensors.specific-force-before-crash-length",

@@ -18,7 +18,7 @@ width_m = 1.7
 front_m = 2.0
 
 [point]
-name = "centre of mass"
+name = "center of mass"
 position_m = [0.0, 0.0, 0.0]
 
 [entry]

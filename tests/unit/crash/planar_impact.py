@@ -18,7 +18,7 @@ from strapdown.crash.closure import ImpactVehicle
 G = 9.80665
 FRICTION = 0.7
 # Azimuth of the normal (force on the first), headings, contact points forward and right of either
-# centre of mass, ranges of the speeds in m/s, friction between the vehicles.
+# center of mass, ranges of the speeds in m/s, friction between the vehicles.
 KINDS = {
     "head-on": (180.0, (0.0, 180.0), ((2.0, 0.05), (2.0, -0.05)), ((10, 20), (10, 20)), 0.5),
     "offset": (180.0, (0.0, 180.0), ((2.0, -0.5), (2.0, -0.5)), ((10, 20), (10, 20)), 0.5),
@@ -44,7 +44,7 @@ def turned(angle, vector):
 
 
 def solve(mass, inertia, arms, velocity, rate, tires, normal, restitution, friction):
-    """Impulse on the first; tires add their change of velocity to the centres of mass."""
+    """Impulse on the first; tires add their change of velocity to the centers of mass."""
     cross = [np.array([-r[1], r[0]]) for r in arms]
     before = [velocity[i] + rate[i] * cross[i] for i in (0, 1)]
     u = before[0] - before[1]
@@ -65,8 +65,11 @@ def solve(mass, inertia, arms, velocity, rate, tires, normal, restitution, frict
     return impulse
 
 
-def draw(rng, kind, *, central=False, restitution=None, road=FRICTION):
-    """Draw an impact of a kind; `central`: without arms, friction, yaw and tire forces."""
+def draw(rng, kind, *, central=False, guided=False, restitution=None, road=FRICTION):
+    """Draw an impact of a kind; `central`: without arms, friction, yaw and tire forces.
+
+    `guided`: on the rails of a laboratory, which neither turn nor slip before the impact.
+    """
     normal_deg, headings, contacts, speeds, friction = KINDS[kind]
     mass = rng.uniform(1000.0, 2200.0, 2)
     gyration = rng.uniform(1.2, 1.45, 2)
@@ -79,6 +82,8 @@ def draw(rng, kind, *, central=False, restitution=None, road=FRICTION):
         contact, rate, friction = [np.zeros(2), np.zeros(2)], np.zeros(2), 0.0
     arms = [turned(heading[i], contact[i]) for i in (0, 1)]
     entry = [np.array([rng.uniform(*speeds[i]), rng.uniform(-0.3, 0.3)]) for i in (0, 1)]
+    if guided:
+        rate, entry = np.zeros(2), [e * [1.0, 0.0] for e in entry]
     velocity = [turned(heading[i], entry[i]) for i in (0, 1)]
     limit = road * G * duration
     tires = []

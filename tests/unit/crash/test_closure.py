@@ -174,9 +174,9 @@ def test_a_non_central_impact_needs_the_point_of_contact(kind):
     impact = draw(np.random.default_rng(5), kind)
     free = [replace(v, contact=None) for v in impact.exact]
     closure = close_vehicles(*free, friction=FRICTION)
-    assert closure.basis == "centres"
-    assert "crash.closure-of-centres" in {f.code for f in closure.findings}
-    # Rotation parts the points of contact, not the centres of mass.
+    assert closure.basis == "centers"
+    assert "crash.closure-of-centers" in {f.code for f in closure.findings}
+    # Rotation parts the points of contact, not the centers of mass.
     assert closure.restitution.value < impact.truth["restitution"]
     at_contact = close_vehicles(*impact.exact, friction=FRICTION)
     assert at_contact.basis == "contact"

@@ -98,6 +98,17 @@ def test_the_reconstructed_change_is_the_recorded_one(tmp_path, length, first):
     assert event.event.delta_v.vector[0] == pytest.approx(-44.3 * KMH, abs=1e-3 * KMH)
 
 
+def test_axes_are_of_the_vehicle_and_begin_together(tmp_path):
+    # In mph with a decimal the lateral change is 0.0 after its first step of 10 ms.
+    draft = drafted(tmp_path, text_of(Layout(units=("mph",), first=0.01, decimals=1)))
+    (unit,) = tomllib.loads(draft.text)["units"]
+    assert unit["angles_deg"] == [0.0, 0.0, 0.0]
+    result = run_case(filled(draft, tmp_path))
+    (event,) = result.reconstruction.main.body
+    change = event.event.delta_v.vector / KMH
+    assert np.abs(change[:2] - [-44.3, 7.4]).max() <= 0.05 * MPH / KMH + 1e-6
+
+
 def test_pedal_and_indicated_speed_are_no_sensors(tmp_path):
     rows = "".join(f"{10 * k},{-min(k, 10) * 3},{20 + k},{60 - k}\n" for k in range(31))
     head = "Time (msec),Delta-V longitudinal (km/h),Accelerator Pedal (% full),Vehicle Speed (km/h)"

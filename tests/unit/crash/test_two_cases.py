@@ -10,6 +10,8 @@ import pandas as pd
 import pytest
 
 import strapdown as sd
+from strapdown.report.crash_words import closure_words
+from strapdown.report.values import plain
 
 G = 9.80665
 MASSES, SPEEDS = (1500.0, 1100.0), (15.0, 12.0)
@@ -23,7 +25,7 @@ name = "{name}"
 mass_kg = {mass}
 crush_m = {crush}
 [point]
-name = "centre of mass"
+name = "center of mass"
 [entry]
 kind = "speed"
 speed_m_per_s = {speed}
@@ -126,6 +128,11 @@ def test_two_cars_close_and_the_figures_hold(tmp_path):
     # Along the impulse on the first, which points backward.
     assert closure.common_velocity.contains(-common)
     assert run.vehicle_names == ("a", "b")
+    # Page one of either names the other and has the closing speed.
+    speed = plain(3.6 * closure.closing_speed.value, 1)
+    for one, other in ((run, "b"), (run.others[0], "a")):
+        words = closure_words(one)
+        assert speed in words and f" {other} " in words
 
 
 @pytest.mark.parametrize(

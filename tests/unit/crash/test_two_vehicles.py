@@ -21,8 +21,8 @@ from strapdown.formats.crash_triad import triad_of_channels
 from strapdown.formats.crash_writers import write_mme, write_nhtsa
 
 LAYOUTS = {"nhtsa": write_nhtsa, "mme": write_mme}
-# Positions and what no gyro says: nothing else is asked of a test whose header is complete.
-ONLY_A_PERSON_KNOWS = {"position_m", "turn_sd_deg", "because"}
+# Positions, headings and what no gyro says: nothing else is asked of a test with a complete header.
+ONLY_A_PERSON_KNOWS = {"position_m", "heading_deg", "heading_sd_deg", "turn_sd_deg", "because"}
 SAID = ("name", "quantity", "axis", "unit", "sampling", "place", "body", "vehicle", "point",
         "low_pass", "full_scale", "bandwidth")  # fmt: skip
 

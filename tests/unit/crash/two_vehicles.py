@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -68,6 +69,48 @@ def felt(change, position):
     return force - force[TIME < 0.0].mean(axis=0)
 
 
+def channels_of(
+    at: At, vehicle: str, letter: str, layout: str, series: tuple[str, np.ndarray, np.ndarray]
+) -> list[CrashChannel]:
+    """Channels of a triad in the codes of a layout, with their stamps and values.
+
+    `series`: quantity, stamps, values of x, y, z. In the layout of NHTSA channels are numbered
+    later: their names are those of the axes.
+    """
+    quantity, time, values = series
+    coded = layout == "mme"
+    turns = quantity == "rate"
+    return [
+        CrashChannel(
+            f"{letter}{at.mme}{'AV' if turns else 'AC'}{axis.upper()}A" if coded else axis,
+            quantity,
+            axis,
+            "rad/s" if turns else "m/s2",
+            lambda v=values[:, k]: (time.copy(), v.copy()),
+            sampling="instantaneous",
+            place=at.words,
+            body=at.body.replace("driver", "front left occupant") if coded else at.body,
+            vehicle=vehicle,
+            point=at.mme if coded else at.nhtsa,
+            low_pass="CFC 1000" if coded else "2800 Hz before the sampler",
+            full_scale=40.0 if turns else 9806.65,
+            bandwidth=None if coded else 2800.0,
+        )
+        for k, axis in enumerate("xyz")
+    ]
+
+
+def record_of(
+    title: str, layout: str, channels: list[CrashChannel], vehicles: dict[str, dict[str, str]]
+) -> CrashRecord:
+    """A record of channels, which are numbered in the layout of NHTSA."""
+    if layout == "nhtsa":
+        channels = [replace(c, name=str(k)) for k, c in enumerate(channels, start=1)]
+    return CrashRecord(
+        Path("test"), layout, title, {"test": "77"}, tuple(channels), (), (), (), vehicles
+    )
+
+
 def recorded(test: str, layout: str) -> CrashRecord:
     """The record of a test in the codes of a layout: ``nhtsa`` or ``mme``."""
     channels: list[CrashChannel] = []
@@ -76,35 +119,6 @@ def recorded(test: str, layout: str) -> CrashRecord:
         vehicles[str(number)] = facts
         for at in points:
             values = felt(change, at.position)
-            for k, axis in enumerate("xyz"):
-                coded = layout == "mme"
-                name = f"{letter}{at.mme}AC{axis.upper()}A" if coded else str(len(channels) + 1)
-                body = at.body.replace("driver", "front left occupant") if coded else at.body
-                channels.append(
-                    CrashChannel(
-                        name,
-                        "acceleration",
-                        axis,
-                        "m/s2",
-                        lambda v=values[:, k]: (TIME.copy(), v.copy()),
-                        sampling="instantaneous",
-                        place=at.words,
-                        body=body,
-                        vehicle=str(number),
-                        point=at.mme if coded else at.nhtsa,
-                        low_pass="CFC 1000" if coded else "2800 Hz before the sampler",
-                        full_scale=9806.65,
-                        bandwidth=None if coded else 2800.0,
-                    )
-                )
-    return CrashRecord(
-        Path("test"),
-        layout,
-        test.capitalize(),
-        {"test": "77"},
-        tuple(channels),
-        (),
-        (),
-        (),
-        vehicles,
-    )
+            series = ("acceleration", TIME, values)
+            channels += channels_of(at, str(number), letter, layout, series)
+    return record_of(test.capitalize(), layout, channels, vehicles)

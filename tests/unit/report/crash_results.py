@@ -86,7 +86,7 @@ def _run(name, units, window, end):
         severity.append(SeverityAnswer(model, risk))
     spec = CaseSpec(
         title=f"simulated {name}",
-        point=PointSpec(name="centre of mass"),
+        point=PointSpec(name="center of mass"),
         entry=EntrySpec(speed_m_per_s=speed, speed_sd_m_per_s=SPEED_SD),
         units=tuple(
             UnitSpec(

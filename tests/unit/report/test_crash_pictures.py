@@ -421,10 +421,10 @@ def test_the_animation_follows_the_path_and_is_small():
 
 def test_the_conventions_show_where_units_and_point_are():
     units = [MountingPoint("IMU1", (0.6, -0.5, 0.2), 0), MountingPoint("LAB", (-0.3, 0.7, -0.3), 3)]
-    picture = conventions_picture(CAR, units, point=(0.1, 0.0, 0.05), point_name="centre of mass")
+    picture = conventions_picture(CAR, units, point=(0.1, 0.0, 0.05), point_name="center of mass")
     words = [t for t, _, _ in texts(picture.svg)]
     assert "IMU1 (0.60, −0.50, 0.20) m" in words
-    assert "centre of mass (0.10, 0.00, 0.05) m" in words
+    assert "center of mass (0.10, 0.00, 0.05) m" in words
     assert {"x forward", "y right", "z down", "roll +", "pitch +", "heading +", "PDOF +"} <= set(
         words
     )

@@ -100,7 +100,7 @@ def test_what_is_felt_is_what_inertial_axes_have(motion, ringing, at):
     mounted = MountedMotion(motion, MOUNTING, ringing)
     found = mounted.specific_force([at])[0]
     # As of the origin, 3e-13; the place at which gravity is taken is right to 5e-9 m of 3e-6 1/s²,
-    # and what is turned into Earth-centred axes and back has a dozen roundings of 10 m/s².
+    # and what is turned into Earth-centered axes and back has a dozen roundings of 10 m/s².
     np.testing.assert_allclose(found, exact_force(motion, MOUNTING, ringing, at), atol=4e-13)
 
 
@@ -109,7 +109,7 @@ def test_without_an_arm_it_is_the_origin():
     mounted = MountedMotion(CRASH)
     np.testing.assert_array_equal(mounted.specific_force(t), CRASH.specific_force(t))
     np.testing.assert_array_equal(mounted.rate(t), CRASH.rate(t))
-    # Through Earth-centred axes and back: five products of unit quaternions, 1e-15 rad.
+    # Through Earth-centered axes and back: five products of unit quaternions, 1e-15 rad.
     angle = rotation.rotation_angle(mounted.attitude(t), CRASH.attitude(t))
     assert np.all(np.abs(angle) < 6e-14)
     ours, theirs = mounted.trajectory(t), CRASH.trajectory(t)
@@ -175,7 +175,7 @@ def test_what_is_felt_integrates_to_velocity_and_path(motion, ringing):
     np.testing.assert_allclose(
         (weight * slope).sum(axis=0), ends.velocity[1] - ends.velocity[0], atol=1e-13
     )
-    # Two conversions of Earth-centred coordinates, at both ends.
+    # Two conversions of Earth-centered coordinates, at both ends.
     np.testing.assert_allclose(moved, ends.position[1] - ends.position[0], atol=1e-8)
 
 
