@@ -497,6 +497,17 @@ class PaperUpdate:
 HUBER = Huber()
 #: Weight of an observation that agrees with the estimate, and how many in a row show that they do.
 HALF, SETTLES = 0.5, 5
+#: Standard deviations within which an observation that jumped agrees with the estimate again.
+CONSISTENT = 2.0
+
+
+@dataclass(frozen=True)
+class Rejection:
+    """The rule that takes nothing of an observation."""
+
+    def step(self, nu: float, s: float, r: float) -> Step:
+        """Return no step; see `UpdateRule.step`."""
+        return Step(0.0, 1.0, r, 0.0)
 
 
 class ScaleState(NamedTuple):
@@ -513,9 +524,9 @@ class ScaleState(NamedTuple):
     settled : int
         Number of those in a row before them that counted by half or more.
     nu, time : float
-        Newest innovation that was not rejected, and its time, s.
-    held : float, s
-        Until then what is rejected is a fault of the observations: they jumped.
+        Newest innovation, and its time, s.
+    jump, held : float, s
+        The innovation with which they jumped, and until when what is like it is their fault.
     """
 
     log_square: float
@@ -524,6 +535,7 @@ class ScaleState(NamedTuple):
     settled: int = 0
     nu: float = 0.0
     time: float = -math.inf
+    jump: float = 0.0
     held: float = -math.inf
 
     @property
@@ -612,10 +624,9 @@ class AdaptiveScale:
         bounded = min(max(1.0, self.lowest), self.highest)
         return ScaleState(2.0 * math.log(bounded), self.prior, 0)
 
-    def rule(self, state: ScaleState, influence: Influence, time: float = math.inf) -> RobustUpdate:
-        """Return the rule of the next observation, at a time in s."""
-        endured = state.rejected >= self.patience and time >= state.held
-        given = HUBER if endured else influence
+    def rule(self, state: ScaleState, influence: Influence) -> RobustUpdate:
+        """Return the rule of the next observation."""
+        given = HUBER if state.rejected >= self.patience else influence
         return RobustUpdate(given, state.factor)
 
     def after(
@@ -630,8 +641,8 @@ class AdaptiveScale:
         if weight == 0.0:
             state = state._replace(rejected=state.rejected + 1)
         else:
-            settled = state.settled + 1 if weight >= HALF else 0
-            state = state._replace(rejected=0, settled=settled, nu=nu, held=-math.inf)
+            settled = state.settled + 1 if weight >= HALF and not state.rejected else 0
+            state = state._replace(rejected=0, settled=settled, held=-math.inf)
         own = math.exp(state.log_square) * r
         total = s + own
         if not (math.isfinite(nu) and total > 0.0 and own > 0.0):
@@ -651,14 +662,25 @@ class AdaptiveScale:
         """Return the state after an observation at a time, s, with what says that it jumped.
 
         `before`, `after`: states. `nu`: its innovation. `reach`: by how much the estimate may have
-        moved since the last one that was not rejected.
+        moved since the last observation.
         """
-        if after.rejected == 0:
-            return after._replace(time=time)
+        jump, held = after.jump, after.held
         far = abs(nu - before.nu) > max(reach, 0.5 * abs(nu))
         if after.rejected == 1 and before.settled >= SETTLES and far:
-            return after._replace(held=time + self.doubt)
-        return after
+            jump, held = nu, time + self.doubt
+        return after._replace(nu=nu, time=time, jump=jump, held=held)
+
+    @staticmethod
+    def is_away(state: ScaleState, nu: float, variance: float, time: float) -> bool:
+        """Return whether an observation that jumped is where it jumped to.
+
+        `nu`: its innovation, of this `variance`. An innovation that grows is that of an estimate
+        that goes wrong; within its own error the estimate may be.
+        """
+        if state.rejected == 0 or time >= state.held or nu**2 <= CONSISTENT**2 * variance:
+            return False
+        near = max(0.5 * abs(state.jump), CONSISTENT * math.sqrt(variance))
+        return abs(nu - state.jump) < near
 
 
 #: Learned scale of each component of an observation.
@@ -693,9 +715,9 @@ class AdaptiveRule:
         """Return the initial scale state of so many components."""
         return (self.scale.begin(),) * size
 
-    def rules(self, scales: Scales, time: float = math.inf) -> list[RobustUpdate]:
-        """Return the rule of each component of the next observation, at a time in s."""
-        return [self.scale.rule(one, self.influence, time) for one in scales]
+    def rules(self, scales: Scales) -> list[RobustUpdate]:
+        """Return the rule of each component of the next observation."""
+        return [self.scale.rule(one, self.influence) for one in scales]
 
     def jumped(
         self,

@@ -22,7 +22,7 @@ from strapdown.estimation.error_filter import (
     is_large,
     unlearnt_force,
 )
-from strapdown.estimation.robust import AdaptiveRule, Scales
+from strapdown.estimation.robust import AdaptiveRule, AdaptiveScale, Rejection, Scales
 from strapdown.nav_state import NavState
 from strapdown.navigation.compiled_engine import CompiledEngine, compiled
 from strapdown.navigation.engine import (
@@ -287,6 +287,19 @@ def _reach(seconds: float) -> float:
     return 0.5 * WRONG * seconds**2
 
 
+def _is_away(scales: Scales, one: Observation, view: View) -> list[Rejection]:
+    """Return rejections of an observation of which a component jumped and has not returned.
+
+    A fix with a fault has it in all components, also where the solution may be off by so much.
+    """
+    if not any(view.time < of.held for of in scales):
+        return []
+    variances = np.einsum("ij,jk,ik->i", one.H, view.covariance, one.H) + one.R
+    told = zip(scales, one.z.tolist(), variances.tolist(), strict=True)
+    away = any(AdaptiveScale.is_away(of, z, s, view.time) for of, z, s in told)
+    return [Rejection()] * len(scales) if away else []
+
+
 class EpochLoop:
     """Processing of one chunk by a navigator."""
 
@@ -495,7 +508,8 @@ class EpochLoop:
             self.observed = at
             observations = [one for _, one in told]
             known = [self.engine.known(one) for one in observations]
-            innovations = self._told([aid.rule or filter_.rule for aid, _ in told], observations)
+            rules = [aid.rule or filter_.rule for aid, _ in told]
+            innovations = self._told(rules, observations, view)
             self.seen += [
                 InnovationRecord(at, one.name, one.labels, nu, one)
                 for one, nu in zip(known, innovations, strict=True)
@@ -503,14 +517,15 @@ class EpochLoop:
         self.mark()
 
     def _told(
-        self, rules: list[UpdateRule | None], observations: list[Observation]
+        self, rules: list[UpdateRule | None], observations: list[Observation], view: View
     ) -> list[Innovations]:
         """Process observations; keep what their adaptive rules learn."""
         asked: list[Rules] = []
         for rule, one in zip(rules, observations, strict=True):
             if isinstance(rule, AdaptiveRule):
                 scales = self.scales.get(one.name) or rule.begin(one.z.size)
-                asked.append(rule.rules(scales, self.engine.time))
+                away = _is_away(scales, one, view)
+                asked.append(away or rule.rules(scales))
             else:
                 asked.append(rule)
         met = self.engine.filter
