@@ -125,7 +125,8 @@ def test_precise_fixes_whose_scatter_is_hidden_have_the_share_of_most_receivers(
     """Velocities of 0.1 m/s over 0.5 s hide 0.02 m: what lasts may be anything."""
     hidden = _position_errors(town.fixes(8503, position_noise=0.02), 0.0)
     assert hidden["position_correlated_share"] == 0.5
-    plain = _position_errors(town.fixes(8503, position_noise=0.02, velocity_noise=0.004), 0.0)
+    table = town.fixes(8503, rate=10.0, position_noise=0.02, velocity_noise=0.004)
+    plain = _position_errors(table, 0.0)
     assert "position_correlated_share" not in plain
 
 
@@ -172,7 +173,7 @@ def test_a_receiver_that_is_believed_again_makes_the_bound_cover_both():
     places = table[GEODETIC].to_numpy()
     shift = np.array([0.8, 0.0, -0.6])
     table.loc[wrong, GEODETIC] = [geodetic_from_ned(shift, place) for place in places[wrong]]
-    rule = AdaptiveRule(Igg3(), AdaptiveScale(lowest=1.0))
+    rule = AdaptiveRule(Igg3(), AdaptiveScale(lowest=1.0, doubt=1e-3))
     navigator, state = town.begun(town.gnss(rule=rule))
     _, piece = town.run(navigator, state, table)
     found = record_of(navigator, [piece])
