@@ -183,8 +183,9 @@ def test_a_receiver_that_is_believed_again_makes_the_bound_cover_both():
     during = (at > 60.0) & (at < 80.0)
     assert np.abs(off[during][:, [0, 2]]).max() > 0.5
     assert (np.abs(off[during])[:, [0, 2]] < bound[during][:, [0, 2]]).mean() > 0.99
-    # East is not contradicted. Back again, the receiver is believed after some seconds.
-    assert bound[:, 1][at > 2.0].max() < 0.1
+    # East is not contradicted, and moves little with the others. Back again, the receiver is
+    # believed after some seconds.
+    assert bound[:, 1][at > 2.0].max() < 0.25 * 0.8
     assert 0.5 < bound[(at > 80.0) & (at < 85.0)].max() < 3.0
     assert bound[at > 120.0].max() < 0.1
 
