@@ -138,14 +138,16 @@ def float_position_sd(table: pd.DataFrame) -> float | None:
     fixed solutions. None of a receiver with one kind of solution.
     """
     sd = values_of(table, POSITION_SD)[usable(table, POSITION_SD[:2]), :2]
-    level = np.unique(np.sqrt(np.mean(np.square(sd), axis=1)))
+    all_sd = np.sqrt(np.mean(np.square(sd), axis=1))
+    level = np.unique(all_sd)
     if len(level) < 2:
         return None
     apart = np.log(level[1:] / level[:-1])
     widest = int(np.argmax(apart))
+    limit = math.sqrt(level[widest] * level[widest + 1])
     if apart[widest] < math.log(FLOAT_GAP) or level[0] > FIXED_SD:
         return None
-    return float(math.sqrt(level[widest] * level[widest + 1]))
+    return limit if np.count_nonzero(all_sd < limit) >= LEAST_ROWS else None
 
 
 def white_velocity_sd(table: pd.DataFrame) -> float | None:
