@@ -733,7 +733,7 @@ class AdaptiveRule:
         """
         return tuple(
             self.scale.jumped(one, then, nu, time, reach(time - one.time))
-            for one, then, nu in zip(*scales, seen.nu.tolist(), strict=True)
+            for one, then, nu in zip(scales[0], scales[1], seen.nu.tolist(), strict=True)
         )
 
     def after(self, scales: Scales, seen: Innovations, R: NDArray[np.float64]) -> Scales:

@@ -41,6 +41,7 @@ from strapdown.navigation.integrity import (
     likelihood_gain,
 )
 from strapdown.navigation.measurements.gnss import Gnss
+from strapdown.navigation.measurements.measurement import Measurement
 from strapdown.navigation.modes import (
     CoarseMode,
     Command,
@@ -254,7 +255,8 @@ def _with_offsets(
     A fix is compared with the motion at its stamp, continued over the offset by velocity and mean
     acceleration: over `CONTINUED` a walk's steps move by more than a centimeter otherwise.
     """
-    aids, findings = [], []
+    aids: list[Measurement] = []
+    findings: list[Finding] = []
     for aid in chain.navigator.aids:
         if isinstance(aid, Gnss) and aid.time_offset_sd > 0.0:
             name = f"{aid.name}.time_offset_t"
