@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar, NamedTuple
@@ -494,6 +495,19 @@ class PaperUpdate:
 
 
 HUBER = Huber()
+#: Weight of an observation that agrees with the estimate, and how many in a row show that they do.
+HALF, SETTLES = 0.5, 5
+#: Standard deviations within which an observation that jumped agrees with the estimate again.
+CONSISTENT = 2.0
+
+
+@dataclass(frozen=True)
+class Rejection:
+    """The rule that takes nothing of an observation."""
+
+    def step(self, nu: float, s: float, r: float) -> Step:
+        """Return no step; see `UpdateRule.step`."""
+        return Step(0.0, 1.0, r, 0.0)
 
 
 class ScaleState(NamedTuple):
@@ -507,11 +521,22 @@ class ScaleState(NamedTuple):
         Effective number of observations behind it.
     rejected : int
         Number of latest observations in a row that were rejected.
+    settled : int
+        Number of those in a row before them that counted by half or more.
+    nu, time : float
+        Newest innovation, and its time, s.
+    jump, held : float, s
+        The innovation with which they jumped, and until when what is like it is their fault.
     """
 
     log_square: float
     information: float
     rejected: int
+    settled: int = 0
+    nu: float = 0.0
+    time: float = -math.inf
+    jump: float = 0.0
+    held: float = -math.inf
 
     @property
     def factor(self) -> float:
@@ -534,6 +559,10 @@ class AdaptiveScale:
     deviations, Tukey's does, one by one, though together they leave no doubt. After `patience`
     rejections in a row `rule` therefore gives Huber's function, which never rejects.
 
+    An estimate goes wrong by degrees. Observations that agreed with it, and jump further than it
+    can have moved since the last one, are faulty themselves: they are rejected until they return,
+    for `doubt` seconds at most.
+
     The object is stateless: its user keeps the learned `ScaleState`.
 
     Attributes
@@ -551,6 +580,9 @@ class AdaptiveScale:
         are gross errors.
     patience : int
         Rejections in a row after which one observation is taken by Huber's function.
+    doubt : float, s
+        How long observations that jumped are rejected at most: as faults of receivers by a wrong
+        ambiguity or by reflections last.
     """
 
     memory: float = 100.0
@@ -559,9 +591,10 @@ class AdaptiveScale:
     highest: float = 100.0
     clip: float = 1.0
     patience: int = 10
+    doubt: float = field(default=60.0, metadata={"unit": "s"})
 
     def __post_init__(self) -> None:
-        for name in ("memory", "prior", "lowest", "highest", "clip", "patience"):
+        for name in ("memory", "prior", "lowest", "highest", "clip", "patience", "doubt"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0.0):
                 raise ConfigError(
@@ -605,11 +638,15 @@ class AdaptiveScale:
         variance of the observation as stated, without the factor. `weight`: weight by the rule; 0
         is a rejection.
         """
-        rejected = state.rejected + 1 if weight == 0.0 else 0
+        if weight == 0.0:
+            state = state._replace(rejected=state.rejected + 1)
+        else:
+            settled = state.settled + 1 if weight >= HALF and not state.rejected else 0
+            state = state._replace(rejected=0, settled=settled, held=-math.inf)
         own = math.exp(state.log_square) * r
         total = s + own
         if not (math.isfinite(nu) and total > 0.0 and own > 0.0):
-            return ScaleState(state.log_square, state.information, rejected)
+            return state
         share = own / total
         mean, within = self._expected
         excess = min(nu * nu / total, self.clip * self.clip) - mean
@@ -617,7 +654,33 @@ class AdaptiveScale:
         information += share * share * (1.0 - information / self.memory)
         square = state.log_square + share * excess / (within * information)
         square = min(max(square, 2.0 * math.log(self.lowest)), 2.0 * math.log(self.highest))
-        return ScaleState(square, information, rejected)
+        return state._replace(log_square=square, information=information)
+
+    def jumped(
+        self, before: ScaleState, after: ScaleState, nu: float, time: float, reach: float
+    ) -> ScaleState:
+        """Return the state after an observation at a time, s, with what says that it jumped.
+
+        `before`, `after`: states. `nu`: its innovation. `reach`: by how much the estimate may have
+        moved since the last observation.
+        """
+        jump, held = after.jump, after.held
+        far = abs(nu - before.nu) > max(reach, 0.5 * abs(nu))
+        if after.rejected == 1 and before.settled >= SETTLES and far:
+            jump, held = nu, time + self.doubt
+        return after._replace(nu=nu, time=time, jump=jump, held=held)
+
+    @staticmethod
+    def is_away(state: ScaleState, nu: float, variance: float, time: float) -> bool:
+        """Return whether an observation that jumped is where it jumped to.
+
+        `nu`: its innovation, of this `variance`. An innovation that grows is that of an estimate
+        that goes wrong; within its own error the estimate may be.
+        """
+        if state.rejected == 0 or time >= state.held or nu**2 <= CONSISTENT**2 * variance:
+            return False
+        near = max(0.5 * abs(state.jump), CONSISTENT * math.sqrt(variance))
+        return abs(nu - state.jump) < near
 
 
 #: Learned scale of each component of an observation.
@@ -655,6 +718,23 @@ class AdaptiveRule:
     def rules(self, scales: Scales) -> list[RobustUpdate]:
         """Return the rule of each component of the next observation."""
         return [self.scale.rule(one, self.influence) for one in scales]
+
+    def jumped(
+        self,
+        scales: tuple[Scales, Scales],
+        seen: Innovations,
+        time: float,
+        reach: Callable[[float], float],
+    ) -> Scales:
+        """Return the scale state after an observation with what says that it jumped.
+
+        `scales`: before and after it. `seen`: innovations of the observation. `time`: its own, s.
+        `reach`: by how much the estimate may move in so many seconds.
+        """
+        return tuple(
+            self.scale.jumped(one, then, nu, time, reach(time - one.time))
+            for one, then, nu in zip(scales[0], scales[1], seen.nu.tolist(), strict=True)
+        )
 
     def after(self, scales: Scales, seen: Innovations, R: NDArray[np.float64]) -> Scales:
         """Return the scale state after an observation.

@@ -22,7 +22,7 @@ from strapdown.estimation.error_filter import (
     is_large,
     unlearnt_force,
 )
-from strapdown.estimation.robust import AdaptiveRule, Scales
+from strapdown.estimation.robust import AdaptiveRule, AdaptiveScale, Rejection, Scales
 from strapdown.nav_state import NavState
 from strapdown.navigation.compiled_engine import CompiledEngine, compiled
 from strapdown.navigation.engine import (
@@ -35,7 +35,7 @@ from strapdown.navigation.engine import (
     begun,
 )
 from strapdown.navigation.filter_options import ClosedLoop, Correction
-from strapdown.navigation.measurements.gnss import HORIZONTAL_CODE, Gnss
+from strapdown.navigation.measurements.gnss import HORIZONTAL_CODE, PLACE, Gnss
 from strapdown.navigation.measurements.measurement import (
     Epochs,
     ImuDerivedMeasurement,
@@ -245,6 +245,8 @@ class NavigatorState:
         Fading means of rate and specific force (`_kernels.steady_motion`) for aids that use them.
     tilted : bool
         Whether the tilt has been so uncertain since the start that its second order counts.
+    kept : mapping of str to ndarray
+        What aids keep from epoch to epoch (`View.kept`).
     """
 
     engine: EngineState
@@ -255,6 +257,7 @@ class NavigatorState:
     scales: Mapping[str, Scales] = field(default_factory=dict)
     steady: Array = field(default_factory=lambda: np.zeros(STEADY))
     tilted: bool = False
+    kept: Mapping[str, Array] = field(default_factory=dict)
 
     @property
     def time(self) -> float:
@@ -274,7 +277,27 @@ AGED = 0.15
 JUST_BEFORE = 1e-6
 #: Relative size up to which a negative variance is rounding.
 ROUNDING = 1e-12
+#: Acceleration by which an inertial solution of any grade may be wrong, m/s².
+WRONG = 3.0
 PHYSICAL_LABELS = ("place", "velocity", "attitude")
+
+
+def _reach(seconds: float) -> float:
+    """Return by how much an inertial position may go wrong in some seconds, m."""
+    return 0.5 * WRONG * seconds**2
+
+
+def _is_away(scales: Scales, one: Observation, view: View) -> list[Rejection]:
+    """Return rejections of an observation of which a component jumped and has not returned.
+
+    A fix with a fault has it in all components, also where the solution may be off by so much.
+    """
+    if not any(view.time < of.held for of in scales):
+        return []
+    variances = np.einsum("ij,jk,ik->i", one.H, view.covariance, one.H) + one.R
+    told = zip(scales, one.z.tolist(), variances.tolist(), strict=True)
+    away = any(AdaptiveScale.is_away(of, z, s, view.time) for of, z, s in told)
+    return [Rejection()] * len(scales) if away else []
 
 
 class EpochLoop:
@@ -288,6 +311,7 @@ class EpochLoop:
         self.marked = state.marked
         self.observed = state.observed
         self.scales = dict(state.scales)
+        self.kept = dict(state.kept)
         self.tilted = state.tilted
         self.steady = state.steady.copy()
         self.begun_steady = state.steady
@@ -419,6 +443,7 @@ class EpochLoop:
             self.scales,
             self.steady,
             self.tilted,
+            self.kept,
         )
 
     def chunk(self) -> NavigationChunk:
@@ -468,6 +493,7 @@ class EpochLoop:
             covariance_of=partial(filter_.physical_covariance, engine.filter),
             steady=self._steady(at),
             unobserved=at - self.observed,
+            kept=self.kept,
         )
         told: list[tuple[Measurement, Observation]] = []
         for aid in self.navigator.aids:
@@ -482,7 +508,8 @@ class EpochLoop:
             self.observed = at
             observations = [one for _, one in told]
             known = [self.engine.known(one) for one in observations]
-            innovations = self._told([aid.rule or filter_.rule for aid, _ in told], observations)
+            rules = [aid.rule or filter_.rule for aid, _ in told]
+            innovations = self._told(rules, observations, view)
             self.seen += [
                 InnovationRecord(at, one.name, one.labels, nu, one)
                 for one, nu in zip(known, innovations, strict=True)
@@ -490,13 +517,15 @@ class EpochLoop:
         self.mark()
 
     def _told(
-        self, rules: list[UpdateRule | None], observations: list[Observation]
+        self, rules: list[UpdateRule | None], observations: list[Observation], view: View
     ) -> list[Innovations]:
         """Process observations; keep what their adaptive rules learn."""
         asked: list[Rules] = []
         for rule, one in zip(rules, observations, strict=True):
             if isinstance(rule, AdaptiveRule):
-                asked.append(rule.rules(self.scales.get(one.name) or rule.begin(one.z.size)))
+                scales = self.scales.get(one.name) or rule.begin(one.z.size)
+                away = _is_away(scales, one, view)
+                asked.append(away or rule.rules(scales))
             else:
                 asked.append(rule)
         met = self.engine.filter
@@ -505,7 +534,10 @@ class EpochLoop:
         for rule, one, nu in zip(rules, observations, innovations, strict=True):
             if isinstance(rule, AdaptiveRule):
                 before = self.scales.get(one.name) or rule.begin(one.z.size)
-                self.scales[one.name] = rule.after(before, nu, one.R)
+                after = rule.after(before, nu, one.R)
+                if set(one.labels) <= set(PLACE):
+                    after = rule.jumped((before, after), nu, self.engine.time, _reach)
+                self.scales[one.name] = after
         return innovations
 
     def _unlearn(self, met: FilterState) -> None:

@@ -43,6 +43,7 @@ NEAR = 1e-6
 PAIR = 2.0 * JUST_BEFORE
 #: Faults of receivers, as of a wrong ambiguity or by reflections, last this long at most, s.
 DOUBT = 60.0
+TINY = 1e-300
 #: A longer interval, relative to the usual, is an outage; after so many observations it is over.
 GAP, SETTLES = 5.0, 5
 
@@ -188,6 +189,7 @@ class Tape:
             marks = np.vstack([marks, self._newest_mark])
         count = model.stacked.sd.size
         at, history = states[:, 0].copy(), states[:, 1:]
+        filtered = marks[:, 1:82].reshape(-1, 9, 9)
         if smoothing is not None:
             later = smoothing.smoothed(marks[:, 0])
             history = later.corrected(at, history)
@@ -200,7 +202,12 @@ class Tape:
         covariance = marks[:, 1:82].reshape(-1, 9, 9).copy()
         for component, begin, end, size in self._contradictions():
             within = (marks[:, 0] >= begin) & (marks[:, 0] <= end)
-            covariance[within, component, component] += size**2
+            # A correction of one position corrects all else by their covariance with it.
+            P = filtered[within]
+            own = P[:, component, component, None]
+            moved = size * P[:, :, component] / np.maximum(own, TINY)
+            moved[:, component] = size
+            covariance[within] += moved[:, :, None] * moved[:, None, :]
         without = ~np.array(model.estimated(used))
         covariance[:, without, :] = covariance[:, :, without] = np.nan
         nearest = np.clip(trajectory.index.searchsorted(time), 0, len(trajectory) - 1)
@@ -280,8 +287,8 @@ def _contradictions(
 
     A receiver that is rejected so many times in a row is believed again, by and by, and either it
     or the solution was wrong. What separated the two is a part of the uncertainty until it jumps
-    back, or for `DOUBT` if it does not. After an outage the solution was wrong, as it is while an
-    error swings out.
+    back, or for `DOUBT` if it does not; one that returns by itself was wrong until then. After an
+    outage the solution was wrong, as it is while an error swings out.
     """
     spans = _long_rejections(rejected, patience)
     if not spans:
@@ -293,6 +300,10 @@ def _contradictions(
         # What was believed last takes as many observations to settle.
         settled = min(span.stop + patience, len(time))
         size, end = float(np.abs(nu[span]).max()), float(time[settled - 1])
+        if span.stop < len(time) and abs(nu[span.stop]) < 0.5 * abs(nu[span.stop - 1]):
+            yield float(time[span.start]), float(time[span.stop]), size
+            back = False
+            continue
         lately = bool(after_gap[max(span.start - SETTLES, 0) : span.start + 1].any())
         if lately or back or span.start <= swings:
             yield float(time[span.start]), end, size

@@ -352,7 +352,8 @@ def _with_remarks(page: Page) -> None:
         "position_correlation_time_s; found where positions scatter less from fix to fix than they "
         "state. Without it bounds of position become too narrow with the number of fixes. "
         "position_sd_factor: on the stated standard deviations; found where the velocities show "
-        "larger errors. "
+        "larger errors. float_position_sd_m: stated standard deviation from which a position is a "
+        "float solution, with errors of its own. "
         "lever_arm_sd_m: a tape measure's; 0 for an arm that is known to a millimetre.",
     )
 

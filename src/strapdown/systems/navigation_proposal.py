@@ -40,6 +40,7 @@ from strapdown.navigation.measurements.gnss_clock import (
 )
 from strapdown.navigation.measurements.gnss_readiness import (
     check_fixes,
+    float_position_sd,
     lasting_position_sd,
     white_position_sd,
     white_velocity_sd,
@@ -134,6 +135,10 @@ LASTS_BY_CODE, LASTS_BY_PHASE, PHASE = 0.9, 0.5, 0.05
 #: The least share that is proposed where velocities show what lasts; the factor of the standard
 #: deviations from which a receiver understates its errors, and beyond which it has others.
 SHOWN, UNDERSTATED, MISSTATED = 0.15, 1.5, 10.0
+#: Standard deviations of a share by which it must differ from zero, and its variance times the
+#: number of fixes: twice the sum of the squared autocorrelations of third differences, 2.31, over
+#: two components.
+SHARE_SD, SCATTER = 3.0, 2.31
 #: Jerk of a vehicle, m/s³, that is not to be taken for scatter.
 JERK = 3.0
 #: Fixes better than this, m, show that a lever arm is measured by a tape to so much, m.
@@ -503,7 +508,7 @@ def _clock(
     speed, place_sd = _speed(fixes), float(np.median(values_of(fixes, POSITION_SD)[:, :2]))
     # What may be a step costs no part of the record where it moves the vehicle by less than fixes.
     if step is not None and (step.certain or abs(step.size) * speed > place_sd):
-        return {}, step
+        return _position_errors(fixes, 0.0), step
     late = velocity_delay(fixes)
     delay = 0.0 if late is None or late.delay < SURE * late.sd else late.delay
     out = {"velocity_delay_s": round(delay, 3)} if delay > LEAST_DELAY else {}
@@ -573,13 +578,18 @@ def _position_errors(fixes: pd.DataFrame, delay: float) -> dict[str, float]:
 
     The share by the scatter from fix to fix, which lacks what lasts; where the velocities show
     what lasts, by its size, which a receiver may understate. One that understates its scatter
-    says nothing of what lasts, either.
+    says nothing of what lasts, either: nor does a scatter that motion or velocities may hide.
+    Float solutions have errors of their own.
     """
+    assumed = "position_sd_taken" in fixes.attrs
+    floats = None if assumed else float_position_sd(fixes)
+    if floats is not None:
+        sd = np.square(values_of(fixes, POSITION_SD)[:, :2]).mean(axis=1)
+        fixes = fixes[~(sd >= floats**2)]
     found = white_position_sd(fixes, delay)
     if found is None:
         return {}
     white, part = found
-    assumed = "position_sd_taken" in fixes.attrs
     stated = float(np.nanmedian(values_of(fixes, POSITION_SD)[:, :2]))
     precise = white < PHASE if assumed else stated < SHOWS_ARM
     by_velocity = None if precise else lasting_position_sd(fixes, delay)
@@ -592,6 +602,13 @@ def _position_errors(fixes: pd.DataFrame, delay: float) -> dict[str, float]:
         lasting = 1.0 - quiet / total
     elif not assumed and UNDERSTATED < part < MISSTATED and _shows_scatter(fixes, white):
         total, lasting = part**2 / (1.0 - usual), usual
+    elif not assumed and precise:
+        # The scatter is an upper bound of what is white.
+        unsure = SHARE_SD * math.sqrt(SCATTER / len(fixes))
+        if lasting > -unsure and _shows_scatter(fixes, white):
+            least = max(SHOWN, unsure)
+        else:
+            lasting = max(lasting, usual)
     if assumed:
         lasting = usual if by_velocity is None else max(lasting, usual)
     lasting = min(lasting, LASTS_MOST)
@@ -600,6 +617,8 @@ def _position_errors(fixes: pd.DataFrame, delay: float) -> dict[str, float]:
         out["position_sd_factor"] = round(math.sqrt(total), 2)
     if precise:
         out["lever_arm_sd_m"] = ARM_SD
+    if floats is not None:
+        out["float_position_sd_m"] = float(f"{floats:.2g}")
     return out
 
 

@@ -40,6 +40,8 @@ from strapdown.navigation.integrity import (
     assess_integrity,
     likelihood_gain,
 )
+from strapdown.navigation.measurements.gnss import Gnss
+from strapdown.navigation.measurements.measurement import Measurement
 from strapdown.navigation.modes import (
     CoarseMode,
     Command,
@@ -90,6 +92,9 @@ GRADES, COARSER = ("tactical-grade", "industrial-grade", "consumer-grade"), 3.0
 #: Gain in the logarithm of the likelihood from which another sensor explains a record: in all, and
 #: for each component. Innovations are correlated: a record has fewer independent ones.
 LEAST_GAIN, GAIN_EACH = 20.0, 0.05
+#: An estimated time offset, s, over which a run is repeated with it, and by how many of its
+#: standard deviations it differs from zero.
+CONTINUED, SURELY = 0.05, 3.0
 #: Length of a chunk of the record, and interval of progress reports, s.
 CHUNK = 20.0
 _AT_ONCE = partial(run_batch, chunk=CHUNK)
@@ -151,6 +156,9 @@ def run_navigation(
     progress("aligning" if spec.start is None else "navigating", BEGUN)
     with said_of_file(*tables):
         run = drive(chain, source.imu, source.tables, recorder, show_mode)
+        chain, by_offset = _with_offsets(chain, run.smoothed or run.record)
+        if by_offset:
+            run = drive(chain, source.imu, source.tables, recorder, show_mode)
     beside = None
     if spec.damping.beside is not None:
         with said_of_file(*tables):
@@ -216,6 +224,7 @@ def run_navigation(
         *(() if fine is None or fine.fine is None else fine.fine.findings),
         *_lost_start(chain, source.imu, best.trajectory),
         *by_grade,
+        *in_file(by_offset, *tables),
     ]
     return NavigationRun(
         spec=spec,
@@ -236,6 +245,37 @@ def run_navigation(
         inputs=(*configuration_file(file), *source.inputs),
         findings=tuple(dict.fromkeys(findings)),
     )
+
+
+def _with_offsets(
+    chain: NavigationPipeline, record: NavigationRecord
+) -> tuple[NavigationPipeline, tuple[Finding, ...]]:
+    """Return a pipeline that begins with the estimated time offsets, where these are large.
+
+    A fix is compared with the motion at its stamp, continued over the offset by velocity and mean
+    acceleration: over `CONTINUED` a walk's steps move by more than a centimeter otherwise.
+    """
+    aids: list[Measurement] = []
+    findings: list[Finding] = []
+    for aid in chain.navigator.aids:
+        if isinstance(aid, Gnss) and aid.time_offset_sd > 0.0:
+            name = f"{aid.name}.time_offset_t"
+            error, sd = (float(of[name].iloc[-1]) for of in (record.sensors, record.sensors_sd))
+            if abs(error) > max(CONTINUED, SURELY * sd):
+                aid = replace(aid, time_offset=aid.time_offset - error)
+                findings.append(
+                    Finding(
+                        "navigation.run-again-with-offset",
+                        severity="note",
+                        quantity=name,
+                        offset=aid.time_offset,
+                        sd=sd,
+                    )
+                )
+        aids.append(aid)
+    if findings:
+        chain = replace(chain, navigator=replace(chain.navigator, aids=tuple(aids)))
+    return chain, tuple(findings)
 
 
 def _explained_by_grade(

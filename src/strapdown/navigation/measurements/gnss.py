@@ -55,6 +55,9 @@ LARGEST_OFFSET = 2.0
 #: Correlation time of the errors of positions by code: reflections last for tens of seconds to
 #: minutes, the atmosphere and orbits for longer, s.
 LASTING = 100.0
+#: Share of the variance of a float solution that lasts, and how long, s: wrong ambiguities are the
+#: same from fix to fix until the receiver loses a signal.
+FLOAT_SHARE, FLOAT_LASTING = 0.9, 30.0
 #: A velocity or acceleration is clear of its error from so many of its standard deviations.
 CLEAR = 3.0
 TINY = 1e-300
@@ -102,6 +105,11 @@ class Gnss(TabulatedMeasurement):
         out in the bounds, and not in the fixes.
     position_correlation_time : float, s
         For which it lasts: autocorrelation ``exp(-|t| / position_correlation_time)``.
+    float_position_sd : float, m
+        Stated horizontal standard deviation, mean of both components, from which a position is a
+        float solution, whose carrier-phase ambiguities are not integers. Its errors are not those
+        of fixed solutions in another size, and most of them last: states ``NAME.float_error``, in
+        standard deviations of `FLOAT_SHARE`, for `FLOAT_LASTING`. Zero: none is.
     position_sd_factor, velocity_sd_factor : float
         Factors on the stated standard deviations.
     least_position_sd, least_velocity_sd : float, m and m/s
@@ -124,6 +132,7 @@ class Gnss(TabulatedMeasurement):
     velocity_delay: float = _in("s")
     position_correlated_share: float = 0.0
     position_correlation_time: float = _in("s", LASTING)
+    float_position_sd: float = _in("m")
     use_position: bool = True
     use_velocity: bool = True
     position_sd_factor: float = 1.0
@@ -149,7 +158,7 @@ class Gnss(TabulatedMeasurement):
         check_number(self, "time_offset_sd", low=0.0, high=LARGEST_OFFSET)
         for name in ("time_offset_drift", "velocity_delay"):
             check_number(self, name, low=0.0)
-        for name in ("least_position_sd", "least_velocity_sd"):
+        for name in ("least_position_sd", "least_velocity_sd", "float_position_sd"):
             check_number(self, name, low=0.0)
         check_number(self, "position_correlated_share", low=0.0, high=0.999)
         check_number(self, "position_correlation_time", low=0.0, above=True)
@@ -170,7 +179,7 @@ class Gnss(TabulatedMeasurement):
         lever_arm(self.lever_arm_sd)
 
     def states(self) -> tuple[SensorStates, ...]:
-        """Errors of the lever arm and of the time offset, if these are uncertain."""
+        """Errors of lever arm and time offset, if uncertain, and of positions that last."""
         out = []
         if np.any(np.asarray(self.lever_arm_sd) > 0.0):
             out.append(lever_arm(self.lever_arm_sd).named(self._arm))
@@ -180,15 +189,23 @@ class Gnss(TabulatedMeasurement):
         if self.position_correlated_share > 0.0:
             lasting = unseen("position_error", ("north", "east", "down"), "1", 1.0)
             out.append(gauss_markov(lasting.named(self._error), self.position_correlation_time))
+        if self.float_position_sd > 0.0:
+            lasting = unseen("float_error", ("north", "east", "down"), "1", 1.0)
+            out.append(gauss_markov(lasting.named(self._float), FLOAT_LASTING))
         return tuple(out)
 
     @property
     def lasts(self) -> bool:
         """As `Measurement.lasts`: with a share of the positions' errors that is correlated."""
-        return self.position_correlated_share > 0.0
+        return self.position_correlated_share > 0.0 or self.float_position_sd > 0.0
 
     def lasting_sd(self, sd: Array) -> Array:
-        """Return the standard deviation of the correlated errors of a position, by that stated."""
+        """Return the standard deviation of the correlated errors of a position, by that stated.
+
+        Zero of a float solution, whose errors are another state.
+        """
+        if self._floats(np.square(self.position_sd_factor * sd)):
+            return np.zeros_like(sd)
         used = np.maximum(self.position_sd_factor * sd, self.least_position_sd)
         return np.asarray(math.sqrt(self.position_correlated_share) * used)
 
@@ -262,17 +279,20 @@ class Gnss(TabulatedMeasurement):
         z, H = C_nl @ computed.value, C_nl @ computed.H
         unclear = np.zeros(3)
         if view.has(self._offset):
-            by_offset, unclear = _by_offset(view, self._offset, C_nl @ shift.value, C_nl @ shift.H)
+            of, dof = C_nl @ shift.value, C_nl @ shift.H
+            by_offset, unclear = _by_offset(view, self._offset, float(values[0]), of, dof)
             H[:, view.place(self._offset)] = -by_offset[:, None]
         if of_place:
             lat, lon, alt = values[1:4].tolist()
             measured = NavState(view.time, lat, lon, alt, np.zeros(3), view.here.q_nb)
             z += displacement_between(view.here, measured, view.ellipsoid)
-            if view.has(self._error):
-                share = self.position_correlated_share
+            error, share = self._error, self.position_correlated_share
+            if self._floats(variance):
+                error, share = self._float, FLOAT_SHARE
+            if view.has(error):
                 lasting = np.sqrt(share * variance)
-                z += lasting * view.estimate(self._error)
-                H[:, view.place(self._error)] = -np.diag(lasting)
+                z += lasting * view.estimate(error)
+                H[:, view.place(error)] = -np.diag(lasting)
                 variance = (1.0 - share) * variance
         else:
             z -= values[1:4]
@@ -298,17 +318,31 @@ class Gnss(TabulatedMeasurement):
     def _error(self) -> str:
         return f"{self.name}.position_error"
 
+    @property
+    def _float(self) -> str:
+        return f"{self.name}.float_error"
 
-def _by_offset(view: View, name: str, shift: Array, of_shift: Array) -> tuple[Array, Array]:
+    def _floats(self, variance: Array) -> bool:
+        """Whether a position with these variances, m², as used, is a float solution."""
+        least = self.position_sd_factor * self.float_position_sd
+        return least > 0.0 and 0.5 * float(variance[0] + variance[1]) >= least**2
+
+
+def _by_offset(
+    view: View, name: str, code: float, shift: Array, of_shift: Array
+) -> tuple[Array, Array]:
     """Derivative of what is observed by the time offset, and variance of what that leaves out.
 
     The derivative is the velocity (of a position) or the acceleration, and as uncertain as the
-    state is. At rest it is error alone: as a derivative it would make the errors of the state
-    observe the offset, whose standard deviation falls falsely. By as much as it is not clear of
-    its own error it is noise, in proportion to the offset's variance.
+    state is. At rest it is error alone, and in steady motion its changes are: as a derivative they
+    would make the errors of the state observe the offset, whose standard deviation falls falsely.
+    So it stays what it was at the last epoch as far as its change is not clear of its own error;
+    the rest is noise, in proportion to the offset's variance.
 
     Parameters
     ----------
+    code : float
+        Kind of the epoch: each keeps a derivative of its own.
     shift : ndarray, (3,)
         Velocity, m/s, or acceleration, m/s², north-east-down.
     of_shift : ndarray, (3, p)
@@ -317,7 +351,11 @@ def _by_offset(view: View, name: str, shift: Array, of_shift: Array) -> tuple[Ar
     P = view.covariance
     at = view.place(name).start
     own = np.einsum("ij,jk,ik->i", of_shift, P, of_shift)
-    clear = shift * np.maximum(1.0 - CLEAR**2 * own / np.maximum(shift**2, TINY), 0.0)
+    kept = f"{name}.{'velocity' if code == POSITION_CODE else 'acceleration'}"
+    before = view.kept.get(kept, np.zeros(3))
+    change = shift - before
+    clear = before + change * np.maximum(1.0 - CLEAR**2 * own / np.maximum(change**2, TINY), 0.0)
+    view.kept[kept] = clear
     return clear, P[at, at] * (np.square(shift - clear) + own)
 
 

@@ -34,6 +34,7 @@ from strapdown.tables.checks import index_of, source_of, values_of
 
 __all__ = [
     "check_fixes",
+    "float_position_sd",
     "gnss_readiness",
     "lasting_position_sd",
     "repeated_rows",
@@ -127,6 +128,26 @@ def white_position_sd(table: pd.DataFrame, delay: float = 0.0) -> tuple[float, f
         return None
     left, stated = left[even], sd[-len(left) :][even]
     return math.sqrt(_variance(left)), math.sqrt(_variance(left / stated))
+
+
+def float_position_sd(table: pd.DataFrame) -> float | None:
+    """Stated horizontal standard deviation that separates float from fixed solutions, m.
+
+    A receiver that fixes its ambiguities states another order of magnitude: the limit is in the
+    widest gap between the stated ones, by ratio, if it is wide and the lesser ones are those of
+    fixed solutions. None of a receiver with one kind of solution.
+    """
+    sd = values_of(table, POSITION_SD)[usable(table, POSITION_SD[:2]), :2]
+    all_sd = np.sqrt(np.mean(np.square(sd), axis=1))
+    level = np.unique(all_sd)
+    if len(level) < 2:
+        return None
+    apart = np.log(level[1:] / level[:-1])
+    widest = int(np.argmax(apart))
+    limit = math.sqrt(level[widest] * level[widest + 1])
+    if apart[widest] < math.log(FLOAT_GAP) or level[0] > FIXED_SD:
+        return None
+    return limit if np.count_nonzero(all_sd < limit) >= LEAST_ROWS else None
 
 
 def white_velocity_sd(table: pd.DataFrame) -> float | None:
@@ -232,6 +253,9 @@ LEAST_ROWS, UNEVEN, TRIM = 30, 0.2, 5.0
 LAGS, LEAST_LAG, HIDDEN = (1.0, 2.0, 5.0, 10.0, 20.0, 40.0), 9.0, 0.5
 #: Correlation times that are tried, s.
 TIMES = (30.0, 100.0)
+#: Factor between the stated standard deviations of float and fixed solutions, at least, and the
+#: largest one of the best fixed solution, m.
+FLOAT_GAP, FIXED_SD = 3.0, 0.1
 #: Limits beyond any vehicle: a speed over the ground, m/s, and an acceleration, m/s².
 LARGEST_SPEED, LARGEST_ACCELERATION = 12_000.0, 60.0
 #: In standard deviations of the positions and of the displacement between them.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any, ClassVar
@@ -282,6 +282,8 @@ class View:
         the present body axes; for an aid that uses them (`Aid.wants_steady`).
     unobserved : float, s
         Time since the last observation.
+    kept : dict of str to ndarray
+        What aids keep from epoch to epoch, by names of theirs; arrays are replaced, never changed.
     """
 
     mechanization: Mechanization
@@ -295,6 +297,7 @@ class View:
     covariance_of: Callable[[], Array] | None = None
     steady: Array | None = None
     unobserved: float = 0.0
+    kept: dict[str, Array] = field(default_factory=dict)
 
     @cached_property
     def covariance(self) -> Array:

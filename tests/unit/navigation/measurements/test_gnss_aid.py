@@ -18,7 +18,7 @@ from strapdown.nav_state import NavState
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.measurement import View
 from strapdown.sensors.antenna import antenna_motion
-from strapdown.tables import VELOCITY_SD, gnss_table
+from strapdown.tables import POSITION_SD, VELOCITY_SD, gnss_table
 
 ARM = (1.2, -0.4, -0.9)
 START = NavState.from_degrees(
@@ -259,7 +259,7 @@ def test_a_velocity_within_its_own_error_does_not_show_the_offset(sd):
     P = np.zeros((plain.columns, plain.columns))
     P[3:6, 3:6] = sd**2 * np.eye(3)
     P[offset, offset] = 0.3**2
-    view = replace(plain, covariance_of=lambda: P)
+    view = replace(plain, covariance_of=lambda: P, kept={})
     row = rows_of(AID, table_of((55.0, 37.0, 300.0), START.v_n))[0]
     (before,), (after,) = AID.observe(plain, row), AID.observe(view, row)
     speed = -before.H[:, offset]
@@ -275,3 +275,43 @@ def test_a_velocity_within_its_own_error_does_not_show_the_offset(sd):
     np.testing.assert_allclose(after.R - before.R, added, rtol=1e-9)
     others = np.arange(plain.columns) != offset
     np.testing.assert_array_equal(after.H[:, others], before.H[:, others])
+
+
+def test_a_change_of_velocity_within_its_error_does_not_show_the_offset():
+    """The derivative by the offset stays what it was: changes by corrections tell nothing of it."""
+    first = view_of("ned")
+    offset = first.place("rtk.time_offset").start
+    row = rows_of(AID, table_of((55.0, 37.0, 300.0), START.v_n))[0]
+    (before,) = AID.observe(first, row)
+    P = np.zeros((first.columns, first.columns))
+    P[3:6, 3:6], P[offset, offset] = 0.3**2 * np.eye(3), 0.2**2
+    derivatives, added = [], []
+    for faster in (0.5, 5.0):
+        start = replace(START, v_n=START.v_n + np.array([faster, 0.0, 0.0]))
+        later = replace(view_of("ned", start=start), covariance_of=lambda: P, kept=dict(first.kept))
+        (after,) = AID.observe(later, row)
+        derivatives.append(after.H[0, offset] - before.H[0, offset])
+        added.append(after.R[0] - before.R[0])
+    # Beyond three standard deviations it follows, short by nine times the share of the error.
+    assert derivatives[0] == 0.0
+    assert derivatives[1] == pytest.approx(-5.0 * (1.0 - 9.0 * 0.3**2 / 5.0**2), rel=1e-6)
+    assert added[0] == pytest.approx(0.2**2 * (0.5**2 + 0.3**2), rel=1e-6)
+
+
+def test_a_float_solution_has_errors_of_its_own():
+    aid = replace(AID, float_position_sd=0.1)
+    view = view_of("ned", aid)
+    table = table_of((55.0, 37.0, 300.0), START.v_n)
+    seen = {}
+    for sd in (0.02, 0.4):
+        table[POSITION_SD] = sd
+        (seen[sd],) = aid.observe(view, rows_of(aid, table)[0])
+    fixed, floating = view.place("rtk.position_error"), view.place("rtk.float_error")
+    for sd, own, other, share in ((0.02, fixed, floating, 0.6), (0.4, floating, fixed, 0.9)):
+        scaled = aid.position_sd_factor * sd
+        expected = -np.sqrt(share) * scaled * np.eye(3)
+        np.testing.assert_allclose(seen[sd].H[:, own], expected, atol=1e-12)
+        np.testing.assert_array_equal(seen[sd].H[:, other], 0.0)
+        np.testing.assert_allclose(seen[sd].R, (1.0 - share) * scaled**2)
+    # As one state in standard deviations, 0.4 m of a float would be 0.02 m of a fix.
+    assert aid.lasting_sd(np.full(3, 0.4)).tolist() == [0.0, 0.0, 0.0]
