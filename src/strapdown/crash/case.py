@@ -70,7 +70,7 @@ from strapdown.sensors.uncertainty import stated_uncertainty
 from strapdown.systems.one_thread import one_thread
 
 if TYPE_CHECKING:
-    from strapdown.crash.gnss_entry import GnssEntry
+    from strapdown.crash.drive_entry import DriveEntry
 
 # Most numbers of a Monte Carlo in memory: half a gigabyte.
 MOST_NUMBERS = 64_000_000
@@ -318,15 +318,15 @@ def _inputs(
     )
 
 
-def _entry(spec: CaseSpec) -> Entry | GnssEntry | None:
+def _entry(spec: CaseSpec) -> Entry | DriveEntry | None:
     entry = spec.entry
     if entry.kind == "standstill":
         return None
     if entry.kind == "gnss":
-        from strapdown.crash.gnss_entry import GnssEntry
+        from strapdown.crash.drive_entry import DriveEntry
 
         assert entry.path is not None
-        return GnssEntry(
+        return DriveEntry(
             read_gnss(entry.path),
             impact=entry.time_s,
             antenna=entry.antenna_m or (0.0, 0.0, 0.0),

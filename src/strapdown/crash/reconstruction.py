@@ -47,7 +47,7 @@ from strapdown.sensors.triad_errors import FARTHEST, finite, span, triple
 from strapdown.tables import NED
 
 if TYPE_CHECKING:
-    from strapdown.crash.gnss_entry import GnssEntry
+    from strapdown.crash.drive_entry import DriveEntry
 
 Row = tuple[str, str, float, float, float]
 
@@ -678,7 +678,7 @@ class CrashReconstruction:
 
 def reconstruct_crash(
     units: Sequence[CrashUnit],
-    entry: Entry | GnssEntry | None,
+    entry: Entry | DriveEntry | None,
     options: CrashOptions = CrashOptions(),
 ) -> CrashReconstruction:
     """Reconstruct a crash.
@@ -687,7 +687,7 @@ def reconstruct_crash(
     ----------
     units : sequence of CrashUnit
         Of one rigid vehicle, as recorded.
-    entry : Entry, GnssEntry or None
+    entry : Entry, DriveEntry or None
         Velocity, heading and instant of the path; or fixes of a GNSS receiver before the crash,
         from which each unit finds them together with its biases (the mean of the units then uses
         the entry of the first). None: the vehicle was stationary at the beginning of the record,
@@ -710,12 +710,12 @@ def reconstruct_crash(
         A path left the range of vehicle motion.
     """
     _check_units(units)
-    of_fixes = None
+    of_fixes: DriveEntry | None = None
     if not (entry is None or isinstance(entry, Entry)):
         # Estimation from fixes is loaded where it is needed.
-        from strapdown.crash.gnss_entry import GnssEntry, start_from_gnss
+        from strapdown.crash.drive_entry import DriveEntry, start_from_drive
 
-        if not isinstance(entry, GnssEntry):
+        if not isinstance(entry, DriveEntry):
             raise _wrong_type("entry", entry)
         of_fixes = entry
     _check_preparation(options.preparation or {}, {unit.name for unit in units})
@@ -724,7 +724,9 @@ def reconstruct_crash(
         units, method=options.clock, rate=options.rate, sampling=options.sampling, cut=False
     )
     findings = list(together.findings)
-    there = prepare_together(together, point, options.gravity, options.preparation or {})
+    preparation = {"by_drive": True} if of_fixes is not None else {}
+    preparation |= options.preparation or {}
+    there = prepare_together(together, point, options.gravity, preparation)
     for of in there:
         findings += () if of.prepared is None else of.prepared.findings
     # Before each unit estimates its own biases, which absorbs part of the differences.
@@ -736,7 +738,7 @@ def reconstruct_crash(
     tied = [entry if isinstance(entry, Entry) else None] * len(there)
     if of_fixes is not None:
         for k, of in enumerate(there):
-            there[k], tied[k], state = start_from_gnss(of, of_fixes, point)
+            there[k], tied[k], state = start_from_drive(of, of_fixes, point)
             findings += state.findings
 
     found = tuple(

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from tests.coded import coded
 
+from strapdown.crash.drive_entry import CONTRIBUTOR, DriveEntry, start_from_drive
 from strapdown.crash.entry_estimate import FixCorrelation
-from strapdown.crash.gnss_entry import CONTRIBUTOR, GnssEntry, start_from_gnss
 from strapdown.crash.measuring_point import at_point
 from strapdown.crash.path import reconstruct_path
 from strapdown.crash.preparation import Preparation, prepare_unit
@@ -37,8 +37,8 @@ def reconstructed(seed):
     fixes.index = fixes.index - IMPACT
     own = synchronise([unit]).units[0]
     at = at_point(prepare_unit(own.unit), (0.0, 0.0, 0.0), time_sd=own.time_sd)
-    at, entry, state = start_from_gnss(
-        at, GnssEntry(fixes, window=6.0, priors=PRIORS), (0.0, 0.0, 0.0)
+    at, entry, state = start_from_drive(
+        at, DriveEntry(fixes, window=6.0, priors=PRIORS), (0.0, 0.0, 0.0)
     )
     path = reconstruct_path(at.imu, at.effects, at.levelling, None, entry)
     return at, fixes, entry, state, path
@@ -84,8 +84,8 @@ def test_what_the_receiver_says_of_the_crash_does_not_matter(cases):
     unit, _ = record_crash(CRASH.motion, DESIGN, impact=IMPACT, seed=1)
     own = synchronise([unit]).units[0]
     again = at_point(prepare_unit(own.unit), (0.0, 0.0, 0.0), time_sd=own.time_sd)
-    _, other, _ = start_from_gnss(
-        again, GnssEntry(wild, window=6.0, priors=PRIORS), (0.0, 0.0, 0.0)
+    _, other, _ = start_from_drive(
+        again, DriveEntry(wild, window=6.0, priors=PRIORS), (0.0, 0.0, 0.0)
     )
     assert other.velocity == entry.velocity
     assert at.name == again.name
@@ -98,7 +98,7 @@ def test_a_mean_of_units_has_no_entry_of_its_own(cases):
     with pytest.raises(
         DataError, check=coded("crash.mean-several-units-no-sensors", quantity="entry")
     ):
-        start_from_gnss(replace(at, prepared=None), GnssEntry(fixes), (0.0, 0.0, 0.0))
+        start_from_drive(replace(at, prepared=None), DriveEntry(fixes), (0.0, 0.0, 0.0))
 
 
 def test_units_that_find_their_own_biases_are_compared_with_them():
@@ -108,7 +108,7 @@ def test_units_that_find_their_own_biases_are_compared_with_them():
     fixes = simulate_gnss(CRASH.motion, RECEIVER, seed=2)
     fixes.index = fixes.index - IMPACT
     units = [record_crash(CRASH.motion, d, impact=IMPACT, seed=2)[0] for d in designs]
-    found = reconstruct_crash(units, GnssEntry(fixes, window=6.0, priors=PRIORS))
+    found = reconstruct_crash(units, DriveEntry(fixes, window=6.0, priors=PRIORS))
     assert len(found.comparison.pairs) == 1
     assert found.comparison.agree
     # Nor are ranges blamed, whose 13 g ahead come in part on the axis to the side.
@@ -132,7 +132,7 @@ def test_units_that_find_their_own_biases_are_compared_with_them():
 def test_what_cannot_be_is_told(cases, options, words):
     _, fixes, *_ = cases[0]
     with pytest.raises(ConfigError, match=words):
-        GnssEntry(fixes, **options)
+        DriveEntry(fixes, **options)
 
 
 def test_priors_are_of_the_vehicles_axes(monkeypatch):
@@ -154,8 +154,8 @@ def test_priors_are_of_the_vehicles_axes(monkeypatch):
         seen["priors"] = priors
         raise RuntimeError("enough")
 
-    monkeypatch.setattr("strapdown.crash.gnss_entry.entry_state_from_gnss", stop)
+    monkeypatch.setattr("strapdown.crash.drive_entry.entry_state_from_gnss", stop)
     with pytest.raises(RuntimeError, match="enough"):
-        start_from_gnss(at, GnssEntry(simulate_gnss(CRASH.motion, RECEIVER)), (0.0, 0.0, 0.0))
+        start_from_drive(at, DriveEntry(simulate_gnss(CRASH.motion, RECEIVER)), (0.0, 0.0, 0.0))
     assert seen["priors"].accel.axis("bias") == pytest.approx((0.2, 0.1, 0.3))
     assert seen["priors"].gyro.axis("bias") == pytest.approx((0.02, 0.01, 0.03))
