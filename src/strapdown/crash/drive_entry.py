@@ -38,11 +38,13 @@ from strapdown.crash.measuring_point import (
     GYRO_BIAS,
     LEVELLING,
     TIMING,
+    Parameter,
     PointKinematics,
     SampleEffects,
 )
 from strapdown.crash.structure import STRUCTURE
 from strapdown.dsp.chi_square import chi_square_above
+from strapdown.dsp.true_runs import true_runs
 from strapdown.ellipsoids import WGS84
 from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.evaluation.control_points import rigid_fit
@@ -179,8 +181,6 @@ def _estimated(
             sensed=sensed[last],
         )
     first = min(float(one[0]) for one in firsts if one.size)
-    rows = _between(imu, first, last)
-    piece = _rows(imu, rows)
     early = _rows(imu, _between(imu, first - RECOVERY - 2.0 * AVERAGED, last))
     turned = _turn_only(mechanization, early, _origin(gnss, epochs, sensed[last]))
     records = [one.judged(turned, impact, float(sensed[last]), priors) for one in epochs]
@@ -193,13 +193,24 @@ def _estimated(
 
     guesses, found = first_guesses(turned, fixes, priors)
     arm = np.asarray(drive.antenna, dtype=np.float64)
-    own = None if errors is None else errors.rows(rows)
-    best = estimate(mechanization, piece, fixes, guesses[0], priors, arm, own)
-    for other in guesses[1:]:
+
+    def over(length: float, guess: NavState, start: Estimate | None) -> Estimate:
+        """Estimate from the last part of the drive."""
+        late = fixes.at(fixes.instants >= sensed[last] - length)
+        part = _between(imu, float(late.instants[0]), last)
+        own = None if errors is None else errors.rows(part)
+        return estimate(mechanization, _rows(imu, part), late, guess, priors, arm, own, start)
+
+    best: Estimate | None = None
+    for guess in guesses:
         # A drive backward, or with the axes turned, fits only from the opposite heading.
-        if unlikely(best.cost, best.degrees_of_freedom):
-            next_best = estimate(mechanization, piece, fixes, other, priors, arm, own)
-            best = min(best, next_best, key=lambda e: e.cost)
+        if best is None or unlikely(best.cost, best.degrees_of_freedom):
+            start = None
+            for length in _lengths(fixes, float(sensed[last])):
+                start = over(length, guess, start)
+            assert start is not None
+            best = start if best is None else min(best, start, key=lambda e: e.cost)
+    assert best is not None
     receiver = fixes.of_receiver
     for record, mine, names in zip(
         records,
@@ -242,13 +253,13 @@ class Epochs:
     def of_fixes(cls, gnss: pd.DataFrame, priors: EntryPriors) -> Epochs:
         """Fixes of a Gnss table."""
         stamps = index_of(gnss)
-        none = np.full(len(stamps), np.nan)
+        zero, none = np.zeros(len(stamps)), np.full(len(stamps), np.nan)
         fixes = Fixes(
             stamps - priors.time_offset,
             values_of(gnss, GEODETIC),
             values_of(gnss, VELOCITY),
             np.hstack([values_of(gnss, POSITION_SD), values_of(gnss, VELOCITY_SD)]),
-            none,
+            zero,
             none,
         )
         return cls(stamps, fixes, values_of(gnss, ["quality"])[:, 0])
@@ -264,10 +275,10 @@ class Epochs:
         n = len(stamps)
         # What a wheel shows of a speed near zero is often zero.
         sds = np.where(np.abs(speed) < LEAST_SPEED, math.hypot(sd, 0.5 * LEAST_SPEED), sd)
-        missing = np.full((n, 3), np.nan)
-        fixes = Fixes(
-            stamps - priors.speed_delay, missing, missing, np.full((n, 6), np.nan), speed, sds
-        )
+        # Of a speed position and velocity are not measured: any numbers will do.
+        place, velocity = np.tile(SOMEWHERE, (n, 1)), np.zeros((n, 3))
+        none = np.full((n, 6), np.nan)
+        fixes = Fixes(stamps - priors.speed_delay, place, velocity, none, speed, sds)
         return cls(stamps, fixes, None)
 
     @property
@@ -292,6 +303,23 @@ class Epochs:
         slack = 3.0 * priors.time_offset_sd
         why = judge_fixes(self.instants, self.quality, run, impact, anchor, slack)
         return record_of_fixes(self.stamps, why)
+
+
+def _lengths(fixes: Fixes, end: float) -> list[float]:
+    """Lengths of the drive to use in turn, s.
+
+    A gyro bias of 0.01 rad/s turns a long record by more than is linear: a short part of it shows
+    the bias well enough for one of twice the length.
+    """
+    whole = end - float(fixes.instants[0])
+    lengths = [whole]
+    while lengths[-1] > 2.0 * FIRST_PART:
+        lengths.append(0.5 * lengths[-1])
+    return [
+        n
+        for n in reversed(lengths)
+        if n == whole or (fixes.instants >= end - n).sum() >= FIRST_FIXES
+    ]
 
 
 def _joined(parts: Sequence[Fixes]) -> Fixes:
@@ -336,7 +364,7 @@ CONTRIBUTOR = "entry from the drive"
 OTHER_PRIORS = tuple(f.name for f in fields(EntryPriors) if f.name not in ("gyro", "accel"))
 #: Of a car on a road, where a speed is measured along it.
 CAR = {
-    "side_slip_sd_deg": 1.0,
+    "side_slip_sd_deg": 0.5,
     "slip_slope_sd_deg": 0.5,
     "pitch_slip_sd_deg": 1.0,
     "pitch_slope_sd_deg": 0.2,
@@ -344,6 +372,8 @@ CAR = {
 }
 #: Speeds are means over this, s.
 SPEED_STEP = 0.25
+#: A vehicle at less than this stands, m/s.
+STANDS = 0.2
 #: Latitude and longitude, deg, and height, m, of a drive without fixes: as of `Entry`.
 SOMEWHERE = (45.0, 0.0, 0.0)
 # Unknowns that do less to every sample of the drive are left as stated, m/s² and rad/s.
@@ -425,6 +455,23 @@ class DriveEntry:
     def has_speeds(self) -> bool:
         """Whether speeds along the vehicle are given."""
         return self.speeds is not None
+
+    def stood(self) -> tuple[tuple[float, float], ...]:
+        """When the vehicle stood, by the fixes or speeds, each span from its first to its last."""
+        spans: list[tuple[float, float]] = []
+        for table in (self.fixes, self.speeds):
+            if table is None:
+                continue
+            if table is self.fixes:
+                size = np.hypot(*values_of(table, VELOCITY[:2]).T)
+                sd = np.hypot(*values_of(table, VELOCITY_SD[:2]).T)
+                still = np.isfinite(sd) & (size < STANDS + 3.0 * sd)
+            else:
+                still = np.abs(values_of(table, ["speed"])[:, 0]) < STANDS
+            stamps = index_of(table)
+            for run in true_runs(still):
+                spans.append((float(stamps[run.start]), float(stamps[run.stop - 1])))
+        return tuple(spans)
 
     def with_sensors(self, gyro: TriadUncertainty, accel: TriadUncertainty) -> EntryPriors:
         """Priors of the search."""
@@ -660,6 +707,19 @@ def lower_root(covariance: Array) -> Array:
     return out
 
 
+def _removed(at: PointKinematics, what: Parameter) -> float:
+    """Bias that the preparation took off already, along the axis of the sensor."""
+    prepared = at.prepared
+    assert prepared is not None
+    unit, lender = prepared.unit, prepared.unit.lender or prepared.unit
+    if what.quantity == "gyro bias":
+        turn = lender.mounting.C_vs.T @ unit.mounting.C_vs
+        return float((turn @ prepared.gyro_bias)[what.axis])
+    if what.quantity == "bias":
+        return float((unit.mounting.C_vs.T @ prepared.force_bias)[what.axis])
+    return 0.0
+
+
 def _calibration(
     at: PointKinematics,
     best: Estimate,
@@ -679,6 +739,7 @@ def _calibration(
         size, own = float(best.parameters[column]), float(sd[column])
         in_crash = what.sd * math.sqrt(float(kept[column]))
         error = what.sd * (size if what.quantity == "mounting" else -size)
+        error += _removed(at, what)
         rows.append((what.quantity, what.axis, what.of, error, what.sd * own, what.sd, in_crash))
         axis = "xyz"[what.axis]
         if kept[column] == 1.0 and own < NARROWED:
@@ -817,6 +878,8 @@ def _near(a: float, b: float) -> bool:
 # Argument checks of the entry state.
 
 
+# Shortest part of a longer drive that the search begins with, s, and fixes in it.
+FIRST_PART, FIRST_FIXES = 8.0, 10
 # Minimum data for an entry state.
 LEAST_FIXES = 3
 LEAST_SPAN = 1.0  # s

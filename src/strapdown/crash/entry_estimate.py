@@ -450,7 +450,7 @@ def record_of_fixes(
 # Iterated least squares of an entry state from accepted GNSS fixes.
 
 
-MOST_ITERATIONS = 30
+MOST_ITERATIONS = 60
 # Convergence: steps below this fraction of a standard deviation.
 CONVERGED = 1e-3
 # Convergence for data without noise, m, m/s, rad.
@@ -540,14 +540,19 @@ def estimate(
     priors: EntryPriors,
     arm: Array,
     errors: SensorErrors | None = None,
+    start: Estimate | None = None,
 ) -> Estimate:
     """Estimate the state at the end of a record and the other unknowns from a guess there.
 
     `arm`, (3,), m: lever arm of the antenna. `errors`: of the sensors, at the rows of the record,
     instead of those that the priors state; noise that turns out larger than stated is then taken as
-    that large. `DivergenceError`: the iteration does not converge, or a run diverges.
+    that large. `start`: from which the search begins, as of a shorter record; the priors remain
+    those about the guess. `DivergenceError`: the iteration does not converge, or a run diverges.
     """
     search = _Search(mechanization, imu, fixes, guess, priors, arm, errors)
+    if start is not None:
+        search.state, search.bias = start.state, start.own_bias
+        search.further = np.concatenate([start.parameters, start.constants])
     weights, settled = np.ones((len(fixes.instants), 3)), 0
     for iteration in range(1, MOST_ITERATIONS + 1):
         problem = search.problem()

@@ -34,7 +34,7 @@ from strapdown.crash.delta_v_bound import (
     velocity_change,
 )
 from strapdown.crash.detectability import undetectable
-from strapdown.crash.entry import Entry
+from strapdown.crash.entry import Entry, EntryState
 from strapdown.crash.events import KMH, PART_563, CrashEvents, EventRule, detect_events
 from strapdown.crash.measuring_point import PointKinematics
 from strapdown.crash.path import VELOCITY, CrashPath, path_line, reconstruct_path
@@ -159,6 +159,8 @@ class UnitReconstruction:
     types : tuple of CrashType
         For every event, from its change along the rotating axes and the roll.
     findings : tuple of Finding
+    drive : EntryState or None
+        What the drive before the crash shows of the unit, where the entry is from there.
     """
 
     name: str
@@ -171,6 +173,7 @@ class UnitReconstruction:
     ned: tuple[EventChanges | None, ...]
     types: tuple[CrashType, ...]
     findings: tuple[Finding, ...] = ()
+    drive: EntryState | None = field(default=None, repr=False)
 
     def __repr__(self) -> str:
         return f"<UnitReconstruction\n{unit_line(self)}>"
@@ -724,8 +727,9 @@ def reconstruct_crash(
         units, method=options.clock, rate=options.rate, sampling=options.sampling, cut=False
     )
     findings = list(together.findings)
-    preparation = {"by_drive": True} if of_fixes is not None else {}
-    preparation |= options.preparation or {}
+    preparation = dict(options.preparation or {})
+    if of_fixes is not None:
+        preparation["stood"] = of_fixes.stood()
     there = prepare_together(together, point, options.gravity, preparation)
     for of in there:
         findings += () if of.prepared is None else of.prepared.findings
@@ -736,13 +740,16 @@ def reconstruct_crash(
         hidden = undetectable(there, comparison)
         there = [comparison.structure.within(of) for of in there]
     tied = [entry if isinstance(entry, Entry) else None] * len(there)
+    drives: list[EntryState | None] = [None] * len(there)
     if of_fixes is not None:
         for k, of in enumerate(there):
             there[k], tied[k], state = start_from_drive(of, of_fixes, point)
+            drives[k] = state
             findings += state.findings
 
     found = tuple(
-        reconstruct_unit(of, start, options) for of, start in zip(there, tied, strict=True)
+        replace(reconstruct_unit(of, start, options), drive=drive)
+        for of, start, drive in zip(there, tied, drives, strict=True)
     )
     combined = None
     if combine and comparison is not None and comparison.agree:

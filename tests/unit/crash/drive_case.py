@@ -29,7 +29,7 @@ from strapdown.sensors.synchronise import synchronise
 from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.tables import gnss_table
 
-FINE, RATE = 1000.0, 200.0
+FINE, RATE = 1000.0, 100.0
 ORIGIN = np.array([45.0, 20.0, 80.0])
 # Ahead of the reference point, vehicle axes, m.
 AXLE, UNIT, ANTENNA = (-1.35, 0.0, 0.3), (0.3, 0.2, 0.1), (0.5, 0.3, -1.2)
@@ -119,7 +119,11 @@ class Drive:
         lat = np.radians(ORIGIN[0])
         radius = 6.38e6
         over = np.column_stack(
-            [velocity[:, 1] / radius, -velocity[:, 0] / radius, -velocity[:, 1] * np.tan(lat) / radius]
+            [
+                velocity[:, 1] / radius,
+                -velocity[:, 0] / radius,
+                -velocity[:, 1] * np.tan(lat) / radius,
+            ]
         )
         pushed = np.gradient(velocity, t, axis=0) + np.cross(2.0 * earth + over, velocity)
         pushed[:, 2] -= gravity()
@@ -187,9 +191,9 @@ def drawn(
     arm = np.array(UNIT)
     alpha = np.gradient(rate, t, axis=0)
     force = force + np.cross(alpha, arm) + np.cross(rate, np.cross(rate, arm))
-    # Vibration of floor and engine between 15 and 80 Hz.
+    # Vibration of floor and engine between 15 and 40 Hz.
     white = g.standard_normal((len(t), 3))
-    fast = sosfilt(butter(2, [15.0, 80.0], "band", fs=FINE, output="sos"), white, axis=0)
+    fast = sosfilt(butter(2, [15.0, 40.0], "band", fs=FINE, output="sos"), white, axis=0)
     force = force + vibration * fast / fast.std()
     rows = slice(None, None, round(FINE / RATE))
     time, rate, force = t[rows], rate[rows], force[rows]
@@ -227,7 +231,7 @@ def drawn(
     return Draw(unit, fixes_of(drive, g), speeds_of(drive, g, tires, delay), errors)
 
 
-def fixes_of(drive, g, rate=5.0, noise=0.05):
+def fixes_of(drive, g, rate=2.0, noise=0.05):
     """Fixes until the impact."""
     velocity, q, _ = drive.motion
     omega, _ = drive.ideal
@@ -265,7 +269,7 @@ def speeds_of(drive, g, tires=None, delay=None, rate=20.0, step=0.03):
 
 
 PRIORS = {
-    "side_slip_sd_deg": 1.0,
+    "side_slip_sd_deg": 0.5,
     "slip_slope_sd_deg": 0.5,
     "pitch_slip_sd_deg": 1.0,
     "pitch_slope_sd_deg": 0.2,
@@ -278,15 +282,16 @@ PRIORS = {
 def reconstructed(draw, by, window=40.0, **priors):
     """Unit with the drive, `by` its fixes, speeds or both; and its state."""
     own = synchronise([draw.unit], rate=RATE).units[0]
-    options = Preparation(gravity=gravity(), by_drive=True)
-    at = at_point(prepare_unit(own.unit, options), (0.0, 0.0, 0.0), time_sd=own.time_sd)
     given = DriveEntry(
         draw.fixes if by in ("fixes", "both") else None,
         window=window,
         antenna=ANTENNA,
         priors=PRIORS | priors,
         speeds=draw.speeds if by in ("speeds", "both") else None,
+        speed_sd=0.03,
     )
+    options = Preparation(gravity=gravity(), stood=given.stood())
+    at = at_point(prepare_unit(own.unit, options), (0.0, 0.0, 0.0), time_sd=own.time_sd)
     return start_from_drive(at, given, (0.0, 0.0, 0.0))
 
 
