@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.crash.entry import ATTITUDE, STATES, Entry, EntryState
+from strapdown.crash.entry import ATTITUDE, STATES, Entry, EntryState, biases_off
 from strapdown.crash.entry import VELOCITY as VELOCITY_COLUMNS
 from strapdown.crash.entry_estimate import (
     AVERAGED,
@@ -58,7 +58,6 @@ from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.tables import (
     ACCEL,
     GEODETIC,
-    GYRO,
     POSITION_SD,
     VELOCITY,
     VELOCITY_SD,
@@ -527,12 +526,8 @@ def start_from_drive(
     priors = given.with_sensors(*_left_by_preparation(at))
     found = _estimated(at.imu, given, priors, anchor, errors=errors)
     state, best = found.state, found.best
-    corrected = values_of(at.imu, [*GYRO, *ACCEL]) - best.own_bias
-    rate, force = errors.off(corrected[:, :3], corrected[:, 3:], best.parameters)
-    imu = at.imu.copy()
-    imu.attrs = dict(at.imu.attrs)
-    imu[GYRO], imu[ACCEL] = rate, force
-    at = replace(at, imu=imu)
+    corrected = errors.off_table(at.imu, best.parameters)
+    at = replace(at, imu=biases_off(corrected, best.own_bias[:3], best.own_bias[3:]))
     if at.rest is None or at.rest.grade == "steady":
         # A quiet drive is no better known than the attitude, which its errors are a part of.
         roll, pitch, _ = state.state.roll_pitch_heading.tolist()

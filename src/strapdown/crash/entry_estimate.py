@@ -67,16 +67,29 @@ class SensorErrors:
     sd: Array
     rotation: Array
 
-    def off(self, rate: Array, force: Array, size: Array) -> tuple[Array, Array]:
-        """Rate and force, (n, 3) each, without parameters of the size given, (q,)."""
-        turn = self.rotation @ size
+    def off_table(self, imu: pd.DataFrame, size: Array) -> pd.DataFrame:
+        """An Imu table of as many rows without parameters of the size given, (q,)."""
+        C = rotation.dcm_from_rotation_vector(self.rotation @ size)
         straight = np.where(self.rotation.any(axis=0), 0.0, size)
-        C = rotation.dcm_from_rotation_vector(turn)
-        return (rate - self.gyro @ straight) @ C.T, (force - self.accel @ straight) @ C.T
+        values = values_of(imu, [*GYRO, *ACCEL])
+        out = imu[[*GYRO, *ACCEL]].copy()
+        out.attrs = dict(imu.attrs)
+        out[GYRO] = (values[:, :3] - self.gyro @ straight) @ C.T
+        out[ACCEL] = (values[:, 3:] - self.accel @ straight) @ C.T
+        return out
 
     def rows(self, kept: slice) -> SensorErrors:
         """The same, at some of the samples."""
         return replace(self, gyro=self.gyro[kept], accel=self.accel[kept])
+
+    def about(self, course: Course, size: Array) -> SensorErrors:
+        """The effects about parameters of the size given, that are off the course already."""
+        C = rotation.dcm_from_rotation_vector(self.rotation @ size)
+        gyro, accel = C @ self.gyro, C @ self.accel
+        for k in np.flatnonzero(self.rotation.any(axis=0)):
+            gyro[:, :, k] = -np.cross(self.rotation[:, k], course.rate)
+            accel[:, :, k] = -np.cross(self.rotation[:, k], course.force)
+        return replace(self, gyro=gyro, accel=accel)
 
 
 def sensor_errors(gyro: TriadUncertainty, accel: TriadUncertainty, course: Course) -> SensorErrors:
@@ -653,6 +666,9 @@ class _Search:
         self.further = self.further + step[STATES:]
         sd = np.sqrt(np.diag(adjustment.covariance))
         self._moved += turn
+        if self.given is not None:
+            mounted = self.given.rotation @ step[STATES : STATES + len(self.given.sd)]
+            self._moved += float(np.linalg.norm(mounted))
         self.near = turn < 0.05
         return bool((np.abs(step) <= np.maximum(CONVERGED * sd, _TINY)).all())
 
@@ -693,11 +709,10 @@ class _Search:
         )
 
     def _run(self) -> tuple[Course, AtFixes]:
-        imu = biases_off(self.imu, self.bias[:3], self.bias[3:])
+        imu = self.imu
         if self.given is not None and self.further.size:
-            values = values_of(imu, [*GYRO, *ACCEL])
-            size = self.further[: len(self.given.sd)]
-            imu[GYRO], imu[ACCEL] = self.given.off(values[:, :3], values[:, 3:], size)
+            imu = self.given.off_table(imu, self.further[: len(self.given.sd)])
+        imu = biases_off(imu, self.bias[:3], self.bias[3:])
         run = run_mechanization(
             self.mechanization, self.state, motion_increments(imu), backward=True
         )
@@ -736,6 +751,8 @@ class _Search:
             if self.given is None
             else self.given.rows(self.kept)
         )
+        if self.further.size and self.given is not None:
+            self.errors = self.errors.about(course, self.further[: len(self.errors.sd)])
         q, m = len(self.errors.sd), len(fixes.instants)
         C_nb = rotation.dcm_from_quaternion(now.q_nb)
         look = np.zeros((m, ROWS, 9))

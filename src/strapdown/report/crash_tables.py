@@ -559,9 +559,9 @@ def units_table(result: CaseResult) -> TableBlock:
 DRIVE_QUANTITIES: dict[str, tuple[str, float, tuple[str, ...]]] = {
     "bias": ("m/s²", 1.0, ("bias x", "bias y", "bias z")),
     "scale": ("%", 0.01, ("scale factor x", "scale factor y", "scale factor z")),
-    "gyro bias": ("°/s", DEG, ("bias x", "bias y", "bias z")),
+    "gyro bias": ("°/s", 1.0 / DEG, ("bias x", "bias y", "bias z")),
     "gyro scale": ("%", 0.01, ("scale factor x", "scale factor y", "scale factor z")),
-    "mounting": ("°", DEG, ("mounting roll", "mounting pitch", "mounting yaw")),
+    "mounting": ("°", 1.0 / DEG, ("mounting roll", "mounting pitch", "mounting yaw")),
     "speed scale": ("%", 0.01, ("scale of the wheels",)),
     "speed delay": ("s", 1.0, ("delay of the wheels",)),
 }
@@ -601,8 +601,8 @@ def drive_table(result: CaseResult) -> TableBlock | None:
         text=(0, 1),
         title="The drive before the crash",
         caption="What a sensor reads too much, what the wheels show too much and how late, and by "
-        "how much a recorder is turned in the vehicle beyond its stated angles, clockwise seen from "
-        "behind, the left or above; 95 % bounds. All are corrected. Ranges that the drive did not "
+        "how much a recorder is turned in the vehicle beyond its stated angles, positive as these; "
+        "95 % bounds. All are corrected. Ranges that the drive did not "
         "reach, and nonlinearity, are as stated." + left,
     )
 

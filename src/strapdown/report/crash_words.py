@@ -1061,8 +1061,8 @@ def assumptions(result: CaseResult) -> tuple[tuple[str, str], ...]:
             (
                 "Speeds of the wheels",
                 f"have a relative error of ± {TWO_SIDED_95 * entry.speed_scale_sd_percent:.2g} % "
-                f"and are {entry.speed_delay_s:.2g} ± {TWO_SIDED_95 * entry.speed_delay_sd_s:.2g} s "
-                "late; they are not used beyond 4 m/s², where wheels slip.",
+                f"and are {entry.speed_delay_s:.2g} ± {TWO_SIDED_95 * entry.speed_delay_sd_s:.2g} "
+                "s late; they are not used beyond 4 m/s², where wheels slip.",
             )
         )
     if entry.kind in OF_DRIVES and (entry.slip_sd_deg or entry.speed_path is not None):
@@ -1070,8 +1070,8 @@ def assumptions(result: CaseResult) -> tuple[tuple[str, str], ...]:
         found.append(
             (
                 "Drive before the crash",
-                f"The rear axle travels along the vehicle within {slip:.2g}°; biases, scale factors "
-                "and mounting are those of the crash.",
+                f"The rear axle travels along the vehicle within {slip:.2g}°; biases, scale "
+                "factors and mounting are those of the crash.",
             )
         )
     reasons: dict[str, list[str]] = {}
