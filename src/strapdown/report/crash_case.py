@@ -279,20 +279,20 @@ def _drive(drive: EntryState) -> dict[str, Any]:
     """What the drive shows; ``determined``: it leaves less than nine tenths of what was stated."""
     rows = []
     table = drive.calibration
-    for what in () if table is None else table.itertuples():
-        key, size = _DRIVE[what.quantity]
+    for what in () if table is None else table.to_dict("records"):
+        key, size = _DRIVE[what["quantity"]]
         half, stated, kept = (
-            TWO_SIDED_95 * x / size for x in (what.sd, what.stated, what.in_crash)
+            TWO_SIDED_95 * x / size for x in (what["sd"], what["stated"], what["in_crash"])
         )
         rows.append(
             {
                 "quantity": key,
-                "of": what.of,
-                "axis": "xyz"[what.axis],
-                "by_drive": _about(what.error / size, half),
+                "of": what["of"],
+                "axis": "xyz"[what["axis"]],
+                "by_drive": _about(what["error"] / size, half),
                 "stated_half_width": stated,
                 "in_crash_half_width": kept,
-                "determined": bool(what.sd <= NARROWED * what.stated),
+                "determined": bool(what["sd"] <= NARROWED * what["stated"]),
             }
         )
     fixes, speeds = drive.fixes, drive.speeds

@@ -573,21 +573,21 @@ def drive_table(result: CaseResult) -> TableBlock | None:
     for unit in result.reconstruction.units:
         if unit.drive is None or unit.drive.calibration is None:
             continue
-        for what in unit.drive.calibration.itertuples():
-            symbol, size, names = DRIVE_QUANTITIES[what.quantity]
-            name = names[what.axis]
-            if what.sd > NARROWED * what.stated:
-                open_ones.append(f"{what.of} {name}")
+        for what in unit.drive.calibration.to_dict("records"):
+            symbol, size, names = DRIVE_QUANTITIES[what["quantity"]]
+            name = names[what["axis"]]
+            if what["sd"] > NARROWED * what["stated"]:
+                open_ones.append(" ".join((what["of"], name)))
                 continue
             half, stated, kept = (
-                TWO_SIDED_95 * x / size for x in (what.sd, what.stated, what.in_crash)
+                TWO_SIDED_95 * x / size for x in (what["sd"], what["stated"], what["in_crash"])
             )
-            of_wheels = what.quantity.startswith("speed")
+            of_wheels = what["quantity"].startswith("speed")
             rows.append(
                 (
                     recorder(unit, result),
-                    f"{what.of}: {name}",
-                    about(what.error / size, half, symbol),
+                    ": ".join((what["of"], name)),
+                    about(what["error"] / size, half, symbol),
                     f"± {stated:.2g} {symbol}",
                     GAP if of_wheels else f"± {kept:.2g} {symbol}",
                 )
