@@ -195,7 +195,8 @@ def _estimated(
 
     def over(length: float, guess: NavState, start: Estimate | None) -> Estimate:
         """Estimate from the last part of the drive."""
-        late = fixes.at(fixes.instants >= sensed[last] - length)
+        # The first is not left out by rounding.
+        late = fixes.at(fixes.instants >= sensed[last] - length - 1e-9)
         part = _between(imu, float(late.instants[0]), last)
         own = None if errors is None else errors.rows(part)
         return estimate(mechanization, _rows(imu, part), late, guess, priors, arm, own, start)
@@ -363,6 +364,7 @@ CONTRIBUTOR = "entry from the drive"
 OTHER_PRIORS = tuple(f.name for f in fields(EntryPriors) if f.name not in ("gyro", "accel"))
 #: Of a car on a road, where a speed is measured along it.
 CAR = {
+    "tilt_sd_deg": 5.0,
     "side_slip_sd_deg": 0.5,
     "slip_slope_sd_deg": 0.5,
     "pitch_slip_sd_deg": 1.0,

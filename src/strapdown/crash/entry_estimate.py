@@ -478,6 +478,8 @@ MOST_WEIGHINGS, SAME_WEIGHT = 15, 0.01
 # Prior standard deviation of unknowns, in standard deviations of the fixes: limited by rounding,
 # and centered on the current parameters so that it does not bias them.
 UNKNOWN = 1e3
+# Likewise of the velocity by speeds alone, m/s.
+SPEED_STRIDE = 3.0
 # Conditions for using the side-slip constraint.
 LEAST_SLIP_SPEED, MOST_LATERAL = 3.0, 2.0  # m/s, m/s²
 # Rows of an epoch: position, velocity, side slip, pitch slip, speed.
@@ -807,8 +809,9 @@ class _Search:
         loose = UNKNOWN * np.where(bounded > 0.0, bounded, np.tile(bounded[:3].max(), 6))
         heading = math.radians(p.heading_sd_deg or ANY_HEADING)
         if self.free == 3:
-            # Speeds alone determine neither position nor heading: both are as guessed.
-            loose[3:6], heading = UNKNOWN * sd[:, SPEED].max(), 0.0
+            # Speeds alone determine neither position nor heading: both are as guessed. What they
+            # do not measure of the velocity must not run away in a bend.
+            loose[3:6], heading = SPEED_STRIDE, 0.0
         prior_sd = np.concatenate(
             [
                 loose,

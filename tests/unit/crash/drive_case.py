@@ -269,6 +269,7 @@ def speeds_of(drive, g, tires=None, delay=None, rate=20.0, step=0.03):
 
 
 PRIORS = {
+    "tilt_sd_deg": 5.0,
     "side_slip_sd_deg": 0.5,
     "slip_slope_sd_deg": 0.5,
     "pitch_slip_sd_deg": 1.0,
