@@ -149,7 +149,7 @@ def test_unknowns_are_of_the_sensors_axes():
     low = own.accelerometers[0]
     told = replace(low.uncertainty, bias=(0.1, 0.2, 0.3))
     own = replace(own, accelerometers=(replace(low, uncertainty=told), *own.accelerometers[1:]))
-    stated = Preparation(levelling=(0.0, 0.0, 5.0), stood=())
+    stated = Preparation(levelling=(0.0, 0.0, 5.0), stood=(), match_gravity=False)
     at = at_point(prepare_unit(own, stated), (0.0, 0.0, 0.0))
     effects = at.effects
     biases = {
