@@ -23,7 +23,7 @@ from papers.tadic.experiment import END, IMUS, SPEED_SD, Experiments, gravity_at
 from papers.tadic.simplifications import TRIPS, error_course, sensor_increments
 from strapdown import CrashOptions, reconstruct_crash
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.crash import Entry, FixCorrelation, DriveEntry
+from strapdown.crash import DriveEntry, Entry, FixCorrelation
 from strapdown.mechanization import NorthEastDown
 from strapdown.sensors import SENSORS, CrashUnit, Sensor, load_sensor
 from strapdown.simulation import (
