@@ -880,6 +880,9 @@ def rest(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     told: dict[tuple[str, str, str], list[str]] = {}
     for unit, prepared in _prepared(result):
         still, level = prepared.rest, prepared.levelling
+        if unit.drive is not None and (still is None or still.grade == "steady"):
+            # Level and biases are those of the drive.
+            continue
         if still is None:
             half = TWO_SIDED_95 * level.sd_deg
             said = (
