@@ -23,7 +23,7 @@ from papers.tadic.experiment import END, IMUS, SPEED_SD, Experiments, gravity_at
 from papers.tadic.simplifications import TRIPS, error_course, sensor_increments
 from strapdown import CrashOptions, reconstruct_crash
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.crash import Entry, FixCorrelation, GnssEntry
+from strapdown.crash import DriveEntry, Entry, FixCorrelation
 from strapdown.mechanization import NorthEastDown
 from strapdown.sensors import SENSORS, CrashUnit, Sensor, load_sensor
 from strapdown.simulation import (
@@ -470,7 +470,7 @@ def tied(runs: int = RECORDS) -> Tied:
         fixes.index = fixes.index - crash.start
         draw = float(np.random.Generator(np.random.PCG64(seed)).standard_normal())
         laboratory = pole_entry(crash, SPEED_SD, draw)
-        satellites = GnssEntry(
+        satellites = DriveEntry(
             fixes,
             window=6.0,
             priors={"side_slip_sd_deg": 1.0, "position_correlation": FixCorrelation(0.0, 1.0)},
@@ -484,7 +484,7 @@ def tied(runs: int = RECORDS) -> Tied:
 
 
 def _errors(
-    crash: CrashScenario, unit: CrashUnit, entry: Entry | GnssEntry, there: float
+    crash: CrashScenario, unit: CrashUnit, entry: Entry | DriveEntry, there: float
 ) -> tuple[Array, Array]:
     """Distance from the true way since the entry, and what is told of it, at two times, m."""
     path = reconstruct_crash(

@@ -130,6 +130,7 @@ def print_crash(result: CaseResult) -> None:
     from strapdown.report.crash_tables import (
         answers_table,
         comparison_table,
+        drive_table,
         indices_table,
         path_table,
         severity_table,
@@ -138,7 +139,14 @@ def print_crash(result: CaseResult) -> None:
     from strapdown.report.values import spaced
 
     out = console()
-    tables = (answers_table, path_table, comparison_table, severity_table, indices_table)
+    tables = (
+        answers_table,
+        path_table,
+        drive_table,
+        comparison_table,
+        severity_table,
+        indices_table,
+    )
     for block in (table(result) for table in tables):
         if block is not None and block.rows:
             print_block(block)

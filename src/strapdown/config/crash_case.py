@@ -82,6 +82,11 @@ class VehicleSpec(Spec):
         default=None, description="largest depth to which the vehicle was crushed"
     )
     crush_sd_m: PositionSd = Field(default=0.05, description="standard deviation of that depth")
+    rear_axle_m: Pair | None = Field(
+        default=None,
+        description="forward, right of the middle of the rear axle, from the origin that all "
+        "positions share",
+    )
     length_m: Size = Field(default=4.5, description="overall length of the vehicle")
     width_m: Size = Field(default=1.8, description="width of the vehicle without mirrors")
     front_m: Number | None = Field(
@@ -104,10 +109,14 @@ class PointSpec(Spec):
 
 
 class EntrySpec(Spec):
-    """Motion of the vehicle at one instant, and its uncertainty."""
+    """Motion of the vehicle at one instant, and its uncertainty.
 
-    kind: Literal["speed", "standstill", "gnss"] = Field(
-        default="speed", description="speed, standstill or gnss"
+    With `gnss` and `speed_record` it is found from the drive before the crash, and with it biases,
+    scale factors and mounting of the recorders, as far as the drive shows them.
+    """
+
+    kind: Literal["speed", "standstill", "gnss", "speed_record"] = Field(
+        default="speed", description="speed, standstill, gnss or speed_record"
     )
     source: str = Field(
         default="",
@@ -134,6 +143,24 @@ class EntrySpec(Spec):
         default=None, description=f"forward, right, down of the antenna {_FROM}"
     )
     antenna_sd_m: PositionSd = 0.0
+    speed_path: FileName | None = Field(
+        default=None,
+        description="file of the speeds of the vehicle's wheels (CAN, OBD) before the crash",
+    )
+    speed_column: Channel | None = Field(default=None, description="the column of the speeds")
+    speed_unit: Word | None = Field(
+        default=None, description="unit of the speeds: km/h, mph or m/s, where none is stated"
+    )
+    #: Tires and wheel circumference: standard deviation of the relative error.
+    speed_scale_sd_percent: Annotated[Number, Field(ge=0.0, le=20.0)] = 2.0
+    speed_delay_s: Annotated[Number, Field(ge=-2.0, le=2.0)] = 0.1
+    speed_delay_sd_s: Annotated[Number, Field(ge=0.0, le=1.0)] = 0.1
+    trigger_s: Number = Field(
+        default=0.0, description="instant of the trigger on the clock of the fixes or speeds"
+    )
+    window_s: Annotated[Number, Field(ge=1.0, le=60.0)] = Field(
+        default=60.0, description="length of the drive before the entry that is used"
+    )
 
 
 class TriadSpec(Spec):

@@ -148,20 +148,36 @@ def _from_side(place: Corner, begin: Corner, end: Corner) -> float:
 
 _OF_SPEED = (
     "speed_m_per_s",
-    "speed_sd_m_per_s",
-    "heading_deg",
-    "heading_sd_deg",
     "slip_deg",
-    "slip_sd_deg",
     "climb_sd_m_per_s",
 )
+_OF_SPEEDS = ("speed_sd_m_per_s",)
+_OF_HEADING = ("heading_deg", "heading_sd_deg")
 _OF_FIXES = ("path", "antenna_m", "antenna_sd_m")
+_OF_SPEED_RECORD = (
+    "speed_path",
+    "speed_column",
+    "speed_unit",
+    "speed_scale_sd_percent",
+    "speed_delay_s",
+    "speed_delay_sd_s",
+)
+_OF_DRIVE = ("trigger_s", "window_s")
 #: Keys that each kind does not use; a value of zero is ignored.
 _NO_USE = {
-    "speed": _OF_FIXES,
+    "speed": (*_OF_FIXES, *_OF_SPEED_RECORD, *_OF_DRIVE),
     # Its heading is of use to the closure with the other vehicle.
-    "standstill": (*(k for k in _OF_SPEED if "heading" not in k), "time_s", *_OF_FIXES),
-    "gnss": _OF_SPEED,
+    "standstill": (
+        *_OF_SPEED,
+        *_OF_SPEEDS,
+        "slip_sd_deg",
+        "time_s",
+        *_OF_FIXES,
+        *_OF_SPEED_RECORD,
+        *_OF_DRIVE,
+    ),
+    "gnss": (*_OF_SPEED, *_OF_HEADING),
+    "speed_record": (*_OF_SPEED, *_OF_FIXES),
 }
 _NEEDED = {
     "speed": {
@@ -171,25 +187,33 @@ _NEEDED = {
     },
     "standstill": {},
     "gnss": {"path": "config.entry-fixes-missing"},
+    "speed_record": {"speed_path": "config.entry-speed-record-missing"},
 }
 
 
 def _entry(spec: CaseSpec) -> Iterator[Fault]:
     entry, window = spec.entry, spec.options.window_s
-    for name in _NO_USE[entry.kind]:
+    unused = _NO_USE[entry.kind]
+    if entry.kind == "gnss" and entry.speed_path is None:
+        unused = (*unused, *_OF_SPEEDS, *_OF_SPEED_RECORD)
+    for name in unused:
         if name in entry.model_fields_set and getattr(entry, name) not in (None, 0.0):
             yield fault(
                 ("entry", name),
-                f"config.entry-{entry.kind}-no-use",
+                f"config.entry-{entry.kind.replace('_', '-')}-no-use",
                 other=At(("entry", "kind"), entry.kind),
                 key=name,
-                kind="gnss" if name in _OF_FIXES else "speed",
+                kind="gnss"
+                if name in _OF_FIXES
+                else "speed_record"
+                if name in (*_OF_SPEED_RECORD, *_OF_DRIVE)
+                else "speed",
             )
     for name, code in _NEEDED[entry.kind].items():
         given = getattr(entry, name)
         if given is None or (isinstance(given, str) and not given.strip()):
             yield missing(CaseSpec, ("entry", name), code)
-    if entry.kind == "speed" and entry.speed_sd_m_per_s == 0.0:
+    if entry.kind != "standstill" and entry.speed_sd_m_per_s == 0.0:
         yield fault(("entry", "speed_sd_m_per_s"), "config.entry-speed-sd-zero")
     start, end = window or (-math.inf, math.inf)
     outside = start < end and not start <= entry.time_s <= end

@@ -31,10 +31,10 @@ if TYPE_CHECKING:
         resolved_delta_v_bound,
         velocity_change,
     )
+    from strapdown.crash.drive_entry import DriveEntry
     from strapdown.crash.entry import Entry
     from strapdown.crash.entry_estimate import FixCorrelation
     from strapdown.crash.events import detect_events
-    from strapdown.crash.gnss_entry import GnssEntry
     from strapdown.crash.measuring_point import at_point
     from strapdown.crash.path import PathComparison, compare_with_reference, sample_paths
     from strapdown.crash.pdof import NedPdof, Pdof, ned_pdof, pdof
@@ -46,11 +46,11 @@ __all__ = [
     "Blame",
     "Closure",
     "CrashOptions",
+    "DriveEntry",
     "Entry",
     "EventChanges",
     "Figure",
     "FixCorrelation",
-    "GnssEntry",
     "Hypothesis",
     "ImpactVehicle",
     "NedPdof",
@@ -95,7 +95,7 @@ load_on_first_use(
         "entry": "Entry",
         "entry_estimate": "FixCorrelation",
         "events": "detect_events",
-        "gnss_entry": "GnssEntry",
+        "drive_entry": "DriveEntry",
         "measuring_point": "at_point",
         "path": "PathComparison compare_with_reference sample_paths",
         "pdof": "NedPdof Pdof ned_pdof pdof",

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -58,7 +58,7 @@ from strapdown.crash.severity import (
 )
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats import files_of
-from strapdown.formats.aid_table import read_reference_path
+from strapdown.formats.aid_table import read_aid_table, read_reference_path
 from strapdown.formats.crash_record import CrashRecord
 from strapdown.formats.crash_records import read_crash_record
 from strapdown.formats.crash_triad import triad_of_channels
@@ -68,10 +68,15 @@ from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.uncertainty import stated_uncertainty
 from strapdown.systems.one_thread import one_thread
+from strapdown.units import SPEEDS, unit_of
 
 if TYPE_CHECKING:
-    from strapdown.crash.gnss_entry import GnssEntry
+    from strapdown.crash.drive_entry import DriveEntry
 
+#: Kinds of entry that are found from the drive before the crash.
+OF_DRIVES = ("gnss", "speed_record")
+# Standard deviation of a speed of the wheels, and of the place of an axle that is stated.
+SPEED_SD, AXLE_SD = 0.1, 0.05  # m/s, m
 # Most numbers of a Monte Carlo in memory: half a gigabyte.
 MOST_NUMBERS = 64_000_000
 
@@ -311,6 +316,7 @@ def _inputs(
     given += [("severity", m, (Path(m),)) for m in dict.fromkeys(models)]
     others = [("reference", r.path) for r in spec.references if r.path is not None]
     others += [("fixes", spec.entry.path)] if spec.entry.path is not None else []
+    others += [("speeds", spec.entry.speed_path)] if spec.entry.speed_path is not None else []
     given += [(role, path, files_of(path)) for role, path in dict.fromkeys(others)]
     return tuple(
         InputFiles(role, Path(path), files, tuple(sha256(file) for file in files))
@@ -318,20 +324,12 @@ def _inputs(
     )
 
 
-def _entry(spec: CaseSpec) -> Entry | GnssEntry | None:
+def _entry(spec: CaseSpec) -> Entry | DriveEntry | None:
     entry = spec.entry
     if entry.kind == "standstill":
         return None
-    if entry.kind == "gnss":
-        from strapdown.crash.gnss_entry import GnssEntry
-
-        assert entry.path is not None
-        return GnssEntry(
-            read_gnss(entry.path),
-            impact=entry.time_s,
-            antenna=entry.antenna_m or (0.0, 0.0, 0.0),
-            priors={"antenna_sd": entry.antenna_sd_m},
-        )
+    if entry.kind in OF_DRIVES:
+        return _drive(spec)
     assert entry.speed_m_per_s is not None and entry.speed_sd_m_per_s is not None
     return Entry.from_speed(
         entry.speed_m_per_s,
@@ -344,6 +342,74 @@ def _entry(spec: CaseSpec) -> Entry | GnssEntry | None:
         climb_sd=entry.climb_sd_m_per_s,
         source=entry.source,
     )
+
+
+def _drive(spec: CaseSpec) -> DriveEntry:
+    """Fixes and speeds of the drive before the crash, on the clock of the trigger."""
+    from strapdown.crash.drive_entry import CAR, DriveEntry
+
+    entry, vehicle = spec.entry, spec.vehicle
+    fixes = speeds = None
+    if entry.path is not None:
+        fixes = read_gnss(entry.path)
+        fixes.index = fixes.index - entry.trigger_s
+    if entry.speed_path is not None:
+        speeds = _speeds(entry)
+        speeds.index = speeds.index - entry.trigger_s
+    priors: dict[str, Any] = {
+        "antenna_sd": entry.antenna_sd_m,
+        "speed_scale_sd": entry.speed_scale_sd_percent / 100.0,
+        "speed_delay": entry.speed_delay_s,
+        "speed_delay_sd": entry.speed_delay_sd_s,
+    }
+    if entry.slip_sd_deg or speeds is not None:
+        # The middle of the rear axle does not slip. Of a car that is at a fifth of its length from
+        # the back, within a twentieth.
+        front = vehicle.length_m / 2.0 if vehicle.front_m is None else vehicle.front_m
+        axle, sd = (front - 0.8 * vehicle.length_m, 0.0), 0.05 * vehicle.length_m
+        if vehicle.rear_axle_m is not None:
+            axle, sd = vehicle.rear_axle_m, AXLE_SD
+        ahead, aside, _ = spec.point.position_m
+        priors |= CAR | {
+            "no_slip_point": (axle[0] - ahead, axle[1] - aside, 0.0),
+            "no_slip_point_sd": sd,
+        }
+        if entry.slip_sd_deg:
+            priors["side_slip_sd_deg"] = entry.slip_sd_deg
+    if entry.heading_sd_deg:
+        priors |= {"heading_deg": entry.heading_deg, "heading_sd_deg": entry.heading_sd_deg}
+    return DriveEntry(
+        fixes,
+        impact=entry.time_s,
+        window=entry.window_s,
+        antenna=entry.antenna_m or (0.0, 0.0, 0.0),
+        priors=priors,
+        speeds=speeds,
+        speed_sd=entry.speed_sd_m_per_s or SPEED_SD,
+    )
+
+
+def _speeds(entry: EntrySpec) -> pd.DataFrame:
+    """Speeds of the wheels, m/s; `DataError`: nothing states their unit."""
+    assert entry.speed_path is not None
+    names = {} if entry.speed_column is None else {"speed": entry.speed_column}
+    table = read_aid_table(entry.speed_path, {"speed": "m/s"}, names=names)
+    found = table.attrs["findings"]
+    if any(f.code == "io.unit-assumed" for f in found):
+        if entry.speed_unit is None:
+            raise DataError(
+                "crash.speed-without-unit", file=table.attrs["source"], quantity="speed"
+            )
+        unit = unit_of(entry.speed_unit, ("velocity",))
+        if unit is None:
+            raise ConfigError(
+                "crash.speed-unit-unknown",
+                quantity="entry, speed_unit",
+                given=entry.speed_unit,
+                known=list(SPEEDS),
+            )
+        table["speed"] *= SPEEDS[unit]
+    return table
 
 
 def _preparation(spec: CaseSpec) -> dict[str, dict[str, object]]:
@@ -456,9 +522,10 @@ def impact_vehicle(
     sd = entry.speed_sd_m_per_s or 0.0
     across = speed * math.radians(entry.slip_sd_deg)
     heading_sd: float | None = entry.heading_sd_deg
-    if entry.kind == "gnss":
+    if entry.kind in OF_DRIVES:
         sd = across = float(path.sd[["VN", "VE"]].iloc[path.anchor].max())
-        heading_sd = float(path.sd["heading"].iloc[path.anchor])
+        if entry.kind == "gnss":
+            heading_sd = float(path.sd["heading"].iloc[path.anchor])
     # The path of a vehicle that stood is in its own axes.
     stated = entry.heading_deg if entry.kind == "standstill" else 0.0
     rate = rate_change = None

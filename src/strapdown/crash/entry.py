@@ -43,10 +43,10 @@ class Entry:
     heading_deg : float, deg
         Of the vehicle, clockwise from north. Zero where the path is expressed in axes of the
         vehicle at the entry: "north" is then forward at the entry, "east" right.
-    unknowns : tuple of (name, contributor, nine or fifteen numbers)
+    unknowns : tuple of (name, contributor, nine numbers)
         Effect of one standard deviation of each independent unknown on attitude (rotation vector
-        in local level, rad), velocity (m/s) and position (m); and, for quantities estimated
-        jointly, on every sample of the rates (rad/s) and specific force (m/s²), vehicle axes.
+        in local level, rad), velocity (m/s) and position (m). One that has the name of an unknown
+        of the samples is that unknown.
     attitude_deg : tuple of float, deg, optional
         Roll and pitch at that instant, where known from a source other than leveling.
     lat_deg, lon_deg, alt : float, deg, m
@@ -244,6 +244,15 @@ class EntryState:
         or not used).
     chi_square, degrees_of_freedom : float, int
         Of the residuals of all used fixes, with their weights, and the priors.
+    speeds : DataFrame or None
+        Every speed, as `fixes`; of a drive without fixes `fixes` has the speeds, too.
+    calibration : DataFrame or None
+        Of a unit of a crash: what the drive shows of its errors, one row for each ``quantity``
+        (`Parameter.quantity`, or ``speed scale``, ``speed delay``), ``axis`` (0 to 2) and ``of``:
+        ``error``, what the sensor reads too much, relatively for a scale, or the angle by which
+        the unit is turned about an axis of the vehicle beyond its stated angles; ``sd``;
+        ``stated``, the standard deviation before the drive; ``in_crash``, that which the crash is
+        given. SI, rad.
     """
 
     state: NavState
@@ -257,6 +266,8 @@ class EntryState:
     degrees_of_freedom: int
     iterations: int
     findings: tuple[Finding, ...] = ()
+    speeds: pd.DataFrame | None = field(default=None, repr=False)
+    calibration: pd.DataFrame | None = field(default=None, repr=False)
 
     @property
     def sd(self) -> Array:

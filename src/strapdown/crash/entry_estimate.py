@@ -1,4 +1,4 @@
-"""Entry state by iterated least squares from GNSS fixes before a crash.
+"""Entry state by iterated least squares from fixes or speeds of the drive before a crash.
 
 Error = true - estimated. With phi about local level axes (``C_true = exp([phi x]) C``), f the
 specific force and e the sensor errors, it grows by
@@ -13,7 +13,8 @@ This affects only the standard deviations: the estimate itself solves the full e
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import pandas as pd
@@ -21,7 +22,7 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.crash.entry import ACCEL_BIAS, GYRO_BIAS, STATES, biases_off, rotated
-from strapdown.dsp.chi_square import chi_square_exceeded
+from strapdown.dsp.chi_square import chi_square_above, chi_square_exceeded
 from strapdown.dsp.running_integral import running_integral
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError, DivergenceError, Finding
@@ -55,11 +56,40 @@ class Course:
 
 @dataclass(frozen=True, eq=False)
 class SensorErrors:
-    """Effect of q parameters beyond the biases on rate and force, (n, 3, q), and their sd."""
+    """What q parameters beyond the biases add to rate and force, (n, 3, q), and their sd.
+
+    `rotation`, (3, q), rad: of parameters that turn the sensors in the vehicle; the rotation vector
+    that turns what was read into the vehicle's axes, where it is more than small.
+    """
 
     gyro: Array
     accel: Array
     sd: Array
+    rotation: Array
+
+    def off_table(self, imu: pd.DataFrame, size: Array) -> pd.DataFrame:
+        """An Imu table of as many rows without parameters of the size given, (q,)."""
+        C = rotation.dcm_from_rotation_vector(self.rotation @ size)
+        straight = np.where(self.rotation.any(axis=0), 0.0, size)
+        values = values_of(imu, [*GYRO, *ACCEL])
+        out = imu[[*GYRO, *ACCEL]].copy()
+        out.attrs = dict(imu.attrs)
+        out[GYRO] = (values[:, :3] - self.gyro @ straight) @ C.T
+        out[ACCEL] = (values[:, 3:] - self.accel @ straight) @ C.T
+        return out
+
+    def rows(self, kept: slice) -> SensorErrors:
+        """The same, at some of the samples."""
+        return replace(self, gyro=self.gyro[kept], accel=self.accel[kept])
+
+    def about(self, course: Course, size: Array) -> SensorErrors:
+        """The effects about parameters of the size given, that are off the course already."""
+        C = rotation.dcm_from_rotation_vector(self.rotation @ size)
+        gyro, accel = C @ self.gyro, C @ self.accel
+        for k in np.flatnonzero(self.rotation.any(axis=0)):
+            gyro[:, :, k] = -np.cross(self.rotation[:, k], course.rate)
+            accel[:, :, k] = -np.cross(self.rotation[:, k], course.force)
+        return replace(self, gyro=gyro, accel=accel)
 
 
 def sensor_errors(gyro: TriadUncertainty, accel: TriadUncertainty, course: Course) -> SensorErrors:
@@ -79,7 +109,9 @@ def sensor_errors(gyro: TriadUncertainty, accel: TriadUncertainty, course: Cours
     maps = np.zeros((2, n, 3, len(columns)))
     for k, (triad, axis, values, _) in enumerate(columns):
         maps[triad, :, axis, k] = values
-    return SensorErrors(maps[0], maps[1], np.array([c[3] for c in columns]))
+    return SensorErrors(
+        maps[0], maps[1], np.array([c[3] for c in columns]), np.zeros((3, len(columns)))
+    )
 
 
 def at_fixes(course: Course, errors: SensorErrors, instants: Array) -> Array:
@@ -190,6 +222,18 @@ class FixCorrelation:
         _positive(self.time, "time", "crash.correlation-time-not-positive")
 
 
+_NOT_NEGATIVE = (
+    "antenna_sd",
+    "time_offset_sd",
+    "no_slip_point_sd",
+    "slip_slope_sd_deg",
+    "pitch_slope_sd_deg",
+    "speed_scale_sd",
+    "speed_delay_sd",
+    "speed_slip_sd",
+)
+
+
 @dataclass(frozen=True)
 class EntryPriors:
     """Priors of an entry state: normal, independent, zero mean, given by standard deviations.
@@ -212,6 +256,22 @@ class EntryPriors:
         accelerations alone.
     no_slip_point : triad, m
         In vehicle axes; for a car the middle of the rear axle.
+    no_slip_point_sd : float, m
+        Of its forward coordinate.
+    slip_slope_sd_deg : float, deg per m/s²
+        Of the side slip that grows with lateral acceleration: 0.3 to 0.7 for the rear axle of a
+        car (Gillespie 1992, Fundamentals of Vehicle Dynamics, chapter 6).
+    pitch_slip_sd_deg : float, deg, optional
+        As `side_slip_sd_deg`, of the angle between the direction of travel and the plane of the
+        forward and right axes: suspension and slope of the road under the vehicle.
+    pitch_slope_sd_deg : float, deg per m/s²
+        Of the part of it that grows with forward acceleration: squat and dive.
+    speed_scale_sd : float
+        Relative, of speeds: tires and wheel circumference.
+    speed_delay, speed_delay_sd : float, s
+        A speed stamped t belongs to the instant ``t - speed_delay``.
+    speed_slip_sd : float, per m/s²
+        Of the relative excess of speeds by driven or braked wheels.
     antenna_sd : float, m
         Of each coordinate of the antenna.
     time_offset, time_offset_sd : float, s
@@ -235,6 +295,14 @@ class EntryPriors:
     heading_sd_deg: float | None = None
     side_slip_sd_deg: float | None = None
     no_slip_point: Triad = ZERO
+    no_slip_point_sd: float = 0.0
+    slip_slope_sd_deg: float = 0.0
+    pitch_slip_sd_deg: float | None = None
+    pitch_slope_sd_deg: float = 0.0
+    speed_scale_sd: float = 0.02
+    speed_delay: float = 0.1
+    speed_delay_sd: float = 0.1
+    speed_slip_sd: float = 0.002
     antenna_sd: float = 0.0
     time_offset: float = 0.0
     time_offset_sd: float = 0.0
@@ -247,14 +315,14 @@ class EntryPriors:
                 "crash.heading-worth-something-only-standard",
                 quantity="heading_deg, heading_sd_deg",
             )
-        for name in ("roll_deg", "pitch_deg", "heading_deg", "time_offset"):
+        for name in ("roll_deg", "pitch_deg", "heading_deg", "time_offset", "speed_delay"):
             value = getattr(self, name)
             if value is not None and not math.isfinite(value):
                 raise ConfigError("crash.not-finite-number", quantity=name, value=value)
-        for name in ("tilt_sd_deg", "heading_sd_deg", "side_slip_sd_deg"):
+        for name in ("tilt_sd_deg", "heading_sd_deg", "side_slip_sd_deg", "pitch_slip_sd_deg"):
             if getattr(self, name) is not None:
                 _positive(getattr(self, name), name, "crash.standard-deviation-not-positive")
-        for name in ("antenna_sd", "time_offset_sd"):
+        for name in _NOT_NEGATIVE:
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):
                 raise ConfigError("crash.standard-deviation-negative", quantity=name, value=value)
@@ -327,6 +395,39 @@ def judge_fixes(
     return why
 
 
+#: A wheel slips by more than `EntryPriors.speed_slip_sd` allows for beyond this, m/s², and for this
+#: long after; the acceleration is the mean over as long.
+LARGEST_OF_WHEELS, OF_WHEELS = 4.0, 0.5
+
+
+def judge_speeds(
+    instants: Array, run: NavigationRun, impact: float, anchor: float, slack: float
+) -> list[tuple[Finding, ...]]:
+    """Return for each speed, by its instant of validity in s, the reasons why it is rejected.
+
+    `run` and `slack` as `judge_fixes`.
+    """
+    velocity = np.column_stack(
+        [np.interp(run.time - OF_WHEELS, run.time, v) for v in run.history[:, 3:5].T]
+    )
+    acceleration = np.linalg.norm(run.history[:, 3:5] - velocity, axis=1) / OF_WHEELS
+    acceleration[run.time < run.time[0] + OF_WHEELS] = 0.0
+    strained = np.flatnonzero(acceleration > LARGEST_OF_WHEELS)
+    why: list[tuple[Finding, ...]] = []
+    for t in instants:
+        recent = strained[(run.time[strained] >= t - OF_WHEELS) & (run.time[strained] <= t + slack)]
+        if t >= impact - slack:
+            why.append((_reason("crash.fix-after-impact"),))
+        elif t > anchor:
+            why.append((_reason("crash.fix-after-anchor"),))
+        elif recent.size:
+            most, last = float(acceleration[recent].max()), float(run.time[recent[-1]])
+            why.append((_reason("crash.speed-of-slipping-wheels", acceleration=most, last=last),))
+        else:
+            why.append(())
+    return why
+
+
 def _reason(code: str, **values: float) -> Finding:
     return Finding(code, severity="note", data=values)
 
@@ -345,26 +446,24 @@ def _excess(
     return (_reason("crash.fix-under-acceleration" if hard else "crash.fix-under-jerk", **said),)
 
 
-def record_of_fixes(stamps: Array, why: list[tuple[Finding, ...]]) -> pd.DataFrame:
+def record_of_fixes(
+    stamps: Array, why: list[tuple[Finding, ...]], kinds: Sequence[str] = ("position", "velocity")
+) -> pd.DataFrame:
     """Begin the record of the fixes: rejected ones have zero weight."""
     used = np.array([not w for w in why], dtype=np.bool_)
-    return pd.DataFrame(
-        {
-            "used": used,
-            "why": pd.Series(why, index=stamps, dtype=object),
-            "position_weight": used.astype(np.float64),
-            "velocity_weight": used.astype(np.float64),
-            "position_misfit": np.full(len(why), np.nan),
-            "velocity_misfit": np.full(len(why), np.nan),
-        },
-        index=pd.Index(stamps, name="time"),
-    )
+    columns: dict[str, object] = {
+        "used": used,
+        "why": pd.Series(why, index=stamps, dtype=object),
+    }
+    columns |= {f"{kind}_weight": used.astype(np.float64) for kind in kinds}
+    columns |= {f"{kind}_misfit": np.full(len(why), np.nan) for kind in kinds}
+    return pd.DataFrame(columns, index=pd.Index(stamps, name="time"))
 
 
 # Iterated least squares of an entry state from accepted GNSS fixes.
 
 
-MOST_ITERATIONS = 30
+MOST_ITERATIONS = 60
 # Convergence: steps below this fraction of a standard deviation.
 CONVERGED = 1e-3
 # Convergence for data without noise, m, m/s, rad.
@@ -379,25 +478,54 @@ MOST_WEIGHINGS, SAME_WEIGHT = 15, 0.01
 # Prior standard deviation of unknowns, in standard deviations of the fixes: limited by rounding,
 # and centered on the current parameters so that it does not bias them.
 UNKNOWN = 1e3
+# Likewise of the velocity by speeds alone, m/s.
+SPEED_STRIDE = 3.0
 # Conditions for using the side-slip constraint.
 LEAST_SLIP_SPEED, MOST_LATERAL = 3.0, 2.0  # m/s, m/s²
+# Rows of an epoch: position, velocity, side slip, pitch slip, speed.
+SIDE_SLIP, PITCH_SLIP, SPEED, ROWS = 6, 7, 8, 9
+GROUPS = np.array([0, 0, 0, 1, 1, 1, -1, -1, 2])
+# Unknown constants of vehicle and receiver, in order: antenna (3), time offset, side slip and its
+# slope, no-slip point, pitch slip and its slope, scale, delay and wheel slip of speeds.
+OWN = 12
 # Attitude steps are limited to this, rad: beyond it the linear model does not hold.
 LONGEST_TURN = 0.5
 
 
 @dataclass(frozen=True, eq=False)
 class Fixes:
-    """Accepted GNSS fixes: instants, s; position, deg, m; velocity, m/s; sd, (m, 6), m, m/s."""
+    """Accepted epochs in order: GNSS fixes, and speeds along the vehicle.
+
+    `instants`, (m,), s; `place`, (m, 3), deg, m; `velocity`, (m, 3), m/s; `sd`, (m, 6), m, m/s;
+    `speed`, `speed_sd`, (m,), m/s: of wheels. A standard deviation that is NaN: not measured.
+    """
 
     instants: Array
     place: Array
     velocity: Array
     sd: Array
+    speed: Array
+    speed_sd: Array
+
+    def at(self, rows: slice | NDArray[np.intp] | NDArray[np.bool_]) -> Fixes:
+        """Some of the epochs, or all in another order."""
+        return Fixes(*(getattr(self, f.name)[rows] for f in fields(self)))
+
+    @property
+    def of_receiver(self) -> NDArray[np.bool_]:
+        """Epochs that are fixes."""
+        return np.asarray(np.isfinite(self.sd).any(axis=1))
 
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Result from one guess; attributes as of `EntryState`, weights and misfits (m, 2)."""
+    """Result from one guess; attributes as of `EntryState`, weights and misfits (m, 3).
+
+    `own_bias`, (6,), rad/s and m/s²: without the effect of `parameters`, (q,), in standard
+    deviations of their priors where the sensor errors were given. `constants`, (12,): of vehicle
+    and receiver (`OWN`), with their standard deviations. `joint`: covariance of the 15 states and
+    the parameters.
+    """
 
     state: NavState
     gyro_bias: Array
@@ -412,6 +540,11 @@ class Estimate:
     iterations: int
     slip_fixes: int
     cost: float
+    own_bias: Array
+    parameters: Array
+    constants: Array
+    constants_sd: Array
+    joint: Array
 
 
 def estimate(
@@ -421,14 +554,21 @@ def estimate(
     guess: NavState,
     priors: EntryPriors,
     arm: Array,
+    errors: SensorErrors | None = None,
+    start: Estimate | None = None,
 ) -> Estimate:
     """Estimate the state at the end of a record and the other unknowns from a guess there.
 
-    `arm`, (3,), m: lever arm of the antenna. `DivergenceError`: the iteration does not converge, or
-    a run diverges.
+    `arm`, (3,), m: lever arm of the antenna. `errors`: of the sensors, at the rows of the record,
+    instead of those that the priors state; noise that turns out larger than stated is then taken as
+    that large. `start`: from which the search begins, as of a shorter record; the priors remain
+    those about the guess. `DivergenceError`: the iteration does not converge, or a run diverges.
     """
-    search = _Search(mechanization, imu, fixes, guess, priors, arm)
-    weights, settled = np.ones((len(fixes.instants), 2)), 0
+    search = _Search(mechanization, imu, fixes, guess, priors, arm, errors)
+    if start is not None:
+        search.state, search.bias = start.state, start.own_bias
+        search.further = np.concatenate([start.parameters, start.constants])
+    weights, settled = np.ones((len(fixes.instants), 3)), 0
     for iteration in range(1, MOST_ITERATIONS + 1):
         problem = search.problem()
         step = adjust(problem, weights)
@@ -443,7 +583,13 @@ def estimate(
                 weights = found
                 step = adjust(problem, weights)
         if search.take(step) and not changed:
-            return search.result(weights, iteration)
+            best = search.result(weights, iteration)
+            misfit, degrees = max(best.chi_square, 0.0), max(best.degrees_of_freedom, 1)
+            likely = chi_square_above(misfit, degrees) > KEPT
+            if errors is None or search.first is not None or likely:
+                return best
+            # Vibration that the sensors fold is not among the stated noise.
+            search.inflation, search.first = misfit / degrees, best
     raise DivergenceError(
         "crash.search-entry-state-not-come",
         file=imu.attrs.get("source"),
@@ -463,12 +609,15 @@ class _Search:
         guess: NavState,
         priors: EntryPriors,
         arm: Array,
+        errors: SensorErrors | None,
     ) -> None:
-        self.mechanization, self.imu = mechanization, imu
+        self.mechanization, self.imu, self.given = mechanization, imu, errors
         # From the anchor backward, in the direction in which errors grow.
-        self.fixes = Fixes(
-            *(x[::-1] for x in (fixes.instants, fixes.place, fixes.velocity, fixes.sd))
-        )
+        self.fixes = fixes.at(slice(None, None, -1))
+        self.inflation = 1.0
+        # Position and velocity have no prior; speeds alone leave the position as it was guessed.
+        self.free = 6 if fixes.of_receiver.any() else 3
+        self.first: Estimate | None = None
         self.priors, self.arm = priors, arm
         self.ellipsoid = find_ellipsoid(mechanization.ellipsoid)
         self.state, self.at_first = guess, guess.q_nb
@@ -483,13 +632,19 @@ class _Search:
         if self._moved > STALE:
             self._linearise(course, now)
             self._moved = 0.0
-        residuals = np.hstack([self._residuals(now), -side_slips(now, self.priors)[:, None]])
-        residuals -= self.linear.by_constants[:, :, STATES:] @ self.further
+        residuals = self._residuals(now)
+        # Sensor errors that were given are off the samples.
+        left = 0 if self.given is None else len(self.errors.sd)
+        residuals -= self.linear.by_constants[:, :, STATES + left :] @ self.further[left:]
         away = rotation.rotation_vector_from_quaternion(
             rotation.compose(self.at_first, rotation.conjugate(self.state.q_nb))
         )
         before = np.concatenate([np.zeros(6), away, -self.bias, -self.further])
-        return replace(self.linear, residuals=residuals, prior_residuals=before)
+        linear = replace(self.linear, residuals=residuals, prior_residuals=before)
+        if self.inflation == 1.0:
+            return linear
+        names = ("noise", "variance", "driven", "first")
+        return replace(linear, **{n: self.inflation * getattr(linear, n) for n in names})
 
     def take(self, adjustment: Adjustment) -> bool:
         """Add a step; return whether it was below the convergence limit."""
@@ -513,6 +668,9 @@ class _Search:
         self.further = self.further + step[STATES:]
         sd = np.sqrt(np.diag(adjustment.covariance))
         self._moved += turn
+        if self.given is not None:
+            mounted = self.given.rotation @ step[STATES : STATES + len(self.given.sd)]
+            self._moved += float(np.linalg.norm(mounted))
         self.near = turn < 0.05
         return bool((np.abs(step) <= np.maximum(CONVERGED * sd, _TINY)).all())
 
@@ -528,6 +686,8 @@ class _Search:
         to[GYRO_BIAS, STATES : STATES + q] = self.errors.gyro.mean(axis=0)
         to[ACCEL_BIAS, STATES : STATES + q] = self.errors.accel.mean(axis=0)
         bias = self.bias + to[9:15, STATES:] @ self.further
+        # The misfit is that with the noise as stated.
+        told = self.first
         means = values_of(self.imu, [*GYRO, *ACCEL]).mean(axis=0) - bias
         return Estimate(
             state=self.state,
@@ -538,20 +698,29 @@ class _Search:
             mean_force=means[3:],
             weights=weights[::-1],
             misfits=misfits[::-1],
-            chi_square=last.chi_square,
-            degrees_of_freedom=int(problem.there.sum()) - 6,
+            chi_square=last.chi_square if told is None else told.chi_square,
+            degrees_of_freedom=int(problem.there.sum()) - self.free,
             iterations=iterations,
-            slip_fixes=int(problem.there[:, 6].sum()),
-            cost=plain.chi_square,
+            slip_fixes=int(problem.there[:, SIDE_SLIP].sum()),
+            cost=plain.chi_square if told is None else told.cost,
+            own_bias=self.bias,
+            parameters=self.further[:q],
+            constants=self.further[q:],
+            constants_sd=np.sqrt(np.diag(last.covariance)[STATES + q :]),
+            joint=last.covariance[: STATES + q, : STATES + q],
         )
 
     def _run(self) -> tuple[Course, AtFixes]:
-        imu = biases_off(self.imu, self.bias[:3], self.bias[3:])
+        imu = self.imu
+        if self.given is not None and self.further.size:
+            imu = self.given.off_table(imu, self.further[: len(self.given.sd)])
+        imu = biases_off(imu, self.bias[:3], self.bias[3:])
         run = run_mechanization(
             self.mechanization, self.state, motion_increments(imu), backward=True
         )
         kept = slice(len(imu) - len(run.time), None)
         sensed = values_of(imu, [*GYRO, *ACCEL])[kept]
+        self.kept = kept
         course = Course(
             run.time,
             rotation.dcm_from_quaternion(run.history[:, 6:10]),
@@ -566,38 +735,58 @@ class _Search:
         place, velocity = antenna_motion(
             now.place, now.velocity, now.q_nb, now.rate, self.arm, ellipsoid=self.ellipsoid
         )
+        own = point_velocity(now, self.priors)
         return np.hstack(
             [
                 place_difference(self.fixes.place, place, ellipsoid=self.ellipsoid),
                 self.fixes.velocity - velocity,
+                -slips(own),
+                (self.fixes.speed - own[:, 0])[:, None],
             ]
         )
 
     def _linearise(self, course: Course, now: AtFixes) -> None:
         """Sensitivities, noise and priors at the current parameters."""
         p, fixes = self.priors, self.fixes
-        self.errors = sensor_errors(p.gyro, p.accel, course)
+        self.errors = (
+            sensor_errors(p.gyro, p.accel, course)
+            if self.given is None
+            else self.given.rows(self.kept)
+        )
+        if self.further.size and self.given is not None:
+            self.errors = self.errors.about(course, self.further[: len(self.errors.sd)])
         q, m = len(self.errors.sd), len(fixes.instants)
         C_nb = rotation.dcm_from_quaternion(now.q_nb)
-        look = np.zeros((m, 7, 9))
+        look = np.zeros((m, ROWS, 9))
         look[:, 0:3, 0:3] = look[:, 3:6, 3:6] = np.eye(3)
         look[:, 0:3, 6:] = -rotation.cross_matrix(C_nb @ self.arm)
         look[:, 3:6, 6:] = -rotation.cross_matrix(
             np.einsum("mij,mj->mi", C_nb, np.cross(now.rate, self.arm))
         )
-        look[:, 6] = by_state(now, C_nb, p)
-        # Derivatives by antenna position, time offset and constant side slip.
-        own = np.zeros((m, 7, STATES + q + 5))
+        look[:, SIDE_SLIP:] = by_state(now, C_nb, p)
+        # Derivatives by the constants of `OWN`.
+        own = np.zeros((m, ROWS, STATES + q + OWN))
         own[:, :, : STATES + q] = look @ at_fixes(course, self.errors, fixes.instants)
         own[:, 3:6, GYRO_BIAS] += C_nb @ rotation.cross_matrix(self.arm)
-        own[:, 0:3, STATES + q : -2] = C_nb
-        own[:, 3:6, STATES + q : -2] = C_nb @ rotation.cross_matrix(now.rate)
-        own[:, 0:3, -2], own[:, 3:6, -2] = -now.velocity, -now.acceleration
-        own[:, 6, -1] = 1.0
+        more = own[:, :, STATES + q :]
+        more[:, 0:3, 0:3] = C_nb
+        more[:, 3:6, 0:3] = C_nb @ rotation.cross_matrix(now.rate)
+        more[:, 0:3, 3], more[:, 3:6, 3] = -now.velocity, -now.acceleration
+        ahead = point_velocity(now, p)[:, 0]
+        gained = np.einsum("mij,mi->mj", C_nb, now.acceleration)[:, 0]
+        moving = np.where(np.abs(ahead) < LEAST_SLIP_SPEED, np.inf, ahead)
+        more[:, SIDE_SLIP, 4:7] = np.column_stack(
+            [np.ones(m), -ahead * now.rate[:, 2], now.rate[:, 2] / moving]
+        )
+        more[:, PITCH_SLIP, 7:9] = np.column_stack([np.ones(m), gained])
+        more[:, SPEED, 9:12] = np.column_stack([ahead, -gained, ahead * gained])
 
-        there = np.column_stack([np.isfinite(fixes.sd), self._slides(now)])
+        slides = self._slides(now)
+        there = np.column_stack([np.isfinite(fixes.sd), slides, np.isfinite(fixes.speed_sd)])
         slip_sd = math.radians(p.side_slip_sd_deg or 0.0)
-        sd = np.column_stack([np.where(there[:, :6], fixes.sd, 0.0), np.full(m, slip_sd)])
+        pitch_sd = math.radians(p.pitch_slip_sd_deg or 0.0)
+        measured = np.column_stack([fixes.sd, np.tile([slip_sd, pitch_sd], (m, 1)), fixes.speed_sd])
+        sd = np.where(there, measured, 0.0)
         spec = (p.position_correlation,) * 3 + (p.velocity_correlation,) * 3
         share = np.array([c.share for c in spec])
         noise = sd**2
@@ -605,7 +794,7 @@ class _Search:
         # The gyro sample beside a fix also moves the antenna.
         swing = (max(p.gyro.axis("noise_density")) * float(np.linalg.norm(self.arm))) ** 2
         noise[:, 3:6] += swing / float(np.median(np.diff(course.time)))
-        by_states = np.concatenate([look, np.zeros((m, 7, 6))], axis=2)
+        by_states = np.concatenate([look, np.zeros((m, ROWS, 6))], axis=2)
         for axis in range(6):
             by_states[:, axis, 9 + axis] = sd[:, axis] * math.sqrt(share[axis])
 
@@ -616,28 +805,36 @@ class _Search:
         for axis in range(6):
             a = np.exp(-lasted / spec[axis].time)
             carry[:, 9 + axis, 9 + axis], driven[:, 9 + axis, 9 + axis] = a, 1.0 - a * a
-        bounded = np.where(np.isfinite(fixes.sd), fixes.sd, 0.0).max(axis=0)
+        bounded = sd[:, :6].max(axis=0)
         loose = UNKNOWN * np.where(bounded > 0.0, bounded, np.tile(bounded[:3].max(), 6))
+        heading = math.radians(p.heading_sd_deg or ANY_HEADING)
+        if self.free == 3:
+            # Speeds alone determine neither position nor heading: both are as guessed. What they
+            # do not measure of the velocity must not run away in a bend.
+            loose[3:6], heading = SPEED_STRIDE, 0.0
         prior_sd = np.concatenate(
             [
                 loose,
-                np.radians([p.tilt_sd_deg, p.tilt_sd_deg, p.heading_sd_deg or ANY_HEADING]),
+                np.radians([p.tilt_sd_deg, p.tilt_sd_deg]),
+                [heading],
                 p.gyro.axis("bias"),
                 p.accel.axis("bias"),
                 self.errors.sd,
                 [p.antenna_sd] * 3,
-                [p.time_offset_sd, slip_sd],
+                [p.time_offset_sd, slip_sd, math.radians(p.slip_slope_sd_deg)],
+                [p.no_slip_point_sd, pitch_sd, math.radians(p.pitch_slope_sd_deg)],
+                [p.speed_scale_sd, p.speed_delay_sd, p.speed_slip_sd],
             ]
         )
-        self.further = self.further if self.further.size else np.zeros(q + 5)
+        self.further = self.further if self.further.size else np.zeros(q + OWN)
         self.linear = Problem(
-            np.zeros((m, 7)),
+            np.zeros((m, ROWS)),
             own,
             by_states,
             noise,
             sd**2,
             there,
-            np.array([0, 0, 0, 1, 1, 1, -1]),
+            GROUPS,
             carry,
             driven,
             np.diag([0.0] * 9 + [1.0] * 6),
@@ -646,10 +843,14 @@ class _Search:
         )
 
     def _slides(self, now: AtFixes) -> NDArray[np.bool_]:
-        """Where the vehicle travels along its axis, so that the side-slip constraint holds."""
+        """Where the vehicle travels along its axis, (m, 2): the conditions on side and pitch slip.
+
+        A speed that stands for a standing wheel says nothing of either.
+        """
         speed = np.linalg.norm(now.velocity, axis=1)
         steady = (speed > LEAST_SLIP_SPEED) & (np.abs(speed * now.rate[:, 2]) < MOST_LATERAL)
-        return np.asarray(steady & (self.priors.side_slip_sd_deg is not None))
+        stated = [self.priors.side_slip_sd_deg, self.priors.pitch_slip_sd_deg]
+        return np.asarray(steady[:, None] & np.array([sd is not None for sd in stated]))
 
 
 # Generalized least squares over correlated fixes, fix by fix.
@@ -835,25 +1036,27 @@ def state_at_fixes(run: NavigationRun, course: Course, instants: Array, late: fl
     )
 
 
-def side_slips(now: AtFixes, priors: EntryPriors) -> Array:
-    """Side-slip angle at the point without side slip, (m,), rad."""
-    v = _point_velocity(now, priors)
-    return np.asarray(np.arctan2(v[:, 1], v[:, 0]))
-
-
-def _point_velocity(now: AtFixes, priors: EntryPriors) -> Array:
+def point_velocity(now: AtFixes, priors: EntryPriors) -> Array:
+    """Velocity of the point without side slip, (m, 3), m/s, vehicle axes."""
     own = rotation.rotate(rotation.conjugate(now.q_nb), now.velocity)
     return np.asarray(own + np.cross(now.rate, np.asarray(priors.no_slip_point)))
 
 
+def slips(v: Array) -> Array:
+    """Side-slip and pitch-slip angle of a velocity in vehicle axes, (m, 2), rad."""
+    return np.column_stack([np.arctan2(v[:, k], v[:, 0]) for k in (1, 2)])
+
+
 def by_state(now: AtFixes, C_nb: Array, priors: EntryPriors) -> Array:
-    """Derivative of the side-slip angle by position, velocity and attitude, (m, 9)."""
-    v = _point_velocity(now, priors)
-    by_v = np.zeros((len(v), 1, 3))
-    by_v[:, 0, 0], by_v[:, 0, 1] = -v[:, 1], v[:, 0]
-    by_v /= (v[:, 0] ** 2 + v[:, 1] ** 2)[:, None, None]
+    """Derivative of the slips and of the speed by position, velocity and attitude, (m, 3, 9)."""
+    v = point_velocity(now, priors)
+    by_v = np.zeros((len(v), 3, 3))
+    for row, axis in enumerate((1, 2)):
+        square = np.maximum(v[:, 0] ** 2 + v[:, axis] ** 2, 1e-6)
+        by_v[:, row, 0], by_v[:, row, axis] = -v[:, axis] / square, v[:, 0] / square
+    by_v[:, 2, 0] = 1.0
     back = by_v @ C_nb.transpose(0, 2, 1)
-    out = np.zeros((len(v), 9))
-    out[:, 3:6] = back[:, 0]
-    out[:, 6:9] = (back @ rotation.cross_matrix(now.velocity))[:, 0]
+    out = np.zeros((len(v), 3, 9))
+    out[:, :, 3:6] = back
+    out[:, :, 6:9] = back @ rotation.cross_matrix(now.velocity)
     return out

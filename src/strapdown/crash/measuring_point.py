@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -78,6 +79,7 @@ class _UnitEffects:
             self.rest_felt = np.asarray(rest.accel_mean) @ self.turn
         self.names: list[str] = []
         self.contributors: list[str] = []
+        self.parameters: list[Parameter | None] = []
         self.forces: list[Array] = []
         self.rates: list[Array] = []
         self.rests: list[Array] = []
@@ -109,6 +111,7 @@ class _UnitEffects:
             # conservative: the noise of successive slopes has opposite signs.
             _sd(self.measured @ noise @ self.measured),
             _sd(self.prepared.gyro_noise_covariance),
+            tuple(self.parameters),
         )
 
     def _add(
@@ -119,11 +122,11 @@ class _UnitEffects:
         rate: Array | None = None,
         rest: Array = NONE,
         tilt: Array | None = None,
-        through_arm: bool = True,
+        parameter: Parameter | None = None,
     ) -> None:
         n = len(self.time)
         added = np.zeros((n, 3)) if force is None else force
-        if rate is not None and through_arm and self.moved.lever_arm.any():
+        if rate is not None and contributor != TIMING and self.moved.lever_arm.any():
             added = added + self.moved.of_rate(rate)
         if contributor not in (MISSING_AXIS, LEVELLING):
             # Sensor and lever-arm errors do not affect an assumed axis.
@@ -142,6 +145,7 @@ class _UnitEffects:
         again = sum(known.split("#")[0] == name for known in self.names)
         self.names.append(f"{name}#{again + 1}" if again else name)
         self.contributors.append(contributor)
+        self.parameters.append(parameter)
         self.forces.append(added)
         self.rates.append(np.zeros((n, 3)) if rate is None else rate)
         self.rests.append(rest)
@@ -177,7 +181,13 @@ class _UnitEffects:
             one[heirs[:, axis]] = 0.0 if since_rest else at_rest
             direction = self.turn[:, axis]
             rest = at_rest * direction if not calibrated and self.has_rest else NONE
-            self._add(f"{name} {label}", contributor, np.outer(one, direction), rest=rest)
+            of = None
+            if of_bias and not calibrated:
+                of = Parameter("bias", axis, bias[axis], name)
+            elif label == f"scale {XYZ[axis]}":
+                of = Parameter("scale", axis, triad.uncertainty.axis("scale")[axis], name)
+            force = np.outer(one, direction)
+            self._add(f"{name} {label}", contributor, force, rest=rest, parameter=of)
         sd = triad.uncertainty.axis("vibration_rectification")
         if not any(sd):
             return
@@ -212,11 +222,23 @@ class _UnitEffects:
             direction = self.gyro_turn[:, axis]
             if biases[axis] > 0.0:
                 rate = np.tile(biases[axis] * direction, (len(self.time), 1))
-                self._add(f"{owner} gyro bias {XYZ[axis]}", GYRO_BIAS, None, rate)
+                of = Parameter("gyro bias", axis, biases[axis], f"{owner} gyro")
+                name = f"{owner} gyro bias {XYZ[axis]}"
+                self._add(name, GYRO_BIAS, None, rate, parameter=of)
             for name, contributor, of_axis, one in errors:
                 if of_axis == axis:
                     rate = np.outer(one, direction)
-                    self._add(f"{owner} gyro {name}", f"gyro {contributor}", None, rate)
+                    scale = gyro.uncertainty.axis("scale")[axis]
+                    of_scale = name == f"scale {XYZ[axis]}"
+                    self._add(
+                        f"{owner} gyro {name}",
+                        f"gyro {contributor}",
+                        None,
+                        rate,
+                        parameter=Parameter("gyro scale", axis, scale, f"{owner} gyro")
+                        if of_scale
+                        else None,
+                    )
             slope = gyro.uncertainty.axis("g_sensitivity")[axis]
             if slope > 0.0:
                 for j in range(3):
@@ -241,6 +263,7 @@ class _UnitEffects:
                     angle * np.cross(unit, felt),
                     None if lent else angle * np.cross(unit, self.rate),
                     angle * np.cross(unit, left),
+                    parameter=Parameter("mounting", axis, float(angle), own),
                 )
             turned = np.radians(self.lender.mounting.angles_sd_deg)
             if lent and turned > 0.0:
@@ -277,15 +300,17 @@ class _UnitEffects:
             # The clock of a borrowed gyro is that of its owner.
             if self.time_sd > 0.0:
                 force = self.time_sd * np.gradient(self.force, self.time, axis=0)
-                self._add(name, "timing", force)
+                self._add(name, TIMING, force)
             late = self.lender.trigger_sd
             if late > 0.0:
-                self._add(f"{self.lender.name} timing", "timing", None, late * slope)
+                # The correction for the lever arm is as late as the rate.
+                moved = self.moved.of_rate(late * slope) if self.moved.lever_arm.any() else None
+                self._add(f"{self.lender.name} timing", TIMING, moved, late * slope)
         elif self.time_sd > 0.0:
             # Force and rate are delayed together, and so is the lever-arm term.
             at_point = self.moved.imu[ACCEL].to_numpy(dtype=np.float64)
             force = self.time_sd * np.gradient(at_point, self.time, axis=0)
-            self._add(name, "timing", force, self.time_sd * slope, through_arm=False)
+            self._add(name, TIMING, force, self.time_sd * slope)
 
 
 def _sd(covariances: Array) -> Array:
@@ -407,6 +432,21 @@ LEVER_ARM = "lever arm"
 MOUNTING = "mounting"
 NO_TURNING = "assumed: no turning"
 MISSING_AXIS = "assumed: missing axis"
+TIMING = "timing"
+
+
+class Parameter(NamedTuple):
+    """What an unknown is, where a drive before the crash may determine it.
+
+    `quantity`: ``bias``, ``scale`` (m/s² and relative), ``gyro bias``, ``gyro scale`` (rad/s and
+    relative), or ``mounting`` (rad, about an axis of the vehicle); `axis`: 0 to 2; `sd`: as stated;
+    `of`: the sensor or the unit.
+    """
+
+    quantity: str
+    axis: int
+    sd: float
+    of: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -417,7 +457,8 @@ class SampleEffects:
     line of the error budget of each. `force`, (p, n, 3), m/s², at the point; `rate`, (p, n, 3),
     rad/s; `rest_force`, (p, 3), m/s², on the stationary mean; `tilt`, (p, 3), rad, on the leveled
     attitude, in local level with forward as north. `force_noise`, `rate_noise`, (n, 3): standard
-    deviation of the part independent from sample to sample.
+    deviation of the part independent from sample to sample. `parameters`: what each unknown is, or
+    None; empty where no unit has them.
     """
 
     names: tuple[str, ...]
@@ -428,6 +469,7 @@ class SampleEffects:
     tilt: Array
     force_noise: Array
     rate_noise: Array
+    parameters: tuple[Parameter | None, ...] = ()
 
     @property
     def roll_bias_sd(self) -> float:

@@ -353,16 +353,20 @@ def reconstruct_path(
             zeroed_at_rest and level_time is not None,
         )
         imu = _turning(imu, begin.missing)
-    names = (*effects.names, *begin.names, *(u[0] for u in origin.unknowns))
-    contributors = (*effects.contributors, *begin.contributors, *(u[1] for u in origin.unknowns))
+    # Unknowns of one name are one unknown.
+    known = {name: k for k, name in enumerate(effects.names)}
+    own = [u for u in origin.unknowns if u[0] not in known]
+    names = (*effects.names, *begin.names, *(u[0] for u in own))
+    contributors = (*effects.contributors, *begin.contributors, *(u[1] for u in own))
+    known |= {u[0]: len(names) - len(own) + k for k, u in enumerate(own)}
     start = np.zeros((len(names), 9))
     start[: len(begin.errors)] = begin.errors
-    if origin.unknowns:
-        start[-len(origin.unknowns) :] = [u[2][:9] for u in origin.unknowns]
+    for name, _, effect in origin.unknowns:
+        start[known[name]] += effect
     q_nb = begin.state.q_nb
     start = there.carried(start, q_nb, turned=origin.attitude_deg is not None)
     state = replace(begin.state, v_n=begin.state.v_n + there.gained(q_nb))
-    padded = _padded(effects, len(begin.names), [u[2][9:] for u in origin.unknowns])
+    padded = _padded(effects, len(names) - len(effects.names))
     back = make_leg(mechanization, state, imu, padded, slice(first, anchor + 1), backward=True)
     ahead = make_leg(mechanization, state, imu, padded, slice(anchor, last + 1), backward=False)
     origin = replace(origin, velocity=triad_of(begin.state.v_n))
@@ -483,17 +487,13 @@ def _turning(imu: pd.DataFrame, rate: Array) -> pd.DataFrame:
     return out
 
 
-def _padded(
-    effects: SampleEffects, more: int, constants: Sequence[Sequence[float]]
-) -> SampleEffects:
-    """Effects extended by unknowns that act on no sample, and by ones common to all samples."""
-    n = len(effects.force_noise)
-    each = np.array([c if len(c) else (0.0,) * 6 for c in constants]).reshape(-1, 1, 6)
-    none, rest = np.zeros((more, n, 3)), np.tile(each, (1, n, 1))
+def _padded(effects: SampleEffects, more: int) -> SampleEffects:
+    """Effects extended by unknowns that act on no sample."""
+    none = np.zeros((more, len(effects.force_noise), 3))
     return replace(
         effects,
-        force=np.concatenate([effects.force, none, rest[:, :, 3:]]),
-        rate=np.concatenate([effects.rate, none, rest[:, :, :3]]),
+        force=np.concatenate([effects.force, none]),
+        rate=np.concatenate([effects.rate, none]),
     )
 
 

@@ -45,6 +45,10 @@ from strapdown.tables import ACCEL, imu_table
 Array = NDArray[np.float64]
 
 
+#: Roll, pitch and their standard deviation on any road, deg.
+ANY_ROAD = (0.0, 0.0, 10.0)
+
+
 @dataclass(frozen=True)
 class Preparation:
     """Options of `prepare_unit`.
@@ -70,6 +74,10 @@ class Preparation:
         0.3 corresponds to a slope of 3 % or engine drag. Zero while stationary.
     steady_rate : float, rad/s
         As `gyro_bias_from`.
+    stood : tuple of (start, end), s, optional
+        Where the attitude comes from the drive before the crash: when the vehicle stood, by its
+        fixes or speeds. A quiet interval that was detected elsewhere is one of driving, and a
+        record without an interval is prepared as level within 10 deg.
     match_gravity : bool
         Whether the specific force while stationary is scaled to the length of gravity.
     margin, hysteresis, fade
@@ -83,6 +91,7 @@ class Preparation:
     moving_at_impact: bool = True
     steady_acceleration: float = 0.3
     steady_rate: float = 0.01
+    stood: tuple[tuple[float, float], ...] | None = None
     match_gravity: bool = True
     margin: float = 0.1
     hysteresis: float = 0.1
@@ -178,7 +187,14 @@ def prepare_unit(unit: CrashUnit, options: Preparation = Preparation()) -> Prepa
             accel_noise=float(np.median(noise[0], axis=0).max()),
             gyro_noise=float(np.median(gyro_noise, axis=0).max()),
         )
-    findings += rest_findings(unit, data.time, own, options)
+    if options.stood is None:
+        findings += rest_findings(unit, data.time, own, options)
+    elif own is None:
+        levelling = levelling or ANY_ROAD
+    elif isinstance(options.rest, str) and not any(
+        start <= own.start and own.end <= end for start, end in options.stood
+    ):
+        own = replace(own, grade="steady")
     unknown = steady_acceleration if own is not None and own.grade == "steady" else 0.0
     turn = gyro_bias_from(own, gyro.axis("bias"), steady_rate=options.steady_rate)
     # Assumptions for missing axes are reported elsewhere.
@@ -243,6 +259,8 @@ def prepare_unit(unit: CrashUnit, options: Preparation = Preparation()) -> Prepa
         bias_sd=bias_sd,
         gravity_matched=matched,
         gravity_correction=correction,
+        gyro_bias=turn.bias,
+        force_bias=triad_of(merged.values.mean(axis=0) @ C.T - force.mean(axis=0)),
         findings=tuple(findings),
     )
 

@@ -34,7 +34,7 @@ from strapdown.crash.delta_v_bound import (
     velocity_change,
 )
 from strapdown.crash.detectability import undetectable
-from strapdown.crash.entry import Entry
+from strapdown.crash.entry import Entry, EntryState
 from strapdown.crash.events import KMH, PART_563, CrashEvents, EventRule, detect_events
 from strapdown.crash.measuring_point import PointKinematics
 from strapdown.crash.path import VELOCITY, CrashPath, path_line, reconstruct_path
@@ -47,7 +47,7 @@ from strapdown.sensors.triad_errors import FARTHEST, finite, span, triple
 from strapdown.tables import NED
 
 if TYPE_CHECKING:
-    from strapdown.crash.gnss_entry import GnssEntry
+    from strapdown.crash.drive_entry import DriveEntry
 
 Row = tuple[str, str, float, float, float]
 
@@ -159,6 +159,8 @@ class UnitReconstruction:
     types : tuple of CrashType
         For every event, from its change along the rotating axes and the roll.
     findings : tuple of Finding
+    drive : EntryState or None
+        What the drive before the crash shows of the unit, where the entry is from there.
     """
 
     name: str
@@ -171,6 +173,7 @@ class UnitReconstruction:
     ned: tuple[EventChanges | None, ...]
     types: tuple[CrashType, ...]
     findings: tuple[Finding, ...] = ()
+    drive: EntryState | None = field(default=None, repr=False)
 
     def __repr__(self) -> str:
         return f"<UnitReconstruction\n{unit_line(self)}>"
@@ -678,7 +681,7 @@ class CrashReconstruction:
 
 def reconstruct_crash(
     units: Sequence[CrashUnit],
-    entry: Entry | GnssEntry | None,
+    entry: Entry | DriveEntry | None,
     options: CrashOptions = CrashOptions(),
 ) -> CrashReconstruction:
     """Reconstruct a crash.
@@ -687,7 +690,7 @@ def reconstruct_crash(
     ----------
     units : sequence of CrashUnit
         Of one rigid vehicle, as recorded.
-    entry : Entry, GnssEntry or None
+    entry : Entry, DriveEntry or None
         Velocity, heading and instant of the path; or fixes of a GNSS receiver before the crash,
         from which each unit finds them together with its biases (the mean of the units then uses
         the entry of the first). None: the vehicle was stationary at the beginning of the record,
@@ -710,12 +713,12 @@ def reconstruct_crash(
         A path left the range of vehicle motion.
     """
     _check_units(units)
-    of_fixes = None
+    of_fixes: DriveEntry | None = None
     if not (entry is None or isinstance(entry, Entry)):
         # Estimation from fixes is loaded where it is needed.
-        from strapdown.crash.gnss_entry import GnssEntry, start_from_gnss
+        from strapdown.crash.drive_entry import DriveEntry, start_from_drive
 
-        if not isinstance(entry, GnssEntry):
+        if not isinstance(entry, DriveEntry):
             raise _wrong_type("entry", entry)
         of_fixes = entry
     _check_preparation(options.preparation or {}, {unit.name for unit in units})
@@ -724,7 +727,10 @@ def reconstruct_crash(
         units, method=options.clock, rate=options.rate, sampling=options.sampling, cut=False
     )
     findings = list(together.findings)
-    there = prepare_together(together, point, options.gravity, options.preparation or {})
+    preparation = dict(options.preparation or {})
+    if of_fixes is not None:
+        preparation["stood"] = of_fixes.stood()
+    there = prepare_together(together, point, options.gravity, preparation)
     for of in there:
         findings += () if of.prepared is None else of.prepared.findings
     # Before each unit estimates its own biases, which absorbs part of the differences.
@@ -734,13 +740,16 @@ def reconstruct_crash(
         hidden = undetectable(there, comparison)
         there = [comparison.structure.within(of) for of in there]
     tied = [entry if isinstance(entry, Entry) else None] * len(there)
+    drives: list[EntryState | None] = [None] * len(there)
     if of_fixes is not None:
         for k, of in enumerate(there):
-            there[k], tied[k], state = start_from_gnss(of, of_fixes, point)
+            there[k], tied[k], state = start_from_drive(of, of_fixes, point)
+            drives[k] = state
             findings += state.findings
 
     found = tuple(
-        reconstruct_unit(of, start, options) for of, start in zip(there, tied, strict=True)
+        replace(reconstruct_unit(of, start, options), drive=drive)
+        for of, start, drive in zip(there, tied, drives, strict=True)
     )
     combined = None
     if combine and comparison is not None and comparison.agree:

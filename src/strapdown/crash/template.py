@@ -46,8 +46,10 @@ from strapdown.crash.record_parts import (
     settle_units,
 )
 from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.formats.aid_table import read_aid_table
 from strapdown.formats.crash_record import CrashRecord, compact
 from strapdown.formats.crash_records import read_crash_record
+from strapdown.formats.gnss_files import read_gnss
 from strapdown.rotation import within_half_turn
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.pre_crash import find_pre_crash_rest
@@ -151,6 +153,7 @@ def draft_cases(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> 
     findings: list[Finding] = []
     paths: list[KnownPath] = []
     entries: list[IndicatedEntry] = []
+    drives: list[RecordedDrive] = []
     labels: dict[str, Mapping[str, str]] = {}
     for record in records:
         path = named_from(record.path, Path(folder))
@@ -167,7 +170,14 @@ def draft_cases(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> 
             findings += recorder.findings
             entries += [recorder.entry] if recorder.entry else []
             continue
+        drive = recorded_drive(path, record)
         found, left, open_units = record_parts(path, record)
+        if drive is not None:
+            drives.append(drive)
+            if drive.kind == "gnss" and all(p.kind != "acceleration" for p in found):
+                # Fixes alone are no recorder.
+                continue
+            left = [s for s in left if drive.column not in s.names]
         own = _labels(record, found, labels)
         skipped += [replace(s, vehicle=own.get(s.vehicle, s.vehicle)) for s in left]
         parts = [replace(p, vehicle=own[p.vehicle]) for p in found]
@@ -213,8 +223,10 @@ def draft_cases(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> 
         left_out = tuple(s for s in skipped if s.vehicle == vehicle or s.vehicle not in units)
         # A recorder's table states no vehicle, so that its speed is of the only one.
         speeds = entries[:1] if len(units) == 1 else []
+        # Fixes have no tires.
+        driven = sorted(drives, key=lambda d: d.kind)[:1] if len(units) == 1 else []
         several = len(units) > 1
-        page = _filled(_face(of_vehicle), left_out, title, facts, paths, speeds, several)
+        page = _filled(_face(of_vehicle), left_out, title, facts, paths, speeds, driven, several)
         drafts.append(
             Draft(
                 page.text,
@@ -289,6 +301,43 @@ def _units_by_vehicle(
     return units, out
 
 
+# The drive before the crash, where a record has fixes or the speed of the vehicle.
+
+
+class RecordedDrive(NamedTuple):
+    """Table of fixes or speeds of a drive: `column` and `unit` of a speed, empty of fixes."""
+
+    kind: str
+    path: str
+    column: str
+    unit: str
+    length: float
+
+
+#: A drive that is shorter shows little, s; a speed that stays below was not driven, m/s.
+LEAST_DRIVE, LEAST_DRIVEN = 5.0, 3.0
+
+
+def recorded_drive(path: str, record: CrashRecord) -> RecordedDrive | None:
+    """Fixes of a record, or else the speed of the vehicle; None where it has neither."""
+    words = {c.name: set(re.findall(r"[a-z]+", c.name.lower())) for c in record.channels}
+    try:
+        if any("lat" in w for w in words.values()) and any("lon" in w for w in words.values()):
+            table = read_gnss(record.path)
+            length = float(np.ptp(table.index))
+            return RecordedDrive("gnss", path, "", "", length) if length > LEAST_DRIVE else None
+        for name in (n for n, w in words.items() if "speed" in w and not w & set("xyz")):
+            table = read_aid_table(record.path, {"speed": "m/s"}, names={"speed": name})
+            length, fastest = float(np.ptp(table.index)), float(table["speed"].max())
+            assumed = any(f.code == "io.unit-assumed" for f in table.attrs["findings"])
+            if length > LEAST_DRIVE and fastest > LEAST_DRIVEN:
+                return RecordedDrive("speed_record", path, name, "?" * assumed, length)
+    except (ConfigError, DataError):
+        # A table that cannot be read as a drive is read as a record alone.
+        return None
+    return None
+
+
 # The file from its template.
 
 # Laboratories sample fast enough to record ringing.
@@ -306,6 +355,7 @@ def _filled(
     facts: Mapping[str, str],
     paths: Sequence[KnownPath],
     entries: Sequence[IndicatedEntry],
+    drives: Sequence[RecordedDrive],
     several: bool,
 ) -> Page:
     """Fill the template, and wrap its comments; `several`: vehicles of one crash."""
@@ -343,6 +393,7 @@ def _filled(
         late=late if timed and late > 0.0 else None,
         # The speed before time zero of a recorder, if the case counts from there.
         indicated=entries[0] if entries and any(u.impact.at_zero for u in units) else None,
+        drive=drives[0] if drives else None,
         units=units,
         paths=paths,
         skipped=skipped,

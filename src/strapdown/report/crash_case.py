@@ -20,6 +20,8 @@ from strapdown.crash.closure import Closure, Figure
 from strapdown.crash.consistency import UnitComparison
 from strapdown.crash.crash_type import CrashType
 from strapdown.crash.delta_v_bound import EventChanges, VelocityChange
+from strapdown.crash.drive_entry import NARROWED
+from strapdown.crash.entry import EntryState
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import CrashPath
 from strapdown.crash.pdof import NedPdof
@@ -239,6 +241,7 @@ def _unit(unit: UnitReconstruction) -> dict[str, Any]:
             )
         ],
         "largest_change_without_event_m_per_s": unit.events.largest_change,
+        "drive": None if unit.drive is None else _drive(unit.drive),
         "path": {
             "start_s": float(path.time[0]),
             "end_s": float(path.time[-1]),
@@ -257,6 +260,49 @@ def _unit(unit: UnitReconstruction) -> dict[str, Any]:
                 for name, row in path.variances()[NED].iterrows()
             },
         },
+    }
+
+
+#: Key of each quantity that a drive determines, and the size of its unit.
+_DRIVE = {
+    "bias": ("accelerometer_bias_m_per_s2", 1.0),
+    "scale": ("accelerometer_scale_percent", 0.01),
+    "gyro bias": ("gyro_bias_deg_per_s", np.pi / 180.0),
+    "gyro scale": ("gyro_scale_percent", 0.01),
+    "mounting": ("mounting_deg", np.pi / 180.0),
+    "speed scale": ("speed_scale_percent", 0.01),
+    "speed delay": ("speed_delay_s", 1.0),
+}
+
+
+def _drive(drive: EntryState) -> dict[str, Any]:
+    """What the drive shows; ``determined``: it leaves less than nine tenths of what was stated."""
+    rows = []
+    table = drive.calibration
+    for what in () if table is None else table.to_dict("records"):
+        key, size = _DRIVE[what["quantity"]]
+        half, stated, kept = (
+            TWO_SIDED_95 * x / size for x in (what["sd"], what["stated"], what["in_crash"])
+        )
+        rows.append(
+            {
+                "quantity": key,
+                "of": what["of"],
+                "axis": "xyz"[what["axis"]],
+                "by_drive": _about(what["error"] / size, half),
+                "stated_half_width": stated,
+                "in_crash_half_width": kept,
+                "determined": bool(what["sd"] <= NARROWED * what["stated"]),
+            }
+        )
+    fixes, speeds = drive.fixes, drive.speeds
+    of_fixes = "position_weight" in fixes
+    return {
+        "fixes_used": int(fixes["used"].sum()) if of_fixes else 0,
+        "fixes_not_used": int((~fixes["used"]).sum()) if of_fixes else 0,
+        "speeds_used": 0 if speeds is None else int(speeds["used"].sum()),
+        "speeds_not_used": 0 if speeds is None else int((~speeds["used"]).sum()),
+        "errors": rows,
     }
 
 

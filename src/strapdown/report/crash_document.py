@@ -204,6 +204,7 @@ def _document(result: CaseResult, name: str) -> Document:
             "Sensors",
             crash_tables.units_table(result),
             crash_tables.sensors_table(result),
+            crash_tables.drive_table(result),
         ),
         section(
             "conventions",

@@ -11,6 +11,7 @@ from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.crash.case import CaseResult, ReferenceAnswer, main_event
 from strapdown.crash.closure import Figure
 from strapdown.crash.delta_v_bound import VelocityChange
+from strapdown.crash.drive_entry import NARROWED
 from strapdown.crash.pdof import AngleInterval, Pdof
 from strapdown.report.document import TableBlock
 from strapdown.report.values import (
@@ -551,6 +552,58 @@ def units_table(result: CaseResult) -> TableBlock:
         text=(0, 1, 2, 5, 6),
         caption="Mounting positions from the vehicle's origin; angles turn vehicle axes into the "
         "recorder's. 95 % bounds.",
+    )
+
+
+#: Quantities that a drive determines, with the unit and its size, and their names on axes 0 to 2.
+DRIVE_QUANTITIES: dict[str, tuple[str, float, tuple[str, ...]]] = {
+    "bias": ("m/s²", 1.0, ("bias x", "bias y", "bias z")),
+    "scale": ("%", 0.01, ("scale factor x", "scale factor y", "scale factor z")),
+    "gyro bias": ("°/s", 1.0 / DEG, ("bias x", "bias y", "bias z")),
+    "gyro scale": ("%", 0.01, ("scale factor x", "scale factor y", "scale factor z")),
+    "mounting": ("°", 1.0 / DEG, ("mounting roll", "mounting pitch", "mounting yaw")),
+    "speed scale": ("%", 0.01, ("scale of the wheels",)),
+    "speed delay": ("s", 1.0, ("delay of the wheels",)),
+}
+
+
+def drive_table(result: CaseResult) -> TableBlock | None:
+    """What the drive before the crash shows of each recorder; None without one."""
+    rows, open_ones = [], []
+    for unit in result.reconstruction.units:
+        if unit.drive is None or unit.drive.calibration is None:
+            continue
+        for what in unit.drive.calibration.to_dict("records"):
+            symbol, size, names = DRIVE_QUANTITIES[what["quantity"]]
+            name = names[what["axis"]]
+            if what["sd"] > NARROWED * what["stated"]:
+                open_ones.append(" ".join((what["of"], name)))
+                continue
+            half, stated, kept = (
+                TWO_SIDED_95 * x / size for x in (what["sd"], what["stated"], what["in_crash"])
+            )
+            of_wheels = what["quantity"].startswith("speed")
+            rows.append(
+                (
+                    recorder(unit, result),
+                    ": ".join((what["of"], name)),
+                    about(what["error"] / size, half, symbol),
+                    f"± {stated:.2g} {symbol}",
+                    GAP if of_wheels else f"± {kept:.2g} {symbol}",
+                )
+            )
+    if not rows and not open_ones:
+        return None
+    left = f" Not determined, as stated: {', '.join(dict.fromkeys(open_ones))}." * bool(open_ones)
+    return TableBlock(
+        ("recorder", "of", "by the drive", "as stated", "in the crash"),
+        tuple(rows),
+        text=(0, 1),
+        title="The drive before the crash",
+        caption="What a sensor reads too much, what the wheels show too much and how late, and by "
+        "how much a recorder is turned in the vehicle beyond its stated angles, positive as these; "
+        "95 % bounds. All are corrected. Ranges that the drive did not "
+        "reach, and nonlinearity, are as stated." + left,
     )
 
 

@@ -9,8 +9,9 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from strapdown.constants import TWO_SIDED_95
-from strapdown.crash.case import CaseResult, main_event
+from strapdown.crash.case import OF_DRIVES, CaseResult, main_event
 from strapdown.crash.delta_v_bound import VelocityChange
+from strapdown.crash.drive_entry import CAR
 from strapdown.crash.pdof import Pdof
 from strapdown.crash.reconstruction import UnitReconstruction
 from strapdown.errors import Finding
@@ -203,13 +204,11 @@ def entry_words(result: CaseResult) -> str:
     entry = result.spec.entry
     if entry.kind == "standstill":
         return "The vehicle was stationary when the record began."
-    if entry.kind == "gnss":
+    if entry.kind in OF_DRIVES:
         at = result.reconstruction.main.path.entry
         size = float(np.linalg.norm(at.velocity))
-        return (
-            f"At {instant(at.time)} it moved at {speed_words(size)}, by GNSS "
-            "fixes before the impact."
-        )
+        by = "GNSS fixes" if entry.kind == "gnss" else "speeds of its wheels"
+        return f"At {instant(at.time)} it moved at {speed_words(size)}, by {by} before the impact."
     assert entry.speed_m_per_s is not None and entry.speed_sd_m_per_s is not None
     half = TWO_SIDED_95 * entry.speed_sd_m_per_s
     source = f" ({entry.source})" if entry.source else ""
@@ -913,6 +912,9 @@ def rest(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     told: dict[tuple[str, str, str], list[str]] = {}
     for unit, prepared in _prepared(result):
         still, level = prepared.rest, prepared.levelling
+        if unit.drive is not None and (still is None or still.grade == "steady"):
+            # Level and biases are those of the drive.
+            continue
         if still is None:
             half = TWO_SIDED_95 * level.sd_deg
             said = (
@@ -1089,12 +1091,30 @@ def assumptions(result: CaseResult) -> tuple[tuple[str, str], ...]:
         )
     elif entry.kind == "standstill":
         found.append(("Entry", "The vehicle was stationary when the record began."))
-    else:
+    elif entry.kind == "gnss":
         found.append(
             (
                 "Entry",
                 "GNSS fixes have their stated uncertainty; they are not used beyond 50 m/s² or "
                 "20 m/s³, nor from the impact on.",
+            )
+        )
+    if entry.speed_path is not None:
+        found.append(
+            (
+                "Speeds of the wheels",
+                f"have a relative error of ± {TWO_SIDED_95 * entry.speed_scale_sd_percent:.2g} % "
+                f"and are {entry.speed_delay_s:.2g} ± {TWO_SIDED_95 * entry.speed_delay_sd_s:.2g} "
+                "s late; they are not used beyond 4 m/s², where wheels slip.",
+            )
+        )
+    if entry.kind in OF_DRIVES and (entry.slip_sd_deg or entry.speed_path is not None):
+        slip = TWO_SIDED_95 * (entry.slip_sd_deg or CAR["side_slip_sd_deg"])
+        found.append(
+            (
+                "Drive before the crash",
+                f"The rear axle travels along the vehicle within {slip:.2g}°; biases, scale "
+                "factors and mounting are those of the crash.",
             )
         )
     reasons: dict[str, list[str]] = {}

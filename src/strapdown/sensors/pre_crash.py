@@ -283,6 +283,10 @@ class PreparedUnit:
         Whether the specific force at rest was corrected to the magnitude of gravity.
     gravity_correction : float, m/s²
         Correction added along the specific force at rest.
+    gyro_bias : triad, rad/s
+        Subtracted from the rates; sensor axes of this unit.
+    force_bias : triad, m/s²
+        Subtracted from the specific force of the lowest range in all; vehicle axes.
     findings : tuple of Finding
     """
 
@@ -301,6 +305,8 @@ class PreparedUnit:
     bias_sd: tuple[Triad, ...]
     gravity_matched: bool
     gravity_correction: float = 0.0
+    gyro_bias: Triad = (0.0, 0.0, 0.0)
+    force_bias: Triad = (0.0, 0.0, 0.0)
     findings: tuple[Finding, ...] = ()
 
     @property

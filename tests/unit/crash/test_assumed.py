@@ -21,8 +21,8 @@ from tests.unit.crash.assumed_case import (
 from strapdown.crash.combine_units import combine_units
 from strapdown.crash.consistency import compare_units
 from strapdown.crash.delta_v import delta_v
+from strapdown.crash.drive_entry import DriveEntry, start_from_drive
 from strapdown.crash.entry import Entry
-from strapdown.crash.gnss_entry import GnssEntry, start_from_gnss
 from strapdown.crash.measuring_point import MISSING_AXIS, NO_TURNING
 from strapdown.crash.path import sample_paths
 from strapdown.crash.preparation import Preparation, prepare_unit
@@ -305,7 +305,7 @@ class TestAnswers:
     def test_an_entry_from_a_receiver_needs_the_turning(self, straight):
         at, _ = path_of(unit_of(straight, 0, "xyz", ASSUMED))
         with pytest.raises(DataError, check=coded("crash.assumed-not-measured-nothing-carries")):
-            start_from_gnss(at, GnssEntry(pd.DataFrame()), (0.0, 0.0, 0.0))
+            start_from_drive(at, DriveEntry(pd.DataFrame()), (0.0, 0.0, 0.0))
 
     def test_three_axes_need_no_stated_levelling(self, straight):
         unit = unit_of(straight, 0, "xyz", Assumed(turn_sd_deg=3.0), uncertainty=CHANNEL)

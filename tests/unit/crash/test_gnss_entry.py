@@ -27,8 +27,8 @@ from entry_case import (
     errors_of,
 )
 
+from strapdown.crash.drive_entry import entry_state_from_gnss
 from strapdown.crash.entry_estimate import EntryPriors, FixCorrelation
-from strapdown.crash.gnss_entry import entry_state_from_gnss
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.simulation import ImuErrors, TriadErrors, car, simulate_imu

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from tests.coded import coded
 
+from strapdown.crash.drive_entry import CONTRIBUTOR, DriveEntry, start_from_drive
 from strapdown.crash.entry_estimate import FixCorrelation
-from strapdown.crash.gnss_entry import CONTRIBUTOR, GnssEntry, start_from_gnss
 from strapdown.crash.measuring_point import at_point
 from strapdown.crash.path import reconstruct_path
 from strapdown.crash.preparation import Preparation, prepare_unit
@@ -37,8 +37,8 @@ def reconstructed(seed):
     fixes.index = fixes.index - IMPACT
     own = synchronise([unit]).units[0]
     at = at_point(prepare_unit(own.unit), (0.0, 0.0, 0.0), time_sd=own.time_sd)
-    at, entry, state = start_from_gnss(
-        at, GnssEntry(fixes, window=6.0, priors=PRIORS), (0.0, 0.0, 0.0)
+    at, entry, state = start_from_drive(
+        at, DriveEntry(fixes, window=6.0, priors=PRIORS), (0.0, 0.0, 0.0)
     )
     path = reconstruct_path(at.imu, at.effects, at.levelling, None, entry)
     return at, fixes, entry, state, path
@@ -67,11 +67,17 @@ def test_speed_and_path_are_as_wrong_as_they_say(cases):
     assert (np.mean(np.square(places), axis=0) > 0.1).all()
 
 
-def test_the_budget_has_the_entry_and_no_bias_of_its_own(cases):
-    *_, path = cases[0]
+def test_the_budget_has_the_entry_and_what_is_left_of_the_unit(cases):
+    at, _, entry, _, path = cases[0]
     shares = path.variances()
-    assert CONTRIBUTOR in shares.index
-    assert "accelerometer bias" not in shares.index
+    assert {CONTRIBUTOR, "accelerometer bias", "scale factor", "mounting"} <= set(shares.index)
+    # The level at rest is no unknown: the attitude is that of the drive.
+    assert "levelling" not in shares.index
+    assert not at.effects.tilt.any()
+    # An unknown that acts on the samples and at the entry is one.
+    both = {u[0] for u in entry.unknowns} & set(at.effects.names)
+    assert len(both) > 10
+    assert len(set(path.names)) == len(path.names)
     assert np.allclose(shares.sum(), np.diagonal(path.covariance[-1]))
 
 
@@ -84,8 +90,8 @@ def test_what_the_receiver_says_of_the_crash_does_not_matter(cases):
     unit, _ = record_crash(CRASH.motion, DESIGN, impact=IMPACT, seed=1)
     own = synchronise([unit]).units[0]
     again = at_point(prepare_unit(own.unit), (0.0, 0.0, 0.0), time_sd=own.time_sd)
-    _, other, _ = start_from_gnss(
-        again, GnssEntry(wild, window=6.0, priors=PRIORS), (0.0, 0.0, 0.0)
+    _, other, _ = start_from_drive(
+        again, DriveEntry(wild, window=6.0, priors=PRIORS), (0.0, 0.0, 0.0)
     )
     assert other.velocity == entry.velocity
     assert at.name == again.name
@@ -98,7 +104,7 @@ def test_a_mean_of_units_has_no_entry_of_its_own(cases):
     with pytest.raises(
         DataError, check=coded("crash.mean-several-units-no-sensors", quantity="entry")
     ):
-        start_from_gnss(replace(at, prepared=None), GnssEntry(fixes), (0.0, 0.0, 0.0))
+        start_from_drive(replace(at, prepared=None), DriveEntry(fixes), (0.0, 0.0, 0.0))
 
 
 def test_units_that_find_their_own_biases_are_compared_with_them():
@@ -108,7 +114,7 @@ def test_units_that_find_their_own_biases_are_compared_with_them():
     fixes = simulate_gnss(CRASH.motion, RECEIVER, seed=2)
     fixes.index = fixes.index - IMPACT
     units = [record_crash(CRASH.motion, d, impact=IMPACT, seed=2)[0] for d in designs]
-    found = reconstruct_crash(units, GnssEntry(fixes, window=6.0, priors=PRIORS))
+    found = reconstruct_crash(units, DriveEntry(fixes, window=6.0, priors=PRIORS))
     assert len(found.comparison.pairs) == 1
     assert found.comparison.agree
     # Nor are ranges blamed, whose 13 g ahead come in part on the axis to the side.
@@ -125,37 +131,32 @@ def test_units_that_find_their_own_biases_are_compared_with_them():
             {"priors": {"antenna_sd": -1.0}},
             r"antenna_sd: a standard deviation of -1\.0 is negative",
         ),
-        ({"window": "10"}, "GNSS entry, window: '10' is not a number"),
-        ({"before": np.nan}, "GNSS entry, before: nan is not a number"),
+        ({"window": "10"}, "entry from the drive, window: '10' is not a number"),
+        ({"before": np.nan}, "entry from the drive, before: nan is not a number"),
     ],
 )
 def test_what_cannot_be_is_told(cases, options, words):
     _, fixes, *_ = cases[0]
     with pytest.raises(ConfigError, match=words):
-        GnssEntry(fixes, **options)
+        DriveEntry(fixes, **options)
 
 
-def test_priors_are_of_the_vehicles_axes(monkeypatch):
+def test_unknowns_are_of_the_sensors_axes():
     """A unit that is turned by 90 deg about down has its forward axis along the sensor's -y."""
     unit, _ = record_crash(CRASH.motion, DESIGN, impact=IMPACT, seed=0)
     turned = Mounting(unit.mounting.position, (0.0, 0.0, 90.0))
     own = synchronise([replace(unit, mounting=turned)]).units[0].unit
-    low, gyro = own.accelerometers[0], own.gyro
+    low = own.accelerometers[0]
     told = replace(low.uncertainty, bias=(0.1, 0.2, 0.3))
-    own = replace(
-        own,
-        accelerometers=(replace(low, uncertainty=told), *own.accelerometers[1:]),
-        gyro=replace(gyro, uncertainty=replace(gyro.uncertainty, bias=(0.01, 0.02, 0.03))),
-    )
-    at = at_point(prepare_unit(own, Preparation(levelling=(0.0, 0.0, 1.0))), (0.0, 0.0, 0.0))
-    seen = {}
-
-    def stop(*_, priors, **__):
-        seen["priors"] = priors
-        raise RuntimeError("enough")
-
-    monkeypatch.setattr("strapdown.crash.gnss_entry.entry_state_from_gnss", stop)
-    with pytest.raises(RuntimeError, match="enough"):
-        start_from_gnss(at, GnssEntry(simulate_gnss(CRASH.motion, RECEIVER)), (0.0, 0.0, 0.0))
-    assert seen["priors"].accel.axis("bias") == pytest.approx((0.2, 0.1, 0.3))
-    assert seen["priors"].gyro.axis("bias") == pytest.approx((0.02, 0.01, 0.03))
+    own = replace(own, accelerometers=(replace(low, uncertainty=told), *own.accelerometers[1:]))
+    stated = Preparation(levelling=(0.0, 0.0, 5.0), stood=(), match_gravity=False)
+    at = at_point(prepare_unit(own, stated), (0.0, 0.0, 0.0))
+    effects = at.effects
+    biases = {
+        what.axis: (what.sd, effects.force[k, 0])
+        for k, what in enumerate(effects.parameters)
+        if what is not None and what.quantity == "bias" and what.of.endswith(low.name)
+    }
+    assert [biases[axis][0] for axis in range(3)] == [0.1, 0.2, 0.3]
+    assert biases[0][1] == pytest.approx([0.0, 0.1, 0.0])
+    assert biases[1][1] == pytest.approx([-0.2, 0.0, 0.0])
