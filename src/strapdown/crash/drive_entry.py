@@ -737,6 +737,9 @@ def _calibration(
         in_crash = what.sd * math.sqrt(float(kept[column]))
         error = what.sd * (size if what.quantity == "mounting" else -size)
         error += _removed(at, what)
+        if what.quantity in ("scale", "gyro scale"):
+            # The search takes off a share of the reading; a scale factor is a share of the truth.
+            error /= 1.0 - error
         rows.append((what.quantity, what.axis, what.of, error, what.sd * own, what.sd, in_crash))
         axis = "xyz"[what.axis]
         if kept[column] == 1.0 and own < NARROWED:

@@ -82,13 +82,22 @@ class SensorErrors:
         """The same, at some of the samples."""
         return replace(self, gyro=self.gyro[kept], accel=self.accel[kept])
 
-    def about(self, course: Course, size: Array) -> SensorErrors:
-        """The effects about parameters of the size given, that are off the course already."""
-        C = rotation.dcm_from_rotation_vector(self.rotation @ size)
+    def about(self, course: Course, size: Array, bias: Array | None) -> SensorErrors:
+        """The effects about parameters of the size given, that are off the course already.
+
+        `bias`, (6,), rad/s and m/s²: off it as well, after what was read was turned. None: turns
+        and biases are taken as small.
+        """
+        whole = self.rotation @ size
+        C = rotation.dcm_from_rotation_vector(whole)
         gyro, accel = C @ self.gyro, C @ self.accel
+        # One more parameter turns by the left Jacobian of the rotation vector; to second order.
+        once = cross_matrix(np.zeros(3) if bias is None else whole)
+        bias = np.zeros(6) if bias is None else bias
+        turned = (np.eye(3) + once / 2.0 + once @ once / 6.0) @ self.rotation
         for k in np.flatnonzero(self.rotation.any(axis=0)):
-            gyro[:, :, k] = -np.cross(self.rotation[:, k], course.rate)
-            accel[:, :, k] = -np.cross(self.rotation[:, k], course.force)
+            gyro[:, :, k] = -np.cross(turned[:, k], course.rate + bias[:3])
+            accel[:, :, k] = -np.cross(turned[:, k], course.force + bias[3:])
         return replace(self, gyro=gyro, accel=accel)
 
 
@@ -623,6 +632,7 @@ class _Search:
         self.state, self.at_first = guess, guess.q_nb
         self.bias = np.zeros(6)
         self.near = False
+        self.late = 0.0
         self.further = np.zeros(0)
         self._moved = math.inf
 
@@ -728,8 +738,9 @@ class _Search:
             sensed[:, 3:],
         )
         # A mean sample belongs on average to half a step before its stamp.
-        late = 0.5 * float(np.median(np.diff(run.time))) * (imu.attrs["sampling"] == "mean")
-        return course, state_at_fixes(run, course, self.fixes.instants, late)
+        step = float(np.median(np.diff(run.time)))
+        self.late = 0.5 * step * (imu.attrs["sampling"] == "mean")
+        return course, state_at_fixes(run, course, self.fixes.instants, self.late)
 
     def _residuals(self, now: AtFixes) -> Array:
         place, velocity = antenna_motion(
@@ -754,7 +765,11 @@ class _Search:
             else self.given.rows(self.kept)
         )
         if self.further.size and self.given is not None:
-            self.errors = self.errors.about(course, self.further[: len(self.errors.sd)])
+            size = self.further[: len(self.errors.sd)]
+            # With speeds alone these terms of second order made 2 of 20 drawn drives diverge;
+            # without them all converge.
+            bias = self.bias if self.free == 6 else None
+            self.errors = self.errors.about(course, size, bias)
         q, m = len(self.errors.sd), len(fixes.instants)
         C_nb = rotation.dcm_from_quaternion(now.q_nb)
         look = np.zeros((m, ROWS, 9))
@@ -767,7 +782,14 @@ class _Search:
         # Derivatives by the constants of `OWN`.
         own = np.zeros((m, ROWS, STATES + q + OWN))
         own[:, :, : STATES + q] = look @ at_fixes(course, self.errors, fixes.instants)
-        own[:, 3:6, GYRO_BIAS] += C_nb @ rotation.cross_matrix(self.arm)
+        # A rate also swings antenna and axle about the reference point.
+        sensed = between(course.time, self.errors.gyro, fixes.instants + self.late)
+        swung = np.concatenate([np.tile(np.eye(3), (m, 1, 1)), sensed], axis=2)
+        rates = np.r_[GYRO_BIAS, STATES : STATES + q]
+        own[:, 3:6, rates] += C_nb @ rotation.cross_matrix(self.arm) @ swung
+        axle = rotation.cross_matrix(np.asarray(p.no_slip_point, dtype=np.float64))
+        if self.free == 6:
+            own[:, SIDE_SLIP:, rates] += by_point(now, p) @ axle @ swung
         more = own[:, :, STATES + q :]
         more[:, 0:3, 0:3] = C_nb
         more[:, 3:6, 0:3] = C_nb @ rotation.cross_matrix(now.rate)
@@ -1047,16 +1069,21 @@ def slips(v: Array) -> Array:
     return np.column_stack([np.arctan2(v[:, k], v[:, 0]) for k in (1, 2)])
 
 
-def by_state(now: AtFixes, C_nb: Array, priors: EntryPriors) -> Array:
-    """Derivative of the slips and of the speed by position, velocity and attitude, (m, 3, 9)."""
+def by_point(now: AtFixes, priors: EntryPriors) -> Array:
+    """Derivative of the slips and of the speed by the point's velocity, vehicle axes, (m, 3, 3)."""
     v = point_velocity(now, priors)
-    by_v = np.zeros((len(v), 3, 3))
+    out = np.zeros((len(v), 3, 3))
     for row, axis in enumerate((1, 2)):
         square = np.maximum(v[:, 0] ** 2 + v[:, axis] ** 2, 1e-6)
-        by_v[:, row, 0], by_v[:, row, axis] = -v[:, axis] / square, v[:, 0] / square
-    by_v[:, 2, 0] = 1.0
-    back = by_v @ C_nb.transpose(0, 2, 1)
-    out = np.zeros((len(v), 3, 9))
+        out[:, row, 0], out[:, row, axis] = -v[:, axis] / square, v[:, 0] / square
+    out[:, 2, 0] = 1.0
+    return out
+
+
+def by_state(now: AtFixes, C_nb: Array, priors: EntryPriors) -> Array:
+    """Derivative of the slips and of the speed by position, velocity and attitude, (m, 3, 9)."""
+    back = by_point(now, priors) @ C_nb.transpose(0, 2, 1)
+    out = np.zeros((len(back), 3, 9))
     out[:, :, 3:6] = back
     out[:, :, 6:9] = back @ rotation.cross_matrix(now.velocity)
     return out
