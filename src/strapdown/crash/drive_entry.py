@@ -537,6 +537,8 @@ def start_from_drive(
     level = rotation.dcm_from_quaternion(state.state.q_nb)
     effects, unknowns, more = _left(at, shown, best.joint, level, window)
     table, said = _calibration(at, best, priors, shown, more)
+    if given.fixes is None:
+        said.append(Finding("crash.drive-by-speeds-alone", file=at.name, quantity="delta-V"))
     state = replace(state, calibration=table, findings=(*state.findings, *said))
     north, east, down = (float(v) for v in state.state.v_n)
     roll, pitch, heading = (float(x) for x in state.roll_pitch_heading)

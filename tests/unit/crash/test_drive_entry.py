@@ -119,6 +119,7 @@ def test_speeds_show_the_mounting_and_not_more_than_the_tires(draw):
     assert found["mounting", 2][1] < 0.6
     rows = state.calibration.set_index("quantity")
     assert rows.loc["scale", "sd"].iloc[0] > 0.9 * rows.loc["speed scale", "sd"] * 0.5
+    assert "crash.drive-by-speeds-alone" in {one.code for one in state.findings}
     # In axes of the vehicle at the entry.
     assert entry.heading_deg == pytest.approx(0.0, abs=0.5) or entry.heading_deg > 359.5
     assert state.speeds["used"].any()
