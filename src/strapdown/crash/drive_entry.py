@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
@@ -389,6 +389,11 @@ BEYOND = 3.0
 NARROWED = 0.9
 # An estimate beyond so many standard deviations of what was stated contradicts it.
 SIGMAS = 4.0
+
+
+def determined(what: Mapping[Any, Any]) -> bool:
+    """Whether the drive determined the error of a row of `EntryState.calibration`."""
+    return bool(what["sd"] <= NARROWED * what["stated"])
 
 
 @dataclass(frozen=True, eq=False)

@@ -497,6 +497,8 @@ class PaperUpdate:
 HUBER = Huber()
 #: Weight of an observation that agrees with the estimate, and how many in a row show that they do.
 HALF, SETTLES = 0.5, 5
+#: Faults of receivers, as of a wrong ambiguity or by reflections, last this long at most, s.
+DOUBT = 60.0
 #: Standard deviations within which an observation that jumped agrees with the estimate again.
 CONSISTENT = 2.0
 
@@ -581,8 +583,7 @@ class AdaptiveScale:
     patience : int
         Rejections in a row after which one observation is taken by Huber's function.
     doubt : float, s
-        How long observations that jumped are rejected at most: as faults of receivers by a wrong
-        ambiguity or by reflections last.
+        How long observations that jumped are rejected at most: `DOUBT`.
     """
 
     memory: float = 100.0
@@ -591,7 +592,7 @@ class AdaptiveScale:
     highest: float = 100.0
     clip: float = 1.0
     patience: int = 10
-    doubt: float = field(default=60.0, metadata={"unit": "s"})
+    doubt: float = field(default=DOUBT, metadata={"unit": "s"})
 
     def __post_init__(self) -> None:
         for name in ("memory", "prior", "lowest", "highest", "clip", "patience", "doubt"):

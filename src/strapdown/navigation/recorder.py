@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from strapdown.dsp.true_runs import true_runs
 from strapdown.errors import ConfigError, DataError
-from strapdown.estimation.robust import AdaptiveRule
-from strapdown.navigation.measurements.gnss import PLACE
+from strapdown.estimation.robust import DOUBT, AdaptiveRule
+from strapdown.navigation.measurements.gnss import PLACE, TINY
 from strapdown.navigation.navigator import JUST_BEFORE, Navigator
 from strapdown.navigation.record import (
     CovarianceSnapshot,
@@ -41,9 +41,6 @@ Array = NDArray[np.float64]
 NEAR = 1e-6
 #: Marks before and after an observation are closer than this, s.
 PAIR = 2.0 * JUST_BEFORE
-#: Faults of receivers, as of a wrong ambiguity or by reflections, last this long at most, s.
-DOUBT = 60.0
-TINY = 1e-300
 #: A longer interval, relative to the usual, is an outage; after so many observations it is over.
 GAP, SETTLES = 5.0, 5
 

@@ -20,7 +20,7 @@ from strapdown.crash.closure import Closure, Figure
 from strapdown.crash.consistency import UnitComparison
 from strapdown.crash.crash_type import CrashType
 from strapdown.crash.delta_v_bound import EventChanges, VelocityChange
-from strapdown.crash.drive_entry import NARROWED
+from strapdown.crash.drive_entry import determined
 from strapdown.crash.entry import EntryState
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import CrashPath
@@ -292,7 +292,7 @@ def _drive(drive: EntryState) -> dict[str, Any]:
                 "by_drive": _about(what["error"] / size, half),
                 "stated_half_width": stated,
                 "in_crash_half_width": kept,
-                "determined": bool(what["sd"] <= NARROWED * what["stated"]),
+                "determined": determined(what),
             }
         )
     fixes, speeds = drive.fixes, drive.speeds

@@ -11,7 +11,7 @@ from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.crash.case import CaseResult, ReferenceAnswer, main_event
 from strapdown.crash.closure import Figure
 from strapdown.crash.delta_v_bound import VelocityChange
-from strapdown.crash.drive_entry import NARROWED
+from strapdown.crash.drive_entry import determined
 from strapdown.crash.pdof import AngleInterval, Pdof
 from strapdown.report.document import TableBlock
 from strapdown.report.values import (
@@ -576,7 +576,7 @@ def drive_table(result: CaseResult) -> TableBlock | None:
         for what in unit.drive.calibration.to_dict("records"):
             symbol, size, names = DRIVE_QUANTITIES[what["quantity"]]
             name = names[what["axis"]]
-            if what["sd"] > NARROWED * what["stated"]:
+            if not determined(what):
                 open_ones.append(" ".join((what["of"], name)))
                 continue
             half, stated, kept = (

@@ -209,17 +209,16 @@ MOVES = 5.0
 def _moves(tables: Mapping[str, pd.DataFrame], begin: float, end: float) -> bool:
     """Whether positions show that the body moves; medians, for single fixes may be wrong."""
     for table in tables.values():
-        if not {*GEODETIC, *POSITION_SD} <= set(table.columns):
+        if not {*GEODETIC, *POSITION_SD, "quality"} <= set(table.columns):
             continue
-        part = table[(table.index >= begin) & (table.index <= end)]
-        place, sd = part[GEODETIC].to_numpy(), part[POSITION_SD[:2]].to_numpy()
-        known = np.isfinite(place).all(axis=1) & np.isfinite(sd).all(axis=1)
-        if known.sum() < 2:
+        within = (table.index >= begin) & (table.index <= end)
+        part = table[within & usable(table, POSITION_SD[:2])]
+        if len(part) < 2:
             continue
-        apart = place_difference(place[known], place[known][0])[:, :2]
-        first, second = np.array_split(apart, 2)
+        place = values_of(part, GEODETIC)
+        first, second = np.array_split(place_difference(place, place[0])[:, :2], 2)
         way = float(np.hypot(*(np.median(second, axis=0) - np.median(first, axis=0))))
-        if way > MOVES * float(np.median(sd[known])):
+        if way > MOVES * float(np.median(values_of(part, POSITION_SD[:2]))):
             return True
     return False
 
