@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +22,8 @@ from numpy.typing import ArrayLike
 
 from strapdown.config.spec import specify
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
+from strapdown.formats import holds
+from strapdown.formats.aid_table import read_stream
 from strapdown.formats.gnss_files import read_gnss as read_gnss_table
 from strapdown.formats.gnss_fixes import GnssOptions
 from strapdown.formats.recording import ABSENT
@@ -179,7 +182,7 @@ class GnssFixes(_Table):
 
 
 class Streams(Mapping[str, pd.DataFrame]):
-    """The streams of one recording by name: ``imu``, ``gnss``, ``reference``.
+    """The streams of one recording by name, of ``imu``, ``gnss``, ``reference`` and others.
 
     Parameters
     ----------
@@ -370,7 +373,9 @@ def read(path: str | Path) -> Streams:
     -------
     Streams
         ``imu``; ``gnss``, if it has fixes; ``reference``, an Attitude table of a log with a truth,
-        or a Trajectory.
+        or a Trajectory; ``magnetometer``, ``barometer`` and ``wheel``, where they are apart from
+        the inertial sensors: ``mag_x mag_y mag_z`` in µT along the sensor's own axes, ``pressure``
+        in Pa, ``speed`` in m/s.
 
     Raises
     ------
@@ -385,7 +390,14 @@ def read(path: str | Path) -> Streams:
 
     tables: dict[str, pd.DataFrame] = {}
     refused: dict[str, StrapdownError] = {}
-    for stream, table_of in (("imu", read_imu), ("gnss", fixes), ("reference", read_trajectory)):
+    others = [s for s in ("magnetometer", "barometer", "wheel") if holds(Path(path), s)]
+    readers: dict[str, Callable[[str | Path], pd.DataFrame]] = {
+        "imu": read_imu,
+        "gnss": fixes,
+        "reference": read_trajectory,
+        **{stream: partial(read_stream, stream=stream) for stream in others},
+    }
+    for stream, table_of in readers.items():
         if stream in tables:
             continue
         try:

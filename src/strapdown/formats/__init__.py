@@ -91,6 +91,7 @@ __all__ = [
     "Reader",
     "Recording",
     "files_of",
+    "holds",
     "open_stream",
     "read_joined",
     "read_log",
@@ -372,6 +373,12 @@ def open_stream(path: str | Path, stream: str, form: str | None = None) -> Raw:
                     "io.not-of-format", file=path.name, title=reader.title, reason=repr(error)
                 ) from None
     raise NoStreamError(path.name, stream, reader.title, list(reader.streams))
+
+
+def holds(path: Path, stream: str) -> bool:
+    """Whether a recording is of a format that may hold a stream, beside the columns of a table."""
+    _, reader = reader_of(path)
+    return reader is not None and stream in reader.streams
 
 
 def files_of(path: str | Path) -> tuple[Path, ...]:

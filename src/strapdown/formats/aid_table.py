@@ -10,13 +10,22 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.formats import csv, foot_mounted, parquet, read_raw
+from strapdown.formats import csv, foot_mounted, holds, open_stream, parquet, read_raw, reader_of
+from strapdown.formats.arrays import ticks_of
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, unrolled, with_clock
 from strapdown.formats.columns import CLOCKS, TIMES
 from strapdown.formats.quantity_columns import Quantity, find_quantities
-from strapdown.formats.recording import RawLog
+from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.tables import NED, POSITION_SD
-from strapdown.units import ANGLES, GYRO_UNITS, LENGTHS, PRESSURES, SPEEDS, TIME_UNITS
+from strapdown.units import (
+    ANGLES,
+    GYRO_UNITS,
+    LENGTHS,
+    MAG_UNITS,
+    PRESSURES,
+    SPEEDS,
+    TIME_UNITS,
+)
 
 __all__ = [
     "POINT",
@@ -25,6 +34,7 @@ __all__ = [
     "read_aid_table",
     "read_control_points",
     "read_reference_path",
+    "read_stream",
 ]
 
 
@@ -57,27 +67,41 @@ def read_aid_table(
     columns: Mapping[str, str],
     *,
     optional: Sequence[str] = (),
+    instead: tuple[str, str] | None = None,
     names: Mapping[str, str] | None = None,
     repair: bool = False,
+    stream: str = "",
 ) -> pd.DataFrame:
     """Read the measurements of an aiding sensor.
 
     `path`: text table or Parquet with column names, which may carry a unit: ``speed_km_h``,
-    ``Pressure [hPa]``, ``heading_sd_deg``. `columns`: required column to its unit, a key of
-    `UNITS`. A column that ends in ``_sd`` is the standard deviation of the column before it, and
-    must be positive where given. `optional`: those of `columns` that may be missing. `names`:
-    column of the table to its name in the file, or its number, from 1. `repair`: drop and count
-    rows that cannot be used, instead of refusing the file. Returns indexed by ``time`` s, with the
-    `columns` that were found, in their units; ``attrs`` has the clock (`clocks`), ``source`` and
-    ``findings``. ConfigError: the file does not exist, or `names` names a column that it does not
-    have. DataError: a column is missing, a unit does not fit, a value is not a number, a standard
+    ``Pressure [hPa]``, ``heading_sd_deg``; or a recording with the `stream`. `columns`: required
+    column to its unit, a key of `UNITS`. A column that ends in ``_sd`` is the standard deviation of
+    the column before it, and must be positive where given. `optional`: those of `columns` that may
+    be missing. `instead`: column, and its unit, that is read where the first one is missing.
+    `names`: column of the table to its name in the file, or its number, from 1. `repair`: drop and
+    count rows that cannot be used, instead of refusing the file. `stream`: of `formats.STREAMS`,
+    read from a recording that holds it. Returns indexed by ``time`` s, with the `columns` that were
+    found, in their units; ``attrs`` has the clock (`clocks`), ``source`` and ``findings``.
+    ConfigError: the file does not exist, or `names` names a column that it does not have.
+    DataError: a column is missing, a unit does not fit, a value is not a number, a standard
     deviation is not positive, or time does not advance; the message names the row.
     """
     path = Path(path)
-    raw = _raw(path)
+    raw = _raw(path, stream)
+    wanted = {**columns, **dict([instead] if instead is not None else [])}
+    units = {c: u for c, (_, u) in raw.stated.items() if u is not None}
+    stated = {q: c for c, (q, _) in raw.stated.items() if q == "time" or q in wanted}
     known = {"time": Quantity((*TIMES, *CLOCKS, "utc", "datetime", "date"), TIME_UNITS)}
-    known |= {name: Quantity(_words(name), UNITS[unit]) for name, unit in columns.items()}
-    found = find_quantities(raw.columns, known, names or {}, raw.name, raw.units)
+    known |= {name: Quantity(_words(name), UNITS[unit]) for name, unit in wanted.items()}
+    asked = {**stated, **(names or {})}
+    found = find_quantities(raw.columns, known, asked, raw.name, {**raw.units, **units})
+    if instead is not None:
+        of = next(iter(columns))
+        if of in found:
+            found.pop(instead[0], None)
+        elif instead[0] in found:
+            columns = {instead[0]: instead[1], **{q: u for q, u in columns.items() if q != of}}
     missing = [q for q in ("time", *columns) if q not in found and q not in optional]
     if missing:
         needed = [q for q in ("time", *columns) if q not in optional]
@@ -118,9 +142,52 @@ def read_aid_table(
     return with_clock(table, Clock(clock))
 
 
-def _raw(path: Path) -> RawLog:
+#: Units of the quantities of other sensors, with the one that a table has.
+_STREAM_UNITS = {
+    "mag": (MAG_UNITS, "uT"),
+    "pressure": (PRESSURES, "Pa"),
+    "speed": (SPEEDS, "m/s"),
+    "height": (LENGTHS, "m"),
+}
+
+
+def read_stream(path: str | Path, stream: str, form: str | None = None) -> pd.DataFrame:
+    """Read a stream of another sensor: ``magnetometer``, ``barometer`` or ``wheel``.
+
+    `path`, `stream`, `form`: as `open_stream`. Returns indexed by ``time`` s, on the file's clock,
+    with what the file states: ``mag_x mag_y mag_z`` in µT, ``pressure`` in Pa, ``speed`` in m/s,
+    ``temperature`` in °C; along the sensor's own axes. ``attrs`` has the clock, ``source``,
+    ``findings``, and ``units`` by column. NoStreamError: the recording does not have it.
+    DataError: it has no stamps, or as `open_stream`.
+    """
+    raw = open_stream(path, stream, form)
+    stated = {q: (c, u) for c, (q, u) in raw.stated.items()} if isinstance(raw, RawLog) else {}
+    if not isinstance(raw, RawLog) or "time" not in stated:
+        _, reader = reader_of(Path(path))
+        title = reader.title if reader is not None else ""
+        raise NoStreamError(Path(path).resolve().name, stream, title, ["imu"])
+    name, unit = stated.pop("time")
+    ticks, dated = ticks_of(raw, name, unit)
+    time = np.asarray(ticks * (1e-9 if dated else TIME_UNITS.get(unit or "s", 1.0)), np.float64)
+    values, units = {}, {}
+    for quantity, (source, own) in stated.items():
+        known, si = _STREAM_UNITS.get(quantity.partition("_")[0], ({}, own))
+        factor = known.get(own or "")
+        column = raw.columns[source]
+        values[quantity] = column if factor is None else column * factor
+        units[quantity] = own if factor is None else si
+    table = pd.DataFrame(values, index=pd.Index(time, name="time"))
+    table.attrs |= {"source": raw.name, "findings": tuple(raw.findings), "units": units}
+    return with_clock(table, Clock(raw.clock or RELATIVE))
+
+
+def _raw(path: Path, stream: str) -> RawLog:
     if not path.exists():
         raise ConfigError("io.no-such-file", file=str(path))
+    if stream and holds(path, stream):
+        raw = open_stream(path, stream)
+        assert isinstance(raw, RawLog)  # of a sensor
+        return raw
     if path.is_dir():
         raise DataError(
             "io.folder",

@@ -31,8 +31,8 @@ from strapdown.formats import (
     open_stream,
     reader_of,
 )
-from strapdown.formats.arrays import ticks_of
-from strapdown.formats.clocks import RELATIVE, clock_of, on_clock_of
+from strapdown.formats.aid_table import read_stream
+from strapdown.formats.clocks import clock_of, on_clock_of
 from strapdown.formats.crash_records import read_crash_record
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.gnss_fixes import GnssOptions
@@ -52,7 +52,6 @@ from strapdown.systems.navigation_proposal import CODE_POSITION_SD, CODE_VELOCIT
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GYRO, POSITION_SD, find_gaps
 from strapdown.tables.checks import index_of, values_of
-from strapdown.units import TIME_UNITS
 
 __all__ = ["USES", "Diagnosis", "LogDiagnosis", "refused_fixes", "run_doctor"]
 
@@ -409,31 +408,14 @@ def _others(
         if name not in held:
             continue
         try:
-            raw = open_stream(log.path, name, log.format)
+            streams[name] = read_stream(log.path, name, log.format)
+            findings += streams[name].attrs["findings"]
         except NoStreamError:
             continue
         except DataError as error:
             findings.append(error.finding.replace(severity="warning"))
-            continue
-        if isinstance(raw, RawLog) and (table := _table(raw)) is not None:
-            streams[name] = table
     # A stream that shares the reading of another has its findings, too.
     return streams, list(dict.fromkeys(findings))
-
-
-def _table(raw: RawLog) -> pd.DataFrame | None:
-    """Return the stated quantities of a stream by time in s; None without stamps."""
-    stated = {quantity: (name, unit) for name, (quantity, unit) in raw.stated.items()}
-    if "time" not in stated:
-        return None
-    name, unit = stated.pop("time")
-    ticks, dated = ticks_of(raw, name, unit)
-    time = ticks * (1e-9 if dated else TIME_UNITS.get(unit or "s", 1.0))
-    columns = {q: raw.columns[source] for q, (source, _) in stated.items() if source in raw.columns}
-    table = pd.DataFrame(columns, index=pd.Index(np.asarray(time, dtype=np.float64), name="time"))
-    table.attrs |= {"source": raw.name, "findings": (), "clock": raw.clock or RELATIVE}
-    table.attrs["units"] = {q: u for q, (_, u) in stated.items()}
-    return table
 
 
 def _columns(path: str, form: str) -> RawLog | None:

@@ -42,6 +42,11 @@ __all__ = ["STANCE", "STANDING", "draft_navigation", "first_stand", "on_foot", "
 
 #: Finding of a kind of sampling that is not stated; turns are means over so many seconds.
 UNSTATED, STEADY = "io.sampling-taken-as-instantaneous", 0.5
+#: Errors of other sensors in the recording, as comments of their tables.
+LASTING_ERRORS = {
+    "barometer": "gusts, and the wind of travel",
+    "odometer": "slip, a bus that is late, and lever_arm_m, which is taken as zero",
+}
 #: Other measurements, as comments.
 OTHER_AIDS = ("no_slip", "zero_velocity", "odometer", "barometer")
 
@@ -296,7 +301,13 @@ def _aids(page: Page, made: Proposal, folder: Path, foot: bool) -> list[str]:
             if "clock_steps_s" in aid:
                 page.say("Found: stamps from the first of each pair on are too late by the second.")
                 page.key("clock_steps_s", toml_value(aid["clock_steps_s"]) or "")
-            _with_remarks(page)
+            if aid["kind"] == "gnss":
+                _with_remarks(page)
+            else:
+                page.say(
+                    "Found in the recording. The standard deviation of a row: its scatter, and "
+                    f"errors that last: {LASTING_ERRORS[aid['kind']]}."
+                )
         for key, what, usual in (
             ("position_sd_m", "place, m", POSITION_SDS),
             ("velocity_sd_m_per_s", "velocity, m/s", VELOCITY_SDS),
@@ -322,14 +333,16 @@ def _aids(page: Page, made: Proposal, folder: Path, foot: bool) -> list[str]:
         )
         for line in WHEELS:
             page.say(line)
-    page.say(*_other(slot, OTHER_AIDS))
+    aids = made.table.get("aiding", {})
+    page.say(*_other(slot, [kind for kind in OTHER_AIDS if kind not in aids]))
     if foot:
         began = made.table["log"].get("from_s")
         if began is not None and began > index_of(made.imu)[0]:
             return [f"it moves where it begins; its first stance, at {began:.6g} s, is the start"]
         return [f"stationary for the first {made.rest:.3g} s"]
+    others = [f"{kind} in the recording, proposed beside" for kind in LASTING_ERRORS if kind in aids]
     if made.gnss is None:
-        return []
+        return others
     time, own = index_of(made.gnss), index_of(made.imu)
     within = int(((time >= own[0]) & (time <= own[-1])).sum())
     told = [f"{made.gnss.attrs['source']}: {within} of {len(time)} fixes within the log"]
@@ -340,7 +353,7 @@ def _aids(page: Page, made: Proposal, folder: Path, foot: bool) -> list[str]:
         )
     if made.rest >= 1.0:
         told.append(f"stationary for the first {made.rest:.4g} s, by the sensors and the fixes")
-    return told
+    return [*told, *others]
 
 
 def _with_remarks(page: Page) -> None:

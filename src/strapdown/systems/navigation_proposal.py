@@ -49,6 +49,7 @@ from strapdown.navigation.measurements.gnss_readiness import (
 from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV, load_sensor
 from strapdown.sensors.rest import LEAST_LENGTH, find_rests_of_every_grade
 from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty, stated_imu
+from strapdown.systems.aid_proposal import propose_aids
 from strapdown.systems.alignment_source import body_record
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
@@ -293,6 +294,10 @@ def propose(
                 **clock,
             }
         }
+    others, of_others = propose_aids(log, recording.imu, fixes)
+    if others:
+        table["aiding"] = {**table.get("aiding", {}), **others}
+    findings = (*findings, *(one for one in of_others if one not in findings))
     return Proposal(table, recording, imu, fixes, rest, noise, guessed, drives, how, findings)
 
 

@@ -14,7 +14,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.bundle.seal import InputFiles, input_files, sensor_file
-from strapdown.config.choice import SLOTS
+from strapdown.config.choice import SLOTS, options_of
 from strapdown.config.navigation import AidSpec, NavigationSpec, ReceiverTable
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError, DataError, DivergenceError, Finding
@@ -208,8 +208,24 @@ def read_aid(given: AidSpec) -> pd.DataFrame:
     assert issubclass(entry, TabulatedMeasurement)
     if set(entry.columns) == set(GNSS):
         return read_gnss(given.path, given.options())
-    units = entry.column_units()
-    return read_aid_table(given.path, units, names=given.columns, repair=given.repair)
+    aid = given.make()
+    assert isinstance(aid, TabulatedMeasurement)
+    stated = aid.sd_options()
+    table = read_aid_table(
+        given.path,
+        aid.column_units(),
+        optional=tuple(stated),
+        instead=aid.instead,
+        names=given.columns,
+        repair=given.repair,
+        stream=aid.stream,
+    )
+    for column, option in stated.items():
+        if column not in table and getattr(aid, option) == 0.0:
+            key = next(o.key for o in options_of(entry) if o.field == option)
+            file = table.attrs["source"]
+            raise DataError("navigation.aid-without-sd", file=file, quantity=column, key=key)
+    return aid.converted(table)
 
 
 # Fixes of a simulated receiver, with specified outages and outliers.

@@ -22,8 +22,8 @@ from strapdown.navigation.measurements.measurement import (
     check_numbers,
 )
 from strapdown.rotation import cross_matrix
-from strapdown.tables.aiding import BAROMETER, check_barometer
-from strapdown.tables.checks import index_of, values_of
+from strapdown.tables.aiding import BAROMETER, barometer_from_pressure, check_barometer
+from strapdown.tables.checks import index_of, source_of, values_of
 
 __all__ = ["Barometer"]
 
@@ -47,6 +47,11 @@ class Barometer(TabulatedMeasurement):
     ----------
     lever_arm : tuple of float, m
         From the inertial sensors to the barometer, body axes.
+    height_sd : float, m
+        Of the noise of each height, where the file does not state it.
+    interval : float, s
+        More than zero: the rows of a file within each such time are one, their mean. Errors that
+        last are not averaged away, and each row costs an update of the filter.
     bias_sd : float, m
         At the start; by default of an absolute pressure: 10 hPa of weather, 84 m, and a geoid that
         is up to 106 m from the ellipsoid, usually 30 m.
@@ -57,6 +62,8 @@ class Barometer(TabulatedMeasurement):
     """
 
     lever_arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    height_sd: float = field(default=0.0, metadata={"unit": "m"})
+    interval: float = field(default=0.0, metadata={"unit": "s"})
     bias_sd: float = field(default=90.0, metadata={"unit": "m"})
     walk: float = field(default=5.0, metadata={"unit": "m_per_sqrt_h"})
     correlation_time: float = field(default=0.0, metadata={"unit": "s"})
@@ -65,10 +72,12 @@ class Barometer(TabulatedMeasurement):
     summary: ClassVar[str] = "heights by the pressure of the air, with their bias"
     source: ClassVar[str] = "Groves (2013), sec. 6.2; US Standard Atmosphere (1976)"
     columns: ClassVar[tuple[str, ...]] = tuple(BAROMETER)
+    instead: ClassVar[tuple[str, str] | None] = ("pressure", "Pa")
+    stream: ClassVar[str] = "barometer"
 
     def __post_init__(self) -> None:
         check_numbers(self, "lever_arm", 3)
-        for name in ("bias_sd", "walk", "correlation_time"):
+        for name in ("height_sd", "interval", "bias_sd", "walk", "correlation_time"):
             check_number(self, name, low=0.0)
 
     def states(self) -> tuple[SensorStates, ...]:
@@ -77,6 +86,22 @@ class Barometer(TabulatedMeasurement):
         if self.correlation_time > 0.0:
             return (gauss_markov(bias, self.correlation_time),)
         return (random_walk(bias, self.walk / HOUR**0.5),)
+
+    def converted(self, table: pd.DataFrame) -> pd.DataFrame:
+        """Return a file's table with heights, by the standard atmosphere where it has pressures."""
+        if "height" in table:
+            out = super().converted(table)
+        else:
+            pressure = values_of(table, ["pressure"])[:, 0]
+            out = barometer_from_pressure(index_of(table), pressure, 1.0, source_of(table))
+            # In metres, as of the option, whatever the pressure is.
+            out = out.assign(height_sd=np.asarray(table.get("height_sd", self.height_sd)))
+        if self.interval > 0.0:
+            time = index_of(out)
+            of = np.floor((time - time[0]) / self.interval)
+            out = out.assign(time=time).groupby(of).mean().set_index("time")
+        out.attrs = {**table.attrs}
+        return out
 
     def epochs(self, table: pd.DataFrame) -> Epochs:
         """Return an epoch for each measured height; see `TabulatedMeasurement.epochs`."""

@@ -44,6 +44,8 @@ class Heading(TabulatedMeasurement):
         from the left antenna to the right one.
     added_deg : float, deg
         Added to the reading: the declination, east positive, of a magnetic heading.
+    heading_sd_deg : float, deg
+        Of the noise of each heading, where the file does not state it.
     misalignment_sd_deg : float, deg
         More than zero adds the state ``NAME.misalignment``: reading − truth.
     steepest_deg : float, deg
@@ -53,6 +55,7 @@ class Heading(TabulatedMeasurement):
 
     axis_deg: float = 0.0
     added_deg: float = 0.0
+    heading_sd_deg: float = 0.0
     misalignment_sd_deg: float = 0.0
     steepest_deg: float = 80.0
 
@@ -64,7 +67,8 @@ class Heading(TabulatedMeasurement):
     def __post_init__(self) -> None:
         for name in ("axis_deg", "added_deg"):
             check_number(self, name, low=-360.0, high=360.0)
-        check_number(self, "misalignment_sd_deg", low=0.0)
+        for name in ("heading_sd_deg", "misalignment_sd_deg"):
+            check_number(self, name, low=0.0)
         check_number(self, "steepest_deg", low=0.0, high=89.0, above=True)
 
     def states(self) -> tuple[SensorStates, ...]:

@@ -116,16 +116,35 @@ COLUMN_UNITS |= dict.fromkeys(("vx", "vy", "vz"), "m/s")
 class TabulatedMeasurement(Measurement):
     """An aid with a table of measurements."""
 
-    #: Columns that its table must have.
+    #: Columns that its table must have; a standard deviation may be an option of the same name.
     columns: ClassVar[tuple[str, ...]] = ()
     #: Units of its columns, where their names do not tell them (`COLUMN_UNITS`).
     units: ClassVar[Mapping[str, str]] = MappingProxyType({})
+    #: Column from which the first one follows (`converted`), with its unit.
+    instead: ClassVar[tuple[str, str] | None] = None
+    #: Stream of a recording that has its measurements, of `formats.STREAMS`.
+    stream: ClassVar[str] = ""
 
     @classmethod
     def column_units(cls) -> dict[str, str]:
         """Unit of each column; empty for one that keeps its unit."""
         known = {c: COLUMN_UNITS.get(c.removesuffix("_sd"), "") for c in cls.columns}
         return {**known, **cls.units}
+
+    def converted(self, table: pd.DataFrame) -> pd.DataFrame:
+        """Return a file's table with the columns of its kind: of a height, by the pressure.
+
+        Standard deviations that the file lacks are those of the options.
+        """
+        sds = {c: getattr(self, option) for c, option in self.sd_options().items()}
+        missing = {c: sd for c, sd in sds.items() if c not in table}
+        return table.assign(**missing) if missing else table
+
+    def sd_options(self) -> dict[str, str]:
+        """Fields that state the standard deviations of a file without them, by column."""
+        fields = {c: (c, f"{c}_deg") for c in self.columns if c.endswith("_sd")}
+        found = {c: [f for f in names if hasattr(self, f)] for c, names in fields.items()}
+        return {c: names[0] for c, names in found.items() if names}
 
     @abstractmethod
     def epochs(self, table: pd.DataFrame) -> Epochs:

@@ -224,6 +224,8 @@ class Odometer(TabulatedMeasurement):
         along the wheel.
     mounting_of : str
         Name of another aid, as one of kind no_slip, whose estimated mounting is used.
+    speed_sd : float, m/s
+        Of the noise of each speed, where the file does not state it.
     scale_sd : float
         Of the scale factor, as by wear, pressure and load of a tire; more than zero adds the
         state ``NAME.scale``.
@@ -236,6 +238,7 @@ class Odometer(TabulatedMeasurement):
     pitch_deg: float = 0.0
     yaw_deg: float = 0.0
     mounting_of: str = ""
+    speed_sd: float = field(default=0.0, metadata={"unit": "m_per_s"})
     scale_sd: float = 0.02
     least_speed: float = 0.0
 
@@ -243,12 +246,13 @@ class Odometer(TabulatedMeasurement):
     summary: ClassVar[str] = "speed of a wheel, with its scale factor"
     source: ClassVar[str] = "Groves (2013), sec. 16.2"
     columns: ClassVar[tuple[str, ...]] = tuple(ODOMETER)
+    stream: ClassVar[str] = "wheel"
 
     def __post_init__(self) -> None:
         check_numbers(self, "lever_arm", 3)
         for name in ("roll_deg", "pitch_deg", "yaw_deg"):
             check_number(self, name, low=-360.0, high=360.0)
-        for name in ("scale_sd", "least_speed"):
+        for name in ("speed_sd", "scale_sd", "least_speed"):
             check_number(self, name, low=0.0)
         check_other_name(self, "mounting_of")
 

@@ -1,0 +1,145 @@
+"""Streams of other sensors in a recording: read with it, proposed, and used."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from functools import cache
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import chi2
+from tests.aiding_sensors import PressureHeight, simulate_barometer
+from tests.coded import coded
+from tests.town_drive import RATE, motion
+
+import strapdown as sd
+from strapdown.config.alignment import LogTable
+from strapdown.config.choice import Kinds
+from strapdown.config.navigation import AidSpec, NavigationSpec
+from strapdown.errors import DataError
+from strapdown.formats.aid_table import read_stream
+from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
+from strapdown.simulation import simulate_imu
+from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
+from strapdown.systems.aid_proposal import propose_aids
+from strapdown.systems.navigation_draft import draft_navigation
+from strapdown.systems.navigation_proposal import propose
+from strapdown.systems.navigation_run import run_navigation
+from strapdown.systems.navigation_source import read_aid
+from strapdown.tables.aiding import standard_slope
+
+#: Scatter of a pressure, Pa, and of positions, m: that of the height is what a code receiver has.
+SCATTER, PLACE_SD = 3.0, (2.0, 2.0, 6.0)
+
+
+def pressure_at(height):
+    """Invert the standard atmosphere of Groves (2013), Eq. (6.18), by its geopotential height."""
+    height = np.asarray(height)
+    return 101325.0 * (1.0 - 0.0065 * 6_356_766.0 * height / (6_356_766.0 + height) / 288.15) ** (
+        9.80665 / (287.05287 * 0.0065)
+    )
+
+
+def measured():
+    return simulate_barometer(motion(), PressureHeight(rate=10.0, noise=0.01, bias=-40.0), seed=3)
+
+
+@cache
+def streams():
+    errors = ImuErrors(
+        TriadErrors(noise_density=1e-4, bias=(1e-4, -1e-4, 1e-4)),
+        TriadErrors(noise_density=1e-3, bias=(0.02, -0.01, 0.02)),
+    )
+    imu, _ = simulate_imu(motion(), errors, rate=RATE, sampling="mean", seed=1)
+    receiver = GnssReceiver(rate=1.0, position_noise=PLACE_SD, velocity_noise=(0.1, 0.1, 0.2))
+    fixes = simulate_gnss(motion(), receiver, seed=2)
+    heights = measured()
+    pressure = pressure_at(heights["height"].to_numpy())
+    pressure += SCATTER * np.random.default_rng(4).standard_normal(len(pressure))
+    barometer = pd.DataFrame({"pressure": pressure}, index=heights.index)
+    return {"imu": imu, "gnss": fixes, "barometer": barometer}
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    path = tmp_path_factory.mktemp("bag") / "drive.mcap"
+    sd.write(streams(), path, epoch=datetime(2024, 5, 1, tzinfo=UTC))
+    return path
+
+
+def test_every_stream_is_read_with_the_recording(recording):
+    read = sd.read(recording)
+    assert list(read) == ["imu", "gnss", "barometer"]
+    assert read["barometer"].attrs["units"] == {"pressure": "Pa"}
+    made = streams()["barometer"]
+    np.testing.assert_array_equal(read["barometer"]["pressure"], made["pressure"])
+    since = read["barometer"].index - read["barometer"].index[0]
+    np.testing.assert_allclose(since, made.index - made.index[0], atol=1e-6)
+
+
+def test_the_noise_of_a_height_is_its_scatter_and_what_lasts(recording):
+    log = LogTable(path=str(recording))
+    imu = sd.read_imu(recording)
+    tables, findings = propose_aids(log, imu, None)
+    assert list(tables) == ["barometer"]
+    assert not findings
+    # Means of ten rows of 3 Pa, 0.08 m; gusts of 0.5 m over 30 s, in rows of 1 s, are 0.5 m √60.
+    scatter = -SCATTER / np.sqrt(10.0) * standard_slope(streams()["barometer"]["pressure"]).mean()
+    expected = np.hypot(scatter, 0.5 * np.sqrt(2.0 * 30.0 / 1.0))
+    assert tables["barometer"]["height_sd_m"] == pytest.approx(expected, rel=0.05)
+
+
+def test_a_barometer_is_proposed_and_holds_the_height(recording, tmp_path):
+    draft = draft_navigation(LogTable(path=str(recording)), folder=tmp_path, axes="x,-y,-z")
+    made = tmp_path / "navigate.toml"
+    made.write_text(draft.text, encoding="utf-8")
+    spec = NavigationSpec.read(made)
+    assert {name: aid.kind for name, aid in spec.aiding.items()} == {
+        "gnss": "gnss",
+        "barometer": "barometer",
+    }
+    without = spec.model_copy(update={"aiding": {"gnss": spec.aiding["gnss"]}})
+    alone, run = run_navigation(without), run_navigation(spec)
+    at = np.linspace(45.0, 180.0, 10)
+    truth = motion().trajectory(at)["alt"].to_numpy()
+    error = np.interp(at, run.trajectory.index, run.trajectory["alt"]) - truth
+    bound = np.interp(at, run.sd.index, run.sd["down"])
+    # At most ten independent instants: errors of the height last.
+    assert np.square(error / bound).sum() < chi2.ppf(1.0 - 1e-4, at.size)
+    assert bound.mean() < np.interp(at, alone.sd.index, alone.sd["down"]).mean()
+    assert propose(LogTable(path=str(recording)), axes="x,-y,-z").drives
+
+
+def test_a_table_of_pressures_needs_its_noise_and_nothing_else(tmp_path):
+    table = streams()["barometer"]
+    path = tmp_path / "air.csv"
+    hectopascals = pd.DataFrame({"time_s": table.index, "p (hPa)": table["pressure"] / 100.0})
+    hectopascals.to_csv(path, index=False)
+    aid = {"kind": "barometer", "path": str(path)}
+    made = Kinds("aiding", base=AidSpec)
+    heights = read_aid(made({**aid, "height_sd_m": 2.0}))
+    assert (heights["height_sd"] == 2.0).all()
+    # 3 Pa are 0.25 m: of 1817 rows none is five of its standard deviations off.
+    np.testing.assert_allclose(heights["height"], measured()["height"], atol=5.0 * 0.26)
+    with pytest.raises(DataError, check=coded("navigation.aid-without-sd")) as error:
+        read_aid(made(aid))
+    assert error.value.finding.data["key"] == "height_sd_m"
+
+
+def test_a_stream_that_is_not_there_is_left_out(recording):
+    with pytest.raises(DataError, check=coded("io.no-stream")):
+        read_stream(recording, "wheel")
+
+
+def test_rows_are_averaged_over_an_interval(tmp_path):
+    path = tmp_path / "air.csv"
+    time = np.arange(20) / 4.0
+    pd.DataFrame({"time_s": time, "height_m": 3.0 + 2.0 * time, "height_sd_m": 0.5}).to_csv(
+        path, index=False
+    )
+    made = Kinds("aiding", base=AidSpec)
+    table = read_aid(made({"kind": "barometer", "path": str(path), "interval_s": 1.0}))
+    np.testing.assert_allclose(table.index, np.arange(5) + 0.375, rtol=1e-15)
+    np.testing.assert_allclose(table["height"], 3.0 + 2.0 * table.index, rtol=1e-15)
+    assert (table["height_sd"] == 0.5).all()
