@@ -340,7 +340,9 @@ def _aids(page: Page, made: Proposal, folder: Path, foot: bool) -> list[str]:
         if began is not None and began > index_of(made.imu)[0]:
             return [f"it moves where it begins; its first stance, at {began:.6g} s, is the start"]
         return [f"stationary for the first {made.rest:.3g} s"]
-    others = [f"{kind} in the recording, proposed beside" for kind in LASTING_ERRORS if kind in aids]
+    others = [
+        f"{kind} in the recording, proposed beside" for kind in LASTING_ERRORS if kind in aids
+    ]
     if made.gnss is None:
         return others
     time, own = index_of(made.gnss), index_of(made.imu)
