@@ -1,4 +1,4 @@
-"""Simulated measurements of barometer, velocity log, compass and odometer on a motion."""
+"""Simulated barometer, velocity log, compass, odometer and magnetometer on a motion."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from strapdown.sensors.triad_errors import ZERO, Triad
 from strapdown.simulation.earth_motion import EarthMotion
 from strapdown.simulation.gnss import instants, motion_of_point, velocity_of_point
 from strapdown.tables import (
+    EULER,
+    MAG,
     barometer_table,
     body_velocity_table,
     heading_table,
@@ -197,3 +199,55 @@ def simulate_odometer(
     forward = velocity @ rotation.dcm_from_euler(wheel.angles_deg)[0]
     noise = wheel.noise * normal(seed, _ODOMETER_NOISE, len(time), axes=1)[:, 0]
     return odometer_table(time, (1.0 + wheel.scale) * forward + noise, wheel.noise, source)
+
+
+# Magnetometer.
+
+_FIELD_NOISE = 0
+
+
+@dataclass(frozen=True)
+class FieldSensor:
+    """Error model of a magnetometer: ``C_bn (field + deviation) + hard iron + noise``, body axes.
+
+    Attributes
+    ----------
+    rate : float, Hz
+    field_ned : triad, uT
+    hard_iron : triad, uT
+    noise : float, uT
+        Standard deviation along each axis, independent for each row.
+    deviation_sd, deviation_time : float, uT, s
+        Of a Gauss-Markov process of the field where the body is, north, east, down.
+    """
+
+    rate: float = 5.0
+    field_ned: Triad = (20.0, 1.5, 43.0)
+    hard_iron: Triad = ZERO
+    noise: float = 0.5
+    deviation_sd: float = 0.0
+    deviation_time: float = 30.0
+
+
+def simulate_magnetometer(
+    motion: EarthMotion, sensor: FieldSensor, *, seed: Seed = 0, source: str | None = None
+) -> pd.DataFrame:
+    """Simulate the field along the axes of the body over a motion.
+
+    `seed`: of noise and deviation. Returns columns ``mag_x mag_y mag_z`` in uT, by time.
+    """
+    time = instants(motion, sensor.rate)
+    draws = normal(seed, _FIELD_NOISE, len(time), axes=6)
+    kept = np.exp(-1.0 / (sensor.rate * sensor.deviation_time))
+    deviation = np.empty((len(time), 3))
+    now = sensor.deviation_sd * draws[0, 3:]
+    for k in range(len(time)):
+        deviation[k] = now
+        now = kept * now + sensor.deviation_sd * np.sqrt(1.0 - kept**2) * draws[k, 3:]
+    q_nb = motion.trajectory(time, source=source)[EULER].to_numpy()
+    C_nb = rotation.dcm_from_euler(q_nb)
+    field = np.einsum("kji,kj->ki", C_nb, np.asarray(sensor.field_ned) + deviation)
+    readings = field + np.asarray(sensor.hard_iron) + sensor.noise * draws[:, :3]
+    table = pd.DataFrame(readings, index=pd.Index(time, name="time"), columns=MAG)
+    table.attrs["source"] = source
+    return table

@@ -480,10 +480,13 @@ class NavigationSpec(FileSpec):
         aid, path = self.aiding[name], ("aiding", name)
         if not _NAME.fullmatch(name):
             yield Fault(path, "config.bad-aid-name")
-        takes = issubclass(SLOTS["aiding"].entries[aid.kind], TabulatedMeasurement)
+        entry = SLOTS["aiding"].entries[aid.kind]
+        takes = issubclass(entry, TabulatedMeasurement)
+        of_samples = takes and entry.of_samples and self.log is not None
         if not takes and aid.path is not None:
             yield Fault((*path, "path"), "config.aid-takes-no-file", {"kind": aid.kind})
-        if takes and aid.path is None and name not in self.receivers and self.live is None:
+        given = aid.path is not None or of_samples or name in self.receivers
+        if takes and not given and self.live is None:
             yield Fault((*path, "path"), "config.aid-file-missing", {"kind": aid.kind})
         for key in ("position_sd_m", "velocity_sd_m_per_s", "units", "datum_height_m", "origin"):
             if getattr(aid, key) and aid.kind != "gnss":

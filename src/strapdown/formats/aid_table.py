@@ -47,6 +47,7 @@ UNITS: dict[str, Mapping[str, float]] = {
     "deg": ANGLES,
     "rad/s": GYRO_UNITS,
     "Pa": PRESSURES,
+    "uT": MAG_UNITS,
 }
 #: Synonyms of a column, without blanks and underscores. Those of opposite sign are excluded.
 SYNONYMS: dict[str, tuple[str, ...]] = {
@@ -56,6 +57,9 @@ SYNONYMS: dict[str, tuple[str, ...]] = {
     "alt": ("altitude", "height", "h", "baroaltitude", "baroheight", "hbaro"),
     "height": ("altitude", "alt", "h", "baroaltitude", "baroheight", "hbaro"),
     "pressure": ("p", "baro", "barometer", "airpressure", "staticpressure"),
+    "mag_x": ("magx", "magneticx", "mx", "bx"),
+    "mag_y": ("magy", "magneticy", "my", "by"),
+    "mag_z": ("magz", "magneticz", "mz", "bz"),
     "heading": ("yaw", "psi", "azimuth", "course", "hdg"),
 }
 _SD = "_sd"
@@ -137,7 +141,7 @@ def read_aid_table(
     )
     rows = np.flatnonzero(keep)
     first, last = raw.row(int(rows[0])), raw.row(int(rows[-1]))
-    table.attrs |= {"source": raw.name, "findings": tuple(findings)}
+    table.attrs |= {"source": raw.name, "findings": tuple(findings), "axes": raw.axes}
     table.attrs["first_row"] = first if last - first == len(rows) - 1 else None
     return with_clock(table, Clock(clock))
 

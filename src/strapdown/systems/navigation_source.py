@@ -124,6 +124,10 @@ def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
         if set(GNSS) <= set(table.columns):
             tables[name], repeats = without_repeats(tables[name])
             findings += repeats
+    for name, aid in spec.aiding.items():
+        own = of_samples(aid, imu)
+        if own is not None:
+            tables[name] = own
     if points is not None:
         points, shifted = on_clock_of(points, recording.imu)
         findings += [] if shifted is None else [shifted]
@@ -226,6 +230,21 @@ def read_aid(given: AidSpec) -> pd.DataFrame:
             file = table.attrs["source"]
             raise DataError("navigation.aid-without-sd", file=file, quantity=column, key=key)
     return aid.converted(table)
+
+
+def of_samples(given: AidSpec, imu: pd.DataFrame) -> pd.DataFrame | None:
+    """Return the columns of the samples that a measurement without a file uses; else None."""
+    entry = SLOTS["aiding"].entries[given.kind]
+    if given.path is not None or not getattr(entry, "of_samples", False):
+        return None
+    if not set(entry.columns) <= set(imu.columns):
+        raise DataError(
+            "navigation.no-such-columns-in-log", file=source_of(imu), columns=entry.columns
+        )
+    table = imu[list(entry.columns)]
+    table.attrs = {"source": source_of(imu), "findings": ()}
+    thinned: pd.DataFrame = given.make().thinned(table)
+    return thinned
 
 
 # Fixes of a simulated receiver, with specified outages and outliers.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from strapdown.navigation.measurements.barometer import Barometer
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.heading import Heading
+from strapdown.navigation.measurements.magnetometer import Magnetometer
 from strapdown.navigation.measurements.measurement import Measurement
 from strapdown.navigation.measurements.standstill import ZeroRate, ZeroVelocity
 from strapdown.navigation.measurements.vehicle import BodyVelocity, NoSlip, Odometer
@@ -15,6 +16,7 @@ __all__ = [
     "BodyVelocity",
     "Gnss",
     "Heading",
+    "Magnetometer",
     "Measurement",
     "NoSlip",
     "Odometer",
@@ -32,4 +34,5 @@ AIDS: dict[str, type[Measurement]] = {
     "body_velocity": BodyVelocity,
     "barometer": Barometer,
     "heading": Heading,
+    "magnetometer": Magnetometer,
 }

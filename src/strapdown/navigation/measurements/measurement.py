@@ -24,7 +24,7 @@ from strapdown.estimation.error_model import PHYSICAL, ErrorModel
 from strapdown.estimation.sensor_states import SensorStates
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.nav_state import NavState
-from strapdown.tables.checks import is_number
+from strapdown.tables.checks import MAG, is_number
 
 __all__ = [
     "Epochs",
@@ -109,7 +109,7 @@ class Measurement(ABC):
 
 #: Units of columns by their names; those of standard deviations end in ``_sd``.
 COLUMN_UNITS = {"speed": "m/s", "height": "m", "heading": "deg"}
-COLUMN_UNITS |= dict.fromkeys(("vx", "vy", "vz"), "m/s")
+COLUMN_UNITS |= dict.fromkeys(("vx", "vy", "vz"), "m/s") | dict.fromkeys(MAG, "uT")
 
 
 @dataclass(frozen=True)
@@ -122,6 +122,8 @@ class TabulatedMeasurement(Measurement):
     units: ClassVar[Mapping[str, str]] = MappingProxyType({})
     #: Column from which the first one follows (`converted`), with its unit.
     instead: ClassVar[tuple[str, str] | None] = None
+    #: Whether its columns may be those of the samples: without a file.
+    of_samples: ClassVar[bool] = False
     #: Stream of a recording that has its measurements, of `formats.STREAMS`.
     stream: ClassVar[str] = ""
 

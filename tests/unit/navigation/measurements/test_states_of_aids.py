@@ -14,12 +14,14 @@ sys.path.insert(0, str(Path(__file__).parents[3]))
 
 from tests.aiding_sensors import (
     Compass,
+    FieldSensor,
     PressureHeight,
     VelocityLog,
     WheelSpeed,
     simulate_barometer,
     simulate_body_velocity,
     simulate_heading,
+    simulate_magnetometer,
     simulate_odometer,
 )
 
@@ -29,6 +31,7 @@ from strapdown.errors import ConfigError
 from strapdown.navigation.measurements.barometer import Barometer
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.heading import Heading
+from strapdown.navigation.measurements.magnetometer import Magnetometer
 from strapdown.navigation.measurements.standstill import ZeroRate, ZeroVelocity
 from strapdown.navigation.measurements.vehicle import BodyVelocity, NoSlip, Odometer
 
@@ -117,6 +120,30 @@ def test_scale_bias_and_misalignment_are_found():
     assert sd["left.scale"] < 0.003
     assert sd["baro.bias"] < 0.5
     assert sd["compass.misalignment"] < np.radians(0.5)
+
+
+def magnetic(seed):
+    """A magnetometer with hard iron, in a field that deviates from the stated one; and GNSS."""
+    rng = np.random.default_rng([seed, 11])
+    iron, motion = 20.0 * rng.standard_normal(3), drive()
+    sensor = FieldSensor(hard_iron=tuple(iron), noise=1.0, deviation_sd=3.0)
+    aids = (
+        Gnss(name="gnss"),
+        Magnetometer(name="mag", field_ned=sensor.field_ned, hard_iron_walk=0.0),
+    )
+    tables = {
+        "gnss": gnss_of(motion, seed),
+        "mag": simulate_magnetometer(motion, sensor, seed=seed + 400),
+    }
+    navigator = navigator_of(aids)
+    state, _ = run(navigator, motion, seed, tables, until=UNTIL)
+    return differences(navigator, state, {"mag.hard_iron": iron})
+
+
+@pytest.mark.slow
+def test_hard_iron_is_found_where_the_field_deviates():
+    sd = all_of(magnetic)
+    assert (sd["mag.hard_iron"] < 3.0).all()
 
 
 def mountings(seed):
