@@ -47,6 +47,7 @@ if TYPE_CHECKING:
         BodyVelocity,
         Gnss,
         Heading,
+        Magnetometer,
         Measurement,
         NavigationRun,
         NonHolonomic,
@@ -105,6 +106,7 @@ __all__ = [
     "Heading",
     "Imu",
     "ImuUncertainty",
+    "Magnetometer",
     "Measurement",
     "Mounting",
     "NavState",
@@ -163,8 +165,8 @@ load_on_first_use(
         "compare_attitude",
         "api.crash": "CrashRun reconstruct",
         "api.doctor": "Diagnosis doctor",
-        "api.navigation": "Barometer BodyVelocity Gnss Heading Measurement NavigationRun "
-        "NonHolonomic Odometer ZeroAngularRate ZeroVelocity navigate",
+        "api.navigation": "Barometer BodyVelocity Gnss Heading Magnetometer Measurement "
+        "NavigationRun NonHolonomic Odometer ZeroAngularRate ZeroVelocity navigate",
         "api.reading": "GnssFixes Imu Streams read read_gnss read_imu",
         "api.simulation": "Simulation simulate",
         "api.writing": "write",

@@ -26,6 +26,7 @@ __all__ = [
     "BodyVelocity",
     "Gnss",
     "Heading",
+    "Magnetometer",
     "Measurement",
     "NavigationRun",
     "NonHolonomic",
@@ -146,6 +147,15 @@ class Barometer(_OfKind):
     """Height: a table with ``height`` and ``height_sd`` in m."""
 
     KIND = "barometer"
+
+
+class Magnetometer(_OfKind):
+    """Magnetic field: without data, the columns ``mag_x mag_y mag_z`` of the samples.
+
+    Options: ``field_ned_ut``, the Earth's field; ``hard_iron_sd_ut``, ``field_sd_ut`` …
+    """
+
+    KIND = "magnetometer"
 
 
 class Heading(_OfKind):

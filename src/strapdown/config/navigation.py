@@ -481,8 +481,9 @@ class NavigationSpec(FileSpec):
         if not _NAME.fullmatch(name):
             yield Fault(path, "config.bad-aid-name")
         entry = SLOTS["aiding"].entries[aid.kind]
-        takes = issubclass(entry, TabulatedMeasurement)
-        of_samples = takes and entry.of_samples and self.log is not None
+        takes, of_samples = issubclass(entry, TabulatedMeasurement), False
+        if issubclass(entry, TabulatedMeasurement):
+            of_samples = entry.of_samples and self.log is not None
         if not takes and aid.path is not None:
             yield Fault((*path, "path"), "config.aid-takes-no-file", {"kind": aid.kind})
         given = aid.path is not None or of_samples or name in self.receivers
@@ -491,6 +492,10 @@ class NavigationSpec(FileSpec):
         for key in ("position_sd_m", "velocity_sd_m_per_s", "units", "datum_height_m", "origin"):
             if getattr(aid, key) and aid.kind != "gnss":
                 yield Fault((*path, key), "config.fix-sd-of-other-aid", {"kind": aid.kind})
+        if not any(getattr(aid, "field_ned_ut", (1.0,))):
+            yield Fault(
+                (*path, "field_ned_ut"), "navigation.no-field-of-the-earth", {"strength": 0.0}
+            )
         if aid.kind == "barometer" and getattr(self.mechanization, "height", None) == "held":
             yield Fault((*path, "kind"), "config.height-aid-with-held-height")
 

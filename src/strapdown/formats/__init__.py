@@ -382,11 +382,21 @@ def holds(path: Path, stream: str) -> bool:
 
 
 def files_of(path: str | Path) -> tuple[Path, ...]:
-    """List the files that are read for a path: itself, or several of a folder."""
+    """List the files that are read for a path: itself, or those of a folder."""
     given = Path(path)
     _, reader = reader_of(given)
-    files = reader.files(given) if reader is not None and reader.files is not None else ()
-    return files or (given,)
+    if reader is not None and reader.files is not None and (files := reader.files(given)):
+        return files
+    if reader is None or not given.is_dir():
+        return (given,)
+    found: list[Path] = []
+    for stream in reader.streams:
+        try:
+            raw = open_stream(given, "imu" if stream == TABLE else stream)
+        except DataError:  # it may lack a stream of its format
+            continue
+        found += raw.files if isinstance(raw, RawLog) else ()
+    return tuple(dict.fromkeys(found)) or (given,)
 
 
 def read_raw(path: str | Path, form: str | None = None) -> RawLog:

@@ -13,10 +13,11 @@ from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats import csv, foot_mounted, holds, open_stream, parquet, read_raw, reader_of
 from strapdown.formats.arrays import ticks_of
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, unrolled, with_clock
-from strapdown.formats.columns import CLOCKS, TIMES
+from strapdown.formats.columns import CLOCKS, TIMES, parse_axes
 from strapdown.formats.quantity_columns import Quantity, find_quantities
 from strapdown.formats.recording import NoStreamError, RawLog
-from strapdown.tables import NED, POSITION_SD
+from strapdown.formats.triad_units import axes_matrix
+from strapdown.tables import MAG, NED, POSITION_SD
 from strapdown.units import (
     ANGLES,
     GYRO_UNITS,
@@ -31,6 +32,7 @@ __all__ = [
     "POINT",
     "SYNONYMS",
     "UNITS",
+    "along_body",
     "read_aid_table",
     "read_control_points",
     "read_reference_path",
@@ -183,6 +185,20 @@ def read_stream(path: str | Path, stream: str, form: str | None = None) -> pd.Da
     table = pd.DataFrame(values, index=pd.Index(time, name="time"))
     table.attrs |= {"source": raw.name, "findings": tuple(raw.findings), "units": units}
     return with_clock(table, Clock(raw.clock or RELATIVE))
+
+
+def along_body(table: pd.DataFrame, axes: str = "") -> pd.DataFrame:
+    """Turn the magnetic field of a file along the axes of the body.
+
+    `axes`: as ``x,-y,-z``; those that the file states, if empty. DataError: neither states them.
+    """
+    axes = axes or table.attrs.get("axes") or ""
+    if not axes:
+        raise DataError("io.field-without-axes", file=table.attrs.get("source"), quantity="axes")
+    turned = table[MAG].to_numpy(dtype=np.float64) @ axes_matrix(*parse_axes(axes)).T
+    out = pd.DataFrame(turned, index=table.index, columns=MAG)
+    out.attrs = dict(table.attrs)
+    return out
 
 
 def _raw(path: Path, stream: str) -> RawLog:

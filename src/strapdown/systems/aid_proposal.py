@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,16 +15,17 @@ from strapdown.config.alignment import LogTable
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError, Finding
 from strapdown.formats import holds
-from strapdown.formats.aid_table import read_aid_table
-from strapdown.formats.clocks import on_clock_of
+from strapdown.formats.aid_table import along_body, read_aid_table
+from strapdown.formats.clocks import GPS, UNIX, WEEK, clock_of, on_clock_of, unix_from_gps
 from strapdown.formats.recording import ABSENT
 from strapdown.navigation.measurements.barometer import Barometer
+from strapdown.navigation.measurements.magnetometer import Magnetometer
 from strapdown.navigation.measurements.measurement import TabulatedMeasurement, longer_by
 from strapdown.navigation.measurements.vehicle import Odometer
-from strapdown.tables import VELOCITY, VELOCITY_SD
+from strapdown.tables import ACCEL, GEODETIC, MAG, VELOCITY, VELOCITY_SD
 from strapdown.tables.checks import index_of, values_of
 
-__all__ = ["propose_aids"]
+__all__ = ["Magnetic", "propose_aids", "propose_magnetometer"]
 
 
 Array = NDArray[np.float64]
@@ -38,6 +40,44 @@ MEAN = 1.0
 #: Error of a wheel's speed by slip, a bus that is late, and a lever arm that nobody stated, m/s,
 #: and how long it lasts, s.
 SLIP, TURN = 0.3, 2.0
+#: Years of the World Magnetic Model, and the one that is taken where a recording has no date.
+FIRST_YEAR, LAST_YEAR, THIS_YEAR = 2010.0, 2029.99, 2025.0
+#: Differences of the Earth's field, as a share of its strength and in dip, deg, that show iron: of
+#: hard iron that turns a heading by about as much.
+WEAK, DIP = 0.15, 8.0
+#: Length at the start over which a heading is read, s, and seconds of a year.
+BEGIN, YEAR = 2.0, 365.25 * 86400.0
+
+
+@dataclass(frozen=True)
+class Magnetic:
+    """A magnetometer of the recording, as a table that a person may switch on.
+
+    Attributes
+    ----------
+    table : dict
+        Of the measurement, with the field by the World Magnetic Model.
+    year : float
+        Of the model; `THIS_YEAR` if the recording has no date.
+    dated : bool
+    heading_deg : float
+        Of the body at the start, true, as if there were no hard iron.
+    measured, expected : tuple of float
+        Strength, uT, and dip, deg, of the field at the start, and by the model.
+    """
+
+    table: dict[str, Any]
+    year: float
+    dated: bool
+    heading_deg: float
+    measured: tuple[float, float]
+    expected: tuple[float, float]
+
+    @property
+    def disturbed(self) -> bool:
+        """Whether the field at the start is not that of the Earth."""
+        strength, dip = (a - b for a, b in zip(self.measured, self.expected, strict=True))
+        return abs(strength) > WEAK * self.expected[0] or abs(dip) > DIP
 
 
 def propose_aids(
@@ -118,3 +158,76 @@ def _error_of(aid: TabulatedMeasurement, fixes: pd.DataFrame | None) -> tuple[fl
 def _scatter(values: Array) -> float:
     """Standard deviation from row to row: second differences have six times its variance."""
     return float(np.sqrt(np.square(np.diff(values, n=2)).mean() / 6.0))
+
+
+def propose_magnetometer(
+    log: LogTable,
+    imu: pd.DataFrame,
+    fixes: pd.DataFrame | None,
+    place: tuple[float, float, float] | None,
+) -> Magnetic | None:
+    """Propose the magnetometer of a recording, at a place; None without one of them.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        Imu table of the log, with the columns of a field or without.
+    fixes : DataFrame, optional
+        They may have the date, and the place.
+    place : tuple of float, optional
+        Latitude and longitude in deg, height in m.
+    """
+    from pygeomag import GeoMag
+
+    if place is None and fixes is not None:
+        lat, lon, alt = np.median(values_of(fixes, GEODETIC)[:LEAST], axis=0).tolist()
+        place = (lat, lon, alt)
+    readings, path = _field(log, imu)
+    if place is None or readings is None or readings.empty:
+        return None
+    dates = (year for table in (imu, fixes) if table is not None and (year := _year(table)))
+    year = next(dates, None)
+    at = float(np.clip(year or THIS_YEAR, FIRST_YEAR, LAST_YEAR))
+    model = GeoMag(base_year=at).calculate(place[0], place[1], 1e-3 * place[2], at)
+    field = tuple(round(1e-3 * x, 2) for x in (model.x, model.y, model.z))
+    table = {"kind": "magnetometer", **path, "field_ned_ut": field}
+    begin = imu.index[0] + BEGIN
+    force = values_of(imu[imu.index <= begin], ACCEL).mean(axis=0)
+    mag = values_of(readings[readings.index <= begin], MAG).mean(axis=0)
+    # Axes of the level at the start: down against the specific force at rest.
+    down = -force / np.linalg.norm(force)
+    east = np.cross(down, mag)
+    magnetic = math.degrees(math.atan2(east[0], np.cross(east, down)[0]))
+    size = float(np.linalg.norm(mag))
+    measured = size, math.degrees(math.asin(float(np.clip(mag @ down / size, -1.0, 1.0))))
+    heading = (magnetic + model.d) % 360.0
+    return Magnetic(table, at, year is not None, heading, measured, (1e-3 * model.f, model.i))
+
+
+def _field(log: LogTable, imu: pd.DataFrame) -> tuple[pd.DataFrame | None, dict[str, str]]:
+    """Return the magnetic field along the body, and the path of a stream apart."""
+    if set(MAG) <= set(imu.columns):
+        seen = np.flatnonzero(np.isfinite(values_of(imu, MAG)).all(axis=1))
+        return imu[MAG].iloc[seen], {}
+    if not holds(Path(log.path), Magnetometer.stream):
+        return None, {}
+    units = dict.fromkeys(MAG, "uT")
+    try:
+        table = read_aid_table(log.path, units, repair=log.repair, stream=Magnetometer.stream)
+    except DataError:
+        return None, {}
+    if not table.attrs["axes"]:
+        return None, {}
+    table, _ = on_clock_of(along_body(table), imu)
+    return table[table.index >= imu.index[0]], {"path": log.path}
+
+
+def _year(table: pd.DataFrame) -> float | None:
+    """Decimal year of a table's first stamp; None if its clock has no date."""
+    clock = clock_of(table)
+    seconds = float(table.index[0]) + clock.origin
+    if clock.name == GPS and clock.week is not None:
+        seconds = float(unix_from_gps(np.array([seconds + WEEK * clock.week]))[0])
+    elif clock.name != UNIX:
+        return None
+    return 1970.0 + seconds / YEAR

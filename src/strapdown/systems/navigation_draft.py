@@ -24,6 +24,7 @@ from strapdown.formats.gnss_fixes import POSITION_SDS, VELOCITY_SDS
 from strapdown.frames import ways_between
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty
+from strapdown.systems.aid_proposal import Magnetic
 from strapdown.systems.alignment_draft import (
     Draft,
     axes_table,
@@ -334,15 +335,17 @@ def _aids(page: Page, made: Proposal, folder: Path, foot: bool) -> list[str]:
         for line in WHEELS:
             page.say(line)
     aids = made.table.get("aiding", {})
+    if made.magnetic is not None:
+        _magnetometer(page, made.magnetic, folder)
     page.say(*_other(slot, [kind for kind in OTHER_AIDS if kind not in aids]))
     if foot:
         began = made.table["log"].get("from_s")
         if began is not None and began > index_of(made.imu)[0]:
             return [f"it moves where it begins; its first stance, at {began:.6g} s, is the start"]
         return [f"stationary for the first {made.rest:.3g} s"]
-    others = [
-        f"{kind} in the recording, proposed beside" for kind in LASTING_ERRORS if kind in aids
-    ]
+    others = [f"{kind} in the recording, proposed" for kind in LASTING_ERRORS if kind in aids]
+    if made.magnetic is not None:
+        others.append(_magnetic(made.magnetic))
     if made.gnss is None:
         return others
     time, own = index_of(made.gnss), index_of(made.imu)
@@ -356,6 +359,33 @@ def _aids(page: Page, made: Proposal, folder: Path, foot: bool) -> list[str]:
     if made.rest >= 1.0:
         told.append(f"stationary for the first {made.rest:.4g} s, by the sensors and the fixes")
     return [*told, *others]
+
+
+def _magnetic(found: Magnetic) -> str:
+    if found.disturbed:
+        (size, dip), (expected, steep) = found.measured, found.expected
+        return (
+            f"magnetometer: {size:.0f} µT at a dip of {dip:.0f}° at the start, where the Earth has "
+            f"{expected:.0f} µT at {steep:.0f}°: iron is near, or its axes are others"
+        )
+    return (
+        f"magnetometer: heading {found.heading_deg:.0f}° at the start, true, by a field like the "
+        "Earth's; its table is a comment"
+    )
+
+
+def _magnetometer(page: Page, found: Magnetic, folder: Path) -> None:
+    """Write the table of a magnetometer as a comment: only a person knows what iron is near."""
+    dated = f"of {found.year:.0f}" if found.dated else f"of {found.year:.0f}; the file has no date"
+    page.say(
+        "Is the magnetometer away from iron and currents that change? Then take the signs off. "
+        f"field_ned_ut: the World Magnetic Model {dated}.",
+        "[aiding.magnetometer]",
+        'kind = "magnetometer"',
+    )
+    if "path" in found.table:
+        page.say(f"path = {string(named_from(Path(found.table['path']), folder))}")
+    page.say(f"field_ned_ut = {toml_value(found.table['field_ned_ut'])}")
 
 
 def _with_remarks(page: Page) -> None:

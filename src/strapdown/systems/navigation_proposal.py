@@ -49,7 +49,7 @@ from strapdown.navigation.measurements.gnss_readiness import (
 from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV, load_sensor
 from strapdown.sensors.rest import LEAST_LENGTH, find_rests_of_every_grade
 from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty, stated_imu
-from strapdown.systems.aid_proposal import propose_aids
+from strapdown.systems.aid_proposal import Magnetic, propose_aids, propose_magnetometer
 from strapdown.systems.alignment_source import body_record
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
@@ -172,6 +172,8 @@ class Proposal:
         Reason for the alignment, in words.
     findings : tuple of Finding
         Findings of reading.
+    magnetic : Magnetic or None
+        The magnetometer, which is left to the user.
     """
 
     table: dict[str, Any]
@@ -184,6 +186,7 @@ class Proposal:
     drives: bool
     how: str
     findings: tuple[Finding, ...]
+    magnetic: Magnetic | None = None
 
 
 @one_thread()
@@ -298,7 +301,10 @@ def propose(
     if others:
         table["aiding"] = {**table.get("aiding", {}), **others}
     findings = (*findings, *(one for one in of_others if one not in findings))
-    return Proposal(table, recording, imu, fixes, rest, noise, guessed, drives, how, findings)
+    magnetic = propose_magnetometer(log, imu, fixes, place)
+    return Proposal(
+        table, recording, imu, fixes, rest, noise, guessed, drives, how, findings, magnetic
+    )
 
 
 def _stated(table: dict[str, Any]) -> ImuUncertainty:

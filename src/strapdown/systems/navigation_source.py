@@ -20,13 +20,14 @@ from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError, DataError, DivergenceError, Finding
 from strapdown.evaluation.differences import rotation_contradicted
 from strapdown.formats import files_of
-from strapdown.formats.aid_table import read_aid_table, read_control_points
+from strapdown.formats.aid_table import along_body, read_aid_table, read_control_points
 from strapdown.formats.assemble import require_accel
 from strapdown.formats.clocks import on_clock_of
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.recording import Reading, StatedStart
 from strapdown.formats.trajectory_readers import read_trajectory
 from strapdown.navigation.measurements.gnss_readiness import without_repeats
+from strapdown.navigation.measurements.magnetometer import Magnetometer
 from strapdown.navigation.measurements.measurement import TabulatedMeasurement
 from strapdown.sensors.error_chain import child, normal
 from strapdown.systems.alignment_source import body_record
@@ -229,13 +230,17 @@ def read_aid(given: AidSpec) -> pd.DataFrame:
             key = next(o.key for o in options_of(entry) if o.field == option)
             file = table.attrs["source"]
             raise DataError("navigation.aid-without-sd", file=file, quantity=column, key=key)
+    if isinstance(aid, Magnetometer):
+        table = along_body(table, aid.axes)
     return aid.converted(table)
 
 
 def of_samples(given: AidSpec, imu: pd.DataFrame) -> pd.DataFrame | None:
     """Return the columns of the samples that a measurement without a file uses; else None."""
     entry = SLOTS["aiding"].entries[given.kind]
-    if given.path is not None or not getattr(entry, "of_samples", False):
+    if given.path is not None or not issubclass(entry, TabulatedMeasurement):
+        return None
+    if not entry.of_samples:
         return None
     if not set(entry.columns) <= set(imu.columns):
         raise DataError(
@@ -243,8 +248,8 @@ def of_samples(given: AidSpec, imu: pd.DataFrame) -> pd.DataFrame | None:
         )
     table = imu[list(entry.columns)]
     table.attrs = {"source": source_of(imu), "findings": ()}
-    thinned: pd.DataFrame = given.make().thinned(table)
-    return thinned
+    converted: pd.DataFrame = given.make().converted(table)
+    return converted
 
 
 # Fixes of a simulated receiver, with specified outages and outliers.

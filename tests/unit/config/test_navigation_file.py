@@ -134,10 +134,11 @@ def test_options_have_the_units_of_their_fields():
         "gate",
     }
     plain |= {"position_sd_factor", "velocity_sd_factor", "mounting_of", "scale_sd", "update_rule"}
-    plain |= {"position_correlated_share"}
+    plain |= {"position_correlated_share", "axes"}
     endings = (
         "_m",
         "_s",
+        "_ut",
         "_deg",
         "_m_per_s",
         "_m_per_s2",

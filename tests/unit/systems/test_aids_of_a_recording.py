@@ -14,19 +14,22 @@ from tests.coded import coded
 from tests.town_drive import RATE, motion
 
 import strapdown as sd
-from strapdown.config.alignment import LogTable
+from strapdown import rotation
+from strapdown.config.alignment import FixesTable, LogTable
 from strapdown.config.choice import Kinds
 from strapdown.config.navigation import AidSpec, NavigationSpec
 from strapdown.errors import DataError
+from strapdown.formats import files_of
 from strapdown.formats.aid_table import read_stream
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation import simulate_imu
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
-from strapdown.systems.aid_proposal import propose_aids
+from strapdown.systems.aid_proposal import propose_aids, propose_magnetometer
 from strapdown.systems.navigation_draft import draft_navigation
 from strapdown.systems.navigation_proposal import propose
 from strapdown.systems.navigation_run import run_navigation
 from strapdown.systems.navigation_source import read_aid
+from strapdown.tables import ACCEL, EULER, GYRO, MAG, imu_table
 from strapdown.tables.aiding import standard_slope
 
 #: Scatter of a pressure, Pa, and of positions, m: that of the height is what a code receiver has.
@@ -143,3 +146,93 @@ def test_rows_are_averaged_over_an_interval(tmp_path):
     np.testing.assert_allclose(table.index, np.arange(5) + 0.375, rtol=1e-15)
     np.testing.assert_allclose(table["height"], 3.0 + 2.0 * table.index, rtol=1e-15)
     assert (table["height_sd"] == 0.5).all()
+
+
+def phone(heading_deg, tilt_deg, field_ned=(23.9, 0.7, 40.0)):
+    """A phone log at rest, with the field of the Earth at Toulouse along its axes."""
+    C_nb = rotation.dcm_from_euler([*tilt_deg, heading_deg])
+    time = np.arange(300) / 50.0
+    return imu_table(
+        time,
+        np.zeros((300, 3)),
+        np.tile(C_nb.T @ [0.0, 0.0, -9.80665], (300, 1)),
+        mag=np.tile(C_nb.T @ field_ned, (300, 1)),
+    )
+
+
+@pytest.mark.parametrize("heading", [0.0, 59.0, 200.0, 330.0])
+def test_a_magnetometer_gives_the_heading_and_the_field_of_the_model(heading, tmp_path):
+    imu = phone(heading, (20.0, -35.0))
+    log = LogTable(path=str(tmp_path / "none.csv"))
+    (tmp_path / "none.csv").write_text("t\n", encoding="utf-8")
+    found = propose_magnetometer(log, imu, None, (43.57, 1.39, 150.0))
+    # WMM2025 by pygeomag 1.1, for 2025.0.
+    np.testing.assert_allclose(found.table["field_ned_ut"], (23.89, 0.7, 40.0), atol=0.02)
+    assert rotation.within_half_turn(found.heading_deg - heading) == pytest.approx(0.0, abs=0.05)
+    assert not found.dated
+    assert not found.disturbed
+    # A magnet of 20 uT along the body.
+    near = imu.assign(mag_x=imu["mag_x"] + 20.0)
+    assert propose_magnetometer(log, near, None, (43.57, 1.39, 150.0)).disturbed
+    assert propose_magnetometer(log, imu, None, None) is None
+    assert propose_magnetometer(log, imu.drop(columns=MAG), None, (43.57, 1.39, 150.0)) is None
+
+
+def test_a_magnetometer_along_the_samples_holds_the_heading(recording, tmp_path):
+    imu, fixes = streams()["imu"], streams()["gnss"]
+    time = np.asarray(imu.index, dtype=np.float64)
+    C_nb = rotation.dcm_from_euler(motion().trajectory(time)[EULER].to_numpy())
+    iron = np.array([6.0, -9.0, 12.0])
+    field = np.einsum("kji,j->ki", C_nb, [22.0, 1.5, 43.0]) + iron
+    field += np.random.default_rng(7).standard_normal(field.shape)
+    samples = sd.Imu(imu.assign(**dict(zip(MAG, field.T, strict=True))))
+    samples.attrs = dict(imu.attrs)
+    gnss = sd.Gnss(fixes, position_correlated_share=0.5)
+    mag = sd.Magnetometer(field_ned_ut=(22.0, 1.5, 43.0))
+    path = tmp_path / "drive.csv"
+    sd.write({"imu": samples}, path)
+    run = sd.navigate(path, [gnss, mag], sensor="icm-42688-p")
+    at = np.linspace(60.0, 175.0, 8)
+    truth = motion().trajectory(at)["heading"].to_numpy()
+    found = np.interp(at, run.trajectory.index, np.unwrap(run.trajectory["heading"], period=360.0))
+    error = rotation.within_half_turn(found - truth)
+    bound = np.interp(at, run.sd.index, run.sd["heading"])
+    assert np.square(error / bound).sum() < chi2.ppf(1.0 - 1e-4, at.size)
+    estimate = run.sensor_errors
+    assert any(column.startswith("magnetometer.hard_iron") for column in estimate.columns)
+
+
+def test_a_folder_of_a_phone_is_navigated_with_the_fixes_in_it(tmp_path):
+    folder = tmp_path / "phone"
+    folder.mkdir()
+    imu, fixes = streams()["imu"], streams()["gnss"]
+    for name, columns, unit in (("Gyroscope", GYRO, "rad/s"), ("Accelerometer", ACCEL, "m/s^2")):
+        table = pd.DataFrame({"Time (s)": imu.index})
+        for axis, column, sign in zip("XYZ", columns, (1.0, -1.0, -1.0), strict=True):
+            table[f"{axis} ({unit})"] = sign * imu[column].to_numpy()
+        table.to_csv(folder / f"{name}.csv", index=False)
+    course = np.degrees(np.arctan2(fixes["VE"], fixes["VN"])) % 360.0
+    place = {
+        "Time (s)": fixes.index,
+        "Latitude (°)": fixes["lat"],
+        "Longitude (°)": fixes["lon"],
+        "Height (m)": fixes["alt"],
+        "Velocity (m/s)": np.hypot(fixes["VN"], fixes["VE"]),
+        "Direction (°)": course,
+        "Horizontal Accuracy (m)": 3.0,
+        "Vertical Accuracy (°)": 6.0,
+    }
+    pd.DataFrame(place).to_csv(folder / "Location.csv", index=False)
+    assert sorted(p.name for p in files_of(folder)) == [
+        "Accelerometer.csv",
+        "Gyroscope.csv",
+        "Location.csv",
+    ]
+    fixes_of = FixesTable(path=str(folder), datum_height_m=0.0)
+    log = LogTable(path=str(folder))
+    draft = draft_navigation(log, folder=tmp_path, axes="x,-y,-z", gnss=fixes_of)
+    made = tmp_path / "navigate.toml"
+    made.write_text(draft.text.replace('"?"', "0.3"), encoding="utf-8")
+    run = sd.navigate(made)
+    run.save(tmp_path / "out", report=False)
+    assert sd.verify(tmp_path / "out").verdict == "identical"

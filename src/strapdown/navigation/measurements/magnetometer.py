@@ -10,12 +10,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import ConfigError, DataError
+from strapdown.errors import ConfigError
 from strapdown.estimation.covariance import Observation
 from strapdown.estimation.sensor_blocks import gauss_markov, random_walk, unseen
 from strapdown.estimation.sensor_states import SensorStates
-from strapdown.formats.columns import parse_axes
-from strapdown.formats.triad_units import axes_matrix
 from strapdown.navigation.measurements.measurement import (
     ROTATION,
     Epochs,
@@ -26,7 +24,7 @@ from strapdown.navigation.measurements.measurement import (
 )
 from strapdown.rotation import cross_matrix
 from strapdown.tables import MAG
-from strapdown.tables.checks import checked_values, index_of, source_of, values_of
+from strapdown.tables.checks import checked_values, index_of, values_of
 
 __all__ = ["Magnetometer"]
 
@@ -50,7 +48,7 @@ class Magnetometer(TabulatedMeasurement):
     Attributes
     ----------
     field_ned : tuple of float, (3,), uT
-        The Earth's field north, east, down, as of the World Magnetic Model.
+        The Earth's field north, east, down, as of the World Magnetic Model; a run needs it.
     axes : str
         Sensor axes that point forward, right, down, as ``x,-y,-z``, or the directions of x, y, z;
         of a file that does not state them. The samples' own columns are along the body.
@@ -87,15 +85,13 @@ class Magnetometer(TabulatedMeasurement):
         for name in ("hard_iron_sd", "hard_iron_walk", "field_sd", "interval"):
             check_number(self, name, low=0.0)
         strength = math.hypot(*self.field_ned)
-        if not WEAKEST <= strength <= STRONGEST:
+        if any(self.field_ned) and not WEAKEST <= strength <= STRONGEST:
             raise ConfigError(
                 "navigation.no-field-of-the-earth",
                 file=self.name or None,
                 quantity="field_ned",
                 strength=strength,
             )
-        if self.axes:
-            parse_axes(self.axes)
 
     def states(self) -> tuple[SensorStates, ...]:
         """Return the states of hard iron, reading − true, and of the field, true − stated."""
@@ -108,22 +104,12 @@ class Magnetometer(TabulatedMeasurement):
         )
 
     def converted(self, table: pd.DataFrame) -> pd.DataFrame:
-        """Return a file's table along the axes of the body."""
-        axes = self.axes or table.attrs.get("axes") or ""
-        if not axes:
-            raise DataError("navigation.magnetometer-axes", file=source_of(table), quantity="axes")
-        turned = values_of(table, MAG) @ axes_matrix(*parse_axes(axes)).T
-        out = pd.DataFrame(turned, index=table.index, columns=MAG)
-        out.attrs = dict(table.attrs)
-        return self.thinned(out)
-
-    def thinned(self, table: pd.DataFrame) -> pd.DataFrame:
-        """Return the first reading of each interval; those of samples are along the body."""
-        table = table[np.isfinite(values_of(table, MAG)).all(axis=1)]
+        """Return the first reading of each interval, of a table along the axes of the body."""
+        table = table.iloc[np.flatnonzero(np.isfinite(values_of(table, MAG)).all(axis=1))]
         if self.interval == 0.0 or table.empty:
             return table
         of = np.floor(index_of(table) / self.interval + 1e-9)
-        return table[np.concatenate([[True], np.diff(of) > 0.0])]
+        return table.iloc[np.flatnonzero(np.diff(of, prepend=-np.inf) > 0.0)]
 
     def epochs(self, table: pd.DataFrame) -> Epochs:
         """Return an epoch for each reading; see `TabulatedMeasurement.epochs`."""
