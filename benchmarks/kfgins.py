@@ -75,9 +75,9 @@ def missing() -> str:
     return ""
 
 
-def generate(folder: Path) -> None:
-    """Write the drive of seed 1 into a folder."""
-    script = [sys.executable, str(BENCH / "generate.py"), "1", str(folder)]
+def generate(folder: Path, seed: int = 1) -> None:
+    """Write the drive of a seed into a folder."""
+    script = [sys.executable, str(BENCH / "generate.py"), str(seed), str(folder)]
     subprocess.run([*script, str(BENCH / "GNSS-RTK.txt")], check=True, capture_output=True)
 
 

@@ -529,6 +529,8 @@ class ScaleState(NamedTuple):
         Newest innovation, and its time, s.
     jump, held : float, s
         The innovation with which they jumped, and until when what is like it is their fault.
+    since : float, s
+        Since when they have agreed with the estimate, but for some that returned to it.
     """
 
     log_square: float
@@ -539,6 +541,7 @@ class ScaleState(NamedTuple):
     time: float = -math.inf
     jump: float = 0.0
     held: float = -math.inf
+    since: float = math.nan
 
     @property
     def factor(self) -> float:
@@ -562,7 +565,10 @@ class AdaptiveScale:
     rejections in a row `rule` therefore gives Huber's function, which never rejects.
 
     An estimate goes wrong by degrees. Observations that agreed with it, and jump further than it
-    can have moved since the last one, are faulty themselves: they are rejected until they return,
+    can have moved since the last one, are faulty themselves, now or until now: a jump begins a
+    fault, or ends one that the estimate had followed. For the first speaks how long they agreed
+    before, for the second how long they disagree. With faults of any length the two are equally
+    likely after the same time: they are rejected until they return, as long as they had agreed, and
     for `doubt` seconds at most.
 
     The object is stateless: its user keeps the learned `ScaleState`.
@@ -665,11 +671,15 @@ class AdaptiveScale:
         `before`, `after`: states. `nu`: its innovation. `reach`: by how much the estimate may have
         moved since the last observation.
         """
-        jump, held = after.jump, after.held
+        jump, held, since = after.jump, after.held, before.since
         far = abs(nu - before.nu) > max(reach, 0.5 * abs(nu))
         if after.rejected == 1 and before.settled >= SETTLES and far:
-            jump, held = nu, time + self.doubt
-        return after._replace(nu=nu, time=time, jump=jump, held=held)
+            jump, held = nu, time + min(self.doubt, time - since)
+        # After rejections the observations returned, or the estimate went to them.
+        went = after.rejected == 0 and before.rejected > 0 and abs(nu) >= 0.5 * abs(before.nu)
+        if went or math.isnan(since):
+            since = time
+        return after._replace(nu=nu, time=time, jump=jump, held=held, since=since)
 
     @staticmethod
     def is_away(state: ScaleState, nu: float, variance: float, time: float) -> bool:

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -190,7 +191,7 @@ def run_navigation(
     if spec.withhold is not None:
         from strapdown.navigation.outage_test import score_withholding
 
-        begun, end = (float(run.record.trajectory.index[0]), float(source.imu.index[-1]))
+        begun, end = _begun(run.record), float(source.imu.index[-1])
         withheld = score_withholding(
             chain,
             source.imu,
@@ -376,6 +377,16 @@ def withheld_aid(spec: NavigationSpec) -> str:
     assert spec.withhold is not None
     named = spec.withhold.aid
     return named or next(name for name, aid in spec.aiding.items() if aid.kind == "gnss")
+
+
+def _begun(record: NavigationRecord) -> float:
+    """Time from which fixes are processed one by one, s: that of the end of the alignment.
+
+    A course that is aligned backward uses those before it as a whole, and navigation then begins
+    with the first sample.
+    """
+    aligned = takewhile(lambda one: one.name != Navigation.name, record.modes)
+    return max([float(record.trajectory.index[0]), *(one.end for one in aligned)])
 
 
 def _test_outages(asked: WithholdTable, begun: float, end: float) -> Sequence[Span]:

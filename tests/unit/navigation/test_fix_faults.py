@@ -54,13 +54,14 @@ def test_fixes_that_jump_are_rejected_until_they_return():
     assert off[0] == pytest.approx(off[1], rel=0.05)
 
 
-def jumps(values, sd=1.0, before=8):
-    """Whether each of values after some good ones, 1 s apart, is where it jumped to."""
+def jumps(values, sd=1.0, before=80, step=1.0):
+    """Whether each of values after some good ones, `step` s apart, is where it jumped to."""
     scale, state, out = RULE.scale, RULE.scale.begin(), []
     for k, nu in enumerate([0.3] * before + values):
-        time = float(k)
+        time = step * k
         out.append(scale.is_away(state, nu, sd**2, time))
-        weight = RULE.influence.weight(nu / sd)
+        usual = scale.rule(state, RULE.influence).influence.weight(nu / sd)
+        weight = 0.0 if out[-1] else usual
         after = scale.after(state, nu, 0.01 * sd**2, sd**2, weight)
         state = scale.jumped(state, after, nu, time, 1.5 * (time - state.time) ** 2)
     return out[before:]
@@ -76,7 +77,24 @@ def test_a_jump_is_a_fault_and_a_growing_innovation_is_not():
     # Without good ones before, nobody knows who is wrong.
     assert not any(jumps([20.0] * 15, before=2))
     # For a minute at most.
-    assert not any(jumps([20.0] * 80)[61:])
+    assert jumps([20.0] * 80) == [False] + [True] * 59 + [False] * 20
+
+
+@pytest.mark.parametrize("step", [0.25, 1.0])
+@pytest.mark.parametrize("before", [8, 24, 40])
+def test_a_receiver_is_rejected_for_as_long_as_it_had_agreed(before, step):
+    """A jump may end a fault that the estimate had followed: a wrong solution that drifted."""
+    expected = [False] + [True] * (before - 1)
+    assert jumps([20.0] * 60, before=before, step=step)[:before] == expected
+    assert not any(jumps([20.0] * 60, before=before, step=step)[before:])
+    # Gross errors that return do not count as a disagreement: the fault of 20 s is rejected.
+    single = [30.0] + [0.3] * 10
+    assert sum(jumps(single + [20.0] * 60, before=before, step=step)[len(single) :]) == (
+        before + len(single) - 1
+    )
+    # Ten rejections that ended because the estimate went to them do: since then they have agreed.
+    followed = [20.0] * 11 + [2.0] + [0.3] * 5
+    assert sum(jumps([*followed, *[-20.0] * 60], before=3, step=step)[len(followed) :]) == 6
 
 
 def test_a_contradiction_widens_all_that_a_correction_would_move():

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
+import pandas as pd
 import pytest
 
 from strapdown.config.navigation import NavigationSpec
-from strapdown.systems.navigation_run import run_navigation
+from strapdown.navigation.record import Span
+from strapdown.systems.navigation_run import _begun, run_navigation
 
 TEXT = """
 [simulation]
@@ -100,3 +104,12 @@ def test_an_alignment_does_not_end_before_its_least_time(tmp_path):
     file.write_text(TEXT.replace("duration_s = 12.0", ends.splitlines()[0]))
     begun = run_navigation(NavigationSpec.read(file), file).record.trajectory.index[0]
     assert begun < 20.0
+
+
+def test_an_outage_test_begins_after_an_alignment_that_used_the_fixes_as_a_whole():
+    """Aligned backward, a run begins with the first sample, but has no fix of its own before."""
+    backward = [Span("coarse", 0.0, 70.0), Span("fine", 70.0, 90.0), Span("navigation", 0.0, 200.0)]
+    again = [Span("coarse", 210.0, 250.0), Span("navigation", 250.0, 300.0)]
+    track = pd.DataFrame(index=[0.0, 300.0])
+    assert _begun(SimpleNamespace(trajectory=track, modes=(*backward, *again))) == 90.0
+    assert _begun(SimpleNamespace(trajectory=track, modes=(*backward[2:], *again))) == 0.0
