@@ -496,7 +496,7 @@ SIDE_SLIP, PITCH_SLIP, SPEED, ROWS = 6, 7, 8, 9
 GROUPS = np.array([0, 0, 0, 1, 1, 1, -1, -1, 2])
 # Unknown constants of vehicle and receiver, in order: antenna (3), time offset, side slip and its
 # slope, no-slip point, pitch slip and its slope, scale, delay and wheel slip of speeds.
-OWN = 12
+OWN, DELAY = 12, 10
 # Attitude steps are limited to this, rad: beyond it the linear model does not hold.
 LONGEST_TURN = 0.5
 
@@ -506,7 +506,8 @@ class Fixes:
     """Accepted epochs in order: GNSS fixes, and speeds along the vehicle.
 
     `instants`, (m,), s; `place`, (m, 3), deg, m; `velocity`, (m, 3), m/s; `sd`, (m, 6), m, m/s;
-    `speed`, `speed_sd`, (m,), m/s: of wheels. A standard deviation that is NaN: not measured.
+    `speed`, `speed_sd`, (m,), m/s: of wheels; `later`, (m,), s: delay of speeds beyond the stated
+    one, by which their instants are moved already. A standard deviation that is NaN: not measured.
     """
 
     instants: Array
@@ -515,6 +516,7 @@ class Fixes:
     sd: Array
     speed: Array
     speed_sd: Array
+    later: Array
 
     def at(self, rows: slice | NDArray[np.intp] | NDArray[np.bool_]) -> Fixes:
         """Some of the epochs, or all in another order."""
@@ -646,7 +648,9 @@ class _Search:
         residuals = self._residuals(now)
         # Sensor errors that were given are off the samples.
         left = 0 if self.given is None else len(self.errors.sd)
-        residuals -= self.linear.by_constants[:, :, STATES + left :] @ self.further[left:]
+        by_own = self.linear.by_constants[:, :, STATES + left :]
+        residuals += by_own[:, :, DELAY - OWN] * self.fixes.later[:, None]
+        residuals -= by_own @ self.further[left:]
         away = rotation.rotation_vector_from_quaternion(
             rotation.compose(self.at_first, rotation.conjugate(self.state.q_nb))
         )

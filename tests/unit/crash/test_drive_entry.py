@@ -119,12 +119,23 @@ def test_speeds_show_the_mounting_and_not_more_than_the_tires(draw):
     assert found["mounting", 2][1] < 0.6
     rows = state.calibration.set_index("quantity")
     assert rows.loc["scale", "sd"].iloc[0] > 0.9 * rows.loc["speed scale", "sd"] * 0.5
-    assert "crash.drive-by-speeds-alone" in {one.code for one in state.findings}
     # In axes of the vehicle at the entry.
     assert entry.heading_deg == pytest.approx(0.0, abs=0.5) or entry.heading_deg > 359.5
     assert state.speeds["used"].any()
     late = state.speeds.index > -0.02
     assert not state.speeds["used"][late].any()
+
+
+def test_a_delay_that_is_far_off_is_found_and_one_beyond_chance_is_said(drive):
+    """Two stated standard deviations late: linear about the stated delay it was 0.25 s."""
+    late = case.drawn(drive, 3, delay=0.3)
+    _, _, state = case.reconstructed(late, "speeds", window=16.0)
+    row = state.calibration.set_index("quantity").loc["speed delay"]
+    assert abs(row["error"] - 0.3) < 3.4 * row["sd"] < 0.1
+    assert "crash.drive-contradicts-stated" not in {one.code for one in state.findings}
+    _, _, state = case.reconstructed(late, "speeds", window=16.0, speed_delay_sd=0.03)
+    said = [f for f in state.findings if f.code == "crash.drive-contradicts-stated"]
+    assert [f.data["sigmas"] > 4.0 for f in said if f.quantity == "speed delay"] == [True]
 
 
 def test_a_unit_bolted_across_is_found_about_its_stated_angle(drive):
