@@ -11,7 +11,7 @@ import pytest
 from tests.coded import coded
 
 from strapdown.crash.watch import CrashLog
-from strapdown.errors import ConfigError
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats.crash_records import read_crash_record
 from strapdown.live.crash import CrashReception, recorder_of_case
 from strapdown.live.sources import Line, open_source
@@ -163,3 +163,83 @@ def test_the_detection_is_written_as_c(case):
     errors = recorder_of_case(case).errors
     assert all(f"R({value!r})" in text for value in errors)
     assert run(case, "", "--export-c", "crash.c").returncode == 4, "it is there already"
+
+
+def calibrated(path, errors, name="recorder"):
+    """A result in which a drive determined errors: (quantity, of, axis, value, half-width)."""
+    rows = [
+        {
+            "quantity": quantity,
+            "of": of,
+            "axis": axis,
+            "by_drive": {"value": value, "low": value - half, "high": value + half},
+        }
+        for quantity, of, axis, value, half in errors
+    ]
+    answers = [{"recorder": name, "drive": {"errors": rows}}, {"recorder": "mean", "drive": None}]
+    path.mkdir()
+    (path / "crash.json").write_text(json.dumps({"answers": answers}))
+    return path
+
+
+def test_a_calibration_by_a_drive_is_taken_off(case, tmp_path):
+    """Errors that are put into the samples are gone again, and the bound is what the drive left."""
+    box, gyro = "recorder accelerometer", "recorder gyro"
+    drive = calibrated(
+        tmp_path / "drive",
+        [
+            ("accelerometer_scale_percent", box, "y", 2.0, 0.196),
+            ("accelerometer_bias_m_per_s2", box, "x", 0.3, 0.0392),
+            ("accelerometer_bias_m_per_s2", box, "y", 0.0, 0.0392),
+            ("gyro_bias_deg_per_s", gyro, "z", 1.5, 0.196),
+            ("gyro_scale_percent", gyro, "z", -1.0, 0.196),
+            ("mounting_deg", "recorder", "z", 3.0, 0.392),
+            ("accelerometer_scale_percent", "recorder of another", "y", 50.0, 0.1),
+        ],
+    )
+    text = case.read_text()
+    case.write_text(text.replace("5000 }", "5000, nonlinearity_bound_percent = 0.3 }"))
+    plain, known = recorder_of_case(case), recorder_of_case(case, drive)
+    true = samples()
+    true[:, 3] = np.radians(40.0) * (true[:, 0] > 2.0)
+    read = true.copy()
+    # The unit is turned by 3 deg more about down, and reads its own errors in its own axes.
+    c, s = np.cos(np.radians(3.0)), np.sin(np.radians(3.0))
+    read[:, 4:6] = true[:, 4:6] @ np.array([[c, -s], [s, c]])
+    read[:, 5] *= 1.02
+    read[:, 4] += 0.3
+    read[:, 3] = 0.99 * true[:, 3] + np.radians(1.5)
+    exact, off, back = (
+        watch_rows(options, rows.tolist(), 0.01).lines[-1]
+        for options, rows in ((plain, true), (plain, read), (known, read))
+    )
+    for name in ("delta_v_forward_m_per_s", "delta_v_right_m_per_s", "pdof_deg"):
+        assert abs(off[name] - exact[name]) > 0.1
+        assert back[name] == pytest.approx(exact[name], abs=1e-9)
+    # The worse of both axes is the one that the drive left as stated; with the nonlinearity.
+    # 3 deg mix in a thousandth of the better one.
+    assert known.errors[1] == pytest.approx(np.hypot(0.005, 0.003 / 3**0.5), rel=0.002)
+    assert known.errors[4:] == pytest.approx(tuple(np.radians([0.2, 0.1])), rel=1e-3)
+    assert known.variance < plain.variance
+    both = calibrated(
+        tmp_path / "both", [("accelerometer_scale_percent", box, a, 2.0, 0.196) for a in "xy"]
+    )
+    assert recorder_of_case(case, both).errors[1] == pytest.approx(
+        np.hypot(0.001, 0.003 / 3**0.5), rel=0.002
+    )
+    # Without a nonlinearity nothing says that the scale factor of a drive holds in a crash.
+    case.write_text(text)
+    assert recorder_of_case(case, both).errors[1] == pytest.approx(0.005)
+    assert recorder_of_case(case, both).scale[3:5] == pytest.approx((0.02, 0.02))
+
+
+def test_what_is_no_calibration_of_the_recorder_is_refused(case, tmp_path):
+    other = calibrated(tmp_path / "other", [], name="another")
+    with pytest.raises(DataError, check=coded("live.calibration-of-others")):
+        recorder_of_case(case, other)
+    with pytest.raises(DataError, check=coded("live.no-calibration")):
+        recorder_of_case(case, case)
+    with pytest.raises(DataError, check=coded("live.no-calibration")):
+        recorder_of_case(case, tmp_path / "nowhere")
+    done = run(case, "", "--calibration", "other")
+    assert (done.returncode, "--calibration" in done.stderr) == (4, True)

@@ -35,6 +35,14 @@ class LiveFlags:
         float | None,
         running("S", "With --live: an estimate of an event so often (0.01).", show_default=False),
     ] = None
+    calibration: Annotated[
+        Path | None,
+        running(
+            "RESULT",
+            "With --live or --export-c: a result of strapdown crash in which the drive determined "
+            "biases, scale factors and mounting of the recorder; they are taken off.",
+        ),
+    ] = None
     export_c: Annotated[
         Path | None,
         writing(
@@ -68,7 +76,7 @@ def crash(
     With --live, samples are watched as they arrive, and delta-V so far, direction of force and
     severity of a crash are written as lines of JSON.
     """
-    if flags.live is not None or flags.export_c is not None or flags.every is not None:
+    if any(x is not None for x in (flags.live, flags.export_c, flags.every, flags.calibration)):
         from strapdown.cli.crash_live import crash_live
 
         crash_live(cases, out, write, flags)

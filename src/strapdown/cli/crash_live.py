@@ -40,18 +40,23 @@ def crash_live(cases: Sequence[Path], out: Path | None, write: OutFlags, flags: 
         raise ConfigError("live.not-together", beside="--live", option=option)
     if flags.live is None and flags.every is not None:
         raise ConfigError("live.only-with", option="--every", beside="--live")
+    if flags.live is None and flags.export_c is None:
+        raise ConfigError("live.only-with", option="--calibration", beside="--live or --export-c")
     name = "--live" if flags.live is not None else "--export-c"
     if len(cases) != 1:
         raise ConfigError("live.one-case", option=name, count=len(cases))
     refuse_result(cases[0], "case")
     WORDS.set("file")
     check_c(flags.export_c, write.force)
-    options = recorder_of_case(cases[0])
+    options = recorder_of_case(cases[0], flags.calibration)
     if flags.live is None:
         from strapdown.export_c.detector import export_detector
 
         assert flags.export_c is not None
-        text = export_detector(options.errors, options.variance, mean=options.mean)
+        known = (*options.bias, *options.scale, *options.axes) if flags.calibration else ()
+        text = export_detector(
+            options.errors, options.variance, mean=options.mean, calibration=known
+        )
         flags.export_c.write_text(text, encoding="utf-8", newline="\n")
         if not write.quiet:
             typer.echo(f"C99   {flags.export_c}")

@@ -253,6 +253,15 @@ class UnitSpec(Spec):
         default=None, description="standard deviation of these angles"
     )
 
+    @property
+    def accelerometer_names(self) -> tuple[str, ...]:
+        """Names of the accelerometers, numbered where there are several."""
+        several = len(self.accelerometers) > 1
+        return tuple(
+            triad.name or (f"accelerometer {k}" if several else "accelerometer")
+            for k, triad in enumerate(self.accelerometers, start=1)
+        )
+
 
 class ReferenceSpec(Spec):
     """Other known data of the crash, for comparison with the results."""

@@ -586,21 +586,14 @@ def case_unit(spec: UnitSpec, records: Mapping[str, CrashRecord]) -> CrashUnit:
     Raises `DataError` for a channel that is missing or unusable, `ConfigError` for an invalid
     sensor, key or number.
     """
-    several = len(spec.accelerometers) > 1
     accelerometers = tuple(
-        _triad(
-            spec,
-            triad,
-            records,
-            "acceleration",
-            f"accelerometer {k}" if several else "accelerometer",
-        )
-        for k, triad in enumerate(spec.accelerometers, start=1)
+        _triad(spec, triad, records, "acceleration", name)
+        for name, triad in zip(spec.accelerometer_names, spec.accelerometers, strict=True)
     )
     assumed = spec.assumed
     gyro = None
     if spec.gyro is not None:
-        gyro = _triad(spec, spec.gyro, records, "rate", "gyro")
+        gyro = _triad(spec, spec.gyro, records, "rate", spec.gyro.name or "gyro")
     return CrashUnit(
         spec.name,
         accelerometers,
@@ -620,7 +613,6 @@ def case_unit(spec: UnitSpec, records: Mapping[str, CrashRecord]) -> CrashUnit:
 def _triad(
     unit: UnitSpec, spec: TriadSpec, records: Mapping[str, CrashRecord], quantity: str, name: str
 ) -> RecordedTriad:
-    name = spec.name or name
     table = triad_of_channels(
         records[spec.path],
         {axis: spec.channels[axis] for axis in ("x", "y", "z") if axis in spec.channels},

@@ -54,7 +54,8 @@ class CrashIndex:
     detail : str
         Further: smoothing, kind of load, surface that is hit.
     at_least : bool
-        The record is a part of the pulse, or clipped.
+        The record is a part of the pulse, or clipped: the value is at least so far from zero, and
+        the bound is open on that side; on both where it has either sign.
     """
 
     name: str
@@ -201,6 +202,9 @@ def vehicle_indices(unit: UnitReconstruction, number: int) -> tuple[CrashIndex, 
                 low, high = -abs(value) - half, abs(value) + half
             low = low if each.signed else max(low, 0.0)
         least = unit.body[number].event.at_least
+        if least and low is not None and high is not None:
+            low = low if value >= 0.0 and (low > 0.0 or not each.signed) else None
+            high = high if value < 0.0 and high < 0.0 else None
         found.append(replace(index, value=value, low=low, high=high, at_least=least))
     return tuple(found)
 

@@ -14,7 +14,7 @@ from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.acceleration import window_weights
 from strapdown.crash.measuring_point import LEVER_ARM, MOUNTING, NO_TURNING, PointKinematics
-from strapdown.crash.single_error import single_error
+from strapdown.crash.single_error import OFF_MOUNTING, OFF_POSITION, OFF_SCALE, single_error
 from strapdown.crash.structure import LARGEST_SHARE, Structure, learn_share, unlearnt
 from strapdown.dsp.chi_square import chi_square_above
 from strapdown.errors import ConfigError, DataError, Finding
@@ -493,6 +493,8 @@ POSSIBLE, EXCLUDED = 9.0, 25.0
 # of 48 candidates fits noise better by chance.
 FITS = 1e-3
 AXES = ("forward", "right", "down")
+# Permutations of three axes, each with either sign.
+SIGNED = 48
 
 
 @dataclass(frozen=True, eq=False)
@@ -540,8 +542,15 @@ def signed_permutations() -> Array:
     return np.array(found)
 
 
-def match_axes(first: VelocityIncrements, second: VelocityIncrements) -> AxisMatch:
+def match_axes(
+    first: VelocityIncrements, second: VelocityIncrements, turned: Array | None = None
+) -> AxisMatch:
     """Find the signed permutation of the second unit's axes that agrees with the first.
+
+    `turned`, (3, 3): the rotation that makes them agree best. Where it is nearer to the stated axes
+    than to any others it is one more candidate, and where it fits as well nothing is swapped: a car
+    that hardly turns has rates that another axis fits by chance, but not the stated ones of a unit
+    that is turned by some degrees.
 
     Least squares over the intervals, gravity included, with the full covariance of the difference.
     The excess of the smallest residuals is added to every interval alike: after moving with wrong
@@ -549,17 +558,19 @@ def match_axes(first: VelocityIncrements, second: VelocityIncrements) -> AxisMat
     is taken, and the identity where it fits with a probability of 1e-3 or more. Accelerometers and
     gyros are judged separately, since either may be wired wrong; a shared gyro is not judged.
     """
-    accel, lead, other = _best(first, second, "force")
+    candidates = signed_permutations()
+    if turned is not None and (np.diag(turned) > math.cos(math.pi / 4.0)).all():
+        candidates = np.concatenate([candidates, turned[None]])
+    accel, lead, other = _best(first, second, "force", candidates)
     if first.borrows(second):
         return AxisMatch(accel, np.eye(3), lead, 0.0, other)
-    gyro, gyro_lead, _ = _best(first, second, "rate")
+    gyro, gyro_lead, _ = _best(first, second, "rate", candidates)
     return AxisMatch(accel, gyro, lead, gyro_lead, other)
 
 
 def _best(
-    first: VelocityIncrements, second: VelocityIncrements, of: str
+    first: VelocityIncrements, second: VelocityIncrements, of: str, candidates: Array
 ) -> tuple[Array, float, tuple[str, ...]]:
-    candidates = signed_permutations()
     a, b = (v.values if of == "force" else v.turned for v in (first, second))
     left = (a[None] - b @ candidates.transpose(0, 2, 1)).reshape(len(candidates), -1, 1)
     covariance = floored(difference_covariance(first, second, of=of, turn=candidates))
@@ -575,9 +586,10 @@ def _best(
     # Nearest to the identity: most ones on the diagonal.
     near = np.trace(candidates[possible], axis1=1, axis2=2)
     best = int(possible[np.lexsort((behind[possible], -near))[0]])
-    if chi_square_tail(fit, a.size) >= FITS:
+    if chi_square_tail(fit, a.size) >= FITS or (np.diag(candidates[best]) > 0.0).all():
         best = identity
-    differs = (candidates[possible] != candidates[best]).any(axis=2).any(axis=0)
+    wired = candidates[possible[possible < SIGNED]]
+    differs = (wired != candidates[best]).any(axis=2).any(axis=0)
     return (
         candidates[best],
         float(max(behind[identity] - behind[best], 0.0)) if best != identity else 0.0,
@@ -776,8 +788,8 @@ def compare_pair(
     whole = not (first.assumed_axes or second.assumed_axes) and bool(kept.any())
     if whole:
         # Swapped axes make more of a difference than any structure, which would hide them.
-        axes = match_axes(*((a, b) if probability >= level else stiff))
         turned, lever = mounting_rotation(a, b), check_lever_arm(a, b)
+        axes = match_axes(*((a, b) if probability >= level else stiff), turned.matrix)
     else:
         # The checks of relative mounting need three measured axes and a gyro on both units.
         axes, turned, lever = AxisMatch.untold(), MountingRotation.untold(), LeverArmCheck.untold()
@@ -810,7 +822,11 @@ def compare_pair(
             error = single_error(effects, structure, edges, kept, difference, plain, level)
         if error is not None:
             agree = False
-            found.append(error.finding(first.name, second.name))
+            if error.code == OFF_MOUNTING and turned.sd_deg.max() < math.degrees(MOST_SD):
+                # Its size beside the structure is drawn toward zero, and linear in the angle.
+                error = replace(error, size=np.radians(turned.vector_deg))
+            # One error has one size, and the likeliest of them is the one that is named.
+            found = [error.finding(first.name, second.name)]
     return UnitPair(
         first.name,
         second.name,
@@ -843,12 +859,12 @@ def _single_effects(
     along = (felt - np.diff(edges)[kept, None] * rest).sum(axis=0) * [1.0, 1.0, 0.0]
     along = along / max(float(np.linalg.norm(along)), TINY)
     effects = {
-        "crash.off-scale": np.outer(felt @ along, along).reshape(-1, 1),
-        "crash.off-mounting": -rotation.cross_matrix(felt).reshape(-1, 3),
+        OFF_SCALE: np.outer(felt @ along, along).reshape(-1, 1),
+        OFF_MOUNTING: -rotation.cross_matrix(felt).reshape(-1, 3),
     }
     levers = [v.lever for v in increments if v.lever.any()]
     if levers:
-        effects["crash.off-position"] = np.mean(levers, axis=0)
+        effects[OFF_POSITION] = np.mean(levers, axis=0)
     return effects
 
 

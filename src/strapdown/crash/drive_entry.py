@@ -22,6 +22,7 @@ from strapdown.crash.entry import ATTITUDE, STATES, Entry, EntryState, biases_of
 from strapdown.crash.entry import VELOCITY as VELOCITY_COLUMNS
 from strapdown.crash.entry_estimate import (
     AVERAGED,
+    DELAY,
     RECOVERY,
     EntryPriors,
     Estimate,
@@ -159,8 +160,12 @@ def _estimated(
     *,
     errors: SensorErrors | None = None,
     ellipsoid: str = "wgs84",
+    later: Sequence[float] = (0.0,),
 ) -> _Estimated:
-    """State at the last sample up to `at`, s; `errors` of the sensors at the rows of `imu`."""
+    """State at the last sample up to `at`, s; `errors` of the sensors at the rows of `imu`.
+
+    `later`, s: delays of the speeds beyond the stated one that were found so far.
+    """
     mechanization = NorthEastDown(ellipsoid=ellipsoid)
     impact, gnss = drive.impact, drive.fixes
     source = (gnss if gnss is not None else drive.speeds).attrs.get("source")  # type: ignore[union-attr]
@@ -168,7 +173,8 @@ def _estimated(
     last = int(np.searchsorted(sensed, at, side="right")) - 1
     begin = max(at - drive.window, float(sensed[0]))
     epochs = [Epochs.of_fixes(gnss, priors)] if gnss is not None else []
-    epochs += [Epochs.of_speeds(drive.speeds, priors, drive.speed_sd)] if drive.has_speeds else []
+    if drive.speeds is not None:
+        epochs += [Epochs.of_speeds(drive.speeds, priors, drive.speed_sd, later[-1])]
     epochs = [one.after(begin) for one in epochs]
     firsts = [one.instants[one.instants <= sensed[last]] for one in epochs]
     if not any(one.size for one in firsts):
@@ -211,6 +217,10 @@ def _estimated(
             assert start is not None
             best = start if best is None else min(best, start, key=lambda e: e.cost)
     assert best is not None
+    found_later = float(best.constants[DELAY])
+    if drive.has_speeds and abs(found_later - later[-1]) > LINEAR and len(later) < ROUNDS:
+        later = (*later, found_later)
+        return _estimated(imu, drive, priors, at, errors=errors, ellipsoid=ellipsoid, later=later)
     receiver = fixes.of_receiver
     for record, mine, names in zip(
         records,
@@ -261,13 +271,16 @@ class Epochs:
             np.hstack([values_of(gnss, POSITION_SD), values_of(gnss, VELOCITY_SD)]),
             zero,
             none,
+            zero,
         )
         return cls(stamps, fixes, values_of(gnss, ["quality"])[:, 0])
 
     @classmethod
-    def of_speeds(cls, table: pd.DataFrame | None, priors: EntryPriors, sd: float) -> Epochs:
-        """Speeds as means over `SPEED_STEP`: faster ones are not independent of each other."""
-        assert table is not None
+    def of_speeds(cls, table: pd.DataFrame, priors: EntryPriors, sd: float, later: float) -> Epochs:
+        """Speeds as means over `SPEED_STEP`: faster ones are not independent of each other.
+
+        `later`, s: by so much more than stated they are delayed.
+        """
         stamps, speed = index_of(table), values_of(table, ["speed"])[:, 0]
         block = np.floor(stamps / SPEED_STEP).astype(np.int64)
         _, first, count = np.unique(block, return_index=True, return_counts=True)
@@ -278,7 +291,8 @@ class Epochs:
         # Of a speed position and velocity are not measured: any numbers will do.
         place, velocity = np.tile(SOMEWHERE, (n, 1)), np.zeros((n, 3))
         none = np.full((n, 6), np.nan)
-        fixes = Fixes(stamps - priors.speed_delay, place, velocity, none, speed, sds)
+        instants = stamps - priors.speed_delay - later
+        fixes = Fixes(instants, place, velocity, none, speed, sds, np.full(n, later))
         return cls(stamps, fixes, None)
 
     @property
@@ -373,6 +387,9 @@ CAR = {
 }
 #: Speeds are means over this, s.
 SPEED_STEP = 0.25
+# A delay is linear up to this, s: a jerk of 2 m/s³ then makes 1 mm/s. Beyond it the search is
+# repeated with the delay that it found.
+LINEAR, ROUNDS = 0.03, 3
 #: A vehicle at less than this stands, m/s.
 STANDS = 0.2
 #: Latitude and longitude, deg, and height, m, of a drive without fixes: as of `Entry`.
@@ -542,8 +559,6 @@ def start_from_drive(
     level = rotation.dcm_from_quaternion(state.state.q_nb)
     effects, unknowns, more = _left(at, shown, best.joint, level, window)
     table, said = _calibration(at, best, priors, shown, more)
-    if given.fixes is None:
-        said.append(Finding("crash.drive-by-speeds-alone", file=at.name, quantity="delta-V"))
     state = replace(state, calibration=table, findings=(*state.findings, *said))
     north, east, down = (float(v) for v in state.state.v_n)
     roll, pitch, heading = (float(x) for x in state.roll_pitch_heading)
@@ -751,16 +766,8 @@ def _calibration(
         axis = "xyz"[what.axis]
         if kept[column] == 1.0 and own < NARROWED:
             held.append(f"{what.of} {axis}")
-        if abs(size) > SIGMAS:
-            said.append(
-                Finding(
-                    "crash.drive-contradicts-stated",
-                    file=what.of,
-                    quantity=what.quantity,
-                    axis=axis,
-                    sigmas=abs(size),
-                )
-            )
+        if contradicts(size, own):
+            said.append(_contradiction(what.of, what.quantity, axis, size))
     if held:
         said.append(
             Finding(
@@ -778,11 +785,31 @@ def _calibration(
         (priors.speed_scale_sd, priors.speed_delay_sd),
         strict=True,
     ):
+        if stated > 0.0 and contradicts(size / stated, own / stated):
+            said.append(_contradiction("speeds", name, "x", size / stated))
         if stated > 0.0 and own < stated:
             shift = priors.speed_delay if name == "speed delay" else 0.0
             rows.append((name, 0, "speeds", shift + size, own, stated, stated))
     columns = ["quantity", "axis", "of", "error", "sd", "stated", "in_crash"]
     return pd.DataFrame(rows, columns=columns), said
+
+
+def contradicts(size: float, left: float) -> bool:
+    """Whether an estimate is beyond chance; it and what is `left` in stated standard deviations.
+
+    By what is stated an estimate scatters by the root of one less the square of what is left.
+    """
+    return abs(size) > SIGMAS * math.sqrt(1.0 - min(left, NARROWED) ** 2)
+
+
+def _contradiction(of: str, quantity: str, axis: str, size: float) -> Finding:
+    return Finding(
+        "crash.drive-contradicts-stated",
+        file=of,
+        quantity=quantity,
+        axis=axis,
+        sigmas=abs(size),
+    )
 
 
 # Initial guesses of the entry state.

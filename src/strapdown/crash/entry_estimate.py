@@ -496,7 +496,7 @@ SIDE_SLIP, PITCH_SLIP, SPEED, ROWS = 6, 7, 8, 9
 GROUPS = np.array([0, 0, 0, 1, 1, 1, -1, -1, 2])
 # Unknown constants of vehicle and receiver, in order: antenna (3), time offset, side slip and its
 # slope, no-slip point, pitch slip and its slope, scale, delay and wheel slip of speeds.
-OWN = 12
+OWN, DELAY = 12, 10
 # Attitude steps are limited to this, rad: beyond it the linear model does not hold.
 LONGEST_TURN = 0.5
 
@@ -506,7 +506,8 @@ class Fixes:
     """Accepted epochs in order: GNSS fixes, and speeds along the vehicle.
 
     `instants`, (m,), s; `place`, (m, 3), deg, m; `velocity`, (m, 3), m/s; `sd`, (m, 6), m, m/s;
-    `speed`, `speed_sd`, (m,), m/s: of wheels. A standard deviation that is NaN: not measured.
+    `speed`, `speed_sd`, (m,), m/s: of wheels; `later`, (m,), s: delay of speeds beyond the stated
+    one, by which their instants are moved already. A standard deviation that is NaN: not measured.
     """
 
     instants: Array
@@ -515,6 +516,7 @@ class Fixes:
     sd: Array
     speed: Array
     speed_sd: Array
+    later: Array
 
     def at(self, rows: slice | NDArray[np.intp] | NDArray[np.bool_]) -> Fixes:
         """Some of the epochs, or all in another order."""
@@ -623,6 +625,7 @@ class _Search:
         self.mechanization, self.imu, self.given = mechanization, imu, errors
         # From the anchor backward, in the direction in which errors grow.
         self.fixes = fixes.at(slice(None, None, -1))
+        self.rolled = np.where(np.isfinite(self.fixes.speed_sd), self.fixes.speed, np.nan)
         self.inflation = 1.0
         # Position and velocity have no prior; speeds alone leave the position as it was guessed.
         self.free = 6 if fixes.of_receiver.any() else 3
@@ -645,7 +648,9 @@ class _Search:
         residuals = self._residuals(now)
         # Sensor errors that were given are off the samples.
         left = 0 if self.given is None else len(self.errors.sd)
-        residuals -= self.linear.by_constants[:, :, STATES + left :] @ self.further[left:]
+        by_own = self.linear.by_constants[:, :, STATES + left :]
+        residuals += by_own[:, :, DELAY - OWN] * self.fixes.later[:, None]
+        residuals -= by_own @ self.further[left:]
         away = rotation.rotation_vector_from_quaternion(
             rotation.compose(self.at_first, rotation.conjugate(self.state.q_nb))
         )
@@ -751,7 +756,7 @@ class _Search:
             [
                 place_difference(self.fixes.place, place, ellipsoid=self.ellipsoid),
                 self.fixes.velocity - velocity,
-                -slips(own),
+                -slips(own, self.rolled),
                 (self.fixes.speed - own[:, 0])[:, None],
             ]
         )
@@ -766,10 +771,7 @@ class _Search:
         )
         if self.further.size and self.given is not None:
             size = self.further[: len(self.errors.sd)]
-            # With speeds alone these terms of second order made 2 of 20 drawn drives diverge;
-            # without them all converge.
-            bias = self.bias if self.free == 6 else None
-            self.errors = self.errors.about(course, size, bias)
+            self.errors = self.errors.about(course, size, self.bias)
         q, m = len(self.errors.sd), len(fixes.instants)
         C_nb = rotation.dcm_from_quaternion(now.q_nb)
         look = np.zeros((m, ROWS, 9))
@@ -778,7 +780,7 @@ class _Search:
         look[:, 3:6, 6:] = -rotation.cross_matrix(
             np.einsum("mij,mj->mi", C_nb, np.cross(now.rate, self.arm))
         )
-        look[:, SIDE_SLIP:] = by_state(now, C_nb, p)
+        look[:, SIDE_SLIP:] = by_state(now, C_nb, p, self.rolled)
         # Derivatives by the constants of `OWN`.
         own = np.zeros((m, ROWS, STATES + q + OWN))
         own[:, :, : STATES + q] = look @ at_fixes(course, self.errors, fixes.instants)
@@ -788,8 +790,7 @@ class _Search:
         rates = np.r_[GYRO_BIAS, STATES : STATES + q]
         own[:, 3:6, rates] += C_nb @ rotation.cross_matrix(self.arm) @ swung
         axle = rotation.cross_matrix(np.asarray(p.no_slip_point, dtype=np.float64))
-        if self.free == 6:
-            own[:, SIDE_SLIP:, rates] += by_point(now, p) @ axle @ swung
+        own[:, SIDE_SLIP:, rates] += by_point(now, p, self.rolled) @ axle @ swung
         more = own[:, :, STATES + q :]
         more[:, 0:3, 0:3] = C_nb
         more[:, 3:6, 0:3] = C_nb @ rotation.cross_matrix(now.rate)
@@ -869,7 +870,9 @@ class _Search:
 
         A speed that stands for a standing wheel says nothing of either.
         """
-        speed = np.linalg.norm(now.velocity, axis=1)
+        speed = np.where(
+            np.isfinite(self.rolled), self.rolled, np.linalg.norm(now.velocity, axis=1)
+        )
         steady = (speed > LEAST_SLIP_SPEED) & (np.abs(speed * now.rate[:, 2]) < MOST_LATERAL)
         stated = [self.priors.side_slip_sd_deg, self.priors.pitch_slip_sd_deg]
         return np.asarray(steady[:, None] & np.array([sd is not None for sd in stated]))
@@ -1064,25 +1067,41 @@ def point_velocity(now: AtFixes, priors: EntryPriors) -> Array:
     return np.asarray(own + np.cross(now.rate, np.asarray(priors.no_slip_point)))
 
 
-def slips(v: Array) -> Array:
-    """Side-slip and pitch-slip angle of a velocity in vehicle axes, (m, 2), rad."""
-    return np.column_stack([np.arctan2(v[:, k], v[:, 0]) for k in (1, 2)])
+def slips(v: Array, rolled: Array) -> Array:
+    """Side-slip and pitch-slip angle of a velocity in vehicle axes, (m, 2), rad.
+
+    `rolled`, (m,), m/s: speed by the wheels. Where it is there, the angle is the part of the
+    velocity over it, and so linear in the velocity: with an angle of a poor guess the search
+    overshoots.
+    """
+    known, ahead = _rolling(rolled)
+    return np.column_stack(
+        [np.where(known, v[:, k] / ahead, np.arctan2(v[:, k], v[:, 0])) for k in (1, 2)]
+    )
 
 
-def by_point(now: AtFixes, priors: EntryPriors) -> Array:
+def _rolling(rolled: Array) -> tuple[NDArray[np.bool_], Array]:
+    """Where the wheels show a speed that can be divided by, and that speed."""
+    known = np.isfinite(rolled) & (np.abs(rolled) > LEAST_SLIP_SPEED)
+    return known, np.where(known, rolled, 1.0)
+
+
+def by_point(now: AtFixes, priors: EntryPriors, rolled: Array) -> Array:
     """Derivative of the slips and of the speed by the point's velocity, vehicle axes, (m, 3, 3)."""
     v = point_velocity(now, priors)
+    known, ahead = _rolling(rolled)
     out = np.zeros((len(v), 3, 3))
     for row, axis in enumerate((1, 2)):
         square = np.maximum(v[:, 0] ** 2 + v[:, axis] ** 2, 1e-6)
-        out[:, row, 0], out[:, row, axis] = -v[:, axis] / square, v[:, 0] / square
+        out[:, row, 0] = np.where(known, 0.0, -v[:, axis] / square)
+        out[:, row, axis] = np.where(known, 1.0 / ahead, v[:, 0] / square)
     out[:, 2, 0] = 1.0
     return out
 
 
-def by_state(now: AtFixes, C_nb: Array, priors: EntryPriors) -> Array:
+def by_state(now: AtFixes, C_nb: Array, priors: EntryPriors, rolled: Array) -> Array:
     """Derivative of the slips and of the speed by position, velocity and attitude, (m, 3, 9)."""
-    back = by_point(now, priors) @ C_nb.transpose(0, 2, 1)
+    back = by_point(now, priors, rolled) @ C_nb.transpose(0, 2, 1)
     out = np.zeros((len(back), 3, 9))
     out[:, :, 3:6] = back
     out[:, :, 6:9] = back @ rotation.cross_matrix(now.velocity)

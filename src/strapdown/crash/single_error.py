@@ -14,11 +14,21 @@ from strapdown.errors import Finding
 
 Array = NDArray[np.float64]
 
+OFF_SCALE, OFF_POSITION, OFF_MOUNTING = (
+    f"crash.off-{what}" for what in ("scale", "position", "mounting")
+)
 #: Standard deviations that are tried, zero first: of a scale factor, in m and rad.
 SIZES: Mapping[str, Array] = {
-    "crash.off-scale": np.array([0.0, 0.05, 0.1, 0.2, 0.4]),
-    "crash.off-position": np.array([0.0, 0.1, 0.2, 0.4, 0.8]),
-    "crash.off-mounting": np.radians([0.0, 3.0, 6.0, 12.0, 24.0]),
+    OFF_SCALE: np.array([0.0, 0.05, 0.1, 0.2, 0.4]),
+    OFF_POSITION: np.array([0.0, 0.1, 0.2, 0.4, 0.8]),
+    OFF_MOUNTING: np.radians([0.0, 3.0, 6.0, 12.0, 24.0]),
+}
+
+
+_QUANTITY = {
+    OFF_SCALE: "scale factor",
+    OFF_POSITION: "position",
+    OFF_MOUNTING: "mounting angles",
 }
 
 
@@ -43,12 +53,12 @@ class SingleError:
 
     def finding(self, first: str, second: str) -> Finding:
         """The error as a finding on the second point."""
-        shown = {"crash.off-scale": 100.0, "crash.off-mounting": 180.0 / math.pi}
+        shown = {OFF_SCALE: 100.0, OFF_MOUNTING: 180.0 / math.pi}
         x, y, z = (float(v) for v in np.resize(shown.get(self.code, 1.0) * self.size, 3))
         return Finding(
             "crash.one-point-off",
             file=second,
-            quantity="comparison",
+            quantity=_QUANTITY[self.code],
             first=first,
             error=Finding(self.code, severity="note", x=x, y=y, z=z),
             odds=float(np.exp(0.5 * min(self.lead, 1000.0))),

@@ -60,6 +60,9 @@ class WatchOptions:
         Whether a sample is the mean over the interval that ends with it.
     severity : tuple of str
         Models of injury risk, evaluated for delta-V so far.
+    bias, scale : six numbers
+        What the recorder reads too much, known by a calibration, and taken off: rad/s and m/s²,
+        and shares of the truth; x, y, z of the gyro, then of the accelerometers.
     """
 
     axes: tuple[float, ...] = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -69,25 +72,27 @@ class WatchOptions:
     gyro: bool = False
     mean: bool = False
     severity: tuple[str, ...] = ()
+    bias: tuple[float, ...] = (0.0,) * 6
+    scale: tuple[float, ...] = (0.0,) * 6
 
 
 def watch_options(
     accel: TriadUncertainty,
     gyro: TriadUncertainty | None,
     C: ArrayLike,
-    angles_sd: float,
+    angles_sd: ArrayLike,
     *,
     mean: bool = False,
     severity: tuple[str, ...] | None = None,
 ) -> WatchOptions:
-    """Options of a recorder from its stated uncertainty; of each error the worst axis is taken.
+    """Options of a recorder from its stated uncertainty; the worse of forward and right is taken.
 
     Parameters
     ----------
     C : array_like, (3, 3)
         Rotates vectors from the axes of the recorder to those of the vehicle.
-    angles_sd : float, rad
-        Standard deviation of the mounting angles.
+    angles_sd : array_like, (3,), rad
+        Standard deviations of the mounting about forward, right and down.
     severity : tuple of str, optional
         By default the models of all crashes.
     """
@@ -95,18 +100,23 @@ def watch_options(
         severity = tuple(n for n, m in SEVERITY_MODELS.items() if not m.applies)
     # A model that needs more than delta-V cannot be evaluated during a crash.
     names = tuple(n for n in severity if find_severity_model(n).inputs == ("delta_v",))
-    bias = max(accel.axis("bias"))
+    C = np.asarray(C, dtype=np.float64)
+    level = accel.turned(C)
+    *leans, facing = np.asarray(angles_sd, dtype=np.float64).tolist()
+    lean = max(leans)
+    # At the end of the range nonlinearity is that share of the reading, below it less.
+    scale = np.hypot(level.axis("scale"), level.axis("nonlinearity_2"))[:2].max()
     return WatchOptions(
-        tuple(float(v) for v in np.asarray(C, dtype=np.float64).ravel()),
+        tuple(float(v) for v in C.ravel()),
         (
-            max(accel.axis("noise_density")),
-            max(accel.axis("scale")),
-            max(accel.axis("misalignment")),
-            angles_sd,
-            angles_sd,
-            UNMEASURED_YAW if gyro is None else max(gyro.axis("bias")),
+            max(level.axis("noise_density")[:2]),
+            float(scale),
+            max(level.axis("misalignment")[:2]),
+            lean,
+            facing,
+            UNMEASURED_YAW if gyro is None else gyro.turned(C).axis("bias")[2],
         ),
-        bias**2 + STANDARD_GRAVITY**2 * (SLOPE**2 + angles_sd**2),
+        max(level.axis("bias")[:2]) ** 2 + STANDARD_GRAVITY**2 * (SLOPE**2 + lean**2),
         tuple(v if math.isfinite(v) else None for v in accel.axis("full_scale")),
         gyro is not None,
         mean,
@@ -131,6 +141,7 @@ class CrashWatch:
         self.options = options
         self._C = np.array(options.axes).reshape(3, 3)
         self._errors = np.array(options.errors)
+        self._bias, self._scale = np.array(options.bias), 1.0 + np.array(options.scale)
         limits = [math.inf if v is None else NEAR_END * v for v in options.full_scale]
         self._limits = np.array(limits)
         self._felt = np.abs(self._C[:2]) > FEELS
@@ -188,8 +199,9 @@ class CrashWatch:
         self._time, self._step = time, float(dt)
         self.samples += 1
         force = numbers[-3:]
-        self._sample[:3] = self._C @ force
-        self._sample[kernel.SPIN] = self._C[2] @ numbers[:3] if self.options.gyro else 0.0
+        self._sample[:3] = self._C @ ((force - self._bias[3:]) / self._scale[3:])
+        rate = (numbers[:3] - self._bias[:3]) / self._scale[:3]
+        self._sample[kernel.SPIN] = self._C[2] @ rate if self.options.gyro else 0.0
         clipped = np.abs(force) >= self._limits
         self._sample[kernel.CLIPPED :] = (self._felt & clipped).any(axis=1)
         before = self._state[kernel.MODE]

@@ -29,10 +29,18 @@ SAMPLES, BEFORE, STEP = 340, 300, 0.0078125
 TERMS = 5
 
 
-def export_detector(errors: Sequence[float], variance: float, *, mean: bool = False) -> str:
+def export_detector(
+    errors: Sequence[float],
+    variance: float,
+    *,
+    mean: bool = False,
+    calibration: Sequence[float] = (),
+) -> str:
     """Write the detection as C99, translated from the kernel that `CrashWatch` runs.
 
-    `errors`, `variance`, `mean`: as in `WatchOptions`. Returns the text of the file.
+    `errors`, `variance`, `mean`: as in `WatchOptions`. `calibration`: its `bias`, `scale` and
+    `axes`, 21 numbers, which the caller of the C takes off; they are in the first comment. Returns
+    the text of the file.
     """
     kernels = Kernels(HOME)
     for name in ("begin", "spread"):
@@ -45,7 +53,7 @@ def export_detector(errors: Sequence[float], variance: float, *, mean: bool = Fa
     used = {c.name for c in kernels.constants()}
     more = "".join(f"#define {n} {v}\n" for n, v in codes.items() if n not in used)
     parts = [
-        _header(mean),
+        _header(mean, calibration),
         precision_lines(body + _WRAPPER),
         constant_lines(kernels) + more,
         _INTERFACE.format(size=kernel.SIZE),
@@ -62,15 +70,23 @@ def export_detector(errors: Sequence[float], variance: float, *, mean: bool = Fa
 CODES = ("QUIET", "AWAKE", "TRIGGERED", "ENDED", "INTERRUPTED")
 
 
-def _header(mean: bool) -> str:
+def _header(mean: bool, calibration: Sequence[float]) -> str:
     version = importlib.import_module("strapdown").__version__
     taken = "the mean over the dt that ends with it" if mean else "the value at its instant"
+    rows = [", ".join(f"{v:.9g}" for v in calibration[k : k + 3]) for k in range(0, 21, 3)]
+    calibrated = (
+        "The errors below are those that a calibration left. Take it off the x, y, z of the "
+        f"recorder: rates less ({rows[0]}) rad/s, over one plus ({rows[2]}); forces less "
+        f"({rows[1]}) m/s², over one plus ({rows[3]}); then turn both by the rows "
+        f"({'), ('.join(rows[4:])})."
+    )
     lines = [
         "Crash detection and delta-V so far, after 49 CFR 563.5(b): 8 km/h forward or right "
         f"within 150 ms. Written by strapdown {version} from the kernel that it runs itself.",
         f"A sample is {taken}, in the axes of the vehicle, forward-right-down: specific force in "
         "m/s², yaw rate in rad/s (0 without a gyro), and 1 where the force forward, and right, is "
         "at the end of its range. dt is in s.",
+        *([calibrated] if calibration else []),
         "The trigger is known at the sample at which the threshold is met. At least 100 samples a "
         "second. Each sample costs two passes over at most "
         f"{kernel.SLOTS} slots; memory in single precision: {4 * kernel.SIZE} bytes.",

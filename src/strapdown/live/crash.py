@@ -10,7 +10,12 @@ from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
-from strapdown.config.crash_case import CaseSpec, TriadSpec
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown import rotation
+from strapdown.config.crash_case import CaseSpec, TriadSpec, UnitSpec
+from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.watch import CrashLog, CrashWatch, WatchOptions, watch_options
 from strapdown.errors import DataError, Finding
 from strapdown.live.lines import END, BadLineError, Sample, Word, parse_line
@@ -24,25 +29,94 @@ from strapdown.sensors.uncertainty import TriadUncertainty, stated_uncertainty
 __all__ = ["CrashReception", "receive_crash", "recorder_of_case"]
 
 
-def recorder_of_case(path: Path) -> WatchOptions:
+def recorder_of_case(path: Path, calibration: Path | None = None) -> WatchOptions:
     """Return the options of the first unit of a case, whose records are not read.
 
     Of several accelerometers, the last has the highest range: its samples are expected. Lines hold
     the axes x, y, z of the recorder, before the signs of `channels`.
+
+    Parameters
+    ----------
+    calibration : Path, optional
+        Result of `strapdown crash`, a folder or its `crash.json`, in which a drive determined the
+        errors of this unit. They are taken off, and their bound replaces the stated one; that of a
+        scale factor only where a nonlinearity says how far beyond the drive it holds.
+
+    Raises
+    ------
+    DataError
+        `calibration` is no such result, or has no drive of the unit.
     """
     spec = CaseSpec.read(path, files=False)
     unit = spec.units[0]
     strong = unit.accelerometers[-1]
     mounting = Mounting(unit.position_m, unit.angles_deg, unit.position_sd_m, unit.angles_sd_deg)
     gyro = None if unit.gyro is None else _uncertainty("gyro", unit.gyro, path.parent)
-    return watch_options(
-        _uncertainty("accel", strong, path.parent),
+    accel, C = _uncertainty("accel", strong, path.parent), mounting.C_vs
+    angles_sd = np.full(3, math.radians(unit.angles_sd_deg))
+    bias, scale = np.zeros((2, 2, 3))
+    if calibration is not None:
+        known = _calibration(calibration, unit)
+        turned, own = known("mounting", unit.name, angles_sd)
+        C, angles_sd = rotation.dcm_from_rotation_vector(turned) @ C, own
+        name = f"{unit.name} {unit.accelerometer_names[-1]}"
+        bias[1], bias_sd = known("bias", name, accel.axis("bias"))
+        scale[1], scale_sd = known("scale", name, accel.axis("scale"))
+        linear = np.array(accel.axis("nonlinearity_2")) > 0.0
+        scale_sd = np.where(linear, scale_sd, accel.axis("scale"))
+        accel = replace(accel, bias=tuple(bias_sd), scale=tuple(scale_sd))
+        if gyro is not None:
+            name = f"{unit.name} gyro"
+            bias[0], bias_sd = known("gyro bias", name, gyro.axis("bias"))
+            scale[0], _ = known("gyro scale", name, gyro.axis("scale"))
+            gyro = replace(gyro, bias=tuple(bias_sd))
+    options = watch_options(
+        accel,
         gyro,
-        mounting.C_vs,
-        math.radians(unit.angles_sd_deg),
+        C,
+        angles_sd,
         mean=(strong.sampling or spec.options.sampling) == "mean",
         severity=spec.options.severity,
     )
+    return replace(options, bias=tuple(bias.ravel().tolist()), scale=tuple(scale.ravel().tolist()))
+
+
+def _calibration(
+    path: Path, unit: UnitSpec
+) -> Callable[[str, str, ArrayLike], tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """Return what gives the error of a quantity of a sensor on three axes, and its bound."""
+    from strapdown.report.crash_tables import DRIVE_QUANTITIES
+
+    file = path / "crash.json" if path.is_dir() else path
+    try:
+        answers = json.loads(file.read_text(encoding="utf-8"))["answers"]
+        drives = {one["recorder"]: one["drive"] for one in answers if one["drive"] is not None}
+    except (OSError, ValueError, TypeError, KeyError):
+        drives = {}
+    if not drives:
+        raise DataError("live.no-calibration", file=str(file), quantity="--calibration")
+    if unit.name not in drives:
+        raise DataError(
+            "live.calibration-of-others",
+            file=str(file),
+            quantity="--calibration",
+            name=unit.name,
+            others=list(drives),
+        )
+
+    def known(
+        quantity: str, of: str, stated: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        key, _, size, _ = DRIVE_QUANTITIES[quantity]
+        error, sd = np.zeros(3), np.array(stated, dtype=np.float64)
+        for row in drives[unit.name]["errors"]:
+            if (row["quantity"], row["of"]) == (key, of):
+                axis, by_drive = "xyz".index(row["axis"]), row["by_drive"]
+                error[axis] = size * by_drive["value"]
+                sd[axis] = size * (by_drive["high"] - by_drive["value"]) / TWO_SIDED_95
+        return error, sd
+
+    return known
 
 
 def _uncertainty(triad: str, spec: TriadSpec, folder: Path) -> TriadUncertainty:

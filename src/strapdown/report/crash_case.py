@@ -32,6 +32,7 @@ from strapdown.progress import Progress
 from strapdown.report import crash_words
 from strapdown.report.chart import Array
 from strapdown.report.crash_document import crash_document
+from strapdown.report.crash_tables import DRIVE_QUANTITIES
 from strapdown.report.document import finding_json
 from strapdown.report.document_pdf import write_pdf
 from strapdown.report.report_bundle import (
@@ -263,24 +264,12 @@ def _unit(unit: UnitReconstruction) -> dict[str, Any]:
     }
 
 
-#: Key of each quantity that a drive determines, and the size of its unit.
-_DRIVE = {
-    "bias": ("accelerometer_bias_m_per_s2", 1.0),
-    "scale": ("accelerometer_scale_percent", 0.01),
-    "gyro bias": ("gyro_bias_deg_per_s", np.pi / 180.0),
-    "gyro scale": ("gyro_scale_percent", 0.01),
-    "mounting": ("mounting_deg", np.pi / 180.0),
-    "speed scale": ("speed_scale_percent", 0.01),
-    "speed delay": ("speed_delay_s", 1.0),
-}
-
-
 def _drive(drive: EntryState) -> dict[str, Any]:
     """What the drive shows; ``determined``: it leaves less than nine tenths of what was stated."""
     rows = []
     table = drive.calibration
     for what in () if table is None else table.to_dict("records"):
-        key, size = _DRIVE[what["quantity"]]
+        key, _, size, _ = DRIVE_QUANTITIES[what["quantity"]]
         half, stated, kept = (
             TWO_SIDED_95 * x / size for x in (what["sd"], what["stated"], what["in_crash"])
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -348,15 +349,16 @@ def indices_table(result: CaseResult) -> TableBlock | None:
         unit = speed_unit() if index.unit == "m/s" else index.unit
         value, bound = "–", "" if index.because is None else index.because.sentence("file")
         if index.value is not None:
-            half = math.inf if index.high is None else factor * (index.high - index.value)
+            ends = [factor * x for x in (index.low, index.high) if x is not None]
+            half = max((abs(x - factor * index.value) for x in ends), default=math.inf)
             places = decimals(half, 2, most=3) if math.isfinite(half) else decimals(index.value)
             value = f"{plain(factor * index.value, places)} {unit}".strip()
             if index.at_least:
-                value = f"at least {value}"
+                value = f"{value} or beyond" if index.value < 0.0 else f"at least {value}"
             bound = "not stated by the record" if index.channels else "not determined"
-            if index.low is not None and index.high is not None:
-                ends = (plain(factor * x, places) for x in (index.low, index.high))
-                bound = " to ".join(ends)
+            if ends:
+                side = "" if len(ends) == 2 else "above " if index.high is None else "below "
+                bound = side + " to ".join(plain(x, places) for x in ends)
         detail = [index.detail] if index.detail else []
         if index.channels:
             detail.append(f"channels {', '.join(index.channels)}")
@@ -555,15 +557,27 @@ def units_table(result: CaseResult) -> TableBlock:
     )
 
 
-#: Quantities that a drive determines, with the unit and its size, and their names on axes 0 to 2.
-DRIVE_QUANTITIES: dict[str, tuple[str, float, tuple[str, ...]]] = {
-    "bias": ("m/s²", 1.0, ("bias x", "bias y", "bias z")),
-    "scale": ("%", 0.01, ("scale factor x", "scale factor y", "scale factor z")),
-    "gyro bias": ("°/s", 1.0 / DEG, ("bias x", "bias y", "bias z")),
-    "gyro scale": ("%", 0.01, ("scale factor x", "scale factor y", "scale factor z")),
-    "mounting": ("°", 1.0 / DEG, ("mounting roll", "mounting pitch", "mounting yaw")),
-    "speed scale": ("%", 0.01, ("scale of the wheels",)),
-    "speed delay": ("s", 1.0, ("delay of the wheels",)),
+class DriveQuantity(NamedTuple):
+    """A quantity that a drive determines: its key in JSON, unit, and names on axes 0 to 2."""
+
+    key: str
+    symbol: str
+    size: float
+    names: tuple[str, ...]
+
+
+_BIAS, _SCALE = (tuple(f"{what} {axis}" for axis in "xyz") for what in ("bias", "scale factor"))
+#: By the quantities of `EntryState.calibration`; `size` is that of the unit, in SI.
+DRIVE_QUANTITIES: dict[str, DriveQuantity] = {
+    "bias": DriveQuantity("accelerometer_bias_m_per_s2", "m/s²", 1.0, _BIAS),
+    "scale": DriveQuantity("accelerometer_scale_percent", "%", 0.01, _SCALE),
+    "gyro bias": DriveQuantity("gyro_bias_deg_per_s", "°/s", 1.0 / DEG, _BIAS),
+    "gyro scale": DriveQuantity("gyro_scale_percent", "%", 0.01, _SCALE),
+    "mounting": DriveQuantity(
+        "mounting_deg", "°", 1.0 / DEG, ("mounting roll", "mounting pitch", "mounting yaw")
+    ),
+    "speed scale": DriveQuantity("speed_scale_percent", "%", 0.01, ("scale of the wheels",)),
+    "speed delay": DriveQuantity("speed_delay_s", "s", 1.0, ("delay of the wheels",)),
 }
 
 
@@ -574,7 +588,7 @@ def drive_table(result: CaseResult) -> TableBlock | None:
         if unit.drive is None or unit.drive.calibration is None:
             continue
         for what in unit.drive.calibration.to_dict("records"):
-            symbol, size, names = DRIVE_QUANTITIES[what["quantity"]]
+            _, symbol, size, names = DRIVE_QUANTITIES[what["quantity"]]
             name = names[what["axis"]]
             if not determined(what):
                 open_ones.append(" ".join((what["of"], name)))

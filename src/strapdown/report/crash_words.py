@@ -493,6 +493,7 @@ AGAINST = frozenset(
         "disagree-their-common-point-chi",
         "momentum-not-closed",
         "no-point-closes",
+        "one-point-off",
         "others-agree-another-not",
         "point-does-not-close",
         "reads-more-than-stated-full",

@@ -14,6 +14,7 @@ from strapdown.crash.case_indices import occupant_indices, vehicle_indices
 from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.formats.crash_records import read_crash_record
 from strapdown.formats.crash_writers import write_mme
+from strapdown.report.crash_tables import indices_table
 
 G = 9.80665
 STEP = 1e-4
@@ -161,3 +162,26 @@ class TestVehicle:
         assert found["OLC"].value is None
         assert found["OLC"].because.code == "crash.index-frontal-only"
         assert found["THIV"].value > 0.0
+
+    def test_the_bound_of_a_part_is_open_away_from_zero(self):
+        result = crash_case("pole")
+        unit = result.reconstruction.main
+        (body,) = unit.body
+        cut = replace(body.event, missing=("after",), open_axes=(True, True, True))
+        part = vehicle_indices(replace(unit, body=(replace(body, event=cut),)), 0)
+        below = 0
+        for whole, one in zip(vehicle_indices(unit, 0), part, strict=True):
+            if whole.low is None:
+                continue
+            assert one.at_least
+            if whole.value >= 0.0:
+                assert (one.low, one.high) == (whole.low if whole.low >= 0.0 else None, None)
+            else:
+                assert (one.low, one.high) == (None, whole.high if whole.high < 0.0 else None)
+                below += 1
+        # The ride down of a front is backward: not "at least" a negative number.
+        assert below
+        table = indices_table(replace(result, indices=part))
+        for cells, one in zip(table.rows, part, strict=True):
+            if one.value is not None:
+                assert cells[2].startswith("at least ") == (one.value >= 0.0)

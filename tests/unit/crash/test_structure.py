@@ -61,6 +61,19 @@ def test_a_single_error_is_named_with_its_size(fault, code, size):
     assert error.data[axis] == pytest.approx(size[0], abs=3.0 * size[1])
 
 
+@pytest.mark.parametrize(("number", "kind"), [(7003, "rear"), (7005, "pole"), (7008, "side")])
+def test_a_unit_that_is_turned_has_no_reversed_axis_and_one_size(number, kind):
+    """A car that hardly turns has rates that another wiring fits by chance."""
+    crash = Crash(number, kind)
+    found = compare(
+        [crash.unit(0, gyro=True), crash.unit(1, gyro=True, fault=Fault(turned_deg=7.0))]
+    )
+    said = [f for f in found.findings if f.quantity in ("axes", "mounting angles")]
+    assert [f.code for f in said] == ["crash.one-point-off"]
+    # Both are mounted to 0.5 deg (1 sd), and the size is within three of them.
+    assert said[0].data["error"].data["z"] == pytest.approx(7.0, abs=3.0 * 0.5 * 2**0.5)
+
+
 def test_four_points_agree_together():
     assert not disagrees(4, "front", gyro=False, count=4)
 
