@@ -273,7 +273,7 @@ class Epochs:
         _, first, count = np.unique(block, return_index=True, return_counts=True)
         stamps, speed = (np.add.reduceat(x, first) / count for x in (stamps, speed))
         n = len(stamps)
-        # What a wheel shows of a speed near zero is often zero.
+        # Wheel sensors often read zero near zero speed.
         sds = np.where(np.abs(speed) < LEAST_SPEED, math.hypot(sd, 0.5 * LEAST_SPEED), sd)
         # Of a speed position and velocity are not measured: any numbers will do.
         place, velocity = np.tile(SOMEWHERE, (n, 1)), np.zeros((n, 3))
@@ -308,8 +308,8 @@ class Epochs:
 def _lengths(fixes: Fixes, end: float) -> list[float]:
     """Lengths of the drive to use in turn, s.
 
-    A gyro bias of 0.01 rad/s turns a long record by more than is linear: a short part of it shows
-    the bias well enough for one of twice the length.
+    A gyro bias of 0.01 rad/s turns a long record by more than is linear: a short part shows the
+    bias well enough for one of twice the length.
     """
     whole = end - float(fixes.instants[0])
     lengths = [whole]
@@ -373,7 +373,7 @@ CAR = {
 }
 #: Speeds are means over this, s.
 SPEED_STEP = 0.25
-#: A vehicle at less than this stands, m/s.
+#: Below this speed a vehicle is stationary, m/s.
 STANDS = 0.2
 #: Latitude and longitude, deg, and height, m, of a drive without fixes: as of `Entry`.
 SOMEWHERE = (45.0, 0.0, 0.0)
@@ -536,7 +536,7 @@ def start_from_drive(
     corrected = errors.off_table(at.imu, best.parameters)
     at = replace(at, imu=biases_off(corrected, best.own_bias[:3], best.own_bias[3:]))
     if at.rest is None or at.rest.grade == "steady":
-        # A quiet drive is no better known than the attitude, which its errors are a part of.
+        # The errors of a quiet drive are part of those of the attitude: count them once.
         roll, pitch, _ = state.state.roll_pitch_heading.tolist()
         at = replace(at, rest=None, rest_accel_sd=0.0, levelling=Levelling(roll, pitch, 0.0, False))
     level = rotation.dcm_from_quaternion(state.state.q_nb)
@@ -731,7 +731,7 @@ def _calibration(
     shown: Sequence[int],
     kept: Array,
 ) -> tuple[pd.DataFrame, list[Finding]]:
-    """What the drive shows of the unit, and the findings on it."""
+    """Errors of the unit as estimated from the drive, and findings."""
     effects, sd = at.effects, np.sqrt(np.diag(best.joint)[STATES:])
     rows: list[tuple[str, int, str, float, float, float, float]] = []
     held: list[str] = []

@@ -274,7 +274,7 @@ class EntryPriors:
         As `side_slip_sd_deg`, of the angle between the direction of travel and the plane of the
         forward and right axes: suspension and slope of the road under the vehicle.
     pitch_slope_sd_deg : float, deg per m/s²
-        Of the part of it that grows with forward acceleration: squat and dive.
+        Of its part that grows with forward acceleration: squat and dive.
     speed_scale_sd : float
         Relative, of speeds: tires and wheel circumference.
     speed_delay, speed_delay_sd : float, s
@@ -831,8 +831,8 @@ class _Search:
         loose = UNKNOWN * np.where(bounded > 0.0, bounded, np.tile(bounded[:3].max(), 6))
         heading = math.radians(p.heading_sd_deg or ANY_HEADING)
         if self.free == 3:
-            # Speeds alone determine neither position nor heading: both are as guessed. What they
-            # do not measure of the velocity must not run away in a bend.
+            # Speeds alone determine neither position nor heading: both are as guessed. The
+            # components of velocity that they do not measure must not drift in a bend.
             loose[3:6], heading = SPEED_STRIDE, 0.0
         prior_sd = np.concatenate(
             [
@@ -867,7 +867,7 @@ class _Search:
     def _slides(self, now: AtFixes) -> NDArray[np.bool_]:
         """Where the vehicle travels along its axis, (m, 2): the conditions on side and pitch slip.
 
-        A speed that stands for a standing wheel says nothing of either.
+        The condition on a locked wheel restricts neither.
         """
         speed = np.linalg.norm(now.velocity, axis=1)
         steady = (speed > LEAST_SLIP_SPEED) & (np.abs(speed * now.rate[:, 2]) < MOST_LATERAL)

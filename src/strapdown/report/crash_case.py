@@ -276,7 +276,7 @@ _DRIVE = {
 
 
 def _drive(drive: EntryState) -> dict[str, Any]:
-    """What the drive shows; ``determined``: it leaves less than nine tenths of what was stated."""
+    """Estimates from the drive; ``determined``: its sd is below nine tenths of the stated one."""
     rows = []
     table = drive.calibration
     for what in () if table is None else table.to_dict("records"):
