@@ -72,7 +72,7 @@ class GnssCourse(CoarseAlignment):
         Heading of the unit's forward axis minus that of the vehicle's.
     mounting_yaw_sd_deg, sideslip_sd_deg : float, deg
         Standard deviation of that angle, unless it is measured 5 deg; accelerations and turns
-        tell the heading better. And of the sideslip: 1 deg for a car that does not turn hard; an
+        reduce it. And of the sideslip: 1 deg for a car that does not turn hard; an
         aircraft or a ship drifts more with wind and current.
     least_speed : float, m/s
         Below it no course is taken.
@@ -376,7 +376,7 @@ class CourseFit:
         )
 
     def _observed(self, found: Found, more: ArrayLike = ()) -> Observed:
-        """What the estimates predict at the fixes, the rests and `more` instants, and residuals."""
+        """Predict the fixes, the rests and `more` instants from the estimates, with residuals."""
         fixes, rests = self.fixes, self.rests
         time = np.concatenate([fixes.time, [rest.time for rest in rests], np.asarray(more, float)])
         sums = drive_sums(self.imu, time, self.means, found.errors)
@@ -563,7 +563,7 @@ class CourseFit:
         by[:, :, TURN] = rotation.cross_matrix(gained)
         by[:, :, OF_GYROS] = found.C @ sums.by_turn
         by[:, :, OF_ACCELS] = found.C @ sums.by_accel
-        # A tilt and a bias that cancel each other do so to the last part that the fixes tell apart:
+        # A tilt and a bias that cancel each other do so to the last digit that the fixes resolve:
         # without these terms, 0.4 % over a minute, fixes of a centimetre seem to separate the two.
         past = np.append(0.0, sums.until_end[from_end])
         along = np.concatenate([np.eye(self.unknowns)[None, END_VELOCITY], by[from_end]])
