@@ -31,7 +31,7 @@ from strapdown.units import MAG_UNITS, PRESSURES, SPEEDS, TIME_UNITS, factor_of
 
 __all__ = ["read_streams", "write"]
 
-#: A column that tells which stream a table is, in the order of the tests.
+#: A column that identifies the stream of a table, in the order of the tests.
 _TELLS = (
     (GYRO[0], "imu"),
     (POSITION_SD[0], "gnss"),

@@ -69,8 +69,8 @@ def gather_references(
 ) -> tuple[pd.DataFrame, tuple[PlaceReference, ...], tuple[SamePose, ...]]:
     """Reference points of attitude and position, and poses that are offered as such.
 
-    `span` is the meaning of the words start and end, s. A rest that the run is leveled at is no
-    reference.
+    `span` is the meaning of the words start and end, s. A rest at which the run is leveled is
+    not a reference.
     """
     words = list(spec.references)
     whole = spec.from_s is spec.to_s is spec.duration_s is None

@@ -169,7 +169,7 @@ def _place(item: InputFiles, places: dict[Path, Path]) -> Path:
     # The given name; a link's target may have lost its suffix.
     own = item.path.name or item.path.resolve().name
     place = Path("inputs") / item.role / own
-    # Several logs may share a name, and a file may have been read for each of them.
+    # Several logs may share a name, and a file may have been read for each.
     number = 2
     while places.get(place, item.path) != item.path:
         place = Path("inputs") / f"{item.role}-{number}" / own

@@ -254,7 +254,7 @@ def _broken(name: str) -> str:
 def print_findings(findings: Sequence[Finding], most: int | None = None) -> None:
     """Print findings to stderr, in `WORDS`; at most the first `most`.
 
-    What is said of several files or recorders alike is one.
+    Findings that several files or recorders share are printed once.
     """
     out = console(err=True)
     findings = _joined(findings)

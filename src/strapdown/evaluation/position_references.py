@@ -7,7 +7,7 @@
     12.5 moved 0.30 0 0 m since 3.0
 
 Both instants lie within rests. A displacement is along the axes of the run's local level:
-forward along the run's north, right of it, and down.
+forward along the run's north, right, and down.
 """
 
 from __future__ import annotations

@@ -229,7 +229,7 @@ def _interface(shape: Shape, around: Sampling, size: int) -> str:
 
 
 def constant_lines(kernels: Kernels) -> str:
-    """Definitions of the constants in use; a comment on several stands above the first."""
+    """Definitions of the constants in use; a comment on several is above the first."""
     lines: list[str] = []
     before = ""
     for constant in kernels.constants():

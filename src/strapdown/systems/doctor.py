@@ -579,7 +579,7 @@ def _impact(imu: pd.DataFrame) -> dict[str, float] | None:
     }
 
 
-# What was measured, as plain data.
+# The measurements, as plain data.
 
 
 def _stream(name: str, table: pd.DataFrame) -> dict[str, Any]:
@@ -688,7 +688,7 @@ def _ranges(raw: RawLog) -> list[dict[str, Any]]:
     return rows
 
 
-# What the log suffices for.
+# The uses for which the log suffices.
 
 
 def _samples(one: LogDiagnosis) -> list[Finding]:

@@ -75,7 +75,7 @@ def part_of_log(
     Returns
     -------
     DataFrame
-        The same table if all of it is used.
+        The same table if it is used whole.
     """
     check_part(from_s, to_s, duration_s)
     time = imu.index.to_numpy(dtype=np.float64)
@@ -196,7 +196,7 @@ def moved(result: R, key: str, old: Path, new: Path) -> R:
     key : str
         Field with the configuration that names their paths.
     old, new : Path
-        As of `Memory.as_files`; `NOWHERE` while there are no files.
+        As of `Memory.as_files`; `NOWHERE` without files.
     """
     if old == new:
         return result

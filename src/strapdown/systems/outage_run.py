@@ -398,7 +398,7 @@ def _drift(
     record = record_of(navigator, run.pieces)
     marks = record.sd.index.to_numpy(dtype=np.float64)
     if not len(marks):
-        # The record has the covariance at intervals; a shorter outage may lie between two of them.
+        # The record has the covariance at intervals; a shorter outage may lie between two.
         raise ConfigError(
             "outage.outage-between-covariances",
             quantity="--outage",
