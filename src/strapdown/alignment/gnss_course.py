@@ -45,7 +45,7 @@ from strapdown.alignment.course_sums import (
 )
 from strapdown.alignment.record_checks import check_record
 from strapdown.constants import MAD_TO_SD, STANDARD_GRAVITY
-from strapdown.dsp.running_integral import running_integral
+from strapdown.dsp.samples import running_integral
 from strapdown.earth import transport_rate
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.estimation.robust import Huber, Igg3, Influence

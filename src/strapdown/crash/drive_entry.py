@@ -44,7 +44,7 @@ from strapdown.crash.measuring_point import (
 )
 from strapdown.crash.structure import STRUCTURE
 from strapdown.dsp.chi_square import chi_square_above
-from strapdown.dsp.true_runs import true_runs
+from strapdown.dsp.samples import true_runs
 from strapdown.ellipsoids import WGS84
 from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.evaluation.control_points import rigid_fit

@@ -23,16 +23,15 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.crash.entry import ACCEL_BIAS, GYRO_BIAS, STATES, biases_off, rotated
 from strapdown.dsp.chi_square import chi_square_above, chi_square_exceeded
-from strapdown.dsp.running_integral import running_integral
+from strapdown.dsp.samples import running_integral
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError, DivergenceError, Finding
 from strapdown.evaluation.trajectory_differences import trajectory_at
-from strapdown.frames import geodetic_from_ned, place_difference
+from strapdown.frames import antenna_motion, geodetic_from_ned, place_difference
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NavigationRun, NorthEastDown, run_mechanization
 from strapdown.nav_state import NavState
 from strapdown.rotation import cross_matrix
-from strapdown.sensors.antenna import antenna_motion
 from strapdown.sensors.triad_errors import ZERO, Triad
 from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.tables import ACCEL, EULER, GEODETIC, GYRO, VELOCITY

@@ -17,7 +17,7 @@ from strapdown.alignment.course_sums import Antenna
 from strapdown.alignment.fine import FineResult
 from strapdown.alignment.gnss_course import GnssCourse
 from strapdown.constants import MAD_TO_SD
-from strapdown.dsp.running_integral import running_integral
+from strapdown.dsp.samples import running_integral
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
 from strapdown.errors import DataError
 from strapdown.estimation.error_filter import ErrorFilter, FilterState, symmetric

@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.dsp.true_runs import true_runs
+from strapdown.dsp.samples import true_runs
 from strapdown.errors import ConfigError, DataError
 from strapdown.estimation.robust import DOUBT, AdaptiveRule
 from strapdown.navigation.measurements.gnss import PLACE, TINY

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from strapdown.config.navigation import make_aids
 from strapdown.constants import TWO_SIDED_95
-from strapdown.dsp.true_runs import true_runs
+from strapdown.dsp.samples import true_runs
 from strapdown.errors import Finding
 from strapdown.estimation.robust import AdaptiveScale
 from strapdown.evaluation.plane_bound import plane_bound, plane_reach

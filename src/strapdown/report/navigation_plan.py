@@ -10,8 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.dsp.running_integral import running_integral
-from strapdown.dsp.true_runs import true_runs
+from strapdown.dsp.samples import running_integral, true_runs
 from strapdown.formats.trajectory_maps import thin
 from strapdown.frames import ned_from_geodetic
 from strapdown.navigation.record import NavigationRecord, Span

@@ -17,7 +17,7 @@ from strapdown.bundle.seal import InputFiles, Seal, input_files
 from strapdown.config.alignment import AxesTable, FixesTable, LogTable
 from strapdown.config.doctor import DoctorSpec, flags_of, flags_of_fixes
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.dsp.running_integral import running_integral
+from strapdown.dsp.samples import running_integral
 from strapdown.errors import DataError, Finding, Severity, StrapdownError
 from strapdown.evaluation.differences import rotation_contradicted
 from strapdown.evaluation.second_log import align_second_log

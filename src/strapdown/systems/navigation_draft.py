@@ -17,7 +17,7 @@ from strapdown.config.choice import SLOTS, Slot, options_of
 from strapdown.config.navigation import STAGES
 from strapdown.config.toml_text import ASK, Page, inline, named_from, string
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.dsp.true_runs import true_runs
+from strapdown.dsp.samples import true_runs
 from strapdown.errors import DataError, Finding
 from strapdown.estimation.sensor_blocks import STATED_STATES, resting_sd, states_that_are_stated
 from strapdown.formats.gnss_fixes import POSITION_SDS, VELOCITY_SDS

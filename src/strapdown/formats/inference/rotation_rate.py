@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import MAD_TO_SD
-from strapdown.dsp.running_integral import running_integral
+from strapdown.dsp.samples import running_integral
 from strapdown.errors import Finding
 from strapdown.formats.inference.conclusion import (
     Inference,

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from strapdown.constants import MAD_TO_SD
-from strapdown.dsp.true_runs import true_runs
+from strapdown.dsp.samples import true_runs
 from strapdown.errors import DataError, Finding
 from strapdown.frames import ned_from_geodetic, place_difference, ways_between
 from strapdown.navigation.measurements.clock_windows import stamp_step, step_finding
