@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from strapdown.bundle.seal import Seal, check_destination
+from strapdown.bundle import Seal, check_destination
 from strapdown.config.crash_case import CaseSpec
 from strapdown.crash.case import CaseResult, run_cases
 from strapdown.crash.reconstruction import UnitReconstruction

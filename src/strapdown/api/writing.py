@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.api.reading import ImuFile, Streams
-from strapdown.bundle.reading import read_manifest
+from strapdown.bundle import read_manifest
 from strapdown.config.alignment import FixesTable, LogTable
 from strapdown.config.spec import specify
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice

@@ -58,7 +58,7 @@ from strapdown.attitude_comparison.sweep import (
     trial_names,
     worst_sweep,
 )
-from strapdown.bundle.seal import InputFiles, Seal, check_destination, input_files
+from strapdown.bundle import InputFiles, Seal, check_destination, input_files
 from strapdown.config import LogSpec
 from strapdown.config.sources import read_options
 from strapdown.errors import ConfigError, DataError, Finding

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from strapdown.attitude_algorithms.algorithm import AttitudeRun
 from strapdown.attitude_comparison.options import AttitudeSpec
 from strapdown.attitude_comparison.source import Source
-from strapdown.bundle.seal import input_files
+from strapdown.bundle import input_files
 from strapdown.config import ScenarioSpec
 from strapdown.errors import ConfigError, Finding
 from strapdown.evaluation.differences import error_angles, known_at

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown.attitude_algorithms import Quaternion, run_attitude
 from strapdown.attitude_comparison.options import AttitudeSpec
-from strapdown.bundle.seal import InputFiles, input_files, sensor_file
+from strapdown.bundle import InputFiles, input_files, sensor_file
 from strapdown.config import LogSpec, ScenarioSpec
 from strapdown.config.sources import read_options
 from strapdown.errors import DataError, Finding

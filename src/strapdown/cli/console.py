@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from strapdown.bundle.seal import Seal
+    from strapdown.bundle import Seal
     from strapdown.errors import Finding, Words
     from strapdown.report.document import TableBlock
 

@@ -12,8 +12,7 @@ from strapdown.attitude_algorithms import make_algorithm
 from strapdown.attitude_algorithms.cost import Cost
 from strapdown.attitude_comparison.comparison import AttitudeComparison
 from strapdown.attitude_comparison.sweep import Share
-from strapdown.bundle.seal import Seal, write_json
-from strapdown.bundle.writing import write_bundle
+from strapdown.bundle import Seal, write_bundle, write_json
 from strapdown.errors import ConfigError
 from strapdown.evaluation.reference_points import Score
 from strapdown.formats import csv

@@ -10,8 +10,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown import __version__
-from strapdown.bundle.configuration_paths import names_file
-from strapdown.bundle.seal import write_json
+from strapdown.bundle import names_file, write_json
 from strapdown.config.crash_case import CaseSpec
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.crash.case import CaseResult, ReferenceAnswer, SeverityAnswer, main_event, run_cases

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from strapdown import earth
-from strapdown.bundle.seal import Seal, check_destination, write_json
-from strapdown.bundle.writing import write_bundle
+from strapdown.bundle import Seal, check_destination, write_bundle, write_json
 from strapdown.config import CrashSimulationSpec
 from strapdown.crash.pdof import pdof
 from strapdown.errors import check_choice

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from strapdown import __version__
-from strapdown.bundle.seal import write_json
+from strapdown.bundle import write_json
 from strapdown.config.doctor import DoctorSpec
 from strapdown.constants import MICRO_G
 from strapdown.errors import DataError, Finding

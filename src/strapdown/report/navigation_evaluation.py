@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from strapdown.config.navigation import make_aids
 from strapdown.constants import TWO_SIDED_95
+from strapdown.dsp.chi_square import plane_bound, plane_reach
 from strapdown.dsp.samples import true_runs
 from strapdown.errors import Finding
 from strapdown.estimation.robust import AdaptiveScale
-from strapdown.evaluation.plane_bound import plane_bound, plane_reach
 from strapdown.evaluation.trajectory_differences import trajectory_differences
 from strapdown.frames import ned_from_geodetic
 from strapdown.navigation.consistency import (

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from strapdown.evaluation.plane_bound import PLANE_95
+from strapdown.dsp.chi_square import PLANE_95
 from strapdown.report.chart import BLACK, GREEN, VERMILLION, Array, Line
 from strapdown.report.svg_drawing import overlap
 

@@ -10,8 +10,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.attitude_comparison.source import scenario_errors, simulate_scenario
-from strapdown.bundle.seal import Seal, check_destination, sensor_file, write_json
-from strapdown.bundle.writing import write_bundle
+from strapdown.bundle import Seal, check_destination, sensor_file, write_bundle, write_json
 from strapdown.config import SimulateSpec, TrajectorySpec
 from strapdown.ellipsoids import WGS84, Ellipsoid, find_ellipsoid
 from strapdown.errors import check_choice

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.bundle.seal import InputFiles, Seal, input_files
+from strapdown.bundle import InputFiles, Seal, input_files
 from strapdown.config.alignment import AxesTable, FixesTable, LogTable
 from strapdown.config.doctor import DoctorSpec, flags_of, flags_of_fixes
 from strapdown.constants import STANDARD_GRAVITY

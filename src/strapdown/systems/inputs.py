@@ -14,8 +14,7 @@ from typing import Any, ClassVar, Self, TypeVar
 import numpy as np
 import pandas as pd
 
-from strapdown.bundle.configuration_paths import with_paths
-from strapdown.bundle.seal import InputFiles, Seal, check_destination, input_files
+from strapdown.bundle import InputFiles, Seal, check_destination, input_files, with_paths
 from strapdown.config.reading import FileSpec
 from strapdown.errors import ConfigError, Finding
 from strapdown.progress import Progress, silent
