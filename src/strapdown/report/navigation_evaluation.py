@@ -302,7 +302,7 @@ LONGEST = 1.5
 
 
 @dataclass(frozen=True)
-class Score:
+class SolutionScore:
     """Errors of one quantity over a run.
 
     Attributes
@@ -358,7 +358,7 @@ class NavigationErrors:
         return TWO_SIDED_95 * self.comparison.sd[column].to_numpy(dtype=np.float64)
 
     @cached_property
-    def scores(self) -> tuple[Score, ...]:
+    def scores(self) -> tuple[SolutionScore, ...]:
         """Scores of each quantity, and of the horizontal position."""
         units = (
             dict.fromkeys(NED, "m") | dict.fromkeys(VELOCITY, "m/s") | dict.fromkeys(EULER, "deg")
@@ -371,7 +371,7 @@ class NavigationErrors:
         size = np.hypot(*(self.error(n) for n in NED[:2]))
         return self._score("horizontal", "m", size, self._plane(size)), *found
 
-    def score(self, quantity: str) -> Score:
+    def score(self, quantity: str) -> SolutionScore:
         """Score of one quantity."""
         return next(s for s in self.scores if s.quantity == quantity)
 
@@ -397,9 +397,9 @@ class NavigationErrors:
         about = 0.5 * (np.append(steps, 0.0) + np.insert(steps, 0, 0.0))
         return np.asarray(about / about.sum())
 
-    def _score(self, name: str, unit: str, error: Array, bound: Array) -> Score:
+    def _score(self, name: str, unit: str, error: Array, bound: Array) -> SolutionScore:
         worst = int(np.argmax(np.abs(error)))
-        return Score(
+        return SolutionScore(
             name,
             unit,
             float(np.sqrt(self._weight @ np.square(error))),

@@ -21,7 +21,7 @@ from strapdown.systems.alignment_source import body_record
 from strapdown.tables.checks import index_of
 
 __all__ = [
-    "Draft",
+    "ProposedAlignment",
     "axes_table",
     "draft_alignment",
     "listed_kinds",
@@ -36,7 +36,7 @@ GRADES = ("navigation", "tactical")
 
 
 @dataclass(frozen=True)
-class Draft:
+class ProposedAlignment:
     """Proposed configuration as text.
 
     Attributes
@@ -58,7 +58,7 @@ class Draft:
     to_check: tuple[Asked, ...] = ()
 
 
-def draft_alignment(log: LogTable, *, folder: Path, axes: str | None = None) -> Draft:
+def draft_alignment(log: LogTable, *, folder: Path, axes: str | None = None) -> ProposedAlignment:
     """Write the proposed alignment configuration of a log.
 
     Parameters
@@ -93,7 +93,7 @@ def draft_alignment(log: LogTable, *, folder: Path, axes: str | None = None) -> 
             page.say("duration_s = 100.0: over the first part alone, and the fine one after it")
     _rest(page)
     text = "\n".join(page.lines) + "\n"
-    return Draft(text, tuple(found), tuple(page.asked), findings)
+    return ProposedAlignment(text, tuple(found), tuple(page.asked), findings)
 
 
 def log_table(

@@ -25,7 +25,7 @@ from strapdown.frames import ways_between
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.alignment_draft import (
-    Draft,
+    ProposedAlignment,
     axes_table,
     listed_kinds,
     log_table,
@@ -54,7 +54,7 @@ def draft_navigation(
     gnss: FixesTable | None = None,
     sensor: str | None = None,
     foot: bool = False,
-) -> Draft:
+) -> ProposedAlignment:
     """Write the proposed navigation configuration of a log.
 
     Parameters
@@ -102,7 +102,9 @@ def draft_navigation(
         stage(page, STAGES[name], made.table.get(name, {}))
     found += _aids(page, made, folder, foot)
     _rest(page, foot)
-    return Draft(page.text, tuple(found), tuple(page.asked), made.findings, tuple(page.to_check))
+    return ProposedAlignment(
+        page.text, tuple(found), tuple(page.asked), made.findings, tuple(page.to_check)
+    )
 
 
 def _sampling_to_check(made: Proposal) -> str:
