@@ -109,7 +109,10 @@ def check_destination(out: Path, force: bool) -> None:
     `force`: allow a bundle, or an empty folder, to be replaced.
     """
     if not out.exists():
-        _refuse_unwritable(out)
+        # Report before a long run a write error that would occur after it.
+        parent = next(p for p in out.absolute().parents if p.exists())
+        if not parent.is_dir() or not os.access(parent, os.W_OK):
+            raise ConfigError("bundle.not-writable", file=str(out), quantity="--out", parent=parent)
         return
     if out.is_dir() and not any(out.iterdir()):
         return
@@ -117,13 +120,6 @@ def check_destination(out: Path, force: bool) -> None:
         raise ConfigError("bundle.folder-exists", file=str(out), quantity="--out")
     if not (out.is_dir() and (out / MANIFEST).is_file()):
         raise ConfigError("bundle.not-a-bundle", file=str(out), quantity="--out")
-
-
-def _refuse_unwritable(out: Path) -> None:
-    """Report before a long run a write error that would occur after it."""
-    parent = next(p for p in out.absolute().parents if p.exists())
-    if not parent.is_dir() or not os.access(parent, os.W_OK):
-        raise ConfigError("bundle.not-writable", file=str(out), quantity="--out", parent=parent)
 
 
 # Files beside the seal, because clocks differ.

@@ -196,7 +196,13 @@ def print_table(
     from rich.table import Table
 
     left = {0, len(columns) - 1} if text is None else set(text)
-    first = [_broken(row[0]) if len(columns) > _MANY_COLUMNS else row[0] for row in rows]
+    # A long name with one option per line.
+    first = [
+        row[0].replace(",", ",\n  ")
+        if len(columns) > _MANY_COLUMNS and len(row[0]) > _NAME_WIDTH
+        else row[0]
+        for row in rows
+    ]
     shown = [(name, *row[1:]) for name, row in zip(first, rows, strict=True)]
     least = [
         max(
@@ -244,11 +250,6 @@ def print_block(block: TableBlock) -> None:
     rows = [[spaced(cell) for cell in row] for row in block.rows]
     columns = [spaced(name) for name in block.columns]
     print_table(columns, rows, text=block.text, strong=block.strong)
-
-
-def _broken(name: str) -> str:
-    """Wrap a long name with one option per line."""
-    return name.replace(",", ",\n  ") if len(name) > _NAME_WIDTH else name
 
 
 def print_findings(findings: Sequence[Finding], most: int | None = None) -> None:
