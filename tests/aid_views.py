@@ -11,10 +11,9 @@ from strapdown.estimation.covariance import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.error_model import PHYSICAL, RotationVectorModel
 from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias, gyro_scale
-from strapdown.frames import q_ne
+from strapdown.frames import antenna_motion, q_ne
 from strapdown.nav_state import NavState
 from strapdown.navigation.measurements.measurement import View
-from strapdown.sensors.antenna import antenna_motion
 from strapdown.simulation import Origin
 from strapdown.simulation.motion import Track
 from strapdown.simulation.path_motion import PathMotion

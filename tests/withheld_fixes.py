@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from strapdown.evaluation.plane_bound import PLANE_95
+from strapdown.dsp.chi_square import PLANE_95
 from strapdown.navigation.outage_test import blinded, end_of_what_tells, score_of, score_of_smoothed
 
 

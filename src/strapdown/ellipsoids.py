@@ -144,8 +144,8 @@ ELLIPSOIDS: dict[str, Ellipsoid] = {
         note="An ellipsoid without a field of its own: gravity is Helmert's, as is usual with it, "
         "and not what a GM would give. Helmert's formula is in the Potsdam system, 14 mGal above "
         "later absolute values; as published it is within 3.3 mGal of WGS 84's, and it stays so "
-        "here. The pole is the formula's; Somigliana's form through both ends is within 1.2 mGal "
-        "of it in between.",
+        "here. The pole is the formula's; Somigliana's form through both ends differs by at most "
+        "1.2 mGal in between.",
     ),
 }
 

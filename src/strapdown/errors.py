@@ -1,7 +1,7 @@
 """Errors and findings: a code, its data and where it is; sentences are made where they are shown.
 
 A `Finding` says in a form that programs can read what a stage noticed; an error is a finding that
-ended the work. Neither holds a sentence. The sentences stand in one catalogue, `messages/*.toml`,
+ended the work. Neither holds a sentence. The sentences are in one catalogue, `messages/*.toml`,
 a file for each room: ``code = {what, remedy}`` as templates over the data, with the words of an
 interface where they differ (``remedy_cli`` for options, ``remedy_file`` for the keys of a
 configuration, which is given to a command: without words of its own it takes those of options).

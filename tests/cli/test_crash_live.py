@@ -14,7 +14,7 @@ from strapdown.crash.watch import CrashLog
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats.crash_records import read_crash_record
 from strapdown.live.crash import CrashReception, recorder_of_case
-from strapdown.live.sources import Line, open_source
+from strapdown.live.sources import ReceivedLine, open_source
 from strapdown.report.crash_live import watch_rows
 from strapdown.report.verify import verify
 
@@ -107,15 +107,15 @@ def test_without_a_gyro_and_with_datagrams_the_same_lines(case):
     for k, row in enumerate(samples()):
         # Rates that come all the same are not looked at.
         text = line(row[[0, 4, 5, 6]], "accel") if k % 2 else line(row)
-        assert got.take(Line(k, text, 0.0))
+        assert got.take(ReceivedLine(k, text, 0.0))
     assert json.loads(written[-1])["status"] == "ended"
     assert warned == []
     case.write_text(CASE + GYRO)
     other = CrashReception(CrashLog(recorder_of_case(case)), Clock(), written.append, warned.append)
-    assert other.take(Line(1, "accel,0.0,1,2,3", 0.0))
+    assert other.take(ReceivedLine(1, "accel,0.0,1,2,3", 0.0))
     assert other.rows == []
     assert warned[0].data["reason"].code == "live.samples-without-gyro"
-    assert other.take(Line(2, "accel,0.0,1,2", 0.0))
+    assert other.take(ReceivedLine(2, "accel,0.0,1,2", 0.0))
     assert (got.unused, other.unused) == ({}, {"accel": 2})
     with pytest.raises(ConfigError, check=coded("live.not-a-source")):
         open_source("elsewhere", Clock(), sys.stdin)
@@ -134,7 +134,7 @@ def test_the_end_of_the_reader_ends_the_run(case):
         raise BrokenPipeError
 
     got = CrashReception(CrashLog(recorder_of_case(case)), Clock(), closed, print)
-    taken = [got.take(Line(k, line(row), 0.0)) for k, row in enumerate(samples())]
+    taken = [got.take(ReceivedLine(k, line(row), 0.0)) for k, row in enumerate(samples())]
     assert all(taken[:1000])
     assert not taken[-1]
 

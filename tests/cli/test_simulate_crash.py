@@ -43,7 +43,7 @@ def test_json_is_what_really_happened(here, run_cli):
     [
         (["pole", "--units", "IMU9"], "error: --units: 'pole' has no recorder 'IMU9'"),
         (["pole", "--units", "LAB1"], "LAB1 has no gyro and uses that of IMU1"),
-        (["pole", "--format", "npz"], "error: --format: there is no writer of crash records"),
+        (["pole", "--format", "npz"], "error: --format: no writer of crash records"),
         (
             ["pole", "--sensor", "bmi270"],
             "error: --sensor: the option does not apply to the recorders",

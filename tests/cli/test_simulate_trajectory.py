@@ -151,5 +151,5 @@ def test_a_writer_of_trajectories_is_asked_for_by_name(here, run_cli):
     (here / "sine.toml").write_text('trajectory_formats = "dwg"\n' + SINE)
     done = run_cli("simulate", "sine.toml")
     assert done.code == 4
-    assert "sine.toml, trajectory_formats: there is no writer for 'dwg'" in done.err
+    assert "sine.toml, trajectory_formats: no writer is named 'dwg'" in done.err
     assert not (here / "sine-simulated").exists()

@@ -10,8 +10,7 @@ from tests.coded import coded
 
 from strapdown import simulate, verify
 from strapdown.api.attitude import compare_attitude
-from strapdown.bundle import sha256, write_bundle
-from strapdown.bundle.seal import MANIFEST, InputFiles
+from strapdown.bundle import MANIFEST, InputFiles, sha256, write_bundle
 from strapdown.errors import ConfigError, DataError
 from strapdown.report.attitude import write_attitude
 
@@ -165,7 +164,7 @@ def test_a_folder_that_is_no_bundle_is_never_touched(log, tmp_path, force):
 
 
 def test_a_large_input_is_referred_to_and_still_watched(log, tmp_path, monkeypatch):
-    monkeypatch.setattr("strapdown.bundle.writing.COPY_LIMIT", 10)
+    monkeypatch.setattr("strapdown.bundle.COPY_LIMIT", 10)
     source = shutil.copy(log, tmp_path / "mine.csv")
     seal = write_attitude(compare_attitude(source), tmp_path / "out")
     assert not (seal.path / "inputs").exists()

@@ -9,23 +9,12 @@ import sys
 import pytest
 from tests.coded import coded
 
-from strapdown.bundle import (
-    configuration_paths,
-    read_manifest,
-    seal,
-    sha256,
-    unsealed_changes,
-    write_bundle,
-    writing,
-)
-from strapdown.bundle import (
-    writing as manifest,
-)
-from strapdown.bundle.seal import InputFiles
+from strapdown import bundle
+from strapdown.bundle import InputFiles, read_manifest, sha256, unsealed_changes, write_bundle
 from strapdown.errors import DataError
 
 NAMES = {"write_bundle", "make_manifest", "_keep", "_place", "_move", "files_of", "with_paths"}
-FILES = {m.__file__ for m in (configuration_paths, manifest, seal, writing)}
+FILES = {bundle.__file__}
 
 
 def write(out, given, text, *, force=False):
@@ -96,8 +85,8 @@ def given(tmp_path):
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch):
-    monkeypatch.setattr(manifest, "versions", dict)
-    monkeypatch.setattr(manifest, "machine", dict)
+    monkeypatch.setattr(bundle, "versions", dict)
+    monkeypatch.setattr(bundle, "machine", dict)
 
 
 def whole(folder):

@@ -111,7 +111,7 @@ def joseph_take(P, d, x, H, j, work, s, moved, slope, r):
     for i in range(n):
         for k in range(n):
             P[i, k] += m[i] * K[k]
-    # The mean of both halves: one of them alone is much further from semidefinite.
+    # The mean of both halves: either alone is much further from semidefinite.
     for i in range(n):
         for k in range(i + 1, n):
             P[i, k] = 0.5 * (P[i, k] + P[k, i])

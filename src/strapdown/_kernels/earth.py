@@ -51,8 +51,8 @@ def gravity_parts(s2, alt, w, curvature, a, e2, gamma, k, f, m):
       power of x has the exact slope of the surface; the second and third are those of the same
       first-order potential.
 
-    What is left out are terms of ``f² x²``; in the derivatives, those that are a part in 1e3 of
-    them.
+    Neglected: terms of ``f² x²``; in the derivatives, a thousandth of the terms that are
+    kept.
     """
     w2 = 1.0 - e2 * s2
     inverse_a = 1.0 / a

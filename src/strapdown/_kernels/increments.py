@@ -29,7 +29,7 @@ def increments(dt, rate, mean, theta, dtheta):
 
 
 # Neighbours help only where their steps are like the one between them: in a burst, or beside
-# a gap, the polynomial through them says nothing of it.
+# a gap, the polynomial through them does not describe it.
 ALIKE = 2.0
 
 
@@ -79,7 +79,7 @@ def increments_cubic(dt, rate, theta, dtheta):
             dtheta[k, j] = (last - first) * dt[k]
 
 
-# What a sample-by-sample run remembers between calls: the head of one float64 array whose tail
+# Memory of a sample-by-sample run between calls: the head of one float64 array whose tail
 # is the algorithm's state. One array, because every further argument of a compiled function
 # costs several times what the attitude update itself does.
 LARGEST = 1e150

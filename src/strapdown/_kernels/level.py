@@ -1,4 +1,4 @@
-"""Level rows: the state of any mechanization as a filter needs it, and corrections of it.
+"""Level rows: the state of any mechanization as a filter needs it, and its corrections.
 
 Level axes l are those of a mechanization's velocity: north-east-down, or the axes of a wander
 azimuth (up is then +z). A row holds the quaternion body to level, the velocity relative to the

@@ -290,7 +290,7 @@ def sixth_order_motion(dt, low, mid, high):
     cu = m * (high[3] - 2.0 * mid[3] + low[3])
     cv = m * (high[4] - 2.0 * mid[4] + low[4])
     cw = m * (high[5] - 2.0 * mid[5] + low[5])
-    # The factors of every commutator stand exchanged, because A multiplies from the right.
+    # The factors of every commutator are exchanged, because A multiplies from the right.
     dx, dy, dz, du, dv, dw, dr, ds, dq = bracket(
         bx, by, bz, bu, bv, bw, o, o, o, o, ax, ay, az, au, av, aw, o, o, o, dt
     )

@@ -23,7 +23,7 @@ from strapdown._kernels.rotation_vector import cross
 
 # Bits of vertical displacement and velocity, which are constant where the height is held.
 HELD_ROWS = (1 << 2) | (1 << 5)
-# Below this cosine of the latitude north is undefined, and there is no slope along it.
+# Below this cosine of the latitude north is undefined, and so is a slope along it.
 NO_MERIDIAN = 1e-9
 
 

@@ -27,7 +27,7 @@ from strapdown._kernels.rotation import quat_from_rotvec, quat_multiply, quat_no
 
 AUTO, MILLER, FIT = 0.0, 1.0, 2.0
 # Relative spread of the steps of a block that still counts as equal. Unequal steps by this
-# share change the correction for coning by the same share of it, which is less than what
+# share change the correction for coning by the same share, which is less than what
 # the correction of the next higher number of increments changes at the rates it is used at.
 EQUAL = 1e-3
 

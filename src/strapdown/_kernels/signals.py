@@ -158,7 +158,7 @@ def stands_out(left, row, i, low, high, guard, window, value):
 
 @njit(cache=True, error_model="numpy", inline="always")
 def in_window(left, row, i, high, guard, window, factor):
-    """Whether a residual may stand out of the window behind it; if not, certainly not."""
+    """Whether a residual may exceed the spread of the window behind it; if not, certainly not."""
     if i + guard + window > high:
         return True
     value = abs(left[row, i]) / factor
@@ -219,7 +219,7 @@ def is_run(x, left, i, m, low, high, weights, allowed, guard, window, factor, st
     small = min(abs(first), abs(last))
     if small <= STEPS * step:
         return False
-    # A sample closer to its neighbors than its prediction is no outlier.
+    # A sample closer to its neighbors than its prediction is not an outlier.
     middle = middle_of_nodes(x, i, m)
     if abs(x[i] - middle) <= abs(x[i] - first - middle) or abs(x[j] - middle) <= abs(
         x[j] - last - middle

@@ -19,7 +19,7 @@ from strapdown._kernels.covariance import udu_matrix
 from strapdown._kernels.growth import LANES as GROWTH_LANES
 from strapdown._kernels.level import level_place
 
-# Vector width: rows of matrices are padded with zeros to a multiple of it.
+# Vector width: rows of matrices are padded with zeros to its multiple.
 LANES = 8
 # Pivot, relative to 1, below which a direction counts as exactly known: thousands of operations
 # leave a rounding error of some 1e-14 in a covariance.
@@ -57,7 +57,7 @@ def inverse(P, out):
             for m in range(j):
                 total -= lower[i, m] * lower[j, m]
             lower[i, j] = total / lower[j, j]
-    # The inverse of the factor, and of it the square; without the rows that are not free.
+    # The inverse of the factor, and its square; without the rows that are not free.
     back = np.zeros((n, n))
     for j in range(n):
         if not free[j]:

@@ -311,8 +311,8 @@ def vote(
                     y[j] = mean[s, j] - offset[j]
                 without = fit(axes, w, y, x)
                 w[i] = 1.0 / cs[s, i]
-                # What it adds to the chi-square is its own, of one degree of freedom. Half of the
-                # limit, so that what stands at it does not come and go.
+                # Its part of the chi-square has one degree of freedom.
+                # Half of the limit gives hysteresis.
                 if fit(axes, w, y, x) - without > 0.5 * limits[1]:
                     within = False
             calm[i] = calm[i] + 1 if within else 0

@@ -15,7 +15,7 @@ the Earth and of the computed body relative to inertial space:
 The level axes have the Earth's axis p (unit vector) where the true ones have p - dp,
 ``dp = p x theta``; so dW is the Earth's rate along it, dg the slopes of gravity along p, whose
 third component is the sine of the latitude, and dw has a part from dV and one from dp. States:
-theta (3), dV (3), eps (3), then k states of the sensors. There is no state of the height.
+theta (3), dV (3), eps (3), then k states of the sensors. The height has no state.
 """
 
 from __future__ import annotations

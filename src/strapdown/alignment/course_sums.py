@@ -193,7 +193,7 @@ def _rate(turned: Array, stamps: Array, time: Array) -> Array:
     turns = rotation.compose(rotation.conjugate(turned[:-1]), turned[1:])
     steps = rotation.rotation_vector_from_quaternion(turns)
     angles = np.concatenate([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
-    # At the ends of a record the mean is over what there is of it.
+    # At the ends of a record the mean is over the available part.
     begin = np.maximum(time - STEADY, stamps[0])
     end = np.minimum(time + STEADY, stamps[-1])
     turned_by = [np.interp(end, stamps, x) - np.interp(begin, stamps, x) for x in angles.T]

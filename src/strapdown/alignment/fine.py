@@ -197,7 +197,7 @@ class FineAlignment:
         if standing is None:
             standing = measured_standing(whole, home, int(ends[0]), LEAST, filter_.model.gyro_noise)
         state = filter_.begin(start, initial_covariance(filter_, coarse, standing))
-        epochs = Epochs(filter_)
+        epochs = AlignmentEpochs(filter_)
         epochs.add(state, {})
         at = 0
         for end in ends.tolist():
@@ -670,7 +670,7 @@ def alignment_of(filter_: ErrorFilter, state: FilterState) -> Alignment:
     )
 
 
-class Epochs:
+class AlignmentEpochs:
     """Epochs of a run."""
 
     def __init__(self, filter_: ErrorFilter) -> None:

@@ -45,7 +45,7 @@ from strapdown.alignment.course_sums import (
 )
 from strapdown.alignment.record_checks import check_record
 from strapdown.constants import MAD_TO_SD, STANDARD_GRAVITY
-from strapdown.dsp.running_integral import running_integral
+from strapdown.dsp.samples import running_integral
 from strapdown.earth import transport_rate
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.estimation.robust import Huber, Igg3, Influence
@@ -72,7 +72,7 @@ class GnssCourse(CoarseAlignment):
         Heading of the unit's forward axis minus that of the vehicle's.
     mounting_yaw_sd_deg, sideslip_sd_deg : float, deg
         Standard deviation of that angle, unless it is measured 5 deg; accelerations and turns
-        tell the heading better. And of the sideslip: 1 deg for a car that does not turn hard; an
+        reduce it. And of the sideslip: 1 deg for a car that does not turn hard; an
         aircraft or a ship drifts more with wind and current.
     least_speed : float, m/s
         Below it no course is taken.
@@ -162,7 +162,7 @@ class GnssCourse(CoarseAlignment):
             self._of(float(imu.index[-1]), found, place), findings=findings, earlier=earlier
         )
 
-    def _of(self, time: float, found: Found, place: Array | None) -> Alignment:
+    def _of(self, time: float, found: CourseEstimate, place: Array | None) -> Alignment:
         joint = found.covariance
         return Alignment(
             self.name,
@@ -246,7 +246,7 @@ class CourseModel:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class CourseEstimate:
     """Current estimates of the least squares.
 
     `C` ((3, 3)): attitude at the end of the record. `velocity` ((3,), m/s): at the end. `errors`
@@ -325,7 +325,7 @@ class CourseFit:
     sensors: ImuUncertainty
     model: CourseModel
 
-    def step(self, found: Found, influence: Influence) -> Found:
+    def step(self, found: CourseEstimate, influence: Influence) -> CourseEstimate:
         """Solve once, about the last estimates, with weights by the residuals.
 
         `found`: its covariance is not used. `influence`: of the velocities of fixes, by the largest
@@ -361,7 +361,7 @@ class CourseFit:
             shift = np.eye(len(inverse))
             shift[END_PLACE, OFFSET] = found.velocity + x[END_VELOCITY]
             inverse = shift @ inverse @ shift.T
-        return Found(
+        return CourseEstimate(
             rotation.dcm_from_rotation_vector(x[TURN]) @ found.C,
             found.velocity + x[END_VELOCITY],
             found.errors + x[OF_SENSORS],
@@ -375,8 +375,8 @@ class CourseFit:
             offset,
         )
 
-    def _observed(self, found: Found, more: ArrayLike = ()) -> Observed:
-        """What the estimates predict at the fixes, the rests and `more` instants, and residuals."""
+    def _observed(self, found: CourseEstimate, more: ArrayLike = ()) -> Observed:
+        """Predict the fixes, the rests and `more` instants from the estimates, with residuals."""
         fixes, rests = self.fixes, self.rests
         time = np.concatenate([fixes.time, [rest.time for rest in rests], np.asarray(more, float)])
         sums = drive_sums(self.imu, time, self.means, found.errors)
@@ -419,7 +419,9 @@ class CourseFit:
             [self._rest(rest, found, C[k + i], turns[k + i]) for i, rest in enumerate(rests)],
         )
 
-    def at_first_sample(self, found: Found, gnss: pd.DataFrame) -> tuple[Found, Array] | None:
+    def at_first_sample(
+        self, found: CourseEstimate, gnss: pd.DataFrame
+    ) -> tuple[CourseEstimate, Array] | None:
         """State at the first sample of the record, and its position (deg, deg, m).
 
         A navigation that begins there meets all fixes again: they count by a part of their weight
@@ -470,7 +472,7 @@ class CourseFit:
         J[:, OFFSET] = 0.0
         covariance = J @ inverse @ J.T
         covariance[len(HANDED) :, len(HANDED) :] += np.diag(own)
-        state = Found(
+        state = CourseEstimate(
             seen.C[here],
             level @ seen.velocity[here],
             found.errors,
@@ -484,7 +486,7 @@ class CourseFit:
         return state, geodetic_from_ned(at, origin, ellipsoid=self.site.ellipsoid)
 
     def _anchors(
-        self, found: Found, gnss: pd.DataFrame
+        self, found: CourseEstimate, gnss: pd.DataFrame
     ) -> tuple[Array, Array, Array, Array] | None:
         """Stamps, positions and sd of the first fixes with one, north-east-down of an origin."""
         fixes = self.fixes
@@ -513,7 +515,7 @@ class CourseFit:
         """Number of unknowns."""
         return COUNT + 3 * self.by_places
 
-    def _prior(self, found: Found, sums: DriveSums) -> Array:
+    def _prior(self, found: CourseEstimate, sums: DriveSums) -> Array:
         """Standard deviation of each unknown before the fixes."""
         gyro, accel, model = self.sensors.gyro, self.sensors.accel, self.model
         inputs = self.means - found.bias
@@ -544,7 +546,9 @@ class CourseFit:
         sd[OFFSET], sd[ARM] = model.antenna.time_offset_sd, model.antenna.lever_arm_sd
         return sd
 
-    def _velocities(self, found: Found, sums: DriveSums, rate: Array) -> tuple[Array, Array]:
+    def _velocities(
+        self, found: CourseEstimate, sums: DriveSums, rate: Array
+    ) -> tuple[Array, Array]:
         """Velocities at the fixes, in the level axes of the end, and their derivatives.
 
         The level rotates with w: ``v = v_e - C int f - g T + w x g T²/2 + w_ie x int v``.
@@ -563,7 +567,7 @@ class CourseFit:
         by[:, :, TURN] = rotation.cross_matrix(gained)
         by[:, :, OF_GYROS] = found.C @ sums.by_turn
         by[:, :, OF_ACCELS] = found.C @ sums.by_accel
-        # A tilt and a bias that cancel each other do so to the last part that the fixes tell apart:
+        # A tilt and a bias that cancel each other do so to the last digit that the fixes resolve:
         # without these terms, 0.4 % over a minute, fixes of a centimetre seem to separate the two.
         past = np.append(0.0, sums.until_end[from_end])
         along = np.concatenate([np.eye(self.unknowns)[None, END_VELOCITY], by[from_end]])
@@ -585,7 +589,7 @@ class CourseFit:
         return np.asarray(-rotation.cross_matrix(site.gravity[None])[0] @ rates.T)
 
     def _displacements(
-        self, found: Found, sums: DriveSums, there: Array, by: Array, rows: slice
+        self, found: CourseEstimate, sums: DriveSums, there: Array, by: Array, rows: slice
     ) -> tuple[Array, Array]:
         """Positions at instants less that at the end, and their derivatives.
 
@@ -623,7 +627,7 @@ class CourseFit:
         return -way, out
 
     def _arms(
-        self, found: Found, sums: DriveSums, turns: Array, rows: slice
+        self, found: CourseEstimate, sums: DriveSums, turns: Array, rows: slice
     ) -> tuple[Array, Array]:
         """Lever arm of the antenna at instants, in the same axes, and its derivatives."""
         fixed = rotation.dcm_from_rotation_vector(self.site.earth_rate * sums.until_end[rows, None])
@@ -647,7 +651,7 @@ class CourseFit:
 
     def _courses(
         self,
-        found: Found,
+        found: CourseEstimate,
         sums: DriveSums,
         C: Array,
         there: Array,
@@ -692,7 +696,7 @@ class CourseFit:
         return turning, pushing + turning * (STANDARD_GRAVITY * length) ** 2 / 12.0
 
     def _rest(
-        self, rest: RestRate, found: Found, C: Array, turns: Array
+        self, rest: RestRate, found: CourseEstimate, C: Array, turns: Array
     ) -> tuple[Array, Array, Array]:
         """The gyros read their bias and the Earth's rate, ``C' exp(-[theta x]) w_ie``."""
         earth, inputs = self.site.earth_rate, self.means - found.bias
@@ -704,7 +708,7 @@ class CourseFit:
         gap = rest.rate - found.bias[:3] - C.T @ earth
         return gap, A, 1.0 / np.square(np.maximum(rest.sd, LEAST_RATE_SD))
 
-    def search(self) -> Found:
+    def search(self) -> CourseEstimate:
         """Solve over increasing parts that end with the record, up to the whole.
 
         Gross errors among the fixes are excluded.
@@ -790,7 +794,7 @@ class CourseFit:
         part.attrs = dict(self.imu.attrs)
         return replace(self, imu=part, fixes=fixes)
 
-    def _guess(self, bias: Array) -> Found:
+    def _guess(self, bias: Array) -> CourseEstimate:
         """Level by mean force minus acceleration from the velocities, heading by median course."""
         fixes = self.fixes
         sums = drive_sums(self.imu, fixes.time, bias[:6], bias)
@@ -810,7 +814,7 @@ class CourseFit:
             heading += math.radians(_middle_turn(off))
         C = _attitude(gained / length, force_n, heading)
         nothing = np.zeros((len(HANDED), len(HANDED)))
-        return Found(C, v1, bias, nothing, _smooth(fixes), _near_neighbours(fixes), 1.0)
+        return CourseEstimate(C, v1, bias, nothing, _smooth(fixes), _near_neighbours(fixes), 1.0)
 
 
 def _solve(
@@ -882,7 +886,7 @@ MOST = 0.5
 HEADING_SPAN = 5.0
 
 
-def left_out(fixes: CourseFixes, found: Found) -> tuple[Finding, ...]:
+def left_out(fixes: CourseFixes, found: CourseEstimate) -> tuple[Finding, ...]:
     """Report the outliers among the fixes."""
     out = np.flatnonzero(found.weight == 0.0)
     if not len(out):
@@ -901,7 +905,7 @@ def left_out(fixes: CourseFixes, found: Found) -> tuple[Finding, ...]:
     )
 
 
-def _converged(fit: CourseFit, found: Found, influence: Influence) -> Found:
+def _converged(fit: CourseFit, found: CourseEstimate, influence: Influence) -> CourseEstimate:
     """Iterate to convergence."""
     for _ in range(STEPS):
         before, found = found, fit.step(found, influence)

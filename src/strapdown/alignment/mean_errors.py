@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown.alignment.inertial_sums import InertialSums
 from strapdown.dsp.chi_square import chi_square_exceeded
-from strapdown.dsp.running_integral import running_integral
+from strapdown.dsp.samples import running_integral
 from strapdown.sensors.triad_errors import Triad
 from strapdown.sensors.uncertainty import BiasDrift, ImuUncertainty
 from strapdown.tables import ACCEL, GYRO

@@ -166,7 +166,7 @@ TURNS: dict[str, tuple[float, float, float]] = {
     "roll it by 90° onto its side": (90.0, 0.0, 0.0),
     "pitch it by 90° onto its nose": (0.0, -90.0, 0.0),
 }
-STAY = "leave it as it stands"
+STAY = "leave it unchanged"
 
 
 @dataclass(frozen=True, eq=False)

@@ -319,7 +319,7 @@ def compare_attitude(
     source : Imu, DataFrame, (t, gyro, accel), str or Path, or a sequence of paths and names
         Samples (s, rad/s, m/s², forward-right-down), a log, or the name of a scenario
         (`strapdown modules`). Several paths or names are trials of one question: the first is
-        shown, and the answer holds for all of them.
+        shown, and the answer holds for all.
     algorithms : sequence of str
         Names with their options, such as ``quaternion:order=3``, plug-ins included; or ``all``.
     options : AttitudeOptions, optional

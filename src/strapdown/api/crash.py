@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import pandas as pd
 
-from strapdown.bundle.seal import Seal, check_destination
+from strapdown.bundle import Seal, check_destination
 from strapdown.config.crash_case import CaseSpec
 from strapdown.crash.case import CaseResult, run_cases
 from strapdown.crash.reconstruction import UnitReconstruction
@@ -168,7 +168,7 @@ def reconstruct(
     *others : str, Path or CaseSpec
         Cases of the other vehicles of the crash. Each vehicle is reconstructed from its own
         recorders. Two vehicles are held against each other: momentum, closing speed, restitution
-        and energy, in `CrashRun.closure`; what each of them says by itself is not changed by it.
+        and energy, in `CrashRun.closure`; their own results do not change.
     progress : callable, optional
         Called with a stage and the completed fraction.
 

@@ -409,7 +409,7 @@ def read(path: str | Path) -> Streams:
             q_nb, stamps = tables[stream].attrs["reference"]
             tables["reference"] = attitude_table(stamps, q_nb)
     if not tables:
-        # A file without a stream is no fault: report that of a stream that it has.
+        # A missing stream is not a fault: report the fault of a stream that the file has.
         raised = refused.values()
         raise next((e for e in raised if e.finding.code not in ABSENT), next(iter(raised)))
     left_out = [

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from strapdown.api.reading import GnssFixes, Imu
 from strapdown.attitude_comparison.source import simulate_scenario
-from strapdown.bundle.seal import Seal
+from strapdown.bundle import Seal
 from strapdown.config import (
     CrashSimulationSpec,
     ScenarioSpec,

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.api.reading import ImuFile, Streams
-from strapdown.bundle.reading import read_manifest
+from strapdown.bundle import read_manifest
 from strapdown.config.alignment import FixesTable, LogTable
 from strapdown.config.spec import specify
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
@@ -31,7 +31,7 @@ from strapdown.units import MAG_UNITS, PRESSURES, SPEEDS, TIME_UNITS, factor_of
 
 __all__ = ["read_streams", "write"]
 
-#: A column that tells which stream a table is, in the order of the tests.
+#: A column that identifies the stream of a table, in the order of the tests.
 _TELLS = (
     (GYRO[0], "imu"),
     (POSITION_SD[0], "gnss"),

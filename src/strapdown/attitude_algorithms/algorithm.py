@@ -85,7 +85,7 @@ class AttitudeAlgorithm(ABC):
     width : int
         Number of elements of the state that are the attitude, the first ones.
     variants : tuple of str
-        Names with options that ``--algorithms all`` stands for; empty: the name alone.
+        Names with options that ``--algorithms all`` includes; empty: the name alone.
     advance_kernel, update_kernel : callable
         The compiled loops over many steps and for one sample.
     """

@@ -20,7 +20,7 @@ from strapdown.rotation import unit_rotation_angle
 from strapdown.sensors.rest import RestStretch
 from strapdown.tables import GYRO
 
-# Where the sensor error exceeds the tolerance, an algorithm error below this share of it is
+# Where the sensor error exceeds the tolerance, an algorithm error below this share is
 # negligible.
 UNSEEN = 0.1
 # A recommendation must reduce the error at least to this share.

@@ -40,14 +40,14 @@ from strapdown.attitude_comparison.references import (
     truth_score,
 )
 from strapdown.attitude_comparison.source import (
-    Source,
+    AttitudeSource,
     describe,
     read_source,
     with_truth,
 )
 from strapdown.attitude_comparison.sweep import (
+    ErrorShare,
     Grounds,
-    Share,
     Trials,
     between_samples,
     choose_factors,
@@ -58,7 +58,7 @@ from strapdown.attitude_comparison.sweep import (
     trial_names,
     worst_sweep,
 )
-from strapdown.bundle.seal import InputFiles, Seal, check_destination, input_files
+from strapdown.bundle import InputFiles, Seal, check_destination, input_files
 from strapdown.config import LogSpec
 from strapdown.config.sources import read_options
 from strapdown.errors import ConfigError, DataError, Finding
@@ -123,13 +123,13 @@ class AttitudeComparison:
     inputs : tuple of InputFiles
     costs : tuple of Cost
         One per algorithm, in the order of `runs`.
-    shares : tuple of Share
+    shares : tuple of ErrorShare
         Likewise.
     sweep : DataFrame
         One row per algorithm, rate and decimation method: ``algorithm``, ``meaning``
         (``drop``: samples are decimated; ``sum``: increments are summed, as in an
         integrating sensor), ``factor``, ``rate_hz``, ``own_deg`` (largest error of algorithm and
-        rate, as in `Share`), ``final_deg``, ``rms_deg``, ``max_deg`` (against the truth),
+        rate, as in `ErrorShare`), ``final_deg``, ``rms_deg``, ``max_deg`` (against the truth),
         ``reference_deg`` (largest at a reference point), ``error_deg`` (the one used for the
         answer: against the truth, else at the reference points, else ``own_deg``).
     answer : Answer
@@ -163,7 +163,7 @@ class AttitudeComparison:
     findings: tuple[Finding, ...]
     inputs: tuple[InputFiles, ...] = field(repr=False)
     costs: tuple[Cost, ...] = field(repr=False)
-    shares: tuple[Share, ...] = field(repr=False)
+    shares: tuple[ErrorShare, ...] = field(repr=False)
     sweep: pd.DataFrame = field(repr=False)
     answer: Answer
     trials: Trials | None = None
@@ -421,7 +421,7 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
 
 
 def _gyro_bias(
-    spec: AttitudeSpec, source: Source, rests: tuple[RestStretch, ...]
+    spec: AttitudeSpec, source: AttitudeSource, rests: tuple[RestStretch, ...]
 ) -> tuple[pd.DataFrame, dict[str, Any], tuple[InputFiles, ...]]:
     """The samples without the gyro bias, the bias as `AttitudeComparison.gyro_bias`, its files."""
     imu = source.imu

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from strapdown.attitude_algorithms.algorithm import AttitudeRun
 from strapdown.attitude_comparison.options import AttitudeSpec
-from strapdown.attitude_comparison.source import Source
-from strapdown.bundle.seal import input_files
+from strapdown.attitude_comparison.source import AttitudeSource
+from strapdown.bundle import input_files
 from strapdown.config import ScenarioSpec
 from strapdown.errors import ConfigError, Finding
 from strapdown.evaluation.differences import error_angles, known_at
@@ -62,15 +62,15 @@ class PeerRun:
 
 def gather_references(
     spec: AttitudeSpec,
-    source: Source,
+    source: AttitudeSource,
     span: tuple[float, float],
     rests: tuple[RestStretch, ...],
     levelled: bool,
 ) -> tuple[pd.DataFrame, tuple[PlaceReference, ...], tuple[SamePose, ...]]:
     """Reference points of attitude and position, and poses that are offered as such.
 
-    `span` is the meaning of the words start and end, s. A rest that the run is leveled at is no
-    reference.
+    `span` is the meaning of the words start and end, s. A rest at which the run is leveled is
+    not a reference.
     """
     words = list(spec.references)
     whole = spec.from_s is spec.to_s is spec.duration_s is None
@@ -100,7 +100,9 @@ def gather_references(
     return points, positions, same_pose_candidates(usable) if points.empty else ()
 
 
-def read_second(spec: AttitudeSpec, source: Source) -> tuple[Source, SecondLog | None]:
+def read_second(
+    spec: AttitudeSpec, source: AttitudeSource
+) -> tuple[AttitudeSource, SecondLog | None]:
     """Cut the source to the part that the log of a second sensor covers, and align the two."""
     if spec.reference_log_path is None:
         return source, None
@@ -137,7 +139,9 @@ def read_second(spec: AttitudeSpec, source: Source) -> tuple[Source, SecondLog |
     ), aligned
 
 
-def truth_of_second(source: Source, aligned: SecondLog, imu: pd.DataFrame, q_nb: Array) -> Source:
+def truth_of_second(
+    source: AttitudeSource, aligned: SecondLog, imu: pd.DataFrame, q_nb: Array
+) -> AttitudeSource:
     """Use the attitude by the second log's rates as the truth."""
     from strapdown.evaluation.second_log import truth_from_second_log
 
@@ -169,7 +173,7 @@ def passed_pole(run: AttitudeRun) -> bool:
     return run.diagnostics.get("closest_to_pole_deg", 90.0) < NEAR_POLE
 
 
-def truth_score(run: AttitudeRun, source: Source) -> list[Score]:
+def truth_score(run: AttitudeRun, source: AttitudeSource) -> list[Score]:
     """Compare a run with the truth, if there is one."""
     if source.truth is None or source.scored is None:
         return []
@@ -193,7 +197,7 @@ def judge(
     imu: pd.DataFrame,
     increments: pd.DataFrame,
     scores: Sequence[Score],
-    source: Source,
+    source: AttitudeSource,
 ) -> list[Finding]:
     """Report unreliable parts of the runs, their steps, stated turns and the truth."""
     findings = []
@@ -261,7 +265,7 @@ LONGEST = 60.0  # s
 
 def run_beside(
     names: Sequence[str],
-    source: Source,
+    source: AttitudeSource,
     imu: pd.DataFrame,
     q_nb: Array,
     references: pd.DataFrame,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown.attitude_algorithms import Quaternion, run_attitude
 from strapdown.attitude_comparison.options import AttitudeSpec
-from strapdown.bundle.seal import InputFiles, input_files, sensor_file
+from strapdown.bundle import InputFiles, input_files, sensor_file
 from strapdown.config import LogSpec, ScenarioSpec
 from strapdown.config.sources import read_options
 from strapdown.errors import DataError, Finding
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Source:
+class AttitudeSource:
     """Log or scenario; `clean` is a scenario without sensor errors, `second` a second log."""
 
     name: str
@@ -68,12 +68,12 @@ def scenario_errors(spec: ScenarioSpec) -> ImuErrors:
     return load_sensor(spec.sensor).draw(spec.seed)
 
 
-def read_source(spec: AttitudeSpec) -> Source:
+def read_source(spec: AttitudeSpec) -> AttitudeSource:
     """Read the log, or simulate the scenario, of a specification."""
     asked = spec.source
     if isinstance(asked, LogSpec):
         log = read_log(asked.path, read_options(asked, asked.axes))
-        return Source(
+        return AttitudeSource(
             log.name,
             "recorded log",
             log.origin,
@@ -97,7 +97,7 @@ def read_source(spec: AttitudeSpec) -> Source:
     )
     exact = run_attitude(Quaternion(), increments_from_imu(clean), truth[QUATERNION].to_numpy()[0])
     lost = error_angles(exact.attitude, truth)
-    return Source(
+    return AttitudeSource(
         asked.name,
         f"simulated: {scenario.title} ({scenario.source})"
         + (f", sensor {Path(asked.sensor).name}" if asked.sensor else ""),
@@ -128,7 +128,7 @@ def describe(imu: pd.DataFrame, what: str, whole: pd.DataFrame) -> str:
     return text
 
 
-def with_truth(source: Source, spec: AttitudeSpec) -> Source:
+def with_truth(source: AttitudeSource, spec: AttitudeSpec) -> AttitudeSource:
     """Add the given truth to the source, on its own clock and within its window."""
     truth, scored, stated = source.truth, source.scored, spec.truth_path
     if stated is not None:

@@ -40,7 +40,7 @@ LEAST_STEPS = 20
 
 
 @dataclass(frozen=True)
-class Share:
+class ErrorShare:
     """Error of one algorithm, separated into algorithm, sensor and single-precision error.
 
     Attributes
@@ -332,7 +332,7 @@ def between_samples(imu: pd.DataFrame, q_nb: Array) -> tuple[float, float] | Non
 
 def find_shares(
     algorithms: Sequence[AttitudeAlgorithm], runs: Sequence[AttitudeRun], grounds: Grounds
-) -> tuple[Share, ...]:
+) -> tuple[ErrorShare, ...]:
     """Split the error of each run into the shares of sensor and algorithm.
 
     In a simulation ``q_true^-1 q = (q_true^-1 q_clean)(q_clean^-1 q)``: the rotation vectors of
@@ -357,7 +357,7 @@ def find_shares(
             sensor = angles_to_errors(unit_rotation_angle(q, q_clean))
         assert mine is not None
         apart = unit_rotation_angle(run_single(algorithm, rounded, q_nb), q)
-        shares.append(Share(run.algorithm, mine, sensor, angles_to_errors(apart)))
+        shares.append(ErrorShare(run.algorithm, mine, sensor, angles_to_errors(apart)))
     return tuple(shares)
 
 

@@ -171,7 +171,7 @@ def attitude(
     from strapdown.api.attitude import compare_attitude
     from strapdown.attitude_algorithms import make_algorithm
     from strapdown.attitude_algorithms.cost import time_algorithms
-    from strapdown.bundle.seal import check_destination, write_timing
+    from strapdown.bundle import check_destination, write_timing
     from strapdown.cli.console import Stopwatch, console, print_findings, print_seal, progress
     from strapdown.cli.result_folder import default_folder, refuse_result
     from strapdown.report.attitude import attitude_json, check_c, chosen_for_c, write_c

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from strapdown.bundle.seal import Seal
+    from strapdown.bundle import Seal
     from strapdown.errors import Finding, Words
     from strapdown.report.document import TableBlock
 
@@ -196,7 +196,13 @@ def print_table(
     from rich.table import Table
 
     left = {0, len(columns) - 1} if text is None else set(text)
-    first = [_broken(row[0]) if len(columns) > _MANY_COLUMNS else row[0] for row in rows]
+    # A long name with one option per line.
+    first = [
+        row[0].replace(",", ",\n  ")
+        if len(columns) > _MANY_COLUMNS and len(row[0]) > _NAME_WIDTH
+        else row[0]
+        for row in rows
+    ]
     shown = [(name, *row[1:]) for name, row in zip(first, rows, strict=True)]
     least = [
         max(
@@ -246,15 +252,10 @@ def print_block(block: TableBlock) -> None:
     print_table(columns, rows, text=block.text, strong=block.strong)
 
 
-def _broken(name: str) -> str:
-    """Wrap a long name with one option per line."""
-    return name.replace(",", ",\n  ") if len(name) > _NAME_WIDTH else name
-
-
 def print_findings(findings: Sequence[Finding], most: int | None = None) -> None:
     """Print findings to stderr, in `WORDS`; at most the first `most`.
 
-    What is said of several files or recorders alike is one.
+    Findings that several files or recorders share are printed once.
     """
     out = console(err=True)
     findings = _joined(findings)

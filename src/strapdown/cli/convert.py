@@ -84,7 +84,7 @@ def convert(
     """
     from strapdown.api.writing import read_streams, writer_streams
     from strapdown.api.writing import write as write_file
-    from strapdown.bundle.seal import to_json
+    from strapdown.bundle import to_json
     from strapdown.cli.console import console, print_findings, print_table
     from strapdown.formats import STREAMS
     from strapdown.formats.clocks import clock_of

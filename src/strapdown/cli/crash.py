@@ -82,7 +82,7 @@ def crash(
         crash_live(cases, out, write, flags)
         return
     from strapdown.api.crash import reconstruct
-    from strapdown.bundle.seal import MANIFEST, Seal, check_destination, sha256, write_timing
+    from strapdown.bundle import MANIFEST, Seal, check_destination, sha256, write_timing
     from strapdown.cli.console import (
         WORDS,
         Stopwatch,

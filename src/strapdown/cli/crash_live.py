@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from strapdown.bundle.seal import check_destination, write_latency
+from strapdown.bundle import check_destination, write_latency
 from strapdown.cli.console import WORDS, print_seal
 from strapdown.cli.navigate_live import line_writer, warner
 from strapdown.cli.navigate_tables import print_latency

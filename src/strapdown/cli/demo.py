@@ -83,7 +83,7 @@ def _part_of(show: Progress, title: str, begin: float, share: float) -> Progress
 
 def _check(out: Path, names: list[str], force: bool) -> None:
     """Refuse before the first run what a later one would refuse."""
-    from strapdown.bundle.seal import check_destination
+    from strapdown.bundle import check_destination
     from strapdown.errors import ConfigError
 
     for name in (*names, _PAGE):

@@ -139,7 +139,7 @@ def run() -> None:
         _fail(what.text(WORDS.get()), 4)
 
 
-#: What a person has to fill in, in options whose value cannot be inferred.
+#: Placeholders in options whose value cannot be inferred, for the user to fill in.
 _BLANKS = re.compile(r"(?<=[ =])(SENSOR|DEG|M|UNIT|NAME|AXES)\b")
 
 

@@ -11,7 +11,7 @@ EPILOG = "Example: strapdown modules\n\nExample: strapdown modules --json"
 
 def modules(json: Json = False) -> None:
     """List the modules of each slot: algorithms, pipeline modules, sensors, formats."""
-    from strapdown.bundle.seal import to_json
+    from strapdown.bundle import to_json
     from strapdown.cli.console import console, print_findings, print_table
     from strapdown.cli.modules_list import HEADINGS, cell_text, listed_modules
 

@@ -31,7 +31,7 @@ from strapdown.cli.shared_options import (
 from strapdown.errors import ConfigError
 
 if TYPE_CHECKING:
-    from strapdown.bundle.seal import Seal
+    from strapdown.bundle import Seal
     from strapdown.config.navigation import NavigationSpec
     from strapdown.live.replay import Replay
     from strapdown.progress import Progress
@@ -133,7 +133,7 @@ def navigate(
     write: OutFlags,
 ) -> None:
     """Find position, velocity and attitude over a record, by inertial sensors and measurements."""
-    from strapdown.bundle.seal import check_destination, write_latency
+    from strapdown.bundle import check_destination, write_latency
     from strapdown.cli.console import WORDS, print_seal
     from strapdown.cli.result_folder import (
         default_folder,

@@ -12,8 +12,7 @@ from typing import Any
 
 import typer
 
-from strapdown.bundle.reading import read_manifest
-from strapdown.bundle.seal import Seal, write_latency, write_timing
+from strapdown.bundle import Seal, read_manifest, write_latency, write_timing
 from strapdown.cli.console import WORDS, Stopwatch, print_seal, progress
 from strapdown.cli.navigate_tables import print_latency, print_navigation
 from strapdown.cli.shared_options import OutFlags

@@ -12,7 +12,7 @@ from strapdown.cli.console import Stopwatch, progress
 from strapdown.errors import ConfigError, DataError, Finding
 
 if TYPE_CHECKING:
-    from strapdown.bundle.seal import Seal
+    from strapdown.bundle import Seal
     from strapdown.cli.shared_options import OutFlags
     from strapdown.config.alignment import AlignmentSpec
     from strapdown.config.navigation import NavigationSpec
@@ -102,7 +102,7 @@ def run_and_save(
     seal, or None if the rest is not to be printed. ConfigError: the folder exists and must not be
     replaced; or as `compute`.
     """
-    from strapdown.bundle.seal import check_destination, write_timing
+    from strapdown.bundle import check_destination, write_timing
 
     check_destination(folder, write.force)
     with progress(write.quiet or write.json) as show:

@@ -59,7 +59,7 @@ def simulate(
 ) -> None:
     """Write the log of a scenario, a trajectory or a crash together with its exact truth."""
     from strapdown.api.simulation import simulate as run_simulation
-    from strapdown.bundle.seal import check_destination
+    from strapdown.bundle import check_destination
     from strapdown.cli.console import WORDS, console, print_seal, progress
     from strapdown.cli.result_folder import default_folder
 

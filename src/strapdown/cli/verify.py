@@ -24,7 +24,7 @@ def verify(
     Answers identical, numerically equal within a number (another processor or version), or
     changed, and names what. Exit code 6 where it has changed, with --quiet, too.
     """
-    from strapdown.bundle.seal import to_json
+    from strapdown.bundle import to_json
     from strapdown.cli.console import console, progress
     from strapdown.report.verify import verify as check
 

@@ -255,7 +255,7 @@ class AlignmentSpec(FileSpec):
     simulation: SimulationTable | None = None
     gnss: FixesTable | None = None
     axes: AxesTable = AxesTable()
-    site: SiteTable = Field(description="where the body stands")
+    site: SiteTable = Field(description="position of the body")
     sensors: SensorsTable = SensorsTable()
     prefilter: Annotated[PrefilterSpec, BeforeValidator(STAGES["prefilter"])] = slot(NONE)
     coarse: Annotated[CoarseSpec, BeforeValidator(STAGES["coarse"])] = slot("inertial_frame")

@@ -41,8 +41,8 @@ class FileSpec(Spec):
         """Create a specification from plain data, as from a command or a sealed folder.
 
         `file`: the file that it was read from, for the lines of messages. ConfigError: keys are
-        unknown or missing, values do not fit, or contradict each other: all of them, each with its
-        key and a remedy.
+        unknown or missing, values do not fit, or contradict each other; each with its key and a
+        remedy.
         """
         return cls._checked(table, table if file is None else file.table, file)
 

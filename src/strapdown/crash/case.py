@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pandas as pd
 
-from strapdown.bundle.seal import InputFiles, sha256
+from strapdown.bundle import InputFiles, sha256
 from strapdown.config.crash_case import (
     CaseSpec,
     EntrySpec,

@@ -48,7 +48,7 @@ Pair = tuple[float, float]
 #: 1 + tan² alpha to 2, which is this.
 CONTACT_FRICTION = 1.0
 #: Probability with which a sound pair's momentum is reported as not closing; each limit of
-#: contact has a fifth of it, so that all stay below 1 %.
+#: contact has a fifth, so that all stay below 1 %.
 LEVEL = 0.005
 LIMIT_SHARE = 0.2
 #: Hypotheses this many times less likely than the best are excluded.
@@ -553,7 +553,7 @@ def close_vehicles(
         Coefficient of friction of tires on the road: the largest that is possible.
     energy_share : pair, optional
         Share of the energy that the first absorbed, 0 to 1, and its sd (`equal_force_share`).
-        Without it there is no energy-equivalent speed.
+        The energy-equivalent speed needs it.
     level : float
         Probability with which sound momentum is reported as not closing.
 
@@ -767,7 +767,7 @@ def _relative_heading(vehicles: Sequence[ImpactVehicle], friction: float) -> Fig
         normal = np.array([-change[1], change[0]])
         square = float(change @ change)
         across = float(normal @ covariance @ normal)
-        # Fieller: the direction is not determined where zero across cannot be told from the size.
+        # Fieller: the direction is not determined where the component across is not significant.
         variance += across / square**2 if square**2 > TWO_SIDED_95**2 * across else math.inf
         angles.append(math.atan2(change[1], change[0]))
     value = float(within_half_turn(np.array(math.degrees(angles[0] - angles[1]) + 180.0)))
@@ -967,7 +967,7 @@ class Blame:
 
     @property
     def candidates(self) -> tuple[Hypothesis, ...]:
-        """Those that close and cannot be told apart from the best; none where none closes.
+        """Those that close and are not significantly worse than the best; none where none closes.
 
         Empty also where nothing is contradicted.
         """

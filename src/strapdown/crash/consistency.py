@@ -912,8 +912,8 @@ def _turned_by_points(
 
     Conditional mean and covariance of the rates of a Gaussian process (`Structure.of_turning`),
     given the differences of the units' increments over the intervals `kept`. Structure may move a
-    point across as far as it was learnt along any axis: what it does in the direction of a turning
-    is not told apart from it.
+    point across as far as it was learnt along any axis: a deformation in the direction of a
+    rotation is not distinguishable from the rotation.
     """
     turned = _across(units)
     if turned is None or not kept.any():
@@ -1130,7 +1130,7 @@ def _turns_back(
     """Report a unit whose velocity turns back while that of the others does not.
 
     A vehicle rebounds as a whole: what one point gives back of its largest change, along the
-    direction in which all of them changed, differs between points by no more than structure does.
+    direction in which all changed, differs between points by no more than structure does.
     """
     if not structure.change > 0.0:
         return None

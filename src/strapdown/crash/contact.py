@@ -1,4 +1,4 @@
-"""Contact of an event: its onset and end with their uncertainty, and what a record misses of it."""
+"""Contact of an event: onset and end with their uncertainty, and the change beyond the record."""
 
 from __future__ import annotations
 

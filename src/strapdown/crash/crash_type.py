@@ -13,7 +13,7 @@ from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.crash.delta_v import DeltaV
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.pdof import AngleInterval, Pdof, pdof, pdof_interval
-from strapdown.dsp.running_integral import running_integral
+from strapdown.dsp.samples import running_integral
 from strapdown.errors import ConfigError, DataError
 from strapdown.tables.checks import as_array, check_rows, check_same_length, check_time
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown.crash.acceleration import Acceleration, check_within, window_weights
 from strapdown.crash.events import CrashEvent
-from strapdown.dsp.running_integral import running_integral
+from strapdown.dsp.samples import running_integral
 from strapdown.errors import ConfigError, DataError
 
 Array = NDArray[np.float64]

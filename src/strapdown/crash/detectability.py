@@ -42,7 +42,7 @@ def _moved(one: VelocityIncrements) -> VelocityIncrements:
     return replace(one, values=one.values + off)
 
 
-#: What is tried, by the code of its name.
+#: Errors that are tried, by the codes of their names.
 WRONG: Mapping[str, Wrong] = {
     "crash.wrong-sign": _opposite,
     "crash.wrong-axes": _times(np.eye(3)[[1, 0, 2]]),
@@ -57,7 +57,7 @@ WRONG: Mapping[str, Wrong] = {
 def undetectable(
     units: Sequence[PointKinematics], comparison: UnitComparison, level: float = 1e-3
 ) -> list[Finding]:
-    """What the comparison of units that agree would not show if it were wrong.
+    """State the errors that a comparison of agreeing units would not detect.
 
     Each of `WRONG` is put into the record of one unit after another, which is then compared with
     the others as in `compare_units`, structure and turning learnt anew. One that a unit could have

@@ -45,7 +45,7 @@ from strapdown.crash.measuring_point import (
 )
 from strapdown.crash.structure import STRUCTURE
 from strapdown.dsp.chi_square import chi_square_above
-from strapdown.dsp.true_runs import true_runs
+from strapdown.dsp.samples import true_runs
 from strapdown.ellipsoids import WGS84
 from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.evaluation.control_points import rigid_fit
@@ -286,7 +286,7 @@ class Epochs:
         _, first, count = np.unique(block, return_index=True, return_counts=True)
         stamps, speed = (np.add.reduceat(x, first) / count for x in (stamps, speed))
         n = len(stamps)
-        # What a wheel shows of a speed near zero is often zero.
+        # Wheel sensors often read zero near zero speed.
         sds = np.where(np.abs(speed) < LEAST_SPEED, math.hypot(sd, 0.5 * LEAST_SPEED), sd)
         # Of a speed position and velocity are not measured: any numbers will do.
         place, velocity = np.tile(SOMEWHERE, (n, 1)), np.zeros((n, 3))
@@ -322,8 +322,8 @@ class Epochs:
 def _lengths(fixes: Fixes, end: float) -> list[float]:
     """Lengths of the drive to use in turn, s.
 
-    A gyro bias of 0.01 rad/s turns a long record by more than is linear: a short part of it shows
-    the bias well enough for one of twice the length.
+    A gyro bias of 0.01 rad/s turns a long record by more than is linear: a short part shows the
+    bias well enough for one of twice the length.
     """
     whole = end - float(fixes.instants[0])
     lengths = [whole]
@@ -390,7 +390,7 @@ SPEED_STEP = 0.25
 # A delay is linear up to this, s: a jerk of 2 m/s³ then makes 1 mm/s. Beyond it the search is
 # repeated with the delay that it found.
 LINEAR, ROUNDS = 0.03, 3
-#: A vehicle at less than this stands, m/s.
+#: Below this speed a vehicle is stationary, m/s.
 STANDS = 0.2
 #: Latitude and longitude, deg, and height, m, of a drive without fixes: as of `Entry`.
 SOMEWHERE = (45.0, 0.0, 0.0)
@@ -553,7 +553,7 @@ def start_from_drive(
     corrected = errors.off_table(at.imu, best.parameters)
     at = replace(at, imu=biases_off(corrected, best.own_bias[:3], best.own_bias[3:]))
     if at.rest is None or at.rest.grade == "steady":
-        # A quiet drive is no better known than the attitude, which its errors are a part of.
+        # The errors of a quiet drive are part of those of the attitude: count them once.
         roll, pitch, _ = state.state.roll_pitch_heading.tolist()
         at = replace(at, rest=None, rest_accel_sd=0.0, levelling=Levelling(roll, pitch, 0.0, False))
     level = rotation.dcm_from_quaternion(state.state.q_nb)
@@ -746,7 +746,7 @@ def _calibration(
     shown: Sequence[int],
     kept: Array,
 ) -> tuple[pd.DataFrame, list[Finding]]:
-    """What the drive shows of the unit, and the findings on it."""
+    """Errors of the unit as estimated from the drive, and findings."""
     effects, sd = at.effects, np.sqrt(np.diag(best.joint)[STATES:])
     rows: list[tuple[str, int, str, float, float, float, float]] = []
     held: list[str] = []

@@ -23,16 +23,15 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.crash.entry import ACCEL_BIAS, GYRO_BIAS, STATES, biases_off, rotated
 from strapdown.dsp.chi_square import chi_square_above, chi_square_exceeded
-from strapdown.dsp.running_integral import running_integral
+from strapdown.dsp.samples import running_integral
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError, DivergenceError, Finding
 from strapdown.evaluation.trajectory_differences import trajectory_at
-from strapdown.frames import geodetic_from_ned, place_difference
+from strapdown.frames import antenna_motion, geodetic_from_ned, place_difference
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NavigationRun, NorthEastDown, run_mechanization
 from strapdown.nav_state import NavState
 from strapdown.rotation import cross_matrix
-from strapdown.sensors.antenna import antenna_motion
 from strapdown.sensors.triad_errors import ZERO, Triad
 from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.tables import ACCEL, EULER, GEODETIC, GYRO, VELOCITY
@@ -274,7 +273,7 @@ class EntryPriors:
         As `side_slip_sd_deg`, of the angle between the direction of travel and the plane of the
         forward and right axes: suspension and slope of the road under the vehicle.
     pitch_slope_sd_deg : float, deg per m/s²
-        Of the part of it that grows with forward acceleration: squat and dive.
+        Of its part that grows with forward acceleration: squat and dive.
     speed_scale_sd : float
         Relative, of speeds: tires and wheel circumference.
     speed_delay, speed_delay_sd : float, s
@@ -832,8 +831,8 @@ class _Search:
         loose = UNKNOWN * np.where(bounded > 0.0, bounded, np.tile(bounded[:3].max(), 6))
         heading = math.radians(p.heading_sd_deg or ANY_HEADING)
         if self.free == 3:
-            # Speeds alone determine neither position nor heading: both are as guessed. What they
-            # do not measure of the velocity must not run away in a bend.
+            # Speeds alone determine neither position nor heading: both are as guessed. The
+            # components of velocity that they do not measure must not drift in a bend.
             loose[3:6], heading = SPEED_STRIDE, 0.0
         prior_sd = np.concatenate(
             [
@@ -868,7 +867,7 @@ class _Search:
     def _slides(self, now: AtFixes) -> NDArray[np.bool_]:
         """Where the vehicle travels along its axis, (m, 2): the conditions on side and pitch slip.
 
-        A speed that stands for a standing wheel says nothing of either.
+        The condition on a locked wheel restricts neither.
         """
         speed = np.where(
             np.isfinite(self.rolled), self.rolled, np.linalg.norm(now.velocity, axis=1)

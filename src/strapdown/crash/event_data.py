@@ -52,7 +52,7 @@ def recorder_parts(path: str, record: CrashRecord) -> Recorder:
         if not triads["velocity"] and not triads["acceleration"]:
             continue
         used = ["velocity"] if triads["velocity"] else ["acceleration"]
-        # Rates before the crash, at 2 a second, are no gyro of the crash.
+        # Pre-crash rates at 2 Hz do not serve as the gyro of the crash.
         clocks = {c.clock for kind in used for c in triads[kind]}
         triads["rate"] = [c for c in triads["rate"] if c.clock in clocks]
         used += ["rate"] if triads["rate"] else []

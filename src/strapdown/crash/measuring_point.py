@@ -436,7 +436,7 @@ TIMING = "timing"
 
 
 class Parameter(NamedTuple):
-    """What an unknown is, where a drive before the crash may determine it.
+    """An unknown that a drive before the crash may determine.
 
     `quantity`: ``bias``, ``scale`` (m/s² and relative), ``gyro bias``, ``gyro scale`` (rad/s and
     relative), or ``mounting`` (rad, about an axis of the vehicle); `axis`: 0 to 2; `sd`: as stated;

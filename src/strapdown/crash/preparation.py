@@ -445,7 +445,7 @@ def from_stated_attitude(
 
     `bias_sd`, (3,), m/s²: stated sd of that bias, vehicle axes; `unknown` as `level_at_rest`.
     Returns the leveling and the stationary reading minus gravity in that attitude, (3,), m/s²; None
-    where there is no stationary interval, or where the stated bias is more accurate than ``g``
+    without a stationary interval, or where the stated bias is more accurate than ``g``
     times the sd of the attitude.
     """
     roll, pitch, sd = stated

@@ -134,7 +134,7 @@ def _size(change: VelocityChange) -> str:
 
 Array = NDArray[np.float64]
 
-# Instants that stand for the mean over which a velocity settles.
+# Instants that represent the mean over which a velocity settles.
 SETTLED_ENDS = 9
 NO_ROLL = "whether it rolled over cannot be determined without a gyro about the forward axis"
 
@@ -160,7 +160,7 @@ class UnitReconstruction:
         For every event, from its change along the rotating axes and the roll.
     findings : tuple of Finding
     drive : EntryState or None
-        What the drive before the crash shows of the unit, where the entry is from there.
+        Estimate from the drive before the crash, where the entry is from there.
     """
 
     name: str
@@ -354,7 +354,8 @@ def reconstruct_unit(
         plain = body_delta_v_bound(
             effects, whole.weights, rest_sd=rest_sd, at_ends=contact.moved, settled=settled
         )
-        # What the record misses is within the bound, or leaves the change without an upper one.
+        # The part beyond the end of the record is within the bound, or leaves it without an upper
+        # end.
         least = contact.beyond(TWO_SIDED_95 * plain.along(whole.vector))
         ends_of = {"event": contact.at_ends(least), "peak": _at_peak(peak, contact)}
         missing = {
@@ -700,8 +701,8 @@ def reconstruct_crash(
     Returns
     -------
     CrashReconstruction
-        All bounds are 95 % bounds. Without an event in the record there are no changes of velocity,
-        and a finding states how near it came; the path is returned in any case.
+        All bounds are 95 % bounds. Without an event in the record no change of velocity is
+        returned, and a finding states how near it came; the path is returned in any case.
 
     Raises
     ------

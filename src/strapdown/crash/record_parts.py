@@ -1096,8 +1096,8 @@ def recorder_model(
     """Error model of a table of delta-V, by keys of the sensor catalogue.
 
     `time`, (n,), s; `change`, (n, k), m/s, of the `channels`; `offset`, m/s: value at time zero.
-    What is absolute - rounding (uniform over a step), change before time zero and value at time
-    zero (bounds) - is a bias that makes it until the largest change.
+    Absolute terms - rounding (uniform over a step), change before time zero and value at time
+    zero (bounds) - become the bias that has the same effect until the largest change.
     """
     largest = np.abs(change).max(axis=1)
     until = max(float(time[int(np.argmax(largest))]), float(np.median(np.diff(time))))
@@ -1185,7 +1185,7 @@ LABORATORY = {
 
 
 class _Place(NamedTuple):
-    """What the channels of one triad have in common."""
+    """Attributes that the channels of one triad share."""
 
     vehicle: str
     quantity: str
@@ -1251,7 +1251,7 @@ def _block(
     skipped += unread
     for names, why in (
         (spare, "redundant"),
-        (twins, "another sensor of the same axis, which the record does not tell from the first,"),
+        (twins, "another sensor of the same axis, not distinguished from the first in the record,"),
     ):
         if names:
             why = f"{why} at '{place}'; to use it, write it in place of the primary one"

@@ -85,14 +85,14 @@ def single_error(
     edges, kept, difference, covariance
         As `learn_share`, of one pair.
     level : float
-        Odds of structure alone against the error below which it is told.
+        The error is reported if the odds of structure alone against it are below this.
 
     Notes
     -----
     A chi-square of all differences dilutes a single error: with 60 degrees of freedom one of 6.3
     standard deviations has a probability of 1e-3. Here each error is one more Gaussian unknown
-    whose size is learnt beside the structure's: the ratio of the two posteriors tells from about 4
-    standard deviations on, and does not let structure grow to take the error's place. A late clock
+    whose size is estimated beside the structure's: the ratio of the two posteriors decides from
+    about 4 standard deviations on, and does not let structure absorb the error. A late clock
     is not among them: it makes the difference of a hump, as structure does.
     """
     unknowns = structural_unknowns(structure, edges, kept, 1)

@@ -25,7 +25,7 @@ CORRELATION_TIMES = (0.003, 0.006, 0.012, 0.024)
 #: less than a twentieth. The prior of a share is half-normal with this standard deviation.
 LARGEST_SHARE, USUAL_SHARE = 0.25, 0.1
 SHARES = np.array([0.0, 0.003, 0.006, 0.01, 0.015, 0.022, 0.033, 0.05, 0.075, 0.11, 0.16, 0.25])
-#: Beyond the stated turning of a vehicle without a gyro, in multiples of it.
+#: Beyond the stated turning of a vehicle without a gyro, as a multiple.
 MORE_TURNING, USUAL_MORE = np.array([0.0, 0.7, 1.2, 1.7]), 0.7
 ROUNDS = 3
 #: A share is taken from this likelihood ratio (chi-square of one degree of freedom, 1 %).

@@ -175,7 +175,7 @@ def draft_cases(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> 
         if drive is not None:
             drives.append(drive)
             if drive.kind == "gnss" and all(p.kind != "acceleration" for p in found):
-                # Fixes alone are no recorder.
+                # Fixes without an accelerometer do not make a recorder.
                 continue
             left = [s for s in left if drive.column not in s.names]
         own = _labels(record, found, labels)
@@ -633,8 +633,8 @@ def _one_recorder(group: Sequence[Part], part: Part) -> str:
         told = f"{_of(low)} and {_of(high)} are low and high range of one recorder: "
         if goes_on:
             told += (
-                f"the first stands at its end of {in_words(end, 'acceleration')}, where the second "
-                f"goes on to {in_words(reached, 'acceleration')}; "
+                f"the first ends at {in_words(end, 'acceleration')}, where the "
+                f"second goes on to {in_words(reached, 'acceleration')}; "
             )
         return told + (
             f"below it they agree (correlation {correlation:.2f}, scale {slope:.2f}) on one clock"

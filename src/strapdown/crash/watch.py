@@ -311,7 +311,7 @@ class CrashLog:
         return line
 
     def summary(self) -> Mapping[str, Any]:
-        """What was processed, and how far below the trigger all else stayed."""
+        """Samples processed, and the margin below the trigger of all others."""
         watch = self.watch
         return {
             "events": watch.events,

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from strapdown.lazy_names import load_on_first_use
 
 if TYPE_CHECKING:
-    from strapdown.dsp.running_integral import running_integral
+    from strapdown.dsp.samples import running_integral
 
 __all__ = ["running_integral"]
 
-load_on_first_use(__name__, {"running_integral": "running_integral"})
+load_on_first_use(__name__, {"samples": "running_integral"})

@@ -211,8 +211,8 @@ def angles_to_errors(angles: Array) -> Errors:
 def known_at(truth: pd.DataFrame, scored: Mask, stamps: Array) -> Known:
     """Interpolate the scored rows of a truth at the samples of a log.
 
-    A sample counts at the stamp of a scored row, or between scored rows that are no further apart
-    than three of the truth's usual steps.
+    A sample counts at the stamp of a scored row, or between scored rows at most three of the
+    truth's usual steps apart.
     """
     rows = truth[scored]
     if rows.empty:

@@ -7,7 +7,7 @@
     12.5 moved 0.30 0 0 m since 3.0
 
 Both instants lie within rests. A displacement is along the axes of the run's local level:
-forward along the run's north, right of it, and down.
+forward along the run's north, right, and down.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ from strapdown.sensors.rest import RestStretch
 from strapdown.tables import ACCEL, QUATERNION
 
 __all__ = [
+    "DeadReckoningErrors",
     "Leg",
     "PlaceReference",
-    "SensorErrors",
     "dead_reckon",
     "is_place",
     "parse_place",
@@ -190,7 +190,7 @@ NEAR_REST = 0.5  # s
 
 
 @dataclass(frozen=True)
-class SensorErrors:
+class DeadReckoningErrors:
     """Assumed errors of the sensors and of the start, for the standard deviation of the position.
 
     Attributes
@@ -222,7 +222,7 @@ def score_places(
     imu: pd.DataFrame,
     rests: Sequence[RestStretch],
     *,
-    errors: SensorErrors | None = None,
+    errors: DeadReckoningErrors | None = None,
     gravity: float | None = None,
 ) -> tuple[PositionScore, ...]:
     """Compare the displacements of a run with known ones.
@@ -235,7 +235,7 @@ def score_places(
         The Imu table that the run used, with acceleration.
     rests : sequence of RestStretch
         In order of time; every instant of `places` lies in one, or at most half a second outside.
-    errors : SensorErrors, optional
+    errors : DeadReckoningErrors, optional
         For the standard deviation of the position; a consumer sensor if not given.
     gravity : float, m/s², optional
         As in `dead_reckon`.
@@ -250,7 +250,7 @@ def score_places(
     DataError
         An instant is not at a rest, two are at the same one, or as `dead_reckon`.
     """
-    assumed = errors or SensorErrors()
+    assumed = errors or DeadReckoningErrors()
     return tuple(
         _score(run, place, imu, list(rests)[slice(*_between(place, rests))], assumed, gravity)
         for place in places
@@ -287,7 +287,7 @@ def _score(
     place: PlaceReference,
     imu: pd.DataFrame,
     rests: list[RestStretch],
-    errors: SensorErrors,
+    errors: DeadReckoningErrors,
     gravity: float | None,
 ) -> PositionScore:
     legs = [
@@ -336,7 +336,9 @@ def _score(
     )
 
 
-def _sd(parts: list[tuple[Array, Array, float]], errors: SensorErrors, noise: float) -> float:
+def _sd(
+    parts: list[tuple[Array, Array, float]], errors: DeadReckoningErrors, noise: float
+) -> float:
     """Root mean square length: biases and tilt are the same in all parts, noise is not."""
     by_bias = np.sum([p[0] for p in parts], axis=0)
     by_tilt = np.sum([p[1] for p in parts], axis=0)

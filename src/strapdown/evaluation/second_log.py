@@ -120,7 +120,7 @@ OFFSET, DRIFT, TURN, BIAS, SCALE = 0, 1, slice(2, 5), slice(5, 8), 8
 
 
 @dataclass(frozen=True)
-class _State:
+class _Estimate:
     offset: float
     drift: float
     turn: Array  # C_12
@@ -241,7 +241,7 @@ class _Fit:
         u = time - self.origin + offset + drift * (time - self.middle)
         return self.spline(u), self.slope(u)
 
-    def solve(self) -> tuple[_State, Array | None]:
+    def solve(self) -> tuple[_Estimate, Array | None]:
         """Gauss-Newton from the coarse offset and the drift of the windows."""
         offset, drift = self._by_windows()
         state = self._mounted(offset, drift)
@@ -256,7 +256,7 @@ class _Fit:
             size = np.sqrt((design**2).sum(axis=0))
             scaled = design / size
             change = free @ (np.linalg.solve(scaled.T @ scaled, scaled.T @ left.ravel()) / size)
-            state = _State(
+            state = _Estimate(
                 state.offset + float(change[OFFSET]),
                 state.drift + float(change[DRIFT]),
                 rotation.dcm_from_rotation_vector(change[TURN]) @ state.turn,
@@ -293,7 +293,7 @@ class _Fit:
             offset += float(np.clip(line[1], -0.25, 0.25))
         return offset, drift
 
-    def _shift(self, state: _State, keep: slice) -> float:
+    def _shift(self, state: _Estimate, keep: slice) -> float:
         """Best offset within a window, by Newton steps of at most a tenth of a second."""
         offset = state.offset
         for _ in range(6):
@@ -307,15 +307,15 @@ class _Fit:
             offset += float(np.clip(step, -0.1, 0.1))
         return offset
 
-    def _mounted(self, offset: float, drift: float) -> _State:
+    def _mounted(self, offset: float, drift: float) -> _Estimate:
         rate, _ = self.second(offset, drift)
         mean_1, mean_2 = self.rate.mean(axis=0), rate.mean(axis=0)
         x, y = self.rate - mean_1, rate - mean_2
         turn, common = proper_rotation(x.T @ y)
         scale = common / max(float((y**2).sum()), 1e-300)
-        return _State(offset, drift, turn, mean_1 - scale * turn @ mean_2, scale)
+        return _Estimate(offset, drift, turn, mean_1 - scale * turn @ mean_2, scale)
 
-    def _residuals(self, state: _State) -> tuple[Array, Array]:
+    def _residuals(self, state: _Estimate) -> tuple[Array, Array]:
         """Residuals, (n, 3), and their derivatives by each parameter, (n, 3, 9)."""
         rate, slope = self.second(state.offset, state.drift)
         turned = rate @ state.turn.T
@@ -330,7 +330,7 @@ class _Fit:
         jacobian[:, :, SCALE] = turned
         return left, jacobian
 
-    def _single_axis(self, state: _State) -> Array | None:
+    def _single_axis(self, state: _Estimate) -> Array | None:
         """The axis in the first sensor's axes, if the body turned about one only."""
         left, _ = self._residuals(state)
         noise = float((left**2).mean())
@@ -342,7 +342,7 @@ class _Fit:
             return None
         return np.asarray(axes[:, 2])
 
-    def _least_turn(self, state: _State, axis: Array) -> _State:
+    def _least_turn(self, state: _Estimate, axis: Array) -> _Estimate:
         """The same alignment of the axis, with the least rotation about it."""
         there = state.turn.T @ axis
         across = np.cross(there, axis)
@@ -356,7 +356,7 @@ class _Fit:
         turn = rotation.dcm_from_rotation_vector(vector)
         mean = self.second(state.offset, state.drift)[0].mean(axis=0)
         bias = self.rate.mean(axis=0) - state.scale * turn @ mean
-        return _State(state.offset, state.drift, turn, bias, state.scale)
+        return _Estimate(state.offset, state.drift, turn, bias, state.scale)
 
     def _free(self, axis: Array | None) -> Array:
         """Free directions of the parameters: not about a single axis."""
@@ -370,7 +370,7 @@ class _Fit:
         out[TURN, 6:] = vt[1:].T
         return out
 
-    def spread(self, state: _State, axis: Array | None) -> tuple[Array, float, float]:
+    def spread(self, state: _Estimate, axis: Array | None) -> tuple[Array, float, float]:
         """Covariance of the parameters, root mean square of the residuals, share explained."""
         left, jacobian = self._residuals(state)
         free = self._free(axis)

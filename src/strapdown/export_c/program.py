@@ -21,7 +21,7 @@ from strapdown.constants import CORTEX_M4F_CYCLES
 from strapdown.errors import ConfigError, check_choice
 from strapdown.export_c.kernels import Function, Kernels
 from strapdown.export_c.translate import WIDTH, Translator, comment, number
-from strapdown.increments.angle import INTERPOLATIONS
+from strapdown.increments import BETWEEN_STAMPS
 from strapdown.tables import GYRO, check_imu, check_sampling_kind
 
 # Math functions with a macro for each precision.
@@ -80,7 +80,7 @@ def export_c(
 def _kind(interpolation: str, sampling: str | None, imu: pd.DataFrame | None) -> str:
     check_choice(
         "mechanization.no-interpolation",
-        INTERPOLATIONS,
+        BETWEEN_STAMPS,
         quantity="interpolation",
         interpolation=interpolation,
     )
@@ -229,7 +229,7 @@ def _interface(shape: Shape, around: Sampling, size: int) -> str:
 
 
 def constant_lines(kernels: Kernels) -> str:
-    """Definitions of the constants in use; a comment on several stands above the first."""
+    """Definitions of the constants in use; a comment on several is above the first."""
     lines: list[str] = []
     before = ""
     for constant in kernels.constants():

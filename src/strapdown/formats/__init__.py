@@ -289,7 +289,7 @@ READERS: dict[str, Reader] = {
 }
 
 
-#: What is in the file of a stranger can break any reader, and the libraries under it.
+#: Exceptions that a damaged file can cause in any reader and in the libraries that it uses.
 _BROKEN = (ArithmeticError, LookupError, RuntimeError, StopIteration, TypeError, ValueError)
 
 
@@ -416,7 +416,7 @@ class Foreign:
     way : str
         How its content gets in: program, or the export of the maker's program.
     magics : tuple of bytes
-        First bytes; empty if only the ending tells.
+        First bytes; empty if the ending alone identifies the format.
     suffixes : tuple of str
         Endings; if `magics` are given, empty for any.
     offset : int

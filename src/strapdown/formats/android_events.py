@@ -6,7 +6,7 @@ gyroscope uncalibrated, 35 accelerometer uncalibrated), its string type
 (``android.sensor.gyroscope``), or a short name (``gyro``, ``ACC``). Under the first two, units,
 axes and the sign of gravity are those of Android: rad/s, m/s² with gravity, µT, x right, y up, z
 out of the screen (developer.android.com/reference/android/hardware/SensorEvent). Linear
-acceleration and gravity are used only where there is no accelerometer: their sum. Short names are
+acceleration and gravity are used only without an accelerometer: their sum. Short names are
 also those of other loggers, so that units and axes under them are left open; so are units under the
 names of Android where the accelerometer has no gravity in m/s², or the rates are rather in another
 unit than rad/s, as of applications that write deg/s and g. A name may state its unit:
@@ -63,7 +63,7 @@ _HEADED = re.compile(r"(sensor|event)?[\s_-]*(type|kind|id|sensor|name|event)?",
 # Specific force of most rows of an accelerometer, m/s²; a hand or a vehicle changes it less.
 _GRAVITY = (6.0, 14.0)
 _FORCES = ("accel", "accel uncalibrated", "gravity")
-# Rows at the top by which the layout is told.
+# Rows at the top that determine the layout.
 TOP = 200
 
 

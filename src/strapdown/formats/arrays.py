@@ -170,7 +170,7 @@ def numbers(raw: RawLog, source: str, quantity: str) -> NDArray[Any]:
 def ticks_of(raw: RawLog, source: str, unit: str | None = None) -> tuple[NDArray[Any], bool]:
     """Return stamps as numbers; dates and times of day as nanoseconds, and True.
 
-    Nanoseconds count from 1970, or from a midnight where there is no date. DataError: a stamp is
+    Nanoseconds count from 1970, or, without a date, from a midnight. DataError: a stamp is
     neither, or of another kind than those before it.
     """
     values = raw.columns[source]

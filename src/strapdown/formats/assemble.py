@@ -245,14 +245,14 @@ def _unused(raw: RawLog, found: dict[str, Column]) -> list[Finding]:
     return out
 
 
-#: A table whose sensors have their own rows leaves out at least this share of one of them.
+#: A table whose sensors have their own rows leaves out at least this share of one sensor.
 OWN_ROWS = 0.2
 
 
 def _by_sensor(raw: RawLog, found: dict[str, Column]) -> list[RawLog]:
     """Take apart a wide table whose sensors have rows of their own, with the other cells empty.
 
-    Empty if every triad has a value in most rows, or there is no time.
+    Empty if every triad has a value in most rows, or the table has no time.
     """
     if "time" not in found:
         return []

@@ -201,7 +201,7 @@ def unrolled(time: Array) -> tuple[Array, list[int]]:
     """Unwrap seconds of week across the end of a week.
 
     `time` ((n,), s). Returns `time` ((n,), s): counted on from the first row's week. The same array
-    if there is no rollover; `rows`: rows, from 0, that begin a week.
+    without a rollover; `rows`: rows, from 0, that begin a week.
 
     A rollover is a decrease of more than half a week, from the last hour of a week to the
     first hour of the next.

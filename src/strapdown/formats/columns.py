@@ -64,7 +64,7 @@ SUMMED = {
 }
 #: Gravity by itself, as phones write it beside acceleration without it.
 _GRAVITY = ("gravity", "grav", "gvec")
-# Words that may stand beside the name of a sensor, and say the same again or how it is meant.
+# Words that may accompany the name of a sensor, and repeat it or state how it is meant.
 _BESIDE = {
     "gyro": {"angular", "rotation", "rotational", "rate", "rates", "velocity", "vel", "speed"},
     "accel": {"acceleration", "linear", "lin", "user", "including", "gravity", "with", "without"},
@@ -154,7 +154,7 @@ _DIRECTIONS = {
 # Words of a name: split at signs, and where capitals begin or end.
 _HUMPS = re.compile(r"[A-Z]+(?![a-z])\d*|[A-Z]?[^\W\d_A-Z]+\d*|[°µ]+|\d+|²")
 _SIGNS = r"[\s_\-/:,;|]+"
-# Words that do not tell quantities apart.
+# Words that do not distinguish quantities.
 _NOISE = {
     *("raw", "imu", "sensor", "sensors", "data", "body", "device", "phone", "watch", "motion"),
     *("cal", "calib", "calibrated", "corrected", "meas", "measured", "value", "values", "axis"),
@@ -165,13 +165,13 @@ _ABOUT = {
     *("bias", "offset", "scale", "cov", "covariance", "std", "stddev", "stdev", "sd", "sigma"),
     *("var", "variance", "error", "err", "accuracy", "setpoint", "desired", "noise"),
 }
-# What is in brackets at the end, which may hold brackets: (m/(s*s)).
+# Text in brackets at the end, which may hold brackets: (m/(s*s)).
 _BRACKETS = re.compile(r"[\[(]\s*((?:[^\[\]()]|\([^()]*\))*?)\s*[\])]\s*$")
 
 
 @dataclass(frozen=True)
 class ColumnName:
-    """What the name of a column says.
+    """Quantity, axis and unit as read from the name of a column.
 
     Attributes
     ----------
@@ -251,7 +251,7 @@ def read_name(name: str) -> ColumnName:
 
 
 def split_brackets(text: str) -> tuple[str, str]:
-    """Split what stands in brackets off the end of a name, as a unit; empty if there is none."""
+    """Split text in brackets off the end of a name, as a unit; empty without brackets."""
     bracket = _BRACKETS.search(text)
     return (text[: bracket.start()], bracket.group(1)) if bracket else (text, "")
 
@@ -409,7 +409,7 @@ def _of_words(words: list[str]) -> ColumnName | None:
     return None
 
 
-# Names that are parts of words, unless their axis stands apart: MaX, but not max.
+# Names that are parts of words, unless their axis is written apart: MaX, but not max.
 _SHORT = {"gyro": "gy", "accel": "ac", "mag": "ma"}
 # Words of the name of a clock.
 _OF_TIME = {

@@ -45,8 +45,9 @@ END_CHANGE, END_SPAN = 0.8 * KMH, 0.020
 # Exports have some hundred rows.
 LARGEST = 4_000_000
 
-# What a heading or a label names, in the order of search; None: delta-V or a sensor, by
-# `read_channel_name`. A pedal is no acceleration, and engine speed none of the vehicle.
+# Elements that a heading or a label names, in the order of search; None: delta-V or a sensor, by
+# `read_channel_name`. The position of a pedal is not an acceleration, and the engine's speed is not
+# the vehicle's.
 _ELEMENTS = (
     ("pedal", r"accelerator|pedal|throttle|fahrpedal|gaspedal|drosselklappe"),
     ("rpm", r"\brpm\b|engine speed|motordrehzahl|drehzahl|1/min|motor speed"),

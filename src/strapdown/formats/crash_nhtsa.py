@@ -232,7 +232,7 @@ def _code(channel: Channel) -> tuple[str, str]:
 def _positions(channels: Sequence[Channel]) -> dict[int, str]:
     """Position that the comment of each channel names; empty where it names none.
 
-    A text that stands at several location codes of a vehicle names no position.
+    A text used for several location codes of a vehicle names no position.
     """
     texts: dict[int, str] = {}
     codes: dict[tuple[int, str], set[tuple[str, str]]] = {}

@@ -345,7 +345,7 @@ def triad_stamps(
         return _same_length(channel, *_stated(record, name, time_unit, findings), values)
     if time is None and name and channel.samples is not None:
         steps = np.diff(_clock_of(record, name, time_unit).stamps.astype(np.float64))
-        # Stamps that go back, or change once, are no clock: samples are counted from zero.
+        # Stamps that decrease, or change only once, are not a clock: samples are counted from zero.
         name = "" if bool((steps < 0.0).any()) or np.count_nonzero(steps) < 2 else name
     return _even(record, channel, name, time_unit, rate_hz, findings, values), values
 
@@ -418,7 +418,7 @@ def _even(
         start, span = float(seconds[0]), float(seconds[1] - seconds[0])
         steps = np.diff(stamps)
         if span > 0.0 and steps.min() == 0.0:
-            # Whole seconds, say: the span is known to one of them.
+            # Whole seconds, say: the span is known to 1 s.
             slack = float(steps.max()) * span / float(ends[1] - ends[0])
         if abs(start) > EPOCH:
             start -= last_midnight(start, 1.0)

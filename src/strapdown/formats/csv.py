@@ -171,7 +171,7 @@ def _numbered(text: str) -> tuple[Lines, list[str]]:
 # Lines that are rows in another form.
 
 
-#: What the serial monitor of a development environment puts before a line: the time of its arrival.
+#: Time of arrival that the serial monitor of a development environment puts before a line.
 _ARRIVAL = re.compile(r"(\d\d:\d\d:\d\d\.\d+) -> ?")
 # "ax: 0.12 g," or "ax = 0.12": a name, its value, and its unit where a sign ends the field.
 _LABELLED = re.compile(
@@ -204,7 +204,7 @@ def _rewritten(numbered: Lines) -> Lines:
 
 
 def _with_arrival(line: str, stamp: str | None) -> str:
-    """Put the time of arrival into the first field; it is a clock where there is no other."""
+    """Put the time of arrival into the first field; it is the clock of a table without one."""
     separator = separator_of(line)
     fields = fields_of(line, separator)
     if not are_data(fields):
@@ -657,7 +657,7 @@ def _parse(lines: list[str], count: int, separator: str | None, name: str) -> Co
     if separator is None:
         lines = ["\t".join(line.split()) for line in lines]
     if separator and separator.strip() and any(f"{separator} " in line for line in lines[:JUDGED]):
-        # Blanks beside a separator are no part of a field.
+        # Blanks beside a separator do not belong to a field.
         around = re.compile(rf"[ \t]*{re.escape(separator)}[ \t]*")
         lines = [line if '"' in line else around.sub(separator, line) for line in lines]
     # Arrow reads 0xFFF0 as a number, but its meaning for a sensor is unknown.

@@ -58,7 +58,7 @@ FORMATS = {
     "q": "<i8",
     "Q": "<u8",
 }
-# Of the values of a text, where they are no numbers with a fraction.
+# Of the values of a text, where they are not numbers with a fraction.
 _TYPES: dict[str, Any] = {**dict.fromkeys("bBhHiIqQ", np.int64), **dict.fromkeys("aMnNZ", "S64")}
 SCALES = {"c": 0.01, "C": 0.01, "e": 0.01, "E": 0.01, "L": 1e-7}
 # Status of a receiver to field 6 of NMEA GGA.
@@ -137,7 +137,7 @@ def _records_of_text(text: str) -> tuple[dict[str, Record], int]:
 
 
 def _of_letter(letter: str, values: Sequence[str]) -> NDArray[Any]:
-    """Convert the texts of a field; those that are no numbers stay texts."""
+    """Convert the texts of a field; those that are not numbers stay texts."""
     try:
         return np.array(values, dtype=_TYPES.get(letter, np.float64))
     except ValueError:

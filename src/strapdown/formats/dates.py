@@ -30,7 +30,7 @@ _ONLY_DATE = re.compile(_DATE)
 _DAY = 86_400 * 10**9
 # A decrease of more than half a day is midnight.
 _HALF_DAY = _DAY // 2
-# Days since 1899-12-30, as spreadsheets count them: 1982 to 2064; and a step of them (0.26 s) that
+# Days since 1899-12-30, as spreadsheets count them: 1982 to 2064; and a step (0.26 s) that
 # in seconds no inertial sensor has.
 _EXCEL_DAYS, _EXCEL_STEP = (30_000.0, 60_000.0), 3e-6
 _EXCEL_EPOCH = 25_569  # days from 1899-12-30 to 1970-01-01
@@ -65,8 +65,8 @@ def nanoseconds_of(texts: Iterable[object]) -> NDArray[np.int64] | None:
     """Convert dates with times of day to nanoseconds since 1970, UTC where no zone is stated.
 
     `texts` ((n,)): ``2024-06-19 15:27:08.576``, ``19.06.2024 15:27:08,576``, ``06/19/2024 3:27:08
-    PM``. Returns (n,), or None if one is neither. Where there is no date, or day and month cannot
-    be told apart, since the midnight before the first, as `day_nanoseconds`.
+    PM``. Returns (n,), or None if one is neither. Without a date, or where day and month are
+    ambiguous, since the midnight before the first, as `day_nanoseconds`.
     """
     found = _matches(texts)
     if found is None:

@@ -1,7 +1,7 @@
 """Garmin FIT (``.fit``): activities with fixes, and cameras and watches with a gyro; by fitdecode.
 
 The messages and their fields are those of the FIT profile (https://developer.garmin.com/fit):
-``record`` has positions in semicircles, 2³¹ of them 180°, ``enhanced_altitude`` over the sea, speed
+``record`` has positions in semicircles (2³¹ are 180°), ``enhanced_altitude`` over the sea, speed
 in m/s and ``gps_accuracy`` in m; ``gyroscope_data``, ``accelerometer_data`` and
 ``magnetometer_data`` have arrays of samples, each with its offset in ms from the stamp of the
 message. Where a device did not calibrate them, ``three_d_sensor_calibration`` converts counts: less

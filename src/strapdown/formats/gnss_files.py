@@ -288,7 +288,7 @@ def _over_ground(
     return np.column_stack([speed * np.cos(angle), speed * np.sin(angle), none]), sd
 
 
-#: Steps between fixes that tell a speed, s, and the shortest way in them, m.
+#: Steps between fixes from which a speed is computed, s, and the least distance in them, m.
 _STEPS, _WAY = (0.05, 10.0), 50.0
 #: Units that a speed without one may have, and how near the ratio to that of the positions is.
 _SPEEDS, _NEAR = ("km/h", "kn", "mph"), 0.04
@@ -376,8 +376,8 @@ def _time(raw: RawLog, found: Found) -> tuple[Array, Clock]:
     first = float(time[np.isfinite(time)][0]) if np.isfinite(time).any() else 0.0
     if name == UNIX and not (raw.clock or dated or found.stated) and first > 1e11:
         step = float(np.median(np.abs(np.diff(time)))) if time.size > 1 else np.nan
-        # A receiver gives 100 fixes a second to one in two minutes: this, not the stamp, tells a
-        # clock of 1970 in ms from one in ns that counts from the start of a phone.
+        # A receiver gives 100 fixes a second to one in two minutes: this, not the stamp, separates
+        # a clock of 1970 in ms from one in ns that counts from the start of a phone.
         fits = [u for u in ("ms", "us", "ns") if 0.005 <= step * TIME_UNITS[u] <= 120.0]
         unit = fits[0] if fits else "ms"
         if len(fits) == 1 and _DATES[0] < first * TIME_UNITS[unit] < _DATES[1]:

@@ -7,7 +7,7 @@ of a simulation. Units are in the names. Layout and frames are those of its READ
 ``ins_data_manager.py`` (https://github.com/Aceinna/gnss-ins-sim, MIT): the body axes are those
 whose attitude to north-east-down is given, forward, right, down; the velocity is along the body
 axes in some versions and north, east, down in others, which the positions decide. In the virtual
-inertial frame (``ref_pos_x (m)``) there is no place on the Earth.
+inertial frame (``ref_pos_x (m)``) positions are not on the Earth.
 """
 
 from __future__ import annotations
@@ -123,7 +123,7 @@ def read_reference(path: Path) -> pd.DataFrame:
 
 
 def _differenced(time: NDArray[Any], place: NDArray[Any]) -> NDArray[Any]:
-    """Velocity north, east, down between positions, on a sphere: it only tells frames apart."""
+    """Velocity north, east, down between positions, on a sphere: enough to distinguish frames."""
     lat, radius = np.radians(place[:, 0]), 6.37e6
     north, down = radius * np.diff(lat), -np.diff(place[:, 2])
     east = radius * np.cos(lat[1:]) * np.radians(np.diff(place[:, 1]))

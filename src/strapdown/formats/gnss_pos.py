@@ -158,8 +158,8 @@ def _layout(lines: list[str], file: str, findings: list[Finding]) -> _Layout:
 def _without_header(lines: list[str], file: str, findings: list[Finding]) -> _Layout:
     """Find the layout by the first row; RTKLIB writes its columns in one order.
 
-    The decimals tell what a position is: nine of degrees, four of meters. What the header would
-    say of the time system and the heights is taken as RTKLIB has it by default.
+    The number of decimals identifies positions: nine in degrees, four in meters. Time system and
+    heights, which the header would state, are the defaults of RTKLIB.
     """
     row, first = next(
         ((k, line) for k, line in enumerate(lines, 1) if line.strip() and line[0] not in "%#"),

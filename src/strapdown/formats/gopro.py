@@ -199,7 +199,7 @@ def _streams(path: Path) -> tuple[dict[str, Stream], str]:
 
 
 def _times(one: Stream, at: NDArray[Any], when: Array) -> Array:
-    """Return stamps of samples: even in each payload, whose start is known at some of them."""
+    """Return stamps of samples: even in each payload; some payloads state their start."""
     step = (when[-1] - when[0]) / (at[-1] - at[0])
     ends = np.array([*one.payloads, one.payloads[-1] + 1], dtype=np.float64)
     starts = np.interp(ends, at, when)
@@ -291,7 +291,7 @@ def _items(data: bytes, path: Path) -> Iterator[tuple[str, tuple[str, int, int],
 
 
 def _from_json(path: Path) -> dict[str, Stream]:
-    """Return the streams of the device that has most of them."""
+    """Return the streams of the device that has most."""
     content = from_json(path)
     devices = [
         d for d in content.values() if isinstance(d, dict) and isinstance(d.get("streams"), dict)

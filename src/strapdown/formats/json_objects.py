@@ -52,7 +52,7 @@ def read(path: Path) -> RawLog:
     Raises
     ------
     DataError
-        A line is not JSON, a value is neither a number nor a text, or there is no object.
+        A line is not JSON, a value is neither a number nor a text, or the file has no object.
     """
     objects, rows, findings = _objects(path)
     kind = next(

@@ -136,7 +136,7 @@ def report_contradictions(
         form = said.get(f"{triad}_form")
         if triad in asked or other is None or not other.settled:
             continue
-        # Sizes of rates alone are no evidence against a statement: gravity that rotated with them
+        # Sizes of rates alone do not contradict a statement: gravity that rotated with them
         # is, and the steps of a sensor.
         turned = "gyro_axes" in said and said["gyro_axes"].settled
         stepped = any(e.code == "io.evidence-steps-of-sensor" for e in other.evidence)

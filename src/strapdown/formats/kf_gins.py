@@ -414,7 +414,8 @@ def write(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
     the first has none. Fixes without standard deviations are left out, for the format has no word
     for unknown.
 
-    DataError: there is no specific force, the clock counts beyond a week, or no fix can be written.
+    DataError: the specific force is missing, the clock counts beyond a week, or no fix can be
+    written.
     """
     path.mkdir()
     findings: list[Finding] = []

@@ -291,7 +291,7 @@ def files_of_poses(path: Path) -> tuple[Path, ...]:
 def read_poses(path: Path) -> pd.DataFrame:
     """Read a trajectory whose comments state where its first pose is.
 
-    DataError: they do not, a stamp is missing, or a row is no pose.
+    DataError: they do not, a stamp is missing, or a row is not a pose.
     """
     raw = csv.read(path)
     said = {m[1]: m[2] for m in map(_SAID.match, head(path).split("\n")) if m}
@@ -336,7 +336,8 @@ def write(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
     Accuracies are nan, states of the receiver -1: unknown. Numbers have the fewest digits that
     reproduce each, dates nine decimals.
 
-    DataError: there is no trajectory, the clock is not related to UTC, or the two do not overlap.
+    DataError: the trajectory is missing, the clock is not related to UTC, or the two do not
+    overlap.
     """
     track, imu = tables.get("reference"), tables.get("imu")
     if track is None or not is_trajectory(track):

@@ -33,7 +33,7 @@ def under(path: Path, skip: int = 0, header: str | None = None, drop: int = 0) -
     """Read the table of a text under lines of another kind.
 
     `skip`: lines above the table. `header`: names to use instead of those of the file. `drop`:
-    further lines under its names that are no data. Rows are counted as in the file. DataError: the
+    further lines under its names that are not data. Rows are counted as in the file. DataError: the
     text ends before its table, or as `csv.parse`.
     """
     text, found = csv.decoded(path.read_bytes(), path.name)

@@ -1,4 +1,4 @@
-"""MATLAB Mobile: sensor logs of a phone, as timetables in a ``.mat`` and as CSV of them.
+"""MATLAB Mobile: sensor logs of a phone, as timetables in a ``.mat`` or as CSV.
 
 The application writes timetables ``Acceleration`` (m/s², with gravity), ``AngularVelocity``
 (rad/s), ``MagneticField`` (µT) and ``Position`` (degrees, ``altitude`` in m, ``speed`` in m/s,

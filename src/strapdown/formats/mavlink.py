@@ -13,7 +13,7 @@ those of https://mavlink.io/en/messages/common.html, body axes forward, right, d
 
 Stamps are those of the autopilot since its start; SYSTEM_TIME relates those of 1970 to them.
 pymavlink is under the LGPL: it is imported where it is installed (extra ``mavlink``), and no part
-of it is here.
+is copied here.
 """
 
 from __future__ import annotations

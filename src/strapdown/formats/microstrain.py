@@ -81,7 +81,7 @@ def _pressure(raw: RawLog) -> str | None:
 
 
 def _stated(raw: RawLog, fields: dict[str, Any]) -> dict[str, tuple[str, str | None]]:
-    """Return the columns of the sensors; their names tell increments from rates."""
+    """Return the columns of the sensors; their names distinguish increments from rates."""
     stated: dict[str, tuple[str, str | None]] = {}
     for name in raw.columns:
         for triad, (pattern, unit) in fields.items():

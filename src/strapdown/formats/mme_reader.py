@@ -568,7 +568,7 @@ def channel_of(file: MmeFile, name: str, others: Mapping[str, tuple[str, MmeFile
         clock=others[clock.upper()][0] if clock else "",
         samples=samples if open_stamps else None,
         from_zero=change and quantity == "velocity",
-        # Fine location 3; that of a part of the structure is no dummy.
+        # Fine location 3; that of a part of the structure is not a dummy's.
         dummy=known.code[10:12] if known and known.code[10:12] in DUMMIES else "",
     )
 

@@ -6,8 +6,8 @@ GPS week and milliseconds, the message, and a CRC of 32 bits. Messages, in Conte
 SPAN_Logs: BESTPOS (height over the sea and undulation), BESTVEL (speed, course, up, and its
 latency), INSPVA (height over the ellipsoid; roll, pitch, azimuth of the vehicle in deg), RAWIMU and
 RAWIMUX: counts of velocity and angle in each interval, z, -y, x of the sensor, scaled by the type
-of the unit (table Raw IMU Scale Factors). CORRIMU is without gravity and the Earth's rate: it is no
-sensor's output, and is not read. Stamps are GPS seconds of week.
+of the unit (table Raw IMU Scale Factors). CORRIMU is without gravity and the Earth's rate: it is
+not a sensor's output, and is not read. Stamps are GPS seconds of week.
 """
 
 from __future__ import annotations

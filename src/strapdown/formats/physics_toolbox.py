@@ -4,7 +4,7 @@
 az`` (linear acceleration in m/s², without it), ``wx, wy, wz`` in rad/s, ``Bx, By, Bz`` in µT, ``p``
 in hPa (https://www.vieyrasoftware.net, "Multi record"). ``time`` is in seconds from the start, or
 the time of day with a fourth part of milliseconds. Axes are those of the phone; the sign of the
-g-force differs between its systems and is told by the numbers.
+g-force differs between its systems and is inferred from the numbers.
 """
 
 from __future__ import annotations

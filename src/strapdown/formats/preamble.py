@@ -1,4 +1,4 @@
-"""What the lines above a table state: the sampling rate, and the units of sensors."""
+"""Sampling rate and units of sensors, stated in the lines above a table."""
 
 from __future__ import annotations
 

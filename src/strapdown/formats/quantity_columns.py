@@ -100,7 +100,7 @@ def find_quantities(
     `names`: as in the file. `asked`: quantity to the name of its column, or its number, from 1;
     overrides what the names suggest. `file`: for messages. `units`: column to unit, if stated apart
     from the name. `of`: object that the quantities describe, for messages. `before`: words that may
-    stand before the name of a quantity that has no column otherwise. Returns quantities that were
+    precede the name of a quantity that has no column otherwise. Returns quantities that were
     not found are absent. ConfigError: a requested column does not exist, or its quantity is
     unknown. DataError: two columns fit one quantity, or a unit does not fit its quantity.
     """
@@ -361,7 +361,7 @@ def fix_columns(raw: RawLog, asked: Mapping[str, str]) -> dict[str, Found]:
 
 
 def names_of_fixes(raw: RawLog) -> set[str]:
-    """Return the columns that are of fixes; empty if there is no latitude and longitude."""
+    """Return the columns that are of fixes; empty without latitude and longitude."""
     try:
         found = fix_columns(raw, {})
     except StrapdownError:

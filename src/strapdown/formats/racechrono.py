@@ -73,7 +73,7 @@ def _table(path: Path) -> tuple[RawLog, dict[str, str]]:
     full = [
         f"{n} {s.rpartition(':')[2].strip()}".strip() for n, s in zip(names, sources, strict=True)
     ]
-    # A name may stand twice, such as device_update_rate of every source.
+    # A name may occur twice, such as device_update_rate of every source.
     raw = under(path, top, header=",".join(f'"{n}"' for n in full), drop=2)
     return raw, dict(zip(raw.columns, units, strict=False))
 

@@ -30,7 +30,7 @@ __all__ = [
 ]
 
 
-#: Codes that say that a recording does not have a stream, which is no fault.
+#: Codes that say that a recording does not have a stream, which is not a fault.
 ABSENT = {
     "io.no-stream",
     "io.no-gyro-columns",
@@ -287,7 +287,7 @@ class Recording:
 
 
 class Questions:
-    """What a file leaves open, asked in one refusal with the answers as inferred.
+    """Questions that a file leaves open, asked in one refusal with the inferred answers.
 
     Parameters
     ----------

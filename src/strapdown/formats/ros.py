@@ -60,7 +60,7 @@ Columns = dict[str, NDArray[Any]]
 
 
 def _has_messages(path: Path) -> bool:
-    """Whether a bag is no database, or has the tables of one."""
+    """Whether a bag has the tables of ROS 2; only a ``.db3`` can lack them."""
     if _suffix(path) != ".db3":
         return True
     try:
@@ -315,8 +315,8 @@ def write(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
     """Write a file of MCAP: Imu, NavSatFix with its velocity, MagneticField, FluidPressure.
 
     Body axes forward, left, up in the frame ``base_link``; stamps in ns since 1970, or of the
-    recording's own clock with a warning. What is not measured has the covariance of REP 145: -1 for
-    orientation and specific force, 0 for accuracies that are not known.
+    recording's own clock with a warning. The covariance of quantities that are not measured is that
+    of REP 145: -1 for orientation and specific force, 0 for accuracies that are not known.
 
     DataError: the library is missing, or a stamp lies before zero.
     """

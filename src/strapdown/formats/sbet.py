@@ -5,7 +5,7 @@ week; latitude and longitude in rad, height over the ellipsoid in m; velocity x,
 pitch, platform heading and wander angle in rad; acceleration and angular rate, which are not read.
 The axes of velocity are north, west, up, turned by the wander angle toward the west: true heading
 is the platform heading less the wander angle. Other programs write velocities north, east, down;
-the positions tell which.
+the positions decide which.
 """
 
 from __future__ import annotations

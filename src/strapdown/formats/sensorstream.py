@@ -2,7 +2,7 @@
 
 A line is a stamp in seconds and any subset of blocks: ``timestamp, id, v1, v2, v3, id, …``. A block
 has three values, or one for pressure and battery temperature. Files have no header; a blank may
-follow each comma. A table of whole numbers is none of them, for stamps and values have decimals.
+follow each comma. A table of whole numbers is another format, for stamps and values have decimals.
 """
 
 from __future__ import annotations

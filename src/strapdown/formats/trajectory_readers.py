@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.dsp.running_integral import running_integral
+from strapdown.dsp.samples import running_integral
 from strapdown.errors import DataError, Finding
 from strapdown.formats import open_stream
 from strapdown.formats.arrays import told_by_file_rows

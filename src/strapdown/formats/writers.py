@@ -76,7 +76,7 @@ __all__ = [
 
 Array = NDArray[Any]
 AXES = "forward-right-down"
-#: What is held: always, or of tables with a column.
+#: A part that a format holds: always, or of tables with a column.
 Part = str | tuple[str, str]
 
 
@@ -531,7 +531,7 @@ WRITERS: dict[str, Writer] = {
 
 #: What `simulate` writes samples in: exact, with the attitude of each.
 LOG_FORMATS = ("csv", "parquet", "npz", "h5", "mat")
-#: What any trajectory can be written in as one file, whatever its clock.
+#: Formats of one file for a trajectory with any clock.
 TRAJECTORY_FORMATS = ("csv", "tum", "kml", "geojson", "nav", "parquet")
 
 

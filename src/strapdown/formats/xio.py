@@ -3,7 +3,7 @@
 ``Inertial.csv``: ``Timestamp (us)`` (or ``Time (s)``), ``Gyroscope X (deg/s)`` …, ``Accelerometer X
 (g)`` …; ``Magnetometer.csv``: ``Magnetometer X (a.u.)`` …, in units of the calibrated field
 (https://github.com/xioTechnologies/x-IMU3-Software, MIT). A message that arrived by two connections
-stands in two rows. Axes are those printed on the unit.
+has two rows. Axes are those printed on the unit.
 """
 
 from __future__ import annotations

@@ -131,7 +131,7 @@ def _stamps(
 
 
 def _is_empty(stamps: NDArray[Any]) -> bool:
-    """Whether a column stands in the header alone."""
+    """Whether a column is in the header alone."""
     if stamps.dtype.kind == "f":
         return bool(np.isnan(stamps).all())
     return stamps.dtype.kind == "O" and not any(str(s).strip() for s in stamps)

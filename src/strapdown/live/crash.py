@@ -19,9 +19,9 @@ from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.watch import CrashLog, CrashWatch, WatchOptions, watch_options
 from strapdown.errors import DataError, Finding
 from strapdown.live.lines import END, BadLineError, Sample, Word, parse_line
-from strapdown.live.replay import Clock, LatencyTape
+from strapdown.live.replay import LatencyTape, RunClock
 from strapdown.live.run import until_a_signal
-from strapdown.live.sources import Line, LineSource
+from strapdown.live.sources import LineSource, ReceivedLine
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.uncertainty import TriadUncertainty, stated_uncertainty
@@ -144,7 +144,7 @@ class CrashReception:
     def __init__(
         self,
         log: CrashLog,
-        clock: Clock,
+        clock: RunClock,
         write: Callable[[str], None],
         warn: Callable[[Finding], None],
     ) -> None:
@@ -157,7 +157,7 @@ class CrashReception:
         self.unused: Counter[str] = Counter()
         self.rows: list[tuple[float, ...]] = []
 
-    def take(self, line: Line) -> bool:
+    def take(self, line: ReceivedLine) -> bool:
         """Process a line; return whether the run continues."""
         self.lines += 1
         try:
@@ -172,7 +172,7 @@ class CrashReception:
                 self._warn(Finding("live.line-not-used", line=line.number, reason=bad.finding))
         return self.there
 
-    def _sample(self, said: Sample, line: Line) -> None:
+    def _sample(self, said: Sample, line: ReceivedLine) -> None:
         began = self._clock.now()
         values = said.values if self._gyro else said.values[-3:]
         if self._gyro and len(values) != 6:
@@ -195,7 +195,7 @@ class CrashReception:
 def receive_crash(
     options: WatchOptions,
     source: LineSource,
-    clock: Clock,
+    clock: RunClock,
     write: Callable[[str], None],
     warn: Callable[[Finding], None],
     every: float = 0.01,

@@ -28,11 +28,11 @@ from strapdown.tables import gnss_table, imu_table
 from strapdown.tables.checks import source_of
 
 __all__ = [
-    "Clock",
     "Latency",
     "LatencyTape",
     "MachineClock",
     "Replay",
+    "RunClock",
     "before_stamp",
     "parse_pace",
     "warm_up",
@@ -43,7 +43,7 @@ __all__ = [
 AWAKE = 1e-3
 
 
-class Clock(Protocol):
+class RunClock(Protocol):
     """Monotonic time in seconds."""
 
     def now(self) -> float:
@@ -240,11 +240,11 @@ class Replay:
     ----------
     pace : float
         Seconds of the record per second; infinite for no limit.
-    clock : Clock, optional
+    clock : RunClock, optional
         That of the machine, if not given.
     """
 
-    def __init__(self, pace: float, clock: Clock | None = None) -> None:
+    def __init__(self, pace: float, clock: RunClock | None = None) -> None:
         self.pace = pace
         self.tape = LatencyTape()
         self._clock = clock or MachineClock()

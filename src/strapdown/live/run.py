@@ -32,8 +32,8 @@ from strapdown.live.lines import (
     Word,
     parse_line,
 )
-from strapdown.live.replay import Clock, Latency, LatencyTape, warm_up
-from strapdown.live.sources import Line, LineSource
+from strapdown.live.replay import Latency, LatencyTape, RunClock, warm_up
+from strapdown.live.sources import LineSource, ReceivedLine
 from strapdown.navigation.engine import SAME_INSTANT
 from strapdown.navigation.measurements.measurement import TabulatedMeasurement
 from strapdown.navigation.modes import PipelineChunk
@@ -88,7 +88,7 @@ class LiveRun:
 def receive(
     spec: NavigationSpec,
     source: LineSource,
-    clock: Clock,
+    clock: RunClock,
     write: Callable[[str], None],
     warn: Callable[[Finding], None],
     form: str = "json",
@@ -320,7 +320,7 @@ class Reception:
         chain: NavigationPipeline,
         spec: NavigationSpec,
         recording: Recording,
-        clock: Clock,
+        clock: RunClock,
         show: Callable[[PipelineChunk], None],
         warn: Callable[[Finding], None],
     ) -> None:
@@ -357,7 +357,7 @@ class Reception:
         """Kind of the samples: 'instantaneous' or 'mean'."""
         return self._live.sampling
 
-    def take(self, line: Line) -> bool:
+    def take(self, line: ReceivedLine) -> bool:
         """Process a line.
 
         Returns
@@ -468,7 +468,7 @@ class Reception:
             raise BadLineError("command", error.finding) from None
         self._words.append(word)
 
-    def _not_used(self, bad: BadLineError, line: Line) -> None:
+    def _not_used(self, bad: BadLineError, line: ReceivedLine) -> None:
         self.unused[bad.kind] += 1
         if self.unused[bad.kind] == 1:
             self._warn(Finding("live.line-not-used", line=line.number, reason=bad.finding))

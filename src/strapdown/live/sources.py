@@ -12,9 +12,9 @@ from typing import IO
 from urllib.parse import urlsplit
 
 from strapdown.errors import ConfigError
-from strapdown.live.replay import Clock
+from strapdown.live.replay import RunClock
 
-__all__ = ["Line", "LineSource", "open_source"]
+__all__ = ["LineSource", "ReceivedLine", "open_source"]
 
 #: Most waiting lines; beyond them a pipe blocks, and the system drops datagrams.
 WAITING = 20_000
@@ -26,7 +26,7 @@ _LOCAL = "127.0.0.1"
 
 
 @dataclass(frozen=True)
-class Line:
+class ReceivedLine:
     """Received line.
 
     Attributes
@@ -59,13 +59,13 @@ class LineSource:
         self,
         name: str,
         read: Callable[[], bytes],
-        clock: Clock,
+        clock: RunClock,
         close: Callable[[], None],
         whole: bool = True,
     ) -> None:
         self.name = name
         self._read, self._clock, self._close = read, clock, close
-        self._queue: queue.Queue[Line | None] = queue.Queue(WAITING)
+        self._queue: queue.Queue[ReceivedLine | None] = queue.Queue(WAITING)
         self._wanted, self._whole = True, whole
         self._count = 0
         self._thread = threading.Thread(target=self._run, name=f"lines of {name}", daemon=True)
@@ -74,7 +74,7 @@ class LineSource:
         """Start to read."""
         self._thread.start()
 
-    def next(self, wait: float = LOOK) -> Line | None:
+    def next(self, wait: float = LOOK) -> ReceivedLine | None:
         """Return the next line, or None at the end."""
         try:
             return self._queue.get(timeout=wait)
@@ -108,9 +108,9 @@ class LineSource:
         for line in lines:
             if line:
                 self._count += 1
-                self._put(Line(self._count, line.decode("utf-8", "replace"), arrived))
+                self._put(ReceivedLine(self._count, line.decode("utf-8", "replace"), arrived))
 
-    def _put(self, line: Line | None) -> None:
+    def _put(self, line: ReceivedLine | None) -> None:
         while self._wanted:
             try:
                 return self._queue.put(line, timeout=LOOK)
@@ -119,7 +119,7 @@ class LineSource:
         return None
 
 
-def open_source(where: str, clock: Clock, stdin: IO[bytes]) -> LineSource:
+def open_source(where: str, clock: RunClock, stdin: IO[bytes]) -> LineSource:
     """Open a source by its name.
 
     Parameters

@@ -16,7 +16,7 @@ from strapdown._kernels import sample as kernel
 from strapdown._kernels.ned import LARGEST_TURN, LEAP, POLE
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError, DataError, DivergenceError, Finding
-from strapdown.increments.motion import IncrementStream, IncrementStreamState
+from strapdown.increments import IncrementStream, IncrementStreamState
 from strapdown.mechanization.mechanization import Mechanization
 from strapdown.mechanization.ned import NorthEastDown
 from strapdown.nav_state import NavState

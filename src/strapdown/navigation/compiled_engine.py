@@ -320,5 +320,5 @@ class CompiledEngine(Engine):
         return DivergenceError("navigation.covariance-lost", quantity="covariance", time=time)
 
 
-#: Engines that stand at a state and can go on from it, as long as the state exists.
+#: Engines that hold a state and can continue from it, as long as the state exists.
 _AT_STATE: WeakKeyDictionary[EngineState, CompiledEngine] = WeakKeyDictionary()

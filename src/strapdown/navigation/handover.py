@@ -17,7 +17,7 @@ from strapdown.alignment.course_sums import Antenna
 from strapdown.alignment.fine import FineResult
 from strapdown.alignment.gnss_course import GnssCourse
 from strapdown.constants import MAD_TO_SD
-from strapdown.dsp.running_integral import running_integral
+from strapdown.dsp.samples import running_integral
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
 from strapdown.errors import DataError
 from strapdown.estimation.error_filter import ErrorFilter, FilterState, symmetric
@@ -65,7 +65,7 @@ Array = NDArray[np.float64]
 PLACE = slice(39, 42)
 # Tolerance of an instant, s.
 INSTANT = 1e-7
-# A mean rate of a rest beyond so many standard deviations is a turn. A body that stands turns by so
+# A mean rate of a rest beyond so many standard deviations is a turn. A stationary body turns by so
 # much from the begin to the end, rad.
 TURNS, SWAY = 4.0, math.radians(0.1)
 # The rate at an instant is a mean over this time before and after it, s.
@@ -169,7 +169,7 @@ def _rested(filter_: ErrorFilter, begun: FilterState, kept: Array) -> FilterStat
     """State with the gyro errors that the mean rate of the levelled rest shows.
 
     Without them a heading that was stated is lost at the rate of an unknown bias before the vehicle
-    moves. A rate beyond what the stated errors allow is a turn, and tells nothing.
+    moves. A rate beyond what the stated errors allow is a turn, and determines no bias.
     """
     mean = kept[:, 1:7].mean(axis=0)
     view = View(
@@ -518,7 +518,7 @@ def _with_biases(
     size = np.sqrt(np.diagonal(A @ P0 @ A.T))
     known = size > 0.0
     A, at, size = A[known], PHYSICAL + np.flatnonzero(known), size[known]
-    # Where a channel has scale-factor errors only, its bias is one of them.
+    # Where a channel has scale-factor errors only, its bias is an error of scale.
     parts = np.linalg.pinv(A @ P0 @ A.T / np.outer(size, size), SAME, hermitian=True)
     K = P0 @ A.T @ (parts / np.outer(size, size))
     P = _with_sensors(filter_, joint[:PHYSICAL, :PHYSICAL])

@@ -555,7 +555,7 @@ def agreeing_sources(
 
     A constant error of a heading measurement is not observable from it alone, and the filter
     becomes overconfident. Independent sources, such as a magnetic compass and two antennas, or two
-    antennas and the gyros' north, do not share it: the accuracy of the worse of them holds while
+    antennas and the gyros' north, do not share it: the accuracy of the worse check holds while
     all agree with the run within 2.58 standard deviations. A measurement with an estimated
     misalignment does not count as a source.
 

@@ -352,7 +352,7 @@ QUANTITIES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
 #: Reason of a status of these, by its code.
 QUANTITY_REASONS: dict[str, str] = {
     "": "its measurements agree with it",
-    "unmeasured": "too few measurements of it, or none for a minute: inertial sensors alone",
+    "unmeasured": "too few measurements, or none for a minute: inertial sensors alone",
     "not_estimated": "the error model does not estimate it, and no measurement tests it",
     "scatter": "its measurements scatter more than expected",
     "apart": "its measurements contradict it: most are rejected, or far beyond their bounds",
@@ -361,7 +361,7 @@ QUANTITY_REASONS: dict[str, str] = {
 
 @dataclass(frozen=True, eq=False)
 class QuantityIntegrity:
-    """Status of a quantity at each second of a run, by the measurements of it.
+    """Status of a quantity at each second of a run, by its measurements.
 
     Attributes
     ----------
@@ -391,7 +391,7 @@ def quantity_status(record: NavigationRecord) -> tuple[QuantityIntegrity, ...]:
     """Return the status of position and velocity, horizontal and vertical, at each second.
 
     Trusted: measured within the last minute, and the newest innovations scatter at most twice as
-    much as predicted. Rejected: they scatter more than three times as much, or half of them were
+    much as predicted. Rejected: they scatter more than three times as much, or half were
     rejected, which says that the measurement or the run is wrong. Unverified: all else.
     """
     seconds = seconds_of(record)
@@ -494,7 +494,7 @@ def repeat_without(
     ellipsoid: Ellipsoid,
     progress: Progress,
 ) -> Repeated:
-    """Re-run a pipeline excluding an inconsistent measurement, its epochs or a stretch of it.
+    """Re-run a pipeline excluding an inconsistent measurement, or some of its epochs.
 
     Gross errors are excluded epoch by epoch, a change over its stretch. A measurement that is
     inconsistent throughout is excluded if another one observes position or velocity; otherwise its

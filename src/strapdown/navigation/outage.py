@@ -10,9 +10,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.dsp.chi_square import plane_bound
 from strapdown.estimation.error_filter import symmetric
 from strapdown.estimation.error_model import ErrorModel
-from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.navigation.engine import SAME_INSTANT
 from strapdown.navigation.navigator import Navigator, NavigatorState
 from strapdown.navigation.record import NavigationChunk

@@ -14,9 +14,9 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown.dsp.chi_square import PLANE_95, plane_reach
 from strapdown.errors import ConfigError
 from strapdown.estimation.covariance import Step
-from strapdown.evaluation.plane_bound import PLANE_95, plane_reach
 from strapdown.navigation.measurements.measurement import TabulatedMeasurement
 from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.pipeline import NavigationPipeline, PipelineState

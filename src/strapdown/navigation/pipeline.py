@@ -121,8 +121,8 @@ class MeasurementMonitor:
     ----------
     outage : float
         A measurement with a table is in outage when it is silent for longer than this multiple of
-        its own interval, the median of the last five. Before the second observation there is no
-        interval, and an outage at the start is reported at its end.
+        its own interval, the median of the last five. Before the second observation the interval
+        is unknown, and an outage at the start is reported at its end.
     """
 
     outage: float = 3.0

@@ -17,7 +17,7 @@ from strapdown._kernels.motion_increments import join_blocks
 from strapdown.dsp.samples import even_step
 from strapdown.errors import ConfigError, DataError
 from strapdown.estimation.error_filter import symmetric
-from strapdown.increments.motion import IncrementStream, IncrementStreamState
+from strapdown.increments import IncrementStream, IncrementStreamState
 from strapdown.navigation.navigator import Navigator, NavigatorState
 from strapdown.navigation.record import GrowingRows
 from strapdown.prefilter.prefilter import CHANNELS, Grid, Portion, Prefilter

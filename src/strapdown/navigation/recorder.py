@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.dsp.true_runs import true_runs
+from strapdown.dsp.samples import true_runs
 from strapdown.errors import ConfigError, DataError
 from strapdown.estimation.robust import DOUBT, AdaptiveRule
 from strapdown.navigation.measurements.gnss import PLACE, TINY
@@ -280,7 +280,7 @@ def _contradictions(
 ) -> Iterator[tuple[float, float, float]]:
     """Begin and end, s, and size, m, of contradictions of a receiver and the inertial solution.
 
-    `nu`, `rejected`: innovations of a component, and which of them an adaptive rule rejected.
+    `nu`, `rejected`: innovations of a component, and those that an adaptive rule rejected.
 
     A receiver that is rejected so many times in a row is believed again, by and by, and either it
     or the solution was wrong. What separated the two is a part of the uncertainty until it jumps
@@ -294,7 +294,7 @@ def _contradictions(
     after_gap = np.diff(time, prepend=-math.inf) > GAP * np.median(np.diff(time))
     back, swings = False, -1
     for j, span in enumerate(spans):
-        # What was believed last takes as many observations to settle.
+        # The last estimate needs as many observations to settle.
         settled = min(span.stop + patience, len(time))
         size, end = float(np.abs(nu[span]).max()), float(time[settled - 1])
         if span.stop < len(time) and abs(nu[span.stop]) < 0.5 * abs(nu[span.stop - 1]):

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.alignment.alignment import Alignment
-from strapdown.bundle.seal import write_json
+from strapdown.bundle import write_json
 from strapdown.config.alignment import AlignmentSpec
 from strapdown.progress import Progress
 from strapdown.report.alignment_document import (

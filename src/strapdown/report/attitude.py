@@ -9,11 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.attitude_algorithms import make_algorithm
-from strapdown.attitude_algorithms.cost import Cost
 from strapdown.attitude_comparison.comparison import AttitudeComparison
-from strapdown.attitude_comparison.sweep import Share
-from strapdown.bundle.seal import Seal, write_json
-from strapdown.bundle.writing import write_bundle
+from strapdown.bundle import Seal, write_bundle, write_json
 from strapdown.errors import ConfigError
 from strapdown.evaluation.reference_points import Score
 from strapdown.formats import csv
@@ -115,8 +112,31 @@ def _write_sweep(bench: AttitudeComparison, path: Path) -> None:
 
 def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
     """Return a bench as plain data; every key carries its unit."""
-    costs = {cost.algorithm: _cost(cost) for cost in bench.costs}
-    shares = {share.algorithm: _share(share) for share in bench.shares}
+    # Operations and cycles are per sample; memory is in numbers.
+    costs = {
+        cost.algorithm: {
+            "add_per_sample": cost.add,
+            "multiply_per_sample": cost.multiply,
+            "divide_per_sample": cost.divide,
+            "sqrt_per_sample": cost.sqrt,
+            "trig_per_sample": cost.trig,
+            "cortex_m4f_cycles_per_sample": cost.cycles,
+            "memory_numbers": cost.memory,
+        }
+        for cost in bench.costs
+    }
+    three = ("final", "rms", "max")
+    shares = {
+        s.algorithm: {
+            key: None if values is None else dict(zip(three, values, strict=True))
+            for key, values in (
+                ("own_deg", s.own_deg),
+                ("sensor_deg", s.sensor_deg),
+                ("single_deg", s.single_deg),
+            )
+        }
+        for s in bench.shares
+    }
     data = {
         "schema": "strapdown attitude 1",
         "source": bench.source,
@@ -124,7 +144,7 @@ def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
         "conventions": dict(words.CONVENTIONS),
         "initial": bench.initial,
         "gyro_bias": bench.gyro_bias,
-        "headline": words.headline(bench),
+        "headline": f"{bench.answer.sentence} {words.standing(bench)}",
         "answer": vars(bench.answer),
         "algorithms": [
             {
@@ -199,30 +219,6 @@ def _score(score: Score) -> dict[str, Any]:
         "turned_deg": score.turned_deg,
         "expected_deg": score.expected_deg,
         "sd_deg": score.sd_deg,
-    }
-
-
-def _cost(cost: Cost) -> dict[str, float]:
-    """Operations and cycles are per sample; memory is in numbers."""
-    return {
-        "add_per_sample": cost.add,
-        "multiply_per_sample": cost.multiply,
-        "divide_per_sample": cost.divide,
-        "sqrt_per_sample": cost.sqrt,
-        "trig_per_sample": cost.trig,
-        "cortex_m4f_cycles_per_sample": cost.cycles,
-        "memory_numbers": cost.memory,
-    }
-
-
-def _share(share: Share) -> dict[str, Any]:
-    def named(three: tuple[float, float, float]) -> dict[str, Any]:
-        return dict(zip(("final", "rms", "max"), three, strict=True))
-
-    return {
-        "own_deg": named(share.own_deg),
-        "sensor_deg": None if share.sensor_deg is None else named(share.sensor_deg),
-        "single_deg": named(share.single_deg),
     }
 
 

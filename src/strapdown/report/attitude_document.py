@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from html import escape
 
 import numpy as np
-import pandas as pd
 
 from strapdown import __version__
 from strapdown.attitude_comparison.comparison import AttitudeComparison
@@ -22,7 +21,7 @@ from strapdown.report.attitude_tables import (
     result_tables,
     sweep_grid,
 )
-from strapdown.report.chart import AXIS_COLOURS, BLACK, GREY, Array, Chart
+from strapdown.report.chart import AXIS_COLOURS, BLACK, GREY, Chart
 from strapdown.report.chart_svg import ChartFigure
 from strapdown.report.document import (
     Animation,
@@ -89,7 +88,17 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
             "inputs",
             "Inputs and assumptions",
             Facts(tuple(tables.facts(bench))),
-            *_readings(bench),
+            TableBlock(
+                ("column", "taken as", "unit", "first value", "because"),
+                tuple(
+                    (r.source, r.quantity, r.unit, tables.first_value(r), r.why)
+                    for r in bench.readings
+                ),
+                (0, 1, 2, 4),
+                title="How the log was read",
+            )
+            if bench.readings
+            else None,
         ),
         section("conventions", "Conventions", Facts(tables.CONVENTIONS)),
         section(
@@ -149,15 +158,6 @@ def _named_items(title: str, lines: Sequence[str]) -> list[Block]:
     return [Paragraph(title), Items(tuple(("", line) for line in lines))] if lines else []
 
 
-def _readings(bench: AttitudeComparison) -> list[Block]:
-    rows = tuple(
-        (r.source, r.quantity, r.unit, tables.first_value(r), r.why) for r in bench.readings
-    )
-    columns = ("column", "taken as", "unit", "first value", "because")
-    title = "How the log was read"
-    return [TableBlock(columns, rows, (0, 1, 2, 4), title=title)] if rows else []
-
-
 # The body in space: a box with its axes among north, east and down, over time.
 
 
@@ -181,20 +181,27 @@ def body_animation(bench: AttitudeComparison) -> Animation:
 
     A wireframe follows the truth, where it is known.
     """
-    run = chosen_run(bench)
-    time = _instants(run.attitude)
+    run, truth = chosen_run(bench), bench.truth
+    # Equally spaced instants, at most as many as there are samples.
+    start, end = float(run.attitude.index[0]), float(run.attitude.index[-1])
+    time = np.linspace(start, end, min(MOST_FRAMES, max(2, len(run.attitude))))
+    # Real time for a short log, else the fastest drawable.
+    real = 1000.0 * (end - start) / (len(time) - 1)
+    frame = max(real, _SHORTEST) if real * (len(time) - 1) <= _AS_IT_WAS else _SHORTEST
     tips = np.eye(3).tolist()
     axes = tuple(
         (name, (tip[0], tip[1], tip[2]), colour)
         for name, tip, colour in zip(_AXIS_NAMES, tips, AXIS_COLOURS, strict=True)
     )
     bodies = [SceneBody(_CORNERS, _FACES, _COLOURS, attitude_at(run.attitude, time), axes=axes)]
-    if (ghost := _ghost(bench, time)) is not None:
+    if truth is not None and len(truth):
+        stamps, ghost = index_of(truth), attitude_at(truth, time)
+        ghost[(time < stamps[0]) | (time > stamps[-1])] = np.nan
         bodies.append(SceneBody(_CORNERS, _FACES, (BLACK,) * 6, ghost, wire=True))
-    ends = ((1.2, 0.0, 0.0), (0.0, 1.2, 0.0), (0.0, 0.0, 1.1))
-    lines = [SceneLine("", np.vstack([np.zeros(3), end]), GREY, 1.0, True) for end in ends]
+    tips_ned = ((1.2, 0.0, 0.0), (0.0, 1.2, 0.0), (0.0, 0.0, 1.1))
+    lines = [SceneLine("", np.vstack([np.zeros(3), tip]), GREY, 1.0, True) for tip in tips_ned]
     names = ("north", "east", "down")
-    labels = [SceneWord(name, end, GREY) for name, end in zip(names, ends, strict=True)]
+    labels = [SceneWord(name, tip, GREY) for name, tip in zip(names, tips_ned, strict=True)]
     scene = Scene(
         tuple(bodies),
         tuple(lines),
@@ -202,50 +209,19 @@ def body_animation(bench: AttitudeComparison) -> Animation:
         tuple(f"{at:.3f} s" for at in time),
         np.full(3, -0.8 * _SPACE),
         np.full(3, 0.8 * _SPACE),
-        round(_frame_length(time), 1),
+        round(frame, 1),
         # From the south-east and above: north points away, east to the right.
         (153.0, 28.0),
     )
-    return Animation("body", "The body in space", _caption(bench, time), scene)
-
-
-def _caption(bench: AttitudeComparison, time: Array) -> str:
-    text = (
-        f"Attitude by {chosen_run(bench).algorithm}; dark: upper side, orange: front. Drag to turn "
-        "the view."
-    )
-    if bench.truth is not None:
+    text = f"Attitude by {run.algorithm}; dark: upper side, orange: front. Drag to turn the view."
+    if truth is not None:
         text += " Wireframe: truth."
-    span = float(time[-1] - time[0])
-    faster = 1000.0 * span / (_frame_length(time) * (len(time) - 1))
-    if faster > 1.05:
+    if real > 1.05 * frame:
         text += (
-            f" Played {faster:.3g} times as fast as recorded, one pose every "
+            f" Played {real / frame:.3g} times as fast as recorded, one pose every "
             f"{time[1] - time[0]:.3g} s."
         )
-    return text
-
-
-def _instants(attitude: pd.DataFrame) -> Array:
-    """Equally spaced instants, at most as many as there are samples."""
-    start, end = float(attitude.index[0]), float(attitude.index[-1])
-    return np.linspace(start, end, min(MOST_FRAMES, max(2, len(attitude))))
-
-
-def _frame_length(time: Array) -> float:
-    """Frame length in ms: real time for a short log, else the fastest drawable."""
-    real = 1000.0 * float(time[-1] - time[0]) / (len(time) - 1)
-    return max(real, _SHORTEST) if real * (len(time) - 1) <= _AS_IT_WAS else _SHORTEST
-
-
-def _ghost(bench: AttitudeComparison, time: Array) -> Array | None:
-    """True attitude at the frames; NaN where it is not known."""
-    if bench.truth is None or not len(bench.truth):
-        return None
-    stamps = index_of(bench.truth)
-    q = attitude_at(bench.truth, time)
-    q[(time < stamps[0]) | (time > stamps[-1])] = np.nan
-    return q
+    return Animation("body", "The body in space", text, scene)
 
 
 # A bench in a notebook: a short text with its table, and its charts as figures.

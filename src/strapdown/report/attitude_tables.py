@@ -60,11 +60,6 @@ def seconds(value: float) -> str:
     return f"{value:.3f}".rstrip("0").rstrip(".") + " s"
 
 
-def headline(bench: AttitudeComparison) -> str:
-    """Return the answer first, then the final errors of the algorithms."""
-    return f"{bench.answer.sentence} {standing(bench)}"
-
-
 def standing(bench: AttitudeComparison) -> str:
     """Return the final errors of the algorithms in one or two sentences."""
     scores = [s for s in bench.scores if s.against == "truth"]
@@ -172,7 +167,10 @@ def reference_lines(bench: AttitudeComparison) -> list[str]:
 
 def facts(bench: AttitudeComparison) -> list[tuple[str, str]]:
     """Inputs and assumptions of the run."""
-    i, b = bench.initial, bench.gyro_bias
+    i, removed = bench.initial, str(bench.gyro_bias["from"])
+    if (bias := bench.gyro_bias["rad_per_s"]) is not None:
+        values = ", ".join(f"{math.degrees(v):.4f}" for v in bias)
+        removed = f"({values}) deg/s about forward, right, down removed: {removed}"
     found = [
         ("Log", bench.description),
         (
@@ -180,7 +178,7 @@ def facts(bench: AttitudeComparison) -> list[tuple[str, str]]:
             f"roll {i['roll_deg']:.3f}°, pitch {i['pitch_deg']:.3f}°, heading "
             f"{i['heading_deg']:.3f}° at {seconds(i['time_s'])}: {i['from']}",
         ),
-        ("Gyro bias", _bias_words(b)),
+        ("Gyro bias", removed),
     ]
     if bench.truth is not None:
         found.append(("Truth", _truth_words(bench)))
@@ -200,7 +198,14 @@ def facts(bench: AttitudeComparison) -> list[tuple[str, str]]:
             )
         )
     if bench.rests:
-        found.append(("At rest", "; ".join(_rest_words(bench))))
+        shown = [
+            f"{seconds(r.start)} to {seconds(r.end)}, mean rate "
+            f"({', '.join(f'{math.degrees(v):.3f}' for v in r.gyro_mean)}) deg/s"
+            for r in bench.rests[:6]
+        ]
+        if (more := len(bench.rests) - len(shown)) > 0:
+            shown.append(f"and {more} more")
+        found.append(("At rest", "; ".join(shown)))
     elif not bench.scores:
         found.append(("At rest", "no stationary stretch of a second or more was found"))
     return found
@@ -215,27 +220,6 @@ def _truth_words(bench: AttitudeComparison) -> str:
         f"known at {len(bench.truth)} samples; {len(counted)} of them count, from "
         f"{seconds(float(counted[0]))} to {seconds(float(counted[-1]))}"
     )
-
-
-def _bias_words(bias: dict[str, Any]) -> str:
-    from math import degrees as to_degrees
-
-    if bias["rad_per_s"] is None:
-        return str(bias["from"])
-    values = ", ".join(f"{to_degrees(v):.4f}" for v in bias["rad_per_s"])
-    return f"({values}) deg/s about forward, right, down removed: {bias['from']}"
-
-
-def _rest_words(bench: AttitudeComparison) -> list[str]:
-    from math import degrees as to_degrees
-
-    shown = [
-        f"{seconds(r.start)} to {seconds(r.end)}, mean rate "
-        f"({', '.join(f'{to_degrees(v):.3f}' for v in r.gyro_mean)}) deg/s"
-        for r in bench.rests[:6]
-    ]
-    more = len(bench.rests) - len(shown)
-    return shown + ([f"and {more} more"] if more > 0 else [])
 
 
 def second_words(second: SecondLog) -> str:
@@ -381,24 +365,20 @@ def result_tables(bench: AttitudeComparison) -> list[TableBlock]:
     names = [run.algorithm for run in bench.runs]
     strong, note = _named(bench), _part_note(bench)
     if len(columns) > _MOST_BESIDE:
-        return [
-            _table("Results", ["algorithm", *columns], names, compared, strong, ""),
-            _table("Parts of the error", ["algorithm", *parts], names, made, strong, note),
-        ]
-    rows = [[*left, *right] for left, right in zip(compared, made, strict=True)]
-    return [_table("Results", ["algorithm", *columns, *parts], names, rows, strong, note)]
-
-
-def _table(
-    title: str,
-    columns: list[str],
-    names: list[str],
-    rows: list[list[str]],
-    strong: tuple[int, ...],
-    note: str,
-) -> TableBlock:
-    named = tuple((name, *row) for name, row in zip(names, rows, strict=True))
-    return TableBlock(tuple(columns), named, caption=note, strong=strong, title=title)
+        tables = [("Results", columns, compared, ""), ("Parts of the error", parts, made, note)]
+    else:
+        rows = [[*left, *right] for left, right in zip(compared, made, strict=True)]
+        tables = [("Results", [*columns, *parts], rows, note)]
+    return [
+        TableBlock(
+            ("algorithm", *header),
+            tuple((name, *row) for name, row in zip(names, rows, strict=True)),
+            caption=caption,
+            strong=strong,
+            title=title,
+        )
+        for title, header, rows, caption in tables
+    ]
 
 
 def _compared(scores: list[Score], count: int) -> list[str]:

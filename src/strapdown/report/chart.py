@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.dsp.true_runs import true_runs
+from strapdown.dsp.samples import true_runs
 
 Array = NDArray[np.float64]
 

@@ -206,7 +206,17 @@ class Frame:
     def draw(self, drawing: Drawing, bands: tuple[Band, ...], marks: tuple[Mark, ...]) -> None:
         """Draw everything within the axes of the panel."""
         panel, (left, top, right, bottom) = self.panel, self.box
-        with drawing.within(self.box, **self._attributes()):
+        kind = "plane" if panel.x_label else "categories" if panel.categories else "time"
+        # What the page's script needs of the axes.
+        axes = {
+            "data_kind": kind,
+            "data_group": self.group,
+            "data_x": self.x.words,
+            "data_y": self.y.words,
+            "data_named": "x" * self.x_named + "y" * (self.y_named and not panel.categories),
+            "data_labels": f"{panel.x_label}|{panel.y_label}",
+        }
+        with drawing.within(self.box, **axes):
             with drawing.group(class_="grid"):
                 self._grid(drawing)
             for band in bands:
@@ -219,7 +229,12 @@ class Frame:
             for bars in panel.bars:
                 with drawing.group(data_series=bars.name):
                     self._bars(drawing, bars)
-            self._zero(drawing)
+            if panel.bars and panel.categories:
+                ((x, _),) = self._edges([0.0])
+                drawing.line((x, top), (x, bottom), INK, 0.8)
+            elif panel.bars:
+                y = float(self.at([self.x.low], [0.0])[0, 1])
+                drawing.line((left, y), (right, y), INK, 0.8)
             for level in panel.levels:
                 y = float(self.at([self.x.low], [level.y])[0, 1])
                 drawing.line((left, y), (right, y), RED, 1.2, "dash")
@@ -235,19 +250,6 @@ class Frame:
             self._ticks(drawing)
         with drawing.group(class_="names"):
             self._names(drawing)
-
-    def _attributes(self) -> dict[str, str]:
-        """Return what the page's script needs to know of the axes."""
-        named = "x" * self.x_named + "y" * (self.y_named and not self.panel.categories)
-        kind = "plane" if self.panel.x_label else "categories" if self.panel.categories else "time"
-        return {
-            "data_kind": kind,
-            "data_group": self.group,
-            "data_x": self.x.words,
-            "data_y": self.y.words,
-            "data_named": named,
-            "data_labels": f"{self.panel.x_label}|{self.panel.y_label}",
-        }
 
     def _edges(self, x: list[float]) -> Array:
         return self.at(x, [self.y.low] * len(x))
@@ -285,17 +287,6 @@ class Frame:
             drawing.shape([[x0, y0], [x1, y0], [x1, y1], [x0, y1]], None, fill=bars.colour)
             if bars.pattern:
                 draw_pattern(drawing, bars.pattern, (x0, y0, x1, y1))
-
-    def _zero(self, drawing: Drawing) -> None:
-        if not self.panel.bars:
-            return
-        left, top, right, bottom = self.box
-        if self.panel.categories:
-            ((x, _),) = self._edges([0.0])
-            drawing.line((x, top), (x, bottom), INK, 0.8)
-        else:
-            y = float(self.at([self.x.low], [0.0])[0, 1])
-            drawing.line((left, y), (right, y), INK, 0.8)
 
     def _line(self, drawing: Drawing, line: Line) -> None:
         at = self.at(line.x, line.y)

@@ -8,9 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from strapdown.bundle.configuration_paths import resolved
-from strapdown.bundle.reading import read_manifest, unsealed_changes
-from strapdown.bundle.seal import write_json
+from strapdown.bundle import read_manifest, resolved, unsealed_changes, write_json
 from strapdown.config.coast import CoastSpec
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.spec import specify

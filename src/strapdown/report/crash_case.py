@@ -10,8 +10,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown import __version__
-from strapdown.bundle.configuration_paths import names_file
-from strapdown.bundle.seal import write_json
+from strapdown.bundle import names_file, write_json
 from strapdown.config.crash_case import CaseSpec
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.crash.case import CaseResult, ReferenceAnswer, SeverityAnswer, main_event, run_cases
@@ -265,7 +264,7 @@ def _unit(unit: UnitReconstruction) -> dict[str, Any]:
 
 
 def _drive(drive: EntryState) -> dict[str, Any]:
-    """What the drive shows; ``determined``: it leaves less than nine tenths of what was stated."""
+    """Estimates from the drive; ``determined``: its sd is below nine tenths of the stated one."""
     rows = []
     table = drive.calibration
     for what in () if table is None else table.to_dict("records"):

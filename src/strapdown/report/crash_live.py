@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from strapdown.bundle.seal import Seal, input_files, write_json
-from strapdown.bundle.writing import write_bundle
+from strapdown.bundle import Seal, input_files, write_bundle, write_json
 from strapdown.crash.watch import CrashLog, WatchOptions
 from strapdown.errors import DataError
 from strapdown.formats import csv

@@ -283,7 +283,7 @@ class PointChange:
         At the point itself, along the axes of the vehicle.
     covariance : ndarray, (3, 3)
     at_least : bool
-        The record holds a part of it.
+        The record holds a part only.
     """
 
     unit: MountingPoint

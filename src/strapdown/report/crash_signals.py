@@ -63,7 +63,7 @@ def unit_signals(
     Parameters
     ----------
     recorded : CrashUnit
-        On its own clock; without a gyro of its own there is no chart of rates.
+        On its own clock; without a gyro of its own it has no chart of rates.
     number : int
         Index of the unit, from 0; sets its color.
     events : sequence of CrashEvent

@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from strapdown import earth
-from strapdown.bundle.seal import Seal, check_destination, write_json
-from strapdown.bundle.writing import write_bundle
+from strapdown.bundle import Seal, check_destination, write_bundle, write_json
 from strapdown.config import CrashSimulationSpec
 from strapdown.crash.pdof import pdof
 from strapdown.errors import check_choice
@@ -323,8 +322,8 @@ _COMMON_RATE = 200.0  # Hz
 _COLUMN = 34
 _HEAD = """\
 # {summary}.
-# Simulated: recorders that wrote records, and here what an investigator would state of them.
-# What no record tells, and only you can know of a real crash, is marked "yours".
+# Simulated: recorders that wrote records, with the statements of an investigator.
+# Facts that no record contains, known only to you in a real crash, are marked "yours".
 # scenario.json and truth.csv hold what really happened.
 #{remark}
 # Run: strapdown crash case.toml
@@ -344,7 +343,7 @@ length_m = 4.2
 width_m = 1.7
 front_m = 2.0  # from the origin forward to the bumper
 
-[point]  # the point whose motion is told
+[point]  # the point whose motion is reconstructed
 name = "center of mass"
 position_m = [0.0, 0.0, 0.0]
 """

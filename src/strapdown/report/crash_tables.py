@@ -582,7 +582,7 @@ DRIVE_QUANTITIES: dict[str, DriveQuantity] = {
 
 
 def drive_table(result: CaseResult) -> TableBlock | None:
-    """What the drive before the crash shows of each recorder; None without one."""
+    """Errors of each recorder as estimated from the drive before the crash; None without one."""
     rows, open_ones = [], []
     for unit in result.reconstruction.units:
         if unit.drive is None or unit.drive.calibration is None:
@@ -614,8 +614,8 @@ def drive_table(result: CaseResult) -> TableBlock | None:
         tuple(rows),
         text=(0, 1),
         title="The drive before the crash",
-        caption="What a sensor reads too much, what the wheels show too much and how late, and by "
-        "how much a recorder is turned in the vehicle beyond its stated angles, positive as these; "
+        caption="Errors of the sensors (measured − true), of the wheels (with "
+        "their delay) and of the stated mounting angles, positive as these; "
         "95 % bounds. All are corrected. Ranges that the drive did not "
         "reach, and nonlinearity, are as stated." + left,
     )

@@ -721,7 +721,7 @@ def _disagreement(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     apart = [p for p in comparison.pairs if not p.agree]
     pairs = [f"{p.first} and {p.second}" for p in apart]
     if len(pairs) == len(comparison.pairs) > 1:
-        pairs = ["No two of them agree"]
+        pairs = ["No two agree"]
     mean = (
         "The weighted mean is between them, and its bound is too narrow. "
         if made.combined is not None
@@ -776,7 +776,7 @@ def _levers(result: CaseResult) -> Iterator[tuple[str, str, str]]:
                 "Deformation that all recorders share is not seen",
                 "By their differences they moved against each other with a standard deviation of "
                 f"up to {speed_words(float(bent.max()))} while the force acted; that is in the "
-                f"bounds. A deformation between all of them and the {told}, is not.",
+                f"bounds. A deformation between all and the {told}, is not.",
             )
             return
         yield (
@@ -958,7 +958,7 @@ def borrowed(result: CaseResult) -> Iterator[tuple[str, str, str]]:
             "borrowed-gyro",
             f"{', '.join(names)}: no gyro",
             f"The rotation is that of {lender}, as of a rigid vehicle. An error of that gyro "
-            "affects all of them, and the comparison of recorders does not show it.",
+            "affects all, and the comparison of recorders does not show it.",
         )
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from strapdown import __version__
-from strapdown.bundle.seal import write_json
+from strapdown.bundle import write_json
 from strapdown.config.doctor import DoctorSpec
 from strapdown.constants import MICRO_G
 from strapdown.errors import DataError, Finding
@@ -115,7 +115,7 @@ def headline(one: LogDiagnosis) -> str:
     """Say what a log is fit for, in one sentence."""
     if not uses(one):
         held = " and ".join(str(s["name"]) for s in one.data["streams"])
-        return f"{one.name}: {held} without inertial samples; give it beside a log of them."
+        return f"{one.name}: {held} without inertial samples; give it beside an IMU log."
     words = {"yes": "fit for {}", "with limits": "fit for {} with limits", "no": "not fit for {}"}
     by_answer: dict[str, list[str]] = {}
     for use in USES:
@@ -333,7 +333,7 @@ def doctor_document(result: Diagnosis, name: str = "") -> Document:
     title = ", ".join(one.name for one in result.logs)
     facts = (("Software", f"strapdown {__version__}"),)
     return Document(
-        title, "What is in the log, and what is wrong", facts, tuple(front), tuple(sections)
+        title, "Content of the log, and its faults", facts, tuple(front), tuple(sections)
     )
 
 
@@ -355,7 +355,7 @@ def _answer(one: LogDiagnosis) -> tuple[Block, ...]:
         Paragraph(headline(one), "lead" if good else "warning"),
         Items(tuple(rows)) if rows else None,
         paragraph("\n".join(commands), "mono"),
-        Paragraph("What is wrong, and the fix:" if items else "No fault was found."),
+        Paragraph("Faults, and the remedy of each:" if items else "No fault was found."),
         Items(tuple(items), numbered=True) if items else None,
         paragraph("With every question answered as inferred:" if ask else None),
         paragraph(ask, "mono"),

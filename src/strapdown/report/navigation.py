@@ -12,7 +12,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.alignment.alignment import Alignment
-from strapdown.bundle.seal import write_json
+from strapdown.bundle import write_json
 from strapdown.config.navigation import STAGES, NavigationSpec
 from strapdown.errors import ConfigError
 from strapdown.formats import csv
@@ -38,7 +38,7 @@ from strapdown.report.navigation_document import (
 from strapdown.report.navigation_evaluation import (
     Agreement,
     NavigationEvaluation,
-    Score,
+    SolutionScore,
     distance_over_ground,
     rms,
     trust,
@@ -288,7 +288,7 @@ def _points(evaluation: NavigationEvaluation) -> dict[str, Any] | None:
     }
 
 
-def _score(score: Score) -> dict[str, Any]:
+def _score(score: SolutionScore) -> dict[str, Any]:
     unit = {"m": "m", "m/s": "m_per_s", "deg": "deg"}[score.unit]
     return {
         f"rms_{unit}": score.rms,

@@ -9,7 +9,7 @@ import numpy as np
 from strapdown import __version__
 from strapdown.config.choice import ChoiceSpec
 from strapdown.constants import TWO_SIDED_95
-from strapdown.evaluation.plane_bound import plane_bound
+from strapdown.dsp.chi_square import plane_bound
 from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.navigation.truth_comparison import SmootherConsistency
 from strapdown.report import navigation_charts as charts

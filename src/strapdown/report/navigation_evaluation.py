@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from strapdown.config.navigation import make_aids
 from strapdown.constants import TWO_SIDED_95
-from strapdown.dsp.true_runs import true_runs
+from strapdown.dsp.chi_square import plane_bound, plane_reach
+from strapdown.dsp.samples import true_runs
 from strapdown.errors import Finding
 from strapdown.estimation.robust import AdaptiveScale
-from strapdown.evaluation.plane_bound import plane_bound, plane_reach
 from strapdown.evaluation.trajectory_differences import trajectory_differences
 from strapdown.frames import ned_from_geodetic
 from strapdown.navigation.consistency import (
@@ -302,7 +302,7 @@ LONGEST = 1.5
 
 
 @dataclass(frozen=True)
-class Score:
+class SolutionScore:
     """Errors of one quantity over a run.
 
     Attributes
@@ -358,7 +358,7 @@ class NavigationErrors:
         return TWO_SIDED_95 * self.comparison.sd[column].to_numpy(dtype=np.float64)
 
     @cached_property
-    def scores(self) -> tuple[Score, ...]:
+    def scores(self) -> tuple[SolutionScore, ...]:
         """Scores of each quantity, and of the horizontal position."""
         units = (
             dict.fromkeys(NED, "m") | dict.fromkeys(VELOCITY, "m/s") | dict.fromkeys(EULER, "deg")
@@ -371,7 +371,7 @@ class NavigationErrors:
         size = np.hypot(*(self.error(n) for n in NED[:2]))
         return self._score("horizontal", "m", size, self._plane(size)), *found
 
-    def score(self, quantity: str) -> Score:
+    def score(self, quantity: str) -> SolutionScore:
         """Score of one quantity."""
         return next(s for s in self.scores if s.quantity == quantity)
 
@@ -397,9 +397,9 @@ class NavigationErrors:
         about = 0.5 * (np.append(steps, 0.0) + np.insert(steps, 0, 0.0))
         return np.asarray(about / about.sum())
 
-    def _score(self, name: str, unit: str, error: Array, bound: Array) -> Score:
+    def _score(self, name: str, unit: str, error: Array, bound: Array) -> SolutionScore:
         worst = int(np.argmax(np.abs(error)))
-        return Score(
+        return SolutionScore(
             name,
             unit,
             float(np.sqrt(self._weight @ np.square(error))),

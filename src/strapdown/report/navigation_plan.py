@@ -10,15 +10,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.dsp.running_integral import running_integral
-from strapdown.dsp.true_runs import true_runs
+from strapdown.dsp.samples import running_integral, true_runs
 from strapdown.formats.trajectory_maps import thin
 from strapdown.frames import ned_from_geodetic
 from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.report.chart import BLACK, BLUE, GREY, PURPLE, VERMILLION, Array, Chart, Line, Panel
 from strapdown.report.navigation_charts import mode_colour
 from strapdown.report.navigation_evaluation import NavigationEvaluation, rejected_times
-from strapdown.report.plan import View, ellipse, path_marks, place_labels
+from strapdown.report.plan import PlanView, ellipse, path_marks, place_labels
 from strapdown.report.svg_drawing import nice_step
 from strapdown.report.values import GAP, duration_words, length_words, plain
 from strapdown.tables import GEODETIC, places_of
@@ -55,9 +54,9 @@ def plan_chart(evaluation: NavigationEvaluation) -> Chart | None:
     plane = Plane(origin, evaluation, *(("km", 1e-3) if reach >= _FAR else ("m", 1.0)))
     path = (plane.scale * ned[:, 1], plane.scale * ned[:, 0])
     time = index_of(kept)
-    tight = View.of([path, *_around(plane)], most=_TALL)
+    tight = PlanView.of([path, *_around(plane)], most=_TALL)
     margin = 0.04 * (tight.high - tight.low)
-    view = View(tight.low - margin, tight.high + margin)
+    view = PlanView(tight.low - margin, tight.high + margin)
     fixes, beyond = _fixes(plane, view)
     lines = [*fixes, *_truth(plane), *_path(record, time, path), *_points(plane)]
     round_, said, obstacles = ellipses(plane, view)
@@ -154,7 +153,7 @@ def _pieces(of: NDArray[np.bool_], path: tuple[Array, Array]) -> tuple[Array, Ar
     return np.concatenate(x)[:-1], np.concatenate(y)[:-1]
 
 
-def _fixes(plane: Plane, view: View) -> tuple[list[Line], str]:
+def _fixes(plane: Plane, view: PlanView) -> tuple[list[Line], str]:
     """Fixes as faint points; text on those outside of the view."""
     out: list[Line] = []
     beyond = 0
@@ -213,7 +212,7 @@ def _points(plane: Plane) -> list[Line]:
     ]
 
 
-def _scale(view: View, path: tuple[Array, Array], unit: str) -> list[Line]:
+def _scale(view: PlanView, path: tuple[Array, Array], unit: str) -> list[Line]:
     """Scale bar of round length and north arrow, in the emptiest corner."""
     size = view.high - view.low
     best, fewest = view.low, math.inf
@@ -299,7 +298,7 @@ def ellipse_rows(evaluation: NavigationEvaluation) -> tuple[list[int], list[tupl
     return [int(k) for k in np.unique(rows[picked])], ends
 
 
-def ellipses(plane: Plane, view: View) -> tuple[list[Line], str, list[tuple[int, Span]]]:
+def ellipses(plane: Plane, view: PlanView) -> tuple[list[Line], str, list[tuple[int, Span]]]:
     """Return ellipses, magnified by one factor to be visible, and their caption.
 
     Returns
@@ -356,7 +355,7 @@ def _round_down(value: float) -> float:
 
 def bound_labels(
     plane: Plane,
-    view: View,
+    view: PlanView,
     path: tuple[Array, Array],
     marks: list[Line],
     ends: list[tuple[int, Span]],
@@ -398,7 +397,7 @@ def bound_labels(
     ]
 
 
-def _text(mark: Line, view: View) -> Array:
+def _text(mark: Line, view: PlanView) -> Array:
     """Points on the labels of marks, (n, 2), approximately."""
     letter, line = _LETTER * view.width, _TEXT * float(view.high[1] - view.low[1])
     found = [np.column_stack([mark.x, mark.y])]

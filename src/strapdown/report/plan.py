@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from strapdown.evaluation.plane_bound import PLANE_95
+from strapdown.dsp.chi_square import PLANE_95
 from strapdown.report.chart import BLACK, GREEN, VERMILLION, Array, Line
 from strapdown.report.svg_drawing import overlap
 
@@ -29,7 +29,7 @@ _HALF_DAY = 43200.0
 
 
 @dataclass(frozen=True)
-class View:
+class PlanView:
     """Extent of a plan with equal scales.
 
     Attributes
@@ -42,7 +42,7 @@ class View:
     high: Array
 
     @classmethod
-    def of(cls, paths: list[Path], most: float = _MOST) -> View:
+    def of(cls, paths: list[Path], most: float = _MOST) -> PlanView:
         """Smallest view of all paths with a panel neither too low nor too high.
 
         Parameters
@@ -76,7 +76,7 @@ class View:
         return np.vstack([self.low, self.high])
 
 
-def path_marks(time: Array, paths: list[Path], view: View, colour: str) -> list[Line]:
+def path_marks(time: Array, paths: list[Path], view: PlanView, colour: str) -> list[Line]:
     """Mark start, end, and positions at round times on the first path, with arrows between them.
 
     Parameters

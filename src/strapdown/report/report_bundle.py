@@ -11,8 +11,7 @@ from typing import Any, Generic, Protocol, TypeVar
 import numpy as np
 import pandas as pd
 
-from strapdown.bundle.seal import InputFiles, Seal
-from strapdown.bundle.writing import write_bundle
+from strapdown.bundle import InputFiles, Seal, write_bundle
 from strapdown.formats import csv
 from strapdown.progress import Progress, silent
 from strapdown.report.document import (

@@ -10,8 +10,7 @@ import numpy as np
 import pandas as pd
 
 from strapdown.attitude_comparison.source import scenario_errors, simulate_scenario
-from strapdown.bundle.seal import Seal, check_destination, sensor_file, write_json
-from strapdown.bundle.writing import write_bundle
+from strapdown.bundle import Seal, check_destination, sensor_file, write_bundle, write_json
 from strapdown.config import SimulateSpec, TrajectorySpec
 from strapdown.ellipsoids import WGS84, Ellipsoid, find_ellipsoid
 from strapdown.errors import check_choice
@@ -28,7 +27,7 @@ from strapdown.frames import ned_from_geodetic
 from strapdown.report.chart import BLUE, ORANGE, Array, Chart, Line, Panel, break_jumps, curve
 from strapdown.report.chart_svg import ChartFigure
 from strapdown.report.crash_simulation import stated_errors
-from strapdown.report.plan import View, path_marks
+from strapdown.report.plan import PlanView, path_marks
 from strapdown.simulation import Motion, PulseMotion, TriadErrors, find_scenario
 from strapdown.systems.trajectory_source import SimulatedTrajectory, simulate_trajectory
 from strapdown.tables import EULER, places_of
@@ -372,7 +371,7 @@ def _plan(drawn: list[_Drawn], reach: float) -> Panel:
     """The paths, with the start, the end, the direction and the times of the first."""
     unit, scale = ("km", 1e-3) if reach >= _FAR else ("m", 1.0)
     paths = [(scale * d.east, scale * d.north) for d in drawn]
-    view = View.of(paths)
+    view = PlanView.of(paths)
     lines = [
         Line(d.name, *path, d.colour, d.dash, 1.8, legend=d.legend)
         for d, path in zip(drawn, paths, strict=True)

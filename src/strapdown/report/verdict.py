@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from strapdown.constants import TWO_SIDED_95
-from strapdown.evaluation.plane_bound import plane_bound
+from strapdown.dsp.chi_square import plane_bound
 from strapdown.navigation.heading_checks import UNSEEN
 from strapdown.navigation.heading_integrity import (
     CHECKS,

@@ -17,10 +17,16 @@ from pydantic import ValidationError
 
 from strapdown.attitude_comparison.comparison import run_comparison
 from strapdown.attitude_comparison.options import AttitudeSpec
-from strapdown.bundle.configuration_paths import names_file, resolved
-from strapdown.bundle.reading import read_manifest, unsealed_changes
-from strapdown.bundle.seal import MANIFEST, sha256
-from strapdown.bundle.writing import machine, versions
+from strapdown.bundle import (
+    MANIFEST,
+    machine,
+    names_file,
+    read_manifest,
+    resolved,
+    sha256,
+    unsealed_changes,
+    versions,
+)
 from strapdown.config import CrashSimulationSpec, SimulateSpec, TrajectorySpec
 from strapdown.config.crash_case import CaseSpec
 from strapdown.config.reading import changed_options

@@ -292,7 +292,7 @@ def _past(log: HealthLog, k: int, relative: Array, slack: float) -> Array:
     """Noise limit of each block from the channel's own past and the other channels.
 
     Never below the limit of its own quiet blocks: where the other channels become quiet, as those
-    that feel the road when a car stops, a channel that does not change is no noisier.
+    that feel the road when a car stops, a channel that does not change is not reported as noisier.
     """
     known = np.isfinite(relative)
     if known.sum() < 4 * LASTING:

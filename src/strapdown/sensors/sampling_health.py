@@ -23,7 +23,7 @@ LEAST_STEPS = 50
 #: Longer steps are pauses of the recording: this many s, and this many usual steps.
 PAUSE, PAUSE_STEPS = 5.0, 50.0
 #: In bursts this share of the steps is shorter than a fifth of the mean step. Two samples a
-#: delivery make a half of them short; jitter of a third of a step makes a hundredth.
+#: delivery make a half short; jitter of a third of a step makes a hundredth.
 SHORT, BURSTS = 0.2, 0.3
 #: Half of the range of the middle 68 % of the steps, over the median step.
 JITTER = 0.2

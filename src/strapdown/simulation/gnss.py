@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown import rotation
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import ConfigError
-from strapdown.sensors.antenna import antenna_motion
+from strapdown.frames import antenna_motion
 from strapdown.sensors.error_chain import Seed, child, gauss_markov, normal
 from strapdown.sensors.triad_errors import ZERO, Triad, TriadLike
 from strapdown.simulation.earth_motion import EarthMotion

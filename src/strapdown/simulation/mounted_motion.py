@@ -106,7 +106,7 @@ class MountedMotion:
             source=source,
         )
 
-    def kinematics_from(self, time: ArrayLike, *, epoch: float = 0.0) -> PointKinematics:
+    def kinematics_from(self, time: ArrayLike, *, epoch: float = 0.0) -> MountedKinematics:
         """Position, velocity and acceleration including ringing, as `point_kinematics`.
 
         `epoch` (s): instant at which the local-level axes are fixed at the vehicle's origin.
@@ -146,7 +146,7 @@ def _instants(time: ArrayLike) -> Array:
 
 
 @dataclass(frozen=True)
-class PointKinematics:
+class MountedKinematics:
     """A vehicle point at n instants, in fixed local-level axes.
 
     The axes are north, east, down at the vehicle's origin at the epoch, fixed to the Earth.
@@ -237,7 +237,7 @@ def moving_point(motion: EarthMotion, arm: Arm, time: Array) -> MovingPoint:
 
 def point_kinematics(
     motion: EarthMotion, position: ArrayLike, time: ArrayLike, *, epoch: float = 0.0
-) -> PointKinematics:
+) -> MountedKinematics:
     """Exact position, velocity and acceleration of a point of a rigid vehicle.
 
     The gravity-free velocity change between two instants is the difference of two rows of
@@ -281,7 +281,7 @@ def rigid_arm(position: ArrayLike, count: int) -> Arm:
     return np.tile(r, (count, 1)), still, still
 
 
-def in_axes_of(motion: EarthMotion, point: MovingPoint, epoch: float) -> PointKinematics:
+def in_axes_of(motion: EarthMotion, point: MovingPoint, epoch: float) -> MountedKinematics:
     """Transform a point from vehicle axes to local-level axes at the origin at an epoch."""
     if not 0.0 <= epoch <= motion.duration:
         raise ConfigError(
@@ -294,7 +294,7 @@ def in_axes_of(motion: EarthMotion, point: MovingPoint, epoch: float) -> PointKi
     )
     q_nv = rotation.compose(level, point.q_nv)
     base = frames.ned_from_geodetic(point.origin, start, ellipsoid=motion.ellipsoid)
-    return PointKinematics(
+    return MountedKinematics(
         base + rotation.rotate(q_nv, point.arm),
         rotation.rotate(q_nv, point.velocity),
         rotation.rotate(q_nv, point.acceleration),

@@ -21,7 +21,7 @@ from strapdown.systems.alignment_source import body_record
 from strapdown.tables.checks import index_of
 
 __all__ = [
-    "Draft",
+    "ProposedAlignment",
     "axes_table",
     "draft_alignment",
     "listed_kinds",
@@ -36,7 +36,7 @@ GRADES = ("navigation", "tactical")
 
 
 @dataclass(frozen=True)
-class Draft:
+class ProposedAlignment:
     """Proposed configuration as text.
 
     Attributes
@@ -58,7 +58,7 @@ class Draft:
     to_check: tuple[Asked, ...] = ()
 
 
-def draft_alignment(log: LogTable, *, folder: Path, axes: str | None = None) -> Draft:
+def draft_alignment(log: LogTable, *, folder: Path, axes: str | None = None) -> ProposedAlignment:
     """Write the proposed alignment configuration of a log.
 
     Parameters
@@ -74,10 +74,10 @@ def draft_alignment(log: LogTable, *, folder: Path, axes: str | None = None) -> 
     require_accel(recording)
     page = Page()
     page.say(
-        f"An alignment of {recording.name}: find roll, pitch and heading of a body that stands.",
+        f"An alignment of {recording.name}: find roll, pitch and heading of a stationary body.",
         'Put what you know in place of each "?", then run: strapdown align on this file.',
     )
-    found = log_table(page, log, folder, imu, recording.name, ", where the body stands")
+    found = log_table(page, log, folder, imu, recording.name, ", position of the body")
     found += _site(page, recording)
     axes_table(
         page,
@@ -93,7 +93,7 @@ def draft_alignment(log: LogTable, *, folder: Path, axes: str | None = None) -> 
             page.say("duration_s = 100.0: over the first part alone, and the fine one after it")
     _rest(page)
     text = "\n".join(page.lines) + "\n"
-    return Draft(text, tuple(found), tuple(page.asked), findings)
+    return ProposedAlignment(text, tuple(found), tuple(page.asked), findings)
 
 
 def log_table(
@@ -128,7 +128,7 @@ def log_table(
 
 def _site(page: Page, recording: Recording) -> list[str]:
     start = recording.start
-    where = "Where the body stands: to a hundredth of a degree is enough."
+    where = "Position of the body: a hundredth of a degree is enough."
     if start is None:
         page.table("[site]", where)
         page.key("lat_deg", ASK, "only you know: geodetic latitude, north positive")
@@ -221,7 +221,7 @@ def _inline(value: Any) -> str:
     return toml_value(value) or ""
 
 
-#: What a chosen option does.
+#: Effect of an option that was chosen.
 _CHOSEN = {"backtrack": "navigation begins with the first sample of that part"}
 _WANTED = {
     "heading_deg": "heading of the body at the start, clockwise from north (gyros that "

@@ -21,7 +21,7 @@ from strapdown.alignment.readiness import (
     manoeuvres_after,
     readiness,
 )
-from strapdown.bundle.seal import InputFiles, Seal
+from strapdown.bundle import InputFiles, Seal
 from strapdown.config.alignment import AlignmentSpec, ReferenceTable, sensors_of
 from strapdown.dsp.outliers import REPLACED, OutlierDesign
 from strapdown.dsp.samples import even_step

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.bundle.seal import InputFiles, input_files, sensor_file
+from strapdown.bundle import InputFiles, input_files, sensor_file
 from strapdown.config.alignment import AlignmentSpec, AxesTable, LogTable
 from strapdown.config.sources import read_options
 from strapdown.ellipsoids import find_ellipsoid

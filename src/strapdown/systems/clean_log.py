@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.bundle.writing import versions
+from strapdown.bundle import versions
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats import csv, parquet, read_log
 from strapdown.formats.clocks import clock_of

@@ -13,11 +13,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.bundle.seal import InputFiles, Seal, input_files
+from strapdown.bundle import InputFiles, Seal, input_files
 from strapdown.config.alignment import AxesTable, FixesTable, LogTable
 from strapdown.config.doctor import DoctorSpec, flags_of, flags_of_fixes
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.dsp.running_integral import running_integral
+from strapdown.dsp.samples import running_integral
 from strapdown.errors import DataError, Finding, Severity, StrapdownError
 from strapdown.evaluation.differences import rotation_contradicted
 from strapdown.evaluation.second_log import align_second_log
@@ -561,7 +561,7 @@ def _impact(imu: pd.DataFrame) -> dict[str, float] | None:
     }
 
 
-# What was measured, as plain data.
+# The measurements, as plain data.
 
 
 def _stream(name: str, table: pd.DataFrame) -> dict[str, Any]:
@@ -670,7 +670,7 @@ def _ranges(raw: RawLog) -> list[dict[str, Any]]:
     return rows
 
 
-# What the log suffices for.
+# The uses for which the log suffices.
 
 
 def _samples(one: LogDiagnosis) -> list[Finding]:

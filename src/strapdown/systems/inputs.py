@@ -14,8 +14,7 @@ from typing import Any, ClassVar, Self, TypeVar
 import numpy as np
 import pandas as pd
 
-from strapdown.bundle.configuration_paths import with_paths
-from strapdown.bundle.seal import InputFiles, Seal, check_destination, input_files
+from strapdown.bundle import InputFiles, Seal, check_destination, input_files, with_paths
 from strapdown.config.reading import FileSpec
 from strapdown.errors import ConfigError, Finding
 from strapdown.progress import Progress, silent
@@ -75,7 +74,7 @@ def part_of_log(
     Returns
     -------
     DataFrame
-        The same table if all of it is used.
+        The same table if it is used whole.
     """
     check_part(from_s, to_s, duration_s)
     time = imu.index.to_numpy(dtype=np.float64)
@@ -196,7 +195,7 @@ def moved(result: R, key: str, old: Path, new: Path) -> R:
     key : str
         Field with the configuration that names their paths.
     old, new : Path
-        As of `Memory.as_files`; `NOWHERE` while there are no files.
+        As of `Memory.as_files`; `NOWHERE` without files.
     """
     if old == new:
         return result

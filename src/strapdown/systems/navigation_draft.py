@@ -17,7 +17,7 @@ from strapdown.config.choice import SLOTS, Slot, options_of
 from strapdown.config.navigation import STAGES
 from strapdown.config.toml_text import ASK, Page, inline, named_from, string
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.dsp.true_runs import true_runs
+from strapdown.dsp.samples import true_runs
 from strapdown.errors import DataError, Finding
 from strapdown.estimation.sensor_blocks import STATED_STATES, resting_sd, states_that_are_stated
 from strapdown.formats.gnss_fixes import POSITION_SDS, VELOCITY_SDS
@@ -26,7 +26,7 @@ from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.aid_proposal import Magnetic
 from strapdown.systems.alignment_draft import (
-    Draft,
+    ProposedAlignment,
     axes_table,
     listed_kinds,
     log_table,
@@ -60,7 +60,7 @@ def draft_navigation(
     gnss: FixesTable | None = None,
     sensor: str | None = None,
     foot: bool = False,
-) -> Draft:
+) -> ProposedAlignment:
     """Write the proposed navigation configuration of a log.
 
     Parameters
@@ -83,7 +83,7 @@ def draft_navigation(
     page.say(
         f"Navigation over {made.recording.name}: place, velocity and attitude, and how well each "
         "is known.",
-        "Each table is a place in the chain, and kind says what stands there; keys that begin "
+        "Each table is a stage of the chain, and kind selects its module; keys that begin "
         "with # show the defaults. Then: strapdown navigate on this file.",
     )
     found = [
@@ -108,14 +108,16 @@ def draft_navigation(
         stage(page, STAGES[name], made.table.get(name, {}))
     found += _aids(page, made, folder, foot)
     _rest(page, foot)
-    return Draft(page.text, tuple(found), tuple(page.asked), made.findings, tuple(page.to_check))
+    return ProposedAlignment(
+        page.text, tuple(found), tuple(page.asked), made.findings, tuple(page.to_check)
+    )
 
 
 def _sampling_to_check(made: Proposal) -> str:
     """Consequence of the assumed kind of sampling; empty where it is stated, or does not matter.
 
-    A row that is the mean over the interval before its stamp is half of it older than one that is
-    the reading at its stamp. That shifts the way along itself, and turns the attitude, which
+    A mean over the interval before its stamp is half an interval older than a reading at its
+    stamp. That shifts the way along itself, and turns the attitude, which
     matters against what fixes and accelerometers resolve.
     """
     if made.gnss is None or all(f.code != UNSTATED for f in made.findings):
@@ -143,7 +145,7 @@ def _sampling_to_check(made: Proposal) -> str:
 
 def _where(page: Page, made: Proposal, foot: bool) -> list[str]:
     said = made.table.get("site")
-    where = "Where the body stands while it is aligned."
+    where = "Position of the body during alignment."
     if said is not None:
         page.table("[site]", where, "Found: the log states it; check that it is so.")
         for key, value in said.items():
@@ -328,8 +330,8 @@ def _aids(page: Page, made: Proposal, folder: Path, foot: bool) -> list[str]:
         options(page, slot.entries[aid["kind"]], aid)
     if made.drives:
         page.say(
-            "Does it drive on wheels? Then take the signs off; it bounds what an outage costs. How "
-            "the unit stands in the vehicle is estimated; lever_arm_m is of the middle of the axle "
+            "Does it drive on wheels? Then take the signs off; it bounds what an outage costs. The "
+            "mounting angles of the unit are estimated; lever_arm_m is of the middle of the axle "
             "that is not steered."
         )
         for line in WHEELS:

@@ -126,11 +126,11 @@ ASIDE = 2.0
 #: a random walk of this many s/√s over 400 s, during which the offset may be unobservable.
 APART = 1e-3
 #: Relative rate of two quartz clocks, at most, where the record does not show a smaller one; one
-#: below the other is no state where it is not significant.
+#: below the other is not estimated where it is not significant.
 QUARTZ, FEW = 5e-5, 1.5e-5
 #: Share of the variance of positions that lasts from fix to fix: proposed from the first on, and at
 #: most. Where standard deviations are assumed, or contradicted by the scatter: that of fixes that
-#: scatter like those of a code receiver, and of others; the scatter, m, that tells them apart.
+#: scatter like those of a code receiver, and of others; the scatter, m, that separates them.
 LASTS, LASTS_MOST = 0.5, 0.9
 LASTS_BY_CODE, LASTS_BY_PHASE, PHASE = 0.9, 0.5, 0.05
 #: The least share that is proposed where velocities show what lasts; the factor of the standard
@@ -161,7 +161,7 @@ class Proposal:
     gnss : DataFrame or None
         Gnss table, on the clock of the samples.
     rest : float, s
-        How long the vehicle is stationary at the start, by everything that can tell.
+        How long the vehicle is stationary at the start, by all sensors.
     noise : tuple of float, (2,), or None
         Of the gyros in rad/s/√Hz, of the accelerometers in m/s²/√Hz, while it is quiet.
     guessed : bool
@@ -234,7 +234,7 @@ def propose(
         findings = (*findings, *fixes.attrs["findings"], *([shifted] if shifted else []))
         fixes, repeats = without_repeats(fixes)
         findings = (*findings, *repeats)
-        # What the run would refuse is refused before a file is written.
+        # Refuse before a file is written whatever the run would refuse.
         check_fixes(fixes)
         check_overlap(fixes, imu, 0.0)
     place, start = site, recording.start
@@ -731,7 +731,7 @@ def _tried(
     levelled: float,
     clock: dict[str, float],
 ) -> tuple[dict[str, Any], str, tuple[Finding, ...]]:
-    """An alignment by course with limits that the record meets, by trial at instants of it.
+    """An alignment by course with limits that the record meets, by trial at some instants.
 
     `clock`: offset and delay of the fixes. If no instant allows an alignment, the heading is asked,
     and a finding gives the reason.

@@ -16,7 +16,7 @@ import pandas as pd
 from strapdown.alignment.alignment import Alignment, Site
 from strapdown.alignment.fine import FineResult
 from strapdown.alignment.gnss_course import GnssCourse
-from strapdown.bundle.seal import InputFiles, Seal
+from strapdown.bundle import InputFiles, Seal
 from strapdown.config.alignment import sensors_of
 from strapdown.config.navigation import (
     CoarseModeSpec,

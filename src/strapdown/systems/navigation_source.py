@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.bundle.seal import InputFiles, input_files, sensor_file
+from strapdown.bundle import InputFiles, input_files, sensor_file
 from strapdown.config.choice import SLOTS, options_of
 from strapdown.config.navigation import AidSpec, NavigationSpec, ReceiverTable
 from strapdown.ellipsoids import find_ellipsoid

@@ -12,17 +12,17 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.bundle.seal import InputFiles, Seal, sensor_file
+from strapdown.bundle import InputFiles, Seal, sensor_file
 from strapdown.config.alignment import sensors_of
 from strapdown.config.coast import CoastSpec, CoastStartTable
 from strapdown.config.navigation import NavigationSpec
 from strapdown.constants import DEG_PER_HOUR, MICRO_G
+from strapdown.dsp.chi_square import PLANE_95, plane_bound
 from strapdown.errors import ConfigError, Finding
 from strapdown.estimation.covariance import Joseph
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.error_model import RotationVectorModel
 from strapdown.estimation.sensor_blocks import stated_states
-from strapdown.evaluation.plane_bound import PLANE_95, plane_bound
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown
 from strapdown.navigation.measurements.gnss import Gnss
@@ -398,7 +398,7 @@ def _drift(
     record = record_of(navigator, run.pieces)
     marks = record.sd.index.to_numpy(dtype=np.float64)
     if not len(marks):
-        # The record has the covariance at intervals; a shorter outage may lie between two of them.
+        # The record has the covariance at intervals; a shorter outage may lie between two.
         raise ConfigError(
             "outage.outage-between-covariances",
             quantity="--outage",

@@ -50,11 +50,6 @@ from strapdown.tables.aiding import (
     odometer_from_distance,
     odometer_table,
 )
-from strapdown.tables.attitude import (
-    attitude_table,
-    check_attitude,
-    references_table,
-)
 from strapdown.tables.checks import (
     ACCEL,
     DR,
@@ -89,9 +84,12 @@ from strapdown.tables.imu import (
 from strapdown.tables.trajectory import (
     TRAJECTORY,
     TRAJECTORY_ERROR,
+    attitude_table,
+    check_attitude,
     check_trajectory,
     check_trajectory_error,
     places_of,
+    references_table,
     trajectory_error_table,
     trajectory_table,
 )

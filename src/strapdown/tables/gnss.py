@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown.dsp.running_integral import running_integral
+from strapdown.dsp.samples import running_integral
 from strapdown.errors import DataError
 from strapdown.frames import place_difference
 from strapdown.tables.checks import (

@@ -8,7 +8,7 @@ import shutil
 
 import numpy as np
 
-from strapdown.bundle import writing as environment
+from strapdown import bundle
 from strapdown.formats.writers import WRITERS
 from strapdown.tables import imu_table
 
@@ -49,17 +49,16 @@ def test_the_manifest_has_the_digest_of_the_source(run_cli, tmp_path):
     done = run_cli("simulate", "alexiev-fig4", "--out", tmp_path / "a", "-q")
     assert done.code == 0, done.err
     manifest = json.loads((tmp_path / "a" / "manifest.json").read_text())
-    assert manifest["versions"]["strapdown source"] == environment.source_digest()
-    assert len(environment.source_digest()) == 64
+    assert manifest["versions"]["strapdown source"] == bundle.source_digest()
+    assert len(bundle.source_digest()) == 64
 
 
 def test_the_digest_follows_one_byte_of_one_source(tmp_path, monkeypatch):
-    (tmp_path / "bundle").mkdir()
-    home = tmp_path / "bundle" / "environment.py"
-    shutil.copy(environment.__file__, home)
+    home = tmp_path / "bundle.py"
+    shutil.copy(bundle.__file__, home)
     (tmp_path / "kernel.py").write_text("a = 1\n")
-    monkeypatch.setattr(environment, "__file__", str(home))
-    plain = environment.source_digest.__wrapped__
+    monkeypatch.setattr(bundle, "__file__", str(home))
+    plain = bundle.source_digest.__wrapped__
     before = plain()
     assert plain() == before
     (tmp_path / "kernel.py").write_text("a = 2\n")

@@ -11,7 +11,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from good_case import TEXT, read, write
 
-from strapdown.bundle.configuration_paths import names_file
+from strapdown.bundle import names_file
 from strapdown.config import CaseSpec
 from strapdown.errors import ConfigError
 

@@ -184,7 +184,7 @@ def test_a_second_sensor_that_nothing_tells_apart_is_left_out_by_name(tmp_path):
     write_nhtsa(tmp_path, replace(record, channels=channels))
     first, _ = draft_cases([read_crash_record(tmp_path)], folder=tmp_path)
     (why,) = [s.why for s in first.left_out if s.names == ("4", "5", "6")]
-    assert "which the record does not tell from the first" in why
+    assert "not distinguished from the first" in why
 
 
 def test_an_unknown_code_is_a_point_and_it_is_said(tmp_path):

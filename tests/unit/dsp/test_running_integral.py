@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
 
-from strapdown.dsp.running_integral import running_integral
+from strapdown.dsp.samples import running_integral
 
 
 @pytest.mark.parametrize("shape", [(), (3,), (3, 2)])

@@ -11,7 +11,7 @@ from strapdown.attitude_algorithms.algorithm import AttitudeRun
 from strapdown.constants import STANDARD_GRAVITY as G
 from strapdown.errors import ConfigError, DataError
 from strapdown.evaluation.position_references import (
-    SensorErrors,
+    DeadReckoningErrors,
     dead_reckon,
     is_place,
     parse_place,
@@ -156,7 +156,7 @@ def test_the_sd_is_that_of_the_errors():
     rng = np.random.default_rng(5)
     time, q, clean = motion((1.0, 0.5, -0.3), rate=50.0)
     turn = rotation.dcm_from_quaternion(q)
-    assumed = SensorErrors(0.02, 1e-4, 0.05, 0.003, levelled=False)
+    assumed = DeadReckoningErrors(0.02, 1e-4, 0.05, 0.003, levelled=False)
     place = parse_place("11 moved 1 0.5 -0.3 m since 1", 0, 12)
     ratios = []
     for _ in range(120):

@@ -12,11 +12,11 @@ from tests.coded import coded
 from strapdown import rotation
 from strapdown.errors import ConfigError, DataError
 from strapdown.increments import (
+    ORDERS,
     imu_from_increments,
     increments_from_imu,
     motion_increments,
 )
-from strapdown.increments.motion import ORDERS
 from strapdown.tables import ACCEL, DR, DV, GYRO, MOTION, PHI, THETA, imu_table
 
 _spec = importlib.util.spec_from_file_location(

@@ -13,8 +13,7 @@ import pytest
 
 from strapdown import rotation
 from strapdown.errors import ConfigError
-from strapdown.increments import motion_accuracy, motion_increments
-from strapdown.increments.motion import ORDERS
+from strapdown.increments import ORDERS, motion_accuracy, motion_increments
 from strapdown.simulation import Coning, Sculling
 
 _spec = importlib.util.spec_from_file_location(

@@ -14,7 +14,7 @@ from strapdown.attitude_algorithms.cost import Cost
 from strapdown.attitude_comparison.answer import Answer
 from strapdown.attitude_comparison.comparison import AttitudeComparison
 from strapdown.attitude_comparison.references import PeerRun
-from strapdown.attitude_comparison.sweep import Share, Trials
+from strapdown.attitude_comparison.sweep import ErrorShare, Trials
 from strapdown.evaluation.differences import error_angles, largest_differences
 from strapdown.evaluation.reference_points import Score, references_from_words, score_references
 from strapdown.increments import increments_from_imu
@@ -119,7 +119,7 @@ def _bench(algorithms, name="alexiev-fig2c", rate=100.0, truth_known=True, refer
         scores += score_references(runs[label], points, noisy)
         own, sensor = _share(clean_runs[label], runs[label], truth)
         single = tuple(1e-5 * (1 + k) for k in range(3))
-        shares.append(Share(label, own, sensor if truth_known else None, single))
+        shares.append(ErrorShare(label, own, sensor if truth_known else None, single))
         add, multiply, divide, sqrt, trig, memory = _OPERATIONS.get(label, (9, 9, 1, 1, 1, 4))
         cycles = add + multiply + 14 * divide + 14 * sqrt + 80 * trig
         costs.append(Cost(label, add, multiply, divide, sqrt, trig, cycles, memory))

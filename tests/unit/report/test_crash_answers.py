@@ -12,7 +12,7 @@ import pytest
 from tests.coded import coded
 
 from strapdown import simulate
-from strapdown.bundle.seal import to_json
+from strapdown.bundle import to_json
 from strapdown.config.crash_case import AssumedSpec, CaseSpec, ReferenceSpec
 from strapdown.crash.case import case_severity, compare_reference, main_event, run_case
 from strapdown.crash.reconstruction import summary_table

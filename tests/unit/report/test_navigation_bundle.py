@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from strapdown.config.navigation import NavigationSpec
+from strapdown.dsp.chi_square import plane_bound
 from strapdown.errors import Finding
-from strapdown.evaluation.plane_bound import plane_bound
 from strapdown.report.document import draw_stills, drawings, write_drawings
 from strapdown.report.navigation import navigation_json
 from strapdown.report.navigation_document import navigation_document

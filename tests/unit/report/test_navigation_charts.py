@@ -16,7 +16,7 @@ from tests.unit.report.navigation_records import (
     without_aids,
 )
 
-from strapdown.evaluation.plane_bound import PLANE_95, plane_bound
+from strapdown.dsp.chi_square import PLANE_95, plane_bound
 from strapdown.frames import ned_from_geodetic
 from strapdown.navigation.record import Span
 from strapdown.report import navigation_charts as charts

@@ -10,8 +10,8 @@ import pytest
 from tests.coded import coded
 from tests.unit.report.navigation_records import one_epoch, record, shifted, told, without_aids
 
+from strapdown.dsp.chi_square import PLANE_95
 from strapdown.errors import DataError, Finding
-from strapdown.evaluation.plane_bound import PLANE_95
 from strapdown.navigation.outage_test import Withheld, WithheldScore
 from strapdown.navigation.record import Span
 from strapdown.report.chart import Chart

@@ -12,7 +12,7 @@ from strapdown.ellipsoids import ELLIPSOIDS, WGS84
 from strapdown.frames import geodetic_from_ned
 from strapdown.report.chart import steady_range
 from strapdown.report.chart_svg import ChartFigure
-from strapdown.report.plan import View
+from strapdown.report.plan import PlanView
 from strapdown.report.simulation import MOST_POINTS, trajectory_chart
 from strapdown.tables import trajectory_table
 
@@ -229,8 +229,8 @@ def drawn_panels(chart):
 
 def test_a_view_is_neither_too_low_nor_too_high():
     east, north = (
-        View.of([(np.array([0.0, 10.0]), np.zeros(2))]),
-        View.of([(np.zeros(2), np.array([0.0, 10.0]))]),
+        PlanView.of([(np.array([0.0, 10.0]), np.zeros(2))]),
+        PlanView.of([(np.zeros(2), np.array([0.0, 10.0]))]),
     )
     assert east.height < north.height < 3.0
     assert (east.width, north.width) == (10.0, pytest.approx(10.0 / 0.62))

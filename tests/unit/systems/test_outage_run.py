@@ -12,8 +12,8 @@ from strapdown import rotation
 from strapdown.config.coast import CoastSpec
 from strapdown.config.spec import specify
 from strapdown.constants import DEG_PER_HOUR, MICRO_G
+from strapdown.dsp.chi_square import PLANE_95
 from strapdown.errors import ConfigError
-from strapdown.evaluation.plane_bound import PLANE_95
 from strapdown.frames import ned_from_geodetic
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown, run_mechanization

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import MAD_TO_SD
-from strapdown.dsp.running_integral import running_integral
+from strapdown.dsp.samples import running_integral
 from strapdown.errors import Finding
 from strapdown.formats.inference.conclusion import (
     Inference,
@@ -200,7 +200,7 @@ def infer_gyro(
 
 
 def _in_steps(gyro: Array, scale: float, written: tuple[float, float]) -> tuple[float, float]:
-    """Step of a common sensor that the rates are multiples of, and what it tells.
+    """Step of a common sensor that the rates are multiples of, and its log-likelihood ratio.
 
     `scale`: of their unit, rad/s. `written`: as of `_written_step`. Returns `step`, in that unit,
     zero if there is none; `gain`: of the probability of a unit in which there is one.
@@ -223,7 +223,7 @@ def _in_steps(gyro: Array, scale: float, written: tuple[float, float]) -> tuple[
             apart = np.diff(np.unique(np.round(k - np.angle(phase) / (2.0 * np.pi))))
             kept = abs(phase) > _IN_STEP and np.mean(apart == 1.0) > _NEIGHBORS
             spreads.append(spread if kept else 0.0)
-        # Every axis that moves has the step, and the finest spread tells most.
+        # Every axis that moves has the step, and the finest spread decides.
         if spreads and min(spreads) / _CHANCE > found[1]:
             found = (step, min(spreads) / _CHANCE)
     return found

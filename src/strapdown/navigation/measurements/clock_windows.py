@@ -38,7 +38,7 @@ AXLE = 10.0
 ARM = 2.0
 #: Samples are averaged to this rate, Hz: motions of a vehicle are slower.
 FAST = 20.0
-#: The way between two fixes shows a step of the receiver's clock to this part of it.
+#: The distance between two fixes shows a step of the receiver's clock to this fraction.
 AGREES = 0.3
 #: A window beyond so many standard deviations of the others has a fault of its own; a step of the
 #: clock is found from so many, from this size, s, and from so many windows on each side.
@@ -180,7 +180,7 @@ def window_offsets(
 
 
 def _thinned(imu: pd.DataFrame) -> pd.DataFrame:
-    """Means over as many samples as leave `FAST` of them a second."""
+    """Means over as many samples as leave `FAST` a second."""
     time = index_of(imu)
     each = max(1, int(1.0 / (FAST * float(np.median(np.diff(time))))))
     if each == 1:
@@ -252,8 +252,8 @@ def stamp_step(
     A receiver measures at whole multiples of an interval. Where its stamps do not go on with them,
     either its clock stepped, by the rest to one of these multiples, or it measured at another time.
     The way from the last fix before to the first one after, at the velocities before and after,
-    tells which multiple, or that the stamps are right. Its standard deviation is that of the same
-    difference in the rest of the record.
+    determines which multiple, or that the stamps are right. Its standard deviation is that of the
+    same difference in the rest of the record.
     """
     time = index_of(gnss)
     if len(time) < FEWEST:

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown._kernels import piecewise
-from strapdown.dsp.running_integral import running_integral
+from strapdown.dsp.samples import running_integral
 from strapdown.errors import DataError, Finding
 from strapdown.frames import place_difference
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY, VELOCITY_SD, usable
@@ -415,7 +415,7 @@ def _to_week(unix: Array) -> float:
 
 #: Range of the searched delays, s.
 GNSS_DELAY_LARGEST = 2.0
-#: Number of steps from fix to fix that are needed, and the longest of them, s: over a longer step
+#: Number of steps from fix to fix that are needed, and the longest, s: over a longer step
 #: the velocity is not representative.
 GNSS_DELAY_LEAST_STEPS, GNSS_DELAY_LONGEST_STEP = 20, 1.5
 #: Length of the segments over which positions and velocities are compared, s: long against their

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from strapdown.constants import MAD_TO_SD
-from strapdown.dsp.true_runs import true_runs
+from strapdown.dsp.samples import true_runs
 from strapdown.errors import DataError, Finding
 from strapdown.frames import ned_from_geodetic, place_difference, ways_between
 from strapdown.navigation.measurements.clock_windows import stamp_step, step_finding
@@ -90,7 +90,7 @@ def white_position_sd(table: pd.DataFrame, delay: float = 0.0) -> tuple[float, f
 
     By their steps less the mean of the velocities at both ends, or by their third differences. An
     error that lasts longer than some fixes is not in it; sudden motion is, so that it is an upper
-    bound. What is beyond `TRIM` standard deviations by the median is a fault and does not count.
+    bound. Innovations beyond `TRIM` standard deviations by the median are faults and do not count.
 
     Parameters
     ----------
@@ -180,8 +180,8 @@ def lasting_position_sd(table: pd.DataFrame, delay: float = 0.0) -> tuple[float,
     ``2 w² + 2 s² (1 - exp(-t / T)) + q t`` in variance: white errors w, lasting ones s and the
     noise of the velocities. Their stated noise q, or the scatter of velocities that state none, is
     subtracted, and w and s are fitted to lags from one fix to `LAGS`, without faulty pairs. The T
-    that fits best is one of `TIMES`: lags that short show little of it, and a longer one by a
-    smaller s.
+    that fits best is one of `TIMES`: so short lags show a longer one by a smaller s
+    only.
 
     Parameters
     ----------
@@ -454,7 +454,7 @@ def repeated_rows(table: pd.DataFrame) -> tuple[Flags, float]:
     -------
     rows : ndarray of bool, (n,)
     speed : float, m/s
-        Of the vehicle in the first of them; 0 without any.
+        Of the vehicle in the first; 0 without any.
     """
     sd, velocity_sd = values_of(table, POSITION_SD), values_of(table, VELOCITY_SD)
     placed, fast = usable(table, POSITION_SD), usable(table, VELOCITY_SD[:2])

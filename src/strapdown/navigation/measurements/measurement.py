@@ -118,7 +118,7 @@ class TabulatedMeasurement(Measurement):
 
     #: Columns that its table must have; a standard deviation may be an option of the same name.
     columns: ClassVar[tuple[str, ...]] = ()
-    #: Units of its columns, where their names do not tell them (`COLUMN_UNITS`).
+    #: Units of its columns, where their names do not state them (`COLUMN_UNITS`).
     units: ClassVar[Mapping[str, str]] = MappingProxyType({})
     #: Column from which the first one follows (`converted`), with its unit.
     instead: ClassVar[tuple[str, str] | None] = None

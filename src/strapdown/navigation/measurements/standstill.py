@@ -79,9 +79,9 @@ class StandstillAid(ImuDerivedMeasurement):
 
     The detector uses the samples of the `window` that ends at an epoch, and no later ones.
 
-    A vehicle that glides over a smooth road looks like a stationary one. So there is no
-    observation while the computed velocity is not near zero: above `largest_speed` by more than
-    `gate` standard deviations of the computed velocity along its direction.
+    A vehicle that glides over a smooth road looks like a stationary one. The update is
+    therefore not made while the computed velocity is not near zero: above `largest_speed` by more
+    than `gate` standard deviations of the computed velocity along its direction.
 
     Attributes
     ----------

@@ -13,11 +13,11 @@ from strapdown._kernels.sums import steady_motion
 from strapdown.errors import ConfigError, DataError
 from strapdown.estimation.error_model import RotationVectorModel
 from strapdown.estimation.sensor_blocks import accel_bias, accel_scale, gyro_bias, gyro_scale
+from strapdown.frames import antenna_motion
 from strapdown.mechanization import MECHANIZATIONS
 from strapdown.nav_state import NavState
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.measurement import View
-from strapdown.sensors.antenna import antenna_motion
 from strapdown.tables import POSITION_SD, VELOCITY_SD, gnss_table
 
 ARM = (1.2, -0.4, -0.9)

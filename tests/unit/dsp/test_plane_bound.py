@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from strapdown.evaluation.plane_bound import PLANE_95, plane_bound, plane_reach
+from strapdown.dsp.chi_square import PLANE_95, plane_bound, plane_reach
 
 
 def covariances(angles, long, short):
