@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats import csv, foot_mounted, parquet, read_raw
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, unrolled, with_clock
-from strapdown.formats.columns import CLOCKS, TIMES
-from strapdown.formats.quantity_columns import Quantity, find_quantities
+from strapdown.formats.quantity_columns import find_quantities
 from strapdown.formats.recording import RawLog
+from strapdown.formats.vocabularies import DATED, Quantity, Vocabulary, spread_of
 from strapdown.tables import NED, POSITION_SD
-from strapdown.units import ANGLES, GYRO_UNITS, LENGTHS, PRESSURES, SPEEDS, TIME_UNITS
+from strapdown.units import ANGLES, GYRO_UNITS, LENGTHS, OF_TABLES, PRESSURES, SPEEDS
 
 __all__ = [
     "POINT",
@@ -49,7 +49,6 @@ SYNONYMS: dict[str, tuple[str, ...]] = {
     "heading": ("yaw", "psi", "azimuth", "course", "hdg"),
 }
 _SD = "_sd"
-_SD_WORDS = ("sd", "std", "stddev", "stdev", "sigma")
 
 
 def read_aid_table(
@@ -75,9 +74,9 @@ def read_aid_table(
     """
     path = Path(path)
     raw = _raw(path)
-    known = {"time": Quantity((*TIMES, *CLOCKS, "utc", "datetime", "date"), TIME_UNITS)}
-    known |= {name: Quantity(_words(name), UNITS[unit]) for name, unit in columns.items()}
-    found = find_quantities(raw.columns, known, names or {}, raw.name, raw.units)
+    known = {name: Quantity(_words(name), UNITS[unit]) for name, unit in columns.items()}
+    vocabulary = Vocabulary({"time": DATED, **known}, OF_TABLES)
+    found = find_quantities(raw.columns, vocabulary, names or {}, raw.name, raw.units)
     missing = [q for q in ("time", *columns) if q not in found and q not in optional]
     if missing:
         needed = [q for q in ("time", *columns) if q not in optional]
@@ -164,10 +163,7 @@ def read_reference_path(path: str | Path) -> pd.DataFrame:
 
 def _words(name: str) -> tuple[str, ...]:
     if name.endswith(_SD):
-        of = _words(name.removesuffix(_SD))
-        return tuple(w + s for w in of for s in _SD_WORDS) + tuple(
-            s + w for w in of for s in _SD_WORDS
-        )
+        return spread_of(*_words(name.removesuffix(_SD)))
     return (name.lower().replace("_", ""), *SYNONYMS.get(name, ()))
 
 

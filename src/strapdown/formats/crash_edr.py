@@ -30,7 +30,7 @@ from strapdown.formats.crash_record import (
     unique,
 )
 from strapdown.formats.crash_samples import Clock, seconds_of
-from strapdown.formats.crash_table import MOST_REMARKS, NOTE, ChannelName, read_channel_name
+from strapdown.formats.crash_table import MOST_REMARKS, NOTE, ChannelName, channel_name
 from strapdown.units import FACTORS, OF_CRASHES, SPEEDS, TIME_UNITS, find_unit, unit_words
 
 __all__ = ["DELTA_V_RANGE", "KMH", "detect", "element_of", "read", "rounding"]
@@ -46,7 +46,7 @@ END_CHANGE, END_SPAN = 0.8 * KMH, 0.020
 LARGEST = 4_000_000
 
 # What a heading or a label names, in the order of search; None: delta-V or a sensor, by
-# `read_channel_name`. A pedal is no acceleration, and engine speed none of the vehicle.
+# `channel_name`. A pedal is no acceleration, and engine speed none of the vehicle.
 _ELEMENTS = (
     ("pedal", r"accelerator|pedal|throttle|fahrpedal|gaspedal|drosselklappe"),
     ("rpm", r"\brpm\b|engine speed|motordrehzahl|drehzahl|1/min|motor speed"),
@@ -94,7 +94,7 @@ def element_of(heading: str) -> str:
     angle``, ``belt``, ``event``, others of a vehicle, or empty: delta-V, a sensor, or unknown.
     """
     text = " ".join(_BRACKETS.sub(" ", heading).lower().replace("_", " ").split()).strip(" ,;:")
-    change = read_channel_name(heading).change
+    change = channel_name(heading).change
     return next((e for e, words in _ELEMENTS if not change and re.search(words, text)), "")
 
 
@@ -236,14 +236,14 @@ def _is_header(fields: list[str]) -> bool:
         return False
     times = [f for f in full if _is_time(f)]
     others = [f for f in full if f not in times]
-    told = (element_of(f) or read_channel_name(f).quantity not in ("other", "time") for f in others)
+    told = (element_of(f) or channel_name(f).quantity not in ("other", "time") for f in others)
     return bool(times) and any(told)
 
 
 def _is_time(heading: str) -> bool:
     if _MAXIMUM.search(heading) or element_of(heading):
         return False
-    return read_channel_name(heading).quantity == "time" or bool(
+    return channel_name(heading).quantity == "time" or bool(
         re.match(r"\s*(time|times|zeit|seconds|milliseconds)\b", heading, re.I)
     )
 
@@ -356,7 +356,7 @@ def _said(heading: str, unit: str) -> ChannelName:
     bare = _EVENT.sub(" ", _BRACKETS.sub(" ", heading))
     for words, instead in _SIGNS:
         bare = words.sub(instead, bare)
-    said = read_channel_name(bare, unit)
+    said = channel_name(bare, unit)
     known = find_unit(unit, OF_CRASHES) if unit else None
     if element_of(heading) or _MAXIMUM.search(heading) or said.quantity == "time":
         return ChannelName("other", "", known[1] if known else unit)
