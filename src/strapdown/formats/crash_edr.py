@@ -70,7 +70,6 @@ _OFF = (
 _BRACKETS = re.compile(r"[\[(]([^\[\]()]*)[\])]")
 # Both units in one cell: 31.1 [50.0].
 _BOTH = re.compile(r"\s*(\S+)\s*[\[(]\s*([^\])\s]+)\s*[\])]\s*")
-_NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
 # A label of the event that the following tables are of.
 _EVENT = re.compile(
     r"\b(?:event|ereignis)(?:[ _-]*(?:record|no\.?|number|nr\.?|#))?[ _:-]*(\d+)", re.I
@@ -232,7 +231,7 @@ def _fields(line: str, table: _Open | None) -> list[str]:
 
 def _is_header(fields: list[str]) -> bool:
     full = [f for f in fields if f]
-    if len(full) < 2 or any(_NUMBER.fullmatch(f) for f in full):
+    if len(full) < 2 or any(csv.NUMBER.fullmatch(f) for f in full):
         return False
     times = [f for f in full if _is_time(f)]
     others = [f for f in full if f not in times]
@@ -250,12 +249,12 @@ def _is_time(heading: str) -> bool:
 
 def _is_row(table: _Open, fields: list[str]) -> bool:
     at = next(k for k, n in enumerate(table.names) if _is_time(n))
-    return len(fields) > max(at, 1) and bool(_NUMBER.fullmatch(fields[at]))
+    return len(fields) > max(at, 1) and bool(csv.NUMBER.fullmatch(fields[at]))
 
 
 def _are_units(fields: list[str]) -> bool:
     known = [find_unit(f.strip("[](){} "), OF_CRASHES) is not None for f in fields if f]
-    return bool(known) and known[0] and not any(_NUMBER.fullmatch(f) for f in fields)
+    return bool(known) and known[0] and not any(csv.NUMBER.fullmatch(f) for f in fields)
 
 
 def _labelled(fields: list[str], event: int) -> int:
@@ -273,7 +272,7 @@ def _labelled(fields: list[str], event: int) -> int:
 
 def _number(cell: str) -> float:
     text = cell.strip().rstrip("%").strip()
-    if _NUMBER.fullmatch(text):
+    if csv.NUMBER.fullmatch(text):
         return float(text.replace(",", "."))
     return 1.0 if text.lower() in _ON else 0.0 if text.lower() in _OFF else math.nan
 
