@@ -115,7 +115,7 @@ def read_name(name: str, of: Vocabulary = LOGS, unit: str = "") -> ColumnName:
     `name`: as ``gyro_x_rad_s``, ``Gyroscope x (rad/s)``, ``wx``, ``acc_y [g]``, ``time_ms``,
     ``IMU1/X-axis angular rate``, ``gyro_1``; or ``gyro[0]``, the first of an array of three;
     ``gps_lat``, ``Lateral Delta-V (km/h)``. `of`: vocabulary of its file. `unit`: stated apart from
-    the name, as in a row of units; counts where the name has none.
+    the name, as in a row of units; counts where the name has none, and first in a crash record.
     """
     text, index = unicodedata.normalize("NFC", name).strip(), ""
     if of.sensors and (match := INDEXED.fullmatch(text)):
@@ -123,7 +123,9 @@ def read_name(name: str, of: Vocabulary = LOGS, unit: str = "") -> ColumnName:
     said = _of_format(text, index) if of.sensors else None
     if said is None:
         bare, bracket = split_brackets(text)
-        written = bracket if not unit or (bracket and find_unit(bracket, of.kinds)) else unit
+        # A recorder may write one heading, with both units, over two columns.
+        own = bracket if not of.stems and find_unit(bracket, of.kinds) else ""
+        written = own or unit or bracket
         said = _read(bare, bracket if of.stems else written, of)
         if index and said.quantity in TRIADS and int(index) < len(_AXES):
             said = replace(said, quantity=f"{said.quantity}_{_AXES[int(index)]}", number=None)

@@ -92,9 +92,10 @@ def test_headings_of_crash_records(name, quantity, axis, unit):
     assert (said.quantity, said.axis, said.unit) == (quantity, axis, unit)
 
 
-def test_a_unit_in_the_name_precedes_that_of_a_row():
-    said = read_name("acc x [g]", CRASHES, "deg/s")
-    assert (said.quantity, said.unit) == ("acceleration", "g")
+def test_a_unit_in_the_name_precedes_that_of_a_row_but_in_a_crash_record():
+    assert read_name("alt [ft]", FIXES, "m").unit == "ft"
+    said = read_name("Delta-V, longitudinal (MPH)", CRASHES, "km/h")
+    assert (said.quantity, said.unit) == ("velocity", "km/h")
     said = channel_name("acc x", "deg/s")
     assert (said.quantity, said.axis, said.unit) == ("rate", "x", "deg/s")
     assert said.contradiction
