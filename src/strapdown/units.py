@@ -37,6 +37,7 @@ __all__ = [
     "factor_of",
     "find_unit",
     "parse_unit",
+    "si_of",
     "unit_of",
     "unit_words",
 ]
@@ -255,6 +256,18 @@ def unit_of(text: str, among: Sequence[str] = OF_LOGS) -> str | None:
     """Parse the spelling of a unit (`find_unit`). Returns in the spelling of this package."""
     found = find_unit(text, among)
     return found[1] if found else None
+
+
+def si_of(text: str, among: Sequence[str] = OF_CRASHES) -> tuple[str, str, float] | None:
+    """Parse the spelling of a unit (`find_unit`): its quantity, its SI unit, and the factor to it.
+
+    None if the unit is not known.
+    """
+    found = find_unit(text, among)
+    if found is None:
+        return None
+    units = FACTORS[found[0]]
+    return found[0], next(u for u, factor in units.items() if factor == 1.0), units[found[1]]
 
 
 def unit_words(words: Sequence[str], among: Sequence[str] = OF_LOGS) -> tuple[list[str], str]:

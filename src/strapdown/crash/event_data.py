@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.record_parts import (
     Clock,
+    Heading,
     Part,
     Skipped,
     find_clock,
-    read_heading,
 )
 from strapdown.errors import DataError, Finding
 from strapdown.formats.crash_edr import KMH, element_of, rounding
@@ -177,7 +177,7 @@ def _stamps(record: CrashRecord, channel: CrashChannel) -> Array:
 def _clock(channel: CrashChannel) -> tuple[Clock, Array]:
     assert channel.samples is not None
     stamps = channel.samples()
-    heading = read_heading(channel.name)._replace(quantity="time", unit=channel.unit)
+    heading = Heading("time", "", channel.unit, "")
     clock, time = find_clock({channel.name: stamps}, {channel.name: heading})
     if time is None:
         raise DataError(

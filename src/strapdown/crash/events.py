@@ -15,6 +15,7 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.acceleration import Acceleration
 from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.tables.imu import SAMPLINGS
+from strapdown.units import SPEEDS
 
 # One event of a crash.
 
@@ -88,8 +89,7 @@ def two_sds(given: float | Sequence[float], name: str) -> tuple[float, float]:
 # Definition of an event: thresholds and windows of 49 CFR Part 563.
 
 
-#: km/h in m/s.
-KMH = 1.0 / 3.6
+KMH = SPEEDS["km/h"]
 
 ZERO_AT = ("interval", "threshold")
 

@@ -15,7 +15,7 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.aid_table import read_reference_path
 from strapdown.formats.clocks import EPOCH
-from strapdown.formats.columns import ABROAD, DIRECTIONS, TURNS, read_name, without_accents
+from strapdown.formats.columns import read_name, split_brackets, without_accents
 from strapdown.formats.crash_edr import KMH, rounding
 from strapdown.formats.crash_record import CrashChannel, CrashRecord, position_of
 from strapdown.formats.crash_samples import (
@@ -32,8 +32,9 @@ from strapdown.formats.inference.conclusion import (
     posterior,
 )
 from strapdown.formats.inference.rotation_rate import infer_gyro
+from strapdown.formats.vocabularies import AXIS_WORDS, CRASHES
 from strapdown.sensors.saturation import find_limits
-from strapdown.units import ACCEL_UNITS, FACTORS, GYRO_UNITS, OF_LOGS, SPEEDS, TIME_UNITS, unit_of
+from strapdown.units import ACCEL_UNITS, FACTORS, GYRO_UNITS, SPEEDS, TIME_UNITS, find_unit
 
 Array = NDArray[np.float64]
 Left = list[tuple[str, str]]
@@ -134,33 +135,7 @@ class Skipped:
         return f"{self.reason.sentence('file')}{row}"
 
 
-# Column headings, in several languages: words and beginnings of words.
-
-
-def _words(text: str) -> tuple[str, ...]:
-    return tuple(text.split())
-
-
-_TIME = (*ABROAD["time"], "stamp", "clock", "time")
-_COUNTER = _words("n nr no num number index idx sample count counter row")
-_OTHER = _words(
-    "temp tmp batt volt spannung druck press humid feucht mag magn kompass compass lat lon alt "
-    "satell status flag valid quality speed geschw vitesse brems brake throttle engine rpm "
-    "accelerator pedal gaspedal fahrpedal steer lenk belt abs stability"
-)
-_ACCEL = (*ABROAD["acceleration"], *_words("acc accel specificforce lowg highg gforce nd hd"))
-# Rotation words, also in compounds: Gierrate, Nickwinkel.
-_TURNS = {word: axis for turn, axis in TURNS.items() for word in (turn, *ABROAD[turn])}
-_RATE = (*ABROAD["gyroscope"], "winkelg", *_words("gyro gyr rate omega angular rot"), *_TURNS)
-_AXES = {
-    "x": ("x", *DIRECTIONS["x"], *_words("long forward fwd")),
-    "y": ("y", *DIRECTIONS["y"], *_words("right transv")),
-    "z": ("z", *DIRECTIONS["z"], *_words("vert down")),
-}
-_AXES = {a: (*known, *(t for t in _TURNS if _TURNS[t] == a)) for a, known in _AXES.items()}
-_NO_AXIS = ("hz", "khz", "mhz", "max", "idx", "index", "mux", "aux", "fix")
-_BRACKET = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]")
-_WORD = re.compile(r"[^\W\d_]+|\d+")
+# Triads of a table.
 
 
 class Heading(NamedTuple):
@@ -177,81 +152,6 @@ class Heading(NamedTuple):
     stem: str
     reversed: bool = False
 
-
-def read_heading(name: str) -> Heading:
-    """Parse a column heading, as ``Beschl. HD X [g]``, ``gyro_z_deg_s``, ``a2``, ``yaw rate``.
-
-    A single ``g`` with an axis means acceleration to some makers and gyro to others: only the axis
-    is returned.
-    """
-    named = read_name(name)
-    bracket = _BRACKET.search(name)
-    text = bracket.group(1).lower().replace(" ", "") if bracket else ""
-    unit = named.unit or (unit_of(text, (*OF_LOGS, "velocity")) or "" if bracket else "")
-    words = _WORD.findall(without_accents(_BRACKET.sub(" ", name).lower()))
-    quantity = axis = ""
-    if named.quantity == "time":
-        quantity = "time"
-    elif named.quantity is not None and not (named.loose and named.quantity.startswith("mag")):
-        # A lone b or m is a second accelerometer more often than a magnetometer.
-        triad, _, axis = named.quantity.partition("_")
-        quantity = {"accel": "acceleration", "gyro": "rate"}.get(triad, "other")
-        axis = axis if axis in ("x", "y", "z") else ""
-    stem = words
-    if words or axis:
-        by_word, stem = _axis(words)
-        axis = axis or by_word
-    joined = "".join(words)
-    if joined in ("gx", "gy", "gz"):
-        quantity = ""
-    if not quantity or quantity == "other":
-        quantity = _quantity(words, joined) or quantity
-    if unit in ("m/s2", "g", "mg") and quantity != "other":
-        quantity = "acceleration"
-    elif unit in ("rad/s", "deg/s", "mrad/s", "mdeg/s") and quantity != "other":
-        quantity = "rate"
-    elif unit in ("s", "ms", "us", "ns") and quantity not in ("other", "counter"):
-        quantity = "time"
-    if quantity not in ("", "acceleration", "rate", "velocity"):
-        axis = ""
-    return Heading(quantity, axis, unit, " ".join(stem))
-
-
-def _quantity(words: list[str], joined: str) -> str:
-    last = words[-1] if words else ""
-    if joined.startswith(("deltav", "dv")):
-        return "velocity"
-    if last in ("ax", "ay", "az"):
-        return "acceleration"
-    if last in ("wx", "wy", "wz"):
-        return "rate"
-    if any(word.startswith(_OTHER) for word in words):
-        return "other"
-    for kind, known in (("rate", _RATE), ("acceleration", _ACCEL)):
-        if any(word.startswith(k) if len(k) > 2 else word == k for word in words for k in known):
-            return kind
-    if any(word.startswith(_TIME) or word.endswith(_TIME) for word in words):
-        return "time"
-    return "counter" if joined in _COUNTER or last in _COUNTER else ""
-
-
-def _axis(words: list[str]) -> tuple[str, list[str]]:
-    """Axis of the last word that is one, or ends in one; and the other words."""
-    for k in range(len(words) - 1, -1, -1):
-        for axis, known in _AXES.items():
-            if words[k] in known:
-                return axis, words[:k] + words[k + 1 :]
-    for k in range(len(words) - 1, -1, -1):
-        word = words[k]
-        turn = next((t for t in _TURNS if word.startswith(t)), "")
-        if turn:
-            return _TURNS[turn], [*words[:k], word[len(turn) :], *words[k + 1 :]]
-        if 1 < len(word) <= 5 and word[-1] in _AXES and word not in _NO_AXIS:
-            return word[-1], [*words[:k], word[:-1], *words[k + 1 :]]
-    return "", words
-
-
-# Triads of a table.
 
 #: A crash of a tenth of a second, at the slowest useful rate.
 LEAST_SAMPLES = 8
@@ -359,8 +259,8 @@ def table_parts(path: str, record: CrashRecord) -> tuple[list[Part], list[Skippe
 def _of_vehicle(group: Group) -> str:
     """Why the axes of a group are the vehicle's: all headings name directions, not letters."""
     for axis, name in group.columns.items():
-        words = _WORD.findall(without_accents(_BRACKET.sub(" ", name).lower()))
-        known = tuple(word for word in _AXES[axis] if len(word) > 1 and word not in _TURNS)
+        words = re.findall(r"[^\W\d_]+", without_accents(split_brackets(name)[0].lower()))
+        known = tuple(w for w, of in AXIS_WORDS.items() if of.endswith(axis) and len(w) > 1)
         if not any(word.startswith(known) for word in words):
             return ""
     return "its headings name directions of the vehicle" if group.by_heading else ""
@@ -418,16 +318,17 @@ def _heading(channel: CrashChannel) -> Heading:
     """Meaning of a heading: the reader's where it finds a unit, else by other languages."""
     if _NUMBERED.fullmatch(channel.name) and not channel.unit:
         return Heading("", "", "", "")
-    own = read_heading(channel.name)
-    if channel.axis:
-        own = own._replace(axis=channel.axis.lstrip("-"), reversed=channel.axis.startswith("-"))
-    if channel.quantity in _KINDS and (channel.unit or not own.quantity):
-        # A lone g means acceleration to some makers, gyro to others.
-        if channel.unit or own.stem != "g":
-            own = own._replace(quantity=channel.quantity, unit=channel.unit)
+    said = read_name(channel.name, CRASHES)
+    unit = said.unit if said.unit and find_unit(said.unit, tuple(FACTORS)) else ""
+    quantity, axis = said.quantity or "", channel.axis or said.axis
+    if not quantity and unit in TIME_UNITS:
+        quantity = "time"
+    # A lone g means acceleration to some makers, gyro to others.
+    if channel.quantity in _KINDS and (channel.unit or (not quantity and said.family != "g")):
+        quantity, unit = channel.quantity, channel.unit
     elif channel.quantity in ("displacement", "force"):
-        own = own._replace(quantity="other")
-    return own
+        quantity = "other"
+    return Heading(quantity, axis.lstrip("-"), unit, said.family, axis.startswith("-"))
 
 
 def group_columns(

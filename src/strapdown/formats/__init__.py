@@ -71,12 +71,12 @@ from strapdown.formats import (
 )
 from strapdown.formats.assemble import assemble
 from strapdown.formats.binary import or_sentences
-from strapdown.formats.columns import BODY_RATES
 from strapdown.formats.find_columns import names_of_quantities
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.quantity_columns import names_of_fixes
 from strapdown.formats.recording import NoStreamError, RawLog, ReadOptions, Recording
 from strapdown.formats.signs import HEAD, Signs, first_bytes, state_of
+from strapdown.formats.vocabularies import BODY_RATES
 from strapdown.plugins import plugin, plugins
 
 _log = logging.getLogger("strapdown")

@@ -13,16 +13,18 @@ from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats import csv, foot_mounted, holds, open_stream, parquet, read_raw, reader_of
 from strapdown.formats.arrays import ticks_of
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, unrolled, with_clock
-from strapdown.formats.columns import CLOCKS, TIMES, parse_axes
-from strapdown.formats.quantity_columns import Quantity, find_quantities
+from strapdown.formats.columns import parse_axes
+from strapdown.formats.quantity_columns import find_quantities
 from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.triad_units import axes_matrix
+from strapdown.formats.vocabularies import DATED, Quantity, Vocabulary, spread_of
 from strapdown.tables import MAG, NED, POSITION_SD
 from strapdown.units import (
     ANGLES,
     GYRO_UNITS,
     LENGTHS,
     MAG_UNITS,
+    OF_TABLES,
     PRESSURES,
     SPEEDS,
     TIME_UNITS,
@@ -65,7 +67,6 @@ SYNONYMS: dict[str, tuple[str, ...]] = {
     "heading": ("yaw", "psi", "azimuth", "course", "hdg"),
 }
 _SD = "_sd"
-_SD_WORDS = ("sd", "std", "stddev", "stdev", "sigma")
 
 
 def read_aid_table(
@@ -98,10 +99,10 @@ def read_aid_table(
     wanted = {**columns, **dict([instead] if instead is not None else [])}
     units = {c: u for c, (_, u) in raw.stated.items() if u is not None}
     stated = {q: c for c, (q, _) in raw.stated.items() if q == "time" or q in wanted}
-    known = {"time": Quantity((*TIMES, *CLOCKS, "utc", "datetime", "date"), TIME_UNITS)}
-    known |= {name: Quantity(_words(name), UNITS[unit]) for name, unit in wanted.items()}
+    known = {name: Quantity(_words(name), UNITS[unit]) for name, unit in wanted.items()}
+    vocabulary = Vocabulary({"time": DATED, **known}, (*OF_TABLES, "magnetic field"))
     asked = {**stated, **(names or {})}
-    found = find_quantities(raw.columns, known, asked, raw.name, {**raw.units, **units})
+    found = find_quantities(raw.columns, vocabulary, asked, raw.name, {**raw.units, **units})
     if instead is not None:
         of = next(iter(columns))
         if of in found:
@@ -251,10 +252,7 @@ def read_reference_path(path: str | Path) -> pd.DataFrame:
 
 def _words(name: str) -> tuple[str, ...]:
     if name.endswith(_SD):
-        of = _words(name.removesuffix(_SD))
-        return tuple(w + s for w in of for s in _SD_WORDS) + tuple(
-            s + w for w in of for s in _SD_WORDS
-        )
+        return spread_of(*_words(name.removesuffix(_SD)))
     return (name.lower().replace("_", ""), *SYNONYMS.get(name, ()))
 
 

@@ -23,7 +23,7 @@ from strapdown.formats.clocks import (
     read_stamps,
     with_clock,
 )
-from strapdown.formats.columns import EULERS, QUATERNIONS, parse_axes, read_name
+from strapdown.formats.columns import parse_axes, read_name
 from strapdown.formats.find_columns import AXES, Column, find_columns, require_gyro
 from strapdown.formats.inference import Inference
 from strapdown.formats.join import join
@@ -47,6 +47,7 @@ from strapdown.formats.triad_units import (
     units_of_triads,
     values_of_triads,
 )
+from strapdown.formats.vocabularies import EULERS, QUATERNIONS
 from strapdown.tables import ACCEL, SAMPLINGS, attitude_table, find_gaps, imu_table
 from strapdown.units import TIME_UNITS, factor_of, parse_unit
 

@@ -1,144 +1,45 @@
-"""Quantity, axis and unit from the name of a column, a key, a data set or a variable."""
+"""What the name of a column says: quantity, axis, unit and sensor, by a vocabulary."""
 
 from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from strapdown.errors import ConfigError, check_choice
-from strapdown.units import find_unit, unit_of, unit_words
+from strapdown.formats.vocabularies import (
+    ABOUT,
+    ABROAD,
+    AXIS_WORDS,
+    BESIDE,
+    CHANGE,
+    CLOCKS,
+    COUNTERS,
+    DIRECTIONS,
+    LOGS,
+    MAGNETIC,
+    NAMED_BY_UNIT,
+    NO_AXIS,
+    NOISE,
+    OF_TIME,
+    PX4,
+    QUANTITIES,
+    RATES,
+    ROS,
+    SENSORS,
+    SHORT,
+    TRIADS,
+    TURN_STEMS,
+    TURNS,
+    WITHOUT_GRAVITY,
+    Vocabulary,
+)
+from strapdown.units import FACTORS, OF_LOGS, find_unit, unit_of, unit_words
 
-__all__ = [
-    "QUANTITIES",
-    "ColumnName",
-    "parse_axes",
-    "parse_column_option",
-    "read_name",
-    "split_brackets",
-]
+__all__ = ["ColumnName", "parse_axes", "parse_column_option", "read_name", "split_brackets"]
 
 
 _AXES = "xyz"
-#: Beginnings of German, French, Spanish, Italian and further words, without accents, by the English
-#: word that they stand for.
-ABROAD = {
-    english: tuple(stems.split())
-    for english, stems in {
-        "time": "zeit uhrzeit temps horodat tiempo tempo vrijeme vreme czas tijd",
-        "acceleration": "beschl aceler accelerazion accelerometr przysp ubrz versnell",
-        "gyroscope": "drehrate drehgeschw winkelgeschw giroscop gyroskop kreisel",
-        "magnetometer": "magnetfeld magnetometr",
-        "velocity": "geschwindigkeit vitesse velocidad velocita",
-        "angular": "angulaire angolar",
-        "linear": "linear lineaire lineal",
-        "without": "ohne sans senza",
-        "roll": "wank roulis alabeo rollio",
-        "pitch": "nick tangage cabeceo beccheggio",
-        "yaw": "gier lacet guinada imbardata",
-    }.items()
-}
-#: Words for the axes of a vehicle.
-DIRECTIONS = {
-    "x": ("longitudinal", "longit", "langs", "laengs", "longitudinale"),
-    "y": ("lateral", "quer", "laterale", "transversal"),
-    "z": ("vertical", "vertikal", "hoch", "verticale"),
-}
-# Names of a sensor without their axis: blanks, underscores and capitals do not count.
-_TRIAD_WORDS = {
-    "gyro": "gyro gyros gyr gyroscope gyroscopes imugyr imugyro angularvelocity angularvel angvel "
-    "velocityangular rotationvelocity velocityrotation "
-    "angularrate angularrates angrate angularspeed turnrate rot rotationrate rotrate omega rate "
-    "w g ω",
-    "accel": "accel acce acc accelerometer accelerometers accelerations acceleration accl "
-    "linearacceleration linacc linaccel lina gforce gf imuacc imuaccel specificforce a f",
-    "mag": "mag magn magnet magnetic magnetometer magnetometers magneticfield magfield field "
-    "imumag compass m b",
-}
-TRIADS = {triad: words.split() for triad, words in _TRIAD_WORDS.items()}
-# Names of columns that hold increments per sample.
-SUMMED = {
-    "gyro": ["dtheta", "deltatheta", "dangle", "deltaangle", "angleincrement", "dang"],
-    "accel": ["dv", "deltav", "dvel", "deltavel", "deltavelocity", "velocityincrement"],
-}
-#: Gravity by itself, as phones write it beside acceleration without it.
-_GRAVITY = ("gravity", "grav", "gvec")
-# Words that may accompany the name of a sensor, and repeat it or state how it is meant.
-_BESIDE = {
-    "gyro": {"angular", "rotation", "rotational", "rate", "rates", "velocity", "vel", "speed"},
-    "accel": {"acceleration", "linear", "lin", "user", "including", "gravity", "with", "without"},
-    "mag": {"magnetic", "field"},
-}
-_WITHOUT_GRAVITY = {"linear", "lin", "user", "without", "linacc", "linaccel", "linearacceleration"}
-_WITHOUT_GRAVITY |= {"lina", "lineara", "usera"}
-# A name that is a unit says the sensor: dps_x, uT_x. The letter g may be anything.
-_NAMED_BY_UNIT = {
-    **dict.fromkeys(("dps", "mdps", "rads", "degs"), "gyro"),
-    **dict.fromkeys(("mps2", "ms2"), "accel"),
-    **dict.fromkeys(("ut",), "mag"),
-}
-#: Axis of the body that a turn is about.
-TURNS = {"roll": "x", "pitch": "y", "yaw": "z"}
-_RATES = {"rate", "speed", "velocity", "vel", "dot", *TRIADS["gyro"]} - set("wgω")
-_TIME_WORDS = (
-    "time t ts timestamp timestamps timesec elapsed secondselapsed seconds sec tow sow gpssow "
-    "gpstow gpstime unixtime epoch stamp elapsedtime timeelapsed timesincestart sampletime "
-    "sensortime systemtime unixtimestamp datetime localtime utc utctime timeutc "
-    "zeit zeitstempel temps tiempo tempo"
-)
-TIMES = _TIME_WORDS.split()
-# Names of clocks that state their unit.
-CLOCKS = {
-    "seconds": "s",
-    "secs": "s",
-    "sec": "s",
-    "secondselapsed": "s",
-    "elapsedseconds": "s",
-    "millis": "ms",
-    "milliseconds": "ms",
-    "micros": "us",
-    "microseconds": "us",
-    "nanos": "ns",
-    "nanoseconds": "ns",
-    "ms": "ms",
-    "msec": "ms",
-    "us": "us",
-    "usec": "us",
-    "ns": "ns",
-    "nsec": "ns",
-}
-QUATERNIONS = {
-    "q_w": ["qw", "quatw", "quaternionw", "q0"],
-    "q_x": ["qx", "quatx", "quaternionx", "q1"],
-    "q_y": ["qy", "quaty", "quaterniony", "q2"],
-    "q_z": ["qz", "quatz", "quaternionz", "q3"],
-}
-EULERS = {
-    "roll": ["roll", "phi"],
-    "pitch": ["pitch", "theta"],
-    "heading": ["heading", "yaw", "psi"],
-}
-QUANTITIES = [
-    "time",
-    *(f"{triad}_{axis}" for triad in TRIADS for axis in _AXES),
-    *QUATERNIONS,
-    *EULERS,
-]
-
-#: Rates about forward, right and down in the notation of flight mechanics, if all three are there:
-#: a letter alone may be anything.
-BODY_RATES = {"rate_p": "gyro_x", "rate_q": "gyro_y", "rate_r": "gyro_z"}
-# Clocks of X-Plane's data output: of the simulated world and of all.
-_XPLANE = ("_totl,_time",)
-# G is also gravity.
-_MAGNETIC = {"g": "gauss", "mg": "mG"}
-# Arrays of PX4 (msg/SensorCombined.msg, SensorMag.msg), whose comments define their units.
-_PX4 = {
-    "gyro_rad": ("gyro", "rad/s"),
-    "accelerometer_m_s2": ("accel", "m/s2"),
-    "magnetometer_ga": ("mag", "gauss"),
-}
 #: A column of an array: its name and its number.
 INDEXED = re.compile(r"(.*)\[(\d+)\]")
 # Word to the axis of the body and its sign.
@@ -153,20 +54,13 @@ _DIRECTIONS = {
 }
 # Words of a name: split at signs, and where capitals begin or end.
 _HUMPS = re.compile(r"[A-Z]+(?![a-z])\d*|[A-Z]?[^\W\d_A-Z]+\d*|[°µ]+|\d+|²")
-_SIGNS = r"[\s_\-/:,;|]+"
-# Words that do not distinguish quantities.
-_NOISE = {
-    *("raw", "imu", "sensor", "sensors", "data", "body", "device", "phone", "watch", "motion"),
-    *("cal", "calib", "calibrated", "corrected", "meas", "measured", "value", "values", "axis"),
-    *("ins", "the", "of", "in", "de", "del", "di", "reading", "readings", "uncal", "uncalibrated"),
-}
-# Words of a quantity that is about another: its spread, its error, its demand.
-_ABOUT = {
-    *("bias", "offset", "scale", "cov", "covariance", "std", "stddev", "stdev", "sd", "sigma"),
-    *("var", "variance", "error", "err", "accuracy", "setpoint", "desired", "noise"),
-}
+_SIGNS = r"[\s_\-/:,;|.#]+"
 # Text in brackets at the end, which may hold brackets: (m/(s*s)).
 _BRACKETS = re.compile(r"[\[(]\s*((?:[^\[\]()]|\([^()]*\))*?)\s*[\])]\s*$")
+# Clocks of X-Plane's data output: of the simulated world and of all.
+_XPLANE = ("_totl,_time",)
+# Words and numbers of a heading, whose capitals may begin words.
+_WORD = re.compile(r"[^\W\d_]+|\d+")
 
 
 @dataclass(frozen=True)
@@ -176,12 +70,13 @@ class ColumnName:
     Attributes
     ----------
     quantity : str or None
-        One of `QUANTITIES`, or a triad's name where the column holds three numbers or the name ends
-        in a number; ``gravity_x``, ``rate_p``.
+        Of the vocabulary; of a sensor with its axis, ``gyro_x``, or a triad's name where the column
+        holds three numbers or the name ends in a number.
     unit : str or None
-        In the spelling of this package.
-    loose : bool
-        The quantity follows only without the words and the order of the name.
+        In the spelling of this package; as written where it is none of the vocabulary's.
+    loose : int
+        Evidence: 0 for a name that is known as it is, 1 behind a word such as ``gps_``, in another
+        order, or with an axis that is only likely, 2 if only some words are known.
     family : str
         Of a sensor: the name without its axis. Columns of one sensor share it. One letter may mean
         anything.
@@ -191,63 +86,52 @@ class ColumnName:
         The name says increments per sample.
     number : int or None
         At the end of the name of a triad: ``gyro_1``.
+    sign : float
+        -1 for the opposite of the quantity: a velocity up.
+    axis : str
+        In a crash record: ``x y z``, with a minus if the name states it, or empty.
+    change : bool
+        In a crash record: a velocity that is a change since time zero.
+    spoken : str
+        In a crash record: the quantity that the words say, where the unit is of another one.
     """
 
     quantity: str | None
     unit: str | None = None
-    loose: bool = False
+    loose: int = 0
     family: str = ""
     linear: bool = False
     increment: bool = False
     number: int | None = None
+    sign: float = 1.0
+    axis: str = ""
+    change: bool = False
+    spoken: str = ""
 
 
-def read_name(name: str) -> ColumnName:
+def read_name(name: str, of: Vocabulary = LOGS, unit: str = "") -> ColumnName:
     """Parse what the name of a column says.
 
     `name`: as ``gyro_x_rad_s``, ``Gyroscope x (rad/s)``, ``wx``, ``acc_y [g]``, ``time_ms``,
-    ``IMU1/X-axis angular rate``, ``gyro_1``; or ``gyro[0]``, the first of an array of three.
+    ``IMU1/X-axis angular rate``, ``gyro_1``; or ``gyro[0]``, the first of an array of three;
+    ``gps_lat``, ``Lateral Delta-V (km/h)``. `of`: vocabulary of its file. `unit`: stated apart from
+    the name, as in a row of units; counts where the name has none, and first in a crash record.
     """
     text, index = unicodedata.normalize("NFC", name).strip(), ""
-    if match := INDEXED.fullmatch(text):
+    if of.sensors and (match := INDEXED.fullmatch(text)):
         text, index = match.groups()
-    if text.startswith("field."):
-        return _ros_field(text)
-    if index and text in _PX4:
-        return _of_array(ColumnName(*_PX4[text], family=text), index)
-    bare, bracket = split_brackets(text)
-    unit = unit_of(bracket) if bracket else None
-    if unit is None:
-        bare, unit = _without_unit(bare)
-    said = ColumnName(None, unit)
-    if text.lower().strip() in _XPLANE:
-        return ColumnName("time", "s")
-    if unit and bare.lower().strip("_ ") == "sampletimefine":
-        return ColumnName("time", unit)  # without a unit it counts 0.1 ms
-    # In group/sub/name the last part decides, unless the whole is a known name.
-    parts = re.split(r"[/.]", bare)
-    if unit is None and len(parts) > 1 and parts[-1].lower() in tuple(_AXES):
-        # The unit of a sensor whose axes are members: gyro_dps.x.
-        parts[-2], unit = _without_unit(parts[-2])
-    if not any(word in _ABOUT for word in re.split(rf"[/.]|{_SIGNS}", bare.lower())):
-        for start in range(len(parts)):
-            said = _read_words(" ".join(parts[start:]), unit)
-            if said.quantity:
-                family = f"{' '.join(parts[:start]).lower()} {said.family}".strip()
-                said = replace(said, family=family if said.family else "")
-                break
-    quantity = said.quantity
-    kind = find_unit(said.unit) if said.unit else None
-    if str(quantity).startswith("mag") and said.unit in _MAGNETIC:
-        said = replace(said, unit=_MAGNETIC[said.unit])
-    elif quantity == "time" and (
-        (bracket and unit is None and bracket.lower() not in _OF_TIME)
-        or (kind and kind[0] != "time")
-    ):
-        return ColumnName(None, said.unit)
-    elif quantity in QUANTITIES[1:] and kind and kind[0] == "time":
-        return ColumnName(None, said.unit)  # gyro_x_min
-    return _of_array(said, index) if index else said
+    said = _of_format(text, index) if of.sensors else None
+    if said is None:
+        bare, bracket = split_brackets(text)
+        # A recorder may write one heading, with both units, over two columns.
+        own = bracket if not of.stems and find_unit(bracket, of.kinds) else ""
+        written = own or unit or bracket
+        said = _read(bare, bracket if of.stems else written, of)
+        if index and said.quantity in TRIADS and int(index) < len(_AXES):
+            said = replace(said, quantity=f"{said.quantity}_{_AXES[int(index)]}", number=None)
+    else:
+        bare, written = text, ""
+    return _of_heading(bare, written or unit, said, of) if of.stems else said
 
 
 def split_brackets(text: str) -> tuple[str, str]:
@@ -256,69 +140,120 @@ def split_brackets(text: str) -> tuple[str, str]:
     return (text[: bracket.start()], bracket.group(1)) if bracket else (text, "")
 
 
-def _of_array(said: ColumnName, index: str) -> ColumnName:
-    """Give a triad the axis of an element of an array of three."""
-    if said.quantity in TRIADS and int(index) < len(_AXES):
-        return replace(said, quantity=f"{said.quantity}_{_AXES[int(index)]}", number=None)
-    return said
+def _of_format(text: str, index: str) -> ColumnName | None:
+    """Read names whose format defines quantity and unit; None if it is none of them.
 
-
-def _ros_field(text: str) -> ColumnName:
-    """Read a name of ``rostopic echo -p``: fields of a message, which define their units.
-
-    ROS REP 103: SI units; stamps in ns.
+    PX4; X-Plane; fields of a message as of ``rostopic echo -p``, with stamps in ns.
     """
+    if index and text in PX4 and int(index) < len(_AXES):
+        triad, unit = PX4[text]
+        return ColumnName(f"{triad}_{_AXES[int(index)]}", unit, family=text)
+    if text.lower() in _XPLANE:
+        return ColumnName("time", "s")
+    if not text.startswith("field."):
+        return None
     if text == "field.header.stamp":
         return ColumnName("time", "ns")
     kind, _, axis = text.removeprefix("field.").partition(".")
-    triad = {"angular_velocity": "gyro", "linear_acceleration": "accel", "magnetic_field": "mag"}
-    units = {"gyro": "rad/s", "accel": "m/s2", "mag": "T"}
-    if kind in triad and axis in ("x", "y", "z"):
-        return ColumnName(f"{triad[kind]}_{axis}", units[triad[kind]], family=f"field.{kind}")
-    return ColumnName(None)
+    if kind not in ROS or axis not in tuple(_AXES):
+        return ColumnName(None)
+    triad, unit = ROS[kind]
+    return ColumnName(f"{triad}_{axis}", unit, family=f"field.{kind}")
 
 
-def _without_unit(text: str) -> tuple[str, str | None]:
+def _read(bare: str, written: str, of: Vocabulary) -> ColumnName:
+    """Read a name without its unit in brackets, which is `written`."""
+    unit = unit_of(written, of.kinds) if written else None
+    if not written or (unit is None and of.sensors):
+        bare, unit = _without_unit(bare, of)
+    said = ColumnName(None, unit)
+    if unit and bare.lower().strip("_ ") == "sampletimefine":
+        return ColumnName("time", unit)  # without a unit it counts 0.1 ms
+    # In group/sub/name the last part decides, unless the whole is a known name.
+    parts = re.split(r"[/.]", bare) if of.sensors else [bare]
+    if unit is None and len(parts) > 1 and parts[-1].lower() in tuple(_AXES):
+        # The unit of a sensor whose axes are members: gyro_dps.x.
+        parts[-2], unit = _without_unit(parts[-2], of)
+    about = any(word in ABOUT for word in re.split(_SIGNS, bare.lower()))
+    if not (about and of.sensors):
+        for start in range(len(parts)):
+            said = _read_words(" ".join(parts[start:]), unit, of, about)
+            if said.quantity:
+                family = f"{' '.join(parts[:start]).lower()} {said.family}".strip()
+                said = replace(said, family=family if said.family else "")
+                break
+    quantity = said.quantity
+    kind = find_unit(said.unit) if said.unit else None
+    if str(quantity).startswith("mag") and said.unit in MAGNETIC:
+        return replace(said, unit=MAGNETIC[said.unit])
+    if quantity == "time" and (
+        (written and unit is None and written.lower() not in OF_TIME)
+        or (kind and kind[0] != "time")
+    ):
+        said = replace(said, quantity=None if of.sensors else quantity)
+    elif of.sensors and quantity in QUANTITIES[1:] and kind and kind[0] == "time":
+        return ColumnName(None, said.unit)  # gyro_x_min
+    if written and unit is None and not of.sensors and written.lower() not in OF_TIME:
+        said = replace(said, unit=re.sub(r"\s+", "", written.strip("[]() ").lower()))
+    return said
+
+
+def _without_unit(text: str, of: Vocabulary) -> tuple[str, str | None]:
     """Split a unit off the end of a name, the longest first: ``acc x m/s/s``, ``P,rad/s``."""
-    whole = "".join(re.split(_SIGNS, text.lower()))
-    if whole in TIMES or whole in CLOCKS:
+    if "".join(re.split(_SIGNS, text.lower())) in (LOGS if of.sensors else of).index:
         return text, None
     for sign in re.finditer(_SIGNS, text):
-        if sign.start() and (unit := unit_of(text[sign.end() :])):
+        rest = text[sign.end() :]
+        # A letter, or "in", is a unit of a crash record in brackets alone.
+        kinds = OF_LOGS if of.stems and len(rest) < 3 else of.kinds
+        member = of.sensors and sign[0] == "."
+        if sign.start() and not member and (unit := unit_of(rest, kinds)):
             return re.sub(r"\s+in$", "", text[: sign.start()]), unit
     return text, None
 
 
-def _read_words(text: str, unit: str | None) -> ColumnName:
+def _read_words(text: str, unit: str | None, of: Vocabulary, about: bool) -> ColumnName:
     word = "".join(re.split(_SIGNS, text.lower()))
-    if (said := _known(word)) and not said.loose:
+    if (said := _known(word, of)) and not said.loose:
         return replace(said, unit=unit or said.unit)
+    rest = word
+    while of.before is not None and (match := of.before.match(rest)):
+        rest = rest[match.end() :]
+        if said := _known(rest, of):
+            return replace(said, unit=unit or said.unit, loose=1)
     # Names in capitals without separators (latDeg), in another order (x_gyro), with words that say
     # nothing of the quantity (raw_acceleration_x), or twice the same (gyroRotationRateX).
     words = [e for w in _HUMPS.findall(text) for e in _english(w.lower())]
     if unit is None:
-        words, its = unit_words(words)
+        words, its = unit_words(words, OF_LOGS if of.stems else of.kinds)
         unit = its or None
+    if not of.sensors:
+        whole = "".join(words)
+        said = None if about or len(whole) < 3 else _known(whole, of)
+        if said is None:
+            clock = "time" in of.quantities and _is_clock(words)
+            return ColumnName("time" if clock else None, unit, loose=2)
+        return replace(said, unit=unit or said.unit, loose=2)
     bare = [part for w in words if not _is_model(w) for part in re.findall(r"\D+|\d+", w)]
-    bare = [w for w in bare if w not in _NOISE]
+    bare = [w for w in bare if w not in NOISE]
     axes = [k for k, w in enumerate(bare) if w in _AXES]
     if not axes and any(w in TRIADS["accel"] for w in bare):
         bare = [next((a for a, known in DIRECTIONS.items() if w in known), w) for w in bare]
         axes = [k for k, w in enumerate(bare) if w in _AXES]
     if len(axes) == 1:
         bare.append(bare.pop(axes[0]))
-    said = _known("".join(bare)) or _of_words(bare)
-    said = said or _known("".join(w for w in bare if not w.isdecimal()))
+    said = _known("".join(bare), of) or _of_words(bare)
+    said = said or _known("".join(w for w in bare if not w.isdecimal()), of)
     if said is None:
         return ColumnName(None, unit)
     if said.family and said.number is None:
         # All words but the axis, so that two sensors are two families.
         axis = str(said.quantity)[-1]
-        rest = [w for w in words if w != axis and w not in TURNS]
-        family = "".join(rest) if len(rest) < len(words) else said.family
+        other = [w for w in words if w != axis and w not in TURNS]
+        family = "".join(other) if len(other) < len(words) else said.family
         family = f"of {family}" if words[:1] == [axis] else family
         said = replace(said, family=f"{family}#" if len(family) < 2 else family)
-    return replace(said, unit=unit or said.unit, loose=True)
+    return replace(said, unit=unit or said.unit, loose=2)
 
 
 def _english(word: str) -> list[str]:
@@ -341,31 +276,34 @@ def without_accents(text: str) -> str:
 def _is_model(word: str) -> bool:
     """Whether a word of letters and digits names a unit or a chip: BMI160, imu1."""
     letters = word.rstrip("0123456789")
-    return 0 < len(letters) < len(word) and not any(letters in names for names, _, _ in _NAMES)
+    return 0 < len(letters) < len(word) and not any(letters in names for names, _, _ in SENSORS)
 
 
-def _known(word: str) -> ColumnName | None:
+def _known(word: str, of: Vocabulary) -> ColumnName | None:
     """Read a name without blanks and signs, in lower case."""
-    if f"rate_{word}" in BODY_RATES:
-        return ColumnName(f"rate_{word}", family="p")
-    if word in TIMES or word in CLOCKS:
-        return ColumnName("time", CLOCKS.get(word))
-    for quantity, known in {**QUATERNIONS, **EULERS}.items():
-        if word in known:
-            return ColumnName(quantity)
+    # Names of sensors in a crash record are those in a log.
+    exact = (LOGS if of.sensors else of).index.get(word)
+    if exact is not None:
+        quantity, sign = exact
+        unit = CLOCKS.get(word) if quantity == "time" else None
+        return ColumnName(
+            quantity, unit, sign=sign, family="p" if quantity.startswith("rate_") else ""
+        )
+    if not of.sensors:
+        return None
     sensor, axis = word[:-1], word[-1:]
     if axis not in _AXES:
         sensor, axis = (word[1:], word[:1]) if word[:1] in _AXES and len(word) > 2 else (word, "")
     turned = word[:1] == axis
-    for names, triad, increment in _NAMES:
+    for names, triad, increment in SENSORS:
         if sensor in names and (axis or len(sensor) > 1):
             quantity = f"{triad}_{axis}" if axis and axis in _AXES else triad
             return ColumnName(
                 quantity,
-                unit_of(sensor) if sensor in _NAMED_BY_UNIT else None,
-                loose=turned,
+                unit_of(sensor) if sensor in NAMED_BY_UNIT else None,
+                loose=int(turned),
                 family=f"of {sensor}" if turned else sensor,
-                linear=sensor in _WITHOUT_GRAVITY,
+                linear=sensor in WITHOUT_GRAVITY,
                 increment=increment,
             )
         # A name that ends in x, y or z without meaning an axis.
@@ -374,60 +312,130 @@ def _known(word: str) -> ColumnName | None:
     return None
 
 
-_NAMES: tuple[tuple[Sequence[str], str, bool], ...] = (
-    *((names, triad, False) for triad, names in TRIADS.items()),
-    *((names, triad, True) for triad, names in SUMMED.items()),
-    *(((unit,), triad, False) for unit, triad in _NAMED_BY_UNIT.items()),
-    (_GRAVITY, "gravity", False),
-)
-
-
 def _of_words(words: list[str]) -> ColumnName | None:
     """Read the words of a name together: sensors with words beside them, turns, numbers."""
     turn = [w for w in words if w in TURNS]
     rest = [w for w in words if w not in TURNS]
-    if len(turn) == 1 and rest and ("".join(rest) in _RATES or set(rest) <= _RATES):
+    if len(turn) == 1 and rest and ("".join(rest) in RATES or set(rest) <= RATES):
         return ColumnName(f"gyro_{TURNS[turn[0]]}", family="".join(rest))
     axis = words[-1] if words and words[-1] in _AXES else ""
     number = words[-1] if words and words[-1].isdecimal() else ""
     bare = [w for w in (words[:-1] if axis or number else words) if not w.isdecimal()]
-    for triad, beside in _BESIDE.items():
+    for triad, beside in BESIDE.items():
         named = [w for w in bare if w in TRIADS[triad] and len(w) > 2]
         known = "".join(bare) in TRIADS[triad]
-        known = known or (bool(axis) and bare == [_SHORT[triad]])
+        known = known or (bool(axis) and bare == [SHORT[triad]])
         if not (known or (named and set(bare) <= {*named, *beside})):
             continue
         return ColumnName(
             f"{triad}_{axis}" if axis else triad,
             family="".join(bare),
-            linear=bool(_WITHOUT_GRAVITY & {*bare, "".join(bare)}),
+            linear=bool(WITHOUT_GRAVITY & {*bare, "".join(bare)}),
             number=int(number) if number and len(number) == 1 else None,
         )
-    clock = {"time", "timestamp", "timestamps", "stamp"} & set(words) and set(words) <= _OF_TIME
-    if clock or words == ["date"]:
-        return ColumnName("time")
-    return None
+    return ColumnName("time") if _is_clock(words) else None
 
 
-# Names that are parts of words, unless their axis is written apart: MaX, but not max.
-_SHORT = {"gyro": "gy", "accel": "ac", "mag": "ma"}
-# Words of the name of a clock.
-_OF_TIME = {
-    *("time", "timestamp", "timestamps", "stamp", "unix", "epoch", "utc", "gps", "system"),
-    *(
-        "gmt",
-        "sample",
-        "logging",
-        "elapsed",
-        "since",
-        "start",
-        "boot",
-        "reboot",
-        "local",
-        "ros",
-        "header",
-    ),
-}
+def _is_clock(words: list[str]) -> bool:
+    clock = {"time", "timestamp", "timestamps", "stamp"} & set(words) and set(words) <= OF_TIME
+    return bool(clock) or words == ["date"]
+
+
+def _of_heading(text: str, written: str, said: ColumnName, of: Vocabulary) -> ColumnName:
+    """Read the heading of a crash record: the unit decides, then the words.
+
+    `said`: what it says as the name of a sensor.
+    """
+    text = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text)  # accX: a capital begins a word
+    words = _WORD.findall(without_accents(text.lower()))
+    known = find_unit(written or said.unit or "", of.kinds)
+    unit = known[1] if known else written or None
+    change = CHANGE.search(" ".join(words)) is not None
+    triad = str(said.quantity).partition("_")[0]
+    if said.quantity == "time" and not (known and known[0] != "time") and (known or not written):
+        return ColumnName("time", unit)
+    if {"speed", "speeds"} & set(words) and triad not in of.sensors:
+        return ColumnName("other", unit)
+    # For phone makers gx is of a gyro, for makers of crash recorders an acceleration in g.
+    either = "".join(words) in ("gx", "gy", "gz")
+    exact = (q for q, k in of.quantities.items() if any(w in k.words for w in words))
+    spoken = "velocity" if change else "" if either else of.sensors.get(triad) or next(exact, "")
+    spoken = "time" if said.quantity == "time" else spoken
+    by_stems, loose = ("", 0) if either else _by_stems(words, said, of)
+    quantity: str | None = spoken or by_stems or None
+    if by_stems == "other" and spoken != "time" and not (change or triad in of.sensors):
+        quantity = "other"  # gyro temp
+    loose = 0 if spoken or known else loose
+    if known and known[0] == "time":
+        quantity = None if by_stems in ("", "time") and not spoken else "other"
+        quantity = "time" if "time" in words and not change else quantity
+    elif known:
+        quantity = known[0]
+    elif not spoken and written and find_unit(written, tuple(FACTORS)):
+        quantity = "other"
+    axis, sure, family = _axis(words, quantity, said)
+    return ColumnName(
+        quantity,
+        unit,
+        loose or int(not sure),
+        family,
+        axis=axis,
+        change=change and quantity == "velocity",
+        spoken=spoken if known and quantity not in (spoken, "other", None) else "",
+    )
+
+
+def _by_stems(words: list[str], said: ColumnName, of: Vocabulary) -> tuple[str, int]:
+    """Return the quantity by beginnings of words, of several languages, and how loosely."""
+    for quantity, stems in of.stems.items():
+        long = tuple(s for s in stems if len(s) > 2)
+        for word in words:
+            if word.startswith(long):
+                # A beginning of some letters is one of other words, too: accuracy.
+                sure = word.startswith(tuple({s for s in stems if len(s) > 4} - TURN_STEMS.keys()))
+                return quantity, 0 if quantity == "other" or (sure and quantity != "time") else 2
+            if word in stems or (quantity == "time" and word.endswith(long)):
+                return quantity, 2
+    if words and {words[-1], "".join(words)} & set(COUNTERS):
+        return "counter", 0
+    # A lone b or m is a second accelerometer more often than a magnetometer.
+    mag = str(said.quantity).startswith("mag") and said.loose
+    return ("other", 0) if said.quantity and not mag else ("", 0)
+
+
+def _axis(words: list[str], quantity: str | None, said: ColumnName) -> tuple[str, bool, str]:
+    """Return the axis, whether it is sure, and the other words: what columns of a triad share."""
+    axes = {AXIS_WORDS[w]: k for k, w in enumerate(words) if w in AXIS_WORDS}
+    at = max((k for k, w in enumerate(words) if w in {*AXIS_WORDS, *TURN_STEMS}), default=-1)
+    turned = next((k for k, w in enumerate(words) if w.startswith(tuple(TURN_STEMS))), -1)
+    ends = [
+        k for k, w in enumerate(words) if w[-1] in _AXES and 1 < len(w) < 4 and w not in NO_AXIS
+    ]
+    rest, loosely = list(words), ""
+    if at >= 0:
+        del rest[at]
+    elif turned >= 0:
+        stem = next(s for s in TURN_STEMS if words[turned].startswith(s))
+        loosely, rest[turned] = TURN_STEMS[stem], words[turned][len(stem) :]
+    elif ends:
+        loosely, rest[ends[-1]] = words[ends[-1]][-1], words[ends[-1]][:-1]
+    turn = next((TURNS[w] for w in words if w in TURNS), "") if quantity == "rate" else ""
+    triad = str(said.quantity)[-1] if str(said.quantity)[-2:] in ("_x", "_y", "_z") else ""
+    sensors = {w[-1] for w in words if w[-1] in _AXES and any(w[:-1] in n for n in _NAMED)}
+    if turn or triad:
+        axis = turn or triad
+    elif quantity == "other" or (quantity is None and {*words} & {*_AXES}):
+        axis = next((w for w in words if w in tuple(_AXES)), "")
+    elif axes or len(sensors) == 1:
+        axis = next(iter(axes or sensors)) if len(axes or sensors) == 1 else ""
+    else:
+        axis = loosely or (TURN_STEMS[words[at]] if at >= 0 and quantity != "time" else "")
+        return axis, not axis, " ".join(rest)
+    return axis, True, " ".join(rest)
+
+
+#: Names of sensors of more than a letter.
+_NAMED = [[n for n in names if len(n) > 1] for names in TRIADS.values()]
 
 
 def parse_column_option(items: list[str]) -> dict[str, str]:

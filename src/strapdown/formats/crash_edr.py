@@ -30,7 +30,7 @@ from strapdown.formats.crash_record import (
     unique,
 )
 from strapdown.formats.crash_samples import Clock, seconds_of
-from strapdown.formats.crash_table import MOST_REMARKS, NOTE, ChannelName, read_channel_name
+from strapdown.formats.crash_table import MOST_REMARKS, NOTE, ChannelName, channel_name
 from strapdown.units import FACTORS, OF_CRASHES, SPEEDS, TIME_UNITS, find_unit, unit_words
 
 __all__ = ["DELTA_V_RANGE", "KMH", "detect", "element_of", "read", "rounding"]
@@ -46,7 +46,7 @@ END_CHANGE, END_SPAN = 0.8 * KMH, 0.020
 LARGEST = 4_000_000
 
 # Elements that a heading or a label names, in the order of search; None: delta-V or a sensor, by
-# `read_channel_name`. The position of a pedal is not an acceleration, and the engine's speed is not
+# `channel_name`. The position of a pedal is not an acceleration, and the engine's speed is not
 # the vehicle's.
 _ELEMENTS = (
     ("pedal", r"accelerator|pedal|throttle|fahrpedal|gaspedal|drosselklappe"),
@@ -71,7 +71,6 @@ _OFF = (
 _BRACKETS = re.compile(r"[\[(]([^\[\]()]*)[\])]")
 # Both units in one cell: 31.1 [50.0].
 _BOTH = re.compile(r"\s*(\S+)\s*[\[(]\s*([^\])\s]+)\s*[\])]\s*")
-_NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
 # A label of the event that the following tables are of.
 _EVENT = re.compile(
     r"\b(?:event|ereignis)(?:[ _-]*(?:record|no\.?|number|nr\.?|#))?[ _:-]*(\d+)", re.I
@@ -95,7 +94,7 @@ def element_of(heading: str) -> str:
     angle``, ``belt``, ``event``, others of a vehicle, or empty: delta-V, a sensor, or unknown.
     """
     text = " ".join(_BRACKETS.sub(" ", heading).lower().replace("_", " ").split()).strip(" ,;:")
-    change = read_channel_name(heading).change
+    change = channel_name(heading).change
     return next((e for e, words in _ELEMENTS if not change and re.search(words, text)), "")
 
 
@@ -233,30 +232,30 @@ def _fields(line: str, table: _Open | None) -> list[str]:
 
 def _is_header(fields: list[str]) -> bool:
     full = [f for f in fields if f]
-    if len(full) < 2 or any(_NUMBER.fullmatch(f) for f in full):
+    if len(full) < 2 or any(csv.NUMBER.fullmatch(f) for f in full):
         return False
     times = [f for f in full if _is_time(f)]
     others = [f for f in full if f not in times]
-    told = (element_of(f) or read_channel_name(f).quantity not in ("other", "time") for f in others)
+    told = (element_of(f) or channel_name(f).quantity not in ("other", "time") for f in others)
     return bool(times) and any(told)
 
 
 def _is_time(heading: str) -> bool:
     if _MAXIMUM.search(heading) or element_of(heading):
         return False
-    return read_channel_name(heading).quantity == "time" or bool(
+    return channel_name(heading).quantity == "time" or bool(
         re.match(r"\s*(time|times|zeit|seconds|milliseconds)\b", heading, re.I)
     )
 
 
 def _is_row(table: _Open, fields: list[str]) -> bool:
     at = next(k for k, n in enumerate(table.names) if _is_time(n))
-    return len(fields) > max(at, 1) and bool(_NUMBER.fullmatch(fields[at]))
+    return len(fields) > max(at, 1) and bool(csv.NUMBER.fullmatch(fields[at]))
 
 
 def _are_units(fields: list[str]) -> bool:
     known = [find_unit(f.strip("[](){} "), OF_CRASHES) is not None for f in fields if f]
-    return bool(known) and known[0] and not any(_NUMBER.fullmatch(f) for f in fields)
+    return bool(known) and known[0] and not any(csv.NUMBER.fullmatch(f) for f in fields)
 
 
 def _labelled(fields: list[str], event: int) -> int:
@@ -274,7 +273,7 @@ def _labelled(fields: list[str], event: int) -> int:
 
 def _number(cell: str) -> float:
     text = cell.strip().rstrip("%").strip()
-    if _NUMBER.fullmatch(text):
+    if csv.NUMBER.fullmatch(text):
         return float(text.replace(",", "."))
     return 1.0 if text.lower() in _ON else 0.0 if text.lower() in _OFF else math.nan
 
@@ -357,7 +356,7 @@ def _said(heading: str, unit: str) -> ChannelName:
     bare = _EVENT.sub(" ", _BRACKETS.sub(" ", heading))
     for words, instead in _SIGNS:
         bare = words.sub(instead, bare)
-    said = read_channel_name(bare, unit)
+    said = channel_name(bare, unit)
     known = find_unit(unit, OF_CRASHES) if unit else None
     if element_of(heading) or _MAXIMUM.search(heading) or said.quantity == "time":
         return ChannelName("other", "", known[1] if known else unit)

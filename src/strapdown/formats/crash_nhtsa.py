@@ -18,39 +18,23 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats.crash_record import (
     DEFORMS,
     LONGEST_NAME,
+    QUANTITIES,
     CrashChannel,
     CrashRecord,
     clean,
     compact,
     position_of,
 )
-from strapdown.formats.nhtsa import UNITS, Channel, CrashTest, Vehicle, read_nhtsa
+from strapdown.formats.nhtsa import KINDS, Channel, CrashTest, Vehicle, read_nhtsa
 from strapdown.formats.signs import Signs
 from strapdown.tables import imu_table
+from strapdown.units import find_unit, si_of
 
 __all__ = ["accelerations", "code_of_place", "detect", "imu_of", "read"]
 
 
 Array = NDArray[np.float64]
 
-# SI unit to quantity; moments and others are "other".
-_QUANTITY = {
-    "m/s2": "acceleration",
-    "rad/s": "rate",
-    "m/s": "velocity",
-    "m": "displacement",
-    "N": "force",
-}
-# In the spelling of this package, where it has one.
-_SPELLED = {"G'S": "g", "G": "g", "M/S2": "m/s2", "DPS": "deg/s", "DEG/SEC": "deg/s"} | {
-    "RAD/S": "rad/s",
-    "NWT": "N",
-    "N": "N",
-    "NWM": "N*m",
-    "NM": "N*m",
-    "MM": "mm",
-    "KPH": "km/h",
-}
 _CODES = tomllib.loads(Path(__file__).with_name("nhtsa_codes.toml").read_text(encoding="utf-8"))
 _SEATS, _OCCUPANT, _MOVING = (_CODES[table] for table in ("seats", "occupant", "moving"))
 #: Parts of the structure by their codes: in words, and which crash pushes them in, if any.
@@ -274,16 +258,16 @@ _DUMMIES = {("H3", "50"): "H3", ("H3", "05"): "HF", ("H3", "95"): "HM", ("TH", "
 
 def _channel(channel: Channel, at: _Point, dummy: str) -> CrashChannel:
     assert channel.path is not None
-    unit = channel.unit.upper()
-    si, factor = UNITS.get(unit, ("", 1.0))
+    known = find_unit(channel.unit, KINDS)
+    quantity, _, factor = si_of(channel.unit, KINDS) or ("other", "", 1.0)
     axis = channel.axis[:1].lower()
     hz = channel.prefilter_hz
     low_pass = "" if math.isnan(hz) else f"{hz:g} Hz before the sampler"
     return CrashChannel(
         name=str(channel.number),
-        quantity=_QUANTITY.get(si, "other"),
+        quantity=quantity if quantity in QUANTITIES else "other",
         axis=axis if axis in ("x", "y", "z") else "",
-        unit=_SPELLED.get(unit, clean(channel.unit, LONGEST_NAME)),
+        unit=known[1] if known else clean(channel.unit, LONGEST_NAME),
         load=_loader(channel),
         sampling="instantaneous",
         place=at.place,
@@ -338,7 +322,7 @@ def _remarks(channel: Channel) -> list[str]:
 def _loader(channel: Channel) -> Callable[[], tuple[Array, Array]]:
     def load() -> tuple[Array, Array]:
         time, values = channel.recorded
-        factor = UNITS.get(channel.unit.upper(), ("", 1.0))[1]
+        *_, factor = si_of(channel.unit, KINDS) or ("", 1.0)
         return time, values * factor
 
     return load

@@ -17,10 +17,11 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.arrays import numbers, ticks_of
-from strapdown.formats.columns import INDEXED, TRIADS, TURNS, read_name, split_brackets
+from strapdown.formats.columns import read_name
 from strapdown.formats.crash_record import (
     CHANGE_NOTE,
     LONGEST_NAME,
+    QUANTITIES,
     CrashChannel,
     CrashRecord,
     attributes_of,
@@ -31,14 +32,15 @@ from strapdown.formats.crash_record import (
 from strapdown.formats.crash_samples import ONE_STEP, Clock, seconds_of
 from strapdown.formats.dates import day_nanoseconds
 from strapdown.formats.recording import RawLog
+from strapdown.formats.vocabularies import CRASHES
 from strapdown.units import FACTORS, OF_CRASHES, find_unit
 
 __all__ = [
     "NOTE",
     "ChannelName",
+    "channel_name",
     "notes_of",
     "read",
-    "read_channel_name",
     "read_text_table",
     "record_of",
     "write_crash_csv",
@@ -56,6 +58,31 @@ EVEN = 0.01
 # of 50 ms gains less.
 SMALL = 0.2
 _OF_TRIAD = {"gyro": "rate", "accel": "acceleration", "mag": "other"}
+
+
+@dataclass(frozen=True)
+class ChannelName:
+    """Content of a column name.
+
+    Attributes
+    ----------
+    quantity : str
+        A key of `crash_record.QUANTITIES`.
+    axis : str
+        ``x y z``, with a minus if the name states it, or empty.
+    unit : str
+        In the spelling of this package, as in the name if unknown, or empty.
+    change : bool
+        For a velocity: the name states a change since time zero.
+    contradiction : str
+        Part of the name that contradicts the unit, or empty.
+    """
+
+    quantity: str
+    axis: str = ""
+    unit: str = ""
+    change: bool = False
+    contradiction: str = ""
 
 
 def read(path: Path) -> CrashRecord:
@@ -167,7 +194,24 @@ def _said(raw: RawLog, source: str) -> ChannelName:
             return ChannelName(_OF_TRIAD[triad], axis, unit or "")
     if raw.columns[source].dtype.kind == "M":
         return ChannelName("time", "", "ns")
-    return read_channel_name(source, raw.units.get(source, ""))
+    return channel_name(source, raw.units.get(source, ""))
+
+
+def channel_name(name: str, unit: str = "") -> ChannelName:
+    """Read the name of a column as far as it is sure. `unit`: of a row of units under the names."""
+    said = read_name(name, CRASHES, unit)
+    known = said.quantity in QUANTITIES and said.loose < 2
+    known = known and not (said.unit and find_unit(said.unit, OF_CRASHES) is None)
+    # Words such as left and normal are axes beside a quantity alone.
+    plain = known or said.axis in re.findall(r"[a-z]+", name.lower())
+    against = f"its name says {said.spoken}, and its unit is one of {said.quantity}"
+    return ChannelName(
+        str(said.quantity) if known else "other",
+        said.axis if plain and not said.loose else "",
+        said.unit or "",
+        said.change,
+        against if said.spoken else "",
+    )
 
 
 def _noted(note: Mapping[str, Any]) -> ChannelName:
@@ -327,153 +371,6 @@ def _stamps(raw: RawLog, clock: str, stated: str) -> Callable[[], Array]:
         return seconds_of(Clock(clock, stamps, unit, raw.name, raw.row))[0]
 
     return read
-
-
-# Names of columns in a crash record: quantity, axis and unit.
-#
-# Recorders in vehicles name their columns in words (``Longitudinal Delta-V (MPH)``), loggers in
-# letters (``ax [g]``). Longitudinal is positive forward, lateral from left to right, vertical down
-# (SAE J1698, SAE J211).
-
-
-_AXIS = {
-    "x": "x",
-    "longitudinal": "x",
-    "long": "x",
-    "longi": "x",
-    "forward": "x",
-    "fwd": "x",
-    "y": "y",
-    "lateral": "y",
-    "lat": "y",
-    "right": "y",
-    "transverse": "y",
-    "z": "z",
-    "vertical": "z",
-    "vert": "z",
-    "down": "z",
-    "normal": "z",
-}
-# Axes opposite to ours.
-_REVERSED = {"backward": "-x", "rearward": "-x", "left": "-y", "up": "-z"}
-_WORDS = {
-    "acceleration": ("acceleration", "accel", "acc", "accelerations", "accelerometer"),
-    "rate": ("rate", "gyro", "gyr", "gyroscope", "angular"),
-    "velocity": ("velocity", "vel", "deltav", "dv", "deltavelocity"),
-    "displacement": ("displacement", "crush"),
-    "force": ("force", "load"),
-}
-# For phone makers a gyro, for makers of crash recorders an acceleration in g.
-_EITHER = ("gx", "gy", "gz")
-_CRASH_NAMES_OF_TRIAD = {"accel": "acceleration", "gyro": "rate"}
-_TRIAD_NAMES = {name: triad for triad, names in TRIADS.items() for name in names if len(name) > 1}
-
-
-@dataclass(frozen=True)
-class ChannelName:
-    """Content of a column name.
-
-    Attributes
-    ----------
-    quantity : str
-        A key of `crash_record.QUANTITIES`.
-    axis : str
-        ``x y z``, with a minus if the name states it, or empty.
-    unit : str
-        In the spelling of this package, as in the name if unknown, or empty.
-    change : bool
-        For a velocity: the name states a change since time zero.
-    contradiction : str
-        Part of the name that contradicts the unit, or empty.
-    """
-
-    quantity: str
-    axis: str = ""
-    unit: str = ""
-    change: bool = False
-    contradiction: str = ""
-
-
-def read_channel_name(name: str, unit: str = "") -> ChannelName:
-    """Parse quantity, axis and unit from a column's name.
-
-    `name`: as ``ax [g]``, ``Gyr_X (deg/s)``, ``Lateral Delta-V (km/h)``, ``Yaw rate``. `unit`: unit
-    from a row of units under the header. Returns the quantity follows from the unit; without a
-    unit, from the words.
-    """
-    said = read_name(name)
-    text, bracket = split_brackets(name.strip())
-    unit = unit or bracket
-    known = find_unit(unit, OF_CRASHES) if unit else None
-    if not unit and said.unit:
-        known = find_unit(said.unit, OF_CRASHES)
-    words = _words(text)
-    change = _says_change(words)
-    spoken = _quantity(words, said.quantity, change)
-    if spoken == "time" and (known is None or known[0] == "time") and (known or not unit):
-        return ChannelName("time", "", known[1] if known else "")
-    written = known[1] if known else unit
-    if "speed" in words or "speeds" in words:
-        return ChannelName("other", "", written)
-    quantity = known[0] if known else spoken if spoken != "time" and not unit else "other"
-    if quantity == "time":
-        stamps = "time" in words and not change
-        return ChannelName("time" if stamps or spoken == "time" else "other", "", written)
-    against = ""
-    if known and spoken not in ("other", quantity):
-        against = f"its name says {spoken}, and its unit is one of {quantity}"
-    axis = _axis(words, quantity, said.quantity)
-    return ChannelName(quantity, axis, written, change and quantity == "velocity", against)
-
-
-def _words(text: str) -> list[str]:
-    text = INDEXED.sub(r"\1", text)
-    # accX, GyroY: a capital after a small letter begins a word.
-    text = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", text)
-    return [w for w in re.split(r"[^a-z0-9]+", text.lower()) if w]
-
-
-def _says_change(words: list[str]) -> bool:
-    joined = " ".join(words)
-    return bool(
-        re.search(
-            r"\b(delta ?v|dv|delta velocity|delta vel|velocity change|geschwindigkeits"
-            r"|change (in|of) velocity|cumulative velocity)",
-            joined,
-        )
-    )
-
-
-def _quantity(words: list[str], triad: str | None, change: bool) -> str:
-    if triad == "time":
-        return "time"
-    if change:
-        return "velocity"
-    if "".join(words) in _EITHER:
-        return "other"
-    base = str(triad).partition("_")[0]
-    if base in _CRASH_NAMES_OF_TRIAD:
-        return _CRASH_NAMES_OF_TRIAD[base]
-    for quantity, known in _WORDS.items():
-        if any(w in known for w in words):
-            return quantity
-    return "other"
-
-
-def _axis(words: list[str], quantity: str, triad: str | None) -> str:
-    if quantity == "rate":
-        for word, axis in TURNS.items():
-            if word in words:
-                return axis
-    if triad and triad[-2:] in ("_x", "_y", "_z"):
-        return triad[-1]
-    if quantity == "other":
-        return next((w for w in words if w in ("x", "y", "z")), "")
-    found = {(_AXIS | _REVERSED)[w] for w in words if w in _AXIS or w in _REVERSED}
-    if not found:
-        # accx, gyroz: a known word with its axis at the end.
-        found = {w[-1] for w in words if w[-1] in "xyz" and w[:-1] in _TRIAD_NAMES}
-    return found.pop() if len(found) == 1 else ""
 
 
 # Text tables exported by recorders: a title above the header, and a row of units under it.

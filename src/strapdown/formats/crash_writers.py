@@ -34,7 +34,7 @@ from strapdown.formats.mme_reader import (
     even_stamps,
 )
 from strapdown.tables import ACCEL, EULER, GYRO, NED, POSITION_SD, VELOCITY
-from strapdown.units import GYRO_UNITS
+from strapdown.units import GYRO_UNITS, si_of
 
 __all__ = [
     "ACCEL_HEADINGS",
@@ -394,7 +394,7 @@ def write_nhtsa(
         grounded = not channel.vehicle and channel.body != "vehicle"
         vehicle = 0 if grounded else objects[channel.vehicle]
         rows.append(_ev5_channel(channel, number, vehicle, time, values))
-        factor = nhtsa.UNITS.get(_EV5_KINDS[channel.quantity][1], ("", 1.0))[1]
+        *_, factor = si_of(_EV5_KINDS[channel.quantity][1]) or ("", 1.0)
         written = (-values if channel.axis.startswith("-") else values) / factor
         pairs = zip(time.tolist(), written.tolist(), strict=True)
         text = "".join(f"{_number(t)}\t{_number(v)}\n" for t, v in pairs)
@@ -467,7 +467,7 @@ def _ev5_channel(
             body=channel.body,
         )
     kind, unit = _EV5_KINDS[channel.quantity]
-    factor = nhtsa.UNITS.get(unit, ("", 1.0))[1]
+    *_, factor = si_of(unit) or ("", 1.0)
     axis = channel.axis.lstrip("-").upper()
     status = next((r.split()[1].strip(",") for r in channel.remarks if _STATUS.match(r)), "AM")
     numbers = {

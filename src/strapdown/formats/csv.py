@@ -33,7 +33,9 @@ SUFFIXES = (".csv", ".txt", ".tsv", ".dat")
 COMMENTS = ("#", "%", "//", "!")
 _MARKS = "#%/;!"
 _SEPARATOR = re.compile(r"sep=.?", re.I)
-_NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?|[+-]?nan|[+-]?inf(inity)?", re.I)
+#: A number, with a point or a comma.
+NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
+_NUMBER = re.compile(rf"{NUMBER.pattern}|[+-]?nan|[+-]?inf(inity)?", re.I)
 # Numbers with a decimal comma, separated by blanks.
 _COMMAS = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?(\s+[+-]?\d+(,\d+)?([eE][+-]?\d+)?)+")
 _UNIT = re.compile(r"\s*[\[(].*")

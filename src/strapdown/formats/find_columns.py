@@ -10,15 +10,9 @@ from typing import NoReturn
 import numpy as np
 
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.formats.columns import (
-    BODY_RATES,
-    INDEXED,
-    QUANTITIES,
-    TRIADS,
-    ColumnName,
-    read_name,
-)
+from strapdown.formats.columns import INDEXED, ColumnName, read_name
 from strapdown.formats.recording import Questions, RawLog, ReadOptions
+from strapdown.formats.vocabularies import BODY_RATES, QUANTITIES, ROS, TRIADS
 from strapdown.units import ACCEL_UNITS, GYRO_UNITS, unit_of
 
 AXES = "xyz"
@@ -307,9 +301,7 @@ def _unit_of(raw: RawLog, column: str) -> str | None:
     return read_name(column).unit or _ros_unit(raw, column)
 
 
-#: Fields of sensor_msgs/Imu and sensor_msgs/MagneticField, which define their units (ROS REP 103).
-ROS_FIELD = re.compile(r"(.*(angular_velocity|linear_acceleration|magnetic_field))[./][xyz]")
-ROS_UNITS = {"angular_velocity": "rad/s", "linear_acceleration": "m/s2", "magnetic_field": "T"}
+ROS_FIELD = re.compile(rf"(.*({'|'.join(ROS)}))[./][xyz]")
 
 
 def _ros_unit(raw: RawLog, column: str) -> str | None:
@@ -317,7 +309,7 @@ def _ros_unit(raw: RawLog, column: str) -> str | None:
     field = ROS_FIELD.fullmatch(column)
     if field is None or not any(n.startswith(f"{field[1]}_covariance") for n in raw.columns):
         return None
-    return ROS_UNITS[field[2]]
+    return ROS[field[2]][1]
 
 
 def _members(quantity: str) -> list[str]:

@@ -25,9 +25,10 @@ from strapdown.formats.gnss_fixes import (
     table_of_fixes,
 )
 from strapdown.formats.gnss_pos import QUALITY
-from strapdown.formats.quantity_columns import FIX_QUANTITIES, Found, fix_columns
+from strapdown.formats.quantity_columns import Found, fix_columns
 from strapdown.formats.recording import RawLog
 from strapdown.formats.trajectory_readers import EARTH
+from strapdown.formats.vocabularies import FIXES
 from strapdown.frames import geodetic_from_ecef, geodetic_from_ned
 from strapdown.tables.checks import POSITION_SD, VELOCITY, VELOCITY_SD
 from strapdown.units import OF_TABLES, SPEEDS, TIME_UNITS, unit_of
@@ -113,7 +114,7 @@ def _in_units(raw: RawLog, found: dict[str, Found], units: Mapping[str, str]) ->
             raise ConfigError(
                 "io.unit-of-missing-column", file=raw.name, quantity="units", of_what=quantity
             )
-        known = FIX_QUANTITIES[quantity].units
+        known = FIXES.quantities[quantity].units
         spelled = unit_of(unit, OF_TABLES) or unit
         check_choice("io.unknown-unit", known, quantity=f"units {quantity}", unit=spelled)
         sign = -1.0 if found[quantity].factor < 0.0 else 1.0

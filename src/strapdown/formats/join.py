@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.arrays import numbers, ticks_of
-from strapdown.formats.columns import QUANTITIES
 from strapdown.formats.find_columns import Column, find_columns
 from strapdown.formats.recording import RawLog, ReadOptions
+from strapdown.formats.vocabularies import QUANTITIES
 from strapdown.tables import find_gaps
 from strapdown.units import TIME_UNITS
 

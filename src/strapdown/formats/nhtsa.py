@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.formats.crash_record import header_of
-from strapdown.units import ACCEL_UNITS, GYRO_UNITS
+from strapdown.units import FACTORS, SPEEDS, TIME_UNITS, find_unit, si_of
 
 __all__ = ["Channel", "CrashTest", "Vehicle", "read_nhtsa"]
 
@@ -406,24 +406,9 @@ def row_error(file: Path, line: int, section: str, found: int, needed: int) -> D
     )
 
 
-KMH = 1.0 / 3.6
-#: Units of the database, with the SI unit and the factor. Only unambiguous units are listed;
-#: others are refused when their channel is read.
-UNITS: dict[str, tuple[str, float]] = {
-    "G'S": ("m/s2", ACCEL_UNITS["g"]),
-    "G": ("m/s2", ACCEL_UNITS["g"]),
-    "M/S2": ("m/s2", 1.0),
-    "DPS": ("rad/s", GYRO_UNITS["deg/s"]),
-    "DEG/SEC": ("rad/s", GYRO_UNITS["deg/s"]),
-    "RAD/S": ("rad/s", 1.0),
-    "NWT": ("N", 1.0),
-    "N": ("N", 1.0),
-    "NWM": ("N*m", 1.0),
-    "NM": ("N*m", 1.0),
-    "MM": ("m", 1e-3),
-    "KPH": ("m/s", KMH),
-}
-TIMES: dict[str, float] = {"SEC": 1.0, "MSEC": 1e-3}
+KMH = SPEEDS["km/h"]
+#: Quantities of the channels that are read; others, such as volts, are refused on reading.
+KINDS = ("acceleration", "rate", "force", "moment", "velocity", "displacement")
 # Stamps have six decimals: two steps may differ by 1 µs.
 STAMP_ROUNDING = 1.1e-6  # s
 # Limit of a row of two numbers; a far larger file does not match its header.
@@ -551,22 +536,24 @@ class Channel:
                 quantity=f"channel {self.number}",
                 name=self.name,
             )
-        if self.time_unit not in TIMES:
+        known = find_unit(self.time_unit, ("time",))
+        if known is None:
             raise DataError(
                 "io.time-unit-not-known",
                 file=self.path.name,
                 quantity="time",
                 time_unit=self.time_unit,
                 word=self.time_unit,
-                known=TIMES,
+                known=TIME_UNITS,
             )
         pairs = _read_pairs(self)
-        time = pairs[:, 0] * TIMES[self.time_unit]
+        time = pairs[:, 0] * TIME_UNITS[known[1]]
         _check_time(self, time)
         return time, pairs[:, 1].copy()
 
     def _si(self) -> tuple[str, float]:
-        if self.unit.upper() not in UNITS:
+        found = si_of(self.unit, KINDS)
+        if found is None:
             raise DataError(
                 "io.unit-not-known",
                 file=self.path.name if self.path else None,
@@ -574,9 +561,9 @@ class Channel:
                 unit=self.unit,
                 name=self.name,
                 word=self.unit.upper(),
-                known=UNITS,
+                known=[u.upper() for k in KINDS for u in FACTORS[k]],
             )
-        return UNITS[self.unit.upper()]
+        return found[1:]
 
 
 def _read_pairs(channel: Channel) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:

@@ -25,6 +25,7 @@ from strapdown.formats.binary import Quantities, damage, solution
 from strapdown.formats.clocks import GPS, WEEK, Clock
 from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.signs import Signs, first_bytes
+from strapdown.units import LENGTHS
 
 TITLE = "NovAtel OEM binary log"
 SYNCS = (b"\xaa\x44\x12", b"\xaa\x44\x13")
@@ -39,7 +40,7 @@ QUALITY = {16: 1, 53: 1, 17: 2, 18: 2, 52: 2, 54: 2, 19: 6, 1: 7, 2: 7}
 QUALITY |= dict.fromkeys((48, 49, 50, 51, 56), 4) | dict.fromkeys((32, 33, 34, 55), 5)
 QUALITY |= dict.fromkeys((68, 69, 70, 73, 74, 77, 78, 79, 80), 2)
 FUSED = (19, 51, 52, 53, 54, 55, 56, 73, 74, 79, 80)
-FOOT, G = 0.3048, STANDARD_GRAVITY
+FOOT, G = LENGTHS["ft"], STANDARD_GRAVITY
 # Radians and m/s of a count by the type of the unit; some counts are rates, at the unit's Hz.
 _HG = (2.0**-33, 2.0**-27 * FOOT)
 _KVH, _FSAS = 0.1 / (3600.0 * 256.0), float(np.radians(0.1 / 256.0 / 3600.0))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
@@ -12,41 +11,14 @@ from numpy.typing import NDArray
 from strapdown.errors import ConfigError, DataError, StrapdownError, check_choice
 from strapdown.formats.arrays import numbers, ticks_of
 from strapdown.formats.clocks import clock_of_name
-from strapdown.formats.columns import CLOCKS, TIMES, split_brackets
+from strapdown.formats.columns import ColumnName, read_name
 from strapdown.formats.recording import RawLog
-from strapdown.units import ANGLES, LENGTHS, OF_TABLES, SPEEDS, TIME_UNITS, unit_of, unit_words
+from strapdown.formats.vocabularies import FIXES, Quantity, Vocabulary
 
-__all__ = [
-    "FIX_QUANTITIES",
-    "GEODETIC_QUANTITIES",
-    "Found",
-    "Quantity",
-    "find_quantities",
-    "fix_columns",
-    "names_of_fixes",
-]
+__all__ = ["Found", "find_quantities", "fix_columns", "names_of_fixes"]
 
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Quantity:
-    """A quantity that a table may hold.
-
-    Attributes
-    ----------
-    words : tuple of str
-        Names without blanks, underscores and units, in lower case.
-    units : dict of str to float
-        Its units, each with its factor to that of the table; empty if dimensionless.
-    negative : tuple of str
-        Further words, for the opposite sign: ``velup`` for a velocity down.
-    """
-
-    words: tuple[str, ...]
-    units: Mapping[str, float]
-    negative: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -88,23 +60,20 @@ class Found:
 
 def find_quantities(
     names: Iterable[str],
-    known: Mapping[str, Quantity],
+    of: Vocabulary,
     asked: Mapping[str, str],
     file: str,
     units: Mapping[str, str] | None = None,
-    of: str = "this table",
-    before: re.Pattern[str] | None = None,
 ) -> dict[str, Found]:
     """Find the column of each quantity.
 
-    `names`: as in the file. `asked`: quantity to the name of its column, or its number, from 1;
-    overrides what the names suggest. `file`: for messages. `units`: column to unit, if stated apart
-    from the name. `of`: object that the quantities describe, for messages. `before`: words that may
-    precede the name of a quantity that has no column otherwise. Returns quantities that were
-    not found are absent. ConfigError: a requested column does not exist, or its quantity is
-    unknown. DataError: two columns fit one quantity, or a unit does not fit its quantity.
+    `names`: as in the file. `of`: vocabulary of the file. `asked`: quantity to the name of its
+    column, or its number, from 1; overrides what the names suggest. `file`: for messages. `units`:
+    column to unit, if stated apart from the name. Returns quantities that were not found are
+    absent. ConfigError: a requested column does not exist, or its quantity is unknown. DataError:
+    two columns fit one quantity, or a unit does not fit its quantity.
     """
-    columns = list(names)
+    columns, known = list(names), of.quantities
     wanted: dict[str, str] = {}
     for quantity, name in asked.items():
         if quantity not in known:
@@ -112,7 +81,7 @@ def find_quantities(
                 "io.unknown-quantity-of-table",
                 quantity="columns",
                 of_what=quantity,
-                of=of,
+                of=of.of,
                 word=quantity,
                 known=known,
             )
@@ -123,62 +92,41 @@ def find_quantities(
         )
         wanted[name] = quantity
     found: dict[str, Found] = {}
-    read = {name: read_words(name, known) for name in columns}
-    there = {_quantity_of(word, known) for word, _ in read.values()}
-    for name in columns:
-        word, unit = read[name]
-        unit = unit or ((units or {}).get(name, "").strip("[]() ").lower() or None)
-        said = _quantity_of(word, known)
-        while said is None and before is not None and (match := before.match(word)):
-            word = word[match.end() :]
-            said = _quantity_of(word, known)
-            said = None if said in there else said
-        meant = wanted.get(name, said)
-        if meant is None or (name not in wanted and meant in asked):
-            continue
-        sign = -1.0 if word in known[meant].negative else 1.0
-        factor = sign * _factor(meant, known[meant], unit, word, name, file)
-        if meant in found:
-            raise DataError(
-                "io.column-names-ambiguous",
-                file=file,
-                quantity=meant,
-                source=found[meant].source,
-                name=name,
-                meant=meant,
-            )
-        found[meant] = Found(name, factor, bool(unit))
+    read = {name: read_name(name, of, (units or {}).get(name, "")) for name in columns}
+    for evidence in range(3):
+        there = set(found) | set(asked)
+        for name, said in read.items():
+            meant = wanted.get(name) if evidence == 0 else None
+            if name not in wanted and said.loose == evidence and said.quantity not in there:
+                meant = said.quantity
+            if meant is None or (evidence == 2 and not _is_plain(name, read, known)):
+                continue
+            sign = said.sign if said.quantity == meant else 1.0
+            factor = sign * _factor(meant, known[meant], said.unit, name, file)
+            if meant in found:
+                raise DataError(
+                    "io.column-names-ambiguous",
+                    file=file,
+                    quantity=meant,
+                    source=found[meant].source,
+                    name=name,
+                    meant=meant,
+                )
+            found[meant] = Found(name, factor, bool(said.unit))
     return found
 
 
-def _quantity_of(word: str, known: Mapping[str, Quantity]) -> str | None:
-    return next((q for q, k in known.items() if word in k.words or word in k.negative), None)
+def _is_plain(name: str, read: Mapping[str, ColumnName], known: Mapping[str, Quantity]) -> bool:
+    """Whether a name of which only words are known is alone with them, and its unit fits."""
+    said = read[name]
+    alone = [n for n, other in read.items() if (other.quantity, other.loose) == (said.quantity, 2)]
+    return len(alone) == 1 and (not said.unit or said.unit in known[str(said.quantity)].units)
 
 
-def read_words(name: str, known: Mapping[str, Quantity]) -> tuple[str, str | None]:
-    """Split a name into its word without blanks, and its unit as spelled, or None.
-
-    `known`: a name that is a word as a whole has no unit: ``h``, ``s``.
-    """
-    text, bracket = split_brackets(name.strip())
-    words = [w for w in re.split(r"[\s_\-/:.#]+", text.lower()) if w]
-    if bracket:
-        return "".join(words), re.sub(r"\s+", "", bracket.lower())
-    whole = "".join(words)
-    if any(whole in k.words or whole in k.negative for k in known.values()):
-        return whole, None
-    bare, its = unit_words(words, OF_TABLES)
-    return "".join(bare), its or None
-
-
-def _factor(
-    quantity: str, known: Quantity, unit: str | None, word: str, name: str, file: str
-) -> float:
+def _factor(quantity: str, known: Quantity, unit: str | None, name: str, file: str) -> float:
     if unit is None:
-        # The word millis of a clock states its unit.
-        return known.units[CLOCKS[word]] if word in CLOCKS and CLOCKS[word] in known.units else 1.0
-    spelled = unit_of(unit, OF_TABLES) or unit
-    if spelled not in known.units:
+        return 1.0
+    if unit not in known.units:
         raise DataError(
             "io.unit-of-other-quantity",
             file=file,
@@ -187,177 +135,27 @@ def _factor(
             name=name,
             units=", ".join(known.units) or "none",
         )
-    return known.units[spelled]
-
-
-# Column names of positions and velocities in tables of fixes and of trajectories.
-
-
-_HEADS = ("v", "vel", "velocity", "speed")
-
-
-def _velocities(letter: str, word: str) -> tuple[str, ...]:
-    return tuple(h + e for h in _HEADS for e in (letter, word)) + tuple(word + h for h in _HEADS)
-
-
-#: Degrees, meters over the ellipsoid, meters per second; velocity up is negative velocity down.
-GEODETIC_QUANTITIES: dict[str, Quantity] = {
-    "lat": Quantity(("lat", "latitude"), ANGLES),
-    "lon": Quantity(("lon", "lng", "long", "longitude"), ANGLES),
-    "alt": Quantity(
-        (
-            "alt",
-            "altitude",
-            "h",
-            "hgt",
-            "height",
-            "hell",
-            "altell",
-            "heightell",
-            "ellipsoidalheight",
-            "heightellipsoid",
-            "altitudeellipsoid",
-        ),
-        LENGTHS,
-    ),
-    "VN": Quantity(_velocities("n", "north"), SPEEDS),
-    "VE": Quantity(_velocities("e", "east"), SPEEDS),
-    "VD": Quantity(_velocities("d", "down"), SPEEDS, _velocities("u", "up")),
-}
-
-
-# Column names of fixes.
-
-
-#: Words before the names of a fix among other columns, as in ``gps_lat``, ``location.latitude``.
-_OF_FIXES = re.compile(r"(?:gps|gnss|navsat|location|loc|position|pos|coords|fix)(?=..)")
-_SD_HEADS = ("sd", "std", "stddev", "stdev", "sigma", "s")
-
-
-def _sds(*words: str) -> tuple[str, ...]:
-    """List names of a standard deviation, with the word for it before or after the quantity."""
-    return tuple(h + w for h in _SD_HEADS for w in words) + tuple(
-        w + h for h in _SD_HEADS[:-1] for w in words
-    )
-
-
-#: Quantities of a table of fixes, with their possible names.
-FIX_QUANTITIES: dict[str, Quantity] = {
-    "time": Quantity(
-        (*TIMES, *CLOCKS, "gpssecondsofweek", "secondsofweek", "utc", "datetime", "date"),
-        TIME_UNITS,
-    ),
-    "week": Quantity(("week", "gpsweek", "weeknumber", "wn"), {}),
-    **GEODETIC_QUANTITIES,
-    "alt_msl": Quantity(
-        (
-            "hmsl",
-            "altmsl",
-            "altitudemsl",
-            "heightmsl",
-            "mslaltitude",
-            "mslheight",
-            "orthometricheight",
-        ),
-        LENGTHS,
-    ),
-    "geoid": Quantity(
-        ("geoid", "undulation", "geoidsep", "geoidseparation", "geoidheight", "geoidundulation"),
-        LENGTHS,
-    ),
-    "alt_take_off": Quantity(
-        (
-            "relalt",
-            "relativealt",
-            "relativealtitude",
-            "heightabovetakeoff",
-            "altitudeabovetakeoff",
-            "heighttakeoff",
-        ),
-        LENGTHS,
-    ),
-    # Of formats that do not say whether it is over the ellipsoid or over the sea.
-    "alt_unstated": Quantity((), LENGTHS),
-    "north": Quantity(("north", "posn", "positionnorth", "northposition"), LENGTHS),
-    "east": Quantity(("east", "pose", "positioneast", "eastposition"), LENGTHS),
-    "up": Quantity(("up", "posu", "positionup"), LENGTHS, ("down", "posd", "positiondown")),
-    **{
-        f"ecef_{axis}": Quantity((f"ecef{axis}", f"{axis}ecef", f"positionecef{axis}"), LENGTHS)
-        for axis in "xyz"
-    },
-    "north_sd": Quantity(_sds("n", "north", "lat", "latitude"), LENGTHS),
-    "east_sd": Quantity(_sds("e", "east", "lon", "longitude"), LENGTHS),
-    "down_sd": Quantity(
-        _sds("d", "down", "u", "up", "h", "alt", "altitude", "height", "hgt"), LENGTHS
-    ),
-    "VN_sd": Quantity(_sds("vn", "veln", "velocityn", "northvelocity", "velnorth"), SPEEDS),
-    "VE_sd": Quantity(_sds("ve", "vele", "velocitye", "eastvelocity", "veleast"), SPEEDS),
-    "VD_sd": Quantity(
-        _sds("vd", "veld", "velocityd", "vu", "velu", "velocityu", "veldown", "velup"), SPEEDS
-    ),
-    "horizontal_accuracy": Quantity(
-        (
-            "accuracy",
-            "horizontalaccuracy",
-            "locationhorizontalaccuracy",
-            "accuracyhorizontal",
-            "hacc",
-            "haccuracy",
-            "eph",
-        ),
-        LENGTHS,
-    ),
-    "vertical_accuracy": Quantity(
-        (
-            "verticalaccuracy",
-            "locationverticalaccuracy",
-            "altitudeaccuracy",
-            "accuracyvertical",
-            "vacc",
-            "vaccuracy",
-            "epv",
-        ),
-        LENGTHS,
-    ),
-    "speed": Quantity(("speed", "sog", "groundspeed", "locationspeed", "speedoverground"), SPEEDS),
-    "speed_sd": Quantity(("speedaccuracy", "speedsd", "sacc", "locationspeedaccuracy"), SPEEDS),
-    "course": Quantity(
-        (
-            "course",
-            "cog",
-            "bearing",
-            "courseoverground",
-            "locationcourse",
-            "track",
-            "directionofmotion",
-            "gpsheading",
-            "gnssheading",
-            "headmot",
-        ),
-        ANGLES,
-    ),
-    "quality": Quantity(("quality", "fixquality", "gpsquality", "gnssquality"), {}),
-    "Q": Quantity(("q",), {}),
-}
+    return known.units[unit]
 
 
 def fix_columns(raw: RawLog, asked: Mapping[str, str]) -> dict[str, Found]:
     """Find the columns of fixes: as asked, else as the file states, else by their names.
 
-    Names are those of `FIX_QUANTITIES`, also after ``gps_``: a quantity that has its own name is
-    not searched behind such a word, for beside ``time`` and ``speed``, ``gps_time`` and
-    ``gps_speed`` are others. A file that states its columns is not searched by names. Errors as of
+    Names are those of `FIXES`, also after ``gps_``: a quantity that has its own name is not
+    searched behind such a word, for beside ``time`` and ``speed``, ``gps_time`` and ``gps_speed``
+    are others. A file that states its columns is not searched by names. Errors as of
     `find_quantities`.
     """
-    known = FIX_QUANTITIES
     if not raw.stated:
-        return find_quantities(raw.columns, known, asked, raw.name, raw.units, before=_OF_FIXES)
+        return find_quantities(raw.columns, FIXES, asked, raw.name, raw.units)
+    known = FIXES.quantities
     found = {
         quantity: Found(column, 1.0 if unit is None else known[quantity].units[unit], True)
         for column, (quantity, unit) in raw.stated.items()
         if quantity in known and quantity not in asked
     }
-    return found | (find_quantities(raw.columns, known, asked, raw.name) if asked else {})
+    named = find_quantities(raw.columns, FIXES, asked, raw.name) if asked else {}
+    return found | {quantity: named[quantity] for quantity in asked}
 
 
 def names_of_fixes(raw: RawLog) -> set[str]:

@@ -20,6 +20,7 @@ from strapdown.formats.join import join
 from strapdown.formats.known_text import column, lacking, selected, split, stated_by, under
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, head
+from strapdown.units import OF_TABLES, unit_of
 
 TITLE = "RaceChrono CSV"
 TRIADS = {"gyro": ("gyro", "{}_rate_of_rotation"), "accel": ("acc", "{}_acc")}
@@ -31,7 +32,6 @@ FIXES = {
     "course": "bearing",
     "horizontal_accuracy": "accuracy",
 }
-UNITS = {"deg": "deg", "m": "m", "m/s": "m/s", "G": "g", "kmh": "km/h", "km/h": "km/h"}
 
 
 detect = Signs(text=r"\AThis file is created using RaceChrono")
@@ -56,7 +56,7 @@ def read_fixes(path: Path) -> RawLog:
     held: dict[str, tuple[NDArray[Any], str | None]] = {"time": (column(raw, "timestamp"), "s")}
     for quantity, name in FIXES.items():
         if f"{name} gps" in raw.columns:
-            held[quantity] = (column(raw, f"{name} gps"), UNITS.get(units[f"{name} gps"]))
+            held[quantity] = (column(raw, f"{name} gps"), unit_of(units[f"{name} gps"], OF_TABLES))
     log = stated_by(raw, held, clock=UNIX)
     return selected(log, np.isfinite(held["lat"][0] + held["lon"][0]))
 
@@ -85,7 +85,7 @@ def _sensor(raw: RawLog, units: dict[str, str], triad: str) -> RawLog | None:
         return None
     held: dict[str, tuple[NDArray[Any], str | None]] = {"time": (column(raw, "timestamp"), "s")}
     for axis, name in zip("xyz", names, strict=True):
-        unit = UNITS.get(units[name], units[name])
+        unit = unit_of(units[name]) or units[name]
         # At rest some devices write gravity upward, others downward.
         held[f"{triad}_{axis}"] = (column(raw, name), "g or -g" if unit == "g" else unit)
     log = selected(stated_by(raw, held), np.isfinite(held[f"{triad}_x"][0]))

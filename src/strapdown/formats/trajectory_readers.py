@@ -15,15 +15,13 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats import open_stream
 from strapdown.formats.arrays import told_by_file_rows
 from strapdown.formats.clocks import Clock, with_clock
-from strapdown.formats.columns import CLOCKS, EULERS, TIMES
-from strapdown.formats.quantity_columns import GEODETIC_QUANTITIES, Found, Quantity, find_quantities
+from strapdown.formats.quantity_columns import Found, find_quantities
 from strapdown.formats.recording import RawLog
+from strapdown.formats.vocabularies import TRAJECTORIES
 from strapdown.rotation import within_half_turn
 from strapdown.tables import EULER, VELOCITY, trajectory_table
-from strapdown.units import ANGLES, TIME_UNITS
 
 __all__ = [
-    "QUANTITIES",
     "find_trajectory_columns",
     "judge_trajectory",
     "read_trajectory",
@@ -73,7 +71,7 @@ def read_trajectory(path: str | Path, columns: Mapping[str, str] | None = None) 
     assert isinstance(raw, RawLog)  # the columns of a table
     found = find_trajectory_columns(raw.columns, columns or {}, raw.name)
     time, clock, _ = found["time"].stamps(raw)
-    values = {q: found[q].values(raw, q) for q in QUANTITIES if q != "time"}
+    values = {q: found[q].values(raw, q) for q in TRAJECTORIES.quantities if q != "time"}
     with told_by_file_rows(raw.name, raw.row):
         table = trajectory_table(
             time,
@@ -98,27 +96,19 @@ def read_trajectory(path: str | Path, columns: Mapping[str, str] | None = None) 
 # Assignment of the columns of a text table to the quantities of a trajectory, with units.
 
 
-#: Quantities of a trajectory table, with their possible names.
-QUANTITIES: dict[str, Quantity] = {
-    "time": Quantity((*TIMES, *CLOCKS), TIME_UNITS),
-    **GEODETIC_QUANTITIES,
-    **{angle: Quantity(tuple(words), ANGLES) for angle, words in EULERS.items()},
-}
-
-
 def find_trajectory_columns(
     names: Iterable[str], asked: Mapping[str, str], file: str
 ) -> dict[str, Found]:
     """Find the column of each quantity.
 
-    `names`: as in the file. `asked`: quantity (one of `QUANTITIES`) to the name of its column, or
+    `names`: as in the file. `asked`: quantity (of `TRAJECTORIES`) to the name of its column, or
     its number, from 1; overrides what the names suggest. `file`: for messages. Returns one for each
-    of `QUANTITIES`. ConfigError: a requested column does not exist, or its quantity is unknown.
+    of them. ConfigError: a requested column does not exist, or its quantity is unknown.
     DataError: a quantity is missing, two columns fit one quantity, or a unit does not fit.
     """
     columns = list(names)
-    found = find_quantities(columns, QUANTITIES, asked, file, of="a trajectory")
-    missing = [q for q in QUANTITIES if q not in found]
+    found = find_quantities(columns, TRAJECTORIES, asked, file)
+    missing = [q for q in TRAJECTORIES.quantities if q not in found]
     if missing:
         raise DataError("io.missing-columns-3", file=file, missing=missing, columns=columns)
     return found

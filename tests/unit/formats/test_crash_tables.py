@@ -12,7 +12,7 @@ from strapdown.errors import ConfigError, DataError
 from strapdown.formats.crash_record import clean, unique
 from strapdown.formats.crash_records import CRASH_READERS, read_crash_record
 from strapdown.formats.crash_samples import mean_acceleration, mean_accelerations_of
-from strapdown.formats.crash_table import read_channel_name
+from strapdown.formats.crash_table import channel_name
 from strapdown.formats.crash_triad import state_unit
 from strapdown.units import FACTORS, OF_CRASHES, find_unit
 
@@ -62,12 +62,12 @@ def read(tmp_path):
     ],
 )
 def test_names_of_columns(name, quantity, axis, unit):
-    said = read_channel_name(name)
+    said = channel_name(name)
     assert (said.quantity, said.axis, said.unit) == (quantity, axis, unit)
 
 
 def test_a_name_against_its_unit_is_told():
-    said = read_channel_name("acc_x [deg/s]")
+    said = channel_name("acc_x [deg/s]")
     assert (said.quantity, said.axis) == ("rate", "x")
     assert "acceleration" in said.contradiction
 

@@ -1,0 +1,460 @@
+"""Vocabularies of column names, as data: of logs, fixes, trajectories and crash records.
+
+`columns.read_name` reads a name by one of them. Names that mean the same in every kind of file
+(clocks, units, words of other languages) are in all of them.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from strapdown.units import (
+    ANGLES,
+    LENGTHS,
+    OF_CRASHES,
+    OF_LOGS,
+    OF_TABLES,
+    SPEEDS,
+    TIME_UNITS,
+)
+
+__all__ = [
+    "CRASHES",
+    "FIXES",
+    "LOGS",
+    "QUANTITIES",
+    "TRAJECTORIES",
+    "Quantity",
+    "Vocabulary",
+]
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A quantity that a file may hold.
+
+    Attributes
+    ----------
+    words : tuple of str
+        Names without blanks, signs and units, in lower case.
+    units : mapping of str to float
+        Its units, each with its factor to that of the table; empty if dimensionless.
+    negative : tuple of str
+        Further words, for the opposite sign: ``velup`` for a velocity down.
+    """
+
+    words: tuple[str, ...]
+    units: Mapping[str, float] = field(default_factory=dict)
+    negative: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Vocabulary:
+    """Names in one kind of file.
+
+    Attributes
+    ----------
+    quantities : mapping of str to Quantity
+        Names that mean a quantity as a whole.
+    kinds : sequence of str
+        Of units (`units.FACTORS`), in the order in which they decide.
+    before : re.Pattern, optional
+        Words that may stand before the name of a quantity.
+    sensors : mapping of str to str
+        ``gyro``, ``accel``, ``mag`` and ``gravity`` to the names of their quantities here; empty if
+        no names of sensors are read.
+    stems : mapping of str to tuple of str
+        Quantities to beginnings of words that are found anywhere in a name, in the order of search.
+    of : str
+        Object that the quantities describe, for messages.
+    """
+
+    quantities: Mapping[str, Quantity]
+    kinds: Sequence[str]
+    before: re.Pattern[str] | None = None
+    sensors: Mapping[str, str] = field(default_factory=dict)
+    stems: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    of: str = "this table"
+
+    @cached_property
+    def index(self) -> dict[str, tuple[str, float]]:
+        """Words to their quantity and its sign; the first quantity that has a word counts."""
+        out: dict[str, tuple[str, float]] = {}
+        for name, quantity in self.quantities.items():
+            for sign, words in ((1.0, quantity.words), (-1.0, quantity.negative)):
+                for word in words:
+                    out.setdefault(word, (name, sign))
+        return out
+
+
+def _words(text: str) -> tuple[str, ...]:
+    return tuple(text.split())
+
+
+# Words that mean the same everywhere.
+
+
+#: Beginnings of German, French, Spanish, Italian and further words, without accents, by the English
+#: word that they stand for.
+ABROAD = {
+    english: _words(stems)
+    for english, stems in {
+        "time": "zeit uhrzeit temps horodat tiempo tempo vrijeme vreme czas tijd",
+        "acceleration": "beschl aceler accelerazion accelerometr przysp ubrz versnell",
+        "gyroscope": "drehrate drehgeschw winkelgeschw giroscop gyroskop kreisel",
+        "magnetometer": "magnetfeld magnetometr",
+        "velocity": "geschwindigkeit vitesse velocidad velocita",
+        "angular": "angulaire angolar",
+        "linear": "linear lineaire lineal",
+        "without": "ohne sans senza",
+        "roll": "wank roulis alabeo rollio",
+        "pitch": "nick tangage cabeceo beccheggio",
+        "yaw": "gier lacet guinada imbardata",
+    }.items()
+}
+#: Axis of the body that a turn is about.
+TURNS = {"roll": "x", "pitch": "y", "yaw": "z"}
+#: Words for the axes of a vehicle.
+DIRECTIONS = {
+    "x": ("longitudinal", "longit", "langs", "laengs", "longitudinale"),
+    "y": ("lateral", "quer", "laterale", "transversal"),
+    "z": ("vertical", "vertikal", "hoch", "verticale"),
+}
+TIMES = _words(
+    "time t ts timestamp timestamps timesec elapsed secondselapsed seconds sec tow sow gpssow "
+    "gpstow gpstime unixtime epoch stamp elapsedtime timeelapsed timesincestart sampletime "
+    "sensortime systemtime unixtimestamp datetime localtime utc utctime timeutc "
+    "gpssecondsofweek secondsofweek zeit zeitstempel temps tiempo tempo"
+)
+# Names of clocks that state their unit.
+CLOCKS = {
+    "seconds": "s",
+    "secs": "s",
+    "sec": "s",
+    "secondselapsed": "s",
+    "elapsedseconds": "s",
+    "millis": "ms",
+    "milliseconds": "ms",
+    "micros": "us",
+    "microseconds": "us",
+    "nanos": "ns",
+    "nanoseconds": "ns",
+    "ms": "ms",
+    "msec": "ms",
+    "us": "us",
+    "usec": "us",
+    "ns": "ns",
+    "nsec": "ns",
+}
+#: Words of the name of a clock, beside ``time``, and words behind it in brackets.
+OF_TIME = {
+    *_words("time timestamp timestamps stamp unix epoch utc gps system gmt sample logging elapsed"),
+    *_words("since start boot reboot local ros header"),
+}
+TIME = Quantity((*TIMES, *CLOCKS), TIME_UNITS)
+#: Of tables of measurements, where a date stands for a clock.
+DATED = Quantity((*TIME.words, "date"), TIME_UNITS)
+
+
+# Names of sensors. Blanks, underscores and capitals do not count.
+
+
+_TRIAD_WORDS = {
+    "gyro": "gyro gyros gyr gyroscope gyroscopes imugyr imugyro angularvelocity angularvel angvel "
+    "velocityangular rotationvelocity velocityrotation "
+    "angularrate angularrates angrate angularspeed turnrate rot rotationrate rotrate omega rate "
+    "w g ω",
+    "accel": "accel acce acc accelerometer accelerometers accelerations acceleration accl "
+    "linearacceleration linacc linaccel lina gforce gf imuacc imuaccel specificforce a f",
+    "mag": "mag magn magnet magnetic magnetometer magnetometers magneticfield magfield field "
+    "imumag compass m b",
+}
+#: Names of a sensor without their axis.
+TRIADS = {triad: words.split() for triad, words in _TRIAD_WORDS.items()}
+# Names of columns that hold increments per sample.
+SUMMED = {
+    "gyro": ["dtheta", "deltatheta", "dangle", "deltaangle", "angleincrement", "dang"],
+    "accel": ["dv", "deltav", "dvel", "deltavel", "deltavelocity", "velocityincrement"],
+}
+#: Gravity by itself, as phones write it beside acceleration without it.
+GRAVITY = ("gravity", "grav", "gvec")
+# A name that is a unit says the sensor: dps_x, uT_x. The letter g may be anything.
+NAMED_BY_UNIT = {
+    **dict.fromkeys(("dps", "mdps", "rads", "degs"), "gyro"),
+    **dict.fromkeys(("mps2", "ms2"), "accel"),
+    **dict.fromkeys(("ut",), "mag"),
+}
+#: Names, their triad, and whether they say increments.
+SENSORS: tuple[tuple[Sequence[str], str, bool], ...] = (
+    *((names, triad, False) for triad, names in TRIADS.items()),
+    *((names, triad, True) for triad, names in SUMMED.items()),
+    *(((unit,), triad, False) for unit, triad in NAMED_BY_UNIT.items()),
+    (GRAVITY, "gravity", False),
+)
+# Words that may stand beside the name of a sensor, and say the same again or how it is meant.
+BESIDE = {
+    "gyro": {"angular", "rotation", "rotational", "rate", "rates", "velocity", "vel", "speed"},
+    "accel": {"acceleration", "linear", "lin", "user", "including", "gravity", "with", "without"},
+    "mag": {"magnetic", "field"},
+}
+WITHOUT_GRAVITY = {"linear", "lin", "user", "without", "linacc", "linaccel", "linearacceleration"}
+WITHOUT_GRAVITY |= {"lina", "lineara", "usera"}
+#: Words that say a rate beside the name of a turn.
+RATES = {"rate", "speed", "velocity", "vel", "dot", *TRIADS["gyro"]} - set("wgω")
+# Names that are parts of words, unless their axis stands apart: MaX, but not max.
+SHORT = {"gyro": "gy", "accel": "ac", "mag": "ma"}
+# G is also gravity.
+MAGNETIC = {"g": "gauss", "mg": "mG"}
+# Arrays of PX4 (msg/SensorCombined.msg, SensorMag.msg), whose comments define their units.
+PX4 = {
+    "gyro_rad": ("gyro", "rad/s"),
+    "accelerometer_m_s2": ("accel", "m/s2"),
+    "magnetometer_ga": ("mag", "gauss"),
+}
+#: Fields of sensor_msgs/Imu and sensor_msgs/MagneticField, whose units ROS REP 103 defines.
+ROS = {
+    "angular_velocity": ("gyro", "rad/s"),
+    "linear_acceleration": ("accel", "m/s2"),
+    "magnetic_field": ("mag", "T"),
+}
+# Words of a sensor's name that do not tell quantities apart.
+NOISE = {
+    *("raw", "imu", "sensor", "sensors", "data", "body", "device", "phone", "watch", "motion"),
+    *("cal", "calib", "calibrated", "corrected", "meas", "measured", "value", "values", "axis"),
+    *("ins", "the", "of", "in", "de", "del", "di", "reading", "readings", "uncal", "uncalibrated"),
+}
+# Words of a quantity that is about another: its spread, its error, its demand.
+ABOUT = {
+    *("bias", "offset", "scale", "cov", "covariance", "std", "stddev", "stdev", "sd", "sigma"),
+    *("var", "variance", "error", "err", "accuracy", "setpoint", "desired", "noise"),
+}
+
+
+# Logs of inertial sensors.
+
+
+QUATERNIONS = {
+    "q_w": ["qw", "quatw", "quaternionw", "q0"],
+    "q_x": ["qx", "quatx", "quaternionx", "q1"],
+    "q_y": ["qy", "quaty", "quaterniony", "q2"],
+    "q_z": ["qz", "quatz", "quaternionz", "q3"],
+}
+EULERS = {
+    "roll": ["roll", "phi"],
+    "pitch": ["pitch", "theta"],
+    "heading": ["heading", "yaw", "psi"],
+}
+#: Quantities that a user may name in a log.
+QUANTITIES = [
+    "time",
+    *(f"{triad}_{axis}" for triad in TRIADS for axis in "xyz"),
+    *QUATERNIONS,
+    *EULERS,
+]
+#: Rates about forward, right and down in the notation of flight mechanics, if all three are there:
+#: a letter alone may be anything.
+BODY_RATES = {"rate_p": "gyro_x", "rate_q": "gyro_y", "rate_r": "gyro_z"}
+
+#: Its quantities are `QUANTITIES`, a triad's name where the column holds three numbers or the name
+#: ends in a number, ``gravity_x`` and `BODY_RATES`.
+LOGS = Vocabulary(
+    {
+        **{rate: Quantity((rate[-1],)) for rate in BODY_RATES},
+        "time": TIME,
+        **{q: Quantity(tuple(words)) for q, words in {**QUATERNIONS, **EULERS}.items()},
+    },
+    OF_LOGS,
+    sensors={triad: triad for triad in (*TRIADS, "gravity")},
+    of="a log",
+)
+
+
+# Positions and velocities, in tables of fixes and of trajectories.
+
+
+_HEADS = ("v", "vel", "velocity", "speed")
+
+
+def _velocities(letter: str, word: str) -> tuple[str, ...]:
+    return tuple(h + e for h in _HEADS for e in (letter, word)) + tuple(word + h for h in _HEADS)
+
+
+#: Degrees, meters over the ellipsoid, meters per second; velocity up is negative velocity down.
+_GEODETIC: dict[str, Quantity] = {
+    "lat": Quantity(_words("lat latitude"), ANGLES),
+    "lon": Quantity(_words("lon lng long longitude"), ANGLES),
+    "alt": Quantity(
+        _words(
+            "alt altitude h hgt height hell altell heightell ellipsoidalheight heightellipsoid "
+            "altitudeellipsoid"
+        ),
+        LENGTHS,
+    ),
+    "VN": Quantity(_velocities("n", "north"), SPEEDS),
+    "VE": Quantity(_velocities("e", "east"), SPEEDS),
+    "VD": Quantity(_velocities("d", "down"), SPEEDS, _velocities("u", "up")),
+}
+TRAJECTORIES = Vocabulary(
+    {
+        "time": TIME,
+        **_GEODETIC,
+        **{angle: Quantity(tuple(words), ANGLES) for angle, words in EULERS.items()},
+    },
+    OF_TABLES,
+    of="a trajectory",
+)
+#: Words for a standard deviation.
+SD_WORDS = ("sd", "std", "stddev", "stdev", "sigma")
+
+
+def spread_of(*words: str, letter: str = "") -> tuple[str, ...]:
+    """List names of a standard deviation, with the word for it before or after the quantity.
+
+    `letter`: another word for it, before the quantity alone.
+    """
+    heads = (*SD_WORDS, *letter)
+    return tuple(h + w for h in heads for w in words) + tuple(
+        w + h for h in SD_WORDS for w in words
+    )
+
+
+#: The names may stand behind others, as in ``gps_lat`` or ``location.latitude``.
+FIXES = Vocabulary(
+    {
+        "time": DATED,
+        "week": Quantity(_words("week gpsweek weeknumber wn")),
+        **_GEODETIC,
+        "alt_msl": Quantity(
+            _words("hmsl altmsl altitudemsl heightmsl mslaltitude mslheight orthometricheight"),
+            LENGTHS,
+        ),
+        "geoid": Quantity(
+            _words("geoid undulation geoidsep geoidseparation geoidheight geoidundulation"), LENGTHS
+        ),
+        "alt_take_off": Quantity(
+            _words(
+                "relalt relativealt relativealtitude heightabovetakeoff altitudeabovetakeoff "
+                "heighttakeoff"
+            ),
+            LENGTHS,
+        ),
+        # Of formats that do not say whether it is over the ellipsoid or over the sea.
+        "alt_unstated": Quantity((), LENGTHS),
+        "north": Quantity(_words("north posn positionnorth northposition"), LENGTHS),
+        "east": Quantity(_words("east pose positioneast eastposition"), LENGTHS),
+        "up": Quantity(_words("up posu positionup"), LENGTHS, _words("down posd positiondown")),
+        **{
+            f"ecef_{a}": Quantity((f"ecef{a}", f"{a}ecef", f"positionecef{a}"), LENGTHS)
+            for a in "xyz"
+        },
+        "north_sd": Quantity(spread_of(*_words("n north lat latitude"), letter="s"), LENGTHS),
+        "east_sd": Quantity(spread_of(*_words("e east lon longitude"), letter="s"), LENGTHS),
+        "down_sd": Quantity(
+            spread_of(*_words("d down u up h alt altitude height hgt"), letter="s"), LENGTHS
+        ),
+        "VN_sd": Quantity(
+            spread_of(*_words("vn veln velocityn northvelocity velnorth"), letter="s"), SPEEDS
+        ),
+        "VE_sd": Quantity(
+            spread_of(*_words("ve vele velocitye eastvelocity veleast"), letter="s"), SPEEDS
+        ),
+        "VD_sd": Quantity(
+            spread_of(*_words("vd veld velocityd vu velu velocityu veldown velup"), letter="s"),
+            SPEEDS,
+        ),
+        "horizontal_accuracy": Quantity(
+            _words(
+                "accuracy horizontalaccuracy locationhorizontalaccuracy accuracyhorizontal hacc "
+                "haccuracy eph"
+            ),
+            LENGTHS,
+        ),
+        "vertical_accuracy": Quantity(
+            _words(
+                "verticalaccuracy locationverticalaccuracy altitudeaccuracy accuracyvertical vacc "
+                "vaccuracy epv"
+            ),
+            LENGTHS,
+        ),
+        "speed": Quantity(_words("speed sog groundspeed locationspeed speedoverground"), SPEEDS),
+        "speed_sd": Quantity(_words("speedaccuracy speedsd sacc locationspeedaccuracy"), SPEEDS),
+        "course": Quantity(
+            _words(
+                "course cog bearing courseoverground locationcourse track directionofmotion "
+                "gpsheading gnssheading headmot"
+            ),
+            ANGLES,
+        ),
+        "quality": Quantity(_words("quality fixquality gpsquality gnssquality")),
+        "Q": Quantity(("q",)),
+    },
+    OF_TABLES,
+    before=re.compile(r"(?:gps|gnss|navsat|location|loc|position|pos|coords|fix)(?=..)"),
+)
+
+
+# Crash records: recorders in vehicles name their columns in words of several languages
+# (``Longitudinal Delta-V (MPH)``, ``Gierrate``), loggers in letters (``ax [g]``).
+
+
+#: Longitudinal is positive forward, lateral from left to right, vertical down (SAE J1698, SAE
+#: J211); axes that point the other way have a minus.
+AXIS_WORDS = {
+    word: axis
+    for axis, words in {
+        "x": "x longitudinal long longi longit longitudinale langs laengs forward fwd",
+        "y": "y lateral lat laterale quer transversal transverse transv right",
+        "z": "z vertical vert verticale vertikal hoch down normal",
+        "-x": "backward rearward",
+        "-y": "left",
+        "-z": "up",
+    }.items()
+    for word in words.split()
+}
+#: Beginnings of words for a turn, also in compounds: Gierrate, Nickwinkel.
+TURN_STEMS = {word: axis for turn, axis in TURNS.items() for word in (turn, *ABROAD[turn])}
+#: Short words that end in a letter without meaning an axis.
+NO_AXIS = _words("hz khz mhz max idx mux aux fix box mix key day any by my")
+#: A velocity that is a change since time zero.
+CHANGE = re.compile(
+    r"\b(delta ?v|dv|delta velocity|delta vel|velocity change|geschwindigkeits"
+    r"|change (in|of) velocity|cumulative velocity)"
+)
+#: Last words of a column that counts samples.
+COUNTERS = _words("n nr no num number index idx sample count counter row")
+#: Quantities are those of `crash_record.QUANTITIES`; ``other`` is known not to be of a sensor, and
+#: ``counter`` counts samples.
+CRASHES = Vocabulary(
+    {
+        "acceleration": Quantity(
+            _words("acceleration accel acc accelerations accelerometer ax ay az")
+        ),
+        "rate": Quantity(_words("rate gyro gyr gyroscope angular wx wy wz")),
+        "velocity": Quantity(_words("velocity vel deltav dv deltavelocity")),
+        "displacement": Quantity(_words("displacement crush")),
+        "force": Quantity(_words("force load")),
+    },
+    OF_CRASHES,
+    sensors={"accel": "acceleration", "gyro": "rate"},
+    stems={
+        "other": _words(
+            "temp tmp batt volt spannung druck press humid feucht mag magn kompass compass latit "
+            "longitud alt satell status flag valid quality speed geschw vitesse brems brake "
+            "throttle engine rpm accelerator pedal gaspedal fahrpedal steer lenk belt abs stability"
+        ),
+        "rate": (
+            *ABROAD["gyroscope"],
+            *_words("winkelg gyro gyr rate omega angular rot"),
+            *TURN_STEMS,
+        ),
+        "acceleration": (
+            *ABROAD["acceleration"],
+            *_words("acc accel specificforce lowg highg gforce nd hd"),
+        ),
+        "time": (*ABROAD["time"], *_words("stamp clock time")),
+    },
+    of="a crash record",
+)
