@@ -18,7 +18,7 @@ from strapdown.formats import read_raw
 from strapdown.report import attitude_tables as tables
 from strapdown.report.attitude import attitude_json, write_attitude
 from strapdown.report.attitude_document import KINDS, attitude_document
-from strapdown.report.attitude_tables import headline
+from strapdown.report.attitude_tables import standing
 from strapdown.report.document import document_page
 from strapdown.report.verify import _difference
 
@@ -31,7 +31,7 @@ def page_of(bench):
 
 
 def test_the_answer_comes_first(full_bench):
-    assert headline(full_bench).startswith(full_bench.answer.sentence + " At 7 s, ")
+    assert standing(full_bench).startswith("At 7 s, ")
     page = page_of(full_bench)
     order = [
         full_bench.answer.sentence,
