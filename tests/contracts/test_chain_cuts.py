@@ -11,6 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from tests.aiding_sensors import FieldSensor, simulate_magnetometer
 from tests.town_drive import (
     ACCEL_BIAS,
     ACCEL_NOISE,
@@ -95,6 +96,7 @@ def tables():
         "body_velocity": body_velocity_table(time, np.outer(speed, [1.0, 0.0, 0.0]), (0.1,) * 3),
         "barometer": barometer_table(time, truth["alt"], 1.0),
         "heading": heading_table(time, truth["heading"], 1.0),
+        "magnetometer": simulate_magnetometer(motion(), FieldSensor(rate=4.0), seed=9),
     }
 
 

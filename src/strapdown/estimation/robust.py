@@ -530,7 +530,8 @@ class ScaleState(NamedTuple):
     jump, held : float, s
         The innovation with which they jumped, and until when what is like it is their fault.
     since : float, s
-        Since when they have agreed with the estimate, but for some that returned to it.
+        Since when they have agreed with the estimate, but for some that returned to it; infinite
+        before the first.
     """
 
     log_square: float
@@ -541,7 +542,7 @@ class ScaleState(NamedTuple):
     time: float = -math.inf
     jump: float = 0.0
     held: float = -math.inf
-    since: float = math.nan
+    since: float = math.inf
 
     @property
     def factor(self) -> float:
@@ -677,7 +678,7 @@ class AdaptiveScale:
             jump, held = nu, time + min(self.doubt, time - since)
         # After rejections the observations returned, or the estimate went to them.
         went = after.rejected == 0 and before.rejected > 0 and abs(nu) >= 0.5 * abs(before.nu)
-        if went or math.isnan(since):
+        if went or math.isinf(since):
             since = time
         return after._replace(nu=nu, time=time, jump=jump, held=held, since=since)
 

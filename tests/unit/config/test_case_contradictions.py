@@ -137,10 +137,10 @@ BAD = {
     "assumed over nothing": ((BORROWED, f"{ASSUMED}, over_s = [1, 1] }}"), ["it lasts 0 s"]),
     "assumed in ms": ((BORROWED, f"{ASSUMED}, over_s = [0, 150] }}"), ["over_ms"]),
     "assumed less than nothing": ((BORROWED, "assumed = { turn_sd_deg = -2 }"), ["is negative"]),
-    "axis of a gyro": (('x = "gx", ', ""), ["unit 1, gyro, channels: there is no channel for x"]),
+    "axis of a gyro": (('x = "gx", ', ""), ["unit 1, gyro, channels: x: neither"]),
     "no channel of a gyro": (
         ('{ x = "gx", y = "gy", z = "gz" }', "{ }"),
-        ["gyro, channels", "no channel for x and y and z"],
+        ["gyro, channels: x and y and z: neither"],
     ),
     "channel of another triad": (('"hx"', '"-ax"'), ["(line 33)", "one axis of one triad"]),
     "channel of another unit's gyro": (

@@ -236,7 +236,7 @@ class TestArguments:
             sample_paths(crash, runs=10)
 
     def test_a_sample_that_there_is_not(self, crash):
-        with pytest.raises(ConfigError, match="no sample 10000"):
+        with pytest.raises(ConfigError, match="sample 10000"):
             crash.main.path.variances(10_000)
 
 
