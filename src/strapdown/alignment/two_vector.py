@@ -126,11 +126,12 @@ def triad_attitude(force: Array, rate: Array, site: Site) -> Array:
 
     `force`, `rate` ((3,)): body axes. Returns (3, 3).
     """
-    known = _triad(site.gravity, site.earth_rate)
-    return known @ _triad(-force, rate).T
+    known = triad(site.gravity, site.earth_rate)
+    return known @ triad(-force, rate).T
 
 
-def _triad(first: Array, second: Array) -> Array:
+def triad(first: Array, second: Array) -> Array:
+    """Axes along a vector, across both, and across these two (TRIAD), as columns, (3, 3)."""
     a = first / np.sqrt(first @ first)
     b = np.cross(a, second)
     b /= max(float(np.sqrt(b @ b)), 1e-300)

@@ -481,13 +481,15 @@ class NavigationSpec(FileSpec):
         if not _NAME.fullmatch(name):
             yield Fault(path, "config.bad-aid-name")
         entry = SLOTS["aiding"].entries[aid.kind]
-        takes, of_samples = issubclass(entry, TabulatedMeasurement), False
-        if issubclass(entry, TabulatedMeasurement):
-            of_samples = entry.of_samples and self.log is not None
-        if not takes and aid.path is not None:
-            yield Fault((*path, "path"), "config.aid-takes-no-file", {"kind": aid.kind})
-        given = aid.path is not None or of_samples or name in self.receivers
-        if takes and not given and self.live is None:
+        if not issubclass(entry, TabulatedMeasurement):
+            if aid.path is not None:
+                yield Fault((*path, "path"), "config.aid-takes-no-file", {"kind": aid.kind})
+        elif not (
+            aid.path is not None
+            or name in self.receivers
+            or self.live is not None
+            or (entry.of_samples and self.log is not None)
+        ):
             yield Fault((*path, "path"), "config.aid-file-missing", {"kind": aid.kind})
         for key in ("position_sd_m", "velocity_sd_m_per_s", "units", "datum_height_m", "origin"):
             if getattr(aid, key) and aid.kind != "gnss":

@@ -1,4 +1,4 @@
-"""Samples of a signal: checks before digital filters, runs of flags, running integral."""
+"""Samples of a signal: checks before filters, runs of flags, white noise, running integral."""
 
 from __future__ import annotations
 
@@ -115,6 +115,15 @@ def true_runs(flags: NDArray[np.bool_]) -> list[slice]:
     """Return the runs of true values, in order: `flags` ((n,)) is true over each slice."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     return [slice(begin, end) for begin, end in edges.reshape(-1, 2).tolist()]
+
+
+def white_sd(values: Array) -> Array:
+    """Estimate the standard deviation of white noise by second differences, per channel.
+
+    They have six times its variance, and remove what changes linearly. `values` ((n, ...)): at
+    equal steps. Returns (...), in their unit.
+    """
+    return np.asarray(np.sqrt(np.square(np.diff(values, n=2, axis=0)).mean(axis=0) / 6.0))
 
 
 def running_integral(time: Array, values: Array, *, means: bool = False) -> Array:

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown.attitude_algorithms.algorithm import AttitudeRun
+from strapdown.dsp.samples import running_integral
 from strapdown.errors import Finding
 from strapdown.rotation import unit_rotation_angle
 from strapdown.tables import EULER, GYRO, QUATERNION
@@ -142,9 +143,8 @@ def rotation_contradicted(imu: pd.DataFrame, reference: pd.DataFrame) -> Finding
         return None
     # The integral of the rate: what rotates about changing axes within a window differs from the
     # angle by the third order in it, less than the share that is allowed.
-    stamps, rate = index_of(imu), values_of(imu, GYRO)
-    steps = np.diff(stamps)[:, None] * 0.5 * (rate[1:] + rate[:-1])
-    whole = np.vstack([np.zeros(3), np.cumsum(steps, axis=0)])
+    stamps = index_of(imu)
+    whole = running_integral(stamps, values_of(imu, GYRO))
     turns = np.diff([np.interp(instants, stamps, one) for one in whole.T], axis=1)
     q = attitude_at(known, instants)
     angles = np.array(

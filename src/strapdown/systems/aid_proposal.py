@@ -11,17 +11,20 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown import rotation
+from strapdown.alignment.two_vector import triad
 from strapdown.config.alignment import LogTable
 from strapdown.constants import STANDARD_GRAVITY
+from strapdown.dsp.samples import white_sd
 from strapdown.errors import DataError, Finding
 from strapdown.formats import holds
-from strapdown.formats.aid_table import along_body, read_aid_table
 from strapdown.formats.clocks import GPS, UNIX, WEEK, clock_of, on_clock_of, unix_from_gps
 from strapdown.formats.recording import ABSENT
 from strapdown.navigation.measurements.barometer import Barometer
 from strapdown.navigation.measurements.magnetometer import Magnetometer
 from strapdown.navigation.measurements.measurement import TabulatedMeasurement, longer_by
 from strapdown.navigation.measurements.vehicle import Odometer
+from strapdown.systems.navigation_source import read_measured
 from strapdown.tables import ACCEL, GEODETIC, MAG, VELOCITY, VELOCITY_SD
 from strapdown.tables.checks import index_of, values_of
 
@@ -119,7 +122,7 @@ def propose_aids(
         step = float(np.median(np.diff(index_of(table))))
         # The filter takes errors as new in each row; those that last have the variance of a mean.
         lasting = errors[0] * math.sqrt(longer_by(step, errors[1]))
-        size = math.hypot(_scatter(values_of(table, aid.columns[:1])[:, 0]), lasting)
+        size = math.hypot(float(white_sd(values_of(table, aid.columns[:1]))[0]), lasting)
         own = {"height_sd_m": size, "interval_s": MEAN}
         if not isinstance(aid, Barometer):
             own = {"speed_sd_m_per_s": size}
@@ -130,15 +133,7 @@ def propose_aids(
 
 def _read(log: LogTable, aid: TabulatedMeasurement, imu: pd.DataFrame) -> pd.DataFrame:
     """Read the rows of a stream within the samples, on their clock."""
-    table = read_aid_table(
-        log.path,
-        aid.column_units(),
-        optional=tuple(aid.sd_options()),
-        instead=aid.instead,
-        repair=log.repair,
-        stream=aid.stream,
-    )
-    table, _ = on_clock_of(aid.converted(table), imu)
+    table, _ = on_clock_of(read_measured(aid, log.path, repair=log.repair), imu)
     begin, end = np.searchsorted(index_of(table), index_of(imu)[[0, -1]])
     return table.iloc[begin:end]
 
@@ -153,11 +148,6 @@ def _error_of(aid: TabulatedMeasurement, fixes: pd.DataFrame | None) -> tuple[fl
         speed = np.linalg.norm(values_of(fixes, VELOCITY)[known], axis=1)
         square = float(np.sqrt(np.mean(speed**4))) if known.any() else 0.0
     return math.hypot(GUSTS, OF_DYNAMIC * square / (2.0 * STANDARD_GRAVITY)), WEATHER
-
-
-def _scatter(values: Array) -> float:
-    """Standard deviation from row to row: second differences have six times its variance."""
-    return float(np.sqrt(np.square(np.diff(values, n=2)).mean() / 6.0))
 
 
 def propose_magnetometer(
@@ -194,13 +184,13 @@ def propose_magnetometer(
     begin = imu.index[0] + BEGIN
     force = values_of(imu[imu.index <= begin], ACCEL).mean(axis=0)
     mag = values_of(readings[readings.index <= begin], MAG).mean(axis=0)
-    # Axes of the level at the start: down against the specific force at rest.
-    down = -force / np.linalg.norm(force)
-    east = np.cross(down, mag)
-    magnetic = math.degrees(math.atan2(east[0], np.cross(east, down)[0]))
+    down, known = np.array([0.0, 0.0, 1.0]), np.array([model.x, model.y, model.z])
+    # The specific force of a body at rest is up.
+    C_nb = triad(down, known) @ triad(-force, mag).T
+    heading = float(rotation.euler_from_dcm(C_nb)[2]) % 360.0
     size = float(np.linalg.norm(mag))
-    measured = size, math.degrees(math.asin(float(np.clip(mag @ down / size, -1.0, 1.0))))
-    heading = (magnetic + model.d) % 360.0
+    dip = math.asin(float(np.clip((C_nb @ mag)[2] / size, -1.0, 1.0)))
+    measured = size, math.degrees(dip)
     return Magnetic(table, at, year is not None, heading, measured, (1e-3 * model.f, model.i))
 
 
@@ -211,15 +201,10 @@ def _field(log: LogTable, imu: pd.DataFrame) -> tuple[pd.DataFrame | None, dict[
         return imu[MAG].iloc[seen], {}
     if not holds(Path(log.path), Magnetometer.stream):
         return None, {}
-    units = dict.fromkeys(MAG, "uT")
     try:
-        table = read_aid_table(log.path, units, repair=log.repair, stream=Magnetometer.stream)
+        return _read(log, Magnetometer(interval=0.0), imu), {"path": log.path}
     except DataError:
         return None, {}
-    if not table.attrs["axes"]:
-        return None, {}
-    table, _ = on_clock_of(along_body(table), imu)
-    return table[table.index >= imu.index[0]], {"path": log.path}
 
 
 def _year(table: pd.DataFrame) -> float | None:

@@ -17,7 +17,7 @@ from strapdown.bundle import InputFiles, Seal, input_files
 from strapdown.config.alignment import AxesTable, FixesTable, LogTable
 from strapdown.config.doctor import DoctorSpec, flags_of, flags_of_fixes
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.dsp.samples import running_integral
+from strapdown.dsp.samples import running_integral, white_sd
 from strapdown.errors import DataError, Finding, Severity, StrapdownError
 from strapdown.evaluation.differences import rotation_contradicted
 from strapdown.evaluation.second_log import align_second_log
@@ -614,9 +614,7 @@ def _rest(imu: pd.DataFrame, rest: RestStretch) -> dict[str, Any]:
     step = float(np.median(np.diff(index_of(part))))
 
     def density(columns: list[str]) -> list[float]:
-        second = np.diff(values_of(part, columns), n=2, axis=0)
-        sd = np.sqrt(np.square(second).mean(axis=0) / 6.0)
-        return [float(x) for x in sd * math.sqrt(step)]
+        return [float(x) for x in white_sd(values_of(part, columns)) * math.sqrt(step)]
 
     force = rest.accel_mean
     return {

@@ -24,7 +24,7 @@ from strapdown.formats.gnss_fixes import POSITION_SDS, VELOCITY_SDS
 from strapdown.frames import ways_between
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty
-from strapdown.systems.aid_proposal import Magnetic
+from strapdown.systems.aid_proposal import Magnetic, propose_aids, propose_magnetometer
 from strapdown.systems.alignment_draft import (
     ProposedAlignment,
     axes_table,
@@ -75,6 +75,14 @@ def draft_navigation(
         Whether the unit is on a shoe: zero-velocity updates at its stances (`on_foot`).
     """
     made = propose(log, axes=axes, gnss=gnss, sensor=sensor)
+    # The aids of the recording are of a file alone: other callers of `propose` state theirs.
+    site = made.table.get("site")
+    place = None if site is None else (site["lat_deg"], site["lon_deg"], site["alt_m"])
+    magnetic = propose_magnetometer(log, made.imu, made.gnss, place)
+    aids, of_aids = propose_aids(log, made.recording.imu, made.gnss)
+    table = {**made.table, "aiding": {**made.table.get("aiding", {}), **aids}}
+    said = (*made.findings, *(one for one in of_aids if one not in made.findings))
+    made = replace(made, table=table, findings=said)
     if foot:
         made = on_foot(made)
     parts = {key: made.table["log"].get(key) for key in ("from_s", "to_s", "duration_s")}
@@ -106,7 +114,7 @@ def draft_navigation(
         stage(page, STAGES[name], made.table[name])
     for name in ("mechanization", "filter", "damping", "smoother", "recorder"):
         stage(page, STAGES[name], made.table.get(name, {}))
-    found += _aids(page, made, folder, foot)
+    found += _aids(page, made, magnetic, folder, foot)
     _rest(page, foot)
     return ProposedAlignment(
         page.text, tuple(found), tuple(page.asked), made.findings, tuple(page.to_check)
@@ -275,7 +283,9 @@ ON_FOOT = (
 )
 
 
-def _aids(page: Page, made: Proposal, folder: Path, foot: bool) -> list[str]:
+def _aids(
+    page: Page, made: Proposal, magnetic: Magnetic | None, folder: Path, foot: bool
+) -> list[str]:
     slot = SLOTS["aiding"]
     page.blank()
     page.say(
@@ -337,8 +347,8 @@ def _aids(page: Page, made: Proposal, folder: Path, foot: bool) -> list[str]:
         for line in WHEELS:
             page.say(line)
     aids = made.table.get("aiding", {})
-    if made.magnetic is not None:
-        _magnetometer(page, made.magnetic, folder)
+    if magnetic is not None:
+        _magnetometer(page, magnetic, folder)
     page.say(*_other(slot, [kind for kind in OTHER_AIDS if kind not in aids]))
     if foot:
         began = made.table["log"].get("from_s")
@@ -346,8 +356,8 @@ def _aids(page: Page, made: Proposal, folder: Path, foot: bool) -> list[str]:
             return [f"it moves where it begins; its first stance, at {began:.6g} s, is the start"]
         return [f"stationary for the first {made.rest:.3g} s"]
     others = [f"{kind} in the recording, proposed" for kind in LASTING_ERRORS if kind in aids]
-    if made.magnetic is not None:
-        others.append(_magnetic(made.magnetic))
+    if magnetic is not None:
+        others.append(_magnetic(magnetic))
     if made.gnss is None:
         return others
     time, own = index_of(made.gnss), index_of(made.imu)

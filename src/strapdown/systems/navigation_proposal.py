@@ -49,7 +49,6 @@ from strapdown.navigation.measurements.gnss_readiness import (
 from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV, load_sensor
 from strapdown.sensors.rest import LEAST_LENGTH, find_rests_of_every_grade
 from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty, stated_imu
-from strapdown.systems.aid_proposal import Magnetic, propose_aids, propose_magnetometer
 from strapdown.systems.alignment_source import body_record
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
@@ -172,8 +171,6 @@ class Proposal:
         Reason for the alignment, in words.
     findings : tuple of Finding
         Findings of reading.
-    magnetic : Magnetic or None
-        The magnetometer, which is left to the user.
     """
 
     table: dict[str, Any]
@@ -186,7 +183,6 @@ class Proposal:
     drives: bool
     how: str
     findings: tuple[Finding, ...]
-    magnetic: Magnetic | None = None
 
 
 @one_thread()
@@ -297,14 +293,7 @@ def propose(
                 **clock,
             }
         }
-    others, of_others = propose_aids(log, recording.imu, fixes)
-    if others:
-        table["aiding"] = {**table.get("aiding", {}), **others}
-    findings = (*findings, *(one for one in of_others if one not in findings))
-    magnetic = propose_magnetometer(log, imu, fixes, place)
-    return Proposal(
-        table, recording, imu, fixes, rest, noise, guessed, drives, how, findings, magnetic
-    )
+    return Proposal(table, recording, imu, fixes, rest, noise, guessed, drives, how, findings)
 
 
 def _stated(table: dict[str, Any]) -> ImuUncertainty:

@@ -213,21 +213,36 @@ def read_aid(given: AidSpec) -> pd.DataFrame:
     assert issubclass(entry, TabulatedMeasurement)
     if set(entry.columns) == set(GNSS):
         return read_gnss(given.path, given.options())
-    aid = given.make()
-    assert isinstance(aid, TabulatedMeasurement)
+    return read_measured(given.make(), given.path, names=given.columns, repair=given.repair)
+
+
+def read_measured(
+    aid: TabulatedMeasurement,
+    path: str,
+    *,
+    names: Mapping[str, str] | None = None,
+    repair: bool = False,
+) -> pd.DataFrame:
+    """Read the table of a measurement that is no receiver, or its stream of a recording.
+
+    Parameters
+    ----------
+    names, repair
+        As `read_aid_table`.
+    """
     stated = aid.sd_options()
     table = read_aid_table(
-        given.path,
+        path,
         aid.column_units(),
         optional=tuple(stated),
         instead=aid.instead,
-        names=given.columns,
-        repair=given.repair,
+        names=names,
+        repair=repair,
         stream=aid.stream,
     )
     for column, option in stated.items():
         if column not in table and getattr(aid, option) == 0.0:
-            key = next(o.key for o in options_of(entry) if o.field == option)
+            key = next(o.key for o in options_of(type(aid)) if o.field == option)
             file = table.attrs["source"]
             raise DataError("navigation.aid-without-sd", file=file, quantity=column, key=key)
     if isinstance(aid, Magnetometer):
