@@ -10,9 +10,10 @@ says so: `fma` and `dot`.
 
 from __future__ import annotations
 
+from fractions import Fraction
 from typing import Any
 
-from numba import njit
+from numba import config, njit
 from numba.core import types
 from numba.core.cpu import CPUTargetOptions
 from numba.extending import intrinsic
@@ -34,6 +35,18 @@ def fma(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
         return builder.fma(*arguments)
 
     return types.float64(types.float64, types.float64, types.float64), generate
+
+
+def _fma_interpreted(a: float, b: float, c: float) -> float:
+    """`fma` where kernels are not compiled (`NUMBA_DISABLE_JIT`): the exact sum, rounded once."""
+    try:
+        return float(Fraction(float(a)) * Fraction(float(b)) + Fraction(float(c)))
+    except (OverflowError, ValueError):  # infinite, or not a number
+        return a * b + c
+
+
+if config.DISABLE_JIT:
+    fma = _fma_interpreted
 
 
 @njit(**IN_PLACE, forceinline=True)

@@ -19,6 +19,7 @@ from strapdown.crash.acceleration import (
     window_weights,
 )
 from strapdown.crash.delta_v import (
+    VelocityCourse,
     cumulative_delta_v,
     delta_v,
     recorder_delta_v,
@@ -76,6 +77,25 @@ def test_windows_off_the_samples_are_of_the_second_order(sampling, order):
         change = delta_v(record(rate, sampling), start, end).vector
         errors.append(np.abs(change - OBLIQUE.velocity(end) + OBLIQUE.velocity(start)).max())
     assert -np.polyfit(np.log(rates), np.log(errors), 1)[0] == pytest.approx(order, abs=0.15)
+
+
+@pytest.mark.parametrize(
+    ("sampling", "velocity", "rate", "slope"),
+    [
+        # 1 · 5 + 200 · 5² / 2000, and (1 + 3) / 2 · 10 + 3 · 5 + 100 · 5² / 2000.
+        ("instantaneous", [7.5, 36.25], [2.0, 3.5], [200.0, 100.0]),
+        ("mean", [15.0, 50.0], [3.0, 4.0], [0.0, 0.0]),
+    ],
+)
+def test_the_course_within_each_step_is_that_of_its_two_samples(sampling, velocity, rate, slope):
+    """Acceleration 1, 3, 4 m/s² at 0, 10, 20 ms: lines between them, or means of each step."""
+    values = np.outer([1.0, 3.0, 4.0], [1.0, 0.0, -1.0])
+    course = VelocityCourse(Acceleration(np.array([0.0, 0.01, 0.02]), values, sampling=sampling))
+    at = np.array([0.005, 0.015])
+    velocity = np.array(velocity) * 1e-3
+    found = (course.velocity(at), course.rate(at), course.slope(at))
+    for each, expected in zip(found, (velocity, rate, slope), strict=True):
+        np.testing.assert_allclose(each, np.outer(expected, [1.0, 0.0, -1.0]), rtol=1e-12)
 
 
 def test_weights_are_the_gradient():

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pandas as pd
 import pytest
 from scipy.stats import norm
 
-from strapdown.crash.delta_v_bound import DeltaVBound, body_delta_v_bound, resolved_delta_v_bound
+from strapdown.crash.delta_v_bound import (
+    DeltaVBound,
+    body_delta_v_bound,
+    direction_bounds,
+    resolved_delta_v_bound,
+)
 from strapdown.crash.entry import Entry
 from strapdown.crash.measuring_point import SampleEffects
 from strapdown.crash.path import CrashPath
+from strapdown.crash.pdof import AngleInterval, NedPdof, Pdof
 from strapdown.errors import DataError
 
 STEP = 0.01
@@ -80,6 +88,23 @@ def test_along_a_direction_its_length_does_not_matter():
 
 FORCE, GRAVITY, SIGMA = 40.0, 9.80665, 1e-3
 COUNT = 61
+
+
+@pytest.mark.parametrize(
+    ("direction", "interval", "expected"),
+    [
+        (Pdof(170.0, 0.0), (160.0, 190.0), (170.0, 160.0, 190.0)),
+        # The direction is within half a turn of the middle of its bounds.
+        (Pdof(-175.0, 0.0), (175.0, 195.0), (-175.0, -185.0, -165.0)),
+        # Over ground: the azimuth, whatever it is relative to the heading.
+        (NedPdof(350.0, 20.0, 0.0), (-20.0, 5.0), (350.0, 340.0, 365.0)),
+    ],
+)
+def test_bounds_of_a_direction_are_about_it(direction, interval, expected):
+    change = SimpleNamespace(
+        pdof=direction, interval=SimpleNamespace(horizontal=AngleInterval(*interval))
+    )
+    assert direction_bounds(change) == expected
 
 
 def noisy_path(anchor):

@@ -241,6 +241,7 @@ def test_monte_carlo_does_not_know_the_cores(case):
     assert np.array_equal(one.errors, three.errors)
     assert np.array_equal(one.errors, more.errors[:200])
     assert not np.array_equal(one.errors, sample_paths(path, runs=200, seed=6).errors)
+    assert len(sample_paths(path, runs=2).errors) == 2
     with pytest.raises(ConfigError, match="runs"):
         sample_paths(path, runs=1)
 

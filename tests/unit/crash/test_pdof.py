@@ -242,6 +242,12 @@ def test_sensitivity_to_the_window_of_a_force_that_turns():
     ned = Acceleration(time, made.values, "ned")
     relative = pdof_by_window(ned, -0.0007, heading_deg=25.0)
     assert np.allclose(relative["horizontal_deg"], table["horizontal_deg"] - 25.0)
+    # Without a heading: from the north.
+    for by, same in (
+        (pdof_by_window(ned, -0.0007), table),
+        (pdof_by_shift(ned, -0.0007, 0.06), shifted),
+    ):
+        assert np.allclose(by["horizontal_deg"], same["horizontal_deg"])
     # What does not fit is left out, and nothing that fits is an error.
     assert list(pdof_by_window(made, 0.7).index) == [0.01, 0.02, 0.03, 0.04, 0.05]
     with pytest.raises(

@@ -2,6 +2,7 @@ import math
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown.errors import ConfigError
 from strapdown.estimation.sensor_blocks import (
@@ -20,6 +21,8 @@ from strapdown.estimation.sensor_blocks import (
     mounting,
     random_walk,
     standard_states,
+    stated_states,
+    states_that_are_stated,
     time_offset,
 )
 from strapdown.estimation.sensor_states import StateLayout
@@ -175,6 +178,33 @@ def test_a_drift_without_end_is_part_of_the_constant():
     assert names(states) == ["gyro_bias", "accel_bias"]
     np.testing.assert_allclose(states[0].sd, 5.0)
     np.testing.assert_allclose(states[1].sd, 1.0)
+
+
+def test_states_by_name_have_the_sizes_that_are_stated():
+    gyro = TriadUncertainty(bias=3.0, scale=2e-3, g_sensitivity=1e-4)
+    accel = TriadUncertainty(bias=0.2, misalignment=5e-4)
+    sensors = ImuUncertainty(gyro, accel, BiasDrift(4.0, 300.0), BiasDrift(0.1, math.inf))
+    # A drift without a correlation time has no model; what has no size is not stated.
+    stated = states_that_are_stated(sensors)
+    assert stated == (
+        "gyro_bias", "accel_bias", "gyro_drift", "gyro_scale", "accel_misalignment", "g_sensitivity"
+    )  # fmt: skip
+    made = dict(zip(stated, stated_states(sensors, stated), strict=True))
+    assert [one.block.name for one in made.values()] == list(stated)
+    sizes = {
+        "gyro_bias": 3.0,  # its drift is a state of its own
+        "accel_bias": math.hypot(0.2, 0.1),  # a drift that does not change is constant
+        "gyro_drift": 4.0,
+        "gyro_scale": 2e-3,
+        "accel_misalignment": 5e-4,
+        "g_sensitivity": 1e-4,
+    }
+    for name, size in sizes.items():
+        np.testing.assert_allclose(made[name].sd, size, rtol=1e-12, err_msg=name)
+        lasting = 300.0 if name == "gyro_drift" else math.inf
+        assert made[name].correlation_time == lasting, name
+    with pytest.raises(ConfigError, check=coded("estimation.nothing-states-over-time-changes-2")):
+        stated_states(sensors, ["accel_drift"])
 
 
 def test_three_states_for_a_bias_bound_what_twice_three_hold():

@@ -2,7 +2,9 @@
 
 import numpy as np
 import pytest
+from numba import njit
 
+from strapdown._kernels.compilation import _fma_interpreted, fma
 from strapdown._kernels.covariance import mwgs, semidefinite_factor, udu_factor, udu_matrix
 
 
@@ -76,3 +78,15 @@ def test_gram_schmidt_is_the_weighted_product():
         udu_matrix(out, back)
         np.testing.assert_allclose(back, W * d @ W.T, atol=1e-12)
         assert (np.diagonal(out) >= 0.0).all()
+
+
+def test_a_product_and_a_sum_are_rounded_once_interpreted_too():
+    """To the bit as compiled, where a product cancels, overflows or is not a number, too."""
+    rng = np.random.default_rng(3)
+    compiled = njit(lambda a, b, c: fma(a, b, c))
+    a, b = rng.normal(size=(2, 500)) * 10.0 ** rng.uniform(-8, 8, (2, 500))
+    for x, y in zip(a, b, strict=True):
+        for z in (-x * y, y, 0.0):
+            assert _fma_interpreted(x, y, z) == compiled(x, y, z)
+    assert _fma_interpreted(1e200, 1e200, 0.0) == compiled(1e200, 1e200, 0.0) == np.inf
+    assert np.isnan(_fma_interpreted(np.nan, 1.0, 0.0))

@@ -39,8 +39,12 @@ def test_spans_are_spread_from_the_begin_to_the_end():
     assert [s.begin for s in spans] == [100.0, 120.0, 140.0, 160.0, 180.0]
     assert [s.end for s in spans] == [120.0, 140.0, 160.0, 180.0, 200.0]
     assert [s.begin for s in spans_to_withhold(0.0, 10.0, 4.0, 1)] == [3.0]
-    with pytest.raises(ConfigError, check=coded("evaluation.spans-do-not-fit-within")):
-        spans_to_withhold(0.0, 10.0, 12.0)
+    assert [s.begin for s in spans_to_withhold(0.0, 10.0, 0.5, 2)] == [0.0, 9.5]
+    # Five, if not stated; one that fits exactly is there five times.
+    assert [s.begin for s in spans_to_withhold(1.0, 5.0, 4.0)] == [1.0] * 5
+    for length, places in ((12.0, 5), (4.0, 0), (0.0, 5)):
+        with pytest.raises(ConfigError, check=coded("evaluation.spans-do-not-fit-within")):
+            spans_to_withhold(0.0, 10.0, length, places)
 
 
 def test_the_score_of_a_span_is_the_error_of_a_run_without_its_fixes():
