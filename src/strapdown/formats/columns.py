@@ -13,6 +13,7 @@ from strapdown.formats.vocabularies import (
     AXIS_WORDS,
     BESIDE,
     CHANGE,
+    CHIP,
     CLOCKS,
     COUNTERS,
     DIRECTIONS,
@@ -22,6 +23,7 @@ from strapdown.formats.vocabularies import (
     NO_AXIS,
     NOISE,
     OF_TIME,
+    PLACES,
     PX4,
     QUANTITIES,
     RATES,
@@ -223,6 +225,7 @@ def _read_words(text: str, unit: str | None, of: Vocabulary, about: bool) -> Col
             return replace(said, unit=unit or said.unit, loose=1)
     # Names in capitals without separators (latDeg), in another order (x_gyro), with words that say
     # nothing of the quantity (raw_acceleration_x), or twice the same (gyroRotationRateX).
+    text, chip = _without_chip(text) if of.sensors else (text, "")
     words = [e for w in _HUMPS.findall(text) for e in _english(w.lower())]
     if unit is None:
         words, its = unit_words(words, OF_LOGS if of.stems else of.kinds)
@@ -244,6 +247,9 @@ def _read_words(text: str, unit: str | None, of: Vocabulary, about: bool) -> Col
         bare.append(bare.pop(axes[0]))
     said = _known("".join(bare), of) or _of_words(bare)
     said = said or _known("".join(w for w in bare if not w.isdecimal()), of)
+    if said is None and PLACES & {*bare}:
+        said = _of_words([w for w in bare if w not in PLACES])
+        said = said if said is not None and str(said.quantity)[-2:-1] == "_" else None
     if said is None:
         return ColumnName(None, unit)
     if said.family and said.number is None:
@@ -251,9 +257,19 @@ def _read_words(text: str, unit: str | None, of: Vocabulary, about: bool) -> Col
         axis = str(said.quantity)[-1]
         other = [w for w in words if w != axis and w not in TURNS]
         family = "".join(other) if len(other) < len(words) else said.family
-        family = f"of {family}" if words[:1] == [axis] else family
+        family = f"of {family}{chip}" if words[:1] == [axis] else f"{family}{chip}"
         said = replace(said, family=f"{family}#" if len(family) < 2 else family)
     return replace(said, unit=unit or said.unit, loose=2)
+
+
+def _without_chip(text: str) -> tuple[str, str]:
+    """Split off the name of a chip, and a letter of its version, beside the name of a sensor."""
+    kept: list[str] = []
+    chip: list[str] = []
+    for part in re.split(_SIGNS, text):
+        version = bool(chip) and len(part) == 1 and part.lower() not in tuple(_AXES)
+        (chip if version or CHIP.fullmatch(part.lower()) else kept).append(part)
+    return (" ".join(kept), "".join(chip).lower()) if kept and chip else (text, "")
 
 
 def _english(word: str) -> list[str]:
