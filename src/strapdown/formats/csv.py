@@ -177,6 +177,8 @@ def _numbered(text: str) -> tuple[Lines, list[str]]:
 _ARRIVAL = re.compile(r"(\d\d:\d\d:\d\d\.\d+) -> ?")
 # A semicolon that ends a line of commas, as of a program's statement.
 _ENDED = re.compile(r"[^;]*,[^;]*;\s*")
+# A sentence with its name and checksum: "$VNYMR,1.5,…*69".
+_SENTENCE = re.compile(r"(\$\w+)(,[^*]*)\*[0-9A-Fa-f]{2}\s*")
 # "ax: 0.12 g," or "ax = 0.12": a name, its value, and its unit where a sign ends the field.
 _PLAIN = r"[+-]?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?"
 _NAME = r"[A-Za-z_][\w ./()\[\]^²³°-]{0,40}?"
@@ -206,6 +208,9 @@ def _rewritten(numbered: Lines) -> Lines:
     top = numbered[:SEARCHED]
     if all(_ENDED.fullmatch(line) for _, line in top):
         numbered = [(row, line.rstrip().removesuffix(";")) for row, line in numbered]
+        top = numbered[:SEARCHED]
+    if len({m[1] if m else "" for m in (_SENTENCE.fullmatch(line) for _, line in top)}) == 1:
+        numbered = [(row, _SENTENCE.sub(r"\1\2", line)) for row, line in numbered]
         top = numbered[:SEARCHED]
     stamped = sum(_ARRIVAL.match(line) is not None for _, line in top)
     if 2 * stamped > len(top):

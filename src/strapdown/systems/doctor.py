@@ -393,6 +393,7 @@ def _others(
         except DataError as error:
             # A table of samples need not be one of fixes, unless an answer makes it one.
             certain = "gnss" in held or recording is None or "flags" in error.finding.data
+            certain |= error.finding.code == "io.fixes-without-height"
             if error.finding.code not in ABSENT and certain:
                 findings.append(error.finding.replace(severity="error", stream="gnss"))
     if recording is not None and recording.truth is not None:

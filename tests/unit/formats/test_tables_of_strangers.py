@@ -813,3 +813,18 @@ def test_the_unit_of_an_accelerometer_is_asked_with_that_of_the_gyro(tmp_path):
         lines.append(f"{100 * k}," + ",".join(f"{v:.5f}" for v in (*force, *rate)))
     asked = answers(tmp_path, lines)
     assert asked.keys() == {"gyro_unit", "accel_unit"} and asked["accel_unit"] == "g"
+
+
+def test_sentences_of_one_name_with_checksums(tmp_path):
+    rng = np.random.default_rng(13)
+    accel = 0.03 * rng.standard_normal((200, 3)) + FORCE
+    gyro = 0.05 * rng.standard_normal((200, 3)) + RATES
+    field = 1e-4 * rng.standard_normal((200, 3)) + (0.2, -0.1, 0.4)
+    rows_ = np.column_stack([field, accel, gyro])
+    lines = ["$XXIMU," + ",".join(f"{v:+.6f}" for v in row) + "*3A" for row in rows_]
+    asked = answers(tmp_path, lines, "log.txt", gyro_unit="rad/s")
+    columns = {f"{s}_{a}": str(5 + 3 * j + k) for j, s in enumerate(("accel", "gyro"))
+               for k, a in enumerate("xyz")}  # fmt: skip
+    assert asked == columns | {"rate": "HZ"}
+    imu = read(tmp_path, lines, "log.txt", gyro_unit="rad/s", columns=columns, rate=50.0).imu
+    assert np.allclose(imu[GYRO], gyro, atol=1e-6) and np.allclose(imu[ACCEL], accel, atol=1e-6)
