@@ -33,6 +33,7 @@ from strapdown.formats.vocabularies import (
     TRIADS,
     TURN_STEMS,
     TURNS,
+    WITH_AXIS,
     WITHOUT_GRAVITY,
     Vocabulary,
 )
@@ -249,7 +250,9 @@ def _read_words(text: str, unit: str | None, of: Vocabulary, about: bool) -> Col
     said = said or _known("".join(w for w in bare if not w.isdecimal()), of)
     if said is None and PLACES & {*bare}:
         said = _of_words([w for w in bare if w not in PLACES])
-        said = said if said is not None and str(said.quantity)[-2:-1] == "_" else None
+        # A letter behind a place may be anything: foot_f_x.
+        if said is None or str(said.quantity)[-2:-1] != "_" or len(said.family) < 2:
+            said = None
     if said is None:
         return ColumnName(None, unit)
     if said.family and said.number is None:
@@ -292,7 +295,11 @@ def without_accents(text: str) -> str:
 def _is_model(word: str) -> bool:
     """Whether a word of letters and digits names a unit or a chip: BMI160, imu1."""
     letters = word.rstrip("0123456789")
-    return 0 < len(letters) < len(word) and not any(letters in names for names, _, _ in SENSORS)
+    return (
+        0 < len(letters) < len(word)
+        and letters not in ABOUT
+        and not any(letters in names for names, _, _ in SENSORS)
+    )
 
 
 def _known(word: str, of: Vocabulary) -> ColumnName | None:
@@ -312,7 +319,7 @@ def _known(word: str, of: Vocabulary) -> ColumnName | None:
         sensor, axis = (word[1:], word[:1]) if word[:1] in _AXES and len(word) > 2 else (word, "")
     turned = word[:1] == axis
     for names, triad, increment in SENSORS:
-        if sensor in names and (axis or len(sensor) > 1):
+        if sensor in names and (axis or (len(sensor) > 1 and sensor not in WITH_AXIS)):
             quantity = f"{triad}_{axis}" if axis and axis in _AXES else triad
             return ColumnName(
                 quantity,
@@ -323,7 +330,7 @@ def _known(word: str, of: Vocabulary) -> ColumnName | None:
                 increment=increment,
             )
         # A name that ends in x, y or z without meaning an axis.
-        if word in names and len(word) > 1:
+        if word in names and len(word) > 1 and word not in WITH_AXIS:
             return ColumnName(triad, family=word, increment=increment)
     return None
 
@@ -339,7 +346,8 @@ def _of_words(words: list[str]) -> ColumnName | None:
     bare = [w for w in (words[:-1] if axis or number else words) if not w.isdecimal()]
     for triad, beside in BESIDE.items():
         named = [w for w in bare if w in TRIADS[triad] and len(w) > 2]
-        known = "".join(bare) in TRIADS[triad]
+        name = "".join(bare)
+        known = name in TRIADS[triad] and (bool(axis) or name not in WITH_AXIS)
         known = known or (bool(axis) and bare == [SHORT[triad]])
         if not (known or (named and set(bare) <= {*named, *beside})):
             continue

@@ -196,6 +196,8 @@ _VECTOR = re.compile(
 _LEADING = re.compile(rf"\s*({_PLAIN})\s*[:,;|]\s*\|?(?=\s*[A-Za-z_])")
 #: Longest line above the rows that is understood, and of labelled values.
 LONGEST = 2000
+#: Name of a number before the first label, unless it counts lines.
+LEADING = "time"
 #: Fewest labelled values of a line that is taken for a row.
 LABELS = 3
 
@@ -243,12 +245,14 @@ def _unlabelled(numbered: Lines) -> Lines:
     if not usual or 2 * usual[0][1] <= len(numbered[:SEARCHED]):
         return numbered
     names, first = usual[0][0], True
+    stamps = [float(m[1]) for _, line in numbered[:SEARCHED] if (m := _LEADING.match(line))]
+    count = all(b - a == 1.0 for a, b in itertools.pairwise(stamps)) and names[0] == LEADING
     out: Lines = []
     for row, line in numbered:
         said, values = _labels(line)
         if said and said == names[: len(said)]:
             if first:
-                out.append((row, "\t".join(names)))
+                out.append((row, "\t".join(("number", *names[1:]) if count else names)))
                 first = False
             line = "\t".join(values)
         out.append((row, line))
@@ -268,7 +272,7 @@ def _labels(line: str) -> tuple[tuple[str, ...], list[str]]:
     values = [value for _, value, _ in found]
     if stamp:
         timed = any(read_name(name).quantity == "time" for name in names)
-        names, values = ["number" if timed else "time", *names], [stamp[1], *values]
+        names, values = ["number" if timed else LEADING, *names], [stamp[1], *values]
     return tuple(names), values
 
 
@@ -351,7 +355,10 @@ class _Top:
         words = {fields_of(row, self.separator)[0] for _, row in self.data[:JUDGED]}
         word = words.pop()
         named = _named(line, self.separator, width - 1) if not words and width > 1 else None
-        return [word, *named] if named and word and not is_data(word) else None
+        # Where the first name is not of a number, the word has it, and another is missing.
+        if not named or read_name(named[0]).quantity is None:
+            return None
+        return [word, *named] if word and not is_data(word) else None
 
     def _units_in_comment(self, width: int, kinds: Sequence[str]) -> list[str] | None:
         """Units in the last comment, where the one before it has the names."""

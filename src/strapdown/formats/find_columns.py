@@ -198,7 +198,7 @@ def _by_name(raw: RawLog, wanted: dict[str, str], questions: Questions) -> dict[
         letter = {
             name[: m.start()] + w + name[m.end() :] for m in _LAST.finditer(name) for w in "wW"
         }
-        if one.quantity in QUANTITIES and one.family and letter & said.keys():
+        if "rot" in one.family and letter & said.keys():
             said[name] = ColumnName(None)
     families = _families(raw, said)
     _letter_g(raw, families, wanted, questions, found)

@@ -211,6 +211,8 @@ WITHOUT_GRAVITY |= {"lina", "la", "lineara", "usera"}
 RATES = {"rate", "speed", "velocity", "vel", "dot", *TRIADS["gyro"]} - set("wgω")
 # Names that are parts of words, unless their axis stands apart: MaX, but not max.
 SHORT = {"gyro": "gy", "accel": "ac", "mag": "ma"}
+#: Names that are a sensor with their axis alone: xav and xla of a message of ROS.
+WITH_AXIS = ("av", "la")
 # G is also gravity.
 MAGNETIC = {"g": "gauss", "mg": "mG"}
 # Arrays of PX4 (msg/SensorCombined.msg, SensorMag.msg), whose comments define their units.
@@ -240,8 +242,8 @@ PLACES = {
 }
 #: Beginnings of the names of sensor chips, which stand beside the name of the sensor.
 CHIP = re.compile(
-    r"(?:lsm|lis|ism|iis|asm|icm|iim|mpu|itg|bmi|bma|bmg|bmx|bmm|bno|akm?|adxl|adis|fxos|fxas|kx|mxg"
-    r"|hmc|qmc|mmc|sca|scha|xsens|mti)[a-z]*\d\w*"
+    r"(?:lsm|lis|ism|iis|asm|icm|iim|mpu|itg|bm[agimx]|bno|akm?|adxl|adis|fxos|fxas|kx|mxg|hmc|qmc|mmc"
+    r"|scha?|sca|mti)\d\w*"
 )
 # Words of a quantity that is about another: its spread, its error, its demand.
 ABOUT = {

@@ -634,6 +634,9 @@ def answers(tmp_path, lines, name="log.csv", **options):
         ("Accel_LN_X_CAL", "accel_x"),
         ("xav", "gyro_x"),
         ("wheel_speed_x", "None"),
+        ("foot_f_x", "None"),
+        ("gyro_scale1_x", "None"),
+        ("la", "None"),
         ("front_left", "None"),
         ("GPST", "time"),
         ("rosbagTimestamp", "time"),
@@ -828,3 +831,20 @@ def test_sentences_of_one_name_with_checksums(tmp_path):
     assert asked == columns | {"rate": "HZ"}
     imu = read(tmp_path, lines, "log.txt", gyro_unit="rad/s", columns=columns, rate=50.0).imu
     assert np.allclose(imu[GYRO], gyro, atol=1e-6) and np.allclose(imu[ACCEL], accel, atol=1e-6)
+
+
+def test_a_number_of_lines_before_labels_is_no_clock(tmp_path):
+    lines = []
+    for k, line in enumerate(rows(), 1):
+        _, *values = line.split(",")
+        names = [f"{s}{a}" for s in ("g", "a") for a in "xyz"]
+        lines.append(f"{k}: " + ", ".join(f"{n}={v}" for n, v in zip(names, values, strict=True)))
+    units = {"gyro_unit": "deg/s", "accel_unit": "g"}
+    assert answers(tmp_path, lines, "log.txt", **units) == {"rate": "HZ"}
+
+
+def test_a_word_before_rows_under_its_own_name_moves_no_name(tmp_path):
+    lines = ["type,t_s,gx,gy,gz,ax,ay,az", *(f"IMU,{line},7" for line in rows())]
+    with pytest.raises(DataError) as refused:
+        read(tmp_path, lines, gyro_unit="deg/s", accel_unit="g")
+    assert "gyro_x" not in dict(refused.value.finding.data.get("answers", ()))
