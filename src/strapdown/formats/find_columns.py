@@ -173,7 +173,8 @@ def advances(values: NDArray[Any]) -> bool:
     """Whether a column advances evenly, as a clock does; a count of samples, by one, does not."""
     if values.size < 3:
         return False
-    steps = np.diff(values.astype(np.int64 if values.dtype.kind == "M" else np.float64))
+    whole = values.dtype.kind == "M"
+    steps: NDArray[Any] = np.diff(values.astype(np.int64) if whole else values.astype(np.float64))
     usual = float(np.median(steps))
     even = np.mean(np.abs(steps - usual) <= 0.5 * usual)
     forward = bool((steps >= 0).all()) and not bool((steps == 1).all())
