@@ -211,7 +211,8 @@ def _rewritten(numbered: Lines) -> Lines:
     if all(_ENDED.fullmatch(line) for _, line in top):
         numbered = [(row, line.rstrip().removesuffix(";")) for row, line in numbered]
         top = numbered[:SEARCHED]
-    if len({m[1] if m else "" for m in (_SENTENCE.fullmatch(line) for _, line in top)}) == 1:
+    sentences = {m[1] if m else "" for m in (_SENTENCE.fullmatch(line) for _, line in top)}
+    if len(sentences) == 1 and "" not in sentences:
         numbered = [(row, _SENTENCE.sub(r"\1\2", line)) for row, line in numbered]
         top = numbered[:SEARCHED]
     stamped = sum(_ARRIVAL.match(line) is not None for _, line in top)
