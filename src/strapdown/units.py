@@ -289,7 +289,7 @@ def unit_words(words: Sequence[str], among: Sequence[str] = OF_LOGS) -> tuple[li
 
 _NUMBER = r"\d+(?:\.\d*)?(?:[eE][+-]?\d+)?"
 # Counts per unit, as in deg/s/131; or units per count, as in 1/131 deg/s.
-_PARTS = re.compile(rf"(?P<unit>.*\D)/\s*(?P<counts>{_NUMBER})")
+_PARTS = re.compile(rf"(?P<unit>.*[^\W\d_].*)/\s*(?P<counts>{_NUMBER})")
 _TIMES = re.compile(rf"(?P<up>{_NUMBER})(?:\s*/\s*(?P<down>{_NUMBER}))?\s*[ *·]\s*(?P<unit>\D.*)")
 
 

@@ -1,17 +1,16 @@
 """Logs of Android sensor events: one row an event of any sensor, its kind in the row.
 
-``kind, timestamp, x, y, z`` or ``timestamp, kind, x, y, z``, further fields unused; with or without
-a header. A kind is the number of a SensorEvent (1 accelerometer, 2 magnetic field, 4 gyroscope, 16
-gyroscope uncalibrated, 35 accelerometer uncalibrated), its string type
-(``android.sensor.gyroscope``), or a short name (``gyro``, ``ACC``). Under the first two, units,
-axes and the sign of gravity are those of Android: rad/s, m/s² with gravity, µT, x right, y up, z
-out of the screen (developer.android.com/reference/android/hardware/SensorEvent). Linear
-acceleration and gravity are used only without an accelerometer: their sum. Short names are
-also those of other loggers, so that units and axes under them are left open; so are units under the
+``kind, timestamp, x, y, z`` or ``timestamp, kind, x, y, z``, further fields unused, or the kind
+behind two clocks; with or without a header. A kind is the number of a SensorEvent (1 accelerometer,
+2 magnetic field, 4 gyroscope, 16 gyroscope uncalibrated, 35 accelerometer uncalibrated), its string
+type (``android.sensor.gyroscope``), or a short name (``gyro``, ``ACC``). Under the first two,
+units, axes and the sign of gravity are those of Android: rad/s, m/s² with gravity, µT, x right, y
+up, z out of the screen (developer.android.com/reference/android/hardware/SensorEvent). Linear
+acceleration and gravity are used only without an accelerometer: their sum. Short names are also
+those of other loggers, so that units and axes under them are left open; so are units under the
 names of Android where the accelerometer has no gravity in m/s², or the rates are rather in another
-unit than rad/s, as of applications that write deg/s and g. A name may state its unit:
-``Gyroscope (deg/s)``. The unit of the stamps is inferred unless the header states it; Android's own
-are ns.
+unit than rad/s, as of applications that write deg/s and g. A name may state its unit: ``Gyroscope
+(deg/s)``. The unit of the stamps is inferred unless the header states it; Android's own are ns.
 
 A table of samples is none of these: its header names axes of sensors (``ax``, ``gyro_x``). Small
 whole numbers are kinds only under a name that says so or without a header, and only if the values
@@ -71,6 +70,8 @@ def kind_of(field: str) -> str | None:
     """Return the kind of sensor that a field names, with or without its unit in brackets."""
     word = split_brackets(field.strip(" \"'").lower())[0].strip()
     word = word.removeprefix("android.sensor.").removeprefix("type_")
+    if "_" in word and (said := read_name(word)).unit and said.quantity in UNITS:
+        word = word[: word.rindex("_")]  # gyro_dps
     # Neither -4 nor 1.6 is a kind.
     letters = re.search("[a-z]", word)
     return _OF.get(re.sub(r"[^a-z0-9]", "", word) if letters else word)
@@ -89,8 +90,8 @@ detect = Signs(
 )
 
 
-def _layout(text: str) -> tuple[int, int, str | None] | None:
-    """Return the fields of kind and stamp, and the unit of stamps in a header."""
+def _layout(text: str) -> tuple[int, int, int, str | None] | None:
+    """Return the fields of kind, stamp and first value, and the unit of stamps in a header."""
     lines = [line for line in text.splitlines()[:TOP] if line.strip() and not csv.is_comment(line)]
     if len(lines) < 3:
         return None
@@ -101,10 +102,12 @@ def _layout(text: str) -> tuple[int, int, str | None] | None:
         return None
     units = [read_name(name).unit for name in rows[0][:2]]
     unit = next((u for u in units if u in TIME_UNITS), None)
+    # A kind may be behind two clocks.
+    orders = ((0, 1, 2), (1, 0, 2), (2, 0, 3))
     body = [r for r in rows[1:-1] if len(r) >= 5]
     if len(body) < 0.9 * (len(rows) - 2):
         return None
-    for kind, stamp in ((0, 1), (1, 0)):
+    for kind, stamp, first in orders[: 3 if body and len(body[0]) > 5 else 2]:
         # A counter of samples takes every number once, a kind of sensor returns.
         fields = Counter(r[kind] for r in body)
         kinds = {kind_of(field) for field, count in fields.items() if count > 1} - {None}
@@ -118,9 +121,13 @@ def _layout(text: str) -> tuple[int, int, str | None] | None:
             if any(field.isdecimal() and kind_of(field) for field in fields):
                 named = not header or _HEADED.fullmatch(header[kind])
                 signed = any(field.startswith("-") for field in fields)
-                if signed or not named or not _are_of_android([(r[kind], *r[2:5]) for r in body]):
+                if (
+                    signed
+                    or not named
+                    or not _are_of_android([(r[kind], *r[first : first + 3]) for r in body])
+                ):
                     continue
-            return (kind, stamp, unit) if kinds & {"gyro", "gyro uncalibrated"} else None
+            return (kind, stamp, first, unit) if kinds & {"gyro", "gyro uncalibrated"} else None
     return None
 
 
@@ -174,7 +181,7 @@ def read(path: Path) -> RawLog:
     layout = _layout(text[: 1 << 16])
     if layout is None:
         raise DataError("io.no-gyroscope-holds", file=path.name, quantity="gyro", held="other rows")
-    kind, stamp, unit = layout
+    kind, stamp, first, unit = layout
     separator = None
     events: dict[str, list[tuple[Any, ...]]] = {}
     names: dict[str, str] = {}
@@ -189,17 +196,17 @@ def read(path: Path) -> RawLog:
         if which is None:
             unknown.add(fields[kind] if len(fields) > kind else line)
             continue
-        if len(fields) < 5:
+        if len(fields) < first + 3:
             if row == len(lines) and not text.endswith("\n"):
                 findings.append(
                     Finding("io.last-line-cut-left-out", file=path.name, row=row, severity="note")
                 )
                 continue
             raise DataError(
-                "io.fields-expected", file=path.name, row=row, count=len(fields), width=5
+                "io.fields-expected", file=path.name, row=row, count=len(fields), width=first + 3
             )
         names.setdefault(which, fields[kind])
-        events.setdefault(which, []).append((row, fields[stamp], *fields[2:5]))
+        events.setdefault(which, []).append((row, fields[stamp], *fields[first : first + 3]))
     others = sorted(u for u in unknown if u and not read_name(u).quantity)[:6]
     if others:
         findings.append(

@@ -24,7 +24,7 @@ from strapdown.formats.clocks import (
     with_clock,
 )
 from strapdown.formats.columns import parse_axes, read_name
-from strapdown.formats.find_columns import AXES, Column, find_columns, require_gyro
+from strapdown.formats.find_columns import AXES, Column, advances, find_columns, require_gyro
 from strapdown.formats.inference import Inference
 from strapdown.formats.join import join
 from strapdown.formats.judge import LIKELY, SUMS, UNITS, intervals, sampling_of_sums
@@ -115,7 +115,8 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
             unit = str(best["unit"]) if best["share"] >= LIKELY else "UNIT"
             questions.ask(error.finding, time_unit=unit)
         elif code == "io.time-column-missing":
-            questions.ask(error.finding, time=_likely_clock(raw, found) or "NAME")
+            clock = _likely_clock(raw, found)
+            questions.ask(error.finding, **({"time": clock} if clock else {"rate": "HZ"}))
         else:
             questions.refuse()
             raise
@@ -188,19 +189,11 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
 
 
 def _likely_clock(raw: RawLog, found: dict[str, Column]) -> str:
-    """Return the column that advances evenly as a clock does; empty if there is not just one.
-
-    A count of samples advances by one, and is none.
-    """
+    """Return the column that advances evenly as a clock does; empty if there is not just one."""
     used = {column.source for column in found.values()}
     likely = []
     for name, values in raw.columns.items():
-        if name in used or values.dtype.kind not in "iuf" or values.size < 3:
-            continue
-        steps = np.diff(values.astype(np.float64))
-        usual = float(np.median(steps))
-        even = np.mean(np.abs(steps - usual) <= 0.5 * usual)
-        if usual > 0.0 and (steps >= 0.0).all() and even > 0.9 and not (steps == 1.0).all():
+        if name not in used and values.dtype.kind in "iuf" and advances(values):
             likely.append(name)
     return likely[0] if len(likely) == 1 and not set(",=") & set(likely[0]) else ""
 
@@ -262,6 +255,15 @@ def _by_sensor(raw: RawLog, found: dict[str, Column]) -> list[RawLog]:
         columns = [raw.columns[found[q].source] for a in AXES if (q := f"{triad}_{a}") in found]
         if len(columns) == 3 and all(c.dtype.kind == "f" for c in columns):
             there[triad] = ~np.logical_and.reduce([np.isnan(c) for c in columns])
+    left_out: list[Finding] = []
+    if "accel" in there and found["accel_x"].why == "by its name":
+        # Rows may say their sensor in a column of text: linear acceleration has no gravity.
+        texts = [c[there["accel"]] for c in raw.columns.values() if c.dtype.kind == "O"]
+        kinds = [set(map(str, c)) for c in texts]
+        if any(len(k) == 1 and read_name(f"{k.pop()} x").linear for k in kinds):
+            del there["accel"]
+            code = "io.left-out-linear-acceleration"
+            left_out = [Finding(code, file=raw.name, quantity="accel", severity="note")]
     shares = [float(rows.mean()) for rows in there.values()]
     if "gyro" not in there or min(shares) > 1.0 - OWN_ROWS or min(shares) == 0.0:
         return []
@@ -277,7 +279,7 @@ def _by_sensor(raw: RawLog, found: dict[str, Column]) -> list[RawLog]:
                 columns={c.source: raw.columns[c.source][keep] for c in mine},
                 rows=rows[keep],
                 stated={c.source: (n, c.unit) for c, n in zip(mine, names, strict=True)},
-                findings=raw.findings if triad == "gyro" else [],
+                findings=[*raw.findings, *left_out] if triad == "gyro" else [],
             )
         )
     return parts

@@ -13,6 +13,7 @@ from strapdown.formats.vocabularies import (
     AXIS_WORDS,
     BESIDE,
     CHANGE,
+    CHIP,
     CLOCKS,
     COUNTERS,
     DIRECTIONS,
@@ -22,6 +23,7 @@ from strapdown.formats.vocabularies import (
     NO_AXIS,
     NOISE,
     OF_TIME,
+    PLACES,
     PX4,
     QUANTITIES,
     RATES,
@@ -31,6 +33,7 @@ from strapdown.formats.vocabularies import (
     TRIADS,
     TURN_STEMS,
     TURNS,
+    WITH_AXIS,
     WITHOUT_GRAVITY,
     Vocabulary,
 )
@@ -223,6 +226,7 @@ def _read_words(text: str, unit: str | None, of: Vocabulary, about: bool) -> Col
             return replace(said, unit=unit or said.unit, loose=1)
     # Names in capitals without separators (latDeg), in another order (x_gyro), with words that say
     # nothing of the quantity (raw_acceleration_x), or twice the same (gyroRotationRateX).
+    text, chip = _without_chip(text) if of.sensors else (text, "")
     words = [e for w in _HUMPS.findall(text) for e in _english(w.lower())]
     if unit is None:
         words, its = unit_words(words, OF_LOGS if of.stems else of.kinds)
@@ -244,6 +248,11 @@ def _read_words(text: str, unit: str | None, of: Vocabulary, about: bool) -> Col
         bare.append(bare.pop(axes[0]))
     said = _known("".join(bare), of) or _of_words(bare)
     said = said or _known("".join(w for w in bare if not w.isdecimal()), of)
+    if said is None and PLACES & {*bare}:
+        said = _of_words([w for w in bare if w not in PLACES])
+        # A letter behind a place may be anything: foot_f_x.
+        if said is None or str(said.quantity)[-2:-1] != "_" or len(said.family) < 2:
+            said = None
     if said is None:
         return ColumnName(None, unit)
     if said.family and said.number is None:
@@ -251,9 +260,19 @@ def _read_words(text: str, unit: str | None, of: Vocabulary, about: bool) -> Col
         axis = str(said.quantity)[-1]
         other = [w for w in words if w != axis and w not in TURNS]
         family = "".join(other) if len(other) < len(words) else said.family
-        family = f"of {family}" if words[:1] == [axis] else family
+        family = f"of {family}{chip}" if words[:1] == [axis] else f"{family}{chip}"
         said = replace(said, family=f"{family}#" if len(family) < 2 else family)
     return replace(said, unit=unit or said.unit, loose=2)
+
+
+def _without_chip(text: str) -> tuple[str, str]:
+    """Split off the name of a chip, and a letter of its version, beside the name of a sensor."""
+    kept: list[str] = []
+    chip: list[str] = []
+    for part in re.split(_SIGNS, text):
+        version = bool(chip) and len(part) == 1 and part.lower() not in tuple(_AXES)
+        (chip if version or CHIP.fullmatch(part.lower()) else kept).append(part)
+    return (" ".join(kept), "".join(chip).lower()) if kept and chip else (text, "")
 
 
 def _english(word: str) -> list[str]:
@@ -276,7 +295,11 @@ def without_accents(text: str) -> str:
 def _is_model(word: str) -> bool:
     """Whether a word of letters and digits names a unit or a chip: BMI160, imu1."""
     letters = word.rstrip("0123456789")
-    return 0 < len(letters) < len(word) and not any(letters in names for names, _, _ in SENSORS)
+    return (
+        0 < len(letters) < len(word)
+        and letters not in ABOUT
+        and not any(letters in names for names, _, _ in SENSORS)
+    )
 
 
 def _known(word: str, of: Vocabulary) -> ColumnName | None:
@@ -296,7 +319,7 @@ def _known(word: str, of: Vocabulary) -> ColumnName | None:
         sensor, axis = (word[1:], word[:1]) if word[:1] in _AXES and len(word) > 2 else (word, "")
     turned = word[:1] == axis
     for names, triad, increment in SENSORS:
-        if sensor in names and (axis or len(sensor) > 1):
+        if sensor in names and (axis or (len(sensor) > 1 and sensor not in WITH_AXIS)):
             quantity = f"{triad}_{axis}" if axis and axis in _AXES else triad
             return ColumnName(
                 quantity,
@@ -307,7 +330,7 @@ def _known(word: str, of: Vocabulary) -> ColumnName | None:
                 increment=increment,
             )
         # A name that ends in x, y or z without meaning an axis.
-        if word in names and len(word) > 1:
+        if word in names and len(word) > 1 and word not in WITH_AXIS:
             return ColumnName(triad, family=word, increment=increment)
     return None
 
@@ -323,7 +346,8 @@ def _of_words(words: list[str]) -> ColumnName | None:
     bare = [w for w in (words[:-1] if axis or number else words) if not w.isdecimal()]
     for triad, beside in BESIDE.items():
         named = [w for w in bare if w in TRIADS[triad] and len(w) > 2]
-        known = "".join(bare) in TRIADS[triad]
+        name = "".join(bare)
+        known = name in TRIADS[triad] and (bool(axis) or name not in WITH_AXIS)
         known = known or (bool(axis) and bare == [SHORT[triad]])
         if not (known or (named and set(bare) <= {*named, *beside})):
             continue

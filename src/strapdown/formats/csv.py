@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
-from strapdown.formats.columns import read_name
+from strapdown.formats.columns import read_name, split_brackets
 from strapdown.formats.dates import is_date, is_day_time, is_stamp
 from strapdown.formats.preamble import stated_by_keys, stated_rate, stated_units
 from strapdown.formats.recording import RawLog, stated_by
@@ -175,13 +175,29 @@ def _numbered(text: str) -> tuple[Lines, list[str]]:
 
 #: Time of arrival that the serial monitor of a development environment puts before a line.
 _ARRIVAL = re.compile(r"(\d\d:\d\d:\d\d\.\d+) -> ?")
+# A semicolon that ends a line of commas, as of a program's statement.
+_ENDED = re.compile(r"[^;]*,[^;]*;\s*")
+# A sentence with its name and checksum: "$VNYMR,1.5,…*69".
+_SENTENCE = re.compile(r"(\$\w+)(,[^*]*)\*[0-9A-Fa-f]{2}\s*")
 # "ax: 0.12 g," or "ax = 0.12": a name, its value, and its unit where a sign ends the field.
+_PLAIN = r"[+-]?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?"
+_NAME = r"[A-Za-z_][\w ./()\[\]^²³°-]{0,40}?"
 _LABELLED = re.compile(
-    r"\s*([A-Za-z_][\w ./()\[\]-]{0,40}?)\s*[:=]\s*([^\s,;|=]+)"
+    rf"\s*({_NAME})\s*[:=]\s*([^\s,;|=]+)"
     r"(?:[ \t]*([^\s\d,;|:=][^\s,;|:=]*)(?=[ \t]*[,;|]|$))?[ \t]*[,;|]?"
 )
+# "Accel (m/s^2): 0.31, -0.12, 9.71": a name and its three values.
+_VECTOR = re.compile(
+    rf"({_NAME})\s*[:=]\s*[\[(]?"
+    + r"\s*[,; ]\s*".join([rf"({_PLAIN})"] * 3)
+    + r"(?=\s*([\])|;]|$))"
+)
+# A number before the first name, as the stamp in "20518269: |Acc X:-0.22".
+_LEADING = re.compile(rf"\s*({_PLAIN})\s*[:,;|]\s*\|?(?=\s*[A-Za-z_])")
 #: Longest line above the rows that is understood, and of labelled values.
 LONGEST = 2000
+#: Name of a number before the first label, unless it counts lines.
+LEADING = "time"
 #: Fewest labelled values of a line that is taken for a row.
 LABELS = 3
 
@@ -192,6 +208,13 @@ def _rewritten(numbered: Lines) -> Lines:
     The same object if there are none.
     """
     top = numbered[:SEARCHED]
+    if all(_ENDED.fullmatch(line) for _, line in top):
+        numbered = [(row, line.rstrip().removesuffix(";")) for row, line in numbered]
+        top = numbered[:SEARCHED]
+    sentences = {m[1] if m else "" for m in (_SENTENCE.fullmatch(line) for _, line in top)}
+    if len(sentences) == 1 and "" not in sentences:
+        numbered = [(row, _SENTENCE.sub(r"\1\2", line)) for row, line in numbered]
+        top = numbered[:SEARCHED]
     stamped = sum(_ARRIVAL.match(line) is not None for _, line in top)
     if 2 * stamped > len(top):
         stamps = [_ARRIVAL.match(line) for _, line in numbered]
@@ -223,12 +246,14 @@ def _unlabelled(numbered: Lines) -> Lines:
     if not usual or 2 * usual[0][1] <= len(numbered[:SEARCHED]):
         return numbered
     names, first = usual[0][0], True
+    stamps = [float(m[1]) for _, line in numbered[:SEARCHED] if (m := _LEADING.match(line))]
+    count = all(b - a == 1.0 for a, b in itertools.pairwise(stamps)) and names[0] == LEADING
     out: Lines = []
     for row, line in numbered:
         said, values = _labels(line)
         if said and said == names[: len(said)]:
             if first:
-                out.append((row, "\t".join(names)))
+                out.append((row, "\t".join(("number", *names[1:]) if count else names)))
                 first = False
             line = "\t".join(values)
         out.append((row, line))
@@ -237,11 +262,29 @@ def _unlabelled(numbered: Lines) -> Lines:
 
 def _labels(line: str) -> tuple[tuple[str, ...], list[str]]:
     """Return labels with units, and values, of a line that has little else; or empty."""
-    found = _LABELLED.findall(line) if len(line) < LONGEST else []
+    if len(line) >= LONGEST:
+        return (), []
+    stamp = _LEADING.match(line)
+    line = _VECTOR.sub(_by_axis, line[stamp.end() :] if stamp else line)
+    found = _LABELLED.findall(line)
     if len(found) < LABELS or _LABELLED.sub("", line).strip():
         return (), []
-    names = tuple(f"{name} [{unit}]" if unit else name for name, _, unit in found)
-    return names, [value for _, value, _ in found]
+    names = [f"{name} [{unit}]" if unit else name for name, _, unit in found]
+    values = [value for _, value, _ in found]
+    if stamp:
+        timed = any(read_name(name).quantity == "time" for name in names)
+        names, values = ["number" if timed else LEADING, *names], [stamp[1], *values]
+    return tuple(names), values
+
+
+def _by_axis(vector: re.Match[str]) -> str:
+    """Write three values under one name as three names with a value each."""
+    bare, unit = split_brackets(vector[1])
+    ends = [f" ({unit})" if unit else ""] * 3
+    return ", ".join(
+        f"{bare.strip()} {axis}{end}: {value}"
+        for axis, end, value in zip("xyz", ends, vector.groups()[1:4], strict=True)
+    )
 
 
 # The top of a table: where rows of numbers begin, and what the lines above them say.
@@ -285,6 +328,8 @@ class _Top:
         near = [line for _, line in numbered[max(0, first - 3) : first]][::-1]
         lines = [_named(line, self.separator, width) for line in near] + [None, None]
         names, over = lines[:2]
+        if names is None and near:
+            names = self._behind_a_word(near[0], width)
         if names is None:
             below = self._units_in_comment(width, kinds)
             named = _above(self.above[:-1] if below else self.above, width, self.separator)
@@ -306,6 +351,16 @@ class _Top:
         if below:
             self.units = {n: u for n, u in zip(self.names, below, strict=True) if u}
 
+    def _behind_a_word(self, line: str, width: int) -> list[str] | None:
+        """Names of rows that all begin with one word, which has no name: ``Data,1,2``."""
+        words = {fields_of(row, self.separator)[0] for _, row in self.data[:JUDGED]}
+        word = words.pop()
+        named = _named(line, self.separator, width - 1) if not words and width > 1 else None
+        # Where the first name is not of a number, the word has it, and another is missing.
+        if not named or read_name(named[0]).quantity is None:
+            return None
+        return [word, *named] if word and not is_data(word) else None
+
     def _units_in_comment(self, width: int, kinds: Sequence[str]) -> list[str] | None:
         """Units in the last comment, where the one before it has the names."""
         if len(self.above) < 2 or not all(map(is_comment, self.above[-2:])):
@@ -323,6 +378,7 @@ class _Top:
         findings: list[Finding],
     ) -> RawLog:
         """Make the log of these columns, with what the lines above them state."""
+        self._leave_out_shared()
         held = dict(zip(self.names, columns, strict=True))
         said = [line[:LONGEST] for line in self.above]
         return RawLog(
@@ -337,6 +393,26 @@ class _Top:
             findings=findings,
             **stated_by(stated_by_keys(said)),
         )
+
+    def _leave_out_shared(self) -> None:
+        """Leave out what all names begin with, as that of a device, if it hides the sensors."""
+        first, last = min(self.names), max(self.names)
+        same = itertools.takewhile(lambda pair: pair[0] == pair[1], zip(first, last, strict=False))
+        shared = _SHARED.match("".join(letter for letter, _ in same))
+        if shared is None or any(_is_gyro(name) for name in self.names):
+            return
+        short = {name: name[shared.end() :] for name in self.names}
+        if all(short.values()) and sum(map(_is_gyro, short.values())) == 3:
+            self.names = list(short.values())
+            self.units = {short[name]: unit for name, unit in self.units.items()}
+
+
+#: Beginning of a name, to the last sign in it.
+_SHARED = re.compile(r".+[\s_\-/:.]")
+
+
+def _is_gyro(name: str) -> bool:
+    return str(read_name(name).quantity).startswith("gyro_")
 
 
 def _first_row(numbered: Lines, kinds: Sequence[str]) -> tuple[int, str | None, int]:
@@ -450,7 +526,7 @@ def _unique(names: list[str]) -> list[str]:
 
 
 #: Ends of names of a stamp's two numbers, as ROS writes them.
-_PARTS = ((".secs", ".nsecs"), (".sec", ".nanosec"), ("/secs", "/nsecs"), ("/sec", "/nanosec"))
+_PARTS = (("secs", "nsecs"), ("sec", "nanosec"), ("sec", "nsec"))
 
 
 def one_clock_of_parts(
@@ -462,12 +538,12 @@ def one_clock_of_parts(
     """
     out = dict(columns)
     for whole, part in _PARTS:
-        for name in [n for n in columns if n.endswith(whole)]:
+        for name in [n for n in out if n == whole or n.endswith((f".{whole}", f"/{whole}"))]:
             other = name.removesuffix(whole) + part
-            if other in columns and all(columns[n].dtype.kind in "iu" for n in (name, other)):
+            if other in out and all(columns[n].dtype.kind in "iu" for n in (name, other)):
                 out.pop(other)
                 held = columns[name].astype(np.int64) * 10**9 + columns[other]
-                one = name.removesuffix(whole)
+                one = name.removesuffix(whole)[:-1] or "stamp"
                 out = {one if n == name else n: held if n == name else c for n, c in out.items()}
                 units[one] = "ns"
     dates = [n for n, c in columns.items() if c.dtype.kind == "O" and is_date(c[0])]

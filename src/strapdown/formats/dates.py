@@ -26,6 +26,13 @@ _STAMP = re.compile(
     r" ?(?:(?P<half>[AP])M|Z|UTC|GMT|(?P<zone>[+-]\d\d:?\d\d))?",
     re.I,
 )
+# As C writes it: Wed Dec 22 21:09:46 2021.
+_CTIME = re.compile(
+    r"(?:mon|tue|wed|thu|fri|sat|sun) (jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec) +(\d{1,2}) "
+    r"(\d\d:\d\d:\d\d(?:\.\d+)?) (\d{4})",
+    re.I,
+)
+_MONTHS = ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"]
 _ONLY_DATE = re.compile(_DATE)
 _DAY = 86_400 * 10**9
 # A decrease of more than half a day is midnight.
@@ -48,7 +55,13 @@ def is_date(field: object) -> bool:
 
 def is_stamp(field: str) -> bool:
     """Whether a field is a time of day, a date, or both."""
-    return _STAMP.fullmatch(field) is not None or is_date(field)
+    return _STAMP.fullmatch(_plain(field)) is not None or is_date(field)
+
+
+def _plain(field: str) -> str:
+    """Write a date of C in numbers; any other text as it is."""
+    m = _CTIME.fullmatch(field)
+    return field if m is None else f"{m[4]}-{_MONTHS.index(m[1].lower()) + 1}-{m[2]} {m[3]}"
 
 
 def day_nanoseconds(texts: Iterable[object]) -> NDArray[np.int64] | None:
@@ -83,7 +96,7 @@ def nanoseconds_of(texts: Iterable[object]) -> NDArray[np.int64] | None:
 def _matches(texts: Iterable[object]) -> list[re.Match[str]] | None:
     found: list[re.Match[str]] = []
     for text in texts:
-        m = None if text is None else _STAMP.fullmatch(str(text).strip())
+        m = None if text is None else _STAMP.fullmatch(_plain(str(text).strip()))
         if m is None or int(m["h"]) > 23:
             return None
         found.append(m)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NoReturn
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.columns import INDEXED, ColumnName, read_name
@@ -65,6 +66,10 @@ def find_columns(
     }
     if not raw.stated:
         found |= _by_name(raw, wanted, asked_here)
+        if not wanted and _is_nameless(raw) and (likely := _likely_columns(raw)):
+            asked_here.ask(_nameless(raw, likely), **likely)
+            names = list(raw.columns)
+            found |= {q: Column(names[int(k) - 1], None, "inferred") for q, k in likely.items()}
     for q, name in wanted.items():
         stated = found[q].unit if q in found and found[q].source == name else None
         found[q] = Column(name, _unit_of(raw, name) or stated, "stated by --columns")
@@ -85,8 +90,8 @@ def require_gyro(raw: RawLog, found: dict[str, Column]) -> None:
     missing = [f"gyro_{a}" for a in AXES if f"gyro_{a}" not in found]
     if not missing:
         return
-    if raw.columns and all(name == f"column {k}" for k, name in enumerate(raw.columns, 1)):
-        _refuse_nameless(raw)
+    if _is_nameless(raw):
+        raise DataError(_nameless(raw, {}))
     left_out = [f for f in raw.findings if f.code.startswith("io.left-out")]
     raise DataError(
         "io.no-gyro-columns-left-out" if left_out else "io.no-gyro-columns",
@@ -97,14 +102,22 @@ def require_gyro(raw: RawLog, found: dict[str, Column]) -> None:
     )
 
 
-def _refuse_nameless(raw: RawLog) -> NoReturn:
-    """Refuse columns without names, and show values by which the user can identify them."""
+def _is_nameless(raw: RawLog) -> bool:
+    """Whether no column has a name."""
+    return bool(raw.columns) and all(n == f"column {k}" for k, n in enumerate(raw.columns, 1))
+
+
+def _nameless(raw: RawLog, likely: dict[str, str]) -> Finding:
+    """Describe columns without names, by values by which the user can identify them."""
     example = "time=1,gyro_x=2,gyro_y=3,gyro_z=4"
     if len(raw.columns) >= 7:
         example += ",accel_x=5,accel_y=6,accel_z=7"
+    if likely:
+        example = ",".join(f"{quantity}={column}" for quantity, column in likely.items())
     # Seven columns are usually increments of KF-GINS.
-    raise DataError(
+    return Finding(
         "io.nameless-seven-columns" if len(raw.columns) == 7 else "io.nameless-columns",
+        severity="error",
         file=raw.name,
         row=raw.row(0),
         count=len(raw.columns),
@@ -113,6 +126,63 @@ def _refuse_nameless(raw: RawLog) -> NoReturn:
     )
 
 
+#: Ranges of the median norm of an accelerometer in m/s², g and mg, and most of its spread between
+#: the first and the last decile, relative to the median.
+GRAVITIES, LOOSEST = ((8.8, 10.8), (0.9, 1.1), (900.0, 1100.0)), 0.5
+#: Spread below which a norm may be that of a magnetometer.
+STEADY = 0.05
+
+
+def _likely_columns(raw: RawLog) -> dict[str, str]:
+    """Guess the numbers of nameless columns: a clock, then triads, of which one shows gravity.
+
+    The rates are the triad beside it; empty where more than one reading fits.
+    """
+    columns = list(raw.columns.values())
+    clock = next((k for k, c in enumerate(columns) if c.dtype.kind in "iufM" and advances(c)), None)
+    first = next((k for k, c in enumerate(columns) if c.dtype.kind in "iuf"), 0)
+    first = first if clock is None else clock + 1
+    triads: dict[int, tuple[float, float]] = {}
+    for k in range(first, len(columns) - 2, 3):
+        three = columns[k : k + 3]
+        if any(c.dtype.kind not in "iuf" for c in three):
+            break
+        norms = np.linalg.norm(np.column_stack(three).astype(np.float64), axis=1)
+        low, usual, high = map(float, np.nanquantile(norms, (0.1, 0.5, 0.9)))
+        triads[k] = usual, (high - low) / usual if usual else 0.0
+    forces = [
+        k
+        for k, (usual, spread) in triads.items()
+        if spread < LOOSEST and any(low < usual < high for low, high in GRAVITIES)
+    ]
+    if len(forces) != 1:
+        return {}
+    force = forces[0]
+    turns = [k for k in (force - 3, force + 3) if k in triads and triads[k][0] > 0.0]
+    if len(triads) > 2:
+        turns = [k for k in turns if triads[k][1] > STEADY]
+    if len(turns) != 1:
+        return {}
+    out = {} if clock is None else {"time": str(clock + 1)}
+    for triad, at in (("gyro", turns[0]), ("accel", force)):
+        out |= {f"{triad}_{axis}": str(at + k + 1) for k, axis in enumerate(AXES)}
+    return out
+
+
+def advances(values: NDArray[Any]) -> bool:
+    """Whether a column advances evenly, as a clock does; a count of samples, by one, does not."""
+    if values.size < 3:
+        return False
+    whole = values.dtype.kind == "M"
+    steps: NDArray[Any] = np.diff(values.astype(np.int64) if whole else values.astype(np.float64))
+    usual = float(np.median(steps))
+    even = np.mean(np.abs(steps - usual) <= 0.5 * usual)
+    forward = bool((steps >= 0).all()) and not bool((steps == 1).all())
+    return usual > 0.0 and forward and bool(even > 0.9)
+
+
+#: The letter of an axis at the end of a name, or before its unit.
+_LAST = re.compile(r"[xyzXYZ](?=\W*$|[\s_]*[\[(])")
 #: Columns of one sensor, by axis.
 Family = dict[str, str]
 
@@ -124,6 +194,13 @@ def _by_name(raw: RawLog, wanted: dict[str, str], questions: Questions) -> dict[
         if str(said[name].quantity).partition("_")[0] != quantity.partition("_")[0]:
             said[name] = ColumnName(None)
     found: dict[str, str] = {}
+    for name, one in said.items():
+        # The vector of a quaternion: rot_w is beside rot_x.
+        letter = {
+            name[: m.start()] + w + name[m.end() :] for m in _LAST.finditer(name) for w in "wW"
+        }
+        if "rot" in one.family and letter & said.keys():
+            said[name] = ColumnName(None)
     families = _families(raw, said)
     _letter_g(raw, families, wanted, questions, found)
     for triad in TRIADS:
@@ -191,6 +268,7 @@ def _best(families: dict[str, Family], said: dict[str, ColumnName]) -> dict[str,
         lambda one, family: not one.increment,
         lambda one, family: not one.linear,
         lambda one, family: "including" in family,
+        lambda one, family: "uncal" not in family,
         # A letter may mean anything, and names read without their order are a last resort.
         lambda one, family: len(family.rstrip("'")) > 1,
         lambda one, family: not one.loose,
@@ -283,6 +361,8 @@ def _one_clock(raw: RawLog, names: list[str]) -> list[str]:
     arrival. Clocks that advance alike are one clock.
     """
     names = [n for n in names if n.lower().endswith("header.stamp")] or names
+    # A stamp that a spreadsheet rounded is the same in every row.
+    names = [n for n in names if len(set(raw.columns[n][:2].tolist())) > 1] or names
     names = [n for n in names if _unit_of(raw, n)] or names
     if len(names) > 1 and all(raw.columns[n].dtype.kind in "iuf" for n in names):
         steps = [np.diff(raw.columns[n].astype(np.float64)) for n in names]

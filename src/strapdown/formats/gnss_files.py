@@ -159,7 +159,7 @@ def _refuse_missing(raw: RawLog, found: dict[str, Found]) -> None:
         missing.append("alt")
     if missing:
         raise DataError(
-            "io.missing-columns-2",
+            "io.fixes-without-height" if missing == ["alt"] else "io.missing-columns-2",
             file=raw.name,
             missing=missing,
             columns=list(raw.columns),

@@ -180,12 +180,16 @@ WITH_VELOCITY = (*NAMES, "VN", "VE", "VD", "VN_sd", "VE_sd", "VD_sd")
 
 
 def _begins_with_fixes(path: Path) -> bool:
-    """Whether the first row has seven or thirteen numbers, without a header."""
+    """Whether the first row has seven or thirteen numbers, without a header.
+
+    A standard deviation is not negative.
+    """
     lines = [line.split() for line in first_bytes(path, HEAD).splitlines() if line.strip()]
     lines = [line for line in lines if not line[0].startswith((b"#", b"%"))]
     if not lines or len(lines[0]) not in (len(NAMES), len(WITH_VELOCITY)):
         return False
-    return all(csv.is_data(f.decode("latin-1")) for f in lines[0])
+    signed = sum(any(f.startswith(b"-") for f in line[4:7]) for line in lines)
+    return 2 * signed <= len(lines) and all(csv.is_data(f.decode("latin-1")) for f in lines[0])
 
 
 detect_fixes = Signs(

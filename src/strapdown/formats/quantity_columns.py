@@ -103,6 +103,11 @@ def find_quantities(
                 continue
             sign = said.sign if said.quantity == meant else 1.0
             factor = sign * _factor(meant, known[meant], said.unit, name, file)
+            if meant in found and meant == "time" and found[meant].stated != bool(said.unit):
+                # Of two clocks, the one that states its unit.
+                if not found[meant].stated:
+                    found[meant] = Found(name, factor, True)
+                continue
             if meant in found:
                 raise DataError(
                     "io.column-names-ambiguous",

@@ -319,15 +319,19 @@ def as_stated(answers: Mapping[str, str]) -> dict[str, Any]:
 
     ``answers`` has them in pairs.
 
-    `answers`: `ReadOptions` that end in ``_unit``, and quantities with their columns.
+    `answers`: `ReadOptions` that end in ``_unit``, ``rate``, and quantities with their columns.
     """
-    columns = {q: c for q, c in answers.items() if not q.endswith("_unit") and q != "repair"}
+    plain = {q for q in answers if q.endswith("_unit")} | {"repair", "rate"}
+    columns = {q: c for q, c in answers.items() if q not in plain}
     units = {q: u for q, u in answers.items() if q.endswith("_unit")}
     flags = [f"--{q.replace('_', '-')} {shlex.quote(u)}" for q, u in units.items()]
     keys = [f'{q} = "{u}"' for q, u in units.items()]
     if columns:
         flags.append("--columns " + shlex.quote(",".join(f"{q}={c}" for q, c in columns.items())))
         keys.append("columns = {" + ", ".join(f'{q} = "{c}"' for q, c in columns.items()) + "}")
+    if "rate" in answers:
+        flags.append(f"--rate {answers['rate']}")
+        keys.append(f"rate_hz = {answers['rate']}")
     if "repair" in answers:
         flags.append("--repair")
         keys.append("repair = true")

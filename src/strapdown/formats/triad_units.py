@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -25,6 +26,7 @@ from strapdown.formats.judge import (
     unit_of_counts,
 )
 from strapdown.formats.recording import Questions, RawLog, ReadOptions
+from strapdown.formats.vocabularies import APPLE
 from strapdown.units import factor_of, parse_unit
 
 __all__ = [
@@ -87,7 +89,12 @@ def _reversed(up: Inference) -> Inference:
     return replace(up, value=other, evidence=said, alternatives=shares)
 
 
-_OF_COUNTS = {"io.counts-unit-not-stated", "io.counts-unit-undecided"}
+#: Questions about an accelerometer that its numbers do not answer.
+_OPEN = {
+    "io.counts-unit-not-stated",
+    "io.counts-unit-undecided",
+    "io.file-leaves-open-whether",
+}
 
 
 def units_of_triads(
@@ -120,9 +127,14 @@ def units_of_triads(
         except DataError as error:
             likely = said.get(f"{triad}_unit")
             if triad != "gyro":
-                # Beside a gyro whose unit is asked, counts of its accelerometer are asked, too.
-                if error.finding.code in _OF_COUNTS and units["gyro"][1] == "asked":
-                    questions.ask(error.finding, accel_unit=unit_of_counts(likely) or "UNIT")
+                # Beside a gyro whose unit is asked, that of its accelerometer is asked, too.
+                if triad == "accel" and units["gyro"][1] == "asked":
+                    unit, code = unit_of_counts(likely) or "UNIT", error.finding.code
+                    sure = likely is not None and likely.value and likely.confidence >= LIKELY
+                    if code in _OPEN:
+                        questions.ask(error.finding, accel_unit=unit)
+                    elif code == "io.unit-undecided" and likely is not None and sure:
+                        questions.ask(error.finding, accel_unit=str(likely.value))
                 findings.append(left_out(raw, triad, error))
                 continue
             sure = likely is not None and likely.value and likely.confidence >= LIKELY
@@ -157,6 +169,9 @@ def _refuse_open(raw: RawLog, found: dict[str, Column], triad: str) -> None:
     """Refuse a unit that the file leaves open: the numbers cannot decide between f and -f."""
     column = found[f"{triad}_x"]
     unit = column.unit
+    apple = any(re.sub(r"\W", "", name).lower() in APPLE for name in raw.columns)
+    if triad == "accel" and unit is None and apple:
+        unit = "-g or g"  # that of CoreMotion, or turned by the application
     if unit is None and read_name(column.source).increment:
         unit = OPEN[triad]
     if unit and " or " in unit:

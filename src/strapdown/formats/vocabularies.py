@@ -22,6 +22,7 @@ from strapdown.units import (
 )
 
 __all__ = [
+    "APPLE",
     "CRASHES",
     "FIXES",
     "LOGS",
@@ -127,11 +128,12 @@ TIMES = _words(
     "time t ts timestamp timestamps timesec elapsed secondselapsed seconds sec tow sow gpssow "
     "gpstow gpstime unixtime epoch stamp elapsedtime timeelapsed timesincestart sampletime "
     "sensortime systemtime unixtimestamp datetime localtime utc utctime timeutc "
-    "gpssecondsofweek secondsofweek zeit zeitstempel temps tiempo tempo"
+    "gpssecondsofweek secondsofweek gpst timeintervalsince1970 zeit zeitstempel temps tiempo tempo"
 )
 # Names of clocks that state their unit.
 CLOCKS = {
     "seconds": "s",
+    "timeintervalsince1970": "s",  # of Apple's NSDate
     "secs": "s",
     "sec": "s",
     "secondselapsed": "s",
@@ -149,10 +151,13 @@ CLOCKS = {
     "ns": "ns",
     "nsec": "ns",
 }
+#: Clocks by whose names an application runs on a system of Apple, whose accelerometer reads -1 g
+#: upward (CMAccelerometerData).
+APPLE = ("timeintervalsince1970",)
 #: Words of the name of a clock, beside ``time``, and words behind it in brackets.
 OF_TIME = {
     *_words("time timestamp timestamps stamp unix epoch utc gps system gmt sample logging elapsed"),
-    *_words("since start boot reboot local ros header"),
+    *_words("since start boot reboot local ros rosbag bag header"),
 }
 TIME = Quantity((*TIMES, *CLOCKS), TIME_UNITS)
 #: Of tables of measurements, where a date stands for a clock.
@@ -166,9 +171,9 @@ _TRIAD_WORDS = {
     "gyro": "gyro gyros gyr gyroscope gyroscopes imugyr imugyro angularvelocity angularvel angvel "
     "velocityangular rotationvelocity velocityrotation "
     "angularrate angularrates angrate angularspeed turnrate rot rotationrate rotrate omega rate "
-    "w g ω",
+    "av w g ω",
     "accel": "accel acce acc accelerometer accelerometers accelerations acceleration accl "
-    "linearacceleration linacc linaccel lina gforce gf imuacc imuaccel specificforce a f",
+    "linearacceleration linacc linaccel lina la gforce gf imuacc imuaccel specificforce a f",
     "mag": "mag magn magnet magnetic magnetometer magnetometers magneticfield magfield field "
     "imumag compass m b",
 }
@@ -201,11 +206,13 @@ BESIDE = {
     "mag": {"magnetic", "field"},
 }
 WITHOUT_GRAVITY = {"linear", "lin", "user", "without", "linacc", "linaccel", "linearacceleration"}
-WITHOUT_GRAVITY |= {"lina", "lineara", "usera"}
+WITHOUT_GRAVITY |= {"lina", "la", "lineara", "usera"}
 #: Words that say a rate beside the name of a turn.
 RATES = {"rate", "speed", "velocity", "vel", "dot", *TRIADS["gyro"]} - set("wgω")
 # Names that are parts of words, unless their axis stands apart: MaX, but not max.
 SHORT = {"gyro": "gy", "accel": "ac", "mag": "ma"}
+#: Names that are a sensor with their axis alone: xav and xla of a message of ROS.
+WITH_AXIS = ("av", "la")
 # G is also gravity.
 MAGNETIC = {"g": "gauss", "mg": "mG"}
 # Arrays of PX4 (msg/SensorCombined.msg, SensorMag.msg), whose comments define their units.
@@ -226,6 +233,18 @@ NOISE = {
     *("cal", "calib", "calibrated", "corrected", "meas", "measured", "value", "values", "axis"),
     *("ins", "the", "of", "in", "de", "del", "di", "reading", "readings", "uncal", "uncalibrated"),
 }
+#: Where a sensor is worn or mounted, and its range: they tell sensors apart, not quantities.
+PLACES = {
+    *_words("left right upper lower front rear back center top bottom l r ln wr"),
+    *_words("head neck chest sternum trunk torso waist hip pelvis sacrum lumbar shoulder arm"),
+    *_words("forearm elbow wrist hand thigh femur shank tibia knee calf leg ankle foot shoe"),
+    *_words("belt pocket frame wheel base board cabin dash dashboard"),
+}
+#: Beginnings of the names of sensor chips, which stand beside the name of the sensor.
+CHIP = re.compile(
+    r"(?:lsm|lis|ism|iis|asm|icm|iim|mpu|itg|bm[agimx]|bno|akm?|adxl|adis|fxos|fxas|kx|mxg|hmc|qmc|mmc"
+    r"|scha?|sca|mti)\d\w*"
+)
 # Words of a quantity that is about another: its spread, its error, its demand.
 ABOUT = {
     *("bias", "offset", "scale", "cov", "covariance", "std", "stddev", "stdev", "sd", "sigma"),

@@ -22,8 +22,10 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
+from strapdown.formats.columns import read_name
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, head
+from strapdown.units import TIME_UNITS
 
 COUNTER, STAMP = "PacketCounter", "SampleTimeFine"
 TRIADS = {"Gyr": ("gyro", "rad/s"), "Acc": ("accel", "m/s2")}
@@ -40,11 +42,11 @@ def _has_names(path: Path) -> bool:
     """Whether the names are under the comments at the top of a table."""
     if not csv.detect(path):
         return False
-    lines = head(path, HEAD).splitlines()
-    names = next((line for line in lines if line.strip() and not csv.is_comment(line)), "")
-    fields = set(csv.fields_of(names, csv.separator_of(names)))
-    named = any({f"{t}_{a}" for a in "XYZ"} <= fields for t in TRIADS)
-    return bool({COUNTER, STAMP} & fields) and named
+    for line in head(path, HEAD).splitlines():
+        fields = set(csv.fields_of(line, csv.separator_of(line)))
+        if {COUNTER, STAMP} & fields:
+            return any({f"{t}_{a}" for a in "XYZ"} <= fields for t in TRIADS)
+    return False
 
 
 detect = Signs(text=f"{COUNTER}|{STAMP}", also=_has_names)
@@ -90,8 +92,9 @@ def read(path: Path) -> RawLog:
         columns[source] = stamps
         stated[source] = ("time", "us")
     if source is None or (source == STAMP and np.array_equal(stamps, raw.columns[STAMP])):
-        # A DOT, which counts µs, writes deg/s; the unit is inferred from the numbers.
-        stated |= {f"Gyr_{axis}": (f"gyro_{axis.lower()}", None) for axis in "XYZ"}
+        # A DOT, which counts µs, writes deg/s; without its preamble the numbers have to show it.
+        unit = "deg/s" if _is_of_dot(raw) else None
+        stated |= {f"Gyr_{axis}": (f"gyro_{axis.lower()}", unit) for axis in "XYZ"}
     return dataclasses.replace(raw, columns=columns, stated=stated, rate=rate, findings=findings)
 
 
@@ -101,7 +104,7 @@ def _stamps(
     """Return stamps in µs, and the column that they come from."""
     if STAMP in raw.columns and not _is_empty(raw.columns[STAMP]):
         ticks = _unwrapped(raw, STAMP, (32,), findings)
-        tick = _tick(raw, ticks, rate)
+        tick = 1 if _is_of_dot(raw) else _tick(raw, ticks, rate or _rate_by_other_clock(raw))
         if tick != 1:
             findings.append(
                 Finding(
@@ -128,6 +131,23 @@ def _stamps(
         )
     )
     return COUNTER, np.asarray((count - count[0]) * (1e6 / rate))
+
+
+def _is_of_dot(raw: RawLog) -> bool:
+    """Whether the preamble is that of the application of a DOT."""
+    return any(line.startswith("DeviceTag") for line in raw.above)
+
+
+def _rate_by_other_clock(raw: RawLog) -> float | None:
+    """Return the rate, Hz, by a further column of the table that is a clock of a known unit."""
+    for name, values in raw.columns.items():
+        said = read_name(name)
+        if name == STAMP or said.quantity != "time" or values.dtype.kind not in "iuf":
+            continue
+        length = float(values[-1] - values[0]) * TIME_UNITS.get(said.unit or "", 0.0)
+        if length > 0.0:
+            return (values.size - 1) / length
+    return None
 
 
 def _is_empty(stamps: NDArray[Any]) -> bool:

@@ -393,6 +393,7 @@ def _others(
         except DataError as error:
             # A table of samples need not be one of fixes, unless an answer makes it one.
             certain = "gnss" in held or recording is None or "flags" in error.finding.data
+            certain |= error.finding.code == "io.fixes-without-height"
             if error.finding.code not in ABSENT and certain:
                 findings.append(error.finding.replace(severity="error", stream="gnss"))
     if recording is not None and recording.truth is not None:
@@ -740,17 +741,19 @@ def _attitude(one: LogDiagnosis) -> list[Finding]:
         said = Finding("doctor.rates-on-three-axes", severity="note", file=one.name, rate_hz=rate)
         found.append(said)
     gravity = one.data["gravity"]
-    leveled = gravity is not None and gravity["included"]
-    found.append(
-        Finding(
-            "doctor.levels-by-gravity" if leveled else "doctor.no-leveling",
-            severity="note" if leveled else "warning",
-            file=one.name,
-        )
-    )
+    if gravity is not None and gravity["included"]:
+        found.append(Finding("doctor.levels-by-gravity", severity="note", file=one.name))
+    else:
+        found.append(_without_force(one, "doctor.no-leveling", "warning"))
     found.append(_bias(one))
     found += [f for f in one.faults if f.code in _LIMITS]
     return found
+
+
+def _without_force(one: LogDiagnosis, code: str, severity: Severity) -> Finding:
+    """Say that specific force is missing: not logged, or left out for what is open of it."""
+    left_out = any(f.code == "io.left-out-unusable" and f.quantity == "accel" for f in one.faults)
+    return Finding("doctor.accel-open" if left_out else code, severity=severity, file=one.name)
 
 
 #: Motion that is missing, and axes that contradict gravity.
@@ -791,7 +794,7 @@ def _navigation(one: LogDiagnosis) -> list[Finding]:
     imu, gnss = one.streams.get("imu"), one.streams.get("gnss")
     gravity = one.data["gravity"]
     if imu is not None and (gravity is None or not gravity["included"]):
-        found.append(Finding("doctor.no-specific-force", severity="error", file=one.name))
+        found.append(_without_force(one, "doctor.no-specific-force", "error"))
     if gnss is None and (refused := refused_fixes(one)):
         return [*found, refused]
     if gnss is None:
@@ -845,7 +848,7 @@ def _crash(one: LogDiagnosis) -> list[Finding]:
     if "imu" not in one.streams:
         return found
     if impact is None:
-        return [*found, Finding("doctor.no-specific-force", severity="error", file=one.name)]
+        return [*found, _without_force(one, "doctor.no-specific-force", "error")]
     change = impact["delta_v_m_per_s"]
     hit = change >= EVENT_DV
     found.append(

@@ -302,3 +302,25 @@ def test_a_speed_without_its_unit_is_asked_for_if_the_positions_contradict(tmp_p
     assert table["VN"].iloc[0] == pytest.approx(10.0 * factor, rel=1e-4)
     text = drive("gps_", "speed", factor=factor, stated=f" [{unit}]")
     assert read_gnss(written(tmp_path, text))["VN"].iloc[0] == pytest.approx(10.0, rel=1e-4)
+
+
+def test_of_two_clocks_of_fixes_the_one_that_states_its_unit_is_used(tmp_path):
+    head = "Timestamp,TimeIntervalSince1970,lat,lon,alt,sdN,sdE,sdD"
+    rows = [f"{k // 2},{1_600_000_000.25 + k},45,7,100,1,1,1" for k in range(6)]
+    assert np.allclose(np.diff(table_of(tmp_path, head, rows).index), 1.0)
+
+
+def test_fixes_without_a_height_say_so(tmp_path):
+    with pytest.raises(DataError, check=coded("io.fixes-without-height")):
+        table_of(tmp_path, "time_ms,lat,lng,accuracy", [f"{1000 * k},45,7,5" for k in range(5)])
+
+
+@pytest.mark.parametrize(("sign", "fixes"), [(1.0, True), (-1.0, False)])
+def test_negative_numbers_are_no_standard_deviations(tmp_path, sign, fixes):
+    rows = [f"{0.5 * k:.3f} 45.0 7.0 100.0 {sign * 0.02} 0.03 0.04" for k in range(20)]
+    path = written(tmp_path, "\n".join(rows) + "\n", "fix.txt")
+    if fixes:
+        assert len(read_gnss(path)) == 20
+    else:
+        with pytest.raises(DataError, check=coded("io.missing-columns-2")):
+            read_gnss(path)

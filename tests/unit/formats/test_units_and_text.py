@@ -47,6 +47,9 @@ def test_powers_of_a_second(text, unit):
         ("g/16384", "accel", "g/16384", ACCEL_UNITS["g"] / 16384.0),
         ("-g/16384", "accel", "-g/16384", ACCEL_UNITS["-g"] / 16384.0),
         ("m/s2", "accel", "m/s2", 1.0),
+        # A unit that ends in a digit.
+        ("m/s2/100", "accel", "m/s2/100", 0.01),
+        ("0.01 m/s^2", "accel", "m/s2/100", 0.01),
     ],
 )
 def test_raw_counts(text, kind, unit, factor):

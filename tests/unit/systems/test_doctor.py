@@ -445,3 +445,16 @@ def test_fixes_that_are_refused_are_not_missing(sound, tmp_path):
     assert (refused.quantity, refused.data["flags"]) == ("alt", "--gnss-datum-height 0")
     (one,) = sd.doctor(path, gnss={"datum_height_m": 46.0}).logs
     assert "gnss" in one.streams
+
+
+def test_an_accelerometer_of_an_open_unit_is_not_said_to_be_missing(sound, tmp_path):
+    # A clock of Apple's leaves the sign of gravity open; without gravity nothing is open.
+    names = {"time_s": "TimeIntervalSince1970", **{a: a.partition("_m")[0] for a in ACCELS}}
+    table = sound.rename(columns=names)
+    table["TimeIntervalSince1970"] += 1.6e9
+    open_, lacks = (
+        sd.doctor(written(t, tmp_path / f"{k}.csv"))
+        for k, t in enumerate((table, sound.drop(columns=list(ACCELS))))
+    )
+    assert "doctor.accel-open" in {f.code for f in open_.logs[0].fit["attitude"]}
+    assert "doctor.no-leveling" in {f.code for f in lacks.logs[0].fit["attitude"]}
