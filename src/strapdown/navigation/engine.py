@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from strapdown._kernels.filter_loop import BEYOND
 from strapdown._kernels.smoothing import (
     BEGIN,
+    CARRIED,
     CORE,
     COVARIANCE,
     GROWTH,
@@ -157,8 +158,8 @@ class Engine(ABC):
         return replace(observation, z=observation.z - observation.H @ (T @ self.errors))
 
     @abstractmethod
-    def widen(self, Q: Array) -> None:
-        """Inflate the covariance of the states by a covariance, (n, n), now."""
+    def carry(self, T: Array, Q: Array) -> None:
+        """Transform the errors of the states by T, and add a noise Q, both (n, n), now."""
 
     @abstractmethod
     def shown(self) -> Array:
@@ -246,10 +247,10 @@ class GeneralEngine(Engine):
         self.nodes.updated(met, taken, self.filter)
         return seen
 
-    def widen(self, Q: Array) -> None:
-        """Inflate the covariance of the states."""
-        self.filter = self.navigation.widened(self.filter, Q)
-        self.nodes.widened(self.filter)
+    def carry(self, T: Array, Q: Array) -> None:
+        """Transform the errors of the states, and add a noise."""
+        self.filter = self.navigation.carried(self.filter, T, Q)
+        self.nodes.carried(T, self.filter)
 
     def shown(self) -> Array:
         """Return the row of the newest step with the estimated errors subtracted."""
@@ -396,10 +397,16 @@ class NodeRows:
             Phi = model.to_physical(used, ended.time, ended.row) @ Phi @ E
         self._growth(Phi, ended)
 
-    def widened(self, state: FilterState) -> None:
-        """Record an inflation of the covariance: a growth by noise alone."""
-        if self.wanted:
-            self._growth(np.eye(self._size), state)
+    def carried(self, T: Array, state: FilterState) -> None:
+        """Record a transformation of the errors of the states by T, (n, n), at one instant."""
+        if not self.wanted:
+            return
+        used, model = self._filter.mechanization, self._filter.model
+        if not model.states_are_physical:
+            E = model.from_physical(used, state.time, state.row)
+            T = model.to_physical(used, state.time, state.row) @ T @ E
+        at = begin_of_move(self._size)
+        self._row(CARRIED, state)[at : at + self._size**2] = T.ravel()
 
     def updated(self, before: FilterState, taken: Array, after: FilterState) -> None:
         """Record the effect of observations, if any.
