@@ -181,13 +181,15 @@ def less_before_growth(core, decay, less, n, half):
 
 @njit(**IN_PLACE)
 def before_carried(row, n, told, less, room):
-    """Carry the adjoint pair back over a transformation of all errors: its transpose."""
+    """Carry the adjoint pair back over a transformation of a triad's errors: its transpose."""
     back, half, new = room
     at = begin_of_move(n)
+    first = int(row[at])
     for i in range(n):
         for j in range(n):
-            back[j, i] = row[at]
-            at += 1
+            back[j, i] = 1.0 if i == j else 0.0
+            if first <= i < first + 3:
+                back[j, i] = row[at + 1 + (i - first) * n + j]
     for i in range(n):
         total = 0.0
         for j in range(n):
@@ -269,13 +271,13 @@ def smooth_back(rows, n, told, less, wanted, estimates, covariances):
 
 
 # History of a filter for its smoother, in rows: a begin, a propagation, an update, a
-# transformation of all errors at one instant.
+# transformation of the errors of a triad at one instant.
 #
 # Of n errors a row has its time, its kind, the rotation from north-east-down to level axes (C_ln,
 # row by row), and the upper half of the covariance after it, row by row. From `begin_of_move` on, a
 # propagation has the rows of its transition for position, velocity and attitude, and the decay of
 # the other errors; an update has the upper half of the covariance before it, and the error that it
-# removed; a transformation has its matrix, row by row.
+# removed; a transformation has the index of the first of three errors, and their rows of it.
 
 
 # Kinds of rows: propagation, update, begin of a filter (independent of all before it), and

@@ -243,7 +243,14 @@ class ErrorFilter:
         return replace(state, covariance=covariance), x, each
 
     def carried(self, state: FilterState, T: Array, Q: Array) -> FilterState:
-        """Return a state whose errors are transformed by T, (n, n), with a noise Q, (n, n), now."""
+        """Return a state with its errors transformed now, and a noise added.
+
+        `T` ((p, p)): of the physical errors. `Q` ((n, n)): of the states.
+        """
+        used, time, row = self.mechanization, state.time, state.row
+        if not self.model.states_are_physical:
+            T = self.model.from_physical(used, time, row) @ T
+            T = T @ self.model.to_physical(used, time, row)
         return replace(state, covariance=self.form.predict(state.covariance, T, Q))
 
     def physical_covariance(self, state: FilterState) -> Array:
@@ -432,21 +439,20 @@ def turned_force(filter_: ErrorFilter, before: FilterState, after: FilterState) 
     correction adds false information. The errors are kept in level axes instead (Huang, Mourikis
     and Roumeliotis, Int. J. Robotics Research 29 (2010) 502, on unobservable directions).
 
-    `before`, `after`: states before and after the correction. Returns (n, n), of the states of the
-    model, or None for one without a bias of the accelerometers.
+    `before`, `after`: states before and after the correction. Returns (p, p), of the physical
+    errors, or None for a model without a bias of the accelerometers.
     """
-    model, used = filter_.model, filter_.mechanization
-    layout, time, row = model.layout, after.time, after.row
+    layout, used = filter_.model.layout, filter_.mechanization
     names = [name for name in ACCEL_BIASES if name in layout]
     if not names:
         return None
-    quaternions = used.levels(np.stack([before.row, row]))[:, ATTITUDE]
+    quaternions = used.levels(np.stack([before.row, after.row]))[:, ATTITUDE]
     C, C_after = (rotation.dcm_from_quaternion(q) for q in quaternions)
-    size = model.physical_size
+    size = filter_.model.physical_size
     out = np.eye(size)
     first = layout[names[0]].start - layout.size + size
     out[first : first + 3, PHYSICAL:] += (C_after.T @ C - np.eye(3)) @ _accel_error(filter_, C)
-    return model.from_physical(used, time, row) @ out @ model.to_physical(used, time, row)
+    return out
 
 
 def _accel_error(filter_: ErrorFilter, C: Array) -> Array:

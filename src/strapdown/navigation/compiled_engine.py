@@ -256,7 +256,7 @@ class CompiledEngine(Engine):
         return seen
 
     def carry(self, T: Array, Q: Array) -> None:
-        """Transform the errors of the states, and add a noise."""
+        """Transform the errors, and add a noise."""
         self.filter = self.navigation.carried(self.filter, T, Q)
         self.nodes.carried(T, self.filter)
         self._covariance[:] = self.filter.covariance

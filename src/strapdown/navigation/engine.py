@@ -159,7 +159,7 @@ class Engine(ABC):
 
     @abstractmethod
     def carry(self, T: Array, Q: Array) -> None:
-        """Transform the errors of the states by T, and add a noise Q, both (n, n), now."""
+        """Transform the physical errors by T, (p, p), and add a noise Q, (n, n), of the states."""
 
     @abstractmethod
     def shown(self) -> Array:
@@ -248,7 +248,7 @@ class GeneralEngine(Engine):
         return seen
 
     def carry(self, T: Array, Q: Array) -> None:
-        """Transform the errors of the states, and add a noise."""
+        """Transform the errors, and add a noise."""
         self.filter = self.navigation.carried(self.filter, T, Q)
         self.nodes.carried(T, self.filter)
 
@@ -398,15 +398,13 @@ class NodeRows:
         self._growth(Phi, ended)
 
     def carried(self, T: Array, state: FilterState) -> None:
-        """Record a transformation of the errors of the states by T, (n, n), at one instant."""
+        """Record a transformation of the errors by T, (p, p), which changes those of one triad."""
         if not self.wanted:
             return
-        used, model = self._filter.mechanization, self._filter.model
-        if not model.states_are_physical:
-            E = model.from_physical(used, state.time, state.row)
-            T = model.to_physical(used, state.time, state.row) @ T @ E
-        at = begin_of_move(self._size)
-        self._row(CARRIED, state)[at : at + self._size**2] = T.ravel()
+        changed = np.flatnonzero((np.eye(self._size) != T).any(axis=1))
+        first = min(int(changed[0]) if len(changed) else 0, self._size - 3)
+        move = self._row(CARRIED, state)[begin_of_move(self._size) :]
+        move[0], move[1 : 1 + 3 * self._size] = first, T[first : first + 3].ravel()
 
     def updated(self, before: FilterState, taken: Array, after: FilterState) -> None:
         """Record the effect of observations, if any.

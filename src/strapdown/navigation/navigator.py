@@ -551,7 +551,8 @@ class EpochLoop:
         Q = unlearnt_force(filter_, met, before, after)
         T = turned_force(filter_, met, engine.filter)
         if T is not None:
-            engine.carry(T, np.zeros_like(T) if Q is None else Q)
+            size = filter_.model.layout.size
+            engine.carry(T, np.zeros((size, size)) if Q is None else Q)
         self.tilted = is_large(after)
 
     def mark(self, before: float = 0.0) -> None:
