@@ -179,6 +179,27 @@ def less_before_growth(core, decay, less, n, half):
             less[i, j] = less[j, i]
 
 
+@njit(**IN_PLACE)
+def before_carried(row, n, told, less, room):
+    """Carry the adjoint pair back over a transformation of a triad's errors: its transpose."""
+    back, half, new = room
+    at = begin_of_move(n)
+    first = int(row[at])
+    for i in range(n):
+        for j in range(n):
+            back[j, i] = 1.0 if i == j else 0.0
+            if first <= i < first + 3:
+                back[j, i] = row[at + 1 + (i - first) * n + j]
+    for i in range(n):
+        total = 0.0
+        for j in range(n):
+            total += back[i, j] * told[j]
+        new[i] = total
+    sandwich(back, less, n, half, less)
+    for i in range(n):
+        told[i] = new[i]
+
+
 @njit(cache=True, error_model="numpy")
 def before_update(row, P, told, less, room):
     """Carry the adjoint pair back over an update with the covariance P after it."""
@@ -240,6 +261,8 @@ def smooth_back(rows, n, told, less, wanted, estimates, covariances):
             unpack_growth(row, n, core, decay)
             told_before_growth(core, decay, told, new)
             less_before_growth(core, decay, less, n, half)
+        elif kind == CARRIED:
+            before_carried(row, n, told, less, (before, half, new))
         elif kind == UPDATE:
             before_update(row, P, told, less, (before, weight, A, half, added, new))
         else:
@@ -247,17 +270,19 @@ def smooth_back(rows, n, told, less, wanted, estimates, covariances):
             less[:, :] = 0.0
 
 
-# History of a filter for its smoother, in rows: a begin, a propagation, an update.
+# History of a filter for its smoother, in rows: a begin, a propagation, an update, a
+# transformation of the errors of a triad at one instant.
 #
 # Of n errors a row has its time, its kind, the rotation from north-east-down to level axes (C_ln,
 # row by row), and the upper half of the covariance after it, row by row. From `begin_of_move` on, a
 # propagation has the rows of its transition for position, velocity and attitude, and the decay of
 # the other errors; an update has the upper half of the covariance before it, and the error that it
-# removed.
+# removed; a transformation has the index of the first of three errors, and their rows of it.
 
 
-# Kinds of rows: propagation, update, begin of a filter (independent of all before it).
-GROWTH, UPDATE, BEGIN = 0, 1, 2
+# Kinds of rows: propagation, update, begin of a filter (independent of all before it), and
+# transformation.
+GROWTH, UPDATE, BEGIN, CARRIED = 0, 1, 2, 3
 # Rows of a transition with more than a decay.
 CORE = 9
 # Indices of a row.

@@ -242,10 +242,16 @@ class ErrorFilter:
         each = [Innovations(*one) for one in zip(*parts, strict=True)]
         return replace(state, covariance=covariance), x, each
 
-    def widened(self, state: FilterState, Q: Array) -> FilterState:
-        """Return a state with its covariance inflated by a covariance of the states, (n, n)."""
-        nothing_moves = np.eye(len(Q))
-        return replace(state, covariance=self.form.predict(state.covariance, nothing_moves, Q))
+    def carried(self, state: FilterState, T: Array, Q: Array) -> FilterState:
+        """Return a state with its errors transformed now, and a noise added.
+
+        `T` ((p, p)): of the physical errors. `Q` ((n, n)): of the states.
+        """
+        used, time, row = self.mechanization, state.time, state.row
+        if not self.model.states_are_physical:
+            T = self.model.from_physical(used, time, row) @ T
+            T = T @ self.model.to_physical(used, time, row)
+        return replace(state, covariance=self.form.predict(state.covariance, T, Q))
 
     def physical_covariance(self, state: FilterState) -> Array:
         """Return the covariance of the physical errors, (p, p), in level axes."""
@@ -402,7 +408,7 @@ def _gravity(mechanization: Mechanization, level: Array) -> float:
     return float(np.linalg.norm(found))
 
 
-# Second-order uncertainty of the vertical force after the correction of a tilt.
+# Second order of the correction of a tilt: sensors turn with it, and gravity along them changes.
 
 
 # Root of the summed variances of both tilts, rad, below which the effect is at most 1 mm/s², the
@@ -420,6 +426,40 @@ def is_large(P: Array) -> bool:
     `P` ((p, p)): covariance of the physical errors, level axes.
     """
     return float(np.trace(P[TILTS, TILTS])) > LARGE**2
+
+
+def turned_force(filter_: ErrorFilter, before: FilterState, after: FilterState) -> Array | None:
+    """Return the transformation of the errors by a correction of a large tilt.
+
+    While a vehicle goes straight on, fixes determine what the accelerometers add to gravity, in
+    level axes: the tilt with the bias that hides it, and the vertical bias. A correction of the
+    attitude turns the axes of the sensors, and the bias that is unknown along a horizontal one gets
+    a vertical part. If the errors of the accelerometers kept their covariance in body axes, the
+    vertical bias, which is known, would then determine the horizontal one, and so the tilt: each
+    correction adds false information. The errors are kept in level axes instead (Huang, Mourikis
+    and Roumeliotis, Int. J. Robotics Research 29 (2010) 502, on unobservable directions).
+
+    `before`, `after`: states before and after the correction. Returns (p, p), of the physical
+    errors, or None for a model without a bias of the accelerometers.
+    """
+    layout, used = filter_.model.layout, filter_.mechanization
+    names = [name for name in ACCEL_BIASES if name in layout]
+    if not names:
+        return None
+    quaternions = used.levels(np.stack([before.row, after.row]))[:, ATTITUDE]
+    C, C_after = (rotation.dcm_from_quaternion(q) for q in quaternions)
+    size = filter_.model.physical_size
+    out = np.eye(size)
+    first = layout[names[0]].start - layout.size + size
+    out[first : first + 3, PHYSICAL:] += (C_after.T @ C - np.eye(3)) @ _accel_error(filter_, C)
+    return out
+
+
+def _accel_error(filter_: ErrorFilter, C: Array) -> Array:
+    """Error of the accelerometers, body axes, at rest by the states of the sensors, (3, k)."""
+    up = filter_.mechanization.level_up * STANDARD_GRAVITY * C[2]
+    inputs = np.concatenate([[1.0, 0.0, 0.0, 0.0], up])
+    return np.asarray(np.tensordot(inputs, filter_.model.stacked.accel, axes=1))
 
 
 def unlearnt_force(
@@ -453,9 +493,7 @@ def unlearnt_force(
         return None
     used = filter_.mechanization
     C = rotation.dcm_from_quaternion(used.levels(state.row[None])[0, Q_LB : Q_LB + 4])
-    up = used.level_up * STANDARD_GRAVITY * C[2]
-    inputs = np.concatenate([[1.0, 0.0, 0.0, 0.0], up])
-    read = C[:2] @ np.tensordot(inputs, filter_.model.stacked.accel, axes=1)
+    read = C[:2] @ _accel_error(filter_, C)
     tilt = before[TILTS, TILTS]
     M = np.linalg.solve(tilt, (read @ before[PHYSICAL:, TILTS]).T).T / STANDARD_GRAVITY
     was, now = M @ tilt @ M.T, M @ after[TILTS, TILTS] @ M.T

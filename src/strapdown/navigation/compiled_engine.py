@@ -255,10 +255,10 @@ class CompiledEngine(Engine):
         self._group[0][0] = self.row
         return seen
 
-    def widen(self, Q: Array) -> None:
-        """Inflate the covariance of the states."""
-        self.filter = self.navigation.widened(self.filter, Q)
-        self.nodes.widened(self.filter)
+    def carry(self, T: Array, Q: Array) -> None:
+        """Transform the errors, and add a noise."""
+        self.filter = self.navigation.carried(self.filter, T, Q)
+        self.nodes.carried(T, self.filter)
         self._covariance[:] = self.filter.covariance
 
     def shown(self) -> Array:

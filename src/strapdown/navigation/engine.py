@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from strapdown._kernels.filter_loop import BEYOND
 from strapdown._kernels.smoothing import (
     BEGIN,
+    CARRIED,
     CORE,
     COVARIANCE,
     GROWTH,
@@ -157,8 +158,8 @@ class Engine(ABC):
         return replace(observation, z=observation.z - observation.H @ (T @ self.errors))
 
     @abstractmethod
-    def widen(self, Q: Array) -> None:
-        """Inflate the covariance of the states by a covariance, (n, n), now."""
+    def carry(self, T: Array, Q: Array) -> None:
+        """Transform the physical errors by T, (p, p), and add a noise Q, (n, n), of the states."""
 
     @abstractmethod
     def shown(self) -> Array:
@@ -246,10 +247,10 @@ class GeneralEngine(Engine):
         self.nodes.updated(met, taken, self.filter)
         return seen
 
-    def widen(self, Q: Array) -> None:
-        """Inflate the covariance of the states."""
-        self.filter = self.navigation.widened(self.filter, Q)
-        self.nodes.widened(self.filter)
+    def carry(self, T: Array, Q: Array) -> None:
+        """Transform the errors, and add a noise."""
+        self.filter = self.navigation.carried(self.filter, T, Q)
+        self.nodes.carried(T, self.filter)
 
     def shown(self) -> Array:
         """Return the row of the newest step with the estimated errors subtracted."""
@@ -396,10 +397,14 @@ class NodeRows:
             Phi = model.to_physical(used, ended.time, ended.row) @ Phi @ E
         self._growth(Phi, ended)
 
-    def widened(self, state: FilterState) -> None:
-        """Record an inflation of the covariance: a growth by noise alone."""
-        if self.wanted:
-            self._growth(np.eye(self._size), state)
+    def carried(self, T: Array, state: FilterState) -> None:
+        """Record a transformation of the errors by T, (p, p), which changes those of one triad."""
+        if not self.wanted:
+            return
+        changed = np.flatnonzero((np.eye(self._size) != T).any(axis=1))
+        first = min(int(changed[0]) if len(changed) else 0, self._size - 3)
+        move = self._row(CARRIED, state)[begin_of_move(self._size) :]
+        move[0], move[1 : 1 + 3 * self._size] = first, T[first : first + 3].ravel()
 
     def updated(self, before: FilterState, taken: Array, after: FilterState) -> None:
         """Record the effect of observations, if any.

@@ -20,6 +20,7 @@ from strapdown.estimation.error_filter import (
     FilterState,
     Rules,
     is_large,
+    turned_force,
     unlearnt_force,
 )
 from strapdown.estimation.robust import AdaptiveRule, AdaptiveScale, Rejection, Scales
@@ -541,15 +542,17 @@ class EpochLoop:
         return innovations
 
     def _unlearn(self, met: FilterState) -> None:
-        """Inflate the covariance after the correction of a large tilt (second-order tilt)."""
+        """Carry the covariance over the correction of a large tilt (second-order tilt)."""
         if not self.tilted or not self.navigator.damping.feeds_back:
             return
         filter_, engine = self.navigator.filter, self.engine
         before = filter_.physical_covariance(met)
         after = filter_.physical_covariance(engine.filter)
         Q = unlearnt_force(filter_, met, before, after)
-        if Q is not None:
-            engine.widen(Q)
+        T = turned_force(filter_, met, engine.filter)
+        if T is not None:
+            size = filter_.model.layout.size
+            engine.carry(T, np.zeros((size, size)) if Q is None else Q)
         self.tilted = is_large(after)
 
     def mark(self, before: float = 0.0) -> None:

@@ -1,17 +1,28 @@
-"""What is unlearnt where a large tilt is corrected: as drawn tilts scatter; or nothing."""
+"""Correction of a large tilt: what is unlearnt, as drawn tilts scatter, and what turns with it."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.estimation.covariance import COVARIANCES
-from strapdown.estimation.error_filter import ErrorFilter, is_large, unlearnt_force
+from strapdown.estimation.covariance import COVARIANCES, Observation
+from strapdown.estimation.error_filter import (
+    ATTITUDE,
+    ErrorFilter,
+    is_large,
+    turned_force,
+    unlearnt_force,
+)
 from strapdown.estimation.error_model import RotationVectorModel
-from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias
+from strapdown.estimation.sensor_blocks import (
+    accel_bias,
+    accel_scale,
+    gyro_bias,
+)
 from strapdown.mechanization import MECHANIZATIONS
 from strapdown.nav_state import NavState
 from strapdown.rotation import dcm_from_quaternion
@@ -81,3 +92,40 @@ def test_where_nothing_was_learnt_about_a_large_tilt_nothing_is_unlearnt(sd, tie
 def test_an_update_that_tells_no_tilt_unlearns_nothing():
     filter_, state, before = levelled("ned", TOLD)
     assert unlearnt_force(filter_, state, before, before) is None
+
+
+@pytest.mark.parametrize("name", ["ned", "wander_azimuth"])
+def test_accelerometers_add_the_same_to_gravity_in_level_axes_after_a_correction(name):
+    filter_, state, P = levelled(name, TOLD, sensors=(*BOTH, accel_scale(0.1)))
+    used = filter_.mechanization
+    C = dcm_from_quaternion(used.levels(state.row[None])[0, ATTITUDE])
+    up = used.level_up * STANDARD_GRAVITY * C[2]
+    # Half of what hides a tilt is of the scale factors, which take of gravity what is along them.
+    half = np.eye(len(P))
+    half[12:15, 12:15] *= 0.5
+    half[15:, 12:15] = 0.5 * np.diag(1.0 / up)
+    met = replace(state, covariance=filter_.form.begin(half @ P @ half.T + 1e-10 * np.eye(len(P))))
+    # Both tilts are told to 3 deg, by two that are twice as far as they were thought to be.
+    H = np.eye(len(P))[6:8]
+    told = Observation("level", np.array([2.0, -2.0]) * TOLD, H, np.full(2, TOLD**2), ("x", "y"))
+    after, _, _ = filter_.observe(met, [told])
+    T, P = turned_force(filter_, met, after), filter_.physical_covariance(after)
+    C_after = dcm_from_quaternion(used.levels(after.row[None])[0, ATTITUDE])
+    error = np.hstack([np.eye(3), np.diag(up)])
+
+    def known(C, P):
+        """Covariance of tilt and of the error of the force, level axes."""
+        to_level = np.zeros((6, len(P)))
+        to_level[:3, 6:9], to_level[3:, 12:] = np.eye(3), C @ error
+        return to_level @ P @ to_level.T
+
+    scale = np.sqrt(np.diagonal(known(C, P)))
+    scale = np.outer(scale, scale)
+    np.testing.assert_allclose(known(C_after, T @ P @ T.T) / scale, known(C, P) / scale, atol=1e-9)
+    # Without it 3 deg of either turn 0.5 m/s² into the vertical force, known to 1e-4 m/s².
+    assert known(C_after, P)[5, 5] > 1e3 * known(C, P)[5, 5]
+
+
+def test_without_a_bias_of_the_accelerometers_nothing_turns():
+    filter_, state, _ = levelled("ned", TOLD, sensors=BOTH[:1])
+    assert turned_force(filter_, state, state) is None

@@ -7,6 +7,7 @@ import pytest
 
 from strapdown._kernels.smoothing import (
     BEGIN,
+    CARRIED,
     CORE,
     COVARIANCE,
     GROWTH,
@@ -26,7 +27,7 @@ N = CORE + 3
 
 
 def system(seed, steps=12, known=()):
-    """Growths and updates of a filter, and the joint problem that they solve."""
+    """Growths, updates and transformations of a filter, and the joint problem that they solve."""
     rng = np.random.default_rng(seed)
     sd = np.exp(rng.uniform(-6.0, 3.0, N))
     mix = np.eye(N) + 0.3 * rng.normal(size=(N, N))
@@ -46,22 +47,29 @@ def system(seed, steps=12, known=()):
         if k == steps // 2:
             # A receiver's outage: nothing for some growths.
             Q *= 10.0
-        truth = Phi @ truth + np.sqrt(np.diagonal(Q)) * rng.normal(size=N)
-        P = Phi @ P @ Phi.T + Q
-        x = Phi @ x
-        entries.append((GROWTH, P.copy(), Phi, np.zeros(N)))
-        size = len(joint)
-        grown = np.zeros((size + N, size + N))
-        grown[:size, :size] = joint
-        here = states[-1]
-        lift = Phi @ here
-        grown[size:, :size] = lift @ joint
-        grown[:size, size:] = grown[size:, :size].T
-        grown[size:, size:] = lift @ joint @ lift.T + Q
-        mean = np.r_[mean, lift @ mean]
-        joint = grown
-        states = [np.hstack([s, np.zeros((N, N))]) for s in states]
-        states.append(np.hstack([np.zeros((N, size)), np.eye(N)]))
+        moves = [(GROWTH, Phi, Q)]
+        if k % 3 == 1:
+            # At one instant the errors of a triad take parts of all others.
+            T = np.eye(N)
+            T[CORE:] += 0.2 * rng.normal(size=(3, N)) * sd[CORE:, None] / sd[None, :]
+            moves.append((CARRIED, T, np.diag(np.r_[np.zeros(CORE), np.square(0.1 * sd[CORE:])])))
+        for what, Phi, Q in moves:
+            truth = Phi @ truth + np.sqrt(np.diagonal(Q)) * rng.normal(size=N)
+            P = Phi @ P @ Phi.T + Q
+            x = Phi @ x
+            entries.append((what, P.copy(), Phi, np.zeros(N)))
+            size = len(joint)
+            grown = np.zeros((size + N, size + N))
+            grown[:size, :size] = joint
+            here = states[-1]
+            lift = Phi @ here
+            grown[size:, :size] = lift @ joint
+            grown[:size, size:] = grown[size:, :size].T
+            grown[size:, size:] = lift @ joint @ lift.T + Q
+            mean = np.r_[mean, lift @ mean]
+            joint = grown
+            states = [np.hstack([s, np.zeros((N, N))]) for s in states]
+            states.append(np.hstack([np.zeros((N, size)), np.eye(N)]))
         if steps // 3 < k < 2 * steps // 3:
             continue
         H = rng.normal(size=(2, N)) / sd
@@ -95,6 +103,8 @@ def smoothed(entries):
         if what == GROWTH:
             row[move : move + CORE * N] = moved[:CORE].ravel()
             row[move + CORE * N : move + CORE * N + N - CORE] = np.diagonal(moved)[CORE:]
+        elif what == CARRIED:
+            row[move], row[move + 1 : move + 1 + 3 * N] = CORE, moved[CORE:].ravel()
         elif what == UPDATE:
             pack(moved, row, move)
             row[taken_at : taken_at + N] = taken
@@ -116,7 +126,7 @@ def test_it_is_the_solution_of_everything_at_once(seed, known):
     # The estimate of the filter at each entry: the errors that were taken off up to it.
     x, place = np.zeros(N), -1
     for k, (what, _, moved, taken) in enumerate(entries):
-        if what == GROWTH:
+        if what in (GROWTH, CARRIED):
             x = moved @ x
         x = x + taken
         place += what != UPDATE

@@ -223,6 +223,11 @@ def test_where_a_large_tilt_was_corrected_less_is_known_of_what_it_told(mechaniz
     wider = forward.covariance[at, 5, 5] / linear.covariance[at, 5, 5]
     assert wider > 1.01
     assert forward.covariance[0] == pytest.approx(linear.covariance[0])
+    # Before them, with the bias that hides a tilt in axes that corrections turn, it seems known.
+    monkeypatch.setattr("strapdown.navigation.navigator.turned_force", lambda *_: None)
+    fixed, _ = both(made, tilt_sd=tilt)
+    before = int(np.searchsorted(forward.sd.index, 25.0))
+    assert forward.covariance[before, 6, 6] > 2.0 * fixed.covariance[before, 6, 6]
 
 
 @pytest.mark.parametrize("aids", [gnss(), (*gnss(), NoSlip(name="tires"))])
