@@ -338,8 +338,8 @@ def assumed_effects(prepared: PreparedUnit, lever_arm: Array) -> Iterator[Assume
     For rotation, two time functions about each vehicle axis (`Assumed`), by the force less gravity
     and without vibration, and the second-order effect; for missing axes, two along each. A specific
     force f rotated by φ about e keeps ``f - φ²/2 (f - e (e·f))`` to second order: ``φ²/2`` has the
-    mean ``sd²/2`` and the standard deviation ``sd²/√2``. The means of all axes are one unknown about
-    zero, the deviations one each; as it is one-sided, 6.5 % lie beyond the 95 % bound. The
+    mean ``sd²/2`` and the standard deviation ``sd²/√2``. The means of all axes are one unknown
+    about zero, the deviations one each; as it is one-sided, 6.5 % lie beyond the 95 % bound. The
     centripetal acceleration ``ω² (r - e (e·r))`` of a lever arm r has the root mean square
     ``√3 sd²`` of a normal rate, and is one unknown. Products of a rotation and a missing axis are
     neglected: 4 deg and 0.8 m/s give 0.03 m/s.
