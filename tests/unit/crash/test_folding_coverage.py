@@ -60,7 +60,9 @@ def test_bounds_hold_by_kind(kind, gyro):
     for who, rows in (("single", single), ("mean", mean)):
         for figure, column in zip(FIGURES, rows.T, strict=True):
             inside = int((np.abs(column) <= 1.0).sum())
-            interval = binomtest(inside, len(column)).proportion_ci(LEVEL)
+            # The level is that of all figures of a kind together.
+            level = 1.0 - (1.0 - LEVEL) / (2 * len(FIGURES))
+            interval = binomtest(inside, len(column)).proportion_ci(level)
             assert interval.low <= 0.95 <= interval.high, (kind, who, figure, inside, len(column))
 
 
