@@ -55,6 +55,18 @@ def test_every_entry_says_something_in_known_words():
         assert set(entry) <= PARTS, code
 
 
+def test_every_placeholder_has_a_format_that_names_can_have():
+    """A comma is of numbers alone: names were refused when the sentence was to be said."""
+    wrong = [
+        code
+        for code, entry in CATALOGUE.items()
+        for template in entry.values()
+        for _, name, spec, _ in string.Formatter().parse(template)
+        if name is not None and "," in (spec or "")
+    ]
+    assert wrong == []
+
+
 def test_every_code_that_is_raised_has_its_entry(trees):
     missing = []
     for path, tree in trees.items():

@@ -64,7 +64,7 @@ def crash(
     ],
     *,
     flags: LiveFlags,
-    out: Annotated[Path | None, folder_to_make("CASE-crash")] = None,
+    out: Annotated[Path | None, folder_to_make("CASE-crash, with --live CASE-crash-live")] = None,
     write: OutFlags,
 ) -> None:
     """Reconstruct a crash: delta-V, direction of force, severity and path, each with its bound.

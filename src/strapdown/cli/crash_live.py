@@ -61,7 +61,7 @@ def crash_live(cases: Sequence[Path], out: Path | None, write: OutFlags, flags: 
         if not write.quiet:
             typer.echo(f"C99   {flags.export_c}")
         return
-    folder = out or default_folder(cases[0], "crash")
+    folder = out or default_folder(cases[0], "crash-live")
     check_destination(folder, write.force)
     clock = MachineClock()
     every = EVERY if flags.every is None else flags.every

@@ -269,7 +269,9 @@ def combine_effects(
     for part, given in zip(parts, weights, strict=True):
         weight = given if isinstance(given, SampleWeights) else SampleWeights.alike(float(given))
         at = [rows[name] for name in part.names]
-        force[at] += np.einsum("...ij,p...j->p...i", weight.force, part.force)
+        # By sample, a product of matrices.
+        weighed = part.force.swapaxes(0, 1) @ np.swapaxes(weight.force, -1, -2)
+        force[at] += weighed.swapaxes(0, 1)
         rate[at] += weight.rate * part.rate
         rest[at] += part.rest_force @ weight.rest.T
         tilt[at] += weight.tilt * part.tilt

@@ -24,6 +24,9 @@ from strapdown.rotation import cross_matrix
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
 
+#: Line of the error budget: of the mean force before the crash, which is subtracted.
+AT_REST = "level before the crash"
+
 
 @dataclass(frozen=True, eq=False)
 class DeltaVBound:
@@ -84,10 +87,11 @@ def body_delta_v_bound(
     """Uncertainty of a change of velocity integrated along the rotating body axes.
 
     `weights`, (n,), s: the change is their product with specific force minus stationary force;
-    `rest_sd`, (3,), m/s²: of the stationary mean from noise; `at_ends`, (e, 3), m/s: effect on the
-    change of one standard deviation of each instant that bounds the window; `settled`: weights,
-    (n,), s, that count for the motion of structure along a direction, (3,), in which the velocity
-    at the end of the window is a mean (`Edge.settled`).
+    `rest_sd`, (3,), m/s²: of the stationary mean, by noise and by what the vehicle accelerates
+    steadily; `at_ends`, (e, 3), m/s: effect on the change of one standard deviation of each instant
+    that bounds the window; `settled`: weights, (n,), s, that count for the motion of structure
+    along a direction, (3,), in which the velocity at the end of the window is a mean
+    (`Edge.settled`).
     """
     w = np.asarray(weights, dtype=np.float64)
     length = float(w.sum())
@@ -98,8 +102,8 @@ def body_delta_v_bound(
         swung = np.einsum("n,pni->pi", mean - w, effects.force[rows])
         each[rows] += np.outer(swung @ along, along)
     noise = (w[:, None] ** 2 * effects.force_noise**2).sum(axis=0)
-    noise += (length * np.asarray(rest_sd, dtype=np.float64)) ** 2
-    return _bound(each, effects.contributors, np.diag(noise), at_ends)
+    at_rest = (length * np.asarray(rest_sd, dtype=np.float64)) ** 2
+    return _bound(each, effects.contributors, np.diag(noise), at_ends, at_rest)
 
 
 def resolved_delta_v_bound(
@@ -154,10 +158,16 @@ def _noise_between(path: CrashPath, start: float, end: float) -> Array:
 
 
 def _bound(
-    each: Array, contributors: tuple[str, ...], noise: Array, at_ends: ArrayLike | None
+    each: Array,
+    contributors: tuple[str, ...],
+    noise: Array,
+    at_ends: ArrayLike | None,
+    at_rest: ArrayLike = (0.0, 0.0, 0.0),
 ) -> DeltaVBound:
     products = np.einsum("pi,pj->pij", each, each).reshape(-1, 9)
     more = {NOISE: noise.ravel()}
+    if np.any(at_rest):
+        more[AT_REST] = np.diag(np.asarray(at_rest, dtype=np.float64)).ravel()
     if at_ends is not None:
         ends = np.asarray(at_ends, dtype=np.float64)
         more["time of the window"] = (ends.T @ ends).ravel()

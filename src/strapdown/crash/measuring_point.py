@@ -17,6 +17,7 @@ from strapdown.crash.acceleration import force_at_rest
 from strapdown.errors import DataError
 from strapdown.sensors.crash_unit import (
     SHAPES,
+    TURN_SHAPES,
     Assumed,
     RecordedTriad,
     assumed_shapes,
@@ -191,12 +192,8 @@ class _UnitEffects:
         sd = triad.uncertainty.axis("vibration_rectification")
         if not any(sd):
             return
-        from scipy.ndimage import uniform_filter1d
-
-        step = float(np.median(np.diff(self.time)))
-        width = max(3, 2 * round(0.5 * VIBRATION / step) + 1)
-        fast = self.felt - uniform_filter1d(self.felt, width, axis=0, mode="nearest")
-        variance = np.asarray(uniform_filter1d(fast**2, width, axis=0, mode="nearest"))
+        fast = self.felt - moving_mean(self.felt, self.time)
+        variance = moving_mean(fast**2, self.time)
         for axis in range(3):
             if sd[axis] > 0.0:
                 one = sd[axis] * np.where(spoke[:, axis], variance[:, axis], 0.0)
@@ -313,6 +310,15 @@ class _UnitEffects:
             self._add(name, TIMING, force, self.time_sd * slope)
 
 
+def moving_mean(values: Array, time: Array) -> Array:
+    """Mean of values, (n, k), about each stamp over the time of `VIBRATION`."""
+    from scipy.ndimage import uniform_filter1d
+
+    step = float(np.median(np.diff(time)))
+    width = max(3, 2 * round(0.5 * VIBRATION / step) + 1)
+    return np.asarray(uniform_filter1d(values, width, axis=0, mode="nearest"))
+
+
 def _sd(covariances: Array) -> Array:
     return np.asarray(np.sqrt(np.diagonal(covariances, axis1=1, axis2=2)))
 
@@ -329,13 +335,14 @@ def assumed_effects(prepared: PreparedUnit, lever_arm: Array) -> Iterator[Assume
 
     `lever_arm`, (3,), m: from the unit to the point.
 
-    For rotation, three time functions about each vehicle axis (`Assumed`) and the second-order
-    effect; for missing axes, two along each. A specific force f rotated by φ about e keeps ``f -
-    φ²/2 (f - e (e·f))`` to second order: ``φ²/2`` has the mean ``sd²/2`` and the standard deviation
-    ``sd²/√2``. The means of all axes are one unknown about zero, the deviations one each; as it is
-    one-sided, 6.5 % lie beyond the 95 % bound. The centripetal acceleration ``ω² (r - e (e·r))`` of
-    a lever arm r has the root mean square ``√3 sd²`` of a normal rate, and is one unknown. Products
-    of a rotation and a missing axis are neglected: 4 deg and 0.8 m/s give 0.03 m/s.
+    For rotation, two time functions about each vehicle axis (`Assumed`), by the force less gravity
+    and without vibration, and the second-order effect; for missing axes, two along each. A specific
+    force f rotated by φ about e keeps ``f - φ²/2 (f - e (e·f))`` to second order: ``φ²/2`` has the
+    mean ``sd²/2`` and the standard deviation ``sd²/√2``. The means of all axes are one unknown
+    about zero, the deviations one each; as it is one-sided, 6.5 % lie beyond the 95 % bound. The
+    centripetal acceleration ``ω² (r - e (e·r))`` of a lever arm r has the root mean square
+    ``√3 sd²`` of a normal rate, and is one unknown. Products of a rotation and a missing axis are
+    neglected: 4 deg and 0.8 m/s give 0.03 m/s.
     """
     unit = prepared.unit
     time = prepared.imu.index.to_numpy(dtype=np.float64)
@@ -344,26 +351,33 @@ def assumed_effects(prepared: PreparedUnit, lever_arm: Array) -> Iterator[Assume
     turns, axes = unmeasured_turns(unit), unmeasured_axes(unit)
     if turning is not None and turns.any():
         force = prepared.imu[ACCEL].to_numpy(dtype=np.float64)
-        yield from _of_turning(turning, turns, (time, sampling), force, lever_arm)
+        rest, level = prepared.rest, prepared.levelling
+        if rest is None or rest.accel_mean is None:
+            at_rest = force_at_rest(level.roll_deg, level.pitch_deg, GRAVITY)
+        else:
+            at_rest = np.asarray(rest.accel_mean)
+        free = moving_mean((force - at_rest) @ (np.eye(3) - axes), time)
+        shapes = turning_shapes(time, turning.over, sampling, np.linalg.norm(free, axis=1))
+        yield from _of_turning(turning, turns, (time, shapes), force, lever_arm)
     if unit.assumed is not None and axes.any():
         shapes = assumed_shapes(time, unit.assumed.over, sampling)
         for name, along in _directions(unit.assumed.sd_of("delta_v_sd"), axes, AXES):
-            for shape, how in zip(shapes, SHAPES, strict=False):
+            for shape, how in zip(shapes, SHAPES, strict=True):
                 force = np.outer(shape, along)
                 yield f"assumed velocity {name} {how}", MISSING_AXIS, force, None
 
 
 def _of_turning(
-    assumed: Assumed, turns: Array, stamps: tuple[Array, str], force: Array, lever_arm: Array
+    assumed: Assumed, turns: Array, profiles: tuple[Array, Array], force: Array, lever_arm: Array
 ) -> Iterator[AssumedEffect]:
-    time, sampling = stamps
-    shapes = turning_shapes(time, assumed.over, sampling)
+    """Of a turning whose rates at the stamps, (n,), are the shapes, (k, n)."""
+    time, shapes = profiles
     steps = np.diff(time, prepend=2.0 * time[0] - time[1])
     turned = (np.cumsum(shapes * steps, axis=1) ** 2).sum(axis=0)
     means = np.zeros_like(force)
     for name, degrees in _directions(assumed.sd_of("turn_sd_deg"), turns, TURNS):
         about = np.radians(degrees)
-        for shape, how in zip(shapes, SHAPES, strict=True):
+        for shape, how in zip(shapes, TURN_SHAPES, strict=True):
             yield f"assumed {name} {how}", NO_TURNING, None, np.outer(shape, about)
         variance = float(about @ about)
         axis = about / math.sqrt(variance)

@@ -244,7 +244,8 @@ class CrashPath:
     @cached_property
     def covariance(self) -> Array:
         """Covariance of attitude (rad), velocity (m/s) and position (m), (n, 9, 9)."""
-        systematic = np.einsum("pni,pnj->nij", self.errors, self.errors)
+        by_time = np.ascontiguousarray(self.errors.transpose(1, 2, 0))
+        systematic = by_time @ by_time.transpose(0, 2, 1)
         return np.asarray(systematic + self.noise_covariance)
 
     @property

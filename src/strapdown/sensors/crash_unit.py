@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from numbers import Real
 from typing import Any
@@ -13,6 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.sensors.triad_errors import (
     FARTHEST,
@@ -293,13 +293,14 @@ def _same_stamps(unit: CrashUnit, triad: RecordedTriad, time: Array) -> None:
 
 # Assumed motion of a vehicle on unmeasured axes, and its uncertainty.
 
-#: Names of the time profiles, in the order of `turning_shapes`, for the names of unknowns; those of
-#: a velocity, in the order of `assumed_shapes`, are the first two.
-SHAPES = ("by the end", "on the way", "going on")
+#: Names of the time profiles, for the names of unknowns: in the order of `assumed_shapes`, and of
+#: `turning_shapes`.
+SHAPES = ("by the end", "on the way")
+TURN_SHAPES = ("with the force", "on the way")
 # Standard deviation at the midpoint of a random walk with known end, relative to that of its end.
 ON_THE_WAY = 0.5
-# The same of a turn, of which a half in variance is at 0.15 of its end by then, and not at a half.
-TURN_ON_THE_WAY = math.sqrt(0.5 * (0.75 - (0.25 - 1.0 / math.pi**2) ** 2))
+# Tires push as well, all the time: by their largest coefficient of friction, of dry asphalt.
+TIRES = 0.8 * STANDARD_GRAVITY  # m/s²
 # Beyond this angle "not rotating" is a poor assumption, and linear bounds are invalid.
 MOST_TURN = 45.0  # deg
 # Velocity changes of road vehicles in crashes are smaller.
@@ -336,20 +337,19 @@ class Assumed:
 
     Notes
     -----
-    The rotation (or velocity change) of an axis over time is the sum of two independent unknowns.
-    One grows as ``u - sin(2 pi u) / (2 pi)``, the integral of a haversine, with u from 0 to 1 over
-    `over`, and has the stated standard deviation at the end. Alone it would fix the midpoint at
-    exactly half the rotation; an early rotation, or a dip that returns, would change the velocity
-    by more than the bound, because it depends on the attitude during the crash pulse. The other
-    unknown therefore rises and returns as ``sin²(pi u)``, with half the standard deviation at the
-    midpoint: the remaining uncertainty of a random walk at its midpoint when its end is known. The
-    total standard deviation at the midpoint is then 0.71 of that at the end, as for a random walk.
+    The velocity change along an axis over time is the sum of two independent unknowns. One grows as
+    ``u - sin(2 pi u) / (2 pi)``, the integral of a haversine, with u from 0 to 1 over `over`, and
+    has the stated standard deviation at the end. Alone it would fix the midpoint at exactly half
+    the change. The other therefore rises and returns as ``sin²(pi u)``, with half the standard
+    deviation at the midpoint: the remaining uncertainty of a random walk at its midpoint when its
+    end is known. The total standard deviation at the midpoint is then 0.71 of that at the end, as
+    for a random walk.
 
-    A velocity has its end with the blow; a vehicle that was turned goes on turning. Half of the
-    variance of a rotation is therefore of a third unknown, ``u² - sin²(pi u) / pi²``, whose rate
-    grows as the integral of a haversine and is largest at the end of `over`; after it the rate
-    falls to zero within half of that time. Without it the rate, which moves a point beside the
-    reference point, would be zero at the end of `over` for certain.
+    The rate of a rotation follows the force, which makes it by an arm: it grows with the impulse up
+    to then, as a share of that by the end of `over` (`turning_shapes`), and stays. The line of the
+    force moves over the vehicle while it folds: half of the variance is that of a random walk over
+    the impulse, whose part beside its end is the second unknown of a rotation. After `over` the
+    rate falls to zero within half of that time.
     """
 
     turn_sd_deg: float | Triad | None = None
@@ -394,27 +394,36 @@ def assumed_shapes(time: Array, over: tuple[float, float], sampling: str) -> Arr
     (2, n), 1/s: means over the interval that ends at the stamp, or about it, so that their sum
     times the step is exact even with few samples in `over`.
     """
-    return _rates(_grown, time, over, sampling)
+    begin, end = _intervals(time, sampling)
+    return np.asarray((_grown(end, over) - _grown(begin, over)) / (end - begin))
 
 
-def turning_shapes(time: Array, over: tuple[float, float], sampling: str) -> Array:
-    """Rates of the three profiles of a turn, (3, n), 1/s, as `assumed_shapes`."""
-    return _rates(_turned, time, over, sampling)
+def turning_shapes(time: Array, over: tuple[float, float], sampling: str, pushed: Array) -> Array:
+    """Rates of the two profiles of a turn, (2, n), 1/s, for a standard deviation of one at its end.
+
+    `pushed`, (n,), m/s²: size of the acceleration of the vehicle about each sample; the rest as
+    `assumed_shapes`. Where the record does not cover `over`, the tires alone push.
+    """
+    begin, end = _intervals(time, sampling)
+    edges = np.concatenate([[min(begin[0], over[0])], begin, end[-1:], [max(end[-1], over[1])]])
+    within = np.diff(np.clip(edges, *over))
+    push = (np.concatenate([[0.0], pushed, [0.0]]) + TIRES) * within
+    share = np.concatenate([[0.0], np.cumsum(push)]) / push.sum()
+    rates = np.array([share, math.sqrt(0.5) * ON_THE_WAY * np.sin(np.pi * share)])
+    turned = 0.5 * (rates[:, 1:] + rates[:, :-1]) * within
+    whole = np.linalg.norm(turned.sum(axis=1))
+    after = np.clip((edges - over[1]) / (over[1] - over[0]), 0.0, 0.5)
+    falling = (over[1] - over[0]) * 0.5 * (after + np.sin(2.0 * np.pi * after) / (2.0 * np.pi))
+    turned[0] += np.diff(falling)
+    return np.asarray(turned[:, 1:-1] / whole / (end - begin))
 
 
-def _rates(
-    grown: Callable[[Array, tuple[float, float]], Array],
-    time: Array,
-    over: tuple[float, float],
-    sampling: str,
-) -> Array:
+def _intervals(time: Array, sampling: str) -> tuple[Array, Array]:
+    """Begin and end of the interval that each sample stands for, (n,) each, without gaps."""
     steps = np.diff(time, prepend=2.0 * time[0] - time[1])
-    after = np.append(steps[1:], steps[-1])
     if sampling == "mean":
-        begin, end = time - steps, time
-    else:
-        begin, end = time - 0.5 * steps, time + 0.5 * after
-    return np.asarray((grown(end, over) - grown(begin, over)) / (end - begin))
+        return time - steps, time
+    return time - 0.5 * steps, time + 0.5 * np.append(steps[1:], steps[-1])
 
 
 def _grown(time: Array, over: tuple[float, float]) -> Array:
@@ -422,18 +431,6 @@ def _grown(time: Array, over: tuple[float, float]) -> Array:
     u = np.clip((time - over[0]) / (over[1] - over[0]), 0.0, 1.0)
     whole = u - np.sin(2.0 * np.pi * u) / (2.0 * np.pi)
     return np.array([whole, ON_THE_WAY * np.sin(np.pi * u) ** 2])
-
-
-def _turned(time: Array, over: tuple[float, float]) -> Array:
-    """Values of the three profiles of a turn, (3, n)."""
-    whole, way = _grown(time, over)
-    u = (time - over[0]) / (over[1] - over[0])
-    within, after = np.clip(u, 0.0, 1.0), np.clip(u - 1.0, 0.0, 0.5)
-    on = within**2 - (np.sin(np.pi * within) / np.pi) ** 2
-    on += after + np.sin(2.0 * np.pi * after) / (2.0 * np.pi)
-    return np.array(
-        [math.sqrt(0.5) * whole, TURN_ON_THE_WAY / ON_THE_WAY * way, math.sqrt(0.5) * on]
-    )
 
 
 def _sds(given: object, name: str, limits: dict[str, Any]) -> Triad:

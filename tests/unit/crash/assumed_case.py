@@ -59,8 +59,7 @@ def move(rates, sideways):
     """
     m = round((END - BEGIN) * FINE)
     middle = BEGIN + (np.arange(m) + 0.5) / FINE
-    u = np.clip(middle / PULSE, 0.0, 1.0)
-    ahead = -CHANGE * 2.0 * np.sin(np.pi * u) ** 2 / PULSE
+    ahead = -pushed(middle)
     turning, right = rates(middle), sideways(middle)
     count = len(right)
     own = np.zeros((count, m, 3))
@@ -89,6 +88,11 @@ def move(rates, sideways):
     gained = np.cumsum(own, axis=1)[:, last] / FINE
     angles = np.array([rotation.euler_from_quaternion(q) for q in attitudes[:, last]])
     return Truth(time, means, path, speeds[:, last], angles, gained)
+
+
+def pushed(time):
+    """Size of the acceleration of the pulse of `move`, (m,), m/s²."""
+    return CHANGE * 2.0 * np.sin(np.pi * np.clip(time / PULSE, 0.0, 1.0)) ** 2 / PULSE
 
 
 def unit_of(truth, k, axes, assumed, name="EDR", uncertainty=PERFECT):
@@ -120,7 +124,7 @@ def drawn_motion(count, seed, *, turn=TURN_SD, slide=0.8, spun=False):
     that is lost, and stays to the end of `OVER`; the turn by then is as assumed.
     """
     rng = np.random.default_rng(seed)
-    turns = np.radians(turn)[:, None] * rng.normal(size=(count, 3, 3))
+    turns = np.radians(turn)[:, None] * rng.normal(size=(count, 3, 2))
     slides = slide * rng.normal(size=(count, 2))
 
     def shapes(time):
@@ -135,6 +139,7 @@ def drawn_motion(count, seed, *, turn=TURN_SD, slide=0.8, spun=False):
     def rates(time):
         if spun:
             return turns[:, None, :, 0] * spinning(time)[:, None]
-        return np.einsum("kas,sm->kma", turns, turning_shapes(time, OVER, "instantaneous"))
+        profiles = turning_shapes(time, OVER, "instantaneous", pushed(time))
+        return np.einsum("kas,sm->kma", turns, profiles)
 
     return move(rates, lambda time: slides @ shapes(time))

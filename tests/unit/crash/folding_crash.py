@@ -2,20 +2,22 @@
 
 They know nothing of the structural term that is learnt: a rigid body under two overlapping pulses
 that turns and goes on turning, whose points have humps of a local deformation and ringing of some
-frequencies on top. Sensors, positions, mountings, attitude and entry err as stated.
+frequencies on top. Sensors, positions, mountings, attitude and entry err as stated; the car
+accelerates steadily before the crash, as far as the preparation takes it to.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from strapdown import CrashOptions, Entry, reconstruct_crash, rotation
 from strapdown.crash.combine_units import combine_units
 from strapdown.crash.consistency import compare_units
-from strapdown.crash.preparation import prepare_together
+from strapdown.crash.preparation import Preparation, prepare_together
 from strapdown.crash.reconstruction import CrashReconstruction, reconstruct_unit
 from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.synchronise import synchronise
@@ -38,6 +40,8 @@ POSITION_SD, ANGLES_SD, LEVEL_SD, SPEED_SD = 0.02, 0.5, 0.5, 0.1
 END, ASSUMED_END = 0.349, 0.15
 #: What a case can state falsely of a point, in words of `Crash.unit`.
 FAULTS = ("sign", "axes", "scale", "lever arm")
+#: Keys of the streams of random numbers beside that of a crash: SeedSequence fills up with zeros.
+DRIVE, STATED, POINT = 97, 98, 99
 
 
 def pulse(time, start, length):
@@ -82,6 +86,8 @@ class Crash:
         self.bent = math.exp(rng.uniform(math.log(0.01), math.log(0.12)))
         self.size, self.seed, self.kind = size, seed, list(KINDS).index(kind)
         self.over_ground, self.fades, self.before = over_ground, 1.0, np.zeros(3)
+        of_drive = np.random.default_rng([seed, self.kind, DRIVE])
+        self.steady = Preparation.steady_acceleration * of_drive.normal(size=3)
         self.speed = 20.0
 
     @classmethod
@@ -100,18 +106,27 @@ class Crash:
         second = pulse(time, self.second, self.length - self.second)
         return self.share * first + (1 - self.share) * second
 
+    def grown(self, time):
+        """Rates at even stamps, (n,), as a multiple of `turned`."""
+        shape = np.cumsum(self.shape(time)) * (time[1] - time[0])
+        return shape * np.exp(-self.fades * np.maximum(time - 0.12, 0))
+
+    def turned_by(self, end):
+        """Angle by an instant over `turned`, s."""
+        time = np.linspace(0.0, end, 2001)
+        return float(np.trapezoid(self.grown(time), time))
+
     def motion(self, time):
         """Specific force of the body and its rates at even stamps, vehicle axes, (n, 3) each."""
-        shape = self.shape(time)
-        rates = np.outer(np.cumsum(shape) * (time[1] - time[0]), self.turned)
-        rates = self.before + rates * np.exp(-self.fades * np.maximum(time - 0.12, 0))[:, None]
-        force = np.outer(shape, self.change)
+        rates = self.before + np.outer(self.grown(time), self.turned)
+        force = np.outer(self.shape(time), self.change)
         if self.over_ground:
             yaw = np.cumsum(rates[:, 2]) * (time[1] - time[0])
             yaw -= np.interp(0.0, time, yaw)
             c, s = np.cos(yaw), np.sin(yaw)
             x, y = force[:, 0].copy(), force[:, 1].copy()
             force[:, 0], force[:, 1] = c * x + s * y, -s * x + c * y
+        force[time < 0.0] += self.steady
         return force + np.array([0, 0, -G]), rates
 
     def structure(self, rng, time):
@@ -139,14 +154,16 @@ class Crash:
         force, _ = self.motion(time)
         return np.trapezoid(force + np.array([0, 0, G]), time, axis=0)
 
+    @cache  # noqa: B019
     def position(self, end):
         """Where the body is at an instant, (3,), m: from where and how it was at time zero."""
         step = 5e-4
         time = np.arange(round(end / step) + 1) * step
         force, rates = self.motion(time)
         C, velocity, position = np.eye(3), np.array([self.speed, 0.0, 0.0]), np.zeros(3)
+        turns = rotation.dcm_from_rotation_vector(0.5 * step * (rates[:-1] + rates[1:]))
         for k in range(1, len(time)):
-            C = C @ rotation.dcm_from_rotation_vector(0.5 * step * (rates[k - 1] + rates[k]))
+            C = C @ turns[k - 1]
             gained = step * (C @ (0.5 * (force[k - 1] + force[k])) + np.array([0, 0, G]))
             position = position + step * (velocity + 0.5 * gained)
             velocity = velocity + gained
@@ -155,7 +172,7 @@ class Crash:
     def unit(self, number, *, gyro, wrong="", fault=None):
         """A recorder with drawn errors and position; `wrong`, `fault`: what is false of it."""
         fault = fault or Fault()
-        rng = np.random.default_rng([self.seed, number, self.kind])
+        rng = np.random.default_rng([self.seed, self.kind, POINT, number])
         place = np.array(
             [
                 rng.uniform(-1, 0.6),
@@ -203,8 +220,7 @@ class Crash:
             noise_density=NOISE / RATE**0.5, bias=BIAS, scale=SCALE, full_scale=fault.full_scale
         )
         of_gyro = TriadUncertainty(noise_density=GYRO_NOISE / RATE**0.5)
-        # By 0.15 s a rate that grows over the crash has turned it by about 0.1 s of its end.
-        turn = tuple(math.degrees(0.1 * x) for x in self.turn_sd)
+        turn = tuple(np.degrees(self.turned_by(ASSUMED_END) * self.turn_sd).tolist())
         if gyro and not fault.missing:
             assumed = None
         else:
@@ -225,7 +241,7 @@ class Crash:
 
     def stated(self, units, entry=None, until=None) -> tuple[Entry, CrashOptions]:
         """Entry and options of a reconstruction, with a stated attitude that errs as it says."""
-        rng = np.random.default_rng([self.seed, self.kind, 99])
+        rng = np.random.default_rng([self.seed, self.kind, STATED])
         roll, pitch, speed = rng.normal(size=3) * [LEVEL_SD, LEVEL_SD, SPEED_SD]
         blind = any(u.gyro is None for u in units)
         return (

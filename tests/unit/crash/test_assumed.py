@@ -15,6 +15,7 @@ from tests.unit.crash.assumed_case import (
     drawn_motion,
     move,
     path_of,
+    pushed,
     unit_of,
 )
 
@@ -23,12 +24,19 @@ from strapdown.crash.consistency import compare_units
 from strapdown.crash.delta_v import delta_v
 from strapdown.crash.drive_entry import DriveEntry, start_from_drive
 from strapdown.crash.entry import Entry
-from strapdown.crash.measuring_point import MISSING_AXIS, NO_TURNING
+from strapdown.crash.measuring_point import MISSING_AXIS, NO_TURNING, moving_mean
 from strapdown.crash.path import sample_paths
 from strapdown.crash.preparation import Preparation, prepare_unit
 from strapdown.crash.reconstruction import CrashOptions, reconstruct_crash
 from strapdown.errors import ConfigError, DataError
-from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad, turning_shapes
+from strapdown.sensors.crash_unit import (
+    TURN_SHAPES,
+    Assumed,
+    CrashUnit,
+    Mounting,
+    RecordedTriad,
+    turning_shapes,
+)
 from strapdown.sensors.uncertainty import TriadUncertainty
 from strapdown.sensors.unmeasured import TURNS
 from strapdown.simulation.crash_motion import CRASHES
@@ -125,12 +133,15 @@ class TestEffects:
         part = 1e-3
 
         def rates(time):
-            out = np.zeros((3, time.size, 3))
-            out[:, :, axis] = np.radians(4.0) * part * turning_shapes(time, (0, 0.15), "mean")
+            out = np.zeros((2, time.size, 3))
+            # As the moving mean of a recorder has the force.
+            felt = moving_mean(pushed(time)[:, None], time)[:, 0]
+            profiles = turning_shapes(time, (0, 0.15), "mean", felt)
+            out[:, :, axis] = np.radians(4.0) * part * profiles
             return out
 
-        truth = move(rates, lambda time: np.zeros((3, time.size)))
-        for k, how in enumerate(("by the end", "on the way", "going on")):
+        truth = move(rates, lambda time: np.zeros((2, time.size)))
+        for k, how in enumerate(TURN_SHAPES):
             _, path = path_of(unit_of(truth, k, "xyz", ASSUMED))
             row = path.errors[path.names.index(f"vehicle assumed {TURNS[axis]} {how}")]
             rows = np.searchsorted(truth.time, path.time - 1e-9)
@@ -200,7 +211,7 @@ def both(straight):
 class TestSeveral:
     def test_they_share_what_is_assumed(self, both):
         names = both.combined.at_point.effects.names
-        assert sum(name.startswith("vehicle assumed heading") for name in names) == 4
+        assert sum(name.startswith("vehicle assumed heading") for name in names) == 3
         # Shared, it does not average out; the scale factors do.
         for unit in both.units:
             single, mean = unit.path.variances(), both.combined.path.variances()

@@ -99,17 +99,37 @@ class TestShapes:
         assert np.hypot(*grown[:, middle]) == pytest.approx(np.sqrt(0.5), abs=1e-9)
         assert (grown[:, time < 0.0] == 0.0).all()
 
-    def test_a_turn_is_known_as_a_random_walk_and_its_rate_does_not_end_with_the_stretch(self):
-        time = np.arange(-100, 1000) / 1000.0
-        rates = turning_shapes(time, (0.0, 0.2), "mean")
-        grown = np.cumsum(rates, axis=1) / 1000.0
-        size = np.linalg.norm(grown, axis=0)
-        middle, end = (int(np.searchsorted(time, t - 1e-9)) for t in (0.1, 0.2))
-        assert size[[middle, end]] == pytest.approx([np.sqrt(0.5), 1.0], abs=1e-9)
-        # A turn that has grown with a pulse of 0.1 s and goes on: 1 / 0.15 s.
-        speed = np.linalg.norm(rates, axis=0)[middle : end + 1]
-        assert speed.min() > 1.0 / 0.15 and speed.max() < 2.0 / 0.15
-        assert (rates[:, time > 0.31] == 0.0).all()
+    @pytest.mark.parametrize("sampling", ["mean", "instantaneous"])
+    @pytest.mark.parametrize("rate", [100.0, 1000.0])
+    def test_a_turn_has_its_stated_size_at_the_end_and_its_rate_follows_the_force(
+        self, sampling, rate
+    ):
+        time = np.arange(-round(rate), round(rate)) / rate
+        # A pulse of 12 m/s between 0.03 and 0.09 s, in means or at the stamps.
+        u = np.clip((time - (0.5 / rate if sampling == "mean" else 0.0) - 0.03) / 0.06, 0.0, 1.0)
+        pushed = 12.0 * 2.0 * np.sin(np.pi * u) ** 2 / 0.06
+        over = (0.0, 0.15 if sampling == "mean" else 0.15 + 0.5 / rate)
+        rates = turning_shapes(time, over, sampling, pushed)
+        turned = np.cumsum(rates, axis=1) / rate
+        end, before = (int(np.searchsorted(time, t - 1e-9)) for t in (0.15, 0.03))
+        # Sums of the rates are exact, to rounding.
+        assert np.linalg.norm(turned[:, end]) == pytest.approx(1.0, abs=1e-9)
+        size = np.linalg.norm(rates, axis=0)
+        # The impulse of the tires is 1.18 m/s of 13.2 by 0.15 s: 2 % until the pulse begins.
+        assert size[before] < 0.1 * size[end]
+        # From the middle of the pulse on it turns by one, at one rate: 1 / 0.09 s.
+        assert size[end] == pytest.approx(1.0 / 0.09, rel=0.08)
+        if rate == 1000.0:
+            half = int(np.searchsorted(time, 0.06 - 1e-9))
+            # Half way: of one rate that grows with the impulse 0.5, of a random walk √0.5.
+            assert 0.5 < size[half] / size[end] < np.sqrt(0.5)
+        assert (rates[:, time > 0.24] == 0.0).all() and (rates[:, time < 0.0] == 0.0).all()
+
+    def test_a_record_that_does_not_cover_the_stretch_leaves_the_rest_to_the_tires(self):
+        rates = turning_shapes(np.arange(5, 10) / 100.0, (0.0, 0.2), "mean", np.zeros(5))
+        # A rate that grows evenly: 2 t / 0.2² of the share beside the random walk's.
+        grows = rates[0] / (np.arange(5, 10) / 100.0 - 0.005)
+        assert grows == pytest.approx(np.full(5, grows[0]))
 
 
 class TestFilling:
