@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,12 @@ from tests.coded import coded
 
 from strapdown import CrashOptions, Entry, reconstruct_crash, rotation
 from strapdown.crash.acceleration import window_weights
-from strapdown.crash.combine_units import combine_units, least_variance
+from strapdown.crash.combine_units import (
+    _rate_weights,
+    combine_effects,
+    combine_units,
+    least_variance,
+)
 from strapdown.crash.consistency import (
     compare_units,
     difference_covariance,
@@ -19,7 +25,7 @@ from strapdown.crash.consistency import (
     signed_permutations,
     velocity_increments,
 )
-from strapdown.crash.measuring_point import at_point
+from strapdown.crash.measuring_point import SampleEffects, at_point
 from strapdown.errors import ConfigError, DataError
 from strapdown.sensors.crash_unit import CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.pre_crash import Levelling, PreparedUnit
@@ -370,3 +376,46 @@ def test_where_nothing_turns_the_stated_axes_of_a_gyro_stand(seed):
     assert out.agree
     assert out.pairs[0].axes.kind == "agree"
     assert out.findings == ()
+
+
+def plain_effects(names, rates, noise, n=151):
+    """Effects of unknowns on the rate about x alone, each constant, and white noise of it."""
+    rate = np.zeros((len(names), n, 3))
+    rate[:, :, 0] = np.array(rates)[:, None]
+    none = np.zeros((len(names), 3))
+    noises = (np.full((n, 3), 0.2), np.full((n, 3), noise))
+    return SampleEffects(tuple(names), tuple(names), 10.0 * rate, rate, none, none + 0.5, *noises)
+
+
+def test_effects_on_a_mean_are_sums_by_unknown_and_noise_adds_in_square():
+    first, second = (
+        plain_effects(["a", "both"], [0.01, 0.02], 0.3),
+        plain_effects(["both"], [0.04], 0.1),
+    )
+    mean = combine_effects([first, second], [0.25, 0.75])
+    assert mean.names == ("a", "both")
+    expected = [0.25 * 0.01, 0.25 * 0.02 + 0.75 * 0.04]
+    np.testing.assert_allclose(mean.rate[:, 7, 0], expected, rtol=1e-12)
+    np.testing.assert_allclose(mean.force[:, 7], np.outer(expected, [10.0, 0.0, 0.0]), rtol=1e-12)
+    np.testing.assert_allclose(mean.tilt[:, 0], [0.125, 0.5])
+    np.testing.assert_allclose(mean.rate_noise, math.hypot(0.25 * 0.3, 0.75 * 0.1), rtol=1e-12)
+    np.testing.assert_allclose(mean.force_noise, 0.2 * math.hypot(0.25, 0.75), rtol=1e-12)
+
+
+def test_gyros_weigh_by_the_variance_of_their_turning_over_the_crash_and_each_once():
+    # 1.5 s at 100 Hz, of which -0.1 to 0.75 s count: 86 stamps.
+    time = np.arange(-60, 91) / 100.0
+    units = [
+        SimpleNamespace(time=time, effects=plain_effects(names, rates, noise), gyro=gyro)
+        for names, rates, noise, gyro in (
+            (["a", "b"], [0.03, 0.04], 0.0, "A"),
+            (["c"], [0.0], 0.5, "B"),
+            (["d"], [0.01], 0.0, "A"),
+            (["e"], [0.01], 0.0, "C"),
+        )
+    ]
+    # Unknowns in square by their sums, (0.03² + 0.04²) 0.86²; noise by sample, 86 · 3 (0.5 / 100)².
+    variances = np.array([0.05**2 * 0.86**2, 86 * 3 * (0.5 * 0.01) ** 2])
+    expected = np.append(1.0 / variances, [0.0, 0.0]) / (1.0 / variances).sum()
+    found = _rate_weights(units, np.array([True, True, True, False]))
+    np.testing.assert_allclose(found, expected, rtol=1e-12)
