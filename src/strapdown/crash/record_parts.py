@@ -1199,6 +1199,9 @@ def _block(
 
 # A path measured by another instrument among the records: a reference for the result.
 
+# A path that counts from the trigger contains it within this.
+LONGEST = 10.0  # s
+
 
 class KnownPath(NamedTuple):
     """Path as named in the case, and its time, s."""
@@ -1207,6 +1210,11 @@ class KnownPath(NamedTuple):
     name: str
     start: float
     end: float
+
+    @property
+    def at_trigger(self) -> bool:
+        """Whether its time may count from the trigger."""
+        return self.start <= 0.0 <= self.end and self.end - self.start < LONGEST
 
 
 def known_path(path: str, record: CrashRecord) -> KnownPath | None:

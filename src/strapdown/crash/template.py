@@ -490,6 +490,8 @@ SAME_PLACE, SAME_SCALE = 0.8, 0.25
 # A gyro shares the accelerometer's clock if it begins to turn, by so many standard deviations,
 # within this of the impact.
 TURNS_WITHIN, TURNED = 0.15, 8.0  # s
+# Zeroed records: length of the rest before the impact, s.
+LEAST_REST, LONGEST_REST = 0.02, 1.0
 _RANGE_WORDS = re.compile(
     r"(?<![a-z])(low|high|lo|hi|lg|hg|nd|hd|acc\w*|gyr\w*|gyro|imu|rate\w*|drehrate\w*|beschl\w*"
     r"|\d+ ?g|a|w|g)(?![a-z])"
@@ -547,6 +549,18 @@ class Unit:
     def place(self) -> str:
         """Position as the record states it; empty where it does not."""
         return next((p.place for p in self.accelerometers if p.place), "")
+
+    @property
+    def zeroed_from(self) -> float | None:
+        """Begin of the rest in which the record was zeroed, s from the trigger.
+
+        With gravity removed, the leveling finds no bias.
+        """
+        part = self.accelerometers[0]
+        before = float(part.time[0]) - self.impact.trigger
+        if not part.zeroed or part.velocities or before > -LEAST_REST:
+            return None
+        return max(before, -LONGEST_REST)
 
 
 def group_units(parts: Sequence[Part]) -> tuple[list[Unit], list[Skipped]]:
