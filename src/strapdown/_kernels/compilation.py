@@ -46,7 +46,7 @@ def _fma_interpreted(a: float, b: float, c: float) -> float:
 
 
 if config.DISABLE_JIT:
-    fma = _fma_interpreted
+    fma = _fma_interpreted  # type: ignore[assignment]
 
 
 @njit(**IN_PLACE, forceinline=True)

@@ -54,6 +54,7 @@ from strapdown.report.values import (
     decimals,
     duration_words,
     half,
+    heading_about,
     length_words,
     plain,
     plus_minus,
@@ -113,9 +114,7 @@ def key_figures(evaluation: NavigationEvaluation) -> tuple[KeyFigure, ...]:
         ),
         KeyFigure(
             "Final heading",
-            "unknown"
-            if heading >= _NO_HEADING
-            else about(float(last["heading"]) % 360.0, heading, "°"),
+            "unknown" if heading >= _NO_HEADING else heading_about(float(last["heading"]), heading),
             f"95{GAP}% bound; {status_words(evaluation.run.trust)}",
             f"roll {about(float(last['roll']), half(sd['roll']), '°')}, pitch "
             f"{about(float(last['pitch']), half(sd['pitch']), '°')}",
@@ -456,9 +455,11 @@ def end_table(evaluation: NavigationEvaluation) -> TableBlock:
     ):
         cells = []
         for k in (0, -1):
-            value = float(record.trajectory[column].iloc[k])
-            value = value % 360.0 if column == "heading" else value
-            cells.append(_stated(value, record.sd[sd].iloc[k], unit))
+            value, of_value = float(record.trajectory[column].iloc[k]), record.sd[sd].iloc[k]
+            if column == "heading" and not math.isnan(of_value):
+                cells.append(heading_about(value, half(of_value)))
+                continue
+            cells.append(_stated(value % 360.0 if column == "heading" else value, of_value, unit))
         rows.append((name, *cells))
     return TableBlock(
         ("", "start", "end"), tuple(rows), text=(0,), caption="Start and end, with 95 % bounds."

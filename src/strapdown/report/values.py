@@ -78,6 +78,11 @@ def about(value: float, half: float, unit: str) -> str:
     return both + (unit if unit == "°" else GAP + unit if unit else "")
 
 
+def heading_about(deg: float, half: float) -> str:
+    """Format a heading with its bound, deg, from 0 to below 360 as shown: 359.9 ± 16 is 0 ± 16°."""
+    return about(round(deg, decimals(half, DIGITS, most=4)) % 360.0, half, "°")
+
+
 def plus_minus(half: float, unit: str) -> str:
     """Format the half width of a bound alone: ``± 0.27 m/s``."""
     text = about(0.0, half, unit)

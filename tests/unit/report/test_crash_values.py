@@ -10,6 +10,7 @@ from strapdown.crash.pdof import AngleInterval
 from strapdown.report.values import (
     about,
     angle_range,
+    heading_about,
     instant,
     plain,
     side_words,
@@ -115,3 +116,14 @@ def test_a_direction_that_nothing_bounds_is_said_to_be_none():
 )
 def test_ways_in_words(forward, right, words):
     assert side_words(forward, right) == words
+
+
+def test_a_heading_is_below_a_turn_as_it_is_shown():
+    gap = "\u00a0"
+    for deg, half, shown in (
+        (359.7, 16.0, f"0{gap}±{gap}16°"),
+        (359.7, 0.21, f"359.70{gap}±{gap}0.21°"),
+        (-0.001, 0.21, f"0.00{gap}±{gap}0.21°"),
+        (-90.0, 2.3, f"270.0{gap}±{gap}2.3°"),
+    ):
+        assert heading_about(deg, half) == shown
