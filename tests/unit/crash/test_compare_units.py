@@ -419,3 +419,16 @@ def test_gyros_weigh_by_the_variance_of_their_turning_over_the_crash_and_each_on
     expected = np.append(1.0 / variances, [0.0, 0.0]) / (1.0 / variances).sum()
     found = _rate_weights(units, np.array([True, True, True, False]))
     np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+def test_what_a_drive_may_determine_are_the_biases_and_scale_factors_of_the_accelerometer():
+    effects = unit("A", A, 1).effects
+    of = {
+        (one.quantity, one.axis): (one.sd, name)
+        for name, one in zip(effects.names, effects.parameters, strict=True)
+        if one is not None and one.quantity in ("bias", "scale")
+    }
+    assert sorted(of) == [(q, k) for q in ("bias", "scale") for k in range(3)]
+    for (quantity, axis), (sd, name) in of.items():
+        assert sd == {"bias": BIAS_SD, "scale": SCALE_SD}[quantity]
+        assert name.endswith(f"{quantity} {'xyz'[axis]}")
