@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,12 +12,13 @@ from tests.coded import coded
 from strapdown._kernels.compensation import compensate
 from strapdown.errors import DivergenceError
 from strapdown.estimation.covariance import COVARIANCES, Joseph, Observation
-from strapdown.estimation.error_filter import ErrorFilter
+from strapdown.estimation.error_filter import LARGE, ErrorFilter, is_large
 from strapdown.estimation.error_model import ERROR_MODELS, QuaternionModel, RotationVectorModel
 from strapdown.estimation.sensor_blocks import (
     accel_bias,
     accel_misalignment,
     accel_scale,
+    gauss_markov,
     gyro_bias,
     gyro_misalignment,
     gyro_scale,
@@ -198,3 +200,26 @@ def test_what_a_bias_and_a_scale_factor_share_is_not_seen():
         # The rounds leave the sixth power of the scale factor of the input; shares of the reading
         # would leave the share of what is taken off, 0.1 x 0.5 m/s² and more.
         assert abs(out[0, 6] / dt - force) < 10.0 * 0.1**6 * 16.0 + 1e-12, scale
+
+
+def test_an_estimate_of_a_drift_fades_and_one_of_a_constant_does_not():
+    blocks = (gauss_markov(gyro_bias(1e-6), 50.0), accel_bias(1e-3))
+    used = ErrorFilter(NorthEastDown(), RotationVectorModel(sensors=blocks), Joseph(), step=0.1)
+    state = used.begin(START, np.eye(used.model.layout.size) * 1e-6)
+    known = np.array([1e-6, -2e-6, 3e-6, 1e-3, 2e-3, -1e-3])
+    time, rows = increments_of(moving())
+    ended, _ = used.predict(replace(state, sensors=known), time, rows)
+    faded = np.exp(-(ended.time - state.time) / 50.0)
+    assert ended.time - state.time == pytest.approx(10.0, abs=0.02)
+    np.testing.assert_allclose(ended.sensors[:3], known[:3] * faded, rtol=1e-9)
+    np.testing.assert_allclose(ended.sensors[3:], known[3:], rtol=1e-12)
+
+
+def test_a_tilt_is_large_by_both_of_its_axes_and_whatever_the_heading():
+    P = np.zeros((15, 15))
+    P[8, 8] = 1.0
+    assert not is_large(P)
+    P[6, 6] = P[7, 7] = 0.49 * LARGE**2
+    assert not is_large(P)
+    P[7, 7] = 0.52 * LARGE**2
+    assert is_large(P)
