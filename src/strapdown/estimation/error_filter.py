@@ -442,17 +442,24 @@ def turned_force(filter_: ErrorFilter, before: FilterState, after: FilterState) 
     `before`, `after`: states before and after the correction. Returns (p, p), of the physical
     errors, or None for a model without a bias of the accelerometers.
     """
-    layout, used = filter_.model.layout, filter_.mechanization
-    names = [name for name in ACCEL_BIASES if name in layout]
-    if not names:
+    used, bias = filter_.mechanization, _accel_bias(filter_)
+    if bias is None:
         return None
     quaternions = used.levels(np.stack([before.row, after.row]))[:, ATTITUDE]
     C, C_after = (rotation.dcm_from_quaternion(q) for q in quaternions)
-    size = filter_.model.physical_size
-    out = np.eye(size)
-    first = layout[names[0]].start - layout.size + size
-    out[first : first + 3, PHYSICAL:] += (C_after.T @ C - np.eye(3)) @ _accel_error(filter_, C)
+    out = np.eye(filter_.model.physical_size)
+    out[bias, PHYSICAL:] += (C_after.T @ C - np.eye(3)) @ _accel_error(filter_, C)
     return out
+
+
+def _accel_bias(filter_: ErrorFilter) -> slice | None:
+    """Positions, among the physical errors, of the states that act as a bias of accelerometers."""
+    layout = filter_.model.layout
+    first = next((layout[name].start for name in ACCEL_BIASES if name in layout), None)
+    if first is None:
+        return None
+    first += filter_.model.physical_size - layout.size
+    return slice(first, first + 3)
 
 
 def _accel_error(filter_: ErrorFilter, C: Array) -> Array:
@@ -487,12 +494,10 @@ def unlearnt_force(
     Filtering Theory (1970), sec. 9.3, has the variance of a second order; when it applies is
     derived here.
     """
-    layout = filter_.model.layout
-    names = [name for name in ACCEL_BIASES if name in layout]
-    if not is_large(before) or not names:
+    used, bias = filter_.mechanization, _accel_bias(filter_)
+    if bias is None or not is_large(before):
         return None
-    used = filter_.mechanization
-    C = rotation.dcm_from_quaternion(used.levels(state.row[None])[0, Q_LB : Q_LB + 4])
+    C = rotation.dcm_from_quaternion(used.levels(state.row[None])[0, ATTITUDE])
     read = C[:2] @ _accel_error(filter_, C)
     tilt = before[TILTS, TILTS]
     M = np.linalg.solve(tilt, (read @ before[PHYSICAL:, TILTS]).T).T / STANDARD_GRAVITY
@@ -501,7 +506,6 @@ def unlearnt_force(
     if not variance > 0.0:
         return None
     along = np.zeros(len(before))
-    first = layout[names[0]].start - layout.size + len(before)
-    along[first : first + 3] = C[2]
+    along[bias] = C[2]
     along = filter_.model.from_physical(used, state.time, state.row) @ along
     return variance * np.outer(along, along)

@@ -196,8 +196,8 @@ _VECTOR = re.compile(
 _LEADING = re.compile(rf"\s*({_PLAIN})\s*[:,;|]\s*\|?(?=\s*[A-Za-z_])")
 #: Longest line above the rows that is understood, and of labelled values.
 LONGEST = 2000
-#: Name of a number before the first label, unless it counts lines.
-LEADING = "time"
+#: Name of a number before the first label, and of one that counts lines or is beside a clock.
+LEADING, COUNTED = "time", "number"
 #: Fewest labelled values of a line that is taken for a row.
 LABELS = 3
 
@@ -253,7 +253,7 @@ def _unlabelled(numbered: Lines) -> Lines:
         said, values = _labels(line)
         if said and said == names[: len(said)]:
             if first:
-                out.append((row, "\t".join(("number", *names[1:]) if count else names)))
+                out.append((row, "\t".join((COUNTED, *names[1:]) if count else names)))
                 first = False
             line = "\t".join(values)
         out.append((row, line))
@@ -273,7 +273,7 @@ def _labels(line: str) -> tuple[tuple[str, ...], list[str]]:
     values = [value for _, value, _ in found]
     if stamp:
         timed = any(read_name(name).quantity == "time" for name in names)
-        names, values = ["number" if timed else LEADING, *names], [stamp[1], *values]
+        names, values = [COUNTED if timed else LEADING, *names], [stamp[1], *values]
     return tuple(names), values
 
 

@@ -27,12 +27,12 @@ _STAMP = re.compile(
     re.I,
 )
 # As C writes it: Wed Dec 22 21:09:46 2021.
+_MONTHS = ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"]
 _CTIME = re.compile(
-    r"(?:mon|tue|wed|thu|fri|sat|sun) (jan|feb|mar|apr|may|jun|jul|aug|sep|oct|nov|dec) +(\d{1,2}) "
+    rf"(?:mon|tue|wed|thu|fri|sat|sun) ({'|'.join(_MONTHS)}) +(\d{{1,2}}) "
     r"(\d\d:\d\d:\d\d(?:\.\d+)?) (\d{4})",
     re.I,
 )
-_MONTHS = ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"]
 _ONLY_DATE = re.compile(_DATE)
 _DAY = 86_400 * 10**9
 # A decrease of more than half a day is midnight.

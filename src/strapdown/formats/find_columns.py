@@ -140,8 +140,10 @@ def _likely_columns(raw: RawLog) -> dict[str, str]:
     """
     columns = list(raw.columns.values())
     clock = next((k for k, c in enumerate(columns) if c.dtype.kind in "iufM" and advances(c)), None)
-    first = next((k for k, c in enumerate(columns) if c.dtype.kind in "iuf"), 0)
-    first = first if clock is None else clock + 1
+    if clock is None:
+        first = next((k for k, c in enumerate(columns) if c.dtype.kind in "iuf"), 0)
+    else:
+        first = clock + 1
     triads: dict[int, tuple[float, float]] = {}
     for k in range(first, len(columns) - 2, 3):
         three = columns[k : k + 3]

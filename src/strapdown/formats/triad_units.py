@@ -125,22 +125,21 @@ def units_of_triads(
                 _refuse_open(raw, found, triad)
             units[triad] = stated or inferred_unit(triad, said, block, raw.name, findings)
         except DataError as error:
-            likely = said.get(f"{triad}_unit")
+            likely, code = said.get(f"{triad}_unit"), error.finding.code
+            sure = likely is not None and likely.value and likely.confidence >= LIKELY
+            unit = str(likely.value) if likely is not None and sure else "UNIT"
+            counts = unit_of_counts(likely)
             if triad != "gyro":
                 # Beside a gyro whose unit is asked, that of its accelerometer is asked, too.
                 if triad == "accel" and units["gyro"][1] == "asked":
-                    unit, code = unit_of_counts(likely) or "UNIT", error.finding.code
-                    sure = likely is not None and likely.value and likely.confidence >= LIKELY
                     if code in _OPEN:
+                        questions.ask(error.finding, accel_unit=counts or "UNIT")
+                    elif code == "io.unit-undecided" and sure:
                         questions.ask(error.finding, accel_unit=unit)
-                    elif code == "io.unit-undecided" and likely is not None and sure:
-                        questions.ask(error.finding, accel_unit=str(likely.value))
                 findings.append(left_out(raw, triad, error))
                 continue
-            sure = likely is not None and likely.value and likely.confidence >= LIKELY
-            unit = str(likely.value) if likely is not None and sure else "UNIT"
-            unit = unit_of_counts(likely) or unit
-            if error.finding.code == "io.unit-not-stated-of-increments":
+            unit = counts or unit
+            if code == "io.unit-not-stated-of-increments":
                 unit = str(error.finding.data["sum_of"]).split(" or ")[0]
             questions.ask(error.finding, gyro_unit=unit)
             units[triad] = "rad/s" if unit == "UNIT" else unit, "asked"

@@ -51,6 +51,7 @@ from strapdown.report.values import (
     about,
     decimals,
     force_words,
+    heading_shown,
     plain,
     plus_minus,
     rate_words,
@@ -421,9 +422,7 @@ def angle_bound(alignment: Alignment, which: int) -> str:
     half = TWO_SIDED_95 * float(alignment.sd_deg[which])
     if not half < ANY[which]:
         return NOT_KNOWN
-    if which == 2:
-        value %= 360.0
-    return about(value, half, "°")
+    return about(heading_shown(value, half) if which == 2 else value, half, "°")
 
 
 # Report of an alignment: the answer first, then its basis.

@@ -54,7 +54,7 @@ from strapdown.report.values import (
     decimals,
     duration_words,
     half,
-    heading_about,
+    heading_shown,
     length_words,
     plain,
     plus_minus,
@@ -114,7 +114,9 @@ def key_figures(evaluation: NavigationEvaluation) -> tuple[KeyFigure, ...]:
         ),
         KeyFigure(
             "Final heading",
-            "unknown" if heading >= _NO_HEADING else heading_about(float(last["heading"]), heading),
+            "unknown"
+            if heading >= _NO_HEADING
+            else about(heading_shown(float(last["heading"]), heading), heading, "°"),
             f"95{GAP}% bound; {status_words(evaluation.run.trust)}",
             f"roll {about(float(last['roll']), half(sd['roll']), '°')}, pitch "
             f"{about(float(last['pitch']), half(sd['pitch']), '°')}",
@@ -455,11 +457,9 @@ def end_table(evaluation: NavigationEvaluation) -> TableBlock:
     ):
         cells = []
         for k in (0, -1):
-            value, of_value = float(record.trajectory[column].iloc[k]), record.sd[sd].iloc[k]
-            if column == "heading" and not math.isnan(of_value):
-                cells.append(heading_about(value, half(of_value)))
-                continue
-            cells.append(_stated(value % 360.0 if column == "heading" else value, of_value, unit))
+            value, its_sd = float(record.trajectory[column].iloc[k]), record.sd[sd].iloc[k]
+            value = heading_shown(value, half(its_sd)) if column == "heading" else value
+            cells.append(_stated(value, its_sd, unit))
         rows.append((name, *cells))
     return TableBlock(
         ("", "start", "end"), tuple(rows), text=(0,), caption="Start and end, with 95 % bounds."

@@ -78,9 +78,9 @@ def about(value: float, half: float, unit: str) -> str:
     return both + (unit if unit == "°" else GAP + unit if unit else "")
 
 
-def heading_about(deg: float, half: float) -> str:
-    """Format a heading with its bound, deg, from 0 to below 360 as shown: 359.9 ± 16 is 0 ± 16°."""
-    return about(round(deg, decimals(half, DIGITS, most=4)) % 360.0, half, "°")
+def heading_shown(deg: float, half: float) -> float:
+    """Return a heading, deg, from 0 to below 360 as `about` shows it: 359.9 ± 16 is 0 ± 16."""
+    return round(deg, decimals(half, DIGITS, most=4)) % 360.0
 
 
 def plus_minus(half: float, unit: str) -> str:

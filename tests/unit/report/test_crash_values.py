@@ -10,7 +10,7 @@ from strapdown.crash.pdof import AngleInterval
 from strapdown.report.values import (
     about,
     angle_range,
-    heading_about,
+    heading_shown,
     instant,
     plain,
     side_words,
@@ -126,4 +126,5 @@ def test_a_heading_is_below_a_turn_as_it_is_shown():
         (-0.001, 0.21, f"0.00{gap}±{gap}0.21°"),
         (-90.0, 2.3, f"270.0{gap}±{gap}2.3°"),
     ):
-        assert heading_about(deg, half) == shown
+        assert about(heading_shown(deg, half), half, "°") == shown
+    assert heading_shown(359.999, math.nan) == 0.0
