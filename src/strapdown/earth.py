@@ -268,7 +268,9 @@ def rows(**quantities: ArrayLike) -> tuple[list[Array], tuple[int, ...]]:
         ) from None
     columns = []
     for name, array in arrays.items():
-        column = np.ascontiguousarray(np.broadcast_to(array, leading).reshape(-1))
+        if array.shape != leading:
+            array = np.broadcast_to(array, leading)
+        column = np.ascontiguousarray(array.reshape(-1))
         refuse(~np.isfinite(column), column, name, "geodesy.not-finite")
         if name.startswith("lat"):
             refuse(np.abs(column) > 90.0, column, name, "geodesy.latitude-beyond-pole")
@@ -302,11 +304,9 @@ def refuse(bad: NDArray[np.bool_], values: Array, name: str, code: str, **data: 
     DataError
         With the value.
     """
-    where = np.flatnonzero(bad)
-    if where.size:
-        raise DataError(
-            code, row=int(where[0]) + 1, quantity=name, value=values[where[0]].tolist(), **data
-        )
+    if bad.any():
+        row = int(np.argmax(bad))
+        raise DataError(code, row=row + 1, quantity=name, value=values[row].tolist(), **data)
 
 
 def _vectors(loop: Callable[..., Any], leading: tuple[int, ...], *columns: Array) -> Array:

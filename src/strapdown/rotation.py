@@ -82,12 +82,9 @@ def compose(q_ab: ArrayLike, q_bc: ArrayLike) -> Array:
     a, lead_a = _unit_quaternions(q_ab, "q_ab")
     b, lead_b = _unit_quaternions(q_bc, "q_bc")
     leading = _common_shape(lead_a, lead_b)
-    left, right = (
-        np.ascontiguousarray(np.broadcast_to(q.reshape((*lead, 4)), (*leading, 4)).reshape(-1, 4))
-        for q, lead in ((a, lead_a), (b, lead_b))
-    )
+    left = _spread(a, lead_a, leading)
     out = np.empty_like(left)
-    kernel.quats_multiply(left, right, out)
+    kernel.quats_multiply(left, _spread(b, lead_b, leading), out)
     return out.reshape((*leading, 4))
 
 
@@ -139,10 +136,9 @@ def rotate(q_ab: ArrayLike, v_b: ArrayLike) -> Array:
     q, lead_q = _unit_quaternions(q_ab, "quaternion")
     v, lead_v = _rows_of(v_b, (3,), "vector")
     leading = _common_shape(lead_q, lead_v)
-    quats = np.broadcast_to(q.reshape((*lead_q, 4)), (*leading, 4)).reshape(-1, 4)
-    vectors = np.broadcast_to(v.reshape((*lead_v, 3)), (*leading, 3)).reshape(-1, 3)
-    out = np.empty((len(vectors), 3))
-    kernel.quats_rotate(np.ascontiguousarray(quats), np.ascontiguousarray(vectors), out)
+    vectors = _spread(v, lead_v, leading)
+    out = np.empty_like(vectors)
+    kernel.quats_rotate(_spread(q, lead_q, leading), vectors, out)
     return out.reshape((*leading, 3))
 
 
@@ -498,36 +494,35 @@ def within_half_turn(angles_deg: Array) -> Array:
 def _rows_of(values: ArrayLike, shape: tuple[int, ...], name: str) -> tuple[Array, tuple[int, ...]]:
     """Return `values` as C-contiguous rows and the leading shape."""
     array = np.asarray(values, dtype=np.float64)
-    if array.shape[array.ndim - len(shape) :] != shape or array.ndim < len(shape):
+    depth = array.ndim - len(shape)
+    if depth < 0 or array.shape[depth:] != shape:
         raise DataError(
             "geodesy.shape-does-not-end-2", quantity=name, shape=array.shape, shape_2=shape
         )
-    leading = array.shape[: array.ndim - len(shape)]
-    rows = np.ascontiguousarray(array.reshape(-1, int(np.prod(shape))))
+    rows = np.ascontiguousarray(array.reshape(-1, math.prod(shape)))
     # A square that overflows is as useless as infinity.
-    bad = np.flatnonzero(~(np.abs(rows) < LARGEST).all(axis=1))
-    if bad.size:
+    good = np.abs(rows) < LARGEST
+    if not good.all():
+        bad = int(np.argmin(good.all(axis=1)))
         raise DataError(
             "geodesy.not-finite-number-below",
-            row=int(bad[0]) + 1,
+            row=bad + 1,
             quantity=name,
             largest=LARGEST,
-            rows=rows[bad[0]].tolist(),
+            rows=rows[bad].tolist(),
         )
-    return rows, leading
+    return rows, array.shape[:depth]
 
 
 def _unit_quaternions(q: ArrayLike, name: str) -> tuple[Array, tuple[int, ...]]:
     """Return quaternions as rows of norm 1 and the leading shape; norms must be 1 within 1 %."""
     rows, leading = _rows_of(q, (4,), name)
     norm = np.sqrt((rows * rows).sum(axis=1))
-    bad = np.flatnonzero(np.abs(norm - 1.0) > _TOLERANCE)
-    if bad.size:
+    far = np.abs(norm - 1.0) > _TOLERANCE
+    if far.any():
+        bad = int(np.argmax(far))
         raise DataError(
-            "geodesy.rotation-needs-quaternion-norm",
-            row=int(bad[0]) + 1,
-            quantity=name,
-            norm=norm[bad[0]],
+            "geodesy.rotation-needs-quaternion-norm", row=bad + 1, quantity=name, norm=norm[bad]
         )
     return rows / norm[:, None], leading
 
@@ -551,16 +546,27 @@ def _proper_matrices(dcm: ArrayLike) -> tuple[Array, tuple[int, ...]]:
 
 def _common_shape(a: tuple[int, ...], b: tuple[int, ...]) -> tuple[int, ...]:
     """Return the common broadcast leading shape."""
+    if a == b:
+        return a
     try:
         return np.broadcast_shapes(a, b)
     except ValueError:
         raise DataError("geodesy.leading-shapes-do-not-go", a=a, b=b) from None
 
 
+def _spread(rows: Array, lead: tuple[int, ...], leading: tuple[int, ...]) -> Array:
+    """Repeat rows, C-contiguous, as their leading shape is broadcast to a common one."""
+    if lead == leading:
+        return rows
+    width = rows.shape[1]
+    spread = np.broadcast_to(rows.reshape((*lead, width)), (*leading, width))
+    return np.ascontiguousarray(spread.reshape(-1, width))
+
+
 def _apply(
     loop: Callable[[Array, Array], Any], rows: Array, leading: tuple[int, ...], *shape: int
 ) -> Array:
     """Apply a kernel to each row, each of `shape` below the leading one."""
-    out = np.empty((rows.shape[0], int(np.prod(shape))))
+    out = np.empty((rows.shape[0], math.prod(shape)))
     loop(rows, out)
     return out.reshape(leading + shape)
