@@ -21,7 +21,7 @@ from strapdown.tables import (
     imu_table,
     increments_table,
 )
-from strapdown.tables.checks import as_array, check_same_length, check_time
+from strapdown.tables.checks import as_array, check_same_length, check_time, values_of
 
 Array = NDArray[np.float64]
 #: Of rates at the stamps.
@@ -130,8 +130,7 @@ def motion_increments(
     """
     mean = _check(imu, samples, interpolation, rows)
     time = np.ascontiguousarray(imu.index.to_numpy(dtype=np.float64))
-    rate = np.ascontiguousarray(imu[GYRO].to_numpy(dtype=np.float64))
-    force = np.ascontiguousarray(imu[ACCEL].to_numpy(dtype=np.float64))
+    rate, force = values_of(imu, GYRO), values_of(imu, ACCEL)
     dt = np.diff(time)
     out = np.empty((len(dt), len(MOTION)))
     scratch = np.empty((kernel.ROWS, kernel.WIDEST))

@@ -14,12 +14,10 @@ from strapdown import rotation
 from strapdown.alignment.inertial_sums import InertialSums, sum_inertially
 from strapdown.errors import DataError
 from strapdown.frames import geodetic_from_ned, ned_from_geodetic
-from strapdown.increments import motion_increments
 from strapdown.sensors.rest import RestStretch, find_rests_of_every_grade, rest_between
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import (
     ACCEL,
-    DV,
     GEODETIC,
     GYRO,
     POSITION_SD,
@@ -82,17 +80,17 @@ def drive_sums(imu: pd.DataFrame, time: Array, means: Array, errors: Array) -> D
     ``theta(t) = theta_e + int_t^e C db`` and ``v(t) = v_e - int_t^e (C f + theta x C f - C da)``.
     """
     stamps = imu.index.to_numpy(dtype=np.float64)
-    table = imu.copy()
+    columns = [*GYRO, *ACCEL]
+    mended = _mended(imu[columns].to_numpy(), stamps, means, errors)
+    table = pd.DataFrame(mended, index=imu.index, columns=columns, copy=False)
     table.attrs = dict(imu.attrs)
-    table[[*GYRO, *ACCEL]] = _mended(imu[[*GYRO, *ACCEL]].to_numpy(), stamps, means, errors)
     n = len(stamps) - 1
     before = np.clip(np.searchsorted(stamps, time, side="right") - 1, 0, n - 1)
     even = np.searchsorted(stamps, np.linspace(stamps[0], stamps[-1], 2 * STRETCHES + 1)[1:-1])
     ends = np.unique(np.concatenate([before, before + 1, np.clip(even, 1, n), [n]]))
     ends = ends[ends > 0].astype(np.int64)
     sums = sum_inertially(table, ends)
-    dv = np.ascontiguousarray(motion_increments(table)[DV].to_numpy(dtype=np.float64))
-    steps = rotation.rotate(sums.turned[:-1], dv)
+    steps = rotation.rotate(sums.turned[:-1], sums.dv)
     gained = np.vstack([np.zeros((1, 3)), np.cumsum(steps, axis=0)])
     end = rotation.dcm_from_quaternion(sums.turned[-1]).T
     part = ((time - stamps[before]) / (stamps[before + 1] - stamps[before]))[:, None]

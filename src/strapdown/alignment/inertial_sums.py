@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.increments import motion_increments
-from strapdown.tables import MOTION
+from strapdown.tables import DV, MOTION
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -18,6 +18,8 @@ Indices = NDArray[np.int64]
 # Nodes over which sensor errors are taken as constant: alignment depends on changes over a fifth of
 # the record and more, and the weight of a node of a 240th is accurate to 1e-4.
 NODES = 240
+#: Velocity increments among the columns of MOTION.
+STEP_DV = slice(MOTION.index(DV[0]), MOTION.index(DV[-1]) + 1)
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +30,8 @@ class InertialSums:
 
     `start`, `length` (s): first stamp, and time to the last. `stamps` ((n,), s): from the first.
     `fallen` ((n, 3), m): second integral of the specific force at the stamps. `turned` ((n, 4)):
-    ``C`` at the stamps, as quaternions. `node_length` ((m,), s). `node_velocity` ((m, 3), m/s):
+    ``C`` at the stamps, as quaternions. `dv` ((n - 1, 3), m/s): velocity increments of the steps,
+    in the body axes at the begin of each. `node_length` ((m,), s). `node_velocity` ((m, 3), m/s):
     integral of the specific force over each node. `times` ((m, 3, 3), s): integral of ``C`` over
     each node. `turns`, `pushes` ((m, 3, 3, 3), rad and m/s): sums of ``C[:, i] phi[j]`` and
     ``C[:, i] dv[j]``, indices (node, component, i, j).
@@ -39,6 +42,7 @@ class InertialSums:
     stamps: Array
     fallen: Array
     turned: Array
+    dv: Array
     node_length: Array
     node_velocity: Array
     times: Array
@@ -84,6 +88,7 @@ def sum_inertially(imu: pd.DataFrame, ends: Indices | None = None) -> InertialSu
         stamps,
         fallen,
         turned,
+        np.ascontiguousarray(rows[:, STEP_DV]),
         np.diff(ends, prepend=0.0),
         np.diff(velocity, axis=0, prepend=np.zeros((1, 3))),
         times,
