@@ -161,12 +161,12 @@ def _row(
 TURN_TIME, STEP = 20.0, 0.1  # s
 #: Possible rotations of the body: a rotation vector in its own axes, deg.
 TURNS: dict[str, tuple[float, float, float]] = {
-    "turn it by 90° about the vertical": (0.0, 0.0, 90.0),
-    "turn it by 180° about the vertical": (0.0, 0.0, 180.0),
-    "roll it by 90° onto its side": (90.0, 0.0, 0.0),
-    "pitch it by 90° onto its nose": (0.0, -90.0, 0.0),
+    "heading-90": (0.0, 0.0, 90.0),
+    "heading-180": (0.0, 0.0, 180.0),
+    "roll-90": (90.0, 0.0, 0.0),
+    "pitch-90": (0.0, -90.0, 0.0),
 }
-STAY = "leave it unchanged"
+STAY = "none"
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +176,7 @@ class Manoeuvre:
     Attributes
     ----------
     name : str
-        Description of the rotation.
+        The rotation, of `TURNS`, or `STAY`.
     rest : float, s
         Duration of the rest afterwards.
     sd_deg : ndarray, (3,), deg

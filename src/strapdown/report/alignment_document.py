@@ -10,6 +10,7 @@ import pandas as pd
 from strapdown import __version__, rotation
 from strapdown.alignment.alignment import Alignment
 from strapdown.alignment.fine import ROCKS
+from strapdown.alignment.readiness import STAY
 from strapdown.constants import DEG_PER_HOUR, MICRO_G, TWO_SIDED_95
 from strapdown.errors import Finding
 from strapdown.estimation.sensor_blocks import resting_sd
@@ -734,6 +735,15 @@ def _bound(half: float, name: str) -> str:
     return f"{small(half)}°" if half < (180.0 if name == "heading_sd" else 90.0) else NOT_KNOWN
 
 
+_TURN_WORDS = {
+    STAY: "leave it unchanged",
+    "heading-90": "turn it by 90° about the vertical",
+    "heading-180": "turn it by 180° about the vertical",
+    "roll-90": "roll it by 90° onto its side",
+    "pitch-90": "pitch it by 90° onto its nose",
+}
+
+
 def turn_table(result: AlignmentRun) -> TableBlock | None:
     """Predicted accuracy after a turn and a further stationary stretch, best heading first."""
     if not result.manoeuvres:
@@ -744,7 +754,7 @@ def turn_table(result: AlignmentRun) -> TableBlock | None:
         accel = TWO_SIDED_95 * MICRO_G * float(np.max(one.accel_bias_sd))
         rows.append(
             (
-                one.name,
+                _TURN_WORDS[one.name],
                 f"{small(TWO_SIDED_95 * float(one.sd_deg[2]))}°",
                 f"{small(TWO_SIDED_95 * float(one.sd_deg[:2].max()))}°",
                 f"{small(gyro)} deg/h",
