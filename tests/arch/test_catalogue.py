@@ -27,8 +27,16 @@ RAISED = {"Finding", "DataError", "ConfigError", "DivergenceError", "check_choic
 
 
 @pytest.fixture(scope="module")
-def trees():
-    return {path: ast.parse(path.read_text(encoding="utf-8")) for path in SOURCE.rglob("*.py")}
+def raised(nodes):
+    """Every call that names a code: path, node."""
+    return [
+        (path, node)
+        for path, inside in nodes.items()
+        for node in inside
+        if isinstance(node, ast.Call)
+        and node.args
+        and getattr(node.func, "id", getattr(node.func, "attr", "")) in RAISED
+    ]
 
 
 def _is_code(text: object) -> bool:
@@ -67,49 +75,38 @@ def test_every_placeholder_has_a_format_that_names_can_have():
     assert wrong == []
 
 
-def test_every_code_that_is_raised_has_its_entry(trees):
-    missing = []
-    for path, tree in trees.items():
-        for node in ast.walk(tree):
-            if not isinstance(node, ast.Call) or not node.args:
-                continue
-            if getattr(node.func, "id", getattr(node.func, "attr", "")) not in RAISED:
-                continue
-            missing += [
-                f"{path.name}:{node.lineno} {code}"
-                for code in _codes(node.args[0])
-                if code not in CATALOGUE
-            ]
+def test_every_code_that_is_raised_has_its_entry(raised):
+    missing = [
+        f"{path.name}:{node.lineno} {code}"
+        for path, node in raised
+        for code in _codes(node.args[0])
+        if code not in CATALOGUE
+    ]
     assert missing == []
 
 
-def test_no_sentence_stands_where_a_code_belongs(trees):
+def test_no_sentence_stands_where_a_code_belongs(raised):
     texts = []
-    for path, tree in trees.items():
-        for node in ast.walk(tree):
-            if not isinstance(node, ast.Call) or not node.args:
-                continue
-            if getattr(node.func, "id", getattr(node.func, "attr", "")) not in RAISED:
-                continue
-            first = node.args[0]
-            said = "".join(
-                str(n.value)
-                for n in ast.walk(first)
-                if isinstance(first, ast.Constant | ast.JoinedStr | ast.BinOp)
-                and isinstance(n, ast.Constant)
-            )
-            names = {k.arg for k in node.keywords}
-            if " " in said or "remedy" in names:
-                texts.append(f"{path.name}:{node.lineno}")
+    for path, node in raised:
+        first = node.args[0]
+        said = "".join(
+            str(n.value)
+            for n in ast.walk(first)
+            if isinstance(first, ast.Constant | ast.JoinedStr | ast.BinOp)
+            and isinstance(n, ast.Constant)
+        )
+        names = {k.arg for k in node.keywords}
+        if " " in said or "remedy" in names:
+            texts.append(f"{path.name}:{node.lineno}")
     assert texts == []
 
 
-def test_no_entry_is_left_behind(trees):
+def test_no_entry_is_left_behind(nodes):
     """An entry is named in full, or by the constant parts of a text that is put together."""
     whole: set[str] = set()
     parts: list[re.Pattern[str]] = []
-    for tree in trees.values():
-        for node in ast.walk(tree):
+    for inside in nodes.values():
+        for node in inside:
             if isinstance(node, ast.JoinedStr):
                 shape = "".join(
                     re.escape(str(v.value)) if isinstance(v, ast.Constant) else "[a-z0-9_.-]*"
@@ -123,28 +120,23 @@ def test_no_entry_is_left_behind(trees):
     assert left == []
 
 
-def test_what_a_sentence_shows_is_given_where_it_is_raised(trees):
+def test_what_a_sentence_shows_is_given_where_it_is_raised(raised):
     """Direct calls with literal codes; what a helper adds is covered by the tests of bad input."""
     lacking = []
-    for path, tree in trees.items():
-        for node in ast.walk(tree):
-            if not isinstance(node, ast.Call) or not node.args:
-                continue
-            raised = getattr(node.func, "id", getattr(node.func, "attr", ""))
-            if raised not in RAISED:
-                continue
-            names = {k.arg for k in node.keywords}
-            names |= {"word", "known"} if raised == "check_choice" else set()
-            if None in names or "data" in names:
-                continue
-            for code in _codes(node.args[0]) if not isinstance(node.args[0], ast.Call) else ():
-                wanted: set[str] = set()
-                for template in CATALOGUE.get(code, {}).values():
-                    wanted |= _placeholders(template)
-                if "nearest" in wanted - names:
-                    wanted = (wanted - {"nearest"}) | {"word", "known"}
-                if wanted - names:
-                    lacking.append(f"{path.name}:{node.lineno} {code} {sorted(wanted - names)}")
+    for path, node in raised:
+        names = {k.arg for k in node.keywords}
+        if getattr(node.func, "id", getattr(node.func, "attr", "")) == "check_choice":
+            names |= {"word", "known"}
+        if None in names or "data" in names:
+            continue
+        for code in _codes(node.args[0]) if not isinstance(node.args[0], ast.Call) else ():
+            wanted: set[str] = set()
+            for template in CATALOGUE.get(code, {}).values():
+                wanted |= _placeholders(template)
+            if "nearest" in wanted - names:
+                wanted = (wanted - {"nearest"}) | {"word", "known"}
+            if wanted - names:
+                lacking.append(f"{path.name}:{node.lineno} {code} {sorted(wanted - names)}")
     assert lacking == []
 
 
@@ -153,20 +145,20 @@ SHOWN = ("cli", "report", "api", "crash/template", "crash/record_parts")
 ON_REQUEST = ("__str__", "__repr__")
 
 
-def test_sentences_are_read_only_where_they_are_shown(trees):
+def test_sentences_are_read_only_where_they_are_shown(nodes):
     """A sentence may be shown, never searched: other floors know codes and data."""
     read = defaultdict(list)
-    for path, tree in trees.items():
+    for path, inside in nodes.items():
         name = path.relative_to(SOURCE).as_posix()
         if name.startswith(SHOWN) or name == "errors.py":
             continue
         shown = {
             id(inner)
-            for node in ast.walk(tree)
+            for node in inside
             if isinstance(node, ast.FunctionDef) and node.name in ON_REQUEST
             for inner in ast.walk(node)
         }
-        for node in ast.walk(tree):
+        for node in inside:
             called = isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)
             if called and node.func.attr in {"sentence", "advice"} and id(node) not in shown:
                 read[name].append(node.lineno)

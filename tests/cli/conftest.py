@@ -30,6 +30,18 @@ def sealed_crash(tmp_path_factory, run_cli) -> Sealed:
     return Sealed(root / "pole", root / "pole-crash", done.out, done.err)
 
 
+@pytest.fixture(scope="session")
+def light_case(sealed_crash) -> Path:
+    """The case by one of its recorders and without drawn paths, where any case will do."""
+    folder = Path(shutil.copytree(sealed_crash.records, sealed_crash.records.with_name("light")))
+    case = folder / "case.toml"
+    text = case.read_text(encoding="utf-8")
+    second = text.index("[[units]]", text.index("[[units]]") + 1)
+    text = text[:second] + text[text.index("[[references]]") :]
+    case.write_text(text.replace("monte_carlo_runs = 2000", "monte_carlo_runs = 0"))
+    return case
+
+
 @pytest.fixture
 def copied_crash(sealed_crash, tmp_path) -> Path:
     return Path(shutil.copytree(sealed_crash.folder, tmp_path / "pole-crash"))

@@ -85,7 +85,6 @@ def test_a_file_says_the_same_as_options(aligned, run_cli, tmp_path):
     one = json.loads(done.out)
     two = json.loads((folder / "out" / "align.json").read_text())
     assert one["end"] == two["end"]
-    assert run_cli("verify", tmp_path / "out").code == 0
 
 
 @pytest.mark.usefixtures("undrawn")

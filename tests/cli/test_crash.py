@@ -236,7 +236,9 @@ def quick(monkeypatch, sealed_crash):
     return sealed_crash.records / "case.toml"
 
 
-def test_json_is_the_file_alone_and_replaces_when_forced(run_cli, quick, tmp_path, told):
+def test_json_is_the_file_alone_and_replaces_when_forced(
+    run_cli, quick, light_case, tmp_path, told
+):
     out = tmp_path / "out"
     done = run_cli("crash", quick, "--out", out, "--json")
     assert done.code == 0
@@ -248,16 +250,17 @@ def test_json_is_the_file_alone_and_replaces_when_forced(run_cli, quick, tmp_pat
     assert "the folder exists" in refused.err
     assert "--force" in refused.err
     (out / "mine.txt").write_text("mine")
-    assert run_cli("crash", quick, "--out", out, "--force", "-q").code == 0
+    assert run_cli("crash", light_case, "--out", out, "--force", "-q").code == 0
     assert not (out / "mine.txt").exists()
     assert sorted(p.name for p in tmp_path.iterdir()) == before
 
 
+@pytest.mark.usefixtures("quick")
 def test_quiet_says_nothing_and_the_folder_is_named_after_the_case(
-    run_cli, quick, tmp_path, monkeypatch
+    run_cli, light_case, tmp_path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
-    done = run_cli("crash", quick, "--quiet")
+    done = run_cli("crash", light_case, "--quiet")
     assert (done.code, done.out, done.err) == (0, "", "")
     assert [p.name for p in tmp_path.iterdir()] == ["case-crash"]
 

@@ -74,7 +74,7 @@ def test_whenever_it_is_stopped(sealed_crash, tmp_path, instant, sent, force):
 
 @pytest.mark.parametrize("fails", ["crash_json", "write_pdf"])
 def test_a_disk_that_is_full_is_said_and_nothing_is_left(
-    sealed_crash, run_cli, tmp_path, monkeypatch, fails
+    sealed_crash, light_case, run_cli, tmp_path, monkeypatch, fails
 ):
     def full(*given, **options):
         raise OSError(errno.ENOSPC, "No space left on device", str(tmp_path / "out"))
@@ -82,7 +82,7 @@ def test_a_disk_that_is_full_is_said_and_nothing_is_left(
     monkeypatch.setattr(report_bundle, "draw_stills", lambda document: ["<svg/>"] * 99)
     monkeypatch.setattr(report_bundle, "document_page", lambda document, stills=(): "")
     monkeypatch.setattr(module, fails, full)
-    done = run_cli("crash", sealed_crash.records / "case.toml", "--out", tmp_path / "deep" / "out")
+    done = run_cli("crash", light_case, "--out", tmp_path / "deep" / "out")
     assert done.code == 4
     assert done.out == ""
     assert done.err.splitlines() == [
@@ -92,7 +92,7 @@ def test_a_disk_that_is_full_is_said_and_nothing_is_left(
     assert list(tmp_path.iterdir()) == []
     old = tmp_path / "old"
     shutil.copytree(sealed_crash.folder, old)
-    assert run_cli("crash", sealed_crash.records / "case.toml", "--out", old, "--force").code == 4
+    assert run_cli("crash", light_case, "--out", old, "--force").code == 4
     assert unsealed_changes(old, read_manifest(old)) == []
     assert [p.name for p in tmp_path.iterdir()] == ["old"]
 

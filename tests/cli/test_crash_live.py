@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -60,6 +62,7 @@ def case(tmp_path):
 
 
 def run(case, given, *options):
+    """The command in a process of its own, which reads lines until they end."""
     return subprocess.run(
         [sys.executable, "-m", "strapdown", "crash", case.name, *options],
         cwd=case.parent,
@@ -150,19 +153,22 @@ def test_the_end_of_the_reader_ends_the_run(case):
         (("--live", "-", "--every", "-1"), "--every"),
     ],
 )
-def test_options_that_do_not_fit_are_refused(case, options, code):
-    done = run(case, "", *options)
-    assert done.returncode == 4
-    assert code in done.stderr
+def test_options_that_do_not_fit_are_refused(case, run_cli, monkeypatch, options, code):
+    monkeypatch.chdir(case.parent)
+    with Path(os.devnull).open() as nothing:
+        monkeypatch.setattr(sys, "stdin", nothing)
+        done = run_cli("crash", case.name, *options)
+    assert done.code == 4
+    assert code in done.err
 
 
-def test_the_detection_is_written_as_c(case):
-    done = run(case, "", "--export-c", "crash.c")
-    assert done.returncode == 0
+def test_the_detection_is_written_as_c(case, run_cli, monkeypatch):
+    monkeypatch.chdir(case.parent)
+    assert run_cli("crash", case.name, "--export-c", "crash.c").code == 0
     text = (case.parent / "crash.c").read_text()
     errors = recorder_of_case(case).errors
     assert all(f"R({value!r})" in text for value in errors)
-    assert run(case, "", "--export-c", "crash.c").returncode == 4, "it is there already"
+    assert run_cli("crash", case.name, "--export-c", "crash.c").code == 4, "it is there already"
 
 
 def calibrated(path, errors, name="recorder"):
@@ -233,7 +239,7 @@ def test_a_calibration_by_a_drive_is_taken_off(case, tmp_path):
     assert recorder_of_case(case, both).scale[3:5] == pytest.approx((0.02, 0.02))
 
 
-def test_what_is_no_calibration_of_the_recorder_is_refused(case, tmp_path):
+def test_what_is_no_calibration_of_the_recorder_is_refused(case, tmp_path, run_cli, monkeypatch):
     other = calibrated(tmp_path / "other", [], name="another")
     with pytest.raises(DataError, check=coded("live.calibration-of-others")):
         recorder_of_case(case, other)
@@ -241,5 +247,6 @@ def test_what_is_no_calibration_of_the_recorder_is_refused(case, tmp_path):
         recorder_of_case(case, case)
     with pytest.raises(DataError, check=coded("live.no-calibration")):
         recorder_of_case(case, tmp_path / "nowhere")
-    done = run(case, "", "--calibration", "other")
-    assert (done.returncode, "--calibration" in done.stderr) == (4, True)
+    monkeypatch.chdir(case.parent)
+    done = run_cli("crash", case.name, "--calibration", "other")
+    assert (done.code, "--calibration" in done.err) == (4, True)

@@ -32,6 +32,7 @@ SLOW = {
     "attitude",
     "coast",
     "consistency",
+    "convert",
     "crash",
     "crash_tutorial",
     "doctor",

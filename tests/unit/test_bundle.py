@@ -24,6 +24,12 @@ def log(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
+def bench(log):
+    """The log alone, compared once for what is only written."""
+    return compare_attitude(log)
+
+
+@pytest.fixture(scope="module")
 def sealed(log, tmp_path_factory):
     bench = compare_attitude(
         log, reference=["end same as 4.5", str(log.with_name("truth.csv"))], gyro_bias=str(log)
@@ -71,8 +77,9 @@ def test_it_verifies_where_it_stands_and_elsewhere_without_its_inputs(sealed, co
         hidden.rename(log)
 
 
-def test_the_same_run_gives_the_same_seal(log, tmp_path):
-    seals = [write_attitude(compare_attitude(log), tmp_path / name) for name in ("a", "b")]
+def test_the_same_run_gives_the_same_seal(log, bench, tmp_path):
+    runs = {"a": bench, "b": compare_attitude(log)}
+    seals = [write_attitude(run, tmp_path / name) for name, run in runs.items()]
     assert seals[0].digest == seals[1].digest
 
 
@@ -143,8 +150,7 @@ def test_a_run_that_fails_leaves_nothing(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_bundle_is_replaced_only_when_asked(log, tmp_path):
-    bench = compare_attitude(log)
+def test_a_bundle_is_replaced_only_when_asked(bench, tmp_path):
     first = write_attitude(bench, tmp_path / "out")
     with pytest.raises(ConfigError, check=coded("bundle.folder-exists")) as refused:
         write_attitude(bench, tmp_path / "out")
@@ -155,11 +161,11 @@ def test_a_bundle_is_replaced_only_when_asked(log, tmp_path):
 
 
 @pytest.mark.parametrize("force", [False, True])
-def test_a_folder_that_is_no_bundle_is_never_touched(log, tmp_path, force):
+def test_a_folder_that_is_no_bundle_is_never_touched(bench, tmp_path, force):
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / "thesis.tex").write_text("years of work")
     with pytest.raises(ConfigError):
-        write_attitude(compare_attitude(log), tmp_path / "out", force=force)
+        write_attitude(bench, tmp_path / "out", force=force)
     assert (tmp_path / "out" / "thesis.tex").read_text() == "years of work"
 
 
@@ -318,8 +324,7 @@ def test_a_log_that_changed_since_it_was_read_is_not_sealed(tmp_path, log):
     assert not (tmp_path / "out").exists()
 
 
-def test_the_old_bundle_stays_where_the_new_one_cannot_be_put(tmp_path, log, monkeypatch):
-    bench = compare_attitude(log)
+def test_the_old_bundle_stays_where_the_new_one_cannot_be_put(tmp_path, bench, monkeypatch):
     seal = write_attitude(bench, tmp_path / "out")
 
     def refuse(self, target):

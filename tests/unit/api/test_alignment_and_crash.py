@@ -160,10 +160,13 @@ def test_a_case_is_reconstructed_as_by_the_engine(tmp_path, run_cli):
 def test_several_vehicles_are_numbered_in_the_order_of_their_cases(tmp_path, run_cli):
     assert run_cli("simulate", "pole", "-q", "--out", tmp_path / "pole").code == 0
     path = tmp_path / "pole" / "case.toml"
+    # One vehicle by a file, the other by what was read; a recorder each, and no drawn paths.
+    text = path.read_text().replace("monte_carlo_runs = 2000", "monte_carlo_runs = 0")
+    path.write_text(text)
     spec = CaseSpec.read(path)
-    # The other vehicle has one recorder, and no drawn paths.
-    options = spec.options.model_copy(update={"monte_carlo_runs": 0})
-    single = spec.model_copy(update={"units": spec.units[:1], "options": options})
+    single = spec.model_copy(update={"units": spec.units[:1]})
+    first = text.index("[[units]]")
+    path.write_text(text[:first] + text[text.index("[[units]]", first + 1) :])
     both, alone = sd.reconstruct(path, single), sd.reconstruct(single)
     assert list(both.vehicles) == ["1", "2"]
     assert list(alone.vehicles) == ["1"]

@@ -433,8 +433,16 @@ def _check(count, draws, stated):
     assert count["named"] >= binom.ppf(0.005, reported, 0.95)
 
 
-@pytest.mark.parametrize("fault", FAULTS)
-@pytest.mark.parametrize("kind", KINDS)
+# Each kind of crash with two faults and each fault in two kinds; all of them are drawn below.
+@pytest.mark.parametrize(
+    ("kind", "fault"),
+    [
+        (kind, fault)
+        for k, kind in enumerate(KINDS)
+        for j, fault in enumerate(FAULTS)
+        if (j - k) % len(FAULTS) < 2
+    ],
+)
 def test_an_error_is_found_and_among_the_candidates(kind, fault):
     _check(_blamed(kind, fault, 6, seed=21), 6, STATED[kind][fault])
 

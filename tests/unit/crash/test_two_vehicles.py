@@ -27,14 +27,25 @@ SAID = ("name", "quantity", "axis", "unit", "sampling", "place", "body", "vehicl
         "low_pass", "full_scale", "bandwidth")  # fmt: skip
 
 
-@pytest.fixture(params=[(test, layout) for test in TESTS for layout in LAYOUTS], ids=" ".join)
-def written(request, tmp_path):
+@pytest.fixture(
+    scope="module",
+    params=[(test, layout) for test in TESTS for layout in LAYOUTS],
+    ids=" ".join,
+)
+def written(request, tmp_path_factory):
     """A record, and the same written and read."""
     test, layout = request.param
+    folder = tmp_path_factory.mktemp("written")
     record = recorded(test, layout)
-    names = LAYOUTS[layout](tmp_path / "record", record)
+    names = LAYOUTS[layout](folder / "record", record)
     assert names == {c.name: c.name for c in record.channels}
-    return test, record, read_crash_record(tmp_path / "record"), tmp_path
+    return test, record, read_crash_record(folder / "record"), folder
+
+
+@pytest.fixture(scope="module")
+def drafts(written):
+    _, _, read, folder = written
+    return draft_cases([read], folder=folder)
 
 
 def test_what_is_written_is_read(written):
@@ -68,9 +79,8 @@ def rigid(vehicle):
     return [at.words for at in vehicle[0] if at.body == "vehicle"]
 
 
-def test_each_vehicle_gets_its_case(written):
-    test, _, read, folder = written
-    drafts = draft_cases([read], folder=folder)
+def test_each_vehicle_gets_its_case(written, drafts):
+    test, _, read, _ = written
     assert [d.vehicle for d in drafts] == ["1", "2"]
     for draft, vehicle in zip(drafts, TESTS[test], strict=True):
         table = tomllib.loads(draft.text)
@@ -88,9 +98,8 @@ def test_each_vehicle_gets_its_case(written):
         assert {a.key for a in draft.asked} <= ONLY_A_PERSON_KNOWS
 
 
-def test_every_channel_is_used_or_left_out_with_its_reason(written):
-    _, record, read, folder = written
-    drafts = draft_cases([read], folder=folder)
+def test_every_channel_is_used_or_left_out_with_its_reason(written, drafts):
+    _, record, _, _ = written
     for draft in drafts:
         used = re.findall(r'[xyz] = "([^"]+)"', draft.text)
         left = {name: s.why for s in draft.left_out for name in s.names}
@@ -101,9 +110,9 @@ def test_every_channel_is_used_or_left_out_with_its_reason(written):
                 assert left[channel.name] == f"it moves with the {channel.body}"
 
 
-def test_the_cases_hold_what_the_points_felt(written):
-    test, _, read, folder = written
-    for draft, vehicle in zip(draft_cases([read], folder=folder), TESTS[test], strict=True):
+def test_the_cases_hold_what_the_points_felt(written, drafts):
+    test, _, _, folder = written
+    for draft, vehicle in zip(drafts, TESTS[test], strict=True):
         lines = [
             re.sub(r'"\?"', '"said"' if line.startswith("because") else "1.0", line)
             if re.match(r'\w+ = .*"\?"', line)
@@ -124,9 +133,9 @@ def test_the_cases_hold_what_the_points_felt(written):
             np.testing.assert_array_equal(triad.to_numpy(), felt(vehicle[3], at.position))
 
 
-def test_one_case_of_two_vehicles_is_refused(written):
+def test_one_case_of_two_vehicles_is_refused():
     with pytest.raises(ConfigError, check=coded("crash.records-of-several-vehicles")):
-        draft_case([written[2]])
+        draft_case([recorded("car to car", "nhtsa")])
 
 
 def commented(record, comment):

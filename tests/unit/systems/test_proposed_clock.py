@@ -158,7 +158,7 @@ def stepped(folder, size, at=40.0):
     return propose(log, gnss=FixesTable(path=str(folder / "fixes.csv")), sensor="adis16495-1")
 
 
-@pytest.mark.parametrize("size", [0.617, -0.1])
+@pytest.mark.parametrize("size", [0.617, pytest.param(-0.1, marks=pytest.mark.slow)])
 def test_a_step_of_the_clock_is_corrected_in_what_is_proposed(tmp_path, size):
     made = stepped(tmp_path, size)
     (found,) = (f for f in made.findings if "clock-step" in f.code)

@@ -100,7 +100,7 @@ def test_places_that_are_later_than_velocities_have_a_remedy_too():
     assert "two measurements" in told.remedy
 
 
-@pytest.mark.parametrize("offset", [0.15, -0.4, 4.0, 18.0])
+@pytest.mark.parametrize("offset", [pytest.param(0.15, marks=pytest.mark.slow), -0.4, 4.0, 18.0])
 def test_the_offset_of_the_clocks_is_found_to_a_tenth_of_a_second(offset):
     table = remade(town.fixes(time_offset=offset, velocity_noise=0.02))
     found = time_offset(table, imu())
