@@ -93,6 +93,7 @@ def test_samples_without_errors_give_the_truth():
     assert np.all(np.abs(error) < np.repeat([5e-3, 2e-4, 3e-6], 3)), error
 
 
+@pytest.mark.slow
 def test_twenty_drives_are_as_wrong_as_they_are_said_to_be():
     plan = Plan()
     squares = squares_of(plan, [one((plan, seed)) for seed in range(20)])

@@ -5,6 +5,15 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import pytest
+
+
+def whole_runs_slow(cases) -> list:
+    """Cases as parameters; those that are done with a warning are whole runs, and slow."""
+    return [
+        pytest.param(one, marks=() if one.code else pytest.mark.slow, id=one.title) for one in cases
+    ]
+
 
 def said_by(command: str, case, folder: Path, options, run_cli) -> tuple[str, int]:
     """What a command says of the source of a case in a folder, and its exit code."""

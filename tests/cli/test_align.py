@@ -12,6 +12,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parent))
 
 from bad_alignment import ALIGNMENT_CASES, FILE, USUAL, alignment_said, record
+from bad_command import whole_runs_slow
 
 from strapdown.formats import read_raw
 
@@ -124,7 +125,7 @@ def test_the_laser_gyro_record(recordings, run_cli, tmp_path):
 
 
 @pytest.mark.usefixtures("undrawn")
-@pytest.mark.parametrize("case", ALIGNMENT_CASES, ids=lambda c: c.title)
+@pytest.mark.parametrize("case", whole_runs_slow(ALIGNMENT_CASES))
 def test_bad_input_leaves_nothing_and_says_why(case, run_cli, tmp_path):
     said, code = alignment_said(case, tmp_path, run_cli)
     if code:

@@ -15,6 +15,7 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+from bad_command import whole_runs_slow
 from bad_navigate import FILE, NAVIGATE_CASES, drive, navigate_said, undrawn, write_drive
 
 from strapdown.config.navigation import NavigationSpec
@@ -276,7 +277,7 @@ def test_the_car_is_navigated_from_its_raw_files(recordings, run_cli, tmp_path, 
     assert 0.6 < found["observations"]["gnss.position"]["rms_in_sd"] < 1.4
 
 
-@pytest.mark.parametrize("case", NAVIGATE_CASES, ids=lambda c: c.title)
+@pytest.mark.parametrize("case", whole_runs_slow(NAVIGATE_CASES))
 def test_bad_input_leaves_nothing_and_says_why(case, run_cli, tmp_path, undrawn_here):
     said, code = navigate_said(case, tmp_path, run_cli)
     if code:

@@ -143,12 +143,16 @@ def test_a_second_signal_ends_it_at_once(live):
         assert unsealed_changes(live / "out", read_manifest(live / "out")) == []
 
 
-def test_without_a_sample_there_is_no_bundle(live):
-    job = start(live, "--live", "-")
-    _, err = job.communicate("imu,1,2\n", timeout=120)
-    assert job.returncode == 3
-    assert "line 1: line not used: imu needs 7 numbers, not 2" in err
-    assert "no sample was received" in err
+def test_without_a_sample_there_is_no_bundle(live, run_cli, monkeypatch, tmp_path_factory):
+    given = tmp_path_factory.mktemp("given") / "lines"
+    given.write_text("imu,1,2\n")
+    monkeypatch.chdir(live)
+    with given.open() as stdin:
+        monkeypatch.setattr("sys.stdin", stdin)
+        done = run_cli("navigate", "run.toml", "--out", "out", "--live", "-")
+    assert done.code == 3
+    assert "line 1: line not used: imu needs 7 numbers, not 2" in done.err
+    assert "no sample was received" in done.err
     assert [p.name for p in live.iterdir()] == ["run.toml"]
 
 

@@ -70,12 +70,17 @@ def test_tables_in_memory_give_the_bits_of_files(of_files, of_tables):
     assert of_tables.spec.log.path == str(NOWHERE / "imu.npz")
 
 
-def test_arrays_give_the_bits_of_a_table_of_instantaneous_samples(folder):
+@pytest.fixture(scope="module")
+def short(folder):
+    """The first 40 s of the log as instantaneous samples, and their run."""
     imu = sd.read_imu(folder / "drive.csv", sampling="instantaneous", span_s=(None, 40.0))
-    gnss = folder / "fixes.csv"
+    return imu, sd.navigate(imu, [sd.Gnss(folder / "fixes.csv")], sensor=SENSOR)
+
+
+def test_arrays_give_the_bits_of_a_table_of_instantaneous_samples(folder, short):
+    imu, one = short
     arrays = (imu.index.to_numpy(), imu.filter(like="gyro").to_numpy(), imu.filter(like="accel"))
-    one = sd.navigate(imu, [sd.Gnss(gnss)], sensor=SENSOR)
-    two = sd.navigate(arrays, [sd.Gnss(gnss)], sensor=SENSOR)
+    two = sd.navigate(arrays, [sd.Gnss(folder / "fixes.csv")], sensor=SENSOR)
     same(one, two)
 
 
@@ -120,14 +125,11 @@ def test_a_run_of_files_seals_these(of_files, folder, tmp_path):
         assert (kept / path / name).read_bytes() == (folder / name).read_bytes()
 
 
-def test_a_table_that_was_changed_no_longer_stands_for_its_file(folder):
-    imu = sd.read_imu(folder / "drive.csv", span_s=(None, 40.0))
+def test_a_table_that_was_changed_no_longer_stands_for_its_file(folder, short):
+    imu, one = short
     changed = imu.copy()
     changed["gyro_x"] += 1e-6
-    one, two = (
-        sd.navigate(table, [sd.Gnss(folder / "fixes.csv")], sensor=SENSOR)
-        for table in (imu, changed)
-    )
+    two = sd.navigate(changed, [sd.Gnss(folder / "fixes.csv")], sensor=SENSOR)
     assert not one.memory.tables and two.memory.tables.keys() == {"imu.npz"}
     assert not one.trajectory["roll"].equals(two.trajectory["roll"])
 

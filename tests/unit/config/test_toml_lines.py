@@ -83,7 +83,7 @@ def test_what_is_in_no_table_has_no_line():
     assert line_of(key_lines(""), ()) is None
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(st.randoms(use_true_random=False))
 def test_every_value_of_any_document_is_on_its_line(random):
     text = Document(random).text
@@ -101,7 +101,7 @@ def test_every_value_of_any_document_is_on_its_line(random):
         assert keys[-1] in row or escaped in row, (path, text)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(st.randoms(use_true_random=False), st.integers(0, 400), st.text(max_size=5))
 def test_text_that_is_no_toml_is_scanned_without_an_error(random, at, put):
     text = Document(random).text

@@ -174,7 +174,9 @@ def test_swapped_axes_are_found(four):
     assert any("forward of IMU1 is its right, right of IMU1 is its forward" in w for w in words)
 
 
-@pytest.mark.parametrize("off", [(0.0, 0.5, 0.0), (0.5, 0.0, 0.0)])
+@pytest.mark.parametrize(
+    "off", [(0.0, 0.5, 0.0), pytest.param((0.5, 0.0, 0.0), marks=pytest.mark.slow)]
+)
 def test_a_wrong_lever_arm_is_found(four, off):
     units, _ = four
     right = units[3].mounting

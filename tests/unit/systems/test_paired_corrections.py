@@ -82,6 +82,7 @@ def both():
     return run_navigation(spec(kind="feedback", beside="none"))
 
 
+@pytest.mark.slow
 def test_either_is_the_run_alone_to_the_last_bit(both):
     for record, kind in ((both.record, "feedback"), (both.beside, "none")):
         alone = run_navigation(spec(kind=kind))

@@ -52,6 +52,7 @@ def ratios(share):
     return np.array(out)
 
 
+@pytest.mark.slow
 def test_bounds_hold_where_errors_last_and_their_share_is_stated():
     # 6 drives of 160 s, about 3 independent instants of 3 axes each: the mean square of 54 is 1
     # within 4 times sqrt(2 / 54); as white errors the bounds are narrower by the root of the number
