@@ -165,6 +165,8 @@ class Proposal:
         Of the gyros in rad/s/√Hz, of the accelerometers in m/s²/√Hz, while it is quiet.
     guessed : bool
         Whether the sensor is only a grade, by its noise.
+    drives : bool
+        Whether it drives fast enough for a course, by the fixes.
     how : str
         Reason for the alignment, in words.
     findings : tuple of Finding
@@ -178,6 +180,7 @@ class Proposal:
     rest: float
     noise: tuple[float, ...] | None
     guessed: bool
+    drives: bool
     how: str
     findings: tuple[Finding, ...]
 
@@ -290,7 +293,7 @@ def propose(
                 **clock,
             }
         }
-    return Proposal(table, recording, imu, fixes, rest, noise, guessed, how, findings)
+    return Proposal(table, recording, imu, fixes, rest, noise, guessed, drives, how, findings)
 
 
 def _stated(table: dict[str, Any]) -> ImuUncertainty:

@@ -26,6 +26,7 @@ from strapdown.simulation import simulate_imu
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
 from strapdown.systems.aid_proposal import propose_aids, propose_magnetometer
 from strapdown.systems.navigation_draft import draft_navigation
+from strapdown.systems.navigation_proposal import propose
 from strapdown.systems.navigation_run import run_navigation
 from strapdown.systems.navigation_source import read_aid
 from strapdown.tables import ACCEL, EULER, GYRO, MAG, imu_table
@@ -111,6 +112,7 @@ def test_a_barometer_is_proposed_and_holds_the_height(recording, tmp_path):
     # At most ten independent instants: errors of the height last.
     assert np.square(error / bound).sum() < chi2.ppf(1.0 - 1e-4, at.size)
     assert bound.mean() < np.interp(at, alone.sd.index, alone.sd["down"]).mean()
+    assert propose(LogTable(path=str(recording)), axes="x,-y,-z").drives
 
 
 def test_a_table_of_pressures_needs_its_noise_and_nothing_else(tmp_path):
