@@ -12,9 +12,6 @@ from pathlib import Path
 import pytest
 from tests.recorded import DATA, without
 
-# The threshold of the command line, which the first test of it would set for all that follow.
-gc.set_threshold(20_000)
-
 
 @pytest.hookimpl(trylast=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
