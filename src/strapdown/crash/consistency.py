@@ -73,7 +73,8 @@ class VelocityIncrements:
         if not structure.share.any():
             return self
         own = structure.of_increments(self.edges)[np.ix_(kept, kept)]
-        return replace(self, force_noise=self.force_noise + np.kron(own, np.diag(structure.sd**2)))
+        size = structure.share * structure.change
+        return replace(self, force_noise=self.force_noise + np.kron(own, np.diag(size**2)))
 
     def borrows(self, other: VelocityIncrements) -> bool:
         """Whether both share one gyro, so that their rates agree by construction."""
@@ -737,11 +738,11 @@ def _of_vehicle(
             rigid, increments[0].edges, kept, difference[1:], floored(covariance), turning
         )
     told = [p.structure for p in pairs if p.agree] or [p.structure for p in pairs]
-    share = np.sqrt(np.mean([one.share**2 for one in told], axis=0))
     times = [one.correlation_time for one in told if one.share.any()]
     return replace(
         rigid,
-        share=share,
+        share=np.sqrt(np.mean([one.share**2 for one in told], axis=0)),
+        expected=np.sqrt(np.mean([one.expected**2 for one in told], axis=0)),
         turning=float(np.sqrt(np.mean([one.turning**2 for one in told]))),
         correlation_time=float(np.median(times)) if times else rigid.correlation_time,
     )
@@ -919,7 +920,7 @@ def _turned_by_points(
     if turned is None or not kept.any():
         return None
     sds, across = turned
-    anywhere = replace(structure, share=np.full(3, structure.share.max()))
+    anywhere = replace(structure, share=np.full(3, structure.expected.max()))
     increments = [one.bent_by(anywhere, kept) for one in increments]
     edges, until = increments[0].edges, min(u.assumed_until for u in units)
     size, others = increments[0].values.size, len(units) - 1
@@ -1105,7 +1106,7 @@ def _of_structure(units: Sequence[PointKinematics], structure: Structure) -> lis
                 forward=structure.sd[0],
                 right=structure.sd[1],
                 down=structure.sd[2],
-                share=100.0 * float(structure.share.max()),
+                share=100.0 * float(structure.expected.max()),
                 correlation_ms=1e3 * structure.correlation_time,
             )
         )

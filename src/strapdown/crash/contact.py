@@ -42,8 +42,6 @@ class Edge:
     missing : float, m/s
         Change of velocity along `force` that may lie outside the record: zero where the record
         reaches the edge, infinite where nothing in it limits that.
-    settled : (float, float), s, optional
-        Of an end: where the velocity has its mean of this interval, less the level.
     """
 
     time: float
@@ -51,7 +49,6 @@ class Edge:
     rate: Array = field(repr=False)
     force: Array = field(repr=False)
     missing: float = 0.0
-    settled: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,11 +196,10 @@ def _edge(
     spread = math.hypot(late / 3.0, density / nu**2, step / math.sqrt(12.0))
     moved = edge + sign * 2.0 / 3.0 * late
     moved = min(moved, far) if sign > 0.0 else max(moved, far)
-    settled = None
     if sign > 0.0 and far - moved >= 0.5 * SETTLING:
-        settled = float(moved), float(min(moved + SETTLING, far))
-        moved = _settled(course, stamps, settled, force, (level_along, nu))
-    return Edge(float(moved), spread, level + nu * force, force, missing, settled)
+        swings = moved, min(moved + SETTLING, far)
+        moved = _settled(course, stamps, swings, force, (level_along, nu))
+    return Edge(float(moved), spread, level + nu * force, force, missing)
 
 
 def _settled(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,7 +15,7 @@ from strapdown.crash.delta_v import DeltaV
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.pdof import AngleInterval, Pdof, pdof, pdof_interval
 from strapdown.dsp.samples import running_integral
-from strapdown.errors import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.tables.checks import as_array, check_rows, check_same_length, check_time
 
 # Rollover criterion: a rigid body about the wheels on one side.
@@ -156,8 +157,8 @@ class CrashType:
     `name` is ``front``, ``right``, ``rear``, ``left``, ``rollover``, or ``undetermined`` where a 95
     % bound, of the direction of force or of tipping over, spans a border; `side` is from the
     estimated direction alone. `interval`: 95 % of the horizontal direction, None without a
-    covariance. `margin_deg` to the border of `next_type`. `roll` is None without rates. `reason` is
-    one sentence.
+    covariance. `margin_deg` to the border of `next_type`. `roll` is None without rates. `reasons`:
+    what decided, and what could not be decided.
     """
 
     name: str
@@ -167,7 +168,7 @@ class CrashType:
     margin_deg: float
     next_type: str
     roll: RollMotion | None
-    reason: str
+    reasons: tuple[Finding, ...]
 
 
 def side_of(horizontal_deg: float) -> tuple[str, float, str]:
@@ -221,36 +222,31 @@ def classify_crash(
     side, margin, beyond = side_of(direction.horizontal_deg)
     interval = None if covariance is None else pdof_interval(change, covariance).horizontal
     motion = None if roll is None else body.roll_motion(roll, since=since)
-    name, reason = _decide(side, margin, beyond, interval, motion)
-    return CrashType(name, side, direction, interval, margin, beyond, motion, reason)
+    name, code, data = _decide(side, margin, beyond, interval, motion)
+    reasons = [Finding(code, severity="note", quantity="crash type", **data)]
+    if motion is None:
+        reasons.append(Finding("crash.type-no-roll", severity="note", quantity="crash type"))
+    return CrashType(name, side, direction, interval, margin, beyond, motion, tuple(reasons))
 
 
 def _decide(
     side: str, margin: float, beyond: str, interval: AngleInterval | None, roll: RollMotion | None
-) -> tuple[str, str]:
+) -> tuple[str, str, dict[str, Any]]:
+    """Type, and code and data of what decided."""
     if roll is not None and roll.low >= 1.0:
-        return ROLLOVER, (
-            f"the roll reached {roll.share:.2f} times what tips it over (at least {roll.low:.2f})"
-        )
+        return ROLLOVER, "crash.type-rolled", {"share": roll.share, "low": roll.low}
     if roll is not None and roll.high >= 1.0:
-        return UNDETERMINED, (
-            f"whether it rolls over is not known: the roll reached {roll.low:.2f} to "
-            f"{roll.high:.2f} times what tips it over"
-        )
+        data = {"low": roll.low, "high": roll.high}
+        return UNDETERMINED, "crash.type-rollover-not-known", data
     if interval is None:
-        return side, f"the direction is {margin:.1f} deg from '{beyond}'; its bound was not given"
+        return side, "crash.type-without-bound", {"margin": margin, "beyond": beyond}
     if interval.undetermined:
-        return UNDETERMINED, "the change of velocity is not larger than its uncertainty"
+        return UNDETERMINED, "crash.type-within-uncertainty", {}
     ends = {side_of(interval.low_deg)[0], side_of(interval.high_deg)[0]}
+    bound = {"low": interval.low_deg, "high": interval.high_deg, "beyond": beyond}
     if ends != {side} or interval.width_deg > 90.0:
-        return UNDETERMINED, (
-            f"the direction lies between {interval.low_deg:.1f} and {interval.high_deg:.1f} deg, "
-            f"across the border of '{side}' to '{beyond}'"
-        )
-    return side, (
-        f"the direction is {margin:.1f} deg from '{beyond}', its bound "
-        f"{interval.low_deg:.1f} to {interval.high_deg:.1f} deg"
-    )
+        return UNDETERMINED, "crash.type-across-border", bound | {"side": side}
+    return side, "crash.type-by-direction", bound | {"margin": margin}
 
 
 def classify_crashes(

@@ -17,7 +17,6 @@ from strapdown.crash.delta_v import DeltaV
 from strapdown.crash.measuring_point import SampleEffects
 from strapdown.crash.path import ATTITUDE, VELOCITY, CrashPath
 from strapdown.crash.pdof import NedPdof, Pdof, PdofInterval, ned_pdof, pdof, pdof_interval
-from strapdown.crash.structure import STRUCTURE
 from strapdown.errors import DataError
 from strapdown.rotation import cross_matrix
 
@@ -82,25 +81,17 @@ def body_delta_v_bound(
     *,
     rest_sd: ArrayLike = (0.0, 0.0, 0.0),
     at_ends: ArrayLike | None = None,
-    settled: tuple[Array, Array] | None = None,
 ) -> DeltaVBound:
     """Uncertainty of a change of velocity integrated along the rotating body axes.
 
     `weights`, (n,), s: the change is their product with specific force minus stationary force;
     `rest_sd`, (3,), m/s²: of the stationary mean, by noise and by what the vehicle accelerates
     steadily; `at_ends`, (e, 3), m/s: effect on the change of one standard deviation of each instant
-    that bounds the window; `settled`: weights, (n,), s, that count for the motion of structure
-    along a direction, (3,), in which the velocity at the end of the window is a mean
-    (`Edge.settled`).
+    that bounds the window.
     """
     w = np.asarray(weights, dtype=np.float64)
     length = float(w.sum())
     each = np.einsum("n,pni->pi", w, effects.force) - length * effects.rest_force
-    rows = [k for k, c in enumerate(effects.contributors) if c == STRUCTURE]
-    if settled is not None and rows:
-        mean, along = settled
-        swung = np.einsum("n,pni->pi", mean - w, effects.force[rows])
-        each[rows] += np.outer(swung @ along, along)
     noise = (w[:, None] ** 2 * effects.force_noise**2).sum(axis=0)
     at_rest = (length * np.asarray(rest_sd, dtype=np.float64)) ** 2
     return _bound(each, effects.contributors, np.diag(noise), at_ends, at_rest)

@@ -17,7 +17,6 @@ from strapdown.crash.acceleration import (
     Acceleration,
     body_acceleration,
     resolved_acceleration,
-    window_weights,
 )
 from strapdown.crash.combine_units import combine_units
 from strapdown.crash.consistency import UnitComparison, clipped_axes, compare_units
@@ -133,10 +132,6 @@ def _size(change: VelocityChange) -> str:
 
 
 Array = NDArray[np.float64]
-
-# Instants that represent the mean over which a velocity settles.
-SETTLED_ENDS = 9
-NO_ROLL = "whether it rolled over cannot be determined without a gyro about the forward axis"
 
 
 @dataclass(frozen=True, eq=False)
@@ -350,10 +345,7 @@ def reconstruct_unit(
         low = min(start + peak_window, end)
         peak = trailing_delta_v(acceleration, peak_window, low, end).peak
         whole = delta_v(acceleration, start, end, across_gaps=True)
-        settled = _settled(acceleration, contact)
-        plain = body_delta_v_bound(
-            effects, whole.weights, rest_sd=rest_sd, at_ends=contact.moved, settled=settled
-        )
+        plain = body_delta_v_bound(effects, whole.weights, rest_sd=rest_sd, at_ends=contact.moved)
         # The part beyond the end of the record is within the bound, or leaves it without an upper
         # end.
         least = contact.beyond(TWO_SIDED_95 * plain.along(whole.vector))
@@ -369,7 +361,6 @@ def reconstruct_unit(
                 change.weights,
                 rest_sd=rest_sd,
                 at_ends=ends_of[window],
-                settled=settled if window == "event" else None,
             )
             why, of = missing[window]
             changes.append(velocity_change(window, change, bound, missing=why, open_axes=of))
@@ -431,8 +422,6 @@ def reconstruct_unit(
         events=events.events,
         roll=roll,
     )
-    if roll is None:
-        types = tuple(replace(t, reason=f"{t.reason}; {NO_ROLL}") for t in types)
     return UnitReconstruction(
         at_point.name,
         at_point,
@@ -463,19 +452,6 @@ def _missing(
         clipped = (cut & measured).any(axis=0) & (cut | ~measured).all(axis=0)
     x, y, z = (bool(c) or bool(beyond) for c in clipped)
     return (*beyond, *(("clipped",) if clipped.any() else ())), (x, y, z)
-
-
-def _settled(acceleration: Acceleration, contact: Contact) -> tuple[Array, Array] | None:
-    """Weights of the velocity's mean where it settles after a contact, and the direction of that.
-
-    None where the record ends before. For `body_delta_v_bound`.
-    """
-    if contact.end.settled is None:
-        return None
-    ends = np.linspace(*contact.end.settled, SETTLED_ENDS)
-    time, sampling = acceleration.time, acceleration.sampling
-    weights = [window_weights(time, contact.start.time, end, sampling) for end in ends]
-    return np.mean(weights, axis=0), contact.end.force
 
 
 def _at_least(change: VelocityChange, name: str) -> Finding:

@@ -96,11 +96,11 @@ def single_error(
     is not among them: it makes the difference of a hump, as structure does.
     """
     unknowns = structural_unknowns(structure, edges, kept, 1)
-    _, alone = likeliest(unknowns, difference, covariance)
+    _, _, alone = likeliest(unknowns, difference, covariance)
     best: SingleError | None = None
     for code, effect in effects.items():
         tried = [(effect, SIZES[code], np.inf), *unknowns]
-        sizes, cost = likeliest(tried, difference, covariance)
+        sizes, _, cost = likeliest(tried, difference, covariance)
         lead = alone - cost
         if sizes[0] == 0.0 or lead < (-2.0 * math.log(level) if best is None else best.lead):
             continue

@@ -42,14 +42,20 @@ ROUNDING = 1e-12
 class Structure:
     """Velocity of measuring points relative to the rigid body, a Gaussian process.
 
-    Along a vehicle axis it has the standard deviation ``share * change * w(t)`` and the correlation
-    ``exp(-|t - s| / correlation_time)``; points and axes are independent. Its mean acceleration is
-    zero: a point that stays a part of the vehicle has its velocity when the blow is over.
+    Along a vehicle axis it has the standard deviation ``expected * change * w(t)`` and the
+    correlation ``exp(-|t - s| / correlation_time)``; points and axes are independent. Its mean
+    acceleration is zero: a point that stays a part of the vehicle has its velocity when the blow is
+    over.
 
     Attributes
     ----------
     share : ndarray, (3,)
-        Of the change of velocity, forward, right, down; zero where the records show none.
+        Likeliest, of the change of velocity, forward, right, down; zero where the records show
+        none. Comparisons count it.
+    expected : ndarray, (3,)
+        Root of the mean of the share's square by its posterior; bounds count it. A variance that is
+        learnt from about ten independent instants is a quarter larger in the mean than its
+        likeliest value.
     correlation_time : float, s
     change : float, m/s
         Change of velocity of the vehicle over the crash.
@@ -61,6 +67,7 @@ class Structure:
     """
 
     share: Array
+    expected: Array
     correlation_time: float
     change: float
     time: Array = field(repr=False)
@@ -69,8 +76,8 @@ class Structure:
 
     @property
     def sd(self) -> Array:
-        """Largest standard deviation along each vehicle axis, (3,), m/s."""
-        return self.share * self.change
+        """Largest standard deviation along each vehicle axis, (3,), m/s, as bounds count it."""
+        return self.expected * self.change
 
     def correlation(self, time: Array) -> Array:
         """Covariance of velocities at instants, (k, k), for a largest variance of one."""
@@ -165,6 +172,7 @@ def unlearnt(units: Sequence[PointKinematics]) -> Structure:
     largest = float(envelope.max())
     return Structure(
         np.zeros(3),
+        np.zeros(3),
         CORRELATION_TIMES[0],
         float(np.median(changes)),
         time,
@@ -193,10 +201,13 @@ def learn_share(
     for correlation_time in CORRELATION_TIMES:
         one = replace(structure, correlation_time=correlation_time)
         along = structural_unknowns(one, edges, kept, len(difference))
-        found, cost = likeliest([*along, *of_turning], difference.ravel(), covariance)
+        found, mean, cost = likeliest([*along, *of_turning], difference.ravel(), covariance)
         if best is None or cost < best[0]:
             more = float(found[3]) if turning is not None else 0.0
-            best = cost, replace(one, share=found[:3], turning=math.hypot(1.0, more))
+            best = (
+                cost,
+                replace(one, share=found[:3], expected=mean[:3], turning=math.hypot(1.0, more)),
+            )
     assert best is not None
     return best[1]
 
@@ -222,18 +233,19 @@ def _root(covariance: Array) -> Array:
 
 def likeliest(
     unknowns: Sequence[tuple[Array, Array, float]], difference: Array, covariance: Array
-) -> tuple[Array, float]:
-    """Sizes of covariances that add to another, by coordinate search, and twice the cost.
+) -> tuple[Array, Array, float]:
+    """Sizes of covariances that add to another, by coordinate search, their means, and the cost.
 
     `unknowns`: the root of the covariance of size one, (d, r), the sizes to try, from zero, and the
-    standard deviation of the half-normal prior of each. The cost is the negative logarithm of the
-    posterior.
+    standard deviation of the half-normal prior of each. The means are roots of the mean square, by
+    the posterior of each size beside the likeliest others, zero where that is; the cost is twice
+    the negative logarithm of the posterior.
     """
     from scipy.linalg import solve_triangular
 
-    sizes = np.zeros(len(unknowns))
+    sizes, means = np.zeros(len(unknowns)), np.zeros(len(unknowns))
     if not difference.size:
-        return sizes, 0.0
+        return sizes, means, 0.0
     squares = [root @ root.T for root, _, _ in unknowns]
 
     def costs(k: int) -> Array:
@@ -270,6 +282,12 @@ def likeliest(
             j = int(np.argmin(tried))
             j = j if tried[0] - tried[j] > SIGNIFICANT else 0
             sizes[k], least = grid[j], float(tried[j])
+            if j:
+                likely = np.exp(-0.5 * (tried - tried[j]))
+                square = np.trapezoid(likely * grid**2, grid) / np.trapezoid(likely, grid)
+                means[k] = math.sqrt(square)
+            else:
+                means[k] = 0.0
         if np.array_equal(sizes, before):
             break
-    return sizes, least
+    return sizes, means, least

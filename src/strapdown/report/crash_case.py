@@ -301,7 +301,7 @@ def _event(
     return {
         "event": k + 1,
         "type": kind.name,
-        "because": kind.reason,
+        "because": "; ".join(reason.sentence("file") for reason in kind.reasons),
         "time_zero_s": event.time_zero,
         "time_zero_sd_s": event.time_zero_sd,
         "time_zero_by": event.basis,
@@ -362,7 +362,7 @@ def _comparison(comparison: UnitComparison) -> dict[str, Any]:
         "contradicted": list(comparison.doubted),
         "structure": {
             "sd_forward_right_down_m_per_s": comparison.structure.sd.tolist(),
-            "share_of_delta_v": comparison.structure.share.tolist(),
+            "share_of_delta_v": comparison.structure.expected.tolist(),
             "correlation_time_s": comparison.structure.correlation_time,
             "turning_of_assumed": comparison.structure.turning,
         },

@@ -299,7 +299,7 @@ class TestAnswers:
         (kind,) = found.main.types
         assert kind.name == "front"
         assert kind.roll is None
-        assert "rolled over cannot be determined" in kind.reason
+        assert [r.code for r in kind.reasons] == ["crash.type-by-direction", "crash.type-no-roll"]
 
     def test_an_impact_along_an_assumed_axis_is_no_event(self):
         # All of it to the side, where the unit has no accelerometer.
