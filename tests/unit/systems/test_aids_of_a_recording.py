@@ -93,7 +93,6 @@ def test_the_noise_of_a_height_is_its_scatter_and_what_lasts(recording):
     assert tables["barometer"]["height_sd_m"] == pytest.approx(expected, rel=0.05)
 
 
-@pytest.mark.slow
 def test_a_barometer_is_proposed_and_holds_the_height(recording, tmp_path):
     draft = draft_navigation(LogTable(path=str(recording)), folder=tmp_path, axes="x,-y,-z")
     made = tmp_path / "navigate.toml"
@@ -203,7 +202,6 @@ def test_a_magnetometer_along_the_samples_holds_the_heading(recording, tmp_path)
     assert any(column.startswith("magnetometer.hard_iron") for column in estimate.columns)
 
 
-@pytest.mark.slow
 def test_a_folder_of_a_phone_is_navigated_with_the_fixes_in_it(tmp_path):
     folder = tmp_path / "phone"
     folder.mkdir()
