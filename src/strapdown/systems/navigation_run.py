@@ -96,9 +96,9 @@ LEAST_GAIN, GAIN_EACH = 20.0, 0.05
 #: An estimated time offset, s, over which a run is repeated with it, and by how many of its
 #: standard deviations it differs from zero.
 CONTINUED, SURELY = 0.05, 3.0
-#: A run is repeated with the offset that it found, known to so many of its standard deviations, where
-#: that is at most this part of what was assumed, and where the assumed one moves the vehicle, at the
-#: speed that is exceeded for a tenth of the time, by so many standard deviations of its fixes.
+#: A run is repeated with the offset that it found, known to so many of its standard deviations,
+#: where that is at most this part of what was assumed, and where the assumed one moves the vehicle,
+#: at the speed that is exceeded for a tenth of the time, by so many standard deviations of fixes.
 ASSUMED, BETTER, MOSTLY, DISPLACED = 3.0, 0.5, 0.9, 3.0
 #: Length of a chunk of the record, and interval of progress reports, s.
 CHUNK = 20.0

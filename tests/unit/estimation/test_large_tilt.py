@@ -112,7 +112,7 @@ def test_accelerometers_add_the_same_to_gravity_in_level_axes_after_a_correction
     turned, P = turned_force(filter_, met, after), filter_.physical_covariance(after)
     assert turned is not None
     T, first = turned
-    assert np.array_equal(np.flatnonzero((T != np.eye(len(T))).any(axis=1)), first + np.arange(3))
+    assert np.array_equal(np.flatnonzero((np.eye(len(T)) != T).any(axis=1)), first + np.arange(3))
     C_after = dcm_from_quaternion(used.levels(after.row[None])[0, ATTITUDE])
     error = np.hstack([np.eye(3), np.diag(up)])
 

@@ -11,8 +11,8 @@ from tests import town_drive as town
 
 from strapdown.estimation.robust import AdaptiveRule, AdaptiveScale, Igg3
 from strapdown.frames import geodetic_from_ned
-from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.measurements.clock_windows import unsure_steps
+from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.recorder import _contradictions, record_of
 from strapdown.systems.navigation_run import ASSUMED, _with_known_offsets, _with_offsets
 from strapdown.tables import GEODETIC, VELOCITY, VELOCITY_SD
