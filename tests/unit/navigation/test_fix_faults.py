@@ -11,6 +11,7 @@ from tests import town_drive as town
 
 from strapdown.estimation.robust import AdaptiveRule, AdaptiveScale, Igg3
 from strapdown.frames import geodetic_from_ned
+from strapdown.navigation.heading_checks import _known
 from strapdown.navigation.measurements.clock_windows import unsure_steps
 from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.recorder import _contradictions, record_of
@@ -154,6 +155,10 @@ def test_a_clock_may_step_in_an_outage():
     assert worst[1] < 4.0
     # The bend after the outage tells the step: assumed less true.
     assert found == pytest.approx(-0.17, abs=0.02)
+    # An independent solution takes the last offset as known.
+    checks = _known(aid, record, robust=False)
+    assert checks.time_offset == -record.sensors["gnss.time_offset_t"].iloc[-1]
+    assert checks.states() == () == checks.clock_unsure
 
 
 def test_stamps_that_change_over_an_outage_tell_of_a_step():
