@@ -428,7 +428,9 @@ def is_large(P: Array) -> bool:
     return float(np.trace(P[TILTS, TILTS])) > LARGE**2
 
 
-def turned_force(filter_: ErrorFilter, before: FilterState, after: FilterState) -> Array | None:
+def turned_force(
+    filter_: ErrorFilter, before: FilterState, after: FilterState
+) -> tuple[Array, int] | None:
     """Return the transformation of the errors by a correction of a large tilt.
 
     While a vehicle goes straight on, fixes determine what the accelerometers add to gravity, in
@@ -440,7 +442,8 @@ def turned_force(filter_: ErrorFilter, before: FilterState, after: FilterState) 
     and Roumeliotis, Int. J. Robotics Research 29 (2010) 502, on unobservable directions).
 
     `before`, `after`: states before and after the correction. Returns (p, p), of the physical
-    errors, or None for a model without a bias of the accelerometers.
+    errors, and the first of the three that it changes, or None for a model without a bias of the
+    accelerometers.
     """
     used, bias = filter_.mechanization, _accel_bias(filter_)
     if bias is None:
@@ -449,7 +452,7 @@ def turned_force(filter_: ErrorFilter, before: FilterState, after: FilterState) 
     C, C_after = (rotation.dcm_from_quaternion(q) for q in quaternions)
     out = np.eye(filter_.model.physical_size)
     out[bias, PHYSICAL:] += (C_after.T @ C - np.eye(3)) @ _accel_error(filter_, C)
-    return out
+    return out, bias.start
 
 
 def _accel_bias(filter_: ErrorFilter) -> slice | None:

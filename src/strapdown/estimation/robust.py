@@ -650,7 +650,7 @@ class AdaptiveScale:
             state = state._replace(rejected=state.rejected + 1)
         else:
             settled = state.settled + 1 if weight >= HALF and not state.rejected else 0
-            state = state._replace(rejected=0, settled=settled, held=-math.inf)
+            state = state._replace(rejected=0, settled=settled)
         own = math.exp(state.log_square) * r
         total = s + own
         if not (math.isfinite(nu) and total > 0.0 and own > 0.0):
@@ -674,12 +674,16 @@ class AdaptiveScale:
         """
         jump, held, since = after.jump, after.held, before.since
         far = abs(nu - before.nu) > max(reach, 0.5 * abs(nu))
+        # One that returns and jumps again at once, as a receiver between two solutions does, is
+        # doubted as it was.
         if after.rejected == 1 and before.settled >= SETTLES and far:
             jump, held = nu, time + min(self.doubt, time - since)
+        elif after.rejected == 1 and not far:
+            held = -math.inf
         # After rejections the observations returned, or the estimate went to them.
-        went = after.rejected == 0 and before.rejected > 0 and abs(nu) >= 0.5 * abs(before.nu)
+        went = after.rejected == 0 and before.rejected > 0 and nu * before.nu >= 0.5 * before.nu**2
         if went or math.isinf(since):
-            since = time
+            since, held = time, -math.inf
         return after._replace(nu=nu, time=time, jump=jump, held=held, since=since)
 
     @staticmethod

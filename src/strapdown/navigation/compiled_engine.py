@@ -255,10 +255,10 @@ class CompiledEngine(Engine):
         self._group[0][0] = self.row
         return seen
 
-    def carry(self, T: Array, Q: Array) -> None:
+    def carry(self, T: Array, Q: Array, first: int = 0) -> None:
         """Transform the errors, and add a noise."""
         self.filter = self.navigation.carried(self.filter, T, Q)
-        self.nodes.carried(T, self.filter)
+        self.nodes.carried(T, first, self.filter)
         self._covariance[:] = self.filter.covariance
 
     def shown(self) -> Array:

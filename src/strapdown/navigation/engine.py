@@ -158,8 +158,11 @@ class Engine(ABC):
         return replace(observation, z=observation.z - observation.H @ (T @ self.errors))
 
     @abstractmethod
-    def carry(self, T: Array, Q: Array) -> None:
-        """Transform the physical errors by T, (p, p), and add a noise Q, (n, n), of the states."""
+    def carry(self, T: Array, Q: Array, first: int = 0) -> None:
+        """Transform the physical errors by T, (p, p), and add a noise Q, (n, n), of the states.
+
+        `first`: of the three errors that T changes.
+        """
 
     @abstractmethod
     def shown(self) -> Array:
@@ -247,10 +250,10 @@ class GeneralEngine(Engine):
         self.nodes.updated(met, taken, self.filter)
         return seen
 
-    def carry(self, T: Array, Q: Array) -> None:
+    def carry(self, T: Array, Q: Array, first: int = 0) -> None:
         """Transform the errors, and add a noise."""
         self.filter = self.navigation.carried(self.filter, T, Q)
-        self.nodes.carried(T, self.filter)
+        self.nodes.carried(T, first, self.filter)
 
     def shown(self) -> Array:
         """Return the row of the newest step with the estimated errors subtracted."""
@@ -397,12 +400,10 @@ class NodeRows:
             Phi = model.to_physical(used, ended.time, ended.row) @ Phi @ E
         self._growth(Phi, ended)
 
-    def carried(self, T: Array, state: FilterState) -> None:
-        """Record a transformation of the errors by T, (p, p), which changes those of one triad."""
+    def carried(self, T: Array, first: int, state: FilterState) -> None:
+        """Record a transformation of the errors by T, (p, p): of three from the first on."""
         if not self.wanted:
             return
-        changed = np.flatnonzero((np.eye(self._size) != T).any(axis=1))
-        first = min(int(changed[0]) if len(changed) else 0, self._size - 3)
         move = self._row(CARRIED, state)[begin_of_move(self._size) :]
         move[0], move[1 : 1 + 3 * self._size] = first, T[first : first + 3].ravel()
 

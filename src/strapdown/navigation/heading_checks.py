@@ -379,6 +379,7 @@ def _known(aid: Gnss, record: NavigationRecord, robust: bool) -> Gnss:
         time_offset=aid.time_offset - offset,
         time_offset_sd=0.0,
         time_offset_drift=0.0,
+        clock_unsure=(),
         position_correlated_share=0.0,
         float_position_sd=0.0,
     )

@@ -221,6 +221,15 @@ def with_states(filter_: ErrorFilter, aids: tuple[Measurement, ...]) -> ErrorFil
     return replace(filter_, model=model)
 
 
+def with_aids(navigator: Navigator, aids: tuple[Measurement, ...]) -> Navigator:
+    """Return a navigator with other options of its aids, and the states that these state."""
+    filter_ = navigator.filter
+    count = sum(len(aid.states()) for aid in navigator.aids)
+    own = filter_.model.sensors[: len(filter_.model.sensors) - count]
+    bare = replace(filter_, model=replace(filter_.model, sensors=own))
+    return replace(navigator, filter=with_states(bare, aids), aids=aids)
+
+
 # State of a navigator between chunks.
 
 
@@ -482,6 +491,7 @@ class EpochLoop:
         engine, filter_ = self.engine, self.navigator.filter
         last = engine.last
         engine.close()
+        self._forget(at)
         view = View(
             mechanization=filter_.mechanization,
             model=filter_.model,
@@ -517,6 +527,15 @@ class EpochLoop:
             ]
         self.mark()
 
+    def _forget(self, at: float) -> None:
+        """Add to the uncertainty of states that something since the last observation changed."""
+        model = self.navigator.filter.model
+        for aid in self.navigator.aids:
+            for name, sd in aid.forgotten(self.observed, at):
+                Q = np.zeros((model.layout.size, model.layout.size))
+                Q[model.layout[name], model.layout[name]] = sd**2
+                self.engine.carry(np.eye(model.physical_size), Q)
+
     def _told(
         self, rules: list[UpdateRule | None], observations: list[Observation], view: View
     ) -> list[Innovations]:
@@ -549,10 +568,11 @@ class EpochLoop:
         before = filter_.physical_covariance(met)
         after = filter_.physical_covariance(engine.filter)
         Q = unlearnt_force(filter_, met, before, after)
-        T = turned_force(filter_, met, engine.filter)
-        if T is not None:
+        turned = turned_force(filter_, met, engine.filter)
+        if turned is not None:
+            T, first = turned
             size = filter_.model.layout.size
-            engine.carry(T, np.zeros((size, size)) if Q is None else Q)
+            engine.carry(T, np.zeros((size, size)) if Q is None else Q, first)
         self.tilted = is_large(after)
 
     def mark(self, before: float = 0.0) -> None:

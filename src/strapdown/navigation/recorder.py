@@ -307,7 +307,8 @@ def _contradictions(
             back, swings = False, settled + patience
             continue
         end = float(time[span.stop - 1]) + DOUBT
-        if j + 1 < len(spans):
+        # One after that time is a fault of its own.
+        if j + 1 < len(spans) and time[spans[j + 1].start] <= end:
             back = abs(first[j] + first[j + 1]) < 0.5 * abs(first[j])
             end = float(time[spans[j + 1].stop - 1]) if back else end
         yield float(time[span.start]), end, size

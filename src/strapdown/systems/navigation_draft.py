@@ -363,6 +363,11 @@ def _aids(
     time, own = index_of(made.gnss), index_of(made.imu)
     within = int(((time >= own[0]) & (time <= own[-1])).sum())
     told = [f"{made.gnss.attrs['source']}: {within} of {len(time)} fixes within the log"]
+    for at, sd in aids["gnss"].get("clock_unsure_s", ()):
+        told.append(
+            f"its stamps change over the outage at {at:.6g} s: its clock may have stepped there, "
+            f"by {sd:.2g} s or so"
+        )
     if not np.isfinite(values_of(made.gnss, VELOCITY_SD[:2])).any():
         told.append(
             "the fixes state no velocity: heading and tilt are found from positions alone, later "
@@ -404,7 +409,8 @@ def _with_remarks(page: Page) -> None:
     page.say(
         "lever_arm_m: of the antenna from the inertial sensors, forward, right, down; zero is "
         "assumed: measure it. time_offset_sd_s above zero: stamps may be off by it, and by how "
-        "much is estimated.",
+        "much is estimated. clock_unsure_s: times at which the receiver's clock may have stepped, "
+        "each with a standard deviation; found where regular stamps change over an outage.",
         "position_correlated_share: part of the variance of each position that lasts for "
         "position_correlation_time_s; found where positions scatter less from fix to fix than they "
         "state. Without it bounds of position become too narrow with the number of fixes. "

@@ -30,6 +30,7 @@ from strapdown.navigation.measurements.clock_windows import (
     ClockStep,
     stamp_step,
     step_finding,
+    unsure_steps,
     window_offsets,
 )
 from strapdown.navigation.measurements.gnss import LASTING
@@ -258,7 +259,7 @@ def propose(
     chosen, how = _alignment(
         sensors, rest, drives, heading_deg, span, levelled, velocities=bool(measured)
     )
-    clock: dict[str, float] = {}
+    clock: dict[str, Any] = {}
     if fixes is not None:
         assert gnss is not None  # whence the fixes are
         clock, step = _clock(fixes, imu, drives, sensors)
@@ -277,6 +278,8 @@ def propose(
         if step is not None:
             # Where a heading is asked, it is that at the first sample: the whole record is used.
             clock["time_offset_sd_s"] = max(clock.get("time_offset_sd_s", 0.0), abs(step.size))
+        if step is None and (unsure := unsure_steps(fixes)) and clock.get("time_offset_sd_s"):
+            clock["clock_unsure_s"] = tuple((round(at, 3), sd) for at, sd in unsure)
     if fixes is not None and sensors is not None and chosen["coarse"]["kind"] == "gnss_course":
         chosen, how, tried = _tried(chosen, how, imu, fixes, sensors, levelled, clock)
         findings = (*findings, *tried)
@@ -494,7 +497,7 @@ def _moving(fixes: pd.DataFrame) -> tuple[int | None, float]:
 
 def _clock(
     fixes: pd.DataFrame, imu: pd.DataFrame, drives: bool, sensors: ImuUncertainty | None = None
-) -> tuple[dict[str, float], ClockStep | None]:
+) -> tuple[dict[str, Any], ClockStep | None]:
     """Errors of positions, significant delays of velocities and stamps, and a step of a clock.
 
     An offset is a state of the filter where it is significant, and where its uncertainty moves the

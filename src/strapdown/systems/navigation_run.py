@@ -52,7 +52,7 @@ from strapdown.navigation.modes import (
     Navigation,
     Until,
 )
-from strapdown.navigation.navigator import Navigator, with_states
+from strapdown.navigation.navigator import Navigator, with_aids, with_states
 from strapdown.navigation.pipeline import NavigationPipeline
 from strapdown.navigation.preprocessing import GapPolicy, ImuPreprocessor, ends_of
 from strapdown.navigation.record import NavigationRecord, Span, innovation_labels
@@ -70,7 +70,7 @@ from strapdown.systems.navigation_source import (
     said_of_file,
 )
 from strapdown.systems.one_thread import one_thread
-from strapdown.tables import EULER, GEODETIC, VELOCITY
+from strapdown.tables import EULER, GEODETIC, POSITION_SD, VELOCITY
 from strapdown.tables.checks import source_of, values_of
 
 if TYPE_CHECKING:
@@ -96,6 +96,10 @@ LEAST_GAIN, GAIN_EACH = 20.0, 0.05
 #: An estimated time offset, s, over which a run is repeated with it, and by how many of its
 #: standard deviations it differs from zero.
 CONTINUED, SURELY = 0.05, 3.0
+#: A run is repeated with the offset that it found, known to so many of its standard deviations,
+#: where that is at most this part of what was assumed, and where the assumed one moves the vehicle,
+#: at the speed that is exceeded for a tenth of the time, by so many standard deviations of fixes.
+ASSUMED, BETTER, MOSTLY, DISPLACED = 3.0, 0.5, 0.9, 3.0
 #: Length of a chunk of the record, and interval of progress reports, s.
 CHUNK = 20.0
 _AT_ONCE = partial(run_batch, chunk=CHUNK)
@@ -157,7 +161,12 @@ def run_navigation(
     progress("aligning" if spec.start is None else "navigating", BEGUN)
     with said_of_file(*tables):
         run = drive(chain, source.imu, source.tables, recorder, show_mode)
+        begun_with = chain
         chain, by_offset = _with_offsets(chain, run.smoothed or run.record)
+        if not by_offset and run.smoothed is None:
+            chain, by_offset = _with_known_offsets(chain, run.record, source.tables)
+        else:
+            begun_with = chain
         if by_offset:
             run = drive(chain, source.imu, source.tables, recorder, show_mode)
     beside = None
@@ -193,7 +202,7 @@ def run_navigation(
 
         begun, end = _begun(run.record), float(source.imu.index[-1])
         withheld = score_withholding(
-            chain,
+            begun_with,  # withheld fixes may not tell of the offset, either
             source.imu,
             source.tables,
             withheld_aid(spec),
@@ -277,6 +286,62 @@ def _with_offsets(
     if findings:
         chain = replace(chain, navigator=replace(chain.navigator, aids=tuple(aids)))
     return chain, tuple(findings)
+
+
+def _with_known_offsets(
+    chain: NavigationPipeline, record: NavigationRecord, tables: Mapping[str, pd.DataFrame]
+) -> tuple[NavigationPipeline, tuple[Finding, ...]]:
+    """Return a pipeline that begins with the time offsets that the record has determined.
+
+    Along the way an offset is a displacement, until the vehicle turns or changes its speed: a run
+    that begins with an uncertain one is as uncertain in position up to its first manoeuvre. It is
+    repeated with the last estimate, of standard deviation s, as if it were known to `ASSUMED` = k
+    times s (and to its random walk since the start). Its data are then used twice: with information
+    1/s² + 1/(k s)² in place of 1/s², so that no variance is understated by more than
+    1 + 1/k² (5 % of a standard deviation). Offsets that were not constant are left as they are.
+    """
+    aids: list[Measurement] = []
+    findings: list[Finding] = []
+    for aid in chain.navigator.aids:
+        if isinstance(aid, Gnss) and aid.time_offset_sd > 0.0 and not aid.clock_unsure:
+            name = f"{aid.name}.time_offset_t"
+            known = _known_offset(aid, record.sensors[name], record.sensors_sd[name])
+            speed = np.linalg.norm(record.trajectory[VELOCITY].to_numpy(), axis=1)
+            fix = float(np.nanmedian(values_of(tables[aid.name], POSITION_SD[:2])))
+            displaced = float(np.quantile(speed, MOSTLY)) * aid.time_offset_sd
+            if known is not None and displaced > DISPLACED * aid.position_sd_factor * fix:
+                error, sd = known
+                aid = replace(aid, time_offset=aid.time_offset - error, time_offset_sd=sd)
+                findings.append(
+                    Finding(
+                        "navigation.run-again-with-known-offset",
+                        severity="note",
+                        quantity=name,
+                        offset=aid.time_offset,
+                        sd=sd,
+                    )
+                )
+        aids.append(aid)
+    if findings:
+        chain = replace(chain, navigator=with_aids(chain.navigator, tuple(aids)))
+    return chain, tuple(findings)
+
+
+def _known_offset(aid: Gnss, error: pd.Series, sd: pd.Series) -> tuple[float, float] | None:
+    """Error of an assumed offset and a standard deviation for another run, where that is worth it.
+
+    Estimates on the way differ from the last by the root of the difference of their variances, and
+    by what the offset has walked since.
+    """
+    last, s = float(error.iloc[-1]), float(sd.iloc[-1])
+    left = float(error.index[-1]) - error.index.to_numpy(dtype=np.float64)
+    walked = aid.time_offset_drift**2 * left
+    apart = np.square(error.to_numpy() - last)
+    expected = np.maximum(np.square(sd.to_numpy()) - s**2, 0.0) + s**2 + walked
+    again = math.hypot(ASSUMED * s, math.sqrt(float(walked[0])))
+    if (apart > SURELY**2 * expected).any() or again > BETTER * aid.time_offset_sd:
+        return None
+    return last, again
 
 
 def _explained_by_grade(

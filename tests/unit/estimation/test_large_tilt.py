@@ -109,7 +109,10 @@ def test_accelerometers_add_the_same_to_gravity_in_level_axes_after_a_correction
     H = np.eye(len(P))[6:8]
     told = Observation("level", np.array([2.0, -2.0]) * TOLD, H, np.full(2, TOLD**2), ("x", "y"))
     after, _, _ = filter_.observe(met, [told])
-    T, P = turned_force(filter_, met, after), filter_.physical_covariance(after)
+    turned, P = turned_force(filter_, met, after), filter_.physical_covariance(after)
+    assert turned is not None
+    T, first = turned
+    assert np.array_equal(np.flatnonzero((np.eye(len(T)) != T).any(axis=1)), first + np.arange(3))
     C_after = dcm_from_quaternion(used.levels(after.row[None])[0, ATTITUDE])
     error = np.hstack([np.eye(3), np.diag(up)])
 

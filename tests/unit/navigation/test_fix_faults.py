@@ -11,9 +11,11 @@ from tests import town_drive as town
 
 from strapdown.estimation.robust import AdaptiveRule, AdaptiveScale, Igg3
 from strapdown.frames import geodetic_from_ned
+from strapdown.navigation.heading_checks import _known
+from strapdown.navigation.measurements.clock_windows import unsure_steps
 from strapdown.navigation.navigator import Navigator
-from strapdown.navigation.recorder import record_of
-from strapdown.systems.navigation_run import _with_offsets
+from strapdown.navigation.recorder import _contradictions, record_of
+from strapdown.systems.navigation_run import ASSUMED, _with_known_offsets, _with_offsets
 from strapdown.tables import GEODETIC, VELOCITY, VELOCITY_SD
 
 
@@ -95,6 +97,143 @@ def test_a_receiver_is_rejected_for_as_long_as_it_had_agreed(before, step):
     # Ten rejections that ended because the estimate went to them do: since then they have agreed.
     followed = [20.0] * 11 + [2.0] + [0.3] * 5
     assert sum(jumps([*followed, *[-20.0] * 60], before=3, step=step)[len(followed) :]) == 6
+
+
+def test_a_receiver_that_returns_for_a_moment_is_doubted_as_it_was():
+    """Between a float and a fixed solution it goes back and forth: each return was a new start."""
+    step, away = 0.1, [20.0] * 15
+    flicker = [*away, 1.0, 1.0, *away, 1.0, *away]
+    told = jumps(flicker, before=100, step=step)
+    # The first of each stretch is rejected by its size alone.
+    firsts = {0, 17, 33}
+    assert [k for k, v in enumerate(flicker) if v == 20.0 and not told[k]] == sorted(firsts)
+    # Never for longer than it had agreed: ten seconds, and what is held is not begun anew.
+    long = jumps(flicker * 4, before=40, step=step)
+    assert not any(long[40:])
+    # It returns beyond the estimate, which did not go to it.
+    beyond = jumps([*[40.0] * 3, -22.0, *[0.3] * 6, *[40.0] * 15], sd=5.0, before=100, step=step)
+    assert all(beyond[11:])
+
+
+def test_a_jump_after_a_minute_does_not_end_the_contradiction_before_it():
+    time = 0.5 * np.arange(400)
+    nu, rejected = np.zeros(400), np.zeros(400, bool)
+    for first, size in ((100, -1.0), (240, 1.1)):  # 70 s apart, and as if it were the way back
+        nu[first : first + 20], rejected[first : first + 20] = size, True
+        nu[first + 20] = size
+    (begin, end, size), (again, until, later) = _contradictions(time, nu, rejected, 10)
+    assert (begin, size) == (50.0, 1.0)
+    assert end == pytest.approx(59.5 + 60.0)
+    assert (again, later) == (120.0, 1.1)
+    assert until == pytest.approx(129.5 + 60.0)
+
+
+def stepped(by, begin=60.0, end=75.0):
+    """Exact positions with an outage in which the receiver's clock steps."""
+    table = town.fixes(77, position_noise=0.02, rate=5.0)
+    table = table[(table.index < begin) | (table.index > end)]
+    table[VELOCITY], table[VELOCITY_SD] = 0.0, np.inf
+    stamps = table.index.to_numpy()
+    table.index = pd.Index(np.where(stamps > begin, stamps + by, stamps), name="time")
+    return table[table.index < 110.0]
+
+
+def test_a_clock_may_step_in_an_outage():
+    """10 m/s and 0.17 s: the positions after it are 1.7 m beside, and contradict nothing."""
+    worst = []
+    for unsure in ((), ((67.0, 0.2),)):
+        aid = town.gnss(rule=RULE, time_offset_sd=0.01, clock_unsure=unsure)
+        navigator, state = town.begun(aid)
+        _, piece = town.run(navigator, state, stepped(0.17))
+        record = record_of(navigator, [piece])
+        at = np.minimum(np.searchsorted(piece.time, record.sd.index), len(piece.time) - 1)
+        ratio = town.off(piece)[at] / record.sd[["north", "east", "down"]].to_numpy()
+        after = (piece.time[at] > 75.2) & (piece.time[at] < 110.0)
+        worst.append(float(np.abs(ratio[after, :2]).max()))
+        found = record.sensors["gnss.time_offset_t"].loc[109.0:110.0].iloc[0]
+    assert worst[0] > 5.0
+    assert worst[1] < 4.0
+    # The bend after the outage tells the step: assumed less true.
+    assert found == pytest.approx(-0.17, abs=0.02)
+    # An independent solution takes the last offset as known.
+    checks = _known(aid, record, robust=False)
+    assert checks.time_offset == -record.sensors["gnss.time_offset_t"].iloc[-1]
+    assert checks.states() == () == checks.clock_unsure
+
+
+def test_stamps_that_change_over_an_outage_tell_of_a_step():
+    (at, sd), *more = unsure_steps(stepped(0.17))
+    assert not more
+    assert at == pytest.approx(67.5, abs=0.3)
+    assert sd == pytest.approx(0.2)
+    assert unsure_steps(stepped(0.0)) == []
+    # A receiver that goes on with its multiples may have lost fixes only.
+    assert unsure_steps(stepped(0.2)) == []
+
+
+def late(seed, offset):
+    """Positions that know the place to 2 cm, stamped late."""
+    table = town.fixes(seed, position_noise=0.02)
+    table[VELOCITY], table[VELOCITY_SD] = 0.0, np.inf
+    table.index = pd.Index(table.index.to_numpy() + offset, name="time")
+    return table[(table.index > 0.5) & (table.index < 50.0)]
+
+
+def test_a_run_begins_again_with_a_known_offset():
+    """Before the first bend an unknown offset is a displacement, at 10 m/s."""
+    before, after, inside = [], [], []
+    for seed in range(2):
+        offset = float(np.random.default_rng(seed).normal(0.0, 0.08))
+        table = late(500 + seed, offset)
+        navigator, state = town.begun(town.gnss(time_offset_sd=0.08))
+        first = town.run(navigator, state, table)[1]
+        record = record_of(navigator, [first])
+        again, findings = _with_known_offsets(SimpleChain(navigator), record, {"gnss": table})
+        assert [one.code for one in findings] == ["navigation.run-again-with-known-offset"]
+        (aid,) = again.navigator.aids
+        sd = float(record.sensors_sd["gnss.time_offset_t"].iloc[-1])
+        assert aid.time_offset_sd == pytest.approx(ASSUMED * sd)
+        assert abs(aid.time_offset - offset) < 4.0 * sd
+        fresh, state = town.begun(aid)
+        ours = again.navigator.filter.model
+        np.testing.assert_array_equal(ours.stacked.sd, fresh.filter.model.stacked.sd)
+        second = town.run(again.navigator, state, table)[1]
+        found = record_of(again.navigator, [second])
+        at = np.minimum(np.searchsorted(second.time, found.sd.index), len(second.time) - 1)
+        ratio = town.off(second)[at] / found.sd[["north", "east", "down"]].to_numpy()
+        inside.append(np.abs(ratio[found.sd.index < 50.0]).max())
+        for sds, one in ((before, record), (after, found)):
+            sds.append(np.hypot(one.sd["north"], one.sd["east"]).loc[2.0:4.0].max())
+    assert min(before) > 0.5
+    assert max(after) < 0.2
+    assert max(inside) < 5.0
+
+
+@pytest.mark.parametrize("what", ["worth", "stepped", "little", "slow", "unsure"])
+def test_an_offset_that_changed_or_hardly_matters_is_left(what):
+    unsure = ((30.0, 0.2),) if what == "unsure" else ()
+    aid = town.gnss(time_offset=-0.1, time_offset_sd=0.1, clock_unsure=unsure)
+    navigator, _ = town.begun(aid)
+    error, sd = np.linspace(0.0, 0.01, 61), np.linspace(0.1, 0.004, 61)
+    if what == "stepped":
+        error[10:30], sd[10:30] = 0.09, 0.005
+    if what == "little":
+        sd[:] = np.linspace(0.1, 0.06, 61)
+    time = pd.Index(np.arange(61.0), name="time")
+    name = "gnss.time_offset_t"
+    speed = 0.1 if what == "slow" else 10.0
+    record = SimpleNamespace(
+        sensors=pd.DataFrame({name: error}, time),
+        sensors_sd=pd.DataFrame({name: sd}, time),
+        trajectory=pd.DataFrame({"VN": speed, "VE": 0.0, "VD": 0.0}, time),
+    )
+    chain = SimpleChain(navigator)
+    table = town.fixes(5, position_noise=0.02)
+    after, findings = _with_known_offsets(chain, record, {"gnss": table})
+    assert (after is chain) == (what != "worth") == (not findings)
+    if what == "worth":
+        assert after.navigator.aids[0].time_offset == pytest.approx(-0.11)
+        assert after.navigator.aids[0].time_offset_sd == pytest.approx(0.012)
 
 
 def test_a_contradiction_widens_all_that_a_correction_would_move():

@@ -143,7 +143,7 @@ def test_two_estimates_of_an_offset_are_joined_or_contradict_each_other():
     assert _agreed((-0.2, 0.08), (0.32, 0.07)) is None
 
 
-def stepped(folder, size, at=40.0):
+def stepped(folder, size, at=40.0, outage=0.0):
     """Files of a drive with fixes by a clock that steps; the time of the file is from 1970."""
     zero = 1_700_000_000.0
     names = [*(f"gyro_{a}_rad_s" for a in "xyz"), *(f"accel_{a}_m_s2" for a in "xyz")]
@@ -151,6 +151,7 @@ def stepped(folder, size, at=40.0):
     text = log.rename_axis("time_s").to_csv()
     (folder / "log.csv").write_text("# sampling: mean\n" + text)
     table = town.fixes(**RECEIVER)
+    table = table[(table.index < at - outage) | (table.index >= at)]
     stamps = table.index.to_numpy()
     late = np.where(stamps >= at, size, 0.0)
     table.set_axis(stamps + zero + late).rename_axis("time").to_csv(folder / "fixes.csv")
@@ -177,3 +178,18 @@ def test_a_step_of_the_clock_is_corrected_in_what_is_proposed(tmp_path, size):
     draft = draft_navigation(LogTable(path=str(tmp_path / "log.csv")), gnss=given, folder=tmp_path)
     written = tomllib.loads(draft.text)["aiding"]["gnss"]["clock_steps_s"]
     assert written == [[pytest.approx(stamp), pytest.approx(by)]]
+
+
+def test_a_clock_that_may_have_stepped_in_an_outage_is_unsure_from_then_on(tmp_path):
+    made = stepped(tmp_path, 0.15, outage=15.0)
+    aid = made.table["aiding"]["gnss"]
+    ((at, sd),) = aid["clock_unsure_s"]
+    # On the time of the run, whose first sample is at zero.
+    assert at == pytest.approx(32.5, abs=0.3)
+    assert sd == pytest.approx(0.25, abs=1e-3)
+    assert aid["time_offset_sd_s"] > 0.0
+    given = FixesTable(path=str(tmp_path / "fixes.csv"))
+    draft = draft_navigation(LogTable(path=str(tmp_path / "log.csv")), gnss=given, folder=tmp_path)
+    written = tomllib.loads(draft.text)["aiding"]["gnss"]["clock_unsure_s"]
+    assert written == [[pytest.approx(at), pytest.approx(sd)]]
+    assert "clock_unsure_s" not in stepped(tmp_path, 0.0, outage=15.0).table["aiding"]["gnss"]

@@ -19,7 +19,14 @@ from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GEODETIC, GYRO, VELOCITY, VELOCITY_SD
 from strapdown.tables.checks import index_of, source_of, values_of
 
-__all__ = ["ClockStep", "Offsets", "stamp_step", "step_finding", "window_offsets"]
+__all__ = [
+    "ClockStep",
+    "Offsets",
+    "stamp_step",
+    "step_finding",
+    "unsure_steps",
+    "window_offsets",
+]
 
 Array = NDArray[np.float64]
 
@@ -255,9 +262,41 @@ def stamp_step(
     determines which multiple, or that the stamps are right. Its standard deviation is that of the
     same difference in the rest of the record.
     """
-    time = index_of(gnss)
-    if len(time) < FEWEST:
+    usual, lone = _irregular(index_of(gnss))
+    if usual is None:
         return None
+    steps = np.diff(index_of(gnss))
+    lost = ~lone & (np.round(steps / usual) > 1.0) & (steps < min(SHORT * usual, SHORT_S))
+    ways = _Ways(gnss, usual)
+    for k in np.flatnonzero(lone | lost).tolist():
+        found = _stamp_step(ways, k, bool(lone[k]), windows)
+        if found is not None:
+            return found
+    return None
+
+
+def unsure_steps(gnss: pd.DataFrame) -> list[tuple[float, float]]:
+    """Times of outages over which regular stamps change, and a standard deviation of the step.
+
+    The receiver began anew, and its clock may have stepped: by the rest to a multiple of its
+    interval, of which no way over an outage says which. The least two are within one interval.
+    """
+    time = index_of(gnss)
+    usual, lone = _irregular(time)
+    if usual is None:
+        return []
+    long = np.flatnonzero(lone & (np.diff(time) > SHORT * usual))
+    sd = min(max(usual, LEAST_STEP), LARGEST)
+    return [(float(0.5 * (time[k] + time[k + 1])), sd) for k in long.tolist()]
+
+
+def _irregular(time: Array) -> tuple[float | None, NDArray[np.bool_]]:
+    """Usual interval of regular stamps, s, and the few intervals that are no multiple of it.
+
+    None where stamps are not regular.
+    """
+    if len(time) < FEWEST:
+        return None, np.zeros(0, np.bool_)
     steps = np.diff(time)
     usual = float(np.median(steps))
     counts = np.maximum(np.round(steps / usual), 1.0)
@@ -266,14 +305,8 @@ def stamp_step(
     odd[[0, -1]] = False
     lone = odd & ~np.roll(odd, 1) & ~np.roll(odd, -1)
     if odd.sum() > FEW or (odd & ~lone).any():
-        return None
-    lost = ~odd & (counts > 1.0) & (steps < min(SHORT * usual, SHORT_S))
-    ways = _Ways(gnss, usual)
-    for k in np.flatnonzero(lone | lost).tolist():
-        found = _stamp_step(ways, k, bool(lone[k]), windows)
-        if found is not None:
-            return found
-    return None
+        return None, lone
+    return usual, lone
 
 
 def _stamp_step(

@@ -95,6 +95,9 @@ class Gnss(TabulatedMeasurement):
         true.
     time_offset_drift : float, s/√s
         By which that state walks.
+    clock_unsure : tuple of pairs of float, s
+        Times, of the stamps, at which the clock of the receiver may have stepped, each with the
+        standard deviation of that step: the state is as uncertain afterwards.
     velocity_delay : float, s
         Delay of the velocity against the position of the same row: half of the interval for a
         mean over the preceding interval.
@@ -129,6 +132,7 @@ class Gnss(TabulatedMeasurement):
     time_offset: float = _in("s")
     time_offset_sd: float = _in("s")
     time_offset_drift: float = _in("s_per_sqrt_s")
+    clock_unsure: tuple[tuple[float, float], ...] = field(default=(), metadata={"unit": "s"})
     velocity_delay: float = _in("s")
     position_correlated_share: float = 0.0
     position_correlation_time: float = _in("s", LASTING)
@@ -176,6 +180,11 @@ class Gnss(TabulatedMeasurement):
             raise ConfigError(
                 "navigation.time-offset-walks-not-estimated", quantity="time_offset_drift"
             )
+        for _, sd in self.clock_unsure:
+            if not 0.0 < sd <= LARGEST_OFFSET:
+                raise ConfigError("navigation.clock-unsure-sd", quantity="clock_unsure", sd=sd)
+        if self.clock_unsure and not self.time_offset_sd:
+            raise ConfigError("navigation.time-offset-walks-not-estimated", quantity="clock_unsure")
         lever_arm(self.lever_arm_sd)
 
     def states(self) -> tuple[SensorStates, ...]:
@@ -193,6 +202,11 @@ class Gnss(TabulatedMeasurement):
             lasting = unseen("float_error", ("north", "east", "down"), "1", 1.0)
             out.append(gauss_markov(lasting.named(self._float), FLOAT_LASTING))
         return tuple(out)
+
+    def forgotten(self, since: float, until: float) -> list[tuple[str, float]]:
+        """Return the time offset where the clock may have stepped; see `Measurement.forgotten`."""
+        times = ((stamp - self.time_offset, sd) for stamp, sd in self.clock_unsure)
+        return [(self._offset, sd) for time, sd in times if since < time <= until]
 
     @property
     def lasts(self) -> bool:

@@ -94,6 +94,13 @@ class Measurement(ABC):
         """Its states in addition to those of the inertial sensors, named ``name.block``."""
         return ()
 
+    def forgotten(self, since: float, until: float) -> Iterable[tuple[str, float]]:
+        """Return states of one element that changed after an instant, s, and by then, unseen.
+
+        Each with the standard deviation of its change.
+        """
+        return ()
+
     @abstractmethod
     def observe(self, view: View, values: Array) -> list[Observation]:
         """Return the observations at one of its epochs; none where it observes nothing.
