@@ -48,7 +48,7 @@ from strapdown.formats.triad_units import (
     values_of_triads,
 )
 from strapdown.formats.vocabularies import EULERS, QUATERNIONS
-from strapdown.tables import ACCEL, SAMPLINGS, attitude_table, find_gaps, imu_table
+from strapdown.tables import ACCEL, SAMPLINGS, attitude_table, find_gaps, imu_of_columns
 from strapdown.units import TIME_UNITS, factor_of, parse_unit
 
 __all__ = [
@@ -130,7 +130,9 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
             quantity="time",
             size=time.size,
         )
-    slow = float(np.median(np.diff(time)))
+    # A median of steps is at most twice their mean.
+    faster = 2.0 * (time[-1] - time[0]) <= SLOWEST * (time.size - 1)
+    slow = 0.0 if faster else float(np.median(np.diff(time)))
     if slow > SLOWEST and options.time_unit is None and options.rate is None:
         raise DataError(
             "io.too-slow-for-a-gyro",
@@ -142,13 +144,15 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
             unit=stamps.unit,
         )
     readings = [time_reading(raw, found, stamps, int(kept[0]))]
-    body: dict[str, Array] = {}
+    # Column by column in one block, which the table keeps: a long log takes a large part of the
+    # memory.
+    block = np.empty((3 * len(units), kept.size)).T
+    body = {triad: block[:, 3 * k : 3 * k + 3] for k, triad in enumerate(units)}
     summed = {t for t, (unit, _) in units.items() if unit in SUMS[t]}
     for triad, (unit, why) in units.items():
         first = values[triad][kept[0]].copy()
-        body[triad] = _turned(
-            values, triad, axes, factor_of(unit, {**UNITS[triad], **SUMS[triad]}), kept
-        )
+        factor = factor_of(unit, {**UNITS[triad], **SUMS[triad]})
+        _turn(values.pop(triad), axes, factor, kept, body[triad])
         if triad in summed:
             body[triad] /= intervals(time, kept)
         readings += _readings_of_triad(found, triad, axes, (unit, why), first)
@@ -159,14 +163,8 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     report_gaps(raw.name, time, body["gyro"], findings)
     report_absurd(raw.name, body["gyro"], lambda k: raw.row(int(kept[k])), findings)
     report_weightless(raw.name, body.get("accel"), findings)
-    imu = imu_table(
-        time,
-        body.pop("gyro"),
-        body.pop("accel", None),
-        body.pop("mag", None),
-        sampling=sampling,
-        source=raw.name,
-    )
+    columns = [f"{triad}_{a}" for triad in units for a in AXES]
+    imu = imu_of_columns(time, block, columns, sampling=sampling, source=raw.name)
     if not axes.stated:
         imu.attrs["axes"] = AXES_OF_SENSOR
     with_clock(imu, clock_of_log(raw, found, stamps, dated))
@@ -254,7 +252,10 @@ def _by_sensor(raw: RawLog, found: dict[str, Column]) -> list[RawLog]:
     for triad in ("gyro", "accel", "mag"):
         columns = [raw.columns[found[q].source] for a in AXES if (q := f"{triad}_{a}") in found]
         if len(columns) == 3 and all(c.dtype.kind == "f" for c in columns):
-            there[triad] = ~np.logical_and.reduce([np.isnan(c) for c in columns])
+            if any(np.isnan(c.sum()) for c in columns):
+                there[triad] = ~np.logical_and.reduce([np.isnan(c) for c in columns])
+            else:  # a sum is a number only if every term is
+                there[triad] = np.ones(columns[0].size, dtype=bool)
     left_out: list[Finding] = []
     if "accel" in there and found["accel_x"].why == "by its name":
         # Rows may say their sensor in a column of text: linear acceleration has no gravity.
@@ -317,17 +318,12 @@ def require_accel(recording: Recording) -> None:
         )
 
 
-def _turned(
-    values: dict[str, Array], triad: str, axes: Axes, factor: float, kept: NDArray[np.int64]
-) -> Array:
-    """Take a triad out of `values`: used rows, in body axes and SI units."""
-    # In place and without a copy: a long log takes a large part of the memory.
-    block = values.pop(triad)
-    turned = block[:, axes.axis]
-    del block
-    turned *= np.array(axes.sign)
-    turned *= factor
-    return turned if kept.size == len(turned) else turned[kept]
+def _turn(values: Array, axes: Axes, factor: float, kept: NDArray[np.int64], body: Array) -> None:
+    """Write the used rows of a triad in body axes and SI units to `body`."""
+    for j, (axis, sign) in enumerate(zip(axes.axis, axes.sign, strict=True)):
+        column = values[:, axis]
+        used = column if kept.size == column.size else column[kept]
+        np.multiply(used, sign * factor, out=body[:, j])
 
 
 def _readings_of_triad(
@@ -523,7 +519,7 @@ def report_absurd(
 
     DataError: a rate is beyond the limit of any rotating body.
     """
-    largest = np.abs(gyro).max(axis=0)
+    largest = np.maximum(gyro.max(axis=0), -gyro.min(axis=0))
     k = int(largest.argmax())
     if largest[k] > IMPOSSIBLE_RATE:
         at = int(np.abs(gyro[:, k]).argmax())
@@ -534,8 +530,10 @@ def report_absurd(
             quantity=f"gyro_{PLAUSIBILITY_AXES[k]}",
             gyro=gyro[at, k],
         )
-    lasting = float(np.quantile(np.sqrt((gyro * gyro).sum(axis=1)), 0.95))
-    if LASTING_RATE < lasting <= largest[k] <= ABSURD_RATE:
+    lasting = 0.0
+    if LASTING_RATE < largest[k] <= ABSURD_RATE:
+        lasting = float(np.quantile(np.sqrt((gyro * gyro).sum(axis=1)), 0.95))
+    if LASTING_RATE < lasting <= largest[k]:
         findings.append(
             Finding(
                 "io.rate-absurd-for-long",
@@ -581,13 +579,16 @@ def report_absurd(
 # Half of a log of a body that is carried, driven or flown has more force than this: only a fall
 # has less.
 WEIGHTLESS = 0.3 * STANDARD_GRAVITY  # m/s²
+#: Rows, spread evenly over a log, of which this is judged.
+SOME = 100_000
 
 
 def report_weightless(name: str, accel: Array | None, findings: list[Finding]) -> None:
     """Report a specific force too small for gravity, which the numbers left open without a unit."""
     if accel is None or any(f.code == "io.no-gravity" for f in findings):
         return
-    usual = float(np.sqrt(np.median((accel * accel).sum(axis=1))))
+    some = accel[:: 1 + len(accel) // SOME]
+    usual = float(np.sqrt(np.median((some * some).sum(axis=1))))
     if usual < WEIGHTLESS:
         reason = Finding("io.evidence-force-too-small", severity="note", usual=usual)
         findings.append(Finding("io.no-gravity", file=name, quantity="accel", reason=reason))
@@ -612,6 +613,8 @@ def finite_rows(
         blocks = {"time": ticks[:, None].astype(np.float64)} | blocks
     keep = np.ones(len(values["gyro"]), dtype=bool)
     for name, block in blocks.items():
+        if np.isfinite(block.sum()):  # only if every term is; much faster than a check of each
+            continue
         bad = ~np.isfinite(block)
         if not bad.any():
             continue

@@ -207,6 +207,8 @@ def unrolled(time: Array) -> tuple[Array, list[int]]:
     first hour of the next.
     """
     steps = np.diff(time)
+    if not steps.size or steps.min() >= 0.0:
+        return time, []
     falls = np.flatnonzero(
         (steps < -0.5 * WEEK) & (time[:-1] > WEEK - 3600.0) & (time[1:] < 3600.0)
     )
@@ -466,6 +468,8 @@ def _repaired(
     stamps: NDArray[Any], ticks: Array, file: str, findings: list[Finding]
 ) -> tuple[NDArray[np.bool_], Array]:
     steps = np.diff(ticks)
+    if not steps.size or steps.min() > 0:
+        return np.ones(ticks.size, dtype=bool), ticks
     usual = _usual_step(steps)
     added = np.zeros(ticks.size)
     for k in np.flatnonzero(steps < 0):

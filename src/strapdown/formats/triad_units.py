@@ -229,10 +229,11 @@ def values_of_triads(
         except DataError as error:
             findings.append(left_out(raw, triad, error))
             continue
-        empty = int((~np.isfinite(block)).any(axis=1).sum())
-        if not np.isfinite(block).any():
+        bad = np.zeros(1, dtype=bool) if np.isfinite(block.sum()) else ~np.isfinite(block)
+        if bad.all():
             findings.append(_not_used(raw, triad, "io.left-out-without-number"))
-        elif triad == "mag" and empty:
+        elif triad == "mag" and bad.any():
+            empty = int(bad.any(axis=1).sum())
             findings.append(_not_used(raw, triad, "io.left-out-rows-without-number", count=empty))
         else:
             values[triad] = block
@@ -245,7 +246,8 @@ def _not_used(raw: RawLog, triad: str, code: str, **data: Any) -> Finding:
 
 def _triad(raw: RawLog, found: dict[str, Column], triad: str) -> Array:
     parts = [numbers(raw, found[f"{triad}_{a}"].source, f"{triad}_{a}") for a in AXES]
-    return np.column_stack(parts).astype(np.float64, copy=False)
+    # Column by column, as it came and as the Imu table has it.
+    return np.stack(parts, dtype=np.float64, casting="unsafe").T
 
 
 def left_out(raw: RawLog, triad: str, error: DataError) -> Finding:
