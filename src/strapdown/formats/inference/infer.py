@@ -181,7 +181,8 @@ def _part(signals: Signals, step: float | None) -> tuple[Signals, list[int]]:
     triads = {t: v for t in ("gyro", "accel", "mag") if (v := getattr(signals, t)) is not None}
     size = len(next(iter(triads.values()), ()))
     if size <= LARGEST:
-        return replace(signals, **{t: _below(v, HUGE) for t, v in triads.items()}), [0]
+        all_rows: dict[str, Any] = {t: _below(v, HUGE) for t, v in triads.items()}
+        return replace(signals, **all_rows), [0]
     rows = np.arange(size)
     if not all(np.isfinite(v.sum()) for v in triads.values()):
         full = np.logical_and.reduce([np.isfinite(v).all(axis=1) for v in triads.values()])
