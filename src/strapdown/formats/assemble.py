@@ -17,9 +17,11 @@ from strapdown.formats.arrays import numbers, ticks_of
 from strapdown.formats.clocks import (
     RELATIVE,
     Clock,
+    EvenStamps,
     Stamps,
     clock_of_name,
     counted,
+    even_stamps,
     read_stamps,
     with_clock,
 )
@@ -92,6 +94,8 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
         if "time" in found
         else (None, False)
     )
+    even = None if ticks is None else even_stamps(ticks)
+    ticks = ticks if even is None else even.ticks
     said = told_by_numbers(raw, found, options, values, ticks, dated)
     axes = body_axes(raw, options, said, findings)
     units = units_of_triads(raw, found, options, values, said, findings, questions)
@@ -143,6 +147,8 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
             step=slow,
             unit=stamps.unit,
         )
+    if even is not None:
+        findings.append(_said_of_coarse(raw, even, TIME_UNITS[stamps.unit]))
     readings = [time_reading(raw, found, stamps, int(kept[0]))]
     # Column by column in one block, which the table keeps: a long log takes a large part of the
     # memory.
@@ -183,6 +189,18 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
         readings=tuple(readings),
         findings=tuple(findings),
         start=raw.start,
+    )
+
+
+def _said_of_coarse(raw: RawLog, even: EvenStamps, factor: float) -> Finding:
+    return Finding(
+        "io.stamps-spread-evenly",
+        file=raw.name,
+        quantity="time",
+        tick=even.tick * factor,
+        rate=1.0 / (even.step * factor),
+        rate_within=even.tick / (even.step**2 * max(even.ticks.size - 1, 1) * factor),
+        off=even.off * factor,
     )
 
 
