@@ -275,7 +275,7 @@ def _by_sensor(raw: RawLog, found: dict[str, Column]) -> list[RawLog]:
             else:  # a sum is a number only if every term is
                 there[triad] = np.ones(columns[0].size, dtype=bool)
     left_out: list[Finding] = []
-    if "accel" in there and found["accel_x"].why == "by its name":
+    if "accel" in there and found["accel_x"].basis == "name":
         # Rows may say their sensor in a column of text: linear acceleration has no gravity.
         texts = [c[there["accel"]] for c in raw.columns.values() if c.dtype.kind == "O"]
         kinds = [set(map(str, c)) for c in texts]
@@ -429,8 +429,8 @@ def stamps_of_log(
         unit, why = "ns", "dates or times of day"
     elif options.time_unit:
         unit, why = parse_unit(options.time_unit, "time"), "stated by --time-unit"
-    elif column.why == "stated by the file":
-        why = "stated by the file"
+    elif column.basis == "file":
+        why = column.why
     elif unit is None and "time_unit" in said and said["time_unit"].settled:
         unit, why = str(said["time_unit"].value), str(said["time_unit"])
         if unit != "s":

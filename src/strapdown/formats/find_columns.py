@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.formats.columns import INDEXED, ColumnName, read_name
+from strapdown.formats.columns import INDEXED, ColumnName, clocks_with_unit, read_name
 from strapdown.formats.recording import Questions, RawLog, ReadOptions
 from strapdown.formats.vocabularies import BODY_RATES, QUANTITIES, ROS, TRIADS
 from strapdown.units import ACCEL_UNITS, GYRO_UNITS, unit_of
@@ -19,13 +19,36 @@ from strapdown.units import ACCEL_UNITS, GYRO_UNITS, unit_of
 AXES = "xyz"
 
 
+#: What assigns a column to its quantity.
+Basis = Literal["name", "file", "option", "numbers"]
+_WHY: dict[Basis, str] = {
+    "name": "by its name",
+    "file": "stated by the file",
+    "option": "stated by --columns",
+    "numbers": "inferred",
+}
+
+
 @dataclass(frozen=True)
 class Column:
-    """The column of a file that holds a quantity."""
+    """The column of a file that holds a quantity.
+
+    Attributes
+    ----------
+    source : str
+    unit : str or None
+    basis : {'name', 'file', 'option', 'numbers'}
+        What assigns it to the quantity.
+    """
 
     source: str
     unit: str | None
-    why: str
+    basis: Basis
+
+    @property
+    def why(self) -> str:
+        """The basis in words, as a `Reading` shows it."""
+        return _WHY[self.basis]
 
 
 def find_columns(
@@ -60,7 +83,7 @@ def find_columns(
                 )
             wanted[q] = name
     found = {
-        quantity: Column(source, unit, "stated by the file")
+        quantity: Column(source, unit, "file")
         for source, (quantity, unit) in raw.stated.items()
         if source in raw.columns
     }
@@ -69,10 +92,10 @@ def find_columns(
         if not wanted and _is_nameless(raw) and (likely := _likely_columns(raw)):
             asked_here.ask(_nameless(raw, likely), **likely)
             names = list(raw.columns)
-            found |= {q: Column(names[int(k) - 1], None, "inferred") for q, k in likely.items()}
+            found |= {q: Column(names[int(k) - 1], None, "numbers") for q, k in likely.items()}
     for q, name in wanted.items():
         stated = found[q].unit if q in found and found[q].source == name else None
-        found[q] = Column(name, _unit_of(raw, name) or stated, "stated by --columns")
+        found[q] = Column(name, _unit_of(raw, name) or stated, "option")
     if questions is None:
         asked_here.refuse()
     return found
@@ -230,7 +253,7 @@ def _by_name(raw: RawLog, wanted: dict[str, str], questions: Questions) -> dict[
             questions.ask(
                 _several(raw, quantity, names, names[0]), **{quantity: _reference(raw, names[0])}
             )
-    return {q: Column(name, _unit_of(raw, name), "by its name") for q, name in found.items()}
+    return {q: Column(name, _unit_of(raw, name), "name") for q, name in found.items()}
 
 
 def _families(raw: RawLog, said: dict[str, ColumnName]) -> dict[tuple[str, str], Family]:
@@ -365,7 +388,7 @@ def _one_clock(raw: RawLog, names: list[str]) -> list[str]:
     names = [n for n in names if n.lower().endswith("header.stamp")] or names
     # A stamp that a spreadsheet rounded is the same in every row.
     names = [n for n in names if len(set(raw.columns[n][:2].tolist())) > 1] or names
-    names = [n for n in names if _unit_of(raw, n)] or names
+    names = clocks_with_unit(names, lambda n: _unit_of(raw, n) is not None)
     if len(names) > 1 and all(raw.columns[n].dtype.kind in "iuf" for n in names):
         steps = [np.diff(raw.columns[n].astype(np.float64)) for n in names]
         scaled = [s / s.mean() if s.size and s.mean() > 0.0 else None for s in steps]

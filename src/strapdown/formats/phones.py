@@ -60,7 +60,7 @@ def force_of(linear: RawLog, gravity: RawLog) -> RawLog:
     """
     clocks, values = [], []
     for log in (linear, gravity):
-        columns = {q: Column(s, u, "") for s, (q, u) in log.stated.items()}
+        columns = {q: Column(s, u, "file") for s, (q, u) in log.stated.items()}
         clocks.append(Clock(numbers(log, columns["time"].source, "time"), columns["time"].unit))
         found = [numbers(log, columns[f"accel_{a}"].source, f"accel_{a}") for a in XYZ]
         values.append(np.column_stack(found).astype(np.float64))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from strapdown.errors import ConfigError, DataError, StrapdownError, check_choice
 from strapdown.formats.arrays import numbers, ticks_of
 from strapdown.formats.clocks import clock_of_name
-from strapdown.formats.columns import ColumnName, read_name
+from strapdown.formats.columns import ColumnName, clocks_with_unit, read_name
 from strapdown.formats.recording import RawLog
 from strapdown.formats.vocabularies import FIXES, Quantity, Vocabulary
 
@@ -95,19 +95,17 @@ def find_quantities(
     read = {name: read_name(name, of, (units or {}).get(name, "")) for name in columns}
     for evidence in range(3):
         there = set(found) | set(asked)
+        clocks = [n for n, s in read.items() if (s.quantity, s.loose) == ("time", evidence)]
+        others = set(clocks).difference(clocks_with_unit(clocks, lambda n: bool(read[n].unit)))
         for name, said in read.items():
             meant = wanted.get(name) if evidence == 0 else None
-            if name not in wanted and said.loose == evidence and said.quantity not in there:
+            free = name not in wanted and name not in others
+            if free and said.loose == evidence and said.quantity not in there:
                 meant = said.quantity
             if meant is None or (evidence == 2 and not _is_plain(name, read, known)):
                 continue
             sign = said.sign if said.quantity == meant else 1.0
             factor = sign * _factor(meant, known[meant], said.unit, name, file)
-            if meant in found and meant == "time" and found[meant].stated != bool(said.unit):
-                # Of two clocks, the one that states its unit.
-                if not found[meant].stated:
-                    found[meant] = Found(name, factor, True)
-                continue
             if meant in found:
                 raise DataError(
                     "io.column-names-ambiguous",

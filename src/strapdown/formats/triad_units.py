@@ -113,6 +113,7 @@ def units_of_triads(
     """
     units: dict[str, tuple[str, str]] = {}
     asked: set[str] = set()
+    gyro_asked = False
     for triad, block in values.items():
         if triad == "accel" and _without_gravity(found, said):
             findings.append(_not_used(raw, triad, "io.left-out-linear-acceleration"))
@@ -131,7 +132,7 @@ def units_of_triads(
             counts = unit_of_counts(likely)
             if triad != "gyro":
                 # Beside a gyro whose unit is asked, that of its accelerometer is asked, too.
-                if triad == "accel" and units["gyro"][1] == "asked":
+                if triad == "accel" and gyro_asked:
                     if code in _OPEN:
                         questions.ask(error.finding, accel_unit=counts or "UNIT")
                     elif code == "io.unit-undecided" and sure:
@@ -143,6 +144,7 @@ def units_of_triads(
                 unit = str(error.finding.data["sum_of"]).split(" or ")[0]
             questions.ask(error.finding, gyro_unit=unit)
             units[triad] = "rad/s" if unit == "UNIT" else unit, "asked"
+            gyro_asked = True
     mirror = options.axes is not None and mirrored(*parse_axes(options.axes))
     plain = {t: u for t, (u, _) in units.items()}
     report_contradictions(said, plain, asked, mirror, raw.name, findings, questions)
@@ -156,7 +158,7 @@ def _without_gravity(found: dict[str, Column], said: dict[str, Inference]) -> bo
     145), so that less is needed to believe it.
     """
     column, gravity = found["accel_x"], said.get("gravity")
-    if column.why != "by its name" or not read_name(column.source).linear:
+    if column.basis != "name" or not read_name(column.source).linear:
         return False
     if gravity is None or gravity.value != "present":
         return True
@@ -198,8 +200,7 @@ def _stated_unit(
         known |= set(SUMS[triad])
     unit = columns[0].unit
     if len(units) == 1 and unit is not None and unit in known:
-        stated = columns[0].why == "stated by the file"
-        return unit, "stated by the file" if stated else "in its name"
+        return unit, columns[0].why if columns[0].basis == "file" else "in its name"
     if units == {None} and triad in raw.triad_units:
         return parse_unit(raw.triad_units[triad], triad), "stated above the table"
     return None
