@@ -71,9 +71,8 @@ from strapdown.formats import (
 )
 from strapdown.formats.assemble import assemble
 from strapdown.formats.binary import or_sentences
-from strapdown.formats.find_columns import names_of_quantities
+from strapdown.formats.find_columns import names_of_fixes, names_of_quantities
 from strapdown.formats.gnss_fixes import Fixes
-from strapdown.formats.quantity_columns import names_of_fixes
 from strapdown.formats.recording import NoStreamError, RawLog, ReadOptions, Recording
 from strapdown.formats.signs import HEAD, Signs, first_bytes, state_of
 from strapdown.formats.vocabularies import BODY_RATES

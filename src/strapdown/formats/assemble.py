@@ -26,11 +26,16 @@ from strapdown.formats.clocks import (
     with_clock,
 )
 from strapdown.formats.columns import parse_axes, read_name
-from strapdown.formats.find_columns import AXES, Column, advances, find_columns, require_gyro
-from strapdown.formats.inference import Inference
+from strapdown.formats.find_columns import (
+    AXES,
+    Column,
+    advances,
+    find_columns,
+    names_of_fixes,
+    require_gyro,
+)
+from strapdown.formats.inference.conclusion import Inference
 from strapdown.formats.join import join
-from strapdown.formats.judge import LIKELY, SUMS, UNITS, intervals, sampling_of_sums
-from strapdown.formats.quantity_columns import names_of_fixes
 from strapdown.formats.recording import (
     AXES_OF_SENSOR,
     Origin,
@@ -41,10 +46,15 @@ from strapdown.formats.recording import (
     Recording,
 )
 from strapdown.formats.triad_units import (
+    LIKELY,
+    SUMS,
+    UNITS,
     Axes,
     axes_matrix,
     body_axes,
+    intervals,
     mirrored,
+    sampling_of_sums,
     told_by_numbers,
     units_of_triads,
     values_of_triads,

@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
+from strapdown.formats.arrays import is_date, is_day_time, is_stamp
 from strapdown.formats.columns import read_name, split_brackets
-from strapdown.formats.dates import is_date, is_day_time, is_stamp
 from strapdown.formats.preamble import stated_by_keys, stated_rate, stated_units
 from strapdown.formats.recording import RawLog, stated_by
 from strapdown.formats.signs import HEAD, Signs, first_bytes

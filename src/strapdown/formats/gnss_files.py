@@ -16,7 +16,7 @@ from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, ch
 from strapdown.formats import comma2k19, open_stream
 from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import GPS, RELATIVE, UNIX, WEEK, Clock
-from strapdown.formats.find_columns import names_of_quantities
+from strapdown.formats.find_columns import Found, fix_columns, names_of_quantities
 from strapdown.formats.gnss_fixes import (
     NOWHERE,
     RADIUS,
@@ -26,7 +26,6 @@ from strapdown.formats.gnss_fixes import (
     table_of_fixes,
 )
 from strapdown.formats.gnss_pos import QUALITY
-from strapdown.formats.quantity_columns import Found, fix_columns
 from strapdown.formats.recording import RawLog
 from strapdown.formats.trajectory_readers import EARTH
 from strapdown.formats.vocabularies import FIXES

@@ -16,13 +16,13 @@ from synthetic_logs import make
 
 from strapdown.errors import DataError
 from strapdown.formats import read_log
-from strapdown.formats.inference import Signals, infer_signals
 from strapdown.formats.inference.conclusion import (
     Steps,
     infer_time_faults,
     infer_time_unit,
     posterior,
 )
+from strapdown.formats.inference.infer import Signals, infer_signals
 from strapdown.formats.inference.rotation_rate import signed_permutations, turns
 from strapdown.formats.recording import ReadOptions
 from strapdown.tables import ACCEL, GYRO, MAG
