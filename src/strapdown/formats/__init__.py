@@ -68,9 +68,9 @@ from strapdown.formats import (
     xsens,
 )
 from strapdown.formats.assemble import assemble
-from strapdown.formats.binary import or_sentences
 from strapdown.formats.find_columns import names_of_fixes, names_of_quantities
 from strapdown.formats.gnss_fixes import Fixes
+from strapdown.formats.known_formats import or_sentences
 from strapdown.formats.recording import NoStreamError, RawLog, ReadOptions, Recording
 from strapdown.formats.signs import HEAD, Signs, first_bytes, state_of
 from strapdown.formats.vocabularies import BODY_RATES

@@ -31,8 +31,7 @@ from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import UNIX, Clock, unix_from_gps
 from strapdown.formats.gnss_fixes import RADIUS, UNSTATED_VERTICAL, Fixes
 from strapdown.formats.join import join
-from strapdown.formats.known_text import column, optional, stated_by, under
-from strapdown.formats.phones import sensor_log
+from strapdown.formats.known_formats import column, optional, sensor_log, stated_by, under
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, head
 from strapdown.formats.text_columns import parsed

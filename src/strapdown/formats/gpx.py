@@ -16,7 +16,7 @@ import numpy as np
 
 from strapdown.errors import DataError, Finding
 from strapdown.formats.clocks import UNIX
-from strapdown.formats.known_text import selected
+from strapdown.formats.known_formats import selected
 from strapdown.formats.recording import RawLog, library
 from strapdown.formats.signs import Signs
 from strapdown.formats.trajectory_writers import one_line

@@ -34,8 +34,8 @@ from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
-from strapdown.formats.binary import Quantities, damage, solution
 from strapdown.formats.clocks import GPS, WEEK, Clock
+from strapdown.formats.known_formats import Quantities, damage, solution
 from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.signs import Signs, first_bytes
 from strapdown.units import LENGTHS
