@@ -106,7 +106,7 @@ def imu_of_columns(
     `time` ((n,), s). `values` ((n, m)): by `columns`, of `GYRO`, `ACCEL`, `MAG`.
     """
     index = pd.Index(time, name="time")
-    table = pd.DataFrame(values, index=index, columns=list(columns), copy=False)
+    table: pd.DataFrame = pd.DataFrame(values, index=index, columns=list(columns), copy=False)
     table.attrs = {"sampling": sampling, "source": source, "axes": "forward-right-down"}
     check_imu(table)
     return table
