@@ -13,7 +13,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import raw_recordings
 
-from strapdown.formats.inference import infer
+from strapdown.formats.inference.infer import infer
 
 TURNED = ("x-pointing-forward", "y-pointing-left", "z-pointing-up")
 

@@ -560,8 +560,9 @@ def imu_of_arrays(
 def _digest(table: pd.DataFrame) -> str:
     """Hash of stamps, names, values and sampling, to detect changes of a table."""
     digest = hashlib.sha256(repr([*table.columns, table.attrs.get("sampling")]).encode())
-    for array in (table.index.to_numpy(), table.to_numpy()):
-        digest.update(np.ascontiguousarray(array).tobytes())
+    # Column by column: so a table that was read lies in memory, and is not copied.
+    for column in (table.index.to_numpy(), *table.to_numpy().T):
+        digest.update(np.ascontiguousarray(column).data)
     return digest.hexdigest()
 
 

@@ -33,9 +33,7 @@ from strapdown.formats import (
     gnss_pos,
     gopro,
     gpx,
-    gsdc,
     hdf5,
-    inertial_explorer,
     join,
     json_objects,
     kf_gins,
@@ -70,10 +68,9 @@ from strapdown.formats import (
     xsens,
 )
 from strapdown.formats.assemble import assemble
-from strapdown.formats.binary import or_sentences
-from strapdown.formats.find_columns import names_of_quantities
+from strapdown.formats.find_columns import names_of_fixes, names_of_quantities
 from strapdown.formats.gnss_fixes import Fixes
-from strapdown.formats.quantity_columns import names_of_fixes
+from strapdown.formats.known_formats import or_sentences
 from strapdown.formats.recording import NoStreamError, RawLog, ReadOptions, Recording
 from strapdown.formats.signs import HEAD, Signs, first_bytes, state_of
 from strapdown.formats.vocabularies import BODY_RATES
@@ -201,13 +198,13 @@ READERS: dict[str, Reader] = {
     "gnss-logger": Reader.of(gnss_logger, "GnssLogger of Android, device_imu.csv"),
     "gsdc": Reader(
         "Smartphone Decimeter Challenge, ground_truth.csv of 2021",
-        gsdc.detect,
-        {"gnss": gsdc.read},
+        gnss_logger.detect_challenge,
+        {"gnss": gnss_logger.read_challenge},
     ),
     "gsdc-raw": Reader(
         "Smartphone Decimeter Challenge, pseudoranges",
-        gsdc.detect_raw,
-        dict.fromkeys(("imu", "gnss", "reference"), gsdc.refuse),
+        gnss_logger.detect_pseudoranges,
+        dict.fromkeys(("imu", "gnss", "reference"), gnss_logger.refuse_pseudoranges),
     ),
     "smartloc": Reader("smartLoc, CSV of raw GNSS data", smartloc.detect, {"gnss": smartloc.read}),
     "racechrono": Reader.of(racechrono),
@@ -234,7 +231,7 @@ READERS: dict[str, Reader] = {
     "json": Reader("JSON of samples: lines, list", json_objects.detect, {TABLE: json_objects.read}),
     "excel": Reader("Excel workbook (.xlsx)", excel.detect, {TABLE: excel.read}),
     "inertial-explorer": Reader(
-        inertial_explorer.TITLE, inertial_explorer.detect, {"reference": inertial_explorer.read}
+        novatel.EXPLORER_TITLE, novatel.detect_explorer, {"reference": novatel.read_explorer}
     ),
     "kitti-odometry": Reader(
         kitti.ODOMETRY_TITLE,

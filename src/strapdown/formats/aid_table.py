@@ -14,7 +14,7 @@ from strapdown.formats import csv, foot_mounted, holds, open_stream, parquet, re
 from strapdown.formats.arrays import ticks_of
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, unrolled, with_clock
 from strapdown.formats.columns import parse_axes
-from strapdown.formats.quantity_columns import find_quantities
+from strapdown.formats.find_columns import find_quantities
 from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.triad_units import axes_matrix
 from strapdown.formats.vocabularies import DATED, Quantity, Vocabulary, spread_of

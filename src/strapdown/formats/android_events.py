@@ -38,11 +38,10 @@ from strapdown.formats.columns import read_name, split_brackets
 from strapdown.formats.inference.conclusion import infer_accel
 from strapdown.formats.inference.infer import Signals, infer_signals
 from strapdown.formats.join import join
-from strapdown.formats.judge import LIKELY
-from strapdown.formats.known_text import split
-from strapdown.formats.phones import force_of, sensor_log
+from strapdown.formats.known_formats import force_of, sensor_log, split
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, head
+from strapdown.formats.triad_units import LIKELY
 from strapdown.units import TIME_UNITS
 
 KINDS = {

@@ -20,7 +20,7 @@ import numpy as np
 from strapdown.errors import DataError, Finding
 from strapdown.formats.clocks import UNIX
 from strapdown.formats.hdf5 import SIGNATURE, read_arrays
-from strapdown.formats.known_text import column, lacking, split, under
+from strapdown.formats.known_formats import column, lacking, split, under
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, first_bytes, head
 from strapdown.units import unit_of

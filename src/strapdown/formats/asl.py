@@ -24,12 +24,12 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
 from strapdown.formats.columns import read_name
-from strapdown.formats.file_options import FileOptions
 from strapdown.formats.recording import RawLog, TruthInSensorAxes
 from strapdown.formats.sensor_folder import file_member, first_line
 from strapdown.formats.signs import Signs
 from strapdown.formats.tum import poses
 from strapdown.formats.writing import (
+    FileOptions,
     Tables,
     accel_needed,
     imu_not_held,

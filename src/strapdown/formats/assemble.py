@@ -17,18 +17,25 @@ from strapdown.formats.arrays import numbers, ticks_of
 from strapdown.formats.clocks import (
     RELATIVE,
     Clock,
+    EvenStamps,
     Stamps,
     clock_of_name,
     counted,
+    even_stamps,
     read_stamps,
     with_clock,
 )
 from strapdown.formats.columns import parse_axes, read_name
-from strapdown.formats.find_columns import AXES, Column, advances, find_columns, require_gyro
-from strapdown.formats.inference import Inference
+from strapdown.formats.find_columns import (
+    AXES,
+    Column,
+    advances,
+    find_columns,
+    names_of_fixes,
+    require_gyro,
+)
+from strapdown.formats.inference.conclusion import Inference
 from strapdown.formats.join import join
-from strapdown.formats.judge import LIKELY, SUMS, UNITS, intervals, sampling_of_sums
-from strapdown.formats.quantity_columns import names_of_fixes
 from strapdown.formats.recording import (
     AXES_OF_SENSOR,
     Origin,
@@ -39,16 +46,21 @@ from strapdown.formats.recording import (
     Recording,
 )
 from strapdown.formats.triad_units import (
+    LIKELY,
+    SUMS,
+    UNITS,
     Axes,
     axes_matrix,
     body_axes,
+    intervals,
     mirrored,
+    sampling_of_sums,
     told_by_numbers,
     units_of_triads,
     values_of_triads,
 )
 from strapdown.formats.vocabularies import EULERS, QUATERNIONS
-from strapdown.tables import ACCEL, SAMPLINGS, attitude_table, find_gaps, imu_table
+from strapdown.tables import ACCEL, SAMPLINGS, attitude_table, find_gaps, imu_of_columns
 from strapdown.units import TIME_UNITS, factor_of, parse_unit
 
 __all__ = [
@@ -92,6 +104,8 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
         if "time" in found
         else (None, False)
     )
+    even = None if ticks is None else even_stamps(ticks)
+    ticks = ticks if even is None else even.ticks
     said = told_by_numbers(raw, found, options, values, ticks, dated)
     axes = body_axes(raw, options, said, findings)
     units = units_of_triads(raw, found, options, values, said, findings, questions)
@@ -130,7 +144,9 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
             quantity="time",
             size=time.size,
         )
-    slow = float(np.median(np.diff(time)))
+    # A median of steps is at most twice their mean.
+    faster = 2.0 * (time[-1] - time[0]) <= SLOWEST * (time.size - 1)
+    slow = 0.0 if faster else float(np.median(np.diff(time)))
     if slow > SLOWEST and options.time_unit is None and options.rate is None:
         raise DataError(
             "io.too-slow-for-a-gyro",
@@ -141,14 +157,18 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
             step=slow,
             unit=stamps.unit,
         )
+    if even is not None:
+        findings.append(_said_of_coarse(raw, even, TIME_UNITS[stamps.unit]))
     readings = [time_reading(raw, found, stamps, int(kept[0]))]
-    body: dict[str, Array] = {}
+    # Column by column in one block, which the table keeps: a long log takes a large part of the
+    # memory.
+    block = np.empty((3 * len(units), kept.size)).T
+    body = {triad: block[:, 3 * k : 3 * k + 3] for k, triad in enumerate(units)}
     summed = {t for t, (unit, _) in units.items() if unit in SUMS[t]}
     for triad, (unit, why) in units.items():
         first = values[triad][kept[0]].copy()
-        body[triad] = _turned(
-            values, triad, axes, factor_of(unit, {**UNITS[triad], **SUMS[triad]}), kept
-        )
+        factor = factor_of(unit, {**UNITS[triad], **SUMS[triad]})
+        _turn(values.pop(triad), axes, factor, kept, body[triad])
         if triad in summed:
             body[triad] /= intervals(time, kept)
         readings += _readings_of_triad(found, triad, axes, (unit, why), first)
@@ -159,14 +179,8 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     report_gaps(raw.name, time, body["gyro"], findings)
     report_absurd(raw.name, body["gyro"], lambda k: raw.row(int(kept[k])), findings)
     report_weightless(raw.name, body.get("accel"), findings)
-    imu = imu_table(
-        time,
-        body.pop("gyro"),
-        body.pop("accel", None),
-        body.pop("mag", None),
-        sampling=sampling,
-        source=raw.name,
-    )
+    columns = [f"{triad}_{a}" for triad in units for a in AXES]
+    imu = imu_of_columns(time, block, columns, sampling=sampling, source=raw.name)
     if not axes.stated:
         imu.attrs["axes"] = AXES_OF_SENSOR
     with_clock(imu, clock_of_log(raw, found, stamps, dated))
@@ -185,6 +199,18 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
         readings=tuple(readings),
         findings=tuple(findings),
         start=raw.start,
+    )
+
+
+def _said_of_coarse(raw: RawLog, even: EvenStamps, factor: float) -> Finding:
+    return Finding(
+        "io.stamps-spread-evenly",
+        file=raw.name,
+        quantity="time",
+        tick=even.tick * factor,
+        rate=1.0 / (even.step * factor),
+        rate_within=even.tick / (even.step**2 * max(even.ticks.size - 1, 1) * factor),
+        off=even.off * factor,
     )
 
 
@@ -254,9 +280,12 @@ def _by_sensor(raw: RawLog, found: dict[str, Column]) -> list[RawLog]:
     for triad in ("gyro", "accel", "mag"):
         columns = [raw.columns[found[q].source] for a in AXES if (q := f"{triad}_{a}") in found]
         if len(columns) == 3 and all(c.dtype.kind == "f" for c in columns):
-            there[triad] = ~np.logical_and.reduce([np.isnan(c) for c in columns])
+            if any(np.isnan(c.sum()) for c in columns):
+                there[triad] = ~np.logical_and.reduce([np.isnan(c) for c in columns])
+            else:  # a sum is a number only if every term is
+                there[triad] = np.ones(columns[0].size, dtype=bool)
     left_out: list[Finding] = []
-    if "accel" in there and found["accel_x"].why == "by its name":
+    if "accel" in there and found["accel_x"].basis == "name":
         # Rows may say their sensor in a column of text: linear acceleration has no gravity.
         texts = [c[there["accel"]] for c in raw.columns.values() if c.dtype.kind == "O"]
         kinds = [set(map(str, c)) for c in texts]
@@ -317,17 +346,12 @@ def require_accel(recording: Recording) -> None:
         )
 
 
-def _turned(
-    values: dict[str, Array], triad: str, axes: Axes, factor: float, kept: NDArray[np.int64]
-) -> Array:
-    """Take a triad out of `values`: used rows, in body axes and SI units."""
-    # In place and without a copy: a long log takes a large part of the memory.
-    block = values.pop(triad)
-    turned = block[:, axes.axis]
-    del block
-    turned *= np.array(axes.sign)
-    turned *= factor
-    return turned if kept.size == len(turned) else turned[kept]
+def _turn(values: Array, axes: Axes, factor: float, kept: NDArray[np.int64], body: Array) -> None:
+    """Write the used rows of a triad in body axes and SI units to `body`."""
+    for j, (axis, sign) in enumerate(zip(axes.axis, axes.sign, strict=True)):
+        column = values[:, axis]
+        used = column if kept.size == column.size else column[kept]
+        np.multiply(used, sign * factor, out=body[:, j])
 
 
 def _readings_of_triad(
@@ -415,8 +439,8 @@ def stamps_of_log(
         unit, why = "ns", "dates or times of day"
     elif options.time_unit:
         unit, why = parse_unit(options.time_unit, "time"), "stated by --time-unit"
-    elif column.why == "stated by the file":
-        why = "stated by the file"
+    elif column.basis == "file":
+        why = column.why
     elif unit is None and "time_unit" in said and said["time_unit"].settled:
         unit, why = str(said["time_unit"].value), str(said["time_unit"])
         if unit != "s":
@@ -523,7 +547,7 @@ def report_absurd(
 
     DataError: a rate is beyond the limit of any rotating body.
     """
-    largest = np.abs(gyro).max(axis=0)
+    largest = np.maximum(gyro.max(axis=0), -gyro.min(axis=0))
     k = int(largest.argmax())
     if largest[k] > IMPOSSIBLE_RATE:
         at = int(np.abs(gyro[:, k]).argmax())
@@ -534,8 +558,10 @@ def report_absurd(
             quantity=f"gyro_{PLAUSIBILITY_AXES[k]}",
             gyro=gyro[at, k],
         )
-    lasting = float(np.quantile(np.sqrt((gyro * gyro).sum(axis=1)), 0.95))
-    if LASTING_RATE < lasting <= largest[k] <= ABSURD_RATE:
+    lasting = 0.0
+    if LASTING_RATE < largest[k] <= ABSURD_RATE:
+        lasting = float(np.quantile(np.sqrt((gyro * gyro).sum(axis=1)), 0.95))
+    if LASTING_RATE < lasting <= largest[k]:
         findings.append(
             Finding(
                 "io.rate-absurd-for-long",
@@ -581,13 +607,16 @@ def report_absurd(
 # Half of a log of a body that is carried, driven or flown has more force than this: only a fall
 # has less.
 WEIGHTLESS = 0.3 * STANDARD_GRAVITY  # m/s²
+#: Rows, spread evenly over a log, of which this is judged.
+SOME = 100_000
 
 
 def report_weightless(name: str, accel: Array | None, findings: list[Finding]) -> None:
     """Report a specific force too small for gravity, which the numbers left open without a unit."""
     if accel is None or any(f.code == "io.no-gravity" for f in findings):
         return
-    usual = float(np.sqrt(np.median((accel * accel).sum(axis=1))))
+    some = accel[:: 1 + len(accel) // SOME]
+    usual = float(np.sqrt(np.median((some * some).sum(axis=1))))
     if usual < WEIGHTLESS:
         reason = Finding("io.evidence-force-too-small", severity="note", usual=usual)
         findings.append(Finding("io.no-gravity", file=name, quantity="accel", reason=reason))
@@ -612,6 +641,8 @@ def finite_rows(
         blocks = {"time": ticks[:, None].astype(np.float64)} | blocks
     keep = np.ones(len(values["gyro"]), dtype=bool)
     for name, block in blocks.items():
+        if np.isfinite(block.sum()):  # only if every term is; much faster than a check of each
+            continue
         bad = ~np.isfinite(block)
         if not bad.any():
             continue

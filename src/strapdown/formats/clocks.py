@@ -207,6 +207,8 @@ def unrolled(time: Array) -> tuple[Array, list[int]]:
     first hour of the next.
     """
     steps = np.diff(time)
+    if not steps.size or steps.min() >= 0.0:
+        return time, []
     falls = np.flatnonzero(
         (steps < -0.5 * WEEK) & (time[:-1] > WEEK - 3600.0) & (time[1:] < 3600.0)
     )
@@ -297,6 +299,78 @@ def counted(columns: Mapping[str, NDArray[Any]]) -> tuple[str, NDArray[np.int64]
                 break
         return name, np.concatenate([[0], np.cumsum(steps)])
     return None
+
+
+# Stamps that are coarser than the samples.
+
+
+#: Share of the samples that repeat the stamp before them, where a clock is coarse; fewest stamps.
+COARSE, FEWEST_STAMPS = 0.5, 5
+#: Of a tick of a coarse clock, how far samples at a constant rate may be outside theirs.
+OFF_TICK = 0.1
+
+
+@dataclass(frozen=True)
+class EvenStamps:
+    """Stamps at a constant rate that fit those of a clock with coarse ticks.
+
+    Attributes
+    ----------
+    ticks : ndarray, (n,)
+        In the unit of the stamps.
+    tick, step : float
+        Tick of the clock and step of the samples, in the unit of the stamps.
+    off : float
+        Largest distance of a stamp from its tick.
+    """
+
+    ticks: NDArray[Any]
+    tick: float
+    step: float
+    off: float
+
+
+def even_stamps(stamps: NDArray[Any]) -> EvenStamps | None:
+    """Spread samples that share the stamps of a coarse clock, as whole seconds of a log of 50 Hz.
+
+    Sample k is at a + k P, and its stamp is the tick that has passed by then, so that the stamps
+    less k P lie within one tick: their range is smallest at the P that fits best, and a is in the
+    middle of what they leave. None if stamps do not repeat, go back, or do not fit within
+    `OFF_TICK`, as with bursts of different sizes.
+    """
+    if stamps.dtype.kind not in "iuf" or stamps.size < FEWEST_STAMPS:
+        return None
+    exact = stamps.astype(np.int64) if stamps.dtype.kind in "iu" else stamps
+    whole = np.diff(exact).astype(np.float64)
+    ends = np.flatnonzero(whole)
+    if ends.size < FEWEST_STAMPS - 1 or ends.size > (1.0 - COARSE) * whole.size:
+        return None
+    tick = float(whole[ends].min())
+    jumps = whole[ends] / tick
+    if not tick > 0.0 or not np.allclose(jumps, np.round(jumps), rtol=0.0, atol=1e-3):
+        return None
+    # First and last sample of each stamp.
+    at = np.unique(np.concatenate([[0], ends, ends + 1, [exact.size - 1]])).astype(np.float64)
+    held = (exact[at.astype(np.int64)] - exact[0]).astype(np.float64)
+
+    def width(step: float) -> float:
+        return float(np.ptp(held - step * at))
+
+    # Convex in the step, which is within a tick over the record of its mean.
+    low, high = ((held[-1] + sign * 2.0 * tick) / at[-1] for sign in (-1.0, 1.0))
+    for _ in range(80):
+        left, right = low + (high - low) / 3.0, high - (high - low) / 3.0
+        low, high = (low, right) if width(left) <= width(right) else (left, high)
+    step = 0.5 * (low + high)
+    rest = held - step * at
+    off = max(0.5 * (width(step) - tick), 0.0)
+    if step <= 0.0 or off > OFF_TICK * tick:
+        return None
+    first = 0.5 * (float(rest.max()) + float(rest.min()) + tick)
+    even = first + step * np.arange(exact.size)
+    if exact.dtype.kind == "i" and step > 1000.0:
+        return EvenStamps(exact[0] + np.rint(even).astype(np.int64), tick, step, off)
+    return EvenStamps(exact[0] + even, tick, step, off)
 
 
 # Time stamps of a log: units, faults and repairs.
@@ -427,6 +501,18 @@ def _refuse_backward(
         return
     k = int(bad[0])
     here, then = stamps[k], stamps[k + 1]
+    if steps[k] == 0 and bad.size > COARSE * steps.size:
+        counts = np.diff(np.flatnonzero(steps))
+        raise DataError(
+            "io.stamps-of-uneven-bursts",
+            file=file,
+            row=row(k + 1),
+            quantity="time",
+            then=then,
+            count=bad.size,
+            least=int(counts.min(initial=steps.size)),
+            most=int(counts.max(initial=1)),
+        )
     if steps[k] == 0:
         raise DataError(
             "io.stamp-repeated",
@@ -466,6 +552,8 @@ def _repaired(
     stamps: NDArray[Any], ticks: Array, file: str, findings: list[Finding]
 ) -> tuple[NDArray[np.bool_], Array]:
     steps = np.diff(ticks)
+    if not steps.size or steps.min() > 0:
+        return np.ones(ticks.size, dtype=bool), ticks
     usual = _usual_step(steps)
     added = np.zeros(ticks.size)
     for k in np.flatnonzero(steps < 0):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from strapdown.errors import ConfigError, check_choice
@@ -39,7 +40,14 @@ from strapdown.formats.vocabularies import (
 )
 from strapdown.units import FACTORS, OF_LOGS, find_unit, unit_of, unit_words
 
-__all__ = ["ColumnName", "parse_axes", "parse_column_option", "read_name", "split_brackets"]
+__all__ = [
+    "ColumnName",
+    "clocks_with_unit",
+    "parse_axes",
+    "parse_column_option",
+    "read_name",
+    "split_brackets",
+]
 
 
 _AXES = "xyz"
@@ -213,6 +221,11 @@ def _without_unit(text: str, of: Vocabulary) -> tuple[str, str | None]:
         if sign.start() and not member and (unit := unit_of(rest, kinds)):
             return re.sub(r"\s+in$", "", text[: sign.start()]), unit
     return text, None
+
+
+def clocks_with_unit(names: list[str], has_unit: Callable[[str], bool]) -> list[str]:
+    """Return those of several clocks that state their unit; all if none does."""
+    return [name for name in names if has_unit(name)] or names
 
 
 def _read_words(text: str, unit: str | None, of: Vocabulary, about: bool) -> ColumnName:

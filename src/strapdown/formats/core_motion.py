@@ -21,8 +21,7 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import Finding
 from strapdown.formats import csv
 from strapdown.formats.columns import read_name
-from strapdown.formats.known_text import column, names_of, stated_by, under
-from strapdown.formats.phones import AXES
+from strapdown.formats.known_formats import AXES, column, names_of, stated_by, under
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs
 

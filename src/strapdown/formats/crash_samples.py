@@ -13,7 +13,7 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats.clocks import EPOCH
 from strapdown.formats.crash_record import CrashChannel
 from strapdown.formats.inference.conclusion import infer_time_unit
-from strapdown.formats.judge import what_numbers_say
+from strapdown.formats.triad_units import what_numbers_say
 from strapdown.units import TIME_UNITS
 
 __all__ = [

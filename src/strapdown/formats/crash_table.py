@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
-from strapdown.formats.arrays import numbers, ticks_of
+from strapdown.formats.arrays import day_nanoseconds, numbers, ticks_of
 from strapdown.formats.columns import read_name
 from strapdown.formats.crash_record import (
     CHANGE_NOTE,
@@ -30,7 +30,6 @@ from strapdown.formats.crash_record import (
     unique,
 )
 from strapdown.formats.crash_samples import ONE_STEP, Clock, seconds_of
-from strapdown.formats.dates import day_nanoseconds
 from strapdown.formats.recording import RawLog
 from strapdown.formats.vocabularies import CRASHES
 from strapdown.units import FACTORS, OF_CRASHES, find_unit

@@ -14,8 +14,8 @@ from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.formats.clocks import EPOCH
 from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord
 from strapdown.formats.crash_samples import Clock, last_midnight, past_midnight, seconds_of
-from strapdown.formats.inference import Signals, infer_signals
-from strapdown.formats.judge import what_numbers_say
+from strapdown.formats.inference.infer import Signals, infer_signals
+from strapdown.formats.triad_units import what_numbers_say
 from strapdown.tables import ACCEL, GYRO, SAMPLINGS
 from strapdown.units import FACTORS, OF_CRASHES, TIME_UNITS, find_unit
 

@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
+from strapdown.formats.arrays import is_date, is_day_time, is_stamp
 from strapdown.formats.columns import read_name, split_brackets
-from strapdown.formats.dates import is_date, is_day_time, is_stamp
 from strapdown.formats.preamble import stated_by_keys, stated_rate, stated_units
 from strapdown.formats.recording import RawLog, stated_by
 from strapdown.formats.signs import HEAD, Signs, first_bytes
@@ -179,6 +179,8 @@ _ARRIVAL = re.compile(r"(\d\d:\d\d:\d\d\.\d+) -> ?")
 _ENDED = re.compile(r"[^;]*,[^;]*;\s*")
 # A sentence with its name and checksum: "$VNYMR,1.5,…*69".
 _SENTENCE = re.compile(r"(\$\w+)(,[^*]*)\*[0-9A-Fa-f]{2}\s*")
+# "IMU: 20, 0.1, …": one word before the numbers of every row.
+_TAGGED = re.compile(r"\s*([A-Za-z]\w*):[ \t]*(?=[+-]?[\d.][^:=]*$)")
 # "ax: 0.12 g," or "ax = 0.12": a name, its value, and its unit where a sign ends the field.
 _PLAIN = r"[+-]?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?"
 _NAME = r"[A-Za-z_][\w ./()\[\]^²³°-]{0,40}?"
@@ -215,6 +217,13 @@ def _rewritten(numbered: Lines) -> Lines:
     if len(sentences) == 1 and "" not in sentences:
         numbered = [(row, _SENTENCE.sub(r"\1\2", line)) for row, line in numbered]
         top = numbered[:SEARCHED]
+    tags = {m[1] if m else "" for m in (_TAGGED.match(line) for _, line in top)}
+    if len(tags) == 1 and "" not in tags:
+        # Three numbers are a vector of that name.
+        between = separator_of(top[0][1])
+        if between is not None and top[0][1].count(between) > 2:
+            numbered = [(row, _TAGGED.sub(rf"\1{between}", line)) for row, line in numbered]
+            top = numbered[:SEARCHED]
     stamped = sum(_ARRIVAL.match(line) is not None for _, line in top)
     if 2 * stamped > len(top):
         stamps = [_ARRIVAL.match(line) for _, line in numbered]

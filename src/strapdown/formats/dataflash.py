@@ -26,8 +26,8 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.errors import DataError, Finding
-from strapdown.formats.binary import Quantities, damage, interpolated, solution, turned
 from strapdown.formats.clocks import RELATIVE, Clock
+from strapdown.formats.known_formats import Quantities, damage, interpolated, solution, turned
 from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.signs import Signs
 

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.formats.clocks import RELATIVE, UNIX
 from strapdown.formats.join import join
-from strapdown.formats.known_text import lacking
+from strapdown.formats.known_formats import lacking
 from strapdown.formats.recording import RawLog, library
 from strapdown.formats.signs import Signs
 

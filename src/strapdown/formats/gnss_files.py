@@ -16,8 +16,9 @@ from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, ch
 from strapdown.formats import comma2k19, open_stream
 from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import GPS, RELATIVE, UNIX, WEEK, Clock
-from strapdown.formats.find_columns import names_of_quantities
+from strapdown.formats.find_columns import Found, fix_columns, names_of_quantities
 from strapdown.formats.gnss_fixes import (
+    NOWHERE,
     RADIUS,
     UNSTATED_VERTICAL,
     Fixes,
@@ -25,7 +26,6 @@ from strapdown.formats.gnss_fixes import (
     table_of_fixes,
 )
 from strapdown.formats.gnss_pos import QUALITY
-from strapdown.formats.quantity_columns import Found, fix_columns
 from strapdown.formats.recording import RawLog
 from strapdown.formats.trajectory_readers import EARTH
 from strapdown.formats.vocabularies import FIXES
@@ -58,7 +58,7 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
     """
     found = _in_units(raw, fix_columns(raw, options.columns), options.units)
     raw = _rows_of_fixes(raw, found)
-    _refuse_missing(raw, found)
+    _refuse_missing(raw, found, stated=options.datum_height is not None)
 
     def values(quantity: str) -> Array:
         return found[quantity].values(raw, quantity)
@@ -125,11 +125,14 @@ def _in_units(raw: RawLog, found: dict[str, Found], units: Mapping[str, str]) ->
 #: Columns of a position, each set with its order; heights of a geodetic position, the first counts.
 _GEODETIC, _ECEF, _LOCAL = ("lat", "lon"), ("ecef_x", "ecef_y", "ecef_z"), ("north", "east")
 _HEIGHTS = ("alt", "alt_msl", "alt_take_off", "alt_unstated")
-_LEVELS = {"alt_msl": "sea", "alt_take_off": "take-off", "alt_unstated": "unstated"}
+_LEVELS = {"alt_msl": "sea", "alt_take_off": "take-off", "alt_unstated": "unstated", "": NOWHERE}
 
 
-def _refuse_missing(raw: RawLog, found: dict[str, Found]) -> None:
-    """Refuse a table without time or position; ask what nameless coordinates are."""
+def _refuse_missing(raw: RawLog, found: dict[str, Found], *, stated: bool) -> None:
+    """Refuse a table without time or position; ask what nameless coordinates are.
+
+    `stated`: whether the user states a height, which a table without any then has.
+    """
     missing = [q for q in ("time",) if q not in found]
     if not any(set(one) <= found.keys() for one in (_GEODETIC, _ECEF, _LOCAL)):
         if not missing and (axes := _bare_axes(raw)):
@@ -155,7 +158,7 @@ def _refuse_missing(raw: RawLog, found: dict[str, Found]) -> None:
                 z=z,
             )
         missing += [q for q in _GEODETIC if q not in found]
-    if set(_GEODETIC) <= found.keys() and not set(_HEIGHTS) & found.keys():
+    if set(_GEODETIC) <= found.keys() and not set(_HEIGHTS) & found.keys() and not stated:
         missing.append("alt")
     if missing:
         raise DataError(
@@ -186,7 +189,10 @@ def _place(
     if options.origin is not None and not local:
         raise ConfigError("io.origin-beside-positions", file=raw.name, quantity="origin")
     if set(_GEODETIC) <= found.keys():
-        kind = next(q for q in _HEIGHTS if q in found)
+        kind = next((q for q in _HEIGHTS if q in found), "")
+        if not kind:
+            level = np.column_stack([values("lat"), values("lon")])
+            return np.column_stack([level, np.zeros(len(level))]), kind
         if "alt_msl" in found and "geoid" in found:
             kind = "alt"
         return np.column_stack([values("lat"), values("lon"), _height(found, values, raw)]), kind

@@ -25,6 +25,9 @@ Sd = float | tuple[float, float, float]
 RADIUS = float(np.sqrt(-2.0 * np.log(0.32)))
 #: Standard deviation of an unstated vertical accuracy, relative to the horizontal one.
 UNSTATED_VERTICAL = 2.0
+#: Level of fixes without heights, and the standard deviation of the one that a user states for all
+#: of them, m, unless stated, too.
+NOWHERE, STATED_HEIGHT_SD = "nowhere", 100.0
 #: Typical accuracies of receivers, m and m/s.
 POSITION_SDS = "0.02 suits RTK, 1 a code receiver with corrections, 5 one without"
 VELOCITY_SDS = "0.05 suits RTK, 0.3 a code receiver by Doppler, 1 one that differences places"
@@ -106,8 +109,9 @@ class Fixes:
         As field 6 of NMEA 0183 GGA.
     zero_is_unknown : bool
         A standard deviation of zero means unknown.
-    heights_from : {'sea', 'take-off', 'unstated', ''}
-        Level from which heights are counted; empty: from the ellipsoid.
+    heights_from : {'sea', 'take-off', 'unstated', 'nowhere', ''}
+        Level from which heights are counted; empty: from the ellipsoid; 'nowhere': the fixes have
+        none.
     height_source : str
         Column or field of the heights, for messages.
     findings : list of Finding
@@ -150,6 +154,8 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
                 )
             )
     position_sd = _sd(fixes, "position", asked, count)
+    if fixes.heights_from == NOWHERE:
+        position_sd[:, 2] = _sd_of_stated_height(fixes, asked, options, count)
     asked = options.velocity_sd
     unstated = fixes.velocity is not None and fixes.velocity_sd is None and asked is None
     if unstated and options.unstated_velocity_sd is not None:
@@ -206,17 +212,41 @@ def _over_ellipsoid(fixes: Fixes, options: GnssOptions) -> Array:
             source=fixes.height_source,
             **(proposed if fixes.heights_from != "take-off" else {}),
         )
+    if fixes.heights_from != NOWHERE:
+        fixes.findings.append(_said_of_datum(fixes, options.datum_height))
+    return np.asarray(fixes.place + np.array([0.0, 0.0, options.datum_height]))
+
+
+def _said_of_datum(fixes: Fixes, height: float) -> Finding:
+    return Finding(
+        "io.heights-with-datum" if height else "io.heights-stay-over-datum",
+        severity="note",
+        file=fixes.name,
+        quantity="alt",
+        source=fixes.height_source,
+        datum_height=height,
+    )
+
+
+def _sd_of_stated_height(fixes: Fixes, asked: Sd | None, options: GnssOptions, count: int) -> float:
+    """Return the standard deviation, m, of one height that is stated for all fixes.
+
+    All of them together say of the height what the statement does once, or its error, which is the
+    same in each, would average out: the variance is that of the statement times their number.
+    """
+    sd = STATED_HEIGHT_SD if asked is None or np.ndim(asked) == 0 else float(np.asarray(asked)[2])
+    used = sd * float(np.sqrt(count))
     fixes.findings.append(
         Finding(
-            "io.heights-with-datum" if options.datum_height else "io.heights-stay-over-datum",
-            severity="note",
+            "io.fixes-with-stated-height",
             file=fixes.name,
             quantity="alt",
-            source=fixes.height_source,
-            datum_height=options.datum_height,
+            height=options.datum_height,
+            sd=sd,
+            used=used,
         )
     )
-    return np.asarray(fixes.place + np.array([0.0, 0.0, options.datum_height]))
+    return used
 
 
 def first_of(rows: NDArray[np.int64]) -> int | None:

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.formats.clocks import RELATIVE, Clock, with_clock
 from strapdown.formats.columns import read_name
-from strapdown.formats.known_text import column, lacking, under
+from strapdown.formats.known_formats import column, lacking, under
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, head
 from strapdown.rotation import dcm_from_euler

@@ -7,6 +7,12 @@ m/s² or µT about the axes of the phone, and three biases estimated by Android,
 subtracted. ``device_imu.csv`` is the same table with a header (kaggle.com/competitions/
 smartphone-decimeter-2022/data). ``Fix`` is a position, with height above the ellipsoid of WGS 84
 (Android, Location.getAltitude).
+
+``ground_truth.csv`` of 2021 (kaggle.com/competitions/google-smartphone-decimeter-challenge/data):
+``millisSinceGpsEpoch`` without leap seconds, ``latDeg``, ``lngDeg``,
+``heightAboveWgs84EllipsoidM``, ``speedMps``, ``courseDegree`` from north. Its stamps are turned to
+Unix time, the clock of ``device_imu.csv``. That of 2022 and later is a table of ``Fix`` lines.
+``device_gnss.csv`` and ``…_derived.csv`` have pseudoranges, which are not positions.
 """
 
 from __future__ import annotations
@@ -22,10 +28,10 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
-from strapdown.formats.clocks import UNIX, Clock
+from strapdown.formats.clocks import UNIX, Clock, unix_from_gps
 from strapdown.formats.gnss_fixes import RADIUS, UNSTATED_VERTICAL, Fixes
 from strapdown.formats.join import join
-from strapdown.formats.phones import sensor_log
+from strapdown.formats.known_formats import column, optional, sensor_log, stated_by, under
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, head
 from strapdown.formats.text_columns import parsed
@@ -317,3 +323,37 @@ def _of_one_provider(
             )
         )
     return keep
+
+
+# Google Smartphone Decimeter Challenge: `ground_truth.csv` of 2021, and what cannot be read.
+
+
+CHALLENGE_TRUTH = "collectionName,phoneName,millisSinceGpsEpoch,latDeg,lngDeg,"
+PSEUDORANGES = ("ReceivedSvTimeNanos", "receivedSvTimeInGpsNanos", "rawPrM")
+
+
+detect_challenge = Signs(text=rf"\A{CHALLENGE_TRUTH}")
+
+
+detect_pseudoranges = Signs(
+    text=rf"\A(?:MessageType|collectionName),.*(?:{'|'.join(PSEUDORANGES)})"
+)
+
+
+def read_challenge(path: Path) -> RawLog:
+    """Read the positions of the reference receiver."""
+    raw = under(path)
+    held = {"time": (unix_from_gps(column(raw, "millisSinceGpsEpoch") * 1e-3), "s")}
+    names = {
+        "lat": ("latDeg", "deg"),
+        "lon": ("lngDeg", "deg"),
+        "alt": ("heightAboveWgs84EllipsoidM", "m"),
+        "speed": ("speedMps", "m/s"),
+        "course": ("courseDegree", "deg"),
+    }
+    return stated_by(raw, held | optional(raw, names), clock=UNIX)
+
+
+def refuse_pseudoranges(path: Path) -> RawLog:
+    """Refuse pseudoranges."""
+    raise DataError("io.pseudoranges", file=path.name)

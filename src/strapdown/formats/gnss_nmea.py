@@ -20,10 +20,10 @@ import numpy as np
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.clocks import RELATIVE, UNIX, Clock
-from strapdown.formats.file_options import FileOptions
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.signs import Signs
 from strapdown.formats.writing import (
+    FileOptions,
     Tables,
     dates,
     fixes_not_held,

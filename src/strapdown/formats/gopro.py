@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError
 from strapdown.formats.clocks import RELATIVE, UNIX
 from strapdown.formats.join import join
-from strapdown.formats.known_text import from_json, lacking
+from strapdown.formats.known_formats import from_json, lacking
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, first_bytes, head
 from strapdown.units import unit_of

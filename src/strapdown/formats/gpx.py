@@ -16,12 +16,12 @@ import numpy as np
 
 from strapdown.errors import DataError, Finding
 from strapdown.formats.clocks import UNIX
-from strapdown.formats.file_options import FileOptions
-from strapdown.formats.known_text import selected
+from strapdown.formats.known_formats import selected
 from strapdown.formats.recording import RawLog, library
 from strapdown.formats.signs import Signs
-from strapdown.formats.trajectory_csv import one_line
+from strapdown.formats.trajectory_writers import one_line
 from strapdown.formats.writing import (
+    FileOptions,
     Tables,
     dates,
     fixes_not_held,

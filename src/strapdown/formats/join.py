@@ -30,7 +30,7 @@ COVERED = 0.9
 
 
 @dataclass(frozen=True)
-class Clock:
+class OwnClock:
     """Stamps as in a log, and their unit if known."""
 
     ticks: NDArray[Any]
@@ -121,7 +121,7 @@ def known_only(stated: dict[str, tuple[str, str | None]]) -> dict[str, tuple[str
     return {source: said for source, said in stated.items() if said[0] in QUANTITIES}
 
 
-def clock_of(log: RawLog, found: dict[str, Column]) -> Clock:
+def clock_of(log: RawLog, found: dict[str, Column]) -> OwnClock:
     """Return the stamps of a log.
 
     DataError: the log has no stamps, or they are not numbers.
@@ -134,10 +134,10 @@ def clock_of(log: RawLog, found: dict[str, Column]) -> Clock:
             columns=list(log.columns),
         )
     ticks, dated = ticks_of(log, found["time"].source, found["time"].unit)
-    return Clock(ticks, "ns" if dated else found["time"].unit)
+    return OwnClock(ticks, "ns" if dated else found["time"].unit)
 
 
-def in_seconds(clock: Clock, origin: Clock) -> Array:
+def in_seconds(clock: OwnClock, origin: OwnClock) -> Array:
     """Convert to seconds since the first stamp of another clock; ticks subtract exactly."""
     first = origin.ticks[np.argmax(np.isfinite(origin.ticks.astype(np.float64)))]
     ours, theirs = TIME_UNITS[clock.unit or "s"], TIME_UNITS[origin.unit or "s"]

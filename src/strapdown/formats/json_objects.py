@@ -18,7 +18,7 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.android_events import joined, kind_of
 from strapdown.formats.columns import read_name
-from strapdown.formats.known_text import from_json
+from strapdown.formats.known_formats import from_json
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, head
 

@@ -18,14 +18,14 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.arrays import numbers, told_by_file_rows
 from strapdown.formats.clocks import GPS, WEEK, Clock, clock_of, unrolled, with_clock
-from strapdown.formats.file_options import FileOptions
 from strapdown.formats.gnss_fixes import Fixes
-from strapdown.formats.judge import intervals
 from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.signs import HEAD, Signs, first_bytes
-from strapdown.formats.trajectory_csv import write_decimals
+from strapdown.formats.trajectory_writers import write_decimals
+from strapdown.formats.triad_units import intervals
 from strapdown.formats.writing import (
     SECOND,
+    FileOptions,
     Tables,
     accel_needed,
     gps_ns,

@@ -33,7 +33,6 @@ from strapdown.evaluation.trajectory_differences import trajectory_at
 from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import RELATIVE, UNIX, Clock, with_clock
-from strapdown.formats.file_options import FileOptions
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.recording import NoStreamError, RawLog, TruthInSensorAxes
 from strapdown.formats.signs import Signs, head
@@ -41,6 +40,7 @@ from strapdown.formats.tum import trajectory_of_poses
 from strapdown.formats.writing import (
     FLU,
     SECOND,
+    FileOptions,
     Tables,
     accel_needed,
     dates,

@@ -12,7 +12,7 @@ from pathlib import Path
 
 from strapdown.errors import DataError
 from strapdown.formats import csv
-from strapdown.formats.known_text import under
+from strapdown.formats.known_formats import under
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs
 

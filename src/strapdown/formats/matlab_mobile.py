@@ -20,8 +20,7 @@ import pandas as pd
 from strapdown.errors import DataError
 from strapdown.formats.clocks import RELATIVE
 from strapdown.formats.join import join
-from strapdown.formats.known_text import column, lacking, optional, stated_by, under
-from strapdown.formats.phones import sensor_log
+from strapdown.formats.known_formats import column, lacking, optional, sensor_log, stated_by, under
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, head
 

@@ -31,8 +31,8 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.errors import DataError, Finding
-from strapdown.formats.binary import Quantities, damage, solution, turned
 from strapdown.formats.clocks import RELATIVE, Clock
+from strapdown.formats.known_formats import Quantities, damage, solution, turned
 from strapdown.formats.recording import NoStreamError, RawLog, library
 from strapdown.formats.signs import Signs, first_bytes
 

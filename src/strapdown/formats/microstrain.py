@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError
 from strapdown.formats.clocks import GPS, UNIX, WEEK
-from strapdown.formats.known_text import column, lacking, stated_by, under
+from strapdown.formats.known_formats import column, lacking, stated_by, under
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, head
 

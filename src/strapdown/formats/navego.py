@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.formats import hdf5
 from strapdown.formats.clocks import RELATIVE, Clock, with_clock
-from strapdown.formats.known_text import lacking
+from strapdown.formats.known_formats import lacking
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs
 from strapdown.tables import trajectory_table

@@ -23,8 +23,7 @@ from strapdown.formats import csv
 from strapdown.formats.clocks import RELATIVE
 from strapdown.formats.columns import read_name
 from strapdown.formats.join import join
-from strapdown.formats.known_text import lacking
-from strapdown.formats.phones import AXES, XYZ
+from strapdown.formats.known_formats import AXES, XYZ, lacking
 from strapdown.formats.recording import RawLog
 from strapdown.formats.sensor_folder import (
     Member,

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.clocks import RELATIVE
-from strapdown.formats.known_text import column, lacking, optional, stated_by, under
-from strapdown.formats.phones import AXES
+from strapdown.formats.known_formats import AXES, column, lacking, optional, stated_by, under
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs
 

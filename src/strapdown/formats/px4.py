@@ -22,9 +22,9 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
-from strapdown.formats.binary import Quantities, damage, interpolated, solution, turned
 from strapdown.formats.clocks import RELATIVE, Clock
 from strapdown.formats.join import join
+from strapdown.formats.known_formats import Quantities, damage, interpolated, solution, turned
 from strapdown.formats.recording import NoStreamError, RawLog, library
 from strapdown.formats.signs import Signs
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError
 from strapdown.formats.clocks import UNIX
 from strapdown.formats.join import join
-from strapdown.formats.known_text import column, lacking, selected, split, stated_by, under
+from strapdown.formats.known_formats import column, lacking, selected, split, stated_by, under
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, head
 from strapdown.units import OF_TABLES, unit_of

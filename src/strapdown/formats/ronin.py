@@ -14,7 +14,7 @@ from pathlib import Path
 from strapdown.errors import DataError, Finding
 from strapdown.formats import hdf5
 from strapdown.formats.arrays import raw_log
-from strapdown.formats.phones import AXES
+from strapdown.formats.known_formats import AXES
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs
 

@@ -27,14 +27,14 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding, check_choice
-from strapdown.formats.binary import Quantities, damage, solution
 from strapdown.formats.clocks import RELATIVE, UNIX, Clock
-from strapdown.formats.file_options import FileOptions
+from strapdown.formats.known_formats import Quantities, damage, solution
 from strapdown.formats.recording import NoStreamError, RawLog, library
 from strapdown.formats.signs import Signs, first_bytes
 from strapdown.formats.writing import (
     FLU,
     SECOND,
+    FileOptions,
     Tables,
     imu_not_held,
     not_held,

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from strapdown.earth import radii_of_curvature
 from strapdown.errors import DataError, Finding
-from strapdown.formats.binary import damage, solution
 from strapdown.formats.clocks import GPS, RELATIVE, WEEK, Clock
+from strapdown.formats.known_formats import damage, solution
 from strapdown.formats.signs import Signs, first_bytes
 
 TITLE = "Applanix SBET trajectory"

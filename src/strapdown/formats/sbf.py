@@ -20,9 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
-from strapdown.formats.binary import Quantities, damage
 from strapdown.formats.clocks import GPS
 from strapdown.formats.join import join
+from strapdown.formats.known_formats import Quantities, damage
 from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.signs import Signs, first_bytes
 from strapdown.frames import C_ne, geodetic_from_ecef

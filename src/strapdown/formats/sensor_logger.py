@@ -32,8 +32,7 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.clocks import UNIX
 from strapdown.formats.join import join
-from strapdown.formats.known_text import lacking
-from strapdown.formats.phones import AXES, force_of, sensor_log
+from strapdown.formats.known_formats import AXES, force_of, lacking, sensor_log
 from strapdown.formats.recording import RawLog
 from strapdown.formats.sensor_folder import (
     Member,

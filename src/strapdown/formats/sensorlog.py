@@ -26,8 +26,15 @@ from strapdown.formats import csv
 from strapdown.formats.arrays import ticks_of
 from strapdown.formats.clocks import RELATIVE, UNIX
 from strapdown.formats.join import join
-from strapdown.formats.known_text import column, lacking, optional, selected, stated_by
-from strapdown.formats.phones import force_of, sensor_log
+from strapdown.formats.known_formats import (
+    column,
+    force_of,
+    lacking,
+    optional,
+    selected,
+    sensor_log,
+    stated_by,
+)
 from strapdown.formats.recording import RawLog
 from strapdown.formats.sensor_folder import file_member, first_line
 from strapdown.formats.signs import Signs

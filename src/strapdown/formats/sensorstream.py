@@ -15,7 +15,7 @@ import numpy as np
 from strapdown.errors import DataError, Finding
 from strapdown.formats.csv import SUFFIXES, decoded
 from strapdown.formats.join import join
-from strapdown.formats.phones import force_of, sensor_log
+from strapdown.formats.known_formats import force_of, sensor_log
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, first_bytes
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from strapdown.errors import Finding
 from strapdown.formats.clocks import GPS
-from strapdown.formats.known_text import column, selected, stated_by, under
+from strapdown.formats.known_formats import column, selected, stated_by, under
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs
 

@@ -15,7 +15,7 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats import open_stream
 from strapdown.formats.arrays import told_by_file_rows
 from strapdown.formats.clocks import Clock, with_clock
-from strapdown.formats.quantity_columns import Found, find_quantities
+from strapdown.formats.find_columns import Found, find_quantities
 from strapdown.formats.recording import RawLog
 from strapdown.formats.vocabularies import TRAJECTORIES
 from strapdown.rotation import within_half_turn

@@ -21,9 +21,9 @@ from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.clocks import Clock, clock_of_name, with_clock
-from strapdown.formats.file_options import TUM_FRAMES, FileOptions
 from strapdown.formats.signs import HEAD, Signs
-from strapdown.formats.trajectory_csv import one_line
+from strapdown.formats.trajectory_writers import one_line
+from strapdown.formats.writing import TUM_FRAMES, FileOptions
 from strapdown.frames import ecef_from_geodetic, geodetic_from_ecef, q_ne
 from strapdown.rotation import Q_NED_ENU
 from strapdown.tables import EULER, VELOCITY, check_trajectory, places_of, trajectory_table

@@ -25,9 +25,9 @@ import numpy as np
 import pandas as pd
 
 from strapdown.errors import DataError, Finding
-from strapdown.formats.binary import Quantities, damage, solution
 from strapdown.formats.clocks import GPS, RELATIVE, WEEK, Clock, gps_from_unix
 from strapdown.formats.join import join
+from strapdown.formats.known_formats import Quantities, damage, solution
 from strapdown.formats.recording import NoStreamError, RawLog, library
 from strapdown.formats.signs import Signs, first_bytes
 

@@ -36,10 +36,9 @@ from strapdown.formats import (
     tum,
 )
 from strapdown.formats.clocks import GPS, RELATIVE, UNIX, clock_of, time_column
-from strapdown.formats.file_options import FileOptions
-from strapdown.formats.trajectory_csv import write_csv, write_parquet
-from strapdown.formats.trajectory_maps import write_geojson, write_kml
+from strapdown.formats.trajectory_writers import write_csv, write_geojson, write_kml, write_parquet
 from strapdown.formats.writing import (
+    FileOptions,
     Tables,
     decimal_seconds,
     is_trajectory,

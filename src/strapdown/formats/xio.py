@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from strapdown.errors import Finding
-from strapdown.formats.known_text import column, selected, under
+from strapdown.formats.known_formats import column, selected, under
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, head
 

@@ -20,8 +20,8 @@ from strapdown.config.navigation import CommandTable, LiveTable, NavigationSpec
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.formats.clocks import EPOCH
 from strapdown.formats.columns import parse_axes
-from strapdown.formats.file_options import FileOptions
 from strapdown.formats.writers import WRITERS
+from strapdown.formats.writing import FileOptions
 from strapdown.live.lines import (
     END,
     AidRows,

@@ -17,8 +17,8 @@ from strapdown.config.navigation import STAGES, NavigationSpec
 from strapdown.errors import ConfigError
 from strapdown.formats import csv
 from strapdown.formats.clocks import clock_of
-from strapdown.formats.file_options import FileOptions
 from strapdown.formats.writers import write_trajectory
+from strapdown.formats.writing import FileOptions
 from strapdown.navigation.consistency import Inconsistency
 from strapdown.navigation.heading_integrity import REASONS, STATUSES
 from strapdown.navigation.integrity import QUANTITY_REASONS, Repeated

@@ -11,7 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.dsp.samples import running_integral, true_runs
-from strapdown.formats.trajectory_maps import thin
+from strapdown.formats.trajectory_writers import thin
 from strapdown.frames import ned_from_geodetic
 from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.report.chart import BLACK, BLUE, GREY, PURPLE, VERMILLION, Array, Chart, Line, Panel

@@ -14,8 +14,7 @@ from strapdown.bundle import Seal, check_destination, sensor_file, write_bundle,
 from strapdown.config import SimulateSpec, TrajectorySpec
 from strapdown.ellipsoids import WGS84, Ellipsoid, find_ellipsoid
 from strapdown.errors import check_choice
-from strapdown.formats.trajectory_csv import one_line
-from strapdown.formats.trajectory_maps import thin
+from strapdown.formats.trajectory_writers import one_line, thin
 from strapdown.formats.writers import (
     TRAJECTORY_FORMATS,
     WRITERS,

@@ -20,9 +20,9 @@ from strapdown.formats import csv, parquet, read_log
 from strapdown.formats.clocks import clock_of
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.gnss_fixes import GnssOptions
-from strapdown.formats.judge import LIKELY
 from strapdown.formats.recording import CHECKED
 from strapdown.formats.trajectory_readers import read_trajectory
+from strapdown.formats.triad_units import LIKELY
 from strapdown.formats.writers import imu_columns, table_columns
 from strapdown.systems.doctor import Diagnosis, LogDiagnosis
 from strapdown.tables import POSITION_SD, QUATERNION, TRAJECTORY, VELOCITY, VELOCITY_SD

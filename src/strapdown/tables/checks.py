@@ -277,8 +277,8 @@ def find_gaps(time: ArrayLike) -> list[Gap]:
     """
     stamps = np.asarray(time, dtype=np.float64)
     steps = np.diff(stamps)
-    if steps.size < 2:
-        return []
+    if steps.size < 2 or steps.max() <= 3.0 * steps.min():
+        return []  # faster, as most records are regular
     usual = float(np.quantile(steps, 0.95, method="lower"))
     return [
         Gap(float(stamps[k]), float(stamps[k + 1]), usual, int(k) + 1)

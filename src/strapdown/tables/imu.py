@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
@@ -16,6 +18,7 @@ from strapdown.tables.checks import (
     MAG,
     PHI,
     THETA,
+    Array,
     as_array,
     check_columns,
     check_rows,
@@ -85,13 +88,25 @@ def imu_table(
         field = as_array(mag, 3, "mag", source)
         check_same_length(source, time=stamps, mag=field)
         columns, values = columns + MAG, np.hstack([values, field])
-    table = pd.DataFrame(
-        values,
-        index=pd.Index(stamps, name="time"),
-        columns=columns,
-        # Arrays stacked above are not shared: no copy needed.
-        copy=accel is None and mag is None,
-    )
+    # Arrays stacked above are not shared: no copy needed.
+    values = values.copy() if accel is None and mag is None else values
+    return imu_of_columns(stamps, values, columns, sampling=sampling, source=source)
+
+
+def imu_of_columns(
+    time: Array,
+    values: Array,
+    columns: Sequence[str],
+    *,
+    sampling: str = "instantaneous",
+    source: str | None = None,
+) -> pd.DataFrame:
+    """Make an Imu table of an array, which it keeps without a copy; otherwise as `imu_table`.
+
+    `time` ((n,), s). `values` ((n, m)): by `columns`, of `GYRO`, `ACCEL`, `MAG`.
+    """
+    index = pd.Index(time, name="time")
+    table: pd.DataFrame = pd.DataFrame(values, index=index, columns=list(columns), copy=False)
     table.attrs = {"sampling": sampling, "source": source, "axes": "forward-right-down"}
     check_imu(table)
     return table
@@ -129,7 +144,10 @@ def check_imu(table: pd.DataFrame) -> None:
             count=len(table),
         )
     check_time(index_of(table), source)
-    check_rows(values_of(table, columns), columns, source)
+    # No copy in another layout only to check it.
+    whole = list(table.columns) == columns
+    values = table.to_numpy(dtype=np.float64) if whole else values_of(table, columns)
+    check_rows(values, columns, source)
 
 
 # Increments tables: integrated angular rate per step, before any algorithm.

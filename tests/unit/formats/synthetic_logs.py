@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from strapdown.formats.inference import Inference, Signals
+from strapdown.formats.inference.conclusion import Inference
+from strapdown.formats.inference.infer import Signals
 from strapdown.units import ACCEL_UNITS, GYRO_UNITS, MAG_UNITS, TIME_UNITS
 
 GRAVITY = 9.81

@@ -19,6 +19,7 @@ from strapdown.formats.clocks import (
     Clock,
     clock_of,
     clock_of_name,
+    even_stamps,
     gps_from_unix,
     leap_seconds,
     on_clock_of,
@@ -129,3 +130,46 @@ def test_weeks_and_unknown_clocks():
     assert unchanged is same and said is None
     for other in (Clock(RELATIVE), Clock(UNIX)):
         assert on_clock_of(table([5.0], other), table([0.0], Clock(RELATIVE)))[1] is None
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.37, 0.99])
+@pytest.mark.parametrize("step", [0.02, 0.0203, 0.1])
+def test_samples_of_whole_seconds_are_spread_evenly(step, offset):
+    """Within one tick over the record in length, and within a tick in the start."""
+    true = 1_700_000_000.0 + offset + step * np.arange(1500)
+    even = even_stamps(np.floor(true).astype(np.int64))
+    assert abs(even.step - step) < 1.0 / 1499
+    assert np.abs(even.ticks - true).max() < 1.0
+    assert even.tick == 1.0
+    # Doubles of a clock of 1970 have 0.24 µs.
+    assert np.ptp(np.diff(even.ticks)) < 1e-6
+    assert even.off < 1e-6
+    # The same in nanoseconds, whole numbers.
+    ns = even_stamps(np.floor(true).astype(np.int64) * 10**9)
+    assert ns.ticks.dtype == np.int64
+    assert np.allclose((ns.ticks - ns.ticks[0]) * 1e-9, even.ticks - even.ticks[0], atol=1e-6)
+
+
+def test_stamps_that_do_not_fit_a_constant_rate_are_not_spread():
+    second = np.floor(0.3 + 0.02 * np.arange(3000))
+    assert even_stamps(second) is not None
+    # 15 samples lost, 0.3 s, which no constant rate explains; a loss within the tolerance is kept.
+    assert even_stamps(np.delete(second, slice(1510, 1525))) is None
+    assert even_stamps(np.delete(second, slice(1510, 1514))).off <= 0.1
+    assert even_stamps(second[::-1].copy()) is None
+    assert even_stamps(np.arange(100.0)) is None
+    # Ticks of different lengths are bursts.
+    assert even_stamps(np.repeat([0.0, 1.0, 2.7, 3.1, 4.0, 5.3, 6.0], 20)) is None
+
+
+def test_a_log_of_whole_seconds_says_what_its_stamps_leave_open(tmp_path):
+    rows = [f"{int(1.7e9 + 0.4 + 0.02 * k)},0.1,{0.01 * (k % 7)},{k}e-4" for k in range(1000)]
+    path = tmp_path / "log.csv"
+    path.write_text("time_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s\n" + "\n".join(rows))
+    log = read_log(path)
+    (said,) = [f for f in log.findings if f.code == "io.stamps-spread-evenly"]
+    assert (said.severity, said.data["tick"]) == ("warning", 1.0)
+    assert abs(said.data["rate"] - 50.0) < said.data["rate_within"]
+    # A tick in the 20 s of the record, of 50 Hz.
+    assert said.data["rate_within"] == pytest.approx(50.0 / 20.0, rel=0.01)
+    assert len(log.imu) == 1000

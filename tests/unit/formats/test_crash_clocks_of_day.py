@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from strapdown.formats.arrays import day_nanoseconds
 from strapdown.formats.crash_records import read_crash_record
 from strapdown.formats.crash_triad import triad_of_channels
-from strapdown.formats.dates import day_nanoseconds
 
 PREAMBLE = (
     "Messprotokoll\nLogger: KD-500\nDatum: 12.03.2024\nKanaele: 3\nAbtastrate: 500 Hz\n"

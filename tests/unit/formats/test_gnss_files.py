@@ -315,6 +315,19 @@ def test_fixes_without_a_height_say_so(tmp_path):
         table_of(tmp_path, "time_ms,lat,lng,accuracy", [f"{1000 * k},45,7,5" for k in range(5)])
 
 
+@pytest.mark.parametrize(("asked", "sd"), [(None, 100.0), (4.0, 100.0), ((4.0, 4.0, 30.0), 30.0)])
+def test_fixes_without_a_height_have_the_stated_one_and_say_it_once(tmp_path, asked, sd):
+    """The information of all of them on the height is that of one statement."""
+    rows = [f"{1000 * k},45,7,5" for k in range(25)]
+    path = written(tmp_path, "\n".join(["time_ms,lat,lng,accuracy", *rows]))
+    table = read_gnss(path, GnssOptions(datum_height=250.0, position_sd=asked))
+    assert (table["alt"] == 250.0).all()
+    assert np.sum(1.0 / table["down_sd"] ** 2) ** -0.5 == pytest.approx(sd, rel=1e-12)
+    assert table["north_sd"].iloc[0] == pytest.approx(4.0 if asked else 5.0 / 1.5096, rel=1e-3)
+    (said,) = [f for f in table.attrs["findings"] if f.code == "io.fixes-with-stated-height"]
+    assert (said.severity, said.data["height"], said.data["sd"]) == ("warning", 250.0, sd)
+
+
 @pytest.mark.parametrize(("sign", "fixes"), [(1.0, True), (-1.0, False)])
 def test_negative_numbers_are_no_standard_deviations(tmp_path, sign, fixes):
     rows = [f"{0.5 * k:.3f} 45.0 7.0 100.0 {sign * 0.02} 0.03 0.04" for k in range(20)]

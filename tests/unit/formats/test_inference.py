@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import sys
 from collections import Counter
 from pathlib import Path
@@ -15,12 +16,19 @@ from synthetic_logs import make
 
 from strapdown.errors import DataError
 from strapdown.formats import read_log
-from strapdown.formats.inference import Signals, infer_signals
-from strapdown.formats.inference.conclusion import infer_time_faults, infer_time_unit, posterior
+from strapdown.formats.inference.conclusion import (
+    Steps,
+    infer_time_faults,
+    infer_time_unit,
+    posterior,
+)
+from strapdown.formats.inference.infer import Signals, infer_signals
 from strapdown.formats.inference.rotation_rate import signed_permutations, turns
 from strapdown.formats.recording import ReadOptions
 from strapdown.tables import ACCEL, GYRO, MAG
 
+# The package has a function of this name.
+infer_module = importlib.import_module("strapdown.formats.inference.infer")
 SEEDS = range(100)
 
 
@@ -179,16 +187,16 @@ def test_units_of_time(stamps, unit):
 
 def test_faults_of_time_are_counted():
     t = np.arange(200) * 0.01
-    assert infer_time_faults(t).value == "none"
-    assert infer_time_faults(np.ones(50)).value == "constant stamps"
+    assert infer_time_faults(Steps.of(t)).value == "none"
+    assert infer_time_faults(Steps.of(np.ones(50))).value == "constant stamps"
     t[50:] += 5.0
     t[100] = t[99]
     t[150] = t[140]
-    assert infer_time_faults(t).value == "1 repeated, 1 backwards, 1 jump"
+    assert infer_time_faults(Steps.of(t)).value == "1 repeated, 1 backwards, 1 jump"
     wrapped = (65_000 + np.arange(200) * 10) % 2**16
-    assert "wrapped (a counter of 16 bits)" in infer_time_faults(wrapped).value
+    assert "wrapped (a counter of 16 bits)" in infer_time_faults(Steps.of(wrapped)).value
     bursts = np.repeat(np.arange(40) * 0.05, 5) + np.tile(np.arange(5) * 1e-4, 40)
-    assert infer_time_faults(bursts).value == "bursts"
+    assert infer_time_faults(Steps.of(bursts)).value == "bursts"
 
 
 def test_a_posterior_is_a_probability():
@@ -398,3 +406,78 @@ def test_beside_an_accelerometer_in_mg_a_gyro_is_rather_in_thousandths():
     ]
     assert share[0] > 0.8
     assert share[0] > share[1] + 0.1
+
+
+def of_half_an_hour(rate=100.0, seed=11):
+    """Alternately at rest and tumbling, for minutes each, with a sensor's noise."""
+    from scipy.spatial.transform import Rotation
+
+    rng = np.random.default_rng(seed)
+    t = np.arange(-1, int(1800 * rate) + 1) / rate
+    moves = np.clip(6.0 * np.sin(2 * np.pi * t / 400.0), 0.0, 1.0)
+    angles = moves[:, None] * np.column_stack(
+        [0.9 * np.sin(0.7 * t), 0.6 * np.sin(0.9 * t + 1), 0.8 * np.sin(0.5 * t)]
+    )
+    turn = Rotation.from_euler("ZYX", angles)
+    gyro = (turn[:-2].inv() * turn[2:]).as_rotvec() * rate / 2.0
+    accel = turn[1:-1].inv().apply([0.0, 0.0, 9.81])
+    n = len(gyro)
+    return (
+        t[1:-1],
+        gyro + rng.normal(0.0, 0.003, (n, 3)),
+        accel + rng.normal(0.0, 0.05, (n, 3)),
+    )
+
+
+def test_parts_of_a_long_log_tell_what_all_of_it_tells(monkeypatch):
+    """Rests and motion are both in the parts, and all stamps count."""
+    t, gyro, accel = of_half_an_hour()
+    t[50_000:] += 3.0
+    signals = Signals(t, np.degrees(gyro), accel / 9.81)
+    parts = said(signals)
+    monkeypatch.setattr(infer_module, "LARGEST", t.size)
+    whole = said(signals)
+    for quantity, value in {
+        "gyro_unit": "deg/s",
+        "gyro_form": "rate",
+        "gyro_axes": "x,y,z",
+        "accel_unit": "g",
+        "gravity": "present",
+        "time_faults": "1 jump",
+    }.items():
+        assert parts[quantity].value == whole[quantity].value == value
+        assert parts[quantity].settled
+        assert whole[quantity].settled
+    assert parts["up_axis"].value == whole["up_axis"].value == "z"
+    # As often within 30° of upright, to two standard deviations of ten parts that are or are not.
+    share = [i["up_axis"].evidence[0].data["percent"] for i in (parts, whole)]
+    assert abs(share[0] - share[1]) < 200 * np.sqrt(0.25 / 10)
+
+
+def test_few_rows_with_a_gyro_in_a_long_log_are_judged():
+    """As where another sensor's rows are between, and its cells empty."""
+    t, gyro, accel = turning()
+    n, m = 60_000, len(t)
+    rows = slice(23_000, 23_000 + m)
+    stamps = np.arange(n) * 0.01
+    g, f = np.full((n, 3), np.nan), np.full((n, 3), np.nan)
+    g[rows], f[rows] = gyro, accel
+    found = said(Signals(stamps, g, f))
+    assert (found["gyro_unit"].value, found["gyro_unit"].settled) == ("rad/s", True)
+    assert found["accel_unit"].value == "m/s2"
+
+
+def test_an_arm_is_seen_in_the_parts_of_a_long_log():
+    """Its derivative is not taken from one part to the next, at 2 kHz 200 rows a step of it."""
+    rate, n = 2000.0, 200_000
+    t = np.arange(n) / rate
+    w = np.column_stack([5.0 * np.sin(6.0 * t), 4.0 * np.sin(7.3 * t + 1), 3.0 * np.sin(5.1 * t)])
+    a = np.gradient(w, t, axis=0)
+    r = np.array([0.2, -0.1, 0.5])
+    force = np.cross(a, r) + np.cross(w, np.cross(w, r))
+    starts = list(range(0, 60_000, 20_000))
+    rows = np.concatenate([np.arange(k, k + 20_000) for k in (0, 90_000, 180_000)])
+    arm = infer_module.fit_arm(1 / rate, w[rows], force[rows], starts)
+    across = infer_module.fit_arm(1 / rate, w[rows], force[rows])
+    assert arm.alone > infer_module.ARM_ALONE
+    assert arm.alone > across.alone

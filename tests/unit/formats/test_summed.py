@@ -9,7 +9,7 @@ from tests.coded import coded
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import ReadOptions, read_log
 from strapdown.formats.columns import read_name
-from strapdown.formats.judge import intervals
+from strapdown.formats.triad_units import intervals
 from strapdown.tables import ACCEL, GYRO
 
 G0 = 9.80665

@@ -558,19 +558,34 @@ def test_linear_acceleration_beside_an_angular_velocity_is_that_of_ros(tmp_path,
 @pytest.mark.parametrize(("every", "proposed"), [(50, True), (4, False)])
 def test_a_repair_that_loses_much_of_a_log_is_not_proposed(tmp_path, every, proposed):
     time, gyro, accel = moving()
-    # One stamp again in 50 rows is a fault of rows; three in four are bursts.
-    again = np.arange(len(time)) % every == 1 if proposed else np.arange(len(time)) % every != 0
+    # One stamp again in 50 rows is a fault of rows; three in four are bursts, of any size.
+    again = np.arange(len(time)) % every == 1
+    if not proposed:
+        again = np.random.default_rng(4).random(len(time)) > 1.0 / every
+        again[0] = False
     time[again] = np.nan
     time = np.maximum.accumulate(np.nan_to_num(time))
     path = table_of(tmp_path / "a.csv", ["t [s]", *UNITS], (time, gyro, accel))
     with pytest.raises(DataError) as refused:
         read_log(path)
     finding = refused.value.finding
-    assert finding.code == "io.stamp-repeated"
-    assert ("--repair" in finding.data["flags"]) == proposed
+    assert finding.code == ("io.stamp-repeated" if proposed else "io.stamps-of-uneven-bursts")
+    assert ("--repair" in finding.data.get("flags", "")) == proposed
     kept = read_log(path, ReadOptions(repair=True)).findings
     dropped = next(f for f in kept if f.code == "io.rows-not-later-left-out")
     assert dropped.severity == ("note" if proposed else "warning")
+
+
+def test_a_word_before_the_numbers_of_each_row_is_a_column(tmp_path):
+    time, gyro, accel = moving()
+    rows = np.column_stack([time, gyro, accel])
+    lines = [f"IMU: {', '.join(f'{v:.6f}' for v in row)}" for row in rows]
+    path = tmp_path / "a.txt"
+    path.write_text("\n".join(lines))
+    with pytest.raises(DataError, check=coded("io.nameless-columns")) as refused:
+        read_log(path)
+    columns = dict(refused.value.finding.data["answers"])
+    assert (columns["time"], columns["gyro_x"], columns["accel_z"]) == ("2", "3", "8")
 
 
 @pytest.mark.parametrize(("last", "rows"), [("0.21", 59), ("0.2131", 60)])

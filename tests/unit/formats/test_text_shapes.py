@@ -8,8 +8,8 @@ from tests.coded import coded
 
 from strapdown.errors import DataError
 from strapdown.formats import csv, read_log, read_raw
+from strapdown.formats.arrays import excel_nanoseconds, nanoseconds_of
 from strapdown.formats.clocks import counted
-from strapdown.formats.dates import excel_nanoseconds, nanoseconds_of
 from strapdown.formats.preamble import stated_rate, stated_units
 from strapdown.formats.recording import ReadOptions
 from strapdown.formats.text_columns import BLOCK, columns_at_once

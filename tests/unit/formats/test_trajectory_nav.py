@@ -9,8 +9,8 @@ import pytest
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import ReadOptions, read_log
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, clock_of, with_clock
-from strapdown.formats.trajectory_csv import write_decimals
 from strapdown.formats.trajectory_readers import read_trajectory
+from strapdown.formats.trajectory_writers import write_decimals
 from strapdown.formats.writers import FileOptions, write_trajectory
 from strapdown.tables import ACCEL, GYRO, TRAJECTORY, trajectory_table
 

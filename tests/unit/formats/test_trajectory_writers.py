@@ -18,8 +18,7 @@ from strapdown import rotation
 from strapdown.ellipsoids import ELLIPSOIDS
 from strapdown.errors import ConfigError, DataError
 from strapdown.evaluation.trajectory_differences import trajectory_differences
-from strapdown.formats.trajectory_csv import write_error_csv
-from strapdown.formats.trajectory_maps import cut_at_date_line, thin
+from strapdown.formats.trajectory_writers import cut_at_date_line, thin, write_error_csv
 from strapdown.formats.writers import (
     TRAJECTORY_FORMATS,
     WRITERS,

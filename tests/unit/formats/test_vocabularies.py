@@ -9,7 +9,7 @@ from tests.coded import coded
 from strapdown.errors import DataError
 from strapdown.formats.columns import read_name
 from strapdown.formats.crash_table import channel_name
-from strapdown.formats.quantity_columns import find_quantities
+from strapdown.formats.find_columns import find_quantities
 from strapdown.formats.vocabularies import CRASHES, FIXES, LOGS, TRAJECTORIES
 
 TABLES = (FIXES, TRAJECTORIES)

@@ -155,20 +155,62 @@ _EPOCH_RATIO = 30.0
 COUNTER_BITS = (16, 24, 31, 32)
 
 
-def time_unit_probabilities(stamps: NDArray[Any]) -> dict[str, float]:
+@dataclass(frozen=True)
+class Steps:
+    """Steps between the stamps of a log, in their unit; computed once for all questions.
+
+    Attributes
+    ----------
+    stamps : ndarray, (n,)
+        Finite, as in the log.
+    steps : ndarray, (n - 1,)
+    forward : ndarray
+        The positive ones.
+    mean : float
+        Of the forward steps within 50 times their median, as the clock may be set between; 0 if
+        time does not advance.
+    median : float
+        Of the forward steps; 0 if time does not advance.
+    """
+
+    stamps: NDArray[Any]
+    steps: Array
+    forward: Array
+    mean: float
+    median: float
+
+    @classmethod
+    def of(cls, stamps: NDArray[Any]) -> Steps:
+        """Compute the steps of stamps."""
+        exact = stamps.astype(np.int64) if stamps.dtype.kind in "iub" else stamps
+        steps = np.diff(exact).astype(np.float64, copy=False)
+        # No copy where all are forward.
+        forward = steps if steps.size and steps.min() > 0 else steps[steps > 0]
+        if not forward.size:
+            return cls(stamps, steps, forward, 0.0, 0.0)
+        usual = forward
+        if forward.max() > 50.0 * forward.min():
+            # Bursts have a median far below the mean; the 90 % quantile covers both.
+            usual = forward[forward <= 50.0 * np.quantile(forward, 0.9)]
+        # Rows of one burst that share a stamp count, too.
+        repeats = steps.size - int(np.count_nonzero(steps))
+        mean = float(usual.sum() / (usual.size + repeats))
+        return cls(stamps, steps, forward, mean, float(np.median(forward)))
+
+
+def time_unit_probabilities(steps: Steps) -> dict[str, float]:
     """Compute the probability of each unit of time, from the mean step and the first stamp.
 
-    `stamps` ((n,)): finite, as in the log. Returns keys of `units.TIME_UNITS`, the most
-    probable first; empty if time does not advance.
+    Returns keys of `units.TIME_UNITS`, the most probable first; empty if time does not advance.
     """
-    step = mean_step(stamps)
-    if not step > 0:
+    if not steps.mean > 0:
         return {}
+    stamps = steps.stamps
     fractional = stamps.dtype.kind == "f" and bool((stamps[:1000] % 1.0 != 0).any())
     first = float(stamps[0])
     weights = {}
     for unit, factor in TIME_UNITS.items():
-        rate = -np.log10(step * factor)
+        rate = -np.log10(steps.mean * factor)
         log10 = float(np.interp(rate, _RATE, _RATE_DENSITY)) + np.log10(_PRIOR[unit])
         if fractional:
             log10 += np.log10(_FRACTIONAL[unit])
@@ -183,95 +225,78 @@ def infer_time_unit(stamps: NDArray[Any]) -> Inference:
 
     `stamps` ((n,)): finite, as in the log.
     """
-    found = time_unit_probabilities(stamps)
+    steps = Steps.of(stamps)
+    found = time_unit_probabilities(steps)
     if not found:
         static = (evidence("io.evidence-time-does-not-advance"),)
         return Inference("time_unit", None, 1.0, static, (), "--time-unit")
-    step = mean_step(stamps)
     return conclude(
-        "time_unit", dict(found), time_evidence(stamps, step, next(iter(found))), "--time-unit"
+        "time_unit", dict(found), time_evidence(steps, next(iter(found))), "--time-unit"
     )
 
 
-def time_evidence(stamps: NDArray[Any], step: float, unit: str) -> tuple[Finding, ...]:
+def time_evidence(steps: Steps, unit: str) -> tuple[Finding, ...]:
     """List the evidence of the stamps for a unit."""
-    factor = TIME_UNITS[unit]
-    told = [evidence("io.evidence-mean-step", step=step, rate_hz=1.0 / (step * factor))]
-    if _EPOCH[0] <= float(stamps[0]) * factor <= _EPOCH[1]:
-        year = 1970 + float(stamps[0]) * factor / 31_556_952.0
+    factor, first = TIME_UNITS[unit], float(steps.stamps[0])
+    told = [evidence("io.evidence-mean-step", step=steps.mean, rate_hz=1.0 / (steps.mean * factor))]
+    if _EPOCH[0] <= first * factor <= _EPOCH[1]:
+        year = 1970 + first * factor / 31_556_952.0
         told.append(evidence("io.evidence-year-of-first-stamp", year=int(year)))
     return tuple(told)
 
 
 def mean_step(stamps: NDArray[Any]) -> float:
-    """Average the forward steps within 50 times their median; the clock may be set between."""
-    if stamps.size < 2:
-        return 0.0
-    exact = stamps.astype(np.int64) if stamps.dtype.kind in "iub" else stamps
-    steps = np.diff(exact).astype(np.float64)
-    forward = steps[steps > 0]
-    if not forward.size:
-        return 0.0
-    # Bursts have a median far below the mean; the 90 % quantile covers both.
-    usual = forward[forward <= 50.0 * np.quantile(forward, 0.9)]
-    # Rows of one burst that share a stamp count, too.
-    repeats = int((steps == 0).sum())
-    return float(usual.sum() / (usual.size + repeats))
+    """Average the forward steps within 50 times their median; see `Steps`."""
+    return Steps.of(stamps).mean
 
 
-def infer_rate(stamps: NDArray[Any], unit: str) -> Inference:
+def infer_rate(steps: Steps, unit: str) -> Inference:
     """Infer the nominal sampling rate in Hz, with its regularity.
 
-    `stamps` ((n,)). `unit`: of the stamps.
+    `unit`: of the stamps.
     """
-    step = mean_step(stamps) * TIME_UNITS[unit]
-    exact = stamps.astype(np.int64) if stamps.dtype.kind in "iub" else stamps
-    steps = np.diff(exact).astype(np.float64) * TIME_UNITS[unit]
-    forward = steps[steps > 0]
-    if not (step > 0):
+    forward, mean, median = steps.forward, steps.mean, steps.median
+    if not mean > 0:
         static = (evidence("io.evidence-time-does-not-advance"),)
         return Inference("rate", None, 1.0, static, (), "--rate")
-    median = float(np.median(forward))
-    within = float(np.mean(np.abs(forward - median) <= 0.1 * median))
-    missing = float(np.maximum(np.round(forward / step) - 1.0, 0.0).sum())
+    largest = float(forward.max())
+    within, missing = 1.0, 0.0
+    if max(largest - median, median - float(forward.min())) > 0.1 * median:
+        within = float(np.mean(np.abs(forward - median) <= 0.1 * median))
+    if largest >= 1.5 * mean:
+        missing = float(np.maximum(np.round(forward / mean) - 1.0, 0.0).sum())
+    factor = TIME_UNITS[unit]
     told = (
-        evidence("io.evidence-steps", mean_ms=1e3 * step, median_ms=1e3 * median),
+        evidence("io.evidence-steps", mean_ms=1e3 * mean * factor, median_ms=1e3 * median * factor),
         evidence("io.evidence-regular-steps", percent=100 * within),
         evidence("io.evidence-missing-samples", missing=missing),
     )
     # With bursts the mean is the sensor's rate; with losses the median is.
-    nominal = 1.0 / median if within > 0.5 else 1.0 / step
+    nominal = 1.0 / ((median if within > 0.5 else mean) * factor)
     return Inference("rate", nominal, 1.0 - 1e-4 if within > 0.5 else 0.9, told, (), "--rate")
 
 
-def infer_time_faults(stamps: NDArray[Any]) -> Inference:
-    """Count faults of stamps: repeated, reversed, wrapped, constant, in bursts, jumps.
-
-    `stamps` ((n,)).
-    """
-    exact = stamps.astype(np.int64) if stamps.dtype.kind in "iub" else stamps.astype(np.float64)
-    steps = np.diff(exact).astype(np.float64)
-    forward = steps[steps > 0]
+def infer_time_faults(steps: Steps) -> Inference:
+    """Count faults of stamps: repeated, reversed, wrapped, constant, in bursts, jumps."""
+    stamps, forward, usual = steps.stamps, steps.forward, steps.median
     faults: list[str] = []
     if not forward.size:
         faults.append("constant stamps")
     else:
-        usual = float(np.median(forward))
-        mean = mean_step(stamps)
-        back = np.flatnonzero(steps < 0)
-        bits = [wrap_bits(float(stamps[k]), float(steps[k]), usual) for k in back]
+        back = np.flatnonzero(steps.steps < 0) if forward.size < steps.steps.size else ()
+        bits = [wrap_bits(float(stamps[k]), float(steps.steps[k]), usual) for k in back]
         wrapped = [b for b in bits if b]
-        if repeated := int((steps == 0).sum()):
+        if repeated := steps.steps.size - forward.size - len(back):
             faults.append(f"{repeated} repeated")
         if wrapped:
             faults.append(f"{len(wrapped)} wrapped (a counter of {wrapped[0]} bits)")
         if len(back) > len(wrapped):
             faults.append(f"{len(back) - len(wrapped)} backwards")
-        if jumps := int((forward > max(50.0 * usual, 10.0 * mean)).sum()):
+        if jumps := int(np.count_nonzero(forward > max(50.0 * usual, 10.0 * steps.mean))):
             faults.append(f"{jumps} jump{'s' if jumps > 1 else ''}")
-        if usual < 0.5 * mean or (repeated > 0.3 * steps.size):
+        if usual < 0.5 * steps.mean or (repeated > 0.3 * steps.steps.size):
             faults.append("bursts")
-    told = evidence("io.evidence-count-of-steps", steps=steps.size)
+    told = evidence("io.evidence-count-of-steps", steps=steps.steps.size)
     return Inference(
         "time_faults",
         ", ".join(faults) or "none",

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,13 +15,13 @@ from strapdown.formats.arrays import numbers, ticks_of
 from strapdown.formats.find_columns import AXES, Column, find_columns
 from strapdown.formats.inference.conclusion import (
     Inference,
+    Steps,
     conclude,
     evidence,
     infer_accel,
     infer_rate,
     infer_time_faults,
     infer_up,
-    mean_step,
     posterior,
     time_evidence,
     time_unit_probabilities,
@@ -29,8 +31,11 @@ from strapdown.formats.recording import RawLog, ReadOptions
 from strapdown.units import MAG_UNITS, TIME_UNITS, parse_unit
 
 Array = NDArray[np.float64]
-# Longer logs are sampled in parts with this many rows in total.
-LARGEST = 40_000
+# Of a longer log the signals are judged in contiguous parts, spread evenly over it so that rests
+# and motion are both in them, with this many rows in total. A part lasts long compared with the
+# windows in which gravity rotates (`HALF_WIDTHS`), if the parts are not too few, and never less
+# than one of them.
+LARGEST, MOST_PARTS, LEAST_PARTS, PART, LEAST_PART = 40_000, 16, 3, 40.0, 10.0  # s
 #: Mean step below which stamps do not advance, in their unit: the largest, min, counts 60 s.
 LEAST_ADVANCE = 1e-12
 #: Beyond any value of a sensor and any stamp, in any unit: their products would overflow.
@@ -95,22 +100,19 @@ def _triad(raw: RawLog, found: dict[str, Column], triad: str) -> Array | None:
 def infer_signals(signals: Signals) -> tuple[Inference, ...]:
     """Infer from the numbers of arrays; see `infer`."""
     out: list[Inference] = []
-    signals = replace(
-        signals,
-        stamps=_below(signals.stamps, FAR),
-        gyro=_below(signals.gyro, HUGE),
-        accel=_below(signals.accel, HUGE),
-        mag=_below(signals.mag, HUGE),
-    )
+    signals = replace(signals, stamps=_below(signals.stamps, FAR))
     stamps = _finite(signals.stamps)
-    times = _times(signals, stamps)
-    step = _step(signals, stamps, times)
+    steps = None if stamps is None else Steps.of(stamps)
+    times = _times(signals, steps)
+    step = _step(signals, steps, times)
+    # All stamps tell of the clock; of the rest a part is enough.
+    signals, starts = _part(signals, step)
     force = None
     accel = _finite_rows(signals.accel)
     heard: list[Inference] = []
     if accel is not None:
         unit, form, gravity, usual = infer_accel(accel, step)
-        arm = _arm(signals, step)
+        arm = _arm(signals, step, starts)
         heard = [unit, form, gravity]
         if arm is not None and arm.hides_gravity:
             heard = [_doubted(i, arm) for i in heard]
@@ -136,21 +138,20 @@ def infer_signals(signals: Signals) -> tuple[Inference, ...]:
             if times and next(iter(joint)) != next(iter(times)):
                 # A rotation that fits only in another unit of time is a doubt, not a proof.
                 times = {u: min(p, 0.5) for u, p in times.items()}
-    advance = 0.0 if stamps is None else mean_step(stamps)
-    if stamps is not None and times and advance > LEAST_ADVANCE:
+    if steps is not None and times and steps.mean > LEAST_ADVANCE:
         best = next(iter(times))
-        told = time_evidence(stamps, advance, best)
+        told = time_evidence(steps, best)
         if signals.time_unit is None:
             out.append(conclude("time_unit", {**times}, told, "--time-unit"))
         else:
-            stated = time_unit_probabilities(stamps)
+            stated = time_unit_probabilities(steps)
             out.append(conclude("time_unit", dict(stated), told, "--time-unit"))
-        out.append(infer_time_faults(stamps))
-        out.append(infer_rate(stamps, signals.time_unit or best))
-    elif stamps is not None:
+        out.append(infer_time_faults(steps))
+        out.append(infer_rate(steps, signals.time_unit or best))
+    elif steps is not None:
         nothing = (evidence("io.evidence-time-does-not-advance"),)
         out.append(Inference("time_unit", None, 1.0, nothing, (), "--time-unit"))
-        out.append(infer_time_faults(stamps))
+        out.append(infer_time_faults(steps))
     out += turned
     out += heard
     mag = _finite_rows(signals.mag)
@@ -159,28 +160,53 @@ def infer_signals(signals: Signals) -> tuple[Inference, ...]:
     return tuple(out)
 
 
-def _times(signals: Signals, stamps: NDArray[Any] | None) -> dict[str, float]:
+def _times(signals: Signals, steps: Steps | None) -> dict[str, float]:
     if signals.time_unit is not None:
         return {signals.time_unit: 1.0}
-    if stamps is None:
+    if steps is None:
         return {"s": 1.0} if signals.rate else {}
-    return time_unit_probabilities(stamps)
+    return time_unit_probabilities(steps)
 
 
-def _step(signals: Signals, stamps: NDArray[Any] | None, times: dict[str, float]) -> float | None:
-    if stamps is not None and times:
+def _step(signals: Signals, steps: Steps | None, times: dict[str, float]) -> float | None:
+    if steps is not None and times:
         best = next(iter(times))
-        step = mean_step(stamps) * TIME_UNITS[best]
+        step = steps.mean * TIME_UNITS[best]
         return step if step > 0 and (times[best] > 0.9) else None
     return 1.0 / signals.rate if signals.rate else None
 
 
-def _arm(signals: Signals, step: float | None) -> Arm | None:
+def _part(signals: Signals, step: float | None) -> tuple[Signals, list[int]]:
+    """Select the rows that are judged, and where their contiguous parts begin among them."""
+    triads = {t: v for t in ("gyro", "accel", "mag") if (v := getattr(signals, t)) is not None}
+    size = len(next(iter(triads.values()), ()))
+    if size <= LARGEST:
+        all_rows: dict[str, Any] = {t: _below(v, HUGE) for t, v in triads.items()}
+        return replace(signals, **all_rows), [0]
+    rows = np.arange(size)
+    if not all(np.isfinite(v.sum()) for v in triads.values()):
+        full = np.logical_and.reduce([np.isfinite(v).all(axis=1) for v in triads.values()])
+        rows = np.flatnonzero(full) if full.any() else rows
+    count, width = LEAST_PARTS, LARGEST // LEAST_PARTS
+    if step is not None:
+        count = int(np.clip(LARGEST * step / PART, LEAST_PARTS, MOST_PARTS))
+        width = max(LARGEST // count, round(LEAST_PART / step))
+    if count * width >= rows.size:
+        count, width = 1, rows.size
+    firsts = np.linspace(0, rows.size - width, count).astype(np.int64)
+    rows = rows[(firsts[:, None] + np.arange(width)).reshape(-1)]
+    part: dict[str, Any] = {t: _below(v[rows], HUGE) for t, v in triads.items()}
+    if signals.stamps is not None:
+        part["stamps"] = signals.stamps[rows]
+    return replace(signals, **part), list(range(0, count * width, width))
+
+
+def _arm(signals: Signals, step: float | None, starts: list[int]) -> Arm | None:
     if step is None or signals.gyro is None or signals.accel is None:
         return None
     kept = np.isfinite(signals.gyro).all(axis=1) & np.isfinite(signals.accel).all(axis=1)
-    first = np.flatnonzero(kept)[:LARGEST]
-    return fit_arm(step, signals.gyro[first], signals.accel[first])
+    before = np.concatenate([[0], np.cumsum(kept)])[starts]
+    return fit_arm(step, signals.gyro[kept], signals.accel[kept], before.tolist())
 
 
 def _doubted(one: Inference, arm: Arm) -> Inference:
@@ -222,7 +248,9 @@ def _sign() -> Inference:
 
 def _below(values: NDArray[Any] | None, limit: float) -> NDArray[Any] | None:
     """Replace values beyond a limit by NaN; integers stay."""
-    if values is None or values.dtype.kind != "f" or not (np.abs(values) >= limit).any():
+    if values is None or values.dtype.kind != "f" or not values.size:
+        return values
+    if -limit < values.min() and values.max() < limit:  # faster than each value; not of NaN
         return values
     return np.where(np.abs(values) < limit, values, np.nan)
 
@@ -230,19 +258,21 @@ def _below(values: NDArray[Any] | None, limit: float) -> NDArray[Any] | None:
 def _finite(values: NDArray[Any] | None) -> NDArray[Any] | None:
     if values is None:
         return None
-    kept = values[np.isfinite(values)] if values.dtype.kind == "f" else values
+    # A sum is finite if every term is.
+    whole = values.dtype.kind != "f" or np.isfinite(values.sum())
+    kept = values if whole else values[np.isfinite(values)]
     return kept if kept.size > 1 else None
 
 
 def _finite_rows(values: Array | None) -> Array | None:
     if values is None:
         return None
-    kept = values[np.isfinite(values).all(axis=1)]
+    kept = values if np.isfinite(values.sum()) else values[np.isfinite(values).all(axis=1)]
     return kept if len(kept) > 1 else None
 
 
 def _increasing(signals: Signals, force: Array | None) -> tuple[Array, Array, Array | None]:
-    """Select finite rows with increasing stamps, no more than needed."""
+    """Select finite rows with increasing stamps."""
     assert signals.gyro is not None
     gyro = signals.gyro
     keep = np.isfinite(gyro).all(axis=1)
@@ -261,11 +291,6 @@ def _increasing(signals: Signals, force: Array | None) -> tuple[Array, Array, Ar
         latest = np.maximum.accumulate(np.where(keep, ticks, -np.inf))
         keep &= ticks > np.concatenate([[-np.inf], latest[:-1]])
     rows = np.flatnonzero(keep)
-    if rows.size > LARGEST:
-        # First, middle and last part, each contiguous; sums do not cross the gaps between.
-        part = LARGEST // 3
-        middle = rows.size // 2 - part // 2
-        rows = np.concatenate([rows[:part], rows[middle : middle + part], rows[-part:]])
     ticks = ticks[rows] - (ticks[rows[0]] if rows.size else 0.0)
     return ticks, gyro[rows], None if force is None else force[rows]
 
@@ -316,15 +341,19 @@ class Arm:
         return self.frequency > LEAST_FREQUENCY and self.in_step > ARM_IN_STEP
 
 
-def fit_arm(step: float, gyro: Array, accel: Array) -> Arm | None:
+def fit_arm(step: float, gyro: Array, accel: Array, starts: Sequence[int] = (0,)) -> Arm | None:
     """Fit a lever arm to an accelerometer.
 
-    `step` (s). `gyro`, `accel` ((n, 3)): finite, in any units and axes. Returns none if the log is
-    too short or does not rotate.
+    `step` (s). `gyro`, `accel` ((n, 3)): finite, in any units and axes. `starts`: first rows of
+    contiguous parts. Returns none if the log is too short or does not rotate.
     """
-    gyro, accel = gyro[:LARGEST], accel[:LARGEST]
     size = max(round(PIECE / step), 1)
-    count = len(gyro) // size
+    parts = [
+        slice(a, a + (b - a) // size * size)
+        for a, b in itertools.pairwise((*starts, len(gyro)))
+        if b - a >= 3 * size
+    ]
+    count = sum(part.stop - part.start for part in parts) // size
     # The mean is the bias, provided that the swing returns.
     rate = gyro - gyro.mean(axis=0) if len(gyro) else gyro
     largest = float(np.abs(rate).max(initial=0.0))
@@ -332,11 +361,15 @@ def fit_arm(step: float, gyro: Array, accel: Array) -> Arm | None:
         return None
     rate = rate / largest
     products = np.column_stack([rate[:, i] * rate[:, j] for i in range(3) for j in range(i, 3)])
-    w, p, f = (
-        v[: count * size].reshape(count, size, -1).mean(axis=1) for v in (rate, products, accel)
-    )
-    a = (w[2:] - w[:-2]) / (2.0 * size * step)
-    w, p, f = w[1:-1], p[1:-1], f[1:-1]
+    means: list[list[Array]] = [[], [], [], []]
+    for part in parts:
+        w, p, f = (
+            v[part].reshape(-1, size, v.shape[1]).mean(axis=1) for v in (rate, products, accel)
+        )
+        a = (w[2:] - w[:-2]) / (2.0 * size * step)
+        for held, one in zip(means, (a, w[1:-1], p[1:-1], f[1:-1]), strict=True):
+            held.append(one)
+    a, w, p, f = map(np.concatenate, means)
     moved = float(np.sum(w**2))
     if not moved > 0:
         return None

@@ -211,18 +211,27 @@ def _in_steps(gyro: Array, scale: float, written: tuple[float, float]) -> tuple[
         return float(sizes[off.argmin()]), np.log(1e4) / (2.0 * near * len(_STEPS))
     part = gyro[:: max(1, len(gyro) // _OF_RATES)]
     part = part - np.median(part, axis=0)
+    # In order of their sizes, the median of those below a limit needs no search.
+    ordered = np.sort(np.abs(part), axis=0)
     found = (0.0, 0.0)
     for step in sizes.tolist():
         spreads = []
-        for axis in part.T:
-            k = axis[np.abs(axis) < _WITHIN * step] / step
-            spread = MAD_TO_SD * float(np.median(np.abs(k))) if k.size >= _LEAST_RATES else 0.0
+        for axis, rates in zip(part.T, ordered.T, strict=True):
+            count = int(np.searchsorted(rates, _WITHIN * step))
+            if count < _LEAST_RATES:
+                continue
+            middle = 0.5 * (rates[(count - 1) // 2] + rates[count // 2])
+            spread = MAD_TO_SD * float(middle) / step
             if spread < _LEAST_SPREAD:
                 continue
-            phase = np.exp(2j * np.pi * k).mean()
+            k = axis[np.abs(axis) < _WITHIN * step] / step
+            turn = 2.0 * np.pi * k
+            phase = complex(np.cos(turn).mean(), np.sin(turn).mean())
+            if abs(phase) <= _IN_STEP:
+                spreads.append(0.0)
+                continue
             apart = np.diff(np.unique(np.round(k - np.angle(phase) / (2.0 * np.pi))))
-            kept = abs(phase) > _IN_STEP and np.mean(apart == 1.0) > _NEIGHBORS
-            spreads.append(spread if kept else 0.0)
+            spreads.append(spread if np.mean(apart == 1.0) > _NEIGHBORS else 0.0)
         # Every axis that moves has the step, and the finest spread decides.
         if spreads and min(spreads) / _CHANCE > found[1]:
             found = (step, min(spreads) / _CHANCE)

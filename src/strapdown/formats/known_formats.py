@@ -1,0 +1,299 @@
+"""Common part of the readers of known formats: columns of text, sensors of phones, binary logs."""
+
+from __future__ import annotations
+
+import json
+import re
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown import rotation
+from strapdown.errors import DataError, Finding, StrapdownError
+from strapdown.formats import csv, gnss_nmea
+from strapdown.formats.arrays import numbers
+from strapdown.formats.clocks import Clock, with_clock
+from strapdown.formats.find_columns import Column
+from strapdown.formats.gnss_fixes import Fixes
+from strapdown.formats.join import OwnClock, at_stamps, in_seconds
+from strapdown.formats.recording import NoStreamError, RawLog
+from strapdown.formats.signs import head
+from strapdown.tables import trajectory_table
+
+
+def under(path: Path, skip: int = 0, header: str | None = None, drop: int = 0) -> RawLog:
+    """Read the table of a text under lines of another kind.
+
+    `skip`: lines above the table. `header`: names to use instead of those of the file. `drop`:
+    further lines under its names that are not data. Rows are counted as in the file. DataError: the
+    text ends before its table, or as `csv.parse`.
+    """
+    text, found = csv.decoded(path.read_bytes(), path.name)
+    lines = text.split("\n")
+    if len(lines) <= skip + drop + 1:
+        raise DataError("io.csv-without-rows", file=path.name, row=len(lines))
+    names = lines[skip] if header is None else header
+    # Blank lines keep the count of rows.
+    kept = [*[""] * skip, names, *[""] * drop, *lines[skip + 1 + drop :]]
+    raw = csv.parse("\n".join(kept).encode(), path.name, (path,))
+    raw.findings[:0] = found
+    return raw
+
+
+def column(raw: RawLog, name: str) -> NDArray[Any]:
+    """Return a column of numbers; NaN where a field is empty.
+
+    DataError: it is missing, or a value is not a number.
+    """
+    if name not in raw.columns:
+        raise DataError(
+            "io.no-column-4", file=raw.name, missing=[name], columns=", ".join(raw.columns)
+        )
+    return numbers(raw, name, name)
+
+
+def optional(
+    raw: RawLog, names: Mapping[str, tuple[str, str | None]]
+) -> dict[str, tuple[NDArray[Any], str | None]]:
+    """Return the quantities whose columns are there: `names` has quantity to column and unit."""
+    return {q: (column(raw, c), u) for q, (c, u) in names.items() if c in raw.columns}
+
+
+def stated_by(
+    raw: RawLog, quantities: Mapping[str, tuple[NDArray[Any], str | None]], **stated: Any
+) -> RawLog:
+    """Make a log of quantities of a table, with its rows and its findings."""
+    out = RawLog.of(raw.files[0], quantities, **stated)
+    out.name, out.rows = raw.name, raw.rows
+    out.findings[:0] = raw.findings
+    return out
+
+
+def selected(log: RawLog, keep: NDArray[np.bool_]) -> RawLog:
+    """Keep some rows of a log, which remember their row of the file."""
+    rows = np.arange(1, keep.size + 1) if log.rows is None else log.rows
+    log.columns = {name: values[keep] for name, values in log.columns.items()}
+    log.rows = rows[keep]
+    return log
+
+
+def from_json(path: Path) -> Any:
+    """Parse a JSON file.
+
+    DataError: it is not JSON, or nested too deeply.
+    """
+    text, _ = csv.decoded(path.read_bytes(), path.name)
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError as error:
+        raise DataError("io.no-json", file=path.name, row=error.lineno, msg=error.msg) from None
+    except (RecursionError, ValueError) as error:
+        raise DataError("io.no-json", file=path.name, msg=str(error)) from None
+
+
+def names_of(path: Path) -> list[str]:
+    """Return the names in the first line, for format detection."""
+    lines = head(path).splitlines()
+    return split(lines[0]) if lines else []
+
+
+def split(line: str, separator: str | None = "") -> list[str]:
+    """Split a line into fields, by its own separator; quotes that do not close are text."""
+    by = csv.separator_of(line) if separator == "" else separator
+    try:
+        return csv.fields_of(line, by)
+    except Exception:  # of the standard library: a quote that does not close, a long field
+        return [field.strip() for field in line.split(by)]
+
+
+def lacking(path: Path, stream: str, title: str, streams: Iterable[str]) -> DataError:
+    """Make the error for a file of a known format that lacks a stream, or all of them."""
+    name, there = path.resolve().name, list(streams)
+    if there:
+        return NoStreamError(name, stream, title, there)
+    return DataError("io.no-known-stream", file=name, title=title)
+
+
+# Sensors of phones, each with the sign of its phone.
+
+
+# The phone's own axes point right, to the top edge, and out of the screen. It is assumed to lie on
+# its back with the top edge forward: forward is y, right is x, down is -z.
+AXES = "y,x,-z"
+XYZ = "xyz"
+
+
+def sensor_log(
+    name: str,
+    file: Path,
+    columns: Mapping[str, NDArray[Any]],
+    triad: str,
+    unit: str | None,
+    *,
+    time: tuple[str, str],
+    xyz: tuple[str, str, str] = ("x", "y", "z"),
+    rows: NDArray[np.int64] | None = None,
+    findings: list[Finding] | None = None,
+) -> RawLog:
+    """Make the log of one sensor of a phone.
+
+    `name`: for messages. `columns` ((n,)). `triad`: ``gyro``, ``accel`` or ``mag``. `unit`: none if
+    unknown. `time` ((str, str)): column of the stamps and their unit. `xyz` ((str, str, str)):
+    columns of the three axes.
+    """
+    return RawLog(
+        name=name,
+        files=(file,),
+        columns=dict(columns),
+        rows=rows,
+        stated={time[0]: ("time", time[1])}
+        | {column: (f"{triad}_{axis}", unit) for column, axis in zip(xyz, XYZ, strict=True)},
+        axes=AXES,
+        findings=findings or [],
+    )
+
+
+def force_of(linear: RawLog, gravity: RawLog) -> RawLog:
+    """Add linear acceleration and gravity, each with the phone's sign, to specific force.
+
+    `linear`, `gravity`: from `sensor_log`, of the triad ``accel``, in one unit. Returns the sum, at
+    the stamps of `linear` that gravity covers. DataError: the two do not overlap in time, or a
+    value is not a number.
+    """
+    clocks, values = [], []
+    for log in (linear, gravity):
+        columns = {q: Column(s, u, "file") for s, (q, u) in log.stated.items()}
+        clocks.append(OwnClock(numbers(log, columns["time"].source, "time"), columns["time"].unit))
+        found = [numbers(log, columns[f"accel_{a}"].source, f"accel_{a}") for a in XYZ]
+        values.append(np.column_stack(found).astype(np.float64))
+    time, own = (in_seconds(clock, clocks[0]) for clock in clocks)
+    if time.shape == own.shape and np.array_equal(time, own):
+        inside, distance, at = np.ones(time.size, dtype=bool), 0.0, values[1]
+    else:
+        use = np.isfinite(own) & np.isfinite(values[1]).all(axis=1)
+        order = np.flatnonzero(use)[np.argsort(own[use], kind="stable")]
+        if not order.size:
+            raise DataError("io.holds-no-number", file=gravity.name, quantity="accel")
+        at, inside, distance = at_stamps(time, own[order], values[1][order])
+    if not inside.any():
+        raise DataError(
+            "io.logs-without-common-time", file=gravity.name, quantity="time", name=linear.name
+        )
+    total = (values[0] + at)[inside]
+    rows = np.arange(1, time.size + 1) if linear.rows is None else linear.rows
+    time_column = next(s for s, (q, _) in linear.stated.items() if q == "time")
+    sources = [next(s for s, (q, _) in linear.stated.items() if q == f"accel_{a}") for a in XYZ]
+    return RawLog(
+        name=linear.name,
+        files=tuple(dict.fromkeys([*linear.files, *gravity.files])),
+        columns={time_column: linear.columns[time_column][inside]}
+        | {source: total[:, k] for k, source in enumerate(sources)},
+        rows=rows[inside],
+        stated=linear.stated,
+        axes=linear.axes,
+        findings=[
+            *linear.findings,
+            *gravity.findings,
+            Finding(
+                "io.force-summed-interpolated" if distance > 0 else "io.force-summed",
+                file=linear.name,
+                quantity="accel",
+                severity="note",
+                linear=linear.name,
+                gravity=gravity.name,
+                distance=distance,
+            ),
+        ],
+    )
+
+
+# Binary logs: damage, and solutions of their own.
+
+
+Array = NDArray[np.float64]
+#: Argument of `RawLog.of`.
+Quantities = dict[str, tuple[NDArray[Any], str | None]]
+
+
+_SENTENCE = re.compile(rb"\$[A-Z]{5},[ -#%-)+-~]*\*[0-9A-Fa-f]{2}")
+
+
+@contextmanager
+def damage(path: Path) -> Iterator[None]:
+    """Report whatever a library raises on damaged content as a DataError of this file."""
+    try:
+        yield
+    except StrapdownError:
+        raise
+    except Exception as error:  # libraries document no common class of their errors
+        reason = f"{type(error).__name__}: {error}".strip(": ")[:200]
+        raise DataError("io.log-damaged", file=path.name, reason=reason) from None
+
+
+def interpolated(time: Array, own: Array, values: Sequence[NDArray[Any]]) -> Array:
+    """Interpolate columns linearly to other stamps; (n, columns), NaN outside."""
+    return np.column_stack([np.interp(time, own, v, left=np.nan, right=np.nan) for v in values])
+
+
+def turned(time: Array, own: Array, q: Array) -> Array:
+    """Interpolate attitude quaternions to other stamps within theirs; roll, pitch, heading, deg."""
+    flips = np.cumprod(np.concatenate([[1.0], np.where((q[1:] * q[:-1]).sum(axis=1) < 0, -1, 1)]))
+    at = interpolated(np.clip(time, own[0], own[-1]), own, list((q * flips[:, None]).T))
+    return rotation.euler_from_quaternion(at / np.linalg.norm(at, axis=1, keepdims=True))
+
+
+def solution(
+    path: Path,
+    columns: Sequence[Array],
+    clock: Clock,
+    findings: Sequence[Finding] = (),
+    *,
+    of_recorder: bool = True,
+) -> pd.DataFrame:
+    """Make a Trajectory of a solution.
+
+    `columns`: time (s), position, velocity and attitude, (n,) and three of (n, 3); rows with a
+    value that is not a number are left out. `of_recorder`: whether the recorder computed it.
+    DataError: no row is left, or as `trajectory_table`.
+    """
+    everything = np.column_stack(columns)
+    use = np.isfinite(everything).all(axis=1)
+    use &= np.diff(everything[:, 0], prepend=-np.inf) > 0.0
+    if not use.any():
+        raise DataError("io.solution-without-rows", file=path.name, quantity="reference")
+    kept = everything[use]
+    table = trajectory_table(kept[:, 0], kept[:, 1:4], kept[:, 4:7], kept[:, 7:], source=path.name)
+    table.attrs["ellipsoid"] = "wgs84"
+    code = "io.reference-own-solution" if of_recorder else "io.reference-rows"
+    count = {"count": int(use.sum()), "size": use.size}
+    note = Finding(code, file=path.name, quantity="reference", severity="note", data=count)
+    told = of_recorder or not use.all()
+    table.attrs["findings"] = (*([note] if told else []), *findings)
+    return with_clock(table, clock)
+
+
+def or_sentences(read: Callable[[Path], RawLog]) -> Callable[[Path], RawLog | Fixes]:
+    """Make a reader of fixes that takes NMEA sentences of the stream if it has no own fixes."""
+
+    def either(path: Path) -> RawLog | Fixes:
+        try:
+            return read(path)
+        except NoStreamError:
+            found = _SENTENCE.findall(path.read_bytes())
+            if not any(sentence[3:6] == b"GGA" for sentence in found):
+                raise
+        with tempfile.TemporaryDirectory() as folder:
+            lines = Path(folder) / path.name
+            lines.write_bytes(b"\n".join(found))
+            fixes = gnss_nmea.read(lines)
+        note = Finding("io.fixes-of-sentences", file=path.name, severity="note", count=len(found))
+        fixes.findings.append(note)
+        return fixes
+
+    return either
