@@ -30,6 +30,10 @@ QUIET_FACTOR = 3.0
 # a log in continuous motion is not taken for rest.
 MAX_GYRO_SD = 0.03  # rad/s, of the three axes together
 MAX_ACCEL_SD = 0.3  # m/s²
+# A vehicle that speeds up smoothly turns no gyro: specific force changes from one second to the
+# next, by more than biases do and than four standard deviations of the means of two windows.
+LAG = 1.0  # s
+MAX_ACCEL_CHANGE = 0.1  # m/s²
 # The zero-rate output of a low-cost gyro may be off by 20 deg/s (MPU-6050 data sheet, revision 3.4,
 # section 6.1).
 MAX_MEAN_RATE = 0.36  # rad/s
@@ -117,8 +121,9 @@ def find_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
     -------
     tuple of RestStretch
         In order of time, each at least 1 s long. A single stretch does not distinguish a slow
-        rotation at a constant rate about the vertical from a bias. It is rejected only if another
-        stretch of the log has a bias that differs by more than 0.01 rad/s.
+        rotation at a constant rate about the vertical from a bias: it is rejected only if another
+        stretch of the log has a bias that differs by more than 0.01 rad/s. Neither is a steady
+        acceleration distinguished from a tilt; one that changes is.
     """
     time = imu.index.to_numpy(dtype=np.float64)
     gyro = imu[GYRO].to_numpy(dtype=np.float64)
@@ -131,7 +136,9 @@ def find_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
     still = gyro_sd <= min(quiet, MAX_GYRO_SD)
     still &= np.abs(_window_mean(gyro, starts, ends)).max(axis=1) <= MAX_MEAN_RATE
     if accel is not None:
-        still &= _window_sd(accel, starts, ends) <= MAX_ACCEL_SD
+        accel_sd = _window_sd(accel, starts, ends)
+        still &= accel_sd <= MAX_ACCEL_SD
+        still &= ~_accelerates(time, accel, accel_sd, still, (starts, ends))
     rests = [
         _stretch(time, gyro, accel, int(starts[a]), int(ends[b]))
         for a, b in _runs(still, time[starts[1:]] - time[ends[:-1] - 1] < LEAST_LENGTH)
@@ -169,6 +176,29 @@ def _window_sd(values: Array, starts: Indices, ends: Indices) -> Array:
     """
     variances = [values[a:b].var(axis=0).sum() for a, b in zip(starts, ends, strict=True)]
     return np.asarray(np.sqrt(variances), dtype=np.float64)
+
+
+def _accelerates(
+    time: Array,
+    accel: Array,
+    accel_sd: Array,
+    still: NDArray[np.bool_],
+    windows: tuple[Indices, Indices],
+) -> NDArray[np.bool_]:
+    """Whether, within still windows, the mean of one is not that of the window a second later."""
+    starts, ends = windows
+    mean = _window_mean(accel, starts, ends)
+    ahead = np.minimum(np.searchsorted(time[starts], time[starts] + LAG - 1e-9), len(starts) - 1)
+    count = np.cumsum(still)
+    together = still & (count[ahead] - count == ahead - np.arange(len(starts)))
+    together &= time[starts[ahead]] - time[starts] <= LAG + WINDOW
+    variance = accel_sd**2 / (ends - starts)
+    limit = MAX_ACCEL_CHANGE + 4.0 * np.sqrt(variance + variance[ahead])
+    moved = together & (np.linalg.norm(mean[ahead] - mean, axis=1) > limit)
+    changes = np.zeros(len(starts) + 1, dtype=np.int64)
+    np.add.at(changes, np.flatnonzero(moved), 1)
+    np.add.at(changes, ahead[moved] + 1, -1)
+    return np.asarray(np.cumsum(changes)[:-1] > 0)
 
 
 def _runs(still: NDArray[np.bool_], joined: NDArray[np.bool_]) -> list[tuple[int, int]]:

@@ -57,6 +57,24 @@ def test_a_steady_turn_is_not_taken_for_a_bias_where_a_rest_shows_it():
     assert [round(r.start) for r in rests] == [0, 16]
 
 
+@pytest.mark.parametrize("most", [2.0, 4.0])
+def test_a_vehicle_that_speeds_up_smoothly_is_not_at_rest(most):
+    """No gyro shows it: specific force changes from second to second, and with no other sign."""
+    table = log(100, 2e-3, [])
+    part = np.clip((table.index.to_numpy() - 6.0) / 8.0, 0.0, 1.0)
+    table["accel_x"] += most * 0.5 * (1.0 - np.cos(2.0 * np.pi * part))
+    first, last = find_rests(table)
+    # A change of 0.1 m/s² within a second is seen, where the ramp's steepest is pi / 8 of `most`;
+    # with four standard deviations of the means, 0.02 / sqrt(50) an axis, 0.12. Both are less far
+    # into the ramp than the mean of a window is long, and the second after it.
+    assert 5.0 < first.end < 8.0
+    assert 12.0 < last.start < 15.0
+    # A bias that drifts is a rest still.
+    table = log(100, 2e-3, [])
+    table["accel_x"] += 0.05 * (table.index.to_numpy() / 20.0)
+    assert len(find_rests(table)) == 1
+
+
 def test_too_short_a_log_has_none():
     assert find_rests(imu_table([0.0, 0.1], np.zeros((2, 3)))) == ()
 
