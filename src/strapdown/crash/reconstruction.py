@@ -342,6 +342,16 @@ def reconstruct_unit(
         )
         contact = find_contact(acceleration, event, options.rule, noise=noise, between=between)
         start, end = contact.start.time, contact.end.time
+        if end > at_point.assumed_until:
+            findings.append(
+                Finding(
+                    "crash.event-beyond-assumed-turning",
+                    file=at_point.name,
+                    quantity="delta-V",
+                    end=end,
+                    until=at_point.assumed_until,
+                )
+            )
         low = min(start + peak_window, end)
         peak = trailing_delta_v(acceleration, peak_window, low, end).peak
         whole = delta_v(acceleration, start, end, across_gaps=True)

@@ -491,6 +491,7 @@ AGAINST = frozenset(
         "bias-against-times-stated",
         "direction-their-forces-stated",
         "disagree-their-common-point-chi",
+        "event-beyond-assumed-turning",
         "momentum-not-closed",
         "no-point-closes",
         "one-point-off",

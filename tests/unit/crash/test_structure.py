@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scipy.stats import binomtest
-from tests.unit.crash.folding_crash import KINDS, RATE, Crash, Fault, G
+from tests.unit.crash.folding_crash import ASSUMED_END, KINDS, RATE, Crash, Fault, G
 
 from strapdown import CrashOptions, Entry, reconstruct, reconstruct_crash
 from strapdown.crash.consistency import UnitComparison, compare_units
@@ -72,6 +72,16 @@ def test_a_unit_that_is_turned_has_no_reversed_axis_and_one_size(number, kind):
     assert [f.code for f in said] == ["crash.one-point-off"]
     # Both are mounted to 0.5 deg (1 sd), and the size is within three of them.
     assert said[0].data["error"].data["z"] == pytest.approx(7.0, abs=3.0 * 0.5 * 2**0.5)
+
+
+def test_a_contact_beyond_the_time_of_a_stated_turning_is_called_so():
+    """A car that spins pushes its points outward for as long as it does: no contact ends there."""
+    for seed, spins in ((2111, True), (2000, False)):
+        crash = Crash(seed, "offset")
+        single, _, _ = crash.answered([crash.unit(k, gyro=False) for k in range(2)])
+        assert (single.delta_v.delta_v.end > ASSUMED_END) == spins
+        said = [f.data for f in single.findings if f.code == "crash.event-beyond-assumed-turning"]
+        assert [d["until"] for d in said] == [ASSUMED_END] * spins
 
 
 def test_four_points_agree_together():
