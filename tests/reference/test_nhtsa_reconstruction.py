@@ -135,7 +135,7 @@ def test_what_was_assumed_is_told_and_in_the_bounds(crash):
     for found in (*crash.units, mean):
         (changes,) = found.body
         assert found.types[0].name == "front"
-        assert "rolled over cannot be determined" in found.types[0].reason
+        assert "crash.type-no-roll" in [r.code for r in found.types[0].reasons]
         lines = changes.event.bound.by_contributor.index
         assert {"assumed: no turning", "assumed: missing axis"} <= set(lines)
         # 0.5 m/s over 150 ms, of which the event has the larger part.
