@@ -60,6 +60,11 @@ def headline(result: CaseResult) -> str:
         return apart_headline(result)
     unit = result.reconstruction.main
     number = main_event(unit)
+    if number is None and (cut := unit.events.cut_change) > 0.0:
+        return (
+            f"The record ends within a blow: delta-V at least {speed_words(cut)}, as far as it was "
+            "recorded; its direction of force is not determined."
+        )
     if number is None:
         size, axis = unit.events.largest_change, unit.events.largest_axis
         return (
@@ -100,7 +105,9 @@ def key_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
         figures += apart_figures(result)
         of = f" by {unit.name}"
     elif number is None:
-        figures.append(KeyFigure("Delta-V", "no event", headline(result)))
+        cut = unit.events.cut_change
+        value = f"at least {speed_words(cut)}" if cut > 0.0 else "no event"
+        figures.append(KeyFigure("Delta-V", value, headline(result)))
     else:
         changes = unit.body[number]
         whole, peak = changes.event, changes.peak
@@ -331,7 +338,8 @@ def apart_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
 def _change(unit: UnitReconstruction) -> str:
     number = main_event(unit)
     if number is None:
-        return "no event"
+        cut = unit.events.cut_change
+        return f"at least {speed_words(cut)}" if cut > 0.0 else "no event"
     return change_words(unit.body[number].event)
 
 
@@ -492,6 +500,7 @@ AGAINST = frozenset(
         "direction-their-forces-stated",
         "disagree-their-common-point-chi",
         "momentum-not-closed",
+        "no-event-yet",
         "no-point-closes",
         "one-point-off",
         "others-agree-another-not",
@@ -635,6 +644,7 @@ def not_shown(result: CaseResult) -> tuple[tuple[str, str], ...]:
 #: Limitations that make an answer wrong, not only less precise.
 GRAVE = frozenset(
     (
+        "blow-beyond-record",
         "event-beyond-record",
         "event-before-record",
         "direction-undetermined",
@@ -676,6 +686,16 @@ def _event(result: CaseResult) -> Iterator[tuple[str, str, str]]:
             f" {' and '.join(others)} alone recorded one: see Delta-V, and check whether another "
             "record begins late or ends early."
         )
+        if unit.events.cut_change > 0.0:
+            yield (
+                "blow-beyond-record",
+                "The record ends within a blow",
+                f"It ends at {instant(unit.acceleration.end)}, while the velocity changes by more "
+                "than what ends an event by 49 CFR 563, and before it is one. Delta-V is at least "
+                f"{speed_words(unit.events.cut_change)}; severity and direction of force are not "
+                f"given.{alone if others else ''}",
+            )
+            return
         yield (
             "no-event",
             "No event",

@@ -28,6 +28,7 @@ from strapdown.report.crash_case import (
 from strapdown.report.crash_document import crash_document
 from strapdown.report.crash_tables import answers_table, severity_table
 from strapdown.report.crash_words import (
+    GRAVE,
     contradictions,
     headline,
     key_figures,
@@ -108,6 +109,15 @@ def test_an_event_that_is_cut_by_the_record(result):
     for missing, code in (("after", "event-beyond-record"), ("before", "event-before-record")):
         cut = with_change(result, missing=(missing,), open_axes=every)
         assert codes(cut) - USUAL == {code}
+
+
+def test_a_record_that_ends_before_its_blow_is_an_event(result):
+    events = replace(result.reconstruction.main.events, events=(), cut_change=2.0)
+    cut = with_main(result, events=events, body=(), ned=(), types=())
+    assert codes(cut) - USUAL == {"blow-beyond-record"} < GRAVE
+    figure, *_ = key_figures(cut)
+    assert spaced(figure.value) == "at least 7.2 km/h" and "7.2 km/h" in spaced(headline(cut))
+    assert "at least 2.00 m/s" in repr(cut.reconstruction.main)
 
 
 def test_a_part_is_told_as_at_least_everywhere(result):
