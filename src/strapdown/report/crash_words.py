@@ -42,7 +42,7 @@ from strapdown.report.values import (
     speed_words,
 )
 from strapdown.sensors.pre_crash import PreparedUnit
-from strapdown.tables import NED
+from strapdown.tables import NED, VELOCITY
 
 TYPES = {
     "front": "an impact from the front",
@@ -52,6 +52,11 @@ TYPES = {
     "rollover": "a rollover",
     "undetermined": "type not determined",
 }
+
+
+#: A vehicle is at rest where its speed with its bound stays below one, m/s, for so long, s: it then
+#: moves by 5 cm at most; a rebound passes zero faster.
+STANDING, STANDING_FOR = 0.5, 0.1
 
 
 def headline(result: CaseResult) -> str:
@@ -137,7 +142,7 @@ def key_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
     place, half = _end(unit)
     figures.append(
         KeyFigure(
-            f"Final position{of}",
+            f"{_last_name(unit)}{of}",
             f"{plain(length_factor() * math.hypot(place[0], place[1]), 2)} {length_unit()}",
             ", ".join(
                 f"{name}{GAP}{length_about(p, h)}"
@@ -275,6 +280,18 @@ def units_words(result: CaseResult) -> str:
 
 def _axes(result: CaseResult) -> str:
     return "over ground" if over_ground(result) else "in the axes of the vehicle at the entry"
+
+
+def _last_name(unit: UnitReconstruction) -> str:
+    """Name of the position at the end of the path: final only where the vehicle came to rest."""
+    path = unit.path
+    last = path.time >= path.time[-1] - STANDING_FOR
+    speeds = np.linalg.norm(path.table[VELOCITY].to_numpy()[last], axis=1)
+    bounds = TWO_SIDED_95 * np.linalg.norm(path.sd[VELOCITY].to_numpy()[last], axis=1)
+    long = path.time[-1] - path.time[0] > STANDING_FOR
+    if long and bool((speeds + bounds < STANDING).all()):
+        return "Final position"
+    return f"Position at {instant(path.time[-1])}"
 
 
 def _end(unit: UnitReconstruction) -> tuple[list[float], list[float]]:
