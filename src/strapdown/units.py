@@ -115,19 +115,21 @@ PRESSURES: dict[str, float] = {"Pa": 1.0, "hPa": 100.0, "kPa": 1000.0, "mbar": 1
 
 @dataclass(frozen=True)
 class ShownUnits:
-    """Units of a crash report: of speeds, with another beside it, lengths and masses."""
+    """Units of a crash report: speeds, with another beside it, lengths, masses, impulse, energy."""
 
     speed: str
     beside: str
     length: str
     mass: str
+    impulse: str = "kN s"
+    energy: str = "kJ"
 
 
 #: Systems that a case may choose.
 SHOWN_UNITS: dict[str, ShownUnits] = {
     "metric": ShownUnits("km/h", "m/s", "m", "kg"),
     "si": ShownUnits("m/s", "km/h", "m", "kg"),
-    "us": ShownUnits("mph", "ft/s", "ft", "lb"),
+    "us": ShownUnits("mph", "ft/s", "ft", "lb", "lbf s", "ft lbf"),
 }
 
 #: Units of each quantity, with their factors.

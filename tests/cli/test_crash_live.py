@@ -102,6 +102,15 @@ def test_from_lines_to_the_bundle_and_to_the_next_case(case):
     np.testing.assert_array_equal(channel.load()[1], np.array(rows)[:, 5])
 
 
+def test_what_is_printed_is_the_processing_and_not_the_queue_of_a_file(case):
+    rows = samples().tolist()
+    done = run(case, "\n".join(line(row) for row in rows) + "\n", "--live", "-", "--out", "out")
+    told = json.loads((case.parent / "out" / "latency.json").read_text())
+    for name in ("median_ms", "largest_ms"):
+        assert f"{told['processing'][name]:.3f}" in done.stderr
+    assert f"{told['largest_ms']:.3f}" not in done.stderr
+
+
 def test_without_a_gyro_and_with_datagrams_the_same_lines(case):
     case.write_text(CASE)
     options = recorder_of_case(case)

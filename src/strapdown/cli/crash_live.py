@@ -86,6 +86,7 @@ def crash_live(cases: Sequence[Path], out: Path | None, write: OutFlags, flags: 
     write_latency(seal, told)
     if not write.quiet:
         with redirect_stdout(sys.stderr):
-            if latency is not None:
-                print_latency(latency, flags.live)
+            # Of lines that come all at once, the time from a sample to its state is their queue.
+            if own is not None:
+                print_latency(own, flags.live, "processing of a sample")
             print_seal(seal, DETECTIONS)

@@ -151,13 +151,13 @@ def _fitting(findings: Sequence[Finding], room: int, width: int) -> int:
     return len(findings)
 
 
-def print_latency(latency: Latency, what: str) -> None:
-    """Print the latency from a sample to its state, and missed deadlines; `what` delivered them."""
+def print_latency(latency: Latency, what: str, of: str = "sample to state") -> None:
+    """Print a latency `of` samples, and missed deadlines; `what` delivered them."""
     times = [_ms(t) for t in (latency.median, latency.most, latency.largest)]
     missed = "-" if latency.missed is None else str(latency.missed)
     behind = "-" if latency.behind is None else _ms(latency.behind)
     print_table(
-        ["sample to state, ms", "samples", "median", "99 %", "largest", "missed", "behind", ""],
+        [f"{of}, ms", "samples", "median", "99 %", "largest", "missed", "behind", ""],
         [[what, str(latency.samples), *times, missed, behind, ""]],
     )
 

@@ -185,7 +185,10 @@ def _find(file: Path, path: KeyPath, given: str) -> str | Fault:
         names = []
     close = difflib.get_close_matches(wanted.name[:255], sorted(names), n=1)
     if close and close[0].isprintable():
-        data = {"given": shown(given), "near": close[0]}
+        # With its folder as given, so that it can be pasted.
+        folder = given.removesuffix(wanted.name) if given.endswith(wanted.name) else ""
+        near = folder + close[0]
+        data = {"given": shown(given), "near": near}
         return Fault(path, "config.named-file-missing-near", data)
     return Fault(path, "config.named-file-missing", {"given": shown(given)})
 

@@ -249,6 +249,8 @@ def _missing(
     peak, far = span
     at = np.append(stamps[(stamps >= min(peak, far)) & (stamps <= max(peak, far))], far)
     inward = np.clip(at - window, stamps[0], stamps[-1])
+    # Nothing lies inward of a peak at the other end of the record.
+    at, inward = at[at != inward], inward[at != inward]
     means = (course.velocity(at) - course.velocity(inward)) @ force / (at - inward)
     last, most = float(means[-1]), int(np.argmax(means))
     if last <= 0.0:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown._kernels import crash_events as kernel
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.crash.acceleration import Acceleration
+from strapdown.crash.acceleration import Acceleration, window_weights
 from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.tables.imu import SAMPLINGS
 from strapdown.units import SPEEDS
@@ -92,6 +92,9 @@ def two_sds(given: float | Sequence[float], name: str) -> tuple[float, float]:
 KMH = SPEEDS["km/h"]
 
 ZERO_AT = ("interval", "threshold")
+#: Finding of a record that begins within the interval of time zero. A table of an event data
+#: recorder begins there by definition.
+BEGINS_WITHIN = "crash.record-begins-event-km-h"
 
 
 @dataclass(frozen=True)
@@ -184,6 +187,9 @@ class CrashEvents:
     `woken`: number of times the wake threshold was exceeded without an event: potholes, curbs,
     doors. `largest_change`, m/s, along `largest_axis` within the trigger window that ends at
     `largest_time`, s (NaN without any change), excluding changes that led to an event.
+    `cut_change`, m/s: where the record ends without an event, and while the velocity still changes
+    by more than the wake threshold within the wake window, its horizontal change up to there within
+    the trigger window; the whole change is at least that. Zero otherwise.
     """
 
     events: tuple[CrashEvent, ...]
@@ -194,6 +200,7 @@ class CrashEvents:
     largest_time: float
     source: str | None = None
     findings: tuple[Finding, ...] = ()
+    cut_change: float = 0.0
 
     @property
     def first(self) -> CrashEvent:
@@ -268,11 +275,19 @@ def detect_events(
     events = detector.events + ((open_event,) if open_event is not None else ())
     size, axis, when = detector.largest_change
     findings = [f for e in events for f in _findings(e, acceleration, rule)]
+    cut = _last_change(acceleration, rule) if detector.changing and not events else 0.0
     if not events:
-        findings.append(_no_event(detector, acceleration))
-    return CrashEvents(
-        events, rule, detector.woken, size, axis, when, source, findings=tuple(findings)
-    )
+        findings.append(_no_event(detector, acceleration, cut))
+    return CrashEvents(events, rule, detector.woken, size, axis, when, source, tuple(findings), cut)
+
+
+def _last_change(acceleration: Acceleration, rule: EventRule) -> float:
+    """Horizontal change of velocity within the trigger window that ends with the record, m/s."""
+    time, end = acceleration.time, acceleration.end
+    start = max(acceleration.begin, end - rule.trigger_window)
+    weights = window_weights(time, start, end, acceleration.sampling)
+    forward, right, _ = weights @ acceleration.values
+    return math.hypot(forward, right if rule.lateral else 0.0)
 
 
 def _findings(event: CrashEvent, acceleration: Acceleration, rule: EventRule) -> list[Finding]:
@@ -281,7 +296,7 @@ def _findings(event: CrashEvent, acceleration: Acceleration, rule: EventRule) ->
     if event.starts_before_record:
         found.append(
             Finding(
-                "crash.record-begins-event-km-h",
+                BEGINS_WITHIN,
                 file=source,
                 quantity="time zero",
                 wake=rule.wake / KMH,
@@ -316,7 +331,7 @@ def _findings(event: CrashEvent, acceleration: Acceleration, rule: EventRule) ->
     return found
 
 
-def _no_event(detector: EventDetector, acceleration: Acceleration) -> Finding:
+def _no_event(detector: EventDetector, acceleration: Acceleration, cut: float) -> Finding:
     rule, (size, axis, when) = detector.rule, detector.largest_change
     changes = size > 0.0
     short = acceleration.end - acceleration.begin < rule.trigger_window
@@ -332,6 +347,13 @@ def _no_event(detector: EventDetector, acceleration: Acceleration) -> Finding:
         "wake_window_ms": rule.wake_window * 1e3,
         "woken": detector.woken,
     }
+    if cut > 0.0:
+        return Finding(
+            "crash.no-event-yet",
+            file=acceleration.source,
+            quantity="delta-V",
+            data={**said, "cut": cut / KMH, "record_end": acceleration.end},
+        )
     largest = Finding("crash.largest-change" if changes else "crash.no-change", data=said)
     more = []
     if detector.woken and not short:
@@ -429,6 +451,11 @@ class EventDetector:
     def triggered(self) -> bool:
         """Whether an event has been detected that has not ended."""
         return bool(self._held and not math.isnan(self._state[kernel.TRIGGERED]))
+
+    @property
+    def changing(self) -> bool:
+        """Whether the resultant now changes by more than the wake threshold within its window."""
+        return bool(self._state[kernel.ACTIVE]) and math.isnan(self._state[kernel.PENDING])
 
     @property
     def current(self) -> CrashEvent | None:

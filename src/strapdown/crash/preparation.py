@@ -527,6 +527,13 @@ def rest_findings(
             code = "crash.record-starts-in-crash" if late else "crash.no-rest"
             raise DataError(code, file=unit.name, quantity="rest", data=said)
         code = "crash.record-starts-in-crash-levelled" if late else "crash.no-rest-levelled"
+        if late and unit.from_zero:
+            # It begins at time zero by definition: no other record of it would begin earlier.
+            return [
+                Finding(
+                    "crash.table-levelled", severity="note", file=unit.name, quantity="rest", **said
+                )
+            ]
         return [Finding(code, file=unit.name, quantity="rest", data=said)]
     if rest.grade == "steady":
         return [

@@ -34,7 +34,14 @@ from strapdown.crash.delta_v_bound import (
 )
 from strapdown.crash.detectability import undetectable
 from strapdown.crash.entry import Entry, EntryState
-from strapdown.crash.events import KMH, PART_563, CrashEvents, EventRule, detect_events
+from strapdown.crash.events import (
+    BEGINS_WITHIN,
+    KMH,
+    PART_563,
+    CrashEvents,
+    EventRule,
+    detect_events,
+)
 from strapdown.crash.measuring_point import PointKinematics
 from strapdown.crash.path import VELOCITY, CrashPath, path_line, reconstruct_path
 from strapdown.crash.preparation import prepare_together
@@ -118,6 +125,8 @@ def unit_line(unit: UnitReconstruction) -> str:
     if not lines:
         size, axis = unit.events.largest_change, unit.events.largest_axis
         lines = [f"{unit.name}: no event, at most {size:.2f} m/s ({axis})"]
+        if (cut := unit.events.cut_change) > 0.0:
+            lines = [f"{unit.name}: the record ends within a blow, at least {cut:.2f} m/s"]
     return "\n".join([*lines, f"{unit.name}, {path_line(unit.path)}"])
 
 
@@ -321,7 +330,7 @@ def reconstruct_unit(
     body: list[EventChanges] = []
     ned: list[EventChanges | None] = []
     findings = [
-        *events.findings,
+        *(f for f in events.findings if f.code != BEGINS_WITHIN or not _from_zero(at_point, units)),
         *entry_findings(at_point, entry, path, events, mechanization),
     ]
     blind = [axis for axis in at_point.assumed_axes if axis in ("forward", "right")]
@@ -444,6 +453,12 @@ def reconstruct_unit(
         types,
         tuple(findings),
     )
+
+
+def _from_zero(at_point: PointKinematics, units: Sequence[PointKinematics]) -> bool:
+    """Whether all records are changes of velocity that count from time zero."""
+    prepared = [u.prepared for u in (at_point, *units) if u.prepared is not None]
+    return bool(prepared) and all(p.unit.from_zero for p in prepared)
 
 
 def _missing(

@@ -83,8 +83,9 @@ def triad_of_channels(
     DataFrame
         The table of a `RecordedTriad`: index ``time``, s; columns ``accel_x accel_y accel_z``,
         m/s², or ``gyro_x gyro_y gyro_z``, rad/s, for the available axes. Axes with their own
-        stamps have NaN in the rows of others. ``attrs``: ``sampling``, ``source`` (the file),
-        ``unit`` (as recorded), and ``findings``, a tuple.
+        stamps have NaN in the rows of others. ``attrs``: ``sampling``, ``from_zero`` (made of
+        changes of velocity since time zero), ``source`` (the file), ``unit`` (as recorded), and
+        ``findings``, a tuple.
 
     Raises
     ------
@@ -118,6 +119,7 @@ def triad_of_channels(
     table = _table(parts, factors, _COLUMNS[quantity])
     table.attrs = {
         "sampling": kind,
+        "from_zero": all(p.mean and p.channel.from_zero for p in parts),
         "source": record.path.name,
         "unit": recorded,
         "findings": tuple(dict.fromkeys(findings)),

@@ -45,6 +45,7 @@ from strapdown.report.values import (
     MEAN,
     SHOWN,
     decimals,
+    instant,
     plain,
     speed_factor,
     speed_unit,
@@ -365,7 +366,7 @@ def place_budget_chart(path: CrashPath, names: tuple[str, str] = ("forward", "ri
     at = 1e3 * float(path.time[-1])
     return _chart(
         "budget-position",
-        "Sources of the uncertainty of the final position",
+        f"Sources of the uncertainty of the position at {instant(path.time[-1])}",
         f"Standard deviation of the position of the reference point at {at:.0f} ms, {names[0]} and "
         f"{names[1]}, due to each contributor; squares add up to that of the total, and the 95 % "
         "bound is 1.96 times it. Contributors below 1 % are joined.",

@@ -22,6 +22,8 @@ from strapdown.report.values import (
     axis_names,
     component_words,
     decimals,
+    energy_shown,
+    impulse_shown,
     instant,
     length_factor,
     length_unit,
@@ -314,9 +316,9 @@ def closure_table(result: CaseResult) -> TableBlock | None:
         row("common velocity along the impulse", closure.common_velocity, per, 1, per_unit),
         row(f"direction of the impulse on {first}", closure.direction_deg, 1.0, 1, "deg"),
         row(f"mass of {second} over that of {first}", closure.mass_ratio, 1.0, 3, ""),
-        row(f"impulse of {first} less that of {second}", closure.magnitude, 1e-3, 2, "kN s"),
+        row(f"impulse of {first} less that of {second}", closure.magnitude, *impulse_shown()),
         row("heading of the second less the first", closure.relative_heading_deg, 1.0, 1, "deg"),
-        row("kinetic energy lost in the contact", closure.energy, 1e-3, 1, "kJ"),
+        row("kinetic energy lost in the contact", closure.energy, *energy_shown()),
         *(
             row(f"energy-equivalent speed of {name}", of, per, 1, per_unit)
             for name, of in equivalent

@@ -42,7 +42,7 @@ from strapdown.report.values import (
     speed_words,
 )
 from strapdown.sensors.pre_crash import PreparedUnit
-from strapdown.tables import NED
+from strapdown.tables import NED, VELOCITY
 
 TYPES = {
     "front": "an impact from the front",
@@ -54,12 +54,22 @@ TYPES = {
 }
 
 
+#: A vehicle is at rest where its speed with its bound stays below one, m/s, for so long, s: it then
+#: moves by 5 cm at most; a rebound passes zero faster.
+STANDING, STANDING_FOR = 0.5, 0.1
+
+
 def headline(result: CaseResult) -> str:
     """Return the answer in one sentence."""
     if apart(result):
         return apart_headline(result)
     unit = result.reconstruction.main
     number = main_event(unit)
+    if number is None and (cut := unit.events.cut_change) > 0.0:
+        return (
+            f"The record ends within a blow: delta-V at least {speed_words(cut)}, as far as it was "
+            "recorded; its direction of force is not determined."
+        )
     if number is None:
         size, axis = unit.events.largest_change, unit.events.largest_axis
         return (
@@ -100,7 +110,9 @@ def key_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
         figures += apart_figures(result)
         of = f" by {unit.name}"
     elif number is None:
-        figures.append(KeyFigure("Delta-V", "no event", headline(result)))
+        cut = unit.events.cut_change
+        value = f"at least {speed_words(cut)}" if cut > 0.0 else "no event"
+        figures.append(KeyFigure("Delta-V", value, headline(result)))
     else:
         changes = unit.body[number]
         whole, peak = changes.event, changes.peak
@@ -130,7 +142,7 @@ def key_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
     place, half = _end(unit)
     figures.append(
         KeyFigure(
-            f"Final position{of}",
+            f"{_last_name(unit)}{of}",
             f"{plain(length_factor() * math.hypot(place[0], place[1]), 2)} {length_unit()}",
             ", ".join(
                 f"{name}{GAP}{length_about(p, h)}"
@@ -270,6 +282,18 @@ def _axes(result: CaseResult) -> str:
     return "over ground" if over_ground(result) else "in the axes of the vehicle at the entry"
 
 
+def _last_name(unit: UnitReconstruction) -> str:
+    """Name of the position at the end of the path: final only where the vehicle came to rest."""
+    path = unit.path
+    last = path.time >= path.time[-1] - STANDING_FOR
+    speeds = np.linalg.norm(path.table[VELOCITY].to_numpy()[last], axis=1)
+    bounds = TWO_SIDED_95 * np.linalg.norm(path.sd[VELOCITY].to_numpy()[last], axis=1)
+    long = path.time[-1] - path.time[0] > STANDING_FOR
+    if long and bool((speeds + bounds < STANDING).all()):
+        return "Final position"
+    return f"Position at {instant(path.time[-1])}"
+
+
 def _end(unit: UnitReconstruction) -> tuple[list[float], list[float]]:
     """Position at the end of the path and the half widths of its bound, m."""
     place = unit.path.table[NED].iloc[-1].tolist()
@@ -331,7 +355,8 @@ def apart_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
 def _change(unit: UnitReconstruction) -> str:
     number = main_event(unit)
     if number is None:
-        return "no event"
+        cut = unit.events.cut_change
+        return f"at least {speed_words(cut)}" if cut > 0.0 else "no event"
     return change_words(unit.body[number].event)
 
 
@@ -493,6 +518,7 @@ AGAINST = frozenset(
         "disagree-their-common-point-chi",
         "event-beyond-assumed-turning",
         "momentum-not-closed",
+        "no-event-yet",
         "no-point-closes",
         "one-point-off",
         "others-agree-another-not",
@@ -636,6 +662,7 @@ def not_shown(result: CaseResult) -> tuple[tuple[str, str], ...]:
 #: Limitations that make an answer wrong, not only less precise.
 GRAVE = frozenset(
     (
+        "blow-beyond-record",
         "event-beyond-record",
         "event-before-record",
         "direction-undetermined",
@@ -677,6 +704,16 @@ def _event(result: CaseResult) -> Iterator[tuple[str, str, str]]:
             f" {' and '.join(others)} alone recorded one: see Delta-V, and check whether another "
             "record begins late or ends early."
         )
+        if unit.events.cut_change > 0.0:
+            yield (
+                "blow-beyond-record",
+                "The record ends within a blow",
+                f"It ends at {instant(unit.acceleration.end)}, while the velocity changes by more "
+                "than what ends an event by 49 CFR 563, and before it is one. Delta-V is at least "
+                f"{speed_words(unit.events.cut_change)}; severity and direction of force are not "
+                f"given.{alone if others else ''}",
+            )
+            return
         yield (
             "no-event",
             "No event",

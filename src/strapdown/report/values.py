@@ -9,7 +9,7 @@ from contextvars import ContextVar
 from typing import TYPE_CHECKING
 
 from strapdown.constants import DEG_PER_HOUR, MICRO_G, STANDARD_GRAVITY, TWO_SIDED_95
-from strapdown.units import LENGTHS, MASSES, SHOWN_UNITS, SPEEDS, ShownUnits
+from strapdown.units import FORCES, LENGTHS, MASSES, MOMENTS, SHOWN_UNITS, SPEEDS, ShownUnits
 
 if TYPE_CHECKING:
     from strapdown.crash.case import CaseResult
@@ -24,6 +24,13 @@ KMH = 3.6
 SHOWN: ContextVar[ShownUnits] = ContextVar("shown units", default=SHOWN_UNITS["metric"])
 # Numbers of a unit in one of SI; of km/h 3.6 to the last bit.
 _PER = {"km/h": 3.6} | {u: 1.0 / f for u, f in (SPEEDS | LENGTHS | MASSES).items() if u != "km/h"}
+# Of an impulse, N s, and an energy, J; with decimals of about the same size.
+_PER_SUM = {
+    "kN s": (1e-3, 2),
+    "kJ": (1e-3, 1),
+    "lbf s": (1.0 / FORCES["lbf"], 0),
+    "ft lbf": (1.0 / MOMENTS["lbf*ft"], 0),
+}
 #: Name of the recorders' mean, in every table and chart.
 MEAN = "mean of the recorders"
 #: Axes of a vehicle.
@@ -122,7 +129,19 @@ def length_factor() -> float:
 def mass_words(mass: float) -> str:
     """Format a mass in kg."""
     unit = SHOWN.get().mass
-    return f"{_PER[unit] * mass:.6g} {unit}" if unit != "kg" else f"{mass:g} kg"
+    return f"{plain(_PER[unit] * mass, 0)} {unit}" if unit != "kg" else f"{mass:g} kg"
+
+
+def impulse_shown() -> tuple[float, int, str]:
+    """Factor to the shown unit of impulses of 1 N s, its decimals, and the unit."""
+    unit = SHOWN.get().impulse
+    return *_PER_SUM[unit], unit
+
+
+def energy_shown() -> tuple[float, int, str]:
+    """Factor to the shown unit of energies of 1 J, its decimals, and the unit."""
+    unit = SHOWN.get().energy
+    return *_PER_SUM[unit], unit
 
 
 def length_about(value: float, half: float) -> str:

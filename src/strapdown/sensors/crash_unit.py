@@ -182,6 +182,15 @@ class CrashUnit:
             if not isinstance(getattr(self, name), kind):
                 raise _wrong_type(name, getattr(self, name), self.name)
 
+    @property
+    def from_zero(self) -> bool:
+        """Whether it recorded changes of velocity from time zero (49 CFR 563.8), and none before.
+
+        By ``attrs["from_zero"]`` of all its accelerometers.
+        """
+        tables = [t.table for t in self.accelerometers]
+        return bool(tables) and all(t.attrs.get("from_zero", False) for t in tables)
+
 
 def _wrong_type(quantity: str, given: object, unit: object) -> ConfigError:
     return ConfigError(

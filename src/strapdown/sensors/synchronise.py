@@ -31,7 +31,8 @@ from strapdown.tables import ACCEL, GYRO, SAMPLINGS
 
 Array = NDArray[np.float64]
 
-LEAST_STAMPS = 8
+#: Stamps that records share to be compared; of one by itself, a peak between two steps.
+LEAST_STAMPS, LEAST_ALONE = 8, 4
 # Methods of resampling that hide saturation in the values.
 HIDING = ("decimated", "averaged")
 
@@ -297,15 +298,17 @@ def _stamps(spans: list[tuple[str, float, float]], rate: float) -> Array:
     earliest = min(spans, key=lambda s: s[2])
     first = math.ceil(latest[1] * rate - 1e-6)
     last = math.floor(earliest[2] * rate + 1e-6)
-    if last - first + 1 < LEAST_STAMPS:
+    least = LEAST_ALONE if len({name for name, _, _ in spans}) == 1 else LEAST_STAMPS
+    if last - first + 1 < least:
+        short = latest[0] == earliest[0]
         raise DataError(
-            "sensors.common-clock-begins-ends-they",
+            "sensors.record-too-short" if short else "sensors.common-clock-begins-ends-they",
             file=latest[0],
             quantity="time",
             latest=latest[1],
             earliest=earliest[0],
             earliest_2=earliest[2],
-            least_stamps=LEAST_STAMPS,
+            least_stamps=least,
             rate=rate,
         )
     return np.arange(first, last + 1) / rate

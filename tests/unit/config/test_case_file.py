@@ -67,6 +67,15 @@ def test_files_are_found_from_the_folder_of_the_case(tmp_path, monkeypatch):
     assert all(names_file("path", path) for path in paths)
 
 
+def test_the_nearest_file_can_be_pasted(tmp_path):
+    write(tmp_path)
+    (tmp_path / "records").mkdir()
+    (tmp_path / "records" / "imu1_high_g.csv").touch()
+    with pytest.raises(ConfigError) as caught:
+        read(tmp_path, ('path = "imu1.csv"', 'path = "records/imu1_highg.csv"'))
+    assert caught.value.finding.data["near"] == "records/imu1_high_g.csv"
+
+
 def test_a_sensor_of_a_file_is_found_there_too(tmp_path):
     from strapdown.sensors.catalogue import FOLDER
 

@@ -98,6 +98,34 @@ def test_the_reconstructed_change_is_the_recorded_one(tmp_path, length, first):
     assert event.event.delta_v.vector[0] == pytest.approx(-44.3 * KMH, abs=1e-3 * KMH)
 
 
+def test_a_table_begins_at_time_zero_by_definition(tmp_path):
+    draft = drafted(tmp_path, text_of(Layout()))
+    result = run_case(filled(draft, tmp_path))
+    assert result.reconstruction.main.events.events[0].starts_before_record
+    found = {f.code: f.severity for f in result.findings}
+    assert found["crash.table-levelled"] == "note"
+    late = {"crash.record-begins-event-km-h", "crash.record-starts-in-crash-levelled"}
+    assert not late & {*found}
+    # A record of accelerations that begins there has missed what it does not have.
+    other = drafted(tmp_path, text_of(Layout(acceleration_only=True, step=0.001)), "g.csv")
+    found = {f.code for f in run_case(filled(other, tmp_path)).findings}
+    assert late <= found
+
+
+@pytest.mark.parametrize("end", [0.05, 0.06])
+def test_a_table_of_six_or_seven_rows_is_at_least(tmp_path, end):
+    draft = drafted(tmp_path, text_of(Layout(end=end, decimals=3)))
+    spec = filled(draft, tmp_path)
+    whole = run_case(spec).reconstruction.main.delta_v
+    assert whole.at_least and whole.missing == ("after",)
+    known = np.linalg.norm(Pulse().change([end]))
+    assert whole.resultant == pytest.approx(known, rel=1e-3)
+    # Its own length is the reason, not an overlap with itself.
+    few = spec.options.model_copy(update={"rate_hz": 30.0})
+    with pytest.raises(DataError, check=coded("sensors.record-too-short")):
+        run_case(spec.model_copy(update={"options": few}))
+
+
 def test_axes_are_of_the_vehicle_and_begin_together(tmp_path):
     # In mph with a decimal the lateral change is 0.0 after its first step of 10 ms.
     draft = drafted(tmp_path, text_of(Layout(units=("mph",), first=0.01, decimals=1)))

@@ -1,5 +1,6 @@
 """Time zero, trigger and end against closed forms; what is a crash and what is not."""
 
+import math
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -183,6 +184,27 @@ def test_what_is_no_crash_is_none_and_says_how_far_it_went(name):
         assert search.woken >= (0 if name == "door slam" else 1)
     with pytest.raises(DataError, check=coded("crash.no-event-perhaps-in-g")):
         search.first  # noqa: B018
+
+
+@pytest.mark.parametrize("sampling", ["instantaneous", "mean"])
+def test_a_record_that_ends_within_a_blow_is_at_least_what_it_has(sampling):
+    # Constant 60 m/s² from 0 s, at 40 deg: neither component reaches 8 km/h within 45 ms.
+    time = np.arange(-1.0, 0.045 + 5e-4, 1e-3)
+    direction = np.array([math.cos(math.radians(40.0)), math.sin(math.radians(40.0)), 0.0])
+    values = 60.0 * (time > 5e-4)[:, None] * direction
+    search = detect_events(Acceleration(time, values, sampling=sampling))
+    assert search.events == ()
+    # Trapezoids count half of the step at the onset.
+    length = 0.045 - (0.0005 if sampling == "instantaneous" else 0.0)
+    assert search.cut_change == pytest.approx(60.0 * length, rel=1e-9)
+    (finding,) = search.findings
+    assert finding.code == "crash.no-event-yet" and finding.severity == "warning"
+    assert finding.data["cut"] == pytest.approx(3.6 * search.cut_change)
+    # Only what the regulation's end would end is over: 30 ms later the record says nothing of it.
+    later = np.arange(-1.0, 0.075 + 5e-4, 1e-3)
+    over = np.where((later < 0.0305)[:, None], 60.0 * (later > 5e-4)[:, None] * direction, 0.0)
+    whole = detect_events(Acceleration(later, over, sampling=sampling))
+    assert whole.cut_change == 0.0 and whole.findings[0].code != "crash.no-event-yet"
 
 
 def test_a_trigger_reached_after_the_spike_is_told_by_the_spike():

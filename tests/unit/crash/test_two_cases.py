@@ -10,8 +10,9 @@ import pandas as pd
 import pytest
 
 import strapdown as sd
+from strapdown.report.crash_tables import closure_table
 from strapdown.report.crash_words import closure_words
-from strapdown.report.values import plain
+from strapdown.report.values import MINUS, plain, shown_in
 
 G = 9.80665
 MASSES, SPEEDS = (1500.0, 1100.0), (15.0, 12.0)
@@ -128,6 +129,17 @@ def test_two_cars_close_and_the_figures_hold(tmp_path):
     # Along the impulse on the first, which points backward.
     assert closure.common_velocity.contains(-common)
     assert run.vehicle_names == ("a", "b")
+    # Its sums are in the units of the report.
+    closed = {}
+    for system in ("metric", "us"):
+        with shown_in(system):
+            found = closure_table(run).rows
+        closed[system] = {row[3]: float(row[1].replace(MINUS, "-")) for row in found}
+    lbf = 0.45359237 * G
+    joules = closure.energy.value
+    assert closed["metric"]["kJ"] == pytest.approx(1e-3 * joules, abs=0.05)
+    assert closed["us"]["ft lbf"] == pytest.approx(joules / (0.3048 * lbf), abs=0.5)
+    assert closed["us"]["lbf s"] == pytest.approx(1e3 * closed["metric"]["kN s"] / lbf, abs=2.0)
     # Page one of either names the other and has the closing speed.
     speed = plain(3.6 * closure.closing_speed.value, 1)
     for one, other in ((run, "b"), (run.others[0], "a")):

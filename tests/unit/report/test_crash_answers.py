@@ -28,6 +28,7 @@ from strapdown.report.crash_case import (
 from strapdown.report.crash_document import crash_document
 from strapdown.report.crash_tables import answers_table, severity_table
 from strapdown.report.crash_words import (
+    GRAVE,
     contradictions,
     headline,
     key_figures,
@@ -36,7 +37,7 @@ from strapdown.report.crash_words import (
     not_shown,
 )
 from strapdown.report.document import Items
-from strapdown.report.values import shown_in, spaced
+from strapdown.report.values import mass_words, shown_in, spaced
 from strapdown.report.verify import changed_case
 
 USUAL = {
@@ -110,6 +111,15 @@ def test_an_event_that_is_cut_by_the_record(result):
         assert codes(cut) - USUAL == {code}
 
 
+def test_a_record_that_ends_before_its_blow_is_an_event(result):
+    events = replace(result.reconstruction.main.events, events=(), cut_change=2.0)
+    cut = with_main(result, events=events, body=(), ned=(), types=())
+    assert codes(cut) - USUAL == {"blow-beyond-record"} < GRAVE
+    figure, *_ = key_figures(cut)
+    assert spaced(figure.value) == "at least 7.2 km/h" and "7.2 km/h" in spaced(headline(cut))
+    assert "at least 2.00 m/s" in repr(cut.reconstruction.main)
+
+
 def test_a_part_is_told_as_at_least_everywhere(result):
     whole = result.reconstruction.main.body[0].event
     cut = with_change(result, missing=("after",), open_axes=(True, True, True))
@@ -142,6 +152,20 @@ def test_a_part_is_told_as_at_least_everywhere(result):
     assert all(s["high"] is None and s["at_least"] for s in crash_json(risky)["severity"])
     assert all(row[1].startswith("at least ") for row in severity_table(risky).rows)
     assert "at least" in repr(cut.reconstruction.main)
+
+
+def test_the_end_of_the_path_is_final_only_at_rest(result, main):
+    def last_figure(speed):
+        table = main.path.table.copy()
+        table[["VN", "VE", "VD"]] *= 0.0
+        table.loc[table.index[-5:], "VN"] = speed
+        exact = {name: 0.0 * getattr(main.path, name) for name in ("errors", "noise_covariance")}
+        path = replace(main.path, table=table, **exact)
+        return key_figures(with_main(result, path=path))[-1].name
+
+    at = spaced(f"{main.path.time[-1]:.4g} s")
+    assert at in spaced(key_figures(result)[-1].name)
+    assert at in spaced(last_figure(0.51)) and at not in spaced(last_figure(0.49))
 
 
 def test_no_event(result):
@@ -319,6 +343,7 @@ def test_units_are_those_of_tables_and_sentences(result):
         table = answers_table(result)
         assert table.columns[3] == "forward, mph"
         assert "mph" in headline(result) and "ft" in lead(result)
+        assert mass_words(1786.0) == "3937 lb"
     assert "km/h" in headline(result) and "mph" not in lead(result)
 
 
