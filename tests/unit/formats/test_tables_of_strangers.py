@@ -12,7 +12,7 @@ from tests.coded import coded
 
 import strapdown as sd
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.errors import DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats import ReadOptions, read_log, reader_of
 from strapdown.formats.assemble import assemble
 from strapdown.formats.columns import read_name
@@ -62,6 +62,9 @@ def check(log, count=40):
         ["Time,gx,gy,gz,ax,ay,az", "(s),(deg/s),(deg/s),(deg/s),(g),(g),(g)"],
         ["Test,bench", "Time,gx,gy,gz,ax,ay,az", "s,deg/s,deg/s,deg/s,g,g,g"],
         [HEADER + ","],
+        # As a spreadsheet fills up its rows: a word and a date are half data.
+        ["Bench 4,,,,,,", "Date,04.05.2023,,,,,", ",,,,,,", HEADER],
+        ["Date,04.05.2023,,,,,", HEADER],
         ["% Time,gx,gy,gz,ax,ay,az", "% s,deg/s,deg/s,deg/s,g,g,g"],
         ["% Time,gx,gy,gz,ax,ay,az", "% ,deg/s,deg/s,deg/s,g,g,g"],
     ],
@@ -626,6 +629,63 @@ def test_an_accelerometer_that_a_format_does_not_read_is_no_note():
     ]
     assert found.severity == "warning"
     assert found.data["names"] == tuple(forces)
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity", "unit"),
+    [
+        ("Accel_LN_X_CAL m/(s^2)", "accel_x", "m/s2"),
+        ("acc_x m/s^(2)", "accel_x", "m/s2"),
+        ("ay_mss", "accel_y", "m/s2"),
+        ("gyro_x rad/(s)", "gyro_x", "rad/s"),
+        ("wz_degsec", "gyro_z", "deg/s"),
+        ("xl_x", "accel_x", None),
+        ("XL Z [mg]", "accel_z", "mg"),
+    ],
+)
+def test_units_as_programs_write_them(name, quantity, unit):
+    said = read_name(name)
+    assert (said.quantity, said.unit) == (quantity, unit)
+
+
+def test_three_axes_of_a_name_without_separators_are_one_sensor():
+    assert len({read_name(f"xl{axis}").family for axis in "xyz"}) == 1
+
+
+def unknown(names, three, n=400):
+    """Make a log with rates, and columns of unknown names."""
+    columns = {"t": np.arange(n) / 50.0, **{f"w{a}": np.full(n, 0.01) for a in "xyz"}}
+    units = {f"w{a}": "rad/s" for a in "xyz"} | {"t": "s"}
+    more = dict(zip(names, np.transpose(three), strict=True))
+    return RawLog("log.csv", (), columns=columns | more, rows=np.arange(n), units=units)
+
+
+TURNED = np.column_stack(
+    [np.sin(np.arange(400) / 40), np.cos(np.arange(400) / 40), np.full(400, 0.1)]
+)
+
+
+@pytest.mark.parametrize("names", [["mxlX", "mxlY", "mxlZ"], ["s1 raw", "s2 raw", "s3 raw"]])
+@pytest.mark.parametrize("size", [9.8, 1.0, 4096.0])
+def test_columns_of_unknown_names_with_the_norm_of_gravity_are_named(names, size):
+    raw = unknown(names, size * TURNED)
+    (found,) = [f for f in assemble(raw, ReadOptions()).findings if f.quantity == "accel"]
+    assert (found.code, found.severity) == ("io.columns-like-accelerometer", "warning")
+    assert found.data["norm"] == pytest.approx(size * np.sqrt(1.01))
+    with pytest.raises(ConfigError, check=coded("io.unit-without-column")):
+        assemble(raw, ReadOptions(accel_unit="g"))
+    stated = dict(item.split("=") for item in found.data["columns"].split(","))
+    read_as = assemble(raw, ReadOptions(columns=stated, accel_unit="m/s2")).imu
+    assert read_as[ACCEL].to_numpy() == pytest.approx(size * TURNED)
+
+
+@pytest.mark.parametrize("name", ["walked", "mag", "acc_bias"])
+def test_other_columns_are_not_taken_for_an_accelerometer(name):
+    """A way has no steady norm, and a magnetometer has a name."""
+    three = TURNED if name == "mag" else TURNED * np.linspace(0.1, 3.0, 400)[:, None]
+    raw = unknown([f"{name}_{a}" for a in "xyz"], three)
+    codes = {f.code for f in assemble(raw, ReadOptions()).findings}
+    assert "io.columns-like-accelerometer" not in codes
 
 
 # Forms of tables that people publish.
