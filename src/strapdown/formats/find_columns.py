@@ -142,11 +142,8 @@ def _is_nameless(raw: RawLog) -> bool:
 
 def _nameless(raw: RawLog, likely: dict[str, str]) -> Finding:
     """Describe columns without names, by values by which the user can identify them."""
-    example = "time=1,gyro_x=2,gyro_y=3,gyro_z=4"
-    if len(raw.columns) >= 7:
-        example += ",accel_x=5,accel_y=6,accel_z=7"
-    if likely:
-        example = ",".join(f"{quantity}={column}" for quantity, column in likely.items())
+    likely = likely or _in_usual_order(raw)
+    example = ",".join(f"{quantity}={column}" for quantity, column in likely.items())
     # Seven columns are usually increments of KF-GINS.
     return Finding(
         "io.nameless-seven-columns" if len(raw.columns) == 7 else "io.nameless-columns",
@@ -159,11 +156,24 @@ def _nameless(raw: RawLog, likely: dict[str, str]) -> Finding:
     )
 
 
+def _in_usual_order(raw: RawLog) -> dict[str, str]:
+    """Number the columns as many logs have them: a clock, which no words are, rates, forces."""
+    kinds = [column.dtype.kind for column in raw.columns.values()]
+    out = {"time": "1"} if kinds[0] in "iufM" else {}
+    words = next((k for k, kind in enumerate(kinds) if kind in "iuf"), 0)
+    first = 2 if out else words + 1
+    triads = ("gyro", "accel") if len(kinds) >= first + 5 else ("gyro",)
+    quantities = [f"{triad}_{axis}" for triad in triads for axis in AXES]
+    return out | {quantity: str(k) for k, quantity in enumerate(quantities, first)}
+
+
 #: Ranges of the median norm of an accelerometer in m/s², g and mg, and most of its spread between
 #: the first and the last decile, relative to the median.
 GRAVITIES, LOOSEST = ((8.8, 10.8), (0.9, 1.1), (900.0, 1100.0)), 0.5
-#: Spread below which a norm may be that of a magnetometer.
+#: Spread below which a norm may be that of a magnetometer, or of an accelerometer in any unit.
 STEADY = 0.05
+#: Most spread of a walk, beside a triad whose norm spreads so many times more.
+VIOLENT, APART = 1.0, 3.0
 
 
 #: Largest median norm of a triad that may be an accelerometer: of counts of 16 bits, three axes.
@@ -232,6 +242,13 @@ def _likely_columns(raw: RawLog) -> dict[str, str]:
         for k, (usual, spread) in triads.items()
         if spread < LOOSEST and any(low < usual < high for low, high in GRAVITIES)
     ]
+    if len(forces) != 1 and len(triads) == 2:
+        # Of two, the norm of rates varies about that of their noise; a force is in any unit.
+        steady, other = sorted(triads, key=lambda k: triads[k][1])
+        (usual, spread), (_, varied) = triads[steady], triads[other]
+        gravity = any(low < usual < high for low, high in GRAVITIES)
+        sure = usual > 0.0 and spread < (VIOLENT if gravity else STEADY) and varied > APART * spread
+        forces = [steady] if sure else forces
     if len(forces) != 1:
         return {}
     force = forces[0]

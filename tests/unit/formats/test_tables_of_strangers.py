@@ -781,6 +781,28 @@ def test_columns_without_names_are_proposed_by_their_numbers(tmp_path):
     assert np.allclose(imu[GYRO], np.round(gyro, 6)) and np.allclose(imu[ACCEL], np.round(accel, 6))
 
 
+@pytest.mark.parametrize("first", ["a/g:", "2023-05-04 10:11:12.000"])
+@pytest.mark.parametrize("scale", [1.0, 16384.0])
+def test_the_steadier_of_two_triads_without_names_is_the_accelerometer(tmp_path, first, scale):
+    """A walk, and counts; a word that begins every row is no time."""
+    rng = np.random.default_rng(7)
+    steps = 0.02 if scale > 1.0 else 0.25
+    accel = scale * (steps * rng.standard_normal((400, 3)) + (0.0, 0.0, 1.0))
+    gyro = rng.standard_normal((400, 3)) * np.abs(rng.standard_normal((400, 1)))
+    table = np.column_stack([accel, 30.0 * gyro])
+    word = first[0].isalpha()
+    lines = []
+    for k, row in enumerate(table):
+        stamp = first if word else f"{first[:17]}{12 + k // 100:02d}.{k % 100:02d}0"
+        lines.append(",".join([stamp, *(f"{v:.4f}" for v in row)]))
+    columns = {} if word else {"time": "1"}
+    columns |= {f"gyro_{a}": str(k) for k, a in enumerate("xyz", 5)}
+    columns |= {f"accel_{a}": str(k) for k, a in enumerate("xyz", 2)}
+    asked = answers(tmp_path, lines)
+    assert {q: c for q, c in asked.items() if q in columns} == columns
+    assert ("time" in asked) is not word
+
+
 def test_columns_without_names_and_without_gravity_are_not_guessed(tmp_path):
     rng = np.random.default_rng(12)
     table = np.column_stack([0.01 * np.arange(100), rng.standard_normal((100, 6))])
@@ -788,6 +810,11 @@ def test_columns_without_names_and_without_gravity_are_not_guessed(tmp_path):
     with pytest.raises(DataError) as refused:
         read(tmp_path, lines, "log.txt", gyro_unit="rad/s")
     assert "answers" not in refused.value.finding.data
+    # A first column of words is no time in an example either.
+    lines = [f"imu {line.partition(' ')[2]}" for line in lines]
+    with pytest.raises(DataError) as refused:
+        read(tmp_path, lines, "log.txt", gyro_unit="rad/s")
+    assert refused.value.finding.data["example"].startswith("gyro_x=2,")
 
 
 def test_a_word_that_begins_every_row_has_no_name(tmp_path):
@@ -870,14 +897,15 @@ def test_the_clock_of_apple_leaves_the_sign_of_gravity_open(tmp_path):
     assert np.allclose(log.imu[ACCEL].to_numpy()[0], -np.array(FORCE), atol=1e-4)
 
 
-@pytest.mark.parametrize("clock", ["elapsed_ms", None])
-def test_the_counter_of_an_xsens_dot(tmp_path, clock):
+@pytest.mark.parametrize(("clock", "first"), [("elapsed_ms", 70_000), (None, 70_000), (None, -1)])
+def test_the_counter_of_an_xsens_dot(tmp_path, clock, first):
     top = [] if clock else ["sep=,", "DeviceTag:,left", "FirmwareVersion:,1.6.0", ""]
     head = "PacketCounter,SampleTimeFine,Gyr_X,Gyr_Y,Gyr_Z,Acc_X,Acc_Y,Acc_Z"
     lines = [*top, head + (f",{clock}" if clock else "")]
     for k in range(60):
         values = ",".join(f"{v:.6f}" for v in (*np.degrees(RATES), *FORCE))
-        lines.append(f"{k},{70_000 + 10_000 * k},{values}" + (f",{10 * k}" if clock else ""))
+        stamp = (first + 10_000 * k) % 2**32  # one wraps after the first row
+        lines.append(f"{k},{stamp},{values}" + (f",{10 * k}" if clock else ""))
     # The preamble of a DOT says deg/s, and its counter is of microseconds.
     check(read(tmp_path, lines, **({"gyro_unit": "deg/s"} if clock else {})), 60)
 
