@@ -264,8 +264,8 @@ def test_a_contradiction_stops_and_the_users_statement_goes_before(tmp_path):
 
 def test_a_stated_unit_by_which_a_gyro_turns_beyond_its_full_scale_is_a_question(tmp_path):
     """About the vertical, gravity does not turn, and the sizes of rates alone are left."""
-    t, gyro, accel = turning()
-    gyro = 0.7 + 0.1 * np.cos(t)[:, None] * (0.0, 0.0, 1.0) + 0.0 * gyro
+    t, _, _ = turning()
+    gyro = 0.7 + 0.1 * np.cos(t)[:, None] * (0.0, 0.0, 1.0)
     level = np.tile([0.1, 0.2, 9.8], (t.size, 1))
     header = "time_s,gx_rad_s,gy_rad_s,gz_rad_s,ax_m_s2,ay_m_s2,az_m_s2"
     path = write(tmp_path / "log.csv", t, np.degrees(gyro), level, header)
