@@ -156,13 +156,13 @@ OF_CRASHES = ("acceleration", "rate", "force", "velocity", "displacement", "time
 # underscore, with or without "per": `_forms` adds these.
 _SPELLINGS = {
     "rad/s": "rad/s rads radps rad/sec rads/s rads/sec radian/s radians/s radians/sec rad·s-1 "
-    "rad*s^-1 rad.s-1 1/s*rad",
+    "rad*s^-1 rad.s-1 radsec 1/s*rad",
     "mrad/s": "mrad/s",
     "deg/s": "deg/s deg/sec degs degps dps °/s °/sec º/s º/sec degree/s degree/sec degrees/s "
-    "degrees/sec deg/second grad/s",
+    "degrees/sec deg/second degsec grad/s",
     "mdeg/s": "mdeg/s mdps",
     "deg/h": "deg/h deg/hr °/h °/hr",
-    "m/s2": "m/s2 m/s^2 m/s² m/s**2 m/s/s m/sec2 m/sec^2 m/(s*s) m/(s^2) m/s*s m/ss ms2 ms^2 ms-2 "
+    "m/s2": "m/s2 m/s^2 m/s² m/s**2 m/s/s m/sec2 m/sec^2 m/(s*s) m/s*s m/ss mss ms2 ms^2 ms-2 "
     "mps2 m_per_s_2 m·s-2 m*s^-2 meters/sec/sec meters/s2 meters/s^2",
     "ft/s2": "ft/s2 ft/s^2 ft/s² ft/s**2 ft/sec2 ft/sec^2 ft/s/s fps2 feet/s2",
     "g": "g g0 gs g's g`s g-force gn g_n",
@@ -216,6 +216,8 @@ _POWERS = {
     "ms-2": "m/s2",
     "ms-1": "m/s",
 }
+# One factor in brackets behind a division or a power: m/(s^2), rad/(s), m/s^(2).
+_ENCLOSED = re.compile(r"([/^])\((\w+(?:\^?[\d²])?)\)")
 _RAISED = str.maketrans({"⁻": "-", "−": "-", "¹": "1", "²": "2"})
 
 
@@ -245,6 +247,7 @@ def find_unit(text: str, among: Sequence[str] = OF_LOGS) -> tuple[str, str] | No
     the quantity and the unit, in the spelling of this package.
     """
     plain = re.sub(r"\s+", "", text.strip().strip("[]").lower())
+    plain = _ENCLOSED.sub(r"\1\2", plain)
     bare = plain.strip("()")
     power = _POWERS.get(re.sub(r"[·*.^_]", "", bare.translate(_RAISED)))
     for word in (plain, bare):

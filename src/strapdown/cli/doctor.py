@@ -128,6 +128,9 @@ def print_log(one: LogDiagnosis, paths: Mapping[str, str], *, tables: bool) -> N
             out.print(f"   {_cut(fix)}", style="dim")
     if len(faults) > MOST:
         out.print(f"   {len(faults) - MOST} more; see the report", style="yellow")
+    for note in one.notes:
+        if note.code == "io.columns-not-used":
+            out.print(_cut(note.sentence("cli")), style="dim")
     if line := report.answering(one, one.log.path):
         out.print(f"As inferred: {line}")
 

@@ -32,7 +32,9 @@ from strapdown.formats.find_columns import (
     advances,
     find_columns,
     names_of_fixes,
+    reference,
     require_gyro,
+    steady_triads,
 )
 from strapdown.formats.inference.conclusion import Inference
 from strapdown.formats.join import join
@@ -87,6 +89,7 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     questions = Questions(raw.name)
     found = find_columns(raw, options, questions)
     require_gyro(raw, found)
+    _refuse_unit_of_nothing(raw, found, options)
     unused = _unused(raw, found)
     if parts := _by_sensor(raw, found):
         raw = dataclasses.replace(
@@ -262,7 +265,45 @@ def _unused(raw: RawLog, found: dict[str, Column]) -> list[Finding]:
             out.append(
                 Finding("io.accelerometer-not-read", file=raw.name, quantity="accel", names=forces)
             )
+        elif not forces:
+            out += [_like_gravity(raw, three, norm) for three, norm in steady_triads(raw, names)]
     return out
+
+
+def _like_gravity(raw: RawLog, three: list[str], norm: float) -> Finding:
+    return Finding(
+        "io.columns-like-accelerometer",
+        file=raw.name,
+        quantity="accel",
+        names=three,
+        norm=norm,
+        columns=",".join(
+            f"accel_{a}={reference(raw, n)}" for a, n in zip(AXES, three, strict=True)
+        ),
+    )
+
+
+def _refuse_unit_of_nothing(raw: RawLog, found: dict[str, Column], options: ReadOptions) -> None:
+    """Refuse a unit that the user states for an accelerometer of which there is no column.
+
+    A reader that left the accelerometer out has said so.
+    """
+    left_out = any(f.quantity == "accel" for f in raw.findings)
+    if options.accel_unit is None or set(ACCEL) & set(found) or left_out:
+        return
+    used = {column.source for column in found.values()}
+    names = [name for name in raw.columns if name and name not in used]
+    likely = next(iter(steady_triads(raw, names)), None)
+    raise ConfigError(
+        "io.unit-without-column",
+        file=raw.name,
+        quantity="--accel-unit",
+        unit=options.accel_unit,
+        names=names or ["none"],
+        columns=_like_gravity(raw, *likely).data["columns"]
+        if likely
+        else ",".join(f"accel_{a}=NAME" for a in AXES),
+    )
 
 
 #: A table whose sensors have their own rows leaves out at least this share of one sensor.

@@ -146,9 +146,14 @@ def read_name(name: str, of: Vocabulary = LOGS, unit: str = "") -> ColumnName:
 
 
 def split_brackets(text: str) -> tuple[str, str]:
-    """Split text in brackets off the end of a name, as a unit; empty without brackets."""
+    """Split text in brackets off the end of a name, as a unit; empty without brackets.
+
+    Brackets behind a division or a power are part of a unit: ``m/(s^2)``.
+    """
     bracket = _BRACKETS.search(text)
-    return (text[: bracket.start()], bracket.group(1)) if bracket else (text, "")
+    if bracket is None or text[: bracket.start()].rstrip().endswith(("/", "^")):
+        return text, ""
+    return text[: bracket.start()], bracket.group(1)
 
 
 def _of_format(text: str, index: str) -> ColumnName | None:
@@ -330,7 +335,7 @@ def _known(word: str, of: Vocabulary) -> ColumnName | None:
     sensor, axis = word[:-1], word[-1:]
     if axis not in _AXES:
         sensor, axis = (word[1:], word[:1]) if word[:1] in _AXES and len(word) > 2 else (word, "")
-    turned = word[:1] == axis
+    turned = bool(axis) and sensor == word[1:]
     for names, triad, increment in SENSORS:
         if sensor in names and (axis or (len(sensor) > 1 and sensor not in WITH_AXIS)):
             quantity = f"{triad}_{axis}" if axis and axis in _AXES else triad

@@ -44,6 +44,8 @@ _HEX = re.compile(r"[+-]?0x[0-9a-f]+", re.I)
 #: Lines at the top of a text in which its rows of numbers are searched, their characters, and the
 #: fields of each that are judged.
 SEARCHED, SEARCHED_TEXT, JUDGED = 400, 1 << 20, 200
+#: Lines below one with a word and a number in which the names of the columns are searched.
+PREAMBLE = 10
 #: Most fields of a row; no log has more, and a damaged line may.
 MOST_COLUMNS = 10_000
 # Line breaks of Python that are none of an editor.
@@ -445,6 +447,8 @@ def _first_row(numbered: Lines, kinds: Sequence[str]) -> tuple[int, str | None, 
     like = [bool(usual) and d and f == usual[0][0] for f, d in zip(forms, data, strict=True)]
     for k in np.flatnonzero(like).tolist():
         after = like[k + 1 : k + 3]
+        if _above_names(numbered, forms, data, k):
+            continue
         if k == 1:
             break
         if after and not any(after) and len(like) > 3:
@@ -463,6 +467,19 @@ def _first_row(numbered: Lines, kinds: Sequence[str]) -> tuple[int, str | None, 
     separator = separator_of(numbered[0][1])
     names = fields_of(numbered[0][1], separator)
     return 1, separator, len(names) - (len(names) > 1 and not names[-1])
+
+
+def _above_names(
+    numbered: Lines, forms: list[tuple[str | None, int]], data: list[bool], k: int
+) -> bool:
+    """Whether a line with empty fields is of a preamble: the names, all there, are soon below."""
+    if all(fields_of(numbered[k][1], forms[k][0])):
+        return False
+    below = range(k + 1, min(k + 1 + PREAMBLE, len(forms)))
+    return any(
+        forms[m] == forms[k] and not data[m] and all(fields_of(numbered[m][1], forms[m][0]))
+        for m in below
+    )
 
 
 def are_data(fields: list[str]) -> bool:

@@ -142,11 +142,8 @@ def _is_nameless(raw: RawLog) -> bool:
 
 def _nameless(raw: RawLog, likely: dict[str, str]) -> Finding:
     """Describe columns without names, by values by which the user can identify them."""
-    example = "time=1,gyro_x=2,gyro_y=3,gyro_z=4"
-    if len(raw.columns) >= 7:
-        example += ",accel_x=5,accel_y=6,accel_z=7"
-    if likely:
-        example = ",".join(f"{quantity}={column}" for quantity, column in likely.items())
+    likely = likely or _in_usual_order(raw)
+    example = ",".join(f"{quantity}={column}" for quantity, column in likely.items())
     # Seven columns are usually increments of KF-GINS.
     return Finding(
         "io.nameless-seven-columns" if len(raw.columns) == 7 else "io.nameless-columns",
@@ -159,11 +156,68 @@ def _nameless(raw: RawLog, likely: dict[str, str]) -> Finding:
     )
 
 
+def _in_usual_order(raw: RawLog) -> dict[str, str]:
+    """Number the columns as many logs have them: a clock, which no words are, rates, forces."""
+    kinds = [column.dtype.kind for column in raw.columns.values()]
+    out = {"time": "1"} if kinds[0] in "iufM" else {}
+    words = next((k for k, kind in enumerate(kinds) if kind in "iuf"), 0)
+    first = 2 if out else words + 1
+    triads = ("gyro", "accel") if len(kinds) >= first + 5 else ("gyro",)
+    quantities = [f"{triad}_{axis}" for triad in triads for axis in AXES]
+    return out | {quantity: str(k) for k, quantity in enumerate(quantities, first)}
+
+
 #: Ranges of the median norm of an accelerometer in m/s², g and mg, and most of its spread between
 #: the first and the last decile, relative to the median.
 GRAVITIES, LOOSEST = ((8.8, 10.8), (0.9, 1.1), (900.0, 1100.0)), 0.5
-#: Spread below which a norm may be that of a magnetometer.
+#: Spread below which a norm may be that of a magnetometer, or of an accelerometer in any unit.
 STEADY = 0.05
+#: Most spread of a walk, beside a triad whose norm spreads so many times more.
+VIOLENT, APART = 1.0, 3.0
+
+
+#: Largest median norm of a triad that may be an accelerometer: of counts of 16 bits, three axes.
+LARGEST_NORM = 6e4
+
+
+def norm_and_spread(three: list[NDArray[Any]]) -> tuple[float, float]:
+    """Return the median norm of three columns, and its spread between deciles, relative to it."""
+    some = 1 + three[0].size // 100_000
+    norms = np.linalg.norm(np.column_stack([c[::some] for c in three]).astype(np.float64), axis=1)
+    norms = norms[np.isfinite(norms)]
+    if not norms.size:
+        return 0.0, 0.0
+    low, usual, high = map(float, np.quantile(norms, (0.1, 0.5, 0.9)))
+    return usual, (high - low) / usual if usual else 0.0
+
+
+def steady_triads(raw: RawLog, names: list[str]) -> list[tuple[list[str], float]]:
+    """Return triads of columns of unknown names whose norm is that of gravity, or steady.
+
+    `names`: columns that nothing takes. Three belong together if their names differ in a letter x,
+    y or z, or in a number that counts; the vector of a quaternion, whose norm is steady too, has a
+    fourth beside it. Returns the names, and the median norm.
+    """
+    out: list[tuple[list[str], float]] = []
+    for name in names:
+        for match in _FIRST.finditer(name):
+            letters = next(s for s in _SERIES if s[0] == match[0])
+            three = [name[: match.start()] + letter + name[match.end() :] for letter in letters]
+            fourth = {"x": "wW", "X": "wW", "0": "3", "1": "04"}[match[0]]
+            beside = {name[: match.start()] + letter + name[match.end() :] for letter in fourth}
+            if not set(three) <= set(names) or beside & raw.columns.keys():
+                continue
+            columns = [raw.columns[n] for n in three]
+            if any(c.dtype.kind not in "iuf" for c in columns):
+                continue
+            if any(read_name(n).quantity for n in three):
+                continue
+            norm, spread = norm_and_spread(columns)
+            gravity = any(low < norm < high for low, high in GRAVITIES)
+            if 0.0 < norm < LARGEST_NORM and spread < (LOOSEST if gravity else STEADY):
+                out.append((three, norm))
+                break
+    return out
 
 
 def _likely_columns(raw: RawLog) -> dict[str, str]:
@@ -182,14 +236,19 @@ def _likely_columns(raw: RawLog) -> dict[str, str]:
         three = columns[k : k + 3]
         if any(c.dtype.kind not in "iuf" for c in three):
             break
-        norms = np.linalg.norm(np.column_stack(three).astype(np.float64), axis=1)
-        low, usual, high = map(float, np.nanquantile(norms, (0.1, 0.5, 0.9)))
-        triads[k] = usual, (high - low) / usual if usual else 0.0
+        triads[k] = norm_and_spread(three)
     forces = [
         k
         for k, (usual, spread) in triads.items()
         if spread < LOOSEST and any(low < usual < high for low, high in GRAVITIES)
     ]
+    if len(forces) != 1 and len(triads) == 2:
+        # Of two, the norm of rates varies about that of their noise; a force is in any unit.
+        steady, other = sorted(triads, key=lambda k: triads[k][1])
+        (usual, spread), (_, varied) = triads[steady], triads[other]
+        gravity = any(low < usual < high for low, high in GRAVITIES)
+        sure = usual > 0.0 and spread < (VIOLENT if gravity else STEADY) and varied > APART * spread
+        forces = [steady] if sure else forces
     if len(forces) != 1:
         return {}
     force = forces[0]
@@ -216,6 +275,9 @@ def advances(values: NDArray[Any]) -> bool:
     return usual > 0.0 and forward and bool(even > 0.9)
 
 
+#: Names of three axes, and the first of them in a name: no letter or digit of its kind beside it.
+_SERIES = ("xyz", "XYZ", "012", "123")
+_FIRST = re.compile(r"[xX]|(?<!\d)[01](?!\d)")
 #: The letter of an axis at the end of a name, or before its unit.
 _LAST = re.compile(r"[xyzXYZ](?=\W*$|[\s_]*[\[(])")
 #: Columns of one sensor, by axis.
@@ -261,7 +323,7 @@ def _by_name(raw: RawLog, wanted: dict[str, str], questions: Questions) -> dict[
         found[quantity] = names[0]
         if len(names) > 1:
             questions.ask(
-                _several(raw, quantity, names, names[0]), **{quantity: _reference(raw, names[0])}
+                _several(raw, quantity, names, names[0]), **{quantity: reference(raw, names[0])}
             )
     return {q: Column(name, _unit_of(raw, name), "name") for q, name in found.items()}
 
@@ -381,10 +443,10 @@ def _answer(raw: RawLog, triad: str, family: Family) -> dict[str, str]:
         and _three_of(raw, triad, prefix) == [family.get(a) for a in AXES]
     ):
         return {triad: prefix}
-    return {f"{triad}_{a}": _reference(raw, family[a]) for a in AXES if a in family}
+    return {f"{triad}_{a}": reference(raw, family[a]) for a in AXES if a in family}
 
 
-def _reference(raw: RawLog, name: str) -> str:
+def reference(raw: RawLog, name: str) -> str:
     """Name a column on the command line: by its number where the name has a separator of them."""
     return str(list(raw.columns).index(name) + 1) if "," in name or "=" in name else name
 

@@ -150,6 +150,8 @@ def units_of_triads(
     mirror = options.axes is not None and mirrored(*parse_axes(options.axes))
     plain = {t: u for t, (u, _) in units.items()}
     report_contradictions(said, plain, asked, mirror, raw.name, findings, questions)
+    if (beyond := _beyond_full_scale(said, plain, asked, values["gyro"])) is not None:
+        questions.ask(beyond.replace(file=raw.name), gyro_unit=str(beyond.data["likely"]))
     return units
 
 
@@ -488,6 +490,45 @@ def report_contradictions(
             axes=axes.value,
             reason=axes.finding(),
         )
+    )
+
+
+# Full scale of most gyros, 2000 deg/s per axis, and seconds beyond it. Bodies that turn so fast are
+# rare, and gravity then shows their unit.
+_FULL_SCALE, _LASTING = np.radians(2000.0), 2.0
+
+
+def _beyond_full_scale(
+    said: dict[str, Inference], units: dict[str, str], asked: set[str], gyro: Array
+) -> Finding | None:
+    """Doubt a unit by which a gyro is beyond its full scale for seconds; None if it may be right.
+
+    Gravity may turn too little, or accelerations hide it, so that no other unit is settled.
+    """
+    other, unit, rate = said.get("gyro_unit"), units.get("gyro", ""), said.get("rate")
+    if "gyro" in asked or unit not in GYRO_UNITS or other is None or other.settled:
+        return None
+    if other.value is None or other.value == unit or rate is None or rate.value is None:
+        return None
+    # A sensor at its full scale is not beyond it.
+    full, likely = 1.001 * _FULL_SCALE, GYRO_UNITS[str(other.value)]
+    largest = np.maximum(gyro.max(axis=1), -gyro.min(axis=1))
+    largest = largest[np.isfinite(largest)]
+    beyond = largest[largest * GYRO_UNITS[unit] > full]
+    seconds = beyond.size / float(rate.value)
+    if seconds < _LASTING or float(np.median(beyond)) * likely > full:
+        return None
+    usual = float(np.median(beyond))
+    return Finding(
+        "io.rates-beyond-full-scale",
+        quantity="gyro",
+        triad="gyro",
+        unit=unit,
+        likely=other.value,
+        seconds=seconds,
+        usual=usual * GYRO_UNITS[unit],
+        otherwise=usual * likely,
+        reason=other.finding(),
     )
 
 

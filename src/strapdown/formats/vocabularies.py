@@ -173,7 +173,7 @@ _TRIAD_WORDS = {
     "angularrate angularrates angrate angularspeed turnrate rot rotationrate rotrate omega rate "
     "av w g ω",
     "accel": "accel acce acc accelerometer accelerometers accelerations acceleration accl "
-    "linearacceleration linacc linaccel lina la gforce gf imuacc imuaccel specificforce a f",
+    "linearacceleration linacc linaccel lina la gforce gf imuacc imuaccel specificforce xl a f",
     "mag": "mag magn magnet magnetic magnetometer magnetometers magneticfield magfield field "
     "imumag compass m b",
 }
@@ -189,7 +189,7 @@ GRAVITY = ("gravity", "grav", "gvec")
 # A name that is a unit says the sensor: dps_x, uT_x. The letter g may be anything.
 NAMED_BY_UNIT = {
     **dict.fromkeys(("dps", "mdps", "rads", "degs"), "gyro"),
-    **dict.fromkeys(("mps2", "ms2"), "accel"),
+    **dict.fromkeys(("mps2", "ms2", "mss"), "accel"),
     **dict.fromkeys(("ut",), "mag"),
 }
 #: Names, their triad, and whether they say increments.

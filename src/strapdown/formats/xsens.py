@@ -91,11 +91,17 @@ def read(path: Path) -> RawLog:
     if source is not None:
         columns[source] = stamps
         stated[source] = ("time", "us")
-    if source is None or (source == STAMP and np.array_equal(stamps, raw.columns[STAMP])):
+    # By the usual step, for a counter that wraps is unwrapped.
+    in_us = source == STAMP and _usual_step(stamps) == _usual_step(raw.columns[STAMP])
+    if source is None or in_us:
         # A DOT, which counts µs, writes deg/s; without its preamble the numbers have to show it.
         unit = "deg/s" if _is_of_dot(raw) else None
         stated |= {f"Gyr_{axis}": (f"gyro_{axis.lower()}", unit) for axis in "XYZ"}
     return dataclasses.replace(raw, columns=columns, stated=stated, rate=rate, findings=findings)
+
+
+def _usual_step(stamps: NDArray[Any]) -> float:
+    return float(np.median(np.diff(stamps.astype(np.float64)))) if stamps.size > 1 else 0.0
 
 
 def _stamps(

@@ -752,9 +752,16 @@ def _attitude(one: LogDiagnosis) -> list[Finding]:
 
 def _without_force(one: LogDiagnosis, code: str, severity: Severity) -> Finding:
     """Say that specific force is missing: not logged, or left out for what is open of it."""
-    left_out = any(f.code == "io.left-out-unusable" and f.quantity == "accel" for f in one.faults)
+    left_out = any(f.code in _OPEN and f.quantity == "accel" for f in one.faults)
     return Finding("doctor.accel-open" if left_out else code, severity=severity, file=one.name)
 
+
+#: Findings about columns that are, or may be, an accelerometer.
+_OPEN = (
+    "io.accelerometer-not-read",
+    "io.columns-like-accelerometer",
+    "io.left-out-unusable",
+)
 
 #: Motion that is missing, and axes that contradict gravity.
 _LIMITS = (

@@ -262,6 +262,28 @@ def test_a_contradiction_stops_and_the_users_statement_goes_before(tmp_path):
     assert np.allclose(as_stated.imu[GYRO], np.degrees(gyro), atol=1e-6)
 
 
+def test_a_stated_unit_by_which_a_gyro_turns_beyond_its_full_scale_is_a_question(tmp_path):
+    """About the vertical, gravity does not turn, and the sizes of rates alone are left."""
+    t, _, _ = turning()
+    gyro = 0.7 + 0.1 * np.cos(t)[:, None] * (0.0, 0.0, 1.0)
+    level = np.tile([0.1, 0.2, 9.8], (t.size, 1))
+    header = "time_s,gx_rad_s,gy_rad_s,gz_rad_s,ax_m_s2,ay_m_s2,az_m_s2"
+    path = write(tmp_path / "log.csv", t, np.degrees(gyro), level, header)
+    with pytest.raises(DataError) as refused:
+        read_log(path)
+    finding = refused.value.finding
+    assert (finding.code, finding.data["unit"], finding.data["likely"]) == (
+        "io.rates-beyond-full-scale",
+        "rad/s",
+        "deg/s",
+    )
+    assert finding.data["flags"] == "--gyro-unit deg/s"
+    for unit in ("deg/s", "rad/s"):
+        assert len(read_log(path, ReadOptions(gyro_unit=unit)).imu) == t.size
+    # Below it, the statement counts.
+    assert len(read_log(write(path, t, 20.0 * gyro, level, header)).imu) == t.size
+
+
 def test_all_questions_are_asked_at_once(tmp_path):
     t, gyro, accel = turning()
     path = write(

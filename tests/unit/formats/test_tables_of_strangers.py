@@ -12,7 +12,7 @@ from tests.coded import coded
 
 import strapdown as sd
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.errors import DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats import ReadOptions, read_log, reader_of
 from strapdown.formats.assemble import assemble
 from strapdown.formats.columns import read_name
@@ -62,6 +62,9 @@ def check(log, count=40):
         ["Time,gx,gy,gz,ax,ay,az", "(s),(deg/s),(deg/s),(deg/s),(g),(g),(g)"],
         ["Test,bench", "Time,gx,gy,gz,ax,ay,az", "s,deg/s,deg/s,deg/s,g,g,g"],
         [HEADER + ","],
+        # As a spreadsheet fills up its rows: a word and a date are half data.
+        ["Bench 4,,,,,,", "Date,04.05.2023,,,,,", ",,,,,,", HEADER],
+        ["Date,04.05.2023,,,,,", HEADER],
         ["% Time,gx,gy,gz,ax,ay,az", "% s,deg/s,deg/s,deg/s,g,g,g"],
         ["% Time,gx,gy,gz,ax,ay,az", "% ,deg/s,deg/s,deg/s,g,g,g"],
     ],
@@ -628,6 +631,63 @@ def test_an_accelerometer_that_a_format_does_not_read_is_no_note():
     assert found.data["names"] == tuple(forces)
 
 
+@pytest.mark.parametrize(
+    ("name", "quantity", "unit"),
+    [
+        ("Accel_LN_X_CAL m/(s^2)", "accel_x", "m/s2"),
+        ("acc_x m/s^(2)", "accel_x", "m/s2"),
+        ("ay_mss", "accel_y", "m/s2"),
+        ("gyro_x rad/(s)", "gyro_x", "rad/s"),
+        ("wz_degsec", "gyro_z", "deg/s"),
+        ("xl_x", "accel_x", None),
+        ("XL Z [mg]", "accel_z", "mg"),
+    ],
+)
+def test_units_as_programs_write_them(name, quantity, unit):
+    said = read_name(name)
+    assert (said.quantity, said.unit) == (quantity, unit)
+
+
+def test_three_axes_of_a_name_without_separators_are_one_sensor():
+    assert len({read_name(f"xl{axis}").family for axis in "xyz"}) == 1
+
+
+def unknown(names, three, n=400):
+    """Make a log with rates, and columns of unknown names."""
+    columns = {"t": np.arange(n) / 50.0, **{f"w{a}": np.full(n, 0.01) for a in "xyz"}}
+    units = {f"w{a}": "rad/s" for a in "xyz"} | {"t": "s"}
+    more = dict(zip(names, np.transpose(three), strict=True))
+    return RawLog("log.csv", (), columns=columns | more, rows=np.arange(n), units=units)
+
+
+TURNED = np.column_stack(
+    [np.sin(np.arange(400) / 40), np.cos(np.arange(400) / 40), np.full(400, 0.1)]
+)
+
+
+@pytest.mark.parametrize("names", [["mxlX", "mxlY", "mxlZ"], ["s1 raw", "s2 raw", "s3 raw"]])
+@pytest.mark.parametrize("size", [9.8, 1.0, 4096.0])
+def test_columns_of_unknown_names_with_the_norm_of_gravity_are_named(names, size):
+    raw = unknown(names, size * TURNED)
+    (found,) = [f for f in assemble(raw, ReadOptions()).findings if f.quantity == "accel"]
+    assert (found.code, found.severity) == ("io.columns-like-accelerometer", "warning")
+    assert found.data["norm"] == pytest.approx(size * np.sqrt(1.01))
+    with pytest.raises(ConfigError, check=coded("io.unit-without-column")):
+        assemble(raw, ReadOptions(accel_unit="g"))
+    stated = dict(item.split("=") for item in found.data["columns"].split(","))
+    read_as = assemble(raw, ReadOptions(columns=stated, accel_unit="m/s2")).imu
+    assert read_as[ACCEL].to_numpy() == pytest.approx(size * TURNED)
+
+
+@pytest.mark.parametrize("name", ["walked", "mag", "acc_bias"])
+def test_other_columns_are_not_taken_for_an_accelerometer(name):
+    """A way has no steady norm, and a magnetometer has a name."""
+    three = TURNED if name == "mag" else TURNED * np.linspace(0.1, 3.0, 400)[:, None]
+    raw = unknown([f"{name}_{a}" for a in "xyz"], three)
+    codes = {f.code for f in assemble(raw, ReadOptions()).findings}
+    assert "io.columns-like-accelerometer" not in codes
+
+
 # Forms of tables that people publish.
 
 
@@ -721,6 +781,28 @@ def test_columns_without_names_are_proposed_by_their_numbers(tmp_path):
     assert np.allclose(imu[GYRO], np.round(gyro, 6)) and np.allclose(imu[ACCEL], np.round(accel, 6))
 
 
+@pytest.mark.parametrize("first", ["a/g:", "2023-05-04 10:11:12.000"])
+@pytest.mark.parametrize("scale", [1.0, 16384.0])
+def test_the_steadier_of_two_triads_without_names_is_the_accelerometer(tmp_path, first, scale):
+    """A walk, and counts; a word that begins every row is no time."""
+    rng = np.random.default_rng(7)
+    steps = 0.02 if scale > 1.0 else 0.25
+    accel = scale * (steps * rng.standard_normal((400, 3)) + (0.0, 0.0, 1.0))
+    gyro = rng.standard_normal((400, 3)) * np.abs(rng.standard_normal((400, 1)))
+    table = np.column_stack([accel, 30.0 * gyro])
+    word = first[0].isalpha()
+    lines = []
+    for k, row in enumerate(table):
+        stamp = first if word else f"{first[:17]}{12 + k // 100:02d}.{k % 100:02d}0"
+        lines.append(",".join([stamp, *(f"{v:.4f}" for v in row)]))
+    columns = {} if word else {"time": "1"}
+    columns |= {f"gyro_{a}": str(k) for k, a in enumerate("xyz", 5)}
+    columns |= {f"accel_{a}": str(k) for k, a in enumerate("xyz", 2)}
+    asked = answers(tmp_path, lines)
+    assert {q: c for q, c in asked.items() if q in columns} == columns
+    assert ("time" in asked) is not word
+
+
 def test_columns_without_names_and_without_gravity_are_not_guessed(tmp_path):
     rng = np.random.default_rng(12)
     table = np.column_stack([0.01 * np.arange(100), rng.standard_normal((100, 6))])
@@ -728,6 +810,11 @@ def test_columns_without_names_and_without_gravity_are_not_guessed(tmp_path):
     with pytest.raises(DataError) as refused:
         read(tmp_path, lines, "log.txt", gyro_unit="rad/s")
     assert "answers" not in refused.value.finding.data
+    # A first column of words is no time in an example either.
+    lines = [f"imu {line.partition(' ')[2]}" for line in lines]
+    with pytest.raises(DataError) as refused:
+        read(tmp_path, lines, "log.txt", gyro_unit="rad/s")
+    assert refused.value.finding.data["example"].startswith("gyro_x=2,")
 
 
 def test_a_word_that_begins_every_row_has_no_name(tmp_path):
@@ -810,14 +897,15 @@ def test_the_clock_of_apple_leaves_the_sign_of_gravity_open(tmp_path):
     assert np.allclose(log.imu[ACCEL].to_numpy()[0], -np.array(FORCE), atol=1e-4)
 
 
-@pytest.mark.parametrize("clock", ["elapsed_ms", None])
-def test_the_counter_of_an_xsens_dot(tmp_path, clock):
+@pytest.mark.parametrize(("clock", "first"), [("elapsed_ms", 70_000), (None, 70_000), (None, -1)])
+def test_the_counter_of_an_xsens_dot(tmp_path, clock, first):
     top = [] if clock else ["sep=,", "DeviceTag:,left", "FirmwareVersion:,1.6.0", ""]
     head = "PacketCounter,SampleTimeFine,Gyr_X,Gyr_Y,Gyr_Z,Acc_X,Acc_Y,Acc_Z"
     lines = [*top, head + (f",{clock}" if clock else "")]
     for k in range(60):
         values = ",".join(f"{v:.6f}" for v in (*np.degrees(RATES), *FORCE))
-        lines.append(f"{k},{70_000 + 10_000 * k},{values}" + (f",{10 * k}" if clock else ""))
+        stamp = (first + 10_000 * k) % 2**32  # one wraps after the first row
+        lines.append(f"{k},{stamp},{values}" + (f",{10 * k}" if clock else ""))
     # The preamble of a DOT says deg/s, and its counter is of microseconds.
     check(read(tmp_path, lines, **({"gyro_unit": "deg/s"} if clock else {})), 60)
 
