@@ -55,7 +55,7 @@ class NoStreamError(DataError):
         held = next((s for s in ("imu", "gnss", "reference") if s in streams and s != stream), "")
         way = Finding(f"io.way-of-{held}" if held else "io.way-of-others", stream=stream, file=file)
         if rows:
-            way = Finding("io.way-of-rows-beside", stream=stream, file=file, count=rows)
+            way = Finding("io.way-of-rows-beside", name=file, count=rows)
         # The sentence of a finding has its data alone.
         way = way.replace(name=file)
         super().__init__(
