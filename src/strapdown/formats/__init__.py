@@ -369,7 +369,8 @@ def open_stream(path: str | Path, stream: str, form: str | None = None) -> Raw:
                 raise DataError(
                     "io.not-of-format", file=path.name, title=reader.title, reason=repr(error)
                 ) from None
-    raise NoStreamError(path.name, stream, reader.title, list(reader.streams))
+    rows = gnss_nmea.rows_beside(path) if form == "nmea" and stream == "imu" else 0
+    raise NoStreamError(path.name, stream, reader.title, list(reader.streams), rows)
 
 
 def holds(path: Path, stream: str) -> bool:

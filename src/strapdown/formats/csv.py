@@ -661,6 +661,8 @@ def _whole_lines(
     rows, lines = [], []
     amid: Lines = []
     numeric = are_data(fields_of(numbered[0][1], separator))
+    # Sentences of a receiver on the same line as the rows of a board.
+    other = not _SENTENCE.fullmatch(numbered[0][1].strip())
     for k, (row, line) in enumerate(numbered):
         last = k == len(numbered) - 1
         if last and k and _was_cut(line, numbered[max(0, k - 20) : k], top, ended):
@@ -673,6 +675,9 @@ def _whole_lines(
         if count == width + 1 and separator and bare.endswith(separator):
             line, count = bare[:-1], width
         odd = count != width
+        if other and line.lstrip().startswith("$") and _SENTENCE.fullmatch(line.strip()):
+            amid.append((row, line))
+            continue
         # Names once more, as where logs were joined.
         first = line.lstrip(" \t\"'")[:1]
         if odd or (numeric and (first.isalpha() or first in f"{_MARKS}_/")):

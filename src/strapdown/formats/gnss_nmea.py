@@ -21,7 +21,7 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.clocks import RELATIVE, UNIX, Clock
 from strapdown.formats.gnss_fixes import Fixes
-from strapdown.formats.signs import Signs
+from strapdown.formats.signs import HEAD, Signs, first_bytes
 from strapdown.formats.writing import (
     FileOptions,
     Tables,
@@ -43,6 +43,8 @@ _KNOT = SPEEDS["kn"]
 _NAN3 = (np.nan, np.nan, np.nan)
 
 
+#: Fewest fields of a line that may be of a gyro.
+LEAST_FIELDS = 4
 # A sentence among the first lines.
 detect = Signs(first=rb"\$G(?:(?<=\A\$G)|(?<=[\r\n]\$G))[PNLAB]")
 
@@ -59,6 +61,14 @@ class _Epoch:
     quality: float = np.nan
     over_sea: bool = False
     day: float | None = None
+
+
+def rows_beside(path: Path) -> int:
+    """Count the lines, of the first, that are no sentences and hold the numbers of a sensor."""
+    text, _ = csv.decoded(first_bytes(path, HEAD), path.name)
+    others = [line for line in text.splitlines() if line.strip() and "$" not in line]
+    rows = [csv.fields_of(line, csv.separator_of(line)) for line in others]
+    return sum(len(row) >= LEAST_FIELDS and csv.are_data(row) for row in rows)
 
 
 def read(path: Path) -> Fixes:

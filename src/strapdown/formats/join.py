@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.arrays import numbers, ticks_of
 from strapdown.formats.find_columns import Column, find_columns
+from strapdown.formats.inference.conclusion import infer_time_unit
 from strapdown.formats.recording import RawLog, ReadOptions
 from strapdown.formats.vocabularies import QUANTITIES
 from strapdown.tables import find_gaps
@@ -203,6 +204,9 @@ def _onto(
         raise DataError("io.stamps-no-unit-those-other", file=mute.name, quantity="time")
     time, stamps = in_seconds(origin, origin), in_seconds(clock, origin)
     known = np.isfinite(time)
+    # Stamps without a unit are as in the log; what is said of them is in s by the likely one.
+    likely = infer_time_unit(origin.ticks[known]).value if origin.unit is None else None
+    factor = TIME_UNITS[str(likely)] if likely else 1.0
     stamps, values = _in_order(stamps, values, log.name, triad, findings)
     if stamps.size == time.size and np.array_equal(stamps, time):
         return values, np.ones(time.size, dtype=bool)
@@ -218,9 +222,9 @@ def _onto(
             "io.stamps-run-after-first-gyro",
             file=log.name,
             quantity="time",
-            stamps=stamps[0] - start,
-            stamps_2=stamps[-1] - start,
-            nanmax=np.nanmax(time) - start,
+            stamps=(stamps[0] - start) * factor,
+            stamps_2=(stamps[-1] - start) * factor,
+            nanmax=(np.nanmax(time) - start) * factor,
         )
     covered = int(inside.sum())
     if covered < COVERED * known.sum():
@@ -243,7 +247,7 @@ def _onto(
                 quantity=triad,
                 severity="note",
                 covered=covered,
-                distance=distance,
+                distance=distance * factor,
             )
         )
     if gaps := find_gaps(stamps):
@@ -255,7 +259,7 @@ def _onto(
                 file=log.name,
                 quantity=triad,
                 count=len(gaps),
-                length=longest.length,
+                length=longest.length * factor,
             )
         )
     # A gyro stamp that is not a number is refused or repaired together with the gyro.

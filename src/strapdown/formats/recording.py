@@ -45,12 +45,17 @@ ABSENT = {
 class NoStreamError(DataError):
     """A file is of a known format that does not hold the stream.
 
-    `stream`: what was wanted. `title`: of the format. `streams`: what it may hold.
+    `stream`: what was wanted. `title`: of the format. `streams`: what it may hold. `rows`: lines of
+    another kind that a text table may be of.
     """
 
-    def __init__(self, file: str, stream: str, title: str, streams: Sequence[str]) -> None:
+    def __init__(
+        self, file: str, stream: str, title: str, streams: Sequence[str], rows: int = 0
+    ) -> None:
         held = next((s for s in ("imu", "gnss", "reference") if s in streams and s != stream), "")
         way = Finding(f"io.way-of-{held}" if held else "io.way-of-others", stream=stream, file=file)
+        if rows:
+            way = Finding("io.way-of-rows-beside", name=file, count=rows)
         # The sentence of a finding has its data alone.
         way = way.replace(name=file)
         super().__init__(

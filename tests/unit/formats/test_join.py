@@ -59,6 +59,19 @@ def test_values_between_two_samples_lie_on_the_line_between_them(tmp_path, gyro)
     assert [f.name for f in recording.files] == ["g.csv", "a.csv"]
 
 
+def test_distances_between_stamps_without_a_unit_are_in_seconds(tmp_path):
+    """They are found in the unit of the stamps, ns here, which no name states."""
+    t = 81_234.5 + np.arange(300) * STEP
+    head = GYRO_HEAD.replace("time_s", "timestamp")
+    gyro = table(tmp_path / "g.csv", t, np.sin(line_of(t)), head, 10**9)
+    head = "timestamp,accel_x_m_s2,accel_y_m_s2,accel_z_m_s2"
+    accel = table(tmp_path / "a.csv", t + 0.0012, line_of(t), head, 10**9)
+    recording = read_joined([gyro, accel])
+    code = "io.interpolated-stamps-gyro-not-own"
+    (finding,) = [f for f in recording.findings if f.code == code]
+    assert finding.data["distance"] == pytest.approx(0.0012)
+
+
 def test_the_order_of_files_and_the_unit_of_time_do_not_matter(tmp_path, gyro):
     path, t = gyro
     own = np.linspace(-0.01, 3.0, 302)

@@ -817,6 +817,25 @@ def test_columns_without_names_and_without_gravity_are_not_guessed(tmp_path):
     assert refused.value.finding.data["example"].startswith("gyro_x=2,")
 
 
+def test_rows_of_a_board_between_sentences_of_a_receiver(tmp_path):
+    """By its sentences the file is NMEA; the refusal says how its other lines are read."""
+    sentence = "$GPGGA,090000.00,4730.0,N,00830.0,E,4,12,0.8,450.0,M,47.0,M,,*5B"
+    lines = []
+    for k, line in enumerate(rows()):
+        lines += [f"IMU,{line}", *([sentence] if k % 10 == 5 else [])]
+    path = tmp_path / "serial.log"
+    path.write_text("\n".join(lines) + "\n")
+    with pytest.raises(DataError, check=coded("io.no-stream")) as refused:
+        read_log(path)
+    way = refused.value.finding.data["way"]
+    assert (way.code, way.data["count"]) == ("io.way-of-rows-beside", 40)
+    columns = {"time": "2", **{q: str(k) for k, q in enumerate([*GYRO, *ACCEL], 3)}}
+    units = {"gyro_unit": "deg/s", "accel_unit": "g", "time_unit": "s"}
+    log = read_log(path, ReadOptions(columns=columns, **units, format="csv"))
+    check(log)
+    assert "io.comments-among-rows" in {f.code for f in log.findings}
+
+
 def test_a_word_that_begins_every_row_has_no_name(tmp_path):
     lines = ["CLEARDATA", HEADER, *(f"Data,{line}" for line in rows())]
     check(read(tmp_path, lines))
