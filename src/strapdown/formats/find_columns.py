@@ -180,6 +180,11 @@ VIOLENT, APART = 1.0, 3.0
 LARGEST_NORM = 6e4
 
 
+def _is_gravity(norm: float) -> bool:
+    """Whether a median norm is that of gravity, in m/s², g or mg."""
+    return any(low < norm < high for low, high in GRAVITIES)
+
+
 def norm_and_spread(three: list[NDArray[Any]]) -> tuple[float, float]:
     """Return the median norm of three columns, and its spread between deciles, relative to it."""
     some = 1 + three[0].size // 100_000
@@ -213,7 +218,7 @@ def steady_triads(raw: RawLog, names: list[str]) -> list[tuple[list[str], float]
             if any(read_name(n).quantity for n in three):
                 continue
             norm, spread = norm_and_spread(columns)
-            gravity = any(low < norm < high for low, high in GRAVITIES)
+            gravity = _is_gravity(norm)
             if 0.0 < norm < LARGEST_NORM and spread < (LOOSEST if gravity else STEADY):
                 out.append((three, norm))
                 break
@@ -237,16 +242,12 @@ def _likely_columns(raw: RawLog) -> dict[str, str]:
         if any(c.dtype.kind not in "iuf" for c in three):
             break
         triads[k] = norm_and_spread(three)
-    forces = [
-        k
-        for k, (usual, spread) in triads.items()
-        if spread < LOOSEST and any(low < usual < high for low, high in GRAVITIES)
-    ]
+    forces = [k for k, (usual, spread) in triads.items() if spread < LOOSEST and _is_gravity(usual)]
     if len(forces) != 1 and len(triads) == 2:
         # Of two, the norm of rates varies about that of their noise; a force is in any unit.
         steady, other = sorted(triads, key=lambda k: triads[k][1])
         (usual, spread), (_, varied) = triads[steady], triads[other]
-        gravity = any(low < usual < high for low, high in GRAVITIES)
+        gravity = _is_gravity(usual)
         sure = usual > 0.0 and spread < (VIOLENT if gravity else STEADY) and varied > APART * spread
         forces = [steady] if sure else forces
     if len(forces) != 1:

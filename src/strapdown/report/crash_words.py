@@ -110,9 +110,7 @@ def key_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
         figures += apart_figures(result)
         of = f" by {unit.name}"
     elif number is None:
-        cut = unit.events.cut_change
-        value = f"at least {speed_words(cut)}" if cut > 0.0 else "no event"
-        figures.append(KeyFigure("Delta-V", value, headline(result)))
+        figures.append(KeyFigure("Delta-V", _change(unit), headline(result)))
     else:
         changes = unit.body[number]
         whole, peak = changes.event, changes.peak

@@ -262,10 +262,10 @@ def stamp_step(
     determines which multiple, or that the stamps are right. Its standard deviation is that of the
     same difference in the rest of the record.
     """
-    usual, lone = _irregular(index_of(gnss))
+    steps = np.diff(index_of(gnss))
+    usual, lone = _irregular(steps)
     if usual is None:
         return None
-    steps = np.diff(index_of(gnss))
     lost = ~lone & (np.round(steps / usual) > 1.0) & (steps < min(SHORT * usual, SHORT_S))
     ways = _Ways(gnss, usual)
     for k in np.flatnonzero(lone | lost).tolist():
@@ -282,22 +282,22 @@ def unsure_steps(gnss: pd.DataFrame) -> list[tuple[float, float]]:
     interval, of which no way over an outage says which. The least two are within one interval.
     """
     time = index_of(gnss)
-    usual, lone = _irregular(time)
+    steps = np.diff(time)
+    usual, lone = _irregular(steps)
     if usual is None:
         return []
-    long = np.flatnonzero(lone & (np.diff(time) > SHORT * usual))
+    long = np.flatnonzero(lone & (steps > SHORT * usual))
     sd = min(max(usual, LEAST_STEP), LARGEST)
     return [(float(0.5 * (time[k] + time[k + 1])), sd) for k in long.tolist()]
 
 
-def _irregular(time: Array) -> tuple[float | None, NDArray[np.bool_]]:
+def _irregular(steps: Array) -> tuple[float | None, NDArray[np.bool_]]:
     """Usual interval of regular stamps, s, and the few intervals that are no multiple of it.
 
     None where stamps are not regular.
     """
-    if len(time) < FEWEST:
+    if len(steps) < FEWEST - 1:
         return None, np.zeros(0, np.bool_)
-    steps = np.diff(time)
     usual = float(np.median(steps))
     counts = np.maximum(np.round(steps / usual), 1.0)
     off = np.abs(steps - usual * counts)
