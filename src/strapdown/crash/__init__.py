@@ -18,6 +18,8 @@ if TYPE_CHECKING:
         blame,
         blame_points,
         close_vehicles,
+    )
+    from strapdown.crash.deformation import (
         crush_energy,
         energy_equivalent_speed,
         equal_force_share,
@@ -87,7 +89,8 @@ load_on_first_use(
     {
         "acceleration": "Acceleration",
         "closure": "Blame Closure Figure Hypothesis ImpactVehicle against_barrier blame "
-        "blame_points close_vehicles crush_energy energy_equivalent_speed equal_force_share "
+        "blame_points close_vehicles",
+        "deformation": "crush_energy energy_equivalent_speed equal_force_share "
         "measured_crush_energy",
         "delta_v": "delta_v trailing_delta_v",
         "delta_v_bound": "EventChanges VelocityChange body_delta_v_bound "

@@ -30,8 +30,8 @@ from strapdown.crash.closure import (
     blame,
     blame_points,
     close_vehicles,
-    equal_force_share,
 )
+from strapdown.crash.deformation import equal_force_share
 from strapdown.crash.delta_v import delta_v
 from strapdown.crash.delta_v_bound import body_delta_v_bound
 from strapdown.crash.entry import Entry

@@ -26,6 +26,8 @@ from strapdown.crash.closure import (
     blame,
     blame_points,
     close_vehicles,
+)
+from strapdown.crash.deformation import (
     crush_energy,
     energy_equivalent_speed,
     equal_force_share,
