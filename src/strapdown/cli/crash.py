@@ -126,7 +126,7 @@ def crash(
         print_findings(run.findings)
         print_seal(seal, "report.html")
     with shown_in(result.spec.options.units):
-        both = closure_table(result)
+        both = closure_table(result) if several else None
     if both is not None:
         console().print("Closure of both vehicles", style="bold")
         print_block(both)
@@ -137,7 +137,9 @@ def print_crash(result: CaseResult) -> None:
     from strapdown.cli.console import console, print_block
     from strapdown.report.crash_tables import (
         answers_table,
+        closure_table,
         comparison_table,
+        deformation_table,
         drive_table,
         indices_table,
         path_table,
@@ -152,6 +154,9 @@ def print_crash(result: CaseResult) -> None:
         path_table,
         drive_table,
         comparison_table,
+        # That of two vehicles is told once, below both.
+        *([] if result.partners else [closure_table]),
+        deformation_table,
         severity_table,
         indices_table,
     )

@@ -55,6 +55,34 @@ Size = Annotated[Number, Field(ge=0.3, le=30.0)]
 _FROM = "from the origin that all positions share"
 
 
+class DeformationSpec(Spec):
+    """Residual crush of the vehicle, and the stiffness of that side: its energy of deformation."""
+
+    crush_m: Annotated[
+        tuple[Annotated[Number, Field(ge=0.0, le=5.0)], ...], Field(min_length=2)
+    ] = Field(
+        description="depths of the residual crush at equally spaced stations across the damage, "
+        "C1 to C6 where there are six"
+    )
+    crush_sd_m: PositionSd = Field(default=0.02, description="standard deviation of each depth")
+    width_m: Annotated[Number, Field(gt=0.0, le=30.0)] = Field(
+        description="width of the damage, from the first station to the last"
+    )
+    width_sd_m: PositionSd = Field(default=0.05, description="standard deviation of that width")
+    stiffness_a_n_per_m: NotNegative = Field(
+        description="coefficient A: force per width at which crush begins"
+    )
+    stiffness_a_sd_n_per_m: NotNegative = Field(description="standard deviation of A")
+    stiffness_b_n_per_m2: Positive = Field(
+        description="coefficient B: force per width that each depth adds"
+    )
+    stiffness_b_sd_n_per_m2: NotNegative = Field(description="standard deviation of B")
+    angle_deg: Annotated[Number, Field(gt=-90.0, lt=90.0)] = Field(
+        default=0.0, description="of the force against the perpendicular of the damaged side"
+    )
+    angle_sd_deg: TiltSd = Field(default=5.0, description="standard deviation of that angle")
+
+
 class VehicleSpec(Spec):
     """The vehicle, as a report draws and describes it.
 
@@ -82,6 +110,13 @@ class VehicleSpec(Spec):
         default=None, description="largest depth to which the vehicle was crushed"
     )
     crush_sd_m: PositionSd = Field(default=0.05, description="standard deviation of that depth")
+    against: Literal["vehicle", "barrier"] = Field(
+        default="vehicle",
+        description="what it met; a barrier is rigid and does not move",
+    )
+    deformation: DeformationSpec | None = Field(
+        default=None, description="residual crush and stiffness, for the energy of deformation"
+    )
     rear_axle_m: Pair | None = Field(
         default=None,
         description="forward, right of the middle of the rear axle, from the origin that all "
@@ -266,12 +301,17 @@ class UnitSpec(Spec):
 class ReferenceSpec(Spec):
     """Other known data of the crash, for comparison with the results."""
 
-    kind: Literal["path", "delta_v"] = Field(description="path or delta_v")
+    kind: Literal["path", "delta_v", "force"] = Field(description="path, delta_v or force")
     name: Word = Field(description="what it is: a video, a barrier's force, another recorder")
     source: str = Field(default="", description="where it is from")
     path: FileName | None = Field(
         default=None,
-        description="file of the path of the reference point: time, north, east, down",
+        description="file of the path of the reference point: time, north, east, down; or of the "
+        "force on the vehicle: time, force",
+    )
+    force_column: Channel | None = Field(default=None, description="the column of the force")
+    force_sd_percent: Annotated[Number, Field(gt=0.0, le=50.0)] | None = Field(
+        default=None, description="standard deviation of the scale of the force"
     )
     delta_v_m_per_s: Speed | None = Field(
         default=None, description="change of velocity along the axis, from time zero"

@@ -476,10 +476,18 @@ def _in_g(values: Sequence[float]) -> str:
 # --- references and options ---------------------------------------------------------------
 
 _REFERENCES_NO_USE = {
-    "path": ("delta_v_m_per_s", "delta_v_sd_m_per_s", "axis", "over_s"),
-    "delta_v": ("path",),
+    "path": (
+        *("delta_v_m_per_s", "delta_v_sd_m_per_s", "axis", "over_s"),
+        *("force_column", "force_sd_percent"),
+    ),
+    "delta_v": ("path", "force_column", "force_sd_percent"),
+    "force": ("delta_v_m_per_s", "delta_v_sd_m_per_s"),
 }
-_REFERENCES_NEEDED = {"path": "path", "delta_v": "delta_v_m_per_s"}
+_REFERENCES_NEEDED = {
+    "path": ("path",),
+    "delta_v": ("delta_v_m_per_s",),
+    "force": ("path", "force_sd_percent"),
+}
 #: The path covers the crash, not the whole drive.
 LONGEST_WINDOW = 60.0  # s
 
@@ -491,9 +499,13 @@ def _references(spec: CaseSpec) -> Iterator[Fault]:
             if name in reference.model_fields_set and getattr(reference, name) is not None:
                 code = f"config.reference-{kind.replace('_', '-')}-no-use"
                 yield fault((*at, name), code, other=At((*at, "kind")))
-        needed, change = _REFERENCES_NEEDED[kind], reference.delta_v_m_per_s
-        if getattr(reference, needed) is None:
-            yield missing(CaseSpec, (*at, needed), "config.reference-value-missing", kind=kind)
+        change = reference.delta_v_m_per_s
+        for needed in _REFERENCES_NEEDED[kind]:
+            if getattr(reference, needed) is None:
+                yield missing(CaseSpec, (*at, needed), "config.reference-value-missing", kind=kind)
+        if kind == "force" and spec.vehicle.mass_kg is None:
+            said = At((*at, "kind"))
+            yield missing(CaseSpec, ("vehicle", "mass_kg"), "config.force-without-mass", said=said)
         if reference.axis == "resultant" and (change or 0.0) < 0.0:
             path = (*at, "delta_v_m_per_s")
             yield fault(path, "config.resultant-with-sign", other=At((*at, "axis")))

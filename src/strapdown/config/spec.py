@@ -54,13 +54,23 @@ UNITS: dict[str, dict[str, tuple[float, float]]] = {
         "_ft": (0.3048, 1.0),
     },
     "_s": {"_s": (1.0, 1.0), "_ms": (1.0, 1000.0)},
+    "_n_per_m2": {
+        "_n_per_m2": (1.0, 1.0),
+        "_kn_per_m2": (1e3, 1.0),
+        "_lb_per_in2": (4.4482216152605 / 0.0254**2, 1.0),
+    },
+    "_n_per_m": {
+        "_n_per_m": (1.0, 1.0),
+        "_kn_per_m": (1e3, 1.0),
+        "_lb_per_in": (4.4482216152605 / 0.0254, 1.0),
+    },
     "_kg": {"_kg": (1.0, 1.0), "_lb": (0.45359237, 1.0)},
     "_deg_per_s": {"_deg_per_s": (1.0, 1.0)},
     "_deg": {"_deg": (1.0, 1.0)},
     "_hz": {"_hz": (1.0, 1.0)},
 }
 #: Units that are accepted and not suggested.
-_SELDOM = ("_in", "_ft", "_ft_per_s", "_lb", "_g")
+_SELDOM = ("_in", "_ft", "_ft_per_s", "_lb", "_g", "_lb_per_in", "_lb_per_in2")
 
 
 @cache

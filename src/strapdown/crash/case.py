@@ -21,17 +21,27 @@ from strapdown.config.crash_case import (
     UnitSpec,
     VehicleSpec,
 )
-from strapdown.constants import TWO_SIDED_95
+from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.crash.case_indices import CrashIndex, occupant_indices, vehicle_indices
 from strapdown.crash.closure import (
     Blame,
     Closure,
+    Figure,
     ImpactVehicle,
+    against_barrier,
     blame,
     blame_points,
     close_vehicles,
 )
-from strapdown.crash.deformation import equal_force_share
+from strapdown.crash.deformation import (
+    Crush,
+    crush_energy,
+    dynamic_crush,
+    energy_equivalent_speed,
+    energy_share,
+    equal_force_share,
+    impulse_of,
+)
 from strapdown.crash.delta_v import delta_v
 from strapdown.crash.delta_v_bound import body_delta_v_bound
 from strapdown.crash.entry import Entry
@@ -81,6 +91,29 @@ SPEED_SD, AXLE_SD = 0.1, 0.05  # m/s, m
 MOST_NUMBERS = 64_000_000
 
 
+@dataclass(frozen=True)
+class Deformation:
+    """Crush and energy of a vehicle, as far as its case has what they need.
+
+    Attributes
+    ----------
+    crush : tuple of Crush
+        Against a barrier: by the main answer, then by every recorder.
+    impulses : tuple of (str, Figure), N s
+        Of the measured forces on it, with the names of their references.
+    energy : Figure, J, optional
+        From the residual crush and the stiffness; with the mass its `equivalent_speed`, m/s.
+    """
+
+    crush: tuple[Crush, ...] = ()
+    impulses: tuple[tuple[str, Figure], ...] = ()
+    energy: Figure | None = None
+    equivalent_speed: Figure | None = None
+
+    def __bool__(self) -> bool:
+        return bool(self.crush or self.impulses or self.energy)
+
+
 @dataclass(frozen=True, eq=False)
 class CaseResult:
     """Result of a case.
@@ -111,6 +144,7 @@ class CaseResult:
         With the other vehicle, the first being that of the first case.
     blame : Blame or None
         What would explain that the two do not close.
+    deformation : Deformation
     indices : tuple of CrashIndex
         Of the vehicle in its severest event, by the main answer; then of the occupants whose
         channels the records have.
@@ -129,6 +163,7 @@ class CaseResult:
     partners: tuple[CaseSpec, ...] = ()
     closure: Closure | None = None
     blame: Blame | None = None
+    deformation: Deformation = Deformation()
     indices: tuple[CrashIndex, ...] = ()
 
     @property
@@ -158,6 +193,13 @@ def run_cases(
     tuple of CaseResult
         Each with the inputs of all, since its closure depends on them.
     """
+    for spec, file in cases:
+        if len(cases) > 1 and spec.vehicle.against == "barrier":
+            raise ConfigError(
+                "crash.barrier-and-other-vehicle",
+                file=None if file is None else file.name,
+                quantity="vehicle, against",
+            )
     alone = []
     for k, (spec, file) in enumerate(cases):
 
@@ -166,7 +208,8 @@ def run_cases(
 
         alone.append(run_case(spec, file, part))
     if len(alone) == 1:
-        return tuple(alone)
+        at_barrier = alone[0].spec.vehicle.against == "barrier"
+        return (_closed_against_barrier(alone[0]),) if at_barrier else tuple(alone)
     specs = [one.spec for one in alone]
     together = [
         replace(
@@ -214,7 +257,7 @@ def run_case(
     records, spec = whole_records(spec)
     findings = [f for record in records.values() for f in record.findings]
     units = tuple(case_unit(unit, records) for unit in spec.units)
-    tables = {r.path: read_reference_path(r.path) for r in spec.references if r.path is not None}
+    tables = {r.path: _reference_table(r) for r in spec.references if r.path is not None}
     entry = _entry(spec)
     inputs = _inputs(spec, case_file, records)
     progress("reconstructing", 0.15)
@@ -239,9 +282,10 @@ def run_case(
     progress("drawing possible paths", 0.4)
     samples, said = _samples(made.main.path, options.monte_carlo_runs, options.seed)
     findings += said
+    deformation, stated = _deformed(spec, made, tables)
     references = tuple(
         compare_reference(reference, unit, options.gravity_m_per_s2, tables)
-        for reference in spec.references
+        for reference in stated
         for unit in dict.fromkeys((made.main, *made.units))
     )
     return CaseResult(
@@ -254,6 +298,7 @@ def run_case(
         case_severity(spec, made.main),
         references,
         tuple(dict.fromkeys(findings)),
+        deformation=deformation,
         indices=_indices(spec, records, made.main),
     )
 
@@ -445,12 +490,116 @@ def _samples(path: CrashPath, runs: int, seed: int) -> tuple[PathSamples | None,
     ]
 
 
-# Closure of two vehicles, each by its own case.
+# Deformation of the vehicle, and closure with what it met.
 
 #: Standard deviation of a stated mass without one: fuel, load and passengers.
 MASS_SD = 0.03
 #: Line of the error budget: of an entry's stated heading.
 ENTRY_HEADING = "heading"
+
+
+def _reference_table(spec: ReferenceSpec) -> pd.DataFrame:
+    """Read the file of a reference: a path, or a force in N."""
+    assert spec.path is not None
+    if spec.kind == "path":
+        return read_reference_path(spec.path)
+    names = {} if spec.force_column is None else {"force": spec.force_column}
+    table = read_aid_table(spec.path, {"force": "N"}, names=names)
+    if any(f.code == "io.unit-assumed" for f in table.attrs["findings"]):
+        source = table.attrs["source"]
+        raise DataError("crash.force-without-unit", file=source, quantity="force")
+    return table
+
+
+def _deformed(
+    spec: CaseSpec, made: CrashReconstruction, tables: Mapping[str, pd.DataFrame]
+) -> tuple[Deformation, tuple[ReferenceSpec, ...]]:
+    """Deformation of the vehicle, and its references with the forces as changes of velocity."""
+    vehicle, number = spec.vehicle, main_event(made.main)
+    energy = equivalent = None
+    if (d := vehicle.deformation) is not None:
+        energy = crush_energy(
+            d.crush_m,
+            (d.width_m, d.width_sd_m),
+            (d.stiffness_a_n_per_m, d.stiffness_a_sd_n_per_m),
+            (d.stiffness_b_n_per_m2, d.stiffness_b_sd_n_per_m2),
+            crush_sd=d.crush_sd_m,
+            angle_deg=(d.angle_deg, d.angle_sd_deg),
+        )
+        if vehicle.mass_kg is not None:
+            equivalent = energy_equivalent_speed(energy, _mass(vehicle, vehicle.mass_kg))
+    crushed: list[Crush] = []
+    if vehicle.against == "barrier":
+        for unit in dict.fromkeys((made.main, *made.units)):
+            own = main_event(unit)
+            if own is not None:
+                found = dynamic_crush(unit.name, unit.path, unit.events.events[own])
+                crushed += [found] if found is not None else []
+    impulses, stated = [], []
+    for reference in spec.references:
+        if reference.kind != "force":
+            stated.append(reference)
+            continue
+        span = reference.over_s
+        if span is None and number is not None:
+            whole = made.main.body[number].event.delta_v
+            span = (whole.start, whole.end)
+        if span is None:
+            raise ConfigError(
+                "crash.no-event-no-span-stated",
+                quantity=f"references, {reference.name}, over_s",
+                name=made.main.name,
+            )
+        assert reference.path is not None and reference.force_sd_percent is not None
+        table = tables[reference.path]
+        try:
+            impulse = impulse_of(
+                table.index.to_numpy(),
+                table["force"].to_numpy(),
+                span,
+                reference.force_sd_percent / 100.0,
+            )
+        except DataError as error:
+            raise error.replaced(file=table.attrs["source"]) from None
+        impulses.append((reference.name, impulse))
+        stated.append(_as_change(reference, impulse, span, spec, made.main))
+    return Deformation(tuple(crushed), tuple(impulses), energy, equivalent), tuple(stated)
+
+
+def _mass(vehicle: VehicleSpec, mass: float) -> tuple[float, float]:
+    """Mass, and its standard deviation."""
+    return mass, vehicle.mass_sd_kg or MASS_SD * mass
+
+
+def _as_change(
+    reference: ReferenceSpec,
+    impulse: Figure,
+    span: tuple[float, float],
+    spec: CaseSpec,
+    main: UnitReconstruction,
+) -> ReferenceSpec:
+    """A measured force as the change of velocity that it makes.
+
+    It pushes against the travel. The tires may have made a part of the change that the recorders
+    measure, up to their friction, in an unknown direction.
+    """
+    assert spec.vehicle.mass_kg is not None
+    mass, mass_sd = _mass(spec.vehicle, spec.vehicle.mass_kg)
+    size, sd = impulse.value / mass, impulse.half_width / TWO_SIDED_95 / mass
+    tires = 0.5 * spec.options.tire_friction * STANDARD_GRAVITY * (span[1] - span[0])
+    sign = 1.0
+    if reference.axis != "resultant":
+        change = main.delta_v
+        along = 0.0 if change is None else float(change.delta_v.vector @ AXES[reference.axis])
+        sign = -1.0 if along < 0.0 else 1.0
+    return reference.model_copy(
+        update={
+            "path": None,
+            "delta_v_m_per_s": sign * size,
+            "delta_v_sd_m_per_s": math.hypot(sd, size * mass_sd / mass, tires),
+            "over_s": span,
+        }
+    )
 
 
 def _closed(first: CaseResult, second: CaseResult) -> tuple[CaseResult, CaseResult]:
@@ -466,9 +615,12 @@ def _closed(first: CaseResult, second: CaseResult) -> tuple[CaseResult, CaseResu
     closure = blamed = None
     if len(pair) == 2:
         friction = max(r.spec.options.tire_friction for r in (first, second))
+        energies = [e for r in (first, second) if (e := r.deformation.energy) is not None]
         depths = [r.spec.vehicle for r in (first, second) if r.spec.vehicle.crush_m is not None]
         share = None
-        if len(depths) == 2:
+        if len(energies) == 2:
+            share = energy_share(*energies)
+        elif len(depths) == 2:
             share = equal_force_share(*((v.crush_m or 0.0, v.crush_sd_m) for v in depths))
         closure = close_vehicles(*pair, friction=friction, energy_share=share)
         findings += closure.findings
@@ -486,6 +638,17 @@ def _closed(first: CaseResult, second: CaseResult) -> tuple[CaseResult, CaseResu
             second, closure=closure, blame=blamed, findings=_once([*second.findings, *findings])
         ),
     )
+
+
+def _closed_against_barrier(result: CaseResult) -> CaseResult:
+    """A result with what it says against a rigid barrier."""
+    name = result.vehicle_names[0]
+    vehicle = _vehicle_of(result, result.reconstruction.main, name)
+    if vehicle is None:
+        lacking = Finding("crash.closure-without-change", quantity="closure", name=name)
+        return replace(result, findings=_once([*result.findings, lacking]))
+    closure = against_barrier(vehicle, friction=result.spec.options.tire_friction)
+    return replace(result, closure=closure, findings=_once([*result.findings, *closure.findings]))
 
 
 def _once(findings: Sequence[Finding]) -> tuple[Finding, ...]:
@@ -539,7 +702,7 @@ def impact_vehicle(
         into_body @ change.delta_v.vector,
         into_body @ covariance @ into_body.T,
         end - start,
-        mass=None if mass is None else (mass, vehicle.mass_sd_kg or MASS_SD * mass),
+        mass=None if mass is None else _mass(vehicle, mass),
         heading_deg=(heading + stated, heading_sd) if heading_sd else None,
         entry=into_body[:2, :2] @ velocity,
         entry_covariance=np.diag([sd**2, across**2]),

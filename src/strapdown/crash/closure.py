@@ -368,7 +368,7 @@ class _Impact:
         return np.asarray(change / size) if size > 0.0 else np.array([1.0, 0.0])
 
     def figures(self) -> tuple[Array, Array]:
-        """Figures in the order of `CLOSING` to `DIRECTION`, and their covariance.
+        """Figures in the order of `CLOSING` to `IMPULSE`, and their covariance.
 
         `APART` is the largest separation speed over the normals that friction allows; EES are
         squared; the direction, rad, is that about the nominal.
@@ -399,13 +399,14 @@ class _Impact:
             turned = np.arctan2(
                 nominal[0] * p[..., 1] - nominal[1] * p[..., 0], (nominal * p).sum(axis=-1)
             )
-            return np.stack([closing, separation, common, apart, energy, *squares, turned], axis=-1)
+            numbers = [closing, separation, common, apart, energy, *squares, turned, mass * size]
+            return np.stack(numbers, axis=-1)
 
         jacobian = jacobian_of(compute, self.x, self.covariance)
         return compute(self.x), jacobian @ self.covariance @ jacobian.T
 
 
-CLOSING, SEPARATION, COMMON, APART, ENERGY, EES_FIRST, EES_SECOND, DIRECTION = range(8)
+CLOSING, SEPARATION, COMMON, APART, ENERGY, EES_FIRST, EES_SECOND, DIRECTION, IMPULSE = range(9)
 
 
 def _impact(
@@ -507,6 +508,8 @@ class Closure:
         Along the impulse, friction included: negative where the vehicles slide on past each other.
     common_velocity : Figure, m/s, optional
         Along the impulse, of both at the end of approach; none where they slide past each other.
+    impulse : Figure, N s, optional
+        Of the contact, adjusted under momentum.
     energy : Figure, J, optional
         Kinetic energy lost in the contact.
     energy_equivalent_speed : pair of Figure, m/s, optional
@@ -528,6 +531,7 @@ class Closure:
     separation_speed: Figure | None
     restitution: Figure | None
     common_velocity: Figure | None
+    impulse: Figure | None
     energy: Figure | None
     energy_equivalent_speed: tuple[Figure | None, Figure | None]
     findings: tuple[Finding, ...]
@@ -602,6 +606,7 @@ def _closed(
     findings = list(_not_closed(vehicles, chi, freedom, probability, level))
     impact = impact.adjusted()
     values, spread = impact.figures()
+    sds = np.sqrt(np.maximum(np.diagonal(spread), 0.0))
     known = _entries_known(vehicles)
     if not known:
         findings.append(Finding("crash.closure-without-entry", severity="note", quantity="entry"))
@@ -613,8 +618,7 @@ def _closed(
             )
 
     def figure(index: int) -> Figure | None:
-        sd = math.sqrt(max(spread[index, index], 0.0))
-        return Figure.from_sd(values[index], sd) if known else None
+        return Figure.from_sd(values[index], sds[index]) if known else None
 
     separation = figure(SEPARATION)
     slid = separation is not None and separation.high < 0.0
@@ -637,12 +641,13 @@ def _closed(
         _magnitude(vehicles, sizes),
         _mass_ratio(sizes),
         _relative_heading(vehicles, friction),
-        Figure.from_sd(azimuth, math.degrees(math.sqrt(max(spread[DIRECTION, DIRECTION], 0.0)))),
+        Figure.from_sd(azimuth, math.degrees(sds[DIRECTION])),
         "contact" if impact.at_contact else "centers",
         figure(CLOSING),
         separation,
         _ratio(values[pair], spread[np.ix_(pair, pair)]) if known else None,
         None if slid else figure(COMMON),
+        Figure.from_sd(values[IMPULSE], sds[IMPULSE]) if masses else None,
         figure(ENERGY) if masses else None,
         (equivalent[0], equivalent[1]),
         tuple(findings),

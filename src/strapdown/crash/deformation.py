@@ -3,15 +3,128 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.closure import CONTACT_FRICTION, Figure, Pair, jacobian_of
+from strapdown.crash.events import PART_563
+from strapdown.crash.path import PLACE
 from strapdown.errors import DataError
 
+if TYPE_CHECKING:
+    from strapdown.crash.events import CrashEvent
+    from strapdown.crash.path import CrashPath
+
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Crush:
+    """Dynamic crush of a vehicle by one of its answers.
+
+    Attributes
+    ----------
+    unit : str
+        Recorder, or the mean.
+    depth : Figure, m
+        How far the reference point went on along its travel after the first touch, at most.
+    touch, time : float, s
+        Instants of the first touch and of the largest depth.
+    at_least : bool
+        The path ends while the point still moves on.
+    """
+
+    unit: str
+    depth: Figure
+    touch: float
+    time: float
+    at_least: bool
+
+
+def dynamic_crush(unit: str, path: CrashPath, event: CrashEvent) -> Crush | None:
+    """Crush between a point of a vehicle and a rigid barrier that its front has met.
+
+    The front stands at the barrier from the first touch on, so that the way of the point is that by
+    which it came nearer to the front. The first touch is the instant of the entry, or time zero of
+    the event where the entry is earlier; the sd of time zero then counts with the speed.
+
+    Parameters
+    ----------
+    path : CrashPath
+        Of the reference point, entry included.
+    event : CrashEvent
+
+    Returns
+    -------
+    Crush or None
+        None where the vehicle stood at the first touch, or the path does not contain it.
+    """
+    touch, touch_sd = path.entry.time, 0.0
+    if touch < event.time_zero - PART_563.wake_window:
+        # Anywhere from the begin to the end of the interval in which the velocity changed enough.
+        touch = 0.5 * (event.time_zero + event.woken)
+        touch_sd = math.hypot((event.woken - event.time_zero) / math.sqrt(12.0), event.time_zero_sd)
+    place = path.table[["north", "east"]].to_numpy()
+    velocity = [np.interp(touch, path.time, path.table[axis]) for axis in ("VN", "VE")]
+    speed = float(np.hypot(*velocity))
+    rows = np.flatnonzero(path.time >= touch)
+    if not rows.size or touch < path.time[0] or speed <= 0.0:
+        return None
+    along = np.array([*velocity, 0.0]) / speed
+    start = [np.interp(touch, path.time, place[:, k]) for k in (0, 1)]
+    depth = (place[rows] - start) @ along[:2]
+    k, first = int(rows[np.argmax(depth)]), int(rows[0])
+    grown = (path.errors[:, k, PLACE] - path.errors[:, first, PLACE]) @ along
+    noise = path.noise_covariance[k, PLACE, PLACE] + path.noise_covariance[first, PLACE, PLACE]
+    variance = float(grown @ grown + along @ noise @ along) + (speed * touch_sd) ** 2
+    return Crush(
+        unit,
+        Figure.from_sd(float(depth.max()), math.sqrt(variance)),
+        touch,
+        float(path.time[k]),
+        k == len(path.time) - 1,
+    )
+
+
+def impulse_of(time: ArrayLike, force: ArrayLike, span: Pair, scale_sd: float) -> Figure:
+    """Size of the impulse of a measured force over a span, N s.
+
+    Parameters
+    ----------
+    time, force : array_like, (n,), s and N
+        With either sign.
+    span : (float, float), s
+    scale_sd : float
+        Relative sd of the scale. The error of the zero is what the force reads before the span:
+        its mean, and the sd of that.
+
+    Raises
+    ------
+    DataError
+        The record does not contain the span.
+    """
+    t, f = np.asarray(time, dtype=np.float64), np.asarray(force, dtype=np.float64)
+    start, end = span
+    if not (t.size > 1 and t[0] <= start and end <= t[-1]):
+        raise DataError(
+            "crash.force-outside-record",
+            quantity="force",
+            start=float(t[0]) if t.size else math.nan,
+            end=float(t[-1]) if t.size else math.nan,
+            begin=start,
+            finish=end,
+        )
+    at = np.array([start, *t[(t > start) & (t < end)], end])
+    impulse = float(np.trapezoid(np.interp(at, t, f), at))
+    before = f[t < start]
+    zero = float(before.mean()) if before.size else 0.0
+    zero_sd = float(before.std()) / math.sqrt(before.size) if before.size else 0.0
+    sd = math.hypot(impulse * scale_sd, math.hypot(zero, zero_sd) * (end - start))
+    return Figure.from_sd(abs(impulse), sd)
 
 
 def equal_force_share(first: Pair, second: Pair, *, of: str = "crush") -> Pair:
@@ -30,6 +143,14 @@ def equal_force_share(first: Pair, second: Pair, *, of: str = "crush") -> Pair:
     share = above[0] / (above[0] + below[0])
     relative = math.hypot(above[1] / above[0], below[1] / below[0])
     return share, share * (1.0 - share) * relative
+
+
+def energy_share(first: Figure, second: Figure) -> Pair:
+    """Share of the energy that the first vehicle absorbed, and its sd, from both energies."""
+    whole = first.value + second.value
+    share = first.value / whole
+    sds = (first.half_width / TWO_SIDED_95, second.half_width / TWO_SIDED_95)
+    return share, math.hypot((1.0 - share) * sds[0], share * sds[1]) / whole
 
 
 def crush_energy(

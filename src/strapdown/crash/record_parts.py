@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.formats.aid_table import read_reference_path
+from strapdown.formats.aid_table import read_aid_table, read_reference_path
 from strapdown.formats.clocks import EPOCH
 from strapdown.formats.columns import read_name, split_brackets, without_accents
 from strapdown.formats.crash_edr import KMH, rounding
@@ -1215,6 +1215,26 @@ class KnownPath(NamedTuple):
     def at_trigger(self) -> bool:
         """Whether its time may count from the trigger."""
         return self.start <= 0.0 <= self.end and self.end - self.start < LONGEST
+
+
+class KnownForce(NamedTuple):
+    """A file of the force on a vehicle, as named in the case, and the column of the force."""
+
+    path: str
+    name: str
+    column: str
+
+
+def known_force(path: str, record: CrashRecord) -> KnownForce | None:
+    """Read a record as the force on a vehicle, if that is all it has beside its time."""
+    forces = [c.name for c in record.channels if c.quantity == "force"]
+    if len(record.files) != 1 or len(forces) != 1 or len(record.channels) > 2:
+        return None
+    try:
+        read_aid_table(record.path, {"force": "N"}, names={"force": forces[0]})
+    except (ConfigError, DataError):
+        return None
+    return KnownForce(path, record.path.stem, forces[0])
 
 
 def known_path(path: str, record: CrashRecord) -> KnownPath | None:

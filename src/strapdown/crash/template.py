@@ -36,10 +36,12 @@ from strapdown.crash.events import KMH, PART_563, EventDetector
 from strapdown.crash.pdof import pdof
 from strapdown.crash.record_parts import (
     FULL_SCALES,
+    KnownForce,
     KnownPath,
     Part,
     Skipped,
     agreement,
+    known_force,
     known_path,
     quiet_part,
     record_parts,
@@ -151,7 +153,7 @@ def draft_cases(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> 
     settled: list[Part] = []
     skipped: list[Skipped] = []
     findings: list[Finding] = []
-    paths: list[KnownPath] = []
+    references: list[KnownPath | KnownForce] = []
     entries: list[IndicatedEntry] = []
     drives: list[RecordedDrive] = []
     labels: dict[str, Mapping[str, str]] = {}
@@ -159,9 +161,9 @@ def draft_cases(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> 
         path = named_from(record.path, Path(folder))
         # The case states the reader's finding about the clock.
         findings += [f for f in record.findings if f.quantity != "time"]
-        known = known_path(path, record)
+        known = known_path(path, record) or known_force(path, record)
         if known is not None:
-            paths.append(known)
+            references.append(known)
             continue
         if record.format == "edr":
             recorder = recorder_parts(path, record)
@@ -205,12 +207,14 @@ def draft_cases(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> 
         )
     if len(units) > 1:
         why = "nothing says which of the vehicles it is of; add it to the case of its own"
-        skipped += [Skipped(p.path, f"the path {plain(p.name)}", why) for p in paths]
-        paths = []
+        skipped += [Skipped(r.path, plain(r.name), why) for r in references]
+        references = []
     of_test = next((r for r in records if r.facts or r.vehicles), None)
     lines = [
-        f"{plain(p.name)}: a path from {instant(p.start)} to {instant(p.end)} s, a reference"
-        for p in paths
+        f"{plain(r.name)}: a path from {instant(r.start)} to {instant(r.end)} s, a reference"
+        if isinstance(r, KnownPath)
+        else f"{plain(r.name)}: a force, a reference"
+        for r in references
     ]
     drafts = []
     for vehicle, of_vehicle in units.items():
@@ -226,7 +230,9 @@ def draft_cases(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> 
         # Fixes have no tires.
         driven = sorted(drives, key=lambda d: d.kind)[:1] if len(units) == 1 else []
         several = len(units) > 1
-        page = _filled(_face(of_vehicle), left_out, title, facts, paths, speeds, driven, several)
+        page = _filled(
+            _face(of_vehicle), left_out, title, facts, references, speeds, driven, several
+        )
         drafts.append(
             Draft(
                 page.text,
@@ -353,7 +359,7 @@ def _filled(
     skipped: Sequence[Skipped],
     title: str,
     facts: Mapping[str, str],
-    paths: Sequence[KnownPath],
+    references: Sequence[KnownPath | KnownForce],
     entries: Sequence[IndicatedEntry],
     drives: Sequence[RecordedDrive],
     several: bool,
@@ -395,7 +401,8 @@ def _filled(
         indicated=entries[0] if entries and any(u.impact.at_zero for u in units) else None,
         drive=drives[0] if drives else None,
         units=units,
-        paths=paths,
+        paths=[r for r in references if isinstance(r, KnownPath)],
+        forces=[r for r in references if isinstance(r, KnownForce)],
         skipped=skipped,
         blows=[_blow(u) for u in sure],
         far_apart=len(sure) > 1 and max(sizes) > FAR_APART * min(sizes),

@@ -21,6 +21,7 @@ from strapdown.formats.vocabularies import DATED, Quantity, Vocabulary, spread_o
 from strapdown.tables import MAG, NED, POSITION_SD
 from strapdown.units import (
     ANGLES,
+    FORCES,
     GYRO_UNITS,
     LENGTHS,
     MAG_UNITS,
@@ -52,6 +53,7 @@ UNITS: dict[str, Mapping[str, float]] = {
     "rad/s": GYRO_UNITS,
     "Pa": PRESSURES,
     "uT": MAG_UNITS,
+    "N": FORCES,
 }
 #: Synonyms of a column, without blanks and underscores. Those of opposite sign are excluded.
 SYNONYMS: dict[str, tuple[str, ...]] = {
@@ -61,6 +63,7 @@ SYNONYMS: dict[str, tuple[str, ...]] = {
     "alt": ("altitude", "height", "h", "baroaltitude", "baroheight", "hbaro"),
     "height": ("altitude", "alt", "h", "baroaltitude", "baroheight", "hbaro"),
     "pressure": ("p", "baro", "barometer", "airpressure", "staticpressure"),
+    "force": ("f", "fx", "totalforce", "forcesum", "sumofforces", "barrierforce"),
     "mag_x": ("magx", "magneticx", "mx", "bx"),
     "mag_y": ("magy", "magneticy", "my", "by"),
     "mag_z": ("magz", "magneticz", "mz", "bz"),
@@ -100,7 +103,9 @@ def read_aid_table(
     units = {c: u for c, (_, u) in raw.stated.items() if u is not None}
     stated = {q: c for c, (q, _) in raw.stated.items() if q == "time" or q in wanted}
     known = {name: Quantity(_words(name), UNITS[unit]) for name, unit in wanted.items()}
-    vocabulary = Vocabulary({"time": DATED, **known}, (*OF_TABLES, "magnetic field"))
+    # Of a force kN is its unit, and not that of a speed.
+    kinds = (*(["force"] if "force" in wanted else []), *OF_TABLES, "magnetic field")
+    vocabulary = Vocabulary({"time": DATED, **known}, kinds)
     asked = {**stated, **(names or {})}
     found = find_quantities(raw.columns, vocabulary, asked, raw.name, {**raw.units, **units})
     if instead is not None:

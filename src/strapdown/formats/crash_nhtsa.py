@@ -94,7 +94,7 @@ def read(path: Path) -> CrashRecord:
         ),
         files=(test.path, *(c.path for c in there if c.path is not None)),
         findings=(*test.findings, *_unknown_codes(there, test.path)),
-        vehicles={str(v.number): _stated(_vehicle(v)) for v in test.vehicles},
+        vehicles={str(v.number): _stated(_vehicle(v) | _against(test)) for v in test.vehicles},
     )
 
 
@@ -112,6 +112,12 @@ def _facts(test: CrashTest) -> dict[str, str]:
             "impact angle, deg": _plain(test.impact_angle_deg),
         }
     )
+
+
+def _against(test: CrashTest) -> dict[str, str]:
+    """Whether the only vehicle met a rigid barrier."""
+    rigid = [fields[0].upper() for fields in test.barrier if fields] == ["R"]
+    return {"against": "barrier"} if rigid and len(test.vehicles) == 1 else {}
 
 
 def _stated(facts: dict[str, str]) -> dict[str, str]:

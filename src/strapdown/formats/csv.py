@@ -39,6 +39,7 @@ _NUMBER = re.compile(rf"{NUMBER.pattern}|[+-]?nan|[+-]?inf(inity)?", re.I)
 # Numbers with a decimal comma, separated by blanks.
 _COMMAS = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?(\s+[+-]?\d+(,\d+)?([eE][+-]?\d+)?)+")
 _UNIT = re.compile(r"\s*[\[(].*")
+_REMARK = re.compile(r"\s*\([^()]*\)|\s*\[[^\[\]]*\]")
 _NO_UNIT = ("-", "--", "none", "1")
 _HEX = re.compile(r"[+-]?0x[0-9a-f]+", re.I)
 #: Lines at the top of a text in which its rows of numbers are searched, their characters, and the
@@ -539,6 +540,9 @@ def _above(comments: list[str], width: int, separator: str | None) -> list[str] 
     if comments and names is None and separator is None:
         # Names over columns of blanks may be separated otherwise: "% time, x, y".
         names = _named(comments[-1], separator_of(comments[-1].strip().lstrip(_MARKS)), width)
+    if comments and names is None:
+        # A remark in brackets may hold separators: "# time_s,force_N (sum of cells, zeroed)".
+        names = _named(_REMARK.sub("", comments[-1]), separator, width)
     return None if names is None or any(is_data(n) for n in names) else names
 
 

@@ -13,7 +13,14 @@ from strapdown import __version__
 from strapdown.bundle import names_file, write_json
 from strapdown.config.crash_case import CaseSpec
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
-from strapdown.crash.case import CaseResult, ReferenceAnswer, SeverityAnswer, main_event, run_cases
+from strapdown.crash.case import (
+    CaseResult,
+    Deformation,
+    ReferenceAnswer,
+    SeverityAnswer,
+    main_event,
+    run_cases,
+)
 from strapdown.crash.case_indices import CrashIndex
 from strapdown.crash.closure import Closure, Figure
 from strapdown.crash.consistency import UnitComparison
@@ -192,6 +199,7 @@ def _json(result: CaseResult) -> dict[str, Any]:
         "answers": [_unit(unit) for unit in made.answers],
         "comparison": None if made.comparison is None else _comparison(made.comparison),
         "closure": None if result.closure is None else _closure(result, result.closure),
+        "deformation": _deformation(result.deformation) if result.deformation else None,
         "severity": [_severity(s) for s in result.severity],
         "indices": [_index(one, result.spec.options.units) for one in result.indices],
         "references": [_reference(r) for r in result.references],
@@ -391,12 +399,35 @@ def _comparison(comparison: UnitComparison) -> dict[str, Any]:
     }
 
 
-def _closure(result: CaseResult, closure: Closure) -> dict[str, Any]:
-    def bounded(figure: Figure | None) -> dict[str, float] | None:
-        if figure is None:
-            return None
-        return {"value": figure.value, "low": figure.low, "high": figure.high}
+def _bounded(figure: Figure | None) -> dict[str, float] | None:
+    if figure is None:
+        return None
+    return {"value": figure.value, "low": figure.low, "high": figure.high}
 
+
+def _deformation(found: Deformation) -> dict[str, Any]:
+    return {
+        "crush": [
+            {
+                "recorder": one.unit,
+                "depth_m": _bounded(one.depth),
+                "first_touch_s": one.touch,
+                "time_s": one.time,
+                "at_least": one.at_least,
+            }
+            for one in found.crush
+        ],
+        "energy_of_residual_crush_j": _bounded(found.energy),
+        "energy_equivalent_speed_m_per_s": _bounded(found.equivalent_speed),
+        "measured_forces": [
+            {"reference": name, "impulse_n_s": _bounded(impulse)}
+            for name, impulse in found.impulses
+        ],
+    }
+
+
+def _closure(result: CaseResult, closure: Closure) -> dict[str, Any]:
+    bounded = _bounded
     return {
         "vehicles": list(result.vehicle_names),
         "contradicted": closure.contradicted,
@@ -413,6 +444,7 @@ def _closure(result: CaseResult, closure: Closure) -> dict[str, Any]:
         "separation_speed_m_per_s": bounded(closure.separation_speed),
         "restitution": bounded(closure.restitution),
         "common_velocity_m_per_s": bounded(closure.common_velocity),
+        "impulse_n_s": bounded(closure.impulse),
         "energy_lost_j": bounded(closure.energy),
         "energy_equivalent_speed_m_per_s": [bounded(f) for f in closure.energy_equivalent_speed],
         "explained_by": []

@@ -167,7 +167,11 @@ def _document(result: CaseResult, name: str) -> Document:
             attitude_chart(path, **sampled),
         ),
         section("agreement", "Consistency of the recorders", *_agreement(result)),
-        section("closure", "Closure with the other vehicle", *_closure(result)),
+        section(
+            "closure",
+            "Closure with the other vehicle" if result.partners else "Contact and deformation",
+            *_closure(result),
+        ),
         section(
             "budget",
             "Error budget",
@@ -304,16 +308,16 @@ def _records(result: CaseResult) -> Iterator[Block]:
 
 
 def _closure(result: CaseResult) -> Iterator[Block | None]:
-    if result.partners:
-        yield crash_tables.closure_table(result)
-        if result.blame is not None:
-            candidates = [one.finding for one in result.blame.candidates]
-            yield Paragraph(
-                "The two do not close. Each of these would explain it, and no other is as likely:"
-                if candidates
-                else "The two do not close, and no single error explains it."
-            )
-            yield Items(tuple(("", one.sentence("file")) for one in candidates))
+    yield crash_tables.closure_table(result)
+    if result.blame is not None:
+        candidates = [one.finding for one in result.blame.candidates]
+        yield Paragraph(
+            "The two do not close. Each of these would explain it, and no other is as likely:"
+            if candidates
+            else "The two do not close, and no single error explains it."
+        )
+        yield Items(tuple(("", one.sentence("file")) for one in candidates))
+    yield crash_tables.deformation_table(result)
 
 
 def _agreement(result: CaseResult) -> tuple[Block | None, ...]:

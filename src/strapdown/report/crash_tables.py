@@ -9,7 +9,7 @@ import numpy as np
 
 from strapdown.config.crash_case import TriadSpec
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
-from strapdown.crash.case import CaseResult, ReferenceAnswer, main_event
+from strapdown.crash.case import CaseResult, main_event
 from strapdown.crash.closure import Figure
 from strapdown.crash.delta_v_bound import VelocityChange
 from strapdown.crash.drive_entry import determined
@@ -293,19 +293,60 @@ def turning_table(result: CaseResult) -> TableBlock | None:
     )
 
 
+_FIGURES = ("quantity", "value", "95 % bound", "unit")
+
+
+def _figure_row(
+    what: str, figure: Figure | None, factor: float, places: int, unit: str, more: str = ""
+) -> Row | None:
+    if figure is None:
+        return None
+    value, low, high = (plain(factor * x, places) for x in (figure.value, figure.low, figure.high))
+    return what, f"{more}{value}", f"{low} to {high}", unit
+
+
+def deformation_table(result: CaseResult) -> TableBlock | None:
+    """Crush of a vehicle, its energy of deformation, and the force that was measured on it."""
+    found = result.deformation
+    if not found:
+        return None
+    row, per, per_unit = _figure_row, speed_factor(), speed_unit()
+    rows = [
+        row(
+            f"crush by {_named(one.unit, result)}, {1e3 * (one.time - one.touch):.0f} ms after the "
+            "first touch",
+            one.depth,
+            length_factor(),
+            3,
+            length_unit(),
+            "at least " if one.at_least else "",
+        )
+        for one in found.crush
+    ]
+    rows.append(row("energy from residual crush and stiffness", found.energy, *energy_shown()))
+    rows.append(row("energy-equivalent speed from it", found.equivalent_speed, per, 1, per_unit))
+    rows += [
+        row(f"impulse of {name}", impulse, *impulse_shown()) for name, impulse in found.impulses
+    ]
+    return TableBlock(
+        _FIGURES,
+        tuple(one for one in rows if one is not None),
+        text=(0, 3),
+        caption="Deformation. The crush is how far the reference point came nearer to the barrier, "
+        "which holds while the front stands there; a part that is folded or sheared off is not in "
+        "it. Dynamic crush is larger than the residual one."
+        if found.crush
+        else "Deformation.",
+    )
+
+
 def closure_table(result: CaseResult) -> TableBlock | None:
-    """What two vehicles say together: momentum, closing speed, restitution, energy."""
+    """What a vehicle says with the other, or a barrier: closing speed, restitution, energy."""
     closure = result.closure
     if closure is None:
         return None
-    first, second = result.vehicle_names
-
-    def row(what: str, figure: Figure | None, factor: float, places: int, unit: str) -> Row | None:
-        if figure is None:
-            return None
-        low, high = (plain(factor * x, places) for x in (figure.low, figure.high))
-        return what, plain(factor * figure.value, places), f"{low} to {high}", unit
-
+    first, second = (*result.vehicle_names, "the barrier")[:2]
+    row = _figure_row
     per, per_unit = speed_factor(), speed_unit()
     at = "at the contact" if closure.basis == "contact" else "of the centers of mass"
     equivalent = zip((first, second), closure.energy_equivalent_speed, strict=True)
@@ -313,11 +354,14 @@ def closure_table(result: CaseResult) -> TableBlock | None:
         row(f"closing speed {at}, along the impulse", closure.closing_speed, per, 1, per_unit),
         row(f"separation speed {at}", closure.separation_speed, per, 1, per_unit),
         row("restitution", closure.restitution, 1.0, 2, ""),
-        row("common velocity along the impulse", closure.common_velocity, per, 1, per_unit),
+        row("common velocity along the impulse", closure.common_velocity, per, 1, per_unit)
+        if result.partners
+        else None,
         row(f"direction of the impulse on {first}", closure.direction_deg, 1.0, 1, "deg"),
         row(f"mass of {second} over that of {first}", closure.mass_ratio, 1.0, 3, ""),
         row(f"impulse of {first} less that of {second}", closure.magnitude, *impulse_shown()),
         row("heading of the second less the first", closure.relative_heading_deg, 1.0, 1, "deg"),
+        row("impulse of the contact", closure.impulse, *impulse_shown()),
         row("kinetic energy lost in the contact", closure.energy, *energy_shown()),
         *(
             row(f"energy-equivalent speed of {name}", of, per, 1, per_unit)
@@ -329,15 +373,17 @@ def closure_table(result: CaseResult) -> TableBlock | None:
         f"(chi-square {closure.chi_square:.3g}, {closure.freedom} degrees of freedom)."
         if closure.freedom
         else "Momentum could not be tested: masses or headings are not known."
+        if result.partners
+        else "The barrier is taken for rigid and fixed."
     )
     if closure.contradicted:
         tested += " They contradict each other: these bounds do not hold before that is explained."
     return TableBlock(
-        ("quantity", "value", "95 % bound", "unit"),
+        _FIGURES,
         tuple(one for one in rows if one is not None),
         text=(0, 3),
-        caption=f"{first} and {second} together, each by its own recorders at its "
-        f"{result.spec.point.name}, taken for its center of mass. {tested}",
+        caption=f"{first} and {second} together, {'each ' * bool(result.partners)}by its own "
+        f"recorders at its {result.spec.point.name}, taken for its center of mass. {tested}",
     )
 
 
@@ -433,7 +479,7 @@ def reference_tables(result: CaseResult) -> tuple[TableBlock, ...]:
     paths: list[tuple[str, ...]] = []
     for answer in result.references:
         spec, verdict = answer.spec, "yes" if answer.consistent else "NO"
-        who = (spec.name, _name(answer, result))
+        who = (spec.name, _named(answer.unit, result))
         if answer.path is not None:
             errors = [length_factor() * v for v in (*answer.path.rms, *answer.path.largest)]
             paths.append((*who, *(plain(float(v), 3) for v in errors), verdict))
@@ -471,9 +517,9 @@ def reference_tables(result: CaseResult) -> tuple[TableBlock, ...]:
     return tuple(table for table in tables if table.rows)
 
 
-def _name(answer: ReferenceAnswer, result: CaseResult) -> str:
+def _named(unit: str, result: CaseResult) -> str:
     combined = result.reconstruction.combined
-    return MEAN if combined is not None and answer.unit == combined.name else answer.unit
+    return MEAN if combined is not None and unit == combined.name else unit
 
 
 # Inputs of a crash report: records, recorders, sensors, files.

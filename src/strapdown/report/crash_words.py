@@ -10,6 +10,7 @@ import numpy as np
 
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.case import OF_DRIVES, CaseResult, main_event
+from strapdown.crash.closure import Closure
 from strapdown.crash.delta_v_bound import VelocityChange
 from strapdown.crash.drive_entry import CAR
 from strapdown.crash.pdof import Pdof
@@ -228,10 +229,12 @@ def entry_words(result: CaseResult) -> str:
 
 
 def closure_words(result: CaseResult) -> str:
-    """Return what the other vehicle says; empty without one."""
+    """Return what the other vehicle, or the barrier, says; empty without one."""
     closure = result.closure
     if closure is None:
         return ""
+    if not result.partners:
+        return _barrier_words(result, closure)
     other = result.vehicle_names[2 - result.number]
     if closure.contradicted:
         return f"It CONTRADICTS {other}: momentum does not close; see the closure."
@@ -246,6 +249,21 @@ def closure_words(result: CaseResult) -> str:
         value, low, high = (plain(x, 2) for x in (figure.value, figure.low, figure.high))
         parts.append(f"the restitution {value} ({low} to {high})")
     return "; ".join(parts) + "."
+
+
+def _barrier_words(result: CaseResult, closure: Closure) -> str:
+    if closure.contradicted:
+        return "It CONTRADICTS a rigid barrier; see Contact and deformation."
+    parts = []
+    for crush in result.deformation.crush[:1]:
+        at_least = "at least " * crush.at_least
+        depth = length_about(crush.depth.value, crush.depth.half_width)
+        parts.append(f"it was crushed by {at_least}{depth}")
+    if closure.restitution is not None:
+        figure = closure.restitution
+        value, low, high = (plain(x, 2) for x in (figure.value, figure.low, figure.high))
+        parts.append(f"the restitution was {value} ({low} to {high})")
+    return f"Against the barrier {'; '.join(parts)}." if parts else ""
 
 
 def path_words(result: CaseResult) -> str:
@@ -779,7 +797,7 @@ def _not_closed(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     if closure is not None and closure.contradicted:
         yield (
             "vehicles-do-not-close",
-            f"{' and '.join(result.vehicle_names)} do not close",
+            f"{' and '.join((*result.vehicle_names, 'the barrier')[:2])} do not close",
             "Momentum, closing speed or restitution of the two vehicles contradict each other "
             "beyond their bounds: a record, a mass, a heading or an entry speed is wrong. See "
             "Closure with the other vehicle.",

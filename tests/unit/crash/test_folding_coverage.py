@@ -20,6 +20,7 @@ from strapdown import Entry
 from strapdown.config.crash_case import EntrySpec, PointSpec, VehicleSpec
 from strapdown.crash.case import impact_vehicle
 from strapdown.crash.closure import close_vehicles
+from strapdown.crash.deformation import dynamic_crush
 from strapdown.dsp.chi_square import normal_quantile
 
 DRAWS = int(os.environ.get("STRAPDOWN_CRASH_DRAWS", "30"))
@@ -107,6 +108,33 @@ def closed(kind, number, gyro):
     return impact, close_vehicles(
         *vehicles, friction=planar_impact.FRICTION, energy_share=impact.share
     )
+
+
+def crushed(number, gyro):
+    """Errors over the half widths of the crush of a car at a wall, of a point and of the mean."""
+    crash = Crash(4000 + number, "front")
+    # It comes back with a tenth to a third of its speed.
+    crash.speed = crash.size / (1.1 + 0.2 * np.random.default_rng(number).uniform())
+    units = [crash.unit(j, gyro=gyro) for j in range(COUNTS[number % len(COUNTS)])]
+    out = []
+    for answer in crash.answered(units)[:2]:
+        if answer is not None:
+            found = dynamic_crush("car", answer.path, answer.events.events[0])
+            near = found.time + np.linspace(-0.006, 0.006, 13)
+            true = max(crash.position(round(t, 4))[0] for t in near)
+            assert not found.at_least and found.touch == 0.0
+            out.append((found.depth.value - true) / found.depth.half_width)
+    return out
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("gyro", [True, False])
+def test_the_bound_of_the_crush_holds(gyro):
+    rows = [crushed(number, gyro) for number in range(DRAWS)]
+    for answers in ([r[0] for r in rows], [r[1] for r in rows if len(r) > 1]):
+        inside = int((np.abs(answers) <= 1.0).sum())
+        interval = binomtest(inside, len(answers)).proportion_ci(LEVEL)
+        assert interval.low <= 0.95 <= interval.high, (inside, len(answers))
 
 
 @pytest.mark.slow
