@@ -304,6 +304,7 @@ def test_going_on_approaching_is_not_held_against_centres_of_mass():
 def test_crush_energy_is_the_integral_over_the_profile(stations, alpha):
     rng = np.random.default_rng(stations)
     depth, width, a, b = rng.uniform(0.0, 0.6, stations), 1.4, 6e4, 5e5
+    depth[0] = 0.0
     w = np.linspace(0.0, width, 200_001)
     c = np.interp(w, np.linspace(0.0, width, stations), depth)
     # Force per width A + B c over the crush, from the onset -A / B of the elastic part.
@@ -581,5 +582,10 @@ def test_other_refusals():
     for depth, width in (([0.1], 1.0), ([0.1, -0.1], 1.0), ([0.1, 0.2], 0.0)):
         with pytest.raises(DataError, check=coded("crash.crush-profile")):
             crush_energy(depth, (width, 0.0), (1e4, 0.0), (1e5, 0.0))
-    with pytest.raises(DataError, check=coded("crash.crush-profile")):
-        measured_crush_energy([1.0, 2.0], [1.0])
+    for force, crush, sd in (
+        ([1.0, 2.0], [1.0], 0.0),
+        ([1.0, math.nan], [0, 1], 0.0),
+        ([1, 2], [0, 1], -1.0),
+    ):
+        with pytest.raises(DataError, check=coded("crash.crush-profile")):
+            measured_crush_energy(force, crush, force_scale_sd=sd)

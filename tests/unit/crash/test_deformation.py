@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import tomllib
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -17,6 +18,7 @@ from strapdown.config.crash_case import CaseSpec
 from strapdown.crash.closure import Figure
 from strapdown.crash.deformation import (
     crush_energy,
+    dynamic_crush,
     energy_equivalent_speed,
     energy_share,
     impulse_of,
@@ -176,12 +178,57 @@ def test_the_share_of_two_energies():
     assert sd_ == pytest.approx(float(np.std(a / (a + b))), rel=0.02)
 
 
+def test_the_bound_of_the_crush_has_what_grows_between_touch_and_depth():
+    time = np.arange(6) / 10.0
+    north = np.array([-1.0, 0.0, 0.6, 0.8, 0.7, 0.6])
+    table = pd.DataFrame({"north": north, "east": 0.0 * north, "VN": 6.0, "VE": 0.0}, index=time)
+    errors, noise = np.zeros((2, 6, 9)), np.zeros((6, 9, 9))
+    # One grows by 3 cm from touch to depth, another is common to both.
+    errors[0, :, 6], errors[1, :, 6] = 0.01 * np.arange(6), 0.5
+    errors[0, 3, 6] = 0.04
+    noise[1, 6, 6], noise[3, 6, 6] = 0.02**2, 0.06**2
+    errors[0, 1, 6] = 0.01
+    path = SimpleNamespace(
+        time=time,
+        table=table,
+        errors=errors,
+        noise_covariance=noise,
+        entry=SimpleNamespace(time=0.1),
+    )
+    event = SimpleNamespace(time_zero=0.1, time_zero_sd=0.001, woken=0.12)
+    found = dynamic_crush("car", path, event)
+    assert found.depth.value == pytest.approx(0.8) and found.time == 0.3 and not found.at_least
+    sd = math.sqrt(0.03**2 + 0.02**2 + 0.06**2)
+    assert found.depth.half_width == pytest.approx(1.959964 * sd, rel=1e-6)
+    # The entry is 30 ms before the interval of time zero: the touch is anywhere within that.
+    later = SimpleNamespace(time_zero=0.13, time_zero_sd=0.001, woken=0.15)
+    found = dynamic_crush("car", path, later)
+    assert found.touch == pytest.approx(0.14)
+    at_touch = math.sqrt(0.02**2 / 12.0 + 0.001**2)
+    errors_since = errors[0, 3, 6] - errors[0, 2, 6]
+    sd = math.sqrt(errors_since**2 + 0.06**2 + (6.0 * at_touch) ** 2)
+    assert found.depth.half_width == pytest.approx(1.959964 * sd, rel=1e-6)
+    # One that still moves on at the end was crushed at least so far.
+    table["north"] = time
+    assert dynamic_crush("car", path, event).at_least
+    table["VN"] = 0.0
+    assert dynamic_crush("car", path, event) is None
+
+
 def test_impulse_of_a_force_and_what_its_zero_may_be():
     time = np.arange(-1000, 2001) / 1e4
     force = np.where(time >= 0.0, -2e5, 50.0)
     found = impulse_of(time, force, (0.0, 0.1), 0.02)
     assert found.value == pytest.approx(2e4, rel=1e-12)
     assert found.half_width == pytest.approx(1.959964 * math.hypot(400.0, 5.0), rel=1e-6)
+    # The whole record has nothing before it.
+    whole = impulse_of(time, force, (time[0], time[-1]), 0.02)
+    assert whole.value == pytest.approx(4e4 - 5.0, abs=10.1)
+    assert whole.half_width == pytest.approx(1.959964 * 0.02 * whole.value, rel=1e-6)
+    # A zero that scatters by 300 N is known to 300 / √1000.
+    noisy = np.where(time >= 0.0, force, 300.0 * (-1.0) ** np.arange(len(time)))
+    found = impulse_of(time, noisy, (0.0, 0.1), 0.0)
+    assert found.half_width == pytest.approx(1.959964 * 30.0 / math.sqrt(1000.0), rel=1e-3)
     for span in ((-0.2, 0.1), (0.0, 0.21)):
         with pytest.raises(DataError, check=coded("crash.force-outside-record")):
             impulse_of(time, force, span, 0.02)
