@@ -168,7 +168,8 @@ def reconstruct(
     *others : str, Path or CaseSpec
         Cases of the other vehicles of the crash. Each vehicle is reconstructed from its own
         recorders. Two vehicles are held against each other: momentum, closing speed, restitution
-        and energy, in `CrashRun.closure`; their own results do not change.
+        and energy, in `CrashRun.closure`; their own results do not change. One that met a barrier
+        has it, too, and its crush in `CrashRun.deformation`.
     progress : callable, optional
         Called with a stage and the completed fraction.
 

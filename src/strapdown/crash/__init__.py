@@ -20,9 +20,13 @@ if TYPE_CHECKING:
         close_vehicles,
     )
     from strapdown.crash.deformation import (
+        Crush,
         crush_energy,
+        dynamic_crush,
         energy_equivalent_speed,
+        energy_share,
         equal_force_share,
+        impulse_of,
         measured_crush_energy,
     )
     from strapdown.crash.delta_v import delta_v, trailing_delta_v
@@ -48,6 +52,7 @@ __all__ = [
     "Blame",
     "Closure",
     "CrashOptions",
+    "Crush",
     "DriveEntry",
     "Entry",
     "EventChanges",
@@ -71,8 +76,11 @@ __all__ = [
     "crush_energy",
     "delta_v",
     "detect_events",
+    "dynamic_crush",
     "energy_equivalent_speed",
+    "energy_share",
     "equal_force_share",
+    "impulse_of",
     "measured_crush_energy",
     "ned_pdof",
     "pdof",
@@ -90,8 +98,8 @@ load_on_first_use(
         "acceleration": "Acceleration",
         "closure": "Blame Closure Figure Hypothesis ImpactVehicle against_barrier blame "
         "blame_points close_vehicles",
-        "deformation": "crush_energy energy_equivalent_speed equal_force_share "
-        "measured_crush_energy",
+        "deformation": "Crush crush_energy dynamic_crush energy_equivalent_speed energy_share "
+        "equal_force_share impulse_of measured_crush_energy",
         "delta_v": "delta_v trailing_delta_v",
         "delta_v_bound": "EventChanges VelocityChange body_delta_v_bound "
         "resolved_delta_v_bound velocity_change",
