@@ -346,7 +346,8 @@ def closure_table(result: CaseResult) -> TableBlock | None:
     if closure is None:
         return None
     first, second = (*result.vehicle_names, "the barrier")[:2]
-    row = _figure_row
+    row, named = _figure_row, result.spec.point.name
+    taken = "" if named == "center of mass" else ", taken for its center of mass"
     per, per_unit = speed_factor(), speed_unit()
     at = "at the contact" if closure.basis == "contact" else "of the centers of mass"
     equivalent = zip((first, second), closure.energy_equivalent_speed, strict=True)
@@ -383,7 +384,7 @@ def closure_table(result: CaseResult) -> TableBlock | None:
         tuple(one for one in rows if one is not None),
         text=(0, 3),
         caption=f"{first} and {second} together, {'each ' * bool(result.partners)}by its own "
-        f"recorders at its {result.spec.point.name}, taken for its center of mass. {tested}",
+        f"recorders at its {named}{taken}. {tested}",
     )
 
 
