@@ -123,13 +123,15 @@ def crash(
             console().print(run.vehicle_names[run.number - 1], style="bold")
         with shown_in(run.spec.options.units):
             print_crash(run)
-        print_findings(run.findings)
+        # What both say together is told with the first.
+        both = run.closure.findings if run.closure is not None and run.number > 1 else ()
+        print_findings([found for found in run.findings if found not in both])
         print_seal(seal, "report.html")
     with shown_in(result.spec.options.units):
-        both = closure_table(result) if several else None
-    if both is not None:
+        closure = closure_table(result) if several else None
+    if closure is not None:
         console().print("Closure of both vehicles", style="bold")
-        print_block(both)
+        print_block(closure)
 
 
 def print_crash(result: CaseResult) -> None:

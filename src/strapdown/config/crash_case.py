@@ -77,7 +77,8 @@ class DeformationSpec(Spec):
         description="coefficient B: force per width that each depth adds"
     )
     stiffness_b_sd_n_per_m2: NotNegative = Field(description="standard deviation of B")
-    angle_deg: Annotated[Number, Field(gt=-90.0, lt=90.0)] = Field(
+    #: Beyond it CRASH3 corrects no farther.
+    angle_deg: Annotated[Number, Field(ge=-45.0, le=45.0)] = Field(
         default=0.0, description="of the force against the perpendicular of the damaged side"
     )
     angle_sd_deg: TiltSd = Field(default=5.0, description="standard deviation of that angle")
@@ -310,6 +311,9 @@ class ReferenceSpec(Spec):
         "force on the vehicle: time, force",
     )
     force_column: Channel | None = Field(default=None, description="the column of the force")
+    force_unit: Literal["N", "kN", "lbf", "kip"] | None = Field(
+        default=None, description="unit of the force: N, kN, lbf or kip, where none is stated"
+    )
     force_sd_percent: Annotated[Number, Field(gt=0.0, le=50.0)] | None = Field(
         default=None, description="standard deviation of the scale of the force"
     )

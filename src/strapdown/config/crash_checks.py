@@ -6,6 +6,8 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from strapdown.config.crash_case import AssumedSpec, CaseSpec, TriadSpec, UnitSpec, VehicleSpec
 from strapdown.config.spec import At, Fault, missing
 from strapdown.config.toml_file import KeyPath
@@ -23,6 +25,7 @@ fault = Fault.of
 def case_faults(spec: CaseSpec) -> Iterator[Fault]:
     """Yield the faults of a case, whose files are named by absolute paths."""
     yield from list(_vehicle(spec.vehicle)) or _positions(spec)
+    yield from _deformation(spec.vehicle)
     yield from _entry(spec)
     yield from _names("units", [unit.name for unit in spec.units])
     yield from _triggers(spec)
@@ -88,6 +91,19 @@ def _vehicle(vehicle: VehicleSpec) -> Iterator[Fault]:
     if vehicle.front_m is not None and not 0.0 <= vehicle.front_m <= vehicle.length_m:
         other = At(("vehicle", "length_m"), vehicle.length_m)
         yield fault(("vehicle", "front_m"), "config.origin-outside-vehicle", other=other)
+
+
+def _deformation(vehicle: VehicleSpec) -> Iterator[Fault]:
+    found, size = vehicle.deformation, max(vehicle.length_m, vehicle.width_m)
+    corners = np.array(vehicle.outline_m or [(0.0, 0.0)])
+    size = max(size, float(np.ptp(corners, axis=0).max()))
+    if found is None:
+        return
+    for name, given in (("crush_m", max(found.crush_m)), ("width_m", found.width_m)):
+        if given > size:
+            other = At(("vehicle",), f"{vehicle.length_m:g} m by {vehicle.width_m:g} m")
+            path = ("vehicle", "deformation", name)
+            yield fault(path, "config.deformation-beyond-vehicle", other=other)
 
 
 def _positions(spec: CaseSpec) -> Iterator[Fault]:
@@ -478,10 +494,10 @@ def _in_g(values: Sequence[float]) -> str:
 _REFERENCES_NO_USE = {
     "path": (
         *("delta_v_m_per_s", "delta_v_sd_m_per_s", "axis", "over_s"),
-        *("force_column", "force_sd_percent"),
+        *("force_column", "force_unit", "force_sd_percent"),
     ),
-    "delta_v": ("path", "force_column", "force_sd_percent"),
-    "force": ("delta_v_m_per_s", "delta_v_sd_m_per_s"),
+    "delta_v": ("path", "force_column", "force_unit", "force_sd_percent"),
+    "force": ("delta_v_m_per_s", "delta_v_sd_m_per_s", "over_s"),
 }
 _REFERENCES_NEEDED = {
     "path": ("path",),

@@ -315,6 +315,9 @@ def _fault(error: Any, form: type[Spec], written: Mapping[str, Any]) -> Fault:
             return fault("config.one-table-for-list", header=_header(path))
         case "tuple_type" | "list_type":
             return fault("config.not-a-list", given=shown(given), key=shown_key(key) or "key")
+        case "too_short" if isinstance(given, list):
+            least = context["min_length"]
+            return fault("config.list-too-short", given=shown(given), count=len(given), least=least)
         case "string_type" if isinstance(given, int | float):
             return fault("config.number-for-text", key=shown_key(key), given=shown(given))
     for limit, code in _LIMITS.items():

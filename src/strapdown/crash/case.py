@@ -78,7 +78,7 @@ from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad
 from strapdown.sensors.uncertainty import stated_uncertainty
 from strapdown.systems.one_thread import one_thread
-from strapdown.units import SPEEDS, unit_of
+from strapdown.units import FORCES, SPEEDS, unit_of
 
 if TYPE_CHECKING:
     from strapdown.crash.drive_entry import DriveEntry
@@ -200,6 +200,19 @@ def run_cases(
                 file=None if file is None else file.name,
                 quantity="vehicle, against",
             )
+    used: set[tuple[str, str]] = set()
+    for spec, file in cases:
+        own = {(t.path, c.lstrip("-")) for t in _triads(spec) for c in t.channels.values()}
+        if shared := sorted(used & own):
+            path, channel = shared[0]
+            raise ConfigError(
+                "crash.vehicles-share-record",
+                file=None if file is None else file.name,
+                quantity="channels",
+                channel=channel,
+                record=Path(path).name,
+            )
+        used |= own
     alone = []
     for k, (spec, file) in enumerate(cases):
 
@@ -220,7 +233,10 @@ def run_cases(
         )
         for k, one in enumerate(alone)
     ]
-    return _closed(*together) if len(together) == 2 else tuple(together)
+    if len(together) == 2:
+        return _closed(*together)
+    only_two = Finding("crash.closure-of-two-only", severity="note", quantity="closure")
+    return tuple(replace(one, findings=(*one.findings, only_two)) for one in together)
 
 
 def _with_inputs_of(own: CaseResult, others: Sequence[CaseResult]) -> tuple[InputFiles, ...]:
@@ -504,10 +520,24 @@ def _reference_table(spec: ReferenceSpec) -> pd.DataFrame:
     if spec.kind == "path":
         return read_reference_path(spec.path)
     names = {} if spec.force_column is None else {"force": spec.force_column}
-    table = read_aid_table(spec.path, {"force": "N"}, names=names)
+    try:
+        table = read_aid_table(spec.path, {"force": "N"}, names=names)
+    except DataError as error:
+        if error.finding.code != "io.missing-columns":
+            raise
+        raise DataError(
+            "crash.force-without-column",
+            file=error.finding.file,
+            quantity="force_column",
+            columns=error.finding.data["columns"],
+        ) from None
+    source = table.attrs["source"]
     if any(f.code == "io.unit-assumed" for f in table.attrs["findings"]):
-        source = table.attrs["source"]
-        raise DataError("crash.force-without-unit", file=source, quantity="force")
+        if spec.force_unit is None:
+            raise DataError("crash.force-without-unit", file=source, quantity="force_unit")
+        table["force"] *= FORCES[spec.force_unit]
+    elif spec.force_unit is not None:
+        raise DataError("crash.force-unit-stated-twice", file=source, quantity="force_unit")
     return table
 
 
@@ -540,16 +570,15 @@ def _deformed(
         if reference.kind != "force":
             stated.append(reference)
             continue
-        span = reference.over_s
-        if span is None and number is not None:
-            whole = made.main.body[number].event.delta_v
-            span = (whole.start, whole.end)
-        if span is None:
+        if number is None:
             raise ConfigError(
-                "crash.no-event-no-span-stated",
-                quantity=f"references, {reference.name}, over_s",
+                "crash.force-without-event",
+                quantity=f"references, {reference.name}",
                 name=made.main.name,
             )
+        # A part of the contact would not do: until it ends, its parts move against each other.
+        whole = made.main.body[number].event.delta_v
+        span = (whole.start, whole.end)
         assert reference.path is not None and reference.force_sd_percent is not None
         table = tables[reference.path]
         try:
@@ -622,8 +651,13 @@ def _closed(first: CaseResult, second: CaseResult) -> tuple[CaseResult, CaseResu
             share = energy_share(*energies)
         elif len(depths) == 2:
             share = equal_force_share(*((v.crush_m or 0.0, v.crush_sd_m) for v in depths))
+        elif energies or depths:
+            findings.append(
+                Finding("crash.crush-of-one", severity="note", quantity="vehicle, crush_m")
+            )
         closure = close_vehicles(*pair, friction=friction, energy_share=share)
         findings += closure.findings
+        findings += _deformation_apart((first, second), closure)
         blamed = blame(*pair, friction=friction) if closure.contradicted else None
         findings += [one.finding for one in blamed.candidates] if blamed is not None else []
         for result, other in ((first, pair[1]), (second, pair[0])):
@@ -648,7 +682,51 @@ def _closed_against_barrier(result: CaseResult) -> CaseResult:
         lacking = Finding("crash.closure-without-change", quantity="closure", name=name)
         return replace(result, findings=_once([*result.findings, lacking]))
     closure = against_barrier(vehicle, friction=result.spec.options.tire_friction)
-    return replace(result, closure=closure, findings=_once([*result.findings, *closure.findings]))
+    findings = [*result.findings, *closure.findings]
+    apart = closure.separation_speed
+    if closure.contradicted:
+        findings.append(Finding("crash.no-rigid-barrier", quantity="vehicle, against", name=name))
+    elif apart is not None and apart.high < 0.0:
+        findings.append(
+            Finding(
+                "crash.moves-on-at-barrier",
+                quantity="vehicle, against",
+                name=name,
+                value=-apart.value,
+                low=-apart.high,
+            )
+        )
+    findings += _deformation_apart((result,), closure)
+    return replace(result, closure=closure, findings=_once(findings))
+
+
+def _deformation_apart(results: Sequence[CaseResult], closure: Closure) -> Iterator[Finding]:
+    """What contradicts the residual crush: the energy that was lost, and the dynamic crush."""
+    energies = [r.deformation.energy for r in results if r.deformation.energy is not None]
+    lost = closure.energy
+    if len(energies) == len(results) and lost is not None:
+        whole = sum(e.value for e in energies)
+        half = math.hypot(lost.half_width, *(e.half_width for e in energies))
+        if abs(whole - lost.value) > half:
+            yield Finding(
+                "crash.deformation-energy-apart",
+                quantity="vehicle, deformation",
+                energy=1e-3 * whole,
+                lost=1e-3 * lost.value,
+                half=1e-3 * half,
+            )
+    for result in results:
+        residual, dynamic = result.spec.vehicle.deformation, result.deformation.crush[:1]
+        if residual is None or not dynamic or dynamic[0].at_least:
+            continue
+        deepest, least = max(residual.crush_m), TWO_SIDED_95 * residual.crush_sd_m
+        if deepest - dynamic[0].depth.value > math.hypot(dynamic[0].depth.half_width, least):
+            yield Finding(
+                "crash.residual-crush-above-dynamic",
+                quantity="vehicle, deformation",
+                residual=deepest,
+                dynamic=dynamic[0].depth.value,
+            )
 
 
 def _once(findings: Sequence[Finding]) -> tuple[Finding, ...]:

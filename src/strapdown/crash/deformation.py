@@ -61,7 +61,8 @@ def dynamic_crush(unit: str, path: CrashPath, event: CrashEvent) -> Crush | None
     Returns
     -------
     Crush or None
-        None where the vehicle stood at the first touch, or the path does not contain it.
+        None where the vehicle stood at the first touch, or went on faster after the event, or the
+        path does not contain them.
     """
     touch, touch_sd = path.entry.time, 0.0
     if touch < event.time_zero - PART_563.wake_window:
@@ -75,6 +76,9 @@ def dynamic_crush(unit: str, path: CrashPath, event: CrashEvent) -> Crush | None
     if not rows.size or touch < path.time[0] or speed <= 0.0:
         return None
     along = np.array([*velocity, 0.0]) / speed
+    after = [np.interp(event.end, path.time, path.table[axis]) for axis in ("VN", "VE")]
+    if float(along[:2] @ after) >= speed:
+        return None
     start = [np.interp(touch, path.time, place[:, k]) for k in (0, 1)]
     depth = (place[rows] - start) @ along[:2]
     k, first = int(rows[np.argmax(depth)]), int(rows[0])

@@ -1218,23 +1218,28 @@ class KnownPath(NamedTuple):
 
 
 class KnownForce(NamedTuple):
-    """A file of the force on a vehicle, as named in the case, and the column of the force."""
+    """A file of the force on a vehicle, as named in the case, and the column of the force.
+
+    `asked`: nothing states its unit.
+    """
 
     path: str
     name: str
     column: str
+    asked: bool
 
 
 def known_force(path: str, record: CrashRecord) -> KnownForce | None:
     """Read a record as the force on a vehicle, if that is all it has beside its time."""
-    forces = [c.name for c in record.channels if c.quantity == "force"]
+    forces = [c.name for c in record.channels if c.quantity == "force" or "force" in c.name.lower()]
     if len(record.files) != 1 or len(forces) != 1 or len(record.channels) > 2:
         return None
     try:
-        read_aid_table(record.path, {"force": "N"}, names={"force": forces[0]})
+        table = read_aid_table(record.path, {"force": "N"}, names={"force": forces[0]})
     except (ConfigError, DataError):
         return None
-    return KnownForce(path, record.path.stem, forces[0])
+    asked = any(f.code == "io.unit-assumed" for f in table.attrs["findings"])
+    return KnownForce(path, record.path.stem, forces[0], asked)
 
 
 def known_path(path: str, record: CrashRecord) -> KnownPath | None:

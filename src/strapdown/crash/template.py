@@ -184,6 +184,7 @@ def draft_cases(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> 
         skipped += [replace(s, vehicle=own.get(s.vehicle, s.vehicle)) for s in left]
         parts = [replace(p, vehicle=own[p.vehicle]) for p in found]
         (tables if open_units else settled).extend(parts)
+    skipped += _beside(records, Path(folder))
     tables, copies, told_of = drop_copies(tables)
     skipped += copies
     findings += told_of
@@ -246,6 +247,23 @@ def draft_cases(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> 
             )
         )
     return tuple(drafts)
+
+
+#: Endings of tables that may lie in the folder of a record.
+TABLES = (".csv", ".tsv", ".txt", ".xlsx")
+
+
+def _beside(records: Sequence[CrashRecord], folder: Path) -> list[Skipped]:
+    """Tables in the folders of the records that are no part of them."""
+    known = {file.resolve() for record in records for file in record.files}
+    folders = {record.files[0].parent for record in records if len(record.files) > 1}
+    why = "it is no part of the record in its folder; to use it, name it, too"
+    return [
+        Skipped(named_from(file, folder), "the file", why)
+        for one in sorted(folders)
+        for file in sorted(one.iterdir())
+        if file.suffix.lower() in TABLES and file.resolve() not in known
+    ]
 
 
 def _labels(

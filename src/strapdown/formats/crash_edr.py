@@ -133,8 +133,11 @@ class _Table:
 
 
 class _Text(NamedTuple):
+    """`short`: tables of whose header every row has fewer fields: row, its fields, the header's."""
+
     tables: list[_Table]
     above: list[tuple[str, int]]
+    short: list[tuple[int, int, int]]
 
 
 @dataclass
@@ -144,6 +147,7 @@ class _Open:
     names: list[str]
     units: list[str]
     event: int
+    header: str
     cells: list[list[str]] = field(default_factory=list)
     rows: list[int] = field(default_factory=list)
 
@@ -162,7 +166,8 @@ def detect(path: Path) -> bool:
     # Logs of other kinds are not parsed.
     if NOTE in text or not _NAMED.search(text):
         return False
-    return bool(_tables(text).tables)
+    found = _tables(text)
+    return bool(found.tables or found.short)
 
 
 def _is_recorder(table: _Table) -> bool:
@@ -182,33 +187,41 @@ def _tables(text: str) -> _Text:
     """Find the tables of a recorder, and the lines between them with the event that they name."""
     found: list[_Table] = []
     above: list[tuple[str, int]] = []
+    short: list[tuple[int, int, int]] = []
     event, table = 0, None
+
+    def close(table: _Open) -> None:
+        if table.cells and not _filled(table):
+            short.append((table.rows[0], max(map(len, table.cells)), len(table.names)))
+        elif table.cells:
+            found.extend(_closed(table))
+
     lines = [(k, line) for k, line in enumerate(text.splitlines(), 1)]
     for k, line in [*lines, (0, "")]:
         line = line.lstrip("#%").replace("\N{MINUS SIGN}", "-")
         fields = _fields(line, table)
         if not any(fields):
             if table is not None and table.cells:
-                found += _closed(table)
+                close(table)
                 table = None
             continue
         if table is not None:
             width = len(table.names)
             fields = fields[:width] if not any(fields[width:]) else fields
             if len(fields) <= width and _is_row(table, fields):
-                table.cells.append([*fields, *[""] * (width - len(fields))])
+                table.cells.append(fields)
                 table.rows.append(k)
                 continue
             if not table.cells and not table.units and _are_units(fields):
                 table.units = fields
                 continue
-            found += _closed(table)
+            close(table)
             table = None
             fields = _fields(line, None)
         if _is_header(fields):
             while not fields[-1]:
                 fields.pop()
-            table = _Open(fields, [], event)
+            table = _Open(fields, [], event, line)
             continue
         event = _labelled(fields, event)
         above.append((", ".join(f for f in fields if f), event))
@@ -216,7 +229,23 @@ def _tables(text: str) -> _Text:
     tables = [t for t in found if any(c.element or c.said.quantity in sensed for c in t.columns)]
     # Accelerations alone are of any recorder.
     own = any(_is_recorder(t) for t in tables)
-    return _Text(_numbered(tables) if own else [], above)
+    return _Text(_numbered(tables) if own else [], above, short)
+
+
+def _filled(table: _Open) -> bool:
+    """Fill rows up to the width of the header; whether one row has it.
+
+    The regulation's own names have commas: where each row has fewer fields than the header, those
+    with a blank after them are of a name, if the number of names is then that of the fields.
+    """
+    widest = max(map(len, table.cells))
+    if widest < len(table.names):
+        names = [name.strip() for name in re.split(r",(?! )", table.header)]
+        if len(names) != widest:
+            return False
+        table.names = names
+    table.cells = [[*row, *[""] * (len(table.names) - len(row))] for row in table.cells]
+    return True
 
 
 def _fields(line: str, table: _Open | None) -> list[str]:
@@ -493,6 +522,8 @@ def read(path: Path) -> CrashRecord:
     """
     text, findings = csv.decoded(path.read_bytes(), path.name)
     found = _tables(text)
+    for row, count, width in found.short:
+        raise DataError("io.edr-header-longer", file=path.name, row=row, count=count, width=width)
     if not found.tables:
         raise DataError("io.no-numeric-column", file=path.name)
     found = found._replace(tables=[_in_order(t, path.name) for t in found.tables])

@@ -410,7 +410,7 @@ def _deformation(found: Deformation) -> dict[str, Any]:
         "crush": [
             {
                 "recorder": one.unit,
-                "depth_m": _bounded(one.depth),
+                "depth_m": {**one.depth.__dict__, "high": None if one.at_least else one.depth.high},
                 "first_touch_s": one.touch,
                 "time_s": one.time,
                 "at_least": one.at_least,
@@ -508,6 +508,7 @@ def _reference(answer: ReferenceAnswer) -> dict[str, Any]:
         "delta_v_m_per_s": answer.delta_v,
         "sd_m_per_s": answer.sd,
         "reference_delta_v_m_per_s": spec.delta_v_m_per_s,
+        "reference_sd_m_per_s": None if spec.kind == "path" else spec.delta_v_sd_m_per_s,
         "rms_m": None if found is None else list(found.rms),
         "largest_m": None if found is None else list(found.largest),
         "consistent": answer.consistent,

@@ -302,7 +302,7 @@ def _figure_row(
     if figure is None:
         return None
     value, low, high = (plain(factor * x, places) for x in (figure.value, figure.low, figure.high))
-    return what, f"{more}{value}", f"{low} to {high}", unit
+    return what, f"{more}{value}", f"from {low}" if more else f"{low} to {high}", unit
 
 
 def deformation_table(result: CaseResult) -> TableBlock | None:
@@ -347,6 +347,7 @@ def closure_table(result: CaseResult) -> TableBlock | None:
         return None
     first, second = (*result.vehicle_names, "the barrier")[:2]
     row, named = _figure_row, result.spec.point.name
+    common = closure.common_velocity if result.partners else None
     taken = "" if named == "center of mass" else ", taken for its center of mass"
     per, per_unit = speed_factor(), speed_unit()
     at = "at the contact" if closure.basis == "contact" else "of the centers of mass"
@@ -355,9 +356,7 @@ def closure_table(result: CaseResult) -> TableBlock | None:
         row(f"closing speed {at}, along the impulse", closure.closing_speed, per, 1, per_unit),
         row(f"separation speed {at}", closure.separation_speed, per, 1, per_unit),
         row("restitution", closure.restitution, 1.0, 2, ""),
-        row("common velocity along the impulse", closure.common_velocity, per, 1, per_unit)
-        if result.partners
-        else None,
+        row(f"common velocity, along the impulse on {first}", common, per, 1, per_unit),
         row(f"direction of the impulse on {first}", closure.direction_deg, 1.0, 1, "deg"),
         row(f"mass of {second} over that of {first}", closure.mass_ratio, 1.0, 3, ""),
         row(f"impulse of {first} less that of {second}", closure.magnitude, *impulse_shown()),

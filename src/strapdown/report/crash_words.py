@@ -532,15 +532,22 @@ AGAINST = frozenset(
         "bias-against-times-stated",
         "direction-their-forces-stated",
         "disagree-their-common-point-chi",
+        "deformation-energy-apart",
         "event-beyond-assumed-turning",
         "momentum-not-closed",
+        "moves-on-at-barrier",
+        "no-closing-speed",
         "no-event-yet",
         "no-point-closes",
+        "no-rigid-barrier",
         "one-point-off",
         "others-agree-another-not",
         "point-does-not-close",
         "reads-more-than-stated-full",
+        "residual-crush-above-dynamic",
         "rest-until-record-itself-comes",
+        "restitution-above-one",
+        "restitution-below-zero",
         "specific-force-rest-along-vehicle",
         "specific-force-rest-long-off",
         "stated-crash-began-ms-before",
@@ -591,7 +598,7 @@ def not_shown(result: CaseResult) -> tuple[tuple[str, str], ...]:
     unit = made.main
     begin, end = unit.acceleration.begin, unit.acceleration.end
     assumed_axes = list(dict.fromkeys(a for u in made.units for a in u.at_point.assumed_axes))
-    others = bool(result.partners)
+    others, barrier = bool(result.partners), spec.vehicle.against == "barrier"
     rows = [
         (
             "Before and after the records",
@@ -634,7 +641,7 @@ def not_shown(result: CaseResult) -> tuple[tuple[str, str], ...]:
             (
                 "The other vehicle or obstacle",
                 "Its mass, speed, stiffness and change of velocity are not known from these "
-                "records; a closing speed needs its case as well.",
+                f"records{'' if barrier else '; a closing speed needs its case as well'}.",
             )
         )
     if assumed_axes:
@@ -800,7 +807,10 @@ def _not_closed(result: CaseResult) -> Iterator[tuple[str, str, str]]:
             f"{' and '.join((*result.vehicle_names, 'the barrier')[:2])} do not close",
             "Momentum, closing speed or restitution of the two vehicles contradict each other "
             "beyond their bounds: a record, a mass, a heading or an entry speed is wrong. See "
-            "Closure with the other vehicle.",
+            "Closure with the other vehicle."
+            if result.partners
+            else "Closing speed or restitution is not that of a rigid barrier that stands still: "
+            "what it met, the entry speed or a record is wrong. See Contact and deformation.",
         )
 
 

@@ -108,6 +108,51 @@ def test_a_force_that_contradicts_the_recorders_is_on_page_one(tmp_path):
     assert "wall" in dict(contradictions(run))
 
 
+DEFORMATION = (
+    "[vehicle.deformation]\ncrush_m = [{depth}, {depth}]\nwidth_m = 1.4\n"
+    "stiffness_a_n_per_m = 0.0\nstiffness_a_sd_n_per_m = 0.0\n"
+    "stiffness_b_n_per_m2 = {b}\nstiffness_b_sd_n_per_m2 = 0.0\n"
+)
+
+
+def test_a_deformation_that_cannot_be_is_on_page_one(tmp_path):
+    lost = 0.5 * MASS * SPEED**2 * (1 - RESTITUTION**2)
+    for depth, times, codes in (
+        (0.4, 1.0, set()),
+        (0.4, 1.5, {"crash.deformation-energy-apart"}),
+        (1.1, 1.0, {"crash.residual-crush-above-dynamic"}),
+    ):
+        # The energy of a constant depth: width B C² / 2.
+        stiffness = 2.0 * times * lost / 1.4 / depth**2
+        made = DEFORMATION.format(depth=depth, b=stiffness)
+        run = sd.reconstruct(at_wall(tmp_path, made))
+        found = {f.code for f in run.findings if "crush" in f.code or "energy" in f.code}
+        assert found == codes
+        assert len(contradictions(run)) == len(codes)
+    for key, text in (("width_m", "width_m = 9.0"), ("crush_m", "crush_m = [0.3, 4.9]")):
+        wrong = "\n".join(
+            text if line.startswith(f"{key} ") else line for line in made.splitlines()
+        )
+        with pytest.raises(ConfigError, check=coded("config.deformation-beyond-vehicle")):
+            CaseSpec.read(at_wall(tmp_path, f"{wrong}\n"))
+
+
+def test_a_vehicle_that_met_no_rigid_barrier_is_named(tmp_path):
+    file = at_wall(tmp_path)
+    text = file.read_text(encoding="utf-8")
+    for speed, code, crushed in (
+        (25.0, "crash.moves-on-at-barrier", True),
+        (5.0, "crash.no-rigid-barrier", True),
+        (-15.0, "crash.no-rigid-barrier", False),
+    ):
+        other = text.replace(f"speed_m_per_s = {SPEED}", f"speed_m_per_s = {speed}")
+        file.write_text(other, encoding="utf-8")
+        run = sd.reconstruct(file)
+        assert code in {f.code for f in run.findings} and contradictions(run)
+        # One that is pushed on along its travel is not crushed by what it left.
+        assert bool(run.deformation.crush) == crushed
+
+
 def test_the_way_before_the_touch_is_in_the_bound(tmp_path):
     found = sd.reconstruct(at_wall(tmp_path, entry_at=-0.1)).deformation.crush[0]
     # Within the interval of 20 ms in which the velocity changed enough.
@@ -155,11 +200,7 @@ def test_the_command_tells_them_and_seals_them(tmp_path, run_cli):
 def test_stiffness_of_both_cars_divides_the_energy(tmp_path):
     files = cases(tmp_path, 1)
     for file, depth in zip(files, (0.3, 0.5), strict=True):
-        more = (
-            f"[vehicle.deformation]\ncrush_m = [{depth}, {depth}]\nwidth_m = 1.4\n"
-            "stiffness_a_n_per_m = 0.0\nstiffness_a_sd_n_per_m = 0.0\n"
-            "stiffness_b_n_per_m2 = 5e5\nstiffness_b_sd_n_per_m2 = 0.0\n"
-        )
+        more = DEFORMATION.format(depth=depth, b=5e5)
         text = file.read_text(encoding="utf-8").replace("[point]", f"{more}[point]")
         file.write_text(text, encoding="utf-8")
     closure = sd.reconstruct(*files).closure
@@ -181,7 +222,10 @@ def test_the_share_of_two_energies():
 def test_the_bound_of_the_crush_has_what_grows_between_touch_and_depth():
     time = np.arange(6) / 10.0
     north = np.array([-1.0, 0.0, 0.6, 0.8, 0.7, 0.6])
-    table = pd.DataFrame({"north": north, "east": 0.0 * north, "VN": 6.0, "VE": 0.0}, index=time)
+    table = pd.DataFrame(
+        {"north": north, "east": 0.0 * north, "VN": [6.0, 6.0, 6.0, 1.0, -1.0, -1.0], "VE": 0.0},
+        index=time,
+    )
     errors, noise = np.zeros((2, 6, 9)), np.zeros((6, 9, 9))
     # One grows by 3 cm from touch to depth, another is common to both.
     errors[0, :, 6], errors[1, :, 6] = 0.01 * np.arange(6), 0.5
@@ -195,13 +239,13 @@ def test_the_bound_of_the_crush_has_what_grows_between_touch_and_depth():
         noise_covariance=noise,
         entry=SimpleNamespace(time=0.1),
     )
-    event = SimpleNamespace(time_zero=0.1, time_zero_sd=0.001, woken=0.12)
+    event = SimpleNamespace(time_zero=0.1, time_zero_sd=0.001, woken=0.12, end=0.4)
     found = dynamic_crush("car", path, event)
     assert found.depth.value == pytest.approx(0.8) and found.time == 0.3 and not found.at_least
     sd = math.sqrt(0.03**2 + 0.02**2 + 0.06**2)
     assert found.depth.half_width == pytest.approx(1.959964 * sd, rel=1e-6)
     # The entry is 30 ms before the interval of time zero: the touch is anywhere within that.
-    later = SimpleNamespace(time_zero=0.13, time_zero_sd=0.001, woken=0.15)
+    later = SimpleNamespace(time_zero=0.13, time_zero_sd=0.001, woken=0.15, end=0.4)
     found = dynamic_crush("car", path, later)
     assert found.touch == pytest.approx(0.14)
     at_touch = math.sqrt(0.02**2 / 12.0 + 0.001**2)
@@ -211,8 +255,10 @@ def test_the_bound_of_the_crush_has_what_grows_between_touch_and_depth():
     # One that still moves on at the end was crushed at least so far.
     table["north"] = time
     assert dynamic_crush("car", path, event).at_least
-    table["VN"] = 0.0
-    assert dynamic_crush("car", path, event) is None
+    # One that goes on faster was pushed, and one that stood was not driven into anything.
+    for after in (7.0, 0.0):
+        table["VN"] = [after and 6.0, after and 6.0, after, after, after, after]
+        assert dynamic_crush("car", path, event) is None
 
 
 def test_impulse_of_a_force_and_what_its_zero_may_be():
@@ -238,6 +284,18 @@ def test_what_cannot_be_is_refused(tmp_path):
     file = at_wall(tmp_path, header="time_s,force")
     with pytest.raises(DataError, check=coded("crash.force-without-unit")):
         sd.reconstruct(file)
+    text = file.read_text(encoding="utf-8")
+    file.write_text(f'{text}force_unit = "kN"\n', encoding="utf-8")
+    assert sd.reconstruct(file).references[0].consistent
+    at_wall(tmp_path)
+    file.write_text(f'{text}force_unit = "kN"\n', encoding="utf-8")
+    with pytest.raises(DataError, check=coded("crash.force-unit-stated-twice")):
+        sd.reconstruct(file)
+    file = at_wall(tmp_path, header="time_s,other_kN")
+    with pytest.raises(DataError, check=coded("crash.force-without-column")):
+        sd.reconstruct(file)
+    with pytest.raises(ConfigError, check=coded("crash.vehicles-share-record")):
+        sd.reconstruct(*[cases(tmp_path, 1)[0]] * 2)
     (tmp_path / "two").mkdir()
     first, second = cases(tmp_path / "two", 1)
     text = first.read_text(encoding="utf-8").replace("[point]", 'against = "barrier"\n[point]')
@@ -259,3 +317,5 @@ def test_a_laboratory_test_at_a_wall_is_proposed_so(recordings):
     (reference,) = told["references"]
     assert reference["kind"] == "force" and reference["force_column"] == "force_N"
     assert "force_sd_percent" in {asked.key for asked in draft.asked}
+    (alone,) = draft_cases(read_records([folder]))
+    assert [s for s in alone.left_out if "barrier_force_sum.csv" in s.path]

@@ -36,6 +36,8 @@ def answered(text, answers):
     lines, name = [], ""
     for line in text.splitlines():
         key, _, value = line.partition(" = ")
+        if key == "mass_sd_kg":
+            continue
         name = json.loads(value.partition("  #")[0]) if key == "name" else name
         if key in ONLY_A_PERSON_KNOWS and '"?"' in value:
             answer = answers[key]
