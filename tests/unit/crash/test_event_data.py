@@ -88,6 +88,25 @@ def test_a_layout_is_read_right(tmp_path, name):
     assert "io.edr-units-disagree" not in said
 
 
+def test_the_regulations_names_with_commas_are_one_column_each(tmp_path):
+    rows = "\n".join(f"{10 * k},{min(k, 12)},{-2 * min(k, 12)}" for k in range(26))
+    for names in (
+        "Time (ms),Delta-V, Longitudinal (km/h),Delta-V, Lateral (km/h)",
+        'Time (ms),"Delta-V, Longitudinal (km/h)","Delta-V, Lateral (km/h)"',
+    ):
+        (tmp_path / "edr.csv").write_text(f"Crash Pulse\n{names}\n{rows}\n", encoding="utf-8")
+        _, forward, right = read_crash_record(tmp_path / "edr.csv").channels
+        assert (forward.axis, right.axis) == ("x", "y")
+        for channel, last in ((forward, 12.0 * KMH), (right, -24.0 * KMH)):
+            assert channel.load()[1][-1] == pytest.approx(last)
+    # Where no blank tells the commas apart, which column is which is not known.
+    text = f"Time (ms),Delta-V,Longitudinal (km/h)\n{rows.replace(',-', ';-')}\n"
+    text = "\n".join(line.partition(";")[0] for line in text.splitlines())
+    (tmp_path / "edr.csv").write_text(text, encoding="utf-8")
+    with pytest.raises(DataError, check=coded("io.edr-header-longer")):
+        read_crash_record(tmp_path / "edr.csv")
+
+
 @pytest.mark.parametrize("length", [0.03, 0.06, 0.1])
 @pytest.mark.parametrize("first", [0.0, 0.01])
 def test_the_reconstructed_change_is_the_recorded_one(tmp_path, length, first):
