@@ -39,6 +39,7 @@ __all__ = [
     "sampling_of_sums",
     "sum_of",
     "told_by_numbers",
+    "unit_of_counts",
     "units_of_triads",
     "values_of_triads",
 ]

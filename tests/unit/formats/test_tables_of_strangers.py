@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -629,6 +630,14 @@ def test_an_accelerometer_that_a_format_does_not_read_is_no_note():
     ]
     assert found.severity == "warning"
     assert found.data["names"] == tuple(forces)
+    sizes = {"m/s2": (0.0, 0.0, 9.8), "g": (0.6, 0.0, 0.8), "UNIT": (0.0, 137.0, 0.0)}
+    for unit, triple in sizes.items():
+        forces = dict(zip(forces, np.tile(triple, (n, 1)).T, strict=True))
+        found = assemble(replace(raw, columns=columns | forces), ReadOptions()).findings
+        (found,) = [f for f in found if f.code == "io.accelerometer-not-read"]
+        assert found.data["unit"] == unit
+        named = dict(item.split("=") for item in found.data["columns"].split(","))
+        assert named == dict(zip(ACCEL, forces, strict=True))
 
 
 @pytest.mark.parametrize(
@@ -672,6 +681,7 @@ def test_columns_of_unknown_names_with_the_norm_of_gravity_are_named(names, size
     (found,) = [f for f in assemble(raw, ReadOptions()).findings if f.quantity == "accel"]
     assert (found.code, found.severity) == ("io.columns-like-accelerometer", "warning")
     assert found.data["norm"] == pytest.approx(size * np.sqrt(1.01))
+    assert found.data["unit"] == {9.8: "m/s2", 1.0: "g"}.get(size, "UNIT")
     with pytest.raises(ConfigError, check=coded("io.unit-without-column")):
         assemble(raw, ReadOptions(accel_unit="g"))
     stated = dict(item.split("=") for item in found.data["columns"].split(","))

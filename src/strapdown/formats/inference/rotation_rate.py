@@ -339,9 +339,9 @@ MODEL_ERROR = 0.1
 # Zero-rate output, one sigma (MPU-6050 data sheet: within 20 deg/s).
 BIAS_SD = 0.12  # rad/s
 # Where the means of the force over both halves of a window have its usual norm within this, the
-# force did not turn within them, and gravity is within 11° of it in a body that accelerates along the
-# ground; it turned by less than twice that, or somewhat more, as a clock and a gyro have errors. So
-# many of the windows must be so, more than by chance, and of these so many must say the same.
+# force did not turn within them, and gravity is within 11° of it in a body that accelerates along
+# the ground; it turned by less than twice that, or somewhat more, as a clock and a gyro have
+# errors. So many of the windows must be so, and of these so many must say the same.
 CALM, STILL_TURN, _OF_WINDOWS, _SAYING = 0.02, 0.5, 0.2, 0.25
 # Largest zero-rate output, and the angle between gravity and the axis of a turn about it, with
 # sensors out of line: 30 deg/s and 3° are beyond those of any data sheet above.
