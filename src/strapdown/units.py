@@ -246,6 +246,8 @@ def find_unit(text: str, among: Sequence[str] = OF_LOGS) -> tuple[str, str] | No
     may be of, of `FACTORS`; the first that has the spelling decides. Returns (str, str) or None,
     the quantity and the unit, in the spelling of this package.
     """
+    if text.strip(" []()") == "T" and "magnetic field" in among:
+        return "magnetic field", "T"  # of which a small letter is a time
     plain = re.sub(r"\s+", "", text.strip().strip("[]").lower())
     plain = _ENCLOSED.sub(r"\1\2", plain)
     bare = plain.strip("()")
