@@ -23,6 +23,7 @@ from strapdown.units import (
     GYRO_SUMS,
     GYRO_UNITS,
     MAG_UNITS,
+    RELATIVE_FIELDS,
     factor_of,
     parse_unit,
 )
@@ -173,6 +174,10 @@ def _refuse_open(raw: RawLog, found: dict[str, Column], triad: str) -> None:
     """Refuse a unit that the file leaves open: the numbers cannot decide between f and -f."""
     column = found[f"{triad}_x"]
     unit = column.unit
+    # A clock may be local, too, so that this is a unit of nothing else.
+    local = re.search(r"\blocal\b", f"{column.source} {raw.units.get(column.source)}")
+    if unit in RELATIVE_FIELDS or (triad == "mag" and unit is None and local):
+        raise DataError("io.mag-unit-relative", file=raw.name, quantity=triad, source=column.source)
     apple = any(re.sub(r"\W", "", name).lower() in APPLE for name in raw.columns)
     if triad == "accel" and unit is None and apple:
         unit = "-g or g"  # that of CoreMotion, or turned by the application
