@@ -340,11 +340,12 @@ def even_stamps(stamps: NDArray[Any]) -> EvenStamps | None:
     """
     if stamps.dtype.kind not in "iuf" or stamps.size < FEWEST_STAMPS:
         return None
+    changes = int(np.count_nonzero(stamps[1:] != stamps[:-1]))
+    if changes < FEWEST_STAMPS - 1 or changes > (1.0 - COARSE) * (stamps.size - 1):
+        return None
     exact = stamps.astype(np.int64) if stamps.dtype.kind in "iu" else stamps
     whole = np.diff(exact).astype(np.float64)
     ends = np.flatnonzero(whole)
-    if ends.size < FEWEST_STAMPS - 1 or ends.size > (1.0 - COARSE) * whole.size:
-        return None
     tick = float(whole[ends].min())
     jumps = whole[ends] / tick
     if not tick > 0.0 or not np.allclose(jumps, np.round(jumps), rtol=0.0, atol=1e-3):
