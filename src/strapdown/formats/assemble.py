@@ -289,7 +289,7 @@ def _like_gravity(raw: RawLog, three: list[str], norm: float) -> Finding:
     )
 
 
-def _as_accelerometer(raw: RawLog, three: list[str]) -> dict[str, str]:
+def _as_accelerometer(raw: RawLog, three: list[str]) -> dict[str, Any]:
     """Return three columns as ``columns``, and the likely ``unit`` of an accelerometer in them."""
     columns = (f"accel_{a}={reference(raw, n)}" for a, n in zip(AXES, three, strict=True))
     numeric = all(raw.columns[n].dtype.kind in "iuf" for n in three)

@@ -443,8 +443,15 @@ def report_contradictions(
         if triad in asked or other is None:
             continue
         if triad == "gyro" and not other.settled and (likely := _instead(unit, other)):
-            data = {"triad": triad, "unit": unit, "likely": likely, "reason": other.finding()}
-            fault = Finding("io.contradicts-unit", file=file, quantity=triad, **data)
+            fault = Finding(
+                "io.contradicts-unit",
+                file=file,
+                quantity=triad,
+                triad=triad,
+                unit=unit,
+                likely=likely,
+                reason=other.finding(),
+            )
             questions.ask(fault, gyro_unit=likely)
         if not other.settled:
             continue
