@@ -17,12 +17,12 @@ from strapdown.errors import ConfigError, DataError, StrapdownError, check_choic
 from strapdown.formats import (
     android_events,
     apdm,
+    ardupilot,
     asl,
     broad,
     comma2k19,
     core_motion,
     csv,
-    dataflash,
     dji_srt,
     excel,
     foot_mounted,
@@ -40,7 +40,6 @@ from strapdown.formats import (
     kitti,
     labview,
     matlab_mobile,
-    mavlink,
     microstrain,
     mpu6050,
     navego,
@@ -137,21 +136,28 @@ class Reader:
     parts: bool = False
 
     @classmethod
-    def of(cls, module: ModuleType, title: str = "", parts: bool = False) -> Reader:
+    def of(cls, module: ModuleType, title: str = "", parts: bool = False, name: str = "") -> Reader:
         """Make the reader of a module whose functions have the names of `_FUNCTIONS`.
 
         `title`: its ``TITLE`` if not given. Its ``files_of``, if there is one, lists the files.
+        `name`: of one of several formats of a module, which is in the names of its functions:
+        ``detect_gpx``, ``read_gpx``, ``read_gpx_fixes``.
         """
-        have = vars(module)
-        streams = {stream: have[name] for stream, name in _FUNCTIONS.items() if name in have}
-        return cls(title or have["TITLE"], have["detect"], streams, have.get("files_of"), parts)
+        have, own = vars(module), f"_{name}" if name else ""
+        streams = {
+            stream: have[function]
+            for stream, plain in _FUNCTIONS.items()
+            if (function := plain.replace("read", f"read{own}")) in have
+        }
+        known = title or have[f"{name.upper()}_TITLE" if name else "TITLE"]
+        return cls(known, have[f"detect{own}"], streams, have.get(f"files_of{own}"), parts)
 
 
 #: In the order of detection: formats of known recordings first, general formats last.
 READERS: dict[str, Reader] = {
     "px4": Reader.of(px4),
-    "dataflash": Reader.of(dataflash),
-    "mavlink": Reader.of(mavlink),
+    "dataflash": Reader.of(ardupilot, name="dataflash"),
+    "mavlink": Reader.of(ardupilot, name="mavlink"),
     "ros": Reader.of(ros, parts=True),
     "novatel": Reader(
         novatel.TITLE,
