@@ -26,13 +26,13 @@ from strapdown.formats import (
     asl,
     csv,
     gnss_nmea,
-    gpx,
     hdf5,
     kf_gins,
     kitti,
     numpy_files,
     parquet,
     ros,
+    tracks,
     tum,
 )
 from strapdown.formats.clocks import GPS, RELATIVE, UNIX, clock_of, time_column
@@ -493,7 +493,7 @@ WRITERS: dict[str, Writer] = {
         "kf-gins-folder",
     ),
     "gpx": Writer(
-        "GPX track", {"gnss": _PLACES, "reference": _PLACES}, gpx.write, "gpx", (".gpx",)
+        "GPX track", {"gnss": _PLACES, "reference": _PLACES}, tracks.write_gpx, "gpx", (".gpx",)
     ),
     "nmea": Writer(
         "NMEA 0183",
