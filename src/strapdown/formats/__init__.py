@@ -19,12 +19,11 @@ from strapdown.formats import (
     apdm,
     ardupilot,
     asl,
-    broad,
     comma2k19,
     core_motion,
     csv,
+    data_sets,
     excel,
-    foot_mounted,
     gnss_ins_sim,
     gnss_logger,
     gnss_nmea,
@@ -38,7 +37,6 @@ from strapdown.formats import (
     labview,
     matlab_mobile,
     microstrain,
-    mpu6050,
     navego,
     novatel,
     numpy_files,
@@ -49,7 +47,6 @@ from strapdown.formats import (
     px4,
     pyins,
     racechrono,
-    ronin,
     ros,
     sbet,
     sbf,
@@ -57,7 +54,6 @@ from strapdown.formats import (
     sensor_logger,
     sensorlog,
     sensorstream,
-    smartloc,
     tracks,
     tum,
     ubx,
@@ -177,8 +173,8 @@ READERS: dict[str, Reader] = {
             "wheel": ubx.read_wheel,
         },
     ),
-    "mpu6050": Reader.of(mpu6050, "folder of an MPU-6050 in MATLAB files"),
-    "broad": Reader.of(broad, "BROAD trial, HDF5 with optical truth"),
+    "mpu6050": Reader.of(data_sets, "folder of an MPU-6050 in MATLAB files", name="mpu"),
+    "broad": Reader.of(data_sets, "BROAD trial, HDF5 with optical truth", name="broad"),
     "comma2k19": Reader.of(comma2k19, "comma2k19 segment, with its pose as truth"),
     "kitti": Reader(
         "KITTI raw, folder oxts",
@@ -186,7 +182,7 @@ READERS: dict[str, Reader] = {
         {"imu": kitti.read, "gnss": kitti.read_fixes, "reference": kitti.read_trajectory},
         kitti.files_of,
     ),
-    "ronin": Reader.of(ronin, "RoNIN, HDF5 of a phone"),
+    "ronin": Reader.of(data_sets, "RoNIN, HDF5 of a phone", name="ronin"),
     "asl": Reader.of(asl, "EuRoC, TUM VI: data.csv of imu0, or folder mav0"),
     "xsens": Reader(
         "Xsens MT Manager export (.txt .csv)", xsens.detect, {"imu": xsens.read, TABLE: csv.read}
@@ -210,7 +206,11 @@ READERS: dict[str, Reader] = {
         gnss_logger.detect_pseudoranges,
         dict.fromkeys(("imu", "gnss", "reference"), gnss_logger.refuse_pseudoranges),
     ),
-    "smartloc": Reader("smartLoc, CSV of raw GNSS data", smartloc.detect, {"gnss": smartloc.read}),
+    "smartloc": Reader(
+        "smartLoc, CSV of raw GNSS data",
+        data_sets.detect_smartloc,
+        {"gnss": data_sets.read_smartloc},
+    ),
     "racechrono": Reader.of(racechrono),
     "microstrain": Reader.of(microstrain),
     "apdm": Reader.of(apdm),
@@ -287,7 +287,9 @@ READERS: dict[str, Reader] = {
     "npz": Reader("NumPy archive (.npz)", numpy_files.detect, {TABLE: numpy_files.read}),
     "parquet": Reader("Parquet (.parquet .pq)", parquet.detect, {TABLE: parquet.read}),
     "hdf5": Reader("HDF5 (.h5 .hdf5) and MATLAB v7.3 (.mat)", hdf5.detect, {TABLE: hdf5.read}),
-    "foot-mounted": Reader.of(foot_mounted, "unit on a shoe: timestamps, imu_data (.mat)"),
+    "foot-mounted": Reader.of(
+        data_sets, "unit on a shoe: timestamps, imu_data (.mat)", name="foot"
+    ),
     "matlab": Reader("MATLAB up to v7 (.mat)", hdf5.detect_matlab, {TABLE: hdf5.read_matlab}),
 }
 

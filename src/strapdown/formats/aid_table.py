@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.formats import csv, foot_mounted, holds, open_stream, parquet, read_raw, reader_of
+from strapdown.formats import csv, data_sets, holds, open_stream, parquet, read_raw, reader_of
 from strapdown.formats.arrays import ticks_of
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, unrolled, with_clock
 from strapdown.formats.columns import parse_axes
@@ -331,8 +331,8 @@ def read_control_points(path: str | Path, names: Mapping[str, str] | None = None
         The file cannot be used, or it has fewer than two points, which leave the heading open.
     """
     path = Path(path)
-    if path.is_file() and foot_mounted.detect_points(path):
-        time, places = foot_mounted.read_points(path)
+    if path.is_file() and data_sets.detect_foot_points(path):
+        time, places = data_sets.read_foot_points(path)
         table = pd.DataFrame(places, index=pd.Index(time, name="time"), columns=POINT)
         table.attrs |= {"source": path.name, "findings": ()}
         table = with_clock(table, Clock(RELATIVE))
