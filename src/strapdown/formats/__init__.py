@@ -16,7 +16,6 @@ import pandas as pd
 from strapdown.errors import ConfigError, DataError, StrapdownError, check_choice
 from strapdown.formats import (
     android_events,
-    apdm,
     ardupilot,
     asl,
     comma2k19,
@@ -29,12 +28,12 @@ from strapdown.formats import (
     gnss_pos,
     gopro,
     hdf5,
+    imu_makers,
     join,
     json_objects,
     kf_gins,
     kitti,
     labview,
-    microstrain,
     navego,
     novatel,
     numpy_files,
@@ -54,8 +53,6 @@ from strapdown.formats import (
     tracks,
     tum,
     ubx,
-    xio,
-    xsens,
 )
 from strapdown.formats.assemble import assemble
 from strapdown.formats.find_columns import names_of_fixes, names_of_quantities
@@ -182,7 +179,9 @@ READERS: dict[str, Reader] = {
     "ronin": Reader.of(data_sets, "RoNIN, HDF5 of a phone", name="ronin"),
     "asl": Reader.of(asl, "EuRoC, TUM VI: data.csv of imu0, or folder mav0"),
     "xsens": Reader(
-        "Xsens MT Manager export (.txt .csv)", xsens.detect, {"imu": xsens.read, TABLE: csv.read}
+        "Xsens MT Manager export (.txt .csv)",
+        imu_makers.detect_xsens,
+        {"imu": imu_makers.read_xsens, TABLE: csv.read},
     ),
     "sensorstream": Reader.of(sensorstream, "Sensorstream IMU+GPS"),
     "sensor-logger": Reader.of(sensor_logger, "Sensor Logger: zip, folder, CSV, JSON"),
@@ -209,9 +208,9 @@ READERS: dict[str, Reader] = {
         {"gnss": data_sets.read_smartloc},
     ),
     "racechrono": Reader.of(phone_apps, name="racechrono"),
-    "microstrain": Reader.of(microstrain),
-    "apdm": Reader.of(apdm),
-    "x-imu3": Reader.of(xio, "x-IMU3: CSV, folder"),
+    "microstrain": Reader.of(imu_makers, name="microstrain"),
+    "apdm": Reader.of(imu_makers, name="apdm"),
+    "x-imu3": Reader.of(imu_makers, "x-IMU3: CSV, folder", name="xio"),
     "physics-toolbox": Reader.of(phone_apps, name="physics_toolbox"),
     "matlab-mobile": Reader.of(phone_apps, name="matlab_mobile"),
     "matlab-objects": Reader(
