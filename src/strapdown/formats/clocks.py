@@ -47,6 +47,7 @@ __all__ = [
     "time_column",
     "unix_from_gps",
     "unrolled",
+    "usual_step",
     "with_clock",
 ]
 
@@ -523,7 +524,7 @@ def _refuse_backward(
             then=then,
             count=bad.size,
         )
-    if bits := wrap_bits(stamps[k], steps[k], _usual_step(steps)):
+    if bits := wrap_bits(stamps[k], steps[k], usual_step(steps)):
         raise DataError(
             "io.time-counter-wraps",
             file=file,
@@ -544,7 +545,8 @@ def _refuse_backward(
     )
 
 
-def _usual_step(steps: Array) -> float:
+def usual_step(steps: Array) -> float:
+    """Return the median of the steps forward; 0 if there is none."""
     forward = steps[steps > 0]
     return float(np.median(forward)) if forward.size else 0.0
 
@@ -555,7 +557,7 @@ def _repaired(
     steps = np.diff(ticks)
     if not steps.size or steps.min() > 0:
         return np.ones(ticks.size, dtype=bool), ticks
-    usual = _usual_step(steps)
+    usual = usual_step(steps)
     added = np.zeros(ticks.size)
     for k in np.flatnonzero(steps < 0):
         if bits := wrap_bits(stamps[k], steps[k], usual):

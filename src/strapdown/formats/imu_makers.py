@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
-from strapdown.formats.clocks import GPS, UNIX, WEEK
+from strapdown.formats.clocks import GPS, UNIX, WEEK, usual_step
 from strapdown.formats.columns import read_name
 from strapdown.formats.hdf5 import SIGNATURE, read_arrays
 from strapdown.formats.known_formats import column, lacking, selected, split, stated_by, under
@@ -358,16 +358,14 @@ def read_xsens(path: Path) -> RawLog:
         columns[source] = stamps
         stated[source] = ("time", "us")
     # By the usual step, for a counter that wraps is unwrapped.
-    in_us = source == STAMP and _usual_step(stamps) == _usual_step(raw.columns[STAMP])
+    in_us = source == STAMP and usual_step(np.diff(stamps.astype(np.float64))) == usual_step(
+        np.diff(raw.columns[STAMP].astype(np.float64))
+    )
     if source is None or in_us:
         # A DOT, which counts µs, writes deg/s; without its preamble the numbers have to show it.
         unit = "deg/s" if _is_of_dot(raw) else None
         stated |= {f"Gyr_{axis}": (f"gyro_{axis.lower()}", unit) for axis in "XYZ"}
     return dataclasses.replace(raw, columns=columns, stated=stated, rate=rate, findings=findings)
-
-
-def _usual_step(stamps: NDArray[Any]) -> float:
-    return float(np.median(np.diff(stamps.astype(np.float64)))) if stamps.size > 1 else 0.0
 
 
 def _stamps(
