@@ -207,7 +207,6 @@ def _log_of_gnss_ins_sim(
 
 
 NAVEGO_TITLE = "structures of NaveGo (.mat)"
-Array = NDArray[np.float64]
 EULERS = {"roll", "pitch", "yaw"}
 FIELDS = {
     "imu": {"t", "fb", "wb"},

@@ -23,9 +23,8 @@ from strapdown.formats import (
     open_stream,
     px4,
     read_log,
+    receivers,
     ros,
-    sbf,
-    ubx,
 )
 from strapdown.formats.gnss_files import GnssOptions, read_gnss
 from strapdown.formats.trajectory_readers import read_trajectory
@@ -769,7 +768,7 @@ def test_ubx_the_finer_position_of_the_same_instant(tmp_path):
 
 def test_ubx_sensors_in_ms_of_the_receiver(tmp_path):
     path = drive(tmp_path)
-    raw = ubx.read(path)
+    raw = receivers.read_ubx(path)
     assert (raw.axes, raw.clock) == (None, "gps-seconds-of-week")
     assert "io.ubx-clock-by-order" in [f.code for f in raw.findings]
     # The fix at 136 154 s follows the sample with the tag 5900, each further one a second later.
@@ -778,13 +777,13 @@ def test_ubx_sensors_in_ms_of_the_receiver(tmp_path):
     alone = written(
         tmp_path / "alone.ubx", b"".join(esf_meas(k, [(14, 0), (13, 0), (5, 9)]) for k in range(9))
     )
-    assert ubx.read(alone).clock == "relative"
-    assert "io.ubx-own-clock" in [f.code for f in ubx.read(alone).findings]
+    assert receivers.read_ubx(alone).clock == "relative"
+    assert "io.ubx-own-clock" in [f.code for f in receivers.read_ubx(alone).findings]
     imu = read_log(path).imu
     np.testing.assert_allclose(imu.iloc[1, :3], np.radians([1.0, -2.0, 0.5]))
     np.testing.assert_allclose(imu.iloc[1, 3:6], [0.5, -1.0, G], atol=1e-3)
     assert imu.index[1] - imu.index[0] == pytest.approx(0.1)
-    wheel = ubx.read_wheel(path)
+    wheel = receivers.read_ubx_wheel(path)
     assert wheel.columns["speed"][0] == -2.5
     with pytest.raises(NoStreamError):
         open_stream(path, "reference")
@@ -884,7 +883,7 @@ def test_sbf_geodetic_and_sensors_in_one_time(tmp_path):
     assert imu.attrs["clock"] == "gps-seconds-of-week"
     np.testing.assert_allclose(imu.iloc[1, :3], np.radians([10.0, 20.0, 31.0]))
     np.testing.assert_allclose(imu.iloc[1, 3:6], [0.1, 0.2, -G])
-    assert sbf.read(path).axes is None
+    assert receivers.read_sbf(path).axes is None
 
 
 def test_sbf_recorded(recordings):
