@@ -21,7 +21,6 @@ from strapdown.formats import (
     comma2k19,
     csv,
     data_sets,
-    excel,
     gnss_logger,
     gnss_nmea,
     gnss_pos,
@@ -29,13 +28,9 @@ from strapdown.formats import (
     hdf5,
     imu_makers,
     join,
-    json_objects,
     kf_gins,
     kitti,
-    labview,
     novatel,
-    numpy_files,
-    parquet,
     phone_apps,
     phyphox,
     px4,
@@ -45,6 +40,7 @@ from strapdown.formats import (
     sensor_logger,
     sensorlog,
     sensorstream,
+    table_files,
     toolboxes,
     tracks,
     tum,
@@ -228,9 +224,17 @@ READERS: dict[str, Reader] = {
     ),
     "sensor-folder": Reader.of(sensor_folder, "folder or zip of one text table a sensor"),
     "android-events": Reader.of(android_events, "log of Android sensor events, one a row"),
-    "labview": Reader("measurement file of LabVIEW (.lvm)", labview.detect, {TABLE: labview.read}),
-    "json": Reader("JSON of samples: lines, list", json_objects.detect, {TABLE: json_objects.read}),
-    "excel": Reader("Excel workbook (.xlsx)", excel.detect, {TABLE: excel.read}),
+    "labview": Reader(
+        "measurement file of LabVIEW (.lvm)",
+        table_files.detect_labview,
+        {TABLE: table_files.read_labview},
+    ),
+    "json": Reader(
+        "JSON of samples: lines, list", table_files.detect_json, {TABLE: table_files.read_json}
+    ),
+    "excel": Reader(
+        "Excel workbook (.xlsx)", table_files.detect_excel, {TABLE: table_files.read_excel}
+    ),
     "inertial-explorer": Reader(
         novatel.EXPLORER_TITLE, novatel.detect_explorer, {"reference": novatel.read_explorer}
     ),
@@ -270,7 +274,9 @@ READERS: dict[str, Reader] = {
     ),
     "psins": Reader.of(toolboxes, "PSINS increments (.imu)", name="psins"),
     "npy-folder": Reader(
-        "folder of NumPy arrays (.npy)", numpy_files.detect_folder, {TABLE: numpy_files.read_folder}
+        "folder of NumPy arrays (.npy)",
+        table_files.detect_numpy_folder,
+        {TABLE: table_files.read_numpy_folder},
     ),
     "csv": Reader("text table (.csv .txt .tsv .dat)", csv.detect, {TABLE: csv.read}),
     "python-ins": Reader(
@@ -283,8 +289,12 @@ READERS: dict[str, Reader] = {
         },
     ),
     "sbet": Reader(receivers.SBET_TITLE, receivers.detect_sbet, {"reference": receivers.read_sbet}),
-    "npz": Reader("NumPy archive (.npz)", numpy_files.detect, {TABLE: numpy_files.read}),
-    "parquet": Reader("Parquet (.parquet .pq)", parquet.detect, {TABLE: parquet.read}),
+    "npz": Reader(
+        "NumPy archive (.npz)", table_files.detect_numpy, {TABLE: table_files.read_numpy}
+    ),
+    "parquet": Reader(
+        "Parquet (.parquet .pq)", table_files.detect_parquet, {TABLE: table_files.read_parquet}
+    ),
     "hdf5": Reader("HDF5 (.h5 .hdf5) and MATLAB v7.3 (.mat)", hdf5.detect, {TABLE: hdf5.read}),
     "foot-mounted": Reader.of(
         data_sets, "unit on a shoe: timestamps, imu_data (.mat)", name="foot"

@@ -13,7 +13,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
-from strapdown.formats import csv, hdf5, numpy_files
+from strapdown.formats import csv, hdf5, table_files
 from strapdown.formats.clocks import RELATIVE, Clock, with_clock
 from strapdown.formats.columns import read_name
 from strapdown.formats.gnss_fixes import Fixes
@@ -602,7 +602,7 @@ def _arrays(path: Path, stream: str, width: int) -> tuple[Array, Array]:
     if not _holds(path, time, values):
         there = [name for name, names in STREAMS.items() if _holds(path, *names)]
         raise NoStreamError(path.name, stream, "python-ins arrays", there)
-    arrays = numpy_files.arrays_of(path)
+    arrays = table_files.arrays_of(path)
     stamps, block = arrays[time], arrays[values]
     numeric = stamps.dtype.kind in "iuf" and block.dtype.kind in "iuf"
     if not numeric or stamps.ndim != 1 or block.shape != (stamps.size, width):

@@ -29,9 +29,8 @@ from strapdown.formats import (
     hdf5,
     kf_gins,
     kitti,
-    numpy_files,
-    parquet,
     ros,
+    table_files,
     tracks,
     tum,
 )
@@ -285,7 +284,7 @@ def _write_parquet(path: Path, tables: Tables, options: FileOptions) -> None:
     if (track := _track_of(tables)) is not None:
         write_parquet(path, track, options)
     else:
-        parquet.write(path, *_columns(tables))
+        table_files.write_parquet(path, *_columns(tables))
 
 
 def _write_npz(path: Path, tables: Tables, options: FileOptions) -> None:
@@ -294,7 +293,7 @@ def _write_npz(path: Path, tables: Tables, options: FileOptions) -> None:
     if "imu" in tables:
         stated = imu_columns(tables["imu"], None)[1]
         said = {key: np.array(text) for key, text in stated.items()}
-    numpy_files.write(path, arrays | said)
+    table_files.write_numpy(path, arrays | said)
 
 
 def _write_mat(path: Path, tables: Tables, options: FileOptions) -> None:
