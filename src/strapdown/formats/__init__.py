@@ -1,4 +1,4 @@
-"""Readers and writers: one module per format, and the registry of readers."""
+"""Readers and writers: one module per format or family of formats, and the registry of readers."""
 
 from __future__ import annotations
 

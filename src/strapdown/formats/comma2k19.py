@@ -99,7 +99,10 @@ def _find(path: Path, *parts: str) -> Path | None:
 
 def _log(name: str, kind: str, triad: str, unit: str, t: Path, value: Path) -> RawLog:
     label = f"{name}/{value.name if value.suffix else kind}"
-    time, values = table_files.load_numpy(t, f"{name}/{t.name}"), table_files.load(value, label)
+    time, values = (
+        table_files.load_numpy(t, f"{name}/{t.name}"),
+        table_files.load_numpy(value, label),
+    )
     kinds = time.dtype.kind + values.dtype.kind
     if time.ndim != 1 or values.shape != (time.size, 3) or not set(kinds) <= set("iuf"):
         raise DataError(
@@ -265,7 +268,9 @@ def read_fixes(path: Path) -> Fixes:
         raise NoStreamError(path.resolve().name, "gnss", "comma2k19 segment", ["imu"])
     t_file, value_file = files
     name = path.resolve().name
-    t, value = (table_files.load_numpy(file, f"{name}/{file.name}") for file in (t_file, value_file))
+    t, value = (
+        table_files.load_numpy(file, f"{name}/{file.name}") for file in (t_file, value_file)
+    )
     if (
         t.ndim != 1
         or value.shape != (t.size, COLUMNS)
