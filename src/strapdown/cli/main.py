@@ -162,6 +162,12 @@ def _blanks(flags: list[str]) -> dict[str, str]:
     }
 
 
+def introduced(flags: list[str], given: list[str]) -> str:
+    """Return the words before a proposed command: whether it is to be filled in, and with what."""
+    blanks = _fill_in(flags, given)
+    return f"Fill in {blanks}" if blanks else "As inferred"
+
+
 def _fill_in(flags: list[str], given: list[str]) -> str:
     """Return what the placeholders stand for, by the help of their options."""
     params = [p for name in (given[0], "attitude", "navigate") for p in _parameters(name, given)]
@@ -201,7 +207,6 @@ def _answers(refused: Finding) -> list[str]:
     if not flags:
         return []
     keys = refused.data.get("keys")
-    blanks = _fill_in(shlex.split(str(flags)), given)
     if WORDS.get() == "file":
         # Of a fault of the file itself, `keys` are names.
         if not isinstance(keys, str):
@@ -209,12 +214,13 @@ def _answers(refused: Finding) -> list[str]:
         table = "log"
         if str(flags).startswith("--gnss-"):
             table = "gnss" if given[:1] == ["align"] else "aiding.gnss"
+        blanks = _fill_in(shlex.split(str(flags)), given)
         said = f"Fill in {blanks}, and write" if blanks else "Write"
         lines = re.split(r"; (?=\w+ = )", keys)
         return [f"{said} into the table [{table}] of the file:", *(f"  {line}" for line in lines)]
     if set(shlex.split(str(flags))) <= set(given):
         return []
-    said = f"Fill in {blanks}" if blanks else "As inferred"
+    said = introduced(shlex.split(str(flags)), given)
     return [f"{said}: strapdown {shlex.join(given)} {flags}"]
 
 
