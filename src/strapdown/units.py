@@ -30,6 +30,7 @@ __all__ = [
     "OF_LOGS",
     "OF_TABLES",
     "PRESSURES",
+    "RELATIVE_FIELDS",
     "SHOWN_UNITS",
     "SPEEDS",
     "TIME_UNITS",
@@ -70,6 +71,9 @@ ACCEL_SUMS: dict[str, float] = {"m/s": 1.0, "g*s": STANDARD_GRAVITY}
 
 #: Factors to µT.
 MAG_UNITS: dict[str, float] = {"uT": 1.0, "nT": 1e-3, "gauss": 100.0, "mG": 0.1, "T": 1e6}
+
+#: Of a magnetometer that is calibrated by the field where it was, whose strength is not stated.
+RELATIVE_FIELDS: dict[str, float] = {"local_flux": 1.0}
 
 #: Factors to s.
 TIME_UNITS: dict[str, float] = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0}
@@ -139,6 +143,7 @@ FACTORS: dict[str, dict[str, float]] = {
     "angle": ANGLES,
     "change of velocity": ACCEL_SUMS,
     "magnetic field": MAG_UNITS,
+    "magnetic field, relative": RELATIVE_FIELDS,
     "time": TIME_UNITS,
     "velocity": SPEEDS,
     "displacement": LENGTHS,
@@ -148,7 +153,10 @@ FACTORS: dict[str, dict[str, float]] = {
 }
 #: Quantities whose units a log, a table of positions and a crash record may state. Where two have
 #: the same spelling, the first decides: kn is knots in a table, and kilonewtons in a crash record.
-OF_LOGS = ("rate", "acceleration", "change of velocity", "magnetic field", "time", "angle")
+OF_LOGS = (
+    *("rate", "acceleration", "change of velocity", "magnetic field", "magnetic field, relative"),
+    *("time", "angle"),
+)
 OF_TABLES = ("time", "angle", "rate", "displacement", "velocity", "pressure")
 OF_CRASHES = ("acceleration", "rate", "force", "velocity", "displacement", "time")
 
@@ -180,6 +188,7 @@ _SPELLINGS = {
     "gauss": "gauss ga",
     "mG": "mgauss milligauss mga",
     "T": "tesla",
+    "local_flux": "local_flux localflux local_flux*",
     "s": "s sec secs second seconds",
     "ms": "ms msec msecs millis millisecond milliseconds",
     "us": "us µs μs usec usecs micros microsecond microseconds",
@@ -246,6 +255,8 @@ def find_unit(text: str, among: Sequence[str] = OF_LOGS) -> tuple[str, str] | No
     may be of, of `FACTORS`; the first that has the spelling decides. Returns (str, str) or None,
     the quantity and the unit, in the spelling of this package.
     """
+    if text.strip(" []()") == "T" and "magnetic field" in among:
+        return "magnetic field", "T"  # a small letter is a time
     plain = re.sub(r"\s+", "", text.strip().strip("[]").lower())
     plain = _ENCLOSED.sub(r"\1\2", plain)
     bare = plain.strip("()")

@@ -67,6 +67,16 @@ def test_nothing_is_written_of_a_log_whose_unit_is_open(log, run_cli, tmp_path):
     assert done.code == 4
 
 
+def test_the_rate_of_a_log_without_a_clock_is_a_placeholder(run_cli, tmp_path):
+    path = tmp_path / "log.csv"
+    names = ",".join(f"gyro_{a}_rad_s" for a in "xyz")
+    path.write_text(names + "\n" + "0.001,0.002,0.003\n0.002,0.001,0.003\n" * 200)
+    done = run_cli("doctor", path, "--out", tmp_path / "out")
+    assert done.code == 0, done.err
+    (proposed,) = [line for line in done.out.splitlines() if line.endswith("csv --rate HZ")]
+    assert "HZ of --rate (" in proposed
+
+
 def test_what_cannot_be_read_at_all_is_refused(run_cli, tmp_path):
     (tmp_path / "noise.dat").write_bytes(bytes(range(256)) * 8)
     done = run_cli("doctor", tmp_path / "noise.dat", "--out", tmp_path / "out")

@@ -29,8 +29,8 @@ def test_a_spelling_has_one_meaning(among: tuple[str, ...], shared: set[str]) ->
 def test_every_unit_can_be_written_by_its_own_name() -> None:
     for quantity, table in FACTORS.items():
         for unit in table:
-            # In lower case mG is milli-g, and T may be a temperature or a time.
-            if not unit.startswith("-") and unit not in ("mG", "T"):
+            # In lower case mG is milli-g.
+            if not unit.startswith("-") and unit != "mG":
                 assert find_unit(unit, (quantity,)) == (quantity, unit)
 
 
@@ -52,6 +52,9 @@ def test_every_unit_can_be_written_by_its_own_name() -> None:
         ("g·s", "g*s"),
         ("kn", None),
         ("furlong", None),
+        ("(T)", "T"),
+        ("t", None),
+        ("local_flux*", "local_flux"),
     ],
 )
 def test_spellings_of_logs(text: str, unit: str | None) -> None:

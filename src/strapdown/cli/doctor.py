@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -132,7 +133,10 @@ def print_log(one: LogDiagnosis, paths: Mapping[str, str], *, tables: bool) -> N
         if note.code == "io.columns-not-used":
             out.print(_cut(note.sentence("cli")), style="dim")
     if line := report.answering(one, one.log.path):
-        out.print(f"As inferred: {line}")
+        from strapdown.cli.main import introduced  # which imports this module
+
+        words = shlex.split(line)[1:]
+        out.print(f"{introduced(words, words)}: {line}")
 
 
 def _cut(text: str) -> str:

@@ -7,6 +7,7 @@ import errno
 import gc
 import inspect
 import io
+import itertools
 import os
 import re
 import shlex
@@ -21,7 +22,7 @@ from typer.core import TyperGroup
 
 from strapdown import __version__
 from strapdown.cli.console import WORDS, logged
-from strapdown.errors import Finding, StrapdownError
+from strapdown.errors import ConfigError, Finding, StrapdownError
 
 _RESEND_S = 0.005
 
@@ -123,6 +124,7 @@ def run() -> None:
     _keep_interrupts()
     try:
         with logged():
+            _refuse_placeholders(sys.argv[1:])
             app()
     except StrapdownError as error:
         text = "\n  ".join([error.finding.text(WORDS.get()), *_answers(error.finding)])
@@ -139,8 +141,60 @@ def run() -> None:
         _fail(what.text(WORDS.get()), 4)
 
 
-#: Placeholders in options whose value cannot be inferred, for the user to fill in.
-_BLANKS = re.compile(r"(?<=[ =])(SENSOR|DEG|M|UNIT|NAME|AXES)\b")
+#: Placeholders of proposed options whose value cannot be inferred, for the user to fill in.
+PLACEHOLDERS = {
+    **dict.fromkeys(("--gyro-unit", "--accel-unit", "--time-unit"), "UNIT"),
+    **dict.fromkeys(("--heading", "--lat", "--lon"), "DEG"),
+    **dict.fromkeys(("--alt", "--gnss-position-sd", "--gnss-datum-height"), "M"),
+    "--rate": "HZ",
+    "--sensor": "SENSOR",
+    "--axes": "AXES",
+    "--columns": "NAME",
+}
+
+
+def _blanks(flags: list[str]) -> dict[str, str]:
+    """Return the options that have a placeholder for their value, with it."""
+    return {
+        option: word
+        for option, value in itertools.pairwise(flags)
+        if (word := PLACEHOLDERS.get(option)) and re.search(rf"(^|=){word}(,|$)", value)
+    }
+
+
+def introduced(flags: list[str], given: list[str]) -> str:
+    """Return the words before a proposed command: whether it is to be filled in, and with what."""
+    blanks = _fill_in(flags, given)
+    return f"Fill in {blanks}" if blanks else "As inferred"
+
+
+def _fill_in(flags: list[str], given: list[str]) -> str:
+    """Return what the placeholders stand for, by the help of their options."""
+    params = [p for name in (given[0], "attitude", "navigate") for p in _parameters(name, given)]
+    said = []
+    for option, word in _blanks(flags).items():
+        text = next((str(p.help) for p in params if option in p.opts), "")
+        said.append(f"{word} of {option}" + (f" ({text.rstrip('.')})" if text else ""))
+    return "; ".join(said)
+
+
+def _parameters(name: str, given: list[str]) -> list[Any]:
+    """Return the parameters of a command, and of that of its own commands that is given."""
+    if name not in COMMANDS:
+        return []
+    command = _command(name)
+    own = [c for n, c in getattr(command, "commands", {}).items() if n in given]
+    return [p for one in (*own, command) for p in one.params]
+
+
+def _refuse_placeholders(given: list[str]) -> None:
+    """Refuse a proposed command in which a placeholder is left: ConfigError."""
+    # A column may have that name, and the reader says which there are.
+    left = {o: w for o, w in _blanks(given).items() if o != "--columns"}
+    if left:
+        said = _fill_in([word for pair in left.items() for word in pair], given)
+        (option, word), *_ = left.items()
+        raise ConfigError("cli.placeholder-left", quantity=option, word=word, placeholders=said)
 
 
 def _answers(refused: Finding) -> list[str]:
@@ -160,12 +214,13 @@ def _answers(refused: Finding) -> list[str]:
         table = "log"
         if str(flags).startswith("--gnss-"):
             table = "gnss" if given[:1] == ["align"] else "aiding.gnss"
-        said = "Fill in, and write" if _BLANKS.search(f" {keys}".replace('"', " ")) else "Write"
+        blanks = _fill_in(shlex.split(str(flags)), given)
+        said = f"Fill in {blanks}, and write" if blanks else "Write"
         lines = re.split(r"; (?=\w+ = )", keys)
         return [f"{said} into the table [{table}] of the file:", *(f"  {line}" for line in lines)]
     if set(shlex.split(str(flags))) <= set(given):
         return []
-    said = "Fill in" if _BLANKS.search(str(flags)) else "As inferred"
+    said = introduced(shlex.split(str(flags)), given)
     return [f"{said}: strapdown {shlex.join(given)} {flags}"]
 
 

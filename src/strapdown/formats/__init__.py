@@ -1,4 +1,4 @@
-"""Readers and writers: one module per format, and the registry of readers."""
+"""Readers and writers: one module per format or family of formats, and the registry of readers."""
 
 from __future__ import annotations
 
@@ -16,56 +16,34 @@ import pandas as pd
 from strapdown.errors import ConfigError, DataError, StrapdownError, check_choice
 from strapdown.formats import (
     android_events,
-    apdm,
+    ardupilot,
     asl,
-    broad,
     comma2k19,
-    core_motion,
     csv,
-    dataflash,
-    dji_srt,
-    excel,
-    foot_mounted,
-    garmin_fit,
-    gnss_ins_sim,
+    data_sets,
     gnss_logger,
     gnss_nmea,
     gnss_pos,
     gopro,
-    gpx,
     hdf5,
+    imu_makers,
     join,
-    json_objects,
     kf_gins,
     kitti,
-    labview,
-    matlab_mobile,
-    mavlink,
-    microstrain,
-    mpu6050,
-    navego,
     novatel,
-    numpy_files,
-    parquet,
+    phone_apps,
     phyphox,
-    physics_toolbox,
-    psins,
     px4,
-    pyins,
-    racechrono,
-    ronin,
+    receivers,
     ros,
-    sbet,
-    sbf,
     sensor_folder,
     sensor_logger,
     sensorlog,
     sensorstream,
-    smartloc,
+    table_files,
+    toolboxes,
+    tracks,
     tum,
-    ubx,
-    xio,
-    xsens,
 )
 from strapdown.formats.assemble import assemble
 from strapdown.formats.find_columns import names_of_fixes, names_of_quantities
@@ -137,21 +115,28 @@ class Reader:
     parts: bool = False
 
     @classmethod
-    def of(cls, module: ModuleType, title: str = "", parts: bool = False) -> Reader:
+    def of(cls, module: ModuleType, title: str = "", parts: bool = False, name: str = "") -> Reader:
         """Make the reader of a module whose functions have the names of `_FUNCTIONS`.
 
         `title`: its ``TITLE`` if not given. Its ``files_of``, if there is one, lists the files.
+        `name`: of one of several formats of a module, which is in the names of its functions:
+        ``detect_gpx``, ``read_gpx``, ``read_gpx_fixes``.
         """
-        have = vars(module)
-        streams = {stream: have[name] for stream, name in _FUNCTIONS.items() if name in have}
-        return cls(title or have["TITLE"], have["detect"], streams, have.get("files_of"), parts)
+        have, own = vars(module), f"_{name}" if name else ""
+        streams = {
+            stream: have[function]
+            for stream, plain in _FUNCTIONS.items()
+            if (function := plain.replace("read", f"read{own}")) in have
+        }
+        known = title or have[f"{name.upper()}_TITLE" if name else "TITLE"]
+        return cls(known, have[f"detect{own}"], streams, have.get(f"files_of{own}"), parts)
 
 
 #: In the order of detection: formats of known recordings first, general formats last.
 READERS: dict[str, Reader] = {
     "px4": Reader.of(px4),
-    "dataflash": Reader.of(dataflash),
-    "mavlink": Reader.of(mavlink),
+    "dataflash": Reader.of(ardupilot, name="dataflash"),
+    "mavlink": Reader.of(ardupilot, name="mavlink"),
     "ros": Reader.of(ros, parts=True),
     "novatel": Reader(
         novatel.TITLE,
@@ -162,19 +147,23 @@ READERS: dict[str, Reader] = {
             "reference": novatel.read_reference,
         },
     ),
-    "sbf": Reader(sbf.TITLE, sbf.detect, {"imu": sbf.read, "gnss": or_sentences(sbf.read_fixes)}),
+    "sbf": Reader(
+        receivers.SBF_TITLE,
+        receivers.detect_sbf,
+        {"imu": receivers.read_sbf, "gnss": or_sentences(receivers.read_sbf_fixes)},
+    ),
     "ubx": Reader(
-        ubx.TITLE,
-        ubx.detect,
+        receivers.UBX_TITLE,
+        receivers.detect_ubx,
         {
-            "imu": ubx.read,
-            "gnss": or_sentences(ubx.read_fixes),
-            "reference": ubx.read_reference,
-            "wheel": ubx.read_wheel,
+            "imu": receivers.read_ubx,
+            "gnss": or_sentences(receivers.read_ubx_fixes),
+            "reference": receivers.read_ubx_reference,
+            "wheel": receivers.read_ubx_wheel,
         },
     ),
-    "mpu6050": Reader.of(mpu6050, "folder of an MPU-6050 in MATLAB files"),
-    "broad": Reader.of(broad, "BROAD trial, HDF5 with optical truth"),
+    "mpu6050": Reader.of(data_sets, "folder of an MPU-6050 in MATLAB files", name="mpu"),
+    "broad": Reader.of(data_sets, "BROAD trial, HDF5 with optical truth", name="broad"),
     "comma2k19": Reader.of(comma2k19, "comma2k19 segment, with its pose as truth"),
     "kitti": Reader(
         "KITTI raw, folder oxts",
@@ -182,10 +171,12 @@ READERS: dict[str, Reader] = {
         {"imu": kitti.read, "gnss": kitti.read_fixes, "reference": kitti.read_trajectory},
         kitti.files_of,
     ),
-    "ronin": Reader.of(ronin, "RoNIN, HDF5 of a phone"),
+    "ronin": Reader.of(data_sets, "RoNIN, HDF5 of a phone", name="ronin"),
     "asl": Reader.of(asl, "EuRoC, TUM VI: data.csv of imu0, or folder mav0"),
     "xsens": Reader(
-        "Xsens MT Manager export (.txt .csv)", xsens.detect, {"imu": xsens.read, TABLE: csv.read}
+        "Xsens MT Manager export (.txt .csv)",
+        imu_makers.detect_xsens,
+        {"imu": imu_makers.read_xsens, TABLE: csv.read},
     ),
     "sensorstream": Reader.of(sensorstream, "Sensorstream IMU+GPS"),
     "sensor-logger": Reader.of(sensor_logger, "Sensor Logger: zip, folder, CSV, JSON"),
@@ -194,7 +185,7 @@ READERS: dict[str, Reader] = {
         sensorlog.detect,
         {"imu": sensorlog.read, "gnss": sensorlog.read_fixes, TABLE: csv.read},
     ),
-    "core-motion": Reader.of(core_motion, "table of Core Motion"),
+    "core-motion": Reader.of(phone_apps, "table of Core Motion", name="core_motion"),
     "gnss-logger": Reader.of(gnss_logger, "GnssLogger of Android, device_imu.csv"),
     "gsdc": Reader(
         "Smartphone Decimeter Challenge, ground_truth.csv of 2021",
@@ -206,30 +197,44 @@ READERS: dict[str, Reader] = {
         gnss_logger.detect_pseudoranges,
         dict.fromkeys(("imu", "gnss", "reference"), gnss_logger.refuse_pseudoranges),
     ),
-    "smartloc": Reader("smartLoc, CSV of raw GNSS data", smartloc.detect, {"gnss": smartloc.read}),
-    "racechrono": Reader.of(racechrono),
-    "microstrain": Reader.of(microstrain),
-    "apdm": Reader.of(apdm),
-    "x-imu3": Reader.of(xio, "x-IMU3: CSV, folder"),
-    "physics-toolbox": Reader.of(physics_toolbox),
-    "matlab-mobile": Reader.of(matlab_mobile),
+    "smartloc": Reader(
+        "smartLoc, CSV of raw GNSS data",
+        data_sets.detect_smartloc,
+        {"gnss": data_sets.read_smartloc},
+    ),
+    "racechrono": Reader.of(phone_apps, name="racechrono"),
+    "microstrain": Reader.of(imu_makers, name="microstrain"),
+    "apdm": Reader.of(imu_makers, name="apdm"),
+    "x-imu3": Reader.of(imu_makers, "x-IMU3: CSV, folder", name="xio"),
+    "physics-toolbox": Reader.of(phone_apps, name="physics_toolbox"),
+    "matlab-mobile": Reader.of(phone_apps, name="matlab_mobile"),
     "matlab-objects": Reader(
         "objects of MATLAB (.mat)",
-        matlab_mobile.detect_objects,
-        dict.fromkeys(("imu", "gnss", "reference"), matlab_mobile.refuse),
+        phone_apps.detect_matlab_mobile_objects,
+        dict.fromkeys(("imu", "gnss", "reference"), phone_apps.refuse_matlab_mobile),
     ),
-    "navego": Reader.of(navego),
+    "navego": Reader.of(toolboxes, name="navego"),
     "phyphox": Reader.of(phyphox, "phyphox: CSV, zip, folder"),
-    "gnss-ins-sim": Reader.of(gnss_ins_sim),
+    "gnss-ins-sim": Reader.of(toolboxes, name="gnss_ins_sim"),
     "gopro": Reader.of(gopro, "GoPro telemetry: GPMF, MP4, JSON"),
-    "garmin-fit": Reader.of(garmin_fit, "Garmin FIT (.fit)"),
-    "gpx": Reader("GPX track (.gpx)", gpx.detect, {"gnss": gpx.read}),
-    "dji-srt": Reader("subtitles of a DJI drone (.SRT)", dji_srt.detect, {"gnss": dji_srt.read}),
+    "garmin-fit": Reader.of(tracks, "Garmin FIT (.fit)", name="fit"),
+    "gpx": Reader("GPX track (.gpx)", tracks.detect_gpx, {"gnss": tracks.read_gpx}),
+    "dji-srt": Reader(
+        "subtitles of a DJI drone (.SRT)", tracks.detect_dji, {"gnss": tracks.read_dji}
+    ),
     "sensor-folder": Reader.of(sensor_folder, "folder or zip of one text table a sensor"),
     "android-events": Reader.of(android_events, "log of Android sensor events, one a row"),
-    "labview": Reader("measurement file of LabVIEW (.lvm)", labview.detect, {TABLE: labview.read}),
-    "json": Reader("JSON of samples: lines, list", json_objects.detect, {TABLE: json_objects.read}),
-    "excel": Reader("Excel workbook (.xlsx)", excel.detect, {TABLE: excel.read}),
+    "labview": Reader(
+        "measurement file of LabVIEW (.lvm)",
+        table_files.detect_labview,
+        {TABLE: table_files.read_labview},
+    ),
+    "json": Reader(
+        "JSON of samples: lines, list", table_files.detect_json, {TABLE: table_files.read_json}
+    ),
+    "excel": Reader(
+        "Excel workbook (.xlsx)", table_files.detect_excel, {TABLE: table_files.read_excel}
+    ),
     "inertial-explorer": Reader(
         novatel.EXPLORER_TITLE, novatel.detect_explorer, {"reference": novatel.read_explorer}
     ),
@@ -267,21 +272,33 @@ READERS: dict[str, Reader] = {
         },
         kf_gins.files_of_folder,
     ),
-    "psins": Reader.of(psins, "PSINS increments (.imu)"),
+    "psins": Reader.of(toolboxes, "PSINS increments (.imu)", name="psins"),
     "npy-folder": Reader(
-        "folder of NumPy arrays (.npy)", numpy_files.detect_folder, {TABLE: numpy_files.read_folder}
+        "folder of NumPy arrays (.npy)",
+        table_files.detect_numpy_folder,
+        {TABLE: table_files.read_numpy_folder},
     ),
     "csv": Reader("text table (.csv .txt .tsv .dat)", csv.detect, {TABLE: csv.read}),
     "python-ins": Reader(
         "python-ins arrays: imu, fix, truth (.npz)",
-        pyins.detect,
-        {"imu": pyins.read, "gnss": pyins.read_fixes, "reference": pyins.read_truth},
+        toolboxes.detect_python_ins,
+        {
+            "imu": toolboxes.read_python_ins,
+            "gnss": toolboxes.read_python_ins_fixes,
+            "reference": toolboxes.read_python_ins_truth,
+        },
     ),
-    "sbet": Reader(sbet.TITLE, sbet.detect, {"reference": sbet.read}),
-    "npz": Reader("NumPy archive (.npz)", numpy_files.detect, {TABLE: numpy_files.read}),
-    "parquet": Reader("Parquet (.parquet .pq)", parquet.detect, {TABLE: parquet.read}),
+    "sbet": Reader(receivers.SBET_TITLE, receivers.detect_sbet, {"reference": receivers.read_sbet}),
+    "npz": Reader(
+        "NumPy archive (.npz)", table_files.detect_numpy, {TABLE: table_files.read_numpy}
+    ),
+    "parquet": Reader(
+        "Parquet (.parquet .pq)", table_files.detect_parquet, {TABLE: table_files.read_parquet}
+    ),
     "hdf5": Reader("HDF5 (.h5 .hdf5) and MATLAB v7.3 (.mat)", hdf5.detect, {TABLE: hdf5.read}),
-    "foot-mounted": Reader.of(foot_mounted, "unit on a shoe: timestamps, imu_data (.mat)"),
+    "foot-mounted": Reader.of(
+        data_sets, "unit on a shoe: timestamps, imu_data (.mat)", name="foot"
+    ),
     "matlab": Reader("MATLAB up to v7 (.mat)", hdf5.detect_matlab, {TABLE: hdf5.read_matlab}),
 }
 

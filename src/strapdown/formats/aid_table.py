@@ -10,7 +10,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.formats import csv, foot_mounted, holds, open_stream, parquet, read_raw, reader_of
+from strapdown.formats import csv, data_sets, holds, open_stream, read_raw, reader_of, table_files
 from strapdown.formats.arrays import ticks_of
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, unrolled, with_clock
 from strapdown.formats.columns import parse_axes
@@ -218,18 +218,20 @@ def _raw(path: Path, stream: str) -> RawLog:
         raise DataError(
             "io.folder",
             file=path.resolve().name,
-            suffixes=(*csv.SUFFIXES, *parquet.SUFFIXES),
+            suffixes=(*csv.SUFFIXES, *table_files.PARQUET_SUFFIXES),
             suffix=path.suffix,
         )
-    if parquet.detect(path) or csv.detect(path):
-        return parquet.read(path) if parquet.detect(path) else csv.read(path)
+    if table_files.detect_parquet(path) or csv.detect(path):
+        return (
+            table_files.read_parquet(path) if table_files.detect_parquet(path) else csv.read(path)
+        )
     try:
         return read_raw(path)
     except DataError:
         raise DataError(
             "io.aid-file-ending",
             file=path.name,
-            suffixes=(*csv.SUFFIXES, *parquet.SUFFIXES),
+            suffixes=(*csv.SUFFIXES, *table_files.PARQUET_SUFFIXES),
             suffix=path.suffix,
         ) from None
 
@@ -336,8 +338,8 @@ def read_control_points(path: str | Path, names: Mapping[str, str] | None = None
         The file cannot be used, or it has fewer than two points, which leave the heading open.
     """
     path = Path(path)
-    if path.is_file() and foot_mounted.detect_points(path):
-        time, places = foot_mounted.read_points(path)
+    if path.is_file() and data_sets.detect_foot_points(path):
+        time, places = data_sets.read_foot_points(path)
         table = pd.DataFrame(places, index=pd.Index(time, name="time"), columns=POINT)
         table.attrs |= {"source": path.name, "findings": ()}
         table = with_clock(table, Clock(RELATIVE))

@@ -11,6 +11,8 @@ those of other loggers, so that units and axes under them are left open; so are 
 names of Android where the accelerometer has no gravity in m/s², or the rates are rather in another
 unit than rad/s, as of applications that write deg/s and g. A name may state its unit: ``Gyroscope
 (deg/s)``. The unit of the stamps is inferred unless the header states it; Android's own are ns.
+Boards write one letter, G, W or R beside A or F, and M: kinds only where the norm in the rows of
+the accelerometer is the steadier.
 
 A table of samples is none of these: its header names axes of sensors (``ax``, ``gyro_x``). Small
 whole numbers are kinds only under a name that says so or without a header, and only if the values
@@ -35,6 +37,7 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.columns import read_name, split_brackets
+from strapdown.formats.find_columns import LOOSEST, norm_and_spread
 from strapdown.formats.inference.conclusion import infer_accel
 from strapdown.formats.inference.infer import Signals, infer_signals
 from strapdown.formats.join import join
@@ -53,6 +56,7 @@ KINDS = {
     "gravity": ("9", "gravity", "grav"),
     "mag": ("2", "mag", "magn", "magnetometer", "magneticfield"),
 }
+LETTERS = {"g": "gyro", "w": "gyro", "r": "gyro", "a": "accel", "f": "accel", "m": "mag"}
 UNITS = {"gyro": "rad/s", "accel": "m/s2", "mag": "uT"}
 _OF = {word: kind for kind, words in KINDS.items() for word in words}
 _STAMP = re.compile(r"\d+(?:\.\d+)?")
@@ -76,6 +80,28 @@ def kind_of(field: str) -> str | None:
     return _OF.get(re.sub(r"[^a-z0-9]", "", word) if letters else word)
 
 
+def _by_letters(rows: list[tuple[str, ...]]) -> dict[str, str]:
+    """Return the kind of each field if they are letters of a gyro and an accelerometer, else none.
+
+    `rows`: kind, x, y, z. A force varies about that of gravity, in any unit; rates vary about zero.
+    """
+    fields = {r[0] for r in rows}
+    kinds = {f: LETTERS[word] for f in fields if (word := f.strip(" \"'").lower()) in LETTERS}
+    if len(kinds) < len(fields) or len(set(kinds.values())) < len(kinds):
+        return {}
+    spread: dict[str, float] = {}
+    for field, kind in kinds.items():
+        try:
+            values = np.array([r[1:] for r in rows if r[0] == field], dtype=np.float64)
+        except ValueError:
+            return {}
+        norm, spread[kind] = norm_and_spread(list(values.T))
+        if not norm > 0.0:
+            return {}
+    steady = spread.get("accel", np.inf) < min(LOOSEST, spread.get("gyro", 0.0))
+    return kinds if steady else {}
+
+
 def _has_layout(path: Path) -> bool:
     """Whether a gyroscope and another sensor are among the kinds of the first rows."""
     return csv.detect(path) and _layout(head(path, 1 << 16)) is not None
@@ -84,13 +110,13 @@ def _has_layout(path: Path) -> bool:
 detect = Signs(
     # A kind that is a gyroscope.
     text=r"\A[\s\S]{0,16000}?(?:(?i:gyr|rotation|angular)"
-    r"|(?:^|[,;\t |])[ \"']{0,3}(?:4|16)[ \"']{0,3}[,;\t |])",
+    r"|(?m:^|[,;\t |])[ \"']{0,3}(?:4|16|[gGwWrR])[ \"']{0,3}[,;\t |])",
     also=_has_layout,
 )
 
 
-def _layout(text: str) -> tuple[int, int, int, str | None] | None:
-    """Return the fields of kind, stamp and first value, and the unit of stamps in a header."""
+def _layout(text: str) -> tuple[int, int, int, str | None, dict[str, str]] | None:
+    """Return the fields of kind, stamp and first value, the unit of stamps in a header, letters."""
     lines = [line for line in text.splitlines()[:TOP] if line.strip() and not csv.is_comment(line)]
     if len(lines) < 3:
         return None
@@ -109,7 +135,11 @@ def _layout(text: str) -> tuple[int, int, int, str | None] | None:
     for kind, stamp, first in orders[: 3 if body and len(body[0]) > 5 else 2]:
         # A counter of samples takes every number once, a kind of sensor returns.
         fields = Counter(r[kind] for r in body)
-        kinds = {kind_of(field) for field, count in fields.items() if count > 1} - {None}
+        again = {field for field, count in fields.items() if count > 1}
+        letters: dict[str, str] = {}
+        if all(len(field.strip(" \"'")) == 1 and not field.isdecimal() for field in again):
+            letters = _by_letters([(r[kind], *r[first : first + 3]) for r in body])
+        kinds = {letters.get(field) or kind_of(field) for field in again} - {None}
         usual = 2 * len(fields) <= len(body) and not any(
             "." in f and f[:1].isdigit() for f in fields
         )
@@ -126,7 +156,8 @@ def _layout(text: str) -> tuple[int, int, int, str | None] | None:
                     or not _are_of_android([(r[kind], *r[first : first + 3]) for r in body])
                 ):
                     continue
-            return (kind, stamp, first, unit) if kinds & {"gyro", "gyro uncalibrated"} else None
+            known = bool(kinds & {"gyro", "gyro uncalibrated"})
+            return (kind, stamp, first, unit, letters) if known else None
     return None
 
 
@@ -180,7 +211,7 @@ def read(path: Path) -> RawLog:
     layout = _layout(text[: 1 << 16])
     if layout is None:
         raise DataError("io.no-gyroscope-holds", file=path.name, quantity="gyro", held="other rows")
-    kind, stamp, first, unit = layout
+    kind, stamp, first, unit, letters = layout
     separator = None
     events: dict[str, list[tuple[Any, ...]]] = {}
     names: dict[str, str] = {}
@@ -191,7 +222,9 @@ def read(path: Path) -> RawLog:
             continue
         separator = separator or csv.separator_of(line)
         fields = split(line, separator)
-        which = kind_of(fields[kind]) if len(fields) > kind else None
+        which = None
+        if len(fields) > kind:
+            which = letters.get(fields[kind]) or kind_of(fields[kind])
         if which is None:
             unknown.add(fields[kind] if len(fields) > kind else line)
             continue

@@ -36,7 +36,7 @@ from strapdown.formats.find_columns import (
     require_gyro,
     steady_triads,
 )
-from strapdown.formats.inference.conclusion import Inference
+from strapdown.formats.inference.conclusion import Inference, infer_accel
 from strapdown.formats.join import join
 from strapdown.formats.recording import (
     AXES_OF_SENSOR,
@@ -58,6 +58,7 @@ from strapdown.formats.triad_units import (
     mirrored,
     sampling_of_sums,
     told_by_numbers,
+    unit_of_counts,
     units_of_triads,
     values_of_triads,
 )
@@ -262,8 +263,15 @@ def _unused(raw: RawLog, found: dict[str, Column]) -> list[Finding]:
     if not set(ACCEL) & set(found):
         forces = [n for n in names if read_name(n).quantity in ACCEL]
         if {read_name(n).quantity for n in forces} == set(ACCEL):
+            named = {read_name(n).quantity: n for n in reversed(forces)}
             out.append(
-                Finding("io.accelerometer-not-read", file=raw.name, quantity="accel", names=forces)
+                Finding(
+                    "io.accelerometer-not-read",
+                    file=raw.name,
+                    quantity="accel",
+                    names=forces,
+                    **_as_accelerometer(raw, [named[q] for q in ACCEL]),
+                )
             )
         elif not forces:
             out += [_like_gravity(raw, three, norm) for three, norm in steady_triads(raw, names)]
@@ -277,10 +285,21 @@ def _like_gravity(raw: RawLog, three: list[str], norm: float) -> Finding:
         quantity="accel",
         names=three,
         norm=norm,
-        columns=",".join(
-            f"accel_{a}={reference(raw, n)}" for a, n in zip(AXES, three, strict=True)
-        ),
+        **_as_accelerometer(raw, three),
     )
+
+
+def _as_accelerometer(raw: RawLog, three: list[str]) -> dict[str, Any]:
+    """Return three columns as ``columns``, and the likely ``unit`` of an accelerometer in them."""
+    columns = (f"accel_{a}={reference(raw, n)}" for a, n in zip(AXES, three, strict=True))
+    numeric = all(raw.columns[n].dtype.kind in "iuf" for n in three)
+    values = np.column_stack([raw.columns[n].astype(float) for n in three]) if numeric else None
+    unit = None
+    if values is not None and len(values := values[np.isfinite(values).all(axis=1)]):
+        inferred, *_ = infer_accel(values, None)
+        likely = inferred.value if inferred.confidence >= LIKELY else None
+        unit = unit_of_counts(inferred) or likely
+    return {"columns": ",".join(columns), "unit": str(unit or "UNIT")}
 
 
 def _refuse_unit_of_nothing(raw: RawLog, found: dict[str, Column], options: ReadOptions) -> None:

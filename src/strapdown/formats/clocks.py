@@ -47,6 +47,7 @@ __all__ = [
     "time_column",
     "unix_from_gps",
     "unrolled",
+    "usual_step",
     "with_clock",
 ]
 
@@ -340,11 +341,12 @@ def even_stamps(stamps: NDArray[Any]) -> EvenStamps | None:
     """
     if stamps.dtype.kind not in "iuf" or stamps.size < FEWEST_STAMPS:
         return None
+    changes = int(np.count_nonzero(stamps[1:] != stamps[:-1]))
+    if changes < FEWEST_STAMPS - 1 or changes > (1.0 - COARSE) * (stamps.size - 1):
+        return None
     exact = stamps.astype(np.int64) if stamps.dtype.kind in "iu" else stamps
     whole = np.diff(exact).astype(np.float64)
     ends = np.flatnonzero(whole)
-    if ends.size < FEWEST_STAMPS - 1 or ends.size > (1.0 - COARSE) * whole.size:
-        return None
     tick = float(whole[ends].min())
     jumps = whole[ends] / tick
     if not tick > 0.0 or not np.allclose(jumps, np.round(jumps), rtol=0.0, atol=1e-3):
@@ -522,7 +524,7 @@ def _refuse_backward(
             then=then,
             count=bad.size,
         )
-    if bits := wrap_bits(stamps[k], steps[k], _usual_step(steps)):
+    if bits := wrap_bits(stamps[k], steps[k], usual_step(steps)):
         raise DataError(
             "io.time-counter-wraps",
             file=file,
@@ -543,7 +545,8 @@ def _refuse_backward(
     )
 
 
-def _usual_step(steps: Array) -> float:
+def usual_step(steps: Array) -> float:
+    """Return the median of the steps forward; 0 if there is none."""
     forward = steps[steps > 0]
     return float(np.median(forward)) if forward.size else 0.0
 
@@ -554,7 +557,7 @@ def _repaired(
     steps = np.diff(ticks)
     if not steps.size or steps.min() > 0:
         return np.ones(ticks.size, dtype=bool), ticks
-    usual = _usual_step(steps)
+    usual = usual_step(steps)
     added = np.zeros(ticks.size)
     for k in np.flatnonzero(steps < 0):
         if bits := wrap_bits(stamps[k], steps[k], usual):

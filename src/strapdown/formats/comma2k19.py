@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from strapdown import frames, rotation
 from strapdown.errors import DataError, Finding
-from strapdown.formats import numpy_files
+from strapdown.formats import table_files
 from strapdown.formats.clocks import RELATIVE, Clock
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.join import join
@@ -99,7 +99,10 @@ def _find(path: Path, *parts: str) -> Path | None:
 
 def _log(name: str, kind: str, triad: str, unit: str, t: Path, value: Path) -> RawLog:
     label = f"{name}/{value.name if value.suffix else kind}"
-    time, values = numpy_files.load(t, f"{name}/{t.name}"), numpy_files.load(value, label)
+    time, values = (
+        table_files.load_numpy(t, f"{name}/{t.name}"),
+        table_files.load_numpy(value, label),
+    )
     kinds = time.dtype.kind + values.dtype.kind
     if time.ndim != 1 or values.shape != (time.size, 3) or not set(kinds) <= set("iuf"):
         raise DataError(
@@ -129,7 +132,7 @@ def _truth(path: Path, name: str, raw: RawLog) -> tuple[TruthInSensorAxes | None
     files = tuple(f for f in found if f is not None)
     if len(files) < 3:
         return None, ()
-    times, positions, q_ed = (numpy_files.load(f, f"{name}/{f.name}") for f in files)
+    times, positions, q_ed = (table_files.load_numpy(f, f"{name}/{f.name}") for f in files)
     shapes = (times.shape, positions.shape, q_ed.shape)
     kinds = "".join(array.dtype.kind for array in (times, positions, q_ed))
     if (
@@ -265,7 +268,9 @@ def read_fixes(path: Path) -> Fixes:
         raise NoStreamError(path.resolve().name, "gnss", "comma2k19 segment", ["imu"])
     t_file, value_file = files
     name = path.resolve().name
-    t, value = (numpy_files.load(file, f"{name}/{file.name}") for file in (t_file, value_file))
+    t, value = (
+        table_files.load_numpy(file, f"{name}/{file.name}") for file in (t_file, value_file)
+    )
     if (
         t.ndim != 1
         or value.shape != (t.size, COLUMNS)

@@ -40,6 +40,9 @@ _NUMBER = re.compile(rf"{NUMBER.pattern}|[+-]?nan|[+-]?inf(inity)?", re.I)
 _COMMAS = re.compile(r"[+-]?\d+(,\d+)?([eE][+-]?\d+)?(\s+[+-]?\d+(,\d+)?([eE][+-]?\d+)?)+")
 _UNIT = re.compile(r"\s*[\[(].*")
 _REMARK = re.compile(r"\s*\([^()]*\)|\s*\[[^\[\]]*\]")
+# A unit in brackets; those within it, as of m/(s^2), are its own.
+_ENCLOSED = re.compile(r"^[\[({]\s*(.*?)\s*[\])}]$")
+_CALIBRATED = {"cal", "raw", "uncal"}
 _NO_UNIT = ("-", "--", "none", "1")
 _HEX = re.compile(r"[+-]?0x[0-9a-f]+", re.I)
 #: Lines at the top of a text in which its rows of numbers are searched, their characters, and the
@@ -337,7 +340,10 @@ class _Top:
         #: Lines above, without those of the names.
         self.above = comments + [line for _, line in numbered[:first]]
         self.units: dict[str, str] = {}
-        near = [line for _, line in numbered[max(0, first - 3) : first]][::-1]
+        near = [line for _, line in numbered[max(0, first - 4) : first]][::-1]
+        # A row that only says that each column is calibrated has neither names nor units.
+        marks = [line for line in near[:2] if _says_calibrated(line, self.separator)]
+        near = [line for line in near if line not in marks][:3]
         lines = [_named(line, self.separator, width) for line in near] + [None, None]
         names, over = lines[:2]
         if names is None and near:
@@ -358,7 +364,7 @@ class _Top:
         grouped = over is not None and len(set(bare)) < len(bare) and _are_groups(over)
         if grouped and over is not None:
             names = [f"{g} {n}".strip() for g, n in zip(_filled(over), names, strict=True)]
-        del self.above[len(self.above) - 1 - bool(below) - grouped :]
+        del self.above[len(self.above) - 1 - bool(below) - grouped - len(marks) :]
         self.names = _unique(names)
         if below:
             self.units = {n: u for n, u in zip(self.names, below, strict=True) if u}
@@ -460,6 +466,8 @@ def _first_row(numbered: Lines, kinds: Sequence[str]) -> tuple[int, str | None, 
             # Lines of a preamble may be filled up with separators.
             full = next((m for m, names in enumerate(top) if all(names)), None)
             first = 1 + (_are_groups(top[0]) if full is None else full)
+            if first < k and _says_calibrated(numbered[first][1], separator):
+                first += 1
             if first < k and _units(numbered[first][1], separator, width, kinds):
                 first += 1
             return min(first, k), separator, width
@@ -512,6 +520,12 @@ def _named(line: str, separator: str | None, width: int) -> list[str] | None:
     return fields if len(fields) == width and any(fields) and not are_data(fields) else None
 
 
+def _says_calibrated(line: str, separator: str | None) -> bool:
+    """Whether a line only says of each column whether it is calibrated."""
+    said = {field.strip().lower() for field in fields_of(line, separator)} - {""}
+    return bool(said) and said <= _CALIBRATED
+
+
 def _are_groups(fields: list[str]) -> bool:
     """Whether a line names groups of columns: some fields are empty, each name is there once."""
     full = [f for f in fields if f]
@@ -528,7 +542,7 @@ def _filled(fields: list[str]) -> list[str]:
 
 def _units(line: str, separator: str | None, width: int, kinds: Sequence[str]) -> list[str] | None:
     """Return the units of a second header line, if most fields are units known here."""
-    fields = [f.strip("[](){} ") for f in fields_of(line, separator)][:width]
+    fields = [_ENCLOSED.sub(r"\1", f.strip()) for f in fields_of(line, separator)][:width]
     fields = ["" if f.lower() in _NO_UNIT else f for f in fields]
     known = [unit_of(f, kinds) is not None for f in fields if f]
     return fields if len(fields) == width and known and 2 * sum(known) > len(known) else None

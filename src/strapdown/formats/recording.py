@@ -291,6 +291,10 @@ class Recording:
     start: StatedStart | None = None
 
 
+#: Answers that stand for a value which the numbers do not show: a unit, a rate.
+PLACEHOLDERS = frozenset({"UNIT", "HZ"})
+
+
 class Questions:
     """Questions that a file leaves open, asked in one refusal with the inferred answers.
 

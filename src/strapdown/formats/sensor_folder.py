@@ -1,4 +1,10 @@
-"""Folders and zip archives with one text table per sensor, and access to their members."""
+"""Folders and zip archives with one text table per sensor, and access to their members.
+
+A table is named after its sensor, or has its name among others and axes x, y, z in its header, as
+those of MetaBase of MbientLab (``MetaWear_DATE_MAC_Gyroscope_100.000Hz_1.4.5.csv`` with ``epoch
+(ms)``, ``elapsed (s)`` and ``x-axis (deg/s)``). The tables are joined by a clock that counts since
+1970 where they have one: seconds elapsed begin in each with its own first sample.
+"""
 
 from __future__ import annotations
 
@@ -9,19 +15,24 @@ import zipfile
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 
-from strapdown.errors import DataError
+from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.arrays import refuse_lie
 from strapdown.formats.columns import read_name
-from strapdown.formats.find_columns import find_columns
+from strapdown.formats.find_columns import AXES, find_columns
+from strapdown.formats.inference.conclusion import EPOCH
 from strapdown.formats.join import join
 from strapdown.formats.recording import RawLog, ReadOptions
 from strapdown.formats.signs import Signs
+from strapdown.formats.vocabularies import WITHOUT_GRAVITY
+from strapdown.units import TIME_UNITS
 
 __all__ = ["Member", "is_container", "members_of", "peek"]
 
 
 _TRIADS = {"gyro": "gyro", "accel": "accel", "mag": "mag", "magnetometer": "mag"}
+#: Words of a table that has no gravity, or that its device did not correct.
+_NOT_A_TRIAD = {*WITHOUT_GRAVITY, "gravity", "uncalibrated"}
 _AXIS = re.compile(r"([xyz])(?:[\s_-]*axis)?(?:\s*[\[(].*)?", re.I)
 
 
@@ -63,21 +74,35 @@ def read(path: Path) -> RawLog:
         raise DataError(
             "io.no-table-gyro-holds", file=name, quantity="gyro", held=held or "nothing"
         )
-    return join([_log(m) for m in tables], name, rows_of_member=True)
+    raw = join([_log(m) for m in tables], name, rows_of_member=True)
+    if others := [m.name for m in members if m.suffix in csv.SUFFIXES and m not in tables]:
+        raw.findings.append(Finding("io.tables-not-used", file=name, severity="note", names=others))
+    return raw
 
 
 def _triad(member: Member) -> str | None:
+    """Return the sensor of a table: by its name, or by a word in it if its header has axes."""
     if member.suffix not in csv.SUFFIXES:
         return None
     said = read_name(member.stem).quantity or member.stem.lower()
-    return _TRIADS.get(said)
+    words = re.findall(r"[A-Za-z]{3,}", member.stem)
+    if said in _TRIADS or _NOT_A_TRIAD & {w.lower() for w in words}:
+        return _TRIADS.get(said)
+    kinds = {_TRIADS.get(str(read_name(word).quantity)) for word in words} - {None}
+    return kinds.pop() if len(kinds) == 1 and _has_axes(member) else None
+
+
+def _has_axes(member: Member) -> bool:
+    line = first_line(member)
+    fields = csv.fields_of(line, csv.separator_of(line))
+    return sorted(m[1].lower() for f in fields if (m := _AXIS.fullmatch(f.strip()))) == [*AXES]
 
 
 def _log(member: Member) -> RawLog:
     raw = csv.parse(member.read(), member.label, (member.file,))
     triad = _triad(member)
     plain = {n: m[1].lower() for n in raw.columns if (m := _AXIS.fullmatch(n.strip()))}
-    if sorted(plain.values()) != ["x", "y", "z"]:
+    if sorted(plain.values()) != [*AXES]:
         return raw
     stated: dict[str, tuple[str, str | None]] = {
         c.source: (q, c.unit) for q, c in find_columns(raw, ReadOptions()).items()
@@ -85,7 +110,21 @@ def _log(member: Member) -> RawLog:
     for column, axis in plain.items():
         unit = read_name(column).unit or read_name(member.stem).unit
         stated[column] = (f"{triad}_{axis}", unit)
+    if clock := _since_1970(raw):
+        stated = {c: said for c, said in stated.items() if said[0] != "time"}
+        stated[clock] = ("time", read_name(clock).unit)
     return dataclasses.replace(raw, stated=stated)
+
+
+def _since_1970(raw: RawLog) -> str | None:
+    """Return the column whose stamps count since 1970, in the unit of its name."""
+    for name, values in raw.columns.items():
+        said = read_name(name)
+        if said.quantity != "time" or said.unit not in TIME_UNITS or values.dtype.kind not in "if":
+            continue
+        if EPOCH[0] <= float(values[0]) * TIME_UNITS[said.unit] <= EPOCH[1]:
+            return name
+    return None
 
 
 # Uniform access to the files of a folder or the members of a zip archive.

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import DataError
 from strapdown.evaluation.trajectory_differences import ROTATION_ERROR
-from strapdown.formats import csv, parquet
+from strapdown.formats import csv, table_files
 from strapdown.formats.clocks import clock_of, time_column
 from strapdown.formats.writing import FileOptions
 from strapdown.frames import ecef_from_geodetic
@@ -202,7 +202,7 @@ def write_parquet(path: Path, trajectory: pd.DataFrame, options: FileOptions | N
     told: dict[str, Any] = told_of(chosen)
     told |= {"clock": clock.name, "clock_origin_s": repr(clock.origin)}
     told |= {} if clock.week is None else {"gps_week": str(clock.week)}
-    parquet.write(path, columns, told)
+    table_files.write_parquet(path, columns, told)
 
 
 # Trajectories for maps, thinned and split at the date line.

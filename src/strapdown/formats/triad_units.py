@@ -23,6 +23,7 @@ from strapdown.units import (
     GYRO_SUMS,
     GYRO_UNITS,
     MAG_UNITS,
+    RELATIVE_FIELDS,
     factor_of,
     parse_unit,
 )
@@ -39,6 +40,7 @@ __all__ = [
     "sampling_of_sums",
     "sum_of",
     "told_by_numbers",
+    "unit_of_counts",
     "units_of_triads",
     "values_of_triads",
 ]
@@ -54,13 +56,11 @@ def told_by_numbers(
     ticks: NDArray[Any] | None,
     dated: bool,
 ) -> dict[str, Inference]:
-    """Run the inference on the numbers; skipped for a gyro alone with a stated unit.
+    """Run the inference on the numbers.
 
     `values` ((n, 3)): from `values_of_triads`. `ticks` ((n,)): stamps as in the file. `dated`:
     whether they were dates, now converted to ns. Returns by quantity.
     """
-    if set(values) == {"gyro"} and _stated_unit(raw, found, "gyro", options):
-        return {}
     unit = "ns" if dated else None
     if ticks is not None and not dated:
         asked = options.time_unit
@@ -174,6 +174,10 @@ def _refuse_open(raw: RawLog, found: dict[str, Column], triad: str) -> None:
     """Refuse a unit that the file leaves open: the numbers cannot decide between f and -f."""
     column = found[f"{triad}_x"]
     unit = column.unit
+    # A clock may be local, too, so that this is a unit of nothing else.
+    local = re.search(r"\blocal\b", f"{column.source} {raw.units.get(column.source)}")
+    if unit in RELATIVE_FIELDS or (triad == "mag" and unit is None and local):
+        raise DataError("io.mag-unit-relative", file=raw.name, quantity=triad, source=column.source)
     apple = any(re.sub(r"\W", "", name).lower() in APPLE for name in raw.columns)
     if triad == "accel" and unit is None and apple:
         unit = "-g or g"  # that of CoreMotion, or turned by the application
@@ -436,7 +440,20 @@ def report_contradictions(
     for triad, unit in units.items():
         other = said.get(f"{triad}_unit")
         form = said.get(f"{triad}_form")
-        if triad in asked or other is None or not other.settled:
+        if triad in asked or other is None:
+            continue
+        if triad == "gyro" and not other.settled and (likely := _instead(unit, other)):
+            fault = Finding(
+                "io.contradicts-unit",
+                file=file,
+                quantity=triad,
+                triad=triad,
+                unit=unit,
+                likely=likely,
+                reason=other.finding(),
+            )
+            questions.ask(fault, gyro_unit=likely)
+        if not other.settled:
             continue
         # Sizes of rates alone do not contradict a statement: gravity that rotated with them
         # is, and the steps of a sensor.
@@ -493,6 +510,21 @@ def report_contradictions(
     )
 
 
+def _instead(unit: str, inferred: Inference) -> str | None:
+    """Return the most probable unit of a gyro if gravity that stood still excludes the stated one.
+
+    The numbers need not settle which of the others it is.
+    """
+    if not any(
+        e.code == "io.evidence-gravity-stood-still" and e.data["unit"] == unit
+        for e in inferred.evidence
+    ):
+        return None
+    shares = dict(((inferred.value, inferred.confidence), *inferred.alternatives))
+    others = [str(u) for u in shares if u not in (unit, None)]
+    return others[0] if others and shares.get(unit, 0.0) < 1.0 - THRESHOLD else None
+
+
 # Full scale of most gyros, 2000 deg/s per axis, and seconds beyond it. Bodies that turn so fast are
 # rare, and gravity then shows their unit.
 _FULL_SCALE, _LASTING = np.radians(2000.0), 2.0
@@ -507,6 +539,8 @@ def _beyond_full_scale(
     """
     other, unit, rate = said.get("gyro_unit"), units.get("gyro", ""), said.get("rate")
     if "gyro" in asked or unit not in GYRO_UNITS or other is None or other.settled:
+        return None
+    if _instead(unit, other):  # asked already
         return None
     if other.value is None or other.value == unit or rate is None or rate.value is None:
         return None

@@ -126,7 +126,7 @@ DIRECTIONS = {
 }
 TIMES = _words(
     "time t ts timestamp timestamps timesec elapsed secondselapsed seconds sec tow sow gpssow "
-    "gpstow gpstime unixtime epoch stamp elapsedtime timeelapsed timesincestart sampletime "
+    "gpstow gpstime unixtime epoch epoc stamp elapsedtime timeelapsed timesincestart sampletime "
     "sensortime systemtime unixtimestamp datetime localtime utc utctime timeutc "
     "gpssecondsofweek secondsofweek gpst timeintervalsince1970 zeit zeitstempel temps tiempo tempo"
 )

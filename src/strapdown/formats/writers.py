@@ -26,13 +26,12 @@ from strapdown.formats import (
     asl,
     csv,
     gnss_nmea,
-    gpx,
     hdf5,
     kf_gins,
     kitti,
-    numpy_files,
-    parquet,
     ros,
+    table_files,
+    tracks,
     tum,
 )
 from strapdown.formats.clocks import GPS, RELATIVE, UNIX, clock_of, time_column
@@ -285,7 +284,7 @@ def _write_parquet(path: Path, tables: Tables, options: FileOptions) -> None:
     if (track := _track_of(tables)) is not None:
         write_parquet(path, track, options)
     else:
-        parquet.write(path, *_columns(tables))
+        table_files.write_parquet(path, *_columns(tables))
 
 
 def _write_npz(path: Path, tables: Tables, options: FileOptions) -> None:
@@ -294,7 +293,7 @@ def _write_npz(path: Path, tables: Tables, options: FileOptions) -> None:
     if "imu" in tables:
         stated = imu_columns(tables["imu"], None)[1]
         said = {key: np.array(text) for key, text in stated.items()}
-    numpy_files.write(path, arrays | said)
+    table_files.write_numpy(path, arrays | said)
 
 
 def _write_mat(path: Path, tables: Tables, options: FileOptions) -> None:
@@ -493,7 +492,7 @@ WRITERS: dict[str, Writer] = {
         "kf-gins-folder",
     ),
     "gpx": Writer(
-        "GPX track", {"gnss": _PLACES, "reference": _PLACES}, gpx.write, "gpx", (".gpx",)
+        "GPX track", {"gnss": _PLACES, "reference": _PLACES}, tracks.write_gpx, "gpx", (".gpx",)
     ),
     "nmea": Writer(
         "NMEA 0183",

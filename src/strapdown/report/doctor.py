@@ -17,7 +17,7 @@ from strapdown.config.doctor import DoctorSpec
 from strapdown.constants import MICRO_G
 from strapdown.errors import DataError, Finding
 from strapdown.formats.clocks import UNIX, on_clock_of
-from strapdown.formats.recording import AXES_OF_SENSOR
+from strapdown.formats.recording import AXES_OF_SENSOR, PLACEHOLDERS
 from strapdown.progress import Progress
 from strapdown.report.chart import (
     AXIS_COLOURS,
@@ -347,6 +347,8 @@ def _answer(one: LogDiagnosis) -> tuple[Block, ...]:
         rows.append((f"{capital(use)}: {one.answer(use)}", text))
     commands = [line for use in shown if (line := command(one, use))]
     ask = answering(one)
+    blanks = ", ".join(sorted(PLACEHOLDERS & set((ask or "").split())))
+    asked = f"With {blanks} filled in, and" if blanks else "With"
     items = [
         (head, f"{capital(text)}. {'Fix: ' + fix + '.' if fix else ''}".strip())
         for head, text, fix in wrong(one)
@@ -357,7 +359,7 @@ def _answer(one: LogDiagnosis) -> tuple[Block, ...]:
         paragraph("\n".join(commands), "mono"),
         Paragraph("Faults, and the remedy of each:" if items else "No fault was found."),
         Items(tuple(items), numbered=True) if items else None,
-        paragraph("With every question answered as inferred:" if ask else None),
+        paragraph(f"{asked} every question answered as inferred:" if ask else None),
         paragraph(ask, "mono"),
     )
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from strapdown.bundle import versions
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.formats import csv, parquet, read_log
+from strapdown.formats import csv, read_log, table_files
 from strapdown.formats.clocks import clock_of
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.gnss_fixes import GnssOptions
@@ -32,7 +32,7 @@ __all__ = ["axes_of_clean_log", "write_clean_log"]
 Columns = Mapping[str, NDArray[Any]]
 Write = Callable[[Path, dict[str, NDArray[Any]], dict[str, str]], None]
 
-WRITERS: dict[str, Write] = {".csv": csv.write, ".parquet": parquet.write}
+WRITERS: dict[str, Write] = {".csv": csv.write, ".parquet": table_files.write_parquet}
 #: Streams of fixes, a trajectory and other sensors, in files beside that of the samples.
 BESIDE = ("gnss", "reference", "magnetometer", "barometer", "wheel")
 

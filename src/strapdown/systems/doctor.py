@@ -36,7 +36,7 @@ from strapdown.formats.clocks import clock_of, on_clock_of
 from strapdown.formats.crash_records import read_crash_record
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.gnss_fixes import GnssOptions
-from strapdown.formats.recording import ABSENT, RawLog, Recording
+from strapdown.formats.recording import ABSENT, PLACEHOLDERS, RawLog, Recording
 from strapdown.formats.trajectory_readers import read_trajectory
 from strapdown.navigation.measurements.gnss_clock import time_offset
 from strapdown.navigation.measurements.gnss_readiness import gnss_readiness
@@ -352,7 +352,7 @@ def _inertial(log: LogTable, axes: str | None) -> _Inertial:
         asked = refused.data["questions"] if refused.code == "io.questions" else [refused]
         questions += [one for one in asked if one not in questions]
         new = {q: a for q, a in refused.data["answers"] if answers.get(q) != a}
-        if not new or "UNIT" in new.values():
+        if not new or PLACEHOLDERS & set(new.values()):
             break
         answers |= new
         log = _answered(log, new)

@@ -92,7 +92,7 @@ def test_unrolled():
 def test_the_origin_of_a_log_of_1970(tmp_path):
     path = tmp_path / "phone.csv"
     first = 1_705_287_845_250
-    rows = "".join(f"{first + 10 * k},0.1,0.2,{k}\n" for k in range(300))
+    rows = "".join(f"{first + 10 * k},0.1,0.2,{k / 1000}\n" for k in range(300))
     path.write_text(f"time_ms,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s\n{rows}")
     imu = read_log(path).imu
     assert clock_of(imu) == Clock(UNIX, first * 1e-3)

@@ -9,10 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 sys.path.insert(0, str(Path(__file__).parent))
 
-from synthetic_logs import make
+from synthetic_logs import _smooth, make
 
 from strapdown.errors import DataError
 from strapdown.formats import read_log
@@ -83,8 +84,6 @@ def test_each_flag_is_an_option_of_attitude():
 
 def turning(seconds=40.0, rate=100.0, seed=3):
     """A slow tumble about all axes without noise: rates in rad/s, reaction in m/s²."""
-    from scipy.spatial.transform import Rotation
-
     t = np.arange(-1, int(seconds * rate) + 1) / rate
     angles = np.column_stack(
         [0.9 * np.sin(0.7 * t), 0.6 * np.sin(0.9 * t + 1), 0.8 * np.sin(0.5 * t)]
@@ -265,7 +264,7 @@ def test_a_contradiction_stops_and_the_users_statement_goes_before(tmp_path):
 def test_a_stated_unit_by_which_a_gyro_turns_beyond_its_full_scale_is_a_question(tmp_path):
     """About the vertical, gravity does not turn, and the sizes of rates alone are left."""
     t, _, _ = turning()
-    gyro = 0.7 + 0.1 * np.cos(t)[:, None] * (0.0, 0.0, 1.0)
+    gyro = np.outer(0.7 + 0.1 * np.cos(t), (0.0, 0.0, 1.0))
     level = np.tile([0.1, 0.2, 9.8], (t.size, 1))
     header = "time_s,gx_rad_s,gy_rad_s,gz_rad_s,ax_m_s2,ay_m_s2,az_m_s2"
     path = write(tmp_path / "log.csv", t, np.degrees(gyro), level, header)
@@ -282,6 +281,96 @@ def test_a_stated_unit_by_which_a_gyro_turns_beyond_its_full_scale_is_a_question
         assert len(read_log(path, ReadOptions(gyro_unit=unit)).imu) == t.size
     # Below it, the statement counts.
     assert len(read_log(write(path, t, 20.0 * gyro, level, header)).imu) == t.size
+
+
+def driven(seed=4, seconds=60.0, rate=100.0):
+    """A car on a road that tilts it by a degree, with gyros of a phone: rad/s and m/s²."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(-1, int(seconds * rate) + 1) / rate
+    tilt = _smooth(rng, t, 0.02, 0.3, 2.0)
+    yaw = np.cumsum(_smooth(rng, t, 0.1, 0.02, 0.1)[:, 0]) / rate
+    speed = 12.0 + _smooth(rng, t, 3.0, 0.02, 0.1)[:, 0]
+    turn = Rotation.from_euler("ZYX", np.column_stack([yaw, tilt[:, 0], tilt[:, 1]]))
+    gyro = (turn[:-2].inv() * turn[2:]).as_rotvec() * rate / 2.0 + rng.normal(0.0, 0.003, 3)
+    v = np.column_stack([np.cos(yaw), np.sin(yaw), 0.0 * yaw]) * speed[:, None]
+    accel = turn[1:-1].inv().apply((v[2:] - v[:-2]) * rate / 2.0 + [0.0, 0.0, 9.81])
+    n = (t.size - 2, 3)
+    return t[1:-1], gyro + rng.normal(0.0, 1e-3, n), accel + rng.normal(0.0, 0.05, n)
+
+
+def test_a_stated_unit_by_which_gravity_would_turn_where_it_stands_still_stops(tmp_path):
+    """Of a drive without tilts that settle another unit, and rates below any full scale."""
+    t, gyro, accel = driven()
+    assert np.degrees(np.abs(gyro).max()) < 35.0
+    found = said(Signals(t, np.degrees(gyro), accel, time_unit="s"))["gyro_unit"]
+    assert not found.settled
+    header = "time_s,gx_rad_s,gy_rad_s,gz_rad_s,ax_m_s2,ay_m_s2,az_m_s2"
+    path = write(tmp_path / "log.csv", t, np.degrees(gyro), accel, header)
+    with pytest.raises(DataError) as refused:
+        read_log(path)
+    finding = refused.value.finding
+    assert (finding.code, finding.data["unit"], finding.data["likely"]) == (
+        "io.contradicts-unit",
+        "rad/s",
+        "deg/s",
+    )
+    assert finding.data["flags"] == "--gyro-unit deg/s"
+    reasons = finding.data["reason"].data["evidence"]
+    assert "io.evidence-gravity-stood-still" in {e.code for e in reasons}
+    assert len(read_log(path, ReadOptions(gyro_unit="rad/s")).imu) == t.size
+    for unit, scale in (("rad_s", 1.0), ("deg_s", np.degrees(1.0))):
+        named = header.replace("rad_s", unit)
+        log = read_log(write(path, t, scale * gyro, accel, named))
+        assert np.allclose(log.imu[GYRO], gyro, atol=1e-8)
+
+
+def excluded(t, gyro, accel):
+    """Units in which gravity would have turned where it stood still."""
+    found = said(Signals(t, gyro, accel, time_unit="s"))["gyro_unit"]
+    return [e.data["unit"] for e in found.evidence if e.code == "io.evidence-gravity-stood-still"]
+
+
+def test_a_bias_that_no_gyro_has_excludes_a_unit_at_rest():
+    rng = np.random.default_rng(8)
+    t = np.arange(3000) * 0.01
+    accel = np.array([0.0, 0.0, 9.81]) + rng.normal(0.0, 0.05, (t.size, 3))
+    noise = rng.normal(0.0, 0.06, (t.size, 3))
+    assert excluded(t, noise + np.array([2.0, 2.0, 0.0]), accel) == ["rad/s"]
+    # One of any axes may be about gravity, which nothing turns then; 28 deg/s may be a bias.
+    assert excluded(t, noise + np.array([0.0, 2.0, 0.0]), accel) == []
+    assert excluded(t, noise + np.array([0.3, 0.3, 0.25]), accel) == []
+
+
+@pytest.mark.parametrize("speed", [2.0, 6.0])
+def test_a_body_on_a_circle_whose_force_turns_with_it_excludes_no_unit(speed):
+    """0.18 g toward the center keep the norm within 2 % and the direction in the body."""
+    t = np.arange(4000) * 0.01
+    rate = speed * (1.0 + 0.3 * np.sin(0.2 * t))
+    gyro = np.outer(rate, (0.0, 0.0, 1.0))
+    force = np.column_stack([1.8 * (rate / speed) ** 2, 0.0 * t, 9.81 + 0.0 * t])
+    assert excluded(t, gyro, force) == []
+    # Banked into its turns, as an airplane, it feels the force along one axis of its own.
+    bank = 0.15 * np.sin(0.5 * t)
+    roll = np.gradient(bank, t)
+    about = np.column_stack([roll, 0.1 * np.sin(bank), 0.1 * np.cos(bank)])
+    banked = np.column_stack([0.0 * t, 0.0 * t, 9.81 / np.cos(bank)])
+    assert excluded(t, about, banked) == []
+
+
+def test_gyros_without_an_accelerometer_are_judged_by_their_steps_and_their_full_scale(tmp_path):
+    t = np.arange(3000) * 0.01
+    path, header = tmp_path / "log.csv", "time_s,gx_rad_s,gy_rad_s,gz_rad_s"
+    turned = np.outer(40.0 + np.cos(t), (0.0, 0.6, 0.8)) + 1e-3 * np.sin(9 * t)[:, None]
+    for gyro, code in (
+        (stepping(2000.0 / 32768.0, 60.0), "io.contradicts-unit"),
+        (1.2 * turned, "io.rates-beyond-full-scale"),
+    ):
+        np.savetxt(path, np.column_stack([t, gyro]), delimiter=",", header=header, comments="")
+        with pytest.raises(DataError) as refused:
+            read_log(path)
+        assert refused.value.finding.code == code
+        assert refused.value.finding.data["flags"] == "--gyro-unit deg/s"
+        assert len(read_log(path, ReadOptions(gyro_unit="rad/s")).imu) == t.size
 
 
 def test_all_questions_are_asked_at_once(tmp_path):
@@ -432,8 +521,6 @@ def test_beside_an_accelerometer_in_mg_a_gyro_is_rather_in_thousandths():
 
 def of_half_an_hour(rate=100.0, seed=11):
     """Alternately at rest and tumbling, for minutes each, with a sensor's noise."""
-    from scipy.spatial.transform import Rotation
-
     rng = np.random.default_rng(seed)
     t = np.arange(-1, int(1800 * rate) + 1) / rate
     moves = np.clip(6.0 * np.sin(2 * np.pi * t / 400.0), 0.0, 1.0)

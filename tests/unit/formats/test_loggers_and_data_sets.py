@@ -707,6 +707,34 @@ def test_android_events_without_an_accelerometer_sum_or_warn(tmp_path):
     assert any(f.code == "io.left-out-without-gravity-no" for f in raw.findings)
 
 
+@pytest.mark.parametrize(
+    ("gyro", "accel", "separator", "header"),
+    [("G", "A", ",", None), ("w", "f", " ", None), ("R", "A", ";", "time_ms;kind;x;y;z")],
+)
+def test_rows_of_two_sensors_by_a_letter(tmp_path, gyro, accel, separator, header):
+    """Each at its own stamps: a quarter of a step apart, from a straight line through the force."""
+    time, swing = 0.01 * np.arange(500), np.sin(0.03 * np.arange(500))
+    rate = np.degrees(np.outer(swing, (0.3, -0.2, 0.5))) + 0.1
+    force = np.column_stack([0.2 * time, 0.0 * time, 9.8 + 0.01 * time])
+    rows = []
+    for k in range(time.size):
+        for kind, stamp, values in ((accel, 10 * k, force[k]), (gyro, 10 * k + 2.5, rate[k])):
+            fields = [kind, f"{stamp:.1f}", *map(repr, values.tolist())]
+            fields[:2] = fields[1::-1] if header else fields[:2]
+            rows.append(separator.join(fields))
+    path = written(tmp_path / "a.csv", [*([header] if header else []), *rows])
+    assert reader_of(path) == "android-events"
+    options = ReadOptions(gyro_unit="deg/s", accel_unit="m/s2", time_unit="ms")
+    imu = read_log(path, options).imu
+    assert len(imu) == time.size - 1
+    np.testing.assert_allclose(imu[GYRO], np.radians(rate[:-1]), atol=1e-15)
+    between = force[:-1] + 0.25 * np.diff(force, axis=0)
+    np.testing.assert_allclose(imu[ACCEL], between, atol=1e-12)
+    # Letters whose force is unsteady beside the rates are of something else.
+    turned = [r.replace(gyro, "?").replace(accel, gyro).replace("?", accel) for r in rows]
+    assert reader_of(written(tmp_path / "b.csv", turned)) == "csv"
+
+
 def test_a_table_with_a_counter_is_no_log_of_events(tmp_path):
     names = "time,count,gyro_x,gyro_y,gyro_z"
     lines = [f"{1_000_000 + 10_000 * k},{k + 1},0.1,0.2,0.3" for k in range(20)]

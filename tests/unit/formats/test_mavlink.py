@@ -10,7 +10,7 @@ import pytest
 from tests.coded import coded
 
 from strapdown.errors import DataError
-from strapdown.formats import NoStreamError, mavlink, open_stream, read_log, readers_of
+from strapdown.formats import NoStreamError, ardupilot, open_stream, read_log, readers_of
 from strapdown.formats.gnss_files import GnssOptions, read_gnss
 from strapdown.formats.trajectory_readers import read_trajectory
 
@@ -133,7 +133,7 @@ def test_heights_over_the_sea_are_asked(tmp_path, dialect):
     fixes = read_gnss(path, GnssOptions(position_sd=3.0, datum_height=47.25))
     assert fixes["alt"].iloc[0] == 547.25
     with pytest.raises(DataError, check=coded("io.reference-height-over-sea")):
-        mavlink.read_reference(path)
+        ardupilot.read_mavlink_reference(path)
 
 
 def test_fixes_on_a_clock_of_1970(tmp_path, dialect):
@@ -145,9 +145,9 @@ def test_fixes_on_a_clock_of_1970(tmp_path, dialect):
             m.time_usec += ahead
         moved.append((at, m))
     with pytest.raises(DataError, check=coded("io.mavlink-two-clocks")):
-        mavlink.read_fixes(tlog(tmp_path / "a.tlog", d, moved))
+        ardupilot.read_mavlink_fixes(tlog(tmp_path / "a.tlog", d, moved))
     system = d.MAVLink_system_time_message(ahead + 1000 * (BOOT + 5), BOOT + 5)
-    fixes = mavlink.read_fixes(tlog(tmp_path / "b.tlog", d, [*moved, (600, system)]))
+    fixes = ardupilot.read_mavlink_fixes(tlog(tmp_path / "b.tlog", d, [*moved, (600, system)]))
     assert fixes.columns["time"][0] == 1000 * BOOT
 
 
@@ -159,7 +159,7 @@ def test_the_ground_station_and_damage(tmp_path, dialect):
     broken = bytearray(whole)
     broken[8 + 15] ^= 1  # in the first message
     path.write_bytes(bytes(broken) + b"\0\1\2" + other + whole[:17])
-    raw = mavlink.read(path)
+    raw = ardupilot.read_mavlink(path)
     assert raw.columns["time"].size == 199
     said = [f.code for f in raw.findings]
     assert said == ["io.mavlink-one-of-systems", "io.mavlink-frames-left-out"]
@@ -171,15 +171,15 @@ def test_what_is_not_in_it(tmp_path, dialect):
     path = tlog(tmp_path / "a.tlog", dialect, beat)
     assert next(readers_of(path))[0] == "mavlink"
     with pytest.raises(NoStreamError):
-        mavlink.read(path)
-    assert not mavlink.detect(tmp_path)
+        ardupilot.read_mavlink(path)
+    assert not ardupilot.detect_mavlink(tmp_path)
     (tmp_path / "c").write_bytes(struct.pack(">Q", T0) + b"\xfd" + bytes(40))
-    assert not mavlink.detect(tmp_path / "c")
+    assert not ardupilot.detect_mavlink(tmp_path / "c")
 
 
 def test_without_the_library_the_message_names_the_extra(tmp_path, dialect, monkeypatch):
     path = tlog(tmp_path / "a.tlog", dialect, flight(dialect, 10))
-    mavlink._messages.cache_clear()
+    ardupilot._messages.cache_clear()
     real = importlib.import_module
 
     def missing(name, *args):
@@ -189,4 +189,4 @@ def test_without_the_library_the_message_names_the_extra(tmp_path, dialect, monk
 
     monkeypatch.setattr(importlib, "import_module", missing)
     with pytest.raises(DataError, check=coded("io.library-missing", extra="mavlink")):
-        mavlink.read(path)
+        ardupilot.read_mavlink(path)

@@ -14,10 +14,11 @@ import numpy as np
 import pytest
 from tests.coded import coded
 
-from strapdown.errors import DataError
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats import READERS, join, read_log, read_raw
 from strapdown.formats.recording import ReadOptions
-from strapdown.tables import ACCEL, GYRO
+from strapdown.tables import ACCEL, GYRO, MAG
 
 N = 120
 T = np.round(np.arange(N) * 0.01, 2)
@@ -364,6 +365,63 @@ def test_a_plain_table_is_not_taken_for_sensorstream(tmp_path, lines):
     path = tmp_path / "log.csv"
     path.write_text("\n".join(lines) + "\n")
     assert reader_of(path) == "csv"
+
+
+# --- MetaBase ---------------------------------------------------------------------------
+
+BOARD = "MetaWear_2019-11-08T21.48.43.456_C9228E7A1F3D_{}_100.000Hz_1.4.5.csv"
+
+
+def of_board(values, unit, first_ms, clock="epoch"):
+    """Seconds elapsed begin with the sensor's own first sample."""
+    axes = ",".join(f"{a}-axis ({unit})" for a in "xyz")
+    rows = [
+        f"{1_573_246_123_000 + first_ms + 10 * k},2019-11-08T21.48.43.{k:03d},{k / 100:.3f},"
+        + ",".join(map(repr, v.tolist()))
+        for k, v in enumerate(values)
+    ]
+    return "\n".join([f"{clock} (ms),time (01:00),elapsed (s),{axes}", *rows]) + "\n"
+
+
+@pytest.mark.parametrize("clock", ["epoch", "epoc"])
+def test_the_tables_of_a_board_are_joined_by_the_clock_that_they_share(tmp_path, clock):
+    tables = {
+        "Accelerometer": of_board(FORCE / STANDARD_GRAVITY, "g", 3, clock),
+        "Gyroscope": of_board(np.degrees(RATE), "deg/s", 8, clock),
+        "Magnetometer": of_board(np.tile([2e-5, -1e-5, 4e-5], (N, 1)), "T", 8, clock),
+        "Linear_Acceleration": of_board(RATE, "g", 8, clock),
+        "Pressure": "epoch (ms),pressure (Pa)\n1573246123000,101325\n",
+    }
+    folder = in_folder(tmp_path / "run", {BOARD.format(k): text for k, text in tables.items()})
+    recording = read_log(folder)
+    imu = recording.imu
+    # Of N samples at 100 Hz the last of the gyro is after that of the accelerometer, and the force,
+    # half a step later, is in the middle of two that lie on a line.
+    assert len(imu) == N - 1
+    np.testing.assert_allclose(imu[GYRO], RATE[:-1], atol=1e-15)
+    np.testing.assert_allclose(imu[ACCEL], 0.5 * (FORCE[1:] + FORCE[:-1]), atol=1e-14)
+    np.testing.assert_allclose(imu[MAG], np.tile([20.0, -10.0, 40.0], (N - 1, 1)), atol=1e-12)
+    assert imu.attrs["clock"] == "unix"
+    (unused,) = [f for f in recording.findings if f.code == "io.tables-not-used"]
+    assert unused.data["names"] == tuple(
+        BOARD.format(k) for k in ("Linear_Acceleration", "Pressure")
+    )
+
+
+def test_a_folder_of_two_boards_is_a_question(tmp_path):
+    names = ("Left_Gyroscope.csv", "Right_Gyroscope.csv")
+    folder = in_folder(tmp_path / "both", dict.fromkeys(names, of_board(RATE, "deg/s", 0)))
+    with pytest.raises(ConfigError, check=coded("io.gyro-in-several-logs")) as refused:
+        read_log(folder)
+    assert len(refused.value.finding.data["have"]) == 2
+
+
+def test_a_table_that_only_has_the_name_of_a_sensor_in_its_own_is_none_of_it(tmp_path):
+    text = of_board(RATE, "deg/s", 0)
+    of_names = text.replace("-axis (deg/s)", " offset")
+    assert reader_of(in_folder(tmp_path / "a", {"my_gyroscope_1.csv": text})) == "sensor-folder"
+    other = in_folder(tmp_path / "b", {"my_gyroscope_1.csv": of_names})
+    assert not READERS["sensor-folder"].detect(other)
 
 
 # --- archives ---------------------------------------------------------------------------

@@ -18,15 +18,13 @@ from strapdown.formats import (
     READERS,
     NoStreamError,
     ReadOptions,
-    dataflash,
+    ardupilot,
     novatel,
     open_stream,
     px4,
     read_log,
+    receivers,
     ros,
-    sbet,
-    sbf,
-    ubx,
 )
 from strapdown.formats.gnss_files import GnssOptions, read_gnss
 from strapdown.formats.trajectory_readers import read_trajectory
@@ -500,14 +498,14 @@ def test_dataflash_first_instance_in_body_axes(tmp_path):
     imu = read_log(path).imu
     np.testing.assert_allclose(imu.iloc[0], [0.1, 0.2, 0.3, 1.0, 2.0, -G], rtol=1e-6)
     assert imu.index[1] - imu.index[0] == pytest.approx(1e-3)
-    raw = dataflash.read(path)
+    raw = ardupilot.read_dataflash(path)
     assert (raw.axes, raw.clock, len(raw.columns["time"])) == ("x,y,z", "relative", 29)
     assert [f.code for f in raw.findings] == ["io.first-of-instances"]
 
 
 def test_dataflash_a_stated_unit_that_differs_is_refused(tmp_path):
     with pytest.raises(DataError, check=coded("io.log-unit-unknown", unit="deg/s")):
-        dataflash.read(arducopter(tmp_path, unit=b"deg/s"))
+        ardupilot.read_dataflash(arducopter(tmp_path, unit=b"deg/s"))
 
 
 @pytest.mark.parametrize("accuracy", [("Und", "f", -19.5), ("AEl", "e", 60_750)])
@@ -525,26 +523,26 @@ def test_dataflash_height_over_the_ellipsoid(tmp_path, accuracy):
 
 def test_dataflash_height_over_the_sea_alone_is_not_one_over_the_ellipsoid(tmp_path):
     path = arducopter(tmp_path)
-    raw = dataflash.read_fixes(path)
+    raw = ardupilot.read_dataflash_fixes(path)
     assert "alt" not in raw.columns
     np.testing.assert_allclose(raw.columns["alt_msl"], 588.0)
     with pytest.raises(DataError, check=coded("io.height-over-sea-column")):
         read_gnss(path)
     with pytest.raises(NoStreamError):
-        dataflash.read_reference(path)
+        ardupilot.read_dataflash_reference(path)
 
 
 def test_dataflash_garbage_between_records_is_counted(tmp_path):
     path = arducopter(tmp_path)
     path.write_bytes(path.read_bytes() + b"\xa3\x95\xf0" + bytes(7))
-    raw = dataflash.read(path)
+    raw = ardupilot.read_dataflash(path)
     assert len(raw.columns["time"]) == 29
     assert raw.findings[0].code == "io.bytes-left-out"
 
 
 def as_text(path):
     """The log as ground stations write it: names and values, which are scaled."""
-    log, _ = dataflash._records(path.resolve(), path.stat().st_mtime_ns)
+    log, _ = ardupilot._records(path.resolve(), path.stat().st_mtime_ns)
     letters = {"IMU": FLASH_IMU[1], "GPS": FLASH_GPS[1], "GPA": "QBCCCe"}
     lines = ["FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns"]
     for name, form in letters.items():
@@ -560,21 +558,21 @@ def test_dataflash_as_text_is_the_same_log(tmp_path):
     path = arducopter(tmp_path, ("AEl", "e", 60_750))
     text = as_text(path)
     assert kind(text) == "dataflash"
-    for read in (dataflash.read, dataflash.read_fixes):
+    for read in (ardupilot.read_dataflash, ardupilot.read_dataflash_fixes):
         binary, said = read(path), read(text)
         assert said.axes == binary.axes and list(said.columns) == list(binary.columns)
         for name, values in binary.columns.items():
             np.testing.assert_allclose(said.columns[name], values, rtol=1e-12)
-    assert dataflash.read(text).columns["time"].dtype.kind == "i"
+    assert ardupilot.read_dataflash(text).columns["time"].dtype.kind == "i"
     with text.open("ab") as stream:
         stream.write(b"\nIMU, 99000, 0, 0.1, cut")
-    assert len(dataflash.read(text).columns["time"]) == 29
+    assert len(ardupilot.read_dataflash(text).columns["time"]) == 29
 
 
 def test_dataflash_recorded(recordings):
     path = recordings("zoo/ardupilot/test.BIN")
     data = path.read_bytes()
-    raw = dataflash.read(path)
+    raw = ardupilot.read_dataflash(path)
     # By hand: the number of IMU in its FMT, then the rows.
     at = data.find(b"IMU\0Qfff")
     number, length = data[at - 2], data[at - 1]
@@ -770,7 +768,7 @@ def test_ubx_the_finer_position_of_the_same_instant(tmp_path):
 
 def test_ubx_sensors_in_ms_of_the_receiver(tmp_path):
     path = drive(tmp_path)
-    raw = ubx.read(path)
+    raw = receivers.read_ubx(path)
     assert (raw.axes, raw.clock) == (None, "gps-seconds-of-week")
     assert "io.ubx-clock-by-order" in [f.code for f in raw.findings]
     # The fix at 136 154 s follows the sample with the tag 5900, each further one a second later.
@@ -779,13 +777,13 @@ def test_ubx_sensors_in_ms_of_the_receiver(tmp_path):
     alone = written(
         tmp_path / "alone.ubx", b"".join(esf_meas(k, [(14, 0), (13, 0), (5, 9)]) for k in range(9))
     )
-    assert ubx.read(alone).clock == "relative"
-    assert "io.ubx-own-clock" in [f.code for f in ubx.read(alone).findings]
+    assert receivers.read_ubx(alone).clock == "relative"
+    assert "io.ubx-own-clock" in [f.code for f in receivers.read_ubx(alone).findings]
     imu = read_log(path).imu
     np.testing.assert_allclose(imu.iloc[1, :3], np.radians([1.0, -2.0, 0.5]))
     np.testing.assert_allclose(imu.iloc[1, 3:6], [0.5, -1.0, G], atol=1e-3)
     assert imu.index[1] - imu.index[0] == pytest.approx(0.1)
-    wheel = ubx.read_wheel(path)
+    wheel = receivers.read_ubx_wheel(path)
     assert wheel.columns["speed"][0] == -2.5
     with pytest.raises(NoStreamError):
         open_stream(path, "reference")
@@ -885,7 +883,7 @@ def test_sbf_geodetic_and_sensors_in_one_time(tmp_path):
     assert imu.attrs["clock"] == "gps-seconds-of-week"
     np.testing.assert_allclose(imu.iloc[1, :3], np.radians([10.0, 20.0, 31.0]))
     np.testing.assert_allclose(imu.iloc[1, 3:6], [0.1, 0.2, -G])
-    assert sbf.read(path).axes is None
+    assert receivers.read_sbf(path).axes is None
 
 
 def test_sbf_recorded(recordings):
@@ -1040,23 +1038,23 @@ def test_inertial_explorer_faults_are_named(tmp_path):
 
 
 def everything(tmp_path):
-    yield flight(tmp_path), px4
-    yield arducopter(tmp_path), dataflash
-    yield drive(tmp_path), ubx
-    yield asterx(tmp_path), sbf
-    yield written(tmp_path / "fix.gps", bestpos(1000) + bestpos(2000) + bestpos(3000)), novatel
-    yield sbet_file(tmp_path / "sbet.out")[0], sbet
-    yield bag(tmp_path / "log.bag", 1, [("/imu", IMU, samples())]), ros
+    yield flight(tmp_path), "px4"
+    yield arducopter(tmp_path), "dataflash"
+    yield drive(tmp_path), "ubx"
+    yield asterx(tmp_path), "sbf"
+    yield written(tmp_path / "fix.gps", bestpos(1000) + bestpos(2000) + bestpos(3000)), "novatel"
+    yield sbet_file(tmp_path / "sbet.out")[0], "sbet"
+    yield bag(tmp_path / "log.bag", 1, [("/imu", IMU, samples())]), "ros"
     folder = bag(tmp_path / "log", "mcap", [("/imu", IMU, samples())])
-    yield next(p for p in folder.iterdir() if p.suffix == ".mcap"), ros
+    yield next(p for p in folder.iterdir() if p.suffix == ".mcap"), "ros"
     folder = bag(tmp_path / "base", "sqlite3", [("/imu", IMU, samples())])
-    yield next(p for p in folder.iterdir() if p.suffix == ".db3"), ros
+    yield next(p for p in folder.iterdir() if p.suffix == ".db3"), "ros"
 
 
 def test_a_cut_or_overwritten_file_is_refused_or_read_in_part(tmp_path):
     """What is left of a log is read; nothing but a DataError is raised."""
     random = np.random.default_rng(4)
-    for path, module in everything(tmp_path):
+    for path, reader in ((path, READERS[name]) for path, name in everything(tmp_path)):
         data = path.read_bytes()
         cuts = [data[:n] for n in (7, 40, len(data) // 2, len(data) - 3)]
         for _ in range(3):
@@ -1066,13 +1064,12 @@ def test_a_cut_or_overwritten_file_is_refused_or_read_in_part(tmp_path):
             cuts.append(bytes(noise))
         for k, content in enumerate(cuts):
             bad = written(tmp_path / f"bad_{k}{path.suffix}", content)
-            module.detect(bad)
-            for name in ("read", "read_fixes", "read_reference", "read_barometer"):
-                if hasattr(module, name):
-                    try:
-                        getattr(module, name)(bad)
-                    except DataError as error:
-                        assert error.finding.file == bad.name
+            reader.detect(bad)
+            for read in reader.streams.values():
+                try:
+                    read(bad)
+                except DataError as error:
+                    assert error.finding.file == bad.name
 
 
 @pytest.mark.parametrize(

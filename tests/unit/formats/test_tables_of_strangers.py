@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -18,7 +19,7 @@ from strapdown.formats.assemble import assemble
 from strapdown.formats.columns import read_name
 from strapdown.formats.gnss_files import open_fixes
 from strapdown.formats.recording import RawLog
-from strapdown.tables import ACCEL, GYRO
+from strapdown.tables import ACCEL, GYRO, MAG
 
 RATES = np.array([0.1, -0.2, 0.3])  # rad/s
 FORCE = np.array([0.5, -1.0, -9.7])  # m/s²
@@ -629,6 +630,14 @@ def test_an_accelerometer_that_a_format_does_not_read_is_no_note():
     ]
     assert found.severity == "warning"
     assert found.data["names"] == tuple(forces)
+    sizes = {"m/s2": (0.0, 0.0, 9.8), "g": (0.6, 0.0, 0.8), "UNIT": (0.0, 137.0, 0.0)}
+    for unit, triple in sizes.items():
+        forces = dict(zip(forces, np.tile(triple, (n, 1)).T, strict=True))
+        found = assemble(replace(raw, columns=columns | forces), ReadOptions()).findings
+        (found,) = [f for f in found if f.code == "io.accelerometer-not-read"]
+        assert found.data["unit"] == unit
+        named = dict(item.split("=") for item in found.data["columns"].split(","))
+        assert named == dict(zip(ACCEL, forces, strict=True))
 
 
 @pytest.mark.parametrize(
@@ -672,6 +681,7 @@ def test_columns_of_unknown_names_with_the_norm_of_gravity_are_named(names, size
     (found,) = [f for f in assemble(raw, ReadOptions()).findings if f.quantity == "accel"]
     assert (found.code, found.severity) == ("io.columns-like-accelerometer", "warning")
     assert found.data["norm"] == pytest.approx(size * np.sqrt(1.01))
+    assert found.data["unit"] == {9.8: "m/s2", 1.0: "g"}.get(size, "UNIT")
     with pytest.raises(ConfigError, check=coded("io.unit-without-column")):
         assemble(raw, ReadOptions(accel_unit="g"))
     stated = dict(item.split("=") for item in found.data["columns"].split(","))
@@ -723,6 +733,52 @@ def test_a_chip_and_a_place_do_not_hide_a_sensor(name, quantity):
 
 def test_two_chips_are_two_sensors():
     assert read_name("mpu6050_gyro_x").family != read_name("bmi160_gyro_x").family
+
+
+SHIMMER = ("Timestamp_Unix", *(f"{s}_{a}" for s in ("Accel_LN", "Gyro", "Mag") for a in "XYZ"))
+OF_SHIMMER = ("ms", *["m/(s^2)"] * 3, *["deg/s"] * 3, *["local_flux"] * 3)
+
+
+@pytest.mark.parametrize("layout", ["row of units", "rows of both", "behind", "brackets"])
+@pytest.mark.parametrize("mag", ["local_flux", "local", "uT", "T"])
+def test_a_magnetometer_relative_to_the_local_field_is_named_and_left_out(tmp_path, layout, mag):
+    """As Consensys exports a Shimmer: a line of the separator, names, and units below them."""
+    t, (gyro, accel) = 10 * np.arange(300), np.random.default_rng(1).normal(0, 5, (2, 300, 3))
+    field = np.tile([22.0, -5.0, 41.0], (300, 1)) / {"uT": 1.0, "T": 1e6}.get(mag, 47.0)
+    accel[:, 2] += 9.8
+    units = [u.replace("local_flux", mag) for u in OF_SHIMMER]
+    names = [f"Shimmer_B663_{n}_CAL" for n in SHIMMER]
+    top = {
+        "row of units": ['"sep=\t"', "\t".join(names) + "\t", "\t".join(units) + "\t"],
+        "rows of both": ["\t".join(SHIMMER), "\t".join(["CAL"] * 10), "\t".join(units)],
+        "behind": ["\t".join(f"{n} {u}" for n, u in zip(names, units, strict=True))],
+        "brackets": ["\t".join(f"{n} ({u})" for n, u in zip(names, units, strict=True))],
+    }[layout]
+    end = "\t" if layout == "row of units" else ""
+    rows = [
+        f"{1_500_000_000_000 + s}\t" + "\t".join(f"{v:.9g}" for v in values) + end
+        for s, values in zip(t.tolist(), np.hstack([accel, gyro, field]), strict=True)
+    ]
+    path = tmp_path / "s.csv"
+    path.write_text("\n".join([*top, *rows]) + "\n")
+    recording = read_log(path)
+    imu = recording.imu
+    # Nine digits, and stamps that are whole steps of 10 ms.
+    np.testing.assert_allclose(imu[GYRO], np.radians(gyro), rtol=1e-8, atol=1e-9)
+    np.testing.assert_allclose(imu[ACCEL], accel, rtol=1e-8, atol=1e-9)
+    np.testing.assert_allclose(imu.index, 0.001 * t, atol=1e-12)
+    left_out = [f for f in recording.findings if f.quantity == "mag"]
+    unused = [f for f in recording.findings if f.code == "io.columns-not-used"]
+    if mag in ("uT", "T"):
+        np.testing.assert_allclose(imu[MAG].to_numpy()[0], [22.0, -5.0, 41.0], rtol=1e-8)
+        assert not left_out
+    elif (layout, mag) == ("behind", "local"):
+        # The word may be of any name.
+        assert [len(f.data["names"]) for f in unused] == [3]
+    else:
+        assert not set(MAG) & set(imu.columns)
+        (fault,) = left_out
+        assert fault.data["reason"].code == "io.mag-unit-relative"
 
 
 def test_of_a_calibrated_and_an_uncalibrated_gyro_the_first_is_used(tmp_path):

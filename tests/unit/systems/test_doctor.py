@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from scipy.spatial.transform import Rotation
+from tests.coded import coded
 from tests.town_drive import motion
 
 import strapdown as sd
@@ -184,6 +185,16 @@ def test_open_questions_have_answers_and_do_not_hide_what_is_in_the_log(sound, t
         sd.doctor(path, fix=tmp_path / "clean.csv")
     assert error.value.finding.code == "io.questions"
     assert not (tmp_path / "clean.csv").exists()
+
+
+def test_a_log_without_a_clock_has_its_question_and_no_answer(sound, tmp_path):
+    path = tmp_path / "log.csv"
+    sound[COLUMNS[1:]].to_csv(path, index=False)
+    (one,) = sd.doctor(path).logs
+    assert (one.answer("attitude"), one.answers) == ("no", {})
+    assert dict(one.refused.data["answers"]) == {"rate": "HZ"}
+    with pytest.raises(DataError, check=coded("io.questions")):
+        sd.doctor(path, fix=tmp_path / "clean.csv")
 
 
 @pytest.mark.parametrize("suffix", ["csv", "parquet"])

@@ -149,8 +149,8 @@ _RATE_DENSITY = np.array([-9.0, -7.0, -4.5, -1.5, -0.5, 0.0, 0.0, -0.8, -1.4, -1
 _PRIOR = {"s": 0.5, "ms": 0.25, "us": 0.15, "ns": 0.1, "min": 1e-6}
 # Probability of fractional stamps in each unit.
 _FRACTIONAL = {"s": 1.0, "ms": 0.6, "us": 0.1, "ns": 0.02, "min": 1.0}
-# A first stamp within these years is rarely a coincidence; clocks of 1970 are common.
-_EPOCH = (946_684_800.0, 2_366_841_600.0)  # 2000 to 2045
+#: A first stamp within these years is rarely a coincidence; clocks of 1970 are common.
+EPOCH = (946_684_800.0, 2_366_841_600.0)  # 2000 to 2045
 _EPOCH_RATIO = 30.0
 COUNTER_BITS = (16, 24, 31, 32)
 
@@ -214,7 +214,7 @@ def time_unit_probabilities(steps: Steps) -> dict[str, float]:
         log10 = float(np.interp(rate, _RATE, _RATE_DENSITY)) + np.log10(_PRIOR[unit])
         if fractional:
             log10 += np.log10(_FRACTIONAL[unit])
-        if _EPOCH[0] <= first * factor <= _EPOCH[1]:
+        if EPOCH[0] <= first * factor <= EPOCH[1]:
             log10 += np.log10(_EPOCH_RATIO)
         weights[unit] = float(np.log(10.0) * log10)
     return posterior(weights)
@@ -239,7 +239,7 @@ def time_evidence(steps: Steps, unit: str) -> tuple[Finding, ...]:
     """List the evidence of the stamps for a unit."""
     factor, first = TIME_UNITS[unit], float(steps.stamps[0])
     told = [evidence("io.evidence-mean-step", step=steps.mean, rate_hz=1.0 / (steps.mean * factor))]
-    if _EPOCH[0] <= first * factor <= _EPOCH[1]:
+    if EPOCH[0] <= first * factor <= EPOCH[1]:
         year = 1970 + first * factor / 31_556_952.0
         told.append(evidence("io.evidence-year-of-first-stamp", year=int(year)))
     return tuple(told)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +59,8 @@ _STEPS = (
 )
 _OF_RATES, _WITHIN, _IN_STEP, _NEIGHBORS, _LEAST_SPREAD = 6000, 300.0, 0.85, 0.3, 5.0
 _LEAST_RATES = 100
+# The mean over so many differs from that over all by 0.03 (1 sd).
+_OF_SOME, _SOME_IN_STEP = 500, 0.7
 # Values that are few have a step of their own: not more than this in any sensor of today, rad/s,
 # but in one log of so many; a round number is how it was written. Steps that agree better than this
 # are the same: half of what 1/16.4 deg/s is from 2000/32768.
@@ -78,6 +81,9 @@ _QUIET, _FULL_SCALE = 3e-3, 25.0
 LEAST_TURN = 0.02  # rad
 LEAST_EXPLAINED = 0.85
 LEAST_SCALES = 2
+# A unit by which gravity would have turned where it stood still is excluded, but for so rare a
+# motion as a roll in flight whose force keeps size and direction.
+_ROLLED = 1e-3
 
 # Unit, form, axes (empty if the rotation of gravity is inconclusive), unit of time.
 Hypothesis = tuple[str | None, str, str, str]
@@ -120,6 +126,7 @@ def infer_gyro(
     steps = {unit: _in_steps(gyro, scale, written) for unit, scale in GYRO_UNITS.items()}
     base: dict[tuple[str | None, str, str], float] = {}
     by_scale: dict[float, dict[Hypothesis, float]] = {}
+    stood: list[Finding] = []
     for tau, share in likely.items():
         factor = TIME_UNITS[tau]
         step = mean_step(ticks) * factor
@@ -140,6 +147,15 @@ def infer_gyro(
             )
         base[None, "other", tau] = float(np.log(share * _OTHER))
         found = turns(ticks * factor, gyro, force) if force is not None else ()
+        for key, (scale, _) in candidates.items():
+            beyond = [(turn.beyond_stillness(scale), turn.half_width) for turn in found]
+            beyond = sorted((b for b in beyond if b[0] > STILL_TURN), reverse=True)
+            if len(beyond) < LEAST_SCALES:
+                continue
+            base[(*key, tau)] += float(np.log(_ROLLED))
+            if key[1] == "rate" and share > 0.5:
+                data = {"turn_deg": np.degrees(beyond[0][0]), "half_width_s": beyond[0][1]}
+                stood.append(evidence("io.evidence-gravity-stood-still", unit=key[0], **data))
         for turn in found:
             if turn.signal < LEAST_TURN:
                 continue
@@ -186,7 +202,7 @@ def infer_gyro(
             kind = "rate" if hypothesis[1].startswith("counts") else hypothesis[1]
             merged = (hypothesis[0], kind, hypothesis[2], hypothesis[3])
             total[merged] = total.get(merged, 0.0) + p / len(pooled)
-    told = _evidence(largest, scales, total)
+    told = (*_evidence(largest, scales, total), *stood)
     best = next(iter(_marginal(total, 0)))
     if best is not None and steps[best][1]:
         told += (evidence("io.evidence-steps-of-sensor", step=steps[best][0], unit=best),)
@@ -225,8 +241,9 @@ def _in_steps(gyro: Array, scale: float, written: tuple[float, float]) -> tuple[
             if spread < _LEAST_SPREAD:
                 continue
             k = axis[np.abs(axis) < _WITHIN * step] / step
-            turn = 2.0 * np.pi * k
-            phase = complex(np.cos(turn).mean(), np.sin(turn).mean())
+            # Some of them show that most steps are none.
+            some = _phase(k[:: 1 + k.size // _OF_SOME])
+            phase = _phase(k) if abs(some) > _SOME_IN_STEP else some
             if abs(phase) <= _IN_STEP:
                 spreads.append(0.0)
                 continue
@@ -236,6 +253,12 @@ def _in_steps(gyro: Array, scale: float, written: tuple[float, float]) -> tuple[
         if spreads and min(spreads) / _CHANCE > found[1]:
             found = (step, min(spreads) / _CHANCE)
     return found
+
+
+def _phase(numbers: Array) -> complex:
+    """Mean of the phases of numbers within whole ones."""
+    turn = 2.0 * np.pi * numbers
+    return complex(np.cos(turn).mean(), np.sin(turn).mean())
 
 
 def _written_step(gyro: Array) -> tuple[float, float]:
@@ -325,6 +348,14 @@ LEAST_WINDOWS = 3
 MODEL_ERROR = 0.1
 # Zero-rate output, one sigma (MPU-6050 data sheet: within 20 deg/s).
 BIAS_SD = 0.12  # rad/s
+# Where the means of the force over both halves of a window have its usual norm within this, the
+# force did not turn within them, and gravity is within 11° of it in a body that accelerates along
+# the ground; it turned by less than twice that, or somewhat more, as a clock and a gyro have
+# errors. So many of the windows must be so, and of these so many must say the same.
+CALM, STILL_TURN, _OF_WINDOWS, _SAYING = 0.02, 0.5, 0.2, 0.25
+# Largest zero-rate output, and the angle between gravity and the axis of a turn about it, with
+# sensors out of line: 30 deg/s and 3° are beyond those of any data sheet above.
+_LARGEST_BIAS, _ALONG = 0.52, np.arccos(1.0 / (1.0 + CALM)) + np.radians(3.0)
 # Below this an offset or a scale error of the accelerometer could rotate the direction as much.
 LEAST_SIGNAL = 1e-4  # of gravity
 _LEVI_CIVITA = np.zeros((3, 3, 3))
@@ -332,6 +363,7 @@ for _i, _j, _k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
     _LEVI_CIVITA[_i, _j, _k], _LEVI_CIVITA[_i, _k, _j] = 1.0, -1.0
 
 
+@cache
 def signed_permutations() -> tuple[tuple[str, ...], Array]:
     """List the 48 mappings of the gyro's axes to the accelerometer's, the identity first.
 
@@ -362,11 +394,16 @@ class Turn:
     gram : ndarray, (10, 10)
         For the nine elements of k M (row by row) and the change of gravity, with the bias
         eliminated; gravity has norm 1.
+    still_rates, still_force : ndarray, (m, 3)
+        Integral of the gyro over each window in which gravity stands still, weighted, in its unit
+        times s, and the direction of the force there; empty if these are few.
     """
 
     half_width: float
     windows: int
     gram: Array
+    still_rates: Array
+    still_force: Array
 
     @property
     def signal(self) -> float:
@@ -397,6 +434,38 @@ class Turn:
         logs = -0.5 * self.windows * np.log((left + floor) / self._nothing())
         return logs, 1.0 - left / max(self.gram[9, 9], 1e-30)
 
+    def beyond_stillness(self, scale: float) -> float:
+        """Compute how far a gyro turns gravity where it stood still, rad.
+
+        At least, whichever axes the gyro has, with a bias, and where gravity is near the force: in
+        the share of these windows that decides. `scale`: of its unit, rad/s.
+        """
+        least = scale * self._unbiased
+        if least > STILL_TURN:
+            bias = scale * self.still_rates.mean(axis=0)
+            most = _LARGEST_BIAS * self.half_width
+            bias *= min(1.0, most / max(float(np.linalg.norm(bias)), 1e-300))
+            least = min(least, self._across(scale * self.still_rates - bias))
+        return least
+
+    @cached_property
+    def _unbiased(self) -> float:
+        """`beyond_stillness` of a gyro without a bias, in its unit times s."""
+        return self._across(self.still_rates) if len(self.still_rates) else 0.0
+
+    def _across(self, rates: Array) -> float:
+        """Compute the part of turns that moves gravity, with the axes that make it the least."""
+        size = np.linalg.norm(rates, axis=1)
+        # Reversed axes turn gravity as far: of 48 permutations half are enough.
+        halves = signed_permutations()[1].reshape(6, 8, 3, 3)[:, :4].reshape(24, 3, 3)
+        along = np.abs((halves @ rates.T * self.still_force.T).sum(axis=1))
+        cosine = np.minimum(along / np.maximum(size, 1e-300), 1.0)
+        sine = np.sqrt(1.0 - cosine * cosine)
+        # The sine of the angle that is beyond the cone about the force.
+        across = size * np.maximum(sine * np.cos(_ALONG) - cosine * np.sin(_ALONG), 0.0)
+        deciding = int((1.0 - _SAYING) * across.shape[1])
+        return float(np.partition(across, deciding, axis=1)[:, deciding].min())
+
     def _nothing(self) -> float:
         """Residual sum of squares of a gyro that predicts no change."""
         return float(self.gram[9, 9] + 6 * self.windows * LEAST_SIGNAL**2)
@@ -423,7 +492,7 @@ def turns(time: Array, gyro: Array, force: Array) -> tuple[Turn, ...]:
     step = np.diff(time)
     # (w x f)_a = e_abc w_b f_c; products of the gyro's axis d and the force's axis c.
     products = (gyro[:, :, None] * force[:, None, :]).reshape(-1, 9)
-    signals = np.hstack([force, products])
+    signals = np.hstack([force, products, gyro])
     once = running_integral(time, signals)
     twice = running_integral(time, once)
     holes = step > max(0.1, 5.0 * float(np.quantile(step, 0.95)))
@@ -461,7 +530,7 @@ def _turn(
     # over the rise, and the mean of P over the fall minus P at the peak.
     y = (once[i2] - once[i1])[:, :3] / w2 - (once[i1] - once[i0])[:, :3] / w1
     weighted = (twice[i2] - twice[i1]) / w2 - (twice[i1] - twice[i0]) / w1
-    f_weighted, p_weighted = weighted[:, :3], weighted[:, 3:].reshape(-1, 3, 3)
+    f_weighted, p_weighted = weighted[:, :3], weighted[:, 3:12].reshape(-1, 3, 3)
     # Regressor of element M[b, d]: -e_abc (weighted product d, c).
     x = -np.einsum("abc,ndc->nabd", _LEVI_CIVITA, p_weighted).reshape(-1, 9)
     bias = -np.einsum("abc,nc->nab", _LEVI_CIVITA, f_weighted).reshape(-1, 3)
@@ -475,4 +544,11 @@ def _turn(
     held = bias.T @ bias + noise**2 * np.eye(3)
     cross = bias.T @ block
     gram = block.T @ block - cross.T @ np.linalg.solve(held, cross)
-    return [Turn(width, windows, gram)]
+    means = np.array([(once[i1] - once[i0])[:, :3] / w1, (once[i2] - once[i1])[:, :3] / w2])
+    calm = (np.abs(np.linalg.norm(means, axis=2) - 1.0) < CALM).all(axis=0)
+    calm &= np.linalg.norm(y, axis=1) < STILL_TURN
+    if calm.sum() < max(2 * LEAST_WINDOWS, _OF_WINDOWS * calm.size):
+        calm[:] = False
+    force = means.mean(axis=0)[calm]
+    force /= np.linalg.norm(force, axis=1, keepdims=True)
+    return [Turn(width, windows, gram, weighted[calm, 12:], force)]

@@ -1,0 +1,414 @@
+"""Positions of watches, receivers and drones: Garmin FIT, GPX, subtitles of DJI."""
+
+from __future__ import annotations
+
+import re
+from collections import defaultdict
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import escape
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.errors import DataError, Finding
+from strapdown.formats import csv
+from strapdown.formats.clocks import RELATIVE, UNIX
+from strapdown.formats.join import join
+from strapdown.formats.known_formats import lacking, selected
+from strapdown.formats.recording import RawLog, library
+from strapdown.formats.signs import Signs, head
+from strapdown.formats.trajectory_writers import one_line
+from strapdown.formats.writing import (
+    FileOptions,
+    Tables,
+    dates,
+    fixes_not_held,
+    fixes_of,
+    heights_of,
+    iso_dates,
+    over_ground,
+)
+from strapdown.tables.checks import values_of
+
+# GPX tracks (https://www.topografix.com/GPX/1/1/): fixes, read by gpxpy.
+#
+# Every ``trkpt`` of every track and segment, in their order: latitude and longitude in degrees of
+# WGS 84, ``time`` in UTC. ``ele`` is over the sea, and ``geoidheight`` the height of the geoid
+# over the ellipsoid, as in NMEA GGA; ``fix`` is the kind of solution; GPX 1.0 also has ``speed``
+# in m/s and ``course`` in degrees from north.
+
+
+QUALITY = {"none": 0.0, "dgps": 2.0, "pps": 3.0}
+
+
+detect_gpx = Signs(text=r"\A[\s\S]{0,4092}?<gpx")
+
+
+def read_gpx(path: Path) -> RawLog:
+    """Read the points that have a time.
+
+    Raises
+    ------
+    DataError
+        The library is missing, the XML is damaged, or no point has a time.
+    """
+    gpxpy = library("gpxpy", path)
+    try:
+        gpx = gpxpy.parse(path.read_bytes())
+        points = [p for track in gpx.tracks for part in track.segments for p in part.points]
+    except Exception as error:  # the library raises errors of its XML parser, too
+        raise DataError("io.gpx-unreadable", file=path.name, error=str(error)) from None
+    timed = np.array([p.time is not None for p in points], dtype=bool)
+    if not timed.any():
+        raise DataError("io.gpx-without-time", file=path.name, quantity="time", count=len(points))
+    stamps = [
+        p.time.replace(tzinfo=p.time.tzinfo or UTC).timestamp() if p.time else 0.0 for p in points
+    ]
+
+    def values(name: str) -> np.ndarray:
+        return np.array([getattr(p, name) for p in points], dtype=np.float64)
+
+    held = {
+        "time": (np.array(stamps), "s"),
+        "lat": (values("latitude"), "deg"),
+        "lon": (values("longitude"), "deg"),
+        "alt_msl": (values("elevation"), "m"),
+        "quality": (np.array([QUALITY.get(p.type_of_gpx_fix or "", 1.0) for p in points]), None),
+    }
+    if np.isfinite(values("geoid_height")[timed]).all():
+        held["geoid"] = (values("geoid_height"), "m")
+    if np.isfinite(values("speed") * values("course")).any():
+        held |= {"speed": (values("speed"), "m/s"), "course": (values("course"), "deg")}
+    log = selected(RawLog.of(path, held, clock=UNIX), timed)
+    if not timed.all():
+        log.findings.append(
+            Finding(
+                "io.points-without-time",
+                file=path.name,
+                quantity="time",
+                severity="note",
+                lost=int((~timed).sum()),
+                count=timed.size,
+            )
+        )
+    return log
+
+
+# Writing: GPX 1.0 (https://www.topografix.com/GPX/1/0/), which has speed and course; 1.1 has not.
+
+_FIX = {1: "3d", 2: "dgps", 3: "pps", 4: "dgps", 5: "dgps"}
+_BEGIN = """<?xml version="1.0" encoding="UTF-8"?>
+<gpx version="1.0" creator="strapdown" xmlns="http://www.topografix.com/GPX/1/0">
+<trk><name>{name}</name><trkseg>
+"""
+
+
+def write_gpx(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
+    """Write one track of the fixes, or of the positions of a trajectory.
+
+    Latitude and longitude have the fewest digits that reproduce each; dates microseconds, as far
+    as readers go. ``ele`` is over the sea by the stated height of the geoid; without one it is that
+    over the ellipsoid, with ``geoidheight`` 0 and a warning.
+
+    DataError: the clock is not related to UTC, or there are neither fixes nor a trajectory.
+    """
+    options.require_wgs84("GPX")
+    gnss, findings = fixes_of(tables, "GPX")
+    stamps, said = dates(gnss, options, "GPX")
+    over_sea, geoid, warned = heights_of(gnss, options)
+    findings += [*said, *warned, *fixes_not_held("GPX", gnss, position_sd=False)]
+    speed, course = (v.tolist() for v in over_ground(gnss))
+    lines = [_BEGIN.format(name=escape(one_line(options.name)))]
+    quality = values_of(gnss, ["quality"])[:, 0].astype(int).tolist()
+    places = zip(*values_of(gnss, ["lat", "lon"]).T.tolist(), over_sea.tolist(), strict=True)
+    for k, ((lat, lon, ele), date) in enumerate(zip(places, iso_dates(stamps), strict=True)):
+        moves = ""
+        if np.isfinite(speed[k]):
+            moves = f"<course>{course[k]!r}</course><speed>{speed[k]!r}</speed>"
+        fix = f"<fix>{_FIX[quality[k]]}</fix>" if quality[k] in _FIX else ""
+        lines.append(
+            f'<trkpt lat="{lat!r}" lon="{lon!r}"><ele>{ele!r}</ele><time>{date}</time>{moves}'
+            f"<geoidheight>{geoid!r}</geoidheight>{fix}</trkpt>\n"
+        )
+    lines.append("</trkseg></trk>\n</gpx>\n")
+    path.write_bytes("".join(lines).encode())
+    return findings
+
+
+# Garmin FIT (``.fit``): activities with fixes, and cameras and watches with a gyro; by fitdecode.
+#
+# The messages and their fields are those of the FIT profile (https://developer.garmin.com/fit):
+# ``record`` has positions in semicircles (2³¹ are 180°), ``enhanced_altitude`` over the sea,
+# speed in m/s and ``gps_accuracy`` in m; ``gyroscope_data``, ``accelerometer_data`` and
+# ``magnetometer_data`` have arrays of samples, each with its offset in ms from the stamp of the
+# message. Where a device did not calibrate them, ``three_d_sensor_calibration`` converts counts:
+# less ``level_shift`` and ``offset_cal``, times ``calibration_factor`` over
+# ``calibration_divisor``, turned by ``orientation_matrix`` (FIT SDK, "calibration adjustment").
+# The profile does not say where the axes of a device point.
+
+
+FIT_TITLE = "Garmin FIT"
+#: Degrees of a semicircle.
+SEMICIRCLE = 180.0 / 2**31
+SENSORS = {
+    "gyro": ("gyroscope_data", "gyro", "deg/s", "gyroscope"),
+    "accel": ("accelerometer_data", "accel", "g", "accelerometer"),
+    "mag": ("magnetometer_data", "mag", "gauss", "compass"),
+}
+Message = dict[str, Any]
+
+
+detect_fit = Signs(first=rb"\A[\x0c\x0e].{7}\.FIT")
+
+
+def read_fit(path: Path) -> RawLog:
+    """Read the gyro, with accelerometer and magnetometer interpolated to its stamps.
+
+    Raises
+    ------
+    DataError
+        The library is missing, or the file is damaged.
+    """
+    messages = _messages(path)
+    logs = [_sensor(path, messages, triad) for triad in SENSORS if messages[SENSORS[triad][0]]]
+    if not messages["gyroscope_data"]:
+        raise lacking(path, "imu", FIT_TITLE, _streams(messages))
+    raw = join(logs, path.name, (path,))
+    raw.clock = logs[0].clock
+    return raw
+
+
+def read_fit_fixes(path: Path) -> RawLog:
+    """Read the positions of the records."""
+    messages = _messages(path)
+    records = [m for m in messages["record"] if isinstance(m.get("position_lat"), int)]
+    if not records:
+        raise lacking(path, "gnss", FIT_TITLE, _streams(messages))
+
+    def values(*names: str) -> NDArray[np.float64]:
+        said = [
+            next((m[n] for n in names if isinstance(m.get(n), int | float)), np.nan)
+            for m in records
+        ]
+        return np.array(said, dtype=np.float64)
+
+    time, clock = _stamps(records)
+    held: dict[str, tuple[NDArray[Any], str | None]] = {
+        "time": (time, "s"),
+        "lat": (values("position_lat") * SEMICIRCLE, "deg"),
+        "lon": (values("position_long") * SEMICIRCLE, "deg"),
+        "alt_msl": (values("enhanced_altitude", "altitude"), "m"),
+        "speed": (values("enhanced_speed", "speed"), "m/s"),
+    }
+    if np.isfinite(accuracy := values("gps_accuracy")).any():
+        held["horizontal_accuracy"] = (accuracy, "m")
+    rows = np.array([m["#"] for m in records])
+    findings = []
+    if lost := len(messages["record"]) - len(records):
+        findings.append(
+            Finding(
+                "io.records-without-place",
+                file=path.name,
+                severity="note",
+                lost=lost,
+                count=len(messages["record"]),
+            )
+        )
+    return RawLog.of(path, held, clock=clock, rows=rows, findings=findings)
+
+
+def _messages(path: Path) -> defaultdict[str, list[Message]]:
+    """Return the messages of each kind, each with its number in the file as ``#``."""
+    fitdecode = library("fitdecode", path)
+    found: defaultdict[str, list[Message]] = defaultdict(list)
+    count = 0
+    try:
+        with fitdecode.FitReader(path.read_bytes()) as reader:
+            for frame in reader:
+                if frame.frame_type == fitdecode.FIT_FRAME_DATA:
+                    count += 1
+                    found[frame.name].append({f.name: f.value for f in frame.fields} | {"#": count})
+    except Exception as error:  # a damaged file can break the decoder anywhere
+        raise DataError(
+            "io.fit-unreadable",
+            file=path.name,
+            count=count,
+            error=str(error) or type(error).__name__,
+        ) from None
+    return found
+
+
+def _streams(messages: defaultdict[str, list[Message]]) -> list[str]:
+    there = {
+        "imu": messages["gyroscope_data"],
+        "gnss": [m for m in messages["record"] if m.get("position_lat") is not None],
+    }
+    return [stream for stream, has in there.items() if has]
+
+
+def _stamps(messages: list[Message]) -> tuple[NDArray[np.float64], str]:
+    """Return seconds since 1970; since the start of the device if it did not know the date."""
+    said = [m.get("timestamp") for m in messages]
+    dated = all(isinstance(s, datetime) for s in said)
+    seconds = [
+        s.replace(tzinfo=s.tzinfo or UTC).timestamp() if isinstance(s, datetime) else s
+        for s in said
+    ]
+    clock = UNIX if dated else RELATIVE
+    return np.array([np.nan if s is None else s for s in seconds], dtype=np.float64), clock
+
+
+def _sensor(path: Path, messages: defaultdict[str, list[Message]], triad: str) -> RawLog:
+    kind, prefix, stated, sensor = SENSORS[triad]
+    unit: str | None = stated
+    own = messages[kind]
+    names = [f"calibrated_{prefix}_{a}" for a in "xyz"]
+    calibrated = all(m.get(n) is not None for m in own for n in names)
+    names = names if calibrated else [f"{prefix}_{a}" for a in "xyz"]
+    base, clock = _stamps(own)
+    times, samples = [], []
+    for message, start in zip(own, base, strict=True):
+        axes = [np.atleast_1d(np.array(message.get(n) or [], dtype=np.float64)) for n in names]
+        offsets = np.atleast_1d(np.array(message.get("sample_time_offset") or 0, dtype=np.float64))
+        if any(a.shape != offsets.shape for a in axes):
+            raise DataError(
+                "io.fit-samples-and-offsets",
+                file=path.name,
+                row=message["#"],
+                quantity=triad,
+                count=offsets.size,
+                counts=[a.size for a in axes],
+            )
+        times.append(start + ((message.get("timestamp_ms") or 0) + offsets) * 1e-3)
+        samples.append(np.column_stack(axes))
+    values = np.concatenate(samples)
+    if not calibrated:
+        applied = _calibrated(path, messages, sensor, values)
+        values, unit = (values, None) if applied is None else (applied, unit)
+    held: dict[str, tuple[NDArray[Any], str | None]] = {"time": (np.concatenate(times), "s")}
+    held |= {f"{triad}_{a}": (values[:, k], unit) for k, a in enumerate("xyz")}
+    log = RawLog.of(path, held, clock=clock)
+    log.name = f"{path.name}/{kind}"
+    return log
+
+
+def _calibrated(
+    path: Path, messages: defaultdict[str, list[Message]], sensor: str, counts: NDArray[np.float64]
+) -> NDArray[np.float64] | None:
+    """Convert counts by the first calibration of their sensor; None if there is none."""
+    for one in messages["three_d_sensor_calibration"]:
+        factor = next(
+            (one[n] for n in one if n.endswith("cal_factor") or n == "calibration_factor"), None
+        )
+        divisor = one.get("calibration_divisor")
+        if one.get("sensor_type") != sensor or not factor or not divisor:
+            continue
+        offset = np.array(one.get("offset_cal") or (0, 0, 0), dtype=np.float64)
+        matrix = np.array(one.get("orientation_matrix") or np.eye(3).ravel(), dtype=np.float64)
+        if offset.size != 3 or matrix.size != 9:
+            raise DataError(
+                "io.fit-samples-and-offsets",
+                file=path.name,
+                row=one["#"],
+                quantity=sensor,
+                count=offset.size,
+                counts=[matrix.size],
+            )
+        shifted = counts - float(one.get("level_shift") or 0) - offset
+        return np.asarray(shifted * (factor / divisor) @ matrix.reshape(3, 3).T)
+    return None
+
+
+# Subtitles of DJI drones (``.SRT``): the position at each frame or second of a video.
+#
+# Two families, as in the samples of https://github.com/JuanIrache/DJI_SRT_Parser (MIT):
+#
+# - ``[latitude: 59.30] [longitude: 18.20] [rel_alt: 1.3 abs_alt: 132.8]`` (older: ``[latitude : …]
+#   [longtitude : …] [altitude: …]``): degrees; ``rel_alt`` is over the point of take-off;
+#   ``abs_alt`` and ``altitude`` are over the ellipsoid in drones with RTK, and by the air pressure
+#   over the sea in others, which the file does not say (DJI Onboard SDK, "Altitude": fused altitude
+#   from the sea level at standard pressure, GPS and RTK altitude over the ellipsoid);
+# - ``GPS (13.37, 52.50, 15) … H 85.80m``: longitude, latitude, and a third number that is a count
+#   of satellites or a height, depending on the drone, and is not used; ``H`` and ``BAROMETER`` are
+#   heights over the point of take-off.
+#
+# Of both families the absolute height is read if it is there, else that over the take-off.
+#
+# Stamps are those of the subtitles, from the start of the video; the printed date has no time
+# zone.
+
+
+_TIME = re.compile(r"(\d+):(\d\d):(\d\d)[,.](\d{1,3})\s*-->")
+_NUMBER = r"\s*([+-]?\d+(?:\.\d+)?)\s*"
+_LAT = re.compile(r"\[\s*latitude\s*:" + _NUMBER, re.I)
+_LON = re.compile(r"\[\s*long?t?itude\s*:" + _NUMBER, re.I)
+_ALT = re.compile(r"\b(?:abs_alt|altitude)\s*:" + _NUMBER, re.I)
+_UP = re.compile(r"\b(?:rel_alt\s*:|H(?=\s)|BAROMETER\s*:)" + _NUMBER, re.I)
+_PAIR = re.compile(r"\bGPS\s*\(" + _NUMBER + "," + _NUMBER + ",")
+
+
+def _has_positions(path: Path) -> bool:
+    text = head(path, 4096)
+    return bool(_TIME.search(text) and (_LAT.search(text) or _PAIR.search(text)))
+
+
+detect_dji = Signs(text=r"\A[\s\S]{0,4080}?\d:\d\d:\d\d[,.]\d{1,3}\s*-->", also=_has_positions)
+
+
+def read_dji(path: Path) -> RawLog:
+    """Read the positions.
+
+    Raises
+    ------
+    DataError
+        No subtitle has a position, or the angles may be in radians.
+    """
+    text, findings = csv.decoded(path.read_bytes(), path.name)
+    starts = list(_TIME.finditer(text))
+    ends = [*(m.start() for m in starts[1:]), len(text)]
+    rows, values, lost = [], [], 0
+    for start, end in zip(starts, ends, strict=True):
+        block = text[start.end() : end]
+        hours, minutes, seconds, rest = (int(g) for g in start.groups())
+        time = 3600 * hours + 60 * minutes + seconds + int(f"{rest:03d}") * 1e-3
+        pair, lat, lon = _PAIR.search(block), _LAT.search(block), _LON.search(block)
+        alt, up = _ALT.search(block), _UP.search(block)
+        place = (pair[2], pair[1]) if pair else (lat[1], lon[1]) if lat and lon else None
+        if place is None:
+            lost += 1
+            continue
+        rows.append(text.count("\n", 0, start.start()) + 1)
+        heights = (float(one[1]) if one else np.nan for one in (alt, up))
+        values.append((time, float(place[0]), float(place[1]), *heights))
+    if not values:
+        raise DataError("io.srt-without-places", file=path.name, quantity="lat, lon")
+    time, lats, lons, alts, ups = np.array(values).T
+    none = (lats == 0.0) & (lons == 0.0)
+    if np.abs(lats).max() <= np.pi / 2 and np.abs(lons).max() <= np.pi and not none.all():
+        raise DataError(
+            "io.srt-degrees-or-radians",
+            file=path.name,
+            quantity="lat, lon",
+            lat=lats[~none][0],
+            lon=lons[~none][0],
+        )
+    if lost:
+        findings.append(
+            Finding(
+                "io.subtitles-without-place",
+                file=path.name,
+                severity="note",
+                lost=lost,
+                count=len(starts),
+            )
+        )
+    held = {
+        "time": (time, "s"),
+        "lat": (lats, "deg"),
+        "lon": (lons, "deg"),
+        **({"alt_take_off": (ups, "m")} if np.isnan(alts).all() else {"alt_unstated": (alts, "m")}),
+        "quality": (np.where(none, 0.0, 1.0), None),
+    }
+    return RawLog.of(path, held, rows=np.array(rows), clock=RELATIVE, findings=findings)
