@@ -8,7 +8,7 @@ REST = '[motion]\nkind = "stationary"\nlat_deg = 10\nlon_deg = 20\n'
 SINE = '[motion]\nkind = "sine_velocity"\nlat_deg = 10\nlon_deg = 20\n'
 BAD = {
     "a sensor without a name": ('sensor = ""\n' + REST + "duration_s = 2", "unknown sensor"),
-    "no format": ("formats = []\n" + REST + "duration_s = 2", "formats: [] does not fit"),
+    "no format": ("formats = []\n" + REST + "duration_s = 2", "formats: [] has 0 elements"),
     "for ever": (REST + "duration_s = 1e308", "gives inf samples"),
     "long": (REST + "duration_s = 1e300", "gives 1e+302 samples"),
     "deep": (
