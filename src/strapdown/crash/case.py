@@ -4,43 +4,34 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import pandas as pd
 
 from strapdown.bundle import InputFiles, sha256
 from strapdown.config.crash_case import (
     CaseSpec,
     EntrySpec,
-    PointSpec,
     ReferenceSpec,
     TriadSpec,
     UnitSpec,
-    VehicleSpec,
 )
-from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
+from strapdown.constants import TWO_SIDED_95
+from strapdown.crash.case_contact import (
+    AXES,
+    OF_DRIVES,
+    Deformation,
+    closed_against_barrier,
+    closed_together,
+    deformed,
+    main_event,
+)
 from strapdown.crash.case_indices import CrashIndex, occupant_indices, vehicle_indices
 from strapdown.crash.closure import (
     Blame,
     Closure,
-    Figure,
-    ImpactVehicle,
-    against_barrier,
-    blame,
-    blame_points,
-    close_vehicles,
-)
-from strapdown.crash.deformation import (
-    Crush,
-    crush_energy,
-    dynamic_crush,
-    energy_equivalent_speed,
-    energy_share,
-    equal_force_share,
-    impulse_of,
 )
 from strapdown.crash.delta_v import delta_v
 from strapdown.crash.delta_v_bound import body_delta_v_bound
@@ -83,35 +74,10 @@ from strapdown.units import FORCES, SPEEDS, unit_of
 if TYPE_CHECKING:
     from strapdown.crash.drive_entry import DriveEntry
 
-#: Kinds of entry that are found from the drive before the crash.
-OF_DRIVES = ("gnss", "speed_record")
 # Standard deviation of a speed of the wheels, and of the place of an axle that is stated.
 SPEED_SD, AXLE_SD = 0.1, 0.05  # m/s, m
 # Most numbers of a Monte Carlo in memory: half a gigabyte.
 MOST_NUMBERS = 64_000_000
-
-
-@dataclass(frozen=True)
-class Deformation:
-    """Crush and energy of a vehicle, as far as its case has what they need.
-
-    Attributes
-    ----------
-    crush : tuple of Crush
-        Against a barrier: by the main answer, then by every recorder.
-    impulses : tuple of (str, Figure), N s
-        Of the measured forces on it, with the names of their references.
-    energy : Figure, J, optional
-        From the residual crush and the stiffness; with the mass its `equivalent_speed`, m/s.
-    """
-
-    crush: tuple[Crush, ...] = ()
-    impulses: tuple[tuple[str, Figure], ...] = ()
-    energy: Figure | None = None
-    equivalent_speed: Figure | None = None
-
-    def __bool__(self) -> bool:
-        return bool(self.crush or self.impulses or self.energy)
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,7 +129,7 @@ class CaseResult:
     partners: tuple[CaseSpec, ...] = ()
     closure: Closure | None = None
     blame: Blame | None = None
-    deformation: Deformation = Deformation()
+    deformation: Deformation = field(default_factory=Deformation)
     indices: tuple[CrashIndex, ...] = ()
 
     @property
@@ -222,7 +188,7 @@ def run_cases(
         alone.append(run_case(spec, file, part))
     if len(alone) == 1:
         at_barrier = alone[0].spec.vehicle.against == "barrier"
-        return (_closed_against_barrier(alone[0]),) if at_barrier else tuple(alone)
+        return (closed_against_barrier(alone[0]),) if at_barrier else tuple(alone)
     specs = [one.spec for one in alone]
     together = [
         replace(
@@ -234,7 +200,7 @@ def run_cases(
         for k, one in enumerate(alone)
     ]
     if len(together) == 2:
-        return _closed(*together)
+        return closed_together(*together)
     only_two = Finding("crash.closure-of-two-only", severity="note", quantity="closure")
     return tuple(replace(one, findings=(*one.findings, only_two)) for one in together)
 
@@ -298,7 +264,7 @@ def run_case(
     progress("drawing possible paths", 0.4)
     samples, said = _samples(made.main.path, options.monte_carlo_runs, options.seed)
     findings += said
-    deformation, stated = _deformed(spec, made, tables)
+    deformation, stated = deformed(spec, made, tables)
     references = tuple(
         compare_reference(reference, unit, options.gravity_m_per_s2, tables)
         for reference in stated
@@ -506,314 +472,6 @@ def _samples(path: CrashPath, runs: int, seed: int) -> tuple[PathSamples | None,
     ]
 
 
-# Deformation of the vehicle, and closure with what it met.
-
-#: Standard deviation of a stated mass without one: fuel, load and passengers.
-MASS_SD = 0.03
-#: Line of the error budget: of an entry's stated heading.
-ENTRY_HEADING = "heading"
-
-
-def _reference_table(spec: ReferenceSpec) -> pd.DataFrame:
-    """Read the file of a reference: a path, or a force in N."""
-    assert spec.path is not None
-    if spec.kind == "path":
-        return read_reference_path(spec.path)
-    names = {} if spec.force_column is None else {"force": spec.force_column}
-    try:
-        table = read_aid_table(spec.path, {"force": "N"}, names=names)
-    except DataError as error:
-        if error.finding.code != "io.missing-columns":
-            raise
-        raise DataError(
-            "crash.force-without-column",
-            file=error.finding.file,
-            quantity="force_column",
-            columns=error.finding.data["columns"],
-        ) from None
-    source = table.attrs["source"]
-    if any(f.code == "io.unit-assumed" for f in table.attrs["findings"]):
-        if spec.force_unit is None:
-            raise DataError("crash.force-without-unit", file=source, quantity="force_unit")
-        table["force"] *= FORCES[spec.force_unit]
-    elif spec.force_unit is not None:
-        raise DataError("crash.force-unit-stated-twice", file=source, quantity="force_unit")
-    return table
-
-
-def _deformed(
-    spec: CaseSpec, made: CrashReconstruction, tables: Mapping[str, pd.DataFrame]
-) -> tuple[Deformation, tuple[ReferenceSpec, ...]]:
-    """Deformation of the vehicle, and its references with the forces as changes of velocity."""
-    vehicle, number = spec.vehicle, main_event(made.main)
-    energy = equivalent = None
-    if (d := vehicle.deformation) is not None:
-        energy = crush_energy(
-            d.crush_m,
-            (d.width_m, d.width_sd_m),
-            (d.stiffness_a_n_per_m, d.stiffness_a_sd_n_per_m),
-            (d.stiffness_b_n_per_m2, d.stiffness_b_sd_n_per_m2),
-            crush_sd=d.crush_sd_m,
-            angle_deg=(d.angle_deg, d.angle_sd_deg),
-        )
-        if vehicle.mass_kg is not None:
-            equivalent = energy_equivalent_speed(energy, _mass(vehicle, vehicle.mass_kg))
-    crushed: list[Crush] = []
-    if vehicle.against == "barrier":
-        for unit in dict.fromkeys((made.main, *made.units)):
-            own = main_event(unit)
-            if own is not None:
-                found = dynamic_crush(unit.name, unit.path, unit.events.events[own])
-                crushed += [found] if found is not None else []
-    impulses, stated = [], []
-    for reference in spec.references:
-        if reference.kind != "force":
-            stated.append(reference)
-            continue
-        if number is None:
-            raise ConfigError(
-                "crash.force-without-event",
-                quantity=f"references, {reference.name}",
-                name=made.main.name,
-            )
-        # A part of the contact would not do: until it ends, its parts move against each other.
-        whole = made.main.body[number].event.delta_v
-        span = (whole.start, whole.end)
-        assert reference.path is not None and reference.force_sd_percent is not None
-        table = tables[reference.path]
-        try:
-            impulse = impulse_of(
-                table.index.to_numpy(),
-                table["force"].to_numpy(),
-                span,
-                reference.force_sd_percent / 100.0,
-            )
-        except DataError as error:
-            raise error.replaced(file=table.attrs["source"]) from None
-        impulses.append((reference.name, impulse))
-        stated.append(_as_change(reference, impulse, span, spec, made.main))
-    return Deformation(tuple(crushed), tuple(impulses), energy, equivalent), tuple(stated)
-
-
-def _mass(vehicle: VehicleSpec, mass: float) -> tuple[float, float]:
-    """Mass, and its standard deviation."""
-    return mass, vehicle.mass_sd_kg or MASS_SD * mass
-
-
-def _as_change(
-    reference: ReferenceSpec,
-    impulse: Figure,
-    span: tuple[float, float],
-    spec: CaseSpec,
-    main: UnitReconstruction,
-) -> ReferenceSpec:
-    """A measured force as the change of velocity that it makes.
-
-    It pushes against the travel. The tires may have made a part of the change that the recorders
-    measure, up to their friction, in an unknown direction.
-    """
-    assert spec.vehicle.mass_kg is not None
-    mass, mass_sd = _mass(spec.vehicle, spec.vehicle.mass_kg)
-    size, sd = impulse.value / mass, impulse.half_width / TWO_SIDED_95 / mass
-    tires = 0.5 * spec.options.tire_friction * STANDARD_GRAVITY * (span[1] - span[0])
-    sign = 1.0
-    if reference.axis != "resultant":
-        change = main.delta_v
-        along = 0.0 if change is None else float(change.delta_v.vector @ AXES[reference.axis])
-        sign = -1.0 if along < 0.0 else 1.0
-    return reference.model_copy(
-        update={
-            "path": None,
-            "delta_v_m_per_s": sign * size,
-            "delta_v_sd_m_per_s": math.hypot(sd, size * mass_sd / mass, tires),
-            "over_s": span,
-        }
-    )
-
-
-def _closed(first: CaseResult, second: CaseResult) -> tuple[CaseResult, CaseResult]:
-    """Both results with their closure, and with what contradicts it."""
-    names = first.vehicle_names
-    pair, findings = [], []
-    for result, name in zip((first, second), names, strict=True):
-        vehicle = _vehicle_of(result, result.reconstruction.main, name)
-        if vehicle is None:
-            findings.append(Finding("crash.closure-without-change", quantity="closure", name=name))
-        else:
-            pair.append(vehicle)
-    closure = blamed = None
-    if len(pair) == 2:
-        friction = max(r.spec.options.tire_friction for r in (first, second))
-        energies = [e for r in (first, second) if (e := r.deformation.energy) is not None]
-        depths = [r.spec.vehicle for r in (first, second) if r.spec.vehicle.crush_m is not None]
-        share = None
-        if len(energies) == 2:
-            share = energy_share(*energies)
-        elif len(depths) == 2:
-            share = equal_force_share(*((v.crush_m or 0.0, v.crush_sd_m) for v in depths))
-        elif energies or depths:
-            findings.append(
-                Finding("crash.crush-of-one", severity="note", quantity="vehicle, crush_m")
-            )
-        closure = close_vehicles(*pair, friction=friction, energy_share=share)
-        findings += closure.findings
-        findings += _deformation_apart((first, second), closure)
-        blamed = blame(*pair, friction=friction) if closure.contradicted else None
-        findings += [one.finding for one in blamed.candidates] if blamed is not None else []
-        for result, other in ((first, pair[1]), (second, pair[0])):
-            units = result.reconstruction.units
-            points = [_vehicle_of(result, unit, unit.name) for unit in units]
-            known = [p for p in points if p is not None]
-            if len(known) > 1:
-                findings += blame_points(known, other, friction=friction)
-    return (
-        replace(first, closure=closure, blame=blamed, findings=_once([*first.findings, *findings])),
-        replace(
-            second, closure=closure, blame=blamed, findings=_once([*second.findings, *findings])
-        ),
-    )
-
-
-def _closed_against_barrier(result: CaseResult) -> CaseResult:
-    """A result with what it says against a rigid barrier."""
-    name = result.vehicle_names[0]
-    vehicle = _vehicle_of(result, result.reconstruction.main, name)
-    if vehicle is None:
-        lacking = Finding("crash.closure-without-change", quantity="closure", name=name)
-        return replace(result, findings=_once([*result.findings, lacking]))
-    closure = against_barrier(vehicle, friction=result.spec.options.tire_friction)
-    findings = [*result.findings, *closure.findings]
-    apart = closure.separation_speed
-    if closure.contradicted:
-        findings.append(Finding("crash.no-rigid-barrier", quantity="vehicle, against", name=name))
-    elif apart is not None and apart.high < 0.0:
-        findings.append(
-            Finding(
-                "crash.moves-on-at-barrier",
-                quantity="vehicle, against",
-                name=name,
-                value=-apart.value,
-                low=-apart.high,
-            )
-        )
-    findings += _deformation_apart((result,), closure)
-    return replace(result, closure=closure, findings=_once(findings))
-
-
-def _deformation_apart(results: Sequence[CaseResult], closure: Closure) -> Iterator[Finding]:
-    """What contradicts the residual crush: the energy that was lost, and the dynamic crush."""
-    energies = [r.deformation.energy for r in results if r.deformation.energy is not None]
-    lost = closure.energy
-    if len(energies) == len(results) and lost is not None:
-        whole = sum(e.value for e in energies)
-        half = math.hypot(lost.half_width, *(e.half_width for e in energies))
-        if abs(whole - lost.value) > half:
-            yield Finding(
-                "crash.deformation-energy-apart",
-                quantity="vehicle, deformation",
-                energy=1e-3 * whole,
-                lost=1e-3 * lost.value,
-                half=1e-3 * half,
-            )
-    for result in results:
-        residual, dynamic = result.spec.vehicle.deformation, result.deformation.crush[:1]
-        if residual is None or not dynamic or dynamic[0].at_least:
-            continue
-        deepest, least = max(residual.crush_m), TWO_SIDED_95 * residual.crush_sd_m
-        if deepest - dynamic[0].depth.value > math.hypot(dynamic[0].depth.half_width, least):
-            yield Finding(
-                "crash.residual-crush-above-dynamic",
-                quantity="vehicle, deformation",
-                residual=deepest,
-                dynamic=dynamic[0].depth.value,
-            )
-
-
-def _once(findings: Sequence[Finding]) -> tuple[Finding, ...]:
-    return tuple(dict.fromkeys(findings))
-
-
-def _vehicle_of(result: CaseResult, unit: UnitReconstruction, name: str) -> ImpactVehicle | None:
-    spec = result.spec
-    return impact_vehicle(unit, name, spec.vehicle, spec.entry, spec.point)
-
-
-def impact_vehicle(
-    unit: UnitReconstruction, name: str, vehicle: VehicleSpec, entry: EntrySpec, point: PointSpec
-) -> ImpactVehicle | None:
-    """A vehicle by one of its answers, at the reference point; None without a resolved change.
-
-    Its axes are those at the onset of the contact, over which its change of velocity is. The bound
-    of that is of the resolved change, with what the vehicle may have turned since, but for the
-    heading of the entry, which turns the entry velocity, too, and is an unknown of its own.
-    """
-    number = main_event(unit)
-    over_ground = None if number is None else unit.ned[number]
-    if number is None or over_ground is None:
-        return None
-    change, path = over_ground.event, unit.path
-    start, end = change.delta_v.start, change.delta_v.end
-    heading = float(np.interp(start, path.time, np.unwrap(path.table["heading"], period=360.0)))
-    turned = np.radians(heading)
-    into_body = np.array(
-        [[np.cos(turned), np.sin(turned), 0.0], [-np.sin(turned), np.cos(turned), 0.0], [0, 0, 1.0]]
-    )
-    velocity = np.array([np.interp(start, path.time, path.table[axis]) for axis in ("VN", "VE")])
-    speed = float(np.linalg.norm(velocity))
-    sd = entry.speed_sd_m_per_s or 0.0
-    across = speed * math.radians(entry.slip_sd_deg)
-    heading_sd: float | None = entry.heading_sd_deg
-    if entry.kind in OF_DRIVES:
-        sd = across = float(path.sd[["VN", "VE"]].iloc[path.anchor].max())
-        if entry.kind == "gnss":
-            heading_sd = float(path.sd["heading"].iloc[path.anchor])
-    # The path of a vehicle that stood is in its own axes.
-    stated = entry.heading_deg if entry.kind == "standstill" else 0.0
-    rate = rate_change = None
-    if "heading" not in unit.at_point.assumed_axes:
-        rate, rate_change = _yaw_rates(unit, start, end)
-    parts = change.bound.by_contributor.drop(index=ENTRY_HEADING, errors="ignore")
-    covariance = parts.to_numpy().sum(axis=0).reshape(3, 3)
-    mass, origin = vehicle.mass_kg, point.position_m
-    return ImpactVehicle(
-        name,
-        into_body @ change.delta_v.vector,
-        into_body @ covariance @ into_body.T,
-        end - start,
-        mass=None if mass is None else _mass(vehicle, mass),
-        heading_deg=(heading + stated, heading_sd) if heading_sd else None,
-        entry=into_body[:2, :2] @ velocity,
-        entry_covariance=np.diag([sd**2, across**2]),
-        rate=rate,
-        rate_change=rate_change,
-        contact=None
-        if vehicle.contact_m is None
-        else (
-            vehicle.contact_m[0] - origin[0],
-            vehicle.contact_m[1] - origin[1],
-            vehicle.contact_sd_m,
-        ),
-    )
-
-
-def _yaw_rates(
-    unit: UnitReconstruction, start: float, end: float
-) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Yaw rate at an instant, and its change until another, each with its sd, deg/s."""
-    of, effects = unit.at_point, unit.at_point.effects
-    first, last = np.searchsorted(of.time, [start, end]).clip(0, len(of.time) - 1)
-    by_unknowns = effects.rate[:, :, 2]
-    noise = float(np.median(effects.rate_noise[:, 2]))
-    sd = math.hypot(float(np.linalg.norm(by_unknowns[:, first])), noise)
-    apart = by_unknowns[:, last] - by_unknowns[:, first]
-    change_sd = math.hypot(float(np.linalg.norm(apart)), math.sqrt(2.0) * noise)
-    yaw = np.degrees(of.rate[:, 2])
-    return (
-        (float(yaw[first]), math.degrees(sd)),
-        (float(yaw[last] - yaw[first]), math.degrees(change_sd)),
-    )
-
-
 # Recorders of a case, from its file and the records.
 
 
@@ -875,9 +533,6 @@ def _triad(
 # Comparison of a case's answers with references.
 
 
-AXES = {"forward": (1.0, 0.0, 0.0), "right": (0.0, 1.0, 0.0)}
-
-
 @dataclass(frozen=True, eq=False)
 class ReferenceAnswer:
     """Comparison of one unit's answer with a reference: a path, or a delta-V over a span in s.
@@ -894,6 +549,33 @@ class ReferenceAnswer:
     delta_v: float
     sd: float
     consistent: bool
+
+
+def _reference_table(spec: ReferenceSpec) -> pd.DataFrame:
+    """Read the file of a reference: a path, or a force in N."""
+    assert spec.path is not None
+    if spec.kind == "path":
+        return read_reference_path(spec.path)
+    names = {} if spec.force_column is None else {"force": spec.force_column}
+    try:
+        table = read_aid_table(spec.path, {"force": "N"}, names=names)
+    except DataError as error:
+        if error.finding.code != "io.missing-columns":
+            raise
+        raise DataError(
+            "crash.force-without-column",
+            file=error.finding.file,
+            quantity="force_column",
+            columns=error.finding.data["columns"],
+        ) from None
+    source = table.attrs["source"]
+    if any(f.code == "io.unit-assumed" for f in table.attrs["findings"]):
+        if spec.force_unit is None:
+            raise DataError("crash.force-without-unit", file=source, quantity="force_unit")
+        table["force"] *= FORCES[spec.force_unit]
+    elif spec.force_unit is not None:
+        raise DataError("crash.force-unit-stated-twice", file=source, quantity="force_unit")
+    return table
 
 
 def compare_reference(
@@ -978,13 +660,6 @@ class SeverityAnswer:
     because: Finding | None = None
     at_least: bool = False
     of: str = ""
-
-
-def main_event(unit: UnitReconstruction) -> int | None:
-    """Number, from 0, of the event with the largest delta-V; None without an event."""
-    if not unit.body:
-        return None
-    return max(range(len(unit.body)), key=lambda k: unit.body[k].event.resultant)
 
 
 def case_severity(spec: CaseSpec, unit: UnitReconstruction) -> tuple[SeverityAnswer, ...]:

@@ -13,14 +13,8 @@ from strapdown import __version__
 from strapdown.bundle import names_file, write_json
 from strapdown.config.crash_case import CaseSpec
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
-from strapdown.crash.case import (
-    CaseResult,
-    Deformation,
-    ReferenceAnswer,
-    SeverityAnswer,
-    main_event,
-    run_cases,
-)
+from strapdown.crash.case import CaseResult, ReferenceAnswer, SeverityAnswer, run_cases
+from strapdown.crash.case_contact import Deformation, main_event
 from strapdown.crash.case_indices import CrashIndex
 from strapdown.crash.closure import Closure, Figure
 from strapdown.crash.consistency import UnitComparison

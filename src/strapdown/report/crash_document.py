@@ -10,7 +10,8 @@ import pandas as pd
 
 from strapdown import __version__
 from strapdown.constants import TWO_SIDED_95
-from strapdown.crash.case import CaseResult, ReferenceAnswer, main_event
+from strapdown.crash.case import CaseResult, ReferenceAnswer
+from strapdown.crash.case_contact import main_event
 from strapdown.crash.path import CrashPath
 from strapdown.crash.reconstruction import UnitReconstruction
 from strapdown.report import crash_tables

@@ -9,7 +9,8 @@ import numpy as np
 
 from strapdown.config.crash_case import TriadSpec
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
-from strapdown.crash.case import CaseResult, main_event
+from strapdown.crash.case import CaseResult
+from strapdown.crash.case_contact import main_event
 from strapdown.crash.closure import Figure
 from strapdown.crash.delta_v_bound import VelocityChange
 from strapdown.crash.drive_entry import determined

@@ -9,7 +9,8 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from strapdown.constants import TWO_SIDED_95
-from strapdown.crash.case import OF_DRIVES, CaseResult, main_event
+from strapdown.crash.case import CaseResult
+from strapdown.crash.case_contact import OF_DRIVES, main_event
 from strapdown.crash.closure import Closure
 from strapdown.crash.delta_v_bound import VelocityChange
 from strapdown.crash.drive_entry import CAR

@@ -18,7 +18,7 @@ from tests.unit.crash.folding_crash import END, FIGURES, KINDS, Crash, errors
 
 from strapdown import Entry
 from strapdown.config.crash_case import EntrySpec, PointSpec, VehicleSpec
-from strapdown.crash.case import impact_vehicle
+from strapdown.crash.case_contact import impact_vehicle
 from strapdown.crash.closure import close_vehicles
 from strapdown.crash.deformation import dynamic_crush
 from strapdown.dsp.chi_square import normal_quantile

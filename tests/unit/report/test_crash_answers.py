@@ -14,7 +14,8 @@ from tests.coded import coded
 from strapdown import simulate
 from strapdown.bundle import to_json
 from strapdown.config.crash_case import AssumedSpec, CaseSpec, ReferenceSpec
-from strapdown.crash.case import case_severity, compare_reference, main_event, run_case
+from strapdown.crash.case import case_severity, compare_reference, run_case
+from strapdown.crash.case_contact import main_event
 from strapdown.crash.reconstruction import summary_table
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats import read_raw

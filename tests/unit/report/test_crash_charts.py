@@ -10,7 +10,7 @@ import pytest
 from tests.unit.report.crash_results import crash_case, figures_of
 
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
-from strapdown.crash.case import main_event
+from strapdown.crash.case_contact import main_event
 from strapdown.crash.delta_v_bound import body_delta_v_bound
 from strapdown.crash.pdof import pdof_by_shift
 from strapdown.report.chart import SERIES_COLOURS
