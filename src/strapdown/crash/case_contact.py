@@ -144,8 +144,8 @@ def _as_change(
 ) -> ReferenceSpec:
     """A measured force as the change of velocity that it makes.
 
-    It pushes against the travel. The tires may have made a part of the change that the recorders
-    measure, up to their friction, in an unknown direction.
+    Records of forces have either sign: it takes that of the change that the recorders measure. The
+    tires may have made a part of this, up to their friction, in an unknown direction.
     """
     assert spec.vehicle.mass_kg is not None
     mass, mass_sd = _mass(spec.vehicle, spec.vehicle.mass_kg)
