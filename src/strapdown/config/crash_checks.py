@@ -6,8 +6,6 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from strapdown.config.crash_case import AssumedSpec, CaseSpec, TriadSpec, UnitSpec, VehicleSpec
 from strapdown.config.spec import At, Fault, missing
 from strapdown.config.toml_file import KeyPath
@@ -94,11 +92,11 @@ def _vehicle(vehicle: VehicleSpec) -> Iterator[Fault]:
 
 
 def _deformation(vehicle: VehicleSpec) -> Iterator[Fault]:
-    found, size = vehicle.deformation, max(vehicle.length_m, vehicle.width_m)
-    corners = np.array(vehicle.outline_m or [(0.0, 0.0)])
-    size = max(size, float(np.ptp(corners, axis=0).max()))
+    found = vehicle.deformation
     if found is None:
         return
+    spans = (max(along) - min(along) for along in zip(*vehicle.outline_m, strict=True))
+    size = max(vehicle.length_m, vehicle.width_m, *spans)
     for name, given in (("crush_m", max(found.crush_m)), ("width_m", found.width_m)):
         if given > size:
             other = At(("vehicle",), f"{vehicle.length_m:g} m by {vehicle.width_m:g} m")

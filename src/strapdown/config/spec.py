@@ -33,6 +33,7 @@ from pydantic_core import PydanticCustomError
 from strapdown.config.toml_file import KeyPath, TomlFile, place_of, shown, shown_key
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, Finding
+from strapdown.units import FORCES, LENGTHS
 
 # --- units of keys ------------------------------------------------------------------------
 
@@ -57,12 +58,12 @@ UNITS: dict[str, dict[str, tuple[float, float]]] = {
     "_n_per_m2": {
         "_n_per_m2": (1.0, 1.0),
         "_kn_per_m2": (1e3, 1.0),
-        "_lb_per_in2": (4.4482216152605 / 0.0254**2, 1.0),
+        "_lb_per_in2": (FORCES["lbf"] / LENGTHS["in"] ** 2, 1.0),
     },
     "_n_per_m": {
         "_n_per_m": (1.0, 1.0),
         "_kn_per_m": (1e3, 1.0),
-        "_lb_per_in": (4.4482216152605 / 0.0254, 1.0),
+        "_lb_per_in": (FORCES["lbf"] / LENGTHS["in"], 1.0),
     },
     "_kg": {"_kg": (1.0, 1.0), "_lb": (0.45359237, 1.0)},
     "_deg_per_s": {"_deg_per_s": (1.0, 1.0)},

@@ -159,26 +159,8 @@ def run_cases(
     tuple of CaseResult
         Each with the inputs of all, since its closure depends on them.
     """
-    for spec, file in cases:
-        if len(cases) > 1 and spec.vehicle.against == "barrier":
-            raise ConfigError(
-                "crash.barrier-and-other-vehicle",
-                file=None if file is None else file.name,
-                quantity="vehicle, against",
-            )
-    used: set[tuple[str, str]] = set()
-    for spec, file in cases:
-        own = {(t.path, c.lstrip("-")) for t in _triads(spec) for c in t.channels.values()}
-        if shared := sorted(used & own):
-            path, channel = shared[0]
-            raise ConfigError(
-                "crash.vehicles-share-record",
-                file=None if file is None else file.name,
-                quantity="channels",
-                channel=channel,
-                record=Path(path).name,
-            )
-        used |= own
+    if len(cases) > 1:
+        _refuse_one_vehicle(cases)
     alone = []
     for k, (spec, file) in enumerate(cases):
 
@@ -203,6 +185,28 @@ def run_cases(
         return closed_together(*together)
     only_two = Finding("crash.closure-of-two-only", severity="note", quantity="closure")
     return tuple(replace(one, findings=(*one.findings, only_two)) for one in together)
+
+
+def _refuse_one_vehicle(cases: Sequence[tuple[CaseSpec, Path | None]]) -> None:
+    """Refuse cases of several vehicles of which one met a barrier, or two have one record."""
+    used: set[tuple[str, str]] = set()
+    for spec, file in cases:
+        name = None if file is None else file.name
+        if spec.vehicle.against == "barrier":
+            raise ConfigError(
+                "crash.barrier-and-other-vehicle", file=name, quantity="vehicle, against"
+            )
+        own = {(t.path, c.lstrip("-")) for t in _triads(spec) for c in t.channels.values()}
+        if shared := sorted(used & own):
+            path, channel = shared[0]
+            raise ConfigError(
+                "crash.vehicles-share-record",
+                file=name,
+                quantity="channels",
+                channel=channel,
+                record=Path(path).name,
+            )
+        used |= own
 
 
 def _with_inputs_of(own: CaseResult, others: Sequence[CaseResult]) -> tuple[InputFiles, ...]:

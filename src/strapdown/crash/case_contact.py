@@ -30,6 +30,7 @@ from strapdown.crash.deformation import (
     equal_force_share,
     impulse_of,
 )
+from strapdown.crash.path import at_instant
 from strapdown.crash.reconstruction import CrashReconstruction, UnitReconstruction
 from strapdown.errors import ConfigError, DataError, Finding
 
@@ -293,7 +294,7 @@ def impact_vehicle(
     into_body = np.array(
         [[np.cos(turned), np.sin(turned), 0.0], [-np.sin(turned), np.cos(turned), 0.0], [0, 0, 1.0]]
     )
-    velocity = np.array([np.interp(start, path.time, path.table[axis]) for axis in ("VN", "VE")])
+    velocity = at_instant(path, start, ("VN", "VE"))
     speed = float(np.linalg.norm(velocity))
     sd = entry.speed_sd_m_per_s or 0.0
     across = speed * math.radians(entry.slip_sd_deg)

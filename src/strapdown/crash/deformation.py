@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.closure import CONTACT_FRICTION, Figure, Pair, jacobian_of
 from strapdown.crash.events import PART_563
-from strapdown.crash.path import PLACE
+from strapdown.crash.path import PLACE, at_instant
 from strapdown.errors import DataError
 
 if TYPE_CHECKING:
@@ -70,16 +70,15 @@ def dynamic_crush(unit: str, path: CrashPath, event: CrashEvent) -> Crush | None
         touch = 0.5 * (event.time_zero + event.woken)
         touch_sd = math.hypot((event.woken - event.time_zero) / math.sqrt(12.0), event.time_zero_sd)
     place = path.table[["north", "east"]].to_numpy()
-    velocity = [np.interp(touch, path.time, path.table[axis]) for axis in ("VN", "VE")]
+    velocity = at_instant(path, touch, ("VN", "VE"))
     speed = float(np.hypot(*velocity))
     rows = np.flatnonzero(path.time >= touch)
     if not rows.size or touch < path.time[0] or speed <= 0.0:
         return None
     along = np.array([*velocity, 0.0]) / speed
-    after = [np.interp(event.end, path.time, path.table[axis]) for axis in ("VN", "VE")]
-    if float(along[:2] @ after) >= speed:
+    if float(along[:2] @ at_instant(path, event.end, ("VN", "VE"))) >= speed:
         return None
-    start = [np.interp(touch, path.time, place[:, k]) for k in (0, 1)]
+    start = at_instant(path, touch, ("north", "east"))
     depth = (place[rows] - start) @ along[:2]
     k, first = int(rows[np.argmax(depth)]), int(rows[0])
     grown = (path.errors[:, k, PLACE] - path.errors[:, first, PLACE]) @ along

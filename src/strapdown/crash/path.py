@@ -270,6 +270,11 @@ class CrashPath:
         return by_contributor(self.errors[:, row] ** 2, ERROR, self.contributors, noise)
 
 
+def at_instant(path: CrashPath, instant: float, columns: Sequence[str]) -> Array:
+    """Values of columns of a path at an instant, s, linear between its samples."""
+    return np.array([np.interp(instant, path.time, path.table[name]) for name in columns])
+
+
 def path_line(path: CrashPath) -> str:
     """End point of a path as a line of text."""
     sd = TWO_SIDED_95 * path.sd[NED].iloc[-1].to_numpy()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -394,9 +395,7 @@ def _comparison(comparison: UnitComparison) -> dict[str, Any]:
 
 
 def _bounded(figure: Figure | None) -> dict[str, float] | None:
-    if figure is None:
-        return None
-    return {"value": figure.value, "low": figure.low, "high": figure.high}
+    return None if figure is None else asdict(figure)
 
 
 def _deformation(found: Deformation) -> dict[str, Any]:
@@ -404,7 +403,7 @@ def _deformation(found: Deformation) -> dict[str, Any]:
         "crush": [
             {
                 "recorder": one.unit,
-                "depth_m": {**one.depth.__dict__, "high": None if one.at_least else one.depth.high},
+                "depth_m": asdict(one.depth) | ({"high": None} if one.at_least else {}),
                 "first_touch_s": one.touch,
                 "time_s": one.time,
                 "at_least": one.at_least,
@@ -421,7 +420,6 @@ def _deformation(found: Deformation) -> dict[str, Any]:
 
 
 def _closure(result: CaseResult, closure: Closure) -> dict[str, Any]:
-    bounded = _bounded
     return {
         "vehicles": list(result.vehicle_names),
         "contradicted": closure.contradicted,
@@ -430,17 +428,17 @@ def _closure(result: CaseResult, closure: Closure) -> dict[str, Any]:
         "chi_square": closure.chi_square,
         "freedom": closure.freedom,
         "probability": closure.probability,
-        "impulse_difference_n_s": bounded(closure.magnitude),
-        "mass_ratio_second_to_first": bounded(closure.mass_ratio),
-        "relative_heading_deg": bounded(closure.relative_heading_deg),
-        "direction_of_impulse_on_first_deg": bounded(closure.direction_deg),
-        "closing_speed_m_per_s": bounded(closure.closing_speed),
-        "separation_speed_m_per_s": bounded(closure.separation_speed),
-        "restitution": bounded(closure.restitution),
-        "common_velocity_m_per_s": bounded(closure.common_velocity),
-        "impulse_n_s": bounded(closure.impulse),
-        "energy_lost_j": bounded(closure.energy),
-        "energy_equivalent_speed_m_per_s": [bounded(f) for f in closure.energy_equivalent_speed],
+        "impulse_difference_n_s": _bounded(closure.magnitude),
+        "mass_ratio_second_to_first": _bounded(closure.mass_ratio),
+        "relative_heading_deg": _bounded(closure.relative_heading_deg),
+        "direction_of_impulse_on_first_deg": _bounded(closure.direction_deg),
+        "closing_speed_m_per_s": _bounded(closure.closing_speed),
+        "separation_speed_m_per_s": _bounded(closure.separation_speed),
+        "restitution": _bounded(closure.restitution),
+        "common_velocity_m_per_s": _bounded(closure.common_velocity),
+        "impulse_n_s": _bounded(closure.impulse),
+        "energy_lost_j": _bounded(closure.energy),
+        "energy_equivalent_speed_m_per_s": [_bounded(f) for f in closure.energy_equivalent_speed],
         "explained_by": []
         if result.blame is None
         else [finding_json(one.finding) for one in result.blame.candidates],
