@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar, NoReturn
 
@@ -188,36 +188,56 @@ class AttitudeRun:
     diagnostics: dict[str, float]
 
 
+#: Attitudes at which a run begins anew, by row: (4,), body to local level.
+Restarts = Sequence[tuple[int, Array]]
+
+
 def attitude_history(
-    algorithm: AttitudeAlgorithm, increments: pd.DataFrame | Steps, q_nb: ArrayLike
+    algorithm: AttitudeAlgorithm,
+    increments: pd.DataFrame | Steps,
+    q_nb: ArrayLike,
+    restarts: Restarts = (),
 ) -> Array:
     """Quaternions of `run_attitude` alone, (n+1, 4): at the start and after each step."""
-    return _run(algorithm, increments, q_nb)[0]
-
-
-def _run(
-    algorithm: AttitudeAlgorithm, increments: pd.DataFrame | Steps, q_nb: ArrayLike
-) -> tuple[Array, Array]:
-    """Quaternions at the start and after each step, and the state at the end."""
-    state = algorithm.begin(rotation.normalise(q_nb))
-    first = state[None, : algorithm.width]
     steps = increments if isinstance(increments, Steps) else steps_of(increments)
-    state, history = algorithm.advance(state, steps)
-    # A truncated series may overflow.
-    bad = np.flatnonzero(~(np.abs(history) < LARGEST).all(axis=1))
-    if bad.size:
-        raise DivergenceError(
-            "attitude.numbers-left-range-floating-point",
-            row=int(bad[0]) + 1,
-            quantity=algorithm.label,
-        )
-    return algorithm.quaternions(np.vstack([first, history])), state
+    return np.vstack([q for q, _ in _pieces(algorithm, steps, q_nb, restarts)])
+
+
+def pieces_of(count: int, q_nb: ArrayLike, restarts: Restarts) -> list[tuple[slice, Array]]:
+    """Steps of each piece of a run of `count` steps, and the attitude that it begins with.
+
+    The step that ends where a piece begins belongs to none.
+    """
+    begins = [(0, np.asarray(q_nb, dtype=np.float64)), *restarts]
+    ends = [row - 1 for row, _ in restarts] + [count]
+    return [(slice(row, end), q) for (row, q), end in zip(begins, ends, strict=True)]
+
+
+def _pieces(
+    algorithm: AttitudeAlgorithm, steps: Steps, q_nb: ArrayLike, restarts: Restarts
+) -> Iterator[tuple[Array, Array]]:
+    """Quaternions at the start and after each step of each piece, and the state at its end."""
+    for part, start in pieces_of(len(steps.dt), q_nb, restarts):
+        piece = Steps(steps.dt[part], steps.theta[part], steps.dtheta[part])
+        begun = algorithm.begin(rotation.normalise(start))
+        first = begun[None, : algorithm.width]
+        state, history = algorithm.advance(begun, piece)
+        # A truncated series may overflow.
+        bad = np.flatnonzero(~(np.abs(history) < LARGEST).all(axis=1))
+        if bad.size:
+            raise DivergenceError(
+                "attitude.numbers-left-range-floating-point",
+                row=part.start + int(bad[0]) + 1,
+                quantity=algorithm.label,
+            )
+        yield algorithm.quaternions(np.vstack([first, history])), state
 
 
 def run_attitude(
     algorithm: AttitudeAlgorithm,
     increments: pd.DataFrame,
     q_nb: ArrayLike = (1.0, 0.0, 0.0, 0.0),
+    restarts: Restarts = (),
 ) -> AttitudeRun:
     """Run an attitude algorithm over a whole record.
 
@@ -228,12 +248,15 @@ def run_attitude(
         An Increments table; the run starts where its first step begins.
     q_nb : array_like, (4,)
         Attitude at the start, body to local level.
+    restarts : sequence of (int, ndarray)
+        Rows (from 1) at which the run begins anew with another attitude, as after a gap; the step
+        that ends there is not used.
 
     Returns
     -------
     AttitudeRun
         Attitude at the start and at the end of each step, and the diagnostics of the
-        algorithm.
+        algorithm: where the run begins anew, those of its worst piece.
 
     Raises
     ------
@@ -242,16 +265,29 @@ def run_attitude(
     DivergenceError
         The algorithm left the range of floating point.
     """
-    q, state = _run(algorithm, increments, q_nb)
     ends = increments.index.to_numpy(dtype=np.float64)
     time = np.concatenate([[ends[0] - increments["dt"].iloc[0]], ends])
+    q, diagnostics = [], []
+    first = 0
+    for piece, state in _pieces(algorithm, steps_of(increments), q_nb, restarts):
+        q.append(piece)
+        diagnostics.append(algorithm.diagnostics(state, time[first : first + len(piece)]))
+        first += len(piece)
     return AttitudeRun(
         algorithm=algorithm.label,
         title=algorithm.title,
         equations=algorithm.equations,
-        attitude=attitude_table(time, q),
-        diagnostics=algorithm.diagnostics(state, time),
+        attitude=attitude_table(time, np.vstack(q)),
+        diagnostics=_worst(diagnostics),
     )
+
+
+def _worst(diagnostics: Sequence[dict[str, float]]) -> dict[str, float]:
+    """Diagnostics of the piece nearest to the pole, or with the largest loss."""
+    key = "closest_to_pole_deg"
+    if key in diagnostics[0]:
+        return min(diagnostics, key=lambda d: d[key])
+    return max(diagnostics, key=lambda d: max((abs(v) for v in d.values()), default=0.0))
 
 
 # Sample by sample, as on a device or live.

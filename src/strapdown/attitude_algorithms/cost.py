@@ -15,7 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown import rotation
 from strapdown._kernels import arithmetic
 from strapdown._kernels.arithmetic import single_precision
-from strapdown.attitude_algorithms.algorithm import Array, AttitudeAlgorithm
+from strapdown.attitude_algorithms.algorithm import (
+    Array,
+    AttitudeAlgorithm,
+    Restarts,
+    pieces_of,
+)
 from strapdown.constants import CORTEX_M4F_CYCLES
 from strapdown.tables import GYRO
 
@@ -163,13 +168,19 @@ def single_kernel(algorithm: AttitudeAlgorithm) -> Any:
 
 
 def run_single(
-    algorithm: AttitudeAlgorithm, increments: tuple[Single, ...], q_nb: ArrayLike
+    algorithm: AttitudeAlgorithm,
+    increments: tuple[Single, ...],
+    q_nb: ArrayLike,
+    restarts: Restarts = (),
 ) -> Array:
     """Quaternions, (n+1, 4), of an algorithm with every operation in single precision."""
     dt, theta, dtheta = increments
-    state = algorithm.begin(rotation.normalise(q_nb)).astype(np.float32)
-    first = state[None, : algorithm.width].astype(np.float64)
-    history = np.empty((len(dt), algorithm.width), np.float32)
-    options = (np.float32(option) for option in algorithm.kernel_options())
-    single_kernel(algorithm)(state, dt, theta, dtheta, history, *options)
-    return algorithm.quaternions(np.vstack([first, history.astype(np.float64)]))
+    options = [np.float32(option) for option in algorithm.kernel_options()]
+    out = []
+    for part, start in pieces_of(len(dt), q_nb, restarts):
+        state = algorithm.begin(rotation.normalise(start)).astype(np.float32)
+        first = state[None, : algorithm.width].astype(np.float64)
+        history = np.empty((part.stop - part.start, algorithm.width), np.float32)
+        single_kernel(algorithm)(state, dt[part], theta[part], dtheta[part], history, *options)
+        out.append(algorithm.quaternions(np.vstack([first, history.astype(np.float64)])))
+    return np.vstack(out)

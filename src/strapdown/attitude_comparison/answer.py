@@ -10,6 +10,7 @@ import pandas as pd
 
 from strapdown.attitude_algorithms import AttitudeAlgorithm, RotationVector
 from strapdown.attitude_algorithms.cost import Cost
+from strapdown.attitude_comparison.error_budget import ErrorBudget, Holding
 from strapdown.attitude_comparison.sweep import (
     MOST_ACCURATE,
     Grounds,
@@ -47,7 +48,12 @@ class Answer:
         The answer as text.
     tolerance_deg : float
     algorithm, meaning : str or None
+        The rate is that of samples averaged by the sensor (``sum``).
     rate_hz : float or None
+    dropped_hz : float or None
+        Rate that the same algorithm needs where samples are left out instead.
+    holding : Holding or None
+        For how long integration alone stays within the tolerance, where a truth is known.
     why, helps : tuple of str
         Reasons, and possible remedies.
     """
@@ -60,6 +66,8 @@ class Answer:
     rate_hz: float | None
     why: tuple[str, ...]
     helps: tuple[str, ...]
+    dropped_hz: float | None = None
+    holding: Holding | None = None
 
 
 @dataclass(frozen=True)
@@ -89,6 +97,11 @@ class Evidence:
     reference_sd : float
         Standard deviation of the best reference point, deg; 0 where there is a truth, or it is
         not stated.
+    budget : ErrorBudget or None
+        Parts of the sensor error.
+    holding : Holding or None
+    as_means : bool
+        Whether the stamps of instantaneous rates are late as those of means are.
     """
 
     algorithms: Sequence[AttitudeAlgorithm]
@@ -102,6 +115,9 @@ class Evidence:
     start: float = 0.0
     sampling: float = 0.0
     reference_sd: float = 0.0
+    budget: ErrorBudget | None = None
+    holding: Holding | None = None
+    as_means: bool = False
 
 
 @dataclass(frozen=True)
@@ -136,8 +152,12 @@ def find_answer(evidence: Evidence, tolerance_deg: float) -> Answer:
     return _limited_by_rate(evidence, best, sensor, tolerance_deg)
 
 
-def choices(evidence: Evidence, column: str, limit: float, meaning: str = "drop") -> list[Choice]:
-    """Every algorithm whose `column` of the sweep passes, with its lowest rate; simplest first."""
+def choices(evidence: Evidence, column: str, limit: float, meaning: str = "sum") -> list[Choice]:
+    """Every algorithm whose `column` of the sweep passes, with its lowest rate; simplest first.
+
+    A sensor of a lower rate averages over its samples (``sum``); a program that reads one sample in
+    several leaves the rest out (``drop``).
+    """
     found = []
     for cost in evidence.costs:
         cells = evidence.sweep[
@@ -157,16 +177,12 @@ def _enough(evidence: Evidence, passing: list[Choice], tolerance: float) -> Answ
     chosen = passing[0]
     judged = "error" if evidence.known else "own error"
     sentence = (
-        f"{_title(evidence, chosen)} at {_rate(chosen)} is the simplest that stays within "
+        f"{_title(evidence, chosen)} {_at(evidence, chosen)} is the simplest that stays within "
         f"{tolerance:g}°: its largest {judged} is {_deg(chosen.error_deg)}."
     )
     why = [_why_not_lower(evidence, chosen, tolerance)]
-    summed = choices(evidence, "error_deg", tolerance, "sum")
-    if same := [c for c in summed if c.cost.algorithm == chosen.cost.algorithm]:
-        why.append(
-            f"With a sensor that sums its increments {_rate(same[0])} would do "
-            f"({_deg(same[0].error_deg)})."
-        )
+    dropped = _dropped(evidence, chosen, "error_deg", tolerance)
+    why += _of_dropped(dropped, chosen)
     thrifty = min(passing, key=lambda c: c.cycles_per_second)
     if thrifty.cost.algorithm != chosen.cost.algorithm:
         why.append(
@@ -196,7 +212,24 @@ def _enough(evidence: Evidence, passing: list[Choice], tolerance: float) -> Answ
         chosen.rate_hz,
         tuple(why),
         helps,
+        None if dropped is None else dropped.rate_hz,
+        evidence.holding,
     )
+
+
+def _dropped(evidence: Evidence, chosen: Choice, column: str, limit: float) -> Choice | None:
+    """Return the same algorithm at the lowest rate that passes by leaving samples out."""
+    passing = choices(evidence, column, limit, "drop")
+    return next((c for c in passing if c.cost.algorithm == chosen.cost.algorithm), None)
+
+
+def _of_dropped(dropped: Choice | None, chosen: Choice) -> list[str]:
+    if dropped is None or dropped.rate_hz <= chosen.rate_hz:
+        return []
+    return [
+        "A program that leaves samples out, instead of a sensor that averages them, needs "
+        f"{_rate(dropped)} ({_deg(dropped.error_deg)})."
+    ]
 
 
 def _limited_by_sensor(
@@ -223,7 +256,9 @@ def _limited_by_sensor(
             "apart"
         )
     sentence = f"No algorithm stays within {tolerance:g}°, and none could: {whose}."
-    algorithm = meaning = rate = None
+    algorithm = meaning = rate = dropped_hz = None
+    if (holding := _of_holding(evidence, tolerance)) is not None:
+        sentence += f" {holding}"
     why = [
         f"The most accurate algorithm here, {best['algorithm']} at {float(best['rate_hz']):.4g} "
         f"Hz, is {_deg(float(best['error_deg']))} off; its own part is "
@@ -233,10 +268,14 @@ def _limited_by_sensor(
         chosen = good[0]
         algorithm, meaning, rate = chosen.cost.algorithm, chosen.meaning, chosen.rate_hz
         sentence += (
-            f" {_title(evidence, chosen)} at {_rate(chosen)} is all that is needed: its own "
-            f"error, {_deg(chosen.error_deg)}, is small beside that."
+            f" {_title(evidence, chosen)} {_at(evidence, chosen)} is all that integration needs: "
+            f"its own error, {_deg(chosen.error_deg)}, is small beside that."
         )
         why.append(_why_not_lower(evidence, chosen, limit, "own_deg"))
+        dropped = _dropped(evidence, chosen, "own_deg", limit)
+        why += _of_dropped(dropped, chosen)
+        dropped_hz = None if dropped is None else dropped.rate_hz
+    why += _of_budget(evidence)
     helps = []
     if off_at_start:
         helps.append("Another attitude at the start: --initial says where it comes from.")
@@ -246,6 +285,7 @@ def _limited_by_sensor(
             "Remove the gyro's bias: with that of the first rest taken off (--gyro-bias rest) "
             f"{_deg(evidence.without_bias)} would be left."
         )
+    helps += _improvements(evidence, sensor)
     if evidence.reference_sd > tolerance:
         helps.append("Better reference points: a truth, or a pose that is known to be the same.")
     elif sensor > LOST:
@@ -262,7 +302,81 @@ def _limited_by_sensor(
         "Aiding: an accelerometer holds roll and pitch, a magnetometer the heading (--peers all "
         "shows what such filters reach on this log).",
     ]
-    return Answer("sensor", sentence, tolerance, algorithm, meaning, rate, tuple(why), tuple(helps))
+    return Answer(
+        *("sensor", sentence, tolerance, algorithm, meaning, rate, tuple(why), tuple(helps)),
+        dropped_hz,
+        evidence.holding,
+    )
+
+
+def _of_holding(evidence: Evidence, tolerance: float) -> str | None:
+    holding = evidence.holding
+    if holding is None:
+        return None
+    if not holding.ends:
+        return (
+            f"From a known attitude, integration alone holds {tolerance:g}° for as long as the "
+            f"reference covers: {holding.shortest_s:.3g} s."
+        )
+    over = "" if holding.median_ends else "more than "
+    return (
+        f"From a known attitude, integration alone holds {tolerance:g}° for "
+        f"{holding.shortest_s:.3g} s at least, and from half of the instants for "
+        f"{over}{holding.median_s:.3g} s."
+    )
+
+
+#: What removes a part of the sensor error.
+_REMEDY = {
+    "bias": "The gyro's bias of this record, instead of that of the rest",
+    "clock": "Stamps on the clock of the reference",
+    "scale and axes": "Calibrated scale factors and axes of the gyro",
+}
+
+
+def _of_budget(evidence: Evidence) -> list[str]:
+    """Say which parts of the sensor error the truth shows, and what each leaves."""
+    budget = evidence.budget
+    if budget is None or len(budget.parts) < 2:
+        return []
+    found = []
+    for row in budget.parts.to_dict("records")[1:]:
+        what = {"bias": "a bias", "clock": "stamps", "scale and axes": "scale factors and axes"}
+        text = what[row["part"]]
+        if row["part"] == "clock":
+            when = "late" if budget.delay_s > 0 else "early"
+            text += f" {abs(1e3 * budget.delay_s):.3g} ± {1e3 * budget.delay_sd:.2g} ms {when}"
+        elif row["part"] == "bias":
+            size = np.degrees(np.sqrt(budget.bias @ budget.bias))
+            text += f" of {size:.2g} deg/s beside that of the rest"
+        found.append(f"{text}: {_deg(row['share_deg'])} ({_deg(row['max_deg'])} left)")
+    return [
+        "Parts of the sensor's error by the reference, removed one after the other: "
+        + "; ".join(found)
+        + "."
+    ]
+
+
+def _improvements(evidence: Evidence, sensor: float) -> list[str]:
+    """Name the part whose removal helps, the cheapest first."""
+    budget = evidence.budget
+    if budget is None:
+        return []
+    found = []
+    for part in ("clock", "bias", "scale and axes"):
+        left = budget.left_without(part)
+        if left is None:
+            continue
+        order = budget.parts["part"].tolist()
+        before = float(budget.parts["max_deg"].iloc[order.index(part) - 1])
+        if left < WORTH * before and before - left > UNSEEN * sensor:
+            remedy = _REMEDY[part]
+            if part == "clock" and evidence.as_means:
+                remedy = (
+                    "Samples taken as means over the step before their stamps (--sampling mean)"
+                )
+            found.append(f"{remedy}: {_deg(left)} instead of {_deg(before)}.")
+    return found
 
 
 def _limited_by_rate(
@@ -340,6 +454,13 @@ def _why_not(evidence: Evidence, cost: Cost) -> str:
 def _title(evidence: Evidence, choice: Choice) -> str:
     title = next(a.title for a in evidence.algorithms if a.label == choice.cost.algorithm)
     return f"{title} ({choice.cost.algorithm})"
+
+
+def _at(evidence: Evidence, choice: Choice) -> str:
+    """Say at which rate, and how it is made from the log's own."""
+    if choice.rate_hz >= float(evidence.sweep["rate_hz"].max()):
+        return f"at {_rate(choice)}"
+    return f"with samples averaged to {_rate(choice)}"
 
 
 def _rate(choice: Choice) -> str:
@@ -421,6 +542,12 @@ def worst_evidence(evidence: Sequence[Evidence], sweep: pd.DataFrame) -> Evidenc
         start=max(e.start for e in evidence),
         sampling=max(e.sampling for e in evidence),
         reference_sd=max(e.reference_sd for e in evidence),
+        budget=None,
+        holding=min(
+            (e.holding for e in evidence if e.holding is not None),
+            key=lambda h: (not h.ends, h.shortest_s),
+            default=None,
+        ),
     )
 
 

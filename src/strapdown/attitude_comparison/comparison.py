@@ -29,6 +29,7 @@ from strapdown.attitude_comparison.answer import (
     find_evidence,
     worst_evidence,
 )
+from strapdown.attitude_comparison.error_budget import ErrorBudget, find_budget, holding_time
 from strapdown.attitude_comparison.options import AttitudeSpec
 from strapdown.attitude_comparison.references import (
     PeerRun,
@@ -42,6 +43,7 @@ from strapdown.attitude_comparison.references import (
 from strapdown.attitude_comparison.source import (
     AttitudeSource,
     describe,
+    on_clock,
     read_source,
     with_truth,
 )
@@ -71,6 +73,8 @@ from strapdown.progress import Progress, silent
 from strapdown.sensors.rest import RestStretch, find_rests, gyro_bias_from_rests, without_gyro_bias
 from strapdown.systems.inputs import part_of_log
 from strapdown.tables import GYRO
+from strapdown.tables.checks import index_of
+from strapdown.tables.sample_clock import SampleClock
 from strapdown.units import GYRO_SUMS, GYRO_UNITS, factor_of, parse_unit
 
 if TYPE_CHECKING:
@@ -81,6 +85,9 @@ if TYPE_CHECKING:
 __all__ = ["AttitudeComparison", "run_comparison"]
 
 Array = NDArray[np.float64]
+
+#: Standard deviations from which the mean rate at rest is a bias.
+BIAS_SIGNIFICANT = 3.0
 
 
 @dataclass(frozen=True, repr=False)
@@ -116,6 +123,8 @@ class AttitudeComparison:
         Initial attitude in degrees, and its source.
     gyro_bias : dict
         Subtracted bias in rad/s, and its source.
+    clock : SampleClock
+        Nominal rate, gaps, lost samples and the nature of the stamps; `imu` is on this clock.
     references : DataFrame
     readings : tuple of Reading
     findings : tuple of Finding
@@ -133,6 +142,8 @@ class AttitudeComparison:
         ``reference_deg`` (largest at a reference point), ``error_deg`` (the one used for the
         answer: against the truth, else at the reference points, else ``own_deg``).
     answer : Answer
+    budget : ErrorBudget or None
+        Parts of the sensor error of a log, against a truth.
     trials : Trials or None
     peers : tuple of PeerRun
     places : tuple of PositionScore
@@ -158,6 +169,7 @@ class AttitudeComparison:
     rests: tuple[RestStretch, ...]
     initial: dict[str, Any]
     gyro_bias: dict[str, Any]
+    clock: SampleClock = field(repr=False)
     references: pd.DataFrame = field(repr=False)
     readings: tuple[Reading, ...] = field(repr=False)
     findings: tuple[Finding, ...]
@@ -166,6 +178,7 @@ class AttitudeComparison:
     shares: tuple[ErrorShare, ...] = field(repr=False)
     sweep: pd.DataFrame = field(repr=False)
     answer: Answer
+    budget: ErrorBudget | None = None
     trials: Trials | None = None
     peers: tuple[PeerRun, ...] = field(default=(), repr=False)
     places: tuple[PositionScore, ...] = field(default=(), repr=False)
@@ -337,7 +350,7 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
     source = read_source(spec)
     whole = source.imu
     part = part_of_log(whole, spec.from_s, spec.to_s, spec.duration_s, source.name)
-    source = replace(source, imu=part)
+    source, clock = on_clock(replace(source, imu=part))
     source, second = read_second(spec, with_truth(source, spec))
     rests = find_rests(source.imu)
     imu, bias, bias_input = _gyro_bias(spec, source, rests)
@@ -349,33 +362,57 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
     if second is not None and source.truth is None:
         source = truth_of_second(source, second, imu, q_nb)
     findings = [*source.findings, *findings]
+    clock = clock.of(index_of(imu))
     increments = increments_from_imu(imu, spec.interpolation)
     costs = tuple(_cost(algorithm, increments["dt"]) for algorithm in algorithms)
-    runs = []
-    for k, algorithm in enumerate(algorithms):
-        progress(algorithm.title, 0.05 + 0.15 * k / len(algorithms))
-        runs.append(run_attitude(algorithm, increments, q_nb))
     span = (float(imu.index[0]), float(imu.index[-1]))
     levelled = initial["method"] == "level"
     references, places, offers = gather_references(spec, source, span, rests, levelled)
-    scores = [s for run in runs for s in truth_score(run, source)]
-    scores += [s for run in runs for s in score_references(run, references, imu)]
-    findings += judge(runs, imu, increments, scores, source)
     known = None
     if source.truth is not None and source.scored is not None:
         known = known_at(source.truth, source.scored, imu.index.to_numpy(dtype=np.float64))
         known = known if known.counts.any() else None
     clean = None if source.clean is None else source.clean.loc[imu.index]
-    grounds = Grounds.of(imu, q_nb, spec.interpolation, references, known, clean)
+    grounds = Grounds.of(imu, q_nb, spec.interpolation, references, known, clean, clock)
+    runs = []
+    for k, algorithm in enumerate(algorithms):
+        progress(algorithm.title, 0.05 + 0.15 * k / len(algorithms))
+        runs.append(run_attitude(algorithm, increments, q_nb, grounds.restarts))
+    scores = [s for run in runs for s in truth_score(run, source)]
+    scores += [s for run in runs for s in score_references(run, references, imu)]
+    findings += judge(runs, imu, increments, scores, source)
+    if clock.gaps and known is None and len(references):
+        findings.append(
+            Finding(
+                "attitude.gap-before-reference",
+                file=source.name,
+                quantity="reference",
+                count=len(clock.gaps),
+                lost=sum(gap.length for gap in clock.gaps),
+            )
+        )
     progress("sharing out the error", 0.2)
     shares = find_shares(algorithms, runs, grounds)
-    factors = choose_factors(imu, spec.rates_hz, findings)
+    factors = choose_factors(clock, spec.rates_hz, findings)
     sweep = sweep_rates(
         algorithms, grounds, factors, lambda stage, share: progress(stage, 0.3 + 0.65 * share)
     )
-    between = source.sampling_error_deg or between_samples(imu, q_nb)
-    evidence = find_evidence(
-        grounds, algorithms, costs, sweep, bias, rests, None if between is None else between[1]
+    between = source.sampling_error_deg or between_samples(grounds)
+    budget = holding = None
+    if source.truth is not None and source.scored is not None:
+        if clean is None:
+            budget = find_budget(grounds, source.truth, source.scored)
+        late = 0.0 if budget is None else budget.late_s
+        holding = holding_time(grounds, spec.tolerance_deg, source.truth, source.scored, late)
+    evidence = replace(
+        find_evidence(
+            grounds, algorithms, costs, sweep, bias, rests, None if between is None else between[1]
+        ),
+        budget=budget,
+        holding=holding,
+        as_means=budget is not None
+        and imu.attrs["sampling"] != "mean"
+        and budget.late_as_means(clock.step),
     )
     beside = run_beside(spec.peers, source, imu, q_nb, references, findings)
     positions: tuple[PositionScore, ...] = ()
@@ -389,7 +426,7 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
         truth, scored = truth[inside], scored[inside]
     bench = AttitudeComparison(
         source=source.name,
-        description=describe(source.imu, source.what, whole),
+        description=describe(source.imu, source.what, whole, clock),
         specification=spec.model_dump(mode="json"),
         imu=imu,
         runs=tuple(runs),
@@ -401,6 +438,8 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
         rests=rests,
         initial=initial,
         gyro_bias=bias,
+        clock=clock,
+        budget=budget,
         references=references,
         readings=source.readings,
         findings=tuple(findings),
@@ -428,9 +467,11 @@ def _gyro_bias(
     files: tuple[InputFiles, ...] = ()
     bias: Sequence[float]
     choice = spec.gyro_bias.lower()
+    if choice == "auto":
+        choice = "rest" if rests and _significant(rests[0]) else "nothing"
     if spec.gyro_bias_path is not None:
         log = spec.source
-        options = read_options(log, log.axes) if isinstance(log, LogSpec) else None
+        options = read_options(log, source.axes) if isinstance(log, LogSpec) else None
         other = read_log(spec.gyro_bias_path, options)
         found = find_rests(other.imu)
         if not found:
@@ -443,8 +484,13 @@ def _gyro_bias(
             longest.gyro_mean,
             f"{longest.end - longest.start:.4g} s of rest in {other.name}",
         )
-    elif choice == "none":
-        return imu, {"rad_per_s": None, "from": "not removed, not requested"}, ()
+    elif choice in ("none", "nothing"):
+        why = "not removed, not requested"
+        if choice == "nothing":
+            why = "not removed: " + (
+                "that of the rest is within its noise" if rests else "no rest shows it"
+            )
+        return imu, {"rad_per_s": None, "from": why}, ()
     elif choice in ("rest", "rests"):
         if not rests:
             raise DataError(
@@ -467,6 +513,12 @@ def _gyro_bias(
     less = imu.copy()
     less[GYRO] = imu[GYRO].to_numpy() - np.asarray(bias)
     return less, {"rad_per_s": list(bias), "from": where}, files
+
+
+def _significant(rest: RestStretch) -> bool:
+    """Whether the mean of a rest differs from zero by more than chance."""
+    mean = np.abs(rest.gyro_mean)
+    return bool((mean > BIAS_SIGNIFICANT * np.asarray(rest.gyro_mean_sd or rest.gyro_sd)).any())
 
 
 def _stated_bias(text: str) -> tuple[list[float], str]:

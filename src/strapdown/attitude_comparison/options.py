@@ -37,7 +37,7 @@ class AttitudeSpec(Spec):
     rates_hz: tuple[FiniteFloat, ...] = ()
     tolerance_deg: FiniteFloat = Field(default=1.0, gt=0.0)
     initial: str = "auto"
-    gyro_bias: str = "none"
+    gyro_bias: str = "auto"
     references: tuple[str, ...] = ()
     truth_path: str | None = None
     gyro_bias_path: str | None = None
@@ -80,7 +80,8 @@ class AttitudeOptions:
         ``auto``, ``truth``, ``level``, ``zero``, or ``roll,pitch,heading`` in deg. ``auto`` is
         the truth where there is one, leveled where the log begins at rest, and zero otherwise.
     gyro_bias : str or array_like, (3,), rad/s
-        ``none``; ``rest``, the mean over the first stationary stretch; ``rests``, interpolated
+        ``auto``, as ``rest`` where there is a rest and its mean is significant; ``none``;
+        ``rest``, the mean over the first stationary stretch; ``rests``, interpolated
         between all of them; three numbers and a unit about forward, right, down; or the path of a
         log of the stationary sensor.
     peers : sequence of str
@@ -107,7 +108,7 @@ class AttitudeOptions:
     reference: str | Sequence[str] = ()
     reference_log: str | Path | None = None
     initial: str | ArrayLike = "auto"
-    gyro_bias: str | ArrayLike = "none"
+    gyro_bias: str | ArrayLike = "auto"
     peers: Sequence[str] = ()
     from_s: float | None = None
     to_s: float | None = None
@@ -253,7 +254,7 @@ def _texts(values: object) -> list[str]:
 
 def _exists(text: str) -> bool:
     """Whether a text is an existing path; False for sentences and invalid characters."""
-    if text in ("", "none", "rest", "rests"):
+    if text in ("", "auto", "none", "rest", "rests"):
         return False
     try:
         return Path(text).exists()

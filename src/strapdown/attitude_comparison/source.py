@@ -21,15 +21,27 @@ from strapdown.formats import read_log
 from strapdown.formats.recording import Origin, Reading, Recording
 from strapdown.increments import increments_from_imu
 from strapdown.sensors.catalogue import load_sensor
-from strapdown.tables import QUATERNION
+from strapdown.tables import GYRO, QUATERNION
+from strapdown.tables.checks import index_of, values_of
+from strapdown.tables.sample_clock import SampleClock, sample_clock
 
 if TYPE_CHECKING:
     from strapdown.simulation import ImuErrors
 
+#: Findings that the axes of a log are not stated and gravity is along another one.
+AXES_OPEN = (
+    "io.axes-not-stated-z-up",
+    "io.axes-not-stated-y-up",
+    "io.axes-not-stated-other-up",
+)
+
 
 @dataclass(frozen=True)
 class AttitudeSource:
-    """Log or scenario; `clean` is a scenario without sensor errors, `second` a second log."""
+    """Log or scenario; `clean` is a scenario without sensor errors, `second` a second log.
+
+    `axes`: how the log's axes were taken, where they were stated or gravity showed them.
+    """
 
     name: str
     what: str
@@ -43,6 +55,7 @@ class AttitudeSource:
     sampling_error_deg: tuple[float, float] | None = None
     clean: pd.DataFrame | None = None
     second: Recording | None = None
+    axes: str | None = None
 
 
 def simulate_scenario(spec: ScenarioSpec) -> tuple[pd.DataFrame, pd.DataFrame]:
@@ -73,6 +86,22 @@ def read_source(spec: AttitudeSpec) -> AttitudeSource:
     asked = spec.source
     if isinstance(asked, LogSpec):
         log = read_log(asked.path, read_options(asked, asked.axes))
+        axes, findings = asked.axes, log.findings
+        if axes is None and (by_gravity := _axes_by_gravity(log)) is not None:
+            axes = str(by_gravity.data["example"])
+            log = read_log(asked.path, read_options(asked, axes))
+            findings = (
+                *(f for f in log.findings if f.code not in AXES_OPEN),
+                Finding(
+                    "attitude.axes-by-gravity",
+                    file=log.name,
+                    quantity="axes",
+                    severity="note",
+                    axes=axes,
+                    up=by_gravity.data["up"],
+                    percent=by_gravity.data["percent"],
+                ),
+            )
         return AttitudeSource(
             log.name,
             "recorded log",
@@ -81,8 +110,9 @@ def read_source(spec: AttitudeSpec) -> AttitudeSource:
             log.truth,
             log.scored,
             log.readings,
-            log.findings,
+            findings,
             (input_files("log", asked.path, log.files),),
+            axes=axes,
         )
     from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
 
@@ -111,15 +141,66 @@ def read_source(spec: AttitudeSpec) -> AttitudeSource:
     )
 
 
-def describe(imu: pd.DataFrame, what: str, whole: pd.DataFrame) -> str:
-    """Describe the input in words: duration, rate, meaning of a row, and part."""
+def _axes_by_gravity(log: Recording) -> Finding | None:
+    """Finding that another axis than z points down, by gravity, where no file states the axes."""
+    return next((f for f in log.findings if f.code in AXES_OPEN and "example" in f.data), None)
+
+
+def on_clock(source: AttitudeSource) -> tuple[AttitudeSource, SampleClock]:
+    """Bring the samples of a log to their own clock, and report what its stamps are."""
+    imu = source.imu
+    clock = sample_clock(index_of(imu), values_of(imu, GYRO))
+    findings = []
+    if clock.repaired:
+        imu = imu.copy()
+        imu.index = pd.Index(clock.time, name=imu.index.name)
+        findings.append(
+            Finding(
+                "attitude.stamps-in-bursts" if clock.kind == "bursts" else "attitude.stamps-jitter",
+                file=source.name,
+                quantity="time",
+                severity="note",
+                rate_hz=clock.rate_hz,
+                spread=clock.spread,
+            )
+        )
+    elif clock.kind == "irregular":
+        findings.append(
+            Finding(
+                "attitude.sampled-unevenly",
+                file=source.name,
+                quantity="time",
+                severity="note",
+                rate_hz=clock.rate_hz,
+            )
+        )
+    if clock.lost:
+        findings.append(
+            Finding(
+                "attitude.samples-lost",
+                file=source.name,
+                quantity="time",
+                severity="note",
+                count=clock.lost,
+                percent=100.0 * clock.lost / (clock.lost + len(imu)),
+            )
+        )
+    return replace(source, imu=imu, findings=(*source.findings, *findings)), clock
+
+
+def describe(imu: pd.DataFrame, what: str, whole: pd.DataFrame, clock: SampleClock) -> str:
+    """Describe the input in words: duration, rate, gaps, meaning of a row, and part."""
     length = float(imu.index[-1] - imu.index[0])
-    rate = (len(imu) - 1) / length
     kind = {
         "instantaneous": "rates at the instant of each stamp",
         "mean": "mean rates over the interval that ends at each stamp",
     }[imu.attrs["sampling"]]
-    text = f"{what}; {len(imu)} samples in {length:.4g} s, {rate:.4g} Hz on average; {kind}"
+    text = f"{what}; {len(imu)} samples in {length:.4g} s, {clock.rate_hz:.4g} Hz; {kind}"
+    if clock.gaps:
+        text += (
+            f"; without {sum(g.length for g in clock.gaps):.4g} s in {len(clock.gaps)} gaps, after "
+            "each of which the algorithms begin anew"
+        )
     if len(imu) < len(whole):
         text += (
             f"; the part from {imu.index[0]:.6g} to {imu.index[-1]:.6g} s of one from "
@@ -135,7 +216,7 @@ def with_truth(source: AttitudeSource, spec: AttitudeSpec) -> AttitudeSource:
         from strapdown.formats.references import read_truth
 
         log = spec.source
-        options = read_options(log, log.axes) if isinstance(log, LogSpec) else None
+        options = read_options(log, source.axes) if isinstance(log, LogSpec) else None
         truth = read_truth(Path(stated), options, source.origin)
         scored = np.ones(len(truth), dtype=bool)
     if truth is None or scored is None:

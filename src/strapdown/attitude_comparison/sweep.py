@@ -23,6 +23,7 @@ from strapdown.increments import increments_from_imu
 from strapdown.progress import Progress
 from strapdown.rotation import unit_rotation_angle
 from strapdown.tables import DTHETA, QUATERNION, THETA, increments_table
+from strapdown.tables.sample_clock import SampleClock
 
 Array = NDArray[np.float64]
 
@@ -105,6 +106,11 @@ class Grounds:
         start of the run; for a log that of the most accurate algorithm.
     clean : DataFrame or None
         In a simulation, the samples without the errors of the sensor: `own` is then exact.
+    clock : SampleClock
+        Of `imu`.
+    restarts : tuple of (int, ndarray)
+        Rows at which every run begins anew, after gaps, and the attitudes there: the truth where
+        it is known, else `own`, which goes on through a gap as if the rate changed evenly in it.
     """
 
     imu: pd.DataFrame
@@ -114,6 +120,8 @@ class Grounds:
     truth: Known | None
     own: Known
     clean: pd.DataFrame | None
+    clock: SampleClock
+    restarts: tuple[tuple[int, Array], ...] = ()
 
     @classmethod
     def of(
@@ -124,8 +132,10 @@ class Grounds:
         references: pd.DataFrame,
         truth: Known | None,
         clean: pd.DataFrame | None,
+        clock: SampleClock,
     ) -> Grounds:
         """Find the reference for the algorithm errors, and gather the rest."""
+        restarts: tuple[tuple[int, Array], ...] = ()
         if clean is not None and truth is not None:
             # The error of the initial attitude is not the algorithm's: the truth is rotated to
             # start with the run.
@@ -133,9 +143,39 @@ class Grounds:
             own = replace(truth, q_nb=rotation.compose(start, truth.q_nb))
         else:
             clean = None
-            best = attitude_history(MOST_ACCURATE, increments_from_imu(imu, interpolation), q_nb)
+            increments = increments_from_imu(imu, interpolation)
+            known = _known_after_gaps(clock, truth)
+            best = attitude_history(MOST_ACCURATE, increments, q_nb, known)
+            there = {row for row, _ in known}
+            restarts = tuple(
+                sorted(
+                    [*known, *((r, best[r]) for r in clock.begins[1:].tolist() if r not in there)],
+                    key=lambda restart: restart[0],
+                )
+            )
             own = Known(best, np.ones(len(best), dtype=bool))
-        return cls(imu, q_nb, interpolation, references, truth, own, clean)
+        return cls(imu, q_nb, interpolation, references, truth, own, clean, clock, restarts)
+
+    def history(
+        self,
+        algorithm: AttitudeAlgorithm,
+        increments: pd.DataFrame | Steps,
+        samples: NDArray[np.int64] | None = None,
+    ) -> Array:
+        """Attitude by an algorithm, anew after each gap; `samples`: the rows, at a lower rate."""
+        return attitude_history(algorithm, increments, self.q_nb, self.restarts_at(samples))
+
+    def restarts_at(self, samples: NDArray[np.int64] | None) -> tuple[tuple[int, Array], ...]:
+        """Return the restarts by the rows of a lower rate."""
+        if samples is None:
+            return self.restarts
+        return tuple((int(np.searchsorted(samples, row)), q) for row, q in self.restarts)
+
+    def samples(self, factor: int) -> NDArray[np.int64]:
+        """Rows of a lower rate, with the rows at which runs begin anew."""
+        return np.union1d(self.clock.every(factor), [row for row, _ in self.restarts]).astype(
+            np.int64
+        )
 
     @property
     def exact(self) -> bool:
@@ -152,21 +192,32 @@ class Grounds:
         if self.truth is None or self.clean is None:
             return None if self.truth is None else self.truth.errors(self.own.q_nb)
         with_errors, without = (
-            attitude_history(
-                MOST_ACCURATE, increments_from_imu(table, self.interpolation), self.q_nb
-            )
+            self.history(MOST_ACCURATE, increments_from_imu(table, self.interpolation))
             for table in (self.imu, self.clean)
         )
         sensor = rotation.compose(rotation.conjugate(without), with_errors)
         return self.truth.errors(rotation.compose(self.own.q_nb, sensor))
 
 
+def _known_after_gaps(clock: SampleClock, truth: Known | None) -> list[tuple[int, Array]]:
+    """Rows after gaps at which the truth is first known, with the truth."""
+    if truth is None:
+        return []
+    found = []
+    for begin, end in clock.stretches[1:]:
+        counted = np.flatnonzero(truth.counts[begin:end])
+        if counted.size:
+            row = begin + int(counted[0])
+            found.append((row, truth.q_nb[row]))
+    return found
+
+
 def choose_factors(
-    imu: pd.DataFrame, rates: Sequence[float], findings: list[Finding]
+    clock: SampleClock, rates: Sequence[float], findings: list[Finding]
 ) -> tuple[int, ...]:
     """Ascending divisors of a log's rate, from 1: of the requested rates in Hz, or its halves."""
-    steps = len(imu) - 1
-    full = steps / float(imu.index[-1] - imu.index[0])
+    steps = clock.number.size - 1
+    full = clock.rate_hz
     if not rates:
         return tuple(f for f in FACTORS if f == 1 or steps // f >= LEAST_STEPS)
     factors = {1}
@@ -221,7 +272,7 @@ def sweep_rates(
             rows += [row | {"meaning": "sum"} for row in full]
             continue
         progress(f"{meaning} 1:{factor}", k / len(cells))
-        samples = chosen_samples(len(grounds.imu), factor)
+        samples = grounds.samples(factor)
         steps = _steps(grounds.imu, whole, samples, meaning, grounds.interpolation)
         error_free = None
         if clean is not None and whole_clean is not None:
@@ -231,11 +282,12 @@ def sweep_rates(
             grounds,
             own=grounds.own.at(samples),
             truth=None if grounds.truth is None else grounds.truth.at(samples),
+            restarts=grounds.restarts_at(samples),
         )
         for algorithm in algorithms:
             rows.append(
                 {"algorithm": algorithm.label, "meaning": meaning, "factor": factor}
-                | {"rate_hz": (len(samples) - 1) / float(used.index[-1] - used.index[0])}
+                | {"rate_hz": grounds.clock.rate_hz / factor}
                 | _cell(algorithm, there, steps, error_free, used)
             )
     return pd.DataFrame(rows, columns=COLUMNS)
@@ -245,12 +297,6 @@ def error_at_full_rate(algorithm: AttitudeAlgorithm, grounds: Grounds) -> float:
     """Return the error in deg that judges an algorithm at the full rate."""
     steps = steps_of(increments_from_imu(grounds.imu, grounds.interpolation))
     return _cell(algorithm, grounds, steps, None, grounds.imu)["error_deg"]
-
-
-def chosen_samples(count: int, factor: int) -> NDArray[np.int64]:
-    """Indices of every factor-th sample, and the last."""
-    samples = np.arange(0, count, factor)
-    return samples if samples[-1] == count - 1 else np.append(samples, count - 1)
 
 
 def _steps(
@@ -290,9 +336,9 @@ def _cell(
 ) -> dict[str, float]:
     infinite: Errors = (np.inf, np.inf, np.inf)
     try:
-        q = attitude_history(algorithm, steps, grounds.q_nb)
+        q = grounds.history(algorithm, steps)
         own = grounds.own.errors(
-            q if error_free is None else attitude_history(algorithm, error_free, grounds.q_nb)
+            q if error_free is None else grounds.history(algorithm, error_free)
         )
         total = None if grounds.truth is None else grounds.truth.errors(q)
         reference = np.nan
@@ -318,12 +364,12 @@ def _cell(
 # Shares of the error: sensor, algorithm, single precision.
 
 
-def between_samples(imu: pd.DataFrame, q_nb: Array) -> tuple[float, float] | None:
+def between_samples(grounds: Grounds) -> tuple[float, float] | None:
     """Final and largest angle in deg between linear and cubic rates; None for mean rates."""
-    if imu.attrs["sampling"] == "mean":
+    if grounds.imu.attrs["sampling"] == "mean":
         return None
     chord, cubic = (
-        attitude_history(MOST_ACCURATE, increments_from_imu(imu, how), q_nb)
+        grounds.history(MOST_ACCURATE, increments_from_imu(grounds.imu, how))
         for how in ("linear", "cubic")
     )
     final, _, largest = angles_to_errors(unit_rotation_angle(chord, cubic))
@@ -338,7 +384,7 @@ def find_shares(
     In a simulation ``q_true^-1 q = (q_true^-1 q_clean)(q_clean^-1 q)``: the rotation vectors of
     both shares add up to within half their product.
     """
-    q_nb, own = grounds.q_nb, grounds.own
+    own = grounds.own
     rounded = single_increments(grounds.imu, grounds.interpolation)
     clean = of_sensor = None
     if grounds.clean is not None:
@@ -352,11 +398,12 @@ def find_shares(
         if clean is None:
             mine, sensor = own.errors(q), of_sensor
         else:
-            q_clean = attitude_history(algorithm, clean, q_nb)
+            q_clean = grounds.history(algorithm, clean)
             mine = own.errors(q_clean)
             sensor = angles_to_errors(unit_rotation_angle(q, q_clean))
         assert mine is not None
-        apart = unit_rotation_angle(run_single(algorithm, rounded, q_nb), q)
+        single = run_single(algorithm, rounded, grounds.q_nb, grounds.restarts)
+        apart = unit_rotation_angle(single, q)
         shares.append(ErrorShare(run.algorithm, mine, sensor, angles_to_errors(apart)))
     return tuple(shares)
 

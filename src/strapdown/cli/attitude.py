@@ -95,12 +95,12 @@ class ComparisonFlags:
         str,
         running(
             "BIAS",
-            "none; rest (mean of the first stationary stretch); rests (interpolated between "
-            "all of these); 'x,y,z deg/s' about forward, right, down; or a log of the stationary "
-            "sensor (none).",
+            "auto (that of the first rest, if it is significant); none; rest (mean of the first "
+            "stationary stretch); rests (interpolated between all of these); 'x,y,z deg/s' about "
+            "forward, right, down; or a log of the stationary sensor (auto).",
             show_default=False,
         ),
-    ] = "none"
+    ] = "auto"
     peers: Annotated[
         str | None,
         running(
@@ -279,6 +279,7 @@ def print_comparison(bench: AttitudeComparison) -> None:
     shown = [
         *tables.result_tables(bench),
         *tables.sweep_tables(bench),
+        tables.budget_table(bench),
         tables.trial_table(bench),
         tables.place_table(bench),
         tables.peer_table(bench),

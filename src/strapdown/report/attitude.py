@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,13 @@ from strapdown.formats import csv
 from strapdown.report import attitude_tables as words
 from strapdown.report.attitude_charts import charts
 from strapdown.report.attitude_document import attitude_document
-from strapdown.report.attitude_tables import places_json, share_basis, source_of
+from strapdown.report.attitude_tables import (
+    budget_json,
+    clock_json,
+    places_json,
+    share_basis,
+    source_of,
+)
 from strapdown.report.chart_svg import ChartFigure
 from strapdown.report.document import finding_json
 from strapdown.report.report_bundle import as_comments, finite, write_report
@@ -144,8 +151,10 @@ def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
         "conventions": dict(words.CONVENTIONS),
         "initial": bench.initial,
         "gyro_bias": bench.gyro_bias,
+        "clock": clock_json(bench),
+        "sensor_error_parts": budget_json(bench),
         "headline": f"{bench.answer.sentence} {words.standing(bench)}",
-        "answer": vars(bench.answer),
+        "answer": asdict(bench.answer),
         "algorithms": [
             {
                 "algorithm": run.algorithm,

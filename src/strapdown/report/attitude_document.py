@@ -77,6 +77,7 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
             "parts",
             "Parts of the error, trials and other libraries",
             chart("share"),
+            tables.budget_table(bench),
             chart("trials"),
             tables.trial_table(bench),
             tables.place_table(bench),

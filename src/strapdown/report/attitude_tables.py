@@ -240,8 +240,8 @@ def second_words(second: SecondLog) -> str:
 
 #: Methods of lowering the sample rate, with their labels.
 MEANINGS = {
+    "sum": "samples averaged",
     "drop": "samples left out",
-    "sum": "increments summed",
 }
 
 
@@ -413,9 +413,9 @@ def _parts(bench: AttitudeComparison) -> tuple[list[str], dict[str, dict[str, st
 
 
 def _lowest_rate(bench: AttitudeComparison, algorithm: str) -> str:
-    """Lowest decimated rate down to which the algorithm error is within the tolerance."""
+    """Lowest rate of averaged samples down to which the algorithm error is within tolerance."""
     cells = bench.sweep[
-        (bench.sweep["algorithm"] == algorithm) & (bench.sweep["meaning"] == "drop")
+        (bench.sweep["algorithm"] == algorithm) & (bench.sweep["meaning"] == "sum")
     ].sort_values("factor")
     within = (cells["own_deg"] <= bench.answer.tolerance_deg).cummin()
     return f"{float(cells.loc[within, 'rate_hz'].min()):.3g} Hz" if within.any() else _NONE
@@ -526,6 +526,68 @@ def difference_table(bench: AttitudeComparison) -> TableBlock | None:
     )
     title = "Largest difference between the algorithms"
     return TableBlock(("", *names), rows, title=title)
+
+
+#: What each part of the sensor error is.
+_PARTS = {
+    "as used": "as used",
+    "bias": "less a constant bias",
+    "clock": "with the stamps shifted",
+    "scale and axes": "less scale factors and misalignment",
+}
+
+
+def budget_table(bench: AttitudeComparison) -> TableBlock | None:
+    """Return the parts of the sensor error by the truth; None where none was found."""
+    budget = bench.budget
+    if budget is None or len(budget.parts) < 2:
+        return None
+    rows = tuple(
+        (
+            _PARTS[row["part"]],
+            _NONE if row["part"] == "as used" else degrees(row["share_deg"]),
+            *(degrees(row[f"{key}_deg"]) for key in ("final", "rms", "max")),
+        )
+        for row in budget.parts.to_dict("records")
+    )
+    step = bench.clock.step
+    return TableBlock(
+        ("sensor", "change", "final", "RMS", "largest"),
+        rows,
+        caption="Estimated from this log and its reference, removed one after the other. Stamps: "
+        f"{1e3 * budget.delay_s:.3g} ms late (1σ {1e3 * budget.delay_sd:.2g} ms), "
+        f"{budget.delay_s / step:.2g} of a step: 0.5 where samples are means over the step before "
+        "their stamps, 0 where they are instantaneous, -0.5 where they are means over the step "
+        "after.",
+        title="Parts of the sensor error",
+    )
+
+
+def budget_json(bench: AttitudeComparison) -> dict[str, Any] | None:
+    """Parts of the sensor error as plain data."""
+    budget = bench.budget
+    if budget is None:
+        return None
+    return {
+        "delay_s": budget.delay_s,
+        "delay_sd_s": budget.delay_sd,
+        "bias_rad_per_s": budget.bias.tolist(),
+        "matrix": budget.matrix.tolist(),
+        "parts": budget.parts.to_dict("records"),
+    }
+
+
+def clock_json(bench: AttitudeComparison) -> dict[str, Any]:
+    """Nominal rate, gaps and nature of the stamps as plain data."""
+    clock = bench.clock
+    return {
+        "rate_hz": clock.rate_hz,
+        "stamps": clock.kind,
+        "repaired": clock.repaired,
+        "spread_s": clock.spread,
+        "lost_samples": clock.lost,
+        "gaps": [{"start_s": g.start, "end_s": g.end} for g in clock.gaps],
+    }
 
 
 def luck_words(luck: float) -> str:

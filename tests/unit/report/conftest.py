@@ -20,6 +20,7 @@ from strapdown.evaluation.reference_points import Score, references_from_words, 
 from strapdown.increments import increments_from_imu
 from strapdown.simulation import ImuErrors, TriadErrors, find_scenario, simulate_imu
 from strapdown.tables import QUATERNION
+from strapdown.tables.sample_clock import sample_clock
 
 NINE = (
     "naive",
@@ -168,6 +169,7 @@ def _bench(algorithms, name="alexiev-fig2c", rate=100.0, truth_known=True, refer
             "from": "the truth",
         },
         gyro_bias={"rad_per_s": None, "from": "none was removed"},
+        clock=sample_clock(noisy.index.to_numpy()),
         references=points,
         readings=(),
         findings=(),

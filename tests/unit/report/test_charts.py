@@ -61,10 +61,10 @@ def test_the_front_holds_exactly_what_nothing_beats(full_bench):
 
 def test_the_sweep_has_both_ways_and_rings_the_answer_in_its_own(full_bench):
     chart = by_slug(full_bench)["sweep"]
-    assert [p.title for p in chart.panels] == ["Samples left out", "Increments summed"]
+    assert [p.title for p in chart.panels] == ["Samples averaged", "Samples left out"]
     rings = [[line for line in p.lines if line.name == "the answer"] for p in chart.panels]
-    assert [len(r) for r in rings] == [1, 0]
-    assert rings[0][0].x.tolist() == [full_bench.answer.rate_hz]
+    assert [len(r) for r in rings] == [0, 1]
+    assert rings[1][0].x.tolist() == [full_bench.answer.rate_hz]
     for panel in chart.panels:
         named = [line for line in panel.lines if line.legend and line.dots]
         assert [line.name for line in named] == [r.algorithm for r in full_bench.runs]

@@ -13,7 +13,6 @@ from strapdown.attitude_algorithms import make_algorithm
 from strapdown.attitude_comparison.sweep import (
     Grounds,
     choose_factors,
-    chosen_samples,
     sum_increments,
     sweep_rates,
 )
@@ -22,6 +21,7 @@ from strapdown.evaluation.differences import Known
 from strapdown.increments import increments_from_imu
 from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
 from strapdown.tables import DTHETA, QUATERNION, THETA, imu_table, references_table
+from strapdown.tables.sample_clock import sample_clock
 
 ALGORITHMS = ["naive", "euler", "dcm", "quaternion", "rk4", "rotvec", "rotvec:samples=4"]
 NUMBERS = ["own_deg", "final_deg", "rms_deg", "max_deg", "error_deg"]
@@ -92,7 +92,7 @@ def test_the_full_rate_is_the_same_by_both_meanings_and_is_what_the_runs_say():
     ],
 )
 def test_every_so_many_samples_and_the_last(count, factor, kept):
-    assert chosen_samples(count, factor).tolist() == kept
+    assert sample_clock(np.arange(count) * 0.01).every(factor).tolist() == kept
 
 
 def irregular(count=203, sampling="instantaneous"):
@@ -106,7 +106,7 @@ def irregular(count=203, sampling="instantaneous"):
 def test_sums_of_increments_lose_nothing_and_end_at_the_same_instant(sampling, factor):
     imu = irregular(sampling=sampling)
     whole = increments_from_imu(imu)
-    samples = chosen_samples(len(imu), factor)
+    samples = sample_clock(imu.index.to_numpy()).every(factor)
     summed = sum_increments(whole, samples)
     dropped = increments_from_imu(imu.iloc[samples])
     for table in (summed, dropped):
@@ -133,14 +133,15 @@ def test_a_ragged_end_is_judged_at_the_last_sample():
     exact[:, 0] = np.cos(angle)
     exact[:, 1:] = np.sin(angle)[:, None] * np.array([0.3, -0.2, 0.5]) / np.sqrt(0.38)
     known = Known(exact, np.ones(102, dtype=bool))
-    grounds = Grounds(imu, q_nb, "linear", references_table([]), known, known, imu)
+    clock = sample_clock(time)
+    grounds = Grounds(imu, q_nb, "linear", references_table([]), known, known, imu, clock)
     sweep = sweep_rates(algorithms, grounds, (1, 2, 7, 40, 60), lambda stage, share: None)
     # Rounding of some 100 steps, and the square root of rounding nowhere: the angle is by sines.
     assert sweep[NUMBERS].to_numpy().max() < 1e-11
-    steps = {1: 101, 2: 51, 7: 15, 40: 3, 60: 2}
-    for factor, count in steps.items():
+    for factor in (1, 2, 7, 40, 60):
         rate = sweep[sweep["factor"] == factor]["rate_hz"]
-        assert rate.to_numpy() == pytest.approx(count / 1.013, rel=1e-12)
+        # The ragged end is not of the clock.
+        assert rate.to_numpy() == pytest.approx(100.0 / factor, rel=1e-3)
 
 
 def test_what_does_not_count_in_the_truth_is_not_judged():
@@ -159,6 +160,7 @@ def test_what_does_not_count_in_the_truth_is_not_judged():
         Known(wrong, counts),
         Known(q, np.ones(41, dtype=bool)),
         None,
+        sample_clock(imu.index.to_numpy()),
     )
     sweep = sweep_rates([make_algorithm("dcm")], grounds, (1, 2, 15), lambda stage, share: None)
     assert (sweep["max_deg"] == 0.0).all()
@@ -166,24 +168,25 @@ def test_what_does_not_count_in_the_truth_is_not_judged():
 
 def test_rates_are_taken_as_what_one_sample_in_so_many_gives():
     imu = simulate_imu(find_scenario("alexiev-fig2a").motion, ImuErrors(), rate=100.0)[0]
+    clock = sample_clock(imu.index.to_numpy())
     findings = []
-    assert choose_factors(imu, (), findings) == (1, 2, 4, 8, 16)
-    assert choose_factors(imu, (50.0, 100.0, 10.0), findings) == (1, 2, 10)
+    assert choose_factors(clock, (), findings) == (1, 2, 4, 8, 16)
+    assert choose_factors(clock, (50.0, 100.0, 10.0), findings) == (1, 2, 10)
     assert findings == []
-    assert choose_factors(imu, (30.0, 200.0), findings) == (1, 3)
+    assert choose_factors(clock, (30.0, 200.0), findings) == (1, 3)
     assert "30 Hz was requested; 33.33 Hz is what one sample in 3 gives" in findings[0].what
     assert "200 Hz was requested; 100 Hz is the log's own rate" in findings[1].what
     # The remedy of the error is a rate that is not refused.
     with pytest.raises(ConfigError, check=coded("attitude.hz-leaves-fewer-than-two")) as refused:
-        choose_factors(imu, (0.1,), findings)
+        choose_factors(clock, (0.1,), findings)
     least = float(str(refused.value).split("use at least ")[1].split(" Hz")[0])
-    assert len(choose_factors(imu, (least * 1.01,), findings)) == 2
+    assert len(choose_factors(clock, (least * 1.01,), findings)) == 2
 
 
 @pytest.mark.parametrize("rate", [0.0, -5.0, float("nan"), float("inf")])
 def test_what_is_no_rate_is_refused(rate):
     with pytest.raises(ConfigError):
-        choose_factors(irregular(), (rate,), [])
+        choose_factors(sample_clock(irregular().index.to_numpy()), (rate,), [])
     with pytest.raises(ConfigError):
         compare_attitude("alexiev-fig2a", rates_hz=[rate])
 
@@ -202,7 +205,8 @@ def test_an_algorithm_that_leaves_the_numbers_has_an_infinite_error():
     q_nb = np.array([1.0, 0.0, 0.0, 0.0])
     known = Known(np.tile(q_nb, (41601, 1)), np.ones(41601, dtype=bool))
     points = references_table([{"time": 400.0, "kind": "same", "since": 0.0}])
-    grounds = Grounds(imu, q_nb, "linear", points, known, known, None)
+    clock = sample_clock(imu.index.to_numpy())
+    grounds = Grounds(imu, q_nb, "linear", points, known, known, None, clock)
     sweep = sweep_rates([growing], grounds, (1, 128), lambda stage, share: None)
     assert np.isfinite(sweep[sweep["factor"] == 1][NUMBERS].to_numpy()).all()
     columns = [*NUMBERS, "reference_deg"]

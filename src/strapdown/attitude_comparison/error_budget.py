@@ -1,0 +1,350 @@
+"""Share of a gyro's bias, clock, scale and axes in an attitude error, estimated against a truth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown import rotation
+from strapdown.attitude_comparison.sweep import MOST_ACCURATE, Grounds
+from strapdown.evaluation.differences import Errors, known_at
+from strapdown.increments import increments_from_imu
+from strapdown.rotation import unit_rotation_angle
+from strapdown.tables import GYRO
+from strapdown.tables.checks import index_of, values_of
+
+__all__ = ["ErrorBudget", "Holding", "find_budget", "holding_time"]
+
+Array = NDArray[np.float64]
+
+#: Rotations are compared over windows of this length; the fewest of them.
+WINDOW, LEAST_WINDOWS = 1.0, 30
+#: A part counts if its chi-square has a smaller probability by chance.
+CHANCE = 1e-3
+#: A clock shift counts beyond this many standard deviations.
+SIGNIFICANT = 3.0
+#: Parts, in the order in which they are removed, and their parameters in the estimate.
+PARTS = {"bias": slice(0, 3), "clock": slice(3, 4), "scale and axes": slice(4, 13)}
+#: Spacing of the starts and of the instants in a search for the time that a tolerance is held.
+STARTS, INSTANTS = 1.0, 0.1
+
+
+@dataclass(frozen=True)
+class ErrorBudget:
+    """What the rotations of a log against a truth say of its gyro, and what removing it leaves.
+
+    Estimated from the record itself: a bound of what a calibration could remove, not a calibration.
+
+    Attributes
+    ----------
+    delay_s, delay_sd : float
+        Stamps less instants of the rates, by the clock of the truth, and standard deviation. Half a
+        step where samples are means over the step before their stamps, minus half a step where
+        they are means over the step after.
+    bias : ndarray, (3,), rad/s
+        Beside the bias that was removed.
+    matrix : ndarray, (3, 3)
+        The gyro reads ``(I + matrix) @ rate + bias``.
+    parts : DataFrame
+        One row per part that counts, in the order of removal, and first ``as used``: ``part``,
+        ``share_deg`` (largest angle between the attitudes before and after), ``final_deg``,
+        ``rms_deg``, ``max_deg`` (errors with this and all parts before removed).
+    """
+
+    delay_s: float
+    delay_sd: float
+    bias: Array
+    matrix: Array
+    parts: pd.DataFrame = field(repr=False)
+
+    @property
+    def late_s(self) -> float:
+        """Delay of the stamps where it is significant, else 0."""
+        return self.delay_s if abs(self.delay_s) > SIGNIFICANT * self.delay_sd else 0.0
+
+    def late_as_means(self, step: float) -> bool:
+        """Whether the stamps are late by half a step, and not in time."""
+        off = abs(self.delay_s - 0.5 * step)
+        return self.late_s > 0.0 and off <= SIGNIFICANT * self.delay_sd
+
+    def left_without(self, part: str) -> float | None:
+        """Return the largest error in deg once a part is removed; None if it does not count."""
+        rows = self.parts[self.parts["part"] == part]
+        return None if rows.empty else float(rows["max_deg"].iloc[0])
+
+
+@dataclass(frozen=True)
+class Holding:
+    """For how long integration alone stays within a tolerance, from any known attitude.
+
+    Attributes
+    ----------
+    shortest_s, median_s : float
+        Over starts along the record.
+    ends : bool
+        Whether the tolerance is exceeded at all; if not, both are what the record covers.
+    median_ends : bool
+        Likewise for the median.
+    """
+
+    shortest_s: float
+    median_s: float
+    ends: bool
+    median_ends: bool
+
+
+def find_budget(
+    grounds: Grounds, truth: pd.DataFrame, scored: NDArray[np.bool_]
+) -> ErrorBudget | None:
+    """Estimate the parts of a log's sensor error against an attitude truth.
+
+    Over a window the gyro's rotation less the truth's is, to first order in the gyro's errors and
+    in axes at the end, ``∫ C (b + M ω) dt + τ (C ω_begin - ω_end)``, with C from each instant to
+    the end and τ the delay of the stamps: the error equation of strapdown attitude (Titterton and
+    Weston, 2004, sec. 12.3), integrated. Least squares over all windows; parts without significance
+    are left out.
+
+    Returns
+    -------
+    ErrorBudget or None
+        None without enough windows of known attitude.
+    """
+    if grounds.truth is None:
+        return None
+    rows = _windows(grounds)
+    if len(rows) < LEAST_WINDOWS:
+        return None
+    design, off = _equations(grounds, rows)
+    kept = list(PARTS)
+    while True:
+        columns = np.array([c for p in kept for c in range(13)[PARTS[p]]], dtype=np.int64)
+        found, covariance = _solved(design[:, columns], off)
+        chances = {p: _chance(found, covariance, columns, PARTS[p]) for p in kept}
+        weak = [p for p in kept if chances[p] > CHANCE]
+        if not weak:
+            break
+        kept.remove(max(weak, key=lambda p: chances[p]))
+    values, sd = np.zeros(13), np.full(13, np.nan)
+    values[columns] = found
+    sd[columns] = np.sqrt(np.diag(covariance))
+    if np.isnan(sd[3]):
+        # The uncertainty of a clock that agrees.
+        with_clock = np.append(columns, 3)
+        sd[3] = float(np.sqrt(_solved(design[:, with_clock], off)[1][-1, -1]))
+    bias, delay, matrix = values[:3], float(values[3]), values[4:].reshape(3, 3)
+    parts = _removed(grounds, truth, scored, kept, (bias, delay, matrix))
+    return ErrorBudget(delay, float(sd[3]), bias, matrix, parts)
+
+
+def _windows(grounds: Grounds) -> list[tuple[int, int]]:
+    """First and last rows of windows within stretches, between samples of known attitude."""
+    assert grounds.truth is not None
+    time = index_of(grounds.imu)
+    out = []
+    for begin, end in grounds.clock.stretches:
+        known = begin + np.flatnonzero(grounds.truth.counts[begin:end])
+        if known.size < 2:
+            continue
+        number = np.floor((time[known] - time[known[0]]) / WINDOW)
+        first = known[np.flatnonzero(np.diff(number, prepend=-1.0))]
+        near = np.diff(time[first]) <= 2.0 * WINDOW
+        out += [(int(a), int(b)) for a, b in zip(first[:-1][near], first[1:][near], strict=True)]
+    return out
+
+
+def _equations(grounds: Grounds, rows: Sequence[tuple[int, int]]) -> tuple[Array, Array]:
+    """Design matrix, (3 n, 13), and rotations left, (3 n,), rad, of all windows."""
+    assert grounds.truth is not None
+    time, rate = index_of(grounds.imu), values_of(grounds.imu, GYRO)
+    q = grounds.own.q_nb
+    c_nb = rotation.dcm_from_quaternion(q)
+    steps = np.diff(time)
+    a, b = np.array(rows).T
+
+    def over(integrand: Array) -> Array:
+        """Integrals over the windows, by the trapezoid."""
+        whole = np.concatenate([[0.0], np.cumsum(0.5 * steps * (integrand[1:] + integrand[:-1]))])
+        return np.asarray(whole[b] - whole[a])
+
+    # One element after the other: all at once would take 36 numbers a sample.
+    turn = np.empty((len(rows), 3, 3))
+    weighed = np.empty((len(rows), 3, 3, 3))
+    for i, k in np.ndindex(3, 3):
+        turn[:, i, k] = over(c_nb[:, i, k])
+        for m in range(3):
+            weighed[:, i, k, m] = over(c_nb[:, i, k] * rate[:, m])
+    c_bn = c_nb[b].transpose(0, 2, 1)
+    bias = c_bn @ turn
+    scale = c_bn @ weighed.reshape(-1, 3, 9)
+    smooth = _smoothed(rate, max(1, round(0.02 / grounds.clock.step)))
+    turned = c_bn @ (c_nb[a] @ smooth[a][:, :, None])
+    clock = turned - smooth[b][:, :, None]
+    by_gyro = rotation.compose(rotation.conjugate(q[a]), q[b])
+    known = grounds.truth.q_nb
+    by_truth = rotation.compose(rotation.conjugate(known[a]), known[b])
+    left = rotation.rotation_vector_from_quaternion(
+        rotation.compose(rotation.conjugate(by_truth), by_gyro)
+    )
+    design = np.concatenate([bias, clock, scale], axis=2)
+    return design.reshape(-1, 13), np.asarray(left).reshape(-1)
+
+
+def _smoothed(rate: Array, width: int) -> Array:
+    from scipy.ndimage import uniform_filter1d
+
+    return np.asarray(uniform_filter1d(rate, width, axis=0, mode="nearest"))
+
+
+def _solved(design: Array, off: Array) -> tuple[Array, Array]:
+    """Least squares and covariance, by the scatter of what is left."""
+    if design.shape[1] == 0:
+        return np.empty(0), np.empty((0, 0))
+    found: Array = np.linalg.lstsq(design, off, rcond=1e-9)[0]
+    left = off - design @ found
+    variance = float(left @ left) / max(off.size - design.shape[1], 1)
+    covariance: Array = variance * np.linalg.pinv(design.T @ design)
+    return found, covariance
+
+
+def _chance(found: Array, covariance: Array, columns: NDArray[np.int64], part: slice) -> float:
+    """Probability that a part is as large by chance."""
+    from scipy.stats import chi2
+
+    there = np.flatnonzero((columns >= part.start) & (columns < part.stop))
+    x = found[there]
+    size = float(x @ np.linalg.pinv(covariance[np.ix_(there, there)]) @ x)
+    return float(chi2.sf(size, there.size))
+
+
+def _removed(
+    grounds: Grounds,
+    truth: pd.DataFrame,
+    scored: NDArray[np.bool_],
+    kept: Sequence[str],
+    values: tuple[Array, float, Array],
+) -> pd.DataFrame:
+    """Errors with one part after another removed; those of `ErrorBudget.parts`."""
+    bias, delay, matrix = values
+    before = grounds.own.q_nb
+    rows: list[dict[str, object]] = [_row("as used", 0.0, _errors(grounds, before))]
+    now = grounds
+    for part in PARTS:
+        if part not in kept:
+            continue
+        imu = now.imu.copy()
+        rate, stamps = values_of(imu, GYRO), index_of(imu)
+        if part == "bias":
+            rate = rate - bias
+        elif part == "clock":
+            stamps = stamps - delay
+        else:
+            # What is left of the bias here is small beside the rates.
+            rate = np.asarray(np.linalg.solve(np.eye(3) + matrix, rate.T).T, dtype=np.float64)
+        imu[GYRO] = rate
+        imu.index = pd.Index(stamps, name=imu.index.name)
+        known = known_at(truth, scored, stamps)
+        start, restarts = now.q_nb, now.restarts
+        if part == "clock" and known.counts.any():
+            first = int(np.argmax(known.counts))
+            start = start if first else known.q_nb[0]
+            anew = {row: known.q_nb[row] if known.counts[row] else q for row, q in restarts}
+            if first:
+                anew[first] = known.q_nb[first]
+            restarts = tuple(sorted(anew.items()))
+        less = replace(now, imu=imu, truth=known, q_nb=start, restarts=restarts)
+        q = less.history(MOST_ACCURATE, increments_from_imu(imu, now.interpolation))
+        row = _row(part, _share(part, before, q, rate, delay), _errors(less, q))
+        # What leaves no less is no explanation.
+        if float(str(row["rms_deg"])) < float(str(rows[-1]["rms_deg"])):
+            rows.append(row)
+            now, before = less, q
+    return pd.DataFrame(rows)
+
+
+def _share(part: str, before: Array, after: Array, rate: Array, delay: float) -> float:
+    """Largest change of the attitude in deg; by a shift of stamps, what is turned meanwhile."""
+    if part == "clock":
+        return float(np.degrees(np.sqrt((rate * rate).sum(axis=1)).max()) * abs(delay))
+    return float(unit_rotation_angle(before, after).max())
+
+
+def _errors(grounds: Grounds, q: Array) -> Errors:
+    assert grounds.truth is not None
+    return grounds.truth.errors(q) or (np.nan, np.nan, np.nan)
+
+
+def _row(part: str, share: float, errors: Errors) -> dict[str, object]:
+    final, rms, largest = errors
+    return {
+        "part": part,
+        "share_deg": share,
+        "final_deg": final,
+        "rms_deg": rms,
+        "max_deg": largest,
+    }
+
+
+def holding_time(
+    grounds: Grounds,
+    tolerance_deg: float,
+    truth: pd.DataFrame,
+    scored: NDArray[np.bool_],
+    delay: float = 0.0,
+) -> Holding | None:
+    """Find for how long integration alone stays within a tolerance of the truth.
+
+    From every second of known attitude on, within a stretch without gaps. `delay` (s): stamps less
+    instants of the samples, which are shifted by it.
+
+    Returns
+    -------
+    Holding or None
+        None where fewer than two instants are known.
+    """
+    time = index_of(grounds.imu) - delay
+    reference = known_at(truth, scored, time)
+    times: list[float] = []
+    ended: list[bool] = []
+    thin = max(1, round(INSTANTS / grounds.clock.step))
+    for begin, end in grounds.clock.stretches:
+        known = (begin + np.flatnonzero(reference.counts[begin:end]))[::thin]
+        if known.size < 2:
+            continue
+        # Error of the attitude in local-level axes; its change is that of a run from then on.
+        error = rotation.compose(grounds.own.q_nb[known], rotation.conjugate(reference.q_nb[known]))
+        at = time[known]
+        starts = np.flatnonzero(np.diff(np.floor((at - at[0]) / STARTS), prepend=-1.0))
+        for k in starts[:-1]:
+            start = np.broadcast_to(error[k], error[k + 1 :].shape)
+            beyond = unit_rotation_angle(error[k + 1 :], start) > tolerance_deg
+            first = int(np.argmax(beyond)) if beyond.any() else beyond.size - 1
+            times.append(float(at[k + 1 + first] - at[k]))
+            ended.append(bool(beyond.any()))
+    if not times:
+        return None
+    held, beyond = np.array(times), np.array(ended)
+    median, reached = _median(held, beyond)
+    return Holding(
+        shortest_s=float(held[beyond].min()) if beyond.any() else float(held.max()),
+        median_s=median,
+        ends=bool(beyond.any()),
+        median_ends=reached,
+    )
+
+
+def _median(times: Array, ended: NDArray[np.bool_]) -> tuple[float, bool]:
+    """Median of times of which some are cut by the end of the record, and whether it is reached.
+
+    Product-limit estimate (Kaplan and Meier, 1958, Eq. (2b)).
+    """
+    order = np.lexsort((~ended, times))
+    at_risk = times.size - np.arange(times.size)
+    left = np.cumprod(1.0 - ended[order] / at_risk)
+    below = np.flatnonzero(left <= 0.5)
+    if not below.size:
+        return float(times.max()), False
+    return float(times[order][below[0]]), True
