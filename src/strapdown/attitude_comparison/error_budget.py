@@ -203,11 +203,10 @@ def _solved(design: Array, off: Array) -> tuple[Array, Array]:
     """Least squares and covariance, by the scatter of what is left."""
     if design.shape[1] == 0:
         return np.empty(0), np.empty((0, 0))
-    found: Array = np.linalg.lstsq(design, off, rcond=1e-9)[0]
+    found = np.asarray(np.linalg.lstsq(design, off, rcond=1e-9)[0], dtype=np.float64)
     left = off - design @ found
     variance = float(left @ left) / max(off.size - design.shape[1], 1)
-    covariance: Array = variance * np.linalg.pinv(design.T @ design)
-    return found, covariance
+    return found, np.asarray(variance * np.linalg.pinv(design.T @ design), dtype=np.float64)
 
 
 def _chance(found: Array, covariance: Array, columns: NDArray[np.int64], part: slice) -> float:
