@@ -19,6 +19,7 @@ from strapdown.config import (
     TrajectorySpec,
     specify,
 )
+from strapdown.config.sources import is_scenario_file
 from strapdown.errors import ConfigError
 from strapdown.simulation import SCENARIOS, GnssReceiver, simulate_gnss
 from strapdown.simulation.crash_cases import CASES, RecordedCase, find_case, record_case
@@ -134,7 +135,7 @@ def simulate(
     ----------
     source : str or Path
         Name of a scenario, of a crash, or of a trajectory (``drive-town``), or the file of a
-        trajectory, which ends in ``.toml``.
+        scenario or a trajectory, which ends in ``.toml``.
     rate_hz : float
         100; for a crash each recorder's own rate.
     sampling : {'instantaneous', 'mean'}
@@ -181,6 +182,8 @@ def simulate(
         "sensor": sensor,
     }
     if name.lower().endswith(".toml"):
+        if is_scenario_file(Path(name)):
+            return _scenario(ScenarioSpec.of_file(Path(name), **stated))
         return _trajectory(TrajectorySpec.read(Path(name), **stated), receiver)
     packaged = files("strapdown").joinpath("simulation", "trajectories")
     trajectories = {
@@ -207,6 +210,10 @@ def simulate(
         seed=seed or 0,
         sensor=sensor,
     )
+    return _scenario(scenario)
+
+
+def _scenario(scenario: ScenarioSpec) -> Simulation:
     imu, truth = simulate_scenario(scenario)
     spec = specify(SimulateSpec, scenario=scenario)
     return Simulation(scenario.name, _imu(imu), truth, _source=spec, _made=(imu, truth))

@@ -13,6 +13,7 @@ from pydantic import Field, FiniteFloat
 
 from strapdown.attitude_algorithms import ALGORITHMS
 from strapdown.config import LogSpec, ScenarioSpec
+from strapdown.config.sources import is_scenario_file
 from strapdown.config.spec import Spec, specify
 from strapdown.errors import ConfigError
 from strapdown.systems.inputs import check_part
@@ -214,6 +215,15 @@ class AttitudeOptions:
                 return [
                     first.model_copy(update={"seed": first.seed + k}) for k in range(self.trials)
                 ]
+        if name.endswith(".toml") and is_scenario_file(Path(text)):
+            first = ScenarioSpec.of_file(
+                Path(text),
+                self.rate_hz,
+                self.sampling and self.sampling.lower(),
+                self.seed,
+                None if self.sensor is None else str(self.sensor),
+            )
+            return [first.model_copy(update={"seed": first.seed + k}) for k in range(self.trials)]
         self._refuse_of_scenario()
         path = str(Path(text))
         return [

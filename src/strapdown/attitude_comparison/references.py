@@ -75,9 +75,9 @@ def gather_references(
     words = list(spec.references)
     whole = spec.from_s is spec.to_s is spec.duration_s is None
     if isinstance(spec.source, ScenarioSpec) and not words and whole:
-        from strapdown.simulation import find_scenario
+        from strapdown.systems.trajectory_source import scenario_of
 
-        words = list(find_scenario(spec.source.name).references)
+        words = list(scenario_of(spec.source).references)
     asked = [w for w in words if w.strip().lower() == RESTS]
     words = [w for w in words if w.strip().lower() != RESTS]
     positions: tuple[PlaceReference, ...] = ()

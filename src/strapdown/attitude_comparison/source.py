@@ -60,10 +60,11 @@ class AttitudeSource:
 
 def simulate_scenario(spec: ScenarioSpec) -> tuple[pd.DataFrame, pd.DataFrame]:
     """Return the samples of a scenario and its exact attitude."""
-    from strapdown.simulation import find_scenario, simulate_imu
+    from strapdown.simulation import simulate_imu
+    from strapdown.systems.trajectory_source import scenario_of
 
     return simulate_imu(
-        find_scenario(spec.name).motion,
+        scenario_of(spec).motion,
         scenario_errors(spec),
         rate=spec.rate_hz,
         sampling=spec.sampling,
@@ -75,9 +76,9 @@ def simulate_scenario(spec: ScenarioSpec) -> tuple[pd.DataFrame, pd.DataFrame]:
 def scenario_errors(spec: ScenarioSpec) -> ImuErrors:
     """Return the errors of a simulated scenario: its own, or those of a sensor's unit."""
     if spec.sensor is None:
-        from strapdown.simulation.scenarios import find_scenario
+        from strapdown.systems.trajectory_source import scenario_of
 
-        return find_scenario(spec.name).errors
+        return scenario_of(spec).errors
     return load_sensor(spec.sensor).draw(spec.seed)
 
 
@@ -114,9 +115,10 @@ def read_source(spec: AttitudeSpec) -> AttitudeSource:
             (input_files("log", asked.path, log.files),),
             axes=axes,
         )
-    from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
+    from strapdown.simulation import ImuErrors, simulate_imu
+    from strapdown.systems.trajectory_source import scenario_of
 
-    scenario = find_scenario(asked.name)
+    scenario = scenario_of(asked)
     imu, truth = simulate_scenario(asked)
     clean, _ = simulate_imu(
         scenario.motion,

@@ -151,7 +151,8 @@ def attitude(
         list[str],
         typer.Argument(
             metavar="LOG|SCENARIO",
-            help="A log (a file or a folder), or the name of a scenario (strapdown modules). "
+            help="A log (a file or a folder), or a scenario: its name (strapdown modules) or its "
+            "file (.toml). "
             "Several are trials of one question.",
         ),
     ],

@@ -156,13 +156,14 @@ def _tables() -> Iterator[tuple[str, str, Mapping[str, Any], Columns]]:
         },
     )
     yield "motions", "Motions of a trajectory's file", dict.fromkeys(KINDS), {}
+    yield "scenario_motions", "Motions of a scenario's file", {"pulses": None}, {}
     yield (
         "scenarios",
         "Scenarios with exact attitude",
         SCENARIOS,
         {
             "duration_s": lambda _, s: float(f"{s.motion.duration:g}"),
-            "summary": lambda _, s: f"{s.title} ({s.origin})",
+            "summary": lambda _, s: f"{s.title} ({s.after or s.origin})",
         },
     )
     yield (

@@ -18,7 +18,8 @@ def simulate(
         str,
         typer.Argument(
             metavar="NAME|FILE",
-            help="A scenario or a crash (strapdown modules), or a trajectory's file (.toml), "
+            help="A scenario or a crash (strapdown modules), or the file (.toml) of a scenario or "
+            "a trajectory, "
             "whose values the options replace.",
         ),
     ],

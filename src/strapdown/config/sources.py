@@ -2,17 +2,104 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from pydantic import Field, FiniteFloat
+from pydantic import Field, FiniteFloat, StrictInt, model_validator
 
-from strapdown.config.spec import Spec
+from strapdown.config.reading import FileSpec
+from strapdown.config.spec import NotNegative, Number, Positive, Spec, Triple, refuse
+from strapdown.config.toml_file import read_toml
 from strapdown.formats.recording import ReadOptions
 
 if TYPE_CHECKING:
     from strapdown.config.alignment import LogTable
 
-__all__ = ["CrashSimulationSpec", "LogSpec", "ScenarioSpec", "SimulateSpec", "read_options"]
+__all__ = [
+    "CrashSimulationSpec",
+    "LogSpec",
+    "PulsesSpec",
+    "ScenarioFile",
+    "ScenarioSpec",
+    "SimulateSpec",
+    "read_options",
+]
+
+
+class PulseSpec(Spec):
+    """One pulse of rate about an axis, or several at a period."""
+
+    start_s: NotNegative
+    duration_s: Positive
+    #: Between the edges.
+    rate_deg_per_s: Number | None = None
+    #: Instead of the rate: of the whole pulse.
+    turn_deg: Number | None = None
+    #: Of a raised cosine at either end: zero for a rectangle, half of the duration for a haversine.
+    edge_s: NotNegative = 0.0
+    times: StrictInt = Field(default=1, ge=1, le=100_000)
+    every_s: Positive | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> PulseSpec:
+        if (self.rate_deg_per_s is None) == (self.turn_deg is None):
+            raise refuse("rate_deg_per_s, turn_deg", "config.rate-or-turn")
+        if (self.times > 1) != (self.every_s is not None):
+            raise refuse("times, every_s", "config.times-and-period")
+        return self
+
+
+class PulsesSpec(Spec):
+    """Pulses of rate about the body's axes, overlapping or not."""
+
+    kind: Literal["pulses"]
+    duration_s: Positive
+    roll_deg: Number = 0.0
+    pitch_deg: Number = 0.0
+    heading_deg: Number = 0.0
+    x: tuple[PulseSpec, ...] = ()
+    y: tuple[PulseSpec, ...] = ()
+    z: tuple[PulseSpec, ...] = ()
+    #: From the point about which the body turns to the sensor.
+    arm_m: Triple = (0.0, 0.0, 0.0)
+
+
+class GyroErrorsSpec(Spec):
+    """Errors of the gyros of a scenario, for each axis."""
+
+    noise_density_deg_per_s_per_sqrt_hz: Triple = (0.0, 0.0, 0.0)
+    bias_deg_per_s: Triple = (0.0, 0.0, 0.0)
+    trend_deg_per_s2: Triple = (0.0, 0.0, 0.0)
+
+
+class AccelErrorsSpec(Spec):
+    """Errors of the accelerometers of a scenario, for each axis."""
+
+    noise_density_ug_per_sqrt_hz: Triple = (0.0, 0.0, 0.0)
+    bias_m_per_s2: Triple = (0.0, 0.0, 0.0)
+
+
+class ScenarioFile(FileSpec):
+    """A scenario of rotation in a file."""
+
+    called = "scenario"
+
+    name: str = "scenario"
+    title: str = ""
+    rate_hz: Positive = 100.0
+    sampling: str = "instantaneous"
+    seed: StrictInt = Field(default=0, ge=0)
+    sensor: str | None = None
+    references: tuple[str, ...] = ()
+    motion: PulsesSpec
+    gyro: GyroErrorsSpec = Field(default_factory=GyroErrorsSpec)
+    accel: AccelErrorsSpec = Field(default_factory=AccelErrorsSpec)
+
+
+def is_scenario_file(path: Path) -> bool:
+    """Whether a TOML file has a scenario of rotation; else it has a trajectory, or is refused."""
+    motion = read_toml(path).table.get("motion")
+    return isinstance(motion, dict) and motion.get("kind") == "pulses"
 
 
 class ScenarioSpec(Spec):
@@ -20,10 +107,35 @@ class ScenarioSpec(Spec):
 
     kind: Literal["scenario"] = "scenario"
     name: str
+    #: The scenario itself, where it is from a file.
+    own: ScenarioFile | None = None
     rate_hz: FiniteFloat = 100.0
     sampling: str = "instantaneous"
     seed: int = Field(default=0, ge=0)
     sensor: str | None = None
+
+    @classmethod
+    def of_file(
+        cls,
+        path: Path,
+        rate_hz: float | None = None,
+        sampling: str | None = None,
+        seed: int | None = None,
+        sensor: str | None = None,
+    ) -> ScenarioSpec:
+        """Read a scenario from its file; what is given replaces the values of the file.
+
+        ConfigError: the file is missing or an entry is invalid; the message names key and line.
+        """
+        own = ScenarioFile.read(path, rate_hz=rate_hz, sampling=sampling, seed=seed, sensor=sensor)
+        return cls(
+            name=own.name,
+            own=own,
+            rate_hz=own.rate_hz,
+            sampling=own.sampling,
+            seed=own.seed,
+            sensor=own.sensor,
+        )
 
 
 class LogSpec(Spec):

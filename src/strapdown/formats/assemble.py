@@ -764,8 +764,8 @@ def truth_of_log(
     if raw.truth is not None:
         q_ns, scored = raw.truth.q_ns[kept], raw.truth.scored[kept]
     else:
-        # The frames of an attitude are unknown unless the file states its axes.
-        q, names = _quaternions(raw, found) if raw.axes else (None, [])
+        # The frames of an attitude are unknown unless the file states those of our own logs.
+        q, names = _quaternions(raw, found) if raw.axes == "x,y,z" else (None, [])
         if q is None:
             _mention(raw, found, findings)
             return None, None
@@ -871,7 +871,7 @@ def _quaternions(raw: RawLog, found: dict[str, Column]) -> tuple[Array | None, l
 
 def _mention(raw: RawLog, found: dict[str, Column], findings: list[Finding]) -> None:
     """Note that an attitude of unknown frames, as from a phone, is not used as truth."""
-    if not raw.axes and any(set(names) <= set(found) for names in (QUATERNIONS, EULERS)):
+    if raw.axes != "x,y,z" and any(set(names) <= set(found) for names in (QUATERNIONS, EULERS)):
         findings.append(
             Finding(
                 "io.attitude-not-used",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import shlex
 from collections.abc import Mapping, Sequence
@@ -13,7 +14,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.formats.columns import parse_axes
 from strapdown.tables import SAMPLINGS
 
 Array = NDArray[np.float64]
@@ -359,10 +361,11 @@ def stated_by(meta: Mapping[str, Any]) -> dict[str, Any]:
     `meta`: text by key: ``sampling``, ``axes``, ``clock``, ``clock_origin_s``, ``checked``.
     """
     sampling, checked = meta.get("sampling"), meta.get("checked") == CHECKED
-    stated = {
-        "sampling": sampling if sampling in SAMPLINGS else None,
-        "axes": "x,y,z" if meta.get("axes") == "forward-right-down" else None,
-    }
+    stated: dict[str, Any] = {"sampling": sampling if sampling in SAMPLINGS else None, "axes": None}
+    if meta.get("axes"):
+        with contextlib.suppress(ConfigError):  # a comment in other words states nothing
+            text = str(meta["axes"])
+            stated["axes"] = "x,y,z" if parse_axes(text) == ([0, 1, 2], [1.0, 1.0, 1.0]) else text
     if checked:
         stated |= {"clock": meta.get("clock"), "epoch": float(meta.get("clock_origin_s", 0.0))}
     return {**stated, "checked": checked}

@@ -27,8 +27,12 @@ from strapdown.report.chart import BLUE, ORANGE, Array, Chart, Line, Panel, brea
 from strapdown.report.chart_svg import ChartFigure
 from strapdown.report.crash_simulation import stated_errors
 from strapdown.report.plan import PlanView, path_marks
-from strapdown.simulation import Motion, PulseMotion, TriadErrors, find_scenario
-from strapdown.systems.trajectory_source import SimulatedTrajectory, simulate_trajectory
+from strapdown.simulation import Motion, PulseMotion, TriadErrors
+from strapdown.systems.trajectory_source import (
+    SimulatedTrajectory,
+    scenario_of,
+    simulate_trajectory,
+)
 from strapdown.tables import EULER, places_of
 from strapdown.tables.checks import index_of
 
@@ -64,7 +68,7 @@ def write_simulation(
     check_destination(out, force)
     formats = log_formats(spec.formats)
     imu, truth = made or simulate_scenario(spec.scenario)
-    scenario = find_scenario(spec.scenario.name)
+    scenario = scenario_of(spec.scenario)
     errors = scenario_errors(spec.scenario)
     seals: list[Seal] = []
     with write_bundle(
@@ -115,10 +119,11 @@ def _describe_motion(motion: Motion) -> dict[str, object]:
                 "end_s": p.end,
                 "end_closed": p.closed,
                 "rate_rad_per_s": p.rate,
+                **({"edge_s": p.edge} if p.edge else {}),
             }
             for p in motion.pulses
         ]
-        return {"pulses": pulses}
+        return {"pulses": pulses, **({"arm_m": motion.arm} if any(motion.arm) else {})}
     return {"motion": {"class": type(motion).__name__, **_fields(motion)}}
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
@@ -206,7 +207,7 @@ class Motion(Protocol):
 
 @dataclass(frozen=True)
 class Pulse:
-    """A constant rate about one body axis over an interval.
+    """A rate about one body axis over an interval, constant or with edges of a raised cosine.
 
     Attributes
     ----------
@@ -215,9 +216,13 @@ class Pulse:
     start, end : float, s
         The pulse acts on the half-open interval [start, end).
     rate : float, rad/s
+        Between the edges.
     closed : bool
         Let a sample on `end` still read the rate. The motion is unchanged, but the samples then
         contain one pulse value too many: a test of the sampling error at an edge.
+    edge : float, s
+        Within the interval, at either end: the rate rises and falls as ``sin²``. Zero is a
+        rectangle, half of the interval a haversine. The turn is ``rate (end - start - edge)``.
     """
 
     axis: int
@@ -225,14 +230,39 @@ class Pulse:
     end: float
     rate: float
     closed: bool = False
+    edge: float = 0.0
+
+    def shape(self, time: Array) -> tuple[Array, Array, Array]:
+        """Share of the rate at each instant, its integral in s, and its derivative per s."""
+        if not self.edge:
+            acts = (time >= self.start) & ((time <= self.end) if self.closed else (time < self.end))
+            return (
+                acts.astype(np.float64),
+                np.clip(time - self.start, 0.0, self.end - self.start),
+                np.zeros(time.shape),
+            )
+        share, total, change = np.zeros((3, *time.shape))
+        total[time >= self.end] = self.end - self.start - self.edge
+        inside = (time > self.start) & (time < self.end)
+        t = time[inside]
+        for begin, sign in ((self.start, 1.0), (self.end - self.edge, -1.0)):
+            x = np.clip((t - begin) / self.edge, 0.0, 1.0)
+            beyond = np.maximum(t - begin - self.edge, 0.0)
+            share[inside] += sign * np.sin(0.5 * np.pi * x) ** 2
+            total[inside] += sign * (
+                self.edge * (0.5 * x - np.sin(np.pi * x) / (2.0 * np.pi)) + beyond
+            )
+            change[inside] += sign * 0.5 * np.pi / self.edge * np.sin(np.pi * x)
+        return share, total, change
 
 
 @dataclass(frozen=True)
 class PulseMotion(FlatMotion):
     """Any number of pulses, overlapping or not, from an initial attitude.
 
-    Between edges the rate vector is constant in body axes, so the attitude is an exact product of
-    exponentials.
+    Between the edges of rectangles the rate vector is constant in body axes, so the attitude is an
+    exact product of exponentials. With edges of a raised cosine it is integrated as series over
+    panels (`integrate_attitude`), to rounding as well.
 
     Attributes
     ----------
@@ -240,28 +270,67 @@ class PulseMotion(FlatMotion):
     duration : float, s
     q_nb : tuple of float
         Attitude at time zero, scalar first.
+    arm : tuple of float, m
+        From the fixed point about which the body turns (a shoulder, a steering column) to the
+        sensor, in body axes. It needs edges: a rectangle has no angular acceleration.
+
+    Raises
+    ------
+    ConfigError
+        A pulse ends before its edges do, or an arm is given with a rectangle.
     """
 
     pulses: tuple[Pulse, ...]
     duration: float
-    q_nb: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    q_nb: Quaternion = (1.0, 0.0, 0.0, 0.0)
+    arm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        for p in self.pulses:
+            if not 0.0 <= 2.0 * p.edge <= (p.end - p.start) * (1.0 + 1e-12):
+                raise ConfigError(
+                    "simulation.pulse-shorter-than-edges",
+                    quantity="edge",
+                    edge=p.edge,
+                    length=p.end - p.start,
+                    start=p.start,
+                )
+        if any(self.arm) and not all(p.edge for p in self.pulses):
+            raise ConfigError("simulation.arm-without-edges", quantity="arm")
 
     def rate(self, time: ArrayLike) -> Array:
         """Body rate at each instant; (n, 3), rad/s."""
-        t = np.asarray(time, dtype=np.float64)
-        out = np.zeros((t.size, 3))
-        for p in self.pulses:
-            acts = (t >= p.start) & ((t <= p.end) if p.closed else (t < p.end))
-            out[acts, p.axis] += p.rate
-        return out
+        return self._summed(time, 0)
 
     def angle(self, time: ArrayLike) -> Array:
         """Integral of the body rate from time zero; (n, 3), rad."""
+        return self._summed(time, 1)
+
+    def moved(self, time: ArrayLike) -> tuple[Array, Array, Array]:
+        """As `FlatMotion.moved`: of the end of the arm, from where it is at time zero."""
+        if not any(self.arm):
+            return super().moved(time)
+        r, q = np.asarray(self.arm), self.attitude(time)
+        omega = self.rate(time)
+        swept = np.cross(omega, r)
+        pulled = np.cross(self._summed(time, 2), r) + np.cross(omega, swept)
+        start = rotation.rotate(np.asarray(self.q_nb, dtype=np.float64), r)
+        return rotation.rotate(q, r) - start, rotation.rotate(q, swept), rotation.rotate(q, pulled)
+
+    def _summed(self, time: ArrayLike, which: int) -> Array:
         t = np.asarray(time, dtype=np.float64)
         out = np.zeros((t.size, 3))
         for p in self.pulses:
-            out[:, p.axis] += p.rate * np.clip(t - p.start, 0.0, p.end - p.start)
+            out[:, p.axis] += p.rate * p.shape(t)[which]
         return out
+
+    @cached_property
+    def _panels(self) -> AttitudeIntegral:
+        within = (
+            e for p in self.pulses for e in (p.start, p.start + p.edge, p.end - p.edge, p.end)
+        )
+        breaks = [0.0, *(e for e in within if 0.0 < e < self.duration), self.duration]
+        return integrate_attitude(self.rate, breaks, self.q_nb)
 
     def attitude(self, time: ArrayLike) -> Array:
         """Exact attitude.
@@ -274,9 +343,11 @@ class PulseMotion(FlatMotion):
         Returns
         -------
         ndarray, (n, 4)
-            ``q_nb``, exact to the rounding of one product per edge passed.
+            ``q_nb``, exact to the rounding of one product per edge or panel passed.
         """
         t = np.asarray(time, dtype=np.float64)
+        if any(p.edge for p in self.pulses):
+            return self._panels(t)
         edges = np.unique([0.0, *(e for p in self.pulses for e in (p.start, p.end))])
         # Evaluated at mid-interval, away from the edges.
         middle = np.append(0.5 * (edges[:-1] + edges[1:]), edges[-1] + 1.0)
@@ -470,3 +541,89 @@ def _sums(terms: Array) -> Array:
         total = new
         out[k + 1] = total + lost
     return out
+
+
+# Largest turn within a panel of an attitude, rad: its series in the turn ends below 1e-16 within
+# the terms that are kept, and Picard's iteration with them.
+_PANEL_TURN = 0.25
+_ITERATIONS = 14
+
+
+@dataclass(frozen=True)
+class AttitudeIntegral:
+    """Attitude as Legendre series over panels.
+
+    Attributes
+    ----------
+    edges : ndarray, (p + 1,), s
+    before : ndarray, (p, 4)
+        Attitude at the left edge of each panel.
+    series : ndarray, (p, 17, 4)
+        Legendre coefficients of the turn since then, a quaternion.
+    """
+
+    edges: Array
+    before: Array
+    series: Array
+
+    def __call__(self, time: ArrayLike) -> Array:
+        """Attitude, (n, 4), continuous in sign; that of the last edge beyond it."""
+        t = np.clip(np.asarray(time, dtype=np.float64), self.edges[0], self.edges[-1])
+        panel = np.clip(np.searchsorted(self.edges, t, side="right") - 1, 0, len(self.before) - 1)
+        left = self.edges[panel]
+        x = 2.0 * (t - left) / (self.edges[panel + 1] - left) - 1.0
+        turn = np.empty((t.size, 4))
+        for start in range(0, t.size, 16384):  # so that the intermediate arrays stay small
+            part = slice(start, start + 16384)
+            vander = legendre.legvander(x[part], _NODES)
+            turn[part] = np.einsum("nj,njk->nk", vander, self.series[panel[part]])
+        q = rotation.compose(self.before[panel], turn)
+        return np.asarray(q / np.linalg.norm(q, axis=1)[:, None])
+
+
+def integrate_attitude(
+    rate: Callable[[ArrayLike], Array], breaks: Sequence[float], q_nb: Quaternion
+) -> AttitudeIntegral:
+    """Integrate a piecewise smooth rate to an attitude, to rounding.
+
+    `rate`: (n,) instants in s to (n, 3) rates in rad/s. `breaks` (s): instants where the rate or a
+    derivative may jump; the first and the last are the ends. `q_nb`: attitude at the first.
+
+    Each stretch between two breaks is cut into equal panels of at most `_PANEL_TURN`, and at least
+    four. Within a panel ``q = 1 + int q omega / 2`` is iterated (Picard) at sixteen Gauss-Legendre
+    nodes; the k-th iteration is exact to the k-th power of half the turn over k!.
+    """
+    corners = np.unique(np.asarray(breaks, dtype=np.float64))
+    lengths = np.diff(corners)
+    seen = corners[:-1, None] + lengths[:, None] * np.linspace(0.0, 1.0, 33)
+    sizes = np.linalg.norm(rate(seen.ravel()), axis=1).reshape(seen.shape).max(axis=1)
+    counts = np.maximum(4, np.ceil(sizes * lengths / _PANEL_TURN).astype(int))
+    at = np.concatenate(
+        [corners[:1]]
+        + [
+            np.linspace(left, right, count + 1)[1:]
+            for (left, right), count in zip(itertools.pairwise(corners), counts, strict=True)
+        ]
+    )
+    half = 0.5 * np.diff(at)
+    nodes = at[:-1, None] + half[:, None] * (1.0 + _X)
+    omega = rate(nodes.ravel()).reshape(len(half), _NODES, 3)
+    one = np.array([1.0, 0.0, 0.0, 0.0])
+    turn = np.broadcast_to(one, (len(half), _NODES, 4))
+    for _ in range(_ITERATIONS):
+        slope = np.empty(turn.shape)
+        slope[..., 0] = -0.5 * (turn[..., 1:] * omega).sum(axis=-1)
+        slope[..., 1:] = 0.5 * (turn[..., :1] * omega + np.cross(turn[..., 1:], omega))
+        c = _TO_COEFFICIENTS @ slope
+        integral = legendre.legint(np.moveaxis(c, 1, 0), lbnd=-1, axis=0) * half[:, None]
+        series = np.moveaxis(integral, 0, 1)
+        turn = one + legendre.legvander(_X, _NODES) @ series
+    series = np.ascontiguousarray(series)
+    series[:, 0, 0] += 1.0
+    before = np.empty((len(half), 4))
+    q = np.asarray(q_nb, dtype=np.float64)
+    for k, whole in enumerate(series.sum(axis=1)):  # every polynomial is one at the right edge
+        before[k] = q
+        q = rotation.compose(q, whole)
+        q = q / np.linalg.norm(q)
+    return AttitudeIntegral(at, before, series)

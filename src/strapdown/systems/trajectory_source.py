@@ -1,4 +1,4 @@
-"""Build a specified trajectory and simulate the sensor readings along it."""
+"""Build a specified trajectory or scenario and simulate the sensor readings along it."""
 
 from __future__ import annotations
 
@@ -10,10 +10,12 @@ from typing import TypeAlias
 import numpy as np
 import pandas as pd
 
-from strapdown.config import TrajectorySpec, motions
+from strapdown import rotation
+from strapdown.config import ScenarioSpec, TrajectorySpec, motions
 from strapdown.config.alignment import SimulationTable
 from strapdown.config.navigation import NavigationSimulationTable
 from strapdown.config.spec import AngleWaveSpec
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
 from strapdown.errors import ConfigError
 from strapdown.sensors.catalogue import load_sensor
@@ -22,17 +24,23 @@ from strapdown.simulation import (
     ImuErrors,
     Origin,
     PathMotion,
+    Pulse,
+    PulseMotion,
+    Scenario,
     SineVelocityMotion,
     StationaryMotion,
+    TriadErrors,
     Wave,
     aircraft,
     car,
+    find_scenario,
     ship,
     simulate_imu,
     through_waypoints,
 )
 from strapdown.simulation import vehicles as steps
 from strapdown.simulation.path_motion import Manoeuvre
+from strapdown.simulation.scenarios import repeated_pulse
 from strapdown.simulation.vehicles import LIMITS
 from strapdown.simulation.walking import GAITS, WalkingMotion, walk
 
@@ -45,6 +53,8 @@ _KEYS = {
     "acceleration": "most_acceleration_m_per_s2",
     "place": "waypoints",
     "alt": "alt_m",
+    "arm": "arm_m",
+    "edge": "edge_s",
     "angle": "angle_deg",
     "bank": "bank_deg",
     "distance": "distance_m",
@@ -87,6 +97,56 @@ def simulate_trajectory(spec: TrajectorySpec) -> SimulatedTrajectory:
         imu, attitude = simulate_samples(motion, spec, spec.sensor, spec.name)
         trajectory = motion.trajectory(imu.index.to_numpy(dtype=np.float64), source=spec.name)
     return motion, errors, imu, attitude, trajectory
+
+
+def scenario_of(spec: ScenarioSpec) -> Scenario:
+    """Return the scenario of a specification: by its name, or from its own file."""
+    if spec.own is None:
+        return find_scenario(spec.name)
+    own = spec.own
+    motion = own.motion
+    with with_key(f"{own.name}.toml"):
+        pulses: list[Pulse] = []
+        for axis, listed in enumerate((motion.x, motion.y, motion.z)):
+            for p in listed:
+                within = (p.start_s, p.start_s + p.duration_s)
+                turn = p.turn_deg
+                if turn is None:
+                    turn = (p.rate_deg_per_s or 0.0) * (p.duration_s - p.edge_s)
+                pulses += repeated_pulse(axis, within, turn, p.edge_s, p.times, p.every_s or 0.0)
+        latest = max(pulses, key=lambda p: p.end, default=None)
+        if latest is not None and latest.end > motion.duration_s:
+            raise ConfigError(
+                "simulation.pulse-not-within-motion",
+                quantity="duration",
+                length=latest.end - latest.start,
+                start=latest.start,
+                duration=motion.duration_s,
+            )
+        q_nb = rotation.quaternion_from_euler(
+            [motion.roll_deg, motion.pitch_deg, motion.heading_deg]
+        )
+        made = PulseMotion(
+            tuple(pulses), motion.duration_s, (q_nb[0], q_nb[1], q_nb[2], q_nb[3]), motion.arm_m
+        )
+    gyro, accel = own.gyro, own.accel
+    errors = ImuErrors(
+        TriadErrors(
+            noise_density=_times(gyro.noise_density_deg_per_s_per_sqrt_hz, np.pi / 180.0),
+            bias=_times(gyro.bias_deg_per_s, np.pi / 180.0),
+            trend=_times(gyro.trend_deg_per_s2, np.pi / 180.0),
+        ),
+        TriadErrors(
+            noise_density=_times(accel.noise_density_ug_per_sqrt_hz, 1e-6 * STANDARD_GRAVITY),
+            bias=accel.bias_m_per_s2,
+        ),
+    )
+    title = own.title or own.name
+    return Scenario(title, own.name, made, errors, own.references, f"{own.name}.toml")
+
+
+def _times(values: tuple[float, float, float], factor: float) -> tuple[float, ...]:
+    return tuple(factor * value for value in values)
 
 
 def _errors(sensor: str | None, seed: int) -> ImuErrors:

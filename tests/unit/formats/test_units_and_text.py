@@ -156,3 +156,26 @@ def test_columns_without_names_are_shown(tmp_path):
     with pytest.raises(DataError, match=r"1: 0, 2: 1.5, 3: -2.25, 4: 3") as caught:
         read_log(path)
     assert "--columns time=1,gyro_x=2" in caught.value.finding.advice("cli")
+
+
+@pytest.mark.parametrize("text", ["forward-left-up", "x,-y,-z", "Forward, Left, Up"])
+def test_axes_in_a_comment_are_those_of_the_sensor(tmp_path, text):
+    rows = [f"# axes: {text}", ",".join(NAMES), *(",".join(map(str, row)) for row in ROWS)]
+    (tmp_path / "log.csv").write_text("\n".join(rows))
+    log = read_log(tmp_path / "log.csv")
+    plain = ["# axes: forward-right-down", *rows[1:]]
+    (tmp_path / "plain.csv").write_text("\n".join(plain))
+    sensor = read_log(tmp_path / "plain.csv").imu[[*GYRO, *ACCEL]].to_numpy()
+    assert np.array_equal(log.imu[[*GYRO, *ACCEL]].to_numpy(), sensor * [1, -1, -1, 1, -1, -1])
+    assert not [f for f in log.findings if f.code.startswith("io.axes-not-stated")]
+
+
+def test_attitude_beside_other_axes_is_no_truth(tmp_path):
+    """Whose frames it has is not stated: the sensor's, or those of its program's world."""
+    rows = [",".join([*NAMES, "q_w", "q_x", "q_y", "q_z"])]
+    rows += [",".join([*map(str, row), "1", "0", "0", "0"]) for row in ROWS]
+    for text, used in (("forward-left-up", False), ("forward-right-down", True)):
+        (tmp_path / "log.csv").write_text("\n".join([f"# axes: {text}", *rows]))
+        log = read_log(tmp_path / "log.csv")
+        assert (log.truth is not None) == used
+        assert ("io.attitude-not-used" in {f.code for f in log.findings}) != used

@@ -5,7 +5,16 @@ from __future__ import annotations
 import mpmath
 import numpy as np
 
-from strapdown.simulation import Coning, Gesture, Handling, SmoothRandom, Track, find_scenario
+from strapdown.simulation import (
+    Coning,
+    Gesture,
+    Handling,
+    Pulse,
+    PulseMotion,
+    SmoothRandom,
+    Track,
+    find_scenario,
+)
 
 SKEW = (0.5, -0.1, 0.7, 0.5)  # norm 1
 MOTIONS = {
@@ -23,6 +32,17 @@ MOTIONS = {
     ),
     "random": SmoothRandom(16.0, 5, 90.0, 0.7, band=(0.3, 1.5), q_nb=SKEW),
     "handling": Handling(40.0, 3),
+    "pulses with edges": PulseMotion(
+        (
+            Pulse(0, 0.5, 3.0, 2.0, edge=0.75),
+            Pulse(1, 1.0, 3.5, -1.5, edge=1.25),
+            Pulse(2, 1.5, 4.5, 2.5, edge=1.0),
+            Pulse(2, 4.5, 6.0, -1.0, edge=0.75),
+        ),
+        7.0,
+        SKEW,
+        (0.2, -0.1, 0.3),
+    ),
 }
 
 
@@ -33,6 +53,9 @@ def breaks(motion) -> np.ndarray:
     elif isinstance(motion, SmoothRandom):
         ramps = (motion.rest, motion.rest + motion.ramp)
         inner = [*ramps, *(motion.duration - r for r in ramps)]
+    elif isinstance(motion, PulseMotion):
+        ends = ((p.start, p.start + p.edge, p.end - p.edge, p.end) for p in motion.pulses)
+        inner = [t for one in ends for t in one]
     else:
         m = getattr(motion, "gestures", motion)
         tracks = (m.roll, m.pitch, m.heading, m.north, m.east, m.down)

@@ -19,6 +19,7 @@ from strapdown.simulation import (
     Gesture,
     Handling,
     ImuErrors,
+    Pulse,
     PulseMotion,
     SmoothRandom,
     Track,
@@ -338,8 +339,8 @@ def test_whole_turns_leave_the_pose_to_the_last_bit():
 
 
 def test_the_new_motions_do_not_know_pulses():
-    new = [s for s in SCENARIOS.values() if not isinstance(s.motion, PulseMotion)]
-    assert len(new) >= 7
+    new = [s for s in SCENARIOS.values() if not isinstance(s.motion, PulseMotion) or s.after]
+    assert len(new) >= 11
     assert all(s.errors == ImuErrors() for s in new)
 
 
@@ -364,3 +365,57 @@ def test_the_new_motions_do_not_know_pulses():
 def test_what_is_no_motion_is_refused(make, message):
     with pytest.raises(ConfigError, match=message):
         make()
+
+
+@pytest.mark.parametrize("name", ["walking", "throwing", "steering", "gesture"])
+def test_attitude_of_an_activity_is_that_of_another_integrator(name):
+    motion = SCENARIOS[name].motion
+    inner = {t for p in motion.pulses for t in (p.start, p.start + p.edge, p.end - p.edge, p.end)}
+    edges = [2.0, *sorted(t for t in inner if 2.0 < t < 4.0), 4.0]
+    q = motion.attitude([2.0])[0]
+
+    def derivative(t, q):
+        x, y, z = motion.rate(np.array([t]))[0]
+        w, a, b, c = q
+        return 0.5 * np.array(
+            [-a * x - b * y - c * z, w * x + b * z - c * y, w * y + c * x - a * z,
+             w * z + a * y - b * x]
+        )  # fmt: skip
+
+    steps = 0
+    for left, right in pairwise(edges):
+        if right - left > 1e-9:
+            run = solve_ivp(derivative, (left, right), q, method="DOP853", rtol=1e-10, atol=1e-11)
+            q, steps = run.y[:, -1], steps + len(run.t)
+    error = rotation.rotation_angle(q / np.linalg.norm(q), motion.attitude([4.0])[0])
+    # Each step keeps 1e-10 of every component, twice that of half the angle.
+    assert np.radians(error) < 4e-10 * steps
+
+
+def test_pulse_with_edges_turns_by_what_it_is_said_to():
+    pulse = Pulse(1, 1.0, 3.0, 0.5, edge=0.4)
+    motion = PulseMotion((pulse,), 4.0)
+    assert motion.angle([4.0])[0, 1] == pytest.approx(0.5 * (2.0 - 0.4), rel=1e-15)
+    found = rotation.rotation_vector_from_quaternion(motion.attitude([4.0])[0])
+    assert np.abs(found - [0.0, 0.8, 0.0]).max() < 1e-14
+    # Half of an edge has half of the rate, and between the edges it is whole.
+    assert np.abs(motion.rate([1.2, 2.0, 2.8])[:, 1] - [0.25, 0.5, 0.25]).max() < 1e-15
+    assert not motion.rate([1.0, 3.0]).any()
+
+
+def test_narrow_edges_are_almost_a_rectangle():
+    """An edge of 1 µs is 1 µs late at its start, and as early at its end."""
+    table = [(0, 1.0, 2.0, 2.0), (1, 1.5, 3.0, -1.0)]
+    sharp = PulseMotion(tuple(Pulse(*row) for row in table), 4.0)
+    edged = PulseMotion(tuple(Pulse(*row, edge=1e-6) for row in table), 4.0)
+    apart = rotation.rotation_angle(sharp.attitude([4.0])[0], edged.attitude([4.0])[0])
+    assert 0.0 < np.radians(apart) < 1e-6 * 3.0
+
+
+def test_pulse_that_its_edges_do_not_fit_into_is_refused():
+    with pytest.raises(ConfigError) as refused:
+        PulseMotion((Pulse(0, 1.0, 2.0, 1.0, edge=0.51),), 4.0)
+    assert refused.value.finding.code == "simulation.pulse-shorter-than-edges"
+    with pytest.raises(ConfigError) as refused:
+        PulseMotion((Pulse(0, 1.0, 2.0, 1.0),), 4.0, arm=(0.1, 0.0, 0.0))
+    assert refused.value.finding.code == "simulation.arm-without-edges"

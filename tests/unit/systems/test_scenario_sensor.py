@@ -1,12 +1,13 @@
-"""A named sensor takes the place of a scenario's own errors."""
+"""A named sensor takes the place of a scenario's own errors; a scenario from a file."""
 
 from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 
-from strapdown import simulate, verify
+from strapdown import compare_attitude, rotation, simulate, verify
 from strapdown.attitude_comparison.source import simulate_scenario
 from strapdown.config import ScenarioSpec, specify
 from strapdown.errors import ConfigError
@@ -51,3 +52,71 @@ def test_an_unknown_sensor_is_named_with_the_nearest(tmp_path):
     with pytest.raises(ConfigError, match="did you mean 'stim300'"):
         simulate("alexiev-fig2c", sensor="stim30").save(tmp_path / "s")
     assert not (tmp_path / "s").exists()
+
+
+PULSES = """
+title = "two turns that overlap"
+rate_hz = 200
+sampling = "mean"
+
+[motion]
+kind = "pulses"
+duration_s = 6
+heading_deg = 30
+x = [{ start_s = 1, duration_s = 1, rate_deg_per_s = 90 }]
+y = [{ start_s = 1.5, duration_ms = 2000, turn_deg = -120 }]
+z = [{ start_s = 4, duration_s = 0.2, turn_deg = 5, times = 3, every_s = 0.5 }]
+
+[gyro]
+noise_density_deg_per_s_per_sqrt_hz = [0.01, 0, 0.02]
+bias_deg_per_s = [0.5, 0, -0.2]
+trend_deg_per_s2 = [0, 0.1, 0]
+"""
+
+
+def test_scenario_of_a_file_is_what_it_says(tmp_path):
+    (tmp_path / "own.toml").write_text(PULSES)
+    made = simulate(tmp_path / "own.toml", seed=3)
+    assert made.imu.attrs["sampling"] == "mean"
+    assert len(made.imu) == 1201
+    turn = rotation.quaternion_from_rotation_vector
+    parts = np.radians([[45, 0, 0], [45, -30, 0], [0, -90, 0], [0, 0, 15]])
+    end = rotation.quaternion_from_euler([0.0, 0.0, 30.0])
+    for part in parts:
+        end = rotation.compose(end, turn(part))
+    last = made.truth[["q_w", "q_x", "q_y", "q_z"]].to_numpy()[-1]
+    assert rotation.rotation_angle(last, end) < 1e-12
+    gyro = np.degrees(made.imu.iloc[1:201, :3].to_numpy())  # at rest
+    noise = np.array([0.01, 0.0, 0.02]) * np.sqrt(200)
+    # Five standard deviations of a mean of 200; the trend has half of its first second.
+    assert (np.abs(gyro.mean(axis=0) - [0.5, 0.05, -0.2]) <= 5 * noise / np.sqrt(200) + 3e-4).all()
+    assert np.diff(gyro[:, 1]) == pytest.approx(0.1 / 200, rel=1e-6)
+    assert gyro.std(axis=0)[[0, 2]] == pytest.approx(noise[[0, 2]], rel=0.3)
+    assert verify(made.save(tmp_path / "out").path).verdict == "identical"
+
+
+def test_scenario_of_a_file_is_compared_like_a_named_one(tmp_path):
+    (tmp_path / "own.toml").write_text(PULSES)
+    result = compare_attitude(tmp_path / "own.toml", ["naive", "quaternion"], trials=2)
+    assert result.truth is not None
+    (tmp_path / "own.toml").unlink()  # what is sealed has the scenario in it
+    assert verify(result.save(tmp_path / "out", report=False).path).verdict == "identical"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "code"),
+    [
+        ("rate_deg_per_s = 90", "rate_deg_per_s = 90, turn_deg = 9", "config.rate-or-turn"),
+        ("times = 3, every_s", "every_s", "config.times-and-period"),
+        ("duration_s = 6", "duration_s = 5", "simulation.pulse-not-within-motion"),
+        ("rate_deg_per_s = 90", "rate_deg_per_s = 90, edge_s = 0.6",
+         "simulation.pulse-shorter-than-edges"),
+        ("heading_deg = 30", "heading_deg = 30\narm_m = [1, 0, 0]", "simulation.arm-without-edges"),
+    ],
+)  # fmt: skip
+def test_scenario_that_is_none_is_refused(tmp_path, old, new, code):
+    (tmp_path / "own.toml").write_text(PULSES.replace(old, new))
+    with pytest.raises(ConfigError) as refused:
+        simulate(tmp_path / "own.toml")
+    assert code in (refused.value.finding.code, *refused.value.finding.data.get("codes", ()))
+    assert refused.value.finding.file == "own.toml"
