@@ -100,8 +100,6 @@ class Evidence:
     budget : ErrorBudget or None
         Parts of the sensor error.
     holding : Holding or None
-    as_means : bool
-        Whether the stamps of instantaneous rates are late as those of means are.
     """
 
     algorithms: Sequence[AttitudeAlgorithm]
@@ -117,7 +115,6 @@ class Evidence:
     reference_sd: float = 0.0
     budget: ErrorBudget | None = None
     holding: Holding | None = None
-    as_means: bool = False
 
 
 @dataclass(frozen=True)
@@ -329,7 +326,6 @@ def _of_holding(evidence: Evidence, tolerance: float) -> str | None:
 #: What removes a part of the sensor error.
 _REMEDY = {
     "bias": "The gyro's bias of this record, instead of that of the rest",
-    "clock": "Stamps on the clock of the reference",
     "scale and axes": "Calibrated scale factors and axes of the gyro",
 }
 
@@ -346,6 +342,8 @@ def _of_budget(evidence: Evidence) -> list[str]:
         if row["part"] == "clock":
             when = "late" if budget.delay_s > 0 else "early"
             text += f" {abs(1e3 * budget.delay_s):.3g} ± {1e3 * budget.delay_sd:.2g} ms {when}"
+            if abs(budget.drift_ppm) > 3.0 * budget.drift_sd_ppm:
+                text += f" and drifting by {budget.drift_ppm:.3g} ppm"
         elif row["part"] == "bias":
             size = np.degrees(np.sqrt(budget.bias @ budget.bias))
             text += f" of {size:.2g} deg/s beside that of the rest"
@@ -363,19 +361,14 @@ def _improvements(evidence: Evidence, sensor: float) -> list[str]:
     if budget is None:
         return []
     found = []
-    for part in ("clock", "bias", "scale and axes"):
+    for part in ("bias", "scale and axes"):
         left = budget.left_without(part)
         if left is None:
             continue
         order = budget.parts["part"].tolist()
         before = float(budget.parts["max_deg"].iloc[order.index(part) - 1])
         if left < WORTH * before and before - left > UNSEEN * sensor:
-            remedy = _REMEDY[part]
-            if part == "clock" and evidence.as_means:
-                remedy = (
-                    "Samples taken as means over the step before their stamps (--sampling mean)"
-                )
-            found.append(f"{remedy}: {_deg(left)} instead of {_deg(before)}.")
+            found.append(f"{_REMEDY[part]}: {_deg(left)} instead of {_deg(before)}.")
     return found
 
 

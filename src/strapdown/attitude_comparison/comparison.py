@@ -42,6 +42,7 @@ from strapdown.attitude_comparison.references import (
 )
 from strapdown.attitude_comparison.source import (
     AttitudeSource,
+    axes_by_truth,
     describe,
     on_clock,
     read_source,
@@ -72,7 +73,7 @@ from strapdown.increments import increments_from_imu
 from strapdown.progress import Progress, silent
 from strapdown.sensors.rest import RestStretch, find_rests, gyro_bias_from_rests, without_gyro_bias
 from strapdown.systems.inputs import part_of_log
-from strapdown.tables import GYRO
+from strapdown.tables import GYRO, references_table
 from strapdown.tables.checks import index_of
 from strapdown.tables.sample_clock import SampleClock
 from strapdown.units import GYRO_SUMS, GYRO_UNITS, factor_of, parse_unit
@@ -352,8 +353,14 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
     part = part_of_log(whole, spec.from_s, spec.to_s, spec.duration_s, source.name)
     source, clock = on_clock(replace(source, imu=part))
     source, second = read_second(spec, with_truth(source, spec))
+    stated = isinstance(spec.source, LogSpec) and spec.source.axes is not None
+    if source.clean is None:
+        source = axes_by_truth(source, stated)
     rests = find_rests(source.imu)
     imu, bias, bias_input = _gyro_bias(spec, source, rests)
+    budget = None
+    if second is None and source.clean is None:
+        source, budget = _on_log_clock(spec, source, imu, clock)
     findings: list[Finding] = []
     q_nb, initial, begin = initial_attitude(spec.initial, source.imu, rests, findings, source.truth)
     imu = imu[imu.index >= begin]
@@ -398,21 +405,12 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
         algorithms, grounds, factors, lambda stage, share: progress(stage, 0.3 + 0.65 * share)
     )
     between = source.sampling_error_deg or between_samples(grounds)
-    budget = holding = None
-    if source.truth is not None and source.scored is not None:
-        if clean is None:
-            budget = find_budget(grounds, source.truth, source.scored)
-        late = 0.0 if budget is None else budget.late_s
-        holding = holding_time(grounds, spec.tolerance_deg, source.truth, source.scored, late)
     evidence = replace(
         find_evidence(
             grounds, algorithms, costs, sweep, bias, rests, None if between is None else between[1]
         ),
         budget=budget,
-        holding=holding,
-        as_means=budget is not None
-        and imu.attrs["sampling"] != "mean"
-        and budget.late_as_means(clock.step),
+        holding=holding_time(grounds, spec.tolerance_deg),
     )
     beside = run_beside(spec.peers, source, imu, q_nb, references, findings)
     positions: tuple[PositionScore, ...] = ()
@@ -454,6 +452,41 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
         second=second,
     )
     return bench, evidence
+
+
+def _on_log_clock(
+    spec: AttitudeSpec, source: AttitudeSource, imu: pd.DataFrame, clock: SampleClock
+) -> tuple[AttitudeSource, ErrorBudget | None]:
+    """Split the sensor's error, and move the truth to the log's clock where the two differ."""
+    truth, scored = source.truth, source.scored
+    if truth is None or scored is None:
+        return source, None
+    stamps = index_of(imu)
+    known = known_at(truth, scored, stamps)
+    if not known.counts.any():
+        return source, None
+    first = int(np.argmax(known.counts))
+    imu, clock = imu.iloc[first:], clock.of(stamps[first:])
+    known = known.at(np.arange(first, len(stamps)))
+    none = references_table([])
+    grounds = Grounds.of(imu, known.q_nb[0], spec.interpolation, none, known, None, clock)
+    budget = find_budget(grounds, truth, scored)
+    if budget is None or not budget.clock_counts or spec.reference_clock == "stated":
+        return source, budget
+    as_means = imu.attrs["sampling"] != "mean" and budget.late_as_means(clock.step)
+    finding = Finding(
+        "attitude.reference-clock-as-of-means" if as_means else "attitude.reference-clock-differs",
+        file=source.name,
+        quantity="time",
+        severity="note",
+        delay_ms=1e3 * budget.delay_s,
+        delay_sd_ms=1e3 * budget.delay_sd,
+        steps=budget.delay_s / clock.step,
+        drift_ppm=budget.drift_ppm,
+        share_deg=float(budget.parts["share_deg"].iloc[1]),
+    )
+    moved = budget.on_log_clock(truth)
+    return replace(source, truth=moved, findings=(*source.findings, finding)), budget
 
 
 # Initial attitude and gyro bias of a run.

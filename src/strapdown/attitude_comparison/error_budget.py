@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.attitude_comparison.sweep import MOST_ACCURATE, Grounds
-from strapdown.evaluation.differences import Errors, known_at
+from strapdown.evaluation.differences import Errors, Known, known_at
 from strapdown.increments import increments_from_imu
 from strapdown.rotation import unit_rotation_angle
 from strapdown.tables import GYRO
@@ -25,10 +26,13 @@ Array = NDArray[np.float64]
 WINDOW, LEAST_WINDOWS = 1.0, 30
 #: A part counts if its chi-square has a smaller probability by chance.
 CHANCE = 1e-3
-#: A clock shift counts beyond this many standard deviations.
+#: A delay is that of means if it is within so many standard deviations.
 SIGNIFICANT = 3.0
 #: Parts, in the order in which they are removed, and their parameters in the estimate.
-PARTS = {"bias": slice(0, 3), "clock": slice(3, 4), "scale and axes": slice(4, 13)}
+PARTS = {"clock": slice(0, 2), "bias": slice(2, 5), "scale and axes": slice(5, 14)}
+UNKNOWNS = 14
+#: Times that a clock is estimated, and the largest delay that a line of the rates can show, s.
+CLOCK_STEPS, MOST_DELAY = 4, 0.3
 #: Spacing of the starts and of the instants in a search for the time that a tolerance is held.
 STARTS, INSTANTS = 1.0, 0.1
 
@@ -42,34 +46,50 @@ class ErrorBudget:
     Attributes
     ----------
     delay_s, delay_sd : float
-        Stamps less instants of the rates, by the clock of the truth, and standard deviation. Half a
-        step where samples are means over the step before their stamps, minus half a step where
-        they are means over the step after.
+        Stamps less instants of the rates, by the clock of the truth, at `middle_s`, and standard
+        deviation. Half a step where samples are means over the step before their stamps, minus half
+        a step where they are means over the step after.
+    drift_ppm, drift_sd_ppm : float
+        Change of the delay over time.
+    middle_s : float
+        Instant of the delay.
     bias : ndarray, (3,), rad/s
         Beside the bias that was removed.
     matrix : ndarray, (3, 3)
         The gyro reads ``(I + matrix) @ rate + bias``.
     parts : DataFrame
-        One row per part that counts, in the order of removal, and first ``as used``: ``part``,
+        One row per part that counts, in the order of removal, and first ``as stamped``: ``part``,
         ``share_deg`` (largest angle between the attitudes before and after), ``final_deg``,
         ``rms_deg``, ``max_deg`` (errors with this and all parts before removed).
     """
 
     delay_s: float
     delay_sd: float
+    drift_ppm: float
+    drift_sd_ppm: float
+    middle_s: float
     bias: Array
     matrix: Array
     parts: pd.DataFrame = field(repr=False)
 
     @property
-    def late_s(self) -> float:
-        """Delay of the stamps where it is significant, else 0."""
-        return self.delay_s if abs(self.delay_s) > SIGNIFICANT * self.delay_sd else 0.0
+    def clock_counts(self) -> bool:
+        """Whether a delay of the stamps is among the parts."""
+        return "clock" in self.parts["part"].tolist()
+
+    def on_log_clock(self, truth: pd.DataFrame) -> pd.DataFrame:
+        """Move the truth to the clock of the log."""
+        return on_log_clock(truth, (self.delay_s, 1e-6 * self.drift_ppm, self.middle_s))
+
+    def most_delay_s(self, time: Array) -> float:
+        """Largest delay over the record."""
+        ends = self.delay_s + 1e-6 * self.drift_ppm * (time[[0, -1]] - self.middle_s)
+        return float(np.abs(ends).max())
 
     def late_as_means(self, step: float) -> bool:
         """Whether the stamps are late by half a step, and not in time."""
         off = abs(self.delay_s - 0.5 * step)
-        return self.late_s > 0.0 and off <= SIGNIFICANT * self.delay_sd
+        return self.clock_counts and off <= SIGNIFICANT * self.delay_sd
 
     def left_without(self, part: str) -> float | None:
         """Return the largest error in deg once a part is removed; None if it does not count."""
@@ -103,41 +123,68 @@ def find_budget(
     """Estimate the parts of a log's sensor error against an attitude truth.
 
     Over a window the gyro's rotation less the truth's is, to first order in the gyro's errors and
-    in axes at the end, ``∫ C (b + M ω) dt + τ (C ω_begin - ω_end)``, with C from each instant to
-    the end and τ the delay of the stamps: the error equation of strapdown attitude (Titterton and
-    Weston, 2004, sec. 12.3), integrated. Least squares over all windows; parts without significance
-    are left out.
+    in axes at the end, ``∫ C (b + M ω) dt + τ(t_begin) C ω_begin - τ(t_end) ω_end``, with C from
+    each instant to the end and τ the delay of the stamps, a line over the record: the error
+    equation of strapdown attitude (Titterton and Weston, 2004, sec. 12.3), integrated. Least
+    squares over all windows; parts without significance are left out.
 
     Returns
     -------
     ErrorBudget or None
         None without enough windows of known attitude.
     """
-    if grounds.truth is None:
+    if grounds.truth is None or len(rows := _windows(grounds)) < LEAST_WINDOWS:
         return None
-    rows = _windows(grounds)
-    if len(rows) < LEAST_WINDOWS:
-        return None
-    design, off = _equations(grounds, rows)
+    clock = [0.0, 0.0, float(index_of(grounds.imu).mean())]
+    now = grounds
+    for _ in range(CLOCK_STEPS):
+        # A delay is estimated from the rates at its own instants: again, once it is taken off.
+        design, off = _equations(now, rows, clock[2])
+        values, sd, kept = _significant_parts(design, off)
+        if "clock" not in kept or not abs(values[0]) < MOST_DELAY:
+            break
+        clock[0] += float(values[0])
+        clock[1] += float(values[1])
+        now = replace(
+            grounds, truth=known_at(on_log_clock(truth, clock), scored, index_of(grounds.imu))
+        )
+        if not len(rows := _windows(now)) >= LEAST_WINDOWS:
+            return None
+    delay, drift, middle = clock
+    bias, matrix = values[PARTS["bias"]], values[PARTS["scale and axes"]].reshape(3, 3)
+    found = ErrorBudget(
+        delay, float(sd[0]), 1e6 * drift, 1e6 * float(sd[1]), middle, bias, matrix, pd.DataFrame()
+    )
+    counted = [p for p in PARTS if p in kept or (p == "clock" and delay != 0.0)]
+    return replace(found, parts=_removed(grounds, truth, scored, counted, found))
+
+
+def on_log_clock(truth: pd.DataFrame, clock: Sequence[float]) -> pd.DataFrame:
+    """Move a truth to the clock of a log: its delay in s, drift, and the instant of the delay."""
+    delay, drift, middle = clock
+    time = index_of(truth)
+    moved = truth.copy()
+    moved.index = pd.Index(time + delay + drift * (time - middle), name=truth.index.name)
+    return moved
+
+
+def _significant_parts(design: Array, off: Array) -> tuple[Array, Array, list[str]]:
+    """Solve for the parts that are significant; a clock that agrees has its uncertainty, too."""
     kept = list(PARTS)
     while True:
-        columns = np.array([c for p in kept for c in range(13)[PARTS[p]]], dtype=np.int64)
+        columns = np.array([c for p in kept for c in range(UNKNOWNS)[PARTS[p]]], dtype=np.int64)
         found, covariance = _solved(design[:, columns], off)
         chances = {p: _chance(found, covariance, columns, PARTS[p]) for p in kept}
         weak = [p for p in kept if chances[p] > CHANCE]
         if not weak:
             break
         kept.remove(max(weak, key=lambda p: chances[p]))
-    values, sd = np.zeros(13), np.full(13, np.nan)
-    values[columns] = found
-    sd[columns] = np.sqrt(np.diag(covariance))
-    if np.isnan(sd[3]):
-        # The uncertainty of a clock that agrees.
-        with_clock = np.append(columns, 3)
-        sd[3] = float(np.sqrt(_solved(design[:, with_clock], off)[1][-1, -1]))
-    bias, delay, matrix = values[:3], float(values[3]), values[4:].reshape(3, 3)
-    parts = _removed(grounds, truth, scored, kept, (bias, delay, matrix))
-    return ErrorBudget(delay, float(sd[3]), bias, matrix, parts)
+    values, sd = np.zeros(UNKNOWNS), np.full(UNKNOWNS, np.nan)
+    values[columns], sd[columns] = found, np.sqrt(np.diag(covariance))
+    if "clock" not in kept:
+        with_clock = np.concatenate([columns, np.arange(UNKNOWNS)[PARTS["clock"]]])
+        sd[PARTS["clock"]] = np.sqrt(np.diag(_solved(design[:, with_clock], off)[1])[-2:])
+    return values, sd, kept
 
 
 def _windows(grounds: Grounds) -> list[tuple[int, int]]:
@@ -156,8 +203,10 @@ def _windows(grounds: Grounds) -> list[tuple[int, int]]:
     return out
 
 
-def _equations(grounds: Grounds, rows: Sequence[tuple[int, int]]) -> tuple[Array, Array]:
-    """Design matrix, (3 n, 13), and rotations left, (3 n,), rad, of all windows."""
+def _equations(
+    grounds: Grounds, rows: Sequence[tuple[int, int]], middle: float
+) -> tuple[Array, Array]:
+    """Design matrix, (3 n, 14), and rotations left, (3 n,), rad, of all windows."""
     assert grounds.truth is not None
     time, rate = index_of(grounds.imu), values_of(grounds.imu, GYRO)
     q = grounds.own.q_nb
@@ -182,15 +231,17 @@ def _equations(grounds: Grounds, rows: Sequence[tuple[int, int]]) -> tuple[Array
     scale = c_bn @ weighed.reshape(-1, 3, 9)
     smooth = _smoothed(rate, max(1, round(0.02 / grounds.clock.step)))
     turned = c_bn @ (c_nb[a] @ smooth[a][:, :, None])
-    clock = turned - smooth[b][:, :, None]
+    ended = smooth[b][:, :, None]
+    since = (time - middle)[:, None, None]
+    clock = np.concatenate([turned - ended, turned * since[a] - ended * since[b]], axis=2)
     by_gyro = rotation.compose(rotation.conjugate(q[a]), q[b])
     known = grounds.truth.q_nb
     by_truth = rotation.compose(rotation.conjugate(known[a]), known[b])
     left = rotation.rotation_vector_from_quaternion(
         rotation.compose(rotation.conjugate(by_truth), by_gyro)
     )
-    design = np.concatenate([bias, clock, scale], axis=2)
-    return design.reshape(-1, 13), np.asarray(left).reshape(-1)
+    design = np.concatenate([clock, bias, scale], axis=2)
+    return design.reshape(-1, UNKNOWNS), np.asarray(left).reshape(-1)
 
 
 def _smoothed(rate: Array, width: int) -> Array:
@@ -224,39 +275,32 @@ def _removed(
     truth: pd.DataFrame,
     scored: NDArray[np.bool_],
     kept: Sequence[str],
-    values: tuple[Array, float, Array],
+    found: ErrorBudget,
 ) -> pd.DataFrame:
     """Errors with one part after another removed; those of `ErrorBudget.parts`."""
-    bias, delay, matrix = values
-    before = grounds.own.q_nb
-    rows: list[dict[str, object]] = [_row("as used", 0.0, _errors(grounds, before))]
-    now = grounds
-    for part in PARTS:
-        if part not in kept:
-            continue
-        imu = now.imu.copy()
-        rate, stamps = values_of(imu, GYRO), index_of(imu)
-        if part == "bias":
-            rate = rate - bias
-        elif part == "clock":
-            stamps = stamps - delay
+    before, now = grounds.own.q_nb, grounds
+    rows: list[dict[str, object]] = [_row("as stamped", 0.0, _errors(grounds, before))]
+    for part in kept:
+        less = now
+        if part == "clock":
+            known = known_at(found.on_log_clock(truth), scored, index_of(now.imu))
+            if not known.counts.any():
+                continue
+            less = replace(now, truth=known, **_anew(now, known))
         else:
-            # What is left of the bias here is small beside the rates.
-            rate = np.asarray(np.linalg.solve(np.eye(3) + matrix, rate.T).T, dtype=np.float64)
-        imu[GYRO] = rate
-        imu.index = pd.Index(stamps, name=imu.index.name)
-        known = known_at(truth, scored, stamps)
-        start, restarts = now.q_nb, now.restarts
-        if part == "clock" and known.counts.any():
-            first = int(np.argmax(known.counts))
-            start = start if first else known.q_nb[0]
-            anew = {row: known.q_nb[row] if known.counts[row] else q for row, q in restarts}
-            if first:
-                anew[first] = known.q_nb[first]
-            restarts = tuple(sorted(anew.items()))
-        less = replace(now, imu=imu, truth=known, q_nb=start, restarts=restarts)
-        q = less.history(MOST_ACCURATE, increments_from_imu(imu, now.interpolation))
-        row = _row(part, _share(part, before, q, rate, delay), _errors(less, q))
+            rate = values_of(now.imu, GYRO) - (found.bias if part == "bias" else 0.0)
+            if part == "scale and axes":
+                # What is left of the bias here is small beside the rates.
+                rate = np.asarray(np.linalg.solve(np.eye(3) + found.matrix, rate.T).T)
+            imu = now.imu.copy()
+            imu[GYRO] = rate
+            less = replace(now, imu=imu)
+        q = less.history(MOST_ACCURATE, increments_from_imu(less.imu, less.interpolation))
+        row = _row(part, float(unit_rotation_angle(before, q).max()), _errors(less, q))
+        if part == "clock":
+            # What the body turns meanwhile.
+            speed = np.sqrt(np.square(values_of(now.imu, GYRO)).sum(axis=1)).max()
+            row["share_deg"] = float(np.degrees(speed)) * found.most_delay_s(index_of(now.imu))
         # What leaves no less is no explanation.
         if float(str(row["rms_deg"])) < float(str(rows[-1]["rms_deg"])):
             rows.append(row)
@@ -264,11 +308,14 @@ def _removed(
     return pd.DataFrame(rows)
 
 
-def _share(part: str, before: Array, after: Array, rate: Array, delay: float) -> float:
-    """Largest change of the attitude in deg; by a shift of stamps, what is turned meanwhile."""
-    if part == "clock":
-        return float(np.degrees(np.sqrt((rate * rate).sum(axis=1)).max()) * abs(delay))
-    return float(unit_rotation_angle(before, after).max())
+def _anew(grounds: Grounds, known: Known) -> dict[str, Any]:
+    """Start and restarts by a truth on another clock."""
+    first = int(np.argmax(known.counts))
+    anew = {row: known.q_nb[row] if known.counts[row] else q for row, q in grounds.restarts}
+    if first:
+        anew[first] = known.q_nb[first]
+    start = grounds.q_nb if first else known.q_nb[0]
+    return {"q_nb": start, "restarts": tuple(sorted(anew.items()))}
 
 
 def _errors(grounds: Grounds, q: Array) -> Errors:
@@ -287,25 +334,19 @@ def _row(part: str, share: float, errors: Errors) -> dict[str, object]:
     }
 
 
-def holding_time(
-    grounds: Grounds,
-    tolerance_deg: float,
-    truth: pd.DataFrame,
-    scored: NDArray[np.bool_],
-    delay: float = 0.0,
-) -> Holding | None:
+def holding_time(grounds: Grounds, tolerance_deg: float) -> Holding | None:
     """Find for how long integration alone stays within a tolerance of the truth.
 
-    From every second of known attitude on, within a stretch without gaps. `delay` (s): stamps less
-    instants of the samples, which are shifted by it.
+    From every second of known attitude on, within a stretch without gaps.
 
     Returns
     -------
     Holding or None
         None where fewer than two instants are known.
     """
-    time = index_of(grounds.imu) - delay
-    reference = known_at(truth, scored, time)
+    if grounds.truth is None:
+        return None
+    time, reference = index_of(grounds.imu), grounds.truth
     times: list[float] = []
     ended: list[bool] = []
     thin = max(1, round(INSTANTS / grounds.clock.step))

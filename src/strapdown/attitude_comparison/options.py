@@ -43,6 +43,7 @@ class AttitudeSpec(Spec):
     truth_path: str | None = None
     gyro_bias_path: str | None = None
     reference_log_path: str | None = None
+    reference_clock: Literal["fitted", "stated"] = "fitted"
     peers: tuple[str, ...] = ()
     from_s: FiniteFloat | None = None
     to_s: FiniteFloat | None = None
@@ -77,6 +78,9 @@ class AttitudeOptions:
     reference_log : str or Path, optional
         Log of a second, better sensor on the same body: synchronized and aligned with this one,
         its attitude serves as the truth.
+    reference_clock : {'fitted', 'stated'}
+        Clock of an attitude truth: moved to that of the log where the rotations of both show an
+        offset or a drift, or as its stamps state.
     initial : str or array_like, (3,), deg
         ``auto``, ``truth``, ``level``, ``zero``, or ``roll,pitch,heading`` in deg. ``auto`` is
         the truth where there is one, leveled where the log begins at rest, and zero otherwise.
@@ -108,6 +112,7 @@ class AttitudeOptions:
     trials: int = 1
     reference: str | Sequence[str] = ()
     reference_log: str | Path | None = None
+    reference_clock: str = "fitted"
     initial: str | ArrayLike = "auto"
     gyro_bias: str | ArrayLike = "auto"
     peers: Sequence[str] = ()
@@ -173,6 +178,7 @@ class AttitudeOptions:
             truth_path=truth_path,
             gyro_bias_path=bias_path,
             peers=tuple(_texts(self.peers)),
+            reference_clock=self.reference_clock,
             reference_log_path=None if self.reference_log is None else str(self.reference_log),
             from_s=self.from_s,
             to_s=self.to_s,

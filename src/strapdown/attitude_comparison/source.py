@@ -10,23 +10,28 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown import rotation
 from strapdown.attitude_algorithms import Quaternion, run_attitude
 from strapdown.attitude_comparison.options import AttitudeSpec
 from strapdown.bundle import InputFiles, input_files, sensor_file
 from strapdown.config import LogSpec, ScenarioSpec
 from strapdown.config.sources import read_options
+from strapdown.dsp.samples import running_integral
 from strapdown.errors import DataError, Finding
-from strapdown.evaluation.differences import error_angles
+from strapdown.evaluation.differences import attitude_at, error_angles
 from strapdown.formats import read_log
+from strapdown.formats.inference.rotation_rate import signed_permutations
 from strapdown.formats.recording import Origin, Reading, Recording
 from strapdown.increments import increments_from_imu
 from strapdown.sensors.catalogue import load_sensor
-from strapdown.tables import GYRO, QUATERNION
-from strapdown.tables.checks import index_of, values_of
+from strapdown.tables import ACCEL, GYRO, QUATERNION, find_gaps
+from strapdown.tables.checks import MAG, index_of, values_of
 from strapdown.tables.sample_clock import SampleClock, sample_clock
 
 if TYPE_CHECKING:
     from strapdown.simulation import ImuErrors
+
+Array = NDArray[np.float64]
 
 #: Findings that the axes of a log are not stated and gravity is along another one.
 AXES_OPEN = (
@@ -146,6 +151,70 @@ def read_source(spec: AttitudeSpec) -> AttitudeSource:
 def _axes_by_gravity(log: Recording) -> Finding | None:
     """Finding that another axis than z points down, by gravity, where no file states the axes."""
     return next((f for f in log.findings if f.code in AXES_OPEN and "example" in f.data), None)
+
+
+#: Windows in which the rotation of a gyro is compared with that of a truth, and the fewest of them;
+#: the largest rotation within one, rad.
+AXES_WINDOW, LEAST_AXES_WINDOWS, SMALL = 0.2, 30, 1.0
+#: Of the sum of squares, what other axes must leave, beside those taken and beside the next best.
+AXES_LEFT, AXES_APART = 0.25, 2.0
+
+
+def axes_by_truth(source: AttitudeSource, stated: bool) -> AttitudeSource:
+    """Turn a gyro whose axes are not those of the truth, as the rotations of both show.
+
+    Right-handed axes turn all sensors; a mirrored gyro has the sign of axes wrong, and is turned
+    alone. Axes that the user stated (`stated`) are only reported.
+    """
+    if source.truth is None or source.scored is None:
+        return source
+    by_gyro, by_truth = _window_rotations(source)
+    if len(by_gyro) < LEAST_AXES_WINDOWS:
+        return source
+    names, matrices = signed_permutations()
+    left = np.array([np.square(by_truth - by_gyro @ m.T).sum() for m in matrices])
+    order = np.argsort(left, kind="stable")
+    best, second = int(order[0]), int(order[1])
+    found = left[best] < AXES_LEFT * min(left[0], float(np.square(by_truth).sum()))
+    if best == 0 or not found or left[second] < AXES_APART * left[best]:
+        return source
+    mirrored = bool(np.linalg.det(matrices[best]) < 0.0)
+    finding = Finding(
+        "attitude.gyro-mirrored" if mirrored else "attitude.axes-by-reference",
+        file=source.name,
+        quantity="axes",
+        axes=names[best],
+        left_percent=100.0 * float(np.sqrt(left[best] / left[0])),
+        applied=not stated,
+    )
+    if stated:
+        return replace(source, findings=(*source.findings, finding))
+    imu = source.imu.copy()
+    for triad in (GYRO,) if mirrored else (GYRO, ACCEL, MAG):
+        if set(triad) <= set(imu.columns):
+            imu[triad] = values_of(imu, triad) @ matrices[best].T
+    return replace(source, imu=imu, findings=(*source.findings, finding))
+
+
+def _window_rotations(source: AttitudeSource) -> tuple[Array, Array]:
+    """Rotations over windows, (n, 3), rad, of the gyro and of the truth."""
+    assert source.truth is not None
+    assert source.scored is not None
+    known = source.truth.iloc[np.flatnonzero(source.scored)]
+    time, stamps = index_of(source.imu), index_of(known)
+    edges = np.arange(max(time[0], stamps[0]), min(time[-1], stamps[-1]), AXES_WINDOW)
+    if edges.size < 2:
+        return np.empty((0, 3)), np.empty((0, 3))
+    whole = running_integral(time, values_of(source.imu, GYRO))
+    turns = np.diff([np.interp(edges, time, axis) for axis in whole.T], axis=1).T
+    q = attitude_at(known, edges)
+    known_turns = rotation.rotation_vector_from_quaternion(
+        rotation.compose(rotation.conjugate(q[:-1]), q[1:])
+    )
+    small = (np.abs(turns).max(axis=1) < SMALL) & (np.abs(known_turns).max(axis=1) < SMALL)
+    for gap in [*find_gaps(time), *find_gaps(stamps)]:
+        small &= ~((edges[1:] > gap.start) & (edges[:-1] < gap.end))
+    return turns[small], np.asarray(known_turns)[small]
 
 
 def on_clock(source: AttitudeSource) -> tuple[AttitudeSource, SampleClock]:

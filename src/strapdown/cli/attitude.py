@@ -83,6 +83,15 @@ class ComparisonFlags:
             "LOG", "Log of a second, better sensor on the same body, to be taken for the truth."
         ),
     ] = None
+    reference_clock: Annotated[
+        str,
+        running(
+            "CLOCK",
+            "Clock of an attitude truth: fitted to the log's by the rotations of both, or as "
+            "stated (fitted).",
+            show_default=False,
+        ),
+    ] = "fitted"
     initial: Annotated[
         str,
         running(

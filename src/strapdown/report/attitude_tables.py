@@ -530,7 +530,7 @@ def difference_table(bench: AttitudeComparison) -> TableBlock | None:
 
 #: What each part of the sensor error is.
 _PARTS = {
-    "as used": "as used",
+    "as stamped": "as stamped",
     "bias": "less a constant bias",
     "clock": "with the stamps shifted",
     "scale and axes": "less scale factors and misalignment",
@@ -545,7 +545,7 @@ def budget_table(bench: AttitudeComparison) -> TableBlock | None:
     rows = tuple(
         (
             _PARTS[row["part"]],
-            _NONE if row["part"] == "as used" else degrees(row["share_deg"]),
+            _NONE if row["part"] == "as stamped" else degrees(row["share_deg"]),
             *(degrees(row[f"{key}_deg"]) for key in ("final", "rms", "max")),
         )
         for row in budget.parts.to_dict("records")
@@ -555,7 +555,8 @@ def budget_table(bench: AttitudeComparison) -> TableBlock | None:
         ("sensor", "change", "final", "RMS", "largest"),
         rows,
         caption="Estimated from this log and its reference, removed one after the other. Stamps: "
-        f"{1e3 * budget.delay_s:.3g} ms late (1σ {1e3 * budget.delay_sd:.2g} ms), "
+        f"{1e3 * budget.delay_s:.3g} ms late (1σ {1e3 * budget.delay_sd:.2g} ms), drifting by "
+        f"{budget.drift_ppm:.2g} ppm (1σ {budget.drift_sd_ppm:.2g}); "
         f"{budget.delay_s / step:.2g} of a step: 0.5 where samples are means over the step before "
         "their stamps, 0 where they are instantaneous, -0.5 where they are means over the step "
         "after.",
@@ -571,6 +572,8 @@ def budget_json(bench: AttitudeComparison) -> dict[str, Any] | None:
     return {
         "delay_s": budget.delay_s,
         "delay_sd_s": budget.delay_sd,
+        "drift_ppm": budget.drift_ppm,
+        "drift_sd_ppm": budget.drift_sd_ppm,
         "bias_rad_per_s": budget.bias.tolist(),
         "matrix": budget.matrix.tolist(),
         "parts": budget.parts.to_dict("records"),

@@ -100,9 +100,57 @@ def test_a_shift_of_the_clock_is_found_and_its_share_named(tmp_path):
     assert budget.delay_s == pytest.approx(late, abs=5e-4)
     assert abs(budget.delay_s - late) < 4.0 * budget.delay_sd + 2e-5
     first, *_ = budget.parts.to_dict("records")
-    assert budget.parts["part"].tolist()[:2] == ["as used", "clock"]
+    assert budget.parts["part"].tolist()[:2] == ["as stamped", "clock"]
     assert first["max_deg"] == pytest.approx(np.degrees(late * 1.5), rel=0.5)
     assert budget.left_without("clock") < 0.1 * first["max_deg"]
+    # The answer is that of the sensor, on one clock; as stamped it is not.
+    assert bench.sweep["max_deg"].min() < 0.1 * first["max_deg"]
+    assert "attitude.reference-clock-differs" in {f.code for f in bench.findings}
+    stated = compare_attitude(
+        log, reference=tmp_path / "truth.csv", reference_clock="stated", **ONE
+    )
+    assert stated.sweep["max_deg"].min() > 0.5 * first["max_deg"]
+
+
+def test_a_drift_of_the_clock_is_found(tmp_path):
+    time = np.arange(6000) / RATE
+    drift = 800e-6
+    log = write(tmp_path, time * (1.0 + drift), rates(time))
+    bench = compare_attitude(log, reference=write_truth(tmp_path, time[::2]), **ONE)
+    # Against the truth's clock: the log's stamps of an instant less that.
+    assert bench.budget.drift_ppm == pytest.approx(800.0, abs=10.0)
+    assert bench.sweep["max_deg"].min() < 0.2
+
+
+@pytest.mark.parametrize("axes", ["y,-x,z", "x,-y,z", "-z,x,-y"])
+def test_axes_are_found_by_the_truth(tmp_path, axes):
+    """Axis by axis of the body: which of the log's it is; an odd number of signs is a mirror."""
+    time = np.arange(6000) / RATE
+    gyro = np.empty((time.size, 3))
+    for body, name in enumerate(axes.split(",")):
+        gyro[:, "xyz".index(name[-1])] = rates(time)[:, body] * (-1.0 if "-" in name else 1.0)
+    log = write(tmp_path, time, gyro)
+    truth = write_truth(tmp_path, time[::2])
+    bench = compare_attitude(log, reference=truth, **ONE)
+    (found,) = [
+        f
+        for f in bench.findings
+        if f.code in ("attitude.axes-by-reference", "attitude.gyro-mirrored")
+    ]
+    assert found.data["axes"] == axes
+    assert (found.code == "attitude.gyro-mirrored") == (axes == "x,-y,z")
+    assert bench.sweep["max_deg"].min() < 0.05
+    stated = compare_attitude(log, reference=truth, axes="x,y,z", **ONE)
+    assert stated.sweep["max_deg"].min() > 20.0
+
+
+def test_right_axes_are_left(tmp_path):
+    time = np.arange(3000) / RATE
+    log = write(tmp_path, time, rates(time))
+    bench = compare_attitude(log, reference=write_truth(tmp_path, time[::2]), **ONE)
+    codes = {f.code for f in bench.findings}
+    assert not codes & {"attitude.axes-by-reference", "attitude.gyro-mirrored"}
+    assert not codes & {"attitude.reference-clock-differs"}
 
 
 @pytest.mark.parametrize("sampling", ["mean before", "instantaneous"])
@@ -137,7 +185,7 @@ def test_bias_and_scale_are_told_apart(tmp_path):
     np.testing.assert_allclose(budget.bias, bias, atol=2e-4)
     np.testing.assert_allclose(budget.matrix, matrix, atol=1e-3)
     parts = budget.parts.set_index("part")
-    assert parts.loc["scale and axes", "max_deg"] < 0.1 * parts.loc["as used", "max_deg"]
+    assert parts.loc["scale and axes", "max_deg"] < 0.1 * parts.loc["as stamped", "max_deg"]
 
 
 def test_integration_holds_a_tolerance_for_as_long_as_a_bias_takes(tmp_path):
