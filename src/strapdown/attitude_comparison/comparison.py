@@ -56,7 +56,9 @@ from strapdown.attitude_comparison.sweep import (
     choose_factors,
     find_shares,
     gather,
+    lower_factor,
     not_judged,
+    passes_at,
     sweep_rates,
     trial_names,
     worst_sweep,
@@ -405,6 +407,15 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
         algorithms, grounds, factors, lambda stage, share: progress(stage, 0.3 + 0.65 * share)
     )
     between = source.sampling_error_deg or between_samples(grounds)
+    lowest = sweep["rate_hz"].min()
+    while not spec.rates_hz and (lower := lower_factor(clock, factors)) is not None:
+        if not passes_at(sweep, lowest, spec.tolerance_deg):
+            break
+        factors = (*factors, lower)
+        sweep = pd.concat(
+            [sweep, sweep_rates(algorithms, grounds, (lower,), silent)], ignore_index=True
+        )
+        lowest = sweep["rate_hz"].min()
     evidence = replace(
         find_evidence(
             grounds, algorithms, costs, sweep, bias, rests, None if between is None else between[1]

@@ -22,8 +22,9 @@ __all__ = ["ErrorBudget", "Holding", "find_budget", "holding_time"]
 
 Array = NDArray[np.float64]
 
-#: Rotations are compared over windows of this length; the fewest of them.
-WINDOW, LEAST_WINDOWS = 1.0, 30
+#: Rotations are compared over windows of at most and at least this length, s: so many in a record;
+#: the fewest of them.
+WINDOW, SHORTEST, WINDOWS, LEAST_WINDOWS = 1.0, 0.1, 60, 30
 #: A part counts if its chi-square has a smaller probability by chance.
 CHANCE = 1e-3
 #: A delay is that of means if it is within so many standard deviations.
@@ -191,14 +192,16 @@ def _windows(grounds: Grounds) -> list[tuple[int, int]]:
     """First and last rows of windows within stretches, between samples of known attitude."""
     assert grounds.truth is not None
     time = index_of(grounds.imu)
+    known_s = time.size * grounds.clock.step * float(grounds.truth.counts.mean())
+    window = min(max(known_s / WINDOWS, SHORTEST), WINDOW)
     out = []
     for begin, end in grounds.clock.stretches:
         known = begin + np.flatnonzero(grounds.truth.counts[begin:end])
         if known.size < 2:
             continue
-        number = np.floor((time[known] - time[known[0]]) / WINDOW)
+        number = np.floor((time[known] - time[known[0]]) / window)
         first = known[np.flatnonzero(np.diff(number, prepend=-1.0))]
-        near = np.diff(time[first]) <= 2.0 * WINDOW
+        near = np.diff(time[first]) <= 2.0 * window
         out += [(int(a), int(b)) for a, b in zip(first[:-1][near], first[1:][near], strict=True)]
     return out
 

@@ -212,6 +212,12 @@ def _known_after_gaps(clock: SampleClock, truth: Known | None) -> list[tuple[int
     return found
 
 
+def lower_factor(clock: SampleClock, factors: Sequence[int]) -> int | None:
+    """Return half the lowest rate that was tried, while enough samples remain."""
+    lower = 2 * max(factors)
+    return lower if (clock.number.size - 1) // lower >= LEAST_STEPS else None
+
+
 def choose_factors(
     clock: SampleClock, rates: Sequence[float], findings: list[Finding]
 ) -> tuple[int, ...]:
@@ -246,6 +252,12 @@ def choose_factors(
                 )
             )
     return tuple(sorted(factors))
+
+
+def passes_at(sweep: pd.DataFrame, rate_hz: float, limit: float) -> bool:
+    """Whether the own error of any algorithm with averaged samples is within a limit at a rate."""
+    cells = sweep[(sweep["meaning"] == "sum") & (sweep["rate_hz"] == rate_hz)]
+    return bool((cells["own_deg"] <= limit).any())
 
 
 def sweep_rates(

@@ -23,6 +23,7 @@ from strapdown.formats.clocks import (
     counted,
     even_stamps,
     read_stamps,
+    spread_bursts,
     with_clock,
 )
 from strapdown.formats.columns import parse_axes, read_name
@@ -109,7 +110,8 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
         else (None, False)
     )
     even = None if ticks is None else even_stamps(ticks)
-    ticks = ticks if even is None else even.ticks
+    bursts = None if ticks is None or even is not None else spread_bursts(ticks)
+    ticks = even.ticks if even is not None else bursts.ticks if bursts is not None else ticks
     said = told_by_numbers(raw, found, options, values, ticks, dated)
     axes = body_axes(raw, options, said, findings)
     units = units_of_triads(raw, found, options, values, said, findings, questions)
@@ -163,6 +165,19 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
         )
     if even is not None:
         findings.append(_said_of_coarse(raw, even, TIME_UNITS[stamps.unit]))
+    if bursts is not None:
+        factor = TIME_UNITS[stamps.unit]
+        findings.append(
+            Finding(
+                "io.stamps-shared-by-bursts",
+                file=raw.name,
+                quantity="time",
+                size=bursts.size,
+                rate_hz=1.0 / (bursts.step * factor),
+                spread=bursts.spread * factor,
+                interval=bursts.size * bursts.step * factor,
+            )
+        )
     readings = [time_reading(raw, found, stamps, int(kept[0]))]
     # Column by column in one block, which the table keeps: a long log takes a large part of the
     # memory.

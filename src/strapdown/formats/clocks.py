@@ -29,6 +29,7 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats.inference.conclusion import THRESHOLD, infer_time_unit, wrap_bits
 from strapdown.formats.recording import Origin
 from strapdown.tables.checks import RELATIVE
+from strapdown.tables.sample_clock import sample_clock
 from strapdown.units import TIME_UNITS
 
 __all__ = [
@@ -373,6 +374,48 @@ def even_stamps(stamps: NDArray[Any]) -> EvenStamps | None:
     if exact.dtype.kind == "i" and step > 1000.0:
         return EvenStamps(exact[0] + np.rint(even).astype(np.int64), tick, step, off)
     return EvenStamps(exact[0] + even, tick, step, off)
+
+
+@dataclass(frozen=True)
+class SpreadBursts:
+    """Stamps of samples that share one by one burst, spread over an even clock.
+
+    Attributes
+    ----------
+    ticks : ndarray, (n,)
+        In the unit of the stamps.
+    step, spread : float
+        Step of the samples, and standard deviation of the deliveries, in the unit of the stamps.
+    size : float
+        Mean number of samples of a burst.
+    """
+
+    ticks: NDArray[Any]
+    step: float
+    spread: float
+    size: float
+
+
+def spread_bursts(stamps: NDArray[Any]) -> SpreadBursts | None:
+    """Spread samples that are delivered together, by their clock (`tables.sample_clock`).
+
+    None if no stamps repeat, any goes back, or the deliveries scatter by half their interval.
+    """
+    if stamps.dtype.kind not in "iuf" or stamps.size < FEWEST_STAMPS:
+        return None
+    exact = stamps.astype(np.int64) if stamps.dtype.kind in "iu" else stamps
+    since = (exact - exact[0]).astype(np.float64)
+    steps = np.diff(since)
+    shared = int(np.count_nonzero(steps == 0.0))
+    if steps.min() < 0.0 or shared <= COARSE * steps.size:
+        return None
+    clock = sample_clock(since)
+    size = stamps.size / (steps.size - shared + 1)
+    if not clock.repaired or clock.spread > 0.5 * size * clock.step:
+        return None
+    whole = exact.dtype.kind == "i" and clock.step > 1000.0
+    ticks = exact[0] + (np.rint(clock.time).astype(np.int64) if whole else clock.time)
+    return SpreadBursts(ticks, clock.step, clock.spread, size)
 
 
 # Time stamps of a log: units, faults and repairs.

@@ -311,8 +311,7 @@ def _fitted(
     pieces = [slice(a, b) for a, b in pairwise(bounds)]
     taken = np.ones(stamps.size, dtype=bool)
     if in_bursts:
-        # The stamp of the last sample of a burst is nearest to its instant.
-        taken = np.append(np.diff(stamps) > 0.5 * step, True)
+        taken = _stamped(stamps, number, step)
     top = bottom = 0.0
     for piece in pieces:
         here = taken[piece]
@@ -343,6 +342,22 @@ def _fitted(
         np.mean(one_all**2)
     )
     return fitted, step, float(left_all.std()), walks
+
+
+def _stamped(stamps: Array, number: Numbers, step: float) -> NDArray[np.bool_]:
+    """Return the samples of bursts at whose instants the stamps are.
+
+    That is the last of each, which is taken just before a delivery, unless the stamps of bursts of
+    different sizes are far more even at the first, as those of a clock that is not advanced.
+    """
+    later = np.diff(stamps) > 0.5 * step
+    last, first = np.append(later, True), np.append(True, later)
+
+    def scatter(taken: NDArray[np.bool_]) -> float:
+        steps = np.diff(stamps[taken]) - step * np.diff(number[taken])
+        return float(np.median(np.abs(steps)))
+
+    return first if scatter(first) < 0.5 * scatter(last) else last
 
 
 def _smoother_on(fitted: Array, stamps: Array, values: Array | None, begins: Numbers) -> float:

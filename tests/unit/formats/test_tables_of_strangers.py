@@ -559,25 +559,37 @@ def test_linear_acceleration_beside_an_angular_velocity_is_that_of_ros(tmp_path,
         np.testing.assert_allclose(imu[ACCEL], accel, atol=1e-6)
 
 
-@pytest.mark.parametrize(("every", "proposed"), [(50, True), (4, False)])
-def test_a_repair_that_loses_much_of_a_log_is_not_proposed(tmp_path, every, proposed):
+def test_samples_that_share_the_stamp_of_their_first_are_spread(tmp_path):
+    """Three stamps in four are repeated, by chance: bursts of any size."""
     time, gyro, accel = moving()
-    # One stamp again in 50 rows is a fault of rows; three in four are bursts, of any size.
-    again = np.arange(len(time)) % every == 1
-    if not proposed:
-        again = np.random.default_rng(4).random(len(time)) > 1.0 / every
-        again[0] = False
+    true = time.copy()
+    again = np.random.default_rng(4).random(len(time)) > 0.25
+    again[0] = False
+    time[again] = np.nan
+    time = np.maximum.accumulate(np.nan_to_num(time))
+    path = table_of(tmp_path / "a.csv", ["t [s]", *UNITS], (time, gyro, accel))
+    log = read_log(path)
+    (finding,) = [f for f in log.findings if f.code == "io.stamps-shared-by-bursts"]
+    step = true[1] - true[0]
+    assert finding.data["rate_hz"] == pytest.approx(1.0 / step, rel=1e-3)
+    np.testing.assert_allclose(log.imu.index, true, atol=0.5 * step)
+
+
+def test_a_repair_that_loses_little_of_a_log_is_proposed(tmp_path):
+    time, gyro, accel = moving()
+    # One stamp again in 50 rows is a fault of rows.
+    again = np.arange(len(time)) % 50 == 1
     time[again] = np.nan
     time = np.maximum.accumulate(np.nan_to_num(time))
     path = table_of(tmp_path / "a.csv", ["t [s]", *UNITS], (time, gyro, accel))
     with pytest.raises(DataError) as refused:
         read_log(path)
     finding = refused.value.finding
-    assert finding.code == ("io.stamp-repeated" if proposed else "io.stamps-of-uneven-bursts")
-    assert ("--repair" in finding.data.get("flags", "")) == proposed
+    assert finding.code == "io.stamp-repeated"
+    assert "--repair" in finding.data["flags"]
     kept = read_log(path, ReadOptions(repair=True)).findings
     dropped = next(f for f in kept if f.code == "io.rows-not-later-left-out")
-    assert dropped.severity == ("note" if proposed else "warning")
+    assert dropped.severity == "note"
 
 
 def test_a_word_before_the_numbers_of_each_row_is_a_column(tmp_path):
