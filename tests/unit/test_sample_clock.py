@@ -155,3 +155,11 @@ def test_a_part_of_a_record_keeps_its_gaps_and_numbers():
     assert [g.sample for g in part.gaps] == [60]
     np.testing.assert_array_equal(part.number, clock.number[40:150])
     assert clock.of(time[120:]).gaps == ()
+
+
+def test_a_clock_that_was_set_is_one_gap():
+    time = np.concatenate([np.arange(500) * 0.01, 1.7e9 + np.arange(500) * 0.01])
+    clock = sample_clock(time)
+    assert clock.rate_hz == pytest.approx(100.0, rel=1e-6)
+    assert [gap.sample for gap in clock.gaps] == [500]
+    assert not clock.repaired

@@ -178,6 +178,9 @@ def _gaps(stamps: Array) -> tuple[list[Gap], bool]:
         if (steps < SHORT * mean).mean() < BURSTS:
             break
         ends = np.flatnonzero(np.append(np.diff(stamps) > 0.5 * mean, True))
+        if ends.size < LEAST:
+            # A single pause far longer than the record is no delivery.
+            break
         gaps = [replace(g, sample=int(ends[g.sample - 1]) + 1) for g in find_gaps(stamps[ends])]
     else:
         return gaps, True
