@@ -306,8 +306,9 @@ def counted(columns: Mapping[str, NDArray[Any]]) -> tuple[str, NDArray[np.int64]
 # Stamps that are coarser than the samples.
 
 
-#: Share of the samples that repeat the stamp before them, where a clock is coarse; fewest stamps.
-COARSE, FEWEST_STAMPS = 0.5, 5
+#: Share of the samples that repeat the stamp before them, where bursts share a stamp and where a
+#: clock is coarse; fewest stamps.
+COARSE, REPEATED, FEWEST_STAMPS = 0.5, 0.01, 5
 #: Of a tick of a coarse clock, how far samples at a constant rate may be outside theirs.
 OFF_TICK = 0.1
 
@@ -343,7 +344,7 @@ def even_stamps(stamps: NDArray[Any]) -> EvenStamps | None:
     if stamps.dtype.kind not in "iuf" or stamps.size < FEWEST_STAMPS:
         return None
     changes = int(np.count_nonzero(stamps[1:] != stamps[:-1]))
-    if changes < FEWEST_STAMPS - 1 or changes > (1.0 - COARSE) * (stamps.size - 1):
+    if changes < FEWEST_STAMPS - 1 or changes > (1.0 - REPEATED) * (stamps.size - 1):
         return None
     exact = stamps.astype(np.int64) if stamps.dtype.kind in "iu" else stamps
     whole = np.diff(exact).astype(np.float64)
@@ -407,11 +408,12 @@ def spread_bursts(stamps: NDArray[Any]) -> SpreadBursts | None:
     since = (exact - exact[0]).astype(np.float64)
     steps = np.diff(since)
     shared = int(np.count_nonzero(steps == 0.0))
-    if steps.min() < 0.0 or shared <= COARSE * steps.size:
+    if steps.min() < 0.0 or shared == 0:
         return None
     clock = sample_clock(since)
-    size = stamps.size / (steps.size - shared + 1)
-    if not clock.repaired or clock.spread > 0.5 * size * clock.step:
+    size = stamps.size / (int(np.count_nonzero(steps > 0.5 * clock.step)) + 1)
+    in_bursts = clock.kind == "bursts" and clock.repaired
+    if not in_bursts or clock.spread > 0.5 * size * clock.step:
         return None
     whole = exact.dtype.kind == "i" and clock.step > 1000.0
     ticks = exact[0] + (np.rint(clock.time).astype(np.int64) if whole else clock.time)

@@ -23,8 +23,9 @@ GAP_STEPS = 10.0
 #: In bursts this share of the steps is shorter than a fifth of the mean step: two samples a
 #: delivery make a half short, jitter of a third of a step a hundredth.
 SHORT, BURSTS = 0.2, 0.3
-#: Of the bursts, the share that has the most frequent size, where samples are delivered in packets.
-PACKETS = 0.5
+#: Of the intervals between deliveries, the share that is within this part of the usual one, where
+#: deliveries are even; share of a size of bursts that is no accident.
+PACKETS, EVEN, OFTEN = 0.5, 0.1, 0.005
 #: Steps within this part of a step of whole multiples, and their share, need no tracking.
 MULTIPLE, MULTIPLES = 0.15, 0.98
 #: Stamps within this part of a step (standard deviation) of the clock are left as they are.
@@ -287,11 +288,19 @@ def _of_bursts(stamps: Array, gaps: Sequence[Gap], mean: float) -> tuple[float, 
     apart = np.diff(stamps[ends])
     if ends.size < LEAST:
         return mean, advance
-    # The first burst may have begun before the record.
-    packet = int(np.bincount(size[1:]).argmax())
-    if (size[1:] == packet).mean() < PACKETS:
+    # The first burst may have begun before the record. Deliveries at even intervals are full packets
+    # of which samples are lost, if sizes are spread below the largest; two sizes beside each other
+    # are those of a timer that has no whole number of samples to deliver.
+    usual = float(np.median(apart))
+    even = np.abs(apart - usual) <= EVEN * usual
+    if even.mean() < PACKETS:
         return mean, advance
-    step = float(np.median(apart[size[1:] == packet])) / packet
+    counts = np.bincount(size[1:][even])
+    often = np.flatnonzero(counts > OFTEN * counts.sum())
+    packet = int(often.max())
+    if often.min() > packet - 2:
+        return mean, advance
+    step = usual / packet
     delivered = _followed(stamps[ends], step, size)
     for end, count, clock in zip(ends[1:], size[1:], delivered, strict=True):
         if clock > count:

@@ -23,6 +23,7 @@ from strapdown.formats.clocks import (
     gps_from_unix,
     leap_seconds,
     on_clock_of,
+    spread_bursts,
     unix_from_gps,
     unrolled,
     with_clock,
@@ -173,3 +174,27 @@ def test_a_log_of_whole_seconds_says_what_its_stamps_leave_open(tmp_path):
     # A tick in the 20 s of the record, of 50 Hz.
     assert said.data["rate_within"] == pytest.approx(50.0 / 20.0, rel=0.01)
     assert len(log.imu) == 1000
+
+
+def test_a_clock_of_10_ms_repeats_a_stamp_of_104_hz_now_and_then():
+    """One stamp in 25 is repeated, and the samples are even all the same."""
+    true = np.arange(3000) / 104.0
+    stamps = np.floor(true * 100.0).astype(np.int64) * 10
+    assert 0.01 < np.mean(np.diff(stamps) == 0) < 0.05
+    even = even_stamps(stamps)
+    assert even.step == pytest.approx(1000.0 / 104.0, rel=1e-4)
+    assert np.abs(even.ticks - 1000.0 * true).max() <= 10.0
+
+
+def test_packets_with_some_stamps_alike_are_spread():
+    """Ten samples a delivery, rounded to the millisecond: some of a packet share their stamp."""
+    rng = np.random.default_rng(2)
+    true = np.arange(1000) * 0.02
+    arrival = np.repeat(true[9::10], 10) + np.tile(np.arange(10) * 4e-4, 100)
+    bursts = spread_bursts(np.round(arrival, 3))
+    assert bursts.step == pytest.approx(0.02, rel=1e-3)
+    assert np.std(bursts.ticks - true) < 0.002
+    # Rows that were written twice are no bursts.
+    assert spread_bursts(np.sort(np.concatenate([true, true[::50]]))) is None
+    assert spread_bursts(true) is None
+    assert spread_bursts(rng.permutation(true)) is None

@@ -577,10 +577,9 @@ def test_samples_that_share_the_stamp_of_their_first_are_spread(tmp_path):
 
 def test_a_repair_that_loses_little_of_a_log_is_proposed(tmp_path):
     time, gyro, accel = moving()
-    # One stamp again in 50 rows is a fault of rows.
-    again = np.arange(len(time)) % 50 == 1
-    time[again] = np.nan
-    time = np.maximum.accumulate(np.nan_to_num(time))
+    # A row again after 50 is a fault of rows.
+    rows = np.sort(np.concatenate([np.arange(len(time)), np.arange(1, len(time), 50)]))
+    time, gyro, accel = time[rows], gyro[rows], accel[rows]
     path = table_of(tmp_path / "a.csv", ["t [s]", *UNITS], (time, gyro, accel))
     with pytest.raises(DataError) as refused:
         read_log(path)
