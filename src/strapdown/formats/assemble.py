@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -109,8 +109,9 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
         if "time" in found
         else (None, False)
     )
-    even = None if ticks is None else even_stamps(ticks)
-    bursts = None if ticks is None or even is not None else spread_bursts(ticks)
+    shared = None if ticks is None or _written_twice(ticks, values) else ticks
+    even = None if shared is None else even_stamps(shared)
+    bursts = None if shared is None or even is not None else spread_bursts(shared)
     ticks = even.ticks if even is not None else bursts.ticks if bursts is not None else ticks
     said = told_by_numbers(raw, found, options, values, ticks, dated)
     axes = body_axes(raw, options, said, findings)
@@ -219,6 +220,17 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
         findings=tuple(findings),
         start=raw.start,
     )
+
+
+def _written_twice(ticks: NDArray[Any], values: Mapping[str, Array]) -> bool:
+    """Whether most rows that repeat the stamp before them repeat its values, too."""
+    if ticks.dtype.kind not in "iuf":
+        return False
+    again = np.flatnonzero(ticks[1:] == ticks[:-1])
+    if not again.size:
+        return False
+    same = [np.all(v[again] == v[again + 1], axis=1) for v in values.values()]
+    return bool(np.all(same, axis=0).mean() > 0.5)
 
 
 def _said_of_coarse(raw: RawLog, even: EvenStamps, factor: float) -> Finding:

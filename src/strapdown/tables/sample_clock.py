@@ -288,9 +288,9 @@ def _of_bursts(stamps: Array, gaps: Sequence[Gap], mean: float) -> tuple[float, 
     apart = np.diff(stamps[ends])
     if ends.size < LEAST:
         return mean, advance
-    # The first burst may have begun before the record. Deliveries at even intervals are full packets
-    # of which samples are lost, if sizes are spread below the largest; two sizes beside each other
-    # are those of a timer that has no whole number of samples to deliver.
+    # The first burst may have begun before the record. Deliveries at even intervals are full
+    # packets of which samples are lost, if sizes are spread below the largest; two sizes beside
+    # each other are those of a timer that has no whole number of samples to deliver.
     usual = float(np.median(apart))
     even = np.abs(apart - usual) <= EVEN * usual
     if even.mean() < PACKETS:
