@@ -367,8 +367,8 @@ def _sweep(bench: AttitudeComparison) -> Chart:
             if judged
             else "Algorithm error at that rate. "
         )
-        + "Left out: as if the sensor were read less often (aliased). Summed: as if it integrated "
-        f"between samples. Drawn at {LEAST_WORDS} where it is less.",
+        + "Averaged: as by a sensor of that rate. Left out: as if it were read less often (aliased). "
+        f"Drawn at {LEAST_WORDS} where it is less.",
         "rate, Hz",
         tuple(panels),
         log_x=True,
