@@ -198,7 +198,10 @@ def test_it_gives_the_bits_of_the_kernels(tmp_path, variant, precision):
 
 
 @needs_compiler
-@pytest.mark.parametrize("variant", ["dcm", "quaternion", "rotvec", "rotvec:samples=1"])
+@pytest.mark.parametrize(
+    "variant",
+    ["dcm", "quaternion", "rotvec", "rotvec:samples=1", "rotvec:samples=1,previous=yes"],
+)
 def test_large_turns_take_sine_and_cosine(tmp_path, variant):
     rows = log(100, longest=0.5)
     assert (np.linalg.norm(rows[:, 1:], axis=1) * rows[:, 0]).max() > 0.5
