@@ -20,6 +20,7 @@ def rates() -> np.ndarray:
 
 
 def ratios() -> Iterator[Ratio]:
+    import strapdown as sd
     from strapdown._kernels import attitude as kernel
     from strapdown.attitude_algorithms import AttitudeTracker, Quaternion, run_attitude
     from strapdown.increments import increments_from_imu
@@ -108,4 +109,32 @@ def ratios() -> Iterator[Ratio]:
         theirs / SAMPLES * 1e9,
         "ns",
         None,
+    )
+
+    time = np.arange(SAMPLES) * STEP
+    ours, theirs = by_turns(lambda: sd.attitude(time, gyro), batch, rounds=7)
+    yield Ratio(
+        "sd.attitude of arrays, a sample",
+        ours / SAMPLES * 1e9,
+        "the kernel alone",
+        theirs / SAMPLES * 1e9,
+        "ns",
+        3.0,
+    )
+
+    tracker = AttitudeTracker(Quaternion())
+    tracker.update(0.0, gyro[0])
+
+    def angles() -> None:
+        for _ in range(part):
+            tracker.roll_pitch_heading  # noqa: B018
+
+    ours, theirs = by_turns(angles, one_by_one)
+    yield Ratio(
+        "angles of a tracker, a read",
+        ours / part * 1e9,
+        "its update with one sample",
+        theirs / part * 1e9,
+        "ns",
+        2.5,
     )

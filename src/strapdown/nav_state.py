@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,6 +86,27 @@ class NavState:
         q_nb.flags.writeable = False
         object.__setattr__(self, "v_n", v_n)
         object.__setattr__(self, "q_nb", q_nb)
+
+    @classmethod
+    def of_numbers(cls, time: float, numbers: Sequence[float]) -> NavState:
+        """Make a state from ten numbers of a kernel: lat, lon, alt, v_n, q_nb.
+
+        The checks are those of the constructor, without what arrays of three and four numbers cost:
+        a live system asks for its state after each sample.
+        """
+        lat, lon, alt, north, east, down, w, x, y, z = numbers
+        norm = math.sqrt(w * w + x * x + y * y + z * z)
+        whole = math.isfinite(time + lat + lon + alt + north + east + down + norm)
+        near = abs(lat) <= 0.5 * math.pi and abs(lon) <= math.pi and abs(norm - 1.0) < 0.01
+        if not (whole and near):
+            return cls(time, lat, lon, alt, np.array([north, east, down]), np.array([w, x, y, z]))
+        v_n = np.array([north, east, down])
+        q_nb = np.array([w / norm, x / norm, y / norm, z / norm])
+        v_n.setflags(write=False)
+        q_nb.setflags(write=False)
+        made = object.__new__(cls)
+        made.__dict__.update(time=time, lat=lat, lon=lon, alt=alt, v_n=v_n, q_nb=q_nb)
+        return made
 
     @classmethod
     def from_degrees(

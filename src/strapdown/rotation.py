@@ -501,8 +501,8 @@ def _rows_of(values: ArrayLike, shape: tuple[int, ...], name: str) -> tuple[Arra
         )
     rows = np.ascontiguousarray(array.reshape(-1, math.prod(shape)))
     # A square that overflows is as useless as infinity.
-    good = np.abs(rows) < LARGEST
-    if not good.all():
+    if rows.size and not (rows.max() < LARGEST and rows.min() > -LARGEST):
+        good = np.abs(rows) < LARGEST
         bad = int(np.argmin(good.all(axis=1)))
         raise DataError(
             "geodesy.not-finite-number-below",
@@ -517,7 +517,8 @@ def _rows_of(values: ArrayLike, shape: tuple[int, ...], name: str) -> tuple[Arra
 def _unit_quaternions(q: ArrayLike, name: str) -> tuple[Array, tuple[int, ...]]:
     """Return quaternions as rows of norm 1 and the leading shape; norms must be 1 within 1 %."""
     rows, leading = _rows_of(q, (4,), name)
-    norm = np.sqrt((rows * rows).sum(axis=1))
+    w, x, y, z = rows.T
+    norm = np.sqrt(w * w + x * x + y * y + z * z)
     far = np.abs(norm - 1.0) > _TOLERANCE
     if far.any():
         bad = int(np.argmax(far))

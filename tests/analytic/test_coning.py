@@ -94,10 +94,76 @@ def test_the_drift_at_10_ms(source, variant, expected, digits):
     ) == pytest.approx(expected, abs=0.51 * 10**-digits)
 
 
+def residual(source, previous, step):
+    """What a step lacks of the solid angle of its cone, over beta^2, by its phase x.
+
+    The attitude turns about the cone axis by ``x / 2`` a step. Increments, chords of a circle that
+    turn by x from one to the next, compose to ``sin(x) / 2``; trapezoids are shorter than them by
+    ``(x / 2) cot(x / 2)``, and the change of their rates adds ``x^2 sin(x) / 12``.
+    """
+    x = OMEGA * step
+    short, own = 1.0, 0.0
+    if source == "rates":
+        short, own = 0.5 * x / np.tan(0.5 * x), x * x * np.sin(x) / 12.0
+    composed = 0.5 * np.sin(x) + (2.0 * np.sin(x) - np.sin(2.0 * x)) / 12.0 * previous
+    return 0.5 * x - short**2 * composed - own
+
+
+@pytest.mark.parametrize("source", ["increments", "rates"])
+@pytest.mark.parametrize("step", [0.01, 0.004])
+def test_drift_of_one_increment_that_knows_the_one_before(source, step):
+    time, half_angle = np.arange(round(6.0 / step) + 1) * step, np.radians(0.1)
+    if source == "increments":
+        increments = exact_increments(time, half_angle)
+    else:
+        increments = increments_from_imu(imu_table(time, rates(time, half_angle)))
+    # The first step has none before it.
+    steps = len(time) - 1
+    lacks = residual(source, 1, step) * (steps - 1) + residual(source, 0, step)
+    expected = -np.degrees(half_angle**2 * lacks) / time[-1] * 3600
+    found = drift(increments, "rotvec:samples=1,previous=yes", time[-1], half_angle)
+    # Products of three increments are beta^2 of it.
+    assert found == pytest.approx(expected, rel=1e-4)
+    # A residual of x^5 / 60 of increments, x^5 / 36 of chords: order 4 of either.
+    x = OMEGA * step
+    size = {"increments": x**5 / 60, "rates": x**5 / 36}[source]
+    assert residual(source, 1, step) == pytest.approx(size, rel=0.3 * x * x)
+
+
+def test_steps_of_any_length_keep_the_order_of_what_the_increment_before_corrects():
+    errors = []
+    for step in (0.1 / 24, 0.1 / 48):
+        lengths = step * np.random.default_rng(1).uniform(0.5, 1.5, round(6 / step))
+        time = np.concatenate([[0.0], np.cumsum(lengths)])
+        run = run_attitude(
+            make_algorithm("rotvec:samples=1,previous=yes"),
+            exact_increments(time),
+            attitude(time)[0],
+        )
+        last = run.attitude[QUATERNION].to_numpy()[-1]
+        errors.append(float(rotation.rotation_angle(last, attitude(time)[-1])))
+    # The steps of the two are other draws, of 1440 and 2880.
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.2)
+
+
+def test_increment_before_a_gap_or_in_a_burst_corrects_nothing():
+    time = np.cumsum([0.0, 0.01, 0.01, 0.031, 0.0103, 0.0034, 0.0034])
+    found, plain = (
+        run_attitude(make_algorithm(v), exact_increments(time)).attitude[QUATERNION].to_numpy()
+        for v in ("rotvec:samples=1,previous=yes", "rotvec:samples=1")
+    )
+    turns = [rotation.compose(rotation.conjugate(q[:-1]), q[1:]) for q in (found, plain)]
+    apart = rotation.rotation_angle(*turns)
+    alike = np.array([False, True, False, False, False, True])
+    assert (apart[~alike] < 1e-13).all()
+    assert (apart[alike] > 1e-6).all()
+
+
 @pytest.mark.parametrize(
     ("variant", "half_angle_deg"),
     [
         *(("quaternion", 1.0), ("euler:step=rk4", 1.0), ("rk4", 1.0), ("dcm", 1.0)),
+        ("rotvec:samples=1,previous=yes", 0.1),
         *(("rotvec:samples=1", 1.0), ("rotvec", 0.1), ("rotvec:samples=3", 0.02)),
         # At 1 deg products of three increments, of order 4, hide the coefficients' eighth.
         *(("rotvec:samples=4", 0.02), ("rotvec:samples=3,coefficients=fit", 0.02)),

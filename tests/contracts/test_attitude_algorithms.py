@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tests.coded import coded
 
 from strapdown import rotation
 from strapdown.attitude_algorithms import ALGORITHMS, AttitudeTracker, make_algorithm, run_attitude
@@ -23,6 +24,7 @@ VARIANTS = [
     "quaternion:normalise=false",
     "rk4:normalise=false",
     "rotvec:samples=1",
+    "rotvec:samples=1,previous=yes",
     "rotvec:samples=3",
     "rotvec:samples=4",
     "rotvec:samples=4,coefficients=miller",
@@ -256,6 +258,12 @@ def test_the_order_of_accuracy_that_it_declares(variant, source):
 def test_what_is_not_understood_is_named(text, message):
     with pytest.raises(ConfigError, match=message):
         make_algorithm(text)
+
+
+def test_increment_before_is_refused_to_a_block_of_several():
+    with pytest.raises(ConfigError, check=coded("attitude.previous-of-one-increment")):
+        make_algorithm("rotvec:previous=yes")
+    assert make_algorithm("rotvec:samples=1,previous=yes").label == "rotvec:samples=1,previous=true"
 
 
 def test_orthogonalising_does_what_it_says():

@@ -312,6 +312,26 @@ def euler_degrees_from_quat(w, x, y, z):
 
 
 @njit(cache=True)
+def unit_quat(a, first):
+    """Four numbers of an array, from `first` on, scaled to norm 1."""
+    w, x, y, z = a[first], a[first + 1], a[first + 2], a[first + 3]
+    norm = math.sqrt(w * w + x * x + y * y + z * z)
+    return w / norm, x / norm, y / norm, z / norm
+
+
+@njit(cache=True)
+def unit_euler_degrees(a, first):
+    """As `euler_degrees_from_quat` of four numbers of an array, as a table has it.
+
+    There the quaternion is scaled to norm 1, and once more where its angles are computed, which can
+    change its last bit.
+    """
+    w, x, y, z = unit_quat(a, first)
+    norm = math.sqrt(w * w + x * x + y * y + z * z)
+    return euler_degrees_from_quat(w / norm, x / norm, y / norm, z / norm)
+
+
+@njit(cache=True)
 def eulers_degrees_from_quats(q, e):
     """Apply `euler_degrees_from_quat` to each row."""
     for i in range(q.shape[0]):

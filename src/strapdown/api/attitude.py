@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, replace
@@ -16,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown import rotation
 from strapdown.api.reading import ImuFile, imu_input, imu_of, imu_of_arrays
 from strapdown.attitude_algorithms import AttitudeTracker, attitude_history, make_algorithm
+from strapdown.attitude_algorithms.algorithm import history_of_samples
 from strapdown.attitude_comparison.comparison import (
     AttitudeComparison,
     initial_attitude,
@@ -23,11 +25,13 @@ from strapdown.attitude_comparison.comparison import (
 )
 from strapdown.attitude_comparison.options import AttitudeOptions
 from strapdown.errors import ConfigError, DataError, Finding, check_choice
-from strapdown.increments import increments_from_imu
+from strapdown.increments import BETWEEN_STAMPS, increments_from_imu
 from strapdown.progress import Progress, silent
 from strapdown.sensors.rest import find_rests
 from strapdown.systems.inputs import NOWHERE, Memory, moved
-from strapdown.tables import GYRO, QUATERNION, attitude_table
+from strapdown.tables import ACCEL, EULER, GYRO, QUATERNION, check_imu
+from strapdown.tables.checks import as_array, check_same_length
+from strapdown.tables.imu import imu_of_columns
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -48,8 +52,38 @@ class Attitude(pd.DataFrame):
     """Attitude by time: a DataFrame with `rotation` and `findings`.
 
     Index ``time`` in s; columns ``q_w q_x q_y q_z`` (body to north-east-down, Hamilton, scalar
-    first) and ``roll pitch heading`` in deg.
+    first) and ``roll pitch heading`` in deg, which are computed when the table is first used.
     """
+
+    @classmethod
+    def _of(cls, time: Array, q_nb: Array) -> Attitude:
+        """A table of checked stamps and unit quaternions, with its angles to be computed."""
+        table = pd.DataFrame(
+            q_nb, index=pd.Index(time.copy(), name="time"), columns=QUATERNION, copy=False
+        )
+        out = cls(table)
+        out.__dict__["_quaternions"] = q_nb
+        return out
+
+    # A table of pandas is what its manager holds. Angles cost several times what the attitude does,
+    # and of many runs nobody looks at them: they join the manager when it is first asked for.
+    @property
+    def _mgr(self) -> Any:
+        q_nb = self.__dict__.pop("_quaternions", None)
+        if q_nb is not None:
+            held = self.__dict__["_held"]
+            whole = pd.DataFrame(
+                np.hstack([q_nb, rotation.euler_from_quaternion(q_nb)]),
+                index=held.axes[1],
+                columns=QUATERNION + EULER,
+                copy=False,
+            )
+            self.__dict__["_held"] = whole._mgr
+        return self.__dict__["_held"]
+
+    @_mgr.setter
+    def _mgr(self, manager: Any) -> None:
+        self.__dict__["_held"] = manager
 
     @property
     def _constructor(self) -> type[Attitude]:
@@ -60,7 +94,10 @@ class Attitude(pd.DataFrame):
         """The attitudes as a scipy Rotation: ``rotation.apply(v_b)`` is ``v_n``."""
         from scipy.spatial.transform import Rotation
 
-        return Rotation.from_quat(self[[*QUATERNION[1:], QUATERNION[0]]].to_numpy())
+        q_nb = self.__dict__.get("_quaternions")
+        if q_nb is None:
+            q_nb = self[QUATERNION].to_numpy()
+        return Rotation.from_quat(np.roll(q_nb, -1, axis=1))
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -124,9 +161,13 @@ def attitude(
         if isinstance(t, np.ndarray):
             raise ConfigError("api.no-samples", quantity="gyro")
         imu = imu_of(t)
+    elif accel is None and not isinstance(gyro_bias, str):
+        imu = _gyro_alone(t, gyro, sampling)
     else:
         imu = imu_of_arrays(t, gyro, accel, sampling)
-    rests = find_rests(imu)
+    # Without an accelerometer a rest is no start, and it takes longer to find than the attitude.
+    leveled = set(ACCEL) <= set(imu.columns) or isinstance(gyro_bias, str)
+    rests = find_rests(imu) if leveled else ()
     findings: list[Finding] = []
     name = str(imu.attrs.get("source") or "imu")
     if isinstance(initial, str):
@@ -138,8 +179,22 @@ def attitude(
         bias = _bias(gyro_bias, rests)
         imu = imu.copy()
         imu[GYRO] = imu[GYRO].to_numpy() - bias
-    history = attitude_history(chosen, increments_from_imu(imu, interpolation), q_nb)
-    out = Attitude(attitude_table(imu.index.to_numpy(), history, source=name))
+    time = np.ascontiguousarray(imu.index.to_numpy(dtype=np.float64))
+    check_choice(
+        "mechanization.no-interpolation",
+        BETWEEN_STAMPS,
+        quantity="interpolation",
+        interpolation=interpolation,
+    )
+    mean = imu.attrs["sampling"] == "mean"
+    if interpolation == "linear" or mean:
+        if gyro is None:
+            check_imu(imu)  # a table may have been changed since it was read
+        rate = imu[GYRO].to_numpy(dtype=np.float64)
+        history = history_of_samples(chosen, time, rate, mean, q_nb)
+    else:
+        history = attitude_history(chosen, increments_from_imu(imu, interpolation), q_nb)
+    out = Attitude._of(time, history)
     out.attrs = {
         "source": name,
         "algorithm": chosen.label,
@@ -147,6 +202,13 @@ def attitude(
         "findings": (*imu.attrs.get("findings", ()), *findings),
     }
     return out
+
+
+def _gyro_alone(t: Any, gyro: ArrayLike, sampling: str) -> pd.DataFrame:
+    """An Imu table of arrays, for this computation alone: it keeps them without a copy."""
+    stamps, rates = as_array(t, None, "time"), as_array(gyro, 3, "gyro")
+    check_same_length(None, time=stamps, gyro=rates)
+    return imu_of_columns(stamps, rates, GYRO, sampling=sampling)
 
 
 def _given(initial: ArrayLike) -> Array:
@@ -174,7 +236,7 @@ def _three(values: ArrayLike, quantity: str) -> Array:
         found = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError):
         found = np.empty(0)
-    if found.shape != (3,) or not np.isfinite(found).all():
+    if found.shape != (3,) or not all(map(math.isfinite, found.tolist())):
         raise DataError(
             "api.not-three-numbers", quantity=quantity, asarray=np.asarray(values).tolist()
         )

@@ -13,6 +13,7 @@ from numba.core.errors import NumbaError
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
+from strapdown._kernels import increments as increment_kernel
 from strapdown._kernels import rotation as kernel
 from strapdown._kernels.increments import HEAD, LARGEST, MEAN, OPTIONS, SAMPLES, TIME
 from strapdown.errors import DataError, DivergenceError
@@ -106,8 +107,8 @@ class AttitudeAlgorithm(ABC):
 
     def quaternions(self, history: Array) -> Array:
         """Return unit quaternions ``q_nb``, (n, 4), of `width` numbers a row."""
-        norm = np.sqrt((history * history).sum(axis=1, keepdims=True))
-        return np.asarray(history / norm)
+        w, x, y, z = history.T
+        return np.asarray(history / np.sqrt(w * w + x * x + y * y + z * z)[:, None])
 
     @property
     @abstractmethod
@@ -222,15 +223,50 @@ def _pieces(
         begun = algorithm.begin(rotation.normalise(start))
         first = begun[None, : algorithm.width]
         state, history = algorithm.advance(begun, piece)
-        # A truncated series may overflow.
-        bad = np.flatnonzero(~(np.abs(history) < LARGEST).all(axis=1))
-        if bad.size:
-            raise DivergenceError(
-                "attitude.numbers-left-range-floating-point",
-                row=part.start + int(bad[0]) + 1,
-                quantity=algorithm.label,
-            )
+        _refuse_overflow(algorithm, history, part.start)
         yield algorithm.quaternions(np.vstack([first, history])), state
+
+
+#: Samples of one step of `history_of_samples`: what is formed of them stays in the cache.
+CHUNK = 8192
+
+
+def history_of_samples(
+    algorithm: AttitudeAlgorithm, time: Array, rate: Array, mean: bool, q_nb: ArrayLike
+) -> Array:
+    """Quaternions of `attitude_history` straight from checked samples, to the last bit.
+
+    `time` ((n,), s): increasing. `rate` ((n, 3), rad/s): linear between the stamps, or with `mean`
+    over the interval that ends there. Chunk by chunk, which no algorithm notices: increments of the
+    whole record and their checks would cost several times what the algorithm does.
+    """
+    state = algorithm.begin(rotation.normalise(q_nb))
+    out = np.empty((len(time), 4))
+    out[:1] = algorithm.quaternions(state[None, : algorithm.width].copy())
+    theta, dtheta = np.empty((2, CHUNK, 3))
+    for start in range(0, len(time) - 1, CHUNK):
+        stop = min(start + CHUNK, len(time) - 1)
+        dt = np.diff(time[start : stop + 1])
+        steps = Steps(dt, theta[: len(dt)], dtheta[: len(dt)])
+        part = np.ascontiguousarray(rate[start : stop + 1])
+        increment_kernel.increments(dt, part, mean, steps.theta, steps.dtheta)
+        state, history = algorithm.advance(state, steps)
+        _refuse_overflow(algorithm, history, start)
+        out[start + 1 : stop + 1] = algorithm.quaternions(history)
+    return out
+
+
+def _refuse_overflow(algorithm: AttitudeAlgorithm, history: Array, before: int) -> None:
+    """Refuse numbers that a truncated series let overflow; `before`: steps before these."""
+    # Of NaN both comparisons are false.
+    if not history.size or (history.max() < LARGEST and history.min() > -LARGEST):
+        return
+    bad = np.flatnonzero(~(np.abs(history) < LARGEST).all(axis=1))
+    raise DivergenceError(
+        "attitude.numbers-left-range-floating-point",
+        row=before + int(bad[0]) + 1,
+        quantity=algorithm.label,
+    )
 
 
 def run_attitude(
@@ -318,7 +354,7 @@ class AttitudeTracker:
         `q_nb` is not a rotation.
     """
 
-    __slots__ = ("_algorithm", "_record", "_update")
+    __slots__ = ("_algorithm", "_plain", "_record", "_update")
 
     def __init__(
         self,
@@ -335,6 +371,8 @@ class AttitudeTracker:
         self._algorithm = algorithm
         self._record = np.concatenate([head, algorithm.begin(unit)])
         self._update = type(algorithm).update_kernel
+        # Whether the state begins with the quaternion itself.
+        self._plain = type(algorithm).quaternions is AttitudeAlgorithm.quaternions
 
     def update(self, time: float, gyro: Array | Sequence[float]) -> None:
         """Process one sample.
@@ -380,14 +418,20 @@ class AttitudeTracker:
             largest=LARGEST,
         )
 
+    def _row(self) -> Array:
+        native = self._record[HEAD : HEAD + self._algorithm.width]
+        row: Array = self._algorithm.quaternions(native[None, :].copy())[0]
+        return row
+
+    # Compiled for one row, where arrays of one row cost more than the arithmetic.
     @property
     def quaternion(self) -> Array:
         """The attitude ``q_nb``, (4,), unit norm."""
-        native = self._record[HEAD : HEAD + self._algorithm.width]
-        q: Array = self._algorithm.quaternions(native[None, :].copy())[0]
-        return q
+        return np.array(kernel.unit_quat(self._record, HEAD)) if self._plain else self._row()
 
     @property
     def roll_pitch_heading(self) -> Array:
         """The attitude as 3-2-1 angles, (3,), deg."""
-        return rotation.euler_from_quaternion(self.quaternion)
+        if self._plain:
+            return np.array(kernel.unit_euler_degrees(self._record, HEAD))
+        return np.array(kernel.euler_degrees_from_quat(*kernel.unit_quat(self._row(), 0)))

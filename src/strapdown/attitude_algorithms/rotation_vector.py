@@ -34,19 +34,29 @@ class RotationVector(AttitudeAlgorithm):
         polynomial through the increments, for steps of any lengths, with the products of
         three and more that general motion needs. ``auto``: ``miller`` where the steps of a
         block are equal to a thousandth, and ``fit`` where they are not.
+    previous : bool
+        Of one increment: the turning of its axis since the increment before is put into the
+        rotation vector (Savage 1998), where their steps are alike within a factor of three. For
+        means, increments, and rates at the stamps as chords, whose own drift it takes off, too;
+        of cubics that would be too much.
     """
 
     name = "rotvec"
     title = "Rotation vector"
     equations = ""
-    source = "Bortz (1971), Miller (1983)"
+    source = "Bortz (1971), Miller (1983), Savage (1998)"
     summary = "rotation vector of 1 to 4 increments, compensated for coning"
-    variants = tuple(f"rotvec:samples={n}" for n in (1, 2, 3, 4))
+    variants = (
+        "rotvec:samples=1",
+        "rotvec:samples=1,previous=true",
+        *(f"rotvec:samples={n}" for n in (2, 3, 4)),
+    )
     advance_kernel = staticmethod(kernel.rotvec_advance)
     update_kernel = staticmethod(kernel.rotvec_update)
 
     samples: int = 2
     coefficients: Literal["auto", "miller", "fit"] = "auto"
+    previous: bool = False
 
     def __post_init__(self) -> None:
         if not 1 <= self.samples <= 4:
@@ -59,6 +69,12 @@ class RotationVector(AttitudeAlgorithm):
             quantity="rotvec:coefficients",
             coefficients=self.coefficients,
         )
+        if self.previous and self.samples != 1:
+            raise ConfigError(
+                "attitude.previous-of-one-increment",
+                quantity="rotvec:previous",
+                samples=self.samples,
+            )
 
     def begin(self, q_nb: Array) -> Array:
         """Return the quaternion now and at the block's start, and an empty block."""
@@ -69,6 +85,8 @@ class RotationVector(AttitudeAlgorithm):
     @property
     def accuracy(self) -> Accuracy:
         """By the number of increments; general motion needs products of three."""
+        if self.previous:
+            return Accuracy(increments=3, rates=2, coning=4)
         if self.samples == 1:
             return Accuracy(increments=2, rates=4, coning=2)
         if self.coefficients == "fit":
@@ -78,4 +96,5 @@ class RotationVector(AttitudeAlgorithm):
 
     def kernel_options(self) -> tuple[float, float]:
         """Return the increments of a block and the kind of coefficients."""
-        return float(self.samples), _COEFFICIENTS[self.coefficients]
+        kind = kernel.PREVIOUS if self.previous else _COEFFICIENTS[self.coefficients]
+        return float(self.samples), kind

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import importlib
+import itertools
 import re
 import textwrap
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -24,8 +25,42 @@ from strapdown.export_c.translate import WIDTH, Translator, comment, number
 from strapdown.increments import BETWEEN_STAMPS
 from strapdown.tables import GYRO, check_imu, check_sampling_kind
 
+Array = NDArray[np.float64]
+
 # Math functions with a macro for each precision.
 MACROS = ("SQRT", "SIN", "COS", "ATAN2", "HYPOT", "FABS", "FMOD", "FMAX", "COPYSIGN")
+
+
+@dataclass(frozen=True)
+class SensorConfiguration:
+    """How a device reads its gyro: `attitude_sample` takes the raw reading.
+
+    `rate_hz`: of the samples. `unit`: of a reading, in words, `scale` rad/s each. `axis`, `sign`:
+    axis of the sensor that points forward, right, down, 0 to 2, and its sign. `bias` ((3,), rad/s):
+    subtracted, forward, right, down. `sources`: where each of these is from, for the head of the
+    file.
+    """
+
+    rate_hz: float
+    unit: str = "rad/s"
+    scale: float = 1.0
+    axis: Sequence[int] = (0, 1, 2)
+    sign: Sequence[float] = (1.0, 1.0, 1.0)
+    bias: Sequence[float] = (0.0, 0.0, 0.0)
+    sources: tuple[str, ...] = ()
+
+    def rates(self, raw: Array, number: Any = np.float64) -> Array:
+        """Rates of the body in rad/s, as the file computes them in a precision."""
+        factors = np.array(self.sign, number) * number(self.scale)
+        return np.asarray(
+            factors * raw[:, list(self.axis)].astype(number) - np.array(self.bias, number)
+        )
+
+    def raw(self, rates: Array) -> Array:
+        """Readings of rates of the body in rad/s."""
+        out = np.empty_like(rates)
+        out[:, list(self.axis)] = (rates + self.bias) * self.sign / self.scale
+        return out
 
 
 def export_c(
@@ -35,6 +70,7 @@ def export_c(
     sampling: str | None = None,
     q_nb: ArrayLike = (1.0, 0.0, 0.0, 0.0),
     imu: pd.DataFrame | None = None,
+    configuration: SensorConfiguration | None = None,
 ) -> str:
     """Write an attitude algorithm as one C99 file with its own test.
 
@@ -45,9 +81,11 @@ def export_c(
     `interpolation` ({'linear', 'cubic'}): as in `increments_from_imu`; the cubic delays the
     attitude by one sample. `sampling` ({'instantaneous', 'mean'}): meaning of a sample; by default
     as in `imu`, or the rate at its instant. `q_nb` ((4,)): initial attitude of the test. `imu`: an
-    Imu table whose first 48 samples are the test; by default a built-in motion. Returns the text of
-    the file. ConfigError: `interpolation` or `sampling` is unknown, or `sampling` differs from that
-    of `imu`. DataError: `q_nb` is not a rotation; or as `tables.check_imu`.
+    Imu table whose first 48 samples are the test; by default a built-in motion. `configuration`:
+    rate, unit, axes and bias of the sensor, with which the file takes its raw readings at even
+    steps; `imu` then has samples of that rate. Returns the text of the file. ConfigError:
+    `interpolation` or `sampling` is unknown, or `sampling` differs from that of `imu`. DataError:
+    `q_nb` is not a rotation; or as `tables.check_imu`.
     """
     kind = _kind(interpolation, sampling, imu)
     around, shape = SAMPLINGS[kind], shape_of(algorithm)
@@ -64,12 +102,13 @@ def export_c(
         update=_update(around, step, increments),
         read=shape.read,
     )
-    body = "\n".join([*functions, ends])
-    vector = make_vector(algorithm, rotation.normalise(q_nb), kind, imu)
+    sample = "" if configuration is None else _sample(configuration)
+    body = "\n".join(filter(None, [*functions, ends, sample]))
+    vector = make_vector(algorithm, rotation.normalise(q_nb), kind, imu, configuration)
     parts = [
-        _header(algorithm, around, translator.state_size),
+        _header(algorithm, around, translator.state_size, configuration),
         precision_lines(body),
-        _interface(shape, around, translator.state_size),
+        _interface(shape, around, translator.state_size, configuration),
         constant_lines(kernels),
         body,
         main_program(vector, rotation.normalise(q_nb), around.lag),
@@ -117,6 +156,24 @@ def _require_increments(kernels: Kernels, kind: str, change: bool) -> Function:
     return kernels.require("increment", {"mean": (False, False)}, None if change else (0,))
 
 
+def _sample(configuration: SensorConfiguration) -> str:
+    """The function that takes a raw reading."""
+    rows = []
+    for axis, sign, bias in zip(
+        configuration.axis, configuration.sign, configuration.bias, strict=True
+    ):
+        minus = "-" if sign < 0.0 else ""
+        less = f" - {number(abs(bias))}" if bias >= 0.0 else f" + {number(abs(bias))}"
+        rows.append(f"        {minus}ATTITUDE_UNIT * raw[{axis}]{less if bias else ''},\n")
+    return SAMPLE.format(
+        scale=number(float(configuration.scale)),
+        step=number(1.0 / configuration.rate_hz),
+        unit=configuration.unit,
+        rate=f"{configuration.rate_hz:.10g}",
+        rows="".join(rows),
+    )
+
+
 def _rest(shape: Shape, size: int) -> str:
     """Statements that clear the part of the state not set from the attitude."""
     if size == shape.begun:
@@ -156,7 +213,12 @@ def _update(around: Sampling, step: Function, increments: Function) -> str:
 # --- the parts of the file ----------------------------------------------------------------
 
 
-def _header(algorithm: AttitudeAlgorithm, around: Sampling, size: int) -> str:
+def _header(
+    algorithm: AttitudeAlgorithm,
+    around: Sampling,
+    size: int,
+    configuration: SensorConfiguration | None,
+) -> str:
     accuracy, cost = algorithm.accuracy, count_cost(algorithm)
     # Looked up at run time, because the package root imports higher layers.
     version = importlib.import_module("strapdown").__version__
@@ -173,6 +235,7 @@ def _header(algorithm: AttitudeAlgorithm, around: Sampling, size: int) -> str:
         + ".",
         f"{algorithm.label}, written by strapdown {version} from the kernels that it runs itself.",
         f"{around.words}.",
+        *(() if configuration is None else _configured(configuration)),
         "Axes: body forward-right-down; local level north-east-down. q_nb turns body into local "
         "level, Hamilton, scalar first. Rates in rad/s of the body relative to inertial space, "
         "time in s.",
@@ -180,11 +243,29 @@ def _header(algorithm: AttitudeAlgorithm, around: Sampling, size: int) -> str:
         f"Operations a step, from increments of angle below 0.5 rad: {operations}. "
         f"Memory in single precision: {4 * size + around.bytes} bytes.",
         "Single precision; -DREAL=double for double. Test: cc -std=c99 -O2 -DATTITUDE_TEST "
-        "attitude.c -lm && ./a.out. With -DATTITUDE_FILTER it reads lines of dt gx gy gz and "
+        "attitude.c -lm && ./a.out. With -DATTITUDE_FILTER it reads lines of "
+        f"{'dt gx gy gz' if configuration is None else 'raw readings x y z'} and "
         f"writes a quaternion for each{', and at the end one more' if around.lag else ''}.",
         "SPDX-License-Identifier: MIT. Copyright (c) 2026 The strapdown developers.",
     ]
     return "\n".join(comment("\n\n".join(lines))) + "\n"
+
+
+def _configured(configuration: SensorConfiguration) -> list[str]:
+    """The configuration in words: what `attitude_sample` takes, and where each figure is from."""
+    along = ", ".join(
+        f"{name} {'-' if sign < 0.0 else ''}{'xyz'[axis]}"
+        for name, axis, sign in zip(
+            ("forward", "right", "down"), configuration.axis, configuration.sign, strict=True
+        )
+    )
+    bias = ", ".join(f"{v:.6g}" for v in configuration.bias)
+    return [
+        f"Configuration of attitude_sample: {configuration.rate_hz:.10g} samples a second; "
+        f"readings in {configuration.unit}, {configuration.scale:.10g} rad/s each; axes of the "
+        f"sensor: {along}; gyro bias subtracted: {bias} rad/s forward, right, down.",
+        *configuration.sources,
+    ]
 
 
 def precision_lines(body: str) -> str:
@@ -219,12 +300,15 @@ typedef REAL real_t;
 {pi}"""
 
 
-def _interface(shape: Shape, around: Sampling, size: int) -> str:
+def _interface(
+    shape: Shape, around: Sampling, size: int, configuration: SensorConfiguration | None
+) -> str:
     lag = FINISH if around.lag else ""
     state = "\n".join(comment(f"{shape.state[0].upper()}{shape.state[1:]}.", "    "))
     return (
         f"struct attitude {{\n{state}\n    real_t state[{size}];\n{around.memory}}};\n\n"
         + PROTOTYPES.format(finish=lag)
+        + ("" if configuration is None else SAMPLE_PROTOTYPE)
     )
 
 
@@ -512,6 +596,28 @@ FINISH = """
 void attitude_finish(struct attitude *a);
 """
 
+SAMPLE_PROTOTYPE = """
+/* Take a raw reading of the sensor, x, y, z in its own unit and axes, a step after the one before,
+ * and give the attitude as a unit quaternion. Returns as attitude_update, which takes rates of the
+ * body in rad/s and any step, as after a lost sample.
+ */
+int attitude_sample(struct attitude *a, const real_t raw[3], real_t q_nb[4]);
+"""
+
+SAMPLE = """\
+#define ATTITUDE_UNIT {scale} /* rad/s, of a reading in {unit} */
+#define ATTITUDE_STEP {step} /* s, at {rate} Hz */
+
+int attitude_sample(struct attitude *a, const real_t raw[3], real_t q_nb[4])
+{{
+    const real_t gyro[3] = {{
+{rows}    }};
+    const int refused = attitude_update(a, ATTITUDE_STEP, gyro);
+    attitude_quaternion(a, q_nb);
+    return refused;
+}}
+"""
+
 ENDS = """\
 void attitude_init(struct attitude *a, const real_t q_nb[4])
 {{
@@ -538,7 +644,6 @@ void attitude_euler(const struct attitude *a, real_t euler[3])
 # Test vector: a short record and its attitudes in double and single precision.
 
 
-Array = NDArray[np.float64]
 SAMPLES = 48
 # Rounding of a step that may differ between compilers (fused products, their own sine): a
 # product of quaternions is four sums of four products, 4 roundings of half an eps each, and so
@@ -551,9 +656,10 @@ ROUNDINGS = 32
 class Vector:
     """A test vector.
 
-    `samples` ((n, 4)): dt in s and the rates in rad/s, each exactly representable in single
-    precision. `double`, `single` ((n, 4)): attitude at each sample from the kernels in either
-    precision. `condition`: factor by which the algorithm magnifies an error near its singularity.
+    `samples` ((n, 4)): dt in s and the rates in rad/s, or of a configured sensor ((n, 3)) raw
+    readings, each exactly representable in single precision. `double`, `single` ((n, 4)): attitude
+    at each sample from the kernels in either precision. `condition`: factor by which the algorithm
+    magnifies an error near its singularity.
     """
 
     samples: Array
@@ -587,12 +693,16 @@ def _rows(imu: pd.DataFrame) -> Array:
 
 
 def make_vector(
-    algorithm: AttitudeAlgorithm, q_nb: Array, kind: str, imu: pd.DataFrame | None
+    algorithm: AttitudeAlgorithm,
+    q_nb: Array,
+    kind: str,
+    imu: pd.DataFrame | None,
+    configuration: SensorConfiguration | None = None,
 ) -> Vector:
     """Run the kernels in both precisions over the same samples.
 
     `q_nb` ((4,)): initial attitude. `kind` ({'linear', 'cubic', 'mean'}). `imu`: its first 48
-    samples; by default a built-in motion.
+    samples; by default a built-in motion. `configuration`: samples are raw readings at its rate.
     """
     rows = motion() if imu is None else _rows(imu)
     rows = rows.astype(np.float32).astype(np.float64)
@@ -600,11 +710,17 @@ def make_vector(
         rows = rows[1:]  # the first mean belongs to an interval that begins before the log
     elif kind != "mean":
         rows[0, 0] = 0.0
+    samples, rounded = rows, rows
+    if configuration is not None:
+        samples = configuration.raw(rows[:, 1:]).astype(np.float32).astype(np.float64)
+        step = np.full((len(rows), 1), 1.0 / configuration.rate_hz)
+        rows = np.hstack([step, configuration.rates(samples)])
+        rounded = np.hstack([step, configuration.rates(samples, np.float32)])
     double, state = _run(algorithm, rows, q_nb, kind, single=False)
-    single, _ = _run(algorithm, rows, q_nb, kind, single=True)
+    single, _ = _run(algorithm, rounded, q_nb, kind, single=True)
     # The rates of the angles, and their errors, have 1/cos(pitch) as a factor.
     condition = 1.0 / max(float(state[3]), 1e-3) if algorithm.name == "euler" else 1.0
-    return Vector(rows, double, single, condition)
+    return Vector(samples, double, single, condition)
 
 
 def _run(
@@ -653,8 +769,8 @@ _TEST = """\
 #define LAG {lag} /* samples by which the attitude is behind */
 
 {start}
-/* dt in s, rates in rad/s; single precision holds each exactly. */
-static const double samples[SAMPLES][4] = {{
+/* {what}; single precision holds each exactly. */
+static const double samples[SAMPLES][{columns}] = {{
 {samples}
 }};
 
@@ -692,8 +808,7 @@ int main(void)
     attitude_init(&a, start);
     for (int k = 0; k < SAMPLES + LAG; k++) {{
         if (k < SAMPLES) {{
-            const real_t gyro[3] = {{R(samples[k][1]), R(samples[k][2]), R(samples[k][3])}};
-            failed |= attitude_update(&a, R(samples[k][0]), gyro);
+{take}
         }}{finish}
         if (k >= LAG) {{
             const double angle = apart(&a, expected[k - LAG]);
@@ -723,19 +838,37 @@ int main(void)
 {{
     static const real_t from[4] = {{{from_}}};
     struct attitude a;
-    double dt, x, y, z;
-    attitude_init(&a, from);
-    while (scanf("%lf %lf %lf %lf", &dt, &x, &y, &z) == 4) {{
-        const real_t gyro[3] = {{R(x), R(y), R(z)}};
-        if (attitude_update(&a, R(dt), gyro)) {{
-            fprintf(stderr, "refused: %g %g %g %g\\n", dt, x, y, z);
-        }}
+{read}
         put(&a);
     }}
 {last}    return 0;
 }}
 #endif
 """
+_TAKE = """\
+            const real_t gyro[3] = {R(samples[k][1]), R(samples[k][2]), R(samples[k][3])};
+            failed |= attitude_update(&a, R(samples[k][0]), gyro);"""
+_READ = """\
+    double dt, x, y, z;
+    attitude_init(&a, from);
+    while (scanf("%lf %lf %lf %lf", &dt, &x, &y, &z) == 4) {
+        const real_t gyro[3] = {R(x), R(y), R(z)};
+        if (attitude_update(&a, R(dt), gyro)) {
+            fprintf(stderr, "refused: %g %g %g %g\\n", dt, x, y, z);
+        }"""
+_TAKE_RAW = """\
+            const real_t raw[3] = {R(samples[k][0]), R(samples[k][1]), R(samples[k][2])};
+            real_t q[4];
+            failed |= attitude_sample(&a, raw, q);"""
+_READ_RAW = """\
+    double x, y, z;
+    attitude_init(&a, from);
+    while (scanf("%lf %lf %lf", &x, &y, &z) == 3) {
+        const real_t raw[3] = {R(x), R(y), R(z)};
+        real_t q[4];
+        if (attitude_sample(&a, raw, q)) {
+            fprintf(stderr, "refused: %g %g %g\\n", x, y, z);
+        }"""
 _FINISH = """ else {
             attitude_finish(&a);
         }"""
@@ -750,14 +883,19 @@ def main_program(vector: Vector, q_nb: Array, lag: int) -> str:
 
     `q_nb` ((4,)): initial attitude. `lag`: delay of the attitude in samples.
     """
-    from_ = ", ".join(f"R({float(v).hex()})" for v in q_nb)
+    from_ = ", ".join(f"R({float(v)!r})" for v in q_nb)
     bound = (
         f"{len(vector.samples)} steps of {ROUNDINGS} roundings that another compiler or another "
         "sine may make otherwise"
     )
     if vector.condition > 1.0:
         bound += f", each magnified by 1/cos(pitch), here up to {vector.condition:.3g}"
+    raw = vector.samples.shape[1] == 3
     return _TEST.format(
+        what="Raw readings" if raw else "dt in s, rates in rad/s",
+        columns=3 if raw else 4,
+        take=_TAKE_RAW if raw else _TAKE,
+        read=_READ_RAW if raw else _READ,
         n=len(vector.samples),
         lag=lag,
         start=f"static const real_t start[4] = {{{from_}}};\n".replace("R(", "\n    R("),
@@ -774,12 +912,10 @@ def main_program(vector: Vector, q_nb: Array, lag: int) -> str:
 
 def braced(values: Array) -> str:
     """Rows of numbers in braces, as C reads them."""
-    # Hexadecimal is exact.
-    return "\n".join(f"    {{{', '.join(_hex(v) for v in row)}}}," for row in values)
-
-
-def _hex(value: float) -> str:
-    digits, _, power = float(value).hex().partition("p")
-    if "." in digits:
-        digits = digits.rstrip("0").rstrip(".")
-    return f"{digits}p{power}"
+    # The shortest decimals that are read as the same double: C++11 has no hexadecimal ones.
+    rows = (f"{{{', '.join(repr(float(v)) for v in row)}}}," for row in values)
+    lines = (
+        textwrap.wrap(row, WIDTH, initial_indent="    ", subsequent_indent="        ")
+        for row in rows
+    )
+    return "\n".join(itertools.chain.from_iterable(lines))

@@ -203,6 +203,10 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     imu = imu_of_columns(time, block, columns, sampling=sampling, source=raw.name)
     if not axes.stated:
         imu.attrs["axes"] = AXES_OF_SENSOR
+    imu.attrs["sensor_axes"] = ",".join(
+        ("-" if sign < 0 else "") + AXES[axis]
+        for axis, sign in zip(axes.axis, axes.sign, strict=True)
+    )
     with_clock(imu, clock_of_log(raw, found, stamps, dated))
     if raw.epoch == 0.0:
         imu.attrs["clock_origin_stamp"] = (stamps.origin.stamp, stamps.origin.unit)

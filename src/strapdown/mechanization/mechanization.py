@@ -21,7 +21,6 @@ from strapdown._kernels.ned import (
     LARGEST_TURN,
     LAT,
     LEAP,
-    LON,
     POLE,
     ROW,
     Q,
@@ -161,14 +160,8 @@ class Mechanization(ABC):
 
         `time` (s).
         """
-        return NavState(
-            time=time,
-            lat=float(state[LAT]),
-            lon=math.remainder(float(state[LON]), 2.0 * math.pi),
-            alt=float(state[ALT]),
-            v_n=state[V : V + 3],
-            q_nb=state[Q : Q + 4],
-        )
+        lat, lon, *others = state[LAT : Q + 4].tolist()
+        return NavState.of_numbers(time, (lat, math.remainder(lon, 2.0 * math.pi), *others))
 
     def kernel_options(self) -> Array:
         """Options and limits for the kernels."""

@@ -133,8 +133,7 @@ class WanderAzimuth(Mechanization):
         """Return the position, velocity and attitude of a state, as `Mechanization.nav_state`."""
         place = np.empty((1, 10))
         level.wander_places(state[None, : kernel.ROW], place)
-        lat, lon, alt = place[0, :3].tolist()
-        return NavState(time=time, lat=lat, lon=lon, alt=alt, v_n=place[0, 3:6], q_nb=place[0, 6:])
+        return NavState.of_numbers(time, place[0].tolist())
 
     def fill_trajectory(self, history: Array, out: Array) -> None:
         """Fill rows of a Trajectory table from rows of a history."""

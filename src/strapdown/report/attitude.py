@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.attitude_algorithms import make_algorithm
@@ -15,6 +16,8 @@ from strapdown.bundle import Seal, write_bundle, write_json
 from strapdown.errors import ConfigError
 from strapdown.evaluation.reference_points import Score
 from strapdown.formats import csv
+from strapdown.formats.columns import parse_axes
+from strapdown.increments import increments_from_imu
 from strapdown.report import attitude_tables as words
 from strapdown.report.attitude_charts import charts
 from strapdown.report.attitude_document import attitude_document
@@ -28,8 +31,9 @@ from strapdown.report.attitude_tables import (
 from strapdown.report.chart_svg import ChartFigure
 from strapdown.report.document import finding_json
 from strapdown.report.report_bundle import as_comments, finite, write_report
-from strapdown.tables import EULER, GYRO, QUATERNION
+from strapdown.tables import EULER, GYRO, QUATERNION, THETA, imu_table
 from strapdown.tables.checks import index_of
+from strapdown.units import GYRO_SUMS, GYRO_UNITS, factor_of
 
 
 def write_attitude(
@@ -297,13 +301,16 @@ def write_c(bench: AttitudeComparison, path: Path, *, force: bool = False) -> st
 
     check_c(path, force)
     chosen = chosen_for_c(bench)
+    configuration, each, mean = _configuration(bench, chosen)
     first = bench.runs[0].attitude[QUATERNION].to_numpy()
-    start = _liveliest(bench)
+    start = _liveliest(bench, each)
+    imu = _at_rate(bench.imu.iloc[start : start + VECTOR * each + 1], each, mean)
     text = export_c(
         make_algorithm(chosen),
         interpolation=str(bench.specification["interpolation"]),
         q_nb=first[start],
-        imu=bench.imu.iloc[start : start + VECTOR],
+        imu=imu,
+        configuration=configuration,
     )
     partial = path.with_name(path.name + ".partial")
     partial.write_text(text, encoding="utf-8", newline="\n")
@@ -311,10 +318,65 @@ def write_c(bench: AttitudeComparison, path: Path, *, force: bool = False) -> st
     return chosen
 
 
-def _liveliest(bench: AttitudeComparison) -> int:
+def _configuration(bench: AttitudeComparison, chosen: str) -> tuple[Any, int, bool]:
+    """Configuration of the exported sensor, samples of the log to one of its own, their mean."""
+    from strapdown.export_c import SensorConfiguration
+
+    answer, imu = bench.answer, bench.imu
+    full = float(bench.sweep["rate_hz"].max()) if len(bench.sweep) else rate_of(imu)
+    recommended = answer.rate_hz if answer.algorithm == chosen else None
+    each = 1 if recommended is None else max(1, round(full / float(recommended)))
+    rate = full / each  # a last, shorter step is in what the answer states
+    mean = imu.attrs["sampling"] == "mean" or (each > 1 and answer.meaning != "drop")
+    by = "by the answer" if recommended is not None else "of the log; the answer names no other"
+    made_of = "as in the log" if each == 1 else f"one in {each} of the log"
+    if mean and each > 1:
+        made_of = f"the mean over {each} steps of the log"
+    sources = [f"Rate: {by}. A sample: {made_of}."]
+    gyro = {r.quantity.lstrip("-"): r for r in bench.readings if r.quantity.lstrip("-") in GYRO}
+    axis, sign, unit, scale = [0, 1, 2], [1.0, 1.0, 1.0], "rad/s", 1.0
+    if len(gyro) == len(GYRO):
+        reading = gyro[GYRO[0]]
+        names = ", ".join(gyro[name].source for name in GYRO)
+        if reading.unit in GYRO_SUMS:
+            sources.append(f"Unit: the log has increments in {reading.unit}; give their rates.")
+        else:
+            unit, scale = reading.unit, factor_of(reading.unit, GYRO_UNITS)
+        axis, sign = parse_axes(str(imu.attrs.get("sensor_axes") or "x,y,z"))
+        sources.append(f"Unit and axes: forward, right, down are {names}: {reading.why}.")
+    bias = bench.gyro_bias.get("rad_per_s")
+    if bias is not None:
+        sources.append(f"Bias: {bench.gyro_bias['from']}.")
+    sources.append(f"Log: {bench.source}.")
+    made = SensorConfiguration(
+        rate, unit, scale, axis, sign, (0.0, 0.0, 0.0) if bias is None else bias, tuple(sources)
+    )
+    return made, each, mean
+
+
+def rate_of(imu: pd.DataFrame) -> float:
+    """Median rate of samples, Hz."""
+    return float(1.0 / np.median(np.diff(index_of(imu))))
+
+
+def _at_rate(imu: pd.DataFrame, each: int, mean: bool) -> pd.DataFrame:
+    """Samples of a lower rate: one in so many, or their means, with the first for the start."""
+    if each == 1 or not mean:
+        return imu.iloc[::each]
+    steps = increments_from_imu(imu)
+    count = len(steps) // each
+    ends = index_of(steps).reshape(-1)[each - 1 : count * each : each]
+    sums = steps[THETA].to_numpy()[: count * each].reshape(count, each, 3).sum(axis=1)
+    time = np.concatenate([index_of(imu)[:1], ends])
+    rates = sums / np.diff(time)[:, None]
+    return imu_table(time, np.vstack([rates[:1], rates]), sampling="mean")
+
+
+def _liveliest(bench: AttitudeComparison, each: int) -> int:
     """Start of the test vector: the stretch with the most rotation, which exercises the code."""
     rate = bench.imu[GYRO].to_numpy()
     energy = (rate * rate).sum(axis=1).cumsum()
-    if len(energy) <= VECTOR:
+    length = VECTOR * each
+    if len(energy) <= length:
         return 0
-    return int((energy[VECTOR:] - energy[:-VECTOR]).argmax())
+    return int((energy[length:] - energy[:-length]).argmax())

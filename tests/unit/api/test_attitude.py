@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import json
+import pickle
 import subprocess
 import sys
+from functools import partial
+from io import StringIO
 
 import numpy as np
 import pandas as pd
@@ -14,11 +18,12 @@ from tests.coded import coded
 
 import strapdown as sd
 from strapdown.attitude_algorithms import make_algorithm, run_attitude
-from strapdown.errors import ConfigError, DataError
+from strapdown.attitude_algorithms.algorithm import CHUNK
+from strapdown.errors import ConfigError, DataError, DivergenceError
 from strapdown.formats.writers import WRITERS
 from strapdown.increments import increments_from_imu
 from strapdown.rotation import level
-from strapdown.tables import QUATERNION, imu_table
+from strapdown.tables import EULER, QUATERNION, attitude_table, imu_table
 
 RATE = 50.0
 
@@ -102,6 +107,98 @@ def test_streaming_and_batch_agree_to_the_bit(algorithm, sampling):
     assert np.array_equal(streamed[first - 1 :], batch[QUATERNION].to_numpy())
     assert np.allclose(filt.rotation.as_quat()[3], streamed[-1, 0])
     assert "400 samples" in repr(filt)
+
+
+@pytest.mark.parametrize(
+    "algorithm", ["quaternion", "rotvec:samples=3", "dcm:order=3", "euler", "naive", "rk4"]
+)
+@pytest.mark.parametrize("sampling", ["instantaneous", "mean"])
+def test_long_record_has_the_bits_of_one_run(algorithm, sampling):
+    """Samples are taken in chunks, whose ends are no ends of blocks of three."""
+    rng = np.random.default_rng(2)
+    t = np.cumsum(rng.uniform(0.005, 0.015, 2 * CHUNK + 11))
+    gyro = rng.normal(size=(len(t), 3))
+    increments = increments_from_imu(imu_table(t, gyro, sampling=sampling))
+    run = run_attitude(make_algorithm(algorithm), increments)
+    made = sd.attitude(t, gyro, algorithm=algorithm, sampling=sampling)
+    assert np.array_equal(made.to_numpy(), run.attitude.to_numpy())
+
+
+def test_overflow_is_at_the_same_row_in_any_chunk():
+    t = np.arange(2 * CHUNK) / 100.0
+    gyro = np.zeros((len(t), 3))
+    gyro[CHUNK + 7] = 1e149
+    call = partial(sd.attitude, t, gyro, algorithm="quaternion:order=1,normalise=false")
+    with pytest.raises(DivergenceError) as refused:
+        call()
+    increments = increments_from_imu(imu_table(t, gyro))
+    with pytest.raises(DivergenceError) as whole:
+        run_attitude(make_algorithm("quaternion:order=1,normalise=false"), increments)
+    assert refused.value.finding.row == whole.value.finding.row > CHUNK
+
+
+@pytest.mark.parametrize(
+    "use",
+    [
+        lambda a: a.copy(),
+        lambda a: pickle.loads(pickle.dumps(a)),
+        lambda a: copy.deepcopy(a),
+        lambda a: copy.copy(a),
+        lambda a: a.iloc[:],
+        lambda a: pd.concat([a.iloc[:5], a.iloc[5:]]),
+        lambda a: pd.read_json(StringIO(a.to_json(double_precision=15))).rename_axis("time"),
+        lambda a: a.assign(),
+        lambda a: a * 1.0,
+        lambda a: a[[*a.columns]],
+    ],
+)
+def test_angles_are_there_whatever_is_done_first(use):
+    t, gyro, _ = samples()
+    made = sd.attitude(t, gyro)
+    known = attitude_table(t, run_quaternions(t, gyro))
+    used = use(made)
+    assert list(used.columns) == [*QUATERNION, *EULER]
+    pd.testing.assert_frame_equal(pd.DataFrame(used), known, rtol=1e-13, check_index_type=False)
+    assert np.array_equal(made["roll"], known["roll"])
+
+
+def run_quaternions(t, gyro):
+    run = run_attitude(make_algorithm("quaternion"), increments_from_imu(imu_table(t, gyro)))
+    return run.attitude[QUATERNION].to_numpy()
+
+
+def test_column_is_an_attribute_and_a_rotation_needs_no_angles():
+    t, gyro, _ = samples()
+    made = sd.attitude(t, gyro)
+    turned = made.rotation.as_quat()
+    # scipy scales each to norm 1 again.
+    assert np.abs(np.roll(turned, 1, axis=1) - made[QUATERNION].to_numpy()).max() < 3e-16
+    assert np.array_equal(sd.attitude(t, gyro).heading, made["heading"])
+    assert np.array_equal(sd.attitude(t, gyro).rotation.as_quat(), made.rotation.as_quat())
+    assert isinstance(made[10:20], type(made))
+    assert "heading" in repr(sd.attitude(t, gyro))
+
+
+def test_arrays_of_the_caller_are_not_shared():
+    t, gyro, _ = samples()
+    made = sd.attitude(t, gyro)
+    before = sd.attitude(t.copy(), gyro.copy())
+    t += 1.0
+    gyro *= 2.0
+    pd.testing.assert_frame_equal(made, before, check_exact=True)
+
+
+@pytest.mark.parametrize(
+    "algorithm", ["quaternion", "rotvec", "rk4", "dcm", "dcm:order=2", "euler"]
+)
+def test_angles_of_one_sample_are_those_of_the_table(algorithm):
+    t, gyro, _ = samples()
+    filt = sd.OrientationFilter(RATE, algorithm, initial=(1.0, 0.1, -0.2))
+    table = sd.attitude(t, gyro, algorithm=algorithm, initial=(1.0, 0.1, -0.2))
+    for k, rate in enumerate(gyro):
+        filt.update(rate)
+        assert np.array_equal(filt.roll_pitch_heading, table[EULER].to_numpy()[k])
+        assert np.array_equal(filt.quaternion, table[QUATERNION].to_numpy()[k])
 
 
 def test_a_filter_refuses_what_it_cannot_take_and_stays_as_it_was():

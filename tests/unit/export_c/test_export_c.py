@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import dataclasses
 import importlib
 import re
 import shutil
@@ -13,17 +14,19 @@ import numpy as np
 import pytest
 from tests.coded import coded
 
+import strapdown as sd
 from strapdown import rotation
 from strapdown._kernels import arithmetic
 from strapdown.attitude_algorithms import ALGORITHMS, make_algorithm, run_attitude
 from strapdown.attitude_algorithms.cost import count_cost, step_kernel
 from strapdown.errors import ConfigError, DataError
-from strapdown.export_c import export_c
+from strapdown.export_c import SensorConfiguration, export_c
 from strapdown.export_c.kernels import Kernels, UntranslatableError
 from strapdown.export_c.program import SHAPES
 from strapdown.export_c.translate import Translator
 from strapdown.increments import increments_from_imu
-from strapdown.tables import GYRO, QUATERNION, imu_table
+from strapdown.report.attitude import write_c
+from strapdown.tables import GYRO, QUATERNION, imu_table, increments_table
 
 # Those of the contracts: a new algorithm is in the subset, or the contract is not yet kept.
 CONTRACTS = Path(__file__).parents[2] / "contracts" / "test_attitude_algorithms.py"
@@ -198,7 +201,10 @@ def test_it_gives_the_bits_of_the_kernels(tmp_path, variant, precision):
 
 
 @needs_compiler
-@pytest.mark.parametrize("variant", ["dcm", "quaternion", "rotvec", "rotvec:samples=1"])
+@pytest.mark.parametrize(
+    "variant",
+    ["dcm", "quaternion", "rotvec", "rotvec:samples=1", "rotvec:samples=1,previous=yes"],
+)
 def test_large_turns_take_sine_and_cosine(tmp_path, variant):
     rows = log(100, longest=0.5)
     assert (np.linalg.norm(rows[:, 1:], axis=1) * rows[:, 0]).max() > 0.5
@@ -307,7 +313,7 @@ def test_it_is_cplusplus_too(tmp_path, variant):
     options = [
         "-x",
         "c++",
-        "-std=c++17",
+        "-std=c++11",
         "-pedantic",
         "-Wall",
         "-Wextra",
@@ -391,3 +397,129 @@ def test_the_example_of_the_manual_is_what_is_written():
         for text in (EXAMPLE.read_text(encoding="utf-8"), export_c(make_algorithm("quaternion")))
     )
     assert shown == now
+
+
+#: A sensor in milli-degrees a second, whose y points forward, x right and z up, with a bias.
+SENSOR = SensorConfiguration(
+    50.0,
+    "mdeg/s",
+    np.pi / 180e3,
+    (1, 0, 2),
+    (1.0, 1.0, -1.0),
+    (0.01, -0.02, 0.0),
+    ("Rate: by the test.",),
+)
+
+
+def readings(count=200):
+    """Raw readings, as single precision holds them, and the rates of the body that they mean."""
+    t = np.arange(count) / SENSOR.rate_hz
+    body = np.column_stack([2 * np.sin(3 * t), np.cos(2 * t), 1.5 * np.sin(t + 1)])
+    x, y, z = body[:, 1] - 0.02, body[:, 0] + 0.01, -body[:, 2]
+    raw = np.column_stack([x, y, z]) * 180e3 / np.pi
+    raw = raw.astype(np.float32).astype(np.float64)
+    rates = raw[:, [1, 0, 2]] * [1, 1, -1] * np.pi / 180e3 - [0.01, -0.02, 0.0]
+    assert np.abs(rates - body).max() < 1e-6
+    return t, raw, rates
+
+
+@needs_compiler
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("real", ["float", "double"])
+def test_configured_file_takes_the_readings_of_the_sensor(tmp_path, kind, real):
+    t, raw, rates = readings()
+    sampling = KINDS[kind].get("sampling", "instantaneous")
+    algorithm = make_algorithm("rotvec:samples=1")
+    imu = imu_table(t, rates, sampling=sampling)
+    text = export_c(algorithm, **KINDS[kind], q_nb=START, imu=imu, configuration=SENSOR)
+    assert max(map(len, text.splitlines())) <= 100
+    assert run(build(tmp_path, text, f"-DREAL={real}", "-DATTITUDE_TEST")).endswith("passed\n")
+    program = build(tmp_path, text, f"-DREAL={real}", "-DATTITUDE_FILTER")
+    given = "\n".join(" ".join(repr(float(v)) for v in row) for row in raw)
+    found = np.array([line.split() for line in run(program, given).splitlines()], dtype=float)
+    steps = increments_from_imu(imu, KINDS[kind].get("interpolation", "linear"))
+    expected = run_attitude(algorithm, steps, START).attitude[QUATERNION].to_numpy()
+    if kind == "mean":  # the device takes the first mean, too
+        first = increments_table([0.02], [0.02], rates[:1] * 0.02)
+        start = run_attitude(algorithm, first, START).attitude[QUATERNION].to_numpy()[-1]
+        expected = run_attitude(algorithm, steps, start).attitude[QUATERNION].to_numpy()
+    if kind == "cubic":
+        found = found[1:]
+    apart = np.radians(rotation.rotation_angle(found / norms(found), expected))
+    # A reading of 2 rad/s in single precision is known to eps / 2 of it, and so are unit and bias.
+    eps = np.finfo(np.float32 if real == "float" else np.float64).eps
+    assert apart.max() < len(t) * (32 + 3 * 0.04) * eps
+
+
+def norms(q):
+    return np.linalg.norm(q, axis=1)[:, None]
+
+
+@needs_compiler
+@pytest.mark.parametrize(
+    ("right", "wrong"),
+    [
+        ("ATTITUDE_UNIT * raw[1]", "ATTITUDE_UNIT * raw[0]"),
+        ("-ATTITUDE_UNIT * raw[2]", "ATTITUDE_UNIT * raw[2]"),
+        ("- R(0.01)", "+ R(0.01)"),
+        ("define ATTITUDE_STEP R(0.02)", "define ATTITUDE_STEP R(0.0201)"),
+        ("define ATTITUDE_UNIT R(1.7453", "define ATTITUDE_UNIT R(1.7553"),
+    ],
+)
+def test_its_test_finds_a_wrong_configuration(tmp_path, right, wrong):
+    t, _, rates = readings()
+    text = export_c(make_algorithm("quaternion"), imu=imu_table(t, rates), configuration=SENSOR)
+    assert right in text
+    program = build(tmp_path, text.replace(right, wrong, 1), "-DATTITUDE_TEST")
+    assert subprocess.run([program], capture_output=True, check=False).returncode == 1
+
+
+@needs_compiler
+@pytest.mark.parametrize("meaning", ["drop", "sum"])
+def test_file_of_a_comparison_is_its_configuration(tmp_path, meaning):
+    """The log's own numbers, at the recommended rate, through the exported file."""
+    rng = np.random.default_rng(3)
+    t = np.arange(2400) / 200.0
+    moving = np.clip(t - 2.0, 0.0, 1.0)[:, None]
+    body = moving * np.column_stack([np.sin(2 * t), np.cos(3 * t), 0.5 * np.sin(t)])
+    sensed = np.column_stack([body[:, 1] + 0.02, body[:, 0] + 0.01, -body[:, 2] - 0.03])
+    raw = np.round(np.degrees(sensed) + rng.normal(0.0, 0.01, sensed.shape), 6)
+    lines = ["# axes: right-forward-up", "time_s,gyro_x_deg_s,gyro_y_deg_s,gyro_z_deg_s"]
+    lines += [
+        f"{a:.3f}," + ",".join(f"{v:.6f}" for v in row) for a, row in zip(t, raw, strict=True)
+    ]
+    (tmp_path / "log.csv").write_text("\n".join(lines))
+    bench = sd.compare_attitude(
+        tmp_path / "log.csv", ["quaternion"], gyro_bias="rest", tolerance_deg=2.0
+    )
+    each = round(200.0 / bench.answer.rate_hz)
+    assert each > 1
+    # How a sample of the lower rate is made is the answer's, whichever it gave here.
+    answer = dataclasses.replace(bench.answer, meaning=meaning)
+    write_c(dataclasses.replace(bench, answer=answer), tmp_path / "attitude.c")
+    text = (tmp_path / "attitude.c").read_text()
+    assert run(build(tmp_path, text, "-DATTITUDE_TEST")).endswith("passed\n")
+    program = build(tmp_path, text, "-DATTITUDE_FILTER", "-DREAL=double")
+    used = raw[::each]
+    if meaning == "sum":
+        count = (len(raw) - 1) // each
+        middle = 0.5 * (raw[1:] + raw[:-1])[: count * each]
+        used = middle.reshape(count, each, 3).mean(axis=1)
+    given = "\n".join(" ".join(repr(float(v)) for v in row) for row in used)
+    found = np.array([line.split() for line in run(program, given).splitlines()], dtype=float)
+    rates = np.radians(used[:, [1, 0, 2]] * [1, 1, -1]) - bench.gyro_bias["rad_per_s"]
+    if meaning == "sum":
+        rates = np.vstack([rates[:1], rates])  # of the start, which is not used
+    imu = imu_table(
+        np.arange(len(rates)) * each / 200.0,
+        rates,
+        sampling="mean" if meaning == "sum" else "instantaneous",
+    )
+    from_ = re.search(r"from\[4\] = \{(.*?)\};", text, re.S)
+    start = [float(v) for v in re.findall(r"R\((.*?)\)", from_[1])]
+    run_ = run_attitude(make_algorithm("quaternion"), increments_from_imu(imu), start)
+    expected = run_.attitude[QUATERNION].to_numpy()[meaning == "sum" :]
+    apart = np.radians(rotation.rotation_angle(found / norms(found), expected))
+    # 1 / 200 s and what is measured of it differ by the digits of stamps of a millisecond.
+    assert apart.max() < 1e-9
+    assert np.radians(rotation.rotation_angle(expected, expected[0])).max() > 0.5
