@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import fields
+from typing import Any
 
 from strapdown.attitude_algorithms.algorithm import (
     AttitudeAlgorithm,
@@ -36,6 +37,7 @@ __all__ = [
     "count_cost",
     "make_algorithm",
     "run_attitude",
+    "with_options",
 ]
 
 ALGORITHMS: dict[str, type[AttitudeAlgorithm]] = {
@@ -82,6 +84,12 @@ def make_algorithm(text: str) -> AttitudeAlgorithm:
             word=name,
             known=ALGORITHMS,
         )
+    made: AttitudeAlgorithm = with_options(cls, name, rest)
+    return made
+
+
+def with_options(cls: type[Any], name: str, rest: str) -> Any:
+    """Make a dataclass from its options as text, ``option=value,option=value``."""
     known = {f.name: f.default for f in fields(cls)}
     options: dict[str, object] = {}
     for item in filter(None, (part.strip() for part in rest.split(","))):
@@ -109,6 +117,11 @@ def _option(name: str, key: str, value: str, default: object) -> object:
             return int(value)
         except ValueError:
             code = "attitude.option-not-whole"
+    elif isinstance(default, float):
+        try:
+            return float(value)
+        except ValueError:
+            code = "attitude.option-not-number"
     else:
         return value
     raise ConfigError(code, quantity=f"{name}:{key}", value=value)

@@ -1,0 +1,104 @@
+"""The error-state orientation filter: attitude, gyro bias and velocity, with a covariance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import isfinite, radians
+
+import numpy as np
+
+from strapdown._kernels import orientation as kernel
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.errors import ConfigError
+from strapdown.orientation_filters.filter import Array, OrientationEstimator
+
+#: Accelerometer bias, m/s²: constant at rest, where nothing distinguishes it from a tilt.
+ACCEL_BIAS = 0.05
+
+
+@dataclass(frozen=True)
+class ErrorState(OrientationEstimator):
+    """Error-state Kalman filter: a carried body has a bounded velocity.
+
+    Dead-reckoned in the level frame, the specific force gives a velocity that a tilt error makes
+    grow. A velocity of zero, with the standard deviation and correlation time of the body's true
+    velocity, is its measurement: accelerations average out over the time that the gyros allow,
+    and the covariance says what remains. The true velocity's standard deviation is `velocity`, or
+    what the specific force shows within seconds, whichever is more. While stationary, rate and
+    velocity are measured as zero.
+
+    The heading of the field is a measurement whose noise grows with the deviation of norm and dip
+    from their usual values. It corrects heading and gyro bias, never roll and pitch.
+
+    The covariance is propagated and updated once a block, by the sums of its samples.
+
+    Parameters
+    ----------
+    velocity : float, m/s
+        Standard deviation of the velocity of the body: 0.3 in hand or worn; 10 in a vehicle.
+    bias : float, deg/s
+        Standard deviation of the gyro bias at the start, each axis.
+    noise : float, deg/s/√Hz
+        Gyro noise density, with what vibration adds.
+    field : float, deg
+        Standard deviation of the constant error of the magnetic heading: local field, hard iron.
+    block : float, s
+        Length of a block.
+
+    Notes
+    -----
+    Error state in the level frame with the multiplicative attitude error of Markley, J. Guidance,
+    Control, Dynamics 26 (2003) 311; the average of accelerations in a nearly inertial frame is the
+    idea of Laidig and Seel, Information Fusion 91 (2023) 187, here with a model of the velocity
+    instead of a low-pass filter. White noise with the density ``2 sd² T`` replaces a velocity of
+    correlation time T, which is exact below 1/T (Maybeck, Stochastic Models 1, 1979, 4.11).
+    """
+
+    name = "error-state"
+    title = "Error-state filter"
+    summary = "attitude, gyro bias and their covariance; a bounded velocity; a disturbed field"
+    size = kernel.STATE
+    row = kernel.ROW
+    advance_kernel = staticmethod(kernel.error_state_advance)
+    update_kernel = staticmethod(kernel.error_state_update)
+
+    velocity: float = 0.3
+    bias: float = 1.0
+    noise: float = 0.02
+    field: float = 4.0
+    block: float = 0.025
+
+    def __post_init__(self) -> None:
+        for option in ("velocity", "bias", "noise", "block", "field"):
+            value = getattr(self, option)
+            if not (isfinite(value) and (value > 0.0 or (option == "field" and value == 0.0))):
+                raise ConfigError(
+                    "attitude.option-not-positive", quantity=f"{self.name}:{option}", value=value
+                )
+
+    def kernel_options(self) -> tuple[float, ...]:
+        """Return velocity variance, bias prior, gyro noise density and block, SI and radians."""
+        return self.velocity**2, radians(self.bias), radians(self.noise) ** 2, self.block
+
+    def begin_state(self, record: Array, given: bool) -> None:
+        """Set the covariance of the start."""
+        p = record[kernel.P : kernel.P + kernel.N**2].reshape(kernel.N, kernel.N)
+        tilt = kernel.GIVEN_SD if given else kernel.UNKNOWN
+        # Without a magnetometer the heading is counted from the start.
+        p[np.diag_indices(kernel.N)] = [tilt**2] * 2 + [0.0] + [radians(self.bias) ** 2] * 3 + [
+            max(self.velocity**2, 0.25)
+        ] * 2
+        record[kernel.POWER] = 0.25
+
+    def covariance(self, history: Array, magnetic: bool) -> Array:
+        """Covariance of the attitude error in north-east-down, (n, 3, 3), rad²."""
+        out = history[:, [4, 5, 6, 5, 7, 8, 6, 8, 9]].reshape(-1, 3, 3)
+        out[:, [0, 1], [0, 1]] += (ACCEL_BIAS / STANDARD_GRAVITY) ** 2
+        if magnetic:
+            out[:, 2, 2] += radians(self.field) ** 2
+        return out
+
+    def bias_sd(self, record: Array) -> Array:
+        """Return the standard deviation of the gyro bias, (3,), rad/s."""
+        p = record[kernel.P : kernel.P + kernel.N**2].reshape(kernel.N, kernel.N)
+        return np.asarray(np.sqrt(np.diag(p)[3:6]))
