@@ -6,7 +6,8 @@ north-east-down in the level frame (n); without a magnetometer "north" is the he
 
 Errors of the error-state filter are true - estimated, in the level frame:
 ``q_true = exp(delta) q``, ``b_true = b + db``, ``v_true = v + dv``.
-Its state is (delta_N, delta_E, delta_D, db_x, db_y, db_z, dv_N, dv_E).
+Its state is (delta_N, delta_E, delta_D, db_x, db_y, db_z, dv_N, dv_E, da_x, da_y, da_z), with the
+biases b of the gyros and a of the accelerometers.
 """
 
 from __future__ import annotations
@@ -63,7 +64,7 @@ def step_of(r, time, gyro, accel, mag):
 
 @njit(cache=True, error_model="numpy")
 def turned(w, x, y, z, tx, ty, tz):
-    """Quaternion turned by a rotation vector in body axes; series of order 7, then Newton's norm."""
+    """Quaternion turned by a rotation vector in body axes; its norm by one Newton step."""
     u = 0.25 * (tx * tx + ty * ty + tz * tz)
     if u < 0.04:
         c = 1.0 - u * (0.5 - u * (1.0 / 24.0 - u * (1.0 / 720.0)))
@@ -126,9 +127,10 @@ V, FAST, POWER, SPAN = 26, 28, 31, 32
 FORCE, FORCES, BODY, TURN, MATRIX, FIELD, FIELDS = 33, 36, 37, 40, 43, 52, 55
 SMOOTH_RATE, SMOOTH_FORCE, REST = 56, 59, 62
 NORM, DIP, DISTURBANCE = 63, 64, 65
-P, X, H, K = 66, 130, 138, 146
-STATE = 154
-N = 8
+ACCEL_BIAS = 66
+N = 11
+P, X, H, K = 69, 190, 201, 212
+STATE = 223
 # Of a row of the history: quaternion, and the covariance of delta: NN, NE, ND, EE, ED, DD.
 ROW = 10
 
@@ -140,11 +142,13 @@ FAST_TIME = 1.5  # s: the velocity that is seen by itself, without gravity's err
 POWER_TIME = 6.0  # s: memory of its power
 SCALE = 0.005  # gyro scale factor and misalignment; constant for 1 s of one rotation axis
 BIAS_WALK = 5e-5  # rad/s/sqrt(s): 0.003 deg/s
-ACCEL_NOISE = 0.03  # m/s²/sqrt(Hz), vibration and the rotating accelerometer bias included
+ACCEL_NOISE = 0.01  # m/s²/sqrt(Hz), vibration included
+ACCEL_BIAS_SD = 0.05  # m/s², scale factor and misalignment included
+ACCEL_WALK = 2e-4  # m/s²/sqrt(s)
 REST_AFTER = 1.5  # s
 REST_RATE = 0.012  # rad/s: 0.7 deg/s from their mean over 0.5 s
 REST_FORCE = 0.15  # m/s²
-REST_VELOCITY = 5e-5  # m²/s: density of 0.01 m/s, correlated over 0.25 s
+REST_VELOCITY = 1e-2  # m²/s: density of the 0.07 m/s that REST_FORCE may hide, correlated over 1 s
 REST_DRIFT = 9e-4  # rad/s/sqrt(Hz): 0.05 deg/s
 FIELD_SD = 0.02  # of the magnetometer, of the total field, correlated over 1 s
 FIELD_FREE = 0.1  # of the horizontal field: deviations of norm and dip that mean nothing
@@ -163,7 +167,14 @@ def forget(r, first, last, variance):
         for j in range(N):
             r[P + N * i + j] = 0.0
             r[P + N * j + i] = 0.0
-        r[P + 9 * i] = variance
+        r[P + (N + 1) * i] = variance
+
+
+@njit(cache=True, error_model="numpy")
+def add(r, first, last, variance):
+    """Add a variance to states."""
+    for i in range(first, last):
+        r[P + (N + 1) * i] += variance
 
 
 @njit(cache=True, error_model="numpy")
@@ -204,9 +215,9 @@ def error_state_head(r, north, east, down):
     own = FIELD_SD * norm / flat
     forget(r, 2, 3, 0.0)
     for j in range(N):
-        r[P + 16 + j] = slope * r[P + j]
-        r[P + 8 * j + 2] = r[P + 16 + j]
-    r[P + 18] = slope * slope * r[P] + own * own
+        r[P + 2 * N + j] = slope * r[P + j]
+        r[P + N * j + 2] = r[P + 2 * N + j]
+    r[P + 2 * N + 2] = slope * slope * r[P] + own * own
     if r[NORM] == 0.0:
         r[NORM], r[DIP] = norm, math.atan2(down, flat)
     r[HEADED] = 1.0
@@ -232,7 +243,9 @@ def observe(r, i, slope, innovation, noise, kind, dx, dy, dz):
         r[K + 4] -= up * dy
         r[K + 5] -= up * dz
     elif kind == 2:
-        r[K], r[K + 1], r[K + 6], r[K + 7] = 0.0, 0.0, 0.0, 0.0
+        r[K], r[K + 1] = 0.0, 0.0
+        for j in range(6, N):
+            r[K + j] = 0.0
     for j in range(N):
         r[X + j] += r[K + j] * innovation
     for j in range(N):
@@ -244,38 +257,33 @@ def observe(r, i, slope, innovation, noise, kind, dx, dy, dz):
 
 
 @njit(cache=True, error_model="numpy")
-def propagate(r, span, lift, squared):
-    """Covariance over a block: delta' = -C db, dv' = delta x f, with f vertical.
+def propagate(r, span, lift, felt, squared):
+    """Covariance over a block: delta' = -C db, dv' = delta x f - C da, with f vertical.
 
     Only the vertical force enters: rotated with the heading the velocity stays what it is, so that
     a bounded velocity must not seem to observe the heading.
     """
-    for j in range(N):
-        a = r[P + 24 + j]
-        b = r[P + 32 + j]
-        c = r[P + 40 + j]
-        r[P + 48 + j] += lift * r[P + 8 + j]
-        r[P + 56 + j] -= lift * r[P + j]
-        r[P + j] -= r[MATRIX] * a + r[MATRIX + 1] * b + r[MATRIX + 2] * c
-        r[P + 8 + j] -= r[MATRIX + 3] * a + r[MATRIX + 4] * b + r[MATRIX + 5] * c
-        r[P + 16 + j] -= r[MATRIX + 6] * a + r[MATRIX + 7] * b + r[MATRIX + 8] * c
-    for j in range(0, N * N, N):
-        a = r[P + 3 + j]
-        b = r[P + 4 + j]
-        c = r[P + 5 + j]
-        r[P + 6 + j] += lift * r[P + 1 + j]
-        r[P + 7 + j] -= lift * r[P + j]
-        r[P + j] -= r[MATRIX] * a + r[MATRIX + 1] * b + r[MATRIX + 2] * c
-        r[P + 1 + j] -= r[MATRIX + 3] * a + r[MATRIX + 4] * b + r[MATRIX + 5] * c
-        r[P + 2 + j] -= r[MATRIX + 6] * a + r[MATRIX + 7] * b + r[MATRIX + 8] * c
-    angle = (r[GYRO_NOISE] + SCALE * SCALE * squared) * span
-    walk = BIAS_WALK * BIAS_WALK * span
-    shake = ACCEL_NOISE * ACCEL_NOISE * span
-    for i in range(3):
-        r[P + 9 * i] += angle
-        r[P + 27 + 9 * i] += walk
-    r[P + 54] += shake
-    r[P + 63] += shake
+    m = MATRIX
+    for j in range(P, P + N):
+        a, b, c = r[j + 3 * N], r[j + 4 * N], r[j + 5 * N]
+        x, y, z = r[j + 8 * N], r[j + 9 * N], r[j + 10 * N]
+        r[j + 6 * N] += lift * r[j + N] - felt * (r[m] * x + r[m + 1] * y + r[m + 2] * z)
+        r[j + 7 * N] -= lift * r[j] + felt * (r[m + 3] * x + r[m + 4] * y + r[m + 5] * z)
+        r[j] -= r[m] * a + r[m + 1] * b + r[m + 2] * c
+        r[j + N] -= r[m + 3] * a + r[m + 4] * b + r[m + 5] * c
+        r[j + 2 * N] -= r[m + 6] * a + r[m + 7] * b + r[m + 8] * c
+    for j in range(P, P + N * N, N):
+        a, b, c = r[j + 3], r[j + 4], r[j + 5]
+        x, y, z = r[j + 8], r[j + 9], r[j + 10]
+        r[j + 6] += lift * r[j + 1] - felt * (r[m] * x + r[m + 1] * y + r[m + 2] * z)
+        r[j + 7] -= lift * r[j] + felt * (r[m + 3] * x + r[m + 4] * y + r[m + 5] * z)
+        r[j] -= r[m] * a + r[m + 1] * b + r[m + 2] * c
+        r[j + 1] -= r[m + 3] * a + r[m + 4] * b + r[m + 5] * c
+        r[j + 2] -= r[m + 6] * a + r[m + 7] * b + r[m + 8] * c
+    add(r, 0, 3, (r[GYRO_NOISE] + SCALE * SCALE * squared) * span)
+    add(r, 3, 6, BIAS_WALK * BIAS_WALK * span)
+    add(r, 6, 8, ACCEL_NOISE * ACCEL_NOISE * span)
+    add(r, 8, 11, ACCEL_WALK * ACCEL_WALK * span)
 
 
 @njit(cache=True, error_model="numpy")
@@ -292,12 +300,8 @@ def at_rest(r, span, gx, gy, gz, squared):
         off = r[BODY + i] / n - r[SMOOTH_FORCE + i]
         r[SMOOTH_FORCE + i] += share * off
         force += off * off
-    limit = 3.0 * math.sqrt(r[P + 27] + r[P + 36] + r[P + 45]) + REST_RATE
-    if (
-        rate < REST_RATE * REST_RATE
-        and force < REST_FORCE * REST_FORCE
-        and squared < limit * limit
-    ):
+    limit = 3.0 * math.sqrt(r[P + 3 * N + 3] + r[P + 4 * N + 4] + r[P + 5 * N + 5]) + REST_RATE
+    if rate < REST_RATE * REST_RATE and force < REST_FORCE * REST_FORCE and squared < limit * limit:
         r[REST] += span
     else:
         r[REST] = 0.0
@@ -333,19 +337,18 @@ def observe_field(r, span, squared):
     else:
         r[DISTURBANCE] += min(1.0, span / FIELD_MEMORY) * (seen - r[DISTURBANCE])
     ratio = r[NORM] / usual
-    free = FIELD_FREE * FIELD_FREE + (r[P] + r[P + 9]) * ratio * ratio
+    lag = squared * FIELD_LAG * FIELD_LAG
+    free = FIELD_FREE * FIELD_FREE + (r[P] + r[P + N + 1] + lag) * ratio * ratio
     excess = max(0.0, r[DISTURBANCE] - free)
     if excess > DISTURBED * DISTURBED:
         r[DISTURBED_TIME] += span
     own = FIELD_SD * norm / flat
-    own = own * own + squared * FIELD_LAG * FIELD_LAG
+    own = own * own + lag
     slope = down / flat
     innovation = -math.atan2(east, north)
     noise = 2.0 * (own + excess * FIELD_TIME) / span
-    variance = r[P + 18] + slope * slope * r[P] + own + excess
-    observe(
-        r, 2, slope, innovation, bounded(innovation, variance, noise), 2, 0.0, 0.0, 0.0
-    )
+    variance = r[P + 2 * N + 2] + slope * slope * r[P] + own + excess
+    observe(r, 2, slope, innovation, bounded(innovation, variance, noise), 2, 0.0, 0.0, 0.0)
     share = min(1.0, span / FIELD_REFERENCE) / (1.0 + r[DISTURBANCE] / (FIELD_FREE * FIELD_FREE))
     r[NORM] += share * longer
     r[DIP] += share * (dip - r[DIP])
@@ -363,16 +366,16 @@ def end_block(r):
     n = r[FORCES]
     if n > 0.0:
         ux, uy, uz = span * r[FORCE] / n, span * r[FORCE + 1] / n, span * r[FORCE + 2] / n
-        propagate(r, span, uz, squared)
+        propagate(r, span, uz, 1.0, squared)
         r[V] += ux
         r[V + 1] += uy
         keep = 1.0 - min(1.0, span / FAST_TIME)
         r[FAST] = keep * r[FAST] + ux
         r[FAST + 1] = keep * r[FAST + 1] + uy
         r[FAST + 2] = keep * r[FAST + 2] + uz + G * span
-        now = (
-            r[FAST] * r[FAST] + r[FAST + 1] * r[FAST + 1] + r[FAST + 2] * r[FAST + 2]
-        ) * (1.0 / 3.0)
+        now = (r[FAST] * r[FAST] + r[FAST + 1] * r[FAST + 1] + r[FAST + 2] * r[FAST + 2]) * (
+            1.0 / 3.0
+        )
         r[POWER] += min(1.0, span / POWER_TIME) * (now - r[POWER])
         w, x, y, z = r[Q], r[Q + 1], r[Q + 2], r[Q + 3]
         dx, dy, dz = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
@@ -391,14 +394,14 @@ def end_block(r):
         else:
             own = r[VELOCITY] + max(r[POWER], now)
             noise = 2.0 * own * VELOCITY_TIME / span
-            a = bounded(r[V], own + r[P + 54], noise)
+            a = bounded(r[V], own + r[P + 6 * N + 6], noise)
             observe(r, 6, 0.0, -r[V], a, 1, dx, dy, dz)
-            a = bounded(r[V + 1], own + r[P + 63], noise)
+            a = bounded(r[V + 1], own + r[P + 7 * N + 7], noise)
             observe(r, 7, 0.0, -r[V + 1], a, 1, dx, dy, dz)
     else:
         # The velocity is unknown without an accelerometer, and says nothing of the tilt.
-        propagate(r, span, 0.0, squared)
-        forget(r, 6, 8, r[P + 54] + span)
+        propagate(r, span, 0.0, 0.0, squared)
+        forget(r, 6, 8, r[P + 6 * N + 6] + span)
         r[REST] = 0.0
     if r[FIELDS] > 0.0 and r[HEADED] != 0.0:
         observe_field(r, span, squared)
@@ -421,6 +424,7 @@ def correct(r):
     r[Q], r[Q + 1], r[Q + 2], r[Q + 3] = n * w, n * x, n * y, n * z
     for i in range(3):
         r[BIAS + i] += r[X + 3 + i]
+        r[ACCEL_BIAS + i] += r[X + 8 + i]
     r[V] += r[X + 6]
     r[V + 1] += r[X + 7]
 
@@ -432,8 +436,9 @@ def bridge_gap(r, dt):
     angle = max(GAP_RATE * GAP_RATE, x * x + y * y + z * z) * dt * dt
     angle = min(angle, UNKNOWN * UNKNOWN)
     for i in range(3):
-        r[P + 9 * i] = min(r[P + 9 * i] + angle, UNKNOWN * UNKNOWN)
-        r[P + 27 + 9 * i] += BIAS_WALK * BIAS_WALK * dt
+        j = P + (N + 1) * i
+        r[j] = min(r[j] + angle, UNKNOWN * UNKNOWN)
+    add(r, 3, 6, BIAS_WALK * BIAS_WALK * dt)
     forget(r, 6, 8, max(r[VELOCITY], 0.25))
     r[V], r[V + 1] = 0.0, 0.0
     for i in range(3):
@@ -459,9 +464,7 @@ def error_state_sample(r, dt, gx, gy, gz, ax, ay, az, mx, my, mz):
         tx = (gx + past * (r[RATE] - gx) - r[BIAS]) * step
         ty = (gy + past * (r[RATE + 1] - gy) - r[BIAS + 1]) * step
         tz = (gz + past * (r[RATE + 2] - gz) - r[BIAS + 2]) * step
-        r[Q], r[Q + 1], r[Q + 2], r[Q + 3] = turned(
-            r[Q], r[Q + 1], r[Q + 2], r[Q + 3], tx, ty, tz
-        )
+        r[Q], r[Q + 1], r[Q + 2], r[Q + 3] = turned(r[Q], r[Q + 1], r[Q + 2], r[Q + 3], tx, ty, tz)
         r[SPAN] += step
         r[TURN] += gx * step
         r[TURN + 1] += gy * step
@@ -470,7 +473,7 @@ def error_state_sample(r, dt, gx, gy, gz, ax, ay, az, mx, my, mz):
     r[RATE], r[RATE + 1], r[RATE + 2] = gx, gy, gz
     felt = usable(ax, ay, az)
     if felt and r[LEVELED] == 0.0:
-        error_state_level(r, ax, ay, az)
+        error_state_level(r, ax - r[ACCEL_BIAS], ay - r[ACCEL_BIAS + 1], az - r[ACCEL_BIAS + 2])
     w, x, y, z = r[Q], r[Q + 1], r[Q + 2], r[Q + 3]
     c00, c01, c02 = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
     c10, c11, c12 = 2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)
@@ -488,6 +491,7 @@ def error_state_sample(r, dt, gx, gy, gz, ax, ay, az, mx, my, mz):
         r[BODY] += ax
         r[BODY + 1] += ay
         r[BODY + 2] += az
+        ax, ay, az = ax - r[ACCEL_BIAS], ay - r[ACCEL_BIAS + 1], az - r[ACCEL_BIAS + 2]
         if r[MEAN] != 0.0:
             # The mean over the step belongs to its middle.
             bx = ax - 0.5 * (ty * az - tz * ay)
@@ -537,7 +541,7 @@ def error_state_advance(r, dt, gyro, accel, mag, history):
         for i in range(4):
             history[k, i] = r[Q + i]
         history[k, 4], history[k, 5], history[k, 6] = r[P], r[P + 1], r[P + 2]
-        history[k, 7], history[k, 8], history[k, 9] = r[P + 9], r[P + 10], r[P + 18]
+        history[k, 7], history[k, 8], history[k, 9] = r[P + N + 1], r[P + N + 2], r[P + 2 * N + 2]
 
 
 @njit(cache=True, error_model="numpy")
@@ -602,8 +606,12 @@ def complementary_sample(r, dt, gx, gy, gz, ax, ay, az, mx, my, mz):
         ey = gain * (dz * ax - dx * az)
         ez = gain * (dx * ay - dy * ax)
     if usable(mx, my, mz) and r[LEVELED] != 0.0:
-        north = (1.0 - 2.0 * (y * y + z * z)) * mx + 2.0 * ((x * y - w * z) * my + (x * z + w * y) * mz)
-        east = 2.0 * ((x * y + w * z) * mx + (y * z - w * x) * mz) + (1.0 - 2.0 * (x * x + z * z)) * my
+        north = (1.0 - 2.0 * (y * y + z * z)) * mx + 2.0 * (
+            (x * y - w * z) * my + (x * z + w * y) * mz
+        )
+        east = (
+            2.0 * ((x * y + w * z) * mx + (y * z - w * x) * mz) + (1.0 - 2.0 * (x * x + z * z)) * my
+        )
         if r[HEADED] == 0.0:
             turn_about_down(r, -math.atan2(east, north))
             w, x, y, z = r[Q], r[Q + 1], r[Q + 2], r[Q + 3]

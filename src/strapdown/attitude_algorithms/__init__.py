@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import fields
 from typing import Any
 
@@ -52,7 +53,7 @@ ALGORITHMS: dict[str, type[AttitudeAlgorithm]] = {
 _BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 
 
-def make_algorithm(text: str) -> AttitudeAlgorithm:
+def make_algorithm(text: str, others: Sequence[str] = ()) -> AttitudeAlgorithm:
     """Make an algorithm from its name and options.
 
     Parameters
@@ -60,6 +61,8 @@ def make_algorithm(text: str) -> AttitudeAlgorithm:
     text : str
         ``name`` or ``name:option=value,option=value``, as in ``quaternion:order=3`` or
         ``euler:step=rk4``.
+    others : sequence of str
+        Further names that the caller knows, for the message.
 
     Returns
     -------
@@ -82,7 +85,7 @@ def make_algorithm(text: str) -> AttitudeAlgorithm:
             quantity="algorithms",
             name=name,
             word=name,
-            known=ALGORITHMS,
+            known=[*ALGORITHMS, *others],
         )
     made: AttitudeAlgorithm = with_options(cls, name, rest)
     return made

@@ -55,4 +55,5 @@ def make_filter(text: str) -> OrientationEstimator:
     """
     name, _, rest = text.strip().lower().partition(":")
     check_choice("attitude.no-orientation-filter", FILTERS, quantity="algorithm", name=name)
-    return with_options(FILTERS[name], name, rest)
+    made: OrientationEstimator = with_options(FILTERS[name], name, rest)
+    return made

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite
 
 from strapdown._kernels import orientation as kernel
-from strapdown.errors import ConfigError
 from strapdown.orientation_filters.filter import OrientationEstimator
 
 
@@ -30,6 +28,9 @@ class Complementary(OrientationEstimator):
     bias : float, s
         Time constant of the bias: it is the integral of the correction, divided by this.
 
+    declination : float, deg
+        Of magnetic north, east positive: added to headings found with a magnetometer.
+
     Notes
     -----
     The explicit complementary filter of Mahony, Hamel and Pflimlin, IEEE Trans. Automatic Control
@@ -47,14 +48,6 @@ class Complementary(OrientationEstimator):
     tilt: float = 3.0
     heading: float = 5.0
     bias: float = 60.0
-
-    def __post_init__(self) -> None:
-        for option in ("tilt", "heading", "bias"):
-            value = getattr(self, option)
-            if not (isfinite(value) and value > 0.0):
-                raise ConfigError(
-                    "attitude.option-not-positive", quantity=f"{self.name}:{option}", value=value
-                )
 
     def kernel_options(self) -> tuple[float, ...]:
         """Return the three time constants, s."""

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import isfinite, radians
+from math import cos, radians, sin
 
 import numpy as np
 
 from strapdown._kernels import orientation as kernel
-from strapdown.constants import STANDARD_GRAVITY
-from strapdown.errors import ConfigError
 from strapdown.orientation_filters.filter import Array, OrientationEstimator
-
-#: Accelerometer bias, m/s²: constant at rest, where nothing distinguishes it from a tilt.
-ACCEL_BIAS = 0.05
 
 
 @dataclass(frozen=True)
@@ -45,6 +40,9 @@ class ErrorState(OrientationEstimator):
     block : float, s
         Length of a block.
 
+    declination : float, deg
+        Of magnetic north, east positive: added to headings found with a magnetometer.
+
     Notes
     -----
     Error state in the level frame with the multiplicative attitude error of Markley, J. Guidance,
@@ -68,14 +66,6 @@ class ErrorState(OrientationEstimator):
     field: float = 4.0
     block: float = 0.025
 
-    def __post_init__(self) -> None:
-        for option in ("velocity", "bias", "noise", "block", "field"):
-            value = getattr(self, option)
-            if not (isfinite(value) and (value > 0.0 or (option == "field" and value == 0.0))):
-                raise ConfigError(
-                    "attitude.option-not-positive", quantity=f"{self.name}:{option}", value=value
-                )
-
     def kernel_options(self) -> tuple[float, ...]:
         """Return velocity variance, bias prior, gyro noise density and block, SI and radians."""
         return self.velocity**2, radians(self.bias), radians(self.noise) ** 2, self.block
@@ -85,17 +75,29 @@ class ErrorState(OrientationEstimator):
         p = record[kernel.P : kernel.P + kernel.N**2].reshape(kernel.N, kernel.N)
         tilt = kernel.GIVEN_SD if given else kernel.UNKNOWN
         # Without a magnetometer the heading is counted from the start.
-        p[np.diag_indices(kernel.N)] = [tilt**2] * 2 + [0.0] + [radians(self.bias) ** 2] * 3 + [
-            max(self.velocity**2, 0.25)
-        ] * 2
+        p[np.diag_indices(kernel.N)] = (
+            [tilt**2] * 2
+            + [0.0]
+            + [radians(self.bias) ** 2] * 3
+            + [max(self.velocity**2, 0.25)] * 2
+            + [kernel.ACCEL_BIAS_SD**2] * 3
+        )
         record[kernel.POWER] = 0.25
 
-    def covariance(self, history: Array, magnetic: bool) -> Array:
+    def row_of(self, record: Array) -> Array:
+        """Return quaternion and covariance of a record, as in a row of the history."""
+        p = record[kernel.P : kernel.P + kernel.N**2].reshape(kernel.N, kernel.N)
+        return np.concatenate([super().row_of(record), p[np.triu_indices(3)]])
+
+    def covariance(self, history: Array, record: Array) -> Array:
         """Covariance of the attitude error in north-east-down, (n, 3, 3), rad²."""
         out = history[:, [4, 5, 6, 5, 7, 8, 6, 8, 9]].reshape(-1, 3, 3)
-        out[:, [0, 1], [0, 1]] += (ACCEL_BIAS / STANDARD_GRAVITY) ** 2
-        if magnetic:
+        if record[kernel.HEADED] != 0.0:
             out[:, 2, 2] += radians(self.field) ** 2
+            if self.declination:
+                c, s = cos(radians(self.declination)), sin(radians(self.declination))
+                turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+                out = turn @ out @ turn.T
         return out
 
     def bias_sd(self, record: Array) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
+from math import cos, isfinite, radians, sin
 from typing import Any, ClassVar, NoReturn
 
 import numpy as np
@@ -15,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown import rotation
 from strapdown._kernels import orientation as kernel
 from strapdown._kernels.increments import LARGEST
-from strapdown.errors import DataError, DivergenceError
+from strapdown.errors import ConfigError, DataError, DivergenceError
 from strapdown.tables import ACCEL, GYRO, MAG, check_sampling_kind
 
 Array = NDArray[np.float64]
@@ -35,6 +36,8 @@ class OrientationEstimator(ABC):
         Numbers of the record.
     row : int
         Numbers of a row of the history; the first four are the quaternion.
+    declination : float, deg
+        Of magnetic north, east positive: added to headings found with a magnetometer.
     advance_kernel, update_kernel : callable
         The compiled loop over many samples, and one sample.
     """
@@ -46,6 +49,22 @@ class OrientationEstimator(ABC):
     row: ClassVar[int]
     advance_kernel: ClassVar[Any]
     update_kernel: ClassVar[Callable[..., Any]]
+
+    declination: float = 0.0
+
+    def __post_init__(self) -> None:
+        for option in fields(self):
+            value = getattr(self, option.name)
+            if option.name == "declination":
+                allowed = abs(value) <= 180.0
+            else:
+                allowed = isfinite(value) and value > 0.0
+            if not allowed:
+                raise ConfigError(
+                    "attitude.filter-option-out-of-range",
+                    quantity=f"{self.name}:{option.name}",
+                    value=value,
+                )
 
     @abstractmethod
     def kernel_options(self) -> tuple[float, ...]:
@@ -89,7 +108,12 @@ class OrientationEstimator(ABC):
         """Set what the filter has beyond the common part of the record."""
         return
 
-    def covariance(self, history: Array, magnetic: bool) -> Array | None:
+    def row_of(self, record: Array) -> Array:
+        """Row of the history, (row,), of a record."""
+        row: Array = record[kernel.Q : kernel.Q + 4]
+        return row
+
+    def covariance(self, history: Array, record: Array) -> Array | None:
         """Covariance of the attitude error in north-east-down, (n, 3, 3), rad², or None."""
         return None
 
@@ -128,6 +152,13 @@ class OrientationEstimator(ABC):
             type(self).advance_kernel(after, np.diff(time, prepend=before), *blocks, history)
             after[kernel.TIME] = time[-1]
         return after, history
+
+    def attitudes(self, q: Array, record: Array) -> Array:
+        """Unit quaternions ``q_nb`` of raw ones, (n, 4), of true north if the field was used."""
+        if self.declination and record[kernel.HEADED] != 0.0:
+            half = 0.5 * radians(self.declination)
+            q = rotation.compose([cos(half), 0.0, 0.0, sin(half)], q)
+        return np.asarray(q / np.sqrt((q * q).sum(axis=1, keepdims=True)))
 
     @property
     def label(self) -> str:
@@ -169,28 +200,39 @@ class FilterRun:
     gaps: int
 
     def euler_sd(self) -> Array | None:
-        """Standard deviations of roll, pitch and heading, (n, 3), deg; at most 180.
+        """Standard deviations of roll, pitch and heading, (n, 3), deg, as `euler_sd`, or None."""
+        return None if self.covariance is None else euler_sd(self.q_nb, self.covariance)
 
-        To first order: near ±90° pitch, roll and heading are not separate, and theirs are large.
-        """
-        if self.covariance is None:
-            return None
-        roll_pitch_heading = np.radians(rotation.euler_from_quaternion(self.q_nb))
-        pitch, heading = roll_pitch_heading[:, 1], roll_pitch_heading[:, 2]
-        sine, cosine = np.sin(heading), np.cos(heading)
-        flat = np.maximum(np.cos(pitch), 1e-6)
-        zero, one = np.zeros_like(flat), np.ones_like(flat)
-        # Errors of the 3-2-1 angles from the rotation vector in the level frame.
-        jacobian = np.stack(
-            [
-                np.stack([cosine / flat, sine / flat, zero], axis=1),
-                np.stack([-sine, cosine, zero], axis=1),
-                np.stack([cosine * np.sin(pitch) / flat, sine * np.sin(pitch) / flat, one], axis=1),
-            ],
-            axis=1,
-        )
-        variance = np.einsum("nij,njk,nik->ni", jacobian, self.covariance, jacobian)
-        return np.minimum(np.degrees(np.sqrt(np.maximum(variance, 0.0))), 180.0)
+
+def euler_sd(q_nb: Array, covariance: Array) -> Array:
+    """Standard deviations of 3-2-1 angles, to first order.
+
+    Parameters
+    ----------
+    q_nb : ndarray, (n, 4)
+    covariance : ndarray, (n, 3, 3), rad²
+        Of the attitude error in north-east-down.
+
+    Returns
+    -------
+    ndarray, (n, 3), deg
+        Of roll, pitch, heading; at most 180. Near ±90° pitch, roll and heading are not separate,
+        and theirs are large.
+    """
+    _, pitch, heading = np.radians(rotation.euler_from_quaternion(q_nb)).T
+    flat = np.maximum(np.cos(pitch), 1e-6)
+    north, east = np.cos(heading), np.sin(heading)
+    zero = np.zeros_like(flat)
+    # From the rotation vector in the level frame.
+    rows = np.array(
+        [
+            [north / flat, east / flat, zero],
+            [-east, north, zero],
+            [north * np.sin(pitch) / flat, east * np.sin(pitch) / flat, zero + 1.0],
+        ]
+    )
+    variance = np.einsum("ijn,njk,ikn->ni", rows, covariance, rows)
+    return np.minimum(np.degrees(np.sqrt(np.maximum(variance, 0.0))), 180.0)
 
 
 def run_filter(
@@ -215,7 +257,7 @@ def run_filter(
     Returns
     -------
     FilterRun
-        With a magnetometer, headings are magnetic.
+        With a magnetometer, headings are magnetic, or true by the filter's declination.
 
     Raises
     ------
@@ -251,12 +293,11 @@ def run_filter(
             row=int(bad[0]) + 1,
             quantity=chosen.label,
         )
-    q = history[:, :4]
     seen = record[kernel.MAG_TIME]
     span = float(imu.index[-1] - imu.index[0])
     return FilterRun(
-        q_nb=q / np.sqrt((q * q).sum(axis=1, keepdims=True)),
-        covariance=chosen.covariance(history, record[kernel.HEADED] != 0.0),
+        q_nb=chosen.attitudes(history[:, :4], record),
+        covariance=chosen.covariance(history, record),
         bias=record[kernel.BIAS : kernel.BIAS + 3].copy(),
         bias_sd=chosen.bias_sd(record),
         disturbed=float(record[kernel.DISTURBED_TIME] / seen) if seen > 0.0 else float("nan"),
@@ -356,8 +397,7 @@ class OrientationTracker:
     @property
     def quaternion(self) -> Array:
         """The attitude ``q_nb``, (4,), unit norm."""
-        q = self._record[kernel.Q : kernel.Q + 4]
-        return np.asarray(q / np.sqrt((q * q).sum()))
+        return self._filter.attitudes(self._record[None, kernel.Q : kernel.Q + 4], self._record)[0]
 
     @property
     def roll_pitch_heading(self) -> Array:
@@ -365,6 +405,14 @@ class OrientationTracker:
         return rotation.euler_from_quaternion(self.quaternion)
 
     @property
+    def roll_pitch_heading_sd(self) -> Array | None:
+        """Standard deviations of these angles, (3,), deg; None if the filter states none."""
+        row = self._filter.row_of(self._record)[None, :]
+        covariance = self._filter.covariance(row, self._record)
+        return None if covariance is None else euler_sd(self.quaternion[None, :], covariance)[0]
+
+    @property
     def gyro_bias(self) -> Array:
         """The estimated gyro bias, (3,), rad/s."""
-        return self._record[kernel.BIAS : kernel.BIAS + 3].copy()
+        bias: Array = self._record[kernel.BIAS : kernel.BIAS + 3].copy()
+        return bias
