@@ -338,9 +338,9 @@ def observe_field(r, span, squared):
         r[DISTURBANCE] += min(1.0, span / FIELD_MEMORY) * (seen - r[DISTURBANCE])
     ratio = r[NORM] / usual
     lag = squared * FIELD_LAG * FIELD_LAG
-    free = FIELD_FREE * FIELD_FREE + (r[P] + r[P + N + 1] + lag) * ratio * ratio
+    free = FIELD_FREE * FIELD_FREE + (r[P] + r[P + N + 1]) * ratio * ratio
     excess = max(0.0, r[DISTURBANCE] - free)
-    if excess > DISTURBED * DISTURBED:
+    if excess > DISTURBED * DISTURBED + lag * ratio * ratio:
         r[DISTURBED_TIME] += span
     own = FIELD_SD * norm / flat
     own = own * own + lag

@@ -64,7 +64,7 @@ class ErrorState(OrientationEstimator):
     bias: float = 1.0
     noise: float = 0.02
     field: float = 4.0
-    block: float = 0.025
+    block: float = 0.08
 
     def kernel_options(self) -> tuple[float, ...]:
         """Return velocity variance, bias prior, gyro noise density and block, SI and radians."""
