@@ -153,7 +153,7 @@ REST_DRIFT = 9e-4  # rad/s/sqrt(Hz): 0.05 deg/s
 FIELD_SD = 0.02  # of the magnetometer, of the total field, correlated over 1 s
 FIELD_FREE = 0.1  # of the horizontal field: deviations of norm and dip that mean nothing
 FIELD_LAG = 0.01  # s: magnetometers sample at 50 to 100 Hz
-FIELD_TIME = 10.0  # s: correlation of a disturbance
+FIELD_TIME = 20.0  # s: correlation of a disturbance
 FIELD_MEMORY = 2.0  # s
 FIELD_REFERENCE = 20.0  # s: norm and dip follow the undisturbed field
 DISTURBED = 0.1  # rad of heading, by norm and dip
@@ -227,9 +227,10 @@ def error_state_head(r, north, east, down):
 def observe(r, i, slope, innovation, noise, kind, dx, dy, dz):
     """One scalar measurement of state i less `slope` times state 0.
 
-    Kind 0: all states are corrected. 1: not the bias about the vertical (dx, dy, dz), which a
-    velocity does not observe, and only seems to. 2: neither tilt nor velocity, which a magnetic
-    disturbance must not move. For any gain K, ``P - K (H P) - (P H') K' + K S K'`` is exact.
+    Kind 0: all states are corrected. 1, by a velocity: not the gyro bias about the vertical
+    (dx, dy, dz), which it does not observe, and only seems to. 2, by a field: of the gyro bias
+    only that part, and neither tilt nor velocity, which a magnetic disturbance must not move. For
+    any gain K, ``P - K (H P) - (P H') K' + K S K'`` is exact.
     """
     innovation -= r[X + i] - slope * r[X]
     for j in range(N):
@@ -237,15 +238,17 @@ def observe(r, i, slope, innovation, noise, kind, dx, dy, dz):
     s = r[H + i] - slope * r[H] + noise
     for j in range(N):
         r[K + j] = r[H + j] / s
-    if kind == 1:
-        up = dx * r[K + 3] + dy * r[K + 4] + dz * r[K + 5]
-        r[K + 3] -= up * dx
-        r[K + 4] -= up * dy
-        r[K + 5] -= up * dz
-    elif kind == 2:
-        r[K], r[K + 1] = 0.0, 0.0
-        for j in range(6, N):
-            r[K + j] = 0.0
+    if kind > 0:
+        down = dx * r[K + 3] + dy * r[K + 4] + dz * r[K + 5]
+        if kind == 1:
+            r[K + 3] -= down * dx
+            r[K + 4] -= down * dy
+            r[K + 5] -= down * dz
+        else:
+            r[K + 3], r[K + 4], r[K + 5] = down * dx, down * dy, down * dz
+            r[K], r[K + 1] = 0.0, 0.0
+            for j in range(6, N):
+                r[K + j] = 0.0
     for j in range(N):
         r[X + j] += r[K + j] * innovation
     for j in range(N):
@@ -316,7 +319,7 @@ def bounded(innovation, variance, noise):
 
 
 @njit(cache=True, error_model="numpy")
-def observe_field(r, span, squared):
+def observe_field(r, span, squared, dx, dy, dz):
     """Heading by the mean field of a block, and its norm and dip against the reference."""
     n = r[FIELDS]
     north, east, down = r[FIELD] / n, r[FIELD + 1] / n, r[FIELD + 2] / n
@@ -332,23 +335,24 @@ def observe_field(r, span, squared):
     longer = norm - r[NORM]
     steeper = (dip - r[DIP]) * r[NORM]
     seen = 0.5 * (longer * longer + steeper * steeper) / (usual * usual)
+    lag = squared * FIELD_LAG * FIELD_LAG
+    own = FIELD_SD * norm / flat
+    own = own * own + lag
+    slope = down / flat
+    innovation = -math.atan2(east, north)
+    variance = r[P + 2 * N + 2] + slope * slope * r[P] + own
     if seen > r[DISTURBANCE]:
         r[DISTURBANCE] = seen
     else:
         r[DISTURBANCE] += min(1.0, span / FIELD_MEMORY) * (seen - r[DISTURBANCE])
     ratio = r[NORM] / usual
-    lag = squared * FIELD_LAG * FIELD_LAG
     free = FIELD_FREE * FIELD_FREE + (r[P] + r[P + N + 1]) * ratio * ratio
     excess = max(0.0, r[DISTURBANCE] - free)
     if excess > DISTURBED * DISTURBED + lag * ratio * ratio:
         r[DISTURBED_TIME] += span
-    own = FIELD_SD * norm / flat
-    own = own * own + lag
-    slope = down / flat
-    innovation = -math.atan2(east, north)
     noise = 2.0 * (own + excess * FIELD_TIME) / span
-    variance = r[P + 2 * N + 2] + slope * slope * r[P] + own + excess
-    observe(r, 2, slope, innovation, bounded(innovation, variance, noise), 2, 0.0, 0.0, 0.0)
+    noise = bounded(innovation, variance + excess, noise)
+    observe(r, 2, slope, innovation, noise, 2, dx, dy, dz)
     share = min(1.0, span / FIELD_REFERENCE) / (1.0 + r[DISTURBANCE] / (FIELD_FREE * FIELD_FREE))
     r[NORM] += share * longer
     r[DIP] += share * (dip - r[DIP])
@@ -364,6 +368,8 @@ def end_block(r):
     for i in range(N):
         r[X + i] = 0.0
     n = r[FORCES]
+    w, x, y, z = r[Q], r[Q + 1], r[Q + 2], r[Q + 3]
+    dx, dy, dz = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
     if n > 0.0:
         ux, uy, uz = span * r[FORCE] / n, span * r[FORCE + 1] / n, span * r[FORCE + 2] / n
         propagate(r, span, uz, 1.0, squared)
@@ -377,8 +383,6 @@ def end_block(r):
             1.0 / 3.0
         )
         r[POWER] += min(1.0, span / POWER_TIME) * (now - r[POWER])
-        w, x, y, z = r[Q], r[Q + 1], r[Q + 2], r[Q + 3]
-        dx, dy, dz = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)
         if at_rest(r, span, gx, gy, gz, squared):
             r[REST_TIME] += span
             r[POWER] -= min(1.0, 2.0 * span) * r[POWER]
@@ -404,7 +408,7 @@ def end_block(r):
         forget(r, 6, 8, r[P + 6 * N + 6] + span)
         r[REST] = 0.0
     if r[FIELDS] > 0.0 and r[HEADED] != 0.0:
-        observe_field(r, span, squared)
+        observe_field(r, span, squared, dx, dy, dz)
     correct(r)
     clear_block(r)
 
