@@ -137,7 +137,7 @@ ROW = 10
 # Model. Each number is a property of bodies and sensors, none of a recording.
 LEVEL_SD = 0.1  # rad: one sample of a moving body, acceleration 1 m/s²
 GIVEN_SD = 0.05  # rad: an attitude given by the user
-VELOCITY_TIME = 2.0  # s: correlation of the velocity of a body that is carried
+VELOCITY_TIME = 1.5  # s: correlation of the velocity of a body that is carried
 FAST_TIME = 1.5  # s: the velocity that is seen by itself, without gravity's error
 POWER_TIME = 6.0  # s: memory of its power
 SCALE = 0.005  # gyro scale factor and misalignment; constant for 1 s of one rotation axis

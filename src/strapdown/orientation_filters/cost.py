@@ -86,8 +86,8 @@ def time_filters(chosen: Sequence[OrientationEstimator], rate_hz: float = 100.0)
     count, rounds = 20_000, 5
     rng = np.random.default_rng(0)
     gyro = rng.normal(0.0, 0.5, (count, 3))
-    accel = rng.normal(0.0, 0.5, (count, 3)) + (0.0, 0.0, -9.8)
-    mag = rng.normal(0.0, 0.5, (count, 3)) + (20.0, 0.0, 40.0)
+    accel = rng.normal(0.0, 0.5, (count, 3)) + np.array([0.0, 0.0, -9.8])
+    mag = rng.normal(0.0, 0.5, (count, 3)) + np.array([20.0, 0.0, 40.0])
     dt = np.full(count, 1.0 / rate_hz)
     rows = []
     for each in chosen:

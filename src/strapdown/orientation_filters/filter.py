@@ -232,7 +232,7 @@ def euler_sd(q_nb: Array, covariance: Array) -> Array:
         ]
     )
     variance = np.einsum("ijn,njk,ikn->ni", rows, covariance, rows)
-    return np.minimum(np.degrees(np.sqrt(np.maximum(variance, 0.0))), 180.0)
+    return np.asarray(np.minimum(np.degrees(np.sqrt(np.maximum(variance, 0.0))), 180.0))
 
 
 def run_filter(
@@ -397,7 +397,9 @@ class OrientationTracker:
     @property
     def quaternion(self) -> Array:
         """The attitude ``q_nb``, (4,), unit norm."""
-        return self._filter.attitudes(self._record[None, kernel.Q : kernel.Q + 4], self._record)[0]
+        q = self._record[None, kernel.Q : kernel.Q + 4]
+        unit: Array = self._filter.attitudes(q, self._record)[0]
+        return unit
 
     @property
     def roll_pitch_heading(self) -> Array:
