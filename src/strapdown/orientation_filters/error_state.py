@@ -30,7 +30,7 @@ class ErrorState(OrientationEstimator):
     Parameters
     ----------
     velocity : float, m/s
-        Standard deviation of the velocity of the body, each axis: 0.5 in hand or walking; 10 in a
+        Standard deviation of the velocity of the body, each axis: 0.7 in hand or walking; 10 in a
         vehicle.
     bias : float, deg/s
         Standard deviation of the gyro bias at the start, each axis.
@@ -61,7 +61,7 @@ class ErrorState(OrientationEstimator):
     advance_kernel = staticmethod(kernel.error_state_advance)
     update_kernel = staticmethod(kernel.error_state_update)
 
-    velocity: float = 0.5
+    velocity: float = 0.7
     bias: float = 1.0
     noise: float = 0.02
     field: float = 4.0
