@@ -23,6 +23,8 @@ from strapdown._kernels.increments import LARGEST
 TIME, SAMPLES, MEAN, STEP = 0, 1, 2, 3
 RATE, Q, BIAS = 4, 7, 11
 LEVELED, HEADED, AGE, GAPS = 14, 15, 16, 17
+# Headed: 0 never, 1 by the field, or by the field before a gap.
+LOST = -1.0
 # Seconds with a magnetometer, of them disturbed, and seconds stationary.
 MAG_TIME, DISTURBED_TIME, REST_TIME = 18, 19, 20
 OPTIONS = 21  # five numbers of the filter
@@ -106,6 +108,14 @@ def level(r, ax, ay, az):
     r[Q], r[Q + 1], r[Q + 2], r[Q + 3] = cr * cp, sr * cp, cr * sp, -sr * sp
     turn_about_down(r, heading)
     r[LEVELED] = 1.0
+
+
+@njit(cache=True, error_model="numpy")
+def lose_attitude(r):
+    """Level and head anew with the next samples."""
+    r[LEVELED] = 0.0
+    if r[HEADED] != 0.0:
+        r[HEADED] = LOST
 
 
 @njit(cache=True, error_model="numpy")
@@ -407,7 +417,7 @@ def end_block(r):
         propagate(r, span, 0.0, 0.0, squared)
         forget(r, 6, 8, r[P + 6 * N + 6] + span)
         r[REST] = 0.0
-    if r[FIELDS] > 0.0 and r[HEADED] != 0.0:
+    if r[FIELDS] > 0.0 and r[HEADED] == 1.0:
         observe_field(r, span, squared, dx, dy, dz)
     correct(r)
     clear_block(r)
@@ -450,8 +460,7 @@ def bridge_gap(r, dt):
     r[REST] = 0.0
     clear_block(r)
     if angle > RELEVEL * RELEVEL:
-        r[LEVELED] = 0.0
-        r[HEADED] = 0.0
+        lose_attitude(r)
 
 
 @njit(cache=True, error_model="numpy")
@@ -510,7 +519,7 @@ def error_state_sample(r, dt, gx, gy, gz, ax, ay, az, mx, my, mz):
         north = c00 * mx + c01 * my + c02 * mz
         east = c10 * mx + c11 * my + c12 * mz
         down = c20 * mx + c21 * my + c22 * mz
-        if r[HEADED] == 0.0:
+        if r[HEADED] != 1.0:
             error_state_head(r, north, east, down)
         elif step > 0.0:
             r[FIELD] += north
@@ -590,7 +599,8 @@ def complementary_sample(r, dt, gx, gy, gz, ax, ay, az, mx, my, mz):
     else:
         step, gap = usual_step(r, dt)
         if gap:
-            r[LEVELED], r[HEADED], r[AGE] = 0.0, 0.0, 0.0
+            lose_attitude(r)
+            r[AGE] = 0.0
     r[SAMPLES] += 1.0
     r[AGE] += step
     if felt and r[LEVELED] == 0.0 and ax * ax + ay * ay + az * az > WEIGHTLESS * WEIGHTLESS:
@@ -616,7 +626,7 @@ def complementary_sample(r, dt, gx, gy, gz, ax, ay, az, mx, my, mz):
         east = (
             2.0 * ((x * y + w * z) * mx + (y * z - w * x) * mz) + (1.0 - 2.0 * (x * x + z * z)) * my
         )
-        if r[HEADED] == 0.0:
+        if r[HEADED] != 1.0:
             turn_about_down(r, -math.atan2(east, north))
             w, x, y, z = r[Q], r[Q + 1], r[Q + 2], r[Q + 3]
             r[HEADED] = 1.0
