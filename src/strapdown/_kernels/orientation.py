@@ -147,9 +147,10 @@ ROW = 10
 # Model. Each number is a property of bodies and sensors, none of a recording.
 LEVEL_SD = 0.1  # rad: one sample of a moving body, acceleration 1 m/s²
 GIVEN_SD = 0.05  # rad: an attitude given by the user
-VELOCITY_TIME = 1.5  # s: correlation of the velocity of a body that is carried
+VELOCITY_TIME = 2.0  # s: correlation of the velocity of a body that is carried
 FAST_TIME = 1.5  # s: the velocity that is seen by itself, without gravity's error
 POWER_TIME = 6.0  # s: memory of its power
+UNSEEN = 2.0  # power of the velocity over that of what is seen of it, above 0.1 Hz
 SCALE = 0.005  # gyro scale factor and misalignment; constant for 1 s of one rotation axis
 BIAS_WALK = 5e-5  # rad/s/sqrt(s): 0.003 deg/s
 ACCEL_NOISE = 0.01  # m/s²/sqrt(Hz), vibration included
@@ -398,6 +399,14 @@ def end_block(r):
             r[POWER] -= min(1.0, 2.0 * span) * r[POWER]
             for i in range(3):
                 r[FAST + i] = 0.0
+            # A body that came to a constant velocity, as in a train, seems stationary: what was
+            # integrated on the way then says nothing of the tilt.
+            limit = HUBER * HUBER
+            if r[V] * r[V] > limit * (r[P + 6 * N + 6] + REST_VELOCITY) or r[V + 1] * r[
+                V + 1
+            ] > limit * (r[P + 7 * N + 7] + REST_VELOCITY):
+                forget(r, 6, 8, REST_VELOCITY)
+                r[V], r[V + 1] = 0.0, 0.0
             noise = REST_VELOCITY / span
             observe(r, 6, 0.0, -r[V], noise, 1, dx, dy, dz)
             observe(r, 7, 0.0, -r[V + 1], noise, 1, dx, dy, dz)
@@ -406,7 +415,7 @@ def end_block(r):
             observe(r, 4, 0.0, oy, noise, 0, 0.0, 0.0, 0.0)
             observe(r, 5, 0.0, oz, noise, 0, 0.0, 0.0, 0.0)
         else:
-            own = r[VELOCITY] + max(r[POWER], now)
+            own = r[VELOCITY] + UNSEEN * max(r[POWER], now)
             noise = 2.0 * own * VELOCITY_TIME / span
             a = bounded(r[V], own + r[P + 6 * N + 6], noise)
             observe(r, 6, 0.0, -r[V], a, 1, dx, dy, dz)

@@ -18,8 +18,8 @@ class ErrorState(OrientationEstimator):
     Dead-reckoned in the level frame, the specific force gives a velocity that a tilt error makes
     grow. A velocity of zero, with the standard deviation and correlation time of the body's true
     velocity, is its measurement: accelerations average out over the time that the gyros allow,
-    and the covariance says what remains. The true velocity's standard deviation is `velocity`, or
-    what the specific force shows within seconds, whichever is more. While stationary, rate and
+    and the covariance says what remains. The variance of
+    the true velocity is that of `velocity`, and what the specific force shows within seconds. While stationary, rate and
     velocity are measured as zero.
 
     The heading of the field is a measurement whose noise grows with the deviation of norm and dip
@@ -30,7 +30,7 @@ class ErrorState(OrientationEstimator):
     Parameters
     ----------
     velocity : float, m/s
-        Standard deviation of the velocity of the body, each axis: 0.7 in hand or walking; 10 in a
+        Standard deviation of the velocity of the body, each axis: 0.3 in hand; 10 in a
         vehicle.
     bias : float, deg/s
         Standard deviation of the gyro bias at the start, each axis.
@@ -61,7 +61,7 @@ class ErrorState(OrientationEstimator):
     advance_kernel = staticmethod(kernel.error_state_advance)
     update_kernel = staticmethod(kernel.error_state_update)
 
-    velocity: float = 0.7
+    velocity: float = 0.3
     bias: float = 1.0
     noise: float = 0.02
     field: float = 4.0
