@@ -31,6 +31,7 @@ def log(samples=900, *, mag=True, sampling="instantaneous"):
     table = imu_table(time, gyro, accel, sampling=sampling)
     if mag:
         table[MAG] = np.array([20.0, 3.0, 40.0]) + 5.0 * gyro
+        table.iloc[200:300, 6:] += [0.0, 30.0, -40.0]
         table.iloc[::3, 6:] = np.nan
     table.iloc[5::7, 3:6] = np.nan
     table.iloc[750:770, 3:6] = np.nan

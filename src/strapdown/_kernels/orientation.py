@@ -150,6 +150,7 @@ GIVEN_SD = 0.05  # rad: an attitude given by the user
 VELOCITY_TIME = 2.0  # s: correlation of the velocity of a body that is carried
 FAST_TIME = 1.5  # s: the velocity that is seen by itself, without gravity's error
 POWER_TIME = 6.0  # s: memory of its power
+SOON, EARLY = 0.1, 0.3  # s, and share of the time since the start
 UNSEEN = 2.0  # power of the velocity over that of what is seen of it, above 0.1 Hz
 SCALE = 0.005  # gyro scale factor and misalignment; constant for 1 s of one rotation axis
 BIAS_WALK = 5e-5  # rad/s/sqrt(s): 0.003 deg/s
@@ -167,6 +168,7 @@ FIELD_LAG = 0.01  # s: magnetometers sample at 50 to 100 Hz
 FIELD_TIME = 20.0  # s: correlation of a disturbance
 FIELD_MEMORY = 2.0  # s
 FIELD_REFERENCE = 20.0  # s: norm and dip follow the undisturbed field
+FIELD_BEGIN = 10.0  # s: until then the dip is found with the tilt
 DISTURBED = 0.1  # rad of heading, by norm and dip
 HUBER = 3.0
 
@@ -201,6 +203,7 @@ def error_state_level(r, ax, ay, az):
     if size < WEIGHTLESS:
         return
     level(r, ax, ay, az)
+    r[AGE] = 0.0
     r[SMOOTH_FORCE], r[SMOOTH_FORCE + 1], r[SMOOTH_FORCE + 2] = ax, ay, az
     off = size / G - 1.0
     forget(r, 0, 2, min(LEVEL_SD * LEVEL_SD + off * off, 1.0))
@@ -366,6 +369,9 @@ def observe_field(r, span, squared, dx, dy, dz):
     observe(r, 2, slope, innovation, noise, 2, dx, dy, dz)
     share = min(1.0, span / FIELD_REFERENCE) / (1.0 + r[DISTURBANCE] / (FIELD_FREE * FIELD_FREE))
     r[NORM] += share * longer
+    if r[MAG_TIME] < FIELD_BEGIN and abs(longer) < FIELD_FREE * usual:
+        # The first dip has the tilt error of the start, which the norm has not.
+        share = min(1.0, 3.0 * span / r[MAG_TIME])
     r[DIP] += share * (dip - r[DIP])
 
 
@@ -416,7 +422,8 @@ def end_block(r):
             observe(r, 5, 0.0, oz, noise, 0, 0.0, 0.0, 0.0)
         else:
             own = r[VELOCITY] + UNSEEN * max(r[POWER], now)
-            noise = 2.0 * own * VELOCITY_TIME / span
+            # Soon after the start the velocity is one, not many: its mean is no better known.
+            noise = 2.0 * own * min(VELOCITY_TIME, SOON + EARLY * r[AGE]) / span
             a = bounded(r[V], own + r[P + 6 * N + 6], noise)
             observe(r, 6, 0.0, -r[V], a, 1, dx, dy, dz)
             a = bounded(r[V + 1], own + r[P + 7 * N + 7], noise)
@@ -488,6 +495,7 @@ def error_state_sample(r, dt, gx, gy, gz, ax, ay, az, mx, my, mz):
         tz = (gz + past * (r[RATE + 2] - gz) - r[BIAS + 2]) * step
         r[Q], r[Q + 1], r[Q + 2], r[Q + 3] = turned(r[Q], r[Q + 1], r[Q + 2], r[Q + 3], tx, ty, tz)
         r[SPAN] += step
+        r[AGE] += step
         r[TURN] += gx * step
         r[TURN + 1] += gy * step
         r[TURN + 2] += gz * step

@@ -18,9 +18,9 @@ class ErrorState(OrientationEstimator):
     Dead-reckoned in the level frame, the specific force gives a velocity that a tilt error makes
     grow. A velocity of zero, with the standard deviation and correlation time of the body's true
     velocity, is its measurement: accelerations average out over the time that the gyros allow,
-    and the covariance says what remains. The variance of
-    the true velocity is that of `velocity`, and what the specific force shows within seconds. While stationary, rate and
-    velocity are measured as zero.
+    and the covariance says what remains. The variance of the true velocity is that of `velocity`,
+    and what the specific force shows within seconds. While stationary, rate and velocity are
+    measured as zero.
 
     The heading of the field is a measurement whose noise grows with the deviation of norm and dip
     from their usual values. It corrects heading and gyro bias, never roll and pitch.

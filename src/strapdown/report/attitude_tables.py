@@ -638,7 +638,8 @@ def _filter_row(peer: PeerRun) -> tuple[str, ...]:
         operations = cost.add + cost.multiply + cost.divide + cost.sqrt + cost.trig
         of_kernel = (degrees(peer.single_deg), f"{operations:.0f}", f"{4 * cost.memory}")
     sensors = {"gyro+accel": "6D", "gyro+accel+mag": "9D"}
-    return (peer.peer, sensors[peer.aiding], *parts, *of_kernel)
+    name = peer.peer.removeprefix("strapdown ")
+    return (name, sensors[peer.aiding], *parts, *of_kernel)
 
 
 def _peer_error(peer: PeerRun) -> str:
