@@ -39,6 +39,7 @@ class Complementary(OrientationEstimator):
 
     name = "complementary"
     title = "Complementary filter"
+    source = "Mahony, Hamel, Pflimlin (2008) (32)"
     summary = "rates pulled towards vertical and north; fewest operations; no covariance"
     size = kernel.COMPLEMENTARY
     row = 4

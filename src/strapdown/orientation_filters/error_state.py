@@ -55,6 +55,7 @@ class ErrorState(OrientationEstimator):
 
     name = "error-state"
     title = "Error-state filter"
+    source = "Markley (2003), Laidig and Seel (2023)"
     summary = "attitude, gyro bias and their covariance; a bounded velocity; a disturbed field"
     size = kernel.STATE
     row = kernel.ROW

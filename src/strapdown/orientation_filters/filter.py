@@ -30,8 +30,8 @@ class OrientationEstimator(ABC):
 
     Attributes
     ----------
-    name, title, summary : str
-        The word for it on the command line, in a report, and what it does.
+    name, title, source, summary : str
+        The word for it on the command line, in a report, its publication, and what it does.
     size : int
         Numbers of the record.
     row : int
@@ -44,6 +44,7 @@ class OrientationEstimator(ABC):
 
     name: ClassVar[str]
     title: ClassVar[str]
+    source: ClassVar[str]
     summary: ClassVar[str]
     size: ClassVar[int]
     row: ClassVar[int]
