@@ -20,7 +20,7 @@ from collections import Counter
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
-SOURCES = ("rotation", "increments", "attitude", "rotation_vector")
+SOURCES = ("rotation", "increments", "attitude", "rotation_vector", "orientation")
 PACKAGE = "strapdown._kernels"
 SINGLE = "_strapdown_single"
 LARGEST_SINGLE = 3e38
@@ -268,6 +268,10 @@ class _CountedMath:
     @staticmethod
     def cos(x: Counted | float) -> Counted | float:
         return _CountedMath._of("trig", math.cos(x), x)
+
+    @staticmethod
+    def atan2(y: Counted | float, x: Counted | float) -> Counted | float:
+        return _CountedMath._of("trig", math.atan2(y, x), y)
 
     @staticmethod
     def fmod(x: Counted | float, y: float) -> Counted | float:

@@ -26,10 +26,18 @@ from strapdown.attitude_comparison.comparison import (
 from strapdown.attitude_comparison.options import AttitudeOptions
 from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.increments import BETWEEN_STAMPS, increments_from_imu
+from strapdown.orientation_filters import (
+    FILTERS,
+    OrientationEstimator,
+    OrientationTracker,
+    is_filter,
+    make_filter,
+    run_filter,
+)
 from strapdown.progress import Progress, silent
 from strapdown.sensors.rest import find_rests
 from strapdown.systems.inputs import NOWHERE, Memory, moved
-from strapdown.tables import ACCEL, EULER, GYRO, QUATERNION, check_imu
+from strapdown.tables import ACCEL, EULER, GYRO, MAG, QUATERNION, attitude_table, check_imu
 from strapdown.tables.checks import as_array, check_same_length
 from strapdown.tables.imu import imu_of_columns
 
@@ -47,12 +55,18 @@ __all__ = [
 
 Array = NDArray[np.float64]
 
+ANGLES_SD = ["roll_sd", "pitch_sd", "heading_sd"]
+
+#: A disturbed field is reported from this share of the time on.
+REPORTED = 0.01
+
 
 class Attitude(pd.DataFrame):
     """Attitude by time: a DataFrame with `rotation` and `findings`.
 
     Index ``time`` in s; columns ``q_w q_x q_y q_z`` (body to north-east-down, Hamilton, scalar
-    first) and ``roll pitch heading`` in deg, which are computed when the table is first used.
+    first) and ``roll pitch heading`` in deg, which are computed when the table is first used; of a
+    filter that states them, standard deviations ``roll_sd pitch_sd heading_sd`` in deg.
     """
 
     @classmethod
@@ -109,6 +123,7 @@ def attitude(
     t: Any,
     gyro: ArrayLike | None = None,
     accel: ArrayLike | None = None,
+    mag: ArrayLike | None = None,
     *,
     algorithm: str = "quaternion",
     initial: str | ArrayLike = "auto",
@@ -116,10 +131,11 @@ def attitude(
     sampling: str = "instantaneous",
     interpolation: str = "linear",
 ) -> Attitude:
-    """Integrate gyro samples to attitude with one algorithm.
+    """Attitude from gyro samples with one algorithm, or with an orientation filter.
 
-    The accelerometer is used only for the initial attitude. Earth rotation (15 deg/h) is
-    neglected.
+    An algorithm integrates the gyros; the accelerometer is used only for the initial attitude. A
+    filter, ``error-state`` or ``complementary``, uses accelerometer and magnetometer throughout.
+    Earth rotation (15 deg/h) is neglected.
 
     Parameters
     ----------
@@ -128,13 +144,17 @@ def attitude(
     gyro : array_like, (n, 3), rad/s
         Body rates, forward-right-down.
     accel : array_like, (n, 3), m/s², optional
-        Specific force, forward-right-down.
+        Specific force, forward-right-down. A filter takes rows with NaN as missing samples.
+    mag : array_like, (n, 3), optional
+        Magnetic field, forward-right-down, in any unit; NaN as in `accel`. For filters only.
     algorithm : str
-        A name with its options, such as ``rotvec:samples=3`` (`strapdown modules`), or the name of
-        an installed plug-in (entry points ``strapdown.attitude``).
+        A name with its options, such as ``rotvec:samples=3`` or ``error-state:velocity=10``
+        (`strapdown modules`), or the name of an installed plug-in (entry points
+        ``strapdown.attitude``).
     initial : str or array_like
         ``auto``: leveled if the samples begin stationary with an accelerometer, else zero;
-        ``level``; ``zero``; roll, pitch, heading in deg; or a quaternion ``q_nb``.
+        ``level``; ``zero``; roll, pitch, heading in deg; or a quaternion ``q_nb``. A filter levels
+        itself with ``auto`` and ``level``, moving or not.
     gyro_bias : array_like, (3,), rad/s, or str, optional
         Subtracted from the rates; ``rest``: the mean over the first stationary interval.
     sampling : {'instantaneous', 'mean'}
@@ -145,7 +165,9 @@ def attitude(
     Returns
     -------
     Attitude
-        One row per sample.
+        One row per sample; with `roll_sd`, `pitch_sd`, `heading_sd` in deg if the filter states
+        them. Headings of a filter are magnetic with a magnetometer, or true with its option
+        ``declination``; without one they are relative to the start.
 
     Raises
     ------
@@ -156,7 +178,20 @@ def attitude(
     DivergenceError
         The algorithm left the floating-point range.
     """
-    chosen = make_algorithm(algorithm)
+    if is_filter(algorithm):
+        chosen_filter = make_filter(algorithm)
+        if interpolation != "linear":
+            raise ConfigError(
+                "attitude.filter-takes-linear",
+                quantity="interpolation",
+                name=chosen_filter.name,
+                interpolation=interpolation,
+            )
+        samples = _filter_samples(t, gyro, accel, mag, sampling)
+        return _filtered(chosen_filter, samples, initial, gyro_bias)
+    chosen = make_algorithm(algorithm, tuple(FILTERS))
+    if mag is not None:
+        raise ConfigError("api.magnetometer-needs-filter", quantity="mag", known=FILTERS)
     if gyro is None:
         if isinstance(t, np.ndarray):
             raise ConfigError("api.no-samples", quantity="gyro")
@@ -211,6 +246,76 @@ def _gyro_alone(t: Any, gyro: ArrayLike, sampling: str) -> pd.DataFrame:
     return imu_of_columns(stamps, rates, GYRO, sampling=sampling)
 
 
+def _filter_samples(
+    t: Any, gyro: ArrayLike | None, accel: ArrayLike | None, mag: ArrayLike | None, sampling: str
+) -> pd.DataFrame:
+    """An Imu table, in which accelerometer and magnetometer may miss samples (NaN)."""
+    if gyro is None:
+        if isinstance(t, np.ndarray):
+            raise ConfigError("api.no-samples", quantity="gyro")
+        imu = imu_of(t)
+        if isinstance(t, pd.DataFrame) and set(MAG) <= set(t.columns) and mag is None:
+            mag = t[MAG].to_numpy(dtype=np.float64)
+    else:
+        imu = imu_of_arrays(t, gyro, None, sampling)
+    for columns, values in ((ACCEL, accel if gyro is not None else None), (MAG, mag)):
+        if values is not None:
+            sensor = columns[0].partition("_")[0]
+            block = as_array(values, 3, sensor)
+            check_same_length(None, time=imu.index.to_numpy(), **{sensor: block})
+            imu[columns] = block
+    return imu
+
+
+def _filtered(
+    chosen: OrientationEstimator,
+    imu: pd.DataFrame,
+    initial: str | ArrayLike,
+    gyro_bias: str | ArrayLike | None,
+) -> Attitude:
+    """Attitude of a filter."""
+    name = str(imu.attrs.get("source") or "imu")
+    q_nb: ArrayLike | None = None
+    how = "leveled by the filter"
+    if not isinstance(initial, str):
+        q_nb, how = _given(initial), "given"
+    elif initial.strip().lower() == "zero":
+        q_nb, how = (1.0, 0.0, 0.0, 0.0), "zero"
+    else:
+        check_choice(
+            "api.filter-levels-itself",
+            ("auto", "level", "zero"),
+            quantity="initial",
+            initial=initial.strip().lower(),
+        )
+    findings: list[Finding] = []
+    if gyro_bias is not None:
+        bias = _bias(gyro_bias, find_rests(imu) if isinstance(gyro_bias, str) else ())
+        imu = imu.copy()
+        imu[GYRO] = imu[GYRO].to_numpy() - bias
+    run = run_filter(chosen, imu, q_nb)
+    if run.disturbed >= REPORTED:
+        findings.append(
+            Finding(
+                "attitude.field-disturbed",
+                quantity=chosen.label,
+                severity="note",
+                share=run.disturbed,
+            )
+        )
+    out = Attitude(attitude_table(imu.index.to_numpy(), run.q_nb, source=name))
+    sd = run.euler_sd()
+    if sd is not None:
+        out[ANGLES_SD] = sd
+    out.attrs = {
+        "source": name,
+        "algorithm": chosen.label,
+        "initial": how,
+        "findings": (*imu.attrs.get("findings", ()), *findings),
+    }
+    return out
+
+
 def _given(initial: ArrayLike) -> Array:
     """A stated initial attitude: three angles in deg, or a quaternion."""
     values = np.asarray(initial, dtype=np.float64).ravel()
@@ -244,13 +349,16 @@ def _three(values: ArrayLike, quantity: str) -> Array:
 
 
 class OrientationFilter:
-    """Attitude sample by sample, as on a device: gyros integrated from a leveled start.
+    """Attitude sample by sample, as on a device.
 
-    Roll and pitch are leveled once, from the mean specific force of the first `level_samples`
-    samples, over which the body must be stationary; heading starts at zero. From then on the chosen
-    algorithm integrates the gyros alone. Without feedback from the accelerometer, gyro errors
-    accumulate (a bias of 1 deg/min is 1 deg after a minute), and accelerations of the body have
-    no effect. `attitude` over the same samples gives bitwise the same result.
+    With a filter, ``error-state`` or ``complementary``, accelerometer and magnetometer are used
+    throughout, and the body may move from the start. `attitude` with the same algorithm gives
+    bitwise the same result.
+
+    With an algorithm that integrates gyros, roll and pitch are leveled once, from the mean
+    specific force of the first `level_samples` samples, over which the body must be stationary;
+    heading starts at zero. From then on the gyros are integrated alone: their errors accumulate (a
+    bias of 1 deg/min is 1 deg after a minute), and accelerations of the body have no effect.
 
     Parameters
     ----------
@@ -263,7 +371,7 @@ class OrientationFilter:
     gyro_bias : array_like, (3,), rad/s
         Subtracted from every sample.
     level_samples : int
-        Number of accelerometer samples averaged at the start.
+        Number of accelerometer samples averaged at the start; a filter does not need them.
     sampling : {'instantaneous', 'mean'}
         Meaning of a gyro sample.
 
@@ -290,17 +398,27 @@ class OrientationFilter:
                 "api.too-few-level-samples", quantity="level_samples", level_samples=level_samples
             )
         self.rate_hz = float(rate_hz)
-        self._algorithm = make_algorithm(algorithm)
         self._bias = _three(gyro_bias, "gyro_bias")
         self._sampling = sampling
-        self._level_samples = 0 if initial is not None else level_samples
         self._force = np.zeros(3)
         self._samples = 0
-        self._tracker = AttitudeTracker(
-            self._algorithm, (1.0, 0.0, 0.0, 0.0) if initial is None else _given(initial), sampling
-        )
+        start = None if initial is None else _given(initial)
+        self._tracker: AttitudeTracker | OrientationTracker
+        if is_filter(algorithm):
+            chosen = make_filter(algorithm)
+            self.label, self._level_samples = chosen.label, 0
+            self._tracker = OrientationTracker(chosen, start, sampling)
+        else:
+            self._algorithm = make_algorithm(algorithm, tuple(FILTERS))
+            self.label = self._algorithm.label
+            self._level_samples = 0 if initial is not None else level_samples
+            self._tracker = AttitudeTracker(
+                self._algorithm, (1.0, 0.0, 0.0, 0.0) if start is None else start, sampling
+            )
 
-    def update(self, gyro: ArrayLike, accel: ArrayLike | None = None) -> Array:
+    def update(
+        self, gyro: ArrayLike, accel: ArrayLike | None = None, mag: ArrayLike | None = None
+    ) -> Array:
         """Process one sample.
 
         Parameters
@@ -308,7 +426,10 @@ class OrientationFilter:
         gyro : array_like, (3,), rad/s
             Body rate, forward-right-down.
         accel : array_like, (3,), m/s², optional
-            Specific force; required during the leveling, and not used afterwards.
+            Specific force. A filter uses every sample, and takes None or NaN as a missing one; an
+            algorithm requires it during the leveling, and does not use it afterwards.
+        mag : array_like, (3,), optional
+            Magnetic field in any unit, for a filter; None or NaN if there is no new sample.
 
         Returns
         -------
@@ -320,9 +441,16 @@ class OrientationFilter:
         DataError
             The sample is not three finite numbers, or its specific force is not that of a
             stationary body during the leveling. The sample is then not processed.
+        ConfigError
+            `mag` is given, and the algorithm is not a filter.
         """
         rate = _three(gyro, "gyro") - self._bias
-        if self._samples < self._level_samples:
+        time = self._samples / self.rate_hz
+        if isinstance(self._tracker, OrientationTracker):
+            self._tracker.update(time, rate, accel, mag)
+        elif mag is not None:
+            raise ConfigError("api.magnetometer-needs-filter", quantity="mag", known=FILTERS)
+        elif self._samples < self._level_samples:
             if accel is None:
                 raise DataError(
                     "api.no-specific-force-to-level", row=self._samples + 1, quantity="accel"
@@ -334,10 +462,10 @@ class OrientationFilter:
                 rotation.quaternion_from_euler([roll, pitch, 0.0]),
                 self._sampling,
             )
-            tracker.update(self._samples / self.rate_hz, rate)
+            tracker.update(time, rate)
             self._force, self._tracker = force, tracker
         else:
-            self._tracker.update(self._samples / self.rate_hz, rate)
+            self._tracker.update(time, rate)
         self._samples += 1
         return self.quaternion
 
@@ -352,6 +480,12 @@ class OrientationFilter:
         return self._tracker.roll_pitch_heading
 
     @property
+    def roll_pitch_heading_sd(self) -> Array | None:
+        """Their standard deviations, (3,), deg; None of an algorithm that states none."""
+        tracker = self._tracker
+        return tracker.roll_pitch_heading_sd if isinstance(tracker, OrientationTracker) else None
+
+    @property
     def rotation(self) -> Rotation:
         """The attitude as a scipy Rotation: ``rotation.apply(v_b)`` is ``v_n``."""
         from scipy.spatial.transform import Rotation
@@ -361,7 +495,7 @@ class OrientationFilter:
     def __repr__(self) -> str:
         roll, pitch, heading = self.roll_pitch_heading
         return (
-            f"<OrientationFilter {self._algorithm.label}, {self.rate_hz:g} Hz: {self._samples} "
+            f"<OrientationFilter {self.label}, {self.rate_hz:g} Hz: {self._samples} "
             f"samples; roll {roll:.3f}°, pitch {pitch:.3f}°, heading {heading:.3f}°>"
         )
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import fields
+from typing import Any
 
 from strapdown.attitude_algorithms.algorithm import (
     AttitudeAlgorithm,
@@ -36,6 +38,7 @@ __all__ = [
     "count_cost",
     "make_algorithm",
     "run_attitude",
+    "with_options",
 ]
 
 ALGORITHMS: dict[str, type[AttitudeAlgorithm]] = {
@@ -50,7 +53,7 @@ ALGORITHMS: dict[str, type[AttitudeAlgorithm]] = {
 _BOOLEANS = {"true": True, "yes": True, "1": True, "false": False, "no": False, "0": False}
 
 
-def make_algorithm(text: str) -> AttitudeAlgorithm:
+def make_algorithm(text: str, others: Sequence[str] = ()) -> AttitudeAlgorithm:
     """Make an algorithm from its name and options.
 
     Parameters
@@ -58,6 +61,8 @@ def make_algorithm(text: str) -> AttitudeAlgorithm:
     text : str
         ``name`` or ``name:option=value,option=value``, as in ``quaternion:order=3`` or
         ``euler:step=rk4``.
+    others : sequence of str
+        Further names that the caller knows, for the message.
 
     Returns
     -------
@@ -80,8 +85,14 @@ def make_algorithm(text: str) -> AttitudeAlgorithm:
             quantity="algorithms",
             name=name,
             word=name,
-            known=ALGORITHMS,
+            known=[*ALGORITHMS, *others],
         )
+    made: AttitudeAlgorithm = with_options(cls, name, rest)
+    return made
+
+
+def with_options(cls: type[Any], name: str, rest: str) -> Any:
+    """Make a dataclass from its options as text, ``option=value,option=value``."""
     known = {f.name: f.default for f in fields(cls)}
     options: dict[str, object] = {}
     for item in filter(None, (part.strip() for part in rest.split(","))):
@@ -109,6 +120,11 @@ def _option(name: str, key: str, value: str, default: object) -> object:
             return int(value)
         except ValueError:
             code = "attitude.option-not-whole"
+    elif isinstance(default, float):
+        try:
+            return float(value)
+        except ValueError:
+            code = "attitude.option-not-number"
     else:
         return value
     raise ConfigError(code, quantity=f"{name}:{key}", value=value)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
@@ -10,11 +10,14 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown import rotation
+from strapdown.attitude_algorithms import Cost
 from strapdown.attitude_algorithms.algorithm import AttitudeRun
 from strapdown.attitude_comparison.options import AttitudeSpec
 from strapdown.attitude_comparison.source import AttitudeSource
 from strapdown.bundle import input_files
 from strapdown.config import ScenarioSpec
+from strapdown.constants import TWO_SIDED_95
 from strapdown.errors import ConfigError, Finding
 from strapdown.evaluation.differences import error_angles, known_at
 from strapdown.evaluation.reference_points import (
@@ -27,7 +30,7 @@ from strapdown.evaluation.reference_points import (
 )
 from strapdown.formats import read_log
 from strapdown.sensors.rest import RestStretch, find_rests
-from strapdown.tables import QUATERNION, THETA, attitude_table, find_gaps
+from strapdown.tables import ACCEL, GYRO, MAG, QUATERNION, THETA, attitude_table, find_gaps
 
 if TYPE_CHECKING:
     from strapdown.evaluation.position_references import PlaceReference
@@ -40,24 +43,55 @@ RESTS = "rests"
 
 
 @dataclass(frozen=True)
+class FilterErrors:
+    """Errors of an aided filter against the truth, deg.
+
+    Attributes
+    ----------
+    rms_deg, final_deg : float
+        Of the whole rotation.
+    inclination_deg, heading_deg : float
+        Root mean square of its parts: about a level axis, and about the vertical.
+    covered : tuple of float or None
+        Share of the samples within the stated 95 % bounds: of inclination, by its two axes, and of
+        heading. None if the filter states none.
+    """
+
+    rms_deg: float
+    final_deg: float
+    inclination_deg: float
+    heading_deg: float
+    covered: tuple[float, float] | None
+
+
+@dataclass(frozen=True)
 class PeerRun:
-    """Another library's filter over the same log.
+    """A filter over the same log, of another library or one of `orientation_filters`.
 
     Attributes
     ----------
     peer : str
-        Name and version.
+        Name and version; the name of a filter of the project.
     aiding : str
         ``gyro``, ``gyro+accel`` or ``gyro+accel+mag``; compare only equal aidings.
     attitude : DataFrame
         Attitude table.
     scores : tuple of Score
+    errors : FilterErrors or None
+        Of an aided filter, if there is a truth.
+    cost : Cost or None
+        Of a filter of the project.
+    single_deg : float or None
+        Largest difference between its results in single and in double precision.
     """
 
     peer: str
     aiding: str
     attitude: pd.DataFrame = field(repr=False)
     scores: tuple[Score, ...]
+    errors: FilterErrors | None = None
+    cost: Cost | None = None
+    single_deg: float | None = None
 
 
 def gather_references(
@@ -256,11 +290,13 @@ def judge(
     return findings
 
 
-# Filters of other libraries on the log of the bench.
+# Filters on the log of the bench.
 
 
 #: A filter that would take longer is skipped with a finding.
 LONGEST = 60.0  # s
+#: A disturbed field is reported from this share of the time on.
+DISTURBED = 0.01
 
 
 def run_beside(
@@ -271,29 +307,122 @@ def run_beside(
     references: pd.DataFrame,
     findings: list[Finding],
 ) -> tuple[PeerRun, ...]:
-    """Run filters of other libraries, and compare them with the references.
+    """Run the filters of the project and those of other libraries, and compare with references.
 
-    An accelerometer alone does not observe the heading: it is rotated to the truth's first one.
+    The filters of the project run whenever there is an accelerometer. Without a magnetometer the
+    heading is not observed: it is rotated to the truth's first one.
     """
+    out = list(_own_filters(source, imu, references, findings))
     if not names:
-        return ()
-    from strapdown.peers import PEERS, align_heading, run_peers
+        return tuple(out)
+    from strapdown.peers import PEERS, run_peers
 
     wanted = list(PEERS) if [n.lower() for n in names] == ["all"] else list(names)
     runs, found = run_peers(wanted, imu, q_nb, longest_s=LONGEST)
     findings += found
-    out = []
     for label, aiding, attitude in runs:
-        if aiding == "gyro+accel" and source.truth is not None and source.scored is not None:
-            known = source.truth[source.scored]
-            stamps = attitude.index.to_numpy()
-            known = known[(known.index >= stamps[0]) & (known.index <= stamps[-1])]
-            if len(known):
-                first = known[QUATERNION].to_numpy(dtype=np.float64)[0]
-                row = int(np.searchsorted(stamps, float(known.index[0])))
-                q = align_heading(attitude[QUATERNION].to_numpy(), first, row)
-                attitude = attitude_table(stamps, q)
-        run = AttitudeRun(label, label, "", attitude, {})
-        scores = [*truth_score(run, source), *score_references(run, references, imu)]
-        out.append(PeerRun(label, aiding, attitude, tuple(scores)))
+        if aiding == "gyro+accel":
+            q = _with_first_heading(attitude[QUATERNION].to_numpy(), attitude.index, source)
+            attitude = attitude_table(attitude.index.to_numpy(), q)
+        scores, errors = _judged(label, attitude, source, imu, references)
+        out.append(PeerRun(label, aiding, attitude, scores, None if aiding == "gyro" else errors))
     return tuple(out)
+
+
+def _own_filters(
+    source: AttitudeSource, imu: pd.DataFrame, references: pd.DataFrame, findings: list[Finding]
+) -> Iterator[PeerRun]:
+    """Run the filters of the project, with their cost.
+
+    Like the other libraries they take each row as the mean over its step.
+    """
+    from strapdown.orientation_filters import FILTERS, run_filter
+    from strapdown.orientation_filters.cost import count_filter_cost, single_precision_error_deg
+
+    if not set(ACCEL) <= set(imu.columns):
+        return
+    step = float(np.median(np.diff(imu.index.to_numpy())))
+    for aiding, columns in (("gyro+accel", GYRO + ACCEL), ("gyro+accel+mag", GYRO + ACCEL + MAG)):
+        if not set(columns) <= set(imu.columns):
+            continue
+        part = imu[columns]
+        for cls in FILTERS.values():
+            chosen = cls()
+            run = run_filter(chosen, part, sampling="mean")
+            q = run.q_nb
+            if aiding == "gyro+accel":
+                q = _with_first_heading(q, imu.index, source)
+            elif run.disturbed >= DISTURBED:
+                findings.append(
+                    Finding(
+                        "attitude.field-disturbed",
+                        file=source.name,
+                        quantity="mag",
+                        severity="note",
+                        share=run.disturbed,
+                    )
+                )
+            attitude = attitude_table(imu.index.to_numpy(), q)
+            scores, errors = _judged(
+                chosen.label, attitude, source, imu, references, run.covariance
+            )
+            yield PeerRun(
+                f"strapdown {chosen.label}",
+                aiding,
+                attitude,
+                scores,
+                errors,
+                count_filter_cost(chosen, step, aiding == "gyro+accel+mag"),
+                single_precision_error_deg(chosen, part, "mean", run.q_nb),
+            )
+
+
+def _with_first_heading(q: Array, stamps: pd.Index, source: AttitudeSource) -> Array:
+    """Attitudes rotated about the vertical to the first known one."""
+    from strapdown.peers import align_heading
+
+    if source.truth is None or source.scored is None:
+        return q
+    known = source.truth[source.scored]
+    known = known[(known.index >= stamps[0]) & (known.index <= stamps[-1])]
+    if known.empty:
+        return q
+    first = known[QUATERNION].to_numpy(dtype=np.float64)[0]
+    return align_heading(q, first, int(np.searchsorted(stamps.to_numpy(), float(known.index[0]))))
+
+
+def _judged(
+    label: str,
+    attitude: pd.DataFrame,
+    source: AttitudeSource,
+    imu: pd.DataFrame,
+    references: pd.DataFrame,
+    covariance: Array | None = None,
+) -> tuple[tuple[Score, ...], FilterErrors | None]:
+    """Scores against the references, and errors by parts if there is a truth."""
+    run = AttitudeRun(label, label, "", attitude, {})
+    scores = (*truth_score(run, source), *score_references(run, references, imu))
+    if source.truth is None or source.scored is None:
+        return scores, None
+    known = known_at(source.truth, source.scored, attitude.index.to_numpy(dtype=np.float64))
+    if not known.counts.any():
+        return scores, None
+    counts = known.counts
+    q = attitude[QUATERNION].to_numpy(dtype=np.float64)[counts]
+    error = rotation.compose(q, rotation.conjugate(known.q_nb[counts]))
+    level = np.hypot(error[:, 0], error[:, 3])
+    tilt = 2.0 * np.degrees(np.arctan2(np.hypot(error[:, 1], error[:, 2]), level))
+    heading = 2.0 * np.degrees(np.arctan2(np.abs(error[:, 3]), np.abs(error[:, 0])))
+    whole = np.degrees(2.0 * np.arctan2(np.linalg.norm(error[:, 1:], axis=1), np.abs(error[:, 0])))
+    covered = None
+    if covariance is not None:
+        sd = np.sqrt(np.diagonal(covariance[counts], axis1=1, axis2=2))
+        inside = np.abs(2.0 * error[:, 1:]) <= TWO_SIDED_95 * sd
+        covered = float(inside[:, :2].mean()), float(inside[:, 2].mean())
+    return scores, FilterErrors(
+        rms_deg=float(np.sqrt(np.mean(whole**2))),
+        final_deg=float(whole[-1]),
+        inclination_deg=float(np.sqrt(np.mean(tilt**2))),
+        heading_deg=float(np.sqrt(np.mean(heading**2))),
+        covered=covered,
+    )

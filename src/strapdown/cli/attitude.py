@@ -293,6 +293,7 @@ def print_comparison(bench: AttitudeComparison) -> None:
         tables.trial_table(bench),
         tables.place_table(bench),
         tables.peer_table(bench),
+        tables.filter_table(bench),
     ]
     for table in shown:
         if table is not None:

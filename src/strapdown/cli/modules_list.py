@@ -17,6 +17,7 @@ from strapdown.formats.writers import WRITERS
 from strapdown.mechanization import MECHANIZATIONS, Mechanization
 from strapdown.navigation.measurements.measurement import Measurement
 from strapdown.navigation.measurements.standstill import STANDSTILL_DETECTORS, STANDSTILL_THRESHOLDS
+from strapdown.orientation_filters import FILTERS
 from strapdown.plugins import plugins
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.simulation import SCENARIOS
@@ -123,6 +124,15 @@ def _tables() -> Iterator[tuple[str, str, Mapping[str, Any], Columns]]:
             "source": lambda _, cls: f"{cls.source} {cls.equations}".strip(),
             "options": lambda _, cls: [f"{f.name}={f.default}".lower() for f in fields(cls)],
             "summary": lambda _, cls: cls.summary,
+        },
+    )
+    yield (
+        "orientation_filters",
+        "Orientation filters (sd.attitude; beside the algorithms in a comparison)",
+        FILTERS,
+        {
+            **_SUMMARY,
+            "options": lambda _, cls: [f"{f.name}={f.default:g}" for f in fields(cls)],
         },
     )
     shared = len(fields(Mechanization))

@@ -187,6 +187,9 @@ def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
                 "aiding": peer.aiding,
                 "final": _final(peer.attitude.iloc[-1], float(peer.attitude.index[-1])),
                 "scores": [_score(s) for s in peer.scores],
+                "errors": None if peer.errors is None else vars(peer.errors),
+                "cost": None if peer.cost is None else vars(peer.cost),
+                "single_precision_deg": peer.single_deg,
             }
             for peer in bench.peers
         ],

@@ -367,8 +367,8 @@ def _sweep(bench: AttitudeComparison) -> Chart:
             if judged
             else "Algorithm error at that rate. "
         )
-        + "Averaged: as by a sensor of that rate. Left out: as if it were read less often (aliased). "
-        f"Drawn at {LEAST_WORDS} where it is less.",
+        + "Averaged: as by a sensor of that rate. Left out: as if it were read less often "
+        f"(aliased). Drawn at {LEAST_WORDS} where it is less.",
         "rate, Hz",
         tuple(panels),
         log_x=True,
@@ -455,8 +455,8 @@ def _peers(bench: AttitudeComparison) -> Chart:
         panels.append(_peer_panel("Aided", _rows(aided, named=True)))
     return Chart(
         "peers",
-        "Other libraries on the same log",
-        "Largest error against the known attitude. Blue: strapdown's algorithms. Filters that also "
+        "Filters and other libraries on the same log",
+        "Largest error against the known attitude. Blue: strapdown's. Filters that also "
         "use an accelerometer or a magnetometer are apart.",
         "error, deg",
         tuple(panels),
@@ -471,7 +471,9 @@ def _rows(peers: list[PeerRun], named: bool = False) -> list[tuple[str, float, s
     for peer in peers:
         error = largest_known(peer.scores)
         name = f"{peer.peer} ({peer.aiding})" if named else peer.peer
-        rows.append((name, np.nan if error is None else error, VERMILLION, "square"))
+        own = peer.cost is not None
+        look = (BLUE, "circle") if own else (VERMILLION, "square")
+        rows.append((name, np.nan if error is None else error, *look))
     return rows
 
 

@@ -83,6 +83,7 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
             tables.place_table(bench),
             chart("peers"),
             tables.peer_table(bench),
+            tables.filter_table(bench),
         ),
         section("findings", "Findings", findings_list(bench.findings)),
         section(

@@ -657,10 +657,54 @@ def peer_table(bench: AttitudeComparison) -> TableBlock | None:
         text=(0, 3),
         caption="Largest error against the known attitude. An aided filter also uses other "
         "sensors: do not compare its column with the other. These libraries take each row as the "
-        "mean over its step; strapdown as the rate at its stamp, unless --sampling mean.",
+        "mean over its step, and so do the aided filters of strapdown; its algorithms as the rate "
+        "at its stamp, unless --sampling mean.",
         strong=_named(bench),
-        title="Other libraries on the same log",
+        title="Filters and other libraries on the same log",
     )
+
+
+def filter_table(bench: AttitudeComparison) -> TableBlock | None:
+    """Return errors, coverage and cost of the aided filters.
+
+    Returns
+    -------
+    TableBlock or None
+        None if none ran.
+    """
+    _, aided = like_with_like(bench)
+    if not aided:
+        return None
+    return TableBlock(
+        (
+            *("filter", "uses", "RMS", "final", "inclination", "heading", "in 95 %"),
+            *("float32", "operations", "bytes"),
+        ),
+        tuple(_filter_row(peer) for peer in aided),
+        text=(0, 1),
+        caption="Root mean square and final error against the truth; its parts about a level axis "
+        "and about the vertical; without a magnetometer the heading is that of the truth at the "
+        "start. In 95 %: share of the time in which inclination / heading are within their stated "
+        "95 % bounds. Float32: largest difference in single precision. Operations a sample, as "
+        "counted on the kernel; bytes kept between samples in single precision.",
+        title="Aided filters",
+    )
+
+
+def _filter_row(peer: PeerRun) -> tuple[str, ...]:
+    errors, cost = peer.errors, peer.cost
+    parts: tuple[str, ...] = ("",) * 5
+    if errors is not None:
+        numbers = (errors.rms_deg, errors.final_deg, errors.inclination_deg, errors.heading_deg)
+        bounds = "" if errors.covered is None else " / ".join(f"{x:.0%}" for x in errors.covered)
+        parts = (*(degrees(x) for x in numbers), bounds)
+    of_kernel = ("", "", "")
+    if cost is not None and peer.single_deg is not None:
+        operations = cost.add + cost.multiply + cost.divide + cost.sqrt + cost.trig
+        of_kernel = (degrees(peer.single_deg), f"{operations:.0f}", f"{4 * cost.memory}")
+    sensors = {"gyro+accel": "6D", "gyro+accel+mag": "9D"}
+    name = peer.peer.removeprefix("strapdown ")
+    return (name, sensors[peer.aiding], *parts, *of_kernel)
 
 
 def _peer_error(peer: PeerRun) -> str:

@@ -12,6 +12,8 @@ import pandas as pd
 import pytest
 from tests.coded import coded
 
+from strapdown.attitude_algorithms import Cost
+from strapdown.attitude_comparison.references import FilterErrors
 from strapdown.cli.attitude import print_comparison
 from strapdown.errors import ConfigError
 from strapdown.formats import read_raw
@@ -143,6 +145,33 @@ def test_aided_errors_stand_in_their_own_column(full_bench):
     assert all(aided == "" for who, (_, aided, _) in rows.items() if who.startswith("strapdown"))
 
 
+def test_aided_filters_have_errors_by_parts_and_their_cost(full_bench):
+    errors = FilterErrors(1.234, 0.5, 0.321, 1.19, (0.991, 0.5))
+    cost = Cost("error-state", 100.0, 120.5, 3.0, 1.0, 0.5, 500.0, 223)
+    own = replace(
+        full_bench.peers[1],
+        peer="strapdown error-state",
+        aiding="gyro+accel+mag",
+        errors=errors,
+        cost=cost,
+        single_deg=0.004,
+    )
+    table = tables.filter_table(replace(full_bench, peers=(*full_bench.peers, own)))
+    none = ("",) * 8
+    assert table.rows == (
+        ("vqf 2.1.1", "6D", *none),
+        ("imufusion 1.2.5", "9D", *none),
+        (
+            *("error-state", "9D", "1.23°", "0.5°", "0.321°", "1.19°"),
+            *("99% / 50%", "0.004°", "225", "892"),
+        ),
+    )
+    assert tables.filter_table(replace(full_bench, peers=full_bench.peers[:1])) is None
+    found = attitude_json(replace(full_bench, peers=(own,)))["peers"][0]
+    assert found["errors"]["covered"] == [0.991, 0.5]
+    assert (found["cost"]["memory"], found["single_precision_deg"]) == (223, 0.004)
+
+
 def test_each_algorithm_names_its_own_source(make_bench):
     table = tables.condition_table(make_bench(("naive", "rotvec")))
     assert [row[1] for row in table.rows] == [
@@ -155,7 +184,7 @@ def test_nine_algorithms_fit_a_terminal(full_bench, capsys):
     print_comparison(full_bench)
     lines = capsys.readouterr().out.splitlines()
     ruled = [k for k, line in enumerate(lines) if "───" in line]
-    assert len(ruled) == 5
+    assert len(ruled) == 6
     for k in ruled:
         assert len(lines[k]) <= TERMINAL
         assert len(lines[k - 1].rstrip()) <= TERMINAL

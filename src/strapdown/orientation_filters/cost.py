@@ -1,0 +1,120 @@
+"""Computational cost of an orientation filter, and its error in single precision."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from time import perf_counter
+
+import numpy as np
+import pandas as pd
+
+from strapdown import rotation
+from strapdown._kernels import arithmetic, orientation
+from strapdown.attitude_algorithms import Cost
+from strapdown.constants import CORTEX_M4F_CYCLES
+from strapdown.orientation_filters.filter import Array, OrientationEstimator
+from strapdown.tables import ACCEL, GYRO, MAG
+
+_HOME = "orientation"
+#: Samples over which operations are averaged; whole blocks of every usual rate.
+SAMPLES = 120
+
+
+def count_filter_cost(
+    chosen: OrientationEstimator, step: float, magnetometer: bool, begin: Sequence[float] = ()
+) -> Cost:
+    """Count the operations of one sample of a slowly turning body.
+
+    Parameters
+    ----------
+    step : float, s
+        Usual step of the samples: a filter that works in blocks costs less at higher rates.
+    magnetometer : bool
+    begin : sequence of float, (4,), optional
+        Initial attitude.
+
+    Returns
+    -------
+    Cost
+        `memory` is the size of the record.
+    """
+    count: Counter[str] = Counter()
+    name = type(chosen).advance_kernel.py_func.__name__.replace("_advance", "_sample")
+    sample = getattr(arithmetic.counted_kernels(_HOME), name)
+    record = chosen.begin(begin or None)
+    record[orientation.SAMPLES], record[orientation.STEP] = 1.0, step
+    state = [arithmetic.Counted(float(v), count) for v in record]
+    field = (20.0, 1.0, 40.0) if magnetometer else (np.nan,) * 3
+    for k in range(SAMPLES):
+        # The first leads to a level and a heading, which are not counted.
+        if k == 1:
+            count.clear()
+        values = (step, 0.3, 0.32 - 0.01 * k, 0.2, 0.1, -0.2, -9.8, *field)
+        sample(state, *(arithmetic.Counted(v, count) for v in values))
+    operations = {kind: count[kind] / (SAMPLES - 1) for kind in CORTEX_M4F_CYCLES}
+    return Cost(
+        algorithm=chosen.label,
+        **operations,
+        cycles=sum(operations[kind] * weight for kind, weight in CORTEX_M4F_CYCLES.items()),
+        memory=chosen.size,
+    )
+
+
+def single_precision_attitude(
+    chosen: OrientationEstimator, imu: pd.DataFrame, sampling: str
+) -> Array:
+    """Attitudes, (n, 4), with every operation in single precision."""
+    kernel = getattr(
+        arithmetic.single_precision(_HOME), type(chosen).advance_kernel.py_func.__name__
+    )
+    time = imu.index.to_numpy(dtype=np.float64)
+    blocks = [
+        np.ascontiguousarray(imu[columns].to_numpy(dtype=np.float32))
+        if set(columns) <= set(imu.columns)
+        else np.empty((0, 3), np.float32)
+        for columns in (GYRO, ACCEL, MAG)
+    ]
+    record = chosen.begin(None, sampling).astype(np.float32)
+    history = np.empty((len(time), chosen.row), np.float32)
+    kernel(record, np.diff(time, prepend=time[0]).astype(np.float32), *blocks, history)
+    return chosen.attitudes(history[:, :4].astype(np.float64), record.astype(np.float64))
+
+
+def time_filters(chosen: Sequence[OrientationEstimator], rate_hz: float = 100.0) -> pd.DataFrame:
+    """Measure the time of a sample with a magnetometer in ns, as `time_algorithms`."""
+    count, rounds = 20_000, 5
+    rng = np.random.default_rng(0)
+    gyro = rng.normal(0.0, 0.5, (count, 3))
+    accel = rng.normal(0.0, 0.5, (count, 3)) + np.array([0.0, 0.0, -9.8])
+    mag = rng.normal(0.0, 0.5, (count, 3)) + np.array([20.0, 0.0, 40.0])
+    dt = np.full(count, 1.0 / rate_hz)
+    rows = []
+    for each in chosen:
+        name = type(each).advance_kernel.py_func.__name__
+        row: dict[str, str | float] = {"algorithm": each.label}
+        for column, kind in (("float64_ns", np.float64), ("float32_ns", np.float32)):
+            kernel = (
+                type(each).advance_kernel
+                if kind is np.float64
+                else getattr(arithmetic.single_precision(_HOME), name)
+            )
+            inputs = [a.astype(kind) for a in (dt, gyro, accel, mag)]
+            history = np.empty((count, each.row), kind)
+            best = np.inf
+            for _ in range(rounds):
+                record = each.begin().astype(kind)
+                start = perf_counter()
+                kernel(record, *inputs, history)
+                best = min(best, perf_counter() - start)
+            row[column] = best / count * 1e9
+        rows.append(row)
+    return pd.DataFrame(rows)
+
+
+def single_precision_error_deg(
+    chosen: OrientationEstimator, imu: pd.DataFrame, sampling: str, q_nb: Array
+) -> float:
+    """Largest rotation angle, deg, between single and double precision over a record."""
+    apart = rotation.rotation_angle(single_precision_attitude(chosen, imu, sampling), q_nb)
+    return float(np.max(apart))

@@ -1,0 +1,108 @@
+"""The error-state orientation filter: attitude, gyro bias and velocity, with a covariance."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, radians, sin
+
+import numpy as np
+
+from strapdown._kernels import orientation as kernel
+from strapdown.orientation_filters.filter import Array, OrientationEstimator
+
+
+@dataclass(frozen=True)
+class ErrorState(OrientationEstimator):
+    """Error-state Kalman filter: a carried body has a bounded velocity.
+
+    Dead-reckoned in the level frame, the specific force gives a velocity that a tilt error makes
+    grow. A velocity of zero, with the standard deviation and correlation time of the body's true
+    velocity, is its measurement: accelerations average out over the time that the gyros allow,
+    and the covariance says what remains. The variance of the true velocity is that of `velocity`,
+    and what the specific force shows within seconds. While stationary, rate and velocity are
+    measured as zero.
+
+    The heading of the field is a measurement whose noise grows with the deviation of norm and dip
+    from their usual values. It corrects heading and gyro bias, never roll and pitch.
+
+    The covariance is propagated and updated once a block, by the sums of its samples.
+
+    Parameters
+    ----------
+    velocity : float, m/s
+        Standard deviation of the velocity of the body, each axis: 0.3 in hand; 10 in a
+        vehicle.
+    bias : float, deg/s
+        Standard deviation of the gyro bias at the start, each axis.
+    noise : float, deg/s/√Hz
+        Gyro noise density, with what vibration adds.
+    field : float, deg
+        Standard deviation of the constant error of the magnetic heading: local field, hard iron.
+    block : float, s
+        Length of a block.
+
+    declination : float, deg
+        Of magnetic north, east positive: added to headings found with a magnetometer.
+
+    Notes
+    -----
+    Error state in the level frame with the multiplicative attitude error of Markley, J. Guidance,
+    Control, Dynamics 26 (2003) 311; the average of accelerations in a nearly inertial frame is the
+    idea of Laidig and Seel, Information Fusion 91 (2023) 187, here with a model of the velocity
+    instead of a low-pass filter. White noise with the density ``2 sd² T`` replaces a velocity of
+    correlation time T, which is exact below 1/T (Maybeck, Stochastic Models 1, 1979, 4.11).
+    """
+
+    name = "error-state"
+    title = "Error-state filter"
+    source = "Markley (2003), Laidig and Seel (2023)"
+    summary = "attitude, gyro bias and their covariance; a bounded velocity; a disturbed field"
+    size = kernel.STATE
+    row = kernel.ROW
+    advance_kernel = staticmethod(kernel.error_state_advance)
+    update_kernel = staticmethod(kernel.error_state_update)
+
+    velocity: float = 0.3
+    bias: float = 1.0
+    noise: float = 0.02
+    field: float = 4.0
+    block: float = 0.08
+
+    def kernel_options(self) -> tuple[float, ...]:
+        """Return velocity variance, bias prior, gyro noise density and block, SI and radians."""
+        return self.velocity**2, radians(self.bias), radians(self.noise) ** 2, self.block
+
+    def begin_state(self, record: Array, given: bool) -> None:
+        """Set the covariance of the start."""
+        p = record[kernel.P : kernel.P + kernel.N**2].reshape(kernel.N, kernel.N)
+        tilt = kernel.GIVEN_SD if given else kernel.UNKNOWN
+        # Without a magnetometer the heading is counted from the start.
+        p[np.diag_indices(kernel.N)] = (
+            [tilt**2] * 2
+            + [0.0]
+            + [radians(self.bias) ** 2] * 3
+            + [max(self.velocity**2, 0.25)] * 2
+            + [kernel.ACCEL_BIAS_SD**2] * 3
+        )
+        record[kernel.POWER] = 0.25
+
+    def row_of(self, record: Array) -> Array:
+        """Return quaternion and covariance of a record, as in a row of the history."""
+        p = record[kernel.P : kernel.P + kernel.N**2].reshape(kernel.N, kernel.N)
+        return np.concatenate([super().row_of(record), p[np.triu_indices(3)]])
+
+    def covariance(self, history: Array, record: Array) -> Array:
+        """Covariance of the attitude error in north-east-down, (n, 3, 3), rad²."""
+        out = history[:, [4, 5, 6, 5, 7, 8, 6, 8, 9]].reshape(-1, 3, 3)
+        if record[kernel.HEADED] != 0.0:
+            out[:, 2, 2] += radians(self.field) ** 2
+            if self.declination:
+                c, s = cos(radians(self.declination)), sin(radians(self.declination))
+                turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+                out = turn @ out @ turn.T
+        return out
+
+    def bias_sd(self, record: Array) -> Array:
+        """Return the standard deviation of the gyro bias, (3,), rad/s."""
+        p = record[kernel.P : kernel.P + kernel.N**2].reshape(kernel.N, kernel.N)
+        return np.asarray(np.sqrt(np.diag(p)[3:6]))
