@@ -193,6 +193,13 @@ def axes_by_truth(source: AttitudeSource, stated: bool) -> AttitudeSource:
     for triad in (GYRO,) if mirrored else (GYRO, ACCEL, MAG):
         if set(triad) <= set(imu.columns):
             imu[triad] = values_of(imu, triad) @ matrices[best].T
+    # The gyro's, which an exported configuration takes.
+    sensor = str(imu.attrs.get("sensor_axes") or "x,y,z").split(",")
+    turned = [sensor["xyz".index(name[-1])] for name in names[best].split(",")]
+    imu.attrs["sensor_axes"] = ",".join(
+        axis if name[0] != "-" else axis[1:] if axis[0] == "-" else f"-{axis}"
+        for axis, name in zip(turned, names[best].split(","), strict=True)
+    )
     return replace(source, imu=imu, findings=(*source.findings, finding))
 
 

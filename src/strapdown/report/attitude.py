@@ -326,7 +326,7 @@ def _configuration(bench: AttitudeComparison, chosen: str) -> tuple[Any, int, bo
     from strapdown.export_c import SensorConfiguration
 
     answer, imu = bench.answer, bench.imu
-    full = float(bench.sweep["rate_hz"].max()) if len(bench.sweep) else rate_of(imu)
+    full = bench.clock.rate_hz
     recommended = answer.rate_hz if answer.algorithm == chosen else None
     each = 1 if recommended is None else max(1, round(full / float(recommended)))
     rate = full / each  # a last, shorter step is in what the answer states
@@ -355,11 +355,6 @@ def _configuration(bench: AttitudeComparison, chosen: str) -> tuple[Any, int, bo
         rate, unit, scale, axis, sign, (0.0, 0.0, 0.0) if bias is None else bias, tuple(sources)
     )
     return made, each, mean
-
-
-def rate_of(imu: pd.DataFrame) -> float:
-    """Median rate of samples, Hz."""
-    return float(1.0 / np.median(np.diff(index_of(imu))))
 
 
 def _at_rate(imu: pd.DataFrame, each: int, mean: bool) -> pd.DataFrame:

@@ -140,6 +140,7 @@ def test_axes_are_found_by_the_truth(tmp_path, axes):
     assert found.data["axes"] == axes
     assert (found.code == "attitude.gyro-mirrored") == (axes == "x,-y,z")
     assert bench.sweep["max_deg"].min() < 0.05
+    assert bench.imu.attrs["sensor_axes"] == axes
     stated = compare_attitude(log, reference=truth, axes="x,y,z", **ONE)
     assert stated.sweep["max_deg"].min() > 20.0
 
