@@ -176,7 +176,7 @@ def test_each_algorithm_names_its_own_source(make_bench):
     table = tables.condition_table(make_bench(("naive", "rotvec")))
     assert [row[1] for row in table.rows] == [
         "Alexiev (2021) Eq. (2)",
-        "Bortz (1971), Miller (1983)",
+        "Bortz (1971), Miller (1983), Savage (1998)",
     ]
 
 
