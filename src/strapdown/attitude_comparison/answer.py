@@ -11,6 +11,7 @@ import pandas as pd
 from strapdown.attitude_algorithms import AttitudeAlgorithm, RotationVector
 from strapdown.attitude_algorithms.cost import Cost
 from strapdown.attitude_comparison.error_budget import ErrorBudget, Holding
+from strapdown.attitude_comparison.references import PeerRun
 from strapdown.attitude_comparison.sweep import (
     MOST_ACCURATE,
     Grounds,
@@ -100,6 +101,8 @@ class Evidence:
     budget : ErrorBudget or None
         Parts of the sensor error.
     holding : Holding or None
+    filters : tuple of PeerRun
+        The project's orientation filters on the same log, judged by a truth.
     """
 
     algorithms: Sequence[AttitudeAlgorithm]
@@ -115,6 +118,7 @@ class Evidence:
     reference_sd: float = 0.0
     budget: ErrorBudget | None = None
     holding: Holding | None = None
+    filters: tuple[PeerRun, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -269,6 +273,8 @@ def _limited_by_sensor(
             f"its own error, {_deg(chosen.error_deg)}, is small beside that."
         )
         why.append(_why_not_lower(evidence, chosen, limit, "own_deg"))
+        if (enough := _filter_enough(evidence, tolerance)) is not None:
+            sentence += f" {enough}"
         dropped = _dropped(evidence, chosen, "own_deg", limit)
         why += _of_dropped(dropped, chosen)
         dropped_hz = None if dropped is None else dropped.rate_hz
@@ -295,9 +301,8 @@ def _limited_by_sensor(
             f"A gyro whose errors are {_two_digits(sensor / tolerance)} times smaller, or that "
             "much less time between reference points."
         )
-    helps += [
-        "Aiding: an accelerometer holds roll and pitch, a magnetometer the heading (--peers all "
-        "shows what such filters reach on this log).",
+    helps += _of_filters(evidence) or [
+        "Aiding: an accelerometer holds roll and pitch, a magnetometer the heading.",
     ]
     return Answer(
         *("sensor", sentence, tolerance, algorithm, meaning, rate, tuple(why), tuple(helps)),
@@ -321,6 +326,51 @@ def _of_holding(evidence: Evidence, tolerance: float) -> str | None:
         f"{holding.shortest_s:.3g} s at least, and from half of the instants for "
         f"{over}{holding.median_s:.3g} s."
     )
+
+
+#: What a filter uses beside the gyro.
+_AIDS = {
+    "gyro+accel": "the accelerometer",
+    "gyro+accel+mag": "the accelerometer and the magnetometer",
+}
+
+
+def _filter_enough(evidence: Evidence, tolerance: float) -> str | None:
+    """Name the orientation filter of fewest operations that stays within the tolerance."""
+    within = [
+        run
+        for run in evidence.filters
+        if run.cost is not None and _largest(run) <= tolerance and run.aiding in _AIDS
+    ]
+    if not within:
+        return None
+    run = min(within, key=lambda r: (r.aiding, r.cost.cycles if r.cost else np.inf))
+    return (
+        f"With {_AIDS[run.aiding]} the filter {run.peer} stays within {tolerance:g}°: its largest "
+        f"error is {_deg(_largest(run))}."
+    )
+
+
+def _of_filters(evidence: Evidence) -> list[str]:
+    """Say what the best orientation filter of each aiding reaches on this log."""
+    lines = []
+    for aiding, words in _AIDS.items():
+        runs = [r for r in evidence.filters if r.aiding == aiding and r.errors is not None]
+        if not runs:
+            continue
+        best = min(runs, key=_largest)
+        assert best.errors is not None
+        lines.append(
+            f"With {words}, {best.peer}: {_deg(_largest(best))} at most, root mean square "
+            f"{_deg(best.errors.inclination_deg)} of roll and pitch and "
+            f"{_deg(best.errors.heading_deg)} of heading."
+        )
+    return lines
+
+
+def _largest(run: PeerRun) -> float:
+    found = [s.max_deg for s in run.scores if s.max_deg is not None]
+    return max(found) if found else np.inf
 
 
 #: What removes a part of the sensor error.
@@ -536,6 +586,7 @@ def worst_evidence(evidence: Sequence[Evidence], sweep: pd.DataFrame) -> Evidenc
         sampling=max(e.sampling for e in evidence),
         reference_sd=max(e.reference_sd for e in evidence),
         budget=None,
+        filters=(),
         holding=min(
             (e.holding for e in evidence if e.holding is not None),
             key=lambda h: (not h.ends, h.shortest_s),

@@ -416,14 +416,15 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
             [sweep, sweep_rates(algorithms, grounds, (lower,), silent)], ignore_index=True
         )
         lowest = sweep["rate_hz"].min()
+    beside = run_beside(spec.peers, source, imu, q_nb, references, findings)
     evidence = replace(
         find_evidence(
             grounds, algorithms, costs, sweep, bias, rests, None if between is None else between[1]
         ),
         budget=budget,
         holding=holding_time(grounds, spec.tolerance_deg),
+        filters=tuple(run for run in beside if run.cost is not None and run.errors is not None),
     )
-    beside = run_beside(spec.peers, source, imu, q_nb, references, findings)
     positions: tuple[PositionScore, ...] = ()
     if places:
         from strapdown.evaluation.position_references import score_places
