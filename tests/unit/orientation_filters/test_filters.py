@@ -13,6 +13,7 @@ from strapdown import rotation
 from strapdown._kernels import orientation as kernel
 from strapdown.errors import ConfigError, DataError
 from strapdown.orientation_filters import make_filter, run_filter
+from strapdown.orientation_filters.cost import count_filter_cost
 from strapdown.orientation_filters.filter import euler_sd
 from strapdown.tables import ACCEL, MAG, QUATERNION, imu_table
 
@@ -201,6 +202,24 @@ def test_front_door_refuses():
     assert "error-state" in caught.value.finding.data["known"]
     with pytest.raises(DataError, check=coded("tables.arrays-different-lengths")):
         sd.attitude(time, gyro, gyro[:-1], algorithm="error-state")
+
+
+def test_cost_by_counting():
+    """What is counted is the kernel: blocks cost by time, the cheap filter by sample."""
+    cheap = [count_filter_cost(make_filter("complementary"), dt, True) for dt in (0.005, 0.05)]
+    assert vars(cheap[0]) == vars(cheap[1])
+    # The two quaternion rotations of gravity and field, and the turn: by hand 4 divisions (three
+    # time constants and the sine) and a root, without a field 2 divisions and none.
+    assert (cheap[0].divide, cheap[0].sqrt, cheap[0].trig) == (4.0, 1.0, 0.0)
+    without = count_filter_cost(make_filter("complementary"), 0.005, False)
+    assert (without.divide, without.sqrt) == (2.0, 0.0)
+    assert cheap[0].memory == kernel.COMPLEMENTARY
+    chosen = make_filter("error-state")
+    slow, fast = (count_filter_cost(chosen, dt, True) for dt in (0.02, 0.005))
+    assert slow.multiply > fast.multiply > 60.0
+    # A block of 0.08 s has 4 or 16 samples: its B products are B/4 and B/16 of a sample.
+    each = (slow.multiply - fast.multiply) / (1 / 4 - 1 / 16)
+    assert 500.0 < each < 1500.0
 
 
 def coverage(kind, count, chosen="error-state", disturbed=False):
