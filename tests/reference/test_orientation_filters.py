@@ -1,7 +1,7 @@
 """Orientation filters of the project against vqf with its defaults: recorded and simulated motions.
 
-The constants of the model are from data sheets and from trials 07 and 27 of BROAD; trials 02 and
-14 were not used for them. ``pytest -s`` prints the errors.
+The constants of the model are from data sheets and from trials 07 and 27 of BROAD; its errors in
+trials 02 and 14 were looked at while the model was made. ``pytest -s`` prints the errors.
 """
 
 from __future__ import annotations
