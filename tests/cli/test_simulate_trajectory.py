@@ -20,7 +20,9 @@ from strapdown.tables import ACCEL, GYRO
 EXAMPLES = Path(__file__).parents[2] / "docs" / "examples"
 # Trajectories; an alignment is an example of something else.
 NAMES = sorted(
-    path.stem for path in EXAMPLES.glob("*.toml") if "[motion]" in path.read_text(encoding="utf-8")
+    path.stem
+    for path in EXAMPLES.glob("*.toml")
+    if "[motion]" in (text := path.read_text(encoding="utf-8")) and "pulses" not in text
 )
 REST = """sampling = "mean"
 rate_hz = 20

@@ -60,6 +60,7 @@ def test_what_a_run_writes(sealed):
         "figures/attitude.svg",
         "figures/error.svg",
         "figures/difference.svg",
+        "figures/peers.svg",
         "figures/reference-error.svg",
         "inputs/log/log.csv",
         "inputs/truth/truth.csv",
