@@ -20,9 +20,13 @@ Numbers = NDArray[np.int64]
 LEAST = 20
 #: A gap is longer than this many steps; shorter ones are lost samples.
 GAP_STEPS = 10.0
-#: In bursts this share of the steps is shorter than a fifth of the mean step: two samples a
-#: delivery make a half short, jitter of a third of a step a hundredth.
-SHORT, BURSTS = 0.2, 0.3
+#: In bursts this share of the steps is shorter than this part of the mean step: two samples a
+#: delivery make a half short, jitter of up to 0.4 of a step a hundredth.
+SHORT, BURSTS = 0.3, 0.3
+#: Shortest step of a fitted clock, in steps.
+SHORTEST = 0.2
+#: A clock of which more samples are missing than there are is none.
+MOST_LOST = 0.5
 #: Of the intervals between deliveries, the share that is within this part of the usual one, where
 #: deliveries are even; share of a size of bursts that is no accident.
 PACKETS, EVEN, OFTEN = 0.5, 0.1, 0.005
@@ -148,9 +152,11 @@ def sample_clock(stamps: Array, values: Array | None = None) -> SampleClock:
     if walks and not in_bursts and spread >= NEGLIGIBLE * step:
         return _as_stamped(stamps, mean, long, "irregular")
     lost = int((numbers[_within(long, numbers.size)] - 1).sum())
+    if lost > MOST_LOST * (lost + stamps.size):
+        return _as_stamped(stamps, mean, long, "irregular")
     clock = SampleClock(step, stamps, number, kind, False, spread, lost, tuple(long))
     as_good = spread < NEGLIGIBLE * step and not in_bursts
-    if as_good or np.diff(fitted).min() <= SHORT * step:
+    if as_good or np.diff(fitted).min() <= SHORTEST * step:
         return clock
     smoother = _smoother_on(fitted, stamps, values, clock.begins)
     if smoother > SIGNIFICANT or (in_bursts and smoother > -SIGNIFICANT):
@@ -337,8 +343,11 @@ def _fitted(
     for piece in pieces:
         here = taken[piece]
         rest = stamps[piece][here] - step * number[piece][here]
-        if rest.size == 0:
-            fitted[piece] = stamps[piece]
+        if rest.size < LEAST:
+            # Too few for a clock of their own: evenly between the first and the last.
+            held, count = stamps[piece], number[piece] - number[piece.start]
+            share = count / max(int(count[-1]), 1)
+            fitted[piece] = held[0] + share * (held[-1] - held[0]) if in_bursts else held
             continue
         width = min(WINDOW if not in_bursts else WINDOW // 2, rest.size)
         slow = uniform_filter1d(rest, width, mode="nearest")
@@ -349,6 +358,8 @@ def _fitted(
         left.append(off)
         one.append(np.diff(rest))
         far.append(rest[LAG:] - rest[:-LAG])
+    if not left:
+        return fitted, step, 0.0, False
     left_all, one_all, far_all = (np.concatenate(x) for x in (left, one, far))
     walks = far_all.size > LEAST and float(np.mean(far_all**2)) > ABOUT_A_CLOCK * float(
         np.mean(one_all**2)
