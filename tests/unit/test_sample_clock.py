@@ -163,3 +163,13 @@ def test_a_clock_that_was_set_is_one_gap():
     assert clock.rate_hz == pytest.approx(100.0, rel=1e-6)
     assert [gap.sample for gap in clock.gaps] == [500]
     assert not clock.repaired
+
+
+def test_a_timer_without_a_whole_number_of_samples_loses_none():
+    """A delivery each 0.104 s of 100 Hz: ten samples, or eleven."""
+    step, count = 0.01, 6000
+    time = 5.0 + step * np.arange(count)
+    deliveries = 0.104 * np.ceil(time / 0.104)
+    clock = sample_clock(deliveries)
+    assert clock.step == pytest.approx(step, rel=1e-3)
+    assert clock.lost == 0

@@ -30,6 +30,8 @@ MOST_LOST = 0.5
 #: Of the intervals between deliveries, the share that is within this part of the usual one, where
 #: deliveries are even; share of a size of bursts that is no accident.
 PACKETS, EVEN, OFTEN = 0.5, 0.1, 0.005
+#: Bursts whose sizes are summed to tell losses from a timer.
+BURSTS_SUMMED = 25
 #: Steps within this part of a step of whole multiples, and their share, need no tracking.
 MULTIPLE, MULTIPLES = 0.15, 0.98
 #: Stamps within this part of a step (standard deviation) of the clock are left as they are.
@@ -295,8 +297,8 @@ def _of_bursts(stamps: Array, gaps: Sequence[Gap], mean: float) -> tuple[float, 
     if ends.size < LEAST:
         return mean, advance
     # The first burst may have begun before the record. Deliveries at even intervals are full
-    # packets of which samples are lost, if sizes are spread below the largest; two sizes beside
-    # each other are those of a timer that has no whole number of samples to deliver.
+    # packets of which samples are lost; or those of a timer that has no whole number of samples to
+    # deliver, whose sizes make up for each other.
     usual = float(np.median(apart))
     even = np.abs(apart - usual) <= EVEN * usual
     if even.mean() < PACKETS:
@@ -304,7 +306,7 @@ def _of_bursts(stamps: Array, gaps: Sequence[Gap], mean: float) -> tuple[float, 
     counts = np.bincount(size[1:][even])
     often = np.flatnonzero(counts > OFTEN * counts.sum())
     packet = int(often.max())
-    if often.min() > packet - 2:
+    if often.min() >= packet - 1 and _make_up(size[1:]):
         return mean, advance
     step = usual / packet
     delivered = _followed(stamps[ends], step, size)
@@ -314,6 +316,15 @@ def _of_bursts(stamps: Array, gaps: Sequence[Gap], mean: float) -> tuple[float, 
             at = np.round(np.linspace(0.0, clock, count + 1)).astype(np.int64)
             advance[end - count : end] = np.diff(at)
     return step, advance
+
+
+def _make_up(sizes: Numbers) -> bool:
+    """Whether sums over many bursts vary by far less than bursts that are independent."""
+    blocks = sizes.size // BURSTS_SUMMED
+    if blocks < 2:
+        return False
+    sums = sizes[: blocks * BURSTS_SUMMED].reshape(blocks, BURSTS_SUMMED).sum(axis=1)
+    return float(sums.var(ddof=1)) < 0.5 * BURSTS_SUMMED * float(sizes.var())
 
 
 def _fitted(
