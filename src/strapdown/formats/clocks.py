@@ -344,7 +344,8 @@ def even_stamps(stamps: NDArray[Any]) -> EvenStamps | None:
     if stamps.dtype.kind not in "iuf" or stamps.size < FEWEST_STAMPS:
         return None
     changes = int(np.count_nonzero(stamps[1:] != stamps[:-1]))
-    if changes < FEWEST_STAMPS - 1 or changes > (1.0 - REPEATED) * (stamps.size - 1):
+    repeats = stamps.size - 1 - changes
+    if changes < FEWEST_STAMPS - 1 or repeats < max(FEWEST_STAMPS, REPEATED * (stamps.size - 1)):
         return None
     exact = stamps.astype(np.int64) if stamps.dtype.kind in "iu" else stamps
     whole = np.diff(exact).astype(np.float64)

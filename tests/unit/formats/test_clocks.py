@@ -184,6 +184,8 @@ def test_a_clock_of_10_ms_repeats_a_stamp_of_104_hz_now_and_then():
     even = even_stamps(stamps)
     assert even.step == pytest.approx(1000.0 / 104.0, rel=1e-4)
     assert np.abs(even.ticks - 1000.0 * true).max() <= 10.0
+    # A stamp or two that are repeated show no clock.
+    assert even_stamps(stamps[:50]) is None
 
 
 def test_packets_with_some_stamps_alike_are_spread():
