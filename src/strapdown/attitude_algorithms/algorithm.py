@@ -333,6 +333,26 @@ def _worst(diagnostics: Sequence[dict[str, float]]) -> dict[str, float]:
 _ndarray = np.ndarray
 
 
+def refuse_sample(taken: int, last: float, time: float, gyro: ArrayLike) -> NoReturn:
+    """Raise DataError for a sample after `taken` others, the last of them at `last`, s."""
+    if taken > 0 and time <= last and np.size(gyro) == 3:
+        raise DataError(
+            "attitude.time-does-not-advance-followed",
+            row=taken + 1,
+            quantity="time",
+            record=last,
+            time=time,
+        )
+    raise DataError(
+        "attitude.time-rate-time-three-finite",
+        row=taken + 1,
+        quantity="gyro",
+        time=time,
+        asarray=np.asarray(gyro).tolist(),
+        largest=LARGEST,
+    )
+
+
 class AttitudeTracker:
     """Propagate an attitude from gyro samples, one call per sample.
 
@@ -401,22 +421,7 @@ class AttitudeTracker:
         self._refuse(time, gyro)
 
     def _refuse(self, time: float, gyro: Array | Sequence[float]) -> NoReturn:
-        if self._record[SAMPLES] > 0 and time <= self._record[TIME] and np.size(gyro) == 3:
-            raise DataError(
-                "attitude.time-does-not-advance-followed",
-                row=int(self._record[SAMPLES]) + 1,
-                quantity="time",
-                record=self._record[TIME],
-                time=time,
-            )
-        raise DataError(
-            "attitude.time-rate-time-three-finite",
-            row=int(self._record[SAMPLES]) + 1,
-            quantity="gyro",
-            time=time,
-            asarray=np.asarray(gyro).tolist(),
-            largest=LARGEST,
-        )
+        refuse_sample(int(self._record[SAMPLES]), float(self._record[TIME]), time, gyro)
 
     def _row(self) -> Array:
         native = self._record[HEAD : HEAD + self._algorithm.width]

@@ -304,7 +304,7 @@ def _removed(
             # What the body turns meanwhile.
             speed = np.sqrt(np.square(values_of(now.imu, GYRO)).sum(axis=1)).max()
             row["share_deg"] = float(np.degrees(speed)) * found.most_delay_s(index_of(now.imu))
-        # What leaves no less is no explanation.
+        # A part counts only if less is left without it.
         if float(str(row["rms_deg"])) < float(str(rows[-1]["rms_deg"])):
             rows.append(row)
             now, before = less, q

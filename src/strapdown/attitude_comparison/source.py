@@ -16,9 +16,8 @@ from strapdown.attitude_comparison.options import AttitudeSpec
 from strapdown.bundle import InputFiles, input_files, sensor_file
 from strapdown.config import LogSpec, ScenarioSpec
 from strapdown.config.sources import read_options
-from strapdown.dsp.samples import running_integral
 from strapdown.errors import DataError, Finding
-from strapdown.evaluation.differences import attitude_at, error_angles
+from strapdown.evaluation.differences import attitude_at, error_angles, gyro_turns
 from strapdown.formats import read_log
 from strapdown.formats.inference.rotation_rate import signed_permutations
 from strapdown.formats.recording import Origin, Reading, Recording
@@ -212,8 +211,7 @@ def _window_rotations(source: AttitudeSource) -> tuple[Array, Array]:
     edges = np.arange(max(time[0], stamps[0]), min(time[-1], stamps[-1]), AXES_WINDOW)
     if edges.size < 2:
         return np.empty((0, 3)), np.empty((0, 3))
-    whole = running_integral(time, values_of(source.imu, GYRO))
-    turns = np.diff([np.interp(edges, time, axis) for axis in whole.T], axis=1).T
+    turns = gyro_turns(source.imu, edges).T
     q = attitude_at(known, edges)
     known_turns = rotation.rotation_vector_from_quaternion(
         rotation.compose(rotation.conjugate(q[:-1]), q[1:])
@@ -228,41 +226,22 @@ def on_clock(source: AttitudeSource) -> tuple[AttitudeSource, SampleClock]:
     """Bring the samples of a log to their own clock, and report what its stamps are."""
     imu = source.imu
     clock = sample_clock(index_of(imu), values_of(imu, GYRO))
-    findings = []
+    said: list[tuple[str, dict[str, float]]] = []
     if clock.repaired:
         imu = imu.copy()
         imu.index = pd.Index(clock.time, name=imu.index.name)
-        findings.append(
-            Finding(
-                "attitude.stamps-in-bursts" if clock.kind == "bursts" else "attitude.stamps-jitter",
-                file=source.name,
-                quantity="time",
-                severity="note",
-                rate_hz=clock.rate_hz,
-                spread=clock.spread,
-            )
-        )
+        in_bursts = clock.kind == "bursts"
+        code = "attitude.stamps-in-bursts" if in_bursts else "attitude.stamps-jitter"
+        said.append((code, {"rate_hz": clock.rate_hz, "spread": clock.spread}))
     elif clock.kind == "irregular":
-        findings.append(
-            Finding(
-                "attitude.sampled-unevenly",
-                file=source.name,
-                quantity="time",
-                severity="note",
-                rate_hz=clock.rate_hz,
-            )
-        )
+        said.append(("attitude.sampled-unevenly", {"rate_hz": clock.rate_hz}))
     if clock.lost:
-        findings.append(
-            Finding(
-                "attitude.samples-lost",
-                file=source.name,
-                quantity="time",
-                severity="note",
-                count=clock.lost,
-                percent=100.0 * clock.lost / (clock.lost + len(imu)),
-            )
-        )
+        share = clock.lost / (clock.lost + len(imu))
+        said.append(("attitude.samples-lost", {"count": clock.lost, "percent": 100.0 * share}))
+    findings = [
+        Finding(code, file=source.name, quantity="time", severity="note", data=data)
+        for code, data in said
+    ]
     return replace(source, imu=imu, findings=(*source.findings, *findings)), clock
 
 

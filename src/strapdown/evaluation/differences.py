@@ -108,6 +108,13 @@ WINDOW, LEAST_WINDOWS, LARGEST = 1.0, 5, 2.0
 BIAS, SHARE = 0.12, 0.25
 
 
+def gyro_turns(imu: pd.DataFrame, instants: Array) -> Array:
+    """Integrals of the rates between instants, (3, n - 1), rad."""
+    stamps = index_of(imu)
+    whole = running_integral(stamps, values_of(imu, GYRO))
+    return np.asarray(np.diff([np.interp(instants, stamps, one) for one in whole.T], axis=1))
+
+
 def rotation_contradicted(imu: pd.DataFrame, reference: pd.DataFrame) -> Finding | None:
     """Check whether a reference attitude rotates as the gyro does.
 
@@ -143,9 +150,7 @@ def rotation_contradicted(imu: pd.DataFrame, reference: pd.DataFrame) -> Finding
         return None
     # The integral of the rate: what rotates about changing axes within a window differs from the
     # angle by the third order in it, less than the share that is allowed.
-    stamps = index_of(imu)
-    whole = running_integral(stamps, values_of(imu, GYRO))
-    turns = np.diff([np.interp(instants, stamps, one) for one in whole.T], axis=1)
+    turns = gyro_turns(imu, instants)
     q = attitude_at(known, instants)
     angles = np.array(
         [np.linalg.norm(turns, axis=0), np.radians(unit_rotation_angle(q[:-1], q[1:]))]

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown import rotation
 from strapdown._kernels import orientation as kernel
 from strapdown._kernels.increments import LARGEST
+from strapdown.attitude_algorithms.algorithm import refuse_sample
 from strapdown.errors import ConfigError, DataError, DivergenceError
 from strapdown.tables import ACCEL, GYRO, MAG, check_sampling_kind
 
@@ -376,24 +377,8 @@ class OrientationTracker:
         self._refuse(time, gyro)
 
     def _refuse(self, time: float, gyro: ArrayLike) -> NoReturn:
-        row = int(self._record[kernel.SAMPLES]) + 1
-        last = float(self._record[kernel.TIME])
-        if row > 1 and time <= last and np.size(gyro) == 3:
-            raise DataError(
-                "attitude.time-does-not-advance-followed",
-                row=row,
-                quantity="time",
-                record=last,
-                time=time,
-            )
-        raise DataError(
-            "attitude.time-rate-time-three-finite",
-            row=row,
-            quantity="gyro",
-            time=time,
-            asarray=np.asarray(gyro).tolist(),
-            largest=LARGEST,
-        )
+        taken, last = self._record[kernel.SAMPLES], self._record[kernel.TIME]
+        refuse_sample(int(taken), float(last), time, gyro)
 
     @property
     def quaternion(self) -> Array:

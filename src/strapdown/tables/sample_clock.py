@@ -25,10 +25,10 @@ GAP_STEPS = 10.0
 SHORT, BURSTS = 0.3, 0.3
 #: Shortest step of a fitted clock, in steps.
 SHORTEST = 0.2
-#: A clock of which more samples are missing than there are is none.
+#: Largest share of lost samples: with more the stamps are not those of a clock.
 MOST_LOST = 0.5
 #: Of the intervals between deliveries, the share that is within this part of the usual one, where
-#: deliveries are even; share of a size of bursts that is no accident.
+#: deliveries are even; least share of a size of bursts that counts.
 PACKETS, EVEN, OFTEN = 0.5, 0.1, 0.005
 #: Bursts whose sizes are summed to tell losses from a timer.
 BURSTS_SUMMED = 25
@@ -186,14 +186,19 @@ def _gaps(stamps: Array) -> tuple[list[Gap], bool]:
         mean = float(steps.mean())
         if (steps < SHORT * mean).mean() < BURSTS:
             break
-        ends = np.flatnonzero(np.append(np.diff(stamps) > 0.5 * mean, True))
+        ends = np.flatnonzero(_last_of_bursts(stamps, mean))
         if ends.size < LEAST:
-            # A single pause far longer than the record is no delivery.
+            # A single pause far longer than the record is not a delivery.
             break
         gaps = [replace(g, sample=int(ends[g.sample - 1]) + 1) for g in find_gaps(stamps[ends])]
     else:
         return gaps, True
     return find_gaps(stamps), False
+
+
+def _last_of_bursts(stamps: Array, step: float) -> NDArray[np.bool_]:
+    """Return the samples after which a burst ends, of a record with this mean step."""
+    return np.append(np.diff(stamps) > 0.5 * step, True)
 
 
 def _as_stamped(stamps: Array, step: float, gaps: Sequence[Gap], kind: str) -> SampleClock:
@@ -264,11 +269,11 @@ def _follow(stamps: Array, step: float, least: Numbers, phase: float) -> tuple[N
     """Follow a clock from its phase at the first stamp; return counts and the phase at the last."""
     out = np.empty(stamps.size - 1, dtype=np.int64)
     upto = np.cumsum(least)
-    # Stamps less the clock without lost samples, over the next stamps.
-    late = stamps - step * (upto - upto[0])
-    for ahead in range(1, min(AHEAD, stamps.size)):
-        late[:-ahead] = np.minimum(late[:-ahead], (stamps - step * (upto - upto[0]))[ahead:])
+    # Stamps less the clock without lost samples, and the earliest of the next.
     own = stamps - step * (upto - upto[0])
+    late = own.copy()
+    for ahead in range(1, min(AHEAD, stamps.size)):
+        late[:-ahead] = np.minimum(late[:-ahead], own[ahead:])
     shift, drift = phase, 0.0
     earliest, each = late[1:].tolist(), own[1:].tolist()
     counts = least[1:].tolist()
@@ -290,7 +295,7 @@ def _of_bursts(stamps: Array, gaps: Sequence[Gap], mean: float) -> tuple[float, 
 
     The last sample of a burst is taken just before it is delivered.
     """
-    ends = np.flatnonzero(np.append(np.diff(stamps) > 0.5 * mean, True))
+    ends = np.flatnonzero(_last_of_bursts(stamps, mean))
     size = np.diff(np.concatenate([[-1], ends]))
     advance = np.ones(stamps.size - 1, dtype=np.int64)
     apart = np.diff(stamps[ends])
@@ -384,8 +389,8 @@ def _stamped(stamps: Array, number: Numbers, step: float) -> NDArray[np.bool_]:
     That is the last of each, which is taken just before a delivery, unless the stamps of bursts of
     different sizes are far more even at the first, as those of a clock that is not advanced.
     """
-    later = np.diff(stamps) > 0.5 * step
-    last, first = np.append(later, True), np.append(True, later)
+    last = _last_of_bursts(stamps, step)
+    first = np.append(True, last[:-1])
 
     def scatter(taken: NDArray[np.bool_]) -> float:
         steps = np.diff(stamps[taken]) - step * np.diff(number[taken])
