@@ -44,6 +44,7 @@ from strapdown.attitude_comparison.source import (
     AttitudeSource,
     axes_by_truth,
     describe,
+    magnetic_north,
     on_clock,
     read_source,
     with_truth,
@@ -73,10 +74,14 @@ from strapdown.formats import read_log
 from strapdown.formats.recording import Reading
 from strapdown.increments import increments_from_imu
 from strapdown.progress import Progress, silent
+from strapdown.sensors.magnetometer import (
+    calibrate_magnetometer,
+    without_iron,
+)
 from strapdown.sensors.rest import RestStretch, find_rests, gyro_bias_from_rests, without_gyro_bias
 from strapdown.systems.inputs import part_of_log
-from strapdown.tables import GYRO, references_table
-from strapdown.tables.checks import index_of
+from strapdown.tables import ACCEL, GYRO, MAG, references_table
+from strapdown.tables.checks import index_of, values_of
 from strapdown.tables.sample_clock import SampleClock
 from strapdown.units import GYRO_SUMS, GYRO_UNITS, factor_of, parse_unit
 
@@ -416,7 +421,8 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
             [sweep, sweep_rates(algorithms, grounds, (lower,), silent)], ignore_index=True
         )
         lowest = sweep["rate_hz"].min()
-    beside = run_beside(spec.peers, source, imu, q_nb, references, findings)
+    of_field, north, field_input = _of_field(spec, source, imu, findings)
+    beside = run_beside(spec.peers, source, of_field, q_nb, references, findings, north)
     evidence = replace(
         find_evidence(
             grounds, algorithms, costs, sweep, bias, rests, None if between is None else between[1]
@@ -453,7 +459,7 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
         references=references,
         readings=source.readings,
         findings=tuple(findings),
-        inputs=source.inputs + bias_input,
+        inputs=source.inputs + bias_input + field_input,
         costs=costs,
         shares=shares,
         sweep=sweep,
@@ -558,6 +564,34 @@ def _gyro_bias(
     less = imu.copy()
     less[GYRO] = imu[GYRO].to_numpy() - np.asarray(bias)
     return less, {"rad_per_s": list(bias), "from": where}, files
+
+
+def _of_field(
+    spec: AttitudeSpec, source: AttitudeSource, imu: pd.DataFrame, findings: list[Finding]
+) -> tuple[pd.DataFrame, tuple[float, float], tuple[InputFiles, ...]]:
+    """Samples with the magnetometer calibrated, declination and its sd in deg, files of it."""
+    declination, sd, files = 0.0, 0.0, tuple[InputFiles, ...]()
+    if not set(MAG + ACCEL) <= set(imu.columns):
+        return imu, (declination, sd), files
+    if spec.place is not None:
+        declination, sd, said = magnetic_north(spec.place, source.imu)
+        findings += said
+    given = None
+    if spec.magnetometer_path is not None:
+        log = spec.source
+        options = read_options(log, source.axes) if isinstance(log, LogSpec) else None
+        other = read_log(spec.magnetometer_path, options)
+        if not set(MAG) <= set(other.imu.columns):
+            raise DataError(
+                "attitude.no-magnetometer-in-log", file=other.name, quantity="--magnetometer"
+            )
+        given = calibrate_magnetometer(values_of(other.imu, MAG))
+        files = (input_files("magnetometer", spec.magnetometer_path, other.files),)
+    if spec.magnetometer != "raw":
+        imu, of_iron, said = without_iron(imu, given)
+        findings += said
+        sd = float(np.hypot(sd, of_iron))
+    return imu, (declination, sd), files
 
 
 def _significant(rest: RestStretch) -> bool:

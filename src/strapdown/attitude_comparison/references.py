@@ -306,13 +306,16 @@ def run_beside(
     q_nb: Array,
     references: pd.DataFrame,
     findings: list[Finding],
+    north: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[PeerRun, ...]:
     """Run the filters of the project and those of other libraries, and compare with references.
+
+    `north`: declination, and by how much headings by the field are less certain than usual, deg.
 
     The filters of the project run whenever there is an accelerometer. Without a magnetometer the
     heading is not observed: it is rotated to the truth's first one.
     """
-    out = list(_own_filters(source, imu, references, findings))
+    out = list(_own_filters(source, imu, references, findings, north))
     if not names:
         return tuple(out)
     from strapdown.peers import PEERS, run_peers
@@ -324,13 +327,21 @@ def run_beside(
         if aiding == "gyro+accel":
             q = _with_first_heading(attitude[QUATERNION].to_numpy(), attitude.index, source)
             attitude = attitude_table(attitude.index.to_numpy(), q)
+        elif aiding == "gyro+accel+mag" and north[0]:
+            turn = rotation.quaternion_from_euler([0.0, 0.0, north[0]])
+            q = rotation.compose(turn, attitude[QUATERNION].to_numpy(dtype=np.float64))
+            attitude = attitude_table(attitude.index.to_numpy(), q)
         scores, errors = _judged(label, attitude, source, imu, references)
         out.append(PeerRun(label, aiding, attitude, scores, None if aiding == "gyro" else errors))
     return tuple(out)
 
 
 def _own_filters(
-    source: AttitudeSource, imu: pd.DataFrame, references: pd.DataFrame, findings: list[Finding]
+    source: AttitudeSource,
+    imu: pd.DataFrame,
+    references: pd.DataFrame,
+    findings: list[Finding],
+    north: tuple[float, float],
 ) -> Iterator[PeerRun]:
     """Run the filters of the project, with their cost.
 
@@ -348,6 +359,9 @@ def _own_filters(
         part = imu[columns]
         for cls in FILTERS.values():
             chosen = cls()
+            label = chosen.label
+            if aiding == "gyro+accel+mag":
+                chosen = chosen.with_heading(*north)
             run = run_filter(chosen, part, sampling="mean")
             q = run.q_nb
             if aiding == "gyro+accel":
@@ -363,11 +377,9 @@ def _own_filters(
                     )
                 )
             attitude = attitude_table(imu.index.to_numpy(), q)
-            scores, errors = _judged(
-                chosen.label, attitude, source, imu, references, run.covariance
-            )
+            scores, errors = _judged(label, attitude, source, imu, references, run.covariance)
             yield PeerRun(
-                f"strapdown {chosen.label}",
+                f"strapdown {label}",
                 aiding,
                 attitude,
                 scores,

@@ -110,6 +110,21 @@ class ComparisonFlags:
             show_default=False,
         ),
     ] = "auto"
+    magnetometer: Annotated[
+        str,
+        running(
+            "auto|raw|LOG",
+            "Of the filters: hard and soft iron removed where the log shows them; raw, left; or a "
+            "log in which the sensor turned through all directions (auto).",
+            show_default=False,
+        ),
+    ] = "auto"
+    lat: Annotated[
+        float | None,
+        running("DEG", "Latitude, north positive: with it headings by the field are true ones."),
+    ] = None
+    lon: Annotated[float | None, running("DEG", "Longitude, east positive.")] = None
+    height: Annotated[float | None, running("M", "Height over the ellipsoid (0).")] = None
     peers: Annotated[
         str | None,
         running(
