@@ -31,6 +31,7 @@ from strapdown.evaluation.reference_points import (
 from strapdown.formats import read_log
 from strapdown.sensors.rest import RestStretch, find_rests
 from strapdown.tables import ACCEL, GYRO, MAG, QUATERNION, THETA, attitude_table, find_gaps
+from strapdown.tables.checks import index_of
 
 if TYPE_CHECKING:
     from strapdown.evaluation.position_references import PlaceReference
@@ -52,6 +53,11 @@ class FilterErrors:
         Of the whole rotation.
     inclination_deg, heading_deg : float
         Root mean square of its parts: about a level axis, and about the vertical.
+    most_inclination_deg : float
+        Largest inclination.
+    drift_deg_per_min : float
+        Root mean square change of the heading error over a minute, or of the longest window that
+        half of the record holds, per minute.
     covered : tuple of float or None
         Share of the samples within the stated 95 % bounds: of inclination, by its two axes, and of
         heading. None if the filter states none.
@@ -61,6 +67,8 @@ class FilterErrors:
     final_deg: float
     inclination_deg: float
     heading_deg: float
+    most_inclination_deg: float
+    drift_deg_per_min: float
     covered: tuple[float, float] | None
 
 
@@ -424,7 +432,8 @@ def _judged(
     error = rotation.compose(q, rotation.conjugate(known.q_nb[counts]))
     level = np.hypot(error[:, 0], error[:, 3])
     tilt = 2.0 * np.degrees(np.arctan2(np.hypot(error[:, 1], error[:, 2]), level))
-    heading = 2.0 * np.degrees(np.arctan2(np.abs(error[:, 3]), np.abs(error[:, 0])))
+    heading = np.degrees(np.unwrap(2.0 * np.arctan2(error[:, 3], error[:, 0]), period=2.0 * np.pi))
+    heading -= 360.0 * np.round(heading[0] / 360.0)
     whole = np.degrees(2.0 * np.arctan2(np.linalg.norm(error[:, 1:], axis=1), np.abs(error[:, 0])))
     covered = None
     if covariance is not None:
@@ -435,6 +444,19 @@ def _judged(
         rms_deg=float(np.sqrt(np.mean(whole**2))),
         final_deg=float(whole[-1]),
         inclination_deg=float(np.sqrt(np.mean(tilt**2))),
-        heading_deg=float(np.sqrt(np.mean(heading**2))),
+        heading_deg=float(np.sqrt(np.mean(((heading + 180.0) % 360.0 - 180.0) ** 2))),
+        most_inclination_deg=float(tilt.max()),
+        drift_deg_per_min=_drift(index_of(attitude)[counts], heading),
         covered=covered,
     )
+
+
+def _drift(time: Array, heading: Array) -> float:
+    """Root mean square change of a heading error over a minute, deg, or as `FilterErrors`."""
+    window = min(60.0, 0.5 * float(time[-1] - time[0]))
+    later = np.searchsorted(time, time + window)
+    first = np.flatnonzero(later < len(time))
+    if window <= 0.0 or not first.size:
+        return float("nan")
+    change = heading[later[first]] - heading[first]
+    return float(np.sqrt(np.mean(change**2)) * 60.0 / window)
