@@ -687,7 +687,8 @@ def filter_table(bench: AttitudeComparison) -> TableBlock | None:
         "start. Drift: root mean square change of the heading error over a minute, or over half "
         "of a shorter record, per minute. In 95 %: share of the time in which inclination and "
         "heading are within their stated 95 % bounds. Float32: largest difference in single "
-        "precision. Operations a sample, as counted on the kernel; bytes kept between samples in single precision.",
+        "precision. Operations a sample, as counted on the kernel; bytes kept between samples in "
+        "single precision.",
         title="Aided filters",
     )
 
