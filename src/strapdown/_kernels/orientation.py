@@ -140,8 +140,7 @@ NORM, DIP, DISTURBANCE = 63, 64, 65
 ACCEL_BIAS = 66
 N = 11
 P, X, H, K = 69, 190, 201, 212
-SLOW = 223
-STATE = 224
+STATE = 223
 # Of a row of the history: quaternion, and the covariance of delta: NN, NE, ND, EE, ED, DD.
 ROW = 10
 
@@ -151,7 +150,6 @@ GIVEN_SD = 0.05  # rad: an attitude given by the user
 VELOCITY_TIME = 2.0  # s: correlation of the velocity of a body that is carried
 FAST_TIME = 1.5  # s: the velocity that is seen by itself, without gravity's error
 POWER_TIME = 6.0  # s: memory of its power
-SLOW_TIME = 10.0  # s: memory of the power of the velocity that the tilt does not explain
 SOON, EARLY = 0.05, 0.15  # s, and share of the time since the start
 UNSEEN = 2.0  # power of the velocity over that of what is seen of it, above 0.1 Hz
 SCALE = 0.005  # gyro scale factor and misalignment; constant for 1 s of one rotation axis
@@ -423,11 +421,7 @@ def end_block(r):
             observe(r, 4, 0.0, oy, noise, 0, 0.0, 0.0, 0.0)
             observe(r, 5, 0.0, oz, noise, 0, 0.0, 0.0, 0.0)
         else:
-            # A vehicle's velocity lasts longer than what is seen of it by itself: it is what the
-            # uncertainty of the tilt leaves unexplained.
-            more = 0.5 * (r[V] * r[V] + r[V + 1] * r[V + 1] - r[P + 6 * N + 6] - r[P + 7 * N + 7])
-            r[SLOW] += min(1.0, span / SLOW_TIME) * (more - r[SLOW])
-            own = r[VELOCITY] + UNSEEN * max(r[POWER], now) + max(r[SLOW], 0.0)
+            own = r[VELOCITY] + UNSEEN * max(r[POWER], now)
             # Soon after the start the velocity is one, not many: its mean is no better known.
             noise = 2.0 * own * min(VELOCITY_TIME, SOON + EARLY * r[AGE]) / span
             a = bounded(r[V], own + r[P + 6 * N + 6], noise)
