@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import math
 import sys
 from pathlib import Path
@@ -253,3 +254,57 @@ def test_what_cannot_be_is_refused_by_row_and_name(call, message):
     with pytest.raises(DataError, match=message) as caught:
         call()
     assert caught.value.finding.remedy
+
+
+# --- the magnetic field -------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("lat", "lon", "alt", "day"),
+    [
+        (48.2, 16.3, 200.0, (2022, 7, 2)),
+        (64.1, -21.9, 1000.0, (2023, 1, 1)),
+        (-33.9, 151.2, 0.0, (2024, 1, 1)),
+        (40.0, -105.0, 1600.0, (2026, 1, 1)),
+    ],
+)
+def test_the_magnetic_field_is_that_of_another_library(lat, lon, alt, day):
+    wmm = pytest.importorskip("ahrs.utils.wmm")
+    date = datetime.date(*day)
+    length = 366.0 if day[0] % 4 == 0 else 365.0
+    year = day[0] + (date.timetuple().tm_yday - 1) / length
+    theirs = wmm.WMM(date, latitude=lat, longitude=lon, height=1e-3 * alt)
+    ours = earth.magnetic_field(lat, lon, alt, year)
+    # A decimal year by either rule differs by a day, in which a field changes by 0.5 nT at most.
+    assert ours.declination == pytest.approx(theirs.D, abs=2e-3)
+    assert ours.inclination == pytest.approx(theirs.I, abs=2e-3)
+    assert ours.strength == pytest.approx(1e-3 * theirs.F, abs=1e-3)
+    north, east, down = ours.field_ned
+    assert math.degrees(math.atan2(east, north)) == pytest.approx(ours.declination)
+    assert math.degrees(math.atan2(down, math.hypot(north, east))) == pytest.approx(
+        ours.inclination
+    )
+
+
+def test_a_declination_is_uncertain_by_the_model_and_more_where_the_field_is_steep():
+    """0.26° and 5417 nT over the horizontal field."""
+    at_equator, near_pole = (earth.magnetic_field(lat, 0.0) for lat in (0.0, 85.0))
+    flat = 1e3 * math.hypot(*at_equator.field_ned[:2])
+    assert at_equator.declination_sd == pytest.approx(math.hypot(0.26, 5417.0 / flat))
+    assert near_pole.declination_sd > 3.0 * at_equator.declination_sd
+
+
+@pytest.mark.parametrize(
+    ("place", "quantity"),
+    [
+        ((91.0, 0.0, 0.0, 2025.0), "lat"),
+        ((0.0, 400.0, 0.0, 2025.0), "lon"),
+        ((0.0, 0.0, 1e6, 2025.0), "alt"),
+        ((0.0, 0.0, 0.0, 2031.0), "year"),
+        ((float("nan"), 0.0, 0.0, 2025.0), "lat"),
+    ],
+)
+def test_outside_the_field_model_is_refused(place, quantity):
+    with pytest.raises(DataError) as raised:
+        earth.magnetic_field(*place)
+    assert raised.value.finding.quantity == quantity

@@ -24,6 +24,7 @@ from strapdown.attitude_comparison.comparison import (
     run_comparison,
 )
 from strapdown.attitude_comparison.options import AttitudeOptions
+from strapdown.attitude_comparison.references import motion_finding
 from strapdown.attitude_comparison.source import magnetic_north
 from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.increments import BETWEEN_STAMPS, increments_from_imu
@@ -33,7 +34,7 @@ from strapdown.orientation_filters import (
     OrientationTracker,
     is_filter,
     make_filter,
-    run_filter,
+    run_for_motion,
 )
 from strapdown.progress import Progress, silent
 from strapdown.sensors.magnetometer import (
@@ -335,7 +336,9 @@ def _filtered(
         bias = _bias(gyro_bias, find_rests(imu) if isinstance(gyro_bias, str) else ())
         imu = imu.copy()
         imu[GYRO] = imu[GYRO].to_numpy() - bias
-    run = run_filter(chosen, imu, q_nb)
+    asked, (chosen, run) = chosen, run_for_motion(chosen, imu, q_nb)
+    if chosen != asked:
+        findings.append(motion_finding(chosen, imu))
     if run.disturbed >= REPORTED:
         findings.append(
             Finding(
@@ -395,7 +398,8 @@ class OrientationFilter:
 
     With a filter, ``error-state`` or ``complementary``, accelerometer and magnetometer are used
     throughout, and the body may move from the start. `attitude` with the same algorithm gives
-    bitwise the same result.
+    bitwise the same result: it names the one that it took (``attrs["algorithm"]``), as it finds the
+    velocity of the body from the whole record, which here is 0.3 m/s unless it is stated.
 
     With an algorithm that integrates gyros, roll and pitch are leveled once, from the mean
     specific force of the first `level_samples` samples, over which the body must be stationary;

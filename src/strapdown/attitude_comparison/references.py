@@ -36,6 +36,7 @@ from strapdown.tables.checks import index_of
 if TYPE_CHECKING:
     from strapdown.evaluation.position_references import PlaceReference
     from strapdown.evaluation.second_log import SecondLog
+    from strapdown.orientation_filters import OrientationEstimator
 
 Array = NDArray[np.float64]
 
@@ -355,7 +356,7 @@ def _own_filters(
 
     Like the other libraries they take each row as the mean over its step.
     """
-    from strapdown.orientation_filters import FILTERS, run_filter
+    from strapdown.orientation_filters import FILTERS, run_for_motion
     from strapdown.orientation_filters.cost import count_filter_cost, single_precision_error_deg
 
     if not set(ACCEL) <= set(imu.columns):
@@ -370,7 +371,11 @@ def _own_filters(
             label = chosen.label
             if aiding == "gyro+accel+mag":
                 chosen = chosen.with_heading(*north)
-            run = run_filter(chosen, part, sampling="mean")
+            asked, (chosen, run) = chosen, run_for_motion(chosen, part, sampling="mean")
+            if chosen != asked:
+                label = chosen.label
+                moved = motion_finding(chosen, imu)
+                findings += [] if moved in findings else [moved]
             q = run.q_nb
             if aiding == "gyro+accel":
                 q = _with_first_heading(q, imu.index, source)
@@ -395,6 +400,17 @@ def _own_filters(
                 count_filter_cost(chosen, step, aiding == "gyro+accel+mag"),
                 single_precision_error_deg(chosen, part, "mean", run.q_nb),
             )
+
+
+def motion_finding(chosen: OrientationEstimator, imu: pd.DataFrame) -> Finding:
+    """Say which options a filter took from the motion of a record."""
+    return Finding(
+        "attitude.velocity-of-motion",
+        file=imu.attrs.get("source"),
+        quantity=chosen.name,
+        severity="note",
+        velocity=getattr(chosen, "velocity", float("nan")),
+    )
 
 
 def _with_first_heading(q: Array, stamps: pd.Index, source: AttitudeSource) -> Array:

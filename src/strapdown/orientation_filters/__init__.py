@@ -11,6 +11,7 @@ from strapdown.orientation_filters.filter import (
     OrientationEstimator,
     OrientationTracker,
     run_filter,
+    run_for_motion,
 )
 
 __all__ = [
@@ -23,6 +24,7 @@ __all__ = [
     "is_filter",
     "make_filter",
     "run_filter",
+    "run_for_motion",
 ]
 
 FILTERS: dict[str, type[OrientationEstimator]] = {

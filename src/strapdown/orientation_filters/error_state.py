@@ -6,9 +6,24 @@ from dataclasses import dataclass, replace
 from math import cos, hypot, radians, sin
 
 import numpy as np
+import pandas as pd
 
+from strapdown import rotation
 from strapdown._kernels import orientation as kernel
-from strapdown.orientation_filters.filter import Array, OrientationEstimator
+from strapdown.attitude_algorithms import Quaternion
+from strapdown.attitude_algorithms.algorithm import history_of_samples
+from strapdown.orientation_filters.filter import Array, FilterRun, OrientationEstimator
+from strapdown.tables import ACCEL, GYRO
+
+#: Windows over which changes of velocity are looked at: of a slow body, and within it of one that
+#: is carried, s; of each at most so many, and the quantile over them.
+SLOW_WINDOW, FAST_WINDOW, MOST_WINDOWS, QUANTILE = 10.0, 3.0, 400, 0.9
+#: Time between the points of a window at least, s.
+POINT = 0.05
+#: Standard deviation of a velocity over that of its changes within 10 s, on a straight line less.
+OF_CHANGE = 3.0
+#: Velocity from which the body is one that walks or drives, m/s; below, the filter sees it itself.
+WALKS = 1.0
 
 
 @dataclass(frozen=True)
@@ -31,7 +46,7 @@ class ErrorState(OrientationEstimator):
     ----------
     velocity : float, m/s
         Standard deviation of the velocity of the body, each axis: 0.3 in hand; 10 in a
-        vehicle.
+        vehicle. Over a whole record `of_motion` finds a larger one, unless it is chosen.
     bias : float, deg/s
         Standard deviation of the gyro bias at the start, each axis.
     noise : float, deg/s/√Hz
@@ -72,6 +87,16 @@ class ErrorState(OrientationEstimator):
         """Return velocity variance, bias prior, gyro noise density and block, SI and radians."""
         return self.velocity**2, radians(self.bias), radians(self.noise) ** 2, self.block
 
+    def of_motion(self, imu: pd.DataFrame, run: FilterRun) -> ErrorState:
+        """Take the velocity from its slow changes, as of a walker or a vehicle.
+
+        The filter sees the fast ones by itself.
+        """
+        if self.velocity != type(self).velocity:
+            return self
+        found = float(f"{OF_CHANGE * slow_velocity(imu, run):.2g}")
+        return replace(self, velocity=found) if found > WALKS else self
+
     def with_heading(self, declination: float, sd: float) -> ErrorState:
         """As in the base; `sd` widens the constant error of the magnetic heading."""
         return replace(super().with_heading(declination, sd), field=hypot(self.field, sd))
@@ -110,3 +135,40 @@ class ErrorState(OrientationEstimator):
         """Return the standard deviation of the gyro bias, (3,), rad/s."""
         p = record[kernel.P : kernel.P + kernel.N**2].reshape(kernel.N, kernel.N)
         return np.asarray(np.sqrt(np.diag(p)[3:6]))
+
+
+def slow_velocity(imu: pd.DataFrame, run: FilterRun) -> float:
+    """Horizontal velocity that changes within 10 s and not within 3 s, m/s, root mean square.
+
+    A tilt, which is as good as constant within a window, makes a velocity grow along a straight
+    line; that line is taken off. Gyros rotate the specific force within a window, and the first run
+    levels its start. Windows with a gap do not count; 0 if there is no other.
+    """
+    time = imu.index.to_numpy(dtype=np.float64)
+    force = imu[ACCEL].ffill().to_numpy(dtype=np.float64)
+    rate = imu[GYRO].to_numpy(dtype=np.float64) - run.bias
+    mean = imu.attrs.get("sampling") == "mean"
+    q = history_of_samples(Quaternion(), time, rate, mean, [1.0, 0.0, 0.0, 0.0])
+    step = np.diff(time, prepend=time[0])
+    pushed = np.cumsum(rotation.rotate(q, force) * step[:, None], axis=0)
+    gaps = step > max(kernel.GAP_STEPS * float(np.median(step)), kernel.GAP_S)
+    lost = np.cumsum(gaps)
+    each = max(1, int(POINT / max(float(np.median(step)), 1e-6)))
+    time, pushed, lost = time[::each], pushed[::each], lost[::each]
+    levels = rotation.dcm_from_quaternion(run.q_nb[::each])
+    levels = levels @ rotation.dcm_from_quaternion(q[::each]).transpose(0, 2, 1)
+    sizes = []
+    for length in (SLOW_WINDOW, FAST_WINDOW):
+        last = time[-1] - length
+        count = int(2.0 * (last - time[0]) / length) + 1 if last >= time[0] else 0
+        found = []
+        for begin in np.linspace(time[0], last, min(count, MOST_WINDOWS)):
+            i, j = np.searchsorted(time, [begin, begin + length])
+            if j - i < 8 or lost[j - 1] > lost[i]:
+                continue
+            velocity = (pushed[i:j] - pushed[i:j].mean(axis=0)) @ levels[i, :2].T
+            line = time[i:j] - time[i:j].mean()
+            left = velocity - np.outer(line, line @ velocity / (line @ line))
+            found.append(float(np.sqrt(np.mean(left * left))))
+        sizes.append(np.quantile(found, QUANTILE) if np.isfinite(found).all() and found else 0.0)
+    return float(np.sqrt(max(sizes[0] ** 2 - sizes[1] ** 2, 0.0)))

@@ -162,6 +162,13 @@ class OrientationEstimator(ABC):
             q = rotation.compose([cos(half), 0.0, 0.0, sin(half)], q)
         return np.asarray(q / np.sqrt((q * q).sum(axis=1, keepdims=True)))
 
+    def of_motion(self, imu: pd.DataFrame, run: FilterRun) -> Self:
+        """Return the same filter for the motion of a record, which `run` is a first run over.
+
+        Options that the user chose stay.
+        """
+        return self
+
     def with_heading(self, declination: float, sd: float) -> Self:
         """The same filter with a declination, deg, unless it has one.
 
@@ -317,6 +324,25 @@ def run_filter(
         stationary=float(record[kernel.REST_TIME] / span) if span > 0.0 else 0.0,
         gaps=int(record[kernel.GAPS]),
     )
+
+
+def run_for_motion(
+    chosen: OrientationEstimator,
+    imu: pd.DataFrame,
+    q_nb: ArrayLike | None = None,
+    sampling: str | None = None,
+) -> tuple[OrientationEstimator, FilterRun]:
+    """Run a filter over a record as `run_filter`, with the options that its motion asks for.
+
+    Returns
+    -------
+    chosen : OrientationEstimator
+        The filter that was run: sample by sample it gives the same result.
+    run : FilterRun
+    """
+    run = run_filter(chosen, imu, q_nb, sampling)
+    fitted = chosen.of_motion(imu, run)
+    return (chosen, run) if fitted == chosen else (fitted, run_filter(fitted, imu, q_nb, sampling))
 
 
 class OrientationTracker:

@@ -678,7 +678,7 @@ def filter_table(bench: AttitudeComparison) -> TableBlock | None:
     return TableBlock(
         (
             *("filter", "uses", "RMS", "final", "inclination", "heading", "drift/min", "in 95 %"),
-            *("float32", "operations", "bytes"),
+            *("float32", "ops", "bytes"),
         ),
         tuple(_filter_row(peer) for peer in aided),
         text=(0, 1),
@@ -687,8 +687,8 @@ def filter_table(bench: AttitudeComparison) -> TableBlock | None:
         "start. Drift: root mean square change of the heading error over a minute, or over half "
         "of a shorter record, per minute. In 95 %: share of the time in which inclination and "
         "heading are within their stated 95 % bounds. Float32: largest difference in single "
-        "precision. Operations a sample, as counted on the kernel; bytes kept between samples in "
-        "single precision.",
+        "precision. Ops: operations a sample, as counted on the kernel; bytes: kept between "
+        "samples in single precision.",
         title="Aided filters",
     )
 

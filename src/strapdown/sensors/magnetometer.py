@@ -23,6 +23,8 @@ HUBER = 1.5
 CHANCE = 0.0027
 #: Change of direction beside its standard deviation from which a calibration is applied.
 WORTH = 2.0
+#: Direction that iron leaves open and that is worth a warning, deg.
+OPEN = 3.0
 #: Terms of the model: hard iron, field, soft iron.
 OFFSET, FIELD, SOFT = slice(0, 3), 3, slice(4, 9)
 #: Symmetric matrices without a trace: a change of shape that leaves the size.
@@ -173,7 +175,7 @@ def without_iron(
     used = calibrate_magnetometer(mag) if given is None else given
     code = "attitude.magnetometer-calibrated"
     if given is None and not used.significant:
-        if not used.found:
+        if not used.found or used.direction_sd_deg < OPEN:
             return imu, 0.0, ()
         code = "attitude.magnetometer-needs-turning"
     shape = np.abs(np.linalg.eigvalsh(used.soft_iron) - 1.0).max()
@@ -182,8 +184,8 @@ def without_iron(
         file=imu.attrs.get("source"),
         quantity="mag",
         severity="note" if code.endswith("calibrated") else "warning",
-        iron=used.hard_iron.tolist(),
-        sd=used.hard_iron_sd.tolist(),
+        data={f"iron_{axis}": float(v) for axis, v in zip("xyz", used.hard_iron, strict=True)},
+        sd=float(used.hard_iron_sd.max()),
         field=used.field,
         soft_percent=100.0 * float(shape),
         raw_percent=100.0 * used.raw_residual,
@@ -258,13 +260,13 @@ def _fit(m: Array, start: Array, free: tuple[slice, ...]) -> _Fit:
         x[open_] -= step
         covariance[np.ix_(open_, open_)] = np.linalg.inv(normal)
         e, _ = _residual(m, x)
-        correlated = _correlation(weight * e)
+        correlated = _correlation(J * (weight * e)[:, None])
         # So many independent readings fewer as terms were fitted to them.
         taken = float(np.trace(np.linalg.solve(normal, J.T @ (J * information[:, None]))))
         left = max(len(m) / correlated - taken, 0.1 * len(m) / correlated, 1.0)
         lost = len(m) / correlated / left
         scatter = max(float(np.sqrt(np.mean(weight * e * e) * lost)), 1e-6)
-        if np.abs(step).max() < 1e-9:
+        if np.abs(step).max() < 1e-6:
             break
     return _Fit(x, covariance, e, scatter, correlated)
 
@@ -276,16 +278,23 @@ def _loss(fit: _Fit, by: _Fit) -> float:
     return float(np.where(size <= limit, size**2, 2.0 * limit * size - limit**2).sum())
 
 
-def _correlation(e: Array) -> float:
-    """Integrated correlation of a series, in rows, at least 1: up to its first negative value."""
-    n = len(e)
-    spectrum = np.abs(np.fft.rfft(e - e.mean(), 2 * n)) ** 2
-    values = np.fft.irfft(spectrum)[: n // 2]
-    if values[0] <= 0.0:
-        return 1.0
-    values = values / values[0]
-    end = int(np.argmax(values < 0.0)) or len(values)
-    return float(max(1.0, 1.0 + 2.0 * values[1:end].sum()))
+def _correlation(scores: Array) -> float:
+    """Integrated correlation of series, (n, k), in rows, at least 1: the mean over them.
+
+    Up to the first negative value of each. Of residuals times derivatives it is what divides the
+    information: a body that turns sees a slow disturbance from many sides.
+    """
+    from scipy.fft import irfft, next_fast_len, rfft
+
+    n = len(scores)
+    size = next_fast_len(2 * n, real=True)
+    spectrum = np.abs(rfft(scores - scores.mean(axis=0), size, axis=0)) ** 2
+    values = irfft(spectrum, size, axis=0)[: n // 2]
+    found = []
+    for column in (values / np.maximum(values[0], 1e-300)).T:
+        end = int(np.argmax(column < 0.0)) or len(column)
+        found.append(max(1.0, 1.0 + 2.0 * float(column[1:end].sum())))
+    return float(np.mean(found))
 
 
 def _between(a: Array, b: Array) -> float:
