@@ -97,12 +97,12 @@ def test_a_second_log_and_rests(here, run_cli, logs):
         (["--peers", "nosuch"], "unknown library 'nosuch'"),
         (["--peers", "vqf:nosuch"], "unknown filter 'nosuch' of vqf"),
         (["--reference-log", "nosuch.csv"], "does not exist"),
-        (["--export-c", "nosuch/x.c"], "the folder does not exist"),
-        (["--export-c", "there.c"], "the file exists"),
-        (["--export-c", "folder.c", "--force"], "the file exists"),
-        (["--export-c", "log.csv", "--force"], "must end in .c"),
+        (["--export", "nosuch/x.c"], "the folder does not exist"),
+        (["--export", "there.c"], "the file exists"),
+        (["--export", "folder.c", "--force"], "the file exists"),
+        (["--export", "log.csv", "--force"], "must end in .c or .py"),
         (
-            ["--export-c", "x.c", "--tolerance-deg", "1e-9"],
+            ["--export", "x.c", "--tolerance-deg", "1e-9"],
             "no algorithm reached the required accuracy",
         ),
     ],
@@ -143,8 +143,8 @@ def test_a_second_log_of_another_motion(here, run_cli, logs):
 
 def test_the_chosen_algorithm_as_c(here, run_cli):
     asked = ["attitude", "alexiev-fig4", *FEW, "--rate", "100", "--quiet"]
-    assert run_cli(*asked, "--out", "one", "--export-c", "one.c").code == 0
+    assert run_cli(*asked, "--out", "one", "--export", "one.c").code == 0
     assert "quaternion" in (here / "one.c").read_text(encoding="utf-8")
-    again = run_cli(*asked, "--out", "two", "--export-c", "one.c", "--force")
+    again = run_cli(*asked, "--out", "two", "--export", "one.c", "--force")
     assert again.code == 0
     assert not list(here.glob("*.partial"))

@@ -10,7 +10,7 @@ import pytest
 
 from strapdown import read_log, rotation
 from strapdown.attitude_algorithms import make_algorithm, run_attitude
-from strapdown.export_c import export_c
+from strapdown.export import export_c
 from strapdown.increments import increments_from_imu
 from strapdown.tables import GYRO, QUATERNION
 
