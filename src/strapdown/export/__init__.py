@@ -14,7 +14,7 @@ from strapdown.export.configuration import Channel, SensorConfiguration
 from strapdown.export.filters import filter_in_c
 from strapdown.export.micropython import algorithm_in_python, filter_in_python
 from strapdown.orientation_filters import OrientationEstimator
-from strapdown.tables import MAG
+from strapdown.tables import GYRO, MAG
 
 __all__ = ["Channel", "SensorConfiguration", "export_c", "export_micropython"]
 
@@ -79,7 +79,7 @@ def export_micropython(
     """Write an algorithm or a filter as one file for MicroPython and CPython, with its own test.
 
     The kernels themselves, without numba and numpy, their options as constants, and a class
-    ``Attitude``. Arguments, result and errors: as of `export_c`; the test has 32 samples.
+    ``Attitude``. Arguments, result and errors: as of `export_c`.
     """
     if isinstance(chosen, AttitudeAlgorithm):
         return algorithm_in_python(
@@ -106,7 +106,8 @@ def _of_filter(
     imu: pd.DataFrame | None,
 ) -> dict[str, Any]:
     """What an exported filter takes, from arguments or from samples."""
-    kind = sampling_kind(interpolation, sampling, imu)
+    # Of the other sensors a sample may be missing.
+    kind = sampling_kind(interpolation, sampling, None if imu is None else imu[GYRO])
     if interpolation != "linear":
         raise ConfigError(
             "attitude.filter-takes-linear",

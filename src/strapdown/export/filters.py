@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Sequence
 from math import cos, radians, sin
 from typing import Any
 
@@ -32,7 +31,7 @@ from strapdown.export.program import (
 from strapdown.export.translate import Translator, comment, number
 from strapdown.orientation_filters import OrientationEstimator
 from strapdown.orientation_filters.cost import count_filter_cost
-from strapdown.tables import ACCEL, GYRO, MAG, check_imu
+from strapdown.tables import ACCEL, GYRO, MAG
 
 HOME = "orientation"
 SENSORS = ("gyro", "accel", "mag")
@@ -425,16 +424,15 @@ def _read(magnetometer: bool, raw: bool) -> str:
 
 
 def filter_motion(magnetometer: bool) -> Array:
-    """A body that lies still for 2 s and then tumbles, with lost samples and one gap, (64, 10).
+    """A body that lies still for 2 s and then tumbles, with lost samples and one gap, (48, 10).
 
     dt in s, rate, specific force and field, NaN where there is none. What it crosses is all that a
     filter does: leveling, heading, the end of blocks, rest, a disturbed field, and a gap.
     """
-    count = 64
-    k = np.arange(count)
-    dt = np.full(count, 0.0625)
-    dt[50] = 0.75
-    grow = np.clip(0.15 * (k - 34), 0.0, 2.0)
+    k = np.arange(SAMPLES)
+    dt = np.full(SAMPLES, 0.0625)
+    dt[42] = 0.75
+    grow = np.clip(0.3 * (k - 30), 0.0, 2.0)
     rate = np.column_stack([np.sin(0.3 * k), np.cos(0.4 * k), 0.7 * np.sin(0.2 * k + 1)])
     rate = rate * grow[:, None] + [0.002, -0.001, 0.0015]
     q = [rotation.quaternion_from_euler([20.0, -15.0, 70.0])]
@@ -444,8 +442,8 @@ def filter_motion(magnetometer: bool) -> Array:
     force = rotation.rotate(back, np.array([0.0, 0.0, -orientation.G]))
     force[:, 0] += 0.5 * grow * np.sin(1.1 * k)
     field = rotation.rotate(back, np.array([20.0, 1.0, 44.0]))
-    field[40:46] *= 1.4
-    force[[20, 44]] = np.nan
+    field[35:39] *= 1.4
+    force[[2, 40]] = np.nan
     field[1::2] = np.nan
     return np.column_stack([dt, rate, force, field][: 3 + magnetometer])
 
@@ -505,9 +503,8 @@ def bound_words(vector: Vector) -> str:
 
 
 def _rows(imu: pd.DataFrame, magnetometer: bool) -> Array:
-    check_imu(imu)
     part = imu.iloc[:SAMPLES]
-    columns: Sequence[str] = [*GYRO, *ACCEL, *(MAG if magnetometer else ())]
+    columns = [*GYRO, *ACCEL, *(MAG if magnetometer else ())]
     if not set(columns) <= set(part.columns):
         raise DataError(
             "attitude.filter-needs-accelerometer",
@@ -516,7 +513,7 @@ def _rows(imu: pd.DataFrame, magnetometer: bool) -> Array:
             name="export",
         )
     time = part.index.to_numpy(dtype=np.float64)
-    values = part[list(columns)].to_numpy(dtype=np.float64)
+    values = part[columns].to_numpy(dtype=np.float64)
     return np.column_stack([np.diff(time, prepend=time[0]), values])
 
 

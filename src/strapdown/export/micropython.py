@@ -34,9 +34,6 @@ from strapdown.export.program import Array, Vector
 from strapdown.export.translate import WIDTH
 from strapdown.orientation_filters import OrientationEstimator
 
-#: Samples of a test: a board with little memory holds them, too.
-SAMPLES = 32
-
 
 def algorithm_in_python(
     algorithm: AttitudeAlgorithm,
@@ -181,7 +178,7 @@ def _file(
     if configuration is not None:
         constants += f"\nSTEP_S = {1.0 / configuration.rate_hz!r}\n"
     hypot = _HYPOT if "hypot(" in functions else ""
-    rows = [[None if v > 1e29 else float(v) for v in row] for row in vector.samples[:SAMPLES]]
+    rows = [[None if v > 1e29 else float(v) for v in row] for row in vector.samples]
     return "\n".join(
         [
             "\n".join(f"# {line}" for text in said for line in textwrap.wrap(text, WIDTH - 2)),
@@ -191,9 +188,9 @@ def _file(
             body,
             _TEST.format(
                 samples=_tuples(rows),
-                expected=_tuples(vector.double[:SAMPLES].tolist()),
+                expected=_tuples(vector.double.tolist()),
                 start="" if start is None else f"({', '.join(map(repr, start.tolist()))})",
-                roundings=f"{vector.roundings * len(rows) / len(vector.samples):.4g}",
+                roundings=f"{vector.roundings:.4g}",
                 take=_take(configuration is not None, sensors),
                 lag=lag,
             ),
@@ -241,8 +238,9 @@ def hypot(x, y):
 _ANGLES = '''
     @property
     def roll_pitch_heading(self):
-        """The attitude as 3-2-1 angles, deg."""
-        return tuple(math.degrees(v) for v in euler_from_quat(*self.quaternion))
+        """The attitude as 3-2-1 angles, deg; heading from 0 to 360."""
+        roll, pitch, heading = euler_from_quat(*self.quaternion)
+        return math.degrees(roll), math.degrees(pitch), math.degrees(heading) % 360.0 % 360.0
 '''
 
 _ALGORITHM = (
