@@ -43,7 +43,10 @@ def check_export(
     if path.suffix.lower() not in suffixes:
         # Otherwise --force could overwrite the log itself.
         raise ConfigError(
-            "report.export-suffix", file=str(path), quantity="--export", known=" or ".join(suffixes)
+            "report.export-suffix",
+            file=str(path),
+            quantity="--export",
+            suffixes=" or ".join(suffixes),
         )
     if path.is_dir() or (path.exists() and not force):
         raise ConfigError("report.already", file=str(path), quantity="--export")

@@ -334,7 +334,7 @@ def test_the_first_samples_of_a_log_can_be_the_test(tmp_path):
     imu = imu_table(17.0 + np.cumsum(rows[:, 0]), rows[:, 1:], sampling="mean")
     text = export_c(make_algorithm("quaternion"), imu=imu, q_nb=START)
     assert "mean rate" in text  # taken from the log
-    assert "#define SAMPLES 47" in text  # the first mean began before the log
+    assert "#define ROWS 47" in text  # the first mean began before the log
     for real in ("float", "double"):
         run(build(tmp_path, text, f"-DREAL={real}", "-DATTITUDE_TEST"))
 
