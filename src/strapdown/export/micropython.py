@@ -47,7 +47,6 @@ def algorithm_in_python(
     shape = shape_of(algorithm)
     kernels, step, increments = algorithm_kernels(algorithm, shape, kind)
     change = "dx" in step.parameters
-    theta = ", ".join(f"theta[{i}]" for i in range(3))
     of = {"state": "self.state", "dt": "dt"}
     of |= {f"t{axis}": f"theta[{i}]" for i, axis in enumerate("xyz")}
     if kind == "mean":
@@ -64,12 +63,11 @@ def algorithm_in_python(
     body = _ALGORITHM.format(
         title=algorithm.title,
         words=SAMPLINGS[kind].words,
-        size=max(shape.begun, _state_size(kernels)),
+        size=len(algorithm.begin(start)),
         begin=shape.python[0],
         read=textwrap.indent(shape.python[1], " " * 8),
         update=update,
         memory=_MEMORY[kind],
-        theta=theta,
     )
     raw = "" if configuration is None else _sample(configuration, ("gyro",), "")
     vector = make_vector(algorithm, start, kind, imu, configuration)
@@ -116,15 +114,6 @@ def filter_in_python(
 
 def _words(configuration: SensorConfiguration | None, sensors: int) -> list[str]:
     return [] if configuration is None else configuration.words(SENSORS[:sensors])
-
-
-def _state_size(kernels: Kernels) -> int:
-    from strapdown.export.translate import Translator
-
-    translator = Translator(kernels)
-    for function in kernels.functions:
-        translator.function(function)
-    return translator.state_size
 
 
 def _record_line(text: str, indent: int) -> str:
