@@ -28,7 +28,7 @@ from strapdown.export.program import (
     precision_lines,
     unit_lines,
 )
-from strapdown.export.translate import Translator, comment, number
+from strapdown.export.translate import Translator, comment, number, wrapped
 from strapdown.orientation_filters import OrientationEstimator
 from strapdown.orientation_filters.cost import count_filter_cost
 from strapdown.tables import ACCEL, GYRO, MAG
@@ -76,15 +76,18 @@ def filter_in_c(
         ends += _sd(chosen, magnetometer)
     if configuration is not None:
         interface += _SAMPLE_PROTOTYPE.format(field=field)
-        ends += "\n" + unit_lines(configuration, sensors) + _sample(configuration, magnetometer)
+        ends += (
+            "\n"
+            + unit_lines(configuration, sensors).rstrip("\n")
+            + "\n"
+            + _sample(configuration, magnetometer)
+        )
     vector = filter_vector(chosen, magnetometer, sampling, q_nb, imu, configuration)
     body = "\n".join([*functions, ends])
     pipe = Pipe(
         take=_take(magnetometer, configuration is not None),
         read=_read(magnetometer, configuration is not None),
-        columns=("raw readings" if configuration else "dt in s, rates in rad/s, forces in m/s²")
-        + (", fields" if magnetometer else "")
-        + "; 1e30 where there is none",
+        columns=_columns(magnetometer, configuration is not None),
         bound=bound_words(vector),
         start=None if q_nb is None else rotation.normalise(q_nb),
     )
@@ -245,8 +248,8 @@ _SAMPLE_PROTOTYPE = """
  * and give the attitude. Returns as attitude_update, which takes numbers of the body and any step,
  * as after a lost sample; a null pointer as there.
  */
-int attitude_sample(struct attitude *a, const real_t gyro[3], const real_t *accel{field},
-    real_t q_nb[4]);
+int attitude_sample(struct attitude *a, const real_t gyro[3],
+    const real_t *accel{field}, real_t q_nb[4]);
 """
 
 _ENDS = """\
@@ -353,9 +356,11 @@ def _sample(configuration: SensorConfiguration, magnetometer: bool) -> str:
     field = ", const real_t *mag" if magnetometer else ""
 
     def when(name: str, values: str) -> str:
-        rows = [v.strip().rstrip(",") for v in values.split(",\n") if v.strip()]
+        rows = [" ".join(v.split()) for v in values.split(",\n") if v.strip()]
         text = "".join(
-            f"        {name}_b[{i}] = {' '.join(row.split())};\n" for i, row in enumerate(rows)
+            f"{line}\n"
+            for i, row in enumerate(rows)
+            for line in wrapped(f"{name}_b[{i}] = {row};", "        ")
         )
         return f"    if ({name}) {{\n{text}    }}\n"
 
@@ -363,8 +368,8 @@ def _sample(configuration: SensorConfiguration, magnetometer: bool) -> str:
     if magnetometer:
         arrays += ", mag_b[3] = {R(0.0), R(0.0), R(0.0)}"
     return (
-        "\nint attitude_sample(struct attitude *a, const real_t gyro[3], const real_t *accel"
-        f"{field},\n    real_t q_nb[4])\n{{\n    const real_t gyro_b[3] = {{\n{gyro}    }};\n"
+        "\nint attitude_sample(struct attitude *a, const real_t gyro[3],\n    const real_t *accel"
+        f"{field}, real_t q_nb[4])\n{{\n    const real_t gyro_b[3] = {{\n{gyro}    }};\n"
         f"    real_t {arrays};\n"
         + when("accel", accel)
         + (when("mag", mag) if magnetometer else "")
@@ -391,6 +396,14 @@ def _call(magnetometer: bool, raw: bool, source: str) -> str:
     field = f",\n                {source}[{first + 6}] < 1e29 ? mag : 0" if magnetometer else ""
     name, last = ("attitude_sample", ", q") if raw else ("attitude_update", "")
     return f"{name}(&a, {dt}gyro, {source}[{first + 3}] < 1e29 ? accel : 0{field}{last})"
+
+
+def _columns(magnetometer: bool, raw: bool) -> str:
+    what = (
+        "raw readings of gyro, accelerometer" if raw else "dt in s, rates in rad/s, forces in m/s²"
+    )
+    field = (", magnetometer" if raw else ", fields") if magnetometer else ""
+    return f"{what}{field}; 1e30 where there is none"
 
 
 def _take(magnetometer: bool, raw: bool) -> str:

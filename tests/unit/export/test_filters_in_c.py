@@ -217,6 +217,7 @@ def test_a_configured_file_takes_the_readings_of_the_sensors(tmp_path, name, mag
     imu = imu_table(np.arange(len(rows)) / 50.0, rows[:, :3])
     imu[columns] = rows[:, :count]
     text = export_c(chosen, imu=imu, configuration=SENSORS)
+    assert max(map(len, text.splitlines())) <= 100
     for real in ("float", "double"):
         passed = build(tmp_path, text, f"-DREAL={real}", "-DATTITUDE_TEST")
         assert run(passed).endswith("passed\n")

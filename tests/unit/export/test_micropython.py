@@ -87,6 +87,7 @@ def test_run_as_a_program(tmp_path, name, program):
         ("complementary", "START_TIME = 0.2", "START_TIME = 0.21"),
         ("error-state", "FIELD_SD = 0.02", "FIELD_SD = 0.03"),
         ("error-state", "r[POWER] = 0.25", "r[POWER] = 0.3"),
+        ("error-state", "return quat_normalise(w, x, y, z)", "return (math.nan,) * 4"),
     ],
 )
 def test_its_test_can_fail(tmp_path, name, right, wrong):
