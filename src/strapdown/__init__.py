@@ -36,8 +36,10 @@ if TYPE_CHECKING:
         Attitude,
         AttitudeComparison,
         AttitudeOptions,
+        MagnetometerCalibration,
         OrientationFilter,
         attitude,
+        calibrate_magnetometer,
         compare_attitude,
     )
     from strapdown.api.crash import CrashRun, reconstruct
@@ -66,6 +68,7 @@ if TYPE_CHECKING:
         CrashReconstruction,
         reconstruct_crash,
     )
+    from strapdown.earth import magnetic_field
     from strapdown.evaluation.trajectory_differences import (
         summarise_differences,
         trajectory_differences,
@@ -107,6 +110,7 @@ __all__ = [
     "Imu",
     "ImuUncertainty",
     "Magnetometer",
+    "MagnetometerCalibration",
     "Measurement",
     "Mounting",
     "NavState",
@@ -128,10 +132,12 @@ __all__ = [
     "__version__",
     "align",
     "attitude",
+    "calibrate_magnetometer",
     "check_imu_channels",
     "coast",
     "compare_attitude",
     "doctor",
+    "magnetic_field",
     "motion_increments",
     "navigate",
     "read",
@@ -161,8 +167,8 @@ load_on_first_use(
         "alignment.alignment": "Site",
         "alignment.fine": "FineAlignment",
         "api.alignment": "AlignmentRun OutageRun align coast",
-        "api.attitude": "Attitude AttitudeComparison AttitudeOptions OrientationFilter attitude "
-        "compare_attitude",
+        "api.attitude": "Attitude AttitudeComparison AttitudeOptions MagnetometerCalibration "
+        "OrientationFilter attitude calibrate_magnetometer compare_attitude",
         "api.crash": "CrashRun reconstruct",
         "api.doctor": "Diagnosis doctor",
         "api.navigation": "Barometer BodyVelocity Gnss Heading Magnetometer Measurement "
@@ -173,6 +179,7 @@ load_on_first_use(
         "crash.entry": "Entry",
         "crash.path": "sample_paths",
         "crash.reconstruction": "CrashOptions CrashReconstruction reconstruct_crash",
+        "earth": "magnetic_field",
         "evaluation.trajectory_differences": "trajectory_differences summarise_differences",
         "formats": "read_log",
         "formats.crash_records": "read_crash_record",

@@ -1,4 +1,4 @@
-"""The Earth as an ellipsoid: radii of curvature, gravity, and the rates of the local level.
+"""The Earth: radii of curvature, gravity, the rates of the local level, and the magnetic field.
 
 Latitudes are geodetic and in degrees, heights in meters over the ellipsoid, vectors north, east,
 down. Every argument may be a number or an array; they are broadcast against each other. The
@@ -7,7 +7,9 @@ formulas are those of the compiled kernels, which mechanizations run.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,10 +20,12 @@ from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import DataError
 
 __all__ = [
+    "MagneticField",
     "centrifugal",
     "earth_rate",
     "gravitation",
     "gravity",
+    "magnetic_field",
     "radii_of_curvature",
     "transport_rate",
 ]
@@ -32,6 +36,12 @@ Array = NDArray[np.float64]
 _DEEPEST, _HIGHEST = -1e6, 1e9  # m
 # Limit of the continuation of gravity with height.
 _HIGHEST_GRAVITY = 1e6  # m
+#: Years of the World Magnetic Models, and the one that is taken where no date is known.
+FIRST_YEAR, LAST_YEAR, THIS_YEAR = 2010.0, 2029.99, 2025.0
+# Range of the model in height, m.
+_LOWEST_FIELD, _HIGHEST_FIELD = -1e3, 850e3
+# Uncertainty of its declination: deg, and deg times uT of the horizontal field.
+_DECLINATION_SD = 0.26, 5.417
 
 
 def radii_of_curvature(lat_deg: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> tuple[Array, Array]:
@@ -229,6 +239,88 @@ def transport_rate(
     velocities = np.column_stack([north, east])
     return _vectors(
         kernel.transport_rates, leading, np.radians(lat), height, velocities, ellipsoid.parameters()
+    )
+
+
+@dataclass(frozen=True)
+class MagneticField:
+    """The Earth's magnetic field at a place and date.
+
+    Attributes
+    ----------
+    field_ned : tuple of float, (3,), uT
+        North, east, down.
+    declination : float, deg
+        Of magnetic north from true north, east positive.
+    declination_sd : float, deg
+        One standard deviation, by the error model of the World Magnetic Model: rocks and ore of
+        the place, which the model does not resolve, included; steel nearby is not.
+    inclination : float, deg
+        Down from the horizontal.
+    strength : float, uT
+    year : float
+        For which it was computed.
+    """
+
+    field_ned: tuple[float, float, float]
+    declination: float
+    declination_sd: float
+    inclination: float
+    strength: float
+    year: float
+
+
+def magnetic_field(
+    lat_deg: float, lon_deg: float, alt: float = 0.0, year: float | None = None
+) -> MagneticField:
+    """Magnetic field by the World Magnetic Model, at one place.
+
+    Parameters
+    ----------
+    lat_deg, lon_deg : float, deg
+    alt : float, m
+        Height over the ellipsoid, -1 to 850 km.
+    year : float, optional
+        Decimal year, 2010 to 2030; 2025 if it is not known: declination changes by some tenths of a
+        degree a year at most, but near the magnetic poles.
+
+    Returns
+    -------
+    MagneticField
+
+    Raises
+    ------
+    DataError
+        The place or the year is outside the model.
+
+    Notes
+    -----
+    Chulliat et al. (2025), The US/UK World Magnetic Model for 2025-2030, NOAA; its coefficients,
+    and those of 2010 to 2020, are those of pygeomag. Declination is uncertain by
+    ``sqrt(0.26² + (5417 / H)²)`` deg, H in nT.
+    """
+    from pygeomag import GeoMag
+
+    limits = {"lat": (lat_deg, -90.0, 90.0), "lon": (lon_deg, -360.0, 360.0)}
+    limits |= {"alt": (alt, _LOWEST_FIELD, _HIGHEST_FIELD)}
+    at = THIS_YEAR if year is None else float(year)
+    limits |= {"year": (at, FIRST_YEAR, LAST_YEAR)}
+    for name, (value, least, most) in limits.items():
+        if not least <= value <= most:
+            raise DataError(
+                "geodesy.outside-field-model", quantity=name, value=value, least=least, most=most
+            )
+    model = GeoMag(base_year=at).calculate(lat_deg, lon_deg, 1e-3 * alt, at)
+    flat = 1e-3 * float(model.h)
+    return MagneticField(
+        field_ned=(1e-3 * model.x, 1e-3 * model.y, 1e-3 * model.z),
+        declination=float(model.d),
+        declination_sd=min(
+            math.hypot(_DECLINATION_SD[0], _DECLINATION_SD[1] / max(flat, 1e-6)), 180.0
+        ),
+        inclination=float(model.i),
+        strength=1e-3 * float(model.f),
+        year=at,
     )
 
 

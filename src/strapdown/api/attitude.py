@@ -24,6 +24,7 @@ from strapdown.attitude_comparison.comparison import (
     run_comparison,
 )
 from strapdown.attitude_comparison.options import AttitudeOptions
+from strapdown.attitude_comparison.source import magnetic_north
 from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.increments import BETWEEN_STAMPS, increments_from_imu
 from strapdown.orientation_filters import (
@@ -35,6 +36,11 @@ from strapdown.orientation_filters import (
     run_filter,
 )
 from strapdown.progress import Progress, silent
+from strapdown.sensors.magnetometer import (
+    MagnetometerCalibration,
+    calibrate_magnetometer,
+    without_iron,
+)
 from strapdown.sensors.rest import find_rests
 from strapdown.systems.inputs import NOWHERE, Memory, moved
 from strapdown.tables import ACCEL, EULER, GYRO, MAG, QUATERNION, attitude_table, check_imu
@@ -48,8 +54,10 @@ __all__ = [
     "Attitude",
     "AttitudeComparison",
     "AttitudeOptions",
+    "MagnetometerCalibration",
     "OrientationFilter",
     "attitude",
+    "calibrate_magnetometer",
     "compare_attitude",
 ]
 
@@ -130,6 +138,8 @@ def attitude(
     gyro_bias: str | ArrayLike | None = None,
     sampling: str = "instantaneous",
     interpolation: str = "linear",
+    magnetometer: str | MagnetometerCalibration = "auto",
+    place: Sequence[float] | None = None,
 ) -> Attitude:
     """Attitude from gyro samples with one algorithm, or with an orientation filter.
 
@@ -161,13 +171,19 @@ def attitude(
         For arrays: the rate at the stamp, or its mean over the interval that ends there.
     interpolation : {'linear', 'cubic'}
         Interpolation of rates between their stamps.
+    magnetometer : {'auto', 'raw'} or MagnetometerCalibration
+        Hard and soft iron: removed where the samples themselves show them significantly; left; or
+        as `calibrate_magnetometer` found them in another log.
+    place : sequence of float, optional
+        Latitude and longitude in deg, and height in m if it matters: magnetic headings become true
+        ones, by the World Magnetic Model at the date of the log (2025 if its clock has none).
 
     Returns
     -------
     Attitude
         One row per sample; with `roll_sd`, `pitch_sd`, `heading_sd` in deg if the filter states
-        them. Headings of a filter are magnetic with a magnetometer, or true with its option
-        ``declination``; without one they are relative to the start.
+        them. Headings of a filter are magnetic with a magnetometer, or true with `place` or the
+        filter's option ``declination``; without one they are relative to the start.
 
     Raises
     ------
@@ -188,7 +204,8 @@ def attitude(
                 interpolation=interpolation,
             )
         samples = _filter_samples(t, gyro, accel, mag, sampling)
-        return _filtered(chosen_filter, samples, initial, gyro_bias)
+        chosen_filter, samples, said = _of_field(chosen_filter, samples, magnetometer, place)
+        return _filtered(chosen_filter, samples, initial, gyro_bias, said)
     chosen = make_algorithm(algorithm, tuple(FILTERS))
     if mag is not None:
         raise ConfigError("api.magnetometer-needs-filter", quantity="mag", known=FILTERS)
@@ -267,13 +284,38 @@ def _filter_samples(
     return imu
 
 
+def _of_field(
+    chosen: OrientationEstimator,
+    imu: pd.DataFrame,
+    magnetometer: str | MagnetometerCalibration,
+    place: Sequence[float] | None,
+) -> tuple[OrientationEstimator, pd.DataFrame, tuple[Finding, ...]]:
+    """Prepare filter and samples for the field: iron, declination."""
+    given = magnetometer if isinstance(magnetometer, MagnetometerCalibration) else None
+    if given is None:
+        check_choice(
+            "api.unknown-magnetometer",
+            ("auto", "raw"),
+            quantity="magnetometer",
+            magnetometer=str(magnetometer),
+        )
+    declination, sd, said = 0.0, 0.0, tuple[Finding, ...]()
+    if place is not None:
+        declination, sd, said = magnetic_north(place, imu)
+    if magnetometer != "raw":
+        imu, of_iron, found = without_iron(imu, given)
+        sd, said = math.hypot(sd, of_iron), (*said, *found)
+    return chosen.with_heading(declination, sd), imu, said
+
+
 def _filtered(
     chosen: OrientationEstimator,
     imu: pd.DataFrame,
     initial: str | ArrayLike,
     gyro_bias: str | ArrayLike | None,
+    said: Sequence[Finding],
 ) -> Attitude:
-    """Attitude of a filter."""
+    """Attitude of a filter; `said`: findings so far."""
     name = str(imu.attrs.get("source") or "imu")
     q_nb: ArrayLike | None = None
     how = "leveled by the filter"
@@ -288,7 +330,7 @@ def _filtered(
             quantity="initial",
             initial=initial.strip().lower(),
         )
-    findings: list[Finding] = []
+    findings = list(said)
     if gyro_bias is not None:
         bias = _bias(gyro_bias, find_rests(imu) if isinstance(gyro_bias, str) else ())
         imu = imu.copy()
@@ -374,6 +416,9 @@ class OrientationFilter:
         Number of accelerometer samples averaged at the start; a filter does not need them.
     sampling : {'instantaneous', 'mean'}
         Meaning of a gyro sample.
+    magnetometer : MagnetometerCalibration, optional
+        Applied to every sample of the field; by default they are taken as they are, like `attitude`
+        does with ``magnetometer="raw"``.
 
     Raises
     ------
@@ -390,6 +435,7 @@ class OrientationFilter:
         gyro_bias: ArrayLike = (0.0, 0.0, 0.0),
         level_samples: int = 1,
         sampling: str = "instantaneous",
+        magnetometer: MagnetometerCalibration | None = None,
     ) -> None:
         if not (np.isfinite(rate_hz) and rate_hz > 0.0):
             raise ConfigError("api.rate-out-of-range", quantity="rate_hz", rate_hz=rate_hz)
@@ -400,6 +446,7 @@ class OrientationFilter:
         self.rate_hz = float(rate_hz)
         self._bias = _three(gyro_bias, "gyro_bias")
         self._sampling = sampling
+        self._magnetometer = magnetometer
         self._force = np.zeros(3)
         self._samples = 0
         start = None if initial is None else _given(initial)
@@ -447,6 +494,8 @@ class OrientationFilter:
         rate = _three(gyro, "gyro") - self._bias
         time = self._samples / self.rate_hz
         if isinstance(self._tracker, OrientationTracker):
+            if mag is not None and self._magnetometer is not None:
+                mag = self._magnetometer.apply(mag)
             self._tracker.update(time, rate, accel, mag)
         elif mag is not None:
             raise ConfigError("api.magnetometer-needs-filter", quantity="mag", known=FILTERS)

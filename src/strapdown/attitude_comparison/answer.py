@@ -336,19 +336,39 @@ _AIDS = {
 
 
 def _filter_enough(evidence: Evidence, tolerance: float) -> str | None:
-    """Name the orientation filter of fewest operations that stays within the tolerance."""
-    within = [
+    """Say which filter suffices: the cheapest within the tolerance, or in roll and pitch."""
+    whole = [run for run in evidence.filters if _largest(run) <= tolerance]
+    if whole:
+        run = min(whole, key=_thrift)
+        return (
+            f"With {_AIDS[run.aiding]} the filter {run.peer} stays within {tolerance:g}°: its "
+            f"largest error is {_deg(_largest(run))}."
+        )
+    level = [
         run
         for run in evidence.filters
-        if run.cost is not None and _largest(run) <= tolerance and run.aiding in _AIDS
+        if run.errors is not None and run.errors.most_inclination_deg <= tolerance
     ]
-    if not within:
+    if not level:
         return None
-    run = min(within, key=lambda r: (r.aiding, r.cost.cycles if r.cost else np.inf))
+    run = min(level, key=_thrift)
+    assert run.errors is not None
     return (
-        f"With {_AIDS[run.aiding]} the filter {run.peer} stays within {tolerance:g}°: its largest "
-        f"error is {_deg(_largest(run))}."
+        f"With {_AIDS[run.aiding]} the filter {run.peer} keeps roll and pitch within "
+        f"{_deg(run.errors.most_inclination_deg)}{_heading_words(run)}."
     )
+
+
+def _thrift(run: PeerRun) -> tuple[str, float]:
+    """Order of filters: fewest sensors, then fewest operations."""
+    return run.aiding, run.cost.cycles if run.cost else np.inf
+
+
+def _heading_words(run: PeerRun) -> str:
+    assert run.errors is not None
+    if run.aiding == "gyro+accel":
+        return f", and the heading drifts by {_deg(run.errors.drift_deg_per_min)} a minute"
+    return f", and the heading to {_deg(run.errors.heading_deg)} (root mean square)"
 
 
 def _of_filters(evidence: Evidence) -> list[str]:
@@ -361,9 +381,8 @@ def _of_filters(evidence: Evidence) -> list[str]:
         best = min(runs, key=_largest)
         assert best.errors is not None
         lines.append(
-            f"With {words}, {best.peer}: {_deg(_largest(best))} at most, root mean square "
-            f"{_deg(best.errors.inclination_deg)} of roll and pitch and "
-            f"{_deg(best.errors.heading_deg)} of heading."
+            f"With {words}, {best.peer}: {_deg(_largest(best))} at most; roll and pitch within "
+            f"{_deg(best.errors.most_inclination_deg)}{_heading_words(best)}."
         )
     return lines
 

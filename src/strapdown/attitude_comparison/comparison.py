@@ -44,6 +44,7 @@ from strapdown.attitude_comparison.source import (
     AttitudeSource,
     axes_by_truth,
     describe,
+    magnetic_north,
     on_clock,
     read_source,
     with_truth,
@@ -73,10 +74,14 @@ from strapdown.formats import read_log
 from strapdown.formats.recording import Reading
 from strapdown.increments import increments_from_imu
 from strapdown.progress import Progress, silent
+from strapdown.sensors.magnetometer import (
+    calibrate_magnetometer,
+    without_iron,
+)
 from strapdown.sensors.rest import RestStretch, find_rests, gyro_bias_from_rests, without_gyro_bias
 from strapdown.systems.inputs import part_of_log
-from strapdown.tables import GYRO, references_table
-from strapdown.tables.checks import index_of
+from strapdown.tables import ACCEL, GYRO, MAG, references_table
+from strapdown.tables.checks import index_of, values_of
 from strapdown.tables.sample_clock import SampleClock
 from strapdown.units import GYRO_SUMS, GYRO_UNITS, factor_of, parse_unit
 
@@ -149,6 +154,10 @@ class AttitudeComparison:
         Parts of the sensor error of a log, against a truth.
     trials : Trials or None
     peers : tuple of PeerRun
+    magnetometer : dict
+        What the filters take of the field: declination, and by how much headings are less certain
+        than usual, deg; ``hard_iron`` and ``soft_iron`` as of `MagnetometerCalibration`, if they
+        are removed. `imu` has the readings as they are.
     places : tuple of PositionScore
         One per algorithm and position reference point.
     offers : tuple of SamePose
@@ -184,6 +193,7 @@ class AttitudeComparison:
     budget: ErrorBudget | None = None
     trials: Trials | None = None
     peers: tuple[PeerRun, ...] = field(default=(), repr=False)
+    magnetometer: dict[str, Any] = field(default_factory=dict, repr=False)
     places: tuple[PositionScore, ...] = field(default=(), repr=False)
     offers: tuple[SamePose, ...] = field(default=(), repr=False)
     second: SecondLog | None = field(default=None, repr=False)
@@ -416,7 +426,8 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
             [sweep, sweep_rates(algorithms, grounds, (lower,), silent)], ignore_index=True
         )
         lowest = sweep["rate_hz"].min()
-    beside = run_beside(spec.peers, source, imu, q_nb, references, findings)
+    of_field, north, iron, field_input = _of_field(spec, source, imu, findings)
+    beside = run_beside(spec.peers, source, of_field, q_nb, references, findings, north)
     evidence = replace(
         find_evidence(
             grounds, algorithms, costs, sweep, bias, rests, None if between is None else between[1]
@@ -448,12 +459,13 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
         rests=rests,
         initial=initial,
         gyro_bias=bias,
+        magnetometer={"declination_deg": north[0], "heading_sd_deg": north[1], **iron},
         clock=clock,
         budget=budget,
         references=references,
         readings=source.readings,
         findings=tuple(findings),
-        inputs=source.inputs + bias_input,
+        inputs=source.inputs + bias_input + field_input,
         costs=costs,
         shares=shares,
         sweep=sweep,
@@ -558,6 +570,39 @@ def _gyro_bias(
     less = imu.copy()
     less[GYRO] = imu[GYRO].to_numpy() - np.asarray(bias)
     return less, {"rad_per_s": list(bias), "from": where}, files
+
+
+def _of_field(
+    spec: AttitudeSpec, source: AttitudeSource, imu: pd.DataFrame, findings: list[Finding]
+) -> tuple[pd.DataFrame, tuple[float, float], dict[str, Any], tuple[InputFiles, ...]]:
+    """Samples with the magnetometer calibrated, declination and its sd in deg, iron, its files."""
+    declination, sd, files = 0.0, 0.0, tuple[InputFiles, ...]()
+    iron: dict[str, Any] = {}
+    if not set(MAG + ACCEL) <= set(imu.columns):
+        return imu, (declination, sd), iron, files
+    if spec.place is not None:
+        declination, sd, said = magnetic_north(spec.place, source.imu)
+        findings += said
+    given = None
+    if spec.magnetometer_path is not None:
+        log = spec.source
+        options = read_options(log, source.axes) if isinstance(log, LogSpec) else None
+        other = read_log(spec.magnetometer_path, options)
+        if not set(MAG) <= set(other.imu.columns):
+            raise DataError(
+                "attitude.no-magnetometer-in-log", file=other.name, quantity="--magnetometer"
+            )
+        given = calibrate_magnetometer(values_of(other.imu, MAG))
+        files = (input_files("magnetometer", spec.magnetometer_path, other.files),)
+    if spec.magnetometer != "raw":
+        known, of_iron, said = without_iron(imu, given)
+        findings += said
+        sd = float(np.hypot(sd, of_iron))
+        if known is not imu:
+            used = given or calibrate_magnetometer(values_of(imu, MAG))
+            iron = {"hard_iron": used.hard_iron.tolist(), "soft_iron": used.soft_iron.tolist()}
+        imu = known
+    return imu, (declination, sd), iron, files
 
 
 def _significant(rest: RestStretch) -> bool:

@@ -44,6 +44,9 @@ class AttitudeSpec(Spec):
     gyro_bias_path: str | None = None
     reference_log_path: str | None = None
     reference_clock: Literal["fitted", "stated"] = "fitted"
+    magnetometer: Literal["auto", "raw", "log"] = "auto"
+    magnetometer_path: str | None = None
+    place: tuple[FiniteFloat, FiniteFloat, FiniteFloat] | None = None
     peers: tuple[str, ...] = ()
     from_s: FiniteFloat | None = None
     to_s: FiniteFloat | None = None
@@ -89,6 +92,13 @@ class AttitudeOptions:
         ``rest``, the mean over the first stationary stretch; ``rests``, interpolated
         between all of them; three numbers and a unit about forward, right, down; or the path of a
         log of the stationary sensor.
+    magnetometer : str or Path
+        For the filters: ``auto``, hard and soft iron are removed where the log shows them
+        significantly; ``raw``, left; or the path of a log in which the sensor turned through all
+        directions.
+    lat, lon, height : float, optional, deg, deg, m
+        Place: headings of filters with a magnetometer become true ones, by the World Magnetic Model
+        at the date of the log.
     peers : sequence of str
         Filters of other libraries to compare (`peers.PEERS`), or ``all``.
     from_s, to_s, duration_s : float, optional
@@ -115,6 +125,10 @@ class AttitudeOptions:
     reference_clock: str = "fitted"
     initial: str | ArrayLike = "auto"
     gyro_bias: str | ArrayLike = "auto"
+    magnetometer: str | Path = "auto"
+    lat: float | None = None
+    lon: float | None = None
+    height: float | None = None
     peers: Sequence[str] = ()
     from_s: float | None = None
     to_s: float | None = None
@@ -163,6 +177,12 @@ class AttitudeOptions:
         words, truth_path = _sort_references(_texts(self.reference))
         bias = _text(self.gyro_bias)
         bias_path = str(Path(bias)) if _exists(bias) else None
+        field_path = str(Path(self.magnetometer)) if _exists(str(self.magnetometer)) else None
+        if (self.lat is None) != (self.lon is None) or (self.height and self.lat is None):
+            raise ConfigError("attitude.half-a-place", quantity="--lat, --lon")
+        place = None
+        if self.lat is not None and self.lon is not None:
+            place = (self.lat, self.lon, self.height or 0.0)
         algorithms = _texts(self.algorithms)
         return specify(
             AttitudeSpec,
@@ -177,6 +197,9 @@ class AttitudeOptions:
             references=words,
             truth_path=truth_path,
             gyro_bias_path=bias_path,
+            magnetometer="log" if field_path else str(self.magnetometer).strip().lower(),
+            magnetometer_path=field_path,
+            place=place,
             peers=tuple(_texts(self.peers)),
             reference_clock=self.reference_clock,
             reference_log_path=None if self.reference_log is None else str(self.reference_log),
@@ -270,7 +293,7 @@ def _texts(values: object) -> list[str]:
 
 def _exists(text: str) -> bool:
     """Whether a text is an existing path; False for sentences and invalid characters."""
-    if text in ("", "auto", "none", "rest", "rests"):
+    if text in ("", "auto", "none", "raw", "rest", "rests"):
         return False
     try:
         return Path(text).exists()

@@ -31,6 +31,7 @@ from strapdown.evaluation.reference_points import (
 from strapdown.formats import read_log
 from strapdown.sensors.rest import RestStretch, find_rests
 from strapdown.tables import ACCEL, GYRO, MAG, QUATERNION, THETA, attitude_table, find_gaps
+from strapdown.tables.checks import index_of
 
 if TYPE_CHECKING:
     from strapdown.evaluation.position_references import PlaceReference
@@ -52,6 +53,11 @@ class FilterErrors:
         Of the whole rotation.
     inclination_deg, heading_deg : float
         Root mean square of its parts: about a level axis, and about the vertical.
+    most_inclination_deg : float
+        Largest inclination.
+    drift_deg_per_min : float
+        Root mean square change of the heading error over a minute, or of the longest window that
+        half of the record holds, per minute.
     covered : tuple of float or None
         Share of the samples within the stated 95 % bounds: of inclination, by its two axes, and of
         heading. None if the filter states none.
@@ -61,6 +67,8 @@ class FilterErrors:
     final_deg: float
     inclination_deg: float
     heading_deg: float
+    most_inclination_deg: float
+    drift_deg_per_min: float
     covered: tuple[float, float] | None
 
 
@@ -306,13 +314,16 @@ def run_beside(
     q_nb: Array,
     references: pd.DataFrame,
     findings: list[Finding],
+    north: tuple[float, float] = (0.0, 0.0),
 ) -> tuple[PeerRun, ...]:
     """Run the filters of the project and those of other libraries, and compare with references.
+
+    `north`: declination, and by how much headings by the field are less certain than usual, deg.
 
     The filters of the project run whenever there is an accelerometer. Without a magnetometer the
     heading is not observed: it is rotated to the truth's first one.
     """
-    out = list(_own_filters(source, imu, references, findings))
+    out = list(_own_filters(source, imu, references, findings, north))
     if not names:
         return tuple(out)
     from strapdown.peers import PEERS, run_peers
@@ -324,13 +335,21 @@ def run_beside(
         if aiding == "gyro+accel":
             q = _with_first_heading(attitude[QUATERNION].to_numpy(), attitude.index, source)
             attitude = attitude_table(attitude.index.to_numpy(), q)
+        elif aiding == "gyro+accel+mag" and north[0]:
+            turn = rotation.quaternion_from_euler([0.0, 0.0, north[0]])
+            q = rotation.compose(turn, attitude[QUATERNION].to_numpy(dtype=np.float64))
+            attitude = attitude_table(attitude.index.to_numpy(), q)
         scores, errors = _judged(label, attitude, source, imu, references)
         out.append(PeerRun(label, aiding, attitude, scores, None if aiding == "gyro" else errors))
     return tuple(out)
 
 
 def _own_filters(
-    source: AttitudeSource, imu: pd.DataFrame, references: pd.DataFrame, findings: list[Finding]
+    source: AttitudeSource,
+    imu: pd.DataFrame,
+    references: pd.DataFrame,
+    findings: list[Finding],
+    north: tuple[float, float],
 ) -> Iterator[PeerRun]:
     """Run the filters of the project, with their cost.
 
@@ -348,6 +367,9 @@ def _own_filters(
         part = imu[columns]
         for cls in FILTERS.values():
             chosen = cls()
+            label = chosen.label
+            if aiding == "gyro+accel+mag":
+                chosen = chosen.with_heading(*north)
             run = run_filter(chosen, part, sampling="mean")
             q = run.q_nb
             if aiding == "gyro+accel":
@@ -363,11 +385,9 @@ def _own_filters(
                     )
                 )
             attitude = attitude_table(imu.index.to_numpy(), q)
-            scores, errors = _judged(
-                chosen.label, attitude, source, imu, references, run.covariance
-            )
+            scores, errors = _judged(label, attitude, source, imu, references, run.covariance)
             yield PeerRun(
-                f"strapdown {chosen.label}",
+                f"strapdown {label}",
                 aiding,
                 attitude,
                 scores,
@@ -412,7 +432,8 @@ def _judged(
     error = rotation.compose(q, rotation.conjugate(known.q_nb[counts]))
     level = np.hypot(error[:, 0], error[:, 3])
     tilt = 2.0 * np.degrees(np.arctan2(np.hypot(error[:, 1], error[:, 2]), level))
-    heading = 2.0 * np.degrees(np.arctan2(np.abs(error[:, 3]), np.abs(error[:, 0])))
+    heading = np.degrees(np.unwrap(2.0 * np.arctan2(error[:, 3], error[:, 0]), period=2.0 * np.pi))
+    heading -= 360.0 * np.round(heading[0] / 360.0)
     whole = np.degrees(2.0 * np.arctan2(np.linalg.norm(error[:, 1:], axis=1), np.abs(error[:, 0])))
     covered = None
     if covariance is not None:
@@ -423,6 +444,19 @@ def _judged(
         rms_deg=float(np.sqrt(np.mean(whole**2))),
         final_deg=float(whole[-1]),
         inclination_deg=float(np.sqrt(np.mean(tilt**2))),
-        heading_deg=float(np.sqrt(np.mean(heading**2))),
+        heading_deg=float(np.sqrt(np.mean(((heading + 180.0) % 360.0 - 180.0) ** 2))),
+        most_inclination_deg=float(tilt.max()),
+        drift_deg_per_min=_drift(index_of(attitude)[counts], heading),
         covered=covered,
     )
+
+
+def _drift(time: Array, heading: Array) -> float:
+    """Root mean square change of a heading error over a minute, deg, or as `FilterErrors`."""
+    window = min(60.0, 0.5 * float(time[-1] - time[0]))
+    later = np.searchsorted(time, time + window)
+    first = np.flatnonzero(later < len(time))
+    if window <= 0.0 or not first.size:
+        return float("nan")
+    change = heading[later[first]] - heading[first]
+    return float(np.sqrt(np.mean(change**2)) * 60.0 / window)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,9 +17,11 @@ from strapdown.attitude_comparison.options import AttitudeSpec
 from strapdown.bundle import InputFiles, input_files, sensor_file
 from strapdown.config import LogSpec, ScenarioSpec
 from strapdown.config.sources import read_options
-from strapdown.errors import DataError, Finding
+from strapdown.earth import magnetic_field
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.evaluation.differences import attitude_at, error_angles, gyro_turns
 from strapdown.formats import read_log
+from strapdown.formats.clocks import year_of
 from strapdown.formats.inference.rotation_rate import signed_permutations
 from strapdown.formats.recording import Origin, Reading, Recording
 from strapdown.increments import increments_from_imu
@@ -222,6 +225,32 @@ def _window_rotations(source: AttitudeSource) -> tuple[Array, Array]:
     for gap in [*find_gaps(time), *find_gaps(stamps)]:
         small &= ~((edges[1:] > gap.start) & (edges[:-1] < gap.end))
     return turns[small], np.asarray(known_turns)[small]
+
+
+def magnetic_north(
+    place: Sequence[float], imu: pd.DataFrame
+) -> tuple[float, float, tuple[Finding, ...]]:
+    """Declination at a place and the date of a log, its standard deviation, deg, and what to say.
+
+    `place`: latitude and longitude in deg, and height in m or none.
+    """
+    if len(place) not in (2, 3):
+        raise ConfigError("attitude.not-a-place", quantity="place", count=len(place))
+    year = year_of(imu)
+    lat, lon, alt = (float(v) for v in (*place, 0.0)[:3])
+    model = magnetic_field(lat, lon, alt, year)
+    finding = Finding(
+        "attitude.true-north" if year is not None else "attitude.true-north-undated",
+        file=imu.attrs.get("source"),
+        quantity="mag",
+        severity="note",
+        declination=model.declination,
+        sd=model.declination_sd,
+        strength=model.strength,
+        inclination=model.inclination,
+        year=model.year,
+    )
+    return model.declination, model.declination_sd, (finding,)
 
 
 def on_clock(source: AttitudeSource) -> tuple[AttitudeSource, SampleClock]:

@@ -110,6 +110,21 @@ class ComparisonFlags:
             show_default=False,
         ),
     ] = "auto"
+    magnetometer: Annotated[
+        str,
+        running(
+            "auto|raw|LOG",
+            "Of the filters: hard and soft iron removed where the log shows them; raw, left; or a "
+            "log in which the sensor turned through all directions (auto).",
+            show_default=False,
+        ),
+    ] = "auto"
+    lat: Annotated[
+        float | None,
+        running("DEG", "Latitude, north positive: with it headings by the field are true ones."),
+    ] = None
+    lon: Annotated[float | None, running("DEG", "Longitude, east positive.")] = None
+    height: Annotated[float | None, running("M", "Height over the ellipsoid (0).")] = None
     peers: Annotated[
         str | None,
         running(
@@ -186,6 +201,8 @@ def attitude(
     them with the known attitude, splits their error into the sensor's and their own, counts their
     cost, and writes the answer with tables, JSON, CSV, a report page and its figures.
     """
+    import pandas as pd
+
     from strapdown.api.attitude import compare_attitude
     from strapdown.attitude_algorithms import make_algorithm
     from strapdown.attitude_algorithms.cost import time_algorithms
@@ -193,6 +210,8 @@ def attitude(
     from strapdown.cli.console import Stopwatch, console, print_findings, print_seal, progress
     from strapdown.cli.result_folder import default_folder, refuse_result
     from strapdown.errors import ConfigError
+    from strapdown.orientation_filters import FILTERS, make_filter
+    from strapdown.orientation_filters.cost import time_filters
     from strapdown.report.attitude import attitude_json
     from strapdown.report.attitude_export import (
         WRITERS,
@@ -221,7 +240,13 @@ def attitude(
         if files.export is not None:
             exported = write_export(bench, files.export, files.export_of, force=write.force)
         report("timing", 0.99)
-        taken = time_algorithms([make_algorithm(run.algorithm) for run in bench.runs])
+        own_filters = any(peer.cost is not None for peer in bench.peers)
+        taken = pd.concat(
+            [
+                time_algorithms([make_algorithm(run.algorithm) for run in bench.runs]),
+                *([time_filters([make_filter(name) for name in FILTERS])] if own_filters else []),
+            ]
+        )
         report.stop()
         of_sample = {
             str(name): {"float64": round(double, 1), "float32": round(single, 1)}
@@ -340,7 +365,7 @@ def print_comparison(bench: AttitudeComparison) -> None:
 
 
 def _print_speed(taken: pd.DataFrame) -> None:
-    """Print the time per sample of each algorithm on this machine."""
+    """Print the time per sample of each algorithm and filter on this machine."""
     from strapdown.cli.console import console, print_table
 
     console().print("\nTime of a sample on this machine")

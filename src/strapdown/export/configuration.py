@@ -70,11 +70,12 @@ class Channel:
                 ("forward", "right", "down"), self.axis, self.sign, strict=True
             )
         )
-        each = f", {self.scale:.10g} {unit} each" if unit else ""
+        each = f", {self.scale:.10g} {unit} each" if unit and self.scale != 1.0 else ""
         text = f"{sensor}: readings in {self.unit}{each}; axes of the sensor: {along}"
+        of = self.unit if self.scale == 1.0 else unit
         if any(self.bias) or sensor == "Gyro":
             bias = ", ".join(f"{v:.6g}" for v in self.bias)
-            text += f"; bias subtracted: {bias} {unit or self.unit} forward, right, down"
+            text += f"; bias subtracted: {bias} {of} forward, right, down"
         if self.matrix is not None:
             rows = "), (".join(", ".join(f"{v:.6g}" for v in row) for row in self.matrix)
             text += f"; then multiplied by ({rows})"
@@ -100,7 +101,7 @@ class SensorConfiguration:
         said = {
             "gyro": self.gyro.words("Gyro", "rad/s"),
             "accel": self.accel.words("Accelerometer", "m/s²"),
-            "mag": self.mag.words("Magnetometer", ""),
+            "mag": self.mag.words("Magnetometer", "uT"),
         }
         head = f"Configuration of a raw reading: {self.rate_hz:.10g} samples a second."
         return [head, *(said[name] for name in sensors), *self.sources]

@@ -50,12 +50,14 @@ __all__ = [
     "unrolled",
     "usual_step",
     "with_clock",
+    "year_of",
 ]
 
 
 Array = NDArray[np.float64]
 GPS, UNIX = "gps-seconds-of-week", "unix"
 WEEK = 604_800.0  # s
+YEAR = 365.25 * 86400.0  # s
 #: 1980-01-06, the origin of GPS weeks, in seconds since 1970.
 GPS_EPOCH = 315_964_800.0
 # Seconds since 1970 from which on GPS time is this many seconds ahead of UTC (IERS Bulletin C).
@@ -154,6 +156,17 @@ def time_column(table: pd.DataFrame) -> dict[str, NDArray[Any]]:
     if clock.origin == 0.0:
         return {f"{name}_s": table.index.to_numpy(dtype=np.float64)}
     return {f"{name}_ns": own_ns(table)}
+
+
+def year_of(table: pd.DataFrame) -> float | None:
+    """Decimal year of a table's first stamp; None if its clock has no date."""
+    clock = clock_of(table)
+    seconds = float(table.index[0]) + clock.origin
+    if clock.name == GPS and clock.week is not None:
+        seconds = float(unix_from_gps(np.array([seconds + WEEK * clock.week]))[0])
+    elif clock.name != UNIX:
+        return None
+    return 1970.0 + seconds / YEAR
 
 
 def clock_of_name(name: str, first: float, *, dated: bool = False) -> str:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from math import cos, radians, sin
+from dataclasses import dataclass, replace
+from math import cos, hypot, radians, sin
 
 import numpy as np
 
@@ -71,6 +71,10 @@ class ErrorState(OrientationEstimator):
     def kernel_options(self) -> tuple[float, ...]:
         """Return velocity variance, bias prior, gyro noise density and block, SI and radians."""
         return self.velocity**2, radians(self.bias), radians(self.noise) ** 2, self.block
+
+    def with_heading(self, declination: float, sd: float) -> ErrorState:
+        """As in the base; `sd` widens the constant error of the magnetic heading."""
+        return replace(super().with_heading(declination, sd), field=hypot(self.field, sd))
 
     def begin_state(self, record: Array, given: bool) -> None:
         """Set the covariance of the start."""

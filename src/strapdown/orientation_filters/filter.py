@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from math import cos, isfinite, radians, sin
-from typing import Any, ClassVar, NoReturn
+from typing import Any, ClassVar, NoReturn, Self
 
 import numpy as np
 import pandas as pd
@@ -161,6 +161,17 @@ class OrientationEstimator(ABC):
             half = 0.5 * radians(self.declination)
             q = rotation.compose([cos(half), 0.0, 0.0, sin(half)], q)
         return np.asarray(q / np.sqrt((q * q).sum(axis=1, keepdims=True)))
+
+    def with_heading(self, declination: float, sd: float) -> Self:
+        """The same filter with a declination, deg, unless it has one.
+
+        Parameters
+        ----------
+        sd : float, deg
+            By which magnetic headings are less certain than the filter takes them to be; one that
+            states no covariance has no use for it.
+        """
+        return self if self.declination else replace(self, declination=declination)
 
     @property
     def label(self) -> str:

@@ -19,7 +19,15 @@ from strapdown.increments import increments_from_imu
 from strapdown.orientation_filters import FILTERS, OrientationEstimator, is_filter, make_filter
 from strapdown.tables import ACCEL, GYRO, MAG, QUATERNION, THETA, imu_table
 from strapdown.tables.checks import index_of
-from strapdown.units import ACCEL_SUMS, ACCEL_UNITS, GYRO_SUMS, GYRO_UNITS, factor_of
+from strapdown.units import (
+    ACCEL_SUMS,
+    ACCEL_UNITS,
+    GYRO_SUMS,
+    GYRO_UNITS,
+    MAG_UNITS,
+    RELATIVE_FIELDS,
+    factor_of,
+)
 
 #: By the suffix of the file: its language and what writes it.
 WRITERS = {".c": ("C99", export_c), ".py": ("MicroPython", export_micropython)}
@@ -123,9 +131,17 @@ def write_export(
     """
     check_export(path, force)
     chosen = chosen_for_export(bench, of)
+    if isinstance(chosen, OrientationEstimator) and set(MAG) <= set(bench.imu):
+        chosen = chosen.with_heading(
+            bench.magnetometer["declination_deg"], bench.magnetometer["heading_sd_deg"]
+        )
     configuration, each, mean = _configuration(bench, chosen)
     start = _liveliest(bench, each)
     imu = _at_rate(bench.imu.iloc[start : start + VECTOR * each + 1], each, mean)
+    if isinstance(chosen, OrientationEstimator) and set(MAG) <= set(imu):
+        imu[MAG] = replace(configuration.mag, scale=1.0, axis=(0, 1, 2), sign=(1, 1, 1)).body(
+            imu[MAG].to_numpy(dtype=np.float64)
+        )
     of_algorithm: dict[str, Any] = {}
     if isinstance(chosen, AttitudeAlgorithm):
         first = bench.runs[0].attitude[QUATERNION].to_numpy()
@@ -165,11 +181,9 @@ def _configuration(
     made = SensorConfiguration(rate, gyro)
     if isinstance(chosen, OrientationEstimator):
         units = {**ACCEL_UNITS, **ACCEL_SUMS}
-        made = replace(
-            made,
-            accel=_channel(bench, ACCEL, made.accel, units, sources),
-            mag=_channel(bench, MAG, made.mag, {}, sources) if set(MAG) <= set(imu) else made.mag,
-        )
+        made = replace(made, accel=_channel(bench, ACCEL, made.accel, units, sources))
+        if set(MAG) <= set(imu):
+            made = replace(made, mag=_magnetometer(bench, made.mag, sources))
     sources.append(f"Log: {bench.source}.")
     return replace(made, sources=tuple(sources)), each, mean
 
@@ -181,13 +195,13 @@ def _channel(
     units: dict[str, float],
     sources: list[str],
 ) -> Channel:
-    """How the log gives one sensor; a magnetometer's unit does not matter (no `units`)."""
+    """How the log gives one sensor."""
     readings = {r.quantity.lstrip("-"): r for r in bench.readings}
     if not set(columns) <= set(readings):
         return known
     reading = readings[columns[0]]
     names = ", ".join(readings[name].source for name in columns)
-    unit, scale = reading.unit, factor_of(reading.unit, units) if units else 1.0
+    unit, scale = reading.unit, factor_of(reading.unit, units)
     if unit in GYRO_SUMS or unit in ACCEL_SUMS:
         sources.append(f"Unit: the log has increments in {unit}; give them by s of the step.")
         unit, scale = known.unit, 1.0
@@ -199,10 +213,24 @@ def _channel(
     return Channel(unit, scale, axis, sign)
 
 
+def _magnetometer(bench: AttitudeComparison, known: Channel, sources: list[str]) -> Channel:
+    """How the log gives the field, and the iron to remove."""
+    made = _channel(bench, MAG, known, {**MAG_UNITS, **RELATIVE_FIELDS}, sources)
+    if "hard_iron" not in bench.magnetometer:
+        return made
+    sources.append("Magnetometer: hard and soft iron as found.")
+    soft = bench.magnetometer["soft_iron"]
+    return replace(
+        made,
+        bias=bench.magnetometer["hard_iron"],
+        matrix=None if np.array_equal(soft, np.eye(3)) else soft,
+    )
+
+
 def _at_rate(imu: pd.DataFrame, each: int, mean: bool) -> pd.DataFrame:
     """Samples of a lower rate: one in so many, or their means, with the first for the start."""
     if each == 1 or not mean:
-        return imu.iloc[::each]
+        return imu.iloc[::each].copy()
     steps = increments_from_imu(imu)
     count = len(steps) // each
     ends = index_of(steps).reshape(-1)[each - 1 : count * each : each]

@@ -677,25 +677,30 @@ def filter_table(bench: AttitudeComparison) -> TableBlock | None:
         return None
     return TableBlock(
         (
-            *("filter", "uses", "RMS", "final", "inclination", "heading", "in 95 %"),
+            *("filter", "uses", "RMS", "final", "inclination", "heading", "drift/min", "in 95 %"),
             *("float32", "operations", "bytes"),
         ),
         tuple(_filter_row(peer) for peer in aided),
         text=(0, 1),
         caption="Root mean square and final error against the truth; its parts about a level axis "
         "and about the vertical; without a magnetometer the heading is that of the truth at the "
-        "start. In 95 %: share of the time in which inclination / heading are within their stated "
-        "95 % bounds. Float32: largest difference in single precision. Operations a sample, as "
-        "counted on the kernel; bytes kept between samples in single precision.",
+        "start. Drift: root mean square change of the heading error over a minute, or over half "
+        "of a shorter record, per minute. In 95 %: share of the time in which inclination and "
+        "heading are within their stated 95 % bounds. Float32: largest difference in single "
+        "precision. Operations a sample, as counted on the kernel; bytes kept between samples in "
+        "single precision.",
         title="Aided filters",
     )
 
 
 def _filter_row(peer: PeerRun) -> tuple[str, ...]:
     errors, cost = peer.errors, peer.cost
-    parts: tuple[str, ...] = ("",) * 5
+    parts: tuple[str, ...] = ("",) * 6
     if errors is not None:
-        numbers = (errors.rms_deg, errors.final_deg, errors.inclination_deg, errors.heading_deg)
+        numbers = (
+            *(errors.rms_deg, errors.final_deg, errors.inclination_deg, errors.heading_deg),
+            errors.drift_deg_per_min,
+        )
         bounds = "" if errors.covered is None else " / ".join(f"{x:.0%}" for x in errors.covered)
         parts = (*(degrees(x) for x in numbers), bounds)
     of_kernel = ("", "", "")

@@ -16,9 +16,10 @@ from strapdown.alignment.two_vector import triad
 from strapdown.config.alignment import LogTable
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.dsp.samples import white_sd
+from strapdown.earth import FIRST_YEAR, LAST_YEAR, THIS_YEAR, magnetic_field
 from strapdown.errors import DataError, Finding
 from strapdown.formats import holds
-from strapdown.formats.clocks import GPS, UNIX, WEEK, clock_of, on_clock_of, unix_from_gps
+from strapdown.formats.clocks import on_clock_of, year_of
 from strapdown.formats.recording import ABSENT
 from strapdown.navigation.measurements.barometer import Barometer
 from strapdown.navigation.measurements.magnetometer import Magnetometer
@@ -43,13 +44,11 @@ MEAN = 1.0
 #: Error of a wheel's speed by slip, a bus that is late, and a lever arm that nobody stated, m/s,
 #: and how long it lasts, s.
 SLIP, TURN = 0.3, 2.0
-#: Years of the World Magnetic Model, and the one that is taken where a recording has no date.
-FIRST_YEAR, LAST_YEAR, THIS_YEAR = 2010.0, 2029.99, 2025.0
 #: Differences of the Earth's field, as a share of its strength and in dip, deg, that show iron: of
 #: hard iron that turns a heading by about as much.
 WEAK, DIP = 0.15, 8.0
-#: Length at the start over which a heading is read, s, and seconds of a year.
-BEGIN, YEAR = 2.0, 365.25 * 86400.0
+#: Length at the start over which a heading is read, s.
+BEGIN = 2.0
 
 
 @dataclass(frozen=True)
@@ -167,31 +166,31 @@ def propose_magnetometer(
     place : tuple of float, optional
         Latitude and longitude in deg, height in m.
     """
-    from pygeomag import GeoMag
-
     if place is None and fixes is not None:
         lat, lon, alt = np.median(values_of(fixes, GEODETIC)[:LEAST], axis=0).tolist()
         place = (lat, lon, alt)
     readings, path = _field(log, imu)
     if place is None or readings is None or readings.empty:
         return None
-    dates = (year for table in (imu, fixes) if table is not None and (year := _year(table)))
+    dates = (year for table in (imu, fixes) if table is not None and (year := year_of(table)))
     year = next(dates, None)
     at = float(np.clip(year or THIS_YEAR, FIRST_YEAR, LAST_YEAR))
-    model = GeoMag(base_year=at).calculate(place[0], place[1], 1e-3 * place[2], at)
-    field = tuple(round(1e-3 * x, 2) for x in (model.x, model.y, model.z))
+    model = magnetic_field(*place, at)
+    field = tuple(round(x, 2) for x in model.field_ned)
     table = {"kind": "magnetometer", **path, "field_ned_ut": field}
     begin = imu.index[0] + BEGIN
     force = values_of(imu[imu.index <= begin], ACCEL).mean(axis=0)
     mag = values_of(readings[readings.index <= begin], MAG).mean(axis=0)
-    down, known = np.array([0.0, 0.0, 1.0]), np.array([model.x, model.y, model.z])
+    down, known = np.array([0.0, 0.0, 1.0]), np.array(model.field_ned)
     # The specific force of a body at rest is up.
     C_nb = triad(down, known) @ triad(-force, mag).T
     heading = float(rotation.euler_from_dcm(C_nb)[2]) % 360.0
     size = float(np.linalg.norm(mag))
     dip = math.asin(float(np.clip((C_nb @ mag)[2] / size, -1.0, 1.0)))
     measured = size, math.degrees(dip)
-    return Magnetic(table, at, year is not None, heading, measured, (1e-3 * model.f, model.i))
+    return Magnetic(
+        table, at, year is not None, heading, measured, (model.strength, model.inclination)
+    )
 
 
 def _field(log: LogTable, imu: pd.DataFrame) -> tuple[pd.DataFrame | None, dict[str, str]]:
@@ -205,14 +204,3 @@ def _field(log: LogTable, imu: pd.DataFrame) -> tuple[pd.DataFrame | None, dict[
         return _read(log, Magnetometer(interval=0.0), imu), {"path": log.path}
     except DataError:
         return None, {}
-
-
-def _year(table: pd.DataFrame) -> float | None:
-    """Decimal year of a table's first stamp; None if its clock has no date."""
-    clock = clock_of(table)
-    seconds = float(table.index[0]) + clock.origin
-    if clock.name == GPS and clock.week is not None:
-        seconds = float(unix_from_gps(np.array([seconds + WEEK * clock.week]))[0])
-    elif clock.name != UNIX:
-        return None
-    return 1970.0 + seconds / YEAR

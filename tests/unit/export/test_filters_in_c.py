@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
+import sys
 
 import numpy as np
 import pytest
 from tests.coded import coded
 from tests.unit.export.test_algorithms_in_c import WARNINGS, build, needs_compiler, run
 
+import strapdown as sd
 from strapdown import rotation
 from strapdown._kernels import arithmetic, orientation
 from strapdown.errors import ConfigError, DataError
@@ -17,6 +20,7 @@ from strapdown.export import Channel, SensorConfiguration, export_c
 from strapdown.export.filters import filter_motion, options_of, sample_kernel, states_deviation
 from strapdown.orientation_filters import FILTERS, make_filter, run_filter
 from strapdown.orientation_filters.filter import euler_sd
+from strapdown.report.attitude_export import write_export
 from strapdown.tables import ACCEL, GYRO, MAG, imu_table
 
 VARIANTS = ["error-state", "complementary", "error-state:velocity=10,noise=0.1,declination=3.1"]
@@ -286,3 +290,55 @@ def test_what_a_filter_cannot_take_is_named():
     imu = imu_table(np.arange(60) / 50.0, np.zeros((60, 3)))
     with pytest.raises(DataError, check=coded("attitude.filter-needs-accelerometer")):
         export_c(chosen, imu=imu)
+
+
+@needs_compiler
+@pytest.mark.parametrize("name", ["error-state", "complementary:tilt=2"])
+def test_file_of_a_comparison_is_its_configuration(tmp_path, name):
+    """The log's own columns through the exported file: units, axes, gyro bias and iron."""
+    rng = np.random.default_rng(5)
+    t = np.arange(6000) / 100.0
+    moving = np.clip(t - 3.0, 0.0, 1.0)[:, None]
+    rate = moving * np.column_stack([np.sin(0.7 * t), np.cos(0.9 * t), 1.2 * np.sin(0.4 * t)])
+    turns = rotation.quaternion_from_rotation_vector((rate[1:] + rate[:-1]) / 200.0)
+    q = [np.array([1.0, 0.0, 0.0, 0.0])]
+    for turn in turns:
+        q.append(rotation.compose(q[-1], turn))
+    back = rotation.conjugate(np.array(q))
+    force = rotation.rotate(back, np.array([0.0, 0.0, -9.80665]))
+    field = rotation.rotate(back, np.array([20.0, 0.0, 44.0])) + np.array([6.0, -4.0, 9.0])
+    sensed = [np.degrees(rate + np.array([0.01, -0.02, 0.005])), force / 9.80665, field / 100.0]
+    noise = (0.01, 0.001, 0.001)
+    raw = np.hstack([v[:, [1, 0, 2]] * [1, 1, -1] for v in sensed])
+    raw += rng.normal(0.0, 1.0, raw.shape) * np.repeat(noise, 3)
+    raw = np.round(raw, 7)
+    units = (("gyro", "deg_s"), ("accel", "g"), ("mag", "gauss"))
+    names = ",".join(f"{s}_{axis}_{unit}" for s, unit in units for axis in "xyz")
+    body = "\n".join(
+        f"{a:.2f}," + ",".join(f"{v:.7f}" for v in row) for a, row in zip(t, raw, strict=True)
+    )
+    text = f"# axes: right-forward-up\ntime_s,{names}\n{body}\n"
+    (tmp_path / "log.csv").write_text(text)
+    bench = sd.compare_attitude(tmp_path / "log.csv", ["quaternion"], rates_hz=[50.0])
+    assert bench.magnetometer["hard_iron"] == pytest.approx([6.0, -4.0, 9.0], abs=0.2)
+    for suffix in (".c", ".py"):
+        write_export(bench, tmp_path / f"attitude{suffix}", name)
+    exported = (tmp_path / "attitude.c").read_text(encoding="utf-8")
+    assert run(build(tmp_path, exported, "-DATTITUDE_TEST")).endswith("passed\n")
+    program = build(tmp_path, exported, "-DATTITUDE_FILTER", "-DREAL=double")
+    found = np.array([v.split() for v in run(program, lines(raw)).splitlines()], dtype=float)
+    imu = bench.imu.copy()
+    imu[MAG] = (imu[MAG] - bench.magnetometer["hard_iron"]) @ np.array(
+        bench.magnetometer["soft_iron"]
+    )
+    chosen = make_filter(name).with_heading(0.0, bench.magnetometer["heading_sd_deg"])
+    expected = run_filter(chosen, imu).q_nb
+    # Stamps and what is measured of them differ by the digits of stamps of 10 ms.
+    assert np.radians(rotation.rotation_angle(found, expected)).max() < 1e-9
+    assert rotation.rotation_angle(found, q).max() < 5.0
+    # The vector of the test is of the log's own readings.
+    first = next(line for line in exported.splitlines() if line.startswith("    {"))
+    numbers = [float(v) for v in re.findall(r"-?[0-9.]+(?:e-?\d+)?", first)]
+    assert np.abs(raw[:, : len(numbers[:3])] - numbers[:3]).max(axis=1).min() < 1e-5
+    done = subprocess.run([sys.executable, tmp_path / "attitude.py"], check=False)
+    assert done.returncode == 0

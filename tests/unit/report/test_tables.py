@@ -146,7 +146,7 @@ def test_aided_errors_stand_in_their_own_column(full_bench):
 
 
 def test_aided_filters_have_errors_by_parts_and_their_cost(full_bench):
-    errors = FilterErrors(1.234, 0.5, 0.321, 1.19, (0.991, 0.5))
+    errors = FilterErrors(1.234, 0.5, 0.321, 1.19, 0.9, 0.75, (0.991, 0.5))
     cost = Cost("error-state", 100.0, 120.5, 3.0, 1.0, 0.5, 500.0, 223)
     own = replace(
         full_bench.peers[1],
