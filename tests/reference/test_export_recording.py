@@ -47,6 +47,7 @@ def test_two_turns_of_a_board(recordings, tmp_path, name, precision):
         assert apart.max() > np.degrees(eps)  # and it was single precision
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(COMPILER is None, reason="no C compiler: install gcc or clang")
 @pytest.mark.parametrize("precision", ["double", "float"])
 @pytest.mark.parametrize("magnetometer", [False, True])

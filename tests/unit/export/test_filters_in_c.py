@@ -82,6 +82,7 @@ def lines(rows: np.ndarray) -> str:
     return "\n".join(" ".join(repr(float(v)) for v in row) for row in rows)
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize("sampling", ["instantaneous", "mean"])
 @pytest.mark.parametrize("single", [False, True])
@@ -122,6 +123,7 @@ def test_it_gives_the_bits_of_the_kernel(tmp_path, variant, magnetometer, single
             assert got[-3:] == pytest.approx(expected, rel=0.0, abs=1e4 * eps)
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize("real", ["float", "double"])
 @pytest.mark.parametrize("magnetometer", [False, True])
@@ -152,7 +154,11 @@ def test_its_own_test_can_fail(tmp_path, name, right, wrong):
     text = export_c(make_filter(name))
     assert right in text
     # A wrong constant of the model is small beside the rounding of single precision.
-    flags = ["-DATTITUDE_TEST", *(["-DREAL=double"] if right.startswith(("#", "r[")) else [])]
+    flags = [
+        "-O0",
+        "-DATTITUDE_TEST",
+        *(["-DREAL=double"] if right.startswith(("#", "r[")) else []),
+    ]
     program = build(tmp_path, text.replace(right, wrong, 1), *flags)
     assert subprocess.run([program], capture_output=True, check=False).returncode == 1
 
@@ -223,9 +229,9 @@ def test_a_configured_file_takes_the_readings_of_the_sensors(tmp_path, name, mag
     text = export_c(chosen, imu=imu, configuration=SENSORS)
     assert max(map(len, text.splitlines())) <= 100
     for real in ("float", "double"):
-        passed = build(tmp_path, text, f"-DREAL={real}", "-DATTITUDE_TEST")
+        passed = build(tmp_path, text, "-O0", f"-DREAL={real}", "-DATTITUDE_TEST")
         assert run(passed).endswith("passed\n")
-    program = build(tmp_path, text, "-DREAL=double", "-DATTITUDE_FILTER")
+    program = build(tmp_path, text, "-O0", "-DREAL=double", "-DATTITUDE_FILTER")
     found = np.array([v.split() for v in run(program, lines(raw[:, :count])).splitlines()], float)
     # Stamps k / 50 differ from steps of 1 / 50 by rounding alone.
     expected = run_filter(chosen, imu).q_nb
@@ -250,7 +256,7 @@ def test_its_test_finds_a_wrong_configuration(tmp_path, right, wrong):
     imu[[*ACCEL, *MAG]] = rows[:, 3:]
     text = export_c(make_filter("error-state"), imu=imu, configuration=SENSORS)
     assert right in text
-    program = build(tmp_path, text.replace(right, wrong, 1), "-DATTITUDE_TEST")
+    program = build(tmp_path, text.replace(right, wrong, 1), "-O0", "-DATTITUDE_TEST")
     assert subprocess.run([program], capture_output=True, check=False).returncode == 1
 
 
@@ -292,6 +298,7 @@ def test_what_a_filter_cannot_take_is_named():
         export_c(chosen, imu=imu)
 
 
+@pytest.mark.slow
 @needs_compiler
 @pytest.mark.parametrize("name", ["error-state", "complementary:tilt=2"])
 def test_file_of_a_comparison_is_its_configuration(tmp_path, name):

@@ -33,6 +33,7 @@ def module(text: str, single: bool = False) -> dict:
     return names
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("variant", VARIANTS)
 def test_the_test_of_an_algorithm_passes(variant, kind, capsys):
