@@ -259,17 +259,16 @@ void attitude_euler(const struct attitude *a, real_t euler[3])
 #include <float.h>
 #include <stdio.h>
 
-#define SAMPLES 48
+#define ROWS 48
 #define LAG 0 /* samples by which the attitude is behind */
 
 static const real_t start[4] = {
-    R(1.0), 
-    R(0.0), 
-    R(0.0), 
-    R(0.0)};
-
-/* dt in s, rates in rad/s; single precision holds each exactly. */
-static const double samples[SAMPLES][4] = {
+        R(1.0), 
+        R(0.0), 
+        R(0.0), 
+        R(0.0)};
+/* Dt in s, rates in rad/s; single precision holds each exactly. */
+static const double samples[ROWS][4] = {
     {0.0, 0.0, 0.0, 0.0},
     {0.0625, 0.20000000298023224, 0.062666155397892, 0.06118737533688545},
     {0.0625, 0.4000000059604645, 0.15581561625003815, 0.027194742113351822},
@@ -321,7 +320,7 @@ static const double samples[SAMPLES][4] = {
 };
 
 /* q_nb at each sample, by the kernels of strapdown in the same precision. */
-static const double expected[SAMPLES][4] = {
+static const double expected[ROWS][4] = {
 #if JOIN(IS_, REAL) == IS_float
     {1.0, 0.0, 0.0, 0.0},
     {0.9999941807982302, 0.003124994155017384, 0.0009791567203155354, 0.0009560509005225091},
@@ -446,8 +445,8 @@ int main(void)
     double largest = 0.0;
     int failed = 0;
     attitude_init(&a, start);
-    for (int k = 0; k < SAMPLES + LAG; k++) {
-        if (k < SAMPLES) {
+    for (int k = 0; k < ROWS + LAG; k++) {
+        if (k < ROWS) {
             const real_t gyro[3] = {R(samples[k][1]), R(samples[k][2]), R(samples[k][3])};
             failed |= attitude_update(&a, R(samples[k][0]), gyro);
         }
@@ -477,14 +476,14 @@ static void put(const struct attitude *a)
 
 int main(void)
 {
-    static const real_t from[4] = {
+    static const real_t start[4] = {
         R(1.0), 
         R(0.0), 
         R(0.0), 
         R(0.0)};
     struct attitude a;
+    attitude_init(&a, start);
     double dt, x, y, z;
-    attitude_init(&a, from);
     while (scanf("%lf %lf %lf %lf", &dt, &x, &y, &z) == 4) {
         const real_t gyro[3] = {R(x), R(y), R(z)};
         if (attitude_update(&a, R(dt), gyro)) {

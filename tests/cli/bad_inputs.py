@@ -465,12 +465,12 @@ CASES = [
     Case(
         "C code into a folder that is not there",
         lambda f: text(f / "log.csv", rows()),
-        ("--export-c", "missing/attitude.c"),
+        ("--export", "missing/attitude.c"),
     ),
     Case(
         "C code over something else",
         lambda f: text(f / "log.csv", rows()),
-        ("--export-c", "log.csv", "--force"),
+        ("--export", "log.csv", "--force"),
     ),
     Case(
         "An algorithm that is none",

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 
 import pytest
 
@@ -97,12 +99,15 @@ def test_a_second_log_and_rests(here, run_cli, logs):
         (["--peers", "nosuch"], "unknown library 'nosuch'"),
         (["--peers", "vqf:nosuch"], "unknown filter 'nosuch' of vqf"),
         (["--reference-log", "nosuch.csv"], "does not exist"),
-        (["--export-c", "nosuch/x.c"], "the folder does not exist"),
-        (["--export-c", "there.c"], "the file exists"),
-        (["--export-c", "folder.c", "--force"], "the file exists"),
-        (["--export-c", "log.csv", "--force"], "must end in .c"),
+        (["--export", "nosuch/x.c"], "the folder does not exist"),
+        (["--export", "there.c"], "the file exists"),
+        (["--export", "folder.c", "--force"], "the file exists"),
+        (["--export", "log.csv", "--force"], "must end in .c or .py"),
+        (["--export-of", "quaternion"], "no file to write it to"),
+        (["--export", "x.c", "--export-of", "quaternoin"], "quaternoin"),
+        (["--export", "x.c", "--export-of", "error-state:velocity=-1"], "-1"),
         (
-            ["--export-c", "x.c", "--tolerance-deg", "1e-9"],
+            ["--export", "x.c", "--tolerance-deg", "1e-9"],
             "no algorithm reached the required accuracy",
         ),
     ],
@@ -143,8 +148,33 @@ def test_a_second_log_of_another_motion(here, run_cli, logs):
 
 def test_the_chosen_algorithm_as_c(here, run_cli):
     asked = ["attitude", "alexiev-fig4", *FEW, "--rate", "100", "--quiet"]
-    assert run_cli(*asked, "--out", "one", "--export-c", "one.c").code == 0
+    assert run_cli(*asked, "--out", "one", "--export", "one.c").code == 0
     assert "quaternion" in (here / "one.c").read_text(encoding="utf-8")
-    again = run_cli(*asked, "--out", "two", "--export-c", "one.c", "--force")
+    again = run_cli(*asked, "--out", "two", "--export", "one.c", "--force")
     assert again.code == 0
     assert not list(here.glob("*.partial"))
+
+
+def test_a_filter_and_an_algorithm_by_name_for_a_device(here, run_cli, logs):
+    asked = ["attitude", logs["a"], "--algorithms", "quaternion", "--rates", "50", "--force"]
+    shown = run_cli(*asked, "--export", "a.py", "--export-of", "complementary:tilt=2")
+    assert shown.code == 0
+    assert "MicroPython   a.py: complementary:tilt=2" in shown.out
+    text = (here / "a.py").read_text(encoding="utf-8")
+    assert "min(2.0, START_TIME" in text
+    done = subprocess.run(
+        [sys.executable, "a.py"], cwd=here, capture_output=True, text=True, check=False
+    )
+    assert done.stdout.endswith("passed\n")
+    assert run_cli(*asked, "--quiet", "--export", "a.c", "--export-of", "rotvec").code == 0
+    assert "rotvec" in (here / "a.c").read_text(encoding="utf-8")
+
+
+def test_a_filter_for_a_log_without_an_accelerometer(here, run_cli):
+    rows = "\n".join(f"{0.02 * k:.2f},0.1,0.2,{0.01 * k:.2f}" for k in range(200))
+    text = f"time_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s\n{rows}\n"
+    (here / "log.csv").write_text(f"# axes: forward-right-down\n{text}")
+    found = run_cli("attitude", "log.csv", "--export", "a.c", "--export-of", "error-state")
+    assert found.code == 3
+    assert "error-state needs an accelerometer" in found.err
+    assert sorted(p.name for p in here.iterdir()) == ["log.csv"]

@@ -1,4 +1,4 @@
-"""`strapdown crash --live` and `--export-c`: the command itself, its bundle, and what follows."""
+"""`strapdown crash --live` and `--export`: the command itself, its bundle, and what follows."""
 
 from __future__ import annotations
 
@@ -155,10 +155,10 @@ def test_the_end_of_the_reader_ends_the_run(case):
     ("options", "code"),
     [
         (("--live", "-", "--json"), "leave out --json"),
-        (("--live", "-", "--export-c", "a.c"), "leave out --export-c"),
+        (("--live", "-", "--export", "a.c"), "leave out --export"),
         (("--every", "1"), "leave out --every"),
         (("case.toml", "--live", "-"), "not 2"),
-        (("--export-c", "a.txt"), "a.txt"),
+        (("--export", "a.txt"), "a.txt"),
         (("--live", "-", "--every", "-1"), "--every"),
     ],
 )
@@ -173,11 +173,11 @@ def test_options_that_do_not_fit_are_refused(case, run_cli, monkeypatch, options
 
 def test_the_detection_is_written_as_c(case, run_cli, monkeypatch):
     monkeypatch.chdir(case.parent)
-    assert run_cli("crash", case.name, "--export-c", "crash.c").code == 0
+    assert run_cli("crash", case.name, "--export", "crash.c").code == 0
     text = (case.parent / "crash.c").read_text()
     errors = recorder_of_case(case).errors
     assert all(f"R({value!r})" in text for value in errors)
-    assert run_cli("crash", case.name, "--export-c", "crash.c").code == 4, "it is there already"
+    assert run_cli("crash", case.name, "--export", "crash.c").code == 4, "it is there already"
 
 
 def calibrated(path, errors, name="recorder"):

@@ -33,7 +33,7 @@ OF_ITS_OWN = {
     *(("navigate", flag) for flag in ("--lat",)),
     *(("init navigate", flag) for flag in ("--sensor",)),
     *(("align", flag) for flag in ("--gnss",)),
-    *(("crash", flag) for flag in ("--live", "--every", "--calibration", "--export-c")),
+    *(("crash", flag) for flag in ("--live", "--every", "--calibration", "--export")),
 }
 
 

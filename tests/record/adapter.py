@@ -48,6 +48,8 @@ UNIT_OF = {label: unit for unit, labels in UNITS.items() for label in labels}
 class Names(adapter_0_1.Names):
     """Neutral terms in the words of today, and today's results in neutral terms."""
 
+    OPTIONS: ClassVar[dict[str, str]] = {**adapter_0_1.Names.OPTIONS, "export": "--export"}
+
     # The status of a heading is written in neutral words.
     WORDS: ClassVar[dict[str, str]] = {
         neutral: theirs

@@ -189,6 +189,7 @@ class Names:
 
     # An option without an entry is `--` and its name.
     OPTIONS: ClassVar[dict[str, str]] = {
+        "export": "--export-c",
         "smoothed": "--smooth",
         "trajectory-reference": "--truth",
         "control-points": "--points",

@@ -103,7 +103,7 @@ add(
     Command(
         "attitude",
         ("alexiev-fig2b",),
-        {"algorithms": "rotvec:samples=2", "export-c": "a.c", **Q},
+        {"algorithms": "rotvec:samples=2", "export": "a.c", **Q},
         "c",
     ),
 )

@@ -1,6 +1,6 @@
 """Crash detection and delta-V so far, sample by sample, in memory and time that do not grow.
 
-In the subset of Python that `export_c` translates. Axes of the vehicle: x forward, y right, z down.
+In the subset of Python that `export` translates. Axes of the vehicle: x forward, y right, z down.
 """
 
 import math

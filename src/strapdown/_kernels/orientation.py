@@ -268,9 +268,9 @@ def observe(r, i, slope, innovation, noise, kind, dx, dy, dz):
     for j in range(N):
         a, b = r[K + j], r[H + j] - s * r[K + j]
         for k in range(j, N):
-            new = r[P + N * j + k] - a * r[H + k] - b * r[K + k]
-            r[P + N * j + k] = new
-            r[P + N * k + j] = new
+            value = r[P + N * j + k] - a * r[H + k] - b * r[K + k]
+            r[P + N * j + k] = value
+            r[P + N * k + j] = value
 
 
 @njit(cache=True, error_model="numpy")
@@ -444,14 +444,12 @@ def correct(r):
     """Move the estimated errors into attitude, bias and velocity."""
     a, b, c = 0.5 * r[X], 0.5 * r[X + 1], 0.5 * r[X + 2]
     w, x, y, z = r[Q], r[Q + 1], r[Q + 2], r[Q + 3]
-    w, x, y, z = (
-        w - a * x - b * y - c * z,
-        x + a * w + b * z - c * y,
-        y + b * w + c * x - a * z,
-        z + c * w + a * y - b * x,
-    )
-    n = 1.0 / math.sqrt(w * w + x * x + y * y + z * z)
-    r[Q], r[Q + 1], r[Q + 2], r[Q + 3] = n * w, n * x, n * y, n * z
+    d = w - a * x - b * y - c * z
+    e = x + a * w + b * z - c * y
+    f = y + b * w + c * x - a * z
+    g = z + c * w + a * y - b * x
+    n = 1.0 / math.sqrt(d * d + e * e + f * f + g * g)
+    r[Q], r[Q + 1], r[Q + 2], r[Q + 3] = n * d, n * e, n * f, n * g
     for i in range(3):
         r[BIAS + i] += r[X + 3 + i]
         r[ACCEL_BIAS + i] += r[X + 8 + i]
@@ -545,6 +543,47 @@ def error_state_sample(r, dt, gx, gy, gz, ax, ay, az, mx, my, mz):
             r[FIELDS] += 1.0
     if r[SPAN] > 0.0 and r[SPAN] + 0.5 * step >= r[BLOCK]:
         end_block(r)
+
+
+@njit(cache=True, error_model="numpy")
+def euler_deviation(w, x, y, z, nn, ne, nd, ee, ed, dd):
+    """Standard deviations of roll, pitch, heading, rad, to first order, at most pi.
+
+    From a unit quaternion and the covariance of the attitude error in the level frame. Near +-90
+    deg pitch, roll and heading are not separate, and theirs are large.
+    """
+    c11, c21 = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z)
+    flat = max(math.sqrt(c11 * c11 + c21 * c21), 1e-6)
+    heading = math.atan2(c21, c11)
+    north, east = math.cos(heading), math.sin(heading)
+    # Of the rotation vector about the horizontal axis that the body points along, and across it.
+    along = max(north * north * nn + 2.0 * north * east * ne + east * east * ee, 0.0)
+    across = max(east * east * nn - 2.0 * north * east * ne + north * north * ee, 0.0)
+    slope = 2.0 * (w * y - x * z) / flat
+    about = slope * slope * along + 2.0 * slope * (north * nd + east * ed) + dd
+    return (
+        min(math.sqrt(along) / flat, math.pi),
+        min(math.sqrt(across), math.pi),
+        min(math.sqrt(max(about, 0.0)), math.pi),
+    )
+
+
+@njit(cache=True, error_model="numpy")
+def euler_deviations(q, covariance, out):
+    """`euler_deviation` of many attitudes, (n, 4), with their covariances, (n, 3, 3)."""
+    for k in range(q.shape[0]):
+        out[k, 0], out[k, 1], out[k, 2] = euler_deviation(
+            q[k, 0],
+            q[k, 1],
+            q[k, 2],
+            q[k, 3],
+            covariance[k, 0, 0],
+            covariance[k, 0, 1],
+            covariance[k, 0, 2],
+            covariance[k, 1, 1],
+            covariance[k, 1, 2],
+            covariance[k, 2, 2],
+        )
 
 
 @njit(cache=True, error_model="numpy")

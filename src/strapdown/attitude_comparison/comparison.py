@@ -154,6 +154,10 @@ class AttitudeComparison:
         Parts of the sensor error of a log, against a truth.
     trials : Trials or None
     peers : tuple of PeerRun
+    magnetometer : dict
+        What the filters take of the field: declination, and by how much headings are less certain
+        than usual, deg; ``hard_iron`` and ``soft_iron`` as of `MagnetometerCalibration`, if they
+        are removed. `imu` has the readings as they are.
     places : tuple of PositionScore
         One per algorithm and position reference point.
     offers : tuple of SamePose
@@ -189,6 +193,7 @@ class AttitudeComparison:
     budget: ErrorBudget | None = None
     trials: Trials | None = None
     peers: tuple[PeerRun, ...] = field(default=(), repr=False)
+    magnetometer: dict[str, Any] = field(default_factory=dict, repr=False)
     places: tuple[PositionScore, ...] = field(default=(), repr=False)
     offers: tuple[SamePose, ...] = field(default=(), repr=False)
     second: SecondLog | None = field(default=None, repr=False)
@@ -421,7 +426,7 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
             [sweep, sweep_rates(algorithms, grounds, (lower,), silent)], ignore_index=True
         )
         lowest = sweep["rate_hz"].min()
-    of_field, north, field_input = _of_field(spec, source, imu, findings)
+    of_field, north, iron, field_input = _of_field(spec, source, imu, findings)
     beside = run_beside(spec.peers, source, of_field, q_nb, references, findings, north)
     evidence = replace(
         find_evidence(
@@ -454,6 +459,7 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
         rests=rests,
         initial=initial,
         gyro_bias=bias,
+        magnetometer={"declination_deg": north[0], "heading_sd_deg": north[1], **iron},
         clock=clock,
         budget=budget,
         references=references,
@@ -568,11 +574,12 @@ def _gyro_bias(
 
 def _of_field(
     spec: AttitudeSpec, source: AttitudeSource, imu: pd.DataFrame, findings: list[Finding]
-) -> tuple[pd.DataFrame, tuple[float, float], tuple[InputFiles, ...]]:
-    """Samples with the magnetometer calibrated, declination and its sd in deg, files of it."""
+) -> tuple[pd.DataFrame, tuple[float, float], dict[str, Any], tuple[InputFiles, ...]]:
+    """Samples with the magnetometer calibrated, declination and its sd in deg, iron, its files."""
     declination, sd, files = 0.0, 0.0, tuple[InputFiles, ...]()
+    iron: dict[str, Any] = {}
     if not set(MAG + ACCEL) <= set(imu.columns):
-        return imu, (declination, sd), files
+        return imu, (declination, sd), iron, files
     if spec.place is not None:
         declination, sd, said = magnetic_north(spec.place, source.imu)
         findings += said
@@ -588,10 +595,14 @@ def _of_field(
         given = calibrate_magnetometer(values_of(other.imu, MAG))
         files = (input_files("magnetometer", spec.magnetometer_path, other.files),)
     if spec.magnetometer != "raw":
-        imu, of_iron, said = without_iron(imu, given)
+        known, of_iron, said = without_iron(imu, given)
         findings += said
         sd = float(np.hypot(sd, of_iron))
-    return imu, (declination, sd), files
+        if known is not imu:
+            used = given or calibrate_magnetometer(values_of(imu, MAG))
+            iron = {"hard_iron": used.hard_iron.tolist(), "soft_iron": used.soft_iron.tolist()}
+        imu = known
+    return imu, (declination, sd), iron, files
 
 
 def _significant(rest: RestStretch) -> bool:

@@ -195,7 +195,9 @@ def axes_by_truth(source: AttitudeSource, stated: bool) -> AttitudeSource:
     for triad in (GYRO,) if mirrored else (GYRO, ACCEL, MAG):
         if set(triad) <= set(imu.columns):
             imu[triad] = values_of(imu, triad) @ matrices[best].T
-    # The gyro's, which an exported configuration takes.
+    # The gyro's, which an exported configuration takes; those of the others may stay.
+    if mirrored:
+        imu.attrs["aiding_axes"] = str(imu.attrs.get("sensor_axes") or "x,y,z")
     sensor = str(imu.attrs.get("sensor_axes") or "x,y,z").split(",")
     turned = [sensor["xyz".index(name[-1])] for name in names[best].split(",")]
     imu.attrs["sensor_axes"] = ",".join(

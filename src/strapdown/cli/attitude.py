@@ -150,12 +150,20 @@ class ComparisonFlags:
 class FileFlags:
     """Files beside the result."""
 
-    export_c: Annotated[
+    export: Annotated[
         Path | None,
         writing(
-            "FILE.c",
-            "Write the algorithm that the answer chose (or the only one named) as C99, with "
-            "a test vector of this log.",
+            "FILE",
+            "Write an algorithm or a filter with the rate, units, axes and biases of this log and "
+            "a test vector from it: C99 (FILE.c) or MicroPython (FILE.py).",
+        ),
+    ] = None
+    export_of: Annotated[
+        str | None,
+        writing(
+            "NAME",
+            "What --export writes: an algorithm or a filter with its options, such as error-state "
+            "or complementary:declination=3.1; the algorithm that the answer chose if not given.",
         ),
     ] = None
     timing: Annotated[
@@ -201,24 +209,36 @@ def attitude(
     from strapdown.bundle import check_destination, write_timing
     from strapdown.cli.console import Stopwatch, console, print_findings, print_seal, progress
     from strapdown.cli.result_folder import default_folder, refuse_result
+    from strapdown.errors import ConfigError
     from strapdown.orientation_filters import FILTERS, make_filter
     from strapdown.orientation_filters.cost import time_filters
-    from strapdown.report.attitude import attitude_json, check_c, chosen_for_c, write_c
+    from strapdown.report.attitude import attitude_json
+    from strapdown.report.attitude_export import (
+        WRITERS,
+        check_export,
+        chosen_for_export,
+        named_for_export,
+        write_export,
+    )
 
     for source in sources:
         refuse_result(source, "log")
     folder = out or default_folder(sources[0], "attitude")
     check_destination(folder, write.force)
-    check_c(files.export_c, write.force)
+    check_export(files.export, write.force)
+    if files.export_of is not None:
+        if files.export is None:
+            raise ConfigError("report.export-of-alone", quantity="--export-of")
+        named_for_export(files.export_of)
     with progress(write.quiet or write.json) as show:
         report = Stopwatch(show)
         bench = compare_attitude(sources, options=_options(compare, log), progress=report)
-        if files.export_c is not None:
-            chosen_for_c(bench)
+        if files.export is not None:
+            chosen_for_export(bench, files.export_of)
         report("writing", 0.95)
         seal = bench.save(folder, force=write.force, png=files.png)
-        if files.export_c is not None:
-            exported = write_c(bench, files.export_c, force=write.force)
+        if files.export is not None:
+            exported = write_export(bench, files.export, files.export_of, force=write.force)
         report("timing", 0.99)
         own_filters = any(peer.cost is not None for peer in bench.peers)
         taken = pd.concat(
@@ -243,8 +263,9 @@ def attitude(
         _print_speed(taken)
     print_findings(bench.findings)
     print_seal(seal, "report.html")
-    if files.export_c is not None:
-        console().print(f"C99   {files.export_c}: {exported}", soft_wrap=True)
+    if files.export is not None:
+        language = WRITERS[files.export.suffix.lower()][0]
+        console().print(f"{language}   {files.export}: {exported}", soft_wrap=True)
 
 
 def _options(compare: ComparisonFlags, log: LogFlags) -> AttitudeOptions:

@@ -39,11 +39,11 @@ class LiveFlags:
         Path | None,
         running(
             "RESULT",
-            "With --live or --export-c: a result of strapdown crash in which the drive determined "
+            "With --live or --export: a result of strapdown crash in which the drive determined "
             "biases, scale factors and mounting of the recorder; they are taken off.",
         ),
     ] = None
-    export_c: Annotated[
+    export: Annotated[
         Path | None,
         writing(
             "FILE.c",
@@ -76,7 +76,7 @@ def crash(
     With --live, samples are watched as they arrive, and delta-V so far, direction of force and
     severity of a crash are written as lines of JSON.
     """
-    if any(x is not None for x in (flags.live, flags.export_c, flags.every, flags.calibration)):
+    if any(x is not None for x in (flags.live, flags.export, flags.every, flags.calibration)):
         from strapdown.cli.crash_live import crash_live
 
         crash_live(cases, out, write, flags)

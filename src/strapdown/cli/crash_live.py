@@ -21,7 +21,7 @@ from strapdown.errors import ConfigError, DataError
 from strapdown.live.crash import receive_crash, recorder_of_case
 from strapdown.live.replay import MachineClock
 from strapdown.live.sources import open_source
-from strapdown.report.attitude import check_c
+from strapdown.report.attitude_export import check_export
 from strapdown.report.crash_live import DETECTIONS, RECEIVED, write_crash_live, write_received
 
 if TYPE_CHECKING:
@@ -35,31 +35,31 @@ def crash_live(cases: Sequence[Path], out: Path | None, write: OutFlags, flags: 
 
     Standard output holds the estimates only; all else goes to standard error.
     """
-    if flags.live is not None and (flags.export_c is not None or write.json):
-        option = "--json" if write.json else "--export-c"
+    if flags.live is not None and (flags.export is not None or write.json):
+        option = "--json" if write.json else "--export"
         raise ConfigError("live.not-together", beside="--live", option=option)
     if flags.live is None and flags.every is not None:
         raise ConfigError("live.only-with", option="--every", beside="--live")
-    if flags.live is None and flags.export_c is None:
-        raise ConfigError("live.only-with", option="--calibration", beside="--live or --export-c")
-    name = "--live" if flags.live is not None else "--export-c"
+    if flags.live is None and flags.export is None:
+        raise ConfigError("live.only-with", option="--calibration", beside="--live or --export")
+    name = "--live" if flags.live is not None else "--export"
     if len(cases) != 1:
         raise ConfigError("live.one-case", option=name, count=len(cases))
     refuse_result(cases[0], "case")
     WORDS.set("file")
-    check_c(flags.export_c, write.force)
+    check_export(flags.export, write.force, (".c",))
     options = recorder_of_case(cases[0], flags.calibration)
     if flags.live is None:
-        from strapdown.export_c.detector import export_detector
+        from strapdown.export.detector import export_detector
 
-        assert flags.export_c is not None
+        assert flags.export is not None
         known = (*options.bias, *options.scale, *options.axes) if flags.calibration else ()
         text = export_detector(
             options.errors, options.variance, mean=options.mean, calibration=known
         )
-        flags.export_c.write_text(text, encoding="utf-8", newline="\n")
+        flags.export.write_text(text, encoding="utf-8", newline="\n")
         if not write.quiet:
-            typer.echo(f"C99   {flags.export_c}")
+            typer.echo(f"C99   {flags.export}")
         return
     folder = out or default_folder(cases[0], "crash-live")
     check_destination(folder, write.force)

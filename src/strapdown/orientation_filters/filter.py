@@ -239,20 +239,9 @@ def euler_sd(q_nb: Array, covariance: Array) -> Array:
         Of roll, pitch, heading; at most 180. Near ±90° pitch, roll and heading are not separate,
         and theirs are large.
     """
-    _, pitch, heading = np.radians(rotation.euler_from_quaternion(q_nb)).T
-    flat = np.maximum(np.cos(pitch), 1e-6)
-    north, east = np.cos(heading), np.sin(heading)
-    zero = np.zeros_like(flat)
-    # From the rotation vector in the level frame.
-    rows = np.array(
-        [
-            [north / flat, east / flat, zero],
-            [-east, north, zero],
-            [north * np.sin(pitch) / flat, east * np.sin(pitch) / flat, zero + 1.0],
-        ]
-    )
-    variance = np.einsum("ijn,njk,ikn->ni", rows, covariance, rows)
-    return np.asarray(np.minimum(np.degrees(np.sqrt(np.maximum(variance, 0.0))), 180.0))
+    out = np.empty((len(q_nb), 3))
+    kernel.euler_deviations(np.ascontiguousarray(q_nb), np.ascontiguousarray(covariance), out)
+    return np.degrees(out)
 
 
 def run_filter(

@@ -7,17 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.attitude_algorithms import make_algorithm
 from strapdown.attitude_comparison.comparison import AttitudeComparison
 from strapdown.bundle import Seal, write_bundle, write_json
-from strapdown.errors import ConfigError
 from strapdown.evaluation.reference_points import Score
 from strapdown.formats import csv
-from strapdown.formats.columns import parse_axes
-from strapdown.increments import increments_from_imu
 from strapdown.report import attitude_tables as words
 from strapdown.report.attitude_charts import charts
 from strapdown.report.attitude_document import attitude_document
@@ -31,9 +26,8 @@ from strapdown.report.attitude_tables import (
 from strapdown.report.chart_svg import ChartFigure
 from strapdown.report.document import finding_json
 from strapdown.report.report_bundle import as_comments, finite, write_report
-from strapdown.tables import EULER, GYRO, QUATERNION, THETA, imu_table
+from strapdown.tables import EULER, QUATERNION
 from strapdown.tables.checks import index_of
-from strapdown.units import GYRO_SUMS, GYRO_UNITS, factor_of
 
 
 def write_attitude(
@@ -236,145 +230,3 @@ def _score(score: Score) -> dict[str, Any]:
         "expected_deg": score.expected_deg,
         "sd_deg": score.sd_deg,
     }
-
-
-# C export of the chosen algorithm.
-
-
-# Samples of the test vector: about a second of motion, in a file of readable length.
-VECTOR = 64
-
-
-def check_c(path: Path | None, force: bool) -> None:
-    """Reject a path that cannot be written, before the run starts.
-
-    Raises
-    ------
-    ConfigError
-        The file name does not end in .c or .h, the file exists without `force`, or its folder does
-        not exist.
-    """
-    if path is None:
-        return
-    if path.suffix.lower() not in (".c", ".h"):
-        # Otherwise --force could overwrite the log itself.
-        raise ConfigError("report.no-name-c-file", file=str(path), quantity="--export-c")
-    if path.is_dir() or (path.exists() and not force):
-        raise ConfigError("report.already", file=str(path), quantity="--export-c")
-    if not path.parent.is_dir():
-        raise ConfigError("report.no-such-folder", file=str(path.parent), quantity="--export-c")
-
-
-def chosen_for_c(bench: AttitudeComparison) -> str:
-    """Return the algorithm to export: the recommended one, or else the only one.
-
-    Raises
-    ------
-    ConfigError
-        No algorithm is recommended among several.
-    """
-    labels = [run.algorithm for run in bench.runs]
-    chosen = labels[0] if len(labels) == 1 else bench.answer.algorithm
-    if chosen is None:
-        raise ConfigError("report.no-algorithm-accurate-enough-chosen", quantity="--export-c")
-    return chosen
-
-
-def write_c(bench: AttitudeComparison, path: Path, *, force: bool = False) -> str:
-    """Write one algorithm of a bench as C99, with a test vector from its log.
-
-    Parameters
-    ----------
-    path : Path
-        File to write.
-    force : bool
-        Overwrite an existing file.
-
-    Returns
-    -------
-    str
-        The exported algorithm: the recommended one, or else the only one.
-
-    Raises
-    ------
-    ConfigError
-        No algorithm is recommended among several, or the file may not be written.
-    """
-    from strapdown.export_c import export_c
-
-    check_c(path, force)
-    chosen = chosen_for_c(bench)
-    configuration, each, mean = _configuration(bench, chosen)
-    first = bench.runs[0].attitude[QUATERNION].to_numpy()
-    start = _liveliest(bench, each)
-    imu = _at_rate(bench.imu.iloc[start : start + VECTOR * each + 1], each, mean)
-    text = export_c(
-        make_algorithm(chosen),
-        interpolation=str(bench.specification["interpolation"]),
-        q_nb=first[start],
-        imu=imu,
-        configuration=configuration,
-    )
-    partial = path.with_name(path.name + ".partial")
-    partial.write_text(text, encoding="utf-8", newline="\n")
-    partial.replace(path)
-    return chosen
-
-
-def _configuration(bench: AttitudeComparison, chosen: str) -> tuple[Any, int, bool]:
-    """Configuration of the exported sensor, samples of the log to one of its own, their mean."""
-    from strapdown.export_c import SensorConfiguration
-
-    answer, imu = bench.answer, bench.imu
-    full = bench.clock.rate_hz
-    recommended = answer.rate_hz if answer.algorithm == chosen else None
-    each = 1 if recommended is None else max(1, round(full / float(recommended)))
-    rate = full / each  # a last, shorter step is in what the answer states
-    mean = imu.attrs["sampling"] == "mean" or (each > 1 and answer.meaning != "drop")
-    by = "by the answer" if recommended is not None else "of the log; the answer names no other"
-    made_of = "as in the log" if each == 1 else f"one in {each} of the log"
-    if mean and each > 1:
-        made_of = f"the mean over {each} steps of the log"
-    sources = [f"Rate: {by}. A sample: {made_of}."]
-    gyro = {r.quantity.lstrip("-"): r for r in bench.readings if r.quantity.lstrip("-") in GYRO}
-    axis, sign, unit, scale = [0, 1, 2], [1.0, 1.0, 1.0], "rad/s", 1.0
-    if len(gyro) == len(GYRO):
-        reading = gyro[GYRO[0]]
-        names = ", ".join(gyro[name].source for name in GYRO)
-        if reading.unit in GYRO_SUMS:
-            sources.append(f"Unit: the log has increments in {reading.unit}; give their rates.")
-        else:
-            unit, scale = reading.unit, factor_of(reading.unit, GYRO_UNITS)
-        axis, sign = parse_axes(str(imu.attrs.get("sensor_axes") or "x,y,z"))
-        sources.append(f"Unit and axes: forward, right, down are {names}: {reading.why}.")
-    bias = bench.gyro_bias.get("rad_per_s")
-    if bias is not None:
-        sources.append(f"Bias: {bench.gyro_bias['from']}.")
-    sources.append(f"Log: {bench.source}.")
-    made = SensorConfiguration(
-        rate, unit, scale, axis, sign, (0.0, 0.0, 0.0) if bias is None else bias, tuple(sources)
-    )
-    return made, each, mean
-
-
-def _at_rate(imu: pd.DataFrame, each: int, mean: bool) -> pd.DataFrame:
-    """Samples of a lower rate: one in so many, or their means, with the first for the start."""
-    if each == 1 or not mean:
-        return imu.iloc[::each]
-    steps = increments_from_imu(imu)
-    count = len(steps) // each
-    ends = index_of(steps).reshape(-1)[each - 1 : count * each : each]
-    sums = steps[THETA].to_numpy()[: count * each].reshape(count, each, 3).sum(axis=1)
-    time = np.concatenate([index_of(imu)[:1], ends])
-    rates = sums / np.diff(time)[:, None]
-    return imu_table(time, np.vstack([rates[:1], rates]), sampling="mean")
-
-
-def _liveliest(bench: AttitudeComparison, each: int) -> int:
-    """Start of the test vector: the stretch with the most rotation, which exercises the code."""
-    rate = bench.imu[GYRO].to_numpy()
-    energy = (rate * rate).sum(axis=1).cumsum()
-    length = VECTOR * each
-    if len(energy) <= length:
-        return 0
-    return int((energy[length:] - energy[:-length]).argmax())

@@ -91,7 +91,7 @@ def test_an_algorithm_from_outside_is_compared_counted_and_verified(installed, t
 def test_an_algorithm_from_outside_is_a_word_of_the_command_line(installed, run_cli, tmp_path):
     done = run_cli(
         *("attitude", "alexiev-fig4", "--algorithms", "first_order", "--rates", "100"),
-        *("--json", "--out", str(tmp_path / "out"), "--export-c", str(tmp_path / "first.c")),
+        *("--json", "--out", str(tmp_path / "out"), "--export", str(tmp_path / "first.c")),
     )
     assert done.code == 0, done.err
     assert "first_order_step(" in (tmp_path / "first.c").read_text()

@@ -6,7 +6,7 @@ import ast
 import textwrap
 from collections.abc import Iterable, Iterator
 
-from strapdown.export_c.kernels import (
+from strapdown.export.kernels import (
     Function,
     Kernels,
     UntranslatableError,
@@ -25,6 +25,7 @@ FUNCTIONS = {
     **{name: name for name in ("sqrt", "sin", "cos", "atan2", "hypot", "fmod", "copysign")},
     "abs": "fabs",
     "max": "fmax",
+    "min": "fmin",
 }
 BINARY: dict[type[ast.operator], tuple[str, int]] = {
     ast.Add: ("+", 12),
@@ -104,7 +105,7 @@ class _Body:
         if name not in FUNCTIONS:
             raise UntranslatableError("function outside the subset", node)
         macro = FUNCTIONS[name].upper()
-        if name == "max":
+        if name in ("max", "min"):
             text = arguments[0]
             for other in arguments[1:]:
                 text = f"{macro}({text}, {other})"
@@ -161,7 +162,9 @@ class _Body:
             sign = BINARY[type(node.op)][0]
             text = f"{self.text(node.target)} {sign}= {self.text(node.value)};"
             return [*out, *wrapped(text, indent)]
-        if isinstance(node, ast.Return) and node.value is not None:
+        if isinstance(node, ast.Return):
+            if node.value is None:
+                return [*out, f"{indent}return;"]
             return out + self.give(node.value, indent, last)
         if isinstance(node, ast.Expr):
             return [*out, *wrapped(f"{self.text(node.value)};", indent)]
@@ -292,6 +295,8 @@ class Translator:
         for function in kernels.functions:  # callees precede their callers
             self._changed[function.name] = set(self._written(function))
             self._type_arrays(function)
+        for function in kernels.functions:
+            self._type_result(function)
         for function in reversed(kernels.functions):
             self._type_arguments(function)
 
@@ -328,6 +333,12 @@ class Translator:
                 for parameter, argument in zip(other.parameters, node.args, strict=True):
                     if self.types(other).get(parameter) == "array":
                         types[name_of(argument)] = "array"
+
+    def _type_result(self, function: Function) -> None:
+        """Find a result that is a condition, before its callers use it."""
+        for node in walk(function.body):
+            if isinstance(node, ast.Return) and isinstance(node.value, ast.Compare | ast.BoolOp):
+                self._returns[function.name] = "int"
 
     def _type_arguments(self, function: Function) -> None:
         """Find the types of the locals, then of the parameters of called functions."""

@@ -41,12 +41,14 @@ class Kernels:
     """The sources of all kernels, and the functions required so far.
 
     `home`: module of the algorithm's kernels (`attitude_algorithms.cost.kernel_home`). `ranges`:
-    for a variable with an integer value at run time: the least and the greatest. `functions`: in
-    the order of definition.
+    for a variable with an integer value at run time: the least and the greatest. `fixed`: numbers
+    of the state and calls, as they are written, whose value is known. `functions`: in the order of
+    definition.
     """
 
     home: str
     ranges: dict[str, tuple[int, int]] = field(default_factory=dict)
+    fixed: dict[str, float] = field(default_factory=dict)
     functions: list[Function] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -167,8 +169,8 @@ class Specialiser:
             if not isinstance(target, ast.Name | ast.Subscript):
                 raise UntranslatableError("statement outside the subset", node)
             new = ast.AugAssign(target, node.op, self.expression(node.value))
-        elif isinstance(node, ast.Return) and node.value is not None:
-            new = ast.Return(self.expression(node.value))
+        elif isinstance(node, ast.Return):
+            new = ast.Return(None if node.value is None else self.expression(node.value))
         elif isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
             new = ast.Expr(self.expression(node.value))
         elif isinstance(node, ast.For) and isinstance(node.iter, ast.Tuple):
@@ -231,6 +233,9 @@ class Specialiser:
 
     def expression(self, node: ast.expr) -> ast.expr:
         """Substitute known values."""
+        fixed = self.fixed(node)
+        if fixed is not None:
+            return ast.copy_location(ast.Constant(fixed), node)
         if self.depends(node):
             span = self.span(node)
             if span and span[0] == span[1]:
@@ -277,10 +282,20 @@ class Specialiser:
         """Whether an option takes part; formulas of constants alone stay as written."""
         return any(isinstance(p, ast.Name) and p.id in self.env for p in ast.walk(node))
 
+    def fixed(self, node: ast.expr) -> float | None:
+        """Value of a number of the state, or of a call, that is known; of others None."""
+        read = isinstance(node, ast.Call) or (
+            isinstance(node, ast.Subscript) and isinstance(node.ctx, ast.Load)
+        )
+        return self.kernels.fixed.get(ast.unparse(node)) if read else None
+
     def span(self, node: ast.expr) -> Span | None:
         """Value or range of an expression, if options or constants determine it."""
         if isinstance(node, ast.Constant) and isinstance(node.value, int | float):
             return node.value, node.value
+        fixed = self.fixed(node)
+        if fixed is not None:
+            return fixed, fixed
         if isinstance(node, ast.Name):
             return self.env.get(node.id) or self.kernels.span(node.id)
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and len(node.args) == 1:
@@ -306,12 +321,20 @@ class Specialiser:
         if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Not):
             inside = self.truth(node.operand)
             return None if inside is None else not inside
-        if isinstance(node, ast.Compare) and len(node.ops) == 1 and self.depends(node):
+        if isinstance(node, ast.Compare) and len(node.ops) == 1 and self.known(node):
             a, b = self.span(node.left), self.span(node.comparators[0])
             if a and b:
                 return COMPARISONS[type(node.ops[0])](a, b)
+        fixed = self.fixed(node)
+        if fixed is not None:
+            return bool(fixed)
         span = self.env.get(node.id) if isinstance(node, ast.Name) else None
         return bool(span[0]) if span and span[0] == span[1] else None
+
+    def known(self, node: ast.expr) -> bool:
+        """Whether an option, or a number of the state that is known, takes part."""
+        parts = (p for p in ast.walk(node) if isinstance(p, ast.expr))
+        return self.depends(node) or any(self.fixed(p) is not None for p in parts)
 
 
 # Knowledge of a number before the program runs: its value, or its range.

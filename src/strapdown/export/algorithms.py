@@ -1,18 +1,17 @@
-"""Compose the C file: header, interface, kernels, test."""
+"""An attitude algorithm as one C99 file: header, interface, kernels, test."""
 
 from __future__ import annotations
 
 import importlib
-import itertools
 import re
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from strapdown import rotation
 from strapdown._kernels import arithmetic
@@ -20,50 +19,26 @@ from strapdown.attitude_algorithms import AttitudeAlgorithm
 from strapdown.attitude_algorithms.cost import count_cost, kernel_home, step_kernel
 from strapdown.constants import CORTEX_M4F_CYCLES
 from strapdown.errors import ConfigError, check_choice
-from strapdown.export_c.kernels import Function, Kernels
-from strapdown.export_c.translate import WIDTH, Translator, comment, number
+from strapdown.export.configuration import SensorConfiguration
+from strapdown.export.kernels import Function, Kernels
+from strapdown.export.program import (
+    ROUNDINGS,
+    SAMPLES,
+    Array,
+    Pipe,
+    Vector,
+    c_rows,
+    constant_lines,
+    main_program,
+    precision_lines,
+    unit_lines,
+)
+from strapdown.export.translate import WIDTH, Translator, comment
 from strapdown.increments import BETWEEN_STAMPS
 from strapdown.tables import GYRO, check_imu, check_sampling_kind
 
-Array = NDArray[np.float64]
 
-# Math functions with a macro for each precision.
-MACROS = ("SQRT", "SIN", "COS", "ATAN2", "HYPOT", "FABS", "FMOD", "FMAX", "COPYSIGN")
-
-
-@dataclass(frozen=True)
-class SensorConfiguration:
-    """How a device reads its gyro: `attitude_sample` takes the raw reading.
-
-    `rate_hz`: of the samples. `unit`: of a reading, in words, `scale` rad/s each. `axis`, `sign`:
-    axis of the sensor that points forward, right, down, 0 to 2, and its sign. `bias` ((3,), rad/s):
-    subtracted, forward, right, down. `sources`: where each of these is from, for the head of the
-    file.
-    """
-
-    rate_hz: float
-    unit: str = "rad/s"
-    scale: float = 1.0
-    axis: Sequence[int] = (0, 1, 2)
-    sign: Sequence[float] = (1.0, 1.0, 1.0)
-    bias: Sequence[float] = (0.0, 0.0, 0.0)
-    sources: tuple[str, ...] = ()
-
-    def rates(self, raw: Array, number: Any = np.float64) -> Array:
-        """Rates of the body in rad/s, as the file computes them in a precision."""
-        factors = np.array(self.sign, number) * number(self.scale)
-        return np.asarray(
-            factors * raw[:, list(self.axis)].astype(number) - np.array(self.bias, number)
-        )
-
-    def raw(self, rates: Array) -> Array:
-        """Readings of rates of the body in rad/s."""
-        out = np.empty_like(rates)
-        out[:, list(self.axis)] = (rates + self.bias) * self.sign / self.scale
-        return out
-
-
-def export_c(
+def algorithm_in_c(
     algorithm: AttitudeAlgorithm,
     *,
     interpolation: str = "linear",
@@ -72,28 +47,10 @@ def export_c(
     imu: pd.DataFrame | None = None,
     configuration: SensorConfiguration | None = None,
 ) -> str:
-    """Write an attitude algorithm as one C99 file with its own test.
-
-    The formulas are translated from strapdown's own kernels: the same operations in the same order.
-    In double precision the file reproduces `run_attitude` bitwise wherever the C library's sine and
-    cosine equal those of Python.
-
-    `interpolation` ({'linear', 'cubic'}): as in `increments_from_imu`; the cubic delays the
-    attitude by one sample. `sampling` ({'instantaneous', 'mean'}): meaning of a sample; by default
-    as in `imu`, or the rate at its instant. `q_nb` ((4,)): initial attitude of the test. `imu`: an
-    Imu table whose first 48 samples are the test; by default a built-in motion. `configuration`:
-    rate, unit, axes and bias of the sensor, with which the file takes its raw readings at even
-    steps; `imu` then has samples of that rate. Returns the text of the file. ConfigError:
-    `interpolation` or `sampling` is unknown, or `sampling` differs from that of `imu`. DataError:
-    `q_nb` is not a rotation; or as `tables.check_imu`.
-    """
-    kind = _kind(interpolation, sampling, imu)
+    """Write an attitude algorithm as one C99 file with its own test: `export_c`."""
+    kind = sampling_kind(interpolation, sampling, imu)
     around, shape = SAMPLINGS[kind], shape_of(algorithm)
-    kernels = Kernels(kernel_home(algorithm), shape.ranges(algorithm))
-    step = _require_step(kernels, algorithm)
-    increments = _require_increments(kernels, kind, "dx" in step.parameters)
-    for name in ("quat_normalise", "euler_from_quat", *shape.kernels):
-        kernels.require(name)
+    kernels, step, increments = algorithm_kernels(algorithm, shape, kind)
     translator = Translator(kernels)
     functions = ["\n".join(translator.function(f)) + "\n" for f in kernels.functions]
     ends = ENDS.format(
@@ -104,19 +61,29 @@ def export_c(
     )
     sample = "" if configuration is None else _sample(configuration)
     body = "\n".join(filter(None, [*functions, ends, sample]))
-    vector = make_vector(algorithm, rotation.normalise(q_nb), kind, imu, configuration)
+    start = rotation.normalise(q_nb)
+    vector = make_vector(algorithm, start, kind, imu, configuration)
+    pipe = Pipe(
+        take=TAKE_RATES if configuration is None else TAKE_RAW,
+        read=READ_RATES if configuration is None else READ_RAW,
+        columns="dt in s, rates in rad/s" if configuration is None else "raw readings",
+        bound=_bound(vector),
+        start=start,
+        lag=around.lag,
+    )
     parts = [
         _header(algorithm, around, translator.state_size, configuration),
         precision_lines(body),
         _interface(shape, around, translator.state_size, configuration),
         constant_lines(kernels),
         body,
-        main_program(vector, rotation.normalise(q_nb), around.lag),
+        main_program(vector, pipe),
     ]
     return "\n".join(parts)
 
 
-def _kind(interpolation: str, sampling: str | None, imu: pd.DataFrame | None) -> str:
+def sampling_kind(interpolation: str, sampling: str | None, imu: pd.DataFrame | None) -> str:
+    """Which of `SAMPLINGS`."""
     check_choice(
         "mechanization.no-interpolation",
         BETWEEN_STAMPS,
@@ -141,6 +108,18 @@ def _kind(interpolation: str, sampling: str | None, imu: pd.DataFrame | None) ->
 # --- required kernel functions ------------------------------------------------------------
 
 
+def algorithm_kernels(
+    algorithm: AttitudeAlgorithm, shape: Shape, kind: str
+) -> tuple[Kernels, Function, Function]:
+    """Kernels of an algorithm, among them its step and the increments of one axis."""
+    kernels = Kernels(kernel_home(algorithm), shape.ranges(algorithm))
+    step = _require_step(kernels, algorithm)
+    increments = _require_increments(kernels, kind, "dx" in step.parameters)
+    for name in ("quat_normalise", "euler_from_quat", *shape.kernels):
+        kernels.require(name)
+    return kernels, step, increments
+
+
 def _require_step(kernels: Kernels, algorithm: AttitudeAlgorithm) -> Function:
     name = step_kernel(algorithm)[1]
     options = zip(kernels.parameters(name)[-2:], algorithm.kernel_options(), strict=True)
@@ -158,19 +137,8 @@ def _require_increments(kernels: Kernels, kind: str, change: bool) -> Function:
 
 def _sample(configuration: SensorConfiguration) -> str:
     """The function that takes a raw reading."""
-    rows = []
-    for axis, sign, bias in zip(
-        configuration.axis, configuration.sign, configuration.bias, strict=True
-    ):
-        minus = "-" if sign < 0.0 else ""
-        less = f" - {number(abs(bias))}" if bias >= 0.0 else f" + {number(abs(bias))}"
-        rows.append(f"        {minus}ATTITUDE_UNIT * raw[{axis}]{less if bias else ''},\n")
-    return SAMPLE.format(
-        scale=number(float(configuration.scale)),
-        step=number(1.0 / configuration.rate_hz),
-        unit=configuration.unit,
-        rate=f"{configuration.rate_hz:.10g}",
-        rows="".join(rows),
+    return unit_lines(configuration, ("gyro",)) + SAMPLE.format(
+        rows=c_rows(configuration.gyro, "raw", "GYRO_UNIT")
     )
 
 
@@ -235,7 +203,7 @@ def _header(
         + ".",
         f"{algorithm.label}, written by strapdown {version} from the kernels that it runs itself.",
         f"{around.words}.",
-        *(() if configuration is None else _configured(configuration)),
+        *(() if configuration is None else configuration.words(("gyro",))),
         "Axes: body forward-right-down; local level north-east-down. q_nb turns body into local "
         "level, Hamilton, scalar first. Rates in rad/s of the body relative to inertial space, "
         "time in s.",
@@ -251,55 +219,6 @@ def _header(
     return "\n".join(comment("\n\n".join(lines))) + "\n"
 
 
-def _configured(configuration: SensorConfiguration) -> list[str]:
-    """The configuration in words: what `attitude_sample` takes, and where each figure is from."""
-    along = ", ".join(
-        f"{name} {'-' if sign < 0.0 else ''}{'xyz'[axis]}"
-        for name, axis, sign in zip(
-            ("forward", "right", "down"), configuration.axis, configuration.sign, strict=True
-        )
-    )
-    bias = ", ".join(f"{v:.6g}" for v in configuration.bias)
-    return [
-        f"Configuration of attitude_sample: {configuration.rate_hz:.10g} samples a second; "
-        f"readings in {configuration.unit}, {configuration.scale:.10g} rad/s each; axes of the "
-        f"sensor: {along}; gyro bias subtracted: {bias} rad/s forward, right, down.",
-        *configuration.sources,
-    ]
-
-
-def precision_lines(body: str) -> str:
-    """Type of a number and the functions of the math library in use, for each precision."""
-    used = [m for m in MACROS if re.search(rf"\b{m}\(", body)]
-    single = "\n".join(f"#define {m} {m.lower()}f" for m in used)
-    double = "\n".join(f"#define {m} {m.lower()}" for m in used)
-    pi = "#define PI R(3.141592653589793)\n" if re.search(r"\bPI\b", body) else ""
-    return f"""\
-#include <math.h>
-
-#ifndef REAL
-#define REAL float
-#endif
-typedef REAL real_t;
-#define R(x) ((real_t)(x))
-
-/* The square of what is below LARGEST is still a number. */
-#define JOIN_(a, b) a##b
-#define JOIN(a, b) JOIN_(a, b)
-#define IS_float 1
-#define IS_double 2
-#if JOIN(IS_, REAL) == IS_float
-#define LARGEST 1e18F
-{single}
-#elif JOIN(IS_, REAL) == IS_double
-#define LARGEST 1e150
-{double}
-#else
-#error "REAL must be float or double"
-#endif
-{pi}"""
-
-
 def _interface(
     shape: Shape, around: Sampling, size: int, configuration: SensorConfiguration | None
 ) -> str:
@@ -310,18 +229,6 @@ def _interface(
         + PROTOTYPES.format(finish=lag)
         + ("" if configuration is None else SAMPLE_PROTOTYPE)
     )
-
-
-def constant_lines(kernels: Kernels) -> str:
-    """Definitions of the constants in use; a comment on several is above the first."""
-    lines: list[str] = []
-    before = ""
-    for constant in kernels.constants():
-        if constant.comment and constant.comment != before:
-            lines += comment(constant.comment)
-        before = constant.comment
-        lines.append(f"#define {constant.name} {number(constant.value)}")
-    return "\n".join([*lines, ""]) if lines else ""
 
 
 # C code around the kernels: structure, initialization, one sample, output.
@@ -364,8 +271,8 @@ class Shape:
 
     `state`: meaning of its numbers. `begin`, `read`: statements: from w, x, y, z into ``a->state``;
     from there into ``q_nb``. `begun`: count of state numbers that `begin` sets; the rest is zero.
-    `kernels`: kernels that these call. `ranges`: least and greatest value of integers that a kernel
-    computes at run time.
+    `kernels`: kernels that these call. `python`: `begin` and `read` in Python. `ranges`: least and
+    greatest value of integers that a kernel computes at run time.
     """
 
     state: str
@@ -373,18 +280,21 @@ class Shape:
     read: str
     begun: int
     kernels: tuple[str, ...]
+    python: tuple[str, str]
     ranges: Callable[[AttitudeAlgorithm], dict[str, tuple[int, int]]] = field(
         default=lambda algorithm: {}
     )
 
 
-_BY_QUATERNION = Shape("quaternion w, x, y, z", _COPY, _UNIT, 4, ())
+_IN_PYTHON = ("self.state[:4] = w, x, y, z", "return quat_normalise(*self.state[:4])")
+_BY_QUATERNION = Shape("quaternion w, x, y, z", _COPY, _UNIT, 4, (), _IN_PYTHON)
 _BY_MATRIX = Shape(
     "C_nb row by row, steps since it was orthogonalised",
     "dcm_from_quat(w, x, y, z, a->state);",
     _ROWS.format("a->state"),
     9,
     ("dcm_from_quat", "quat_from_dcm"),
+    ("self.state[:9] = dcm_from_quat(w, x, y, z)", "return quat_from_dcm(*self.state[:9])"),
 )
 _TRUNCATED = Shape(
     _BY_MATRIX.state,
@@ -392,16 +302,37 @@ _TRUNCATED = Shape(
     NEAREST + _ROWS.format("m"),
     9,
     (*_BY_MATRIX.kernels, "orthogonalise"),
+    (
+        _BY_MATRIX.python[0],
+        """\
+scale = math.sqrt(3.0 / sum(v * v for v in self.state[:9]))
+m = [scale * v for v in self.state[:9]]
+for _ in range(12):
+    orthogonalise(m)
+return quat_from_dcm(*m)""",
+    ),
 )
 
+_ANGLES_IN_PYTHON = "self.state[:3] = euler_from_quat(w, x, y, z)"
 SHAPES: dict[str, Shape] = {
-    "naive": Shape("roll, pitch, heading, rad", _FROM_ANGLES, _ANGLES, 3, ("quat_from_euler",)),
+    "naive": Shape(
+        "roll, pitch, heading, rad",
+        _FROM_ANGLES,
+        _ANGLES,
+        3,
+        ("quat_from_euler",),
+        (_ANGLES_IN_PYTHON, "return quat_from_euler(*self.state[:3])"),
+    ),
     "euler": Shape(
         "roll, pitch, heading, rad; least |cos pitch|, its step, steps",
         f"{_FROM_ANGLES}\n    a->state[3] = FABS(COS(a->state[1]));",
         _ANGLES,
         4,
         ("quat_from_euler",),
+        (
+            f"{_ANGLES_IN_PYTHON}\n        self.state[3] = abs(math.cos(self.state[1]))",
+            "return quat_from_euler(*self.state[:3])",
+        ),
     ),
     "dcm": _BY_MATRIX,
     "quaternion": _BY_QUATERNION,
@@ -413,6 +344,7 @@ SHAPES: dict[str, Shape] = {
         _UNIT,
         8,
         (),
+        ("self.state[:8] = 2 * (w, x, y, z)", _IN_PYTHON[1]),
         lambda algorithm: {"done": (0, int(algorithm.kernel_options()[0]) - 1)},
     ),
 }
@@ -425,7 +357,7 @@ def shape_of(algorithm: AttitudeAlgorithm) -> Shape:
     if algorithm.name in SHAPES:
         return SHAPES[algorithm.name]
     if type(algorithm).begin is not AttitudeAlgorithm.begin:
-        raise ConfigError("attitude.state-not-exported", quantity="--export-c", name=algorithm.name)
+        raise ConfigError("attitude.state-not-exported", quantity="--export", name=algorithm.name)
     return _BY_QUATERNION
 
 
@@ -605,9 +537,6 @@ int attitude_sample(struct attitude *a, const real_t raw[3], real_t q_nb[4]);
 """
 
 SAMPLE = """\
-#define ATTITUDE_UNIT {scale} /* rad/s, of a reading in {unit} */
-#define ATTITUDE_STEP {step} /* s, at {rate} Hz */
-
 int attitude_sample(struct attitude *a, const real_t raw[3], real_t q_nb[4])
 {{
     const real_t gyro[3] = {{
@@ -641,36 +570,43 @@ void attitude_euler(const struct attitude *a, real_t euler[3])
 """
 
 
+# How the test passes samples.
+
+TAKE_RATES = """\
+            const real_t gyro[3] = {R(samples[k][1]), R(samples[k][2]), R(samples[k][3])};
+            failed |= attitude_update(&a, R(samples[k][0]), gyro);"""
+READ_RATES = """\
+    double dt, x, y, z;
+    while (scanf("%lf %lf %lf %lf", &dt, &x, &y, &z) == 4) {
+        const real_t gyro[3] = {R(x), R(y), R(z)};
+        if (attitude_update(&a, R(dt), gyro)) {
+            fprintf(stderr, "refused: %g %g %g %g\\n", dt, x, y, z);
+        }"""
+TAKE_RAW = """\
+            const real_t raw[3] = {R(samples[k][0]), R(samples[k][1]), R(samples[k][2])};
+            real_t q[4];
+            failed |= attitude_sample(&a, raw, q);"""
+READ_RAW = """\
+    double x, y, z;
+    while (scanf("%lf %lf %lf", &x, &y, &z) == 3) {
+        const real_t raw[3] = {R(x), R(y), R(z)};
+        real_t q[4];
+        if (attitude_sample(&a, raw, q)) {
+            fprintf(stderr, "refused: %g %g %g\\n", x, y, z);
+        }"""
+
+
+def _bound(vector: Vector) -> str:
+    text = (
+        f"{len(vector.samples)} steps of {ROUNDINGS} roundings that another compiler or another "
+        "sine may make otherwise"
+    )
+    if vector.condition > 1.0:
+        text += f", each magnified by 1/cos(pitch), here up to {vector.condition:.3g}"
+    return text
+
+
 # Test vector: a short record and its attitudes in double and single precision.
-
-
-SAMPLES = 48
-# Rounding of a step that may differ between compilers (fused products, their own sine): a
-# product of quaternions is four sums of four products, 4 roundings of half an eps each, and so
-# 2 eps a component, 4 eps in the vector of four, 8 eps as an angle; the same again for the
-# quaternion of the increment; and both runs may have them.
-ROUNDINGS = 32
-
-
-@dataclass(frozen=True)
-class Vector:
-    """A test vector.
-
-    `samples` ((n, 4)): dt in s and the rates in rad/s, or of a configured sensor ((n, 3)) raw
-    readings, each exactly representable in single precision. `double`, `single` ((n, 4)): attitude
-    at each sample from the kernels in either precision. `condition`: factor by which the algorithm
-    magnifies an error near its singularity.
-    """
-
-    samples: Array
-    double: Array
-    single: Array
-    condition: float
-
-    @property
-    def roundings(self) -> float:
-        """Largest difference between two correct implementations, in eps of the precision."""
-        return len(self.samples) * ROUNDINGS * self.condition
 
 
 def motion() -> Array:
@@ -712,10 +648,11 @@ def make_vector(
         rows[0, 0] = 0.0
     samples, rounded = rows, rows
     if configuration is not None:
-        samples = configuration.raw(rows[:, 1:]).astype(np.float32).astype(np.float64)
+        gyro = configuration.gyro
+        samples = gyro.raw(rows[:, 1:]).astype(np.float32).astype(np.float64)
         step = np.full((len(rows), 1), 1.0 / configuration.rate_hz)
-        rows = np.hstack([step, configuration.rates(samples)])
-        rounded = np.hstack([step, configuration.rates(samples, np.float32)])
+        rows = np.hstack([step, gyro.body(samples)])
+        rounded = np.hstack([step, gyro.body(samples, np.float32)])
     double, state = _run(algorithm, rows, q_nb, kind, single=False)
     single, _ = _run(algorithm, rounded, q_nb, kind, single=True)
     # The rates of the angles, and their errors, have 1/cos(pitch) as a factor.
@@ -756,166 +693,3 @@ def _run(
     if kind != "mean":
         history = np.vstack([first, history])
     return algorithm.quaternions(np.ascontiguousarray(history, dtype=np.float64)), state
-
-
-# Test at the end of the C file: a vector with its attitudes, and a filter for a pipe.
-
-_TEST = """\
-#ifdef ATTITUDE_TEST
-#include <float.h>
-#include <stdio.h>
-
-#define SAMPLES {n}
-#define LAG {lag} /* samples by which the attitude is behind */
-
-{start}
-/* {what}; single precision holds each exactly. */
-static const double samples[SAMPLES][{columns}] = {{
-{samples}
-}};
-
-/* q_nb at each sample, by the kernels of strapdown in the same precision. */
-static const double expected[SAMPLES][4] = {{
-#if JOIN(IS_, REAL) == IS_float
-{single}
-#else
-{double}
-#endif
-}};
-
-{bound}
-#define EPSILON (sizeof(real_t) == sizeof(float) ? (double)FLT_EPSILON : DBL_EPSILON)
-#define BOUND ({roundings} * EPSILON)
-
-/* Angle between the attitude and an expected one, rad. */
-static double apart(const struct attitude *a, const double *q_nb)
-{{
-    real_t q[4];
-    double sum = 0.0, difference = 0.0;
-    attitude_quaternion(a, q);
-    for (int i = 0; i < 4; i++) {{
-        difference += ((double)q[i] - q_nb[i]) * ((double)q[i] - q_nb[i]);
-        sum += ((double)q[i] + q_nb[i]) * ((double)q[i] + q_nb[i]);
-    }}
-    return 2.0 * sqrt(difference < sum ? difference : sum);
-}}
-
-int main(void)
-{{
-    struct attitude a;
-    double largest = 0.0;
-    int failed = 0;
-    attitude_init(&a, start);
-    for (int k = 0; k < SAMPLES + LAG; k++) {{
-        if (k < SAMPLES) {{
-{take}
-        }}{finish}
-        if (k >= LAG) {{
-            const double angle = apart(&a, expected[k - LAG]);
-            failed |= !(angle <= BOUND); /* so written NaN fails, too */
-            largest = angle > largest ? angle : largest;
-        }}
-    }}
-    printf("largest difference %.3g rad, bound %.3g rad: %s\\n", largest, BOUND,
-        failed ? "FAILED" : "passed");
-    return failed;
-}}
-#endif
-
-#ifdef ATTITUDE_FILTER
-#include <stdio.h>
-
-static void put(const struct attitude *a)
-{{
-    real_t q[4];
-    attitude_quaternion(a, q);
-    for (int i = 0; i < 4; i++) {{
-        printf("%.17g%c", (double)q[i], i < 3 ? ' ' : '\\n');
-    }}
-}}
-
-int main(void)
-{{
-    static const real_t from[4] = {{{from_}}};
-    struct attitude a;
-{read}
-        put(&a);
-    }}
-{last}    return 0;
-}}
-#endif
-"""
-_TAKE = """\
-            const real_t gyro[3] = {R(samples[k][1]), R(samples[k][2]), R(samples[k][3])};
-            failed |= attitude_update(&a, R(samples[k][0]), gyro);"""
-_READ = """\
-    double dt, x, y, z;
-    attitude_init(&a, from);
-    while (scanf("%lf %lf %lf %lf", &dt, &x, &y, &z) == 4) {
-        const real_t gyro[3] = {R(x), R(y), R(z)};
-        if (attitude_update(&a, R(dt), gyro)) {
-            fprintf(stderr, "refused: %g %g %g %g\\n", dt, x, y, z);
-        }"""
-_TAKE_RAW = """\
-            const real_t raw[3] = {R(samples[k][0]), R(samples[k][1]), R(samples[k][2])};
-            real_t q[4];
-            failed |= attitude_sample(&a, raw, q);"""
-_READ_RAW = """\
-    double x, y, z;
-    attitude_init(&a, from);
-    while (scanf("%lf %lf %lf", &x, &y, &z) == 3) {
-        const real_t raw[3] = {R(x), R(y), R(z)};
-        real_t q[4];
-        if (attitude_sample(&a, raw, q)) {
-            fprintf(stderr, "refused: %g %g %g\\n", x, y, z);
-        }"""
-_FINISH = """ else {
-            attitude_finish(&a);
-        }"""
-_LAST = """\
-    attitude_finish(&a);
-    put(&a);
-"""
-
-
-def main_program(vector: Vector, q_nb: Array, lag: int) -> str:
-    """Return the end of the file, which is compiled only for a test.
-
-    `q_nb` ((4,)): initial attitude. `lag`: delay of the attitude in samples.
-    """
-    from_ = ", ".join(f"R({float(v)!r})" for v in q_nb)
-    bound = (
-        f"{len(vector.samples)} steps of {ROUNDINGS} roundings that another compiler or another "
-        "sine may make otherwise"
-    )
-    if vector.condition > 1.0:
-        bound += f", each magnified by 1/cos(pitch), here up to {vector.condition:.3g}"
-    raw = vector.samples.shape[1] == 3
-    return _TEST.format(
-        what="Raw readings" if raw else "dt in s, rates in rad/s",
-        columns=3 if raw else 4,
-        take=_TAKE_RAW if raw else _TAKE,
-        read=_READ_RAW if raw else _READ,
-        n=len(vector.samples),
-        lag=lag,
-        start=f"static const real_t start[4] = {{{from_}}};\n".replace("R(", "\n    R("),
-        samples=braced(vector.samples),
-        single=braced(vector.single),
-        double=braced(vector.double),
-        bound="\n".join(comment(f"{bound}.")),
-        roundings=f"{vector.roundings:.4g}".replace("e+0", "e"),
-        finish=_FINISH if lag else "",
-        last=_LAST if lag else "",
-        from_=from_.replace("R(", "\n        R("),
-    )
-
-
-def braced(values: Array) -> str:
-    """Rows of numbers in braces, as C reads them."""
-    # The shortest decimals that are read as the same double: C++11 has no hexadecimal ones.
-    rows = (f"{{{', '.join(repr(float(v)) for v in row)}}}," for row in values)
-    lines = (
-        textwrap.wrap(row, WIDTH, initial_indent="    ", subsequent_indent="        ")
-        for row in rows
-    )
-    return "\n".join(itertools.chain.from_iterable(lines))

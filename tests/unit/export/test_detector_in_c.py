@@ -6,10 +6,10 @@ import subprocess
 
 import numpy as np
 import pytest
-from tests.unit.export_c.test_export_c import COMPILER, WARNINGS, needs_compiler
+from tests.unit.export.test_algorithms_in_c import COMPILER, WARNINGS, needs_compiler
 
 from strapdown._kernels import crash_trigger as kernel
-from strapdown.export_c.detector import STEP, crash_samples, export_detector, run_samples
+from strapdown.export.detector import STEP, crash_samples, export_detector, run_samples
 
 ERRORS, VARIANCE = (0.01, 0.005, 0.002, 0.0175, 0.0175, 0.02), 1.05
 # Prints the result of `crash_update`, of `crash_delta_v`, and its numbers, for each sample.

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 
 from strapdown._kernels import arithmetic
 from strapdown._kernels import crash_trigger as kernel
-from strapdown.export_c.kernels import Kernels
-from strapdown.export_c.program import (
+from strapdown.export.kernels import Kernels
+from strapdown.export.program import (
     ROUNDINGS,
     braced,
     constant_lines,
     precision_lines,
 )
-from strapdown.export_c.translate import Translator, comment
+from strapdown.export.translate import Translator, comment
 
 Array = NDArray[np.float64]
 

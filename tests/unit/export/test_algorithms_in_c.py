@@ -20,12 +20,12 @@ from strapdown._kernels import arithmetic
 from strapdown.attitude_algorithms import ALGORITHMS, make_algorithm, run_attitude
 from strapdown.attitude_algorithms.cost import count_cost, step_kernel
 from strapdown.errors import ConfigError, DataError
-from strapdown.export_c import SensorConfiguration, export_c
-from strapdown.export_c.kernels import Kernels, UntranslatableError
-from strapdown.export_c.program import SHAPES
-from strapdown.export_c.translate import Translator
+from strapdown.export import Channel, SensorConfiguration, export_c
+from strapdown.export.algorithms import SHAPES
+from strapdown.export.kernels import Kernels, UntranslatableError
+from strapdown.export.translate import Translator
 from strapdown.increments import increments_from_imu
-from strapdown.report.attitude import write_c
+from strapdown.report.attitude_export import write_export
 from strapdown.tables import GYRO, QUATERNION, imu_table, increments_table
 
 # Those of the contracts: a new algorithm is in the subset, or the contract is not yet kept.
@@ -334,7 +334,7 @@ def test_the_first_samples_of_a_log_can_be_the_test(tmp_path):
     imu = imu_table(17.0 + np.cumsum(rows[:, 0]), rows[:, 1:], sampling="mean")
     text = export_c(make_algorithm("quaternion"), imu=imu, q_nb=START)
     assert "mean rate" in text  # taken from the log
-    assert "#define SAMPLES 47" in text  # the first mean began before the log
+    assert "#define ROWS 47" in text  # the first mean began before the log
     for real in ("float", "double"):
         run(build(tmp_path, text, f"-DREAL={real}", "-DATTITUDE_TEST"))
 
@@ -402,12 +402,8 @@ def test_the_example_of_the_manual_is_what_is_written():
 #: A sensor in milli-degrees a second, whose y points forward, x right and z up, with a bias.
 SENSOR = SensorConfiguration(
     50.0,
-    "mdeg/s",
-    np.pi / 180e3,
-    (1, 0, 2),
-    (1.0, 1.0, -1.0),
-    (0.01, -0.02, 0.0),
-    ("Rate: by the test.",),
+    Channel("mdeg/s", np.pi / 180e3, (1, 0, 2), (1.0, 1.0, -1.0), (0.01, -0.02, 0.0)),
+    sources=("Rate: by the test.",),
 )
 
 
@@ -459,11 +455,11 @@ def norms(q):
 @pytest.mark.parametrize(
     ("right", "wrong"),
     [
-        ("ATTITUDE_UNIT * raw[1]", "ATTITUDE_UNIT * raw[0]"),
-        ("-ATTITUDE_UNIT * raw[2]", "ATTITUDE_UNIT * raw[2]"),
+        ("GYRO_UNIT * raw[1]", "GYRO_UNIT * raw[0]"),
+        ("-GYRO_UNIT * raw[2]", "GYRO_UNIT * raw[2]"),
         ("- R(0.01)", "+ R(0.01)"),
         ("define ATTITUDE_STEP R(0.02)", "define ATTITUDE_STEP R(0.0201)"),
-        ("define ATTITUDE_UNIT R(1.7453", "define ATTITUDE_UNIT R(1.7553"),
+        ("define GYRO_UNIT R(1.7453", "define GYRO_UNIT R(1.7553"),
     ],
 )
 def test_its_test_finds_a_wrong_configuration(tmp_path, right, wrong):
@@ -496,7 +492,7 @@ def test_file_of_a_comparison_is_its_configuration(tmp_path, meaning):
     assert each > 1
     # How a sample of the lower rate is made is the answer's, whichever it gave here.
     answer = dataclasses.replace(bench.answer, meaning=meaning)
-    write_c(dataclasses.replace(bench, answer=answer), tmp_path / "attitude.c")
+    write_export(dataclasses.replace(bench, answer=answer), tmp_path / "attitude.c")
     text = (tmp_path / "attitude.c").read_text()
     assert run(build(tmp_path, text, "-DATTITUDE_TEST")).endswith("passed\n")
     program = build(tmp_path, text, "-DATTITUDE_FILTER", "-DREAL=double")
@@ -515,7 +511,7 @@ def test_file_of_a_comparison_is_its_configuration(tmp_path, meaning):
         rates,
         sampling="mean" if meaning == "sum" else "instantaneous",
     )
-    from_ = re.search(r"from\[4\] = \{(.*?)\};", text, re.S)
+    from_ = re.search(r"start\[4\] = \{(.*?)\};", text, re.S)
     start = [float(v) for v in re.findall(r"R\((.*?)\)", from_[1])]
     run_ = run_attitude(make_algorithm("quaternion"), increments_from_imu(imu), start)
     expected = run_.attitude[QUATERNION].to_numpy()[meaning == "sum" :]
