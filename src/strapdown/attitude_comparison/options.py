@@ -96,7 +96,7 @@ class AttitudeOptions:
         For the filters: ``auto``, hard and soft iron are removed where the log shows them
         significantly; ``raw``, left; or the path of a log in which the sensor turned through all
         directions.
-    lat, lon, height : float, optional, deg, deg, m
+    lat, lon, alt : float, optional, deg, deg, m
         Place: headings of filters with a magnetometer become true ones, by the World Magnetic Model
         at the date of the log.
     peers : sequence of str
@@ -128,7 +128,7 @@ class AttitudeOptions:
     magnetometer: str | Path = "auto"
     lat: float | None = None
     lon: float | None = None
-    height: float | None = None
+    alt: float | None = None
     peers: Sequence[str] = ()
     from_s: float | None = None
     to_s: float | None = None
@@ -178,11 +178,11 @@ class AttitudeOptions:
         bias = _text(self.gyro_bias)
         bias_path = str(Path(bias)) if _exists(bias) else None
         field_path = str(Path(self.magnetometer)) if _exists(str(self.magnetometer)) else None
-        if (self.lat is None) != (self.lon is None) or (self.height and self.lat is None):
+        if (self.lat is None) != (self.lon is None) or (self.alt and self.lat is None):
             raise ConfigError("attitude.half-a-place", quantity="--lat, --lon")
         place = None
         if self.lat is not None and self.lon is not None:
-            place = (self.lat, self.lon, self.height or 0.0)
+            place = (self.lat, self.lon, self.alt or 0.0)
         algorithms = _texts(self.algorithms)
         return specify(
             AttitudeSpec,

@@ -10,11 +10,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from strapdown.cli.shared_options import (
+    Height,
     LogFlags,
+    Longitude,
     OutFlags,
     folder_to_make,
     running,
     spread,
+    with_what,
     writing,
 )
 
@@ -115,16 +118,14 @@ class ComparisonFlags:
         running(
             "auto|raw|LOG",
             "Of the filters: hard and soft iron removed where the log shows them; raw, left; or a "
-            "log in which the sensor turned through all directions (auto).",
+            "log in which the sensor turned through all directions (auto). With --lat and --lon "
+            "headings are true ones.",
             show_default=False,
         ),
     ] = "auto"
-    lat: Annotated[
-        float | None,
-        running("DEG", "Latitude, north positive: with it headings by the field are true ones."),
-    ] = None
-    lon: Annotated[float | None, running("DEG", "Longitude, east positive.")] = None
-    height: Annotated[float | None, running("M", "Height over the ellipsoid (0).")] = None
+    lat: Annotated[float | None, with_what("DEG", "Latitude, north positive.")] = None
+    lon: Longitude = None
+    alt: Height = None
     peers: Annotated[
         str | None,
         running(

@@ -114,7 +114,7 @@ def test_the_velocity_of_a_vehicle_is_taken_and_named():
     assert (again[QUATERNION].to_numpy() == found[QUATERNION].to_numpy()).all()
     assert "attitude.velocity-of-motion" not in codes(again)
     stated = sd.attitude(imu, algorithm="error-state:velocity=0.5")
-    assert stated.attrs["algorithm"] == "error-state:velocity=0.5"
+    assert stated.attrs["algorithm"].startswith("error-state:velocity=0.5")
 
 
 @pytest.fixture(scope="module")
