@@ -11,9 +11,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
-from strapdown._kernels.compilation import IN_PLACE
+from strapdown._kernels.compilation import IN_PLACE, njit
 from strapdown._kernels.earth import E2, A, radii, transport_rate
 from strapdown._kernels.ned import ALT as NED_ALT
 from strapdown._kernels.ned import LAT, LON, Q, V, displace, level_turn, turn_back
