@@ -309,9 +309,11 @@ def wander_correct_rows(rows, errors, earth):
     # The Earth's turn since the start, which only the kernel's memory needs.
     state[SPIN] = 1.0
     for i in range(rows.shape[0]):
-        state[: rows.shape[1]] = rows[i]
+        for j in range(rows.shape[1]):
+            state[j] = rows[i, j]
         wander_correct(state, errors[i], earth)
-        rows[i] = state[: rows.shape[1]]
+        for j in range(rows.shape[1]):
+            rows[i, j] = state[j]
 
 
 # Position and level axes of the state of either mechanization.
