@@ -66,7 +66,7 @@ def increments_from_imu(imu: pd.DataFrame, interpolation: str = "linear") -> pd.
     )
     check_imu(imu)
     time = np.ascontiguousarray(imu.index.to_numpy(dtype=np.float64))
-    rate = np.ascontiguousarray(imu[GYRO].to_numpy(dtype=np.float64))
+    rate = values_of(imu, GYRO)
     dt = np.diff(time)
     theta = np.empty((len(dt), 3))
     dtheta = np.empty_like(theta)

@@ -468,7 +468,7 @@ def unit_rotation_angle(q_1: Array, q_2: Array) -> Array:
     ndarray, (n,), deg
     """
     out = np.empty(len(q_1))
-    kernel.quats_angle(np.ascontiguousarray(q_1), np.ascontiguousarray(q_2), out)
+    kernel.quats_angle(_for_kernels(q_1), _for_kernels(q_2), out)
     return np.asarray(np.degrees(out))
 
 
@@ -491,6 +491,11 @@ def within_half_turn(angles_deg: Array) -> Array:
 # Arguments as rows for the kernels.
 
 
+def _for_kernels(array: Array) -> Array:
+    """C-contiguous and writable: numba compiles a kernel again for other arrays."""
+    return np.require(array, requirements=["C", "W"])
+
+
 def _rows_of(values: ArrayLike, shape: tuple[int, ...], name: str) -> tuple[Array, tuple[int, ...]]:
     """Return `values` as C-contiguous rows and the leading shape."""
     array = np.asarray(values, dtype=np.float64)
@@ -499,7 +504,7 @@ def _rows_of(values: ArrayLike, shape: tuple[int, ...], name: str) -> tuple[Arra
         raise DataError(
             "geodesy.shape-does-not-end-2", quantity=name, shape=array.shape, shape_2=shape
         )
-    rows = np.ascontiguousarray(array.reshape(-1, math.prod(shape)))
+    rows = _for_kernels(array.reshape(-1, math.prod(shape)))
     # A square that overflows is as useless as infinity.
     if rows.size and not (rows.max() < LARGEST and rows.min() > -LARGEST):
         good = np.abs(rows) < LARGEST
@@ -561,7 +566,7 @@ def _spread(rows: Array, lead: tuple[int, ...], leading: tuple[int, ...]) -> Arr
         return rows
     width = rows.shape[1]
     spread = np.broadcast_to(rows.reshape((*lead, width)), (*leading, width))
-    return np.ascontiguousarray(spread.reshape(-1, width))
+    return _for_kernels(spread.reshape(-1, width))
 
 
 def _apply(

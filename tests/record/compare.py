@@ -36,6 +36,19 @@ TOLERANCES = (
         Tolerance("*", f"*/{name}", SUMMED, "a mean over samples: its last bits are of the order")
         for name in ("rms", "rms_deg", "rms_in_sd", "rms_m", "mean_nis", "mean_nees")
     ),
+    # Likewise a standard deviation: the root of a sum of squares over the unknowns of a crash.
+    *(
+        Tolerance(run, quantity, SUMMED, "a sum of squares over unknowns: its order")
+        for run, quantity in (
+            ("crash-*", "crash/trajectory.csv/*_sd_*"),
+            ("demo", "demo/pole/trajectory.csv/*_sd_*"),
+            ("crash-paths", "crash_paths/path/share/*"),
+            ("crash-*", "crash/crash.json/answers/*/path/variances_at_the_end_m2/*"),
+            ("crash-*", "crash/crash.json/answers/*/path/end/*"),
+            ("demo", "demo/pole/crash.json/answers/*/path/variances_at_the_end_m2/*"),
+            ("demo", "demo/pole/crash.json/answers/*/path/end/*"),
+        )
+    ),
 )
 
 

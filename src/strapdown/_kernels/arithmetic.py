@@ -22,6 +22,7 @@ from types import ModuleType, SimpleNamespace
 
 SOURCES = ("rotation", "increments", "attitude", "rotation_vector", "orientation")
 PACKAGE = "strapdown._kernels"
+FORMULAS = tuple(f"{PACKAGE}.{name}" for name in SOURCES)
 SINGLE = "_strapdown_single"
 LARGEST_SINGLE = 3e38
 
@@ -48,7 +49,7 @@ class _InSingle(ast.NodeTransformer):
         return node
 
     def visit_ImportFrom(self, node: ast.ImportFrom) -> ast.AST:
-        if node.module and node.module.startswith(PACKAGE):
+        if node.module in FORMULAS:
             node.module = SINGLE + node.module.removeprefix(PACKAGE)
         return node
 
@@ -239,7 +240,7 @@ def counted_kernels(module: str) -> SimpleNamespace:
     for node in list(tree.body):
         if isinstance(node, ast.ImportFrom):
             tree.body.remove(node)
-            if node.module and node.module.startswith(f"{PACKAGE}."):
+            if node.module in FORMULAS:
                 other = vars(counted_kernels(node.module.rpartition(".")[2]))
                 namespace |= {item.name: other[item.name] for item in node.names}
         elif isinstance(node, ast.FunctionDef):

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from numba import njit
-
-from strapdown._kernels.compilation import IN_PLACE
+from strapdown._kernels.compilation import IN_PLACE, njit
 from strapdown._kernels.rotation_vector import cross
 
 #: Iterations; each evaluates the errors at the inputs found by the previous one.

@@ -10,13 +10,41 @@ says so: `fma` and `dot`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from fractions import Fraction
-from typing import Any
+from typing import Any, TypeVar
 
-from numba import config, njit
+import numba
+from numba import config
 from numba.core import types
 from numba.core.cpu import CPUTargetOptions
+from numba.core.dispatcher import Dispatcher
 from numba.extending import intrinsic
+
+Kernel = TypeVar("Kernel", bound=Callable[..., Any])
+
+
+def njit(**options: Any) -> Callable[[Kernel], Dispatcher[Kernel]]:
+    """Decorate a kernel: `numba.njit`, with one version for all whole numbers.
+
+    Where a kernel calls another with a number that is written in the source, numba compiles a
+    version for that number; so it does for the first value of a loop's variable, and never calls
+    that version. The optimizer inserts such numbers without it. No kernel is a callback of C, so
+    none has the wrapper for it.
+    """
+    compiled: Any = numba.njit(**{"no_cfunc_wrapper": True, **options})
+
+    def decorate(function: Kernel) -> Dispatcher[Kernel]:
+        kernel = compiled(function)
+        if hasattr(kernel, "get_call_template"):  # not with NUMBA_DISABLE_JIT
+            template = kernel.get_call_template
+            kernel.get_call_template = lambda kinds, named: template(
+                [types.unliteral(kind) for kind in kinds], named
+            )
+        return kernel  # type: ignore[no-any-return]
+
+    return decorate
+
 
 # Numba counts references to arrays by atomic operations, a third of the time of a kernel of 1 µs.
 # The caller holds the arrays until the kernel returns, so that no counting is needed. Not for a

@@ -10,9 +10,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
-from strapdown._kernels.compilation import dot, fma
+from strapdown._kernels.compilation import dot, fma, njit
 
 
 @njit(cache=True, error_model="numpy")

@@ -11,8 +11,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from strapdown._kernels.compilation import njit
 from strapdown._kernels.earth import radii
 from strapdown._kernels.ned import ALT, COSINE, DONE, LAT, LON, PRIME, ROW, SINE, Q, V, ned_advance
 from strapdown._kernels.rotation import quat_from_rotvec, quat_multiply
@@ -156,7 +156,8 @@ def perturbed_runs(
                 mine[i, 1 + j] = rows[i, 1 + j] + added[j, i]
             for j in range(3):
                 mine[i, 7 + j] = rows[i, 7 + j] + half * added[3 + j, i]
-        own[:] = state
+        for j in range(own.shape[0]):
+            own[j] = state[j]
         own[LAT] += first[6] / north
         own[LON] += first[7] / east
         own[ALT] -= first[8]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from strapdown._kernels.compilation import njit
 
 # Options.
 MEAN, TRIGGER, LONG, WAKE, SHORT, SIDE, QUIET, LEVEL, LATERAL = range(9)

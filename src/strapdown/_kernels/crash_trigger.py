@@ -5,7 +5,7 @@ In the subset of Python that `export` translates. Axes of the vehicle: x forward
 
 import math
 
-from numba import njit
+from strapdown._kernels.compilation import njit
 
 # Trigger threshold of 49 CFR 563.5(b): 8 km/h, forward or right, within 150 ms.
 TRIGGER, WINDOW = 8.0 / 3.6, 0.150

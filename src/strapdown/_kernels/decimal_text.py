@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from strapdown._kernels.compilation import njit
 
 # Doubles hold all whole numbers up to here.
 _LARGEST = 9007199254740992.0

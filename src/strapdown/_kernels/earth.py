@@ -9,8 +9,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from strapdown._kernels.compilation import njit
 from strapdown._kernels.rotation import dcm_from_quat
 
 # Indices of the array of an ellipsoid: semi-major axis in m, first eccentricity squared, normal

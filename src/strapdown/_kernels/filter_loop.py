@@ -9,10 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from strapdown._kernels.compensation import compensate, errors_of_states
-from strapdown._kernels.compilation import IN_PLACE
+from strapdown._kernels.compilation import IN_PLACE, njit
 from strapdown._kernels.covariance import dense_update, ud_update, udu_matrix, udu_predict, wd_epoch
 from strapdown._kernels.earth import E2, RATE, A, displacement
 from strapdown._kernels.growth import grown_covariance, growth_of_step, unfold_growth
@@ -111,7 +110,10 @@ def factors_over_group(states, room):
     _, growth, _, _, _, whole, added, after = room
     unfold_growth(growth, whole, added)
     bad = udu_predict(states[2], whole, added, after)
-    states[2][:, :] = after
+    covariance = states[2]
+    for i in range(covariance.shape[0]):
+        for j in range(covariance.shape[1]):
+            covariance[i, j] = after[i, j]
     return bad
 
 

@@ -16,9 +16,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-from strapdown._kernels.compilation import IN_PLACE
+from strapdown._kernels.compilation import IN_PLACE, njit
 
 CORE = 9
 SIXTH = 1.0 / 6.0

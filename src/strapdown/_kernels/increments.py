@@ -9,7 +9,7 @@ integral is zero and whose effect on the attitude is of the fifth.
 
 from __future__ import annotations
 
-from numba import njit
+from strapdown._kernels.compilation import njit
 
 
 @njit(cache=True)

@@ -11,9 +11,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
-from strapdown._kernels.compilation import IN_PLACE
+from strapdown._kernels.compilation import IN_PLACE, njit
 from strapdown._kernels.earth import E2, A, radii, transport_rate
 from strapdown._kernels.ned import ALT as NED_ALT
 from strapdown._kernels.ned import LAT, LON, Q, V, displace, level_turn, turn_back
@@ -310,9 +309,11 @@ def wander_correct_rows(rows, errors, earth):
     # The Earth's turn since the start, which only the kernel's memory needs.
     state[SPIN] = 1.0
     for i in range(rows.shape[0]):
-        state[: rows.shape[1]] = rows[i]
+        for j in range(rows.shape[1]):
+            state[j] = rows[i, j]
         wander_correct(state, errors[i], earth)
-        rows[i] = state[: rows.shape[1]]
+        for j in range(rows.shape[1]):
+            rows[i, j] = state[j]
 
 
 # Position and level axes of the state of either mechanization.

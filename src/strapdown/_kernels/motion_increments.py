@@ -18,8 +18,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from strapdown._kernels.compilation import njit
 from strapdown._kernels.increments import neighbour
 from strapdown._kernels.ned import turn_back
 from strapdown._kernels.rotation import (

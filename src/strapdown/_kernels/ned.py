@@ -15,8 +15,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from strapdown._kernels.compilation import njit
 from strapdown._kernels.earth import gravity_around
 from strapdown._kernels.rotation import (
     DEGREES,

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from strapdown._kernels.compilation import njit
 from strapdown._kernels.earth import earth_rate, gravity_around, radii, transport_rate
 from strapdown._kernels.ned import (
     COS_LATITUDE,

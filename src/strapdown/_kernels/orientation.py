@@ -14,8 +14,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from strapdown._kernels.compilation import njit
 from strapdown._kernels.increments import LARGEST
 
 # --- The record: what both filters have ---------------------------------------------------

@@ -12,9 +12,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
-from strapdown._kernels.compilation import IN_PLACE
+from strapdown._kernels.compilation import IN_PLACE, njit
 from strapdown._kernels.earth import E2, GAMMA, RATE, A, F, K, M, gravity_around
 from strapdown._kernels.growth import CORE, compose_growth, growth_of_step, unfold_growth
 from strapdown._kernels.level import ALT, AXIS, OMEGA_EL, Q_LB, curvatures

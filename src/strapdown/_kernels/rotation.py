@@ -10,7 +10,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from strapdown._kernels.compilation import njit
 
 # Below this square of the half angle (|r| = 0.5 rad) the series replaces sin and cos:
 # the first neglected term is under 1e-17 of the value there, so both sides of the switch

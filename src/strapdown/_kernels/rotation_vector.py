@@ -23,8 +23,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from strapdown._kernels.compilation import njit
 from strapdown._kernels.increments import HEAD, OPTIONS, take_sample
 from strapdown._kernels.rotation import quat_from_rotvec, quat_multiply, quat_normalise
 

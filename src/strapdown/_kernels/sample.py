@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from strapdown._kernels.compilation import njit
 from strapdown._kernels.increments import LARGEST
 from strapdown._kernels.motion_increments import linear_motion, mean_motion
 from strapdown._kernels.ned import (

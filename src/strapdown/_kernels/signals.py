@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from numba import njit
+from strapdown._kernels.compilation import njit
 
 
 @njit(cache=True, error_model="numpy")
@@ -316,7 +316,8 @@ def replace_outliers(
             # Earlier judgments included these samples.
             before, length = int(state[1]), int(state[2])
             if length > 0 and before + length + NODES > i:
-                work[before : before + length] = raw[before : before + length]
+                for j in range(before, before + length):
+                    work[j] = raw[j]
                 if is_run(
                     work,
                     left,

@@ -12,9 +12,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
-from strapdown._kernels.compilation import IN_PLACE, dot
+from strapdown._kernels.compilation import IN_PLACE, dot, njit
 from strapdown._kernels.covariance import udu_matrix
 from strapdown._kernels.growth import LANES as GROWTH_LANES
 from strapdown._kernels.level import level_place

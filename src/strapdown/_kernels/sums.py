@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from strapdown._kernels.compilation import njit
 from strapdown._kernels.rotation import (
     dcm_from_quat,
     quat_from_rotvec,

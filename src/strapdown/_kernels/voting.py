@@ -10,7 +10,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from strapdown._kernels.compilation import njit
 
 # Rows of `facts`.
 NOISE2, BIAS2, DRIFT2, TIME, SCALE2, ACROSS2, OTHER2, STEP2 = range(8)

@@ -23,8 +23,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from strapdown._kernels.compilation import njit
 from strapdown._kernels.earth import gravity_parts
 from strapdown._kernels.ned import (
     DIVERGED,

@@ -9,7 +9,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.increments import motion_increments
-from strapdown.tables import DV, MOTION
+from strapdown.tables import DV, MOTION, values_of
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -64,7 +64,7 @@ def sum_inertially(imu: pd.DataFrame, ends: Indices | None = None) -> InertialSu
     from strapdown._kernels.sums import inertial_sums
 
     increments = motion_increments(imu)
-    rows = np.ascontiguousarray(increments[MOTION].to_numpy(dtype=np.float64))
+    rows = values_of(increments, MOTION)
     time = imu.index.to_numpy(dtype=np.float64)
     stamps = time - time[0]
     n = len(rows)

@@ -168,7 +168,7 @@ def axes_by_truth(source: AttitudeSource, stated: bool) -> AttitudeSource:
     Right-handed axes turn all sensors; a mirrored gyro has the sign of axes wrong, and is turned
     alone. Axes that the user stated (`stated`) are only reported.
     """
-    if source.truth is None or source.scored is None:
+    if source.truth is None or source.scored is None or not source.scored.any():
         return source
     by_gyro, by_truth = _window_rotations(source)
     if len(by_gyro) < LEAST_AXES_WINDOWS:

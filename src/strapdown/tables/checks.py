@@ -198,9 +198,9 @@ def values_of(table: pd.DataFrame, columns: Sequence[str]) -> Array:
         for k, name in enumerate(wanted):
             out[:, k] = table[name].to_numpy(dtype=np.float64)
         return out
-    # A selection copies; a table made by the functions here needs no copy.
     there = table if own == wanted else table[wanted]
-    return np.ascontiguousarray(there.to_numpy(dtype=np.float64))
+    # Numba compiles a kernel again for a read-only array, as a view of a table is.
+    return np.require(there.to_numpy(dtype=np.float64), requirements=["C", "W"])
 
 
 def index_of(table: pd.DataFrame) -> Array:

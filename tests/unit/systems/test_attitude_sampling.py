@@ -154,6 +154,13 @@ def test_right_axes_are_left(tmp_path):
     assert not codes & {"attitude.reference-clock-differs"}
 
 
+def test_a_part_that_no_movement_is_in_is_compared(recordings):
+    # The first 30 s of a trial of BROAD are a rest: no row of the truth counts.
+    log = recordings("broad/02_undisturbed_slow_rotation_B.hdf5")
+    bench = compare_attitude(log, algorithms=["quaternion"], duration_s=30.0, gyro_bias="rest")
+    assert [one.algorithm for one in bench.runs] == ["quaternion"]
+
+
 @pytest.mark.parametrize("sampling", ["mean before", "instantaneous"])
 def test_means_taken_for_instants_are_late_by_half_a_step(tmp_path, sampling):
     fine = np.arange(0.0, 60.0, 1e-3)
