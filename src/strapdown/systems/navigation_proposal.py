@@ -142,8 +142,9 @@ SHOWN, UNDERSTATED, MISSTATED = 0.15, 1.5, 10.0
 SHARE_SD, SCATTER = 3.0, 2.31
 #: Jerk of a vehicle, m/s³, that is not to be taken for scatter.
 JERK = 3.0
-#: Fixes better than this, m, show that a lever arm is measured by a tape to so much, m.
-SHOWS_ARM, ARM_SD = 0.1, 0.02
+#: Fixes better than this, m, show that a lever arm is measured by a tape to so much, m. Velocities
+#: do where the body turns: its rate without vibration, by means over so many seconds.
+SHOWS_ARM, ARM_SD, TURNING = 0.1, 0.02, 0.2
 #: Attributes of fixes with assumed standard deviations, and the keys of these.
 TAKEN = {"position_sd_taken": "position_sd_m", "velocity_sd_taken": "velocity_sd_m_per_s"}
 
@@ -516,6 +517,8 @@ def _clock(
     delay = 0.0 if late is None or late.delay < SURE * late.sd else late.delay
     out = {"velocity_delay_s": round(delay, 3)} if delay > LEAST_DELAY else {}
     out |= _position_errors(fixes, delay)
+    if _velocities_show_arm(fixes, imu):
+        out["lever_arm_sd_m"] = ARM_SD
     antenna = _antenna(out)
     scan = time_offset(fixes, imu, delay)
     found = None if scan is None else (scan.offset, scan.sd)
@@ -642,6 +645,27 @@ def _shows_scatter(fixes: pd.DataFrame, white: float) -> bool:
     # A way by trapezoids, and by velocities with errors.
     sds = float(np.median(sd)), white_velocity_sd(fixes) or math.inf
     return math.hypot(0.5 * min(sds) * step, JERK * step**3 / math.sqrt(288.0)) < 0.5 * white
+
+
+def _velocities_show_arm(fixes: pd.DataFrame, imu: pd.DataFrame) -> bool:
+    """Whether all velocities together show by how much a tape measures an arm wrong.
+
+    An error of the arm turns with the body. Where a hand sways, the velocity that it causes is in
+    step with the one by which the sway of gravity separates tilts from biases: it does not average
+    out, and a filter without this state takes it for a tilt.
+    """
+    sd = values_of(fixes, VELOCITY_SD)[:, :2]
+    sd = sd[np.isfinite(sd).all(axis=1)]
+    time, rate = index_of(imu), values_of(imu, GYRO)
+    size = max(1, round(TURNING / float(np.median(np.diff(time)))))
+    count = len(rate) // size
+    if not len(sd) or count < 2:
+        return False
+    # What is constant is mostly a bias.
+    means = rate[: count * size].reshape(count, size, 3).mean(axis=1)
+    turn = float(np.sqrt(np.square(means - means.mean(axis=0)).sum(axis=1).mean()))
+    scatter = min(float(np.median(sd)), white_velocity_sd(fixes) or math.inf)
+    return ARM_SD * turn * math.sqrt(len(sd)) > scatter
 
 
 def _speed(fixes: pd.DataFrame) -> float:
