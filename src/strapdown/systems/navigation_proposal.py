@@ -540,8 +540,10 @@ def _clock(
     walk = {}
     if 0.5 * apart * span * speed > FAR * place_sd:
         walk = {"time_offset_drift_s_per_sqrt_s": float(f"{apart * math.sqrt(span):.1g}")}
+    # Of what drives, windows show the offset; of a walk, turns and steps do, to its velocities.
+    slow = 0.0 if drives else _change_in_sd(fixes)
     if found is None:
-        if drives or speed * OFFSET_SD > FAR * place_sd:
+        if drives or speed * OFFSET_SD > FAR * place_sd or slow * OFFSET_SD > FAR:
             out |= {"time_offset_sd_s": OFFSET_SD} | walk
         return out, None
     offset, sd = found
@@ -549,7 +551,7 @@ def _clock(
         out |= {"time_offset_s": round(offset, 3)}
         out |= {"time_offset_sd_s": round(max(2.0 * sd, LEAST_OFFSET_SD), 3)}
         return out | {"time_offset_drift_s_per_sqrt_s": APART}, None
-    if walk or speed * sd > FAR * place_sd:
+    if walk or speed * sd > FAR * place_sd or slow * sd > FAR:
         out |= {"time_offset_sd_s": max(round(2.0 * sd, 3), 0.001)} | walk
     return out, None
 
@@ -666,6 +668,23 @@ def _velocities_show_arm(fixes: pd.DataFrame, imu: pd.DataFrame) -> bool:
     turn = float(np.sqrt(np.square(means - means.mean(axis=0)).sum(axis=1).mean()))
     scatter = min(float(np.median(sd)), white_velocity_sd(fixes) or math.inf)
     return ARM_SD * turn * math.sqrt(len(sd)) > scatter
+
+
+def _change_in_sd(fixes: pd.DataFrame) -> float:
+    """Change of velocity in a second, in standard deviations of all velocities together, 1/s."""
+    sd = values_of(fixes, VELOCITY_SD)[:, :2]
+    stated = np.isfinite(sd).all(axis=1)
+    if stated.sum() < TOGETHER:
+        return 0.0
+    part = fixes[stated]
+    v, time = values_of(part, VELOCITY_COLUMNS)[:, :2], index_of(part)
+    steps = max(1, round(1.0 / float(np.median(np.diff(time)))))
+    if len(v) <= steps:
+        return 0.0
+    usual, apart = float(np.median(sd[stated])), (time[steps:] - time[:-steps])[:, None]
+    # Without the change by their own noise.
+    square = float(np.mean((np.square(v[steps:] - v[:-steps]) - 2.0 * usual**2) / apart**2))
+    return math.sqrt(max(square, 0.0) * len(v)) / usual
 
 
 def _speed(fixes: pd.DataFrame) -> float:
