@@ -676,8 +676,7 @@ def _change_in_sd(fixes: pd.DataFrame) -> float:
     stated = np.isfinite(sd).all(axis=1)
     if stated.sum() < TOGETHER:
         return 0.0
-    part = fixes[stated]
-    v, time = values_of(part, VELOCITY_COLUMNS)[:, :2], index_of(part)
+    v, time = values_of(fixes, VELOCITY_COLUMNS)[stated, :2], index_of(fixes)[stated]
     steps = max(1, round(1.0 / float(np.median(np.diff(time)))))
     if len(v) <= steps:
         return 0.0
