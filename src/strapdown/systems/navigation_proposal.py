@@ -142,8 +142,9 @@ SHOWN, UNDERSTATED, MISSTATED = 0.15, 1.5, 10.0
 SHARE_SD, SCATTER = 3.0, 2.31
 #: Jerk of a vehicle, m/s³, that is not to be taken for scatter.
 JERK = 3.0
-#: Fixes better than this, m, show that a lever arm is measured by a tape to so much, m.
-SHOWS_ARM, ARM_SD = 0.1, 0.02
+#: Fixes better than this, m, show that a lever arm is measured by a tape to so much, m. Velocities
+#: do where the body turns: its rate without vibration, by means over so many seconds.
+SHOWS_ARM, ARM_SD, TURNING = 0.1, 0.02, 0.2
 #: Attributes of fixes with assumed standard deviations, and the keys of these.
 TAKEN = {"position_sd_taken": "position_sd_m", "velocity_sd_taken": "velocity_sd_m_per_s"}
 
@@ -516,6 +517,8 @@ def _clock(
     delay = 0.0 if late is None or late.delay < SURE * late.sd else late.delay
     out = {"velocity_delay_s": round(delay, 3)} if delay > LEAST_DELAY else {}
     out |= _position_errors(fixes, delay)
+    if _velocities_show_arm(fixes, imu):
+        out["lever_arm_sd_m"] = ARM_SD
     antenna = _antenna(out)
     scan = time_offset(fixes, imu, delay)
     found = None if scan is None else (scan.offset, scan.sd)
@@ -537,8 +540,10 @@ def _clock(
     walk = {}
     if 0.5 * apart * span * speed > FAR * place_sd:
         walk = {"time_offset_drift_s_per_sqrt_s": float(f"{apart * math.sqrt(span):.1g}")}
+    # Of what drives, windows show the offset; of a walk, turns and steps do, to its velocities.
+    slow = 0.0 if drives else _change_in_sd(fixes)
     if found is None:
-        if drives or speed * OFFSET_SD > FAR * place_sd:
+        if drives or speed * OFFSET_SD > FAR * place_sd or slow * OFFSET_SD > FAR:
             out |= {"time_offset_sd_s": OFFSET_SD} | walk
         return out, None
     offset, sd = found
@@ -546,7 +551,7 @@ def _clock(
         out |= {"time_offset_s": round(offset, 3)}
         out |= {"time_offset_sd_s": round(max(2.0 * sd, LEAST_OFFSET_SD), 3)}
         return out | {"time_offset_drift_s_per_sqrt_s": APART}, None
-    if walk or speed * sd > FAR * place_sd:
+    if walk or speed * sd > FAR * place_sd or slow * sd > FAR:
         out |= {"time_offset_sd_s": max(round(2.0 * sd, 3), 0.001)} | walk
     return out, None
 
@@ -642,6 +647,43 @@ def _shows_scatter(fixes: pd.DataFrame, white: float) -> bool:
     # A way by trapezoids, and by velocities with errors.
     sds = float(np.median(sd)), white_velocity_sd(fixes) or math.inf
     return math.hypot(0.5 * min(sds) * step, JERK * step**3 / math.sqrt(288.0)) < 0.5 * white
+
+
+def _velocities_show_arm(fixes: pd.DataFrame, imu: pd.DataFrame) -> bool:
+    """Whether all velocities together show by how much a tape measures an arm wrong.
+
+    An error of the arm turns with the body. Where a hand sways, the velocity that it causes is in
+    step with the one by which the sway of gravity separates tilts from biases: it does not average
+    out, and a filter without this state takes it for a tilt.
+    """
+    sd = values_of(fixes, VELOCITY_SD)[:, :2]
+    sd = sd[np.isfinite(sd).all(axis=1)]
+    time, rate = index_of(imu), values_of(imu, GYRO)
+    size = max(1, round(TURNING / float(np.median(np.diff(time)))))
+    count = len(rate) // size
+    if not len(sd) or count < 2:
+        return False
+    # What is constant is mostly a bias.
+    means = rate[: count * size].reshape(count, size, 3).mean(axis=1)
+    turn = float(np.sqrt(np.square(means - means.mean(axis=0)).sum(axis=1).mean()))
+    scatter = min(float(np.median(sd)), white_velocity_sd(fixes) or math.inf)
+    return ARM_SD * turn * math.sqrt(len(sd)) > scatter
+
+
+def _change_in_sd(fixes: pd.DataFrame) -> float:
+    """Change of velocity in a second, in standard deviations of all velocities together, 1/s."""
+    sd = values_of(fixes, VELOCITY_SD)[:, :2]
+    stated = np.isfinite(sd).all(axis=1)
+    if stated.sum() < TOGETHER:
+        return 0.0
+    v, time = values_of(fixes, VELOCITY_COLUMNS)[stated, :2], index_of(fixes)[stated]
+    steps = max(1, round(1.0 / float(np.median(np.diff(time)))))
+    if len(v) <= steps:
+        return 0.0
+    usual, apart = float(np.median(sd[stated])), (time[steps:] - time[:-steps])[:, None]
+    # Without the change by their own noise.
+    square = float(np.mean((np.square(v[steps:] - v[:-steps]) - 2.0 * usual**2) / apart**2))
+    return math.sqrt(max(square, 0.0) * len(v)) / usual
 
 
 def _speed(fixes: pd.DataFrame) -> float:

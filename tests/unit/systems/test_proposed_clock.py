@@ -93,6 +93,27 @@ def test_what_is_proposed_follows_quartz_and_spoils_little_without_it():
         assert sd < 0.01
 
 
+@pytest.mark.parametrize(("sway", "noise", "arm"), [(0.3, 0.05, 0.02), (0.3, 1.0, None)])
+def test_a_tape_measured_arm_is_a_state_where_velocities_of_a_turning_body_show_it(
+    sway, noise, arm
+):
+    """0.02 m at 0.3 rad/s are 6 mm/s in step with the sway: 70 fixes of 0.05 m/s show it."""
+    swayed = imu().copy()
+    swayed[GYRO[0]] += sway * np.sqrt(2.0) * np.sin(2.0 * np.pi * 0.3 * swayed.index)
+    # Positions that are too coarse to show it.
+    table = town.fixes(**{**RECEIVER, "position_noise": 1.0, "velocity_noise": noise})
+    found, _ = _clock(table, swayed, False)
+    assert found.get("lever_arm_sd_m") == arm
+
+
+def test_a_bias_of_the_gyros_is_no_turn_that_shows_an_arm():
+    biased = imu() * 0.0
+    biased.attrs = dict(imu().attrs)
+    biased[GYRO] = 0.3
+    table = town.fixes(**{**RECEIVER, "position_noise": 1.0})
+    assert not navigation_proposal._velocities_show_arm(table, biased)
+
+
 def straight(speed, sd, length=200.0):
     """Positions alone of a way north at a speed: nothing shows an offset of the clock."""
     time = np.arange(0.0, length, 1.0)
@@ -107,6 +128,21 @@ def test_an_offset_is_a_state_of_a_walk_where_its_fixes_would_show_it(speed, sd,
     # 0.2 s of a walk are 0.28 m.
     assert found.get("time_offset_sd_s") == (OFFSET_SD if offset else None)
     assert DRIFT not in found
+
+
+@pytest.mark.parametrize(("turns", "offset"), [(True, True), (False, False)])
+def test_an_offset_is_a_state_of_a_walk_where_its_velocities_would_show_it(turns, offset):
+    """Turns of 1.4 m/s within seconds: 0.2 s of them are far more than 0.05 m/s."""
+    rng = np.random.default_rng(8541)
+    time = np.arange(0.0, 200.0, 1.0)
+    course = np.pi / 2.0 * np.sin(2.0 * np.pi * time / 15.0) if turns else 0.0 * time
+    v = 1.4 * np.column_stack([np.cos(course), np.sin(course), 0.0 * time])
+    place = np.column_stack([45.0 + np.cumsum(v[:, 0]) / 111_132.0, 0.0 * time + 20.0, 0.0 * time])
+    place[:, :2] += rng.normal(0.0, 1.0, (len(time), 2)) / 111_132.0
+    sd = np.full((len(time), 3), 0.05)
+    v += rng.normal(0.0, 0.05, v.shape)
+    found, _ = _clock(gnss_table(time, place, v, 60.0 * sd, sd, source="r.csv"), imu(), False)
+    assert ("time_offset_sd_s" in found) == offset
 
 
 def windows(rate, sd_rate, count=6):
