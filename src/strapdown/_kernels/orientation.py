@@ -51,6 +51,12 @@ def usable(x, y, z):
 
 
 @njit(cache=True, error_model="numpy")
+def is_field(x, y, z):
+    """Whether a reading is one of a field: many drivers give zeros before the first conversion."""
+    return usable(x, y, z) and x * x + y * y + z * z > 0.0
+
+
+@njit(cache=True, error_model="numpy")
 def step_of(r, time, gyro, accel, mag):
     """Step to a sample, s; 0 for the first one; negative or NaN for one to be refused."""
     if gyro.shape[0] != 3 or accel.shape[0] != 3 or mag.shape[0] != 3:
@@ -139,7 +145,8 @@ NORM, DIP, DISTURBANCE = 63, 64, 65
 ACCEL_BIAS = 66
 N = 11
 P, X, H, K = 69, 190, 201, 212
-STATE = 223
+STILL = 223
+STATE = 226
 # Of a row of the history: quaternion, and the covariance of delta: NN, NE, ND, EE, ED, DD.
 ROW = 10
 
@@ -159,6 +166,9 @@ ACCEL_WALK = 2e-4  # m/s²/sqrt(s)
 REST_AFTER = 1.5  # s
 REST_RATE = 0.012  # rad/s: 0.7 deg/s from their mean over 0.5 s
 REST_FORCE = 0.15  # m/s²
+REST_LIMIT = 0.0035  # rad/s: 0.2 deg/s, of a bias since it was known
+REST_FIELD = 0.03  # of the field: its change in a body at rest, noise included
+REST_TURN = 0.15  # rad: shows as twice that change up to a dip of 66 deg
 REST_VELOCITY = 1e-2  # m²/s: density of the 0.07 m/s that REST_FORCE may hide, correlated over 1 s
 REST_DRIFT = 9e-4  # rad/s/sqrt(Hz): 0.05 deg/s
 FIELD_SD = 0.02  # of the magnetometer, of the total field, correlated over 1 s
@@ -303,11 +313,37 @@ def propagate(r, span, lift, felt, squared):
 
 
 @njit(cache=True, error_model="numpy")
-def at_rest(r, span, gx, gy, gz, squared):
-    """Whether rate and force have been steady for long enough, and the rate is a bias's."""
+def field_turned(r):
+    """Whether the field has turned in the body since it came to rest; follows it if so."""
+    n = r[FIELDS]
+    m = MATRIX
+    off, size = 0.0, 0.0
+    for i in range(3):
+        along = (
+            r[m + i] * r[FIELD] + r[m + 3 + i] * r[FIELD + 1] + r[m + 6 + i] * r[FIELD + 2]
+        ) / (n * r[SPAN])
+        before = r[STILL + i]
+        if r[REST] == 0.0:
+            r[STILL + i] = along
+        else:
+            off += (along - before) * (along - before)
+        size += along * along
+    if off > REST_FIELD * REST_FIELD * size:
+        r[REST] = 0.0
+        return True
+    return False
+
+
+@njit(cache=True, error_model="numpy")
+def at_rest(r, span, gx, gy, gz):
+    """Whether rate and force have been steady for long enough, and the rate is a bias's.
+
+    A steady slow turn looks the same, but to the field: where the rate is beyond what the bias is
+    known to, it is one of rest only once a turn would have shown.
+    """
     share = min(1.0, 2.0 * span)
     n = r[FORCES]
-    rate, force = 0.0, 0.0
+    rate, force, squared = 0.0, 0.0, 0.0
     for i in range(3):
         g = gx if i == 0 else (gy if i == 1 else gz)
         off = g - r[SMOOTH_RATE + i]
@@ -316,12 +352,20 @@ def at_rest(r, span, gx, gy, gz, squared):
         off = r[BODY + i] / n - r[SMOOTH_FORCE + i]
         r[SMOOTH_FORCE + i] += share * off
         force += off * off
-    limit = 3.0 * math.sqrt(r[P + 3 * N + 3] + r[P + 4 * N + 4] + r[P + 5 * N + 5]) + REST_RATE
-    if rate < REST_RATE * REST_RATE and force < REST_FORCE * REST_FORCE and squared < limit * limit:
-        r[REST] += span
-    else:
+        off = r[SMOOTH_RATE + i] - r[BIAS + i]
+        squared += off * off
+    limit = 3.0 * math.sqrt(r[P + 3 * N + 3] + r[P + 4 * N + 4] + r[P + 5 * N + 5]) + REST_LIMIT
+    steady = rate < REST_RATE * REST_RATE and force < REST_FORCE * REST_FORCE
+    if not (steady and squared < limit * limit):
         r[REST] = 0.0
-    return r[REST] > REST_AFTER
+    if r[FIELDS] > 0.0 and r[HEADED] == 1.0 and field_turned(r):
+        steady = False
+    if steady and squared < limit * limit:
+        r[REST] += span
+    after = REST_AFTER
+    if r[HEADED] == 1.0 and squared > REST_LIMIT * REST_LIMIT:
+        after = max(after, REST_TURN / math.sqrt(squared))
+    return r[REST] > after
 
 
 @njit(cache=True, error_model="numpy")
@@ -399,7 +443,7 @@ def end_block(r):
             1.0 / 3.0
         )
         r[POWER] += min(1.0, span / POWER_TIME) * (now - r[POWER])
-        if at_rest(r, span, gx, gy, gz, squared):
+        if at_rest(r, span, gx, gy, gz):
             r[REST_TIME] += span
             r[POWER] -= min(1.0, 2.0 * span) * r[POWER]
             for i in range(3):
@@ -529,7 +573,7 @@ def error_state_sample(r, dt, gx, gy, gz, ax, ay, az, mx, my, mz):
         r[FORCE + 1] += c10 * ax + c11 * ay + c12 * az
         r[FORCE + 2] += c20 * ax + c21 * ay + c22 * az
         r[FORCES] += 1.0
-    if usable(mx, my, mz) and r[LEVELED] != 0.0:
+    if is_field(mx, my, mz) and r[LEVELED] != 0.0:
         north = c00 * mx + c01 * my + c02 * mz
         east = c10 * mx + c11 * my + c12 * mz
         down = c20 * mx + c21 * my + c22 * mz
@@ -674,7 +718,7 @@ def complementary_sample(r, dt, gx, gy, gz, ax, ay, az, mx, my, mz):
         ex = gain * (dy * az - dz * ay)
         ey = gain * (dz * ax - dx * az)
         ez = gain * (dx * ay - dy * ax)
-    if usable(mx, my, mz) and r[LEVELED] != 0.0:
+    if is_field(mx, my, mz) and r[LEVELED] != 0.0:
         north = (1.0 - 2.0 * (y * y + z * z)) * mx + 2.0 * (
             (x * y - w * z) * my + (x * z + w * y) * mz
         )

@@ -21,7 +21,9 @@ SLOW_WINDOW, FAST_WINDOW, MOST_WINDOWS, QUANTILE = 10.0, 3.0, 400, 0.9
 #: Time between the points of a window at least, s.
 POINT = 0.05
 #: Standard deviation of a velocity over that of its changes within 10 s, on a straight line less.
-OF_CHANGE = 3.0
+OF_CHANGE = 5.0
+#: Velocity of what is carried in hand, m/s.
+CARRIED = 0.3
 #: Velocity from which the body is one that walks or drives, m/s; below, the filter sees it itself.
 WALKS = 1.0
 
@@ -45,8 +47,9 @@ class ErrorState(OrientationEstimator):
     Parameters
     ----------
     velocity : float, m/s
-        Standard deviation of the velocity of the body, each axis: 0.3 in hand; 10 in a
-        vehicle. Over a whole record `of_motion` finds a larger one, unless it is chosen.
+        Standard deviation of the velocity of the body, each axis: 0.3 in hand; 10 to 30 in a
+        vehicle. 0: that of what is carried in hand, unless a whole record shows a larger one
+        (`of_motion`).
     bias : float, deg/s
         Standard deviation of the gyro bias at the start, each axis.
     noise : float, deg/s/√Hz
@@ -77,7 +80,7 @@ class ErrorState(OrientationEstimator):
     advance_kernel = staticmethod(kernel.error_state_advance)
     update_kernel = staticmethod(kernel.error_state_update)
 
-    velocity: float = 0.3
+    velocity: float = 0.0
     bias: float = 1.0
     noise: float = 0.02
     field: float = 4.0
@@ -85,21 +88,24 @@ class ErrorState(OrientationEstimator):
 
     def kernel_options(self) -> tuple[float, ...]:
         """Return velocity variance, bias prior, gyro noise density and block, SI and radians."""
-        return self.velocity**2, radians(self.bias), radians(self.noise) ** 2, self.block
+        velocity = self.velocity or CARRIED
+        return velocity**2, radians(self.bias), radians(self.noise) ** 2, self.block
 
     def of_motion(self, imu: pd.DataFrame, run: FilterRun) -> ErrorState:
         """Take the velocity from its slow changes, as of a walker or a vehicle.
 
         The filter sees the fast ones by itself.
         """
-        if self.velocity != type(self).velocity:
+        if self.velocity:
             return self
         found = float(f"{OF_CHANGE * slow_velocity(imu, run):.2g}")
         return replace(self, velocity=found) if found > WALKS else self
 
     def with_heading(self, declination: float, sd: float) -> ErrorState:
         """As in the base; `sd` widens the constant error of the magnetic heading."""
-        return replace(super().with_heading(declination, sd), field=hypot(self.field, sd))
+        # As its label says it, so that the label is the whole configuration.
+        field = float(f"{hypot(self.field, sd):.3g}")
+        return replace(super().with_heading(declination, sd), field=field)
 
     def begin_state(self, record: Array, given: bool) -> None:
         """Set the covariance of the start."""
@@ -110,7 +116,7 @@ class ErrorState(OrientationEstimator):
             [tilt**2] * 2
             + [0.0]
             + [radians(self.bias) ** 2] * 3
-            + [max(self.velocity**2, 0.25)] * 2
+            + [max((self.velocity or CARRIED) ** 2, 0.25)] * 2
             + [kernel.ACCEL_BIAS_SD**2] * 3
         )
         record[kernel.POWER] = 0.25

@@ -59,6 +59,8 @@ class OrientationEstimator(ABC):
             value = getattr(self, option.name)
             if option.name == "declination":
                 allowed = abs(value) <= 180.0
+            elif option.name == "velocity":
+                allowed = isfinite(value) and value >= 0.0
             else:
                 allowed = isfinite(value) and value > 0.0
             if not allowed:
@@ -178,7 +180,7 @@ class OrientationEstimator(ABC):
             By which magnetic headings are less certain than the filter takes them to be; one that
             states no covariance has no use for it.
         """
-        return self if self.declination else replace(self, declination=declination)
+        return self if self.declination else replace(self, declination=round(declination, 3))
 
     @property
     def label(self) -> str:

@@ -10,17 +10,23 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown.errors import DataError, Finding
 from strapdown.tables import ACCEL, MAG
+from strapdown.tables.checks import as_array
 
 Array = NDArray[np.float64]
 
 #: Readings of a fit at most, and at least.
 MOST, LEAST = 4000, 50
-#: Before the log is read: hard iron as a share of the field, soft iron along each term.
+#: Before the log is read: hard iron as a share of what is read, soft iron along each term.
 OFFSET_PRIOR, SOFT_PRIOR = 1.0, 0.1
 #: Residuals, in standard deviations, from which a reading counts less (Huber).
 HUBER = 1.5
+#: Scatter that a fit begins with, as a share of the field; its rounds, and steps in each.
+FIRST_SCATTER, ROUNDS, STEPS = 0.02, 4, 15
 #: Chance at which readings of a perfect magnetometer are called wrong: beyond three sigma.
 CHANCE = 0.0027
+#: Mean square of the directions seen along the axis with least, a third if all are, from which soft
+#: iron is looked for.
+COVERED = 0.03
 #: Change of direction beside its standard deviation from which a calibration is applied.
 WORTH = 2.0
 #: Direction that iron leaves open and that is worth a warning, deg.
@@ -117,31 +123,36 @@ def calibrate_magnetometer(
     """
     from scipy.stats import chi2
 
-    rows = np.asarray(mag, dtype=np.float64).reshape(-1, 3)
-    rows = rows[np.isfinite(rows).all(axis=1)]
+    rows = as_array(mag, 3, "mag")
+    # Zeros are what many drivers give before the first conversion.
+    rows = rows[np.isfinite(rows).all(axis=1) & rows.any(axis=1)]
     if len(rows) < LEAST:
         raise DataError("attitude.too-few-field-readings", quantity="mag", count=len(rows))
     m = rows[:: -(-len(rows) // MOST)]
     size = float(np.median(np.linalg.norm(m, axis=1)))
     m = m / size
     start = _sphere(m)
-    raw, full = _fit(m, start, ()), _fit(m, start, (OFFSET, SOFT))
-    sphere = _fit(m, start, (OFFSET,))
+    raw, best = _fit(m, start, ()), _fit(m, start, (OFFSET,))
+    by, terms = best, 3
+    # Of a plane of readings soft iron would flatten the noise across it.
+    off = m - best.x[OFFSET]
+    off = off / np.linalg.norm(off, axis=1)[:, None]
+    if np.linalg.eigvalsh(off.T @ off / len(off))[0] > COVERED:
+        by = _fit(m, best.x, (OFFSET, SOFT))
+        scale = by.scatter**2 * by.correlated
+        if (_loss(best, by) - _loss(by, by)) / scale > chi2.isf(CHANCE, 5):
+            best, terms = by, 8
     # By the scatter of the best model; each is a special case of the next.
-    scale = full.scatter**2 * full.correlated
-    soft = (_loss(sphere, full) - _loss(full, full)) / scale > chi2.isf(CHANCE, 5)
-    best = full if soft else sphere
-    terms = 8 if soft else 3
-    gained = (_loss(raw, full) - _loss(best, full)) / scale
+    gained = (_loss(raw, by) - _loss(best, by)) / (by.scatter**2 * by.correlated)
     A = np.eye(3) + np.tensordot(best.x[SOFT], SHAPES, 1)
     return MagnetometerCalibration(
         hard_iron=size * best.x[OFFSET],
         soft_iron=A,
         field=size * float(best.x[FIELD]),
-        hard_iron_sd=size * np.sqrt(np.diag(full.covariance)[OFFSET]),
+        hard_iron_sd=size * np.sqrt(np.diag(by.covariance)[OFFSET]),
         residual=best.scatter / float(best.x[FIELD]),
         raw_residual=raw.scatter / float(raw.x[FIELD]),
-        direction_sd_deg=_direction_sd(full),
+        direction_sd_deg=_direction_sd(by),
         change_deg=_between(m, (m - best.x[OFFSET]) @ A),
         found=bool(gained > chi2.isf(CHANCE, terms)),
     )
@@ -170,7 +181,7 @@ def without_iron(
     if not set(MAG) <= set(imu.columns):
         return imu, 0.0, ()
     mag = imu[MAG].to_numpy(dtype=np.float64)
-    if given is None and np.isfinite(mag).all(axis=1).sum() < LEAST:
+    if given is None and (np.isfinite(mag).all(axis=1) & mag.any(axis=1)).sum() < LEAST:
         return imu, 0.0, ()
     used = calibrate_magnetometer(mag) if given is None else given
     code = "attitude.magnetometer-calibrated"
@@ -245,37 +256,59 @@ def _fit(m: Array, start: Array, free: tuple[slice, ...]) -> _Fit:
     x = np.where(open_, start, 0.0)
     if OFFSET not in free:
         x[FIELD] = np.linalg.norm(m, axis=1).mean()
-    scatter, correlated, weight = 0.1, 1.0, np.ones(len(m))
+    prior = np.concatenate([np.full(3, OFFSET_PRIOR**-2), [0.0], np.full(5, SOFT_PRIOR**-2)])
+    prior = prior[open_]
     covariance = np.zeros((9, 9))
-    for _ in range(30):
-        prior = np.zeros(9)
-        prior[OFFSET] = (OFFSET_PRIOR * x[FIELD]) ** -2
-        prior[SOFT] = SOFT_PRIOR**-2
-        e, J = _residual(m, x)
-        weight = np.minimum(1.0, HUBER * scatter / np.maximum(np.abs(e), 1e-12))
-        information = weight / (scatter**2 * correlated)
-        J = J[:, open_]
-        normal = J.T @ (J * information[:, None]) + np.diag(prior[open_])
-        step = np.linalg.solve(normal, J.T @ (e * information) + prior[open_] * x[open_])
-        x[open_] -= step
+    # Scatter and correlation are those of residuals at a solution: on the way there the readings
+    # count fully, as residuals of a wrong model are large and alike.
+    scatter, correlated = FIRST_SCATTER, 1.0
+    for _ in range(ROUNDS):
+        damping, cost = 0.0, np.inf
+        for _ in range(STEPS):
+            e, J = _residual(m, x)
+            weight = np.minimum(1.0, HUBER * scatter / np.maximum(np.abs(e), 1e-12))
+            information = weight / (scatter**2 * correlated)
+            J = J[:, open_]
+            gradient = J.T @ (e * information) + prior * x[open_]
+            normal = J.T @ (J * information[:, None]) + np.diag(prior)
+            cost = _cost(e, scatter, correlated, prior, x[open_])
+            # Damped (Levenberg, Marquardt): of a plane of readings a full step goes too far.
+            while damping < 1e6:
+                step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), gradient)
+                tried = x.copy()
+                tried[open_] -= step
+                if _cost(_residual(m, tried)[0], scatter, correlated, prior, tried[open_]) <= cost:
+                    x, damping = tried, 0.1 * damping if damping > 1e-6 else 0.0
+                    break
+                damping = max(10.0 * damping, 1e-4)
+            if damping >= 1e6 or np.abs(step).max() < 1e-6:
+                break
         covariance[np.ix_(open_, open_)] = np.linalg.inv(normal)
-        e, _ = _residual(m, x)
+        e, J = _residual(m, x)
+        J = J[:, open_]
         correlated = _correlation(J * (weight * e)[:, None])
         # So many independent readings fewer as terms were fitted to them.
         taken = float(np.trace(np.linalg.solve(normal, J.T @ (J * information[:, None]))))
         left = max(len(m) / correlated - taken, 0.1 * len(m) / correlated, 1.0)
         lost = len(m) / correlated / left
         scatter = max(float(np.sqrt(np.mean(weight * e * e) * lost)), 1e-6)
-        if np.abs(step).max() < 1e-6:
-            break
     return _Fit(x, covariance, e, scatter, correlated)
+
+
+def _cost(e: Array, scatter: float, correlated: float, prior: Array, x: Array) -> float:
+    """Twice the negative logarithm of the posterior, but for a constant."""
+    return _huber(e, HUBER * scatter) / (scatter**2 * correlated) + float(prior @ (x * x))
+
+
+def _huber(e: Array, limit: float) -> float:
+    """Sum of squares, and beyond a limit of what grows in proportion."""
+    size = np.abs(e)
+    return float(np.where(size <= limit, size**2, 2.0 * limit * size - limit**2).sum())
 
 
 def _loss(fit: _Fit, by: _Fit) -> float:
     """Sum of squared residuals, by the weights of another fit."""
-    limit = HUBER * by.scatter
-    size = np.abs(fit.residual)
-    return float(np.where(size <= limit, size**2, 2.0 * limit * size - limit**2).sum())
+    return _huber(fit.residual, HUBER * by.scatter)
 
 
 def _correlation(scores: Array) -> float:
