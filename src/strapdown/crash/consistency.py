@@ -784,7 +784,9 @@ def compare_pair(
     lengths = np.diff(edges)[kept, None]
     force = np.full((2, kept.size, 3), np.nan)
     force[0, kept] = difference.reshape(-1, 3) / lengths + told
-    force[1, kept] = np.sqrt(np.diag(covariance)).reshape(-1, 3) / lengths + told
+    # An axis that is not measured has a variance of zero, or its rounding.
+    variance = np.maximum(np.diag(covariance), 0.0)
+    force[1, kept] = np.sqrt(variance).reshape(-1, 3) / lengths + told
     findings: list[Finding] = []
     whole = not (first.assumed_axes or second.assumed_axes) and bool(kept.any())
     if whole:
