@@ -73,6 +73,7 @@ from strapdown.evaluation.reference_points import SamePose, Score, score_referen
 from strapdown.formats import read_log
 from strapdown.formats.recording import Reading
 from strapdown.increments import increments_from_imu
+from strapdown.orientation_filters import is_filter
 from strapdown.progress import Progress, silent
 from strapdown.sensors.magnetometer import (
     calibrate_magnetometer,
@@ -96,6 +97,8 @@ Array = NDArray[np.float64]
 
 #: Standard deviations from which the mean rate at rest is a bias.
 BIAS_SIGNIFICANT = 3.0
+#: Parts of a rest whose mean fields are compared; a share of the field by which they may differ.
+TURN_PARTS, TURNED = 8, 0.1
 
 
 @dataclass(frozen=True, repr=False)
@@ -353,6 +356,9 @@ def _cost(algorithm: AttitudeAlgorithm, dt: pd.Series) -> Cost:
 
 def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, Evidence]:
     """Run the bench on one source; return the result and the evidence for its answer."""
+    for text in spec.algorithms:
+        if is_filter(text):
+            raise ConfigError("attitude.filter-is-beside", quantity="algorithms", name=text)
     algorithms = [make_algorithm(text) for text in spec.algorithms]
     labels = [a.label for a in algorithms]
     if not labels:
@@ -526,6 +532,8 @@ def _gyro_bias(
     choice = spec.gyro_bias.lower()
     if choice == "auto":
         choice = "rest" if rests and _significant(rests[0]) else "nothing"
+        if choice == "rest" and _field_turned(imu, rests[0]):
+            choice = "turned"
     if spec.gyro_bias_path is not None:
         log = spec.source
         options = read_options(log, source.axes) if isinstance(log, LogSpec) else None
@@ -541,9 +549,11 @@ def _gyro_bias(
             longest.gyro_mean,
             f"{longest.end - longest.start:.4g} s of rest in {other.name}",
         )
-    elif choice in ("none", "nothing"):
+    elif choice in ("none", "nothing", "turned"):
         why = "not removed, not requested"
-        if choice == "nothing":
+        if choice == "turned":
+            why = "not removed: the magnetic field turns in what looks like a rest"
+        elif choice == "nothing":
             why = "not removed: " + (
                 "that of the rest is within its noise" if rests else "no rest shows it"
             )
@@ -579,6 +589,12 @@ def _of_field(
     declination, sd, files = 0.0, 0.0, tuple[InputFiles, ...]()
     iron: dict[str, Any] = {}
     if not set(MAG + ACCEL) <= set(imu.columns):
+        if spec.place is not None or spec.magnetometer != "auto":
+            findings.append(
+                Finding(
+                    "attitude.no-field-here", file=source.name, quantity="--magnetometer, --lat"
+                )
+            )
         return imu, (declination, sd), iron, files
     if spec.place is not None:
         declination, sd, said = magnetic_north(spec.place, source.imu)
@@ -603,6 +619,18 @@ def _of_field(
             iron = {"hard_iron": used.hard_iron.tolist(), "soft_iron": used.soft_iron.tolist()}
         imu = known
     return imu, (declination, sd), iron, files
+
+
+def _field_turned(imu: pd.DataFrame, rest: RestStretch) -> bool:
+    """Whether the magnetic field turns in a rest: it is a steady, slow turn then."""
+    if not set(MAG) <= set(imu.columns):
+        return False
+    mag = imu.loc[rest.start : rest.end, MAG].dropna().to_numpy(dtype=np.float64)
+    parts = [part.mean(axis=0) for part in np.array_split(mag, TURN_PARTS) if len(part)]
+    if len(parts) < TURN_PARTS:
+        return False
+    off = np.linalg.norm(np.array(parts) - parts[0], axis=1)
+    return bool(off.max() > TURNED * np.linalg.norm(parts[0]))
 
 
 def _significant(rest: RestStretch) -> bool:

@@ -177,6 +177,11 @@ class AttitudeOptions:
         words, truth_path = _sort_references(_texts(self.reference))
         bias = _text(self.gyro_bias)
         bias_path = str(Path(bias)) if _exists(bias) else None
+        stated = str(self.magnetometer).strip()
+        if stated.lower() not in ("auto", "raw") and not _exists(stated):
+            raise ConfigError(
+                "attitude.no-such-calibration", file=stated, quantity="--magnetometer"
+            )
         field_path = str(Path(self.magnetometer)) if _exists(str(self.magnetometer)) else None
         if (self.lat is None) != (self.lon is None) or (self.alt and self.lat is None):
             raise ConfigError("attitude.half-a-place", quantity="--lat, --lon")

@@ -92,6 +92,8 @@ class PeerRun:
         Of a filter of the project.
     single_deg : float or None
         Largest difference between its results in single and in double precision.
+    ran : OrientationEstimator or None
+        Filter of the project with all options, those that the log gave included.
     """
 
     peer: str
@@ -101,6 +103,7 @@ class PeerRun:
     errors: FilterErrors | None = None
     cost: Cost | None = None
     single_deg: float | None = None
+    ran: OrientationEstimator | None = field(default=None, repr=False)
 
 
 def gather_references(
@@ -399,6 +402,7 @@ def _own_filters(
                 errors,
                 count_filter_cost(chosen, step, aiding == "gyro+accel+mag"),
                 single_precision_error_deg(chosen, part, "mean", run.q_nb),
+                chosen,
             )
 
 

@@ -138,12 +138,13 @@ def _key_figures(bench: AttitudeComparison) -> KeyFigures | None:
     answer = bench.answer
     if answer.algorithm is None:
         return None
-    figures = [KeyFigure("Simplest sufficient algorithm", answer.algorithm, "")]
+    alone = answer.verdict == "sensor"  # beside its errors the algorithm's own are small
+    words = ("All that integration needs", "At a rate of")
+    names = words if alone else ("Simplest sufficient algorithm", "Lowest sufficient rate")
+    figures = [KeyFigure(names[0], answer.algorithm, "")]
     rate, meaning, error = answer.rate_hz, answer.meaning, math.nan
     if rate is not None:
-        figures.append(
-            KeyFigure("Lowest sufficient rate", f"{rate:.4g} Hz", MEANINGS.get(meaning or "", ""))
-        )
+        figures.append(KeyFigure(names[1], f"{rate:.4g} Hz", MEANINGS.get(meaning or "", "")))
         grid = sweep_grid(bench, meaning or "drop")
         if rate in grid.columns:
             errors = grid[rate].to_dict()
@@ -152,6 +153,8 @@ def _key_figures(bench: AttitudeComparison) -> KeyFigures | None:
         error = full_rate_errors(bench).get(answer.algorithm, math.nan)
     whose = "algorithm error, without a reference" if answer.verdict == "own" else "largest error"
     bound = f"tolerance {answer.tolerance_deg:g}°"
+    if alone:
+        whose, bound = "largest error, the sensor's included", f"beyond the {bound}"
     figures.append(KeyFigure(whose.capitalize(), tables.degrees(error), bound))
     return KeyFigures(tuple(figures))
 

@@ -131,10 +131,8 @@ def write_export(
     """
     check_export(path, force)
     chosen = chosen_for_export(bench, of)
-    if isinstance(chosen, OrientationEstimator) and set(MAG) <= set(bench.imu):
-        chosen = chosen.with_heading(
-            bench.magnetometer["declination_deg"], bench.magnetometer["heading_sd_deg"]
-        )
+    if isinstance(chosen, OrientationEstimator):
+        chosen = _as_compared(bench, chosen)
     configuration, each, mean = _configuration(bench, chosen)
     start = _liveliest(bench, each)
     imu = _at_rate(bench.imu.iloc[start : start + VECTOR * each + 1], each, mean)
@@ -158,6 +156,19 @@ def write_export(
     return chosen.label
 
 
+def _as_compared(bench: AttitudeComparison, named: OrientationEstimator) -> OrientationEstimator:
+    """Return a filter with what the log gave, as it was compared; options that are named stay."""
+    aiding = "gyro+accel+mag" if set(MAG) <= set(bench.imu) else "gyro+accel"
+    runs = [p.ran for p in bench.peers if p.aiding == aiding and p.ran is not None]
+    ran = next((one for one in runs if type(one) is type(named)), None)
+    if ran is not None and named == type(named)():
+        return ran
+    if aiding == "gyro+accel":
+        return named
+    found = bench.magnetometer
+    return named.with_heading(found["declination_deg"], found["heading_sd_deg"])
+
+
 def _configuration(
     bench: AttitudeComparison, chosen: AttitudeAlgorithm | OrientationEstimator
 ) -> tuple[SensorConfiguration, int, bool]:
@@ -168,7 +179,7 @@ def _configuration(
     each = 1 if recommended is None else max(1, round(full / float(recommended)))
     rate = full / each  # a last, shorter step is in what the answer states
     mean = imu.attrs["sampling"] == "mean" or (each > 1 and answer.meaning != "drop")
-    by = "by the answer" if recommended is not None else "of the log; the answer names no other"
+    by = "by the answer" if recommended is not None else "of the log, at which it was compared"
     made_of = "as in the log" if each == 1 else f"one in {each} of the log"
     if mean and each > 1:
         made_of = f"the mean over {each} steps of the log"

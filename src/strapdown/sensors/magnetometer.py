@@ -18,15 +18,17 @@ Array = NDArray[np.float64]
 MOST, LEAST = 4000, 50
 #: Before the log is read: hard iron as a share of what is read, soft iron along each term.
 OFFSET_PRIOR, SOFT_PRIOR = 1.0, 0.1
+#: Soft iron of a magnetometer whose own is not looked for, along each term.
+SOFT_LEFT = 0.02
 #: Residuals, in standard deviations, from which a reading counts less (Huber).
 HUBER = 1.5
 #: Scatter that a fit begins with, as a share of the field; its rounds, and steps in each.
 FIRST_SCATTER, ROUNDS, STEPS = 0.02, 4, 15
 #: Chance at which readings of a perfect magnetometer are called wrong: beyond three sigma.
 CHANCE = 0.0027
-#: Mean square of the directions seen along the axis with least, a third if all are, from which soft
-#: iron is looked for.
-COVERED = 0.03
+#: Variance of the directions seen along the axis with least, a third if all are, from which soft
+#: iron is looked for: of a cap of 40 deg, or a band of 15 deg.
+COVERED = 0.02
 #: Change of direction beside its standard deviation from which a calibration is applied.
 WORTH = 2.0
 #: Direction that iron leaves open and that is worth a warning, deg.
@@ -137,7 +139,7 @@ def calibrate_magnetometer(
     # Of a plane of readings soft iron would flatten the noise across it.
     off = m - best.x[OFFSET]
     off = off / np.linalg.norm(off, axis=1)[:, None]
-    if np.linalg.eigvalsh(off.T @ off / len(off))[0] > COVERED:
+    if np.linalg.eigvalsh(np.cov(off.T))[0] > COVERED:
         by = _fit(m, best.x, (OFFSET, SOFT))
         scale = by.scatter**2 * by.correlated
         if (_loss(best, by) - _loss(by, by)) / scale > chi2.isf(CHANCE, 5):
@@ -283,8 +285,13 @@ def _fit(m: Array, start: Array, free: tuple[slice, ...]) -> _Fit:
                 damping = max(10.0 * damping, 1e-4)
             if damping >= 1e6 or np.abs(step).max() < 1e-6:
                 break
-        covariance[np.ix_(open_, open_)] = np.linalg.inv(normal)
         e, J = _residual(m, x)
+        own = np.linalg.inv(normal)
+        if SOFT not in free and OFFSET in free:
+            # Soft iron that is not looked for is there all the same.
+            gain = own @ J[:, open_].T @ (J[:, SOFT] * information[:, None])
+            own = own + SOFT_LEFT**2 * gain @ gain.T
+        covariance[np.ix_(open_, open_)] = own
         J = J[:, open_]
         correlated = _correlation(J * (weight * e)[:, None])
         # So many independent readings fewer as terms were fitted to them.
