@@ -138,7 +138,8 @@ def test_the_label_makes_the_same_filter_again(variant):
 @pytest.mark.parametrize("name", FILTERS)
 def test_every_option_is_checked(name):
     for option in (field.name for field in fields(FILTERS[name])):
-        for value in ("nan", "-181" if option == "declination" else "0"):
+        wrong = {"declination": "-181", "velocity": "-1"}
+        for value in ("nan", wrong.get(option, "0")):
             with pytest.raises(ConfigError, check=coded("attitude.filter-option-out-of-range")):
                 make_filter(f"{name}:{option}={value}")
         with pytest.raises(ConfigError, check=coded("attitude.option-not-number")):

@@ -51,12 +51,6 @@ def usable(x, y, z):
 
 
 @njit(cache=True, error_model="numpy")
-def is_field(x, y, z):
-    """Whether a reading is one of a field: many drivers give zeros before the first conversion."""
-    return usable(x, y, z) and x * x + y * y + z * z > 0.0
-
-
-@njit(cache=True, error_model="numpy")
 def step_of(r, time, gyro, accel, mag):
     """Step to a sample, s; 0 for the first one; negative or NaN for one to be refused."""
     if gyro.shape[0] != 3 or accel.shape[0] != 3 or mag.shape[0] != 3:
@@ -168,7 +162,8 @@ REST_RATE = 0.012  # rad/s: 0.7 deg/s from their mean over 0.5 s
 REST_FORCE = 0.15  # m/s²
 REST_LIMIT = 0.0035  # rad/s: 0.2 deg/s, of a bias since it was known
 REST_FIELD = 0.03  # of the field: its change in a body at rest, noise included
-REST_TURN = 0.15  # rad: shows as twice that change up to a dip of 66 deg
+REST_BIAS = 0.0175  # rad/s: 1 deg/s; a larger bias waits until a turn would have shown
+REST_TURN = 0.1  # rad: shows as that change up to a dip of 72 deg
 REST_VELOCITY = 1e-2  # m²/s: density of the 0.07 m/s that REST_FORCE may hide, correlated over 1 s
 REST_DRIFT = 9e-4  # rad/s/sqrt(Hz): 0.05 deg/s
 FIELD_SD = 0.02  # of the magnetometer, of the total field, correlated over 1 s
@@ -314,10 +309,10 @@ def propagate(r, span, lift, felt, squared):
 
 @njit(cache=True, error_model="numpy")
 def field_turned(r):
-    """Whether the field has turned in the body since it came to rest; follows it if so."""
+    """Whether the field has turned in the body since it came to rest; its strength stays then."""
     n = r[FIELDS]
     m = MATRIX
-    off, size = 0.0, 0.0
+    off, size, still = 0.0, 0.0, 0.0
     for i in range(3):
         along = (
             r[m + i] * r[FIELD] + r[m + 3 + i] * r[FIELD + 1] + r[m + 6 + i] * r[FIELD + 2]
@@ -327,8 +322,10 @@ def field_turned(r):
             r[STILL + i] = along
         else:
             off += (along - before) * (along - before)
+            still += before * before
         size += along * along
-    if off > REST_FIELD * REST_FIELD * size:
+    stronger = abs(size - still) > 2.0 * REST_FIELD * size
+    if off > REST_FIELD * REST_FIELD * size and not stronger:
         r[REST] = 0.0
         return True
     return False
@@ -363,7 +360,7 @@ def at_rest(r, span, gx, gy, gz):
     if steady and squared < limit * limit:
         r[REST] += span
     after = REST_AFTER
-    if r[HEADED] == 1.0 and squared > REST_LIMIT * REST_LIMIT:
+    if r[HEADED] == 1.0 and squared > REST_BIAS * REST_BIAS:
         after = max(after, REST_TURN / math.sqrt(squared))
     return r[REST] > after
 
@@ -573,7 +570,8 @@ def error_state_sample(r, dt, gx, gy, gz, ax, ay, az, mx, my, mz):
         r[FORCE + 1] += c10 * ax + c11 * ay + c12 * az
         r[FORCE + 2] += c20 * ax + c21 * ay + c22 * az
         r[FORCES] += 1.0
-    if is_field(mx, my, mz) and r[LEVELED] != 0.0:
+    # Zeros, as drivers give them before the first conversion, are no field.
+    if usable(mx, my, mz) and r[LEVELED] != 0.0 and mx * mx + my * my + mz * mz > 0.0:
         north = c00 * mx + c01 * my + c02 * mz
         east = c10 * mx + c11 * my + c12 * mz
         down = c20 * mx + c21 * my + c22 * mz
@@ -718,7 +716,8 @@ def complementary_sample(r, dt, gx, gy, gz, ax, ay, az, mx, my, mz):
         ex = gain * (dy * az - dz * ay)
         ey = gain * (dz * ax - dx * az)
         ez = gain * (dx * ay - dy * ax)
-    if is_field(mx, my, mz) and r[LEVELED] != 0.0:
+    # Zeros, as drivers give them before the first conversion, are no field.
+    if usable(mx, my, mz) and r[LEVELED] != 0.0 and mx * mx + my * my + mz * mz > 0.0:
         north = (1.0 - 2.0 * (y * y + z * z)) * mx + 2.0 * (
             (x * y - w * z) * my + (x * z + w * y) * mz
         )
