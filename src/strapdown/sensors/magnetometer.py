@@ -24,6 +24,8 @@ SOFT_LEFT = 0.02
 HUBER = 1.5
 #: Scatter that a fit begins with, as a share of the field; its rounds, and steps in each.
 FIRST_SCATTER, ROUNDS, STEPS = 0.02, 4, 15
+#: Least scatter, as a share of the field: finer than any magnetometer.
+FINEST = 1e-4
 #: Chance at which readings of a perfect magnetometer are called wrong: beyond three sigma.
 CHANCE = 0.0027
 #: Variance of the directions seen along the axis with least, a third if all are, from which soft
@@ -151,7 +153,7 @@ def calibrate_magnetometer(
         hard_iron=size * best.x[OFFSET],
         soft_iron=A,
         field=size * float(best.x[FIELD]),
-        hard_iron_sd=size * np.sqrt(np.diag(by.covariance)[OFFSET]),
+        hard_iron_sd=size * np.sqrt(np.maximum(np.diag(by.covariance)[OFFSET], 0.0)),
         residual=best.scatter / float(best.x[FIELD]),
         raw_residual=raw.scatter / float(raw.x[FIELD]),
         direction_sd_deg=_direction_sd(by),
@@ -298,7 +300,7 @@ def _fit(m: Array, start: Array, free: tuple[slice, ...]) -> _Fit:
         taken = float(np.trace(np.linalg.solve(normal, J.T @ (J * information[:, None]))))
         left = max(len(m) / correlated - taken, 0.1 * len(m) / correlated, 1.0)
         lost = len(m) / correlated / left
-        scatter = max(float(np.sqrt(np.mean(weight * e * e) * lost)), 1e-6)
+        scatter = max(float(np.sqrt(np.mean(weight * e * e) * lost)), FINEST)
     return _Fit(x, covariance, e, scatter, correlated)
 
 
@@ -353,4 +355,4 @@ def _direction_sd(fit: _Fit) -> float:
     # Of a random unit vector u, E|S u - (u'S u) u|² = (1/3 - 2/15) |S|² for S without a trace.
     shape = 0.2 * np.einsum("kl,kij,lij->", of_shape, SHAPES, SHAPES)
     squared = (2.0 / 3.0) * np.trace(of_offset) / F**2 + shape
-    return float(np.degrees(np.sqrt(0.5 * squared)))
+    return float(np.degrees(np.sqrt(0.5 * max(squared, 0.0))))

@@ -155,3 +155,10 @@ def test_missing_readings_and_too_few():
     assert np.allclose(found.hard_iron, IRON, atol=0.1)
     with pytest.raises(DataError, match="40 readings"):
         calibrate_magnetometer(mag[:60])
+
+
+def test_a_field_that_never_changes_shows_no_iron():
+    """Exact and constant, as of a made-up log at rest; warnings are errors here."""
+    found = calibrate_magnetometer(np.tile([20.0, 0.0, 44.0], (2000, 1)))
+    assert not found.significant
+    assert (found.hard_iron_sd > STRENGTH / 4.0).sum() >= 2
