@@ -66,6 +66,8 @@ Array = NDArray[np.float64]
 
 ANGLES_SD = ["roll_sd", "pitch_sd", "heading_sd"]
 
+#: Median specific force of a body on Earth, m/s²: half and twice gravity.
+WEAKEST, STRONGEST = 4.9, 19.6
 #: A disturbed field is reported from this share of the time on.
 REPORTED = 0.01
 
@@ -332,6 +334,9 @@ def _filtered(
             initial=initial.strip().lower(),
         )
     findings = list(said)
+    force = np.linalg.norm(imu[ACCEL].dropna().to_numpy(dtype=np.float64), axis=1)
+    if force.size and not WEAKEST < (median := float(np.median(force))) < STRONGEST:
+        findings.append(Finding("attitude.no-gravity-in-force", quantity="accel", force=median))
     if gyro_bias is not None:
         bias = _bias(gyro_bias, find_rests(imu) if isinstance(gyro_bias, str) else ())
         imu = imu.copy()

@@ -35,6 +35,9 @@ COVERED = 0.02
 WORTH = 2.0
 #: Direction that iron leaves open and that is worth a warning, deg.
 OPEN = 3.0
+#: A calibration of another log does not fit where the strength scatters more with it than without,
+#: and by more than a room makes it.
+MISFIT, FITS = 1.0, 0.05
 #: Terms of the model: hard iron, field, soft iron.
 OFFSET, FIELD, SOFT = slice(0, 3), 3, slice(4, 9)
 #: Symmetric matrices without a trace: a change of shape that leaves the size.
@@ -188,7 +191,13 @@ def without_iron(
     if given is None and (np.isfinite(mag).all(axis=1) & mag.any(axis=1)).sum() < LEAST:
         return imu, 0.0, ()
     used = calibrate_magnetometer(mag) if given is None else given
+    known = used.apply(mag)
+    raw_scatter, scatter = used.raw_residual, used.residual
     code = "attitude.magnetometer-calibrated"
+    if given is not None:
+        raw_scatter, scatter = _scatter(mag), _scatter(known)
+        if scatter > max(MISFIT * raw_scatter, FITS):
+            code = "attitude.calibration-does-not-fit"
     if given is None and not used.significant:
         if not used.found or used.direction_sd_deg < OPEN:
             return imu, 0.0, ()
@@ -203,17 +212,24 @@ def without_iron(
         sd=float(used.hard_iron_sd.max()),
         field=used.field,
         soft_percent=100.0 * float(shape),
-        raw_percent=100.0 * used.raw_residual,
-        left_percent=100.0 * used.residual,
+        raw_percent=100.0 * raw_scatter,
+        left_percent=100.0 * scatter,
         change_deg=used.change_deg,
         sd_deg=used.direction_sd_deg,
     )
-    known = used.apply(mag)
+    if code == "attitude.calibration-does-not-fit":
+        return imu, 0.0, (finding,)
     sd = used.direction_sd_deg / _level_share(known, imu[ACCEL].to_numpy(dtype=np.float64))
     if code.endswith("calibrated"):
         imu = imu.copy()
         imu[MAG] = known
     return imu, min(sd, 180.0), (finding,)
+
+
+def _scatter(mag: Array) -> float:
+    """Scatter of the strength, as a share of it, of the readings that are there."""
+    strength = np.linalg.norm(mag[np.isfinite(mag).all(axis=1) & mag.any(axis=1)], axis=1)
+    return float(strength.std() / strength.mean()) if strength.size else 0.0
 
 
 def _level_share(m: Array, f: Array) -> float:

@@ -12,7 +12,7 @@ from strapdown.errors import ConfigError, DataError
 from strapdown.formats.writers import WRITERS
 from strapdown.orientation_filters import make_filter, run_filter
 from strapdown.orientation_filters.error_state import slow_velocity
-from strapdown.tables import MAG, QUATERNION, attitude_table, imu_table
+from strapdown.tables import ACCEL, MAG, QUATERNION, attitude_table, imu_table
 
 IRON = np.array([18.0, -25.0, 10.0])
 
@@ -262,3 +262,21 @@ def test_what_is_asked_of_a_field_that_is_not_there_is_said(logs):
         compare(logs, magnetometer="nowhere.csv")
     with pytest.raises(ConfigError, match="orientation filter"):
         sd.compare_attitude(logs / "log.csv", ["error-state"])
+
+
+def test_a_calibration_of_other_axes_is_not_applied(turned):
+    _, imu = turned
+    other = sd.calibrate_magnetometer(imu[MAG].to_numpy()[:, [1, 2, 0]] + [30.0, 0.0, -40.0])
+    found = sd.attitude(imu, algorithm="complementary", magnetometer=other)
+    raw = sd.attitude(imu, algorithm="complementary", magnetometer="raw")
+    assert "attitude.calibration-does-not-fit" in codes(found)
+    assert (found[QUATERNION].to_numpy() == raw[QUATERNION].to_numpy()).all()
+
+
+def test_a_force_in_g_is_said(turned):
+    made, _ = turned
+    imu = made.imu.copy()
+    imu[ACCEL] = imu[ACCEL] / 9.80665
+    assert "attitude.no-gravity-in-force" in codes(sd.attitude(imu, algorithm="complementary"))
+    plain = sd.attitude(made.imu, algorithm="complementary")
+    assert "attitude.no-gravity-in-force" not in codes(plain)
