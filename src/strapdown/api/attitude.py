@@ -334,7 +334,8 @@ def _filtered(
             initial=initial.strip().lower(),
         )
     findings = list(said)
-    force = np.linalg.norm(imu[ACCEL].dropna().to_numpy(dtype=np.float64), axis=1)
+    felt = imu.reindex(columns=ACCEL).dropna()  # a filter refuses a log without them
+    force = np.linalg.norm(felt.to_numpy(dtype=np.float64), axis=1)
     if force.size and not WEAKEST < (median := float(np.median(force))) < STRONGEST:
         findings.append(Finding("attitude.no-gravity-in-force", quantity="accel", force=median))
     if gyro_bias is not None:

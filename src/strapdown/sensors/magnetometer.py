@@ -173,7 +173,7 @@ def without_iron(
     Parameters
     ----------
     imu : DataFrame
-        An Imu table with an accelerometer; without ``mag_x..z`` it is returned as it is.
+        An Imu table; without ``mag_x..z`` or ``accel_x..z`` it is returned as it is.
     given : MagnetometerCalibration, optional
         Of another log, which is applied as it is.
 
@@ -185,7 +185,7 @@ def without_iron(
     findings : tuple of Finding
         What was applied; or that there is iron, and the log does not show it well enough.
     """
-    if not set(MAG) <= set(imu.columns):
+    if not {*MAG, *ACCEL} <= set(imu.columns):
         return imu, 0.0, ()
     mag = imu[MAG].to_numpy(dtype=np.float64)
     if given is None and (np.isfinite(mag).all(axis=1) & mag.any(axis=1)).sum() < LEAST:

@@ -280,3 +280,9 @@ def test_a_force_in_g_is_said(turned):
     assert "attitude.no-gravity-in-force" in codes(sd.attitude(imu, algorithm="complementary"))
     plain = sd.attitude(made.imu, algorithm="complementary")
     assert "attitude.no-gravity-in-force" not in codes(plain)
+
+
+def test_a_field_without_a_force_is_refused_as_a_log_without_one(turned):
+    made, _ = turned
+    with pytest.raises(DataError, match="needs an accelerometer"):
+        sd.attitude(made.imu.drop(columns=ACCEL), algorithm="error-state")
