@@ -353,11 +353,12 @@ def at_rest(r, span, gx, gy, gz):
         squared += off * off
     limit = 3.0 * math.sqrt(r[P + 3 * N + 3] + r[P + 4 * N + 4] + r[P + 5 * N + 5]) + REST_LIMIT
     steady = rate < REST_RATE * REST_RATE and force < REST_FORCE * REST_FORCE
-    if not (steady and squared < limit * limit):
+    steady = steady and squared < limit * limit
+    if not steady:
         r[REST] = 0.0
     if r[FIELDS] > 0.0 and r[HEADED] == 1.0 and field_turned(r):
         steady = False
-    if steady and squared < limit * limit:
+    if steady:
         r[REST] += span
     after = REST_AFTER
     if r[HEADED] == 1.0 and squared > REST_BIAS * REST_BIAS:

@@ -199,13 +199,7 @@ def attitude(
     """
     if is_filter(algorithm):
         chosen_filter = make_filter(algorithm)
-        if interpolation != "linear":
-            raise ConfigError(
-                "attitude.filter-takes-linear",
-                quantity="interpolation",
-                name=chosen_filter.name,
-                interpolation=interpolation,
-            )
+        chosen_filter.check_interpolation(interpolation)
         samples = _filter_samples(t, gyro, accel, mag, sampling)
         chosen_filter, samples, said = _of_field(chosen_filter, samples, magnetometer, place)
         return _filtered(chosen_filter, samples, initial, gyro_bias, said)
@@ -306,7 +300,7 @@ def _of_field(
     if place is not None:
         declination, sd, said = magnetic_north(place, imu)
     if magnetometer != "raw":
-        imu, of_iron, found = without_iron(imu, given)
+        imu, _, of_iron, found = without_iron(imu, given)
         sd, said = math.hypot(sd, of_iron), (*said, *found)
     return chosen.with_heading(declination, sd), imu, said
 

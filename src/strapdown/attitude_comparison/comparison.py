@@ -75,10 +75,7 @@ from strapdown.formats.recording import Reading
 from strapdown.increments import increments_from_imu
 from strapdown.orientation_filters import is_filter
 from strapdown.progress import Progress, silent
-from strapdown.sensors.magnetometer import (
-    calibrate_magnetometer,
-    without_iron,
-)
+from strapdown.sensors.magnetometer import calibrate_magnetometer, without_iron
 from strapdown.sensors.rest import RestStretch, find_rests, gyro_bias_from_rests, without_gyro_bias
 from strapdown.systems.inputs import part_of_log
 from strapdown.tables import ACCEL, GYRO, MAG, references_table
@@ -611,13 +608,11 @@ def _of_field(
         given = calibrate_magnetometer(values_of(other.imu, MAG))
         files = (input_files("magnetometer", spec.magnetometer_path, other.files),)
     if spec.magnetometer != "raw":
-        known, of_iron, said = without_iron(imu, given)
+        imu, used, of_iron, said = without_iron(imu, given)
         findings += said
         sd = float(np.hypot(sd, of_iron))
-        if known is not imu:
-            used = given or calibrate_magnetometer(values_of(imu, MAG))
+        if used is not None:
             iron = {"hard_iron": used.hard_iron.tolist(), "soft_iron": used.soft_iron.tolist()}
-        imu = known
     return imu, (declination, sd), iron, files
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import pandas as pd
 from numpy.typing import ArrayLike
 
 from strapdown.attitude_algorithms import AttitudeAlgorithm
-from strapdown.errors import ConfigError
 from strapdown.export.algorithms import algorithm_in_c, sampling_kind
 from strapdown.export.configuration import Channel, SensorConfiguration
 from strapdown.export.filters import filter_in_c
@@ -47,22 +47,13 @@ def export_c(
     from that of `imu`. DataError: `q_nb` is not a rotation; `imu` has not the sensors; or as
     `tables.check_imu`.
     """
-    if isinstance(chosen, AttitudeAlgorithm):
-        level = (1.0, 0.0, 0.0, 0.0) if q_nb is None else q_nb
-        return algorithm_in_c(
-            chosen,
-            interpolation=interpolation,
-            sampling=sampling,
-            q_nb=level,
-            imu=imu,
-            configuration=configuration,
-        )
-    return filter_in_c(
+    return _written(
+        (algorithm_in_c, filter_in_c),
         chosen,
-        **_of_filter(chosen, interpolation, sampling, magnetometer, imu),
-        q_nb=q_nb,
-        imu=imu,
-        configuration=configuration,
+        (interpolation, sampling, magnetometer),
+        q_nb,
+        imu,
+        configuration,
     )
 
 
@@ -81,20 +72,39 @@ def export_micropython(
     The kernels themselves, without numba and numpy, their options as constants, and a class
     ``Attitude``. Arguments, result and errors: as of `export_c`.
     """
+    return _written(
+        (algorithm_in_python, filter_in_python),
+        chosen,
+        (interpolation, sampling, magnetometer),
+        q_nb,
+        imu,
+        configuration,
+    )
+
+
+def _written(
+    writers: tuple[Callable[..., str], Callable[..., str]],
+    chosen: AttitudeAlgorithm | OrientationEstimator,
+    asked: tuple[str, str | None, bool | None],
+    q_nb: ArrayLike | None,
+    imu: pd.DataFrame | None,
+    configuration: SensorConfiguration | None,
+) -> str:
+    """Write a file by the writer of algorithms, or that of filters.
+
+    `asked`: interpolation, sampling, and whether there is a magnetometer.
+    """
+    of_algorithm, of_filter = writers
     if isinstance(chosen, AttitudeAlgorithm):
-        return algorithm_in_python(
+        return of_algorithm(
             chosen,
-            kind=sampling_kind(interpolation, sampling, imu),
+            kind=sampling_kind(*asked[:2], imu),
             q_nb=(1.0, 0.0, 0.0, 0.0) if q_nb is None else q_nb,
             imu=imu,
             configuration=configuration,
         )
-    return filter_in_python(
-        chosen,
-        **_of_filter(chosen, interpolation, sampling, magnetometer, imu),
-        q_nb=q_nb,
-        imu=imu,
-        configuration=configuration,
+    return of_filter(
+        chosen, **_of_filter(chosen, *asked, imu), q_nb=q_nb, imu=imu, configuration=configuration
     )
 
 
@@ -108,13 +118,7 @@ def _of_filter(
     """What an exported filter takes, from arguments or from samples."""
     # Of the other sensors a sample may be missing.
     kind = sampling_kind(interpolation, sampling, None if imu is None else imu[GYRO])
-    if interpolation != "linear":
-        raise ConfigError(
-            "attitude.filter-takes-linear",
-            quantity="interpolation",
-            name=chosen.name,
-            interpolation=interpolation,
-        )
+    chosen.check_interpolation(interpolation)
     if magnetometer is None:
         magnetometer = imu is None or set(MAG) <= set(imu.columns)
     return {

@@ -41,14 +41,12 @@ from strapdown.tables import GYRO, check_imu, check_sampling_kind
 def algorithm_in_c(
     algorithm: AttitudeAlgorithm,
     *,
-    interpolation: str = "linear",
-    sampling: str | None = None,
+    kind: str,
     q_nb: ArrayLike = (1.0, 0.0, 0.0, 0.0),
     imu: pd.DataFrame | None = None,
     configuration: SensorConfiguration | None = None,
 ) -> str:
     """Write an attitude algorithm as one C99 file with its own test: `export_c`."""
-    kind = sampling_kind(interpolation, sampling, imu)
     around, shape = SAMPLINGS[kind], shape_of(algorithm)
     kernels, step, increments = algorithm_kernels(algorithm, shape, kind)
     translator = Translator(kernels)

@@ -79,6 +79,7 @@ class ErrorState(OrientationEstimator):
     row = kernel.ROW
     advance_kernel = staticmethod(kernel.error_state_advance)
     update_kernel = staticmethod(kernel.error_state_update)
+    may_be_zero = ("velocity",)
 
     velocity: float = 0.0
     bias: float = 1.0
@@ -86,10 +87,14 @@ class ErrorState(OrientationEstimator):
     field: float = 4.0
     block: float = 0.08
 
+    @property
+    def _velocity(self) -> float:
+        """The velocity that is used, m/s."""
+        return self.velocity or CARRIED
+
     def kernel_options(self) -> tuple[float, ...]:
         """Return velocity variance, bias prior, gyro noise density and block, SI and radians."""
-        velocity = self.velocity or CARRIED
-        return velocity**2, radians(self.bias), radians(self.noise) ** 2, self.block
+        return self._velocity**2, radians(self.bias), radians(self.noise) ** 2, self.block
 
     def of_motion(self, imu: pd.DataFrame, run: FilterRun) -> ErrorState:
         """Take the velocity from its slow changes, as of a walker or a vehicle.
@@ -116,7 +121,7 @@ class ErrorState(OrientationEstimator):
             [tilt**2] * 2
             + [0.0]
             + [radians(self.bias) ** 2] * 3
-            + [max((self.velocity or CARRIED) ** 2, 0.25)] * 2
+            + [max(self._velocity**2, 0.25)] * 2
             + [kernel.ACCEL_BIAS_SD**2] * 3
         )
         record[kernel.POWER] = 0.25

@@ -41,6 +41,8 @@ class OrientationEstimator(ABC):
         Of magnetic north, east positive: added to headings found with a magnetometer.
     advance_kernel, update_kernel : callable
         The compiled loop over many samples, and one sample.
+    may_be_zero : tuple of str
+        Options with a meaning at zero; every other one is positive.
     """
 
     name: ClassVar[str]
@@ -51,6 +53,7 @@ class OrientationEstimator(ABC):
     row: ClassVar[int]
     advance_kernel: ClassVar[Any]
     update_kernel: ClassVar[Callable[..., Any]]
+    may_be_zero: ClassVar[tuple[str, ...]] = ()
 
     declination: float = 0.0
 
@@ -59,10 +62,9 @@ class OrientationEstimator(ABC):
             value = getattr(self, option.name)
             if option.name == "declination":
                 allowed = abs(value) <= 180.0
-            elif option.name == "velocity":
-                allowed = isfinite(value) and value >= 0.0
             else:
-                allowed = isfinite(value) and value > 0.0
+                zero = value == 0.0 and option.name in self.may_be_zero
+                allowed = isfinite(value) and (value > 0.0 or zero)
             if not allowed:
                 raise ConfigError(
                     "attitude.filter-option-out-of-range",
@@ -163,6 +165,26 @@ class OrientationEstimator(ABC):
             half = 0.5 * radians(self.declination)
             q = rotation.compose([cos(half), 0.0, 0.0, sin(half)], q)
         return np.asarray(q / np.sqrt((q * q).sum(axis=1, keepdims=True)))
+
+    def check_interpolation(self, interpolation: str) -> None:
+        """Raise ConfigError unless rates are to be linear between their stamps."""
+        if interpolation != "linear":
+            raise ConfigError(
+                "attitude.filter-takes-linear",
+                quantity="interpolation",
+                name=self.name,
+                interpolation=interpolation,
+            )
+
+    def check_sensors(self, imu: pd.DataFrame) -> None:
+        """Raise DataError unless an Imu table has the accelerometer that every filter needs."""
+        if not set(ACCEL) <= set(imu.columns):
+            raise DataError(
+                "attitude.filter-needs-accelerometer",
+                file=imu.attrs.get("source"),
+                quantity="accel",
+                name=self.name,
+            )
 
     def of_motion(self, imu: pd.DataFrame, run: FilterRun) -> Self:
         """Return the same filter for the motion of a record, which `run` is a first run over.
@@ -278,10 +300,7 @@ def run_filter(
         The filter left the range of floating point.
     """
     source = imu.attrs.get("source")
-    if not set(ACCEL) <= set(imu.columns):
-        raise DataError(
-            "attitude.filter-needs-accelerometer", file=source, quantity="accel", name=chosen.name
-        )
+    chosen.check_sensors(imu)
     rate = imu[GYRO].to_numpy(dtype=np.float64)
     bad = np.flatnonzero(~(np.abs(rate) < LARGEST).all(axis=1))
     if bad.size:

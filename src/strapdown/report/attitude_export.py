@@ -12,7 +12,7 @@ import pandas as pd
 
 from strapdown.attitude_algorithms import AttitudeAlgorithm, make_algorithm
 from strapdown.attitude_comparison.comparison import AttitudeComparison
-from strapdown.errors import ConfigError, DataError
+from strapdown.errors import ConfigError
 from strapdown.export import Channel, SensorConfiguration, export_c, export_micropython
 from strapdown.formats.columns import parse_axes
 from strapdown.increments import increments_from_imu
@@ -31,6 +31,8 @@ from strapdown.units import (
 
 #: By the suffix of the file: its language and what writes it.
 WRITERS = {".c": ("C99", export_c), ".py": ("MicroPython", export_micropython)}
+#: In words.
+SENSORS = {"gyro": "Gyro", "accel": "Accelerometer", "mag": "Magnetometer"}
 # Samples of the test vector: about a second of motion, in a file of readable length.
 VECTOR = 64
 
@@ -91,13 +93,8 @@ def chosen_for_export(
     if of is None:
         raise ConfigError("report.no-algorithm-accurate-enough-chosen", quantity="--export")
     chosen = named_for_export(of)
-    if isinstance(chosen, OrientationEstimator) and not set(ACCEL) <= set(bench.imu.columns):
-        raise DataError(
-            "attitude.filter-needs-accelerometer",
-            file=bench.source,
-            quantity="accel",
-            name=chosen.name,
-        )
+    if isinstance(chosen, OrientationEstimator):
+        chosen.check_sensors(bench.imu)
     return chosen
 
 
@@ -219,8 +216,8 @@ def _channel(
     attrs = bench.imu.attrs
     axes = attrs.get("sensor_axes") if columns is GYRO else attrs.get("aiding_axes")
     axis, sign = parse_axes(str(axes or attrs.get("sensor_axes") or "x,y,z"))
-    sensor = {id(GYRO): "Gyro", id(ACCEL): "Accelerometer"}.get(id(columns), "Magnetometer")
-    sources.append(f"{sensor}: columns {names}: {reading.why}.")
+    sensor = columns[0].partition("_")[0]
+    sources.append(f"{SENSORS[sensor]}: columns {names}: {reading.why}.")
     return Channel(unit, scale, axis, sign)
 
 

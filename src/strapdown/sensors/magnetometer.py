@@ -98,9 +98,7 @@ class MagnetometerCalibration:
         return np.asarray((np.asarray(mag, np.float64) - self.hard_iron) @ self.soft_iron)
 
 
-def calibrate_magnetometer(
-    mag: ArrayLike, time: ArrayLike | None = None
-) -> MagnetometerCalibration:
+def calibrate_magnetometer(mag: ArrayLike) -> MagnetometerCalibration:
     """Fit the ellipsoid on which the readings of a turning magnetometer lie.
 
     Parameters
@@ -130,9 +128,7 @@ def calibrate_magnetometer(
     """
     from scipy.stats import chi2
 
-    rows = as_array(mag, 3, "mag")
-    # Zeros are what many drivers give before the first conversion.
-    rows = rows[np.isfinite(rows).all(axis=1) & rows.any(axis=1)]
+    rows = _readings(as_array(mag, 3, "mag"))
     if len(rows) < LEAST:
         raise DataError("attitude.too-few-field-readings", quantity="mag", count=len(rows))
     m = rows[:: -(-len(rows) // MOST)]
@@ -167,7 +163,7 @@ def calibrate_magnetometer(
 
 def without_iron(
     imu: pd.DataFrame, given: MagnetometerCalibration | None = None
-) -> tuple[pd.DataFrame, float, tuple[Finding, ...]]:
+) -> tuple[pd.DataFrame, MagnetometerCalibration | None, float, tuple[Finding, ...]]:
     """Calibrate the magnetometer of a log by itself, where its iron is significant.
 
     Parameters
@@ -175,60 +171,73 @@ def without_iron(
     imu : DataFrame
         An Imu table; without ``mag_x..z`` or ``accel_x..z`` it is returned as it is.
     given : MagnetometerCalibration, optional
-        Of another log, which is applied as it is.
+        Of another log, which is applied unless the strength of the field contradicts it.
 
     Returns
     -------
     imu : DataFrame
+    calibration : MagnetometerCalibration or None
+        The one that was applied.
     heading_sd : float, deg
         Standard deviation that iron leaves in headings, at the dip of the log.
     findings : tuple of Finding
         What was applied; or that there is iron, and the log does not show it well enough.
     """
     if not {*MAG, *ACCEL} <= set(imu.columns):
-        return imu, 0.0, ()
+        return imu, None, 0.0, ()
     mag = imu[MAG].to_numpy(dtype=np.float64)
-    if given is None and (np.isfinite(mag).all(axis=1) & mag.any(axis=1)).sum() < LEAST:
-        return imu, 0.0, ()
-    used = calibrate_magnetometer(mag) if given is None else given
-    known = used.apply(mag)
-    raw_scatter, scatter = used.raw_residual, used.residual
-    code = "attitude.magnetometer-calibrated"
     if given is not None:
-        raw_scatter, scatter = _scatter(mag), _scatter(known)
+        raw_scatter, scatter = _scatter(mag), _scatter(given.apply(mag))
         if scatter > max(MISFIT * raw_scatter, FITS):
             code = "attitude.calibration-does-not-fit"
+            return imu, None, 0.0, (_finding(code, imu, given, raw_scatter, scatter),)
+        used = given
+    else:
+        if len(_readings(mag)) < LEAST:
+            return imu, None, 0.0, ()
+        used = calibrate_magnetometer(mag)
+        raw_scatter, scatter = used.raw_residual, used.residual
+    known = used.apply(mag)
+    sd = used.direction_sd_deg / _level_share(known, imu[ACCEL].to_numpy(dtype=np.float64))
+    sd = min(sd, 180.0)
     if given is None and not used.significant:
         if not used.found or used.direction_sd_deg < OPEN:
-            return imu, 0.0, ()
+            return imu, None, 0.0, ()
         code = "attitude.magnetometer-needs-turning"
-    shape = np.abs(np.linalg.eigvalsh(used.soft_iron) - 1.0).max()
-    finding = Finding(
+        return imu, None, sd, (_finding(code, imu, used, raw_scatter, scatter),)
+    said = _finding("attitude.magnetometer-calibrated", imu, used, raw_scatter, scatter)
+    imu = imu.copy()
+    imu[MAG] = known
+    return imu, used, sd, (said.replace(severity="note"),)
+
+
+def _finding(
+    code: str, imu: pd.DataFrame, used: MagnetometerCalibration, raw_scatter: float, scatter: float
+) -> Finding:
+    """What the sentences about a calibration show."""
+    return Finding(
         code,
         file=imu.attrs.get("source"),
         quantity="mag",
-        severity="note" if code.endswith("calibrated") else "warning",
         data={f"iron_{axis}": float(v) for axis, v in zip("xyz", used.hard_iron, strict=True)},
         sd=float(used.hard_iron_sd.max()),
         field=used.field,
-        soft_percent=100.0 * float(shape),
+        soft_percent=100.0 * float(np.abs(np.linalg.eigvalsh(used.soft_iron) - 1.0).max()),
         raw_percent=100.0 * raw_scatter,
         left_percent=100.0 * scatter,
         change_deg=used.change_deg,
         sd_deg=used.direction_sd_deg,
     )
-    if code == "attitude.calibration-does-not-fit":
-        return imu, 0.0, (finding,)
-    sd = used.direction_sd_deg / _level_share(known, imu[ACCEL].to_numpy(dtype=np.float64))
-    if code.endswith("calibrated"):
-        imu = imu.copy()
-        imu[MAG] = known
-    return imu, min(sd, 180.0), (finding,)
+
+
+def _readings(mag: Array) -> Array:
+    """Rows that are readings: not NaN, nor the zeros of drivers before the first conversion."""
+    return mag[np.isfinite(mag).all(axis=1) & mag.any(axis=1)]
 
 
 def _scatter(mag: Array) -> float:
     """Scatter of the strength, as a share of it, of the readings that are there."""
-    strength = np.linalg.norm(mag[np.isfinite(mag).all(axis=1) & mag.any(axis=1)], axis=1)
+    strength = np.linalg.norm(_readings(mag), axis=1)
     return float(strength.std() / strength.mean()) if strength.size else 0.0
 
 
@@ -283,7 +292,7 @@ def _fit(m: Array, start: Array, free: tuple[slice, ...]) -> _Fit:
     # count fully, as residuals of a wrong model are large and alike.
     scatter, correlated = FIRST_SCATTER, 1.0
     for _ in range(ROUNDS):
-        damping, cost = 0.0, np.inf
+        damping = 0.0
         for _ in range(STEPS):
             e, J = _residual(m, x)
             weight = np.minimum(1.0, HUBER * scatter / np.maximum(np.abs(e), 1e-12))

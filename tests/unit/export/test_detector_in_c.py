@@ -6,7 +6,7 @@ import subprocess
 
 import numpy as np
 import pytest
-from tests.unit.export.test_algorithms_in_c import COMPILER, WARNINGS, needs_compiler
+from tests.unit.export.test_algorithms_in_c import build, needs_compiler
 
 from strapdown._kernels import crash_trigger as kernel
 from strapdown.export.detector import STEP, crash_samples, export_detector, run_samples
@@ -38,24 +38,9 @@ int main(void)
 """
 
 
-def built(folder, text, *options):
-    source, program = folder / "crash.c", folder / "crash"
-    source.write_text(text, encoding="utf-8")
-    # No fused products, which round once where Python rounds twice.
-    flags = [*WARNINGS, "-O2", "-ffp-contract=off", *options]
-    done = subprocess.run(
-        [str(COMPILER), *flags, str(source), "-o", str(program), "-lm"],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    return program
-
-
 def through_c(folder, rows, single, mean):
     precision = f"-DREAL={'float' if single else 'double'}"
-    program = built(folder, export_detector(ERRORS, VARIANCE, mean=mean) + HARNESS, precision)
+    program = build(folder, export_detector(ERRORS, VARIANCE, mean=mean) + HARNESS, precision)
     given = "\n".join(" ".join(float(v).hex() for v in row) for row in rows)
     done = subprocess.run([program], input=given, capture_output=True, text=True, check=True)
     lines = [line.split() for line in done.stdout.splitlines()]
@@ -100,7 +85,7 @@ def test_the_c_file_gives_the_bits_of_the_kernel(tmp_path, single, mean):
 @pytest.mark.parametrize("real", ["float", "double"])
 def test_its_own_test_passes_and_notices_a_wrong_threshold(tmp_path, real, mean):
     text = export_detector(ERRORS, VARIANCE, mean=mean)
-    program = built(tmp_path, text, f"-DREAL={real}", "-DCRASH_TEST")
+    program = build(tmp_path, text, f"-DREAL={real}", "-DCRASH_TEST")
     assert subprocess.run([program], capture_output=True, check=False).returncode == 0
     for right, wrong in (
         ("#define TRIGGER R(2.2222222222222223)", "#define TRIGGER R(6.0)"),
@@ -108,7 +93,7 @@ def test_its_own_test_passes_and_notices_a_wrong_threshold(tmp_path, real, mean)
         ("state[MEAN + 1] * t", "state[MEAN] * t"),
     ):
         assert right in text
-        program = built(tmp_path, text.replace(right, wrong), f"-DREAL={real}", "-DCRASH_TEST")
+        program = build(tmp_path, text.replace(right, wrong), f"-DREAL={real}", "-DCRASH_TEST")
         assert subprocess.run([program], capture_output=True, check=False).returncode == 1, wrong
 
 

@@ -120,14 +120,14 @@ def samples(mag, force):
 def test_a_table_is_calibrated_where_the_log_shows_it():
     rng = np.random.default_rng(5)
     true, force = turning(rng, 1.5, 0.01)
-    imu, sd, (said,) = without_iron(samples(true + IRON, force))
+    imu, _, sd, (said,) = without_iron(samples(true + IRON, force))
     assert said.code == "attitude.magnetometer-calibrated"
     assert said.severity == "note"
     assert angle(imu[MAG].to_numpy(), true) < 1.5
     assert 0.0 < sd < 5.0
-    same, sd, said = without_iron(samples(true, force))
+    same, used, sd, said = without_iron(samples(true, force))
     assert (same[MAG].to_numpy() == true).all()
-    assert (sd, said) == (0.0, ())
+    assert (used, sd, said) == (None, 0.0, ())
 
 
 def test_iron_that_the_log_does_not_show_well_enough_is_said_and_widens():
@@ -136,7 +136,7 @@ def test_iron_that_the_log_does_not_show_well_enough_is_said_and_widens():
     for seed in range(20):
         true, force = turning(np.random.default_rng(seed), 0.05, 0.02)
         raw = true + IRON
-        imu, sd, said = without_iron(samples(raw, force))
+        imu, _, sd, said = without_iron(samples(raw, force))
         if [f.code for f in said] == ["attitude.magnetometer-needs-turning"]:
             open_ += 1
             assert said[0].severity == "warning"
