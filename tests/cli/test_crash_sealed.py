@@ -73,7 +73,7 @@ def test_any_byte_of_the_case_file_may_be_harmed(copy, no_run):
         path.write_bytes(other)
         details = found(copy)
         assert len(details) == 2
-        assert details[1].startswith("inputs/case/case.toml: it is not a valid case: ")
+        assert details[1].startswith("inputs/case/case.toml: not a valid case: ")
     path.write_bytes(whole)
 
 

@@ -207,9 +207,9 @@ def attitude(
     from strapdown.api.attitude import compare_attitude
     from strapdown.attitude_algorithms import make_algorithm
     from strapdown.attitude_algorithms.cost import time_algorithms
-    from strapdown.bundle import check_destination, write_timing
+    from strapdown.bundle import write_timing
     from strapdown.cli.console import Stopwatch, console, print_findings, print_seal, progress
-    from strapdown.cli.result_folder import default_folder, refuse_result
+    from strapdown.cli.result_folder import claim, default_folder, refuse_result
     from strapdown.errors import ConfigError
     from strapdown.orientation_filters import FILTERS, make_filter
     from strapdown.orientation_filters.cost import time_filters
@@ -225,7 +225,7 @@ def attitude(
     for source in sources:
         refuse_result(source, "log")
     folder = out or default_folder(sources[0], "attitude")
-    check_destination(folder, write.force)
+    claim(folder, write.force)
     check_export(files.export, write.force)
     if files.export_of is not None:
         if files.export is None:

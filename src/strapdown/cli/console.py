@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import sys
 from collections.abc import Callable, Container, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from contextvars import ContextVar
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -22,6 +22,8 @@ _log = logging.getLogger("strapdown")
 
 #: Terms of messages: options, or the keys of the file that a command runs.
 WORDS: ContextVar[Words] = ContextVar("words", default="cli")
+#: What is held until the command ends.
+RESOURCES: ContextVar[ExitStack] = ContextVar("resources")
 # Redirected output has no width; its tables are as wide as needed.
 PIPE_WIDTH = 160
 # A long name with options is wrapped in a table with many columns of numbers.

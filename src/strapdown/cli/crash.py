@@ -82,7 +82,7 @@ def crash(
         crash_live(cases, out, write, flags)
         return
     from strapdown.api.crash import reconstruct
-    from strapdown.bundle import MANIFEST, Seal, check_destination, sha256, write_timing
+    from strapdown.bundle import MANIFEST, Seal, sha256, write_timing
     from strapdown.cli.console import (
         WORDS,
         Stopwatch,
@@ -92,7 +92,7 @@ def crash(
         print_seal,
         progress,
     )
-    from strapdown.cli.result_folder import default_folder, refuse_result
+    from strapdown.cli.result_folder import claim, default_folder, refuse_result
     from strapdown.report.crash_tables import closure_table
     from strapdown.report.values import shown_in
 
@@ -101,7 +101,7 @@ def crash(
     folder = out or default_folder(cases[0], "crash")
     several = len(cases) > 1
     for k in range(len(cases)):
-        check_destination(folder / str(k + 1) if several else folder, write.force)
+        claim(folder / str(k + 1) if several else folder, write.force)
     WORDS.set("file")
     with progress(write.quiet or write.json) as show:
         report = Stopwatch(show)

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from strapdown.bundle import check_destination, write_latency
+from strapdown.bundle import write_latency
 from strapdown.cli.console import WORDS, print_seal
 from strapdown.cli.navigate_live import line_writer, warner
 from strapdown.cli.navigate_tables import print_latency
-from strapdown.cli.result_folder import default_folder, refuse_result
+from strapdown.cli.result_folder import claim, default_folder, refuse_result
 from strapdown.cli.shared_options import OutFlags
 from strapdown.errors import ConfigError, DataError
 from strapdown.live.crash import receive_crash, recorder_of_case
@@ -62,7 +62,7 @@ def crash_live(cases: Sequence[Path], out: Path | None, write: OutFlags, flags: 
             typer.echo(f"C99   {flags.export}")
         return
     folder = out or default_folder(cases[0], "crash-live")
-    check_destination(folder, write.force)
+    claim(folder, write.force)
     clock = MachineClock()
     every = EVERY if flags.every is None else flags.every
     source = open_source(flags.live, clock, sys.stdin.buffer)

@@ -83,12 +83,12 @@ def _part_of(show: Progress, title: str, begin: float, share: float) -> Progress
 
 def _check(out: Path, names: list[str], force: bool) -> None:
     """Refuse before the first run what a later one would refuse."""
-    from strapdown.bundle import check_destination
+    from strapdown.cli.result_folder import claim
     from strapdown.errors import ConfigError
 
     for name in (*names, _PAGE):
         if "." not in name:
-            check_destination(out / name, force)
+            claim(out / name, force)
         elif (out / name).exists() and not force:
             raise ConfigError("cli.folder-exists", file=str(out / name), quantity="--out")
 

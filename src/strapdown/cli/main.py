@@ -14,6 +14,7 @@ import shlex
 import signal
 import sys
 import threading
+from contextlib import ExitStack
 from importlib import import_module
 from typing import Any, NoReturn
 
@@ -21,7 +22,7 @@ import typer
 from typer.core import TyperGroup
 
 from strapdown import __version__
-from strapdown.cli.console import WORDS, logged
+from strapdown.cli.console import RESOURCES, WORDS, logged
 from strapdown.errors import ConfigError, Finding, StrapdownError
 
 _RESEND_S = 0.005
@@ -29,7 +30,7 @@ _RESEND_S = 0.005
 EXIT_CODES = (
     "Exit codes: 0 done; 1 an error of strapdown itself; 2 the command line was not understood; "
     "3 the data cannot be used; 4 what was asked for is unknown or cannot be done; 5 a computation "
-    "diverged; 6 verify found a change."
+    "diverged; 6 verify found a change; 7 verify could compare only a part."
 )
 
 #: Modules of the commands, in the order of the help.
@@ -44,6 +45,7 @@ COMMANDS = (
     "crash",
     "simulate",
     "verify",
+    "sign",
     "modules",
     "demo",
 )
@@ -98,12 +100,14 @@ def _version(asked: bool) -> None:
 
 @app.callback()
 def main(
+    ctx: typer.Context,
     version: bool = typer.Option(
         False, "--version", callback=_version, is_eager=True, help="Print the version."
     ),
 ) -> None:
     """From an inertial sensor log to an answer that you can trust."""
     WORDS.set("cli")
+    RESOURCES.set(ctx.with_resource(ExitStack()))
 
 
 #: Number of new objects before a garbage collection.

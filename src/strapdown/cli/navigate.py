@@ -133,9 +133,10 @@ def navigate(
     write: OutFlags,
 ) -> None:
     """Find position, velocity and attitude over a record, by inertial sensors and measurements."""
-    from strapdown.bundle import check_destination, write_latency
+    from strapdown.bundle import write_latency
     from strapdown.cli.console import WORDS, print_seal
     from strapdown.cli.result_folder import (
+        claim,
         default_folder,
         refuse_result,
         run_and_save,
@@ -167,7 +168,7 @@ def navigate(
     if live is not None:
         from strapdown.cli.navigate_live import navigate_live
 
-        check_destination(folder, write.force)
+        claim(folder, write.force)
         refused = {flag_of(name): value for name, value in given.items()}
         refused |= {"--pace": pace, "--json": write.json or None}
         navigate_live(source, live, folder, write, lines=lines, every=every, given=refused)

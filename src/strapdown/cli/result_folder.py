@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from strapdown.cli.console import Stopwatch, progress
+from strapdown.cli.console import RESOURCES, Stopwatch, progress
 from strapdown.errors import ConfigError, DataError, Finding
 
 if TYPE_CHECKING:
@@ -88,6 +88,16 @@ def _hints(path: Path, command: str, manifest: Mapping[str, Any]) -> Iterator[Fi
         yield Finding("cli.hint-input", severity="note", role=own["role"], input=at)
 
 
+def claim(folder: Path, force: bool) -> None:
+    """Hold the folder of a result until the command ends; no other run writes it.
+
+    ConfigError: it exists and must not be replaced, or another run holds it.
+    """
+    from strapdown.bundle import claimed
+
+    RESOURCES.get().enter_context(claimed(folder, force))
+
+
 def run_and_save(
     compute: Callable[[Stopwatch], Any],
     folder: Path,
@@ -102,9 +112,9 @@ def run_and_save(
     seal, or None if the rest is not to be printed. ConfigError: the folder exists and must not be
     replaced; or as `compute`.
     """
-    from strapdown.bundle import check_destination, write_timing
+    from strapdown.bundle import write_timing
 
-    check_destination(folder, write.force)
+    claim(folder, write.force)
     with progress(write.quiet or write.json) as show:
         report = Stopwatch(show)
         result = compute(report)

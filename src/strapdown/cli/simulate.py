@@ -60,15 +60,14 @@ def simulate(
 ) -> None:
     """Write the log of a scenario, a trajectory or a crash together with its exact truth."""
     from strapdown.api.simulation import simulate as run_simulation
-    from strapdown.bundle import check_destination
     from strapdown.cli.console import WORDS, console, print_seal, progress
-    from strapdown.cli.result_folder import default_folder
+    from strapdown.cli.result_folder import claim, default_folder
 
     own = name.lower().endswith(".toml")
     WORDS.set("file" if own else "cli")
     title = Path(name).stem if own else name
     folder = out or default_folder(name, "simulated")
-    check_destination(folder, write.force)
+    claim(folder, write.force)
     with progress(write.quiet or write.json) as report:
         report("simulating", 0.1)
         made = run_simulation(

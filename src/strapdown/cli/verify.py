@@ -10,37 +10,85 @@ import typer
 from strapdown.cli.shared_options import Json, Quiet, Verbose
 
 EPILOG = "Example: strapdown verify alexiev-fig4-attitude"
-CHANGED = 6
+CHANGED, IN_PART = 6, 7
 
 
 def verify(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder that a run wrote.")],
+    seal: Annotated[
+        str | None,
+        typer.Option(metavar="DIGEST", help="The seal that was printed when it was made."),
+    ] = None,
+    signer: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KEY", help="Public key by which it is to be signed: a file, or its name."
+        ),
+    ] = None,
+    inputs: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--input",
+            metavar="PATH",
+            help="A file or folder outside DIR that may be read; may be repeated.",
+        ),
+    ] = None,
+    again: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Keep the repeated run in this folder.")
+    ] = None,
+    page: Annotated[
+        Path | None, typer.Option(metavar="FILE.html", help="Write the result on one page.")
+    ] = None,
     json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
     """Run a result again from its own configuration and compare it bit for bit.
 
-    Answers identical, numerically equal within a number (another processor or version), or
-    changed, and names what. Exit code 6 where it has changed, with --quiet, too.
+    Answers identical; numerically equal within a number (another processor or version); equal in
+    part, if of some files only the text could be compared; or changed, and names what. Exit code 6
+    where it has changed and 7 where it is equal in part, with --quiet, too.
     """
     from strapdown.bundle import to_json
-    from strapdown.cli.console import console, progress
+    from strapdown.bundle.atomic_folder import replace_file
+    from strapdown.cli.console import WORDS, console, progress
+    from strapdown.errors import ConfigError
+    from strapdown.report.verification_page import verification_page
     from strapdown.report.verify import verify as check
 
+    if page is not None and page.exists():
+        raise ConfigError("cli.file-exists", file=str(page), quantity="--page")
     with progress(quiet or json) as report:
         report("running it again", 0.5)
-        result = check(folder)
+        result = check(folder, seal=seal, signer=signer, inputs=inputs or (), again=again)
+    if page is not None:
+        text = verification_page(result, folder, seal=seal, signer=signer)
+        replace_file(page.absolute(), text.encode())
     if json:
         finite = result.within if result.within < float("inf") else None
-        typer.echo(to_json({**vars(result), "within": finite}), nl=False)
+        told = {
+            "verdict": result.verdict,
+            "within": finite,
+            "digest": result.digest,
+            "details": list(result.details),
+            "findings": [found.plain() for found in result.findings],
+            "files": dict(result.files),
+        }
+        typer.echo(to_json(told), nl=False)
     elif not quiet:
         out = console()
-        style = {"identical": "bold green", "numerically equal": "bold yellow"}
+        style = {"identical": "bold green", "changed": "bold red"}
         within = f" within {result.within:.1e}" if result.verdict == "numerically equal" else ""
-        out.print(f"{result.verdict}{within}", style=style.get(result.verdict, "bold red"))
-        for line in result.details:
-            out.print(f"  {line}")
+        out.print(f"{result.verdict}{within}", style=style.get(result.verdict, "bold yellow"))
+        for found in result.findings:
+            for line in found.text(WORDS.get()).split("\n"):
+                out.print(f"  {line}")
         out.print(f"Seal  sha256 {result.digest}")
+        if seal is None and signer is None and result.verdict != "changed":
+            out.print("Compare it with the seal printed at the time, or give that by --seal.")
+        if page is not None:
+            out.print(f"Page  {page}")
     if result.verdict == "changed":
         raise typer.Exit(CHANGED)
+    if result.verdict == "equal in part":
+        raise typer.Exit(IN_PART)

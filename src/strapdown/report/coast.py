@@ -92,13 +92,10 @@ def _of_bundle(path: Path) -> tuple[NavigationSpec, Path | None]:
     for item in manifest["inputs"]:
         if not (root / item["name"]).is_file():
             raise DataError("report.made-not-any-more", file=path.name, item=item["name"])
-    changed = [
-        c
-        for c in unsealed_changes(root, manifest)
-        if any(c.startswith(item["name"]) for item in manifest["inputs"])
-    ]
+    inputs = {item["name"] for item in manifest["inputs"]}
+    changed = [c for c in unsealed_changes(root, manifest) if c.file in inputs]
     if changed:
-        raise DataError("report.made-changed-since", file=path.name, changed=changed[0])
+        raise DataError("report.made-changed-since", file=path.name, changed=changed[0].text())
     configuration = resolved(manifest["configuration"], root)
     file = configuration.get("file_path")
     spec = NavigationSpec.checked(configuration["navigation"])

@@ -1,41 +1,46 @@
-"""Re-run a sealed bundle and compare, bit for bit and then number for number."""
+"""Re-run a sealed bundle and compare, bit for bit, and elsewhere by content."""
 
 from __future__ import annotations
 
-import json
 import math
 import re
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from strapdown.attitude_comparison.comparison import run_comparison
 from strapdown.attitude_comparison.options import AttitudeSpec
 from strapdown.bundle import (
+    KEYS,
     MANIFEST,
+    SIGNATURE_FILE,
+    TIMESTAMP,
+    environment,
+    found_references,
     machine,
     names_file,
     read_manifest,
     resolved,
     sha256,
+    to_json,
     unsealed_changes,
     versions,
+    with_paths,
 )
+from strapdown.bundle.signature import signatures, signer_of
 from strapdown.config import CrashSimulationSpec, SimulateSpec, TrajectorySpec
 from strapdown.config.crash_case import CaseSpec
 from strapdown.config.reading import changed_options
-from strapdown.errors import DataError, StrapdownError
-from strapdown.formats import read_raw
+from strapdown.errors import ConfigError, DataError, Finding, Severity, StrapdownError
 from strapdown.report import crash_live
 from strapdown.report.alignment import ALIGNMENT
 from strapdown.report.attitude import write_attitude
 from strapdown.report.coast import COAST
+from strapdown.report.content import EQUAL, Comparison, compare_files
 from strapdown.report.crash_case import CRASH
 from strapdown.report.crash_simulation import write_crash_simulation
 from strapdown.report.doctor import DOCTOR
@@ -43,10 +48,8 @@ from strapdown.report.navigation import NAVIGATION
 from strapdown.report.report_bundle import ReportBundle
 from strapdown.report.simulation import write_simulation, write_trajectory_simulation
 
-# Another processor or library may round the last digits differently, and a long integration
-# amplifies that. A larger difference is a different result.
-EQUAL = 1e-6
-_NUMBER = re.compile(r"-?\d+\.?\d*(?:[eE][+-]?\d+)?")
+#: Verdicts, from best to worst.
+VERDICTS = ("identical", "numerically equal", "equal in part", "changed")
 
 
 @dataclass(frozen=True)
@@ -56,19 +59,28 @@ class Verification:
     Attributes
     ----------
     verdict : str
-        ``identical``, ``numerically equal`` or ``changed``.
+        ``identical``; ``numerically equal`` on another platform or with other versions; ``equal in
+        part``, if of some files only the text could be compared, or nothing; or ``changed``.
     within : float
         Largest difference of a number, relative if it exceeds 1; zero if identical.
     digest : str
         SHA-256 of the manifest, to be compared with the printed or recorded one.
-    details : tuple of str
-        Changes and differences, one sentence each.
+    findings : tuple of Finding
+        Changes and differences; signatures as notes.
+    files : tuple of (str, str)
+        Each sealed output with its result: ``same bytes``, or the code of its finding.
     """
 
     verdict: str
     within: float
     digest: str
-    details: tuple[str, ...]
+    findings: tuple[Finding, ...]
+    files: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def details(self) -> tuple[str, ...]:
+        """The findings, one sentence each."""
+        return tuple(found.text() for found in self.findings)
 
 
 #: Commands with a `ReportBundle`; ``attitude``, ``simulate`` and ``crash --live`` write theirs.
@@ -100,13 +112,29 @@ def _rerun(command: str, configuration: dict[str, Any], out: Path, sealed: set[s
         write_simulation(SimulateSpec.model_validate(configuration), out)
 
 
-def verify(bundle: str | Path) -> Verification:
+def verify(
+    bundle: str | Path,
+    *,
+    seal: str | None = None,
+    signer: str | Path | None = None,
+    inputs: Sequence[str | Path] = (),
+    again: str | Path | None = None,
+) -> Verification:
     """Check a bundle against its seal, re-run it from its configuration, and compare.
 
     Parameters
     ----------
     bundle : str or Path
         A folder written by a run.
+    seal : str, optional
+        SHA-256 that was printed when the bundle was made. Without it a bundle vouches only for
+        itself: who changes a result can seal it again.
+    signer : str or Path, optional
+        Public key by which it is to be signed: its file, or its name (`Signature.signer`).
+    inputs : sequence of (str or Path)
+        Files and folders outside the bundle that may be read: inputs that it refers to.
+    again : str or Path, optional
+        Folder to keep the repeated run in; by default it is not kept.
 
     Returns
     -------
@@ -118,160 +146,211 @@ def verify(bundle: str | Path) -> Verification:
     ------
     DataError
         The folder is not a bundle, or its manifest is damaged.
+    ConfigError
+        The bundle refers to inputs that are not in `inputs`; `seal` or `signer` is none.
     """
     root = Path(bundle).absolute()
     manifest = read_manifest(root)
     digest = sha256(root / MANIFEST)
-    changes = unsealed_changes(root, manifest)
+    moved = found_references(manifest, [Path(path) for path in inputs])
+    notes = _beside_the_seal(root, signer)
+    changes = [n for n in notes if n.severity == "error"]
+    notes = [n for n in notes if n.severity != "error"]
+    if seal is not None and _digest(seal) != digest:
+        changes.append(Finding("verify.other-seal", file=MANIFEST, seal=_digest(seal)))
+    changes += [] if _is_ours(root, manifest) else [Finding("verify.form", file=MANIFEST)]
+    changes += unsealed_changes(root, manifest, moved)
     if changes or manifest["command"] == "crash":
         changes += changed_case(root, manifest)
     if changes:
-        return Verification("changed", math.inf, digest, tuple(changes))
+        return Verification("changed", math.inf, digest, (*changes, *notes))
     if manifest["command"] == "reproduce":
         raise DataError("report.reproduced-paper", file=MANIFEST)
     if manifest["command"] not in (*BUNDLES, "attitude", "simulate", crash_live.COMMAND):
         raise DataError("report.command-not-known", file=MANIFEST, manifest=manifest["command"])
     with tempfile.TemporaryDirectory(prefix="strapdown-verify-") as folder:
-        again = Path(folder) / "again"
-        configuration = resolved(manifest["configuration"], root)
+        repeated = Path(folder) / "again" if again is None else Path(again).absolute()
+        configuration = resolved(manifest["configuration"], root, moved)
         try:
             sealed = {item["name"] for item in manifest["outputs"]}
-            _rerun(manifest["command"], configuration, again, sealed)
+            _rerun(manifest["command"], configuration, repeated, sealed)
         except ValidationError as error:
             raise DataError(
                 "report.configuration-not-understood",
                 file=MANIFEST,
                 errors=error.errors()[0]["msg"],
             ) from None
-        return _compare(root, again, manifest, digest)
+        return _compare(root, repeated, manifest, digest, moved, notes)
 
 
-def _compare(root: Path, again: Path, manifest: dict[str, Any], digest: str) -> Verification:
+def _digest(seal: str) -> str:
+    """Return a digest as it is in a manifest; it may be written as it was printed."""
+    digest = seal.strip().lower().removeprefix("seal").strip().removeprefix("sha256").strip(" :")
+    if not re.fullmatch(r"[0-9a-f]{64}", digest):
+        raise ConfigError("verify.no-digest", quantity="--seal", seal=seal)
+    return digest
+
+
+def _beside_the_seal(root: Path, signer: str | Path | None) -> list[Finding]:
+    """Check signatures; what speaks against the bundle has the severity of an error."""
+    wanted = None if signer is None else signer_of(signer)
+    found = []
+    try:
+        signed = signatures(root)
+    except DataError as error:
+        return [error.finding]
+    except ConfigError as error:
+        if wanted is not None:
+            raise
+        return [Finding("verify.signatures-unchecked", severity="note", reason=error.finding)]
+    for one in signed:
+        data: dict[str, Any] = {"file": one.file, "signer": one.signer}
+        if one.valid:
+            found.append(Finding("verify.signed", severity="note", **data))
+        else:
+            found.append(Finding("verify.signature-wrong", severity="error", **data))
+    if wanted is not None and not any(one.valid and one.signer == wanted for one in signed):
+        found.append(Finding("verify.not-signed", severity="error", signer=wanted))
+    if (root / TIMESTAMP).is_file():
+        found.append(Finding("verify.timestamp", severity="note", file=TIMESTAMP))
+    return found
+
+
+def _is_ours(root: Path, manifest: dict[str, Any]) -> bool:
+    """Whether a manifest is written as strapdown writes it: nothing twice, nothing unknown."""
+    names = [item["name"] for item in [*manifest["inputs"], *manifest["outputs"]]]
+    reserved = [n for n in names if n in (MANIFEST, TIMESTAMP) or SIGNATURE_FILE.fullmatch(n)]
+    keys = {frozenset(item) for item in manifest["inputs"]}
+    keys |= {frozenset({"role", "kept", *item}) for item in manifest["outputs"]}
+    return (
+        (root / MANIFEST).read_bytes() == to_json(manifest).encode()
+        and set(manifest) == set(KEYS)
+        and keys <= {frozenset({"role", "name", "kept", "sha256", "bytes"})}
+        and len(names) == len(set(names))
+        and not reserved
+    )
+
+
+def _compare(
+    root: Path,
+    again: Path,
+    manifest: dict[str, Any],
+    digest: str,
+    moved: dict[str, Path],
+    notes: Sequence[Finding],
+) -> Verification:
     now = read_manifest(again)
-    written = {item["name"] for item in now["outputs"]}
+    written = {item["name"]: sha256(again / item["name"]) for item in now["outputs"]}
     sealed = {item["name"]: item["sha256"] for item in manifest["outputs"]}
-    details = [f"{name}: not written any more" for name in sorted(sealed.keys() - written)]
-    details += [f"{name}: written now, and not sealed" for name in sorted(written - sealed.keys())]
+    conditions = list(_other_conditions(manifest))
+    alike = not any(found.data["name"] in DRAWING for found in conditions)
+    changes = [Finding("verify.not-written", file=n) for n in sorted(sealed.keys() - written)]
+    changes += [Finding("verify.not-sealed", file=n) for n in sorted(written.keys() - sealed)]
     if _read(manifest) != _read(now):
-        details.append(f"{MANIFEST}: the inputs are not in the roles in which they are read")
-    conditions = _other_conditions(manifest)
-    changed, within = bool(details), 0.0
+        changes.append(Finding("verify.roles", file=MANIFEST))
+    changes += _other_configuration(manifest, now, moved, exact=not conditions)
+    files, differences, within = [], list[Finding](), 0.0
     for name in sorted(sealed.keys() & written):
-        if sha256(again / name) == sealed[name]:
+        if written[name] == sealed[name]:
+            files.append((name, "same bytes"))
             continue
         if not conditions:
             # The same code on the same machine must give the same bytes.
-            details.append(f"{name}: differs, though versions and platform are the same")
-            changed = True
-            continue
-        difference = _difference(root / name, again / name)
-        if difference is None:
-            details.append(f"{name}: drawn differently; its numbers are in the JSON")
-            continue
-        within = max(within, difference)
-        changed |= not difference <= EQUAL
-        details.append(
-            f"{name}: numbers differ by up to {difference:.1e}"
-            if math.isfinite(difference)
-            else f"{name}: differs in more than numbers"
-        )
-    if not details:
-        return Verification("identical", 0.0, digest, ())
-    verdict = "changed" if changed else "numerically equal"
-    return Verification(verdict, within, digest, (*details, *conditions))
+            result = Finding("verify.bytes-differ", file=name)
+        else:
+            content = compare_files(root / name, again / name, drawn_alike=alike)
+            drawn = name.removesuffix(".png") + ".svg"
+            if name.endswith(".png") and alike and sealed.get(drawn) == written.get(drawn):
+                # The same figure has the same points on every machine.
+                content = Comparison(math.inf)
+            within = max(within, content.within)
+            result = _finding(name, content)
+        files.append((name, result.code))
+        (differences if result.severity == "note" else changes).append(result)
+    if changes:
+        verdict = "changed"
+    elif any(found.code in PARTIAL for found in differences):
+        verdict = "equal in part"
+    elif conditions:
+        verdict = "numerically equal"
+        if not differences:
+            differences.append(Finding("verify.same-bytes", severity="note"))
+    else:
+        verdict = "identical"
+    found = (*changes, *differences, *conditions, *_other_environment(manifest), *notes)
+    return Verification(verdict, within, digest, found, tuple(files))
+
+
+#: Packages that draw pages, figures and PDF.
+DRAWING = ("strapdown", "strapdown source", "jinja2", "typst")
+#: Codes of files that were not compared as a whole.
+PARTIAL = ("verify.drawing", "verify.not-compared")
+
+
+def _finding(name: str, content: Comparison) -> Finding:
+    """Return what the comparison of a file found; a note where it agrees."""
+    if content.drawing:
+        code = "verify.not-compared" if name.endswith(".png") else "verify.drawing"
+        return Finding(code, file=name, severity="note")
+    if math.isinf(content.within):
+        return Finding("verify.content", file=name)
+    if content.within == 0.0:
+        return Finding("verify.last-digits", file=name, severity="note")
+    severity: Severity = "note" if content.within <= EQUAL else "warning"
+    return Finding("verify.numbers", file=name, severity=severity, difference=content.within)
 
 
 def _read(manifest: dict[str, Any]) -> list[tuple[str, str]]:
     return sorted((str(item["role"]), str(item["sha256"])) for item in manifest["inputs"])
 
 
-def _difference(a: Path, b: Path) -> float | None:
-    """Largest difference of two files' numbers; infinite if anything else differs.
+def _other_configuration(
+    manifest: dict[str, Any], now: dict[str, Any], moved: dict[str, Path], *, exact: bool
+) -> list[Finding]:
+    """Compare the sealed configuration with the one of the repeated run, which it led to.
 
-    None for drawings, whose bytes depend on the versions of the drawing libraries.
+    `exact`: whether both have the same options; another version may have others.
     """
-    try:
-        if a.suffix == ".json":
-            leaves = [list(_leaves(json.loads(p.read_text(encoding="utf-8")))) for p in (a, b)]
-            if len(leaves[0]) != len(leaves[1]):
-                return math.inf
-            return max(map(_leaf_difference, *leaves), default=0.0)
-        if a.suffix in (".csv", ".npz", ".h5", ".mat", ".parquet"):
-            return _column_difference(read_raw(a).columns, read_raw(b).columns)
-    except (ValueError, RecursionError, StrapdownError):
-        return math.inf
-    return None
+    before = {str(place.resolve()): name for name, place in moved.items()}
+    had = with_paths(now["configuration"], lambda path: before.get(path, path))
+    sealed = manifest["configuration"]
+    if not exact:
+        sealed, had = _in_both(sealed, had), _in_both(had, sealed)
+    options = changed_options(sealed, had)
+    return [Finding("verify.configuration", file=MANIFEST, options=options)] if options else []
 
 
-def _leaf_difference(one: tuple[str, Any], two: tuple[str, Any]) -> float:
-    (key, x), (other, y) = one, two
-    if key != other:
-        return math.inf
-    if isinstance(x, float) and isinstance(y, float):
-        return _apart(key, np.array([x]), np.array([y]))
-    if x == y:
-        return 0.0
-    if not isinstance(x, str) or not isinstance(y, str):
-        return math.inf
-    numbers = [_NUMBER.findall(text) for text in (x, y)]
-    if _NUMBER.sub("#", x) != _NUMBER.sub("#", y):
-        return math.inf
-    # Sentences quote numbers to three digits, the last of which may round differently; numbers
-    # printed as a power of ten below rounding are rounding errors.
-    near = (
-        abs(float(p) - float(q)) <= 0.02 * abs(float(p)) + 1e-9
-        for p, q in zip(*numbers, strict=True)
-    )
-    return 0.0 if all(near) else math.inf
+def _in_both(one: Any, other: Any) -> Any:
+    """Return the part of a configuration whose keys another one has, too."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        return {k: _in_both(v, other[k]) for k, v in one.items() if k in other}
+    if isinstance(one, list) and isinstance(other, list) and len(one) == len(other):
+        return [_in_both(*pair) for pair in zip(one, other, strict=True)]
+    return one
 
 
-def _column_difference(one: dict[str, NDArray[Any]], two: dict[str, NDArray[Any]]) -> float:
-    if one.keys() != two.keys() or any(one[k].shape != two[k].shape for k in one):
-        return math.inf
-    return max((_apart(name, one[name], two[name]) for name in one), default=0.0)
-
-
-def _apart(name: str, one: NDArray[Any], two: NDArray[Any]) -> float:
-    """Largest difference, relative if a number exceeds 1; infinite if one is not a number."""
-    if not {one.dtype.kind, two.dtype.kind} <= set("fiu"):
-        return 0.0 if np.array_equal(one, two) else math.inf
-    # An empty field on both sides is equal.
-    apart = np.where(np.isnan(one) & np.isnan(two), 0.0, np.abs(one - two))
-    if name.endswith("heading_deg"):
-        # A heading just below 360 may be just above 0 on another platform.
-        apart = np.minimum(apart, np.abs(apart - 360.0))
-    largest = float(np.max(apart / np.fmax(1.0, np.abs(one)), initial=0.0))
-    return largest if math.isfinite(largest) else math.inf
-
-
-def _leaves(value: Any, key: str = "") -> Iterator[tuple[str, Any]]:
-    """Every value in JSON with the name of its field."""
-    if isinstance(value, dict):
-        for name, item in value.items():
-            yield from _leaves(item, name)
-    elif isinstance(value, list):
-        for item in value:
-            yield from _leaves(item, key)
-    elif isinstance(value, int | float) and not isinstance(value, bool):
-        yield key, float(value)
-    else:
-        yield key, value
-
-
-def _other_conditions(manifest: dict[str, Any]) -> list[str]:
+def _other_conditions(manifest: dict[str, Any]) -> Iterator[Finding]:
     now = versions() | {f"platform {k}": v for k, v in machine().items()}
     then = manifest["versions"] | {f"platform {k}": v for k, v in manifest["platform"].items()}
-    return [
-        f"{name}: {then.get(name, 'absent')} then, {now.get(name, 'absent')} now"
-        for name in sorted(now.keys() | then.keys())
-        if now.get(name) != then.get(name)
-    ]
+    for name in sorted(now.keys() | then.keys()):
+        if now.get(name) != then.get(name):
+            pair = {"then": then.get(name, "absent"), "now": now.get(name, "absent")}
+            yield Finding("verify.condition", severity="note", name=name, **pair)
+
+
+def _other_environment(manifest: dict[str, Any]) -> list[Finding]:
+    """Count the packages that no number depends on and that are of other versions."""
+    others = set(manifest["environment"]) ^ set(environment())
+    names = {line.partition("==")[0] for line in others} - set(versions())
+    if not names:
+        return []
+    return [Finding("verify.environment", severity="note", count=len(names))]
 
 
 # Differences between a sealed crash case and the case file in its bundle.
 
 
-def changed_case(root: Path, manifest: dict[str, Any]) -> list[str]:
+def changed_case(root: Path, manifest: dict[str, Any]) -> list[Finding]:
     """Name the options in which a bundle's case file and its sealed configuration differ.
 
     Parameters
@@ -283,9 +362,9 @@ def changed_case(root: Path, manifest: dict[str, Any]) -> list[str]:
 
     Returns
     -------
-    list of str
-        One sentence per option, with the sealed value first; empty if both agree, or if the bundle
-        is not of a crash.
+    list of Finding
+        One per option, with the sealed value first; empty if both agree, or if the bundle is not of
+        a crash.
     """
     configuration = manifest["configuration"]
     if manifest["command"] != "crash" or not isinstance(configuration, dict):
@@ -299,11 +378,11 @@ def changed_case(root: Path, manifest: dict[str, Any]) -> list[str]:
     try:
         stated = CaseSpec.read(path, files=False).model_dump(mode="json", exclude_none=True)
     except StrapdownError as error:
-        return [f"{name}: it is not a valid case: {error.finding.what}"]
+        return [Finding("verify.case-invalid", file=name, reason=error.finding)]
     stated.pop("name", None)
     sealed = {k: v for k, v in configuration.get("case", {}).items() if k != "name"}
     return [
-        f"{name}: {what}"
+        Finding("verify.case", file=name, option=what)
         for what in changed_options(_without_files(sealed), _without_files(stated))
     ]
 

@@ -11,24 +11,27 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
-import os
 import platform
+import re
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError, distribution, version
 from pathlib import Path
-from secrets import token_hex
 from typing import Any
 
-from strapdown.errors import ConfigError, DataError
+from strapdown.bundle import atomic_folder
+from strapdown.errors import ConfigError, DataError, Finding
 
 MANIFEST = "manifest.json"
 TIMING = "timing.json"
 LATENCY = "latency.json"
-#: Files outside the seal: clocks differ.
-UNSEALED = (TIMING, LATENCY)
+#: Answer of a timestamp authority (RFC 3161) to the digest of the manifest.
+TIMESTAMP = "manifest.json.tsr"
+#: Files outside the seal: clocks differ, and a signature or timestamp is of the seal.
+UNSEALED = (TIMING, LATENCY, TIMESTAMP)
+SIGNATURE_FILE = re.compile(r"signature-[0-9a-f]{16}\.json")
 SCHEMA = "strapdown bundle 2"
 
 
@@ -100,7 +103,7 @@ def files_of(root: Path) -> list[str]:
     return sorted(p.relative_to(root).as_posix() for p in found)
 
 
-# Check of the destination before the run.
+# The destination, before and during a run.
 
 
 def check_destination(out: Path, force: bool) -> None:
@@ -108,18 +111,15 @@ def check_destination(out: Path, force: bool) -> None:
 
     `force`: allow a bundle, or an empty folder, to be replaced.
     """
-    if not out.exists():
-        # Report before a long run a write error that would occur after it.
-        parent = next(p for p in out.absolute().parents if p.exists())
-        if not parent.is_dir() or not os.access(parent, os.W_OK):
-            raise ConfigError("bundle.not-writable", file=str(out), quantity="--out", parent=parent)
-        return
-    if out.is_dir() and not any(out.iterdir()):
-        return
-    if not force:
-        raise ConfigError("bundle.folder-exists", file=str(out), quantity="--out")
-    if not (out.is_dir() and (out / MANIFEST).is_file()):
-        raise ConfigError("bundle.not-a-bundle", file=str(out), quantity="--out")
+    atomic_folder.check_destination(out, force, MANIFEST)
+
+
+@contextmanager
+def claimed(out: Path, force: bool) -> Iterator[Path]:
+    """Hold a destination for the duration of a run, as `atomic_folder.claimed`, and check it."""
+    with atomic_folder.claimed(out) as folder:
+        check_destination(folder, force)
+        yield folder
 
 
 # Files beside the seal, because clocks differ.
@@ -135,7 +135,7 @@ def write_timing(
     timing: dict[str, Any] = {"seconds": {stage: round(t, 4) for stage, t in seconds.items()}}
     if sample_ns:
         timing["sample_ns"] = sample_ns
-    write_json(seal.path / TIMING, timing)
+    atomic_folder.replace_file(seal.path / TIMING, to_json(timing).encode(), seal.path)
 
 
 def write_latency(seal: Seal, latency: Mapping[str, Any]) -> None:
@@ -143,7 +143,7 @@ def write_latency(seal: Seal, latency: Mapping[str, Any]) -> None:
 
     `latency`: as JSON.
     """
-    write_json(seal.path / LATENCY, latency)
+    atomic_folder.replace_file(seal.path / LATENCY, to_json(latency).encode(), seal.path)
 
 
 # JSON format of bundles.
@@ -202,12 +202,13 @@ def with_paths(value: Any, change: Callable[[str], str], key: str = "") -> Any:
     return change(value) if names_file(key, value) else value
 
 
-def resolved(value: Any, root: Path) -> Any:
-    """Return a configuration with the paths of copied inputs made absolute.
+def resolved(value: Any, root: Path, moved: Mapping[str, Path] | None = None) -> Any:
+    """Return a configuration with the paths of its inputs as they are now.
 
-    `value`: from a manifest. `root`: folder of the bundle.
+    `value`: from a manifest. `root`: folder of the bundle. `moved`: from `found_references`.
     """
-    return with_paths(value, lambda path: str(root / path))
+    places = moved or {}
+    return with_paths(value, lambda path: str(places.get(path, root / path)))
 
 
 # Write a bundle atomically.
@@ -230,47 +231,20 @@ def write_bundle(
     configuration; paths of inputs are replaced by those in or from the bundle. `inputs`: copied if
     they total at most 64 MiB, otherwise referred to by path. `seals`: the seal is appended when the
     bundle is complete. Yields an empty folder; its content at the end of the block becomes the
-    bundle. ConfigError: `out` exists and must not be replaced.
+    bundle. ConfigError: `out` exists and must not be replaced, or another run writes it.
     """
-    out = out.absolute()
-    check_destination(out, force)
-    made = [p for p in out.parents if not p.exists()]
-    # Named before it is created: an interrupt in between leaves no folder either.
-    staging = out.parent / f".{out.name}.{token_hex(8)}.partial"
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        staging.mkdir(0o700)
+
+    def seal(folder: Path) -> None:
+        write_json(folder / MANIFEST, make_manifest(folder, command, configuration, inputs))
+        digests.append(sha256(folder / MANIFEST))
+
+    digests: list[str] = []
+    with (
+        claimed(out, force) as folder,
+        atomic_folder.written_whole(folder, seal) as staging,
+    ):
         yield staging
-        manifest = make_manifest(staging, command, configuration, inputs)
-        write_json(staging / MANIFEST, manifest)
-        digest = sha256(staging / MANIFEST)
-        staging.chmod(0o755)
-        _move(staging, out)
-    except BaseException:
-        shutil.rmtree(staging, ignore_errors=True)
-        # A folder that another process has begun to use is kept.
-        with suppress(OSError):
-            for parent in made:
-                parent.rmdir()
-        raise
-    seals.append(Seal(out, digest))
-
-
-def _move(staging: Path, out: Path) -> None:
-    """Rename the finished bundle to its destination, then delete an old one."""
-    if not out.exists():
-        staging.rename(out)
-        return
-    old = out.parent / f".{out.name}.{token_hex(8)}.old"
-    try:
-        out.rename(old)
-        staging.rename(out)
-        shutil.rmtree(old, ignore_errors=True)
-    except BaseException:
-        if old.exists() and not out.exists():
-            old.rename(out)
-        shutil.rmtree(old, ignore_errors=True)
-        raise
+    seals.append(Seal(out.absolute(), *digests))
 
 
 # The manifest of a bundle, and copies of its inputs.
@@ -306,6 +280,7 @@ def make_manifest(
         "outputs": outputs,
         "versions": versions(),
         "platform": machine(),
+        "environment": list(environment()),
     }
 
 
@@ -389,13 +364,43 @@ def versions() -> dict[str, str]:
     return found
 
 
+#: Extras with readers, references and signatures; the others are for development.
+RUN_EXTRAS = ("logs", "mavlink", "peers", "sign")
+
+
+@functools.cache
+def environment() -> tuple[str, ...]:
+    """Return all installed packages that strapdown can import, as ``name==version``.
+
+    From these a later user makes the same environment: those that it requires, and of `RUN_EXTRAS`
+    those that are installed. `versions` has the ones that numbers depend on.
+    """
+    found: dict[str, str] = {}
+    wanted = ["strapdown"]
+    while wanted:
+        name = wanted.pop()
+        key = re.sub(r"[-_.]+", "-", name).lower()
+        if key in found:
+            continue
+        try:
+            package = distribution(name)
+        except PackageNotFoundError:
+            continue  # of an extra, or of another platform
+        found[key] = package.version
+        for line in package.requires or ():
+            extra = re.search(r"extra\s*==\s*[\"']([\w-]+)", line)
+            if extra is None or (key == "strapdown" and extra[1] in RUN_EXTRAS):
+                wanted.append(re.split(r"[\s;<>=!~\[(]", line, maxsplit=1)[0])
+    return tuple(f"{name}=={found[name]}" for name in sorted(found))
+
+
 @functools.cache
 def source_digest() -> str:
     """SHA-256 of the sources and data of this package, as installations of a version may differ.
 
     Of the name and the content of each file except compiled ones, in order of names.
     """
-    root = Path(__file__).parent
+    root = Path(__file__).parents[1]
     digest = hashlib.sha256()
     for path in sorted(root.rglob("*")):
         if path.is_file() and path.suffix in (".py", ".toml", ".j2", ".html", ".js", ".css"):
@@ -420,6 +425,8 @@ def machine() -> dict[str, str]:
 
 
 KEPT = ("copy", "reference")
+#: Largest manifest, bytes: one with hundreds of records is smaller.
+LARGEST = 50_000_000
 
 
 def read_manifest(bundle: Path) -> dict[str, Any]:
@@ -432,12 +439,13 @@ def read_manifest(bundle: Path) -> dict[str, Any]:
         raise DataError("bundle.no-such-folder", file=str(bundle))
     if not path.is_file():
         raise DataError("bundle.no-manifest", file=str(bundle))
+    if path.is_symlink() or path.stat().st_size > LARGEST:
+        raise DataError("bundle.malformed", file=MANIFEST)
     try:
         manifest = json.loads(path.read_text(encoding="utf-8"))
     except (ValueError, RecursionError) as error:
         raise DataError("bundle.not-json", file=MANIFEST, reason=error) from None
-    wanted = {"schema", "command", "configuration", "inputs", "outputs", "versions", "platform"}
-    if not isinstance(manifest, dict) or wanted - set(manifest):
+    if not isinstance(manifest, dict) or not {"schema", "versions"} <= set(manifest):
         raise DataError("bundle.unknown-form", file=MANIFEST)
     if manifest["schema"] != SCHEMA:
         known = manifest["versions"]
@@ -445,8 +453,22 @@ def read_manifest(bundle: Path) -> dict[str, Any]:
         raise DataError(
             "bundle.other-schema", file=MANIFEST, schema=manifest["schema"], version=version
         )
+    if set(KEYS) - set(manifest):
+        raise DataError("bundle.unknown-form", file=MANIFEST)
     _refuse_escape(manifest)
     return manifest
+
+
+KEYS = (
+    "schema",
+    "command",
+    "configuration",
+    "inputs",
+    "outputs",
+    "versions",
+    "platform",
+    "environment",
+)
 
 
 def _refuse_escape(manifest: dict[str, Any]) -> None:
@@ -461,9 +483,9 @@ def _refuse_escape(manifest: dict[str, Any]) -> None:
             if ".." in path.parts:
                 raise ValueError
         _refuse_unsealed_paths(manifest)
-        for part in ("versions", "platform"):
-            if not all(isinstance(v, str) for v in manifest[part].values()):
-                raise ValueError
+        lists = [manifest[part].values() for part in ("versions", "platform")]
+        if not all(isinstance(v, str) for each in [*lists, manifest["environment"]] for v in each):
+            raise ValueError
         if not isinstance(manifest["command"], str):
             raise ValueError
     except (TypeError, KeyError, ValueError, AttributeError):
@@ -479,22 +501,92 @@ def _refuse_unsealed_paths(manifest: dict[str, Any]) -> None:
             raise ValueError
 
 
-def unsealed_changes(bundle: Path, manifest: dict[str, Any]) -> list[str]:
+def unsealed_changes(
+    bundle: Path, manifest: dict[str, Any], moved: Mapping[str, Path] | None = None
+) -> list[Finding]:
     """List the files of a bundle that differ from the seal.
 
-    `manifest`: from `read_manifest`. Returns one sentence per file: changed, missing, or not in the
-    manifest.
+    `manifest`: from `read_manifest`. `moved`: from `found_references`. Returns a finding per file:
+    changed, missing, a link, or not in the manifest.
     """
     changes = []
-    expected: set[str] = {MANIFEST, *UNSEALED}
-    for item in [*manifest["inputs"], *manifest["outputs"]]:
-        path = bundle / item["name"]  # an absolute path stays what it is
-        expected.add(item["name"])
-        if not path.is_file():
-            changes.append(f"{item['name']}: missing")
+    items = {item["name"]: item for item in [*manifest["inputs"], *manifest["outputs"]]}
+    for name, item in items.items():
+        own = item.get("kept", "copy") == "copy"
+        path = bundle / name if own else (moved or {}).get(name, Path(name))
+        if own and _is_linked(bundle, name):
+            changes.append(Finding("bundle.a-link", file=name))
+        elif not path.is_file():
+            changes.append(Finding("bundle.file-missing", file=name))
         elif sha256(path) != item["sha256"]:
-            changes.append(f"{item['name']}: changed after it was sealed")
+            changes.append(Finding("bundle.file-changed", file=name))
         elif path.stat().st_size != item["bytes"]:
-            changes.append(f"{item['name']}: not of the {item['bytes']} bytes of the manifest")
-    changes += [f"{name}: not in the manifest" for name in files_of(bundle) if name not in expected]
+            changes.append(Finding("bundle.other-size", file=name, bytes=item["bytes"]))
+    for name in files_of(bundle):
+        beside = name in (MANIFEST, *UNSEALED) or SIGNATURE_FILE.fullmatch(name)
+        if beside and (bundle / name).is_symlink():
+            changes.append(Finding("bundle.a-link", file=name))
+        elif not beside and name not in items:
+            changes.append(Finding("bundle.not-in-manifest", file=name))
     return changes
+
+
+def _is_linked(bundle: Path, name: str) -> bool:
+    """Whether a file, or a folder on the way to it, is a symbolic link: it may change at will."""
+    path = bundle / name
+    return any(p.is_symlink() for p in (path, *path.parents[: len(Path(name).parts) - 1]))
+
+
+# Inputs outside a bundle.
+
+
+def found_references(manifest: dict[str, Any], given: Sequence[Path]) -> dict[str, Path]:
+    """Find the inputs that a bundle refers to, among the files and folders that the user allows.
+
+    Parameters
+    ----------
+    manifest : dict
+        From `read_manifest`.
+    given : sequence of Path
+        Files or folders. An input may have moved: a file is found by its digest, a folder takes the
+        place of the recorded one.
+
+    Returns
+    -------
+    dict of str to Path
+        From each recorded path, of files and of folders, to where it is now.
+
+    Raises
+    ------
+    ConfigError
+        An input is not covered by `given`: a manifest may name any file of this machine.
+    """
+    folders = [Path(p) for p in named_paths(manifest["configuration"])]
+    found: dict[str, Path] = {}
+    missing = []
+    for item in manifest["inputs"]:
+        if item["kept"] == "copy":
+            continue
+        name = Path(item["name"])
+        root = next((f for f in folders if f != name and name.is_relative_to(f)), name)
+        places = [place for one in given for place in _places(name, root, one)]
+        for place in places:
+            file = place / name.relative_to(root)
+            if file.is_file() and (place is places[-1] or sha256(file) == item["sha256"]):
+                found |= {item["name"]: file, str(root): place}
+                break
+        else:
+            missing.append(item["name"])
+    if missing:
+        raise ConfigError("bundle.inputs-outside", file=MANIFEST, quantity="inputs", names=missing)
+    return found
+
+
+def _places(name: Path, root: Path, given: Path) -> list[Path]:
+    """Return where a recorded input, or the folder that it is in, may be now."""
+    absolute = given.absolute()
+    if name.is_relative_to(absolute):
+        return [root]
+    if not absolute.is_dir():
+        return [absolute] if root == name else []
+    return [absolute / name.name] if root == name else [absolute, absolute / root.name]

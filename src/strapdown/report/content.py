@@ -1,0 +1,269 @@
+"""Compare a file of two runs by its content: numbers within a tolerance, all else exactly.
+
+Another processor or library may round the last digits of a number differently, and other versions
+may draw a page differently. What is compared, by kind of file:
+
+* JSON, CSV and arrays: every number within `EQUAL`; words, units and comments exactly;
+* HTML, SVG, KML, GeoJSON and other text: everything between the numbers exactly, the numbers within
+  `EQUAL` or one unit of their last digit, whole numbers exactly;
+* PDF: the same for all objects in it, drawings included.
+
+Where other versions drew (another page, other fonts), the text of a page, an SVG or a PDF is
+extracted and compared in that way; `Comparison.drawing` then says that the rest was not compared.
+A picture of points is not compared: its figure as SVG stands beside it.
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+import math
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from strapdown.errors import StrapdownError
+from strapdown.formats import read_raw
+from strapdown.formats.recording import RawLog
+
+__all__ = ["EQUAL", "Comparison", "compare_files"]
+
+# A long integration amplifies rounding. A larger difference is a different result.
+EQUAL = 1e-6
+ARRAYS = (".csv", ".npz", ".h5", ".mat", ".parquet")
+_NUMBER = re.compile(r"-?\d+\.?\d*(?:[eE][+-]?\d+)?")
+_OWN_VERSION = re.compile(r"strapdown \d+\.\d+\.\d+[\w.+]*")
+_EMBEDDED = re.compile(r"data:image/svg\+xml;base64,([A-Za-z0-9+/=]+)")
+_BLANKS = re.compile(r"\s+")
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Result of the comparison of two files.
+
+    Attributes
+    ----------
+    within : float
+        Largest difference of a number, relative if it exceeds 1; infinite if anything else differs.
+    drawing : bool
+        Whether the drawing was not compared: only the text agrees, or nothing could be read.
+    """
+
+    within: float
+    drawing: bool = False
+
+
+_DIFFERENT = Comparison(math.inf)
+
+
+def compare_files(one: Path, two: Path, *, drawn_alike: bool) -> Comparison:
+    """Compare two files of one name by their content.
+
+    `drawn_alike`: whether the versions that draw are the same, so that drawings must be.
+    """
+    ending = one.suffix.lower()
+    try:
+        if ending in (".json", ".geojson"):
+            return Comparison(_difference_of_json(one, two))
+        if ending in ARRAYS:
+            return Comparison(_difference_of_tables(read_raw(one), read_raw(two)))
+        if ending == ".pdf":
+            return _compare_pdf(one, two, drawn_alike)
+        texts = [path.read_bytes().decode("utf-8") for path in (one, two)]
+    except UnicodeDecodeError:
+        return Comparison(0.0, drawing=True) if ending == ".png" else _DIFFERENT
+    except (ValueError, RecursionError, StrapdownError):
+        return _DIFFERENT
+    if same_text(*texts):
+        return Comparison(0.0)
+    if drawn_alike or ending not in (".html", ".svg"):
+        return _DIFFERENT
+    said = [_joined(_html_text(text)) for text in texts]
+    return Comparison(0.0, drawing=True) if same_text(*said) else _DIFFERENT
+
+
+# Text with numbers.
+
+
+def same_text(one: str, two: str) -> bool:
+    """Whether two texts are the same but for the last digit of numbers, and our own version."""
+    one, two = (_EMBEDDED.sub(_decoded, _OWN_VERSION.sub("strapdown", t)) for t in (one, two))
+    if one == two:
+        return True
+    if _NUMBER.sub("#", one) != _NUMBER.sub("#", two):
+        return False
+    pairs = zip(_NUMBER.findall(one), _NUMBER.findall(two), strict=True)
+    return all(x == y or _near(x, y) for x, y in pairs)
+
+
+def _decoded(found: re.Match[str]) -> str:
+    try:
+        return base64.b64decode(found[1], validate=True).decode("utf-8")
+    except ValueError:
+        return found[0]
+
+
+def _near(one: str, two: str) -> bool:
+    """Whether two printed numbers may be roundings of nearly the same number."""
+    p, q = float(one), float(two)
+    if not math.isfinite(p) or not math.isfinite(q):
+        return False
+    if one.lstrip("-").isdigit() and two.lstrip("-").isdigit():
+        # Whole numbers count something; a rounding does not change them but with odds of 1e-6.
+        return p == q
+    last = min(_unit(one), _unit(two))
+    return abs(p - q) <= max(1.001 * last, EQUAL * max(1.0, abs(p)))
+
+
+def _unit(number: str) -> float:
+    """Unit of the last digit of a printed number."""
+    mantissa, _, exponent = number.lower().partition("e")
+    decimals = len(mantissa.partition(".")[2])
+    return 10.0 ** (int(exponent or 0) - decimals) if abs(int(exponent or 0)) < 300 else 0.0
+
+
+# JSON and columns.
+
+
+def _difference_of_json(one: Path, two: Path) -> float:
+    leaves = [list(_leaves(json.loads(p.read_text(encoding="utf-8")))) for p in (one, two)]
+    if len(leaves[0]) != len(leaves[1]):
+        return math.inf
+    return max(map(_leaf_difference, *leaves), default=0.0)
+
+
+def _leaves(value: Any, key: str = "") -> Iterator[tuple[str, Any]]:
+    """Every value in JSON with the name of its field; an empty list or object, too."""
+    if isinstance(value, dict) and value:
+        for name, item in value.items():
+            yield from _leaves(item, name)
+    elif isinstance(value, list) and value:
+        for item in value:
+            yield from _leaves(item, key)
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        yield key, float(value)
+    else:
+        yield key, value
+
+
+def _leaf_difference(one: tuple[str, Any], two: tuple[str, Any]) -> float:
+    (key, x), (other, y) = one, two
+    if key != other:
+        return math.inf
+    if isinstance(x, float) and isinstance(y, float):
+        return _apart(key, np.array([x]), np.array([y]))
+    if isinstance(x, str) and isinstance(y, str):
+        return 0.0 if same_text(x, y) else math.inf
+    return 0.0 if x == y and type(x) is type(y) else math.inf
+
+
+def _difference_of_tables(one: RawLog, two: RawLog) -> float:
+    said = [repr((t.units, t.rate, t.sampling, t.axes, t.above)) for t in (one, two)]
+    a, b = one.columns, two.columns
+    if not same_text(*said) or a.keys() != b.keys() or any(a[k].shape != b[k].shape for k in a):
+        return math.inf
+    return max((_apart(name, a[name], b[name]) for name in a), default=0.0)
+
+
+def _apart(name: str, one: NDArray[Any], two: NDArray[Any]) -> float:
+    """Largest difference, relative if a number exceeds 1; infinite if one is not a number."""
+    if not {one.dtype.kind, two.dtype.kind} <= set("fiu"):
+        return 0.0 if np.array_equal(one, two) else math.inf
+    # An empty field on both sides is equal.
+    apart = np.where(np.isnan(one) & np.isnan(two), 0.0, np.abs(one - two))
+    if name.endswith("heading_deg"):
+        # A heading just below 360 may be just above 0 on another platform.
+        apart = np.minimum(apart, np.abs(apart - 360.0))
+    largest = float(np.max(apart / np.fmax(1.0, np.abs(one)), initial=0.0))
+    return largest if math.isfinite(largest) else math.inf
+
+
+# The text of a page, and the objects of a PDF.
+
+
+class _Text(HTMLParser):
+    """What a page says: its text, the data of its scenes, and where its links lead."""
+
+    _SAID = ("href", "alt", "title", "aria-label")
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.said: list[str] = []
+        self._skip: str | None = None
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        given = dict(attrs)
+        data = tag == "script" and given.get("type") == "application/json"
+        if tag == "style" or (tag == "script" and not data):
+            self._skip = tag
+        self.said += [value for name in self._SAID if (value := given.get(name))]
+        source = _EMBEDDED.fullmatch(given.get("src") or "")
+        if source:
+            self.said += _html_text(_decoded(source))
+
+    def handle_endtag(self, tag: str) -> None:
+        if tag == self._skip:
+            self._skip = None
+
+    def handle_data(self, data: str) -> None:
+        if self._skip is None:
+            self.said.append(data)
+
+
+def _html_text(text: str) -> list[str]:
+    page = _Text()
+    page.feed(text)
+    page.close()
+    return page.said
+
+
+def _joined(parts: Iterable[str]) -> str:
+    """Words with one blank between them, wherever lines were broken."""
+    return _BLANKS.sub(" ", " ".join(parts)).strip()
+
+
+def _compare_pdf(one: Path, two: Path, drawn_alike: bool) -> Comparison:
+    import pypdf
+    from pypdf.errors import PyPdfError
+
+    try:
+        readers = [pypdf.PdfReader(path) for path in (one, two)]
+        parts = [list(_pdf_objects(reader)) for reader in readers]
+        if len(parts[0]) == len(parts[1]) and all(map(_same_part, *parts)):
+            return Comparison(0.0)
+        if drawn_alike:
+            return _DIFFERENT
+        # Lines may be broken elsewhere, within a word, too.
+        said = ["".join(_BLANKS.sub("", p.extract_text()) for p in r.pages) for r in readers]
+    except (PyPdfError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        return _DIFFERENT  # a damaged file can break the library anywhere
+    return Comparison(0.0, drawing=True) if same_text(*said) else _DIFFERENT
+
+
+def _pdf_objects(reader: Any) -> Iterator[tuple[str, bytes]]:
+    """Each object of a PDF as text, with the decoded data of a stream."""
+    from pypdf.generic import IndirectObject, StreamObject
+
+    for number in range(1, int(reader.trailer["/Size"])):
+        found = reader.get_object(IndirectObject(number, 0, reader))
+        stream = isinstance(found, StreamObject)
+        entries = {k: v for k, v in found.items() if k != "/Length"} if stream else found
+        # Names of objects hold the address of their reader.
+        yield re.sub(r", \d+\)", ")", repr(entries)), found.get_data() if stream else b""
+
+
+def _same_part(one: tuple[str, bytes], two: tuple[str, bytes]) -> bool:
+    if not same_text(one[0], two[0]):
+        return False
+    if one[1] == two[1]:
+        return True
+    try:
+        return same_text(one[1].decode("ascii"), two[1].decode("ascii"))
+    except UnicodeDecodeError:
+        return same_text(one[1].decode("latin-1"), two[1].decode("latin-1"))
