@@ -1,0 +1,1 @@
+"""Whole commands under faults: killed, failing at a system call, and two at once."""
