@@ -8,7 +8,7 @@ PYTEST = PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest
 # A cache of compiled kernels for one run; otherwise its folder is named after their sources.
 FRESH = cache=$$(mktemp -d); trap 'rm -rf "$$cache"' EXIT; NUMBA_CACHE_DIR="$$cache"
 
-.PHONY: demo test test-slow test-bounds examples papers record mutation check format bench docs codes strangers pictures clean
+.PHONY: demo test test-slow test-bounds examples papers record mutation check format bench docs audit codes strangers pictures clean
 .DEFAULT_GOAL := help
 
 help:
@@ -20,6 +20,7 @@ help:
 	@echo "make papers     the tests of the reproduced papers, and the three of them into papers-reproduced"
 	@echo "make check      ruff, format, mypy, import-linter"
 	@echo "make bench      speed and memory as ratios against named alternatives"
+	@echo "make audit      known vulnerabilities of the versions in constraints.txt"
 	@echo "make docs       the manual, into docs/_build"
 
 $(VENV)/bin/python:
@@ -88,6 +89,10 @@ statements: $(VENV)/.test
 
 pictures: $(VENV)/.test
 	STRAPDOWN_WRITE_PICTURES=1 $(PYTEST) -m '' tests/cli/test_pictures.py papers -k picture
+
+audit: $(VENV)/.dev
+	$(PIP) pip-audit
+	$(BIN)/pip-audit -r constraints.txt --no-deps --disable-pip
 
 docs: $(VENV)/.dev
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs docs/_build/html

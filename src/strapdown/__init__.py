@@ -61,6 +61,7 @@ if TYPE_CHECKING:
     from strapdown.api.reading import GnssFixes, Imu, Streams, read, read_gnss, read_imu
     from strapdown.api.simulation import Simulation, simulate
     from strapdown.api.writing import write
+    from strapdown.bundle.signature import sign
     from strapdown.crash.entry import Entry
     from strapdown.crash.path import sample_paths
     from strapdown.crash.reconstruction import (
@@ -151,6 +152,7 @@ __all__ = [
     "reconstruct_crash",
     "run_mechanization",
     "sample_paths",
+    "sign",
     "simulate",
     "summarise_differences",
     "trajectory_differences",
@@ -177,6 +179,7 @@ load_on_first_use(
         "api.simulation": "Simulation simulate",
         "api.writing": "write",
         "crash.entry": "Entry",
+        "bundle.signature": "sign",
         "crash.path": "sample_paths",
         "crash.reconstruction": "CrashOptions CrashReconstruction reconstruct_crash",
         "earth": "magnetic_field",

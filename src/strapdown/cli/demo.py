@@ -35,6 +35,7 @@ def demo(
     Runs on one minute of a real drive and on simulations; further recordings are added if they are
     in the folder named by STRAPDOWN_DATA, by default ../shared/data.
     """
+    from strapdown.bundle.atomic_folder import replace_file
     from strapdown.cli.console import console, progress
     from strapdown.report.demo_page import demo_page, shown_answer, shown_truth
 
@@ -68,7 +69,8 @@ def demo(
         )
         if truth:
             page.print(f"   {truth}", style="green")
-    _write_whole(out / _PAGE, demo_page([run.shown for run in there], out, missing))
+    text = demo_page([run.shown for run in there], out, missing)
+    replace_file(out / _PAGE, text.encode())
     if write.quiet:
         return
     if missing:
@@ -91,16 +93,6 @@ def _check(out: Path, names: list[str], force: bool) -> None:
             claim(out / name, force)
         elif (out / name).exists() and not force:
             raise ConfigError("cli.folder-exists", file=str(out / name), quantity="--out")
-
-
-def _write_whole(path: Path, text: str) -> None:
-    """Write a file atomically."""
-    partial = path.with_name(f".{path.name}.partial")
-    try:
-        partial.write_text(text, encoding="utf-8", newline="\n")
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 @dataclass(frozen=True)
@@ -302,6 +294,7 @@ def _attitude(
 def _navigation(name: str, data: Path) -> Callable[[Path, bool, Progress], None]:
     def make(folder: Path, force: bool, progress: Progress) -> None:
         from strapdown.api.navigation import navigate
+        from strapdown.bundle.atomic_folder import replace_file
 
         packaged = files("strapdown").joinpath("demo_data")
         text = packaged.joinpath(f"{name}.toml").read_text("utf-8")
@@ -311,7 +304,7 @@ def _navigation(name: str, data: Path) -> Callable[[Path, bool, Progress], None]
             with as_file(packaged.joinpath("comma2k19")) as recording:
                 shutil.copytree(recording, folder / _RECORDING, dirs_exist_ok=True)
         file = folder / f"{name}.toml"
-        file.write_text(text, encoding="utf-8", newline="\n")
+        replace_file(file, text.encode())
         navigate(file, progress=progress).save(folder / name, force=force, progress=progress)
 
     return make

@@ -63,7 +63,7 @@ def verify(
         result = check(folder, seal=seal, signer=signer, inputs=inputs or (), again=again)
     if page is not None:
         text = verification_page(result, folder, seal=seal, signer=signer)
-        replace_file(page.absolute(), text.encode())
+        replace_file(page, text.encode())
     if json:
         finite = result.within if result.within < float("inf") else None
         told = {

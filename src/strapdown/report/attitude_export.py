@@ -12,6 +12,7 @@ import pandas as pd
 
 from strapdown.attitude_algorithms import AttitudeAlgorithm, make_algorithm
 from strapdown.attitude_comparison.comparison import AttitudeComparison
+from strapdown.bundle.atomic_folder import replace_file
 from strapdown.errors import ConfigError
 from strapdown.export import Channel, SensorConfiguration, export_c, export_micropython
 from strapdown.formats.columns import parse_axes
@@ -147,9 +148,7 @@ def write_export(
     text = WRITERS[path.suffix.lower()][1](
         chosen, imu=imu, configuration=configuration, **of_algorithm
     )
-    partial = path.with_name(path.name + ".partial")
-    partial.write_text(text, encoding="utf-8", newline="\n")
-    partial.replace(path)
+    replace_file(path, text.encode())
     return chosen.label
 
 
