@@ -140,7 +140,7 @@ def test_an_interrupt_leaves_no_page(tmp_path, run_cli, monkeypatch):
 
     _only(monkeypatch, interrupted)
     assert run_cli("demo", "--force").code == 130
-    assert not (tmp_path / "demo").exists()
+    assert list((tmp_path / "demo").iterdir()) == []
 
 
 def test_a_page_that_cannot_be_written_leaves_no_piece(tmp_path, run_cli, monkeypatch):

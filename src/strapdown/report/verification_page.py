@@ -72,7 +72,7 @@ def verification_page(
         Paragraph(_of_seal(seal, signer), "note"),
     )
     rows = [
-        (item["name"], str(item["bytes"]), item["sha256"], _outcome(result, compared, item["name"]))
+        (item["name"], _outcome(result, compared, item["name"]), str(item["bytes"]), item["sha256"])
         for item in manifest["outputs"]
     ]
     inputs = [
@@ -93,7 +93,7 @@ def verification_page(
             section(
                 "outputs",
                 "Results",
-                TableBlock(("file", "bytes", "SHA-256", "compared"), tuple(rows), text=(0, 2, 3)),
+                TableBlock(("file", "compared", "bytes", "SHA-256"), tuple(rows), text=(0, 1, 3)),
             ),
             section(
                 "inputs",
