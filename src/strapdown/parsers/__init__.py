@@ -12,6 +12,6 @@ The functions are in modules by library: `hdf5`, `matlab`, `parquet`, `archives`
 streams and quantities: what arrays mean is decided by `formats`, in the caller's process.
 """
 
-from strapdown.parsers.process import in_place, parse, start
+from strapdown.parsers.process import in_place, parse, start, start_for
 
-__all__ = ["in_place", "parse", "start"]
+__all__ = ["in_place", "parse", "start", "start_for"]

@@ -27,7 +27,7 @@ DECLARED, DECLARED_PER_BYTE = 256 * _MIB, 16
 #: Memory of the process that parses: beside three times that.
 MEMORY = 512 * _MIB
 #: Time of its processor, s, and s per MiB; pure Python reads half a MiB a second.
-SECONDS, SECONDS_PER_MIB = 10.0, 5.0
+SECONDS, SECONDS_PER_MIB = 5.0, 5.0
 #: An array is refused if it declares more than SMALL and exceeds its stored bytes by this ratio.
 LARGEST_RATIO, SMALL = 1000, 64 * _MIB
 
@@ -86,14 +86,16 @@ def refuse_total(declared: int, path: Path) -> None:
 
 @contextmanager
 def damage(code: str, path: Path, **data: Any) -> Iterator[None]:
-    """Report whatever a library raises on a damaged file by `code`, with its words as `error`."""
+    """Report what a library raises on a damaged file by `code`: its words are `error`, `reason`."""
     try:
         yield
     except (StrapdownError, MemoryError):
         raise
     except Exception as error:  # libraries document no common class of their errors
-        said = str(error) or type(error).__name__
-        raise DataError(code, file=path.name, data={"error": said[:300], **data}) from None
+        said = str(error)[:300] or type(error).__name__
+        reason = f"{type(error).__name__}: {error}".strip(": ")[:200]
+        words = {"error": said, "reason": reason}
+        raise DataError(code, file=path.name, data=words | data) from None
 
 
 def library(module: str, path: Path, extra: str = "logs") -> Any:

@@ -16,14 +16,20 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 from strapdown.errors import ConfigError, DataError, StrapdownError
 from strapdown.parsers.limits import memory_most, seconds_most, size_of
 
-__all__ = ["in_place", "parse", "start"]
+__all__ = ["in_place", "parse", "start", "start_for"]
+
+#: Endings of files that are parsed elsewhere.
+ENDINGS = (
+    *(".h5", ".hdf5", ".hdf", ".mat", ".npz", ".parquet", ".pq", ".zip", ".xlsx", ".xlsm"),
+    *(".ulg", ".ulog", ".bag", ".mcap", ".db3", ".ubx", ".tlog", ".fit", ".gpx"),
+)
 
 #: Time on a clock for one of the processor: other programs run, too.
 PATIENCE = 3.0
@@ -109,6 +115,12 @@ def start() -> None:
     """Start the process now, without waiting for it, where a file that needs it is expected."""
     with _lock, contextlib.suppress(OSError):
         _running()
+
+
+def start_for(names: Iterable[str]) -> None:
+    """Start the process now if one of some words is likely the name of a file that needs it."""
+    if any(name.lower().endswith(ENDINGS) for name in names):
+        start()
 
 
 def _running() -> subprocess.Popen[bytes]:
