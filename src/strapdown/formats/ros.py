@@ -165,7 +165,8 @@ def read(path: Path, topic: str | None = None) -> RawLog:
     out: Quantities = {"time": (columns["time"], "ns")}
     for triad, unit in (("gyro", "rad/s"), ("accel", "m/s2")):
         part = {f"{triad}_{a}": (columns[f"{triad}_{a}"], unit) for a in "xyz"}
-        size = float(np.median(np.linalg.norm([v for v, _ in part.values()], axis=0)))
+        with np.errstate(over="ignore"):  # of damaged values, which are infinite then
+            size = float(np.median(np.linalg.norm([v for v, _ in part.values()], axis=0)))
         if columns[f"{triad}_none"].all() and not any(v.any() for v, _ in part.values()):
             if triad == "gyro":
                 raise DataError("io.ros-not-measured", file=path.name, quantity=triad)

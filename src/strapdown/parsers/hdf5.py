@@ -44,22 +44,20 @@ def arrays(path: Path, only: Sequence[str] | None = None) -> dict[str, Any]:
         _links(file, path)
         meta: dict[str, Any] = {k: _plain(v) for k, v in file.attrs.items()}
         wanted: dict[str, h5py.Dataset] = {}
-        total = 0
 
         def visit(name: str, item: object) -> None:
-            nonlocal total
-            if not isinstance(item, h5py.Dataset) or name.startswith("#"):
-                return
-            if only is not None and name not in only:
-                return
+            chosen = not name.startswith("#") if only is None else name in only
+            if chosen and isinstance(item, h5py.Dataset):
+                wanted[name] = item
+
+        file.visititems(visit)
+        total = 0
+        for name, item in wanted.items():
             _refuse_elsewhere(item, name, path)
             if item.dtype.kind in "iufb":
                 size = int(np.prod(item.shape or (), dtype=object)) * item.dtype.itemsize
                 refuse_lie(size, item.id.get_storage_size(), name, path.name)
                 total += size
-            wanted[name] = item
-
-        file.visititems(visit)
         refuse_total(total, path)
         for name, item in wanted.items():
             values = _dataset(item)
@@ -78,16 +76,18 @@ def _links(file: h5py.File, path: Path) -> list[str]:
     """Return the names of all links; none is followed to another file."""
     names: list[str] = []
 
-    def visit(name: bytes, about: Any) -> bool | None:
+    def visit(name: bytes, about: Any) -> str | None:
+        # What is returned ends the walk; the library does not survive an exception in here.
         text = name.decode("utf-8", "replace")
-        if about.type > h5py.h5l.TYPE_SOFT:
-            kind = "the target of the link"
-            raise DataError("io.hdf5-elsewhere", file=path.name, quantity=text, kind=kind)
         names.append(text)
-        return True if len(names) >= MOST_LINKS else None
+        if about.type > h5py.h5l.TYPE_SOFT:  # external, or defined by a user
+            return text
+        return "" if len(names) > MOST_LINKS else None
 
-    file.id.links.visit(visit, info=True)
-    if len(names) >= MOST_LINKS:
+    if outside := file.id.links.visit(visit, info=True):
+        kind = "the target of the link"
+        raise DataError("io.hdf5-elsewhere", file=path.name, quantity=outside, kind=kind)
+    if len(names) > MOST_LINKS:
         raise DataError("io.hdf5-too-many-objects", file=path.name, most=MOST_LINKS)
     return names
 

@@ -12,10 +12,12 @@ import atexit
 import contextlib
 import json
 import os
+import select
 import signal
 import subprocess
 import sys
 import threading
+import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -148,13 +150,6 @@ def _exchange(request: bytes, asked: dict[str, Any], label: str) -> Any:
     """Send a request, and return the answer to it; `_lock` is held."""
     from strapdown.parsers import wire
 
-    late = False
-
-    def end() -> None:
-        nonlocal late
-        late = True
-        process.kill()
-
     for again in (False, True):
         try:
             process = _running()
@@ -167,31 +162,68 @@ def _exchange(request: bytes, asked: dict[str, Any], label: str) -> Any:
             _forget()
             if again:
                 raise DataError("io.parser-not-started", file=label, reason=str(error)) from None
-    watch = threading.Timer(asked["patience"] + LATE, end)
-    watch.daemon = True
-    watch.start()
     whole = False
     try:
-        answer = wire.decode(process.stdout, asked["memory"])  # type: ignore[arg-type]
+        with _watched(process, asked["patience"] + LATE) as stream:
+            answer = wire.decode(stream, asked["memory"])
         whole = True
         return answer
+    except TimeoutError:
+        raise DataError("io.parser-out-of-time", file=label, seconds=asked["seconds"]) from None
     except EOFError:
-        code = process.wait()
-        seconds = asked["seconds"]
-        raise _death(-9999 if late else code, label, seconds, asked["memory"]) from None
+        raise _death(process.wait(), label, asked["seconds"], asked["memory"]) from None
     except wire.BrokenAnswerError as error:
         reason = f"answer: {error}"
         raise DataError("io.parser-failed", file=label, reason=reason) from None
     finally:
-        watch.cancel()
         if not whole:  # an interrupt, too, leaves an answer that nobody asked for
             _forget()
+
+
+@contextlib.contextmanager
+def _watched(process: subprocess.Popen[bytes], seconds: float) -> Iterator[Any]:
+    """Give the stream of answers, whose end is waited for by so many seconds. TimeoutError."""
+    assert process.stdout is not None
+    if os.name == "posix":
+        yield _Timed(process.stdout, time.monotonic() + seconds)
+        return
+    late = threading.Event()
+
+    def end() -> None:
+        late.set()
+        process.kill()
+
+    watch = threading.Timer(seconds, end)
+    watch.daemon = True
+    watch.start()
+    try:
+        yield process.stdout
+    except EOFError:
+        if late.is_set():
+            raise TimeoutError from None
+        raise
+    finally:
+        watch.cancel()
+
+
+class _Timed:
+    """A pipe that is read until an instant of the monotonic clock."""
+
+    def __init__(self, stream: Any, end: float) -> None:
+        self._stream, self._end = stream, end
+        self._ready = select.poll()
+        self._ready.register(stream, select.POLLIN | select.POLLHUP)
+
+    def readinto(self, view: memoryview) -> int:
+        if not self._ready.poll(max(0.0, 1e3 * (self._end - time.monotonic()))):
+            raise TimeoutError
+        return int(self._stream.readinto(view))
 
 
 def _death(code: int, label: str, seconds: float, memory: int) -> DataError:
     """Make the error of a process that ended without an answer."""
     name = signal.Signals(-code).name if -code in set(signal.Signals) else f"exit code {code}"
-    if code == -9999 or name in ("SIGXCPU", "SIGALRM"):
+    if name in ("SIGXCPU", "SIGALRM"):
         return DataError("io.parser-out-of-time", file=label, seconds=seconds)
     if name == "SIGKILL":  # by the system, which was short of memory, or by a person
         return DataError("io.parser-killed", file=label, memory=memory / 2**20)

@@ -13,7 +13,7 @@ import re
 import struct
 from collections.abc import Callable
 from datetime import date, datetime, time
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 
@@ -69,7 +69,7 @@ def encode(value: Any) -> list[Any]:
     return [_LENGTHS.pack(len(head), size), head, *(a.view(np.uint8) for a in arrays if a.nbytes)]
 
 
-def decode(stream: BinaryIO, most: int) -> Any:
+def decode(stream: Any, most: int) -> Any:
     """Read a tree.
 
     `most`: bytes that it may have. EOFError: the stream ended. BrokenAnswerError: it is no tree.
@@ -105,7 +105,7 @@ def decode(stream: BinaryIO, most: int) -> Any:
 
 
 def _array(
-    stream: BinaryIO, dtype: str, shape: list[int], turned: bool, nbytes: int
+    stream: Any, dtype: str, shape: list[int], turned: bool, nbytes: int
 ) -> np.ndarray[Any, Any]:
     if not _DTYPE.fullmatch(dtype):
         raise BrokenAnswerError("dtype")
@@ -123,7 +123,7 @@ def _array(
     return values.reshape(shape[::-1]).T if turned else values.reshape(shape)
 
 
-def _exactly(stream: BinaryIO, size: int) -> bytes:
+def _exactly(stream: Any, size: int) -> bytes:
     data = bytearray(size)
     _into(stream, memoryview(data))
     return bytes(data)
