@@ -19,6 +19,7 @@ __all__ = [
     "refuse_total",
     "seconds_most",
     "size_of",
+    "text_most",
 ]
 
 _MIB = 1 << 20
@@ -26,8 +27,10 @@ _MIB = 1 << 20
 DECLARED, DECLARED_PER_BYTE = 256 * _MIB, 16
 #: Memory of the process that parses: beside three times that.
 MEMORY = 512 * _MIB
+#: Bytes of JSON that it may answer beside arrays: fields of messages have names, each time.
+TEXT, TEXT_PER_BYTE = 64 * _MIB, 48
 #: Time of its processor, s, and s per MiB; pure Python reads half a MiB a second.
-SECONDS, SECONDS_PER_MIB = 5.0, 5.0
+SECONDS, SECONDS_PER_MIB = 5.0, 10.0
 #: An array is refused if it declares more than SMALL and exceeds its stored bytes by this ratio.
 LARGEST_RATIO, SMALL = 1000, 64 * _MIB
 
@@ -50,6 +53,11 @@ def declared_most(size: int) -> int:
 def memory_most(size: int) -> int:
     """Return the memory, bytes, that may be taken to parse a file of `size` bytes."""
     return MEMORY + 3 * declared_most(size)
+
+
+def text_most(size: int) -> int:
+    """Return the most bytes of an answer about a file of `size` bytes, beside arrays."""
+    return TEXT + TEXT_PER_BYTE * size
 
 
 def seconds_most(size: int) -> float:

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from strapdown.errors import ConfigError, DataError, StrapdownError
-from strapdown.parsers.limits import memory_most, seconds_most, size_of
+from strapdown.parsers.limits import declared_most, memory_most, seconds_most, size_of, text_most
 
 __all__ = ["in_place", "parse", "start", "start_for"]
 
@@ -37,11 +37,13 @@ ENDINGS = (
 PATIENCE = 3.0
 #: How long its own clock may be late before it is ended from outside, s.
 LATE = 5.0
-#: One thread of each library is enough, and each reserves memory; Arrow's own allocators, too.
+#: One thread of each library is enough, and each reserves memory; Arrow's own allocators, too. A
+#: warning that the caller wants as an error is none in there.
 _ENVIRONMENT = {
     "OPENBLAS_NUM_THREADS": "1",
     "OMP_NUM_THREADS": "1",
     "MKL_NUM_THREADS": "1",
+    "PYTHONWARNINGS": "ignore",
     "ARROW_DEFAULT_MEMORY_POOL": "system",
 }
 _COMMAND = "import sys; sys.path[:] = {path!r}; from strapdown.parsers.worker import main; main()"
@@ -63,12 +65,13 @@ def in_place() -> Iterator[None]:
 
 
 def parse(function: str, path: Path, *, label: str = "", memory: int = 0, **arguments: Any) -> Any:
-    """Run a function of this package on a file, in the process that parses.
+    """Run a function on a file in the process that parses.
 
     Parameters
     ----------
     function : str
-        ``module.name``; its first parameter is the path.
+        ``module.name`` of this package, or ``package.module:name`` of another distribution, which
+        returns the like; its first parameter is the path.
     path : Path
         A file or folder, whose size sets the limits.
     label : str
@@ -109,7 +112,7 @@ def parse(function: str, path: Path, *, label: str = "", memory: int = 0, **argu
         "patience": PATIENCE * seconds,
     }
     with _lock:
-        answer = _exchange(json.dumps(asked).encode() + b"\n", asked, label)
+        answer = _exchange(asked, label, (declared_most(size), text_most(size)))
     return _taken(answer, label, memory)
 
 
@@ -131,12 +134,14 @@ def _running() -> subprocess.Popen[bytes]:
         _forget()
         if not sys.executable or getattr(sys, "frozen", False):
             raise OSError("this program is not run by a Python that can be started again")
-        command = _COMMAND.format(path=[p for p in sys.path if isinstance(p, str)])
+        folders = [str(Path(p).absolute()) for p in sys.path if isinstance(p, str)]
+        command = _COMMAND.format(path=folders)
         _process = subprocess.Popen(
             [sys.executable, "-P", "-c", command],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
+            cwd=Path(sys.executable).anchor,  # the caller may want to remove its own
             bufsize=0,
             env=os.environ | _ENVIRONMENT,
             # An interrupt at the terminal is for the caller, which ends it.
@@ -146,10 +151,11 @@ def _running() -> subprocess.Popen[bytes]:
     return _process
 
 
-def _exchange(request: bytes, asked: dict[str, Any], label: str) -> Any:
-    """Send a request, and return the answer to it; `_lock` is held."""
+def _exchange(asked: dict[str, Any], label: str, most: tuple[int, int]) -> Any:
+    """Send a request, and return the answer to it, which has at `most` so much; `_lock` is held."""
     from strapdown.parsers import wire
 
+    request = json.dumps(asked).encode() + b"\n"
     for again in (False, True):
         try:
             process = _running()
@@ -165,7 +171,7 @@ def _exchange(request: bytes, asked: dict[str, Any], label: str) -> Any:
     whole = False
     try:
         with _watched(process, asked["patience"] + LATE) as stream:
-            answer = wire.decode(stream, asked["memory"])
+            answer = wire.decode(stream, *most)
         whole = True
         return answer
     except TimeoutError:

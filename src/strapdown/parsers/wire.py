@@ -69,13 +69,14 @@ def encode(value: Any) -> list[Any]:
     return [_LENGTHS.pack(len(head), size), head, *(a.view(np.uint8) for a in arrays if a.nbytes)]
 
 
-def decode(stream: Any, most: int) -> Any:
+def decode(stream: Any, most: int, most_text: int | None = None) -> Any:
     """Read a tree.
 
-    `most`: bytes that it may have. EOFError: the stream ended. BrokenAnswerError: it is no tree.
+    `most`: bytes that its arrays may have. `most_text`: that the rest may. EOFError: the stream
+    ended. BrokenAnswerError: it is no tree.
     """
     head, size = _LENGTHS.unpack(_exactly(stream, _LENGTHS.size))
-    if head + size > most:
+    if size > most or head > (most if most_text is None else most_text):
         raise BrokenAnswerError(f"{head + size} bytes")
     try:
         about, text = json.loads(_exactly(stream, head))

@@ -7,6 +7,7 @@ caller is gone.
 
 from __future__ import annotations
 
+import contextlib
 import importlib
 import json
 import os
@@ -26,11 +27,21 @@ MODULES = ("hdf5", "matlab", "parquet", "archives", "workbooks", "recorders", "b
 
 
 def call(function: str, path: Path, arguments: dict[str, Any]) -> Any:
-    """Call ``module.function`` of this package."""
-    module, _, name = function.partition(".")
-    if module not in MODULES or name.startswith("_"):
+    """Call ``module.name`` of this package, or ``package.module:name`` of another."""
+    module, name = _names(function)
+    if name.startswith("_"):
         raise LookupError(function)
-    return getattr(importlib.import_module(f"strapdown.parsers.{module}"), name)(path, **arguments)
+    return getattr(importlib.import_module(module), name)(path, **arguments)
+
+
+def _names(function: str) -> tuple[str, str]:
+    if ":" in function:
+        module, _, name = function.partition(":")
+        return module, name
+    module, _, name = function.partition(".")
+    if module not in MODULES:
+        raise LookupError(function)
+    return f"strapdown.parsers.{module}", name
 
 
 def main() -> None:
@@ -48,9 +59,10 @@ def main() -> None:
     while line := requests.readline():
         asked = json.loads(line)
         if not locked:
-            # Before the lock, because a module that is not compiled yet is written.
-            importlib.import_module(f"strapdown.parsers.{asked['function'].partition('.')[0]}")
             locked = True
+            # Before the lock, because a module that is not compiled yet is written.
+            with contextlib.suppress(Exception):  # the call says why
+                importlib.import_module(_names(asked["function"])[0])
             _lock()
         _limit(asked["memory"], asked["seconds"], asked["patience"])
         ends = _ends_with_caller(source)

@@ -162,8 +162,10 @@ def test_memory_is_limited(tmp_path, log):
 @posix
 def test_time_on_a_clock_is_limited(fifo, log, monkeypatch):
     monkeypatch.setattr(process, "PATIENCE", 0.1)
+    begun = time.monotonic()
     with pytest.raises(DataError, check=coded("io.parser-out-of-time", seconds=5.0)):
         read_gpx(fifo)
+    assert time.monotonic() - begun < process.LATE  # by its own clock
     assert read_raw(log).columns["time_s"].size == 60
 
 
@@ -315,16 +317,33 @@ def test_threads_take_turns(tmp_path):
 @pytest.mark.filterwarnings("ignore:.*fork.*:DeprecationWarning")
 def test_after_a_fork_both_read(log):
     read_raw(log)
-    mine = process._process.pid
+    mine, pipe = process._process.pid, process._process.stdin.fileno()
+    asks, done = threading.Event(), threading.Event()
+
+    def ask():
+        with process._lock:
+            asks.set()
+            done.wait(30)
+
+    other = threading.Thread(target=ask)
+    other.start()
+    asks.wait()
     child = os.fork()
     if not child:
+        signal.alarm(20)
         try:
+            with contextlib.suppress(OSError):
+                os.fstat(pipe)
+                os._exit(3)  # it would keep the other process alive
             same = read_raw(log).columns["time_s"].size == 60 and process._process.pid != mine
             process._forget()
             os._exit(0 if same else 1)
         finally:
             os._exit(2)
-    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    done.set()
+    other.join()
+    assert code == 0
     assert read_raw(log).columns["time_s"].size == 60
     assert process._process.pid == mine
 
@@ -632,3 +651,25 @@ def test_a_drawn_set_of_damaged_files_is_read_or_refused(tmp_path):
     found = fuzz.main(104, seed=5, keep=tmp_path)
     assert found["read"] > 10 and found["refused"] > 40
     assert not found["traceback"] and not found["slow"]
+
+
+def test_a_reader_of_another_distribution_asks_for_it(tmp_path, monkeypatch):
+    """It names a function of its own module, which the other process finds where this one does."""
+    (tmp_path / "my_parser.py").write_text(
+        "import os\ndef values(path, scale):\n"
+        "    return {'pid': os.getpid(), 'values': [scale * b for b in path.read_bytes()]}\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    process._forget()
+    (tmp_path / "log.bin").write_bytes(b"\x01\x02")
+    found = parse("my_parser:values", tmp_path / "log.bin", scale=2)
+    assert found["values"] == [2, 4] and found["pid"] != os.getpid()
+    process._forget()
+
+
+def test_an_answer_larger_than_the_file_allows_is_refused(tmp_path):
+    answer = b"".join(wire.encode({"a": np.zeros(1000)}))
+    for most in ((7999, 1000), (8000, 10)):
+        with pytest.raises(wire.BrokenAnswerError):
+            wire.decode(io.BytesIO(answer), *most)
+    assert wire.decode(io.BytesIO(answer), 8000, 1000)["a"].size == 1000
