@@ -21,7 +21,7 @@ def has_messages(path: Path) -> bool:
     try:
         with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)) as base:
             names = {name for (name,) in base.execute("select name from sqlite_master")}
-    except sqlite3.Error:
+    except (sqlite3.Error, UnicodeDecodeError):  # damaged, or names in no encoding
         return False
     return {"messages", "topics"} <= names
 

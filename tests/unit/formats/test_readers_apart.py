@@ -7,6 +7,7 @@ import io
 import os
 import random
 import signal
+import sqlite3
 import struct
 import subprocess
 import sys
@@ -549,6 +550,13 @@ def test_values_of_another_file_are_refused(tmp_path, kind, form):
     assert str(SECRET)[:6] not in f"{error} {error.finding!r}"
 
 
+def test_a_folder_is_listed_beside_such_a_file(tmp_path, log):
+    log.rename(tmp_path / "good.h5")
+    elsewhere(tmp_path, "link")
+    with pytest.raises(DataError, check=coded("io.folder-of-one-recording", names="good.h5")):
+        read_raw(tmp_path)
+
+
 def test_a_soft_link_within_the_file_is_none(tmp_path):
     held = fuzz.signals()
     path = hdf5(tmp_path / "log.h5", held)
@@ -573,6 +581,16 @@ def hdf5_of_groups(path, count):
         for k in range(count):
             file.create_group(f"g{k}")
     return path
+
+
+def test_a_database_with_names_in_no_encoding_is_no_bag(tmp_path):
+    path = tmp_path / "log.db3"
+    with contextlib.closing(sqlite3.connect(path)) as base:
+        base.execute("create table messages (a)")
+        base.commit()
+    path.write_bytes(path.read_bytes().replace(b"messages", b"mess\xe5\xff\xffs"))
+    with pytest.raises(DataError, check=coded("io.foreign-format")):
+        read_raw(path)
 
 
 # --- what unpacks too far ---------------------------------------------------------------
