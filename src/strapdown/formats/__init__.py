@@ -304,7 +304,10 @@ READERS: dict[str, Reader] = {
 
 
 #: Exceptions that a damaged file can cause in any reader and in the libraries that it uses.
-_BROKEN = (ArithmeticError, LookupError, RuntimeError, StopIteration, TypeError, ValueError)
+_BROKEN = (
+    *(ArithmeticError, AttributeError, LookupError, RuntimeError),
+    *(StopIteration, TypeError, ValueError),
+)
 
 
 def readers_of(path: Path) -> Iterator[tuple[str, Reader]]:

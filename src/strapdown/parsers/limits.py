@@ -30,7 +30,7 @@ MEMORY = 512 * _MIB
 #: Bytes of JSON that it may answer beside arrays: fields of messages have names, each time.
 TEXT, TEXT_PER_BYTE = 64 * _MIB, 48
 #: Time of its processor, s, and s per MiB; pure Python reads half a MiB a second.
-SECONDS, SECONDS_PER_MIB = 5.0, 10.0
+SECONDS, SECONDS_PER_MIB = 10.0, 10.0
 #: An array is refused if it declares more than SMALL and exceeds its stored bytes by this ratio.
 LARGEST_RATIO, SMALL = 1000, 64 * _MIB
 

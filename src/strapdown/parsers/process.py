@@ -14,6 +14,7 @@ import json
 import os
 import select
 import signal
+import stat
 import subprocess
 import sys
 import threading
@@ -22,7 +23,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from strapdown.errors import ConfigError, DataError, StrapdownError
+from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.parsers.limits import declared_most, memory_most, seconds_most, size_of, text_most
 
 __all__ = ["in_place", "parse", "start", "start_for"]
@@ -50,6 +51,11 @@ _COMMAND = "import sys; sys.path[:] = {path!r}; from strapdown.parsers.worker im
 
 _lock = threading.RLock()
 _process: subprocess.Popen[bytes] | None = None
+#: Files that ended the process: each is asked for by several formats, and once for each stream.
+_refused: dict[tuple[Any, ...], Finding] = {}
+_MOST_REFUSED = 64
+#: What the same file does again.
+_LASTING = ("io.parser-crashed", "io.parser-out-of-memory", "io.parser-out-of-time")
 _in_place = False
 
 
@@ -99,6 +105,9 @@ def parse(function: str, path: Path, *, label: str = "", memory: int = 0, **argu
             return worker.call(function, path, arguments)
         except StrapdownError as error:
             raise type(error)(error.finding, file=label) from None
+    state = () if memory else _state(path)
+    if known := _refused.get(state):
+        raise DataError(known, file=label)
     size = size_of(path)
     memory = memory or memory_most(size)
     seconds = seconds_most(size)
@@ -111,9 +120,27 @@ def parse(function: str, path: Path, *, label: str = "", memory: int = 0, **argu
         "seconds": seconds,
         "patience": PATIENCE * seconds,
     }
-    with _lock:
-        answer = _exchange(asked, label, (declared_most(size), text_most(size)))
-    return _taken(answer, label, memory)
+    try:
+        with _lock:
+            answer = _exchange(asked, label, (declared_most(size), text_most(size)))
+        return _taken(answer, label, memory)
+    except DataError as error:
+        if state and error.finding.code in _LASTING and not error.finding.data.get("on_clock"):
+            if len(_refused) >= _MOST_REFUSED:
+                _refused.clear()
+            _refused[state] = error.finding
+        raise
+
+
+def _state(path: Path) -> tuple[Any, ...]:
+    """Return what shows that a file is the same; empty for a folder."""
+    try:
+        about = path.stat()
+    except OSError:
+        return ()
+    if not stat.S_ISREG(about.st_mode):
+        return ()
+    return str(path.absolute()), about.st_ino, about.st_size, about.st_mtime_ns
 
 
 def start() -> None:
@@ -155,27 +182,16 @@ def _exchange(asked: dict[str, Any], label: str, most: tuple[int, int]) -> Any:
     """Send a request, and return the answer to it, which has at `most` so much; `_lock` is held."""
     from strapdown.parsers import wire
 
-    request = json.dumps(asked).encode() + b"\n"
-    for again in (False, True):
-        try:
-            process = _running()
-            assert process.stdin is not None
-            rest = memoryview(request)
-            while rest:
-                rest = rest[process.stdin.write(rest) :]
-            break
-        except (OSError, ValueError) as error:  # it may have been ended while it was idle
-            _forget()
-            if again:
-                raise DataError("io.parser-not-started", file=label, reason=str(error)) from None
     whole = False
     try:
+        process = _asked(json.dumps(asked).encode() + b"\n", label)
         with _watched(process, asked["patience"] + LATE) as stream:
             answer = wire.decode(stream, *most)
         whole = True
         return answer
     except TimeoutError:
-        raise DataError("io.parser-out-of-time", file=label, seconds=asked["seconds"]) from None
+        said = {"seconds": asked["seconds"], "on_clock": True}
+        raise DataError("io.parser-out-of-time", file=label, data=said) from None
     except EOFError:
         raise _death(process.wait(), label, asked["seconds"], asked["memory"]) from None
     except wire.BrokenAnswerError as error:
@@ -184,6 +200,23 @@ def _exchange(asked: dict[str, Any], label: str, most: tuple[int, int]) -> Any:
     finally:
         if not whole:  # an interrupt, too, leaves an answer that nobody asked for
             _forget()
+
+
+def _asked(request: bytes, label: str) -> subprocess.Popen[bytes]:
+    """Send a request; a process that was ended while it had nothing to do is started again."""
+    for again in (False, True):
+        try:
+            process = _running()
+            assert process.stdin is not None
+            rest = memoryview(request)
+            while rest:
+                rest = rest[process.stdin.write(rest) :]
+            return process
+        except (OSError, ValueError) as error:
+            _forget()
+            if again:
+                raise DataError("io.parser-not-started", file=label, reason=str(error)) from None
+    raise AssertionError
 
 
 @contextlib.contextmanager
@@ -230,7 +263,8 @@ def _death(code: int, label: str, seconds: float, memory: int) -> DataError:
     """Make the error of a process that ended without an answer."""
     name = signal.Signals(-code).name if -code in set(signal.Signals) else f"exit code {code}"
     if name in ("SIGXCPU", "SIGALRM"):
-        return DataError("io.parser-out-of-time", file=label, seconds=seconds)
+        on_clock = name == "SIGALRM"  # other programs may have had the processor
+        return DataError("io.parser-out-of-time", file=label, seconds=seconds, on_clock=on_clock)
     if name == "SIGKILL":  # by the system, which was short of memory, or by a person
         return DataError("io.parser-killed", file=label, memory=memory / 2**20)
     return DataError("io.parser-crashed", file=label, signal=name)

@@ -58,11 +58,12 @@ def main() -> None:
     locked = False
     while line := requests.readline():
         asked = json.loads(line)
+        # Before the limits, which are for the file; before the lock, because a module that is not
+        # compiled yet is written.
+        with contextlib.suppress(Exception):  # the call says why
+            importlib.import_module(_names(asked["function"])[0])
         if not locked:
             locked = True
-            # Before the lock, because a module that is not compiled yet is written.
-            with contextlib.suppress(Exception):  # the call says why
-                importlib.import_module(_names(asked["function"])[0])
             _lock()
         _limit(asked["memory"], asked["seconds"], asked["patience"])
         ends = _ends_with_caller(source)

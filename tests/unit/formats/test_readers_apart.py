@@ -37,6 +37,7 @@ from strapdown.formats import (
     toolboxes,
 )
 from strapdown.formats import hdf5 as hdf5_files
+from strapdown.formats.aid_table import read_control_points
 from strapdown.parsers import in_place, parse, process, start_for, wire
 from strapdown.parsers.limits import declared_most
 
@@ -117,6 +118,12 @@ def test_a_file_that_ends_the_library_by_a_signal_is_an_error_that_names_it(tmp_
     with pytest.raises(DataError, check=coded("io.parser-crashed", signal="SIGSEGV")) as caught:
         read_raw(path)
     assert caught.value.finding.file == "one.mat" and "CSV" in str(caught.value.finding.remedy)
+    process._forget()
+    with pytest.raises(DataError, check=coded("io.parser-crashed", signal="SIGSEGV")):
+        read_raw(path)
+    assert process._process is None  # it is known, and not tried again
+    savemat(path, fuzz.signals(), oned_as="column")
+    assert read_raw(path).columns["time_s"].size == 60
     assert read_raw(log).columns["time_s"].size == 60
 
 
@@ -164,7 +171,7 @@ def test_memory_is_limited(tmp_path, log):
 def test_time_on_a_clock_is_limited(fifo, log, monkeypatch):
     monkeypatch.setattr(process, "PATIENCE", 0.1)
     begun = time.monotonic()
-    with pytest.raises(DataError, check=coded("io.parser-out-of-time", seconds=5.0)):
+    with pytest.raises(DataError, check=coded("io.parser-out-of-time", seconds=10.0)):
         read_gpx(fifo)
     assert time.monotonic() - begun < process.LATE  # by its own clock
     assert read_raw(log).columns["time_s"].size == 60
@@ -691,3 +698,28 @@ def test_an_answer_larger_than_the_file_allows_is_refused(tmp_path):
         with pytest.raises(wire.BrokenAnswerError):
             wire.decode(io.BytesIO(answer), *most)
     assert wire.decode(io.BytesIO(answer), 8000, 1000)["a"].size == 1000
+
+
+def test_a_control_point_file_says_why_it_is_refused(tmp_path):
+    """Not that its ending is not one of a table."""
+    with pytest.raises(DataError, check=coded("io.hdf5-elsewhere")):
+        read_control_points(elsewhere(tmp_path, "external"))
+
+
+def test_stamps_that_are_no_dataset_are_missed_by_name(tmp_path):
+    held = fuzz.signals()
+    three = np.column_stack([held[f"gyro_{a}_rad_s"] for a in "xyz"])
+    path = hdf5(tmp_path / "data.hdf5", {"synced/gyro": three, "synced/acce": three})
+    with h5py.File(path, "a") as file:
+        file.create_group("synced/time")
+    with pytest.raises(DataError, check=coded("io.no-such-array", name="synced/time")):
+        read_raw(path)
+
+
+def test_an_archive_of_another_version_is_refused(tmp_path):
+    np.savez(tmp_path / "log.npz", **fuzz.signals())
+    data = bytearray((tmp_path / "log.npz").read_bytes())
+    data[data.index(b"PK\x01\x02") + 6] = 255  # version that is needed
+    (tmp_path / "log.npz").write_bytes(data)
+    with pytest.raises(DataError, check=coded("io.npz-unreadable")):
+        read_raw(tmp_path / "log.npz")
