@@ -9,7 +9,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import h5py
 import numpy as np
+from scipy.io import savemat
 
 HEADER = "time_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s"
 
@@ -141,6 +143,33 @@ def pickled(folder: Path) -> Path:
 def no_matlab(folder: Path) -> Path:
     (folder / "log.mat").write_bytes(b"MATLAB 5.0 MAT-file" + bytes(200))
     return folder / "log.mat"
+
+
+def deadly_matlab(folder: Path) -> Path:
+    """A variable that is said to be complex, and has no imaginary part: SciPy dies of it."""
+    path = folder / "log.mat"
+    savemat(path, {"gyro": np.ones((50, 3)), "accel": np.ones((50, 3))})
+    data = bytearray(path.read_bytes())
+    data[145] |= 0x08
+    path.write_bytes(data)
+    return path
+
+
+def hdf5_elsewhere(folder: Path) -> Path:
+    with h5py.File(folder / "log.h5", "w") as file:
+        file["time_s"] = np.arange(50) * 0.01
+        file["gyro"] = h5py.ExternalLink("other.h5", "gyro")
+    return folder / "log.h5"
+
+
+def packed_zeros(folder: Path) -> Path:
+    packed = {"chunks": (1 << 20,), "compression": "gzip"}
+    with h5py.File(folder / "log.h5", "w") as file:
+        for name in ("time_s", "gyro_x", "gyro_y", "gyro_z"):
+            values = np.zeros(9_000_000)
+            values[::97] = 1.0
+            file.create_dataset(name, data=values, **packed)
+    return folder / "log.h5"
 
 
 def no_hdf5(folder: Path) -> Path:
@@ -487,6 +516,9 @@ CASES = [
     Case("An archive of Python objects", pickled),
     Case("A damaged MATLAB file", no_matlab),
     Case("A damaged HDF5 file", no_hdf5),
+    Case("A MATLAB file that ends the library by a signal", deadly_matlab),
+    Case("An HDF5 file whose gyro is in another file", hdf5_elsewhere),
+    Case("An HDF5 file that unpacks to far more than it stores", packed_zeros),
     Case("An archive of a phone that was cut", cut_zip),
     Case("An archive of something else", recording_zip(Contacts="name,number")),
     Case(

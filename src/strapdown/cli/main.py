@@ -24,6 +24,7 @@ from typer.core import TyperGroup
 from strapdown import __version__
 from strapdown.cli.console import RESOURCES, WORDS, logged
 from strapdown.errors import ConfigError, Finding, StrapdownError
+from strapdown.parsers import start_for
 
 _RESEND_S = 0.005
 
@@ -129,6 +130,7 @@ def run() -> None:
     try:
         with logged():
             _refuse_placeholders(sys.argv[1:])
+            start_for(sys.argv[1:])  # beside the imports of the command
             app()
     except StrapdownError as error:
         text = "\n  ".join([error.finding.text(WORDS.get()), *_answers(error.finding)])

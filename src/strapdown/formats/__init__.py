@@ -304,7 +304,10 @@ READERS: dict[str, Reader] = {
 
 
 #: Exceptions that a damaged file can cause in any reader and in the libraries that it uses.
-_BROKEN = (ArithmeticError, LookupError, RuntimeError, StopIteration, TypeError, ValueError)
+_BROKEN = (
+    *(ArithmeticError, AttributeError, LookupError, RuntimeError),
+    *(StopIteration, TypeError, ValueError),
+)
 
 
 def readers_of(path: Path) -> Iterator[tuple[str, Reader]]:
@@ -518,7 +521,7 @@ def _not_recognized(path: Path) -> DataError:
         head = first_bytes(path, 8).hex(" ")
         return DataError("io.ending-no-known-format", file=path.name, suffix=path.suffix, head=head)
     inside = sorted(path.iterdir())[:MOST_NAMES]
-    found = (p.name for p in inside if reader_of(p)[1] is not None and _has_sensors(p))
+    found = (p.name for p in inside if _has_sensors(p))
     logs = list(itertools.islice(found, MOST_SHOWN + 1))
     shown = logs or [p.name for p in inside]
     names = ", ".join(shown[:MOST_SHOWN]) + (" …" if len(shown) > MOST_SHOWN else "")
@@ -536,9 +539,11 @@ def _not_recognized(path: Path) -> DataError:
 
 def _has_sensors(path: Path) -> bool:
     """Whether a log has a gyro or an accelerometer; a table of fixes has neither."""
-    if path.is_file() and path.stat().st_size > MOST_BYTES:
-        return True
     try:
+        if reader_of(path)[1] is None:
+            return False
+        if path.is_file() and path.stat().st_size > MOST_BYTES:
+            return True
         raw = read_raw(path)
     except StrapdownError:
         return False

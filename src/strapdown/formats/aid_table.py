@@ -207,6 +207,10 @@ def along_body(table: pd.DataFrame, axes: str = "") -> pd.DataFrame:
     return out
 
 
+#: What a file that is no table is refused by; a table that is damaged says why.
+_NO_TABLE = ("io.ending-no-known-format", "io.foreign-format", "io.no-stream")
+
+
 def _raw(path: Path, stream: str) -> RawLog:
     if not path.exists():
         raise ConfigError("io.no-such-file", file=str(path))
@@ -227,7 +231,9 @@ def _raw(path: Path, stream: str) -> RawLog:
         )
     try:
         return read_raw(path)
-    except DataError:
+    except DataError as error:
+        if error.finding.code not in _NO_TABLE:
+            raise
         raise DataError(
             "io.aid-file-ending",
             file=path.name,

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import re
 import struct
-from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -18,8 +17,10 @@ from strapdown import rotation
 from strapdown.errors import DataError, Finding
 from strapdown.formats.clocks import RELATIVE, Clock
 from strapdown.formats.known_formats import Quantities, damage, interpolated, solution, turned
-from strapdown.formats.recording import NoStreamError, RawLog, library
+from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.signs import Signs, first_bytes
+from strapdown.parsers import parse
+from strapdown.parsers.recorders import FIRST, mavlink_frames
 
 # ArduPilot DataFlash logs (``.bin``, or as text ``.log``): records that the log itself describes.
 #
@@ -342,79 +343,37 @@ MAVLINK_STREAMS |= {"barometer": ("SCALED_PRESSURE",)}
 #: Kind of a fix to field 6 of NMEA GGA.
 MAVLINK_QUALITY = {2: 1, 3: 1, 4: 2, 5: 5, 6: 4, 7: 4, 8: 3}
 UNKNOWN = 65535  # of a speed and a course
-#: 2000 to 2045 in µs since 1970; a clock since a start never counts so far.
-FIRST, LAST = 946_684_800_000_000, 2_366_841_600_000_000
-HEAD = 8  # bytes of a stamp
 Fields = dict[str, NDArray[Any]]
 
 
 def _begins(path: Path) -> bool:
     """Whether there are two records, each a stamp of these decades and a frame."""
-    return len(list(_frames(first_bytes(path, 1024), most=2))) == 2
+    return len(list(mavlink_frames(first_bytes(path, 1024), most=2))) == 2
 
 
 detect_mavlink = Signs(first=rb"\A.{8,1023}?[\xfd\xfe]", also=_begins)
 
 
-def _frames(data: bytes, most: int | None = None) -> Iterator[tuple[int, bytes]]:
-    """Yield number and bytes of each frame; what is between records is passed over."""
-    k, count = 0, 0
-    while k + HEAD + 8 <= len(data) and (most is None or count < most):
-        stamp, marker = struct.unpack_from(">QB", data, k)
-        size = 0
-        if FIRST < stamp < LAST and marker in (0xFD, 0xFE):
-            length = data[k + HEAD + 1]
-            signed = 13 if marker == 0xFD and data[k + HEAD + 2] & 1 else 0
-            size = length + signed + (12 if marker == 0xFD else 8)
-        if not size or k + HEAD + size > len(data):
-            if most is not None:  # a file of this kind begins with a record
-                return
-            k += 1
-            continue
-        frame = data[k + HEAD : k + HEAD + size]
-        number = int.from_bytes(frame[7:10], "little") if marker == 0xFD else frame[5]
-        yield number, frame
-        k, count = k + HEAD + size, count + 1
-
-
 @lru_cache(maxsize=1)
 def _messages(path: Path, stamp: int) -> tuple[dict[str, Fields], list[Finding]]:
     """Read the fields of the messages of the vehicle, by their names."""
-    dialect = library("pymavlink.dialects.v20.ardupilotmega", path, "mavlink")
-    parser, held, lost = dialect.MAVLink(None), [], 0
-    for number, frame in _frames(path.read_bytes()):
-        if number in IDS:
-            try:
-                held.append(parser.decode(bytearray(frame)))
-            except dialect.MAVError:
-                lost += 1
+    read = parse("recorders.mavlink", path, wanted=list(IDS.items()))
     findings = []
-    systems = Counter(m.get_srcSystem() for m in held)
-    if len(systems) > 1:
-        vehicle = systems.most_common(1)[0][0]
-        held = [m for m in held if m.get_srcSystem() == vehicle]
-        others = sorted(set(systems) - {vehicle})
+    if read["others"]:
         findings.append(
             Finding(
                 "io.mavlink-one-of-systems",
                 severity="note",
                 file=path.name,
-                system=vehicle,
-                others=others,
+                system=read["system"],
+                others=read["others"],
             )
         )
-    if lost:
+    if lost := read["lost"]:
         findings.append(
             Finding("io.mavlink-frames-left-out", severity="note", file=path.name, count=lost)
         )
-    out: dict[str, Fields] = {}
-    for name in IDS.values():
-        rows = [m for m in held if m.get_type() == name]
-        # Several units of a vehicle send the same message; the first that is there counts.
-        rows = [m for m in rows if m.get_srcComponent() == rows[0].get_srcComponent()]
-        if rows:
-            out[name] = {n: np.array([getattr(m, n) for m in rows]) for n in rows[0].fieldnames}
-    return out, findings
+    return read["fields"], findings
 
 
 def _of(path: Path, stream: str) -> tuple[dict[str, Fields], str, list[Finding]]:

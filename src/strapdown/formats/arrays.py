@@ -190,20 +190,6 @@ def excel_nanoseconds(values: NDArray[Any]) -> NDArray[np.int64] | None:
 
 
 RATES = ("sampling_rate", "sample_rate", "rate_hz", "fs", "freq", "frequency")
-# An array is refused if it declares more than SMALL and exceeds its stored bytes by this ratio.
-LARGEST_RATIO = 1000
-SMALL = 64 * 1024 * 1024  # bytes
-
-
-def refuse_lie(declared: int, stored: int, what: str, file: str) -> None:
-    """Refuse an array that declares far more data than its file can hold.
-
-    `what`: name of the array.
-    """
-    if declared > SMALL and declared > LARGEST_RATIO * max(stored, 1):
-        raise DataError(
-            "io.claims-bytes-stored", file=file, quantity=what, declared=declared, stored=stored
-        )
 
 
 def raw_log(

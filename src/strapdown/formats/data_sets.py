@@ -29,13 +29,7 @@ Array = NDArray[np.float64]
 
 def _has_trial(path: Path) -> bool:
     """Whether HDF5 has the datasets of BROAD."""
-    import h5py
-
-    try:
-        with h5py.File(path, "r") as file:
-            return {"imu_gyr", "imu_acc", "opt_quat"} <= set(file)
-    except OSError:
-        return False
+    return hdf5.outline(path)[0] >= {"imu_gyr", "imu_acc", "opt_quat"}
 
 
 detect_broad = Signs(suffixes=hdf5.SUFFIXES, also=_has_trial)
@@ -104,13 +98,7 @@ CHEST = "pose/tango_ori"
 
 def _has_datasets(path: Path) -> bool:
     """Whether HDF5 has the stamps and both sensors."""
-    import h5py
-
-    try:
-        with h5py.File(path, "r") as file:
-            return all(name in file for name in (TIME, GYRO, FORCE))
-    except OSError:
-        return False
+    return hdf5.outline(path)[0] >= {TIME, GYRO, FORCE}
 
 
 detect_ronin = Signs(suffixes=hdf5.SUFFIXES, also=_has_datasets)
@@ -124,9 +112,12 @@ def read_ronin(path: Path) -> RawLog:
     DataError
         The file is damaged, or an array has the wrong shape.
     """
-    import h5py
-
     arrays, _, _ = hdf5.read_arrays(path, (TIME, *TRIADS))
+    for name in (TIME, GYRO, FORCE):
+        if name not in arrays:
+            raise DataError(
+                "io.no-such-array", file=path.name, quantity=name, name=name, arrays=list(arrays)
+            )
     samples = arrays[TIME].size
     for name in TRIADS:
         if name in arrays and arrays[name].shape != (samples, 3):
@@ -142,17 +133,16 @@ def read_ronin(path: Path) -> RawLog:
     for name, (triad, unit) in TRIADS.items():
         if name in arrays:
             stated |= {f"{name}[{k}]": (f"{triad}_{a}", unit) for k, a in enumerate("xyz")}
-    with h5py.File(path, "r") as file:
-        if CHEST in file:
-            raw.findings.append(
-                Finding(
-                    "io.attitude-of-other-phone",
-                    file=path.name,
-                    quantity="attitude",
-                    severity="note",
-                    name=CHEST,
-                )
+    if CHEST in hdf5.outline(path)[0]:
+        raw.findings.append(
+            Finding(
+                "io.attitude-of-other-phone",
+                file=path.name,
+                quantity="attitude",
+                severity="note",
+                name=CHEST,
             )
+        )
     raw.stated, raw.axes = stated, AXES
     return raw
 
@@ -339,14 +329,9 @@ def detect_foot_points(path: Path) -> bool:
 
 
 def _names(path: Path) -> set[str]:
-    if not hdf5.detect_matlab(path):
-        return set()
-    from scipy.io import whosmat
-
-    try:
-        return {name for name, _, _ in whosmat(path)}
-    except Exception:  # damage is reported by the reader of MATLAB files
-        return set()
+    return (
+        {name for name, _ in hdf5.contents_of_matlab(path)} if hdf5.detect_matlab(path) else set()
+    )
 
 
 def _arrays(path: Path, *names: str) -> dict[str, Any]:

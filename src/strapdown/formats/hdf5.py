@@ -4,20 +4,16 @@ from __future__ import annotations
 
 import io
 from collections.abc import Collection
+from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import DataError
-from strapdown.formats.arrays import raw_log, refuse_lie
+from strapdown.formats.arrays import raw_log
 from strapdown.formats.recording import RawLog
-from strapdown.formats.signs import Signs, first_bytes
-
-if TYPE_CHECKING:
-    import h5py
-
+from strapdown.formats.signs import Signs, first_bytes, state_of
+from strapdown.parsers import parse
 
 SUFFIXES = (".h5", ".hdf5", ".hdf", ".mat")
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
@@ -56,45 +52,24 @@ def read_arrays(
 
     `only` (collection of str): names of the datasets to read; all if not given.
     """
-    import h5py
-
-    arrays: dict[str, NDArray[Any]] = {}
-    units: dict[str, str] = {}
-    try:
-        with h5py.File(path, "r") as file:
-            meta: dict[str, Any] = dict(file.attrs.items())
-
-            def visit(name: str, item: object) -> None:
-                if only is not None and name not in only:
-                    return
-                if isinstance(item, h5py.Dataset) and not name.startswith("#"):
-                    values = _dataset(item, name, path.name)
-                    if values.ndim == 0:
-                        meta.setdefault(name, values[()])
-                    else:
-                        arrays[name] = values
-                    for key in ("unit", "units"):
-                        if key in item.attrs:
-                            said = item.attrs[key]
-                            units[name] = said.decode() if isinstance(said, bytes) else str(said)
-
-            file.visititems(visit)
-    except DataError:
-        raise
-    except Exception as error:  # a damaged file can break the library anywhere
-        raise DataError("io.hdf5-unreadable", file=path.name, error=error) from None
-    return arrays, units, meta
+    found = parse("hdf5.arrays", path, only=None if only is None else list(only))
+    return found["arrays"], found["units"], found["meta"]
 
 
-def _dataset(item: h5py.Dataset, name: str, file: str) -> NDArray[Any]:
-    if item.dtype.kind not in "iufb":
-        return (
-            np.array(item.asstr()[()])
-            if item.dtype.kind in "OS" and not item.shape
-            else np.empty(0, dtype="O")
-        )
-    refuse_lie(int(item.size) * item.dtype.itemsize, item.id.get_storage_size(), name, file)
-    return np.asarray(item[()])
+def outline(path: Path) -> tuple[frozenset[str], frozenset[str]]:
+    """Return the names of all objects and of the attributes of a file; none if it is no HDF5.
+
+    DataError: it refers to another file.
+    """
+    return _outline(path, state_of(path))
+
+
+@lru_cache(maxsize=4)
+def _outline(path: Path, _state: tuple[Any, ...]) -> tuple[frozenset[str], frozenset[str]]:
+    if SIGNATURE not in first_bytes(path, 1 << 20):
+        return frozenset(), frozenset()
+    found = parse("hdf5.outline", path)
+    return frozenset(found["names"]), frozenset(found["attributes"])
 
 
 def write(
@@ -139,36 +114,19 @@ def read_matlab(path: Path) -> RawLog:
 
 
 def read_matlab_arrays(path: Path) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
-    """Read the arrays and the texts of a MATLAB file."""
-    from scipy.io import loadmat, whosmat
-
-    stored = path.stat().st_size
-    try:
-        for name, shape, _ in whosmat(path):
-            refuse_lie(8 * int(np.prod(shape, dtype=object)), stored, str(name), path.name)
-        content = loadmat(path)
-    except DataError:
-        raise
-    except Exception as error:  # a damaged file can break the parser anywhere
-        raise DataError(
-            "io.matlab-unreadable", file=path.name, error=error or type(error).__name__
-        ) from None
-    named: dict[str, NDArray[Any]] = {}
-    for name, value in content.items():
-        if not name.startswith("__"):
-            named |= _unfolded(name, value)
-    arrays = {k: v for k, v in named.items() if v.dtype.kind in "iufb" and v.size > 1}
-    return arrays, {k: v for k, v in named.items() if k not in arrays}
+    """Read the arrays and the texts of a MATLAB file; fields of structures as structure.field."""
+    found = parse("matlab.arrays", path)
+    return found["arrays"], found["meta"]
 
 
-def _unfolded(name: str, value: Any) -> dict[str, NDArray[Any]]:
-    """Return a value under its name; fields of a structure under name.field."""
-    if not isinstance(value, np.ndarray) or value.dtype.names is None or value.size != 1:
-        return {name: np.asarray(value)}
-    found: dict[str, NDArray[Any]] = {}
-    for field in value.dtype.names:
-        found |= _unfolded(f"{name}.{field}", value[field].item())
-    return found
+def contents_of_matlab(path: Path) -> tuple[tuple[str, str], ...]:
+    """Return name and class of each variable; none if damaged, or HDF5."""
+    return _contents(path, state_of(path)) if _is_old(path) else ()
+
+
+@lru_cache(maxsize=4)
+def _contents(path: Path, _state: tuple[Any, ...]) -> tuple[tuple[str, str], ...]:
+    return tuple((name, kind) for name, kind in parse("matlab.contents", path))
 
 
 def write_matlab(path: Path, arrays: dict[str, NDArray[Any]], meta: dict[str, str]) -> None:

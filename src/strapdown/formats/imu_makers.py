@@ -15,7 +15,7 @@ from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import GPS, UNIX, WEEK, usual_step
 from strapdown.formats.columns import read_name
-from strapdown.formats.hdf5 import SIGNATURE, read_arrays
+from strapdown.formats.hdf5 import SIGNATURE, outline, read_arrays
 from strapdown.formats.known_formats import column, lacking, selected, split, stated_by, under
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, first_bytes, head
@@ -97,16 +97,13 @@ def _told(raw: RawLog, monitors: list[str]) -> RawLog:
 
 def _groups(path: Path) -> dict[str, str]:
     """Return the monitors of an HDF5 file, each with its group; none if it is of another kind."""
-    import h5py
-
-    try:
-        with h5py.File(path, "r") as file:
-            if "Sensors" in file and "FileFormatVersion" in file.attrs:
-                return {str(name): f"Sensors/{name}" for name in file["Sensors"]}
-            old = [name for name in file if f"{name}/Calibrated/Gyroscopes" in file]
-            return {str(name): str(name) for name in old}
-    except Exception:  # a damaged file can break the library anywhere
-        return {}
+    names, attributes = outline(path)
+    if "Sensors" in names and "FileFormatVersion" in attributes:
+        inside = sorted(n.removeprefix("Sensors/") for n in names if n.startswith("Sensors/"))
+        return {name: f"Sensors/{name}" for name in inside if "/" not in name}
+    end = "/Calibrated/Gyroscopes"
+    old = sorted(n.removesuffix(end) for n in names if n.endswith(end))
+    return {name: name for name in old if "/" not in name}
 
 
 def _hdf5(path: Path) -> RawLog:

@@ -15,6 +15,7 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.clocks import RELATIVE, UNIX
 from strapdown.formats.columns import read_name
+from strapdown.formats.hdf5 import contents_of_matlab
 from strapdown.formats.join import join
 from strapdown.formats.known_formats import (
     AXES,
@@ -228,12 +229,7 @@ detect_matlab_mobile = Signs(folder=_has_tables)
 
 def _has_objects(path: Path) -> bool:
     """Whether there are objects of MATLAB, which nothing else opens."""
-    from scipy.io import whosmat
-
-    try:
-        return any(kind == "opaque" for _, _, kind in whosmat(path))
-    except Exception:  # of another version, or damaged
-        return False
+    return any(kind == "opaque" for _, kind in contents_of_matlab(path))
 
 
 detect_matlab_mobile_objects = Signs(suffixes=(".mat",), also=_has_objects)

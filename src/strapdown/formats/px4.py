@@ -11,9 +11,7 @@ are accuracies in m. ``vehicle_attitude`` rotates body axes to north-east-down, 
 
 from __future__ import annotations
 
-import io
 import re
-from contextlib import redirect_stdout
 from pathlib import Path
 from typing import Any
 
@@ -25,13 +23,15 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats.clocks import RELATIVE, Clock
 from strapdown.formats.join import join
 from strapdown.formats.known_formats import Quantities, damage, interpolated, solution, turned
-from strapdown.formats.recording import NoStreamError, RawLog, library
+from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.signs import Signs
+from strapdown.parsers import parse
 
 TITLE = "PX4 flight log (.ulg)"
 STREAMS = ("imu", "gnss", "reference", "magnetometer", "barometer")
 MAGIC = b"ULog\x01\x12\x35"
 AXES = "x,y,z"
+DELAY = "EKF2_GPS_DELAY"  # parameter of the autopilot
 NO_STAMP = 0x7FFFFFFF  # of the accelerometer: not valid
 # Kind of fix to field 6 of NMEA GGA.
 QUALITY = {2: 1, 3: 1, 4: 2, 5: 5, 6: 4, 7: 1, 8: 6}
@@ -44,22 +44,20 @@ detect = Signs(first=rb"\A" + re.escape(MAGIC))
 def _topics(path: Path, stream: str, *names: str) -> tuple[dict[str, Topic], list[Finding], Any]:
     """Read the first instance of topics; the first of `names` is needed, "a|b": either."""
     wanted = [n for name in names for n in name.split("|")]
-    reader = library("pyulog", path)
-    # The library prints what it finds damaged.
-    with damage(path), path.open("rb") as file, redirect_stdout(io.StringIO()):
-        log = reader.ULog(file, wanted)
-    found = {d.name: d.data for d in sorted(log.data_list, key=lambda d: -d.multi_id)}
+    log = parse("recorders.ulog", path, wanted=wanted, parameter=DELAY)
+    instances = sorted(log["topics"], key=lambda one: -one[1])
+    found = {name: data for name, _, data in instances}
     findings = []
-    if log.file_corruption:
+    if log["corrupt"]:
         findings.append(_note("io.log-partly-damaged", path, None, "warning"))
-    if log.dropouts:
-        lost = sum(d.duration for d in log.dropouts) * 1e-3
-        findings.append(_note("io.log-dropouts", path, None, count=len(log.dropouts), lost=lost))
+    if log["dropouts"]:
+        lost = sum(log["dropouts"]) * 1e-3
+        findings.append(_note("io.log-dropouts", path, None, count=len(log["dropouts"]), lost=lost))
     topics: dict[str, Topic] = {}
     for name in names:
         chosen = next((n for n in name.split("|") if n in found), "")
         topics[name.split("|")[0]] = found.get(chosen, {})
-        if (count := sum(d.name == chosen for d in log.data_list)) > 1:
+        if (count := sum(name == chosen for name, *_ in instances)) > 1:
             findings.append(_note("io.first-of-instances", path, chosen, count=count))
     if not topics[names[0].split("|")[0]]:
         raise NoStreamError(path.name, stream, TITLE, [s for s in STREAMS if s != stream])
@@ -145,7 +143,7 @@ def read_fixes(path: Path) -> RawLog:
             velocity = np.where(known, data[f"vel_{axis.lower()}_m_s"], np.nan)
             out |= {f"V{axis}": (velocity, "m/s"), f"V{axis}_sd": (sd, "m/s")}
         out["quality"] = (np.array([QUALITY.get(int(k), 1) for k in data["fix_type"]]), None)
-        delay = log.initial_parameters.get("EKF2_GPS_DELAY")
+        delay = log["parameter"]
     if not use.any():
         raise DataError("io.no-usable-fix", file=path.name, quantity="lat, lon")
     if not use.all():

@@ -5,10 +5,10 @@ from __future__ import annotations
 import binascii
 import re
 import struct
-from collections.abc import Iterator
 from datetime import UTC, datetime
 from itertools import islice
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -20,9 +20,11 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats.clocks import GPS, RELATIVE, WEEK, Clock, gps_from_unix
 from strapdown.formats.join import join
 from strapdown.formats.known_formats import Quantities, damage, solution
-from strapdown.formats.recording import NoStreamError, RawLog, library
+from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.signs import Signs, first_bytes
 from strapdown.frames import C_ne, geodetic_from_ecef
+from strapdown.parsers import parse
+from strapdown.parsers.recorders import UBX_SYNC, ubx_frames
 
 Array = NDArray[np.float64]
 
@@ -41,7 +43,6 @@ Array = NDArray[np.float64]
 
 
 UBX_TITLE = "u-blox UBX stream"
-UBX_SYNC, MOST_PAYLOAD = b"\xb5\x62", 8192
 LEAST_FRAMES = 3  # of a stream that begins with something else
 PVT, PVAT, MEAS, RAW = b"\x01\x07", b"\x01\x17", b"\x10\x02", b"\x10\x03"
 PRECISE = b"\x01\x14"  # NAV-HPPOSLLH
@@ -59,40 +60,17 @@ SCALES = {**dict.fromkeys(GYRO, 2.0**-12), **dict.fromkeys(ACCEL, 2.0**-10), SPE
 def _has_frames(path: Path) -> bool:
     """Whether a frame with its checksum is at the start, or several are among other lines."""
     head = first_bytes(path, 65536)
-    frames = list(islice(_frames(head), LEAST_FRAMES))
+    frames = list(islice(ubx_frames(head), LEAST_FRAMES))
     return len(frames) == LEAST_FRAMES or bool(frames and head.startswith(UBX_SYNC))
 
 
 detect_ubx = Signs(first=re.escape(UBX_SYNC), also=_has_frames)
 
 
-def _frames(data: bytes) -> Iterator[bytes]:
-    """Yield whole frames with a right checksum."""
-    k = 0
-    while (k := data.find(UBX_SYNC, k)) >= 0 and k + 8 <= len(data):
-        end = k + 8 + struct.unpack_from("<H", data, k + 4)[0]
-        body = data[k + 2 : end - 2]
-        if end > len(data) or len(body) > MOST_PAYLOAD or _sum(body) != data[end - 2 : end]:
-            k += 2
-            continue
-        yield data[k:end]
-        k = end
-
-
-def _sum(body: bytes) -> bytes:
-    """Fletcher's checksum of 8 bits."""
-    octets = np.frombuffer(body, dtype=np.uint8).astype(np.int64)
-    first = np.cumsum(octets)
-    return bytes([int(first[-1]) & 255, int(first.sum()) & 255])
-
-
 def _messages(path: Path, stream: str) -> list[Any]:
     """Parse the messages of a stream: of the kinds that it may have, the first that is there."""
-    ubx = library("pyubx2", path)
     with damage(path):
-        frames: dict[bytes, list[bytes]] = {}
-        for frame in _frames(path.read_bytes()):
-            frames.setdefault(frame[2:4], []).append(frame)
+        frames = {frame[2:4] for frame in ubx_frames(path.read_bytes())}
         kind = next((k for k in NAMES[stream] if k in frames), None)
         if kind is None:
             if stream == "imu" and RAW in frames:
@@ -102,7 +80,13 @@ def _messages(path: Path, stream: str) -> list[Any]:
             has = [s for s, kinds in NAMES.items() if any(k in frames for k in kinds)]
             has = [s for s in has if s != "precise"]
             raise NoStreamError(path.name, stream, UBX_TITLE, has or ["other messages"])
-        return [ubx.UBXReader.parse(frame) for frame in frames[kind]]
+    return _parsed(path, kind)
+
+
+def _parsed(path: Path, kind: bytes) -> list[Any]:
+    """Return the messages of a kind, with their fields as attributes."""
+    found = parse("recorders.ubx", path, kind=kind.hex())
+    return [SimpleNamespace(**fields) for fields in found]
 
 
 def _solved(path: Path, stream: str) -> tuple[list[Any], Quantities, list[Finding]]:
@@ -232,17 +216,18 @@ def _lag(path: Path) -> int | None:
     By the order of the messages: a fix is written after the last sample before it, by the time
     that the receiver needs for it.
     """
-    ubx, tag, lags = library("pyubx2", path), None, []
+    tag, lags = None, []
+    messages = {kind: iter(_parsed(path, kind)) for kind in (PVT, PVAT)}
     with damage(path):
-        for frame in _frames(path.read_bytes()):
+        for frame in ubx_frames(path.read_bytes()):
             if frame[2:4] == MEAS:
                 count = struct.unpack_from("<H", frame, 10)[0] >> 11
                 words = struct.unpack_from(f"<{count}I", frame, 14)
                 if {w >> 24 & 63 for w in words} >= set(GYRO):
                     tag = struct.unpack_from("<I", frame, 6)[0]
-            elif frame[2:4] in (PVT, PVAT) and tag is not None:
-                message = ubx.UBXReader.parse(frame)
-                if _ok(message):
+            elif frame[2:4] in messages:
+                message = next(messages[frame[2:4]])
+                if tag is not None and _ok(message):
                     lags.append(tag - int(message.iTOW))
     return int(np.median(lags)) if lags else None
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import importlib
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -369,17 +368,3 @@ def stated_by(meta: Mapping[str, Any]) -> dict[str, Any]:
     if checked:
         stated |= {"clock": meta.get("clock"), "epoch": float(meta.get("clock_origin_s", 0.0))}
     return {**stated, "checked": checked}
-
-
-def library(module: str, path: Path, extra: str = "logs") -> Any:
-    """Import the library that reads a format.
-
-    `module`: its name. `path`: the file that needs it. `extra`: of this package, which installs it.
-    DataError: it is not installed.
-    """
-    try:
-        return importlib.import_module(module)
-    except ImportError:
-        raise DataError(
-            "io.library-missing", file=path.name, library=module.partition(".")[0], extra=extra
-        ) from None

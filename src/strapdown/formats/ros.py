@@ -15,10 +15,8 @@ import heapq
 import re
 import shlex
 import shutil
-import sqlite3
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -28,8 +26,8 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding, check_choice
 from strapdown.formats.clocks import RELATIVE, UNIX, Clock
-from strapdown.formats.known_formats import Quantities, damage, solution
-from strapdown.formats.recording import NoStreamError, RawLog, library
+from strapdown.formats.known_formats import Quantities, solution
+from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.signs import Signs, first_bytes
 from strapdown.formats.writing import (
     FLU,
@@ -41,6 +39,8 @@ from strapdown.formats.writing import (
     stream_not_held,
     unix_ns,
 )
+from strapdown.parsers import parse
+from strapdown.parsers.limits import library
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import GEODETIC, MAG, POSITION_SD, VELOCITY, VELOCITY_SD, values_of
 
@@ -53,7 +53,6 @@ SOLUTIONS = tuple(f"novatel_oem7_msgs/msg/{m}" for m in ("INSPVAX", "INSPVA"))
 STREAMS = {"imu": IMU, "gnss": FIX, "reference": SOLUTIONS, "magnetometer": FIELD}
 STREAMS |= {"barometer": PRESSURE}
 QUALITY = {-1: 0, 0: 1, 1: 2, 2: 2}  # status of NavSatFix to field 6 of NMEA GGA
-SOLVED = (3, 6, 7)  # states of an inertial solution: good, free, alignment complete
 LEAST_FORCE = 5.0  # m/s²
 MODERN = 10**18  # ns, 2001: a clock since the start of a device never counts so far
 Columns = dict[str, NDArray[Any]]
@@ -63,12 +62,7 @@ def _has_messages(path: Path) -> bool:
     """Whether a bag has the tables of ROS 2; only a ``.db3`` can lack them."""
     if _suffix(path) != ".db3":
         return True
-    try:
-        with closing(sqlite3.connect(f"{path.resolve().as_uri()}?mode=ro", uri=True)) as base:
-            names = {name for (name,) in base.execute("select name from sqlite_master")}
-    except sqlite3.Error:
-        return False
-    return {"messages", "topics"} <= names
+    return bool(parse("bags.has_messages", path))
 
 
 def _is_described(folder: Path) -> bool:
@@ -92,49 +86,28 @@ def files_of(path: Path) -> tuple[Path, ...]:
     return tuple(sorted(p for p in path.iterdir() if p.is_file())) if path.is_dir() else (path,)
 
 
-@contextmanager
-def _opened(path: Path) -> Iterator[Any]:
-    """Open a bag; the library goes by the ending, which a file may have lost."""
-    bags, types = library("rosbags.highlevel", path), library("rosbags.typesys", path)
-    known = types.get_typestore(types.Stores.LATEST)
-    with damage(path), tempfile.TemporaryDirectory() as folder:
-        own = path
-        if path.is_file() and path.suffix != (suffix := _suffix(path)):
-            own = Path(folder) / f"bag{suffix}"
-            own.symlink_to(path.resolve())
-        with bags.AnyReader([own], default_typestore=known) as bag:
-            yield bag
+def _parsed(function: str, path: Path, **arguments: Any) -> Any:
+    """Parse a bag; the library goes by the ending, which a file may have lost."""
+    if path.is_dir() or path.suffix == (suffix := _suffix(path)):
+        return parse(function, path, **arguments)
+    with tempfile.TemporaryDirectory() as folder:
+        own = Path(folder) / f"bag{suffix}"
+        own.symlink_to(path.resolve())
+        return parse(function, own, label=path.name, **arguments)
 
 
 def _read(
-    path: Path,
-    stream: str,
-    kinds: Sequence[str],
-    take: Callable[[Any], dict[str, Any]],
-    topic: str | None = None,
+    path: Path, stream: str, kinds: Sequence[str], values: str, topic: str | None = None
 ) -> tuple[Columns, list[Finding], str]:
-    """Read one topic: stamps in ns and what `take` gives of each message, findings, the clock."""
+    """Read one topic: stamps in ns and the `values` (of `parsers.bags`), findings, the clock."""
     findings: list[Finding] = []
-    samples: dict[str, list[Any]] = {"time": [], "record": []}
-    with _opened(path) as bag:
-        found = [c for c in bag.connections if c.msgcount > 0]
-        chosen = [c for c in found if c.topic == topic and c.msgtype in kinds]
-        if not chosen:
-            there = sorted({c.topic for c in found if c.msgtype in kinds})
-            if topic is not None and there:
-                check_choice(
-                    "io.unknown-topic", there, file=path.name, quantity="format", topic=topic
-                )
-            topic = _topic(path, stream, found, kinds, findings)
-            chosen = [c for c in found if c.topic == topic]
-        for one, record, data in bag.messages(connections=chosen):
-            message = bag.deserialize(data, one.msgtype)
-            stamp = message.header.stamp
-            samples["time"].append(int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec))
-            samples["record"].append(int(record))
-            for name, value in take(message).items():
-                samples.setdefault(name, []).append(value)
-    columns = {name: np.array(values) for name, values in samples.items()}
+    found = _parsed("bags.topics", path)
+    if not any(name == topic and kind in kinds for name, kind, _ in found):
+        there = sorted({name for name, kind, _ in found if kind in kinds})
+        if topic is not None and there:
+            check_choice("io.unknown-topic", there, file=path.name, quantity="format", topic=topic)
+        topic = _topic(path, stream, found, kinds, findings)
+    columns = dict(_parsed("bags.columns", path, topic=topic, kinds=list(kinds), values=values))
     record_time = columns.pop("record")
     if not columns["time"].any():
         findings.append(Finding("io.ros-stamps-of-record", file=path.name, quantity="time"))
@@ -144,21 +117,25 @@ def _read(
 
 
 def _topic(
-    path: Path, stream: str, found: Sequence[Any], kinds: Sequence[str], findings: list[Finding]
+    path: Path,
+    stream: str,
+    found: Sequence[tuple[str, str, int]],
+    kinds: Sequence[str],
+    findings: list[Finding],
 ) -> str:
     """Choose the topic of a stream: the raw one of several, else refuse."""
-    kind = next((k for k in kinds if any(c.msgtype == k for c in found)), None)
+    kind = next((k for k in kinds if any(own == k for _, own, _ in found)), None)
     if kind is None:
-        there = {c.msgtype for c in found}
+        there = {own for _, own, _ in found}
         has = [s for s, types in STREAMS.items() if there & set(types)]
         raise NoStreamError(path.name, stream, TITLE, has or ["other messages"])
-    topics = sorted({c.topic for c in found if c.msgtype == kind})
+    topics = sorted({name for name, own, _ in found if own == kind})
     left = [t for t in topics if "filter" not in t.lower()]
     raw = [t for t in left if "raw" in t.lower().rpartition("/")[2]]
     picked = next((some for some in (topics, left, raw) if len(some) == 1), None)
     if picked is None:
         # The driver's own topic has at least as many messages as one that is made from it.
-        count = {t: sum(c.msgcount for c in found if c.topic == t) for t in topics}
+        count = {t: sum(n for name, _, n in found if name == t) for t in topics}
         most = max(topics, key=lambda topic: count[topic])
         flag = "--gnss-format" if stream == "gnss" else "--format"
         raise DataError(
@@ -182,23 +159,14 @@ def _log(path: Path, out: Quantities, clock: str, findings: list[Finding]) -> Ra
     return raw
 
 
-def _vector(prefix: str, v: Any) -> dict[str, float]:
-    return {f"{prefix}_x": v.x, f"{prefix}_y": v.y, f"{prefix}_z": v.z}
-
-
 def read(path: Path, topic: str | None = None) -> RawLog:
     """Read rates and specific force of the topic of type Imu; its orientation is not used."""
-
-    def take(m: Any) -> dict[str, Any]:
-        values = _vector("gyro", m.angular_velocity) | _vector("accel", m.linear_acceleration)
-        values["gyro_none"] = m.angular_velocity_covariance[0] == -1.0
-        return values | {"accel_none": m.linear_acceleration_covariance[0] == -1.0}
-
-    columns, findings, clock = _read(path, "imu", IMU, take, topic)
+    columns, findings, clock = _read(path, "imu", IMU, "imu", topic)
     out: Quantities = {"time": (columns["time"], "ns")}
     for triad, unit in (("gyro", "rad/s"), ("accel", "m/s2")):
         part = {f"{triad}_{a}": (columns[f"{triad}_{a}"], unit) for a in "xyz"}
-        size = float(np.median(np.linalg.norm([v for v, _ in part.values()], axis=0)))
+        with np.errstate(over="ignore"):  # of damaged values, which are infinite then
+            size = float(np.median(np.linalg.norm([v for v, _ in part.values()], axis=0)))
         if columns[f"{triad}_none"].all() and not any(v.any() for v, _ in part.values()):
             if triad == "gyro":
                 raise DataError("io.ros-not-measured", file=path.name, quantity=triad)
@@ -216,14 +184,7 @@ def read(path: Path, topic: str | None = None) -> RawLog:
 
 def read_fixes(path: Path, topic: str | None = None) -> RawLog:
     """Read the topic of type NavSatFix, with the velocity of the same device if there is one."""
-
-    def take(m: Any) -> dict[str, Any]:
-        known = m.position_covariance_type != 0
-        variance = [m.position_covariance[k] if known else np.nan for k in (4, 0, 8)]
-        values = {"lat": m.latitude, "lon": m.longitude, "alt": m.altitude, "variance": variance}
-        return values | {"status": m.status.status, "frame": m.header.frame_id}
-
-    columns, findings, clock = _read(path, "gnss", FIX, take, topic)
+    columns, findings, clock = _read(path, "gnss", FIX, "fix", topic)
     units = {"time": "ns", "lat": "deg", "lon": "deg", "alt": "m"}
     out: Quantities = {q: (columns[q], u) for q, u in units.items()}
     quality = [QUALITY.get(int(s), 0) for s in columns["status"]]
@@ -237,18 +198,9 @@ def read_fixes(path: Path, topic: str | None = None) -> RawLog:
 
 def _velocity(path: Path, fixes: Columns, findings: list[Finding]) -> dict[str, Any]:
     """Return velocity and its standard deviation, by the stamps of the fixes."""
-
-    def take(m: Any) -> dict[str, Any]:
-        twist, variance = m.twist, [np.nan] * 3
-        if hasattr(twist, "covariance"):
-            variance, twist = [twist.covariance[k] for k in (7, 0, 14)], twist.twist
-        v = twist.linear
-        return {"ned": [v.y, v.x, -v.z], "variance": variance, "frame": m.header.frame_id}
-
-    with _opened(path) as bag:
-        topics = {c.topic for c in bag.connections if c.msgtype in TWISTS and c.msgcount > 0}
+    topics = {name for name, kind, _ in _parsed("bags.topics", path) if kind in TWISTS}
     for topic in sorted(topics):
-        columns, _, _ = _read(path, "gnss", TWISTS, take, topic)
+        columns, _, _ = _read(path, "gnss", TWISTS, "twist", topic)
         same, at, of = np.intersect1d(fixes["time"], columns["time"], return_indices=True)
         if same.size < fixes["time"].size / 2 or fixes["frame"][0] != columns["frame"][0]:
             continue
@@ -268,16 +220,7 @@ def _velocity(path: Path, fixes: Columns, findings: list[Finding]) -> dict[str, 
 
 def read_reference(path: Path, topic: str | None = None) -> pd.DataFrame:
     """Read the solution of a SPAN system: roll, pitch and azimuth are those of its vehicle."""
-
-    def take(m: Any) -> dict[str, Any]:
-        status, up = getattr(m, "ins_status", None), getattr(m, "undulation", 0.0)
-        status = m.status if status is None else status
-        place = [m.latitude, m.longitude, m.height + up]  # INSPVAX has the height over the geoid
-        velocity = [m.north_velocity, m.east_velocity, -m.up_velocity]
-        values = [*place, *velocity, m.roll, m.pitch, m.azimuth]
-        return {"values": values if status.status in SOLVED else [np.nan] * 9}
-
-    columns, findings, clock = _read(path, "reference", SOLUTIONS, take, topic)
+    columns, findings, clock = _read(path, "reference", SOLUTIONS, "solution", topic)
     values, time = columns["values"], columns["time"] * 1e-9
     parts = (time, values[:, :3], values[:, 3:6], values[:, 6:])
     return solution(path, parts, Clock(clock), findings)
@@ -285,9 +228,7 @@ def read_reference(path: Path, topic: str | None = None) -> pd.DataFrame:
 
 def read_magnetometer(path: Path, topic: str | None = None) -> RawLog:
     """Read the topic of type MagneticField."""
-    columns, findings, clock = _read(
-        path, "magnetometer", FIELD, lambda m: _vector("mag", m.magnetic_field), topic
-    )
+    columns, findings, clock = _read(path, "magnetometer", FIELD, "magnetometer", topic)
     units = {"time": "ns"} | {f"mag_{a}": "T" for a in "xyz"}
     out: Quantities = {q: (columns[q], u) for q, u in units.items()}
     return _log(path, out, clock, findings)
@@ -295,9 +236,7 @@ def read_magnetometer(path: Path, topic: str | None = None) -> RawLog:
 
 def read_barometer(path: Path, topic: str | None = None) -> RawLog:
     """Read the topic of type FluidPressure."""
-    columns, findings, clock = _read(
-        path, "barometer", PRESSURE, lambda m: {"pressure": m.fluid_pressure}, topic
-    )
+    columns, findings, clock = _read(path, "barometer", PRESSURE, "barometer", topic)
     out: Quantities = {"time": (columns["time"], "ns"), "pressure": (columns["pressure"], "Pa")}
     return _log(path, out, clock, findings)
 

@@ -11,20 +11,21 @@ from __future__ import annotations
 import codecs
 import dataclasses
 import re
-import zipfile
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
-from strapdown.formats.arrays import refuse_lie
 from strapdown.formats.columns import read_name
 from strapdown.formats.find_columns import AXES, find_columns
 from strapdown.formats.inference.conclusion import EPOCH
 from strapdown.formats.join import join
 from strapdown.formats.recording import RawLog, ReadOptions
-from strapdown.formats.signs import Signs
+from strapdown.formats.signs import Signs, state_of
 from strapdown.formats.vocabularies import WITHOUT_GRAVITY
+from strapdown.parsers import parse
 from strapdown.units import TIME_UNITS
 
 __all__ = ["Member", "is_container", "members_of", "peek"]
@@ -183,21 +184,28 @@ class Member:
         return next((line for line in text.splitlines() if line.strip()), "")
 
     def _bytes(self, count: int) -> bytes:
+        if self.archived:
+            if count == HEAD and self.suffix in csv.SUFFIXES:
+                data = _heads(self.file, state_of(self.file)).get(self.name)
+                if data is not None:
+                    return data
+            data = parse(
+                "archives.member", self.file, label=self.label, name=self.name, count=count
+            )
+            return bytes(data)
         try:
-            if not self.archived:
-                with self.file.open("rb") as stream:
-                    return stream.read(count)
-            with zipfile.ZipFile(self.file) as archive:
-                info = archive.getinfo(self.name)
-                refuse_lie(info.file_size, info.compress_size, self.name, self.file.name)
-                with archive.open(info) as member:
-                    return member.read(count)
-        except DataError:
-            raise
-        except Exception as error:  # a damaged archive can break any of the decoders
-            raise DataError(
-                "io.member-unreadable", file=self.label, error=error or type(error).__name__
-            ) from None
+            with self.file.open("rb") as stream:
+                return stream.read(count)
+        except OSError as error:
+            raise DataError("io.member-unreadable", file=self.label, error=error) from None
+
+
+@lru_cache(maxsize=2)
+def _heads(archive: Path, _state: tuple[Any, ...]) -> dict[str, bytes | None]:
+    """Return the beginning of each table: detection asks for those of all, once a format."""
+    tables = [m.name for m in _listed(archive) if m.suffix in csv.SUFFIXES][:MOST_TABLES]
+    heads = parse("archives.heads", archive, members=tables, count=HEAD)
+    return dict(zip(tables, heads, strict=False))
 
 
 def is_container(path: Path) -> bool:
@@ -233,18 +241,16 @@ def _listed(path: Path) -> list[Member]:
             for p in found
             if p.is_file() and not (name := p.relative_to(path).as_posix()).startswith(".")
         ]
-    try:
-        with zipfile.ZipFile(path) as archive:
-            names = sorted({i.filename for i in archive.infolist() if not i.is_dir()})
-    except Exception as error:  # zipfile raises more than BadZipFile on damaged archives
-        raise DataError(
-            "io.zip-unreadable", file=whole, error=error or type(error).__name__
-        ) from None
     return [
         Member(n, f"{whole}/{n}", path, True)
-        for n in names
+        for n in _names(path, state_of(path))
         if not any(part.startswith((".", "__MACOSX")) for part in PurePosixPath(n).parts)
     ]
+
+
+@lru_cache(maxsize=2)
+def _names(path: Path, _state: tuple[Any, ...]) -> tuple[str, ...]:
+    return tuple(parse("archives.names", path, label=path.resolve().name))
 
 
 def peek(path: Path) -> list[Member]:

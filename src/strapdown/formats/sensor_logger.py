@@ -159,9 +159,10 @@ def _stated(raw: RawLog, wanted: dict[str, tuple[str, str]]) -> RawLog:
 
 
 def _is_located(member: Member) -> bool:
+    if _sensor(member) not in STREAMS["gnss"][0]:
+        return False
     fields = {f.strip().strip('"').lower() for f in first_line(member).split(",")}
-    named = _sensor(member) in STREAMS["gnss"][0]
-    return named and {"time", "seconds_elapsed", "latitude", "longitude"} <= fields
+    return {"time", "seconds_elapsed", "latitude", "longitude"} <= fields
 
 
 def _sensor(member: Member) -> str:

@@ -7,10 +7,9 @@ import dataclasses
 import io
 import json
 import re
-import zipfile
 from datetime import datetime, time
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,11 +17,13 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.android_events import joined, kind_of
-from strapdown.formats.arrays import raw_log, refuse_lie
+from strapdown.formats.arrays import raw_log
 from strapdown.formats.columns import read_name
 from strapdown.formats.known_formats import from_json, under
-from strapdown.formats.recording import RawLog, library
+from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, head
+from strapdown.parsers import parse
+from strapdown.parsers.archives import numpy_array
 
 # Excel workbooks (``.xlsx``) by openpyxl: the sheet with the most numbers, as a table.
 #
@@ -41,16 +42,7 @@ def read_excel(path: Path) -> RawLog:
     DataError
         The library is missing, the file is damaged, or no sheet has numbers.
     """
-    openpyxl = library("openpyxl", path)
-    try:
-        book = openpyxl.load_workbook(io.BytesIO(path.read_bytes()), read_only=True, data_only=True)
-        sheets = {
-            s.title: [list(r) for r in s.iter_rows(values_only=True)] for s in book.worksheets
-        }
-    except Exception as error:  # a damaged archive can break any of the decoders
-        raise DataError(
-            "io.excel-unreadable", file=path.name, error=str(error) or type(error).__name__
-        ) from None
+    sheets = parse("workbooks.sheets", path)
     counts = {
         name: sum(isinstance(c, int | float) for row in rows for c in row)
         for name, rows in sheets.items()
@@ -281,26 +273,8 @@ def read_numpy(path: Path) -> RawLog:
 
 def arrays_of(path: Path) -> dict[str, NDArray[Any]]:
     """Return the arrays of an archive by name."""
-    found: dict[str, NDArray[Any]] = {}
-    try:
-        with zipfile.ZipFile(path) as archive:
-            for info in archive.infolist():
-                if info.filename.endswith(".npy"):
-                    found[info.filename[:-4]] = _member(archive, info, path.name)
-    except DataError:
-        raise
-    except Exception as error:  # a damaged archive can break any of the decoders involved
-        raise DataError(
-            "io.npz-unreadable", file=path.name, error=error or type(error).__name__
-        ) from None
+    found: dict[str, NDArray[Any]] = parse("archives.arrays", path)
     return found
-
-
-def _member(archive: zipfile.ZipFile, info: zipfile.ZipInfo, file: str) -> NDArray[Any]:
-    name = info.filename[:-4]
-    refuse_lie(info.file_size, info.compress_size, name, file)
-    with archive.open(info) as stream:
-        return read_numpy_array(stream, info.file_size, name, file)
 
 
 def write_numpy(path: Path, arrays: dict[str, NDArray[Any]]) -> None:
@@ -320,48 +294,14 @@ def load_numpy(path: Path, label: str) -> NDArray[Any]:
     """
     try:
         with path.open("rb") as stream:
-            return read_numpy_array(stream, path.stat().st_size, None, label)
+            found: NDArray[Any] = numpy_array(stream, path.stat().st_size, None, label)
     except DataError:
         raise
     except Exception as error:  # a damaged header can break NumPy's parser
         raise DataError(
             "io.npy-unreadable", file=label, error=error or type(error).__name__
         ) from None
-
-
-def read_numpy_array(
-    stream: BinaryIO | Any, size: int, name: str | None, file: str
-) -> NDArray[Any]:
-    """Read an array from a stream.
-
-    `size`: stored size, including the header. `name`: name of the array, for messages. DataError:
-    the declared size differs from the stored one, or the array holds Python objects. ValueError:
-    the header is damaged.
-    """
-    version = np.lib.format.read_magic(stream)
-    header = (
-        np.lib.format.read_array_header_1_0
-        if version == (1, 0)
-        else np.lib.format.read_array_header_2_0
-    )
-    shape, fortran, dtype = header(stream)
-    if dtype.hasobject:
-        raise DataError("io.holds-python-objects-not-loaded", file=file, quantity=name)
-    count = int(np.prod([int(n) for n in shape], dtype=object))
-    stored = size - stream.tell()
-    if count * dtype.itemsize != stored:
-        raise DataError(
-            "io.claims-values-bytes-bytes-stored"
-            if name
-            else "io.claims-values-bytes-bytes-stored-2",
-            file=file,
-            quantity=name,
-            count=count,
-            itemsize=dtype.itemsize,
-            stored=stored,
-        )
-    data = np.frombuffer(stream.read(), dtype=dtype)
-    return data.reshape(shape, order="F" if fortran else "C")
+    return found
 
 
 # Folders of NumPy arrays, one per quantity: ``time.npy``, ``gyro_rad_s.npy``, ``accel.npy``.
@@ -402,7 +342,6 @@ def _arrays(path: Path) -> list[Path]:
 
 PARQUET_SUFFIXES = (".parquet", ".pq")
 PARQUET_MAGIC = b"PAR1"
-UNITS = (b"unit", b"units")
 
 
 detect_parquet = Signs(named=PARQUET_SUFFIXES, first=rb"\A" + re.escape(PARQUET_MAGIC))
@@ -423,84 +362,8 @@ def read_parquet(path: Path) -> RawLog:
     DataError
         The file is damaged, or declares far more data than it holds.
     """
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        with pq.ParquetFile(path) as file:
-            rows, width = file.metadata.num_rows, max(file.metadata.num_columns, 1)
-            refuse_lie(rows * width * 8, path.stat().st_size, "table", path.name)
-            table = file.read()
-        while any(pa.types.is_struct(field.type) for field in table.schema):
-            table = table.flatten()
-        meta = {
-            _text_of_parquet(k): _text_of_parquet(v)
-            for k, v in (table.schema.metadata or {}).items()
-        }
-        units = _units(table)
-        arrays = {}
-        # Column by column, so that at most one is in memory twice.
-        for name in table.column_names:
-            arrays[name] = _array(table.column(0))
-            table = table.remove_column(0)
-        pa.default_memory_pool().release_unused()
-    except DataError:
-        raise
-    except Exception as error:  # a damaged file can break any of the decoders involved
-        raise DataError(
-            "io.table-cannot-read",
-            file=path.name,
-            splitlines=str(error).splitlines()[0] if str(error) else "damaged",
-        ) from None
-    return raw_log(path, {n: a for n, a in arrays.items() if a is not None}, units, meta)
-
-
-def _units(table: Any) -> dict[str, str]:
-    found = {}
-    for field in table.schema:
-        for key in UNITS:
-            if key in (field.metadata or {}):
-                found[field.name] = _text_of_parquet(field.metadata[key])
-    return found
-
-
-def _array(column: Any) -> NDArray[Any] | None:
-    """Convert to numbers, dates, or rows of numbers; None for anything else."""
-    import pyarrow as pa
-
-    kind = column.type
-    if pa.types.is_list(kind) or pa.types.is_large_list(kind) or pa.types.is_fixed_size_list(kind):
-        return _rows(column)
-    if pa.types.is_dictionary(kind):
-        return _array(column.cast(kind.value_type))
-    if pa.types.is_decimal(kind):
-        column, kind = column.cast(pa.float64()), pa.float64()
-    if pa.types.is_integer(kind) and column.null_count:
-        column, kind = column.cast(pa.float64()), pa.float64()
-    if pa.types.is_timestamp(kind) and not column.null_count:
-        dates: NDArray[Any] = column.cast(pa.timestamp("ns")).to_numpy()
-        return dates
-    if pa.types.is_integer(kind) or pa.types.is_floating(kind):
-        values: NDArray[Any] = column.to_numpy()
-        # Arrow keeps memory that it has allocated, even when freed.
-        return values if values.flags.owndata else values.copy()
-    return None
-
-
-def _rows(column: Any) -> NDArray[Any] | None:
-    """Convert lists of equal length to rows of an array; a missing list is a row of NaN."""
-    import pyarrow as pa
-
-    if not (
-        pa.types.is_integer(column.type.value_type) or pa.types.is_floating(column.type.value_type)
-    ):
-        return None
-    lists = column.to_pylist()
-    widths = {len(row) for row in lists if row is not None}
-    if len(widths) != 1:
-        return None
-    empty = [np.nan] * widths.pop()
-    return np.array([empty if row is None else row for row in lists], dtype=np.float64)
+    found = parse("parquet.table", path)
+    return raw_log(path, found["arrays"], found["units"], found["meta"])
 
 
 def write_parquet(path: Path, columns: dict[str, NDArray[Any]], meta: dict[str, str]) -> None:
@@ -516,7 +379,3 @@ def write_parquet(path: Path, columns: dict[str, NDArray[Any]], meta: dict[str, 
         use_dictionary=False,
         use_byte_stream_split=True,
     )
-
-
-def _text_of_parquet(value: bytes) -> str:
-    return value.decode("utf-8", "replace")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-import zipfile
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,8 @@ from strapdown.formats.columns import read_name
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.known_formats import column, lacking, under
 from strapdown.formats.recording import NoStreamError, RawLog, StatedStart
-from strapdown.formats.signs import Signs, head
+from strapdown.formats.signs import Signs, head, state_of
+from strapdown.parsers import parse
 from strapdown.rotation import dcm_from_euler
 from strapdown.tables import trajectory_table
 
@@ -217,15 +218,17 @@ FIELDS = {
 
 def _has_structures(path: Path) -> bool:
     """Whether a file of MATLAB has structures with the fields of NaveGo."""
-    from scipy.io import whosmat
-
-    try:
-        # Reading a file is dear; most have no structure.
-        if not hdf5.detect(path) and all(kind != "struct" for _, _, kind in whosmat(path)):
+    # Reading a file is dear; most have no structure.
+    if hdf5.detect(path):
+        fields: dict[str, set[str]] = {}
+        for name in hdf5.outline(path)[0]:
+            of, _, field = name.rpartition("/")
+            fields.setdefault(of, set()).add(field)
+        if not any(own >= FIELDS["imu"] or own >= FIELDS["gnss"] for own in fields.values()):
             return False
-        return bool(_kinds(_structures(path)))
-    except Exception:  # damaged, or of another version
+    elif all(kind != "struct" for _, kind in hdf5.contents_of_matlab(path)):
         return False
+    return bool(_kinds(_structures(path)))
 
 
 detect_navego = Signs(suffixes=(".mat",), also=_has_structures)
@@ -579,11 +582,12 @@ COLUMNS = [*(f"gyro_{a}" for a in "xyz"), *(f"accel_{a}" for a in "xyz")]
 def _holds(path: Path, *names: str) -> bool:
     if not path.is_file() or path.suffix.lower() != ".npz":
         return False
-    try:
-        with zipfile.ZipFile(path) as archive:
-            return {f"{name}.npy" for name in names} <= set(archive.namelist())
-    except zipfile.BadZipFile:
-        return False
+    return set(names) <= _names(path, state_of(path))
+
+
+@lru_cache(maxsize=4)
+def _names(path: Path, _state: tuple[Any, ...]) -> frozenset[str]:
+    return frozenset(parse("archives.array_names", path))
 
 
 STREAMS = {"imu": ("time", "imu"), "gnss": ("fix_time", "fix"), "reference": ("time", "truth")}

@@ -17,7 +17,7 @@ from strapdown.formats import csv
 from strapdown.formats.clocks import RELATIVE, UNIX
 from strapdown.formats.join import join
 from strapdown.formats.known_formats import lacking, selected
-from strapdown.formats.recording import RawLog, library
+from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, head
 from strapdown.formats.trajectory_writers import one_line
 from strapdown.formats.writing import (
@@ -30,6 +30,7 @@ from strapdown.formats.writing import (
     iso_dates,
     over_ground,
 )
+from strapdown.parsers import parse
 from strapdown.tables.checks import values_of
 
 # GPX tracks (https://www.topografix.com/GPX/1/1/): fixes, read by gpxpy.
@@ -54,28 +55,21 @@ def read_gpx(path: Path) -> RawLog:
     DataError
         The library is missing, the XML is damaged, or no point has a time.
     """
-    gpxpy = library("gpxpy", path)
-    try:
-        gpx = gpxpy.parse(path.read_bytes())
-        points = [p for track in gpx.tracks for part in track.segments for p in part.points]
-    except Exception as error:  # the library raises errors of its XML parser, too
-        raise DataError("io.gpx-unreadable", file=path.name, error=str(error)) from None
-    timed = np.array([p.time is not None for p in points], dtype=bool)
+    points = parse("recorders.gpx", path)
+    times = points["time"]
+    timed = np.array([t is not None for t in times], dtype=bool)
     if not timed.any():
-        raise DataError("io.gpx-without-time", file=path.name, quantity="time", count=len(points))
-    stamps = [
-        p.time.replace(tzinfo=p.time.tzinfo or UTC).timestamp() if p.time else 0.0 for p in points
-    ]
+        raise DataError("io.gpx-without-time", file=path.name, quantity="time", count=len(times))
 
     def values(name: str) -> np.ndarray:
-        return np.array([getattr(p, name) for p in points], dtype=np.float64)
+        return np.array(points[name], dtype=np.float64)
 
     held = {
-        "time": (np.array(stamps), "s"),
+        "time": (np.array([0.0 if t is None else t for t in times]), "s"),
         "lat": (values("latitude"), "deg"),
         "lon": (values("longitude"), "deg"),
         "alt_msl": (values("elevation"), "m"),
-        "quality": (np.array([QUALITY.get(p.type_of_gpx_fix or "", 1.0) for p in points]), None),
+        "quality": (np.array([QUALITY.get(f or "", 1.0) for f in points["fix"]]), None),
     }
     if np.isfinite(values("geoid_height")[timed]).all():
         held["geoid"] = (values("geoid_height"), "m")
@@ -157,6 +151,7 @@ SENSORS = {
     "accel": ("accelerometer_data", "accel", "g", "accelerometer"),
     "mag": ("magnetometer_data", "mag", "gauss", "compass"),
 }
+KINDS = (*(kind for kind, *_ in SENSORS.values()), "three_d_sensor_calibration", "record")
 Message = dict[str, Any]
 
 
@@ -221,23 +216,7 @@ def read_fit_fixes(path: Path) -> RawLog:
 
 def _messages(path: Path) -> defaultdict[str, list[Message]]:
     """Return the messages of each kind, each with its number in the file as ``#``."""
-    fitdecode = library("fitdecode", path)
-    found: defaultdict[str, list[Message]] = defaultdict(list)
-    count = 0
-    try:
-        with fitdecode.FitReader(path.read_bytes()) as reader:
-            for frame in reader:
-                if frame.frame_type == fitdecode.FIT_FRAME_DATA:
-                    count += 1
-                    found[frame.name].append({f.name: f.value for f in frame.fields} | {"#": count})
-    except Exception as error:  # a damaged file can break the decoder anywhere
-        raise DataError(
-            "io.fit-unreadable",
-            file=path.name,
-            count=count,
-            error=str(error) or type(error).__name__,
-        ) from None
-    return found
+    return defaultdict(list, parse("recorders.fit", path, wanted=KINDS))
 
 
 def _streams(messages: defaultdict[str, list[Message]]) -> list[str]:

@@ -20,6 +20,7 @@ from tests.coded import coded
 from strapdown.errors import DataError
 from strapdown.formats import NoStreamError, open_stream, read_log
 from strapdown.formats.gnss_files import GnssOptions, fixes_of_columns, read_gnss
+from strapdown.parsers import in_place
 
 
 def without_library(monkeypatch, name):
@@ -512,7 +513,8 @@ def test_a_dive_has_nothing_to_read(recordings):
 def test_a_missing_library_is_named(recordings, monkeypatch, name, library, stream):
     path = recordings(f"zoo/{name}")
     without_library(monkeypatch, library)
-    with pytest.raises(DataError, check=coded("io.library-missing", library=library)) as caught:
+    expected = coded("io.library-missing", library=library)
+    with in_place(), pytest.raises(DataError, check=expected) as caught:
         open_stream(path, stream)
     assert "strapdown[logs]" in str(caught.value)
 

@@ -6,6 +6,7 @@ Samples against an independent parse by pandas; other files are written here as 
 from __future__ import annotations
 
 import dataclasses
+import importlib
 import json
 
 import h5py
@@ -22,6 +23,7 @@ from strapdown.formats.clocks import unix_from_gps
 from strapdown.formats.gnss_files import GnssOptions, fixes_of_columns, read_gnss
 from strapdown.formats.recording import ReadOptions
 from strapdown.formats.trajectory_readers import read_trajectory
+from strapdown.parsers import in_place, matlab
 from strapdown.rotation import dcm_from_euler
 from strapdown.tables import ACCEL, GYRO
 
@@ -765,8 +767,8 @@ def test_tables_of_matlab_mobile(tmp_path):
 def test_objects_of_matlab_are_refused_with_the_way_in(tmp_path, monkeypatch):
     path = tmp_path / "sensorlog_20210414.mat"
     savemat(path, {"a": np.arange(3.0)})
-    monkeypatch.setattr("scipy.io.whosmat", lambda _: [("None", (1,), "opaque")])
-    with pytest.raises(DataError, check=coded("io.matlab-objects")) as caught:
+    monkeypatch.setattr(matlab, "whosmat", lambda _: [("None", (1,), "opaque")])
+    with in_place(), pytest.raises(DataError, check=coded("io.matlab-objects")) as caught:
         open_stream(path, "imu")
     assert "writetimetable" in str(caught.value)
 
@@ -850,11 +852,18 @@ def test_the_sheet_with_the_most_numbers(tmp_path):
 def test_a_missing_library_of_excel_is_named(tmp_path, monkeypatch):
     path = workbook(tmp_path / "a.xlsx")
 
+    real = importlib.import_module
+
     def missing(module):
-        raise ImportError(module)
+        if module == "openpyxl":
+            raise ImportError(module)
+        return real(module)
 
     monkeypatch.setattr("importlib.import_module", missing)
-    with pytest.raises(DataError, check=coded("io.library-missing", library="openpyxl")):
+    with (
+        in_place(),
+        pytest.raises(DataError, check=coded("io.library-missing", library="openpyxl")),
+    ):
         open_stream(path, "imu")
 
 

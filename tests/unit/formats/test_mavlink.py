@@ -13,6 +13,7 @@ from strapdown.errors import DataError
 from strapdown.formats import NoStreamError, ardupilot, open_stream, read_log, readers_of
 from strapdown.formats.gnss_files import GnssOptions, read_gnss
 from strapdown.formats.trajectory_readers import read_trajectory
+from strapdown.parsers import in_place
 
 T0 = 1_700_000_000_000_000  # arrival of the first message, µs since 1970
 BOOT = 60_000  # ms since the start of the autopilot at the first message
@@ -188,5 +189,5 @@ def test_without_the_library_the_message_names_the_extra(tmp_path, dialect, monk
         return real(name, *args)
 
     monkeypatch.setattr(importlib, "import_module", missing)
-    with pytest.raises(DataError, check=coded("io.library-missing", extra="mavlink")):
+    with in_place(), pytest.raises(DataError, check=coded("io.library-missing", extra="mavlink")):
         ardupilot.read_mavlink(path)

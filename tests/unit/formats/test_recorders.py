@@ -28,6 +28,7 @@ from strapdown.formats import (
 )
 from strapdown.formats.gnss_files import GnssOptions, read_gnss
 from strapdown.formats.trajectory_readers import read_trajectory
+from strapdown.parsers import in_place
 
 G = 9.80665
 
@@ -1089,7 +1090,8 @@ def test_a_missing_library_names_the_extra(tmp_path, monkeypatch, name, make):
         return real(module, *rest)
 
     monkeypatch.setattr(importlib, "import_module", without)
-    with pytest.raises(DataError, check=coded("io.library-missing", library=name, extra="logs")):
+    expected = coded("io.library-missing", library=name, extra="logs")
+    with in_place(), pytest.raises(DataError, check=expected):
         open_stream(path, "imu")
 
 

@@ -1,0 +1,102 @@
+"""Parquet tables, by Arrow: columns, lists of equal length, structures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from strapdown.errors import DataError
+from strapdown.parsers.limits import refuse_lie, refuse_total
+
+UNITS = (b"unit", b"units")
+#: Most columns: each takes memory, whatever it holds.
+MOST_COLUMNS = 20_000
+
+
+def table(path: Path) -> dict[str, Any]:
+    """Read ``arrays``, their ``units``, and ``meta``, the metadata of the table.
+
+    DataError: the file is damaged, or declares far more data than it holds.
+    """
+    try:
+        with pq.ParquetFile(path) as file:
+            rows, width = file.metadata.num_rows, max(file.metadata.num_columns, 1)
+            refuse_lie(rows * width * 8, path.stat().st_size, "table", path.name)
+            refuse_total(rows * width * 8, path)
+            if width > MOST_COLUMNS:
+                raise DataError(
+                    "io.too-many-columns-of-table", file=path.name, count=width, most=MOST_COLUMNS
+                )
+            held = file.read(use_threads=False)
+        while any(pa.types.is_struct(field.type) for field in held.schema):
+            held = held.flatten()
+        meta = {_text(k): _text(v) for k, v in (held.schema.metadata or {}).items()}
+        units = _units(held)
+        arrays = {}
+        # Column by column, so that at most one is in memory twice.
+        for name in held.column_names:
+            arrays[name] = _array(held.column(0))
+            held = held.remove_column(0)
+        pa.default_memory_pool().release_unused()
+    except (DataError, MemoryError):
+        raise
+    except Exception as error:  # a damaged file can break any of the decoders involved
+        raise DataError(
+            "io.table-cannot-read",
+            file=path.name,
+            splitlines=str(error).splitlines()[0] if str(error) else "damaged",
+        ) from None
+    arrays = {n: a for n, a in arrays.items() if a is not None}
+    return {"arrays": arrays, "units": units, "meta": meta}
+
+
+def _units(held: Any) -> dict[str, str]:
+    found = {}
+    for field in held.schema:
+        for key in UNITS:
+            if key in (field.metadata or {}):
+                found[field.name] = _text(field.metadata[key])
+    return found
+
+
+def _array(column: Any) -> np.ndarray[Any, Any] | None:
+    """Convert to numbers, dates, or rows of numbers; None for anything else."""
+    kind = column.type
+    if pa.types.is_list(kind) or pa.types.is_large_list(kind) or pa.types.is_fixed_size_list(kind):
+        return _rows(column)
+    if pa.types.is_dictionary(kind):
+        return _array(column.cast(kind.value_type))
+    if pa.types.is_decimal(kind):
+        column, kind = column.cast(pa.float64()), pa.float64()
+    if pa.types.is_integer(kind) and column.null_count:
+        column, kind = column.cast(pa.float64()), pa.float64()
+    if pa.types.is_timestamp(kind) and not column.null_count:
+        dates: np.ndarray[Any, Any] = column.cast(pa.timestamp("ns")).to_numpy()
+        return dates
+    if pa.types.is_integer(kind) or pa.types.is_floating(kind):
+        values: np.ndarray[Any, Any] = column.to_numpy()
+        # Arrow keeps memory that it has allocated, even when freed.
+        return values if values.flags.owndata else values.copy()
+    return None
+
+
+def _rows(column: Any) -> np.ndarray[Any, Any] | None:
+    """Convert lists of equal length to rows of an array; a missing list is a row of NaN."""
+    if not (
+        pa.types.is_integer(column.type.value_type) or pa.types.is_floating(column.type.value_type)
+    ):
+        return None
+    lists = column.to_pylist()
+    widths = {len(row) for row in lists if row is not None}
+    if len(widths) != 1:
+        return None
+    empty = [np.nan] * widths.pop()
+    return np.array([empty if row is None else row for row in lists], dtype=np.float64)
+
+
+def _text(value: bytes) -> str:
+    return value.decode("utf-8", "replace")
