@@ -278,7 +278,12 @@ class Journal:
         if not number:
             return DataError("live.not-a-journal", file=str(path), quantity="--recover")
         return DataError(
-            "live.journal-damaged", file=str(path), quantity="--recover", at=at, number=number
+            "live.journal-damaged",
+            file=str(path),
+            quantity="--recover",
+            path=path,
+            at=at,
+            number=number,
         )
 
     def _check(self) -> None:
@@ -328,6 +333,7 @@ def _refuse_data(folder: Path) -> None:
             "live.journal-left",
             file=str(folder),
             quantity="--out",
+            folder=folder,
             command=_read_run(folder)["command"].split()[0],
         )
     if {p.name for p in folder.iterdir()} - {JOURNAL, LOCK, RUN, f"{RUN}.part"}:
@@ -408,7 +414,9 @@ class SpooledRows:
         except OSError:
             with suppress(OSError):
                 self._file.truncate(self._size)
-            self._kept, self._file = self._read(), None
+            self._kept = self._read()
+            self._file.close()
+            self._file = None
             return
         self._size, self._buffer = self._size + len(data), array("d")
 
