@@ -1,9 +1,9 @@
 """Gate of a live run: stamps far ahead wait for confirmation; impossible values are refused.
 
 A sample whose stamp is a gap away from the one before is held: one wrong stamp must not refuse the
-right ones after it. If `confirm` samples follow one another from there, the gap is real, and all of
-them are used. A sample that continues where the others were contradicts them, and they are dropped.
-The decision depends on the stamps alone, so that it repeats with the lines.
+right ones. Once `confirm` held samples follow one another, the gap is real: they are used, wrong
+ones among them dropped. A sample that continues where the others were contradicts all held
+samples. The decision depends on the stamps alone, so that it repeats with the lines.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ T = TypeVar("T")
 COHERENT = 10.0
 #: Samples that give the usual step, as in `navigation.preprocessing`, and its share of them.
 FIRST, SHARE = 64, 0.95
+#: Most samples that are held, as a multiple of those that confirm.
+HELD = 4
 #: Stamps are rounded: a step of exactly the limit is not a gap.
 ROUNDED = 1.01
 #: Largest stamp, s: the year 2286, where a double resolves 2 µs.
@@ -33,6 +35,16 @@ LATEST = 1e10
 FAMILY = 8.0
 #: Beyond any gyro, rad/s, and accelerometer, m/s².
 FASTEST, STRONGEST = 1e4, 1e6
+
+
+@dataclass(frozen=True, eq=False)
+class _Held(Generic[T]):
+    """Held sample, the one that it follows, and its number in that row."""
+
+    time: float
+    item: T
+    before: _Held[T] | None
+    number: int
 
 
 class StampGate(Generic[T]):
@@ -57,9 +69,9 @@ class StampGate(Generic[T]):
         self._confirm, self._gap = confirm, gap
         self.newest = -math.inf
         self.dropped: list[tuple[float, T]] = []
-        self._held: list[tuple[float, T]] = []
+        self._held: list[_Held[T]] = []
         self._steps: list[float] = []
-        self._limit = 0.0
+        self._limit, self._known = 0.0, False
 
     @property
     def holding(self) -> bool:
@@ -70,42 +82,64 @@ class StampGate(Generic[T]):
         """Take a sample later than `newest`; return those that can be used now, in order."""
         self.dropped = []
         if time - self.newest <= self._limit:
-            self._drop()
+            if self._held:
+                self._drop(self._held)
             return self._pass([(time, item)])
-        if self._held and not 0.0 < time - self._held[-1][0] <= COHERENT:
-            self._drop()
-        self._held.append((time, item))
-        if len(self._held) < self._confirm:
-            return []
-        passed, self._held = self._held, []
-        return self._pass(passed)
+        before = [one for one in self._held if 0.0 < time - one.time <= COHERENT]
+        last = max(before, key=lambda one: (one.number, one.time), default=None)
+        new = _Held(time, item, last, 1 if last is None else last.number + 1)
+        self._held.append(new)
+        if new.number >= self._confirm:
+            return self._pass(self._chain(new))
+        if len(self._held) > HELD * self._confirm:
+            self._drop(self._held[:1])
+        return []
 
     def finish(self) -> list[tuple[float, T]]:
         """Return the samples of a run that ends before its begin is confirmed; drop others."""
         self.dropped = []
-        if self.newest == -math.inf:
-            passed, self._held = self._held, []
-            return self._pass(passed)
-        self._drop()
+        if self.newest == -math.inf and self._held:
+            return self._pass(self._chain(max(self._held, key=lambda one: one.number)))
+        self._drop(self._held)
         return []
 
     def restart(self, time: float) -> None:
         """Continue from a stamp of a clock that was reset."""
-        self._drop()
+        self._drop(self._held)
         self.newest = time
 
-    def _drop(self) -> None:
-        self.dropped += self._held
+    def _chain(self, last: _Held[T]) -> list[tuple[float, T]]:
+        """Take the samples that follow one another to the last one, and drop the others."""
+        chain: list[_Held[T]] = []
+        one: _Held[T] | None = last
+        while one is not None:
+            chain.append(one)
+            one = one.before
+        self._drop([one for one in self._held if one not in chain])
         self._held = []
+        # These steps are the usual ones from here on.
+        self._steps, self._known = [], False
+        return [(one.time, one.item) for one in reversed(chain)]
+
+    def _drop(self, held: list[_Held[T]]) -> None:
+        self.dropped += [(one.time, one.item) for one in held]
+        self._held = [one for one in self._held if one not in held]
 
     def _pass(self, items: list[tuple[float, T]]) -> list[tuple[float, T]]:
-        for time, _ in items:
-            if len(self._steps) < FIRST and self.newest > -math.inf:
-                self._steps.append(time - self.newest)
-                usual = float(np.quantile(self._steps, SHARE, method="lower"))
-                self._limit = self._gap * ROUNDED * usual
+        for k, (time, _) in enumerate(items):
+            # Not the step over the gap.
+            if k or len(items) == 1:
+                self._learn(time - self.newest)
             self.newest = time
         return items
+
+    def _learn(self, step: float) -> None:
+        self._steps.append(step)
+        if not self._known or len(self._steps) == FIRST:
+            usual = float(np.quantile(self._steps, SHARE, method="lower"))
+            self._limit = self._gap * ROUNDED * usual
+        if len(self._steps) == FIRST:
+            self._steps, self._known = [], True
 
 
 @dataclass(frozen=True)
