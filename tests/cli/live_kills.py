@@ -8,19 +8,34 @@ imported, so that an instant is not spent in imports.
 from __future__ import annotations
 
 import os
+import shutil
 import signal
 import sys
 import tempfile
 import time
+import traceback
 from collections import Counter
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 from tests.cli.test_crash_live import CASE, GYRO, line, samples
-from tests.cli.test_live_recovery import RECORD, received
 from tests.cli.test_navigate_live import lines, written
 
 from strapdown.cli import crash_live, main, navigate_live
+from strapdown.live.journal import MAGIC
+
+RECORD = 65  # of a sample of rates and forces, with its frame
+NEVER = 1 << 40
+
+
+def received(folder):
+    """How many records a journal has, an incomplete one not counted."""
+    data, at, count = (folder / "journal").read_bytes(), len(MAGIC), 0
+    while at + 8 <= len(data):
+        at += 8 + int.from_bytes(data[at : at + 2], "little")
+        count += at <= len(data)
+    return count - 1
 
 
 def start(folder, *options):
@@ -36,13 +51,20 @@ def start(folder, *options):
     log = os.open("log", os.O_WRONLY | os.O_CREAT | os.O_APPEND)
     os.dup2(log, 1)
     os.dup2(log, 2)
-    sys.stdin = os.fdopen(0)
+    sys.stdin, sys.stdout, sys.stderr = os.fdopen(0), os.fdopen(1, "w"), os.fdopen(2, "w")
     sys.argv = ["strapdown", *options, "--quiet"]
     try:
         main.run()
-        os._exit(0)
+        code = 0
     except SystemExit as end:
-        os._exit(end.code if isinstance(end.code, int) else 1)
+        code = end.code if isinstance(end.code, int) else 1
+    except BaseException:
+        traceback.print_exc()
+        code = 1
+    with suppress(OSError):
+        sys.stdout.flush()
+        sys.stderr.flush()
+    os._exit(code)
 
 
 def finished(folder, texts, *options):
@@ -54,7 +76,7 @@ def finished(folder, texts, *options):
 
 
 def killed(folder, texts, options, size, wait):
-    """Run to a kill: once the journal has a size, or after a time."""
+    """Run to a kill: once the journal has a size, or after a time; the input ends only then."""
     child, write = start(folder, *options)
     os.set_blocking(write, False)
     data, journal = "".join(f"{text}\n" for text in texts).encode(), folder / "out-received/journal"
@@ -64,7 +86,7 @@ def killed(folder, texts, options, size, wait):
             data = data[os.write(write, data[:2048]) :] if data else data
         except BlockingIOError:
             time.sleep(1e-4)
-        if not data and write >= 0:
+        if not data and write >= 0 and size == NEVER:
             os.close(write)
             write = -1
         if not data:
@@ -94,6 +116,9 @@ def kills(name, command, prepare, texts, count, draw):
                 seals[n] = seal.read_bytes() if seal.is_file() else b""
             return seals[n]
 
+        reference(len(texts))
+        del seals[len(texts)]
+        shutil.rmtree(Path(root) / f"ref{len(texts)}")
         begun = time.monotonic()
         reference(len(texts))
         whole = time.monotonic() - begun
@@ -101,9 +126,9 @@ def kills(name, command, prepare, texts, count, draw):
             folder = Path(root) / str(k)
             folder.mkdir()
             prepare(folder)
-            size = 101 + RECORD * int(draw.integers(0, len(texts))) if k % 2 else 1 << 40
+            size = 101 + RECORD * int(draw.integers(0, len(texts))) if k % 2 else NEVER
             options = (*command, "--live", "-", "--out", "out")
-            killed(folder, texts, options, size, 60.0 if k % 2 else draw.uniform(0.0, 1.1 * whole))
+            killed(folder, texts, options, size, 60.0 if k % 2 else draw.uniform(0.0, whole))
             left, out = folder / "out-received", folder / "out" / "manifest.json"
             n, was = (received(left) if (left / "journal").is_file() else -1), out.is_file()
             if was:

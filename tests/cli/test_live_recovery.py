@@ -5,13 +5,15 @@ from __future__ import annotations
 import json
 import os
 import resource
-import signal
+import shutil
+import socket
 import subprocess
 import sys
 import time
 
 import numpy as np
 import pytest
+from tests.cli.live_kills import RECORD, finished, killed, received
 from tests.cli.test_crash_live import CASE, GYRO, line, samples
 from tests.cli.test_navigate_live import lines, written
 from tests.coded import coded
@@ -23,8 +25,6 @@ from strapdown.live.crash import CrashReception, recorder_of_case
 from strapdown.live.journal import Journal
 from strapdown.live.lines import Measured, Sample, Word
 from strapdown.report.crash_live import COMMAND
-
-RECORD = 65  # of a sample, with its frame
 
 
 def start(folder, *options):
@@ -38,67 +38,38 @@ def start(folder, *options):
     )
 
 
-def kill_at(job, texts, journal, size):
-    """Send lines until the journal has that size, and kill the process; return what it said."""
-    data = memoryview(("\n".join(texts) + "\n").encode())
-    os.set_blocking(job.stdin.fileno(), False)
-    deadline = time.monotonic() + 120.0
-    while not journal.is_file() or journal.stat().st_size < size:
-        assert job.poll() is None, job.stderr.read()
-        assert time.monotonic() < deadline
-        try:
-            data = data[os.write(job.stdin.fileno(), data[:4096]) :] if data else data
-        except BlockingIOError:
-            time.sleep(1e-3)
-    job.send_signal(signal.SIGKILL)
-    job.stdin.close()
-    assert job.wait(60) == -signal.SIGKILL
-    job.stderr.close()
-
-
-def received(folder):
-    """How many records a journal has, an incomplete one not counted."""
-    data, at, count = (folder / "journal").read_bytes(), len(module.MAGIC), 0
-    while at + 8 <= len(data):
-        at += 8 + int.from_bytes(data[at : at + 2], "little")
-        count += at <= len(data)
-    return count - 1
-
-
 def three_kills(folder, command, texts, draw):
     """Kill a run at three drawn instants, and continue it each time from where it was."""
     left, done = folder / "out-received", 0
     for size in sorted(draw.integers(2, len(texts) - 60, 3).tolist()):
         begun = [*command, "--out", "out"] if not done else [command[0], "--recover", left.name]
-        job = start(folder, *begun, "--live", "-")
         # Some that it may or may not have read when it is killed.
         sent = texts[done : max(size, done + 1) + int(draw.integers(1, 50))]
-        kill_at(job, sent, left / "journal", 101 + RECORD * size)
+        killed(folder, sent, (*begun, "--live", "-"), 101 + RECORD * size, 120.0)
         assert not (folder / "out").exists()
         done = received(left)
     assert 0 < done < len(texts)
-    job = start(folder, command[0], "--recover", left.name, "--live", "-")
-    _, err = job.communicate(("\n".join(texts[done:]) + "\n").encode(), timeout=120)
-    assert (job.returncode, err) == (0, b"")
+    code = finished(folder, texts[done:], command[0], "--recover", left.name, "--live", "-")
+    assert (code, (folder / "log").read_text().count("Traceback")) == (0, 0)
     assert not left.exists()
     return (folder / "out" / "manifest.json").read_bytes()
 
 
+def not_killed(folder, command, texts):
+    """The seal of a run to its end."""
+    whole = folder / "whole"
+    whole.mkdir()
+    shutil.copy(folder / command[1], whole)
+    assert finished(whole, texts, *command, "--out", "out", "--live", "-") == 0
+    return (whole / "out" / "manifest.json").read_bytes()
+
+
 @pytest.mark.slow
 def test_three_kills_of_a_run_of_navigation_leave_its_bits(tmp_path):
-    texts = lines()
-    texts.insert(200, "command,navigation")
-    seals = []
-    for name in ("killed", "whole"):
-        (tmp_path / name).mkdir()
-        written(tmp_path / name, '[live]\nsampling = "mean"\n')
-    command = ("navigate", "run.toml")
-    seals.append(three_kills(tmp_path / "killed", command, texts, np.random.default_rng(1)))
-    job = start(tmp_path / "whole", *command, "--out", "out", "--live", "-")
-    _, err = job.communicate(("\n".join(texts) + "\n").encode(), timeout=120)
-    assert (job.returncode, err) == (0, b"")
-    seals.append((tmp_path / "whole" / "out" / "manifest.json").read_bytes())
-    assert seals[0] == seals[1]
+    written(tmp_path, '[live]\nsampling = "mean"\n')
+    command, texts = ("navigate", "run.toml"), lines()
+    killed = three_kills(tmp_path, command, texts, np.random.default_rng(1))
+    assert killed == not_killed(tmp_path, command, texts)
 
 
 @pytest.fixture
@@ -115,10 +86,9 @@ def blow():
 
 
 def test_three_kills_of_a_detection_leave_its_bits(case, blow):
-    killed = three_kills(case.parent, ("crash", "case.toml"), blow, np.random.default_rng(2))
-    job = start(case.parent, "crash", "case.toml", "--out", "whole", "--live", "-")
-    job.communicate(("\n".join(blow) + "\n").encode(), timeout=60)
-    assert (case.parent / "whole" / "manifest.json").read_bytes() == killed
+    command = ("crash", "case.toml")
+    killed = three_kills(case.parent, command, blow, np.random.default_rng(2))
+    assert killed == not_killed(case.parent, command, blow)
     found = json.loads((case.parent / "out" / "detections.json").read_text())
     assert (found["events"], found["samples"]) == (1, len(blow))
     told = json.loads((case.parent / "out" / "latency.json").read_text())
@@ -164,16 +134,20 @@ def test_a_torn_end_is_cut_at_each_byte_of_the_last_three_records(left):
     data = (left / "journal").read_bytes()
     rows, told = whole(left)
     assert (len(rows), told[0]["status"]) == (700, "trigger")
-    shorter = dict.fromkeys(range(697, 701))
     for cut in range(3 * RECORD + 1):
         (left / "journal").write_bytes(data[: len(data) - cut])
         count = 700 - -(-cut // RECORD)
-        found, lines = whole(left)
-        assert len(found) == count
-        np.testing.assert_array_equal(found, rows[:count])
-        shorter[count] = shorter[count] or lines
-        assert lines == shorter[count]
-        assert (left / "journal").stat().st_size == len(data) - RECORD * (700 - count)
+        if cut % RECORD in (0, 1, 40):
+            np.testing.assert_array_equal(whole(left)[0], rows[:count])
+        own = Journal.reopen(left, COMMAND)
+        assert [one.time for one in own.said()] == rows[:count, 0].tolist()
+        # What comes next continues it.
+        own.append(Sample(9.0, (1.0,) * 6))
+        own.close()
+        assert (left / "journal").stat().st_size == len(data) - RECORD * (699 - count)
+        own = Journal.reopen(left, COMMAND)
+        assert list(own.said())[-1] == Sample(9.0, (1.0,) * 6)
+        own.close()
 
 
 def test_any_other_damage_is_an_error_and_nothing_is_changed(left):
@@ -359,3 +333,66 @@ def test_a_second_recovery_waits_for_nobody(left):
     assert codes[1] in (3, 4)
     assert not any(b"Traceback" in err for err, _ in ends)
     assert (left.parent / "out" / "manifest.json").is_file()
+
+
+def test_the_disk_is_told_to_keep_it_and_a_disk_that_cannot_is_told_of(tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "SYNCED", 0.01)
+    calls, real, told = [], os.fsync, []
+
+    def sync(file):
+        calls.append(file)
+        real(file)
+
+    monkeypatch.setattr(os, "fsync", sync)
+    own = Journal.begin(tmp_path / "a", {"command": "x"})
+    own.warn = told.append
+    assert len(calls) == 3, "the configuration, and both folders"
+
+    def wait(enough):
+        deadline = time.monotonic() + 10.0
+        while not enough() and time.monotonic() < deadline:
+            time.sleep(0.005)
+        assert enough()
+
+    own.append(Word("next"))
+    wait(lambda: own._file in calls)
+
+    def fails(file):
+        raise OSError(5, "Input/output error")
+
+    monkeypatch.setattr(os, "fsync", fails)
+    own.append(Word("fine"))
+    wait(lambda: told)
+    own.append(Word("navigation"))
+    assert [one.code for one in told] == ["live.journal-stopped"]
+    assert [one.word for one in own.said()] == ["next", "fine"]
+    own.close()
+
+
+def test_a_command_over_the_network_needs_the_token_that_was_told(case, blow):
+    job = subprocess.Popen(
+        [sys.executable, "-m", "strapdown", "crash", "case.toml", "--live", "udp://:0"],
+        cwd=case.parent,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    token = job.stderr.readline().split("command,WORD,")[1].strip()
+    port = int(job.stderr.readline().rpartition(":")[2])
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+        for text in (*blow[:50], "command,end", "command,end,guessed", f"command,end,{token}"):
+            sender.sendto(text.encode(), ("127.0.0.1", port))
+    _, err = job.communicate(timeout=60)
+    assert job.returncode == 0, err
+    assert "line 51: line not used: the command 'end' came without the token" in err
+    assert token not in err
+    told = json.loads((case.parent / "case-crash-live" / "latency.json").read_text())
+    assert (told["lines"], told["not_used"]) == (53, {"command refused": 2})
+
+
+def test_a_recovery_by_another_program_says_so(left, run_cli, monkeypatch):
+    monkeypatch.chdir(left.parent)
+    done = run_cli("crash", "--recover", left)
+    assert done.code == 0
+    assert "another version of strapdown (0)" in done.err
+    assert "is recovered" in done.err

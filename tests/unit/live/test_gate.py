@@ -181,3 +181,26 @@ def test_commands_need_the_token_where_others_can_send():
     assert parse_line("command, end , own", ()) == Word("end", "own")
     with pytest.raises(BadLineError):
         parse_line("command,end,own,more", ())
+
+
+def test_a_first_sample_that_is_wrong_is_no_begin():
+    good = lines(length=2.0)
+    live, _, told = received([sample(1.7e9, [0.0] * 6), *good])
+    clean, _, _ = received(good)
+    assert_same(live.run, clean.run)
+    assert [one.data["reason"].code for one in told] == ["live.stamp-not-first"]
+    live, _, told = received([sample(3e10, [0.0] * 6), *good])
+    assert [one.data["reason"].code for one in told] == ["live.stamp-beyond-limit"]
+
+
+def test_commands_that_wait_are_bounded():
+    more = {
+        "site": {"lat_deg": 45.0, "lon_deg": 20.0, "alt_m": 80.0},
+        "coarse": {"kind": "known_heading", "heading_deg": 0.0, "sd_deg": 1.0},
+        "fine": {"kind": "none"},
+    }
+    spec = NavigationSpec.checked({k: v for k, v in table(**more).items() if k != "start"})
+    good = lines(length=3.0)
+    live, _, told = received([*good[:100], *["command,navigation"] * 150, *good[100:]], spec)
+    assert live.got.unused == {"command": 50}
+    assert told[0].data["reason"].code == "live.commands-waiting"
