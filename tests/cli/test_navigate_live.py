@@ -63,7 +63,7 @@ def lines(until=5.0):
 
 def start(folder, *options):
     return subprocess.Popen(
-        [sys.executable, "-m", "strapdown", "navigate", "run.toml", "--out", "out", *options],
+        [sys.executable, "-m", "strapdown", "navigate", *asked(options), "--out", "out", *options],
         cwd=folder,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
@@ -71,6 +71,10 @@ def start(folder, *options):
         text=True,
         start_new_session=True,
     )
+
+
+def asked(options):
+    return [] if "--recover" in options else ["run.toml"]
 
 
 @pytest.fixture
@@ -138,9 +142,16 @@ def test_a_second_signal_ends_it_at_once(live):
     job.send_signal(signal.SIGTERM)
     _, err = job.communicate(timeout=120)
     assert "Traceback" not in err
-    assert [p.name for p in live.iterdir() if p.name != "out"] == ["run.toml"]
+    assert not any(live.glob(".out.*"))
     if (live / "out").exists():
         assert unsealed_changes(live / "out", read_manifest(live / "out")) == []
+        return
+    # What was received is not lost with the result.
+    assert "strapdown navigate --recover out-received" in err
+    job = start(live, "--recover", "out-received")
+    _, err = job.communicate(timeout=120)
+    assert job.returncode == 0, err
+    assert sorted(p.name for p in live.iterdir()) == ["out", "run.toml"]
 
 
 def test_without_a_sample_there_is_no_bundle(live, run_cli, monkeypatch, tmp_path_factory):

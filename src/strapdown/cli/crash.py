@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from strapdown.cli.shared_options import OutFlags, folder_to_make, running, spread, writing
+from strapdown.cli.shared_options import (
+    OutFlags,
+    Recover,
+    Token,
+    folder_to_make,
+    missing_argument,
+    running,
+    spread,
+    writing,
+)
 
 if TYPE_CHECKING:
     from strapdown.crash.case import CaseResult
@@ -43,6 +52,8 @@ class LiveFlags:
             "biases, scale factors and mounting of the recorder; they are taken off.",
         ),
     ] = None
+    token: Token = None
+    recover: Recover = None
     export: Annotated[
         Path | None,
         writing(
@@ -56,12 +67,13 @@ class LiveFlags:
 @spread
 def crash(
     cases: Annotated[
-        list[Path],
+        list[Path] | None,
         typer.Argument(
             metavar="CASE.toml...",
             help="The case of each vehicle; strapdown init crash writes them.",
+            show_default=False,
         ),
-    ],
+    ] = None,
     *,
     flags: LiveFlags,
     out: Annotated[Path | None, folder_to_make("CASE-crash, with --live CASE-crash-live")] = None,
@@ -76,7 +88,14 @@ def crash(
     With --live, samples are watched as they arrive, and delta-V so far, direction of force and
     severity of a crash are written as lines of JSON.
     """
-    if any(x is not None for x in (flags.live, flags.export, flags.every, flags.calibration)):
+    if flags.recover is not None:
+        from strapdown.cli.crash_live import recover_crash
+
+        recover_crash(cases or None, out, write, flags)
+        return
+    if not cases:
+        raise missing_argument("CASE.toml...")
+    if any(one is not None for one in asdict(flags).values()):
         from strapdown.cli.crash_live import crash_live
 
         crash_live(cases, out, write, flags)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import sys
-import tempfile
 from collections.abc import Sequence
 from contextlib import redirect_stdout
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,16 +13,33 @@ import typer
 
 from strapdown.bundle import write_latency
 from strapdown.cli.console import WORDS, print_seal
-from strapdown.cli.navigate_live import line_writer, warner
+from strapdown.cli.live_folder import (
+    begin_journal,
+    note_token,
+    recovered,
+    refuse_beside_recover,
+    remove_received,
+    sealing,
+    warner,
+)
+from strapdown.cli.navigate_live import line_writer
 from strapdown.cli.navigate_tables import print_latency
 from strapdown.cli.result_folder import claim, default_folder, refuse_result
-from strapdown.cli.shared_options import OutFlags
+from strapdown.cli.shared_options import OutFlags, refuse_without_live
 from strapdown.errors import ConfigError, DataError
 from strapdown.live.crash import receive_crash, recorder_of_case
+from strapdown.live.journal import Journal
 from strapdown.live.replay import MachineClock
 from strapdown.live.sources import open_source
 from strapdown.report.attitude_export import check_export
-from strapdown.report.crash_live import DETECTIONS, RECEIVED, write_crash_live, write_received
+from strapdown.report.crash_live import (
+    COMMAND,
+    DETECTIONS,
+    RECEIVED,
+    recorder_of,
+    write_crash_live,
+    write_received,
+)
 
 if TYPE_CHECKING:
     from strapdown.cli.crash import LiveFlags
@@ -38,8 +55,8 @@ def crash_live(cases: Sequence[Path], out: Path | None, write: OutFlags, flags: 
     if flags.live is not None and (flags.export is not None or write.json):
         option = "--json" if write.json else "--export"
         raise ConfigError("live.not-together", beside="--live", option=option)
-    if flags.live is None and flags.every is not None:
-        raise ConfigError("live.only-with", option="--every", beside="--live")
+    if flags.live is None:
+        refuse_without_live({"--every": flags.every, "--token": flags.token})
     if flags.live is None and flags.export is None:
         raise ConfigError("live.only-with", option="--calibration", beside="--live or --export")
     name = "--live" if flags.live is not None else "--export"
@@ -63,30 +80,68 @@ def crash_live(cases: Sequence[Path], out: Path | None, write: OutFlags, flags: 
         return
     folder = out or default_folder(cases[0], "crash-live")
     claim(folder, write.force)
-    clock = MachineClock()
     every = EVERY if flags.every is None else flags.every
-    source = open_source(flags.live, clock, sys.stdin.buffer)
-    got = receive_crash(options, source, clock, line_writer, warner(write.quiet), every)
+    run = {"configuration": {"recorder": asdict(options)}, "every": every}
+    _run(begin_journal(folder, COMMAND, run), folder, write, flags)
+
+
+def recover_crash(
+    cases: Sequence[Path] | None, out: Path | None, write: OutFlags, flags: LiveFlags
+) -> None:
+    """Finish, or with ``--live`` continue, a run that was killed, from what it had received."""
+    refuse_beside_recover(
+        {
+            "CASE.toml": cases,
+            "--export": flags.export,
+            "--calibration": flags.calibration,
+            "--json": write.json or None,
+        }
+    )
+    assert flags.recover is not None
+    WORDS.set("file")
+    journal = recovered(flags.recover, COMMAND, warner(write.quiet))
+    with sealing(journal):
+        folder = out or journal.folder.parent / journal.run["out"]
+        claim(folder, write.force)
+    _run(journal, folder, write, flags)
+
+
+def _run(journal: Journal, folder: Path, write: OutFlags, flags: LiveFlags) -> None:
+    """Detect crashes in what the journal has, and in what comes; and write the bundle."""
+    clock, warn = MachineClock(), warner(write.quiet)
+    options = recorder_of(journal.run["configuration"])
+    every = journal.run["every"] if flags.every is None else flags.every
+    with sealing(journal):
+        source = None
+        if flags.live is not None:
+            source = open_source(flags.live, clock, sys.stdin.buffer, flags.token)
+            note_token(source, flags.token, warn)
+        got = receive_crash(options, source, clock, line_writer, warn, every, journal)
+        if got.rows.count:
+            record = journal.folder / RECEIVED
+            write_received(record, got.rows.rows)
+            seal = write_crash_live(
+                options, record, folder, every=every, log=got.log, force=write.force
+            )
+            journal.sealed(seal.digest)
     if not got.log.watch.samples:
-        raise DataError("cli.no-sample", quantity="--live")
-    latency = got.tape.latency()
-    with tempfile.TemporaryDirectory(prefix="strapdown-live-") as received:
-        record = Path(received) / RECEIVED
-        write_received(record, got.rows)
-        seal = write_crash_live(
-            options, record, folder, every=every, log=got.log, force=write.force
-        )
+        journal.close()
+        journal.remove()
+        raise DataError("cli.no-sample", quantity="--live" if source else "--recover")
+    remove_received(journal, seal.path)
+    latency, own = got.tape.latency(), got.processing.latency()
     told: dict[str, Any] = {
         **({} if latency is None else latency.told()),
         "lines": got.lines,
         "not_used": dict(got.unused),
+        **({"replayed": got.replayed} if got.replayed else {}),
     }
-    if (own := got.processing.latency()) is not None:
+    if own is not None:
         told["processing"] = own.told()
     write_latency(seal, told)
     if not write.quiet:
         with redirect_stdout(sys.stderr):
             # Of lines that come all at once, the time from a sample to its state is their queue.
             if own is not None:
-                print_latency(own, flags.live, "processing of a sample")
+                print_latency(own, flags.live or "", "processing of a sample")
             print_seal(seal, DETECTIONS)

@@ -16,14 +16,18 @@ from strapdown.cli.shared_options import (
     LogFlags,
     Longitude,
     OutFlags,
+    Recover,
     Sensor,
+    Token,
     as_flag,
     fix_flags,
     fix_keys,
     flag_of,
     folder_to_make,
     log_keys,
+    missing_argument,
     refuse_beside_file,
+    refuse_without_live,
     running,
     spread,
     with_what,
@@ -109,24 +113,28 @@ class NavigateFlags:
         ),
     ] = None
     every: Annotated[
-        float, running("S", "With --live: a line of the state so often (1).", show_default=False)
-    ] = 1.0
+        float | None,
+        running("S", "With --live: a line of the state so often (1).", show_default=False),
+    ] = None
     lines: Annotated[
-        str, running("json|csv", "With --live: as what (json).", show_default=False)
-    ] = "json"
+        str | None, running("json|csv", "With --live: as what (json).", show_default=False)
+    ] = None
+    token: Token = None
+    recover: Recover = None
 
 
 @spread
 def navigate(
     source: Annotated[
-        Path,
+        Path | None,
         typer.Argument(
             metavar="LOG|CONFIG.toml",
             help="A log of gyros and accelerometers, or the file of a run of navigation.",
+            show_default=False,
         ),
-    ],
-    flags: NavigateFlags,
+    ] = None,
     *,
+    flags: NavigateFlags,
     log: LogFlags,
     fixes: FixFlags,
     out: Annotated[Path | None, folder_to_make("LOG-navigate")] = None,
@@ -145,7 +153,11 @@ def navigate(
     from strapdown.config.navigation import NavigationSpec
     from strapdown.systems.navigation_run import run_navigation
 
-    refuse_result(source, "log")
+    if source is None:
+        if flags.recover is None:
+            raise missing_argument("LOG|CONFIG.toml")
+    else:
+        refuse_result(source, "log")
     played: Replay | None = None
     if flags.pace is not None:
         from strapdown.live.replay import Replay, parse_pace
@@ -154,7 +166,16 @@ def navigate(
     given: dict[str, Any] = {**asdict(flags), "smooth": flags.smooth or None}
     given |= {**log.given(), **fixes.given()}
     pace, live = given.pop("pace"), given.pop("live")
-    every, lines = given.pop("every"), given.pop("lines")
+    own_of_live = {f"--{name}": given.pop(name) for name in ("every", "lines", "token")}
+    refused = {flag_of(name): value for name, value in given.items() if name != "recover"}
+    refused |= {"--pace": pace, "--json": write.json or None}
+    if flags.recover is not None:
+        from strapdown.cli.navigate_live import recover_navigation
+
+        recover_navigation(out, write, flags, {"LOG|CONFIG.toml": source, **refused})
+        return
+    del given["recover"]
+    assert source is not None
     own = source.suffix.lower() == ".toml"
     if own and live is None:
         refuse_beside_file(source, {**given, "smooth": None}, FLAGS)
@@ -169,10 +190,9 @@ def navigate(
         from strapdown.cli.navigate_live import navigate_live
 
         claim(folder, write.force)
-        refused = {flag_of(name): value for name, value in given.items()}
-        refused |= {"--pace": pace, "--json": write.json or None}
-        navigate_live(source, live, folder, write, lines=lines, every=every, given=refused)
+        navigate_live(source, folder, write, flags, refused)
         return
+    refuse_without_live(own_of_live)
 
     def compute(report: Progress) -> NavigationRun:
         report("looking through", 0.01)

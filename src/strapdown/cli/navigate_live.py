@@ -3,45 +3,52 @@
 from __future__ import annotations
 
 import os
-import shutil
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import redirect_stdout
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import typer
-
-from strapdown.bundle import Seal, read_manifest, write_latency, write_timing
-from strapdown.cli.console import WORDS, Stopwatch, print_seal, progress
+from strapdown.bundle import Seal, write_latency, write_timing
+from strapdown.cli.console import Stopwatch, print_seal, progress
+from strapdown.cli.live_folder import (
+    begin_journal,
+    note_token,
+    recovered,
+    refuse_beside_recover,
+    remove_received,
+    sealing,
+    warner,
+)
 from strapdown.cli.navigate_tables import print_latency, print_navigation
+from strapdown.cli.result_folder import claim
 from strapdown.cli.shared_options import OutFlags
 from strapdown.config.navigation import NavigationSpec
-from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
+from strapdown.errors import ConfigError, DataError
+from strapdown.live.journal import Journal
 from strapdown.live.replay import MachineClock
 from strapdown.live.run import LiveRun, live_spec, receive, result_of
 from strapdown.live.sources import open_source
 from strapdown.report.navigation import NAVIGATION
 
+if TYPE_CHECKING:
+    from strapdown.cli.navigate import NavigateFlags
+
+COMMAND = "navigate --live"
+EVERY, LINES = 1.0, "json"
+
 
 def navigate_live(
-    file: Path,
-    where: str,
-    folder: Path,
-    write: OutFlags,
-    *,
-    lines: str,
-    every: float,
-    given: Mapping[str, Any],
+    file: Path, folder: Path, write: OutFlags, flags: NavigateFlags, given: Mapping[str, Any]
 ) -> None:
     """Navigate by lines, and write the bundle at their end.
 
     Standard output holds the states only; all else goes to standard error.
 
-    `file`: the configuration. `where`: as `open_source`. `folder`: the bundle. `lines`, `every`: as
-    `StateLines`. `given`: flags without a meaning here, by name; None where not given. ConfigError:
-    the configuration is missing, or a flag without a meaning here is given. StrapdownError: the
-    error that ended the run; the bundle holds the run up to it, if navigation had begun.
+    `file`: the configuration. `folder`: the bundle. `given`: flags without a meaning here, by name;
+    None where not given. ConfigError: the configuration is missing, or a flag without a meaning
+    here is given. StrapdownError: the error that ended the run; the bundle holds the run up to it,
+    if navigation had begun.
     """
     flag = next((name for name, value in given.items() if value is not None), None)
     if flag is not None or file.suffix.lower() != ".toml":
@@ -50,56 +57,92 @@ def navigate_live(
             quantity="--live",
             option=flag,
         )
-    received = folder.parent / f"{folder.name}-received"
-    if received.exists():
-        raise ConfigError("cli.received-before", file=str(received), quantity="--out")
-    clock = MachineClock()
     spec = live_spec(NavigationSpec.read(file))
-    live = receive(
-        spec,
-        open_source(where, clock, sys.stdin.buffer),
-        clock,
-        line_writer,
-        warner(write.quiet),
-        lines,
-        every,
-    )
-    if not len(live.got.samples):
-        raise DataError("cli.no-sample", quantity="--live")
+    run = {
+        "configuration": spec.plain(),
+        "file": {"path": str(file.absolute()), "text": file.read_bytes().decode()},
+        "every": EVERY if flags.every is None else flags.every,
+        "lines": LINES if flags.lines is None else flags.lines,
+    }
+    _run(begin_journal(folder, COMMAND, run), spec, file, folder, write, flags)
+
+
+def recover_navigation(
+    out: Path | None, write: OutFlags, flags: NavigateFlags, given: Mapping[str, Any]
+) -> None:
+    """Finish, or with ``--live`` continue, a run that was killed, from what it had received.
+
+    `out`, `given`: as of `navigate_live`; by default the bundle that the killed run was to write.
+    """
+    refuse_beside_recover(given)
+    assert flags.recover is not None
+    journal = recovered(flags.recover, COMMAND, warner(write.quiet))
+    with sealing(journal):
+        folder = out or journal.folder.parent / journal.run["out"]
+        claim(folder, write.force)
+        spec = NavigationSpec.checked(journal.run["configuration"])
+        file = _file(journal)
+    _run(journal, spec, file, folder, write, flags)
+
+
+def _file(journal: Journal) -> Path:
+    """Return the configuration file of a killed run; a copy, if it has changed since."""
+    path, text = Path(journal.run["file"]["path"]), journal.run["file"]["text"].encode()
+    if not path.is_file() or path.read_bytes() != text:
+        path = journal.folder / "configuration" / path.name
+        path.parent.mkdir(exist_ok=True)
+        path.write_bytes(text)
+    return path
+
+
+def _run(
+    journal: Journal,
+    spec: NavigationSpec,
+    file: Path,
+    folder: Path,
+    write: OutFlags,
+    flags: NavigateFlags,
+) -> None:
+    """Navigate what the journal has, and what comes; and write the bundle."""
+    clock, warn, run = MachineClock(), warner(write.quiet), journal.run
+    with sealing(journal):
+        source = None
+        if flags.live is not None:
+            source = open_source(flags.live, clock, sys.stdin.buffer, flags.token)
+            note_token(source, flags.token, warn)
+        lines = run["lines"] if flags.lines is None else flags.lines
+        every = run["every"] if flags.every is None else flags.every
+        live = receive(spec, source, clock, line_writer, warn, lines, every, journal)
+        with redirect_stdout(sys.stderr):
+            if live.got.count:
+                seal = _sealed(live, journal, file, folder, write)
+    if not live.got.count:
+        journal.close()
+        journal.remove()
+        raise DataError("cli.no-sample", quantity="--live" if source else "--recover")
+    remove_received(journal, seal.path)
     with redirect_stdout(sys.stderr):
-        seal = _sealed(live, file, folder, received, force=write.force, quiet=write.quiet)
         if not write.quiet and live.latency is not None:
-            print_latency(live.latency, where)
+            print_latency(live.latency, flags.live or "")
         if not write.quiet:
             print_seal(seal, "report.html")
     if live.error is not None:
         raise live.error
 
 
-def _sealed(
-    live: LiveRun, file: Path, folder: Path, received: Path, *, force: bool, quiet: bool
-) -> Seal:
-    """Write the bundle; the received input is kept beside it unless the bundle has a copy."""
-    try:
-        received.mkdir(parents=True)
-        with progress(quiet) as show:
-            report = Stopwatch(show)
-            result = result_of(live, received, file, report)
-            if live.run is None and live.error is not None:
-                raise live.error
-            seal = NAVIGATION.write(result, folder, force=force, progress=report)
-            report.stop()
-            write_timing(seal, report.seconds)
-            write_latency(seal, live.told())
-    except StrapdownError:
-        typer.echo(f"received data: {received}", err=True)
-        raise
-    except BaseException:
-        shutil.rmtree(received, ignore_errors=True)
-        raise
-    if all(item["kept"] == "copy" for item in read_manifest(seal.path)["inputs"]):
-        shutil.rmtree(received)
-    if not quiet:
+def _sealed(live: LiveRun, journal: Journal, file: Path, folder: Path, write: OutFlags) -> Seal:
+    """Write the bundle."""
+    with progress(write.quiet) as show:
+        report = Stopwatch(show)
+        result = result_of(live, journal.folder, file, report)
+        if live.run is None and live.error is not None:
+            raise live.error
+        seal = NAVIGATION.write(result, folder, force=write.force, progress=report)
+        journal.sealed(seal.digest)
+        report.stop()
+        write_timing(seal, report.seconds)
+        write_latency(seal, live.told())
+    if not write.quiet:
         print_navigation(result)
     return seal
 
@@ -112,13 +155,3 @@ def line_writer(text: str) -> None:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         raise
-
-
-def warner(quiet: bool) -> Callable[[Finding], None]:
-    """Return a function that writes a finding to standard error."""
-
-    def warn(finding: Finding) -> None:
-        if not quiet:
-            typer.echo(f"note: {finding.text(WORDS.get())}", err=True)
-
-    return warn

@@ -44,6 +44,22 @@ SENSOR = (
 Sensor = Annotated[str | None, with_what("NAME|FILE", SENSOR)]
 Longitude = Annotated[float | None, with_what("DEG", "Longitude, east positive.")]
 Height = Annotated[float | None, with_what("M", "Height over the ellipsoid (0).")]
+Token = Annotated[
+    str | None,
+    running(
+        "WORD",
+        "With --live udp://…: what a command in a datagram must carry, command,WORD,TOKEN; "
+        "by default one is drawn and shown.",
+    ),
+]
+Recover = Annotated[
+    Path | None,
+    running(
+        "DIR",
+        "Finish a --live run that was killed, from the folder OUT-received that it left; "
+        "with --live, continue it.",
+    ),
+]
 
 
 @dataclass(frozen=True)
@@ -366,6 +382,18 @@ def refuse_beside_file(
     raise ConfigError(
         "cli.option-of-key-beside-file", file=source.name, quantity=flag, entry=entry, table=table
     )
+
+
+def missing_argument(name: str) -> typer.BadParameter:
+    """Return the error of an argument that only ``--recover`` replaces."""
+    return typer.BadParameter("missing argument; only --recover does without", param_hint=name)
+
+
+def refuse_without_live(given: Mapping[str, Any]) -> None:
+    """Refuse options that only a live run has; `given`: by flag, None where not given."""
+    for flag, value in given.items():
+        if value is not None:
+            raise ConfigError("live.only-with", option=flag, beside="--live")
 
 
 def flag_of(name: str) -> str:

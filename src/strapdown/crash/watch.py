@@ -155,6 +155,11 @@ class CrashWatch:
         self.events, self.samples, self.refused, self.resets = 0, 0, 0, 0
 
     @property
+    def newest(self) -> float | None:
+        """Stamp of the newest accepted sample, s; None before the first."""
+        return self._time if self.samples else None
+
+    @property
     def largest_change(self) -> float:
         """Largest change forward or right within 150 ms outside events, m/s."""
         return float(self._state[kernel.MOST])
@@ -283,8 +288,9 @@ class CrashLog:
     ----------
     lines : list of mapping
         One for each estimate.
-    records : list of list of tuple
-        Accepted samples, stamp first, from one clock each.
+    accepted : list of list of [int, int]
+        Of each clock, begin and end of each run of accepted samples, counted among all that were
+        taken.
     """
 
     def __init__(self, options: WatchOptions, every: float = 0.01) -> None:
@@ -292,15 +298,21 @@ class CrashLog:
             raise ConfigError("live.bad-interval", quantity="--every", every=every)
         self.watch, self._every, self._next = CrashWatch(options), every, 0.0
         self.lines: list[Mapping[str, Any]] = []
-        self.records: list[list[tuple[float, ...]]] = [[]]
+        self.accepted: list[list[list[int]]] = [[]]
+        self._taken = 0
 
     def take(self, time: float, values: Sequence[float]) -> Mapping[str, Any] | None:
         """Process a sample, as `CrashWatch.take`; return the estimate that is due, if any."""
-        resets = self.watch.resets
+        resets, number = self.watch.resets, self._taken
+        self._taken += 1
         status = self.watch.take(time, values)
         if self.watch.resets > resets:
-            self.records.append([])
-        self.records[-1].append((time, *values))
+            self.accepted.append([])
+        spans = self.accepted[-1]
+        if spans and spans[-1][1] == number:
+            spans[-1][1] = number + 1
+        else:
+            spans.append([number, number + 1])
         # Stamps are rounded decimal fractions.
         if status is None or (status == "event" and time < self._next - 1e-9):
             return None
@@ -309,6 +321,19 @@ class CrashLog:
         line |= self.watch.estimate()
         self.lines.append(line)
         return line
+
+    def records(self, rows: Array) -> list[Array]:
+        """Return the accepted ones among all samples that were taken, of one clock each.
+
+        Parameters
+        ----------
+        rows : ndarray, (n, k)
+            Every sample that was taken, refused ones included.
+        """
+        return [
+            np.concatenate([rows[:0], *(rows[first:end] for first, end in spans)])
+            for spans in self.accepted
+        ]
 
     def summary(self) -> Mapping[str, Any]:
         """Samples processed, and the margin below the trigger of all others."""

@@ -6,7 +6,7 @@ import json
 import math
 from collections import Counter
 from collections.abc import Callable
-from contextlib import closing
+from contextlib import closing, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,9 +18,11 @@ from strapdown.config.crash_case import CaseSpec, TriadSpec, UnitSpec
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.watch import CrashLog, CrashWatch, WatchOptions, watch_options
 from strapdown.errors import DataError, Finding
-from strapdown.live.lines import END, BadLineError, Sample, Word, parse_line
+from strapdown.live.gate import FAMILY, STRONGEST, StampGate, ValueLimits
+from strapdown.live.journal import Journal, SpooledRows
+from strapdown.live.lines import END, BadLineError, Sample, Word, check_token, parse_line
 from strapdown.live.replay import LatencyTape, RunClock
-from strapdown.live.run import until_a_signal
+from strapdown.live.run import received_lines, until_a_signal
 from strapdown.live.sources import LineSource, ReceivedLine
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.crash_unit import Mounting
@@ -127,18 +129,34 @@ def _uncertainty(triad: str, spec: TriadSpec, folder: Path) -> TriadUncertainty:
     return stated_uncertainty(triad, spec.uncertainty, sensor)
 
 
+#: Samples in a row that confirm a gap, as many as a clock that was reset.
+CONFIRM = 3
+#: A longer step, relative to the usual one, is a gap, as in navigation.
+GAP = 3.0
+
+
 class CrashReception:
     """Pass the samples of lines to the detection.
 
+    Parameters
+    ----------
+    journal : Journal, optional
+        Takes every sample before it is used, and holds the recorded ones; in memory without it.
+
     Attributes
     ----------
-    rows : list of tuple
-        Every sample that came, also with a refused stamp: stamp, rates if any, forces.
+    rows : SpooledRows
+        Every sample that was taken, also with a stamp that is not later: stamp, rates if any,
+        forces.
     unused : Counter
         Lines that were not used, by kind.
     tape, processing : LatencyTape
         From the arrival of a line to its result, the time in the queue included; and the part of
         the detection.
+    replayed : int
+        Records that came from the journal.
+    token : str or None
+        That commands need.
     """
 
     def __init__(
@@ -147,15 +165,20 @@ class CrashReception:
         clock: RunClock,
         write: Callable[[str], None],
         warn: Callable[[Finding], None],
+        journal: Journal | None = None,
     ) -> None:
         self.log, self.tape, self.processing = log, LatencyTape(), LatencyTape()
-        self._clock, self._write, self._warn = clock, write, warn
-        self._gyro = log.watch.options.gyro
-        self.lines = 0
+        self._clock, self._write, self._warn, self._journal = clock, write, warn, journal
+        self._options = log.watch.options
+        self._gate: StampGate[tuple[Sample, ReceivedLine | None]] = StampGate(CONFIRM, GAP)
+        self._limits = _limits(self._options)
+        self.lines = self.replayed = 0
         #: Whether the reader of the estimates is there; when it closes the pipe, the run ends.
         self.there = True
         self.unused: Counter[str] = Counter()
-        self.rows: list[tuple[float, ...]] = []
+        self.token: str | None = None
+        columns = 7 if self._options.gyro else 4
+        self.rows = SpooledRows(columns) if journal is None else journal.spool("samples", columns)
 
     def take(self, line: ReceivedLine) -> bool:
         """Process a line; return whether the run continues."""
@@ -163,69 +186,127 @@ class CrashReception:
         try:
             said = parse_line(line.text, (), without_gyro=True)
             if isinstance(said, Word):
+                check_token(said, self.token)
                 return said.word != END
             if isinstance(said, Sample):
+                self._check(said)
+                if self._journal is not None:
+                    self._journal.append(said)
                 self._sample(said, line)
         except BadLineError as bad:
-            self.unused[bad.kind] += 1
-            if self.unused[bad.kind] == 1:
-                self._warn(Finding("live.line-not-used", line=line.number, reason=bad.finding))
+            self._not_used(bad, line)
         return self.there
 
-    def _sample(self, said: Sample, line: ReceivedLine) -> None:
-        began = self._clock.now()
-        values = said.values if self._gyro else said.values[-3:]
-        if self._gyro and len(values) != 6:
+    def replay(self, journal: Journal) -> None:
+        """Process what the journal of a killed run has; nothing is written."""
+        write, self._write = self._write, lambda text: None
+        for said in journal.said():
+            self.replayed += 1
+            if isinstance(said, Sample):
+                self._sample(said, None)
+        self._write = write
+
+    def finish(self) -> None:
+        """Use what waits, if nothing contradicts it."""
+        self._pass(self._gate.finish())
+
+    def _check(self, said: Sample) -> None:
+        if self._options.gyro and len(said.values) != 6:
             raise BadLineError("accel", "live.samples-without-gyro")
+        self._limits.check(said)
+
+    def _sample(self, said: Sample, line: ReceivedLine | None) -> None:
+        if said.time > self._gate.newest:
+            self._pass(self._gate.take(said.time, (said, line)))
+            return
+        resets = self.log.watch.resets
+        self._detect(said, line)
+        if self.log.watch.resets > resets:
+            self._gate.restart(said.time)
+
+    def _pass(self, items: list[tuple[float, tuple[Sample, ReceivedLine | None]]]) -> None:
+        newest = self.log.watch.newest
+        for stamp, (_, line) in self._gate.dropped:
+            code = "live.stamp-not-first" if newest is None else "live.stamp-not-confirmed"
+            self._not_used(BadLineError("stamp", code, time=stamp, newest=newest), line)
+        for _, (said, line) in items:
+            self._detect(said, line)
+
+    def _detect(self, said: Sample, line: ReceivedLine | None) -> None:
+        began = self._clock.now()
+        values = said.values if self._options.gyro else said.values[-3:]
         self.rows.append((said.time, *values))
         try:
             due = self.log.take(said.time, values)
         except DataError:
-            raise BadLineError("time", "live.sample-not-later", time=said.time) from None
+            self._not_used(BadLineError("time", "live.sample-not-later", time=said.time), line)
+            return
         if due is not None and self.there:
             try:
                 self._write(json.dumps(due) + "\n")
             except BrokenPipeError:
                 self.there = False
-        done = self._clock.now()
-        self.tape.take(line.arrived, done)
-        self.processing.take(began, done)
+        if line is not None:
+            done = self._clock.now()
+            self.tape.take(line.arrived, done)
+            self.processing.take(began, done)
+
+    def _not_used(self, bad: BadLineError, line: ReceivedLine | None) -> None:
+        self.unused[bad.kind] += 1
+        if self.unused[bad.kind] == 1:
+            number = None if line is None else line.number
+            self._warn(Finding("live.line-not-used", line=number, reason=bad.finding))
+
+
+def _limits(options: WatchOptions) -> ValueLimits:
+    stated = [FAMILY * one for one in options.full_scale if one is not None]
+    whole = len(stated) == len(options.full_scale)
+    return ValueLimits(force=min(STRONGEST, max(stated))) if whole else ValueLimits()
 
 
 def receive_crash(
     options: WatchOptions,
-    source: LineSource,
+    source: LineSource | None,
     clock: RunClock,
     write: Callable[[str], None],
     warn: Callable[[Finding], None],
     every: float = 0.01,
+    journal: Journal | None = None,
 ) -> CrashReception:
     """Detect crashes in lines until they end, an ``end`` command, or a signal.
 
     Parameters
     ----------
+    source : LineSource or None
+        None for what the journal has, and no more.
     write : callable
-        Called with each estimate of an event, as a line of JSON.
+        Called with each estimate of an event, as a line of JSON, that comes of a received line.
     warn : callable
         Called with each finding.
     every : float, s
         Least interval between estimates of an event.
+    journal : Journal, optional
+        Takes what is received before it is used; what it has already is processed first.
     """
-    with closing(source):
-        got = CrashReception(CrashLog(options, every), clock, write, warn)
+    with closing(source) if source is not None else nullcontext():
+        got = CrashReception(CrashLog(options, every), clock, write, warn, journal)
+        if journal is not None:
+            journal.warn = warn
+            got.replay(journal)
+        if source is None:
+            got.finish()
+            return got
         _warm_up(options)
         with until_a_signal() as wanted:
+            got.token = source.token
             warn(Finding("live.listening", severity="note", source=source.name))
             if None in options.full_scale:
                 warn(Finding("live.range-not-stated", quantity="full_scale_g"))
             source.begin()
-            while wanted():
-                try:
-                    line = source.next()
-                except TimeoutError:
-                    continue
-                if line is None or not got.take(line):
+            for line in received_lines(source, wanted):
+                if not got.take(line):
                     break
+    got.finish()
     return got
 
 

@@ -4,7 +4,7 @@
 
     imu,TIME,GX,GY,GZ,AX,AY,AZ        rad/s and m/s², axes of the sensors
     NAME,TIME,COLUMN=VALUE,…          measurement of the aid NAME
-    command,WORD                      next, fine, navigation; end
+    command,WORD[,TOKEN]              next, fine, navigation; end
     TIME,4,GX,GY,GZ,3,AX,AY,AZ,…      as sent by Sensorstream
     accel,TIME,AX,AY,AZ               to detect a crash without gyros
 
@@ -13,12 +13,13 @@ Blanks around commas, empty lines and lines that begin with ``#`` are ignored.
 
 from __future__ import annotations
 
+import hmac
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -36,6 +37,9 @@ from strapdown.rotation import euler_sd
 from strapdown.tables import EULER, GEODETIC, GNSS, TRAJECTORY, VELOCITY
 from strapdown.tables.checks import POSITION_SD, VELOCITY_SD
 
+if TYPE_CHECKING:
+    from strapdown.live.journal import SpooledRows
+
 __all__ = [
     "END",
     "LINE_FORMS",
@@ -45,6 +49,7 @@ __all__ = [
     "Sample",
     "StateLines",
     "Word",
+    "check_token",
     "parse_line",
 ]
 
@@ -57,6 +62,8 @@ _ACCEL, _GYRO = 3, 4
 _FORM, _FORCE_FORM = "imu,TIME,GX,GY,GZ,AX,AY,AZ", "accel,TIME,AX,AY,AZ"
 #: Most characters of a line in a message.
 LONGEST = 40
+#: Largest value of a measurement: a double squares and sums it without harm.
+MEASURABLE = 1e9
 
 
 class BadLineError(Exception):
@@ -97,9 +104,10 @@ class Measured:
 
 @dataclass(frozen=True)
 class Word:
-    """A command."""
+    """A command, with the token of its sender, if it has one."""
 
     word: str
+    token: str = ""
 
 
 def parse_line(
@@ -136,9 +144,9 @@ def parse_line(
         time, *values = (_number(field, FORCE) for field in fields)
         return Sample(time, tuple(values))
     if head == COMMAND:
-        if len(fields) != 1 or not fields[0]:
+        if len(fields) not in (1, 2) or not fields[0]:
             raise BadLineError("command", "live.command-not-one-word", end=END)
-        return Word(fields[0])
+        return Word(*fields)
     if head in aids:
         return _measured(head, fields)
     if head[:1].isdigit() or head[:1] in ("-", "+", "."):
@@ -147,6 +155,12 @@ def parse_line(
     raise BadLineError(
         "word", "live.unknown-line", given=_shown(head), word=head[:LONGEST], known=known
     )
+
+
+def check_token(said: Word, token: str | None) -> None:
+    """Refuse a command without the token of the run; None: it comes from the launching side."""
+    if token is not None and not hmac.compare_digest(said.token.encode(), token.encode()):
+        raise BadLineError("command refused", "live.command-refused", command=_shown(said.word))
 
 
 def _measured(name: str, fields: Sequence[str]) -> Measured:
@@ -159,7 +173,16 @@ def _measured(name: str, fields: Sequence[str]) -> Measured:
             raise BadLineError(name, "live.not-column-value", name=name, given=_shown(field))
         if column.strip() in values:
             raise BadLineError(name, "live.column-repeated", name=name, given=_shown(field))
-        values[column.strip()] = _number(value.strip(), name)
+        number = _number(value.strip(), name)
+        if abs(number) > MEASURABLE:
+            raise BadLineError(
+                f"{name} value",
+                "live.row-beyond-limit",
+                column=column,
+                value=number,
+                most=MEASURABLE,
+            )
+        values[column.strip()] = number
     return Measured(name, _number(fields[0], name), values)
 
 
@@ -214,26 +237,30 @@ class AidRows:
     ----------
     given : AidSpec
         Configuration, whose standard deviations of fixes replace received ones.
+    spool : callable
+        Returns empty rows of so many columns.
     """
 
-    def __init__(self, aid: TabulatedMeasurement, given: AidSpec) -> None:
+    def __init__(
+        self, aid: TabulatedMeasurement, given: AidSpec, spool: Callable[[int], SpooledRows]
+    ) -> None:
         self.aid = aid
         self.of_fixes = set(aid.columns) == set(GNSS)
         self._columns = GNSS if self.of_fixes else list(aid.columns)
         self._position_sd = _three(given.position_sd_m)
         self._velocity_sd = _three(given.velocity_sd_m_per_s)
-        self._time: list[float] = []
-        self._rows: list[list[float]] = []
+        self._rows = spool(1 + len(self._columns))
+        self._newest = -math.inf
 
     @property
     def newest(self) -> float:
         """Stamp of the newest kept row, s."""
-        return self._time[-1] if self._time else -math.inf
+        return self._newest
 
     @property
     def count(self) -> int:
         """Number of kept rows."""
-        return len(self._time)
+        return self._rows.count
 
     def row(self, values: Mapping[str, float]) -> list[float]:
         """Arrange the values of a line in the order of the table.
@@ -279,16 +306,16 @@ class AidRows:
 
     def keep(self, time: float, row: list[float]) -> None:
         """Keep a row that the pipeline has received."""
-        self._time.append(time)
-        self._rows.append(row)
+        self._rows.append([time, *row])
+        self._newest = time
 
     def write(self, path: Path) -> None:
         """Write the rows to a file that reads back to the same numbers."""
-        values = np.array(self._rows)
+        time, values = np.split(self._rows.rows, [1], axis=1)
         units = _UNITS_OF_FIXES
         if not self.of_fixes:
             units = {c: u.replace("/", "_") for c, u in self.aid.column_units().items()}
-        columns = {"time_s": np.array(self._time)}
+        columns = {"time_s": time[:, 0]}
         for k, name in enumerate(self._columns):
             if not np.isnan(values[:, k]).all():
                 columns[f"{name}_{units[name]}" if units[name] else name] = values[:, k]
@@ -335,6 +362,10 @@ class StateLines:
         self._used, self._write, self._form, self._every = navigator, write, form, every
         self._next = -math.inf
         self._mark: CovarianceSnapshot | None = None
+        self._begun = False
+
+    def begin(self) -> None:
+        """Begin the lines of a new reader: with a header, if the form has one."""
         self._begun = False
 
     def take(self, piece: PipelineChunk) -> None:

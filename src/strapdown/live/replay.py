@@ -112,12 +112,21 @@ def _ms(seconds: float) -> float:
     return round(1e3 * seconds, 6)
 
 
+#: Latencies that are kept, of all samples until there are more, then evenly of one in 2, 4, …
+KEPT = 1 << 16
+
+
 class LatencyTape:
-    """Collect the times of delivery and of the state of each sample."""
+    """Collect the times of delivery and of the state of each sample, in bounded memory.
+
+    Quantiles beyond 65 536 samples are of every second, fourth, … sample; all else is of all.
+    """
 
     def __init__(self) -> None:
         self._took = array("d")
-        self._late = array("d")
+        self._each = 1
+        self._count = self._due = self._missed = 0
+        self._sum, self._largest, self._behind = 0.0, -math.inf, -math.inf
 
     def take(self, delivered: float, done: float, deadline: float = math.nan) -> None:
         """Add one sample.
@@ -128,23 +137,31 @@ class LatencyTape:
         deadline : float, s
             Due time of the next sample, by which the state is needed; NaN without due times.
         """
-        self._took.append(done - delivered)
-        self._late.append(done - deadline)
+        took, late = done - delivered, done - deadline
+        if self._count % self._each == 0:
+            self._took.append(took)
+            if len(self._took) == KEPT:
+                self._took, self._each = self._took[::2], 2 * self._each
+        self._count += 1
+        self._sum += took
+        self._largest = max(self._largest, took)
+        if math.isfinite(late):
+            self._due += 1
+            self._missed += late > 0.0
+            self._behind = max(self._behind, late)
 
     def latency(self) -> Latency | None:
         """Return the collected latency; None without samples."""
-        if not self._took:
+        if not self._count:
             return None
-        took, late = np.array(self._took), np.array(self._late)
-        late = late[np.isfinite(late)]
         return Latency(
-            samples=len(took),
-            median=float(np.median(took)),
-            most=float(np.percentile(took, 99.0)),
-            largest=float(took.max()),
-            mean=float(took.mean()),
-            missed=int((late > 0.0).sum()) if late.size else None,
-            behind=max(float(late.max()), 0.0) if late.size else None,
+            samples=self._count,
+            median=float(np.median(self._took)),
+            most=float(np.percentile(self._took, 99.0)),
+            largest=self._largest,
+            mean=self._sum / self._count,
+            missed=self._missed if self._due else None,
+            behind=max(self._behind, 0.0) if self._due else None,
         )
 
 

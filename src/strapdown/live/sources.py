@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import queue
+import re
+import secrets
 import socket
 import threading
 from collections.abc import Callable
@@ -18,8 +20,8 @@ __all__ = ["LineSource", "ReceivedLine", "open_source"]
 
 #: Most waiting lines; beyond them a pipe blocks, and the system drops datagrams.
 WAITING = 20_000
-#: Longest line, bytes; a longer one is split there, and both parts are unusable.
-LONGEST = 4096
+#: Longest line, bytes; of a longer one the begin is kept, marked so that no parser accepts it.
+LONGEST, BEGIN, MARK = 4096, 64, b"\0"
 #: Interval at which a thread checks whether to stop, s.
 LOOK = 0.2
 _LOCAL = "127.0.0.1"
@@ -53,6 +55,8 @@ class LineSource:
         Returns bytes; empty at the end; raises `TimeoutError` if no data arrived.
     whole : bool
         Whether each read ends with a complete line.
+    token : str, optional
+        That commands need, if others than the launching side can send lines.
     """
 
     def __init__(
@@ -62,8 +66,9 @@ class LineSource:
         clock: RunClock,
         close: Callable[[], None],
         whole: bool = True,
+        token: str | None = None,
     ) -> None:
-        self.name = name
+        self.name, self.token = name, token
         self._read, self._clock, self._close = read, clock, close
         self._queue: queue.Queue[ReceivedLine | None] = queue.Queue(WAITING)
         self._wanted, self._whole = True, whole
@@ -87,7 +92,7 @@ class LineSource:
         self._close()
 
     def _run(self) -> None:
-        rest = b""
+        rest, cut = b"", False
         while self._wanted:
             try:
                 data = self._read()
@@ -98,7 +103,14 @@ class LineSource:
             if not data:
                 break
             lines = (rest + data).split(b"\n")
-            rest = b"" if self._whole or len(lines[-1]) > LONGEST else lines.pop()
+            if cut:  # the rest of a line whose begin was taken
+                lines[0] = b""
+            cut, rest = cut and len(lines) == 1, b""
+            if not self._whole:
+                rest = lines.pop()
+                if len(rest) > LONGEST and not cut:
+                    lines.append(rest)
+                    rest, cut = b"", True
             self._put_all(lines)
         self._put_all([rest])
         self._put(None)
@@ -108,6 +120,8 @@ class LineSource:
         for line in lines:
             if line:
                 self._count += 1
+                if len(line) > LONGEST:
+                    line = MARK + line[:BEGIN]
                 self._put(ReceivedLine(self._count, line.decode("utf-8", "replace"), arrived))
 
     def _put(self, line: ReceivedLine | None) -> None:
@@ -119,7 +133,9 @@ class LineSource:
         return None
 
 
-def open_source(where: str, clock: RunClock, stdin: IO[bytes]) -> LineSource:
+def open_source(
+    where: str, clock: RunClock, stdin: IO[bytes], token: str | None = None
+) -> LineSource:
     """Open a source by its name.
 
     Parameters
@@ -128,8 +144,14 @@ def open_source(where: str, clock: RunClock, stdin: IO[bytes]) -> LineSource:
         ``-`` for standard input, or ``udp://HOST:PORT``; without a host, for this machine only.
         Port 0 selects a free one.
     stdin : file
+    token : str, optional
+        That commands in datagrams need; drawn, if not given. Standard input needs none.
     """
+    if token is not None and not re.fullmatch(r"[\w.~+/=-]{8,128}", token, re.ASCII):
+        raise ConfigError("live.bad-token", quantity="--token")
     if where == "-":
+        if token is not None:
+            raise ConfigError("live.only-with", option="--token", beside="--live udp://HOST:PORT")
         # A thread in a buffered read holds its lock to the end of the process.
         file = stdin.fileno()
         return LineSource("stdin", lambda: os.read(file, 65_536), clock, lambda: None, whole=False)
@@ -143,7 +165,13 @@ def open_source(where: str, clock: RunClock, stdin: IO[bytes]) -> LineSource:
     bound = _bound(host, port)
     bound.settimeout(LOOK)
     name = f"udp://{host}:{bound.getsockname()[1]}"
-    return LineSource(name, lambda: bound.recv(65_536) or b"\n", clock, bound.close)
+    return LineSource(
+        name,
+        lambda: bound.recv(65_536) or b"\n",
+        clock,
+        bound.close,
+        token=token or secrets.token_urlsafe(12),
+    )
 
 
 def _bound(host: str, port: int) -> socket.socket:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from strapdown.bundle import Seal, input_files, write_bundle, write_json
 from strapdown.crash.watch import CrashLog, WatchOptions
@@ -20,12 +21,12 @@ COMMAND = "crash --live"
 RECEIVED, DETECTIONS = "received.csv", "detections.json"
 _RATES = ("gyro_x_rad_s", "gyro_y_rad_s", "gyro_z_rad_s")
 _FORCES = ("accel_x_m_s2", "accel_y_m_s2", "accel_z_m_s2")
+Array = NDArray[np.float64]
 Rows = Sequence[Sequence[float]]
 
 
-def write_received(path: Path, rows: Rows) -> None:
+def write_received(path: Path, table: Array) -> None:
     """Write every sample that came, refused stamps included: stamp, rates if any, forces."""
-    table = np.array(rows)
     names = ("time_s", *(_RATES if table.shape[1] > 4 else ()), *_FORCES)
     csv.write(path, {name: table[:, k] for k, name in enumerate(names)}, {})
 
@@ -55,8 +56,8 @@ def write_crash_live(
     `record`: as `write_received` writes it. `log`: the detections if they are known; by default
     they are computed from the record, to the same bits.
     """
+    rows = np.loadtxt(record, delimiter=",", skiprows=1, ndmin=2)
     if log is None:
-        rows = np.loadtxt(record, delimiter=",", skiprows=1, ndmin=2)
         log = watch_rows(options, rows.tolist(), every)
     configuration: dict[str, Any] = {
         "log": {"path": str(record)},
@@ -73,10 +74,10 @@ def write_crash_live(
         seals=seals,
     ) as folder:
         write_json(folder / DETECTIONS, {**log.summary(), "estimates": log.lines})
-        for number, rows_of_clock in enumerate(log.records, start=1):
+        for number, table in enumerate(log.records(rows), start=1):
             name = "record.csv" if number == 1 else f"record-{number}.csv"
-            if rows_of_clock:
-                _write_record(folder / name, np.array(rows_of_clock))
+            if len(table):
+                _write_record(folder / name, table)
     return seals[0]
 
 
@@ -90,11 +91,17 @@ def _write_record(path: Path, table: Any) -> None:
     csv.write(path, columns, {})
 
 
-def rerun(configuration: dict[str, Any], out: Path) -> Seal:
-    """Repeat a live detection from its bundle."""
+def recorder_of(configuration: Mapping[str, Any]) -> WatchOptions:
+    """Return the recorder of a detection from its plain data."""
     recorder: dict[str, Any] = {
         key: tuple(value) if isinstance(value, list) else value
         for key, value in configuration["recorder"].items()
     }
+    return WatchOptions(**recorder)
+
+
+def rerun(configuration: dict[str, Any], out: Path) -> Seal:
+    """Repeat a live detection from its bundle."""
     record = Path(configuration["log"]["path"])
-    return write_crash_live(WatchOptions(**recorder), record, out, every=configuration["every_s"])
+    every = configuration["every_s"]
+    return write_crash_live(recorder_of(configuration), record, out, every=every)

@@ -269,8 +269,8 @@ def test_of_a_record_the_same_with_lines(tmp_path):
 
 def test_datagrams_to_a_commanded_end_are_the_batch_run():
     clock = MachineClock()
-    source = open_source("udp://127.0.0.1:0", clock, None)
-    texts = [*lines(), "command,end"]
+    source = open_source("udp://127.0.0.1:0", clock, None, "word-of-this-run")
+    texts = [*lines(), "command,end", "command,end,another-word", "command,end,word-of-this-run"]
 
     def send(note):
         if note.code != "live.listening":
@@ -283,5 +283,6 @@ def test_datagrams_to_a_commanded_end_are_the_batch_run():
 
     live = receive(NavigationSpec.checked(table()), source, clock, lambda text: None, send)
     assert live.got.lines == len(texts)
+    assert live.got.unused == {"command refused": 2}
     assert_same(live.run, at_once(live.spec))
     assert live.latency.samples <= len(drive())

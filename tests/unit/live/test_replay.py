@@ -9,7 +9,7 @@ import pytest
 from tests.contracts.test_chain_cuts import assert_same, drive, driving, navigation, tables
 
 from strapdown.errors import ConfigError
-from strapdown.live.replay import LatencyTape, Replay, parse_pace
+from strapdown.live.replay import KEPT, LatencyTape, Replay, parse_pace
 from strapdown.navigation.recorder import FullRecorder
 from strapdown.navigation.replay import run_batch
 
@@ -95,6 +95,22 @@ def test_quantiles():
     np.testing.assert_allclose([found.median, found.most, found.largest], [0.05, 0.099, 0.1])
     assert found.missed == 5  # 96 to 100 ms
     np.testing.assert_allclose(found.behind, 0.0045)
+
+
+def test_of_many_samples_a_part_is_kept_that_has_their_quantiles():
+    tape, draw = LatencyTape(), np.random.default_rng(1)
+    took = draw.exponential(1e-3, 300_000)
+    for value in took.tolist():
+        tape.take(0.0, value, 0.005)
+    assert len(tape._took) <= KEPT
+    found = tape.latency()
+    assert (found.samples, found.missed) == (len(took), (took > 0.005).sum())
+    assert (found.largest, found.behind) == (took.max(), took.max() - 0.005)
+    assert found.mean == pytest.approx(took.mean(), rel=1e-12)
+    # A quantile of 37 500 draws: its own standard deviation is 0.5 % and 1.1 %; four of them.
+    assert len(tape._took) == 37_500
+    assert found.median == pytest.approx(np.median(took), rel=0.03)
+    assert found.most == pytest.approx(np.percentile(took, 99.0), rel=0.05)
 
 
 @pytest.mark.parametrize("text", ["0", "-1", "nan", "inf", "fast", ""])

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 import socket
+from pathlib import Path
 from urllib.parse import urlsplit
 
 import pytest
 from tests.coded import coded
 
 from strapdown.errors import ConfigError
+from strapdown.live.lines import BadLineError, parse_line
 from strapdown.live.replay import MachineClock
 from strapdown.live.sources import LineSource, open_source
 
@@ -79,3 +81,39 @@ def test_a_port_that_is_taken():
     with pytest.raises(ConfigError, check=coded("live.cannot-listen")):
         open_source(one.name, MachineClock(), None)
     one.close()
+
+
+def test_a_line_without_end_is_one_line_that_no_parser_accepts():
+    """Whatever its length, little of it is kept, and the line after it is whole."""
+    long = b"imu,1,2,3,4,5,6,7" + b" " * 200_000
+    parts = [long[k : k + 65_536] for k in range(0, len(long), 65_536)]
+    data = iter([b"a\n", *parts, b" 8\nb\n", b"#" * 5000 + b"\nc", b""])
+    source = LineSource("test", lambda: next(data), MachineClock(), lambda: None, whole=False)
+    found = texts(source)
+    assert [text for _, text in found if len(text) < 5] == ["a", "b", "c"]
+    others = [text for _, text in found if len(text) > 5]
+    assert len(others) == 2
+    for text in others:
+        assert len(text) < 100
+        with pytest.raises(BadLineError):
+            parse_line(text, ())
+    whole = LineSource("test", iter([long, b""]).__next__, MachineClock(), lambda: None)
+    assert [len(text) < 100 for _, text in texts(whole)] == [True]
+
+
+def test_only_others_need_a_token_and_it_is_drawn():
+    sources = [open_source("udp://127.0.0.1:0", MachineClock(), None) for _ in range(2)]
+    tokens = {source.token for source in sources}
+    assert len(tokens) == 2
+    assert min(map(len, tokens)) >= 16
+    own = open_source("udp://127.0.0.1:0", MachineClock(), None, "word-of-mine")
+    assert own.token == "word-of-mine"
+    for source in (*sources, own):
+        source.close()
+    with Path(os.devnull).open("rb") as stdin:
+        assert open_source("-", MachineClock(), stdin).token is None
+        with pytest.raises(ConfigError, check=coded("live.only-with")):
+            open_source("-", MachineClock(), stdin, "word-of-mine")
+    for bad in ("", "short", "two words", "with,comma", "x" * 129, "näv-näv-näv"):
+        with pytest.raises(ConfigError, check=coded("live.bad-token")):
+            open_source("udp://127.0.0.1:0", MachineClock(), None, bad)

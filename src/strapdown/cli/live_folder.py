@@ -1,0 +1,108 @@
+"""What a live run received: its journal from the first line to the sealed result, and recovery."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import typer
+
+from strapdown import __version__
+from strapdown.bundle import named_paths, read_manifest, sha256, source_digest
+from strapdown.cli.console import WORDS
+from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
+from strapdown.live.journal import Journal, received_folder
+from strapdown.live.sources import LineSource
+
+__all__ = ["begin_journal", "note_token", "recovered", "remove_received", "sealing", "warner"]
+
+
+def begin_journal(folder: Path, command: str, run: Mapping[str, Any]) -> Journal:
+    """Start the journal of a run beside its output.
+
+    `folder`: the output. `run`: what is needed to repeat it, its ``configuration`` among it.
+    """
+    named = sorted(set(named_paths(run["configuration"])))
+    return Journal.begin(
+        received_folder(folder),
+        {
+            "command": command,
+            "out": folder.name,
+            "strapdown": __version__,
+            "source": source_digest(),
+            "named": {name: sha256(Path(name)) for name in named},
+            **run,
+        },
+    )
+
+
+def recovered(folder: Path, command: str, warn: Callable[[Finding], None]) -> Journal:
+    """Open the journal of a killed run, and check that what it depends on is unchanged.
+
+    ConfigError, DataError: as `Journal.reopen`; or a file that the configuration names has changed.
+    """
+    journal = Journal.reopen(folder, command)
+    try:
+        for name, digest in journal.run["named"].items():
+            file = Path(name)
+            if not file.is_file() or sha256(file) != digest:
+                raise DataError("live.named-file-changed", file=name, quantity="--recover")
+    except BaseException:
+        journal.close()
+        raise
+    if journal.run["source"] != source_digest():
+        warn(Finding("live.other-program", version=journal.run["strapdown"]))
+    warn(Finding("live.recovering", severity="note", file=str(folder)))
+    return journal
+
+
+@contextmanager
+def sealing(journal: Journal) -> Iterator[None]:
+    """Keep the journal if the run has no result, and say where; it is closed in any case."""
+    try:
+        yield
+    except BaseException as error:
+        journal.close()
+        if not journal.empty:
+            own = journal.run["command"].split()[0]
+            typer.echo(f"received data: {journal.folder}", err=True)
+            if not isinstance(error, StrapdownError):
+                typer.echo(f"to finish: strapdown {own} --recover {journal.folder}", err=True)
+        else:
+            journal.remove()
+        raise
+
+
+def remove_received(journal: Journal, bundle: Path) -> None:
+    """Remove what was received, unless the bundle refers to it; then the journal alone."""
+    journal.close()
+    if all(item["kept"] == "copy" for item in read_manifest(bundle)["inputs"]):
+        shutil.rmtree(journal.folder)
+    else:
+        journal.remove()
+
+
+def note_token(source: LineSource, token: str | None, warn: Callable[[Finding], None]) -> None:
+    """Tell the token that was drawn for commands over the network."""
+    if source.token is not None and token is None:
+        warn(Finding("live.command-token", severity="note", token=source.token))
+
+
+def refuse_beside_recover(given: Mapping[str, Any]) -> None:
+    """Refuse options and arguments that a journal states; `given`: by name, None if not given."""
+    for name, value in given.items():
+        if value is not None:
+            raise ConfigError("live.not-beside-recover", quantity="--recover", option=name)
+
+
+def warner(quiet: bool) -> Callable[[Finding], None]:
+    """Return a function that writes a finding to standard error."""
+
+    def warn(finding: Finding) -> None:
+        if not quiet:
+            typer.echo(f"note: {finding.text(WORDS.get())}", err=True)
+
+    return warn
