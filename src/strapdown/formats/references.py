@@ -74,8 +74,8 @@ def _understood(numbered: list[tuple[int, str]], path: Path, what: str) -> list[
 
 def _from_toml(path: Path) -> list[str]:
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except (ValueError, RecursionError) as error:  # an integer of 4,301 digits is a ValueError
         raise DataError("io.toml-malformed", file=path.name, error=error) from None
     words = content.get("references")
     if not isinstance(words, list) or not all(isinstance(w, str) for w in words):
