@@ -445,11 +445,10 @@ def spread_bursts(stamps: NDArray[Any]) -> SpreadBursts | None:
 
 # Range of steps of inertial sensors.
 PLAUSIBLE_STEP = (1e-5, 0.25)  # s
-#: No recording pauses for longer in all and goes on: a stamp is corrupt, or the clock was set. A
-#: grid over a log is therefore not much longer than the log, whatever its stamps are.
-LONGEST_PAUSE = 30.0 * 86400.0  # s
-#: Shortest pause that counts, and in steps of the log, so that a wrong unit is none.
-PAUSE, PAUSE_STEPS = 3600.0, 1000.0  # s
+#: A longer step of a log, also by so many of its least steps, is a corrupt stamp or a clock that was
+#: set; more of these, or more time, are not of a clock that was set.
+LONGEST_PAUSE, PAUSE_STEPS = 30.0 * 86400.0, 1000.0  # s
+MOST_PAUSES, LONGEST_LOG = 3, 100.0 * 365.25 * 86400.0  # s
 #: Most successive rows whose stamps are taken for corrupt.
 WILD_RUN = 3
 # Later stamps are counted from the first: a double resolves a clock of 1970 to only 0.2 µs.
@@ -635,20 +634,18 @@ def _without_pauses(
     time = seconds[rows]
     steps = np.diff(time)
     least = float(steps.min()) if steps.size > 1 else 0.0
-    ends = np.flatnonzero(steps > max(PAUSE, PAUSE_STEPS * least))
-    total = float(steps[ends].sum())
-    # The samples of years, an hour each day, are no pause.
-    if not total > max(LONGEST_PAUSE, float(time.size)):
-        return keep
-    k = int(ends[steps[ends].argmax()])
+    ends = np.flatnonzero(steps > max(LONGEST_PAUSE, PAUSE_STEPS * least))
+    alone = np.minimum(ends + 1, time.size - ends - 1) <= WILD_RUN
+    if not (alone.any() or ends.size > MOST_PAUSES or steps[ends].sum() > LONGEST_LOG):
+        return keep  # a clock that was set
+    k = int(ends[alone][0] if alone.any() else ends[steps[ends].argmax()])
     said = Finding(
         "io.pause-impossible",
         file=file,
         row=row(int(rows[k + 1])),
         quantity="time",
         pause_days=float(steps[k]) / 86400.0,
-        total_days=total / 86400.0,
-        longest_days=LONGEST_PAUSE / 86400.0,
+        pauses=ends.size,
         count=int(min(k + 1, time.size - k - 1)),
     )
     if not repair:
