@@ -281,11 +281,9 @@ def _options(
 
 def _arrays(table: Any) -> Columns:
     """Convert column by column, so that at most one is in memory twice."""
-    columns = []
-    for _ in range(table.num_columns):
-        columns.append(_array(table.column(0)))
-        table = table.remove_column(0)
-    return columns
+    held = table.columns[::-1]
+    del table
+    return [_array(held.pop()) for _ in range(len(held))]
 
 
 def _array(column: Any) -> NDArray[Any]:
