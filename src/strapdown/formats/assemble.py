@@ -264,6 +264,7 @@ def _likely_clock(raw: RawLog, found: dict[str, Column]) -> str:
 REPAIRABLE = {
     "io.not-finite-in-rows",
     "io.pause-impossible",
+    "io.stamp-impossible",
     "io.stamp-repeated",
     "io.time-goes-back",
     "io.time-counter-wraps",

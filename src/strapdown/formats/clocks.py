@@ -449,6 +449,8 @@ PLAUSIBLE_STEP = (1e-5, 0.25)  # s
 #: set; more of these, or more time, are not of a clock that was set.
 LONGEST_PAUSE, PAUSE_STEPS = 30.0 * 86400.0, 1000.0  # s
 MOST_PAUSES, LONGEST_LOG = 3, 100.0 * 365.25 * 86400.0  # s
+#: Largest stamp of a clock; nanoseconds since 1970 are 2e18.
+MOST_STAMP = 1e20
 #: Most successive rows whose stamps are taken for corrupt.
 WILD_RUN = 3
 # Later stamps are counted from the first: a double resolves a clock of 1970 to only 0.2 µs.
@@ -515,6 +517,11 @@ def read_stamps(
             only_seconds=only_seconds,
         )
         return _with_wild(rest, wild, stamps, file, row)
+    if stamps.size and not np.abs(stamps[[stamps.argmin(), stamps.argmax()]]).max() <= MOST_STAMP:
+        k = int((np.abs(stamps) > MOST_STAMP).argmax())
+        raise DataError(
+            "io.stamp-impossible", file=file, row=row(k), quantity="time", stamp=stamps[k], count=1
+        )
     if unit in (None, "s"):
         whole, weeks = unrolled(stamps.astype(np.float64, copy=False))
         if weeks:
@@ -572,7 +579,9 @@ def _wild(stamps: NDArray[Any]) -> NDArray[np.bool_]:
 
     Rows that are swapped or repeated, a counter that wraps and a clock that is set back are not.
     """
-    wild = np.zeros(stamps.size, dtype=bool)
+    wild = np.abs(stamps.astype(np.float64)) > MOST_STAMP
+    if wild.any():
+        return wild  # the others are judged without these
     steps = np.diff(stamps).astype(np.float64)
     back = np.flatnonzero(steps < 0)
     usual = usual_step(steps) if back.size else 0.0

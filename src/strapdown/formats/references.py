@@ -85,6 +85,9 @@ def _from_toml(path: Path) -> list[str]:
 
 def _from_csv(path: Path) -> list[str]:
     raw = csv.read(path)
+    if "kind" not in raw.columns:
+        # A name over rows that hold no fields for it.
+        raise DataError("io.no-column-4", file=path.name, missing="kind", columns=[*raw.columns])
     words = []
     for sample in range(len(raw.columns["kind"])):
         row = {name: column[sample] for name, column in raw.columns.items()}
