@@ -349,7 +349,7 @@ class _Sentence(string.Formatter):
 _ODD = re.compile("[^ -~\u00a0\u1680\u2000-\u200a\u202f\u205f\u3000]")
 
 
-def printable(text: str, *, lines: bool = False) -> str:
+def printable(text: str, *, lines: bool = False, json: bool = False) -> str:
     r"""Return a text in which nothing steers a terminal or a page, or hides.
 
     Parameters
@@ -358,6 +358,8 @@ def printable(text: str, *, lines: bool = False) -> str:
         From a file, the name of a file, or a user.
     lines : bool
         Whether line ends and tabs are kept.
+    json : bool
+        Whether the text is JSON, whose strings are to keep their values.
 
     Returns
     -------
@@ -365,15 +367,18 @@ def printable(text: str, *, lines: bool = False) -> str:
         With ``\x1b``, ``\n`` or ``\u202e`` for such characters, and ``\xff`` for a byte of a file name
         that is no text.
     """
-    return text if text.isascii() and text.isprintable() else _ODD.sub(_escape(lines), text)
+    return text if text.isascii() and text.isprintable() else _ODD.sub(_escape(lines, json), text)
 
 
 @cache
-def _escape(lines: bool) -> Callable[[re.Match[str]], str]:
+def _escape(lines: bool, json: bool) -> Callable[[re.Match[str]], str]:
     def escaped(found: re.Match[str]) -> str:
         char = found[0]
         if char.isprintable() or (lines and char in "\n\t"):
             return char
+        if json:
+            units = char.encode("utf-16-be", "surrogatepass").hex()
+            return "".join(f"\\u{units[k : k + 4]}" for k in range(0, len(units), 4))
         if "\udc80" <= char <= "\udcff":
             return f"\\x{ord(char) - 0xDC00:02x}"
         return char.encode("unicode_escape").decode()

@@ -1,7 +1,7 @@
 """Fuzz our own parsers: ``python tests/fuzz --minutes 1 --seed 0``.
 
-With atheris (extra ``fuzz``) inputs are led by the branches that they reach; without it a seeded
-mutator makes them, and the same seed makes the same ones. They run in a process of their own, of
+With atheris (extra ``fuzz``) half of the time inputs are led by the branches that they reach. In the
+other half, and without it, a seeded mutator makes them: the same seed makes the same ones. They run in a process of their own, of
 which an input may take 30 s and 2 GB. Every new failure is kept in ``tests/fuzz/corpus`` as a
 reproducer, which `test_corpus.py` replays.
 """
@@ -170,14 +170,21 @@ class Session:
         def change(data: bytes, size: int, seed: int) -> bytes:
             if len(data) < 3 or seed % 4 == 0:
                 return bytes(atheris.Mutate(data, size))
+            if seed % 4 == 1:
+                # Slow targets have the most branches, and would take nearly all inputs.
+                data = chances.choice(firsts[chances.choice(list(firsts))])
             made = mutated(data[2:], random.Random(seed), others[chosen(data)[0]])
             return (data[:2] + made)[:size]
 
+        firsts = {
+            name: [files.index((name, file)).to_bytes(2, "big") + data for file, data in seeds]
+            for name, seeds in self.seeds.items()
+        }
+        chances = random.Random(seed)
         with tempfile.TemporaryDirectory() as corpus:
-            for name, seeds in self.seeds.items():
-                for k, (file, data) in enumerate(seeds):
-                    first = files.index((name, file)).to_bytes(2, "big")
-                    Path(corpus, f"{name}{k}").write_bytes(first + data)
+            for name, seeds in firsts.items():
+                for k, data in enumerate(seeds):
+                    Path(corpus, f"{name}{k}").write_bytes(data)
             flags = [f"-max_total_time={max(1, int(seconds))}", f"-seed={seed + 1}"]
             flags += ["-max_len=65536", "-timeout=0", "-rss_limit_mb=0"]
             atheris.Setup([sys.argv[0], *flags, corpus], one, custom_mutator=change)
@@ -216,24 +223,35 @@ def main() -> int:
         return 0
     led = not options.mutator and importlib.util.find_spec("atheris") is not None
     if not led and not options.mutator:
-        print("atheris is not installed (extra fuzz): the seeded mutator makes the inputs")
+        print("atheris is not installed (extra fuzz): the seeded mutator makes all inputs")
+    minutes = options.minutes / 2 if led else options.minutes
+    words = [*sys.argv[1:], "--minutes", str(minutes)]
+    runs = [_run([*words, "--led"]), _run(words)] if led else [_run(words)]
+    bad = any(code for code, _ in runs)
+    total = dict.fromkeys(COUNTED, 0)
+    print("".join([f"{'target':12}", *(f"{key:>10}" for key in COUNTED)]))
+    for name in names:
+        counts = {key: sum(of.get(name, {}).get(key, 0) for _, of in runs) for key in COUNTED}
+        total = {key: total[key] + counts[key] for key in COUNTED}
+        print(f"{name:12}" + "".join(f"{counts[key]:10d}" for key in COUNTED))
+    print(f"{'all':12}" + "".join(f"{total[key]:10d}" for key in COUNTED))
+    if led:
+        print(f"of these led by coverage: {sum(of['inputs'] for of in runs[0][1].values())}")
+    return int(bad or bool(total["failures"]) or not total["inputs"])
+
+
+def _run(words: Sequence[str]) -> tuple[int, dict[str, dict[str, int]]]:
+    """Give inputs in a process of its own; return its exit code, and the counts of each target."""
     with tempfile.TemporaryDirectory() as folder, tempfile.TemporaryFile() as said:
         file = Path(folder, "counts.json")
-        words = [sys.executable, str(Path(__file__).parent), *sys.argv[1:], "--counts", str(file)]
+        words = [sys.executable, str(Path(__file__).parent), *words, "--counts", str(file)]
         # What libFuzzer says of its progress is of use only if it ends early.
-        done = subprocess.run([*words, *(["--led"] if led else [])], stderr=said, check=False)
-        said.seek(0)
-        if done.returncode:
+        code = subprocess.run(words, stderr=said, check=False).returncode
+        if code:
+            said.seek(0)
             print(said.read()[-4000:].decode(errors="replace"), file=sys.stderr)
-            print(f"the process ended with {done.returncode}", file=sys.stderr)
-        counts = json.loads(file.read_text()) if file.is_file() else {}
-    total = {key: sum(of[key] for of in counts.values()) for key in COUNTED}
-    how = "led by coverage (atheris)" if led else f"of the mutator, seed {options.seed}"
-    print("".join([f"{'target':12}", *(f"{key:>10}" for key in COUNTED)]))
-    for name, of in [*counts.items(), ("all", total)]:
-        print(f"{name:12}" + "".join(f"{of[key]:10d}" for key in COUNTED))
-    print(f"inputs {how}")
-    return int(bool(done.returncode or total["failures"] or not total["inputs"]))
+            print(f"the process ended with {code}", file=sys.stderr)
+        return code, json.loads(file.read_text()) if file.is_file() else {}
 
 
 if __name__ == "__main__":
