@@ -8,13 +8,14 @@ PYTEST = PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest
 # A cache of compiled kernels for one run; otherwise its folder is named after their sources.
 FRESH = cache=$$(mktemp -d); trap 'rm -rf "$$cache"' EXIT; NUMBA_CACHE_DIR="$$cache"
 
-.PHONY: demo test test-slow test-bounds examples papers record mutation check format bench docs audit codes strangers pictures clean
+.PHONY: demo test fuzz test-slow test-bounds examples papers record mutation check format bench docs audit codes strangers pictures clean
 .DEFAULT_GOAL := help
 
 help:
 	@echo "make demo       install into $(VENV) and run strapdown on built-in data"
 	@echo "make test       install into $(VENV) and run the tests"
 	@echo "make test-slow  the tests that take more than 4 s each"
+	@echo "make fuzz       mutated files through our own parsers, led by coverage; MINUTES=n SEED=k"
 	@echo "make examples   the longer examples of the manual: each prints what its page shows"
 	@echo "make record     version 0.1 and this tree on the same runs, compared to the last bit"
 	@echo "make papers     the tests of the reproduced papers, and the three of them into papers-reproduced"
@@ -38,6 +39,11 @@ $(VENV)/.dev: pyproject.toml constraints.txt | $(VENV)/bin/python
 	$(PIP) -e '.[dev]'
 	@touch $@ $(VENV)/.test $(VENV)/.run
 
+# Where atheris has no wheel, the seeded mutator of tests/fuzz makes the inputs, and says so.
+$(VENV)/.fuzz: $(VENV)/.test
+	-$(PIP) -e '.[fuzz]'
+	@touch $@
+
 demo: $(VENV)/.run
 	$(BIN)/strapdown demo --out demo --force
 
@@ -46,6 +52,11 @@ test: $(VENV)/.test
 
 test-slow: $(VENV)/.test
 	$(PYTEST) -n 2 --dist worksteal -m slow tests papers
+
+MINUTES ?= 1
+SEED ?= 0
+fuzz: $(VENV)/.fuzz
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/fuzz --minutes $(MINUTES) --seed $(SEED)
 
 examples: $(VENV)/.test
 	$(PYTEST) -n 2 --dist worksteal -m slow tests/cli/test_manual.py

@@ -15,14 +15,17 @@ Templates are those of `str.format`, and besides:
 * a finding among the data gives its sentence, and ``{reason.remedy}`` its remedy;
 * ``{faults:lines}`` lists findings of one file, each on a line of its own with its location, its
   sentence and, below it, its remedy;
+* what is not printable in a text of the data, as an escape sequence, a line break or a mark of
+  direction, is shown as ``\\x1b``, ``\\n``, ``\\u202e`` (`printable`): names and values are from files;
 * ``{nearest}`` suggests the known word (data `known`, `also`) that is nearest to the data `word`.
 """
 
 from __future__ import annotations
 
 import difflib
+import re
 import string
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from copy import copy
 from functools import cache
 from importlib import resources
@@ -39,6 +42,7 @@ __all__ = [
     "Words",
     "check_choice",
     "nearest",
+    "printable",
 ]
 
 #: A note informs, a warning speaks against a result, an error ended the work.
@@ -128,7 +132,7 @@ class Finding:
         """Return what was found, with the numbers that show it."""
         text = _text(self, "what", words)
         shown = self.data.get("shown")
-        return text if shown is None else f"{shown}: {text}"
+        return text if shown is None else f"{printable(str(shown))}: {text}"
 
     def advice(self, words: Words = "python") -> str | None:
         """Return what the user can do about it."""
@@ -146,7 +150,7 @@ class Finding:
 
     def text(self, words: Words = "python") -> str:
         """Return where it is, the sentence, and the remedy on a line of its own."""
-        where = ", ".join([*([self.file] if self.file else []), *self._in_file()])
+        where = ", ".join([*([printable(self.file)] if self.file else []), *self._in_file()])
         remedy = self.advice(words)
         text = ": ".join(part for part in (where, self.sentence(words)) if part)
         return f"{text}\n  Remedy: {remedy}" if remedy else text
@@ -160,7 +164,7 @@ class Finding:
     def _in_file(self) -> list[str]:
         where = [f"row {self.row}"] if self.row is not None else []
         where += [f"line {self.line}"] if self.line is not None else []
-        return [*where, self.quantity] if self.quantity else where
+        return [*where, printable(self.quantity)] if self.quantity else where
 
     def plain(self) -> dict[str, Any]:
         """Return it as data for JSON: code, severity, location, data, without a sentence."""
@@ -338,7 +342,48 @@ class _Sentence(string.Formatter):
             if spec in self._JOINTS:
                 return self._JOINTS[spec].join(self.format_field(one, "") for one in value)
             return ", ".join(self.format_field(one, spec) for one in value)
-        return str(format(value, spec))
+        return printable(str(format(value, spec)))
+
+
+# Characters that are not printable as `str.isprintable` says, but for the blanks of all scripts.
+_ODD = re.compile("[^ -~\u00a0\u1680\u2000-\u200a\u202f\u205f\u3000]")
+
+
+def printable(text: str, *, lines: bool = False, json: bool = False) -> str:
+    r"""Return a text in which nothing steers a terminal or a page, or hides.
+
+    Parameters
+    ----------
+    text : str
+        From a file, the name of a file, or a user.
+    lines : bool
+        Whether line ends and tabs are kept.
+    json : bool
+        Whether the text is JSON, whose strings are to keep their values.
+
+    Returns
+    -------
+    str
+        With ``\x1b``, ``\n`` or ``\u202e`` for such characters, and ``\xff`` for a byte of a file name
+        that is no text.
+    """
+    return text if text.isascii() and text.isprintable() else _ODD.sub(_escape(lines, json), text)
+
+
+@cache
+def _escape(lines: bool, json: bool) -> Callable[[re.Match[str]], str]:
+    def escaped(found: re.Match[str]) -> str:
+        char = found[0]
+        if char.isprintable() or (lines and char in "\n\t"):
+            return char
+        if json:
+            units = char.encode("utf-16-be", "surrogatepass").hex()
+            return "".join(f"\\u{units[k : k + 4]}" for k in range(0, len(units), 4))
+        if "\udc80" <= char <= "\udcff":
+            return f"\\x{ord(char) - 0xDC00:02x}"
+        return char.encode("unicode_escape").decode()
+
+    return escaped
 
 
 def _plain(value: Any) -> Any:

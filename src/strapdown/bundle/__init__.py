@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from strapdown.bundle import atomic_folder
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding, printable
 
 MANIFEST = "manifest.json"
 TIMING = "timing.json"
@@ -152,8 +152,8 @@ def write_latency(seal: Seal, latency: Mapping[str, Any]) -> None:
 def to_json(content: Any) -> str:
     """Format JSON for bundles: readable, in the given order, reproducible byte by byte."""
     text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-    # Names of files need not be valid text; invalid parts become question marks.
-    return text.encode("utf-8", "replace").decode("utf-8")
+    # Names of files need not be valid text, and marks of direction would change how it looks.
+    return printable(text, lines=True, json=True)
 
 
 def write_json(path: Path, content: Any) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json as json_module
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -207,7 +206,7 @@ def attitude(
     from strapdown.api.attitude import compare_attitude
     from strapdown.attitude_algorithms import make_algorithm
     from strapdown.attitude_algorithms.cost import time_algorithms
-    from strapdown.bundle import write_timing
+    from strapdown.bundle import to_json, write_timing
     from strapdown.cli.console import Stopwatch, console, print_findings, print_seal, progress
     from strapdown.cli.result_folder import claim, default_folder, refuse_result
     from strapdown.errors import ConfigError
@@ -255,7 +254,7 @@ def attitude(
         }
         write_timing(seal, report.seconds, of_sample)
     if write.json:
-        typer.echo(json_module.dumps(attitude_json(bench), indent=2, ensure_ascii=False))
+        typer.echo(to_json(attitude_json(bench)), nl=False)
         return
     if write.quiet:
         return

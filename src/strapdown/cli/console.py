@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.text import Text
 
     from strapdown.bundle import Seal
     from strapdown.errors import Finding, Words
@@ -31,11 +32,17 @@ _NAME_WIDTH, _MANY_COLUMNS = 24, 6
 
 
 def console(*, err: bool = False) -> Console:
-    """Return a console that ignores markup in external text."""
+    """Return a console that ignores markup and control characters in external text."""
     from rich.console import Console
+
+    from strapdown.errors import printable
 
     class QuietlyPiped(Console):
         """Exit with success when the reader has closed the pipe, as with ``| head``."""
+
+        def render_str(self, text: str, **options: Any) -> Text:
+            # Everything that is printed passes here, cells of tables, too.
+            return super().render_str(printable(text, lines=True), **options)
 
         def on_broken_pipe(self) -> None:
             try:

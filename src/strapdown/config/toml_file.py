@@ -6,6 +6,7 @@ import re
 import tomllib
 from bisect import bisect_right
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -141,9 +142,10 @@ def _no_toml(path: Path, text: str, said: str) -> ConfigError:
 
 def _twice(text: str, line: int) -> tuple[KeyPath, int] | None:
     """Find the earlier occurrence of this line's key, with its line."""
-    for key, lines in key_lines(text).items():
-        if len(lines) > 1 and lines[-1] == line:
-            return key, lines[0]
+    with suppress(RecursionError):
+        for key, lines in key_lines(text).items():
+            if len(lines) > 1 and lines[-1] == line:
+                return key, lines[0]
     return None
 
 

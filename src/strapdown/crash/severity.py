@@ -364,6 +364,8 @@ def find_severity_model(name: str) -> SeverityModel:
 # Injury-risk model from a TOML file transcribed from a publication.
 
 
+#: Largest coefficient.
+LARGEST = 1e100
 TEXTS = ("title", "author", "table", "outcome")
 TOP = (
     *TEXTS,
@@ -470,7 +472,7 @@ def _terms(file: TomlFile, table: Mapping[str, Any]) -> tuple[Term, ...]:
             term = Term(name, coefficient, equals=_text(file, row, "equals", f"{place}."))
         else:
             transform = row.get("transform", "identity")
-            if transform not in TRANSFORMS:
+            if not isinstance(transform, str) or transform not in TRANSFORMS:
                 raise _bad(
                     file,
                     f"{place}.transform",
@@ -531,7 +533,9 @@ def _applies(file: TomlFile, given: Any) -> dict[str, tuple[str, ...]]:
 
 
 def _number(file: TomlFile, value: Any, key: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    # Nor an integer that is no double, or a number whose square is none.
+    if not number or not -LARGEST <= value <= LARGEST:
         raise _bad(file, key, "crash.coefficient-not-a-number", value=value)
     return float(value)
 

@@ -16,6 +16,21 @@ Array = NDArray[np.float64]
 JITTER = 0.1
 
 
+def occupied_grid(time: Array, end: float, step: float, reach: float) -> Array:
+    """Return the instants of an even grid after which samples follow.
+
+    `time` ((n,), s): increasing; the grid begins with it. `end`, `step` (s): of the grid. `reach`
+    (s): within which a sample follows, a few steps. At most reach/step + 2 instants for each
+    sample, however long the pauses are; without long ones the whole grid.
+    """
+    if end - time[0] <= 2.0 * step * time.size:
+        return np.arange(time[0], end, step)
+    cells = np.floor((time - time[0]) / step)
+    before = np.arange(math.ceil(reach / step) + 1.0)
+    grid = time[0] + step * np.unique((cells[:, None] - before).ravel())
+    return np.asarray(grid[(grid >= time[0]) & (grid < end)])
+
+
 def as_channels(values: ArrayLike, quantity: str = "values") -> Array:
     """Convert samples to floats of shape (n, k), all finite.
 

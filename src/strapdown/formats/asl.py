@@ -24,6 +24,7 @@ from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
 from strapdown.formats.columns import read_name
+from strapdown.formats.inference.conclusion import differenced
 from strapdown.formats.recording import RawLog, TruthInSensorAxes
 from strapdown.formats.sensor_folder import file_member, first_line
 from strapdown.formats.signs import Signs
@@ -139,6 +140,11 @@ def _stated(raw: RawLog, known: dict[str, str]) -> RawLog:
         if quantity is not None:
             unit = read_name(column).unit
             stated[column] = (quantity, unit or "ns" if quantity == "time" else unit)
+    # Names over rows that hold no numbers are not taken for names.
+    missing = {"time", *known.values()} - {quantity for quantity, _ in stated.values()}
+    if missing:
+        names = ", ".join(raw.columns)
+        raise DataError("io.no-column-4", file=raw.name, missing=sorted(missing), columns=names)
     return dataclasses.replace(raw, stated=stated)
 
 
@@ -184,7 +190,8 @@ def _seconds(raw: RawLog, origin: RawLog) -> Array:
         column = next(c for c, (q, _) in log.stated.items() if q == "time")
         return numbers(log, column, "time")
 
-    return np.asarray((stamps(raw) - stamps(origin)[0]).astype(np.float64) * 1e-9)
+    both = differenced(np.concatenate([stamps(origin)[:1], stamps(raw)]))
+    return np.asarray((both[1:] - both[0]).astype(np.float64) * 1e-9)
 
 
 def _at_samples(time: Array, known: Array, truth: RawLog) -> Array:
@@ -194,7 +201,10 @@ def _at_samples(time: Array, known: Array, truth: RawLog) -> Array:
     assert truth.truth is not None
     q_ns = np.full((time.size, 4), np.nan)
     order = np.flatnonzero(truth.truth.scored & np.isfinite(known))
-    order = order[np.diff(known[order], prepend=-np.inf) > 0]
+    if order.size:
+        # Poses that are not later than all before them are left out.
+        latest = np.maximum.accumulate(known[order])
+        order = order[np.diff(latest, prepend=-np.inf) > 0]
     if order.size < 2:
         return q_ns
     poses, stamps = truth.truth.q_ns[order], known[order]

@@ -197,6 +197,7 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     else:
         sampling = sampling_of_rates(raw, options, findings)
     report_gaps(raw.name, time, body["gyro"], findings)
+    _refuse_impossible(raw.name, body, lambda k: raw.row(int(kept[k])))
     report_absurd(raw.name, body["gyro"], lambda k: raw.row(int(kept[k])), findings)
     report_weightless(raw.name, body.get("accel"), findings)
     columns = [f"{triad}_{a}" for triad in units for a in AXES]
@@ -262,6 +263,8 @@ def _likely_clock(raw: RawLog, found: dict[str, Column]) -> str:
 #: Faults of rows that `ReadOptions.repair` leaves out.
 REPAIRABLE = {
     "io.not-finite-in-rows",
+    "io.pause-impossible",
+    "io.stamp-impossible",
     "io.stamp-repeated",
     "io.time-goes-back",
     "io.time-counter-wraps",
@@ -442,7 +445,8 @@ def _turn(values: Array, axes: Axes, factor: float, kept: NDArray[np.int64], bod
     for j, (axis, sign) in enumerate(zip(axes.axis, axes.sign, strict=True)):
         column = values[:, axis]
         used = column if kept.size == column.size else column[kept]
-        np.multiply(used, sign * factor, out=body[:, j])
+        with np.errstate(over="ignore"):  # what is no force or rate is refused below
+            np.multiply(used, sign * factor, out=body[:, j])
 
 
 def _readings_of_triad(
@@ -593,8 +597,10 @@ def sampling_of_rates(raw: RawLog, options: ReadOptions, findings: list[Finding]
 
 PLAUSIBILITY_AXES = "xyz"
 
-# Upper limit of any rate; squares of larger ones soon overflow a double.
+# Upper limits of any rate and specific force; squares of larger ones soon overflow a double. A
+# shell is fired with 1e6 m/s².
 IMPOSSIBLE_RATE = 1e6  # rad/s
+IMPOSSIBLE_FORCE = 1e8  # m/s²
 # No body that is carried, driven or flown turns this fast for a twentieth of a log.
 LASTING_RATE = 20.0  # rad/s, 3 turns a second
 # No gyro in a phone, a toy, a car or an aircraft reads this; a wrong unit does.
@@ -631,24 +637,26 @@ def report_gaps(name: str, time: Array, gyro: Array, findings: list[Finding]) ->
     )
 
 
+def _refuse_impossible(name: str, body: Mapping[str, Array], row: Callable[[int], int]) -> None:
+    """Refuse values beyond the limits of any body. DataError: names row and column."""
+    limits = {
+        "gyro": ("io.rate-impossible", IMPOSSIBLE_RATE),
+        "accel": ("io.force-impossible", IMPOSSIBLE_FORCE),
+    }
+    for triad, (code, limit) in limits.items():
+        if triad not in body or max(body[triad].max(), -body[triad].min()) <= limit:
+            continue
+        at, k = (int(i) for i in np.argwhere(~(np.abs(body[triad]) <= limit))[0])
+        quantity = f"{triad}_{PLAUSIBILITY_AXES[k]}"
+        raise DataError(code, file=name, row=row(at), quantity=quantity, value=body[triad][at, k])
+
+
 def report_absurd(
     name: str, gyro: Array, row: Callable[[int], int], findings: list[Finding]
 ) -> None:
-    """Report rates that are implausible, or clipped at the sensor's full scale.
-
-    DataError: a rate is beyond the limit of any rotating body.
-    """
+    """Report rates that are implausible, or clipped at the sensor's full scale."""
     largest = np.maximum(gyro.max(axis=0), -gyro.min(axis=0))
     k = int(largest.argmax())
-    if largest[k] > IMPOSSIBLE_RATE:
-        at = int(np.abs(gyro[:, k]).argmax())
-        raise DataError(
-            "io.rate-impossible",
-            file=name,
-            row=row(at),
-            quantity=f"gyro_{PLAUSIBILITY_AXES[k]}",
-            gyro=gyro[at, k],
-        )
     lasting = 0.0
     if LASTING_RATE < largest[k] <= ABSURD_RATE:
         lasting = float(np.quantile(np.sqrt((gyro * gyro).sum(axis=1)), 0.95))

@@ -16,6 +16,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -26,7 +27,12 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import DataError, Finding
-from strapdown.formats.inference.conclusion import THRESHOLD, infer_time_unit, wrap_bits
+from strapdown.formats.inference.conclusion import (
+    THRESHOLD,
+    differenced,
+    infer_time_unit,
+    wrap_bits,
+)
 from strapdown.formats.recording import Origin
 from strapdown.tables.checks import RELATIVE
 from strapdown.tables.sample_clock import sample_clock
@@ -360,7 +366,7 @@ def even_stamps(stamps: NDArray[Any]) -> EvenStamps | None:
     repeats = stamps.size - 1 - changes
     if changes < FEWEST_STAMPS - 1 or repeats < max(FEWEST_STAMPS, REPEATED * (stamps.size - 1)):
         return None
-    exact = stamps.astype(np.int64) if stamps.dtype.kind in "iu" else stamps
+    exact = differenced(stamps)
     whole = np.diff(exact).astype(np.float64)
     ends = np.flatnonzero(whole)
     tick = float(whole[ends].min())
@@ -418,7 +424,7 @@ def spread_bursts(stamps: NDArray[Any]) -> SpreadBursts | None:
     """
     if stamps.dtype.kind not in "iuf" or stamps.size < FEWEST_STAMPS:
         return None
-    exact = stamps.astype(np.int64) if stamps.dtype.kind in "iu" else stamps
+    exact = differenced(stamps)
     since = (exact - exact[0]).astype(np.float64)
     steps = np.diff(since)
     shared = int(np.count_nonzero(steps == 0.0))
@@ -439,6 +445,14 @@ def spread_bursts(stamps: NDArray[Any]) -> SpreadBursts | None:
 
 # Range of steps of inertial sensors.
 PLAUSIBLE_STEP = (1e-5, 0.25)  # s
+#: A longer step of a log, also by so many of its least steps, is a corrupt stamp or a clock that was
+#: set; more of these, or more time, are not of a clock that was set.
+LONGEST_PAUSE, PAUSE_STEPS = 30.0 * 86400.0, 1000.0  # s
+MOST_PAUSES, LONGEST_LOG = 3, 100.0 * 365.25 * 86400.0  # s
+#: Largest stamp of a clock; nanoseconds since 1970 are 2e18.
+MOST_STAMP = 1e20
+#: Most successive rows whose stamps are taken for corrupt.
+WILD_RUN = 3
 # Later stamps are counted from the first: a double resolves a clock of 1970 to only 0.2 µs.
 EPOCH = 1e6  # s
 
@@ -489,8 +503,25 @@ def read_stamps(
     advance.
     """
     findings: list[Finding] = []
-    # Small and unsigned integers would overflow for negative steps.
-    stamps = raw.astype(np.int64) if raw.dtype.kind in "iub" else raw.astype(np.float64)
+    stamps = differenced(raw)
+    if repair and (wild := _wild(stamps)).any():
+        good = np.flatnonzero(~wild)
+        rest = read_stamps(
+            stamps[good],
+            unit,
+            why,
+            file=file,
+            row=lambda k: row(int(good[k])),
+            repair=repair,
+            origin=origin,
+            only_seconds=only_seconds,
+        )
+        return _with_wild(rest, wild, stamps, file, row)
+    if stamps.size and not np.abs(stamps[[stamps.argmin(), stamps.argmax()]]).max() <= MOST_STAMP:
+        k = int((np.abs(stamps) > MOST_STAMP).argmax())
+        raise DataError(
+            "io.stamp-impossible", file=file, row=row(k), quantity="time", stamp=stamps[k], count=1
+        )
     if unit in (None, "s"):
         whole, weeks = unrolled(stamps.astype(np.float64, copy=False))
         if weeks:
@@ -538,7 +569,103 @@ def read_stamps(
                     unit=unit,
                 )
             )
-    return Stamps(_since(first, unit, origin) + ticks * factor, unit, why, keep, origin, findings)
+    seconds = _since(first, unit, origin) + ticks * factor
+    keep = _without_pauses(seconds, keep, repair, file, row, findings)
+    return Stamps(seconds, unit, why, keep, origin, findings)
+
+
+def _wild(stamps: NDArray[Any]) -> NDArray[np.bool_]:
+    """Find corrupt stamps: a few rows ahead of more rows that continue what was before them.
+
+    Rows that are swapped or repeated, a counter that wraps and a clock that is set back are not.
+    """
+    wild = np.abs(stamps.astype(np.float64)) > MOST_STAMP
+    if wild.any():
+        return wild  # the others are judged without these
+    steps = np.diff(stamps).astype(np.float64)
+    back = np.flatnonzero(steps < 0)
+    usual = usual_step(steps) if back.size else 0.0
+    for k in back.tolist():
+        if wrap_bits(float(stamps[k]), float(steps[k]), usual):
+            continue
+        first = k
+        while first > 0 and k - first < WILD_RUN and stamps[first - 1] > stamps[k + 1]:
+            first -= 1
+        ahead = k - first + 1
+        after = stamps[k + 1 : k + 2 + ahead]
+        if ahead <= WILD_RUN and after.size > ahead and (after <= stamps[k]).all():
+            wild[first : k + 1] = True
+    return wild
+
+
+def _with_wild(
+    rest: Stamps,
+    wild: NDArray[np.bool_],
+    stamps: NDArray[Any],
+    file: str,
+    row: Callable[[int], int],
+) -> Stamps:
+    """Add the rows with corrupt stamps to those of the others; they are not kept."""
+    good = np.flatnonzero(~wild)
+    keep = np.zeros(wild.size, dtype=bool)
+    keep[good] = rest.keep
+    nearest = np.minimum(np.searchsorted(good, np.arange(wild.size)), good.size - 1)
+    k = int(wild.argmax())
+    finding = Finding(
+        "io.wild-stamps-left-out",
+        file=file,
+        row=row(k),
+        quantity="time",
+        stamp=stamps[k],
+        count=int(wild.sum()),
+    )
+    return dataclasses.replace(
+        rest, seconds=rest.seconds[nearest], keep=keep, findings=[finding, *rest.findings]
+    )
+
+
+def _without_pauses(
+    seconds: Array,
+    keep: NDArray[np.bool_],
+    repair: bool,
+    file: str,
+    row: Callable[[int], int],
+    findings: list[Finding],
+) -> NDArray[np.bool_]:
+    """Keep the longest part of a log between pauses that no recording has.
+
+    DataError: there is such a pause, and rows may not be dropped.
+    """
+    # Ordinary logs end here: no pause is longer than the log.
+    if not np.ptp(seconds) > LONGEST_PAUSE:
+        return keep
+    rows = np.flatnonzero(keep)
+    time = seconds[rows]
+    steps = np.diff(time)
+    least = float(steps.min()) if steps.size > 1 else 0.0
+    ends = np.flatnonzero(steps > max(LONGEST_PAUSE, PAUSE_STEPS * least))
+    alone = np.minimum(ends + 1, time.size - ends - 1) <= WILD_RUN
+    if not (alone.any() or ends.size > MOST_PAUSES or steps[ends].sum() > LONGEST_LOG):
+        return keep  # a clock that was set
+    k = int(ends[alone][0] if alone.any() else ends[steps[ends].argmax()])
+    said = Finding(
+        "io.pause-impossible",
+        file=file,
+        row=row(int(rows[k + 1])),
+        quantity="time",
+        pause_days=float(steps[k]) / 86400.0,
+        pauses=ends.size,
+        count=int(min(k + 1, time.size - k - 1)),
+    )
+    if not repair:
+        raise DataError(said)
+    edges = np.concatenate([[0], ends + 1, [time.size]])
+    longest = int(np.argmax(np.diff(edges)))
+    out = np.zeros_like(keep)
+    out[rows[edges[longest] : edges[longest + 1]]] = True
+    left_out = int(keep.sum() - out.sum())
+    findings.append(said.replace(code="io.part-between-pauses-used", count=left_out))
+    return out
 
 
 def _since(stamp: float, unit: str, origin: Origin) -> float:

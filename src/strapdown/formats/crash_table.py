@@ -433,7 +433,9 @@ def notes_of(lines: list[str], raw: RawLog) -> dict[str, dict[str, Any]]:
         try:
             said = json.loads(line[len(NOTE) :])
             checked = check_attributes(said, raw.name, row)
-            column = int(said["column"])
+            column = said["column"]
+            if not isinstance(column, int) or not 1 <= column <= len(names):
+                raise IndexError
             notes[names[column - 1]] = checked
         except (DataError, ValueError, TypeError, KeyError, IndexError, RecursionError) as error:
             reason = error.finding if isinstance(error, DataError) else None

@@ -118,6 +118,7 @@ def _at_once(
     if not text or "\0" in text or _BREAKS.search(text):
         return None
     numbered, comments = _numbered(text)
+    _refuse_wide(numbered, name)
     if not numbered or _rewritten(numbered) is not numbered:
         return None
     top = _Top(numbered, comments, name, kinds)
@@ -160,6 +161,7 @@ def _line_by_line(
     numbered, comments = _numbered(text)
     if not numbered:
         raise DataError("io.file-holds-comments-alone" if comments else "io.file-empty", file=name)
+    _refuse_wide(numbered, name)
     top = _Top(_rewritten(numbered), comments, name, kinds)
     if not top.data:
         raise DataError("io.csv-without-rows", file=name, row=numbered[0][0])
@@ -176,13 +178,27 @@ def _numbered(text: str) -> tuple[Lines, list[str]]:
     return numbered[len(comments) :], comments
 
 
+def _refuse_wide(numbered: Lines, name: str) -> None:
+    """Refuse a line of more fields than a log has, before any pattern is searched in it.
+
+    DataError: one of the first lines has more than `MOST_COLUMNS` fields.
+    """
+    for row, line in numbered[:SEARCHED]:
+        if len(line) < 2 * MOST_COLUMNS:
+            continue
+        count = 1 + max(line.count(separator) for separator in ",;\t|")
+        count = count if count > MOST_COLUMNS else len(line.split(None, 2 * MOST_COLUMNS))
+        if count > MOST_COLUMNS:
+            raise DataError(
+                "io.csv-too-many-columns", file=name, row=row, count=count, most=MOST_COLUMNS
+            )
+
+
 # Lines that are rows in another form.
 
 
 #: Time of arrival that the serial monitor of a development environment puts before a line.
 _ARRIVAL = re.compile(r"(\d\d:\d\d:\d\d\.\d+) -> ?")
-# A semicolon that ends a line of commas, as of a program's statement.
-_ENDED = re.compile(r"[^;]*,[^;]*;\s*")
 # A sentence with its name and checksum: "$VNYMR,1.5,…*69".
 _SENTENCE = re.compile(r"(\$\w+)(,[^*]*)\*[0-9A-Fa-f]{2}\s*")
 # "IMU: 20, 0.1, …": one word before the numbers of every row.
@@ -216,7 +232,8 @@ def _rewritten(numbered: Lines) -> Lines:
     The same object if there are none.
     """
     top = numbered[:SEARCHED]
-    if all(_ENDED.fullmatch(line) for _, line in top):
+    # A semicolon that ends a line of commas, as of a program's statement.
+    if all(line.count(";") == 1 and "," in line and line.rstrip()[-1] == ";" for _, line in top):
         numbered = [(row, line.rstrip().removesuffix(";")) for row, line in numbered]
         top = numbered[:SEARCHED]
     sentences = {m[1] if m else "" for m in (_SENTENCE.fullmatch(line) for _, line in top)}
@@ -320,22 +337,12 @@ class _Top:
         For messages.
     kinds : sequence of str
         Kinds of units that a row under the names may have.
-
-    Raises
-    ------
-    DataError
-        A row has more than `MOST_COLUMNS` fields.
     """
 
     def __init__(
         self, numbered: Lines, comments: list[str], name: str, kinds: Sequence[str]
     ) -> None:
         first, self.separator, width = _first_row(numbered, kinds)
-        if width > MOST_COLUMNS:
-            row = numbered[min(first, len(numbered) - 1)][0]
-            raise DataError(
-                "io.csv-too-many-columns", file=name, row=row, count=width, most=MOST_COLUMNS
-            )
         self.data = numbered[first:]
         #: Lines above, without those of the names.
         self.above = comments + [line for _, line in numbered[:first]]

@@ -243,7 +243,8 @@ def _refuse_words(plain: list[tuple[int, str]], names: list[str], file: str) -> 
     for row, line in plain:
         for name, text in zip(names, line.split(), strict=True):
             try:
-                float(text)
+                # Python takes digits of other scripts and 1_000 for numbers, too.
+                float(text if text.isascii() and "_" not in text else "")
             except ValueError:
                 raise DataError(
                     "io.text-with-decimal-comma" if "," in text else "io.text-not-a-number",
@@ -261,9 +262,15 @@ def _time(
     if "week" in columns:
         weeks, seconds = columns["week"], columns["tow"]
     else:
-        months = (12.0 * (columns["year"] - 1970.0) + columns["month"] - 1.0).astype(np.int64)
-        month = months.astype("datetime64[M]").astype("datetime64[D]").astype(np.int64)
-        days = month + columns["day"] - 1.0 - _DAYS_OF_1980
+        year, month, day = columns["year"], columns["month"], columns["day"]
+        dated = (np.abs(year - 2090.0) <= 110.0) & (np.abs(month - 6.5) <= 5.5)
+        dated &= np.abs(day - 16.0) <= 15.0
+        if not dated.all():
+            row = int(rows[int(np.argmin(dated))])
+            raise DataError("io.time-no-date-since-no", file=file, row=row, quantity="time")
+        months = (12.0 * (year - 1970.0) + month - 1.0).astype(np.int64)
+        begin = months.astype("datetime64[M]").astype("datetime64[D]").astype(np.int64)
+        days = begin + day - 1.0 - _DAYS_OF_1980
         weeks = np.floor(days / 7.0)
         seconds = 86400.0 * (days - 7.0 * weeks) + 3600.0 * columns["hour"]
         seconds = seconds + 60.0 * columns["minute"] + columns["second"]

@@ -79,6 +79,10 @@ def read_core_motion(path: Path) -> RawLog:
     """
     raw = under(path)
     named = _named(list(raw.columns))
+    missing = [f"{v}_{a}" for v in WORDS for a in "xyz" if f"{v}_{a}" not in named]
+    if missing:
+        names = ", ".join(raw.columns)
+        raise DataError("io.no-column-4", file=path.name, missing=missing, columns=names)
     gyro, gravity, user = (
         np.column_stack([column(raw, named[f"{v}_{a}"]) for a in "xyz"]) for v in WORDS
     )

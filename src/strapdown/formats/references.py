@@ -74,8 +74,8 @@ def _understood(numbered: list[tuple[int, str]], path: Path, what: str) -> list[
 
 def _from_toml(path: Path) -> list[str]:
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except (ValueError, RecursionError) as error:  # an integer of 4,301 digits is a ValueError
         raise DataError("io.toml-malformed", file=path.name, error=error) from None
     words = content.get("references")
     if not isinstance(words, list) or not all(isinstance(w, str) for w in words):
@@ -85,6 +85,9 @@ def _from_toml(path: Path) -> list[str]:
 
 def _from_csv(path: Path) -> list[str]:
     raw = csv.read(path)
+    if "kind" not in raw.columns:
+        # A name over rows that hold no fields for it.
+        raise DataError("io.no-column-4", file=path.name, missing="kind", columns=[*raw.columns])
     words = []
     for sample in range(len(raw.columns["kind"])):
         row = {name: column[sample] for name, column in raw.columns.items()}

@@ -215,7 +215,7 @@ def _records(path: Path) -> tuple[list[dict[str, Any]], list[Finding]]:
         records = json.loads(text)
     except json.JSONDecodeError as error:
         raise DataError("io.no-json", file=path.name, row=error.lineno, msg=error.msg) from None
-    except RecursionError:
+    except (RecursionError, ValueError):  # nested too deeply, or an integer of 4,301 digits
         records = None
     if not isinstance(records, list) or not all(isinstance(r, dict) for r in records):
         raise DataError("io.not-list-records", file=path.name)

@@ -246,7 +246,8 @@ def read_labview(path: Path) -> RawLog:
         raw.units |= dict(zip(channels, units, strict=True))
     raw.units |= {"time": "s"} if "time" in raw.columns else {}
     step = next(iter(said.get("Delta_X", ())), "").replace(",", ".")
-    if "time" not in raw.columns and step and float(step) > 0.0:
+    stated = csv.NUMBER.fullmatch(step) is not None and 1e-9 < float(step) < 1e9
+    if "time" not in raw.columns and stated:
         raw.rate = 1.0 / float(step)
     return raw
 

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -105,7 +106,11 @@ def _streamed(
     ]
     rows = 0
     try:
-        with pa.BufferReader(view) if isinstance(source, bytes) else pa.OSFile(str(source)) as held:
+        with (
+            pa.BufferReader(view)
+            if isinstance(source, bytes)
+            else pa.OSFile(os.fsencode(source)) as held
+        ):
             held.seek(0 if isinstance(source, bytes) else start)
             options = _options(types, len(types), separator, ".", False)
             options[0].block_size = STREAMED
@@ -281,11 +286,9 @@ def _options(
 
 def _arrays(table: Any) -> Columns:
     """Convert column by column, so that at most one is in memory twice."""
-    columns = []
-    for _ in range(table.num_columns):
-        columns.append(_array(table.column(0)))
-        table = table.remove_column(0)
-    return columns
+    held = table.columns[::-1]
+    del table
+    return [_array(held.pop()) for _ in range(len(held))]
 
 
 def _array(column: Any) -> NDArray[Any]:

@@ -20,6 +20,7 @@ from strapdown import rotation
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
 from strapdown.errors import DataError, Finding
 from strapdown.formats import csv
+from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import Clock, clock_of_name, with_clock
 from strapdown.formats.signs import HEAD, Signs
 from strapdown.formats.trajectory_writers import one_line
@@ -164,6 +165,15 @@ detect = Signs(
 )
 
 
+def _three(text: str) -> NDArray[np.float64] | None:
+    """Return latitude, longitude and height; None if a text holds anything else."""
+    parts = text.split()
+    if len(parts) != 3 or not all(csv.NUMBER.fullmatch(p) and "," not in p for p in parts):
+        return None
+    at = np.array(parts, dtype=np.float64)
+    return at if np.isfinite(at).all() and abs(at[0]) <= 90.0 else None
+
+
 def read(path: Path) -> pd.DataFrame:
     """Read a trajectory whose comments state its axes and its origin.
 
@@ -172,20 +182,21 @@ def read(path: Path) -> pd.DataFrame:
 
     DataError: the file does not state where on the Earth it is, or has fewer than two poses.
     """
-    told = {m[1].decode(): m[2].decode().strip() for m in map(_HEAD.match, _lines(path)) if m}
+    heads = [m for m in map(_HEAD.match, _lines(path)) if m]
+    told = {m[1].decode("utf-8", "replace"): m[2].decode("utf-8", "replace").strip() for m in heads}
     axes = (told.get("world axes"), told.get("body axes"))
     frame = next((name for name, known in TUM_FRAMES.items() if known == axes), None)
     origin = told.get("origin lat lon deg, height m")
-    if frame is None or (origin is None and frame != "ecef"):
+    at = _three(origin or "")
+    if frame is None or (at is None and (origin is not None or frame != "ecef")):
         raise DataError("io.tum-without-origin", file=path.name)
     raw = csv.read(path)
-    values = np.column_stack([np.asarray(c, dtype=np.float64) for c in raw.columns.values()])
+    values = np.column_stack([numbers(raw, c, c) for c in raw.columns]).astype(np.float64)
     if values.shape[1] != 8 or len(values) < 2:
         raise DataError("io.tum-columns", file=path.name, count=values.shape[1], rows=len(values))
     ellipsoid = find_ellipsoid(told.get("ellipsoid", "wgs84"))
     time, position, q_wb = values[:, 0], values[:, 1:4], values[:, [7, 4, 5, 6]]
-    if origin is not None:
-        at = np.array([float(v) for v in origin.split()])
+    if at is not None:
         q_we = q_ne(at[0], at[1])
         if frame == "enu":
             q_we = rotation.compose(Q_NED_ENU, q_we)

@@ -24,6 +24,8 @@ GRADES = ("phone", "industrial", "tactical", "navigation", "crash")
 
 TOP = ("title", "class", "summary", "sources", "gyro", "accel")
 FIGURE = ("value", "source", "place", "assumed")
+# Largest figure of a data sheet in any unit; squares of larger ones would overflow.
+LARGEST = 1e12
 # Key in the seed tree, beside those of the triads in a simulation; the quantities drawn for a unit,
 # in the order of their keys below it.
 DRAW_SEED = 2
@@ -133,9 +135,11 @@ def load_sensor(name: str | Path) -> Sensor:
 
 def _read(path: Path) -> Sensor:
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        table = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except (ValueError, RecursionError) as error:  # an integer of 4,301 digits is a ValueError
         raise ConfigError("sensors.no-toml", file=path.name, error=error) from None
+    except OSError as error:
+        raise ConfigError("sensors.no-toml", file=path.name, error=error.strerror) from None
     _known(table, TOP, path, "")
     title, summary, grade = (_text(table, key, path) for key in ("title", "summary", "class"))
     if grade not in GRADES:
@@ -207,7 +211,7 @@ def _figure(entry: Any, place: str, documents: Mapping[str, Any], path: Path) ->
     given = entry.get("value")
     numbers: list[Any] = given if isinstance(given, list) else [given] * 3
     if len(numbers) != 3 or not all(
-        isinstance(x, int | float) and not isinstance(x, bool) and math.isfinite(x) and x >= 0.0
+        isinstance(x, int | float) and not isinstance(x, bool) and 0.0 <= x <= LARGEST
         for x in numbers
     ):
         raise _bad(path, place, "sensors.figure-not-a-number", given=given)

@@ -9,6 +9,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from strapdown.dsp.samples import occupied_grid
 from strapdown.errors import DataError
 from strapdown.sensors.triad_errors import triad_of
 from strapdown.tables import ACCEL, GYRO
@@ -343,7 +344,8 @@ def find_shaking_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
     time = imu.index.to_numpy(dtype=np.float64)
     values = imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64)
     spans: list[tuple[float, float]] = []
-    for start in np.arange(time[0], time[-1] - SHAKING_WINDOW + 1e-9, STEP):
+    end = time[-1] - SHAKING_WINDOW + 1e-9
+    for start in occupied_grid(time, end, STEP, SHAKING_WINDOW):
         if not _shakes_in_place(time, values, float(start)):
             continue
         if spans and start <= spans[-1][1]:

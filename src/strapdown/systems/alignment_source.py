@@ -27,7 +27,7 @@ from strapdown.sensors.triad_errors import (
     check_axes_matrix,
     report_transposed,
 )
-from strapdown.systems.inputs import part_of_log
+from strapdown.systems.inputs import part_of_log, refuse_long_span
 from strapdown.tables import ACCEL, EULER, GYRO
 from strapdown.tables.checks import values_of
 
@@ -68,6 +68,7 @@ def read_alignment_source(spec: AlignmentSpec) -> AlignmentSource:
     if spec.log is None:
         return _simulated(spec)
     recording, imu, findings = body_record(spec.log, spec.axes)
+    refuse_long_span(imu, recording.name)
     require_accel(recording)
     gnss, inputs = None, [input_files("log", spec.log.path, recording.files)]
     if spec.gnss is not None:

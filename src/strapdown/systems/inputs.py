@@ -16,7 +16,7 @@ import pandas as pd
 
 from strapdown.bundle import InputFiles, Seal, check_destination, input_files, with_paths
 from strapdown.config.reading import FileSpec
-from strapdown.errors import ConfigError, Finding
+from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.progress import Progress, silent
 
 __all__ = [
@@ -28,6 +28,7 @@ __all__ = [
     "moved",
     "moved_paths",
     "part_of_log",
+    "refuse_long_span",
 ]
 
 
@@ -110,6 +111,41 @@ def part_of_log(
     if out.attrs.get("first_row") is not None:
         out.attrs["first_row"] += int(np.argmax(kept))
     return out
+
+
+#: Most time of a log in which a position is carried on: a month, or ten seconds a sample.
+MOST_SPAN, MOST_STEP = 30.0 * 86400.0, 10.0  # s
+
+
+def refuse_long_span(imu: pd.DataFrame, name: str) -> None:
+    """Refuse a log over a clock that was set: grids over its time would be without limit.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        Used part of an Imu table.
+    name : str
+        Of the log, for messages.
+
+    Raises
+    ------
+    DataError
+        The log is longer than a month, and than ten seconds for each of its samples.
+    """
+    time = imu.index.to_numpy(dtype=np.float64)
+    if time[-1] - time[0] <= max(MOST_SPAN, MOST_STEP * time.size):
+        return
+    k = int(np.diff(time).argmax())
+    row = imu.attrs.get("first_row")
+    raise DataError(
+        "io.clock-set-in-log",
+        file=name,
+        row=None if row is None else row + k + 1,
+        quantity="time",
+        pause_days=(time[k + 1] - time[k]) / 86400.0,
+        before=time[k],
+        after=time[k + 1],
+    )
 
 
 # Tables in memory as input files of a bundle.

@@ -31,6 +31,7 @@ from strapdown.navigation.measurements.magnetometer import Magnetometer
 from strapdown.navigation.measurements.measurement import TabulatedMeasurement
 from strapdown.sensors.error_chain import child, normal
 from strapdown.systems.alignment_source import body_record
+from strapdown.systems.inputs import refuse_long_span
 from strapdown.tables import GEODETIC, GNSS, POSITION_SD, VELOCITY_SD, gnss_table
 from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
 from strapdown.tables.checks import index_of, source_of, values_of
@@ -118,6 +119,7 @@ def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
     if spec.log is None:
         return _simulated(spec, tables, truth, points, inputs, findings)
     recording, imu, of_log = body_record(spec.log, spec.axes)
+    refuse_long_span(imu, recording.name)
     require_accel(recording)
     for name, table in tables.items():
         tables[name], shifted = on_clock_of(table, recording.imu)

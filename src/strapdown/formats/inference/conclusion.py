@@ -13,7 +13,7 @@ from strapdown.constants import MAD_TO_SD, STANDARD_GRAVITY
 from strapdown.errors import Finding
 from strapdown.units import TIME_UNITS
 
-__all__ = ["THRESHOLD", "Inference", "conclude", "evidence", "posterior"]
+__all__ = ["THRESHOLD", "Inference", "conclude", "differenced", "evidence", "posterior"]
 
 
 K = TypeVar("K", bound=Hashable)
@@ -182,8 +182,7 @@ class Steps:
     @classmethod
     def of(cls, stamps: NDArray[Any]) -> Steps:
         """Compute the steps of stamps."""
-        exact = stamps.astype(np.int64) if stamps.dtype.kind in "iub" else stamps
-        steps = np.diff(exact).astype(np.float64, copy=False)
+        steps = np.diff(differenced(stamps)).astype(np.float64, copy=False)
         # No copy where all are forward.
         forward = steps if steps.size and steps.min() > 0 else steps[steps > 0]
         if not forward.size:
@@ -196,6 +195,19 @@ class Steps:
         repeats = steps.size - int(np.count_nonzero(steps))
         mean = float(usual.sum() / (usual.size + repeats))
         return cls(stamps, steps, forward, mean, float(np.median(forward)))
+
+
+def differenced(stamps: NDArray[Any]) -> NDArray[Any]:
+    """Return stamps as a type in which their differences are right: int64, or float64.
+
+    Small and unsigned integers would overflow for negative steps, and stamps of 64 bits that are
+    far apart, as a corrupt one, for any.
+    """
+    if stamps.dtype.kind in "iu" and stamps.size:
+        low, high = int(stamps.min()), int(stamps.max())
+        if high >= 2**63 or high - low >= 2**63:
+            return stamps.astype(np.float64)
+    return stamps.astype(np.int64 if stamps.dtype.kind in "iub" else np.float64, copy=False)
 
 
 def time_unit_probabilities(steps: Steps) -> dict[str, float]:

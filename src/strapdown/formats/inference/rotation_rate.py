@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.constants import MAD_TO_SD
-from strapdown.dsp.samples import running_integral
+from strapdown.dsp.samples import occupied_grid, running_integral
 from strapdown.errors import Finding
 from strapdown.formats.inference.conclusion import (
     Inference,
@@ -508,13 +508,7 @@ def _turn(
     time: Array, once: Array, twice: Array, holes: NDArray[np.bool_], width: float
 ) -> list[Turn]:
     half, end = 0.5 * width, time[-1] - 2 * width + 1e-9
-    if end - time[0] < time.size * width:
-        grid = np.arange(time[0], end, half)
-    else:
-        # Pauses take most of the record: windows begin only where there are samples.
-        cells = np.floor((time - time[0]) / half)
-        grid = time[0] + half * np.unique(np.concatenate([cells, np.maximum(cells - 1.0, 0.0)]))
-        grid = grid[grid < end]
+    grid = occupied_grid(time, end, half, half)
     # At the samples, where the integrals are known.
     at = np.array([np.searchsorted(time, grid + k * width) for k in (0, 1, 2)])
     at = np.minimum(at, time.size - 1)
