@@ -244,6 +244,7 @@ def _any_manifest() -> Iterator[tuple[str, bytes]]:
         "inputs": [{"name": "inputs/log/imu.csv", "sha256": digest, "bytes": 3, "kept": "copy"}],
         "outputs": [{"name": "report.html", "sha256": digest, "bytes": 5}],
         "versions": {"strapdown": "0.2.0"},
+        "environment": ["numpy==2.0"],
         "platform": {"system": "Linux"},
     }
     yield "manifest.json", json.dumps(manifest, indent=1).encode()
