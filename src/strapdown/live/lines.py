@@ -62,8 +62,10 @@ _ACCEL, _GYRO = 3, 4
 _FORM, _FORCE_FORM = "imu,TIME,GX,GY,GZ,AX,AY,AZ", "accel,TIME,AX,AY,AZ"
 #: Most characters of a line in a message.
 LONGEST = 40
-#: Largest value of a measurement: a double squares and sums it without harm.
+#: Largest value of a measurement: a double squares and sums it without harm; and of columns that
+#: have a limit of their own, deg, m and m/s.
 MEASURABLE = 1e9
+LIMITS = {"lon": 360.0, "alt": 1e8, **dict.fromkeys(VELOCITY, 1e5)}
 
 
 class BadLineError(Exception):
@@ -174,13 +176,11 @@ def _measured(name: str, fields: Sequence[str]) -> Measured:
         if column.strip() in values:
             raise BadLineError(name, "live.column-repeated", name=name, given=_shown(field))
         number = _number(value.strip(), name)
-        if abs(number) > MEASURABLE:
+        most = LIMITS.get(column.strip(), MEASURABLE)
+        if abs(number) > most:
+            kind = f"{name} value"
             raise BadLineError(
-                f"{name} value",
-                "live.row-beyond-limit",
-                column=column,
-                value=number,
-                most=MEASURABLE,
+                kind, "live.row-beyond-limit", column=column, value=number, most=most
             )
         values[column.strip()] = number
     return Measured(name, _number(fields[0], name), values)

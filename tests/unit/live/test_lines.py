@@ -64,3 +64,25 @@ def test_a_wrong_word_is_answered_with_the_nearest():
     with pytest.raises(BadLineError) as told:
         parse_line("wheel,2.5,speed=1", AIDS)
     assert "wheels" in told.value.finding.remedy
+
+
+@pytest.mark.parametrize(
+    ("said", "refused"),
+    [
+        ("lon=361", True),
+        ("lon=-359", False),
+        ("alt=1.1e8", True),
+        ("alt=4e7", False),
+        ("VN=1.1e5", True),
+        ("VD=-9e4", False),
+        ("speed=1.1e9", True),
+        ("speed=9e8", False),
+    ],
+)
+def test_a_value_that_cannot_be_is_refused(said, refused):
+    if not refused:
+        assert parse_line(f"gps,1,{said}", ["gps"]).values
+        return
+    with pytest.raises(BadLineError) as caught:
+        parse_line(f"gps,1,{said}", ["gps"])
+    assert (caught.value.kind, caught.value.finding.code) == ("gps value", "live.row-beyond-limit")
