@@ -106,7 +106,11 @@ def _streamed(
     ]
     rows = 0
     try:
-        with pa.BufferReader(view) if isinstance(source, bytes) else pa.OSFile(os.fsencode(source)) as held:
+        with (
+            pa.BufferReader(view)
+            if isinstance(source, bytes)
+            else pa.OSFile(os.fsencode(source)) as held
+        ):
             held.seek(0 if isinstance(source, bytes) else start)
             options = _options(types, len(types), separator, ".", False)
             options[0].block_size = STREAMED
