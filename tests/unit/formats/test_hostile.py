@@ -6,6 +6,7 @@ import resource
 import signal
 import warnings
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -32,8 +33,7 @@ def limits(seconds=20, memory=2 << 30):
         raise TimeoutError
 
     before = resource.getrlimit(resource.RLIMIT_AS)
-    with open("/proc/self/statm") as statm:
-        size = int(statm.read().split()[0]) * resource.getpagesize()
+    size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     old = signal.signal(signal.SIGALRM, expired)
     signal.alarm(seconds)
     resource.setrlimit(resource.RLIMIT_AS, (size + memory, before[1]))
