@@ -15,8 +15,8 @@ Templates are those of `str.format`, and besides:
 * a finding among the data gives its sentence, and ``{reason.remedy}`` its remedy;
 * ``{faults:lines}`` lists findings of one file, each on a line of its own with its location, its
   sentence and, below it, its remedy;
-* what is not printable in a text of the data, as an escape sequence, a line break or a mark of
-  direction, is shown as ``\\x1b``, ``\\n``, ``\\u202e`` (`printable`): names and values are from files;
+* what is not printable in a text of the data, an escape sequence or a mark of direction, is shown
+  escaped (`printable`), as names and values are from files;
 * ``{nearest}`` suggests the known word (data `known`, `also`) that is nearest to the data `word`.
 """
 
@@ -364,8 +364,8 @@ def printable(text: str, *, lines: bool = False, json: bool = False) -> str:
     Returns
     -------
     str
-        With ``\x1b``, ``\n`` or ``\u202e`` for such characters, and ``\xff`` for a byte of a file name
-        that is no text.
+        With ``\x1b``, ``\n`` or ``\u202e`` for such characters, and ``\xff`` for a byte of a file
+        name that is no text.
     """
     return text if text.isascii() and text.isprintable() else _ODD.sub(_escape(lines, json), text)
 

@@ -1,9 +1,9 @@
 """Fuzz our own parsers: ``python tests/fuzz --minutes 1 --seed 0``.
 
-With atheris (extra ``fuzz``) half of the time inputs are led by the branches that they reach. In the
-other half, and without it, a seeded mutator makes them: the same seed makes the same ones. They run in a process of their own, of
-which an input may take 30 s and 2 GB. Every new failure is kept in ``tests/fuzz/corpus`` as a
-reproducer, which `test_corpus.py` replays.
+With atheris (extra ``fuzz``) half of the time inputs are led by the branches that they reach. In
+the other half, and without it, a seeded mutator makes them: the same seed makes the same ones.
+They run in a process of their own, of which an input may take 30 s and 2 GB. Every new failure is
+kept in ``tests/fuzz/corpus`` as a reproducer, which `test_corpus.py` replays.
 """
 
 from __future__ import annotations

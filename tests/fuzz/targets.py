@@ -257,9 +257,9 @@ def _schema() -> str:
 
 
 def _crash_files() -> dict[str, bytes]:
-    from tests.property.test_crash_record_fuzz import SEEDS as files
+    from tests.property import test_crash_record_fuzz as crash
 
-    return {name if "/" in name else f"file/{name}": data for name, data in files.items()}
+    return {n if "/" in n else f"file/{n}": data for n, data in crash.SEEDS.items()}
 
 
 #: By name; the folder of its reproducers has the same.

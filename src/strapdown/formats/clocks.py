@@ -445,8 +445,8 @@ def spread_bursts(stamps: NDArray[Any]) -> SpreadBursts | None:
 
 # Range of steps of inertial sensors.
 PLAUSIBLE_STEP = (1e-5, 0.25)  # s
-#: A longer step of a log, also by so many of its least steps, is a corrupt stamp or a clock that was
-#: set; more of these, or more time, are not of a clock that was set.
+#: A longer step of a log, also by so many of its least steps, is a corrupt stamp or a clock that
+#: was set; more of these, or more time, are not of a clock that was set.
 LONGEST_PAUSE, PAUSE_STEPS = 30.0 * 86400.0, 1000.0  # s
 MOST_PAUSES, LONGEST_LOG = 3, 100.0 * 365.25 * 86400.0  # s
 #: Largest stamp of a clock; nanoseconds since 1970 are 2e18.

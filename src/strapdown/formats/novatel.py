@@ -272,7 +272,8 @@ def _values(path: Path, lines: list[str]) -> dict[str, Any]:
         (k for k, n in enumerate(lines) if {"latitude", "h-ell"} <= set(n.lower().split())), 0
     )
     names = lines[at].lower().split()
-    units = [u.strip("()").lower() for u in _UNIT.findall(lines[at + 1])] if at else []
+    below = lines[at + 1] if 0 < at < len(lines) - 1 else ""
+    units = [u.strip("()").lower() for u in _UNIT.findall(below)]
     if len(names) != len(units):
         raise DataError("io.inertial-explorer-header", file=path.name)
     for name, unit in zip(names, units, strict=True):
@@ -292,6 +293,8 @@ def _values(path: Path, lines: list[str]) -> dict[str, Any]:
                 "io.inertial-explorer-row", file=path.name, row=k, count=len(fields), width=width
             )
         rows.append(fields)
+    if not rows:
+        raise DataError("io.csv-without-rows", file=path.name, row=at + 1)
     out = {}
     for k, name in enumerate(names):
         parts = [[row[j] for row in rows] for j in range(starts[k], starts[k + 1])]

@@ -6,6 +6,7 @@ import resource
 import signal
 import warnings
 from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -32,8 +33,7 @@ def limits(seconds=20, memory=2 << 30):
         raise TimeoutError
 
     before = resource.getrlimit(resource.RLIMIT_AS)
-    with open("/proc/self/statm") as statm:
-        size = int(statm.read().split()[0]) * resource.getpagesize()
+    size = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     old = signal.signal(signal.SIGALRM, expired)
     signal.alarm(seconds)
     resource.setrlimit(resource.RLIMIT_AS, (size + memory, before[1]))
@@ -55,7 +55,7 @@ def table(path, rows, head=HEAD):
 
 def samples(count=400, rate=100.0):
     chance = np.random.default_rng(0)
-    values = chance.normal(0.0, 0.01, (count, 6)) + [0, 0, 0, 0, 0, -9.8]
+    values = chance.normal(0.0, 0.01, (count, 6)) + np.array([0, 0, 0, 0, 0, -9.8])
     return [[repr(k / rate), *map(repr, row)] for k, row in enumerate(values.tolist())]
 
 
@@ -206,12 +206,11 @@ def test_a_coefficient_of_a_severity_model_that_is_no_number_is_refused(tmp_path
 
 # --- ASL, RTKLIB ------------------------------------------------------------------------
 
-POSE = "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], q_RS_z []"
-SENSOR = "#timestamp [ns]," + ",".join(
-    f"{kind}_RS_S_{a} [{unit}]"
-    for kind, unit in (("w", "rad s^-1"), ("a", "m s^-2"))
-    for a in "xyz"
+POSE = ", ".join(
+    ["#timestamp", *(f"p_RS_R_{a} [m]" for a in "xyz"), *(f"q_RS_{a} []" for a in "wxyz")]
 )
+RATES = [f"w_RS_S_{a} [rad s^-1]" for a in "xyz"]
+SENSOR = ",".join(["#timestamp [ns]", *RATES, *(f"a_RS_S_{a} [m s^-2]" for a in "xyz")])
 
 
 def asl(folder, poses, rows, *, sensor=SENSOR):
@@ -275,7 +274,7 @@ def repaired(path):
 
 READERS = (sd.read_imu, repaired, sd.read_gnss, sd.read_trajectory, sd.read, sd.doctor, crash)
 #: Of the corpus what our own parsers read; binary files are read in a process of their own.
-TEXTS = (
+TEXTS = [
     "0ddb16",
     "7037bd",
     "82b960",
@@ -285,7 +284,7 @@ TEXTS = (
     "e60740",
     "huge-rate",
     "1457c3",
-)
+]
 TOMLS = ("10d0ed", "3191ed", "8343ca", "e3be7d", "d664c1")
 
 
