@@ -235,16 +235,16 @@ def test_links_are_no_files_of_a_bundle(sealed, tmp_path):
     assert verify(copy).details == ("timing.json: a link, and a bundle has only files",)
 
 
-def test_a_manifest_in_other_bytes_or_with_other_keys_is_not_ours(sealed, tmp_path):
+def test_a_manifest_that_says_something_twice_or_more_is_not_ours(sealed, tmp_path):
     copy = shutil.copytree(sealed / "simulate", tmp_path / "copy")
     text = (copy / MANIFEST).read_text(encoding="utf-8")
     twice = text.replace('"command": "simulate"', '"command": "x",\n  "command": "simulate"')
     more = to_json(json.loads(text) | {"verdict": "guilty"})
     beside = json.loads(text)
     beside["outputs"][0]["note"] = "guilty"
-    for other in (twice, more, to_json(beside), text + " "):
+    for other in (twice, more, to_json(beside)):
         (copy / MANIFEST).write_text(other, encoding="utf-8")
-        assert verify(copy).details == ("manifest.json: not as strapdown writes it",)
+        assert [f.code for f in verify(copy).findings] == ["verify.form"]
     missing = json.loads(text)
     del missing["environment"]
     (copy / MANIFEST).write_text(to_json(missing), encoding="utf-8")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 import tempfile
@@ -26,7 +27,6 @@ from strapdown.bundle import (
     read_manifest,
     resolved,
     sha256,
-    to_json,
     unsealed_changes,
     versions,
     with_paths,
@@ -217,18 +217,31 @@ def _beside_the_seal(root: Path, signer: str | Path | None) -> list[Finding]:
 
 
 def _is_ours(root: Path, manifest: dict[str, Any]) -> bool:
-    """Whether a manifest is written as strapdown writes it: nothing twice, nothing unknown."""
+    """Whether a manifest says nothing twice, in which readers could differ, and nothing unknown."""
     names = [item["name"] for item in [*manifest["inputs"], *manifest["outputs"]]]
     reserved = [n for n in names if n in (MANIFEST, TIMESTAMP) or SIGNATURE_FILE.fullmatch(n)]
     keys = {frozenset(item) for item in manifest["inputs"]}
     keys |= {frozenset({"role", "kept", *item}) for item in manifest["outputs"]}
     return (
-        (root / MANIFEST).read_bytes() == to_json(manifest).encode()
+        not _says_twice((root / MANIFEST).read_text(encoding="utf-8"))
         and set(manifest) == set(KEYS)
         and keys <= {frozenset({"role", "name", "kept", "sha256", "bytes"})}
         and len(names) == len(set(names))
         and not reserved
     )
+
+
+def _says_twice(text: str) -> bool:
+    """Whether an object of JSON has a key twice."""
+    twice: list[str] = []
+
+    def pairs(found: list[tuple[str, Any]]) -> dict[str, Any]:
+        keys = [key for key, _ in found]
+        twice.extend(keys if len(keys) != len(set(keys)) else ())
+        return dict(found)
+
+    json.loads(text, object_pairs_hook=pairs)
+    return bool(twice)
 
 
 def _compare(
