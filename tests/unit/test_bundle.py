@@ -247,7 +247,9 @@ def test_a_simulation_verifies_too(tmp_path):
     assert other.digest != seal.digest
 
 
-@pytest.mark.parametrize("name", ["../secret", "/etc/hostname", 7])
+@pytest.mark.parametrize(
+    "name", ["../secret", "/etc/hostname", 7, "x" * 256, "a\0b", "\ud800", ".", ""]
+)
 def test_a_manifest_that_names_files_outside_is_refused(copy, name):
     manifest = json.loads((copy / MANIFEST).read_text())
     manifest["outputs"][0]["name"] = name

@@ -11,6 +11,7 @@ from __future__ import annotations
 import functools
 import hashlib
 import json
+import os
 import platform
 import re
 import shutil
@@ -480,7 +481,8 @@ def _refuse_escape(manifest: dict[str, Any]) -> None:
                 raise ValueError
             if not isinstance(item["bytes"], int) or item.get("kept", "copy") not in KEPT:
                 raise ValueError
-            if ".." in path.parts:
+            parts = [os.fsencode(part) for part in path.parts]
+            if b".." in parts or b"\0" in b"".join(parts) or max(map(len, parts)) > 255:
                 raise ValueError
         _refuse_unsealed_paths(manifest)
         lists = [manifest[part].values() for part in ("versions", "platform")]
