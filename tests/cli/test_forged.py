@@ -200,8 +200,8 @@ def test_the_text_of_a_pdf_is_compared_where_other_versions_drew_it(sealed, tmp_
         ("2e-16", "3e-16", True),
         ("1.5e3", "1.6e3", True),
         ("1.5e3", "1.7e3", False),
-        ("1.000000000", "1.000000900", True),
-        ("1.000000000", "1.000009000", False),
+        ("1.0000000000", "1.0000000009", True),
+        ("55.000000000", "55.000000900", False),
         ("-0.1", "0.1", False),
         ("0.0", "-0.0", True),
         ("1e999", "1e998", False),
@@ -214,6 +214,92 @@ def test_the_text_of_a_pdf_is_compared_where_other_versions_drew_it(sealed, tmp_
 def test_printed_numbers_may_differ_in_their_last_digit(one, two, same):
     assert same_text(one, two) is same
     assert same_text(two, one) is same
+
+
+def test_a_route_that_moved_is_no_rounding(sealed, again, tmp_path):
+    """By six meters, relative to degrees within 1e-6; and small numbers that all turned round."""
+    again("navigate")
+
+    def route(data):
+        head, rows = data.split(b"heading_deg\n")
+        lines = [line.split(b",") for line in rows.splitlines()]
+        for line in lines:
+            line[1] = repr(float(line[1]) + 5e-5).encode()
+        return head + b"heading_deg\n" + b"".join(b",".join(line) + b"\n" for line in lines)
+
+    assert forged(sealed, tmp_path, "navigate", "trajectory.csv", route).verdict == "changed"
+    shutil.rmtree(tmp_path / "forged")
+    small = re.compile(rb"(?<=,)\d\.\d+e-[89](?=,)")
+
+    def turned(data):
+        # All that are below the tolerance of a number of one.
+        return small.sub(lambda m: b"-" + m[0], data)
+
+    found = forged(sealed, tmp_path, "navigate", "sensor_errors.csv", turned)
+    assert found.verdict == "changed"
+
+
+def doubled(data):
+    text = json.loads(data)
+    key = next(iter(text))
+    return data.replace(b"{", b'{"' + key.encode() + b'": "forged",', 1)
+
+
+ADDED = [
+    ("crash", "crash.json", doubled),
+    ("navigate", "trajectory.geojson", doubled),
+    ("navigate", "trajectory.csv", lambda data: data + b"# the recorder was faulty\n"),
+    ("navigate", "trajectory.csv", lambda data: data[:-1] + b",\n"),
+    ("navigate", "trajectory.csv", lambda data: data.replace(b"\n", b"\r\n")),
+    ("simulate", "log.npz", lambda data: data + b"x"),
+    ("simulate", "log.npz", lambda data: b"#!/bin/sh\n" + data),
+    ("simulate", "log.mat", lambda data: b"FORGED" + data[6:]),
+    ("simulate", "log.h5", lambda data: data + b"x"),
+    ("crash", "report.pdf", lambda data: data + b"x"),
+    ("crash", "report.pdf", lambda data: data + data[data.rindex(b"startxref") :]),
+]
+
+
+@pytest.mark.parametrize(("kind", "name", "change"), ADDED)
+def test_what_is_added_to_a_file_is_found(sealed, again, tmp_path, kind, name, change):
+    again(kind)
+    found = forged(sealed, tmp_path, kind, name, change)
+    assert (found.verdict, [f.file for f in found.findings if f.code == "verify.content"]) == (
+        "changed",
+        [name],
+    )
+
+
+def test_arrays_and_attributes_that_are_added_are_found(sealed, again, tmp_path):
+    import h5py
+    import pyarrow.parquet as pq
+
+    again("simulate")
+
+    def of_hdf5(data):
+        path = tmp_path / "x.h5"
+        path.write_bytes(data)
+        with h5py.File(path, "a") as file:
+            file.attrs["forged"] = "yes"
+        return path.read_bytes()
+
+    def of_parquet(data):
+        path = tmp_path / "x.parquet"
+        path.write_bytes(data)
+        table = pq.read_table(path)
+        pq.write_table(table.replace_schema_metadata({"forged": "yes"}), path)
+        return path.read_bytes()
+
+    for name, change in (("log.h5", of_hdf5), ("log.parquet", of_parquet)):
+        assert forged(sealed, tmp_path, "simulate", name, change).verdict == "changed", name
+        shutil.rmtree(tmp_path / "forged")
+
+
+def test_a_page_or_a_run_inside_the_bundle_would_change_it(sealed, run_cli):
+    folder = sealed / "simulate"
+    for option in ("--page", "--again"):
+        done = run_cli("verify", folder, option, folder / "x.html")
+        assert (done.code, "inside the bundle" in done.err) == (4, True)
 
 
 def test_links_are_no_files_of_a_bundle(sealed, tmp_path):

@@ -135,7 +135,8 @@ def test_numbers_that_differ_are_told_by_how_much(copy, shift, verdict):
     path = copy / "attitude.json"
     content = json.loads(path.read_text())
     final = content["algorithms"][0]["final"]
-    relative = shift / max(1.0, abs(final["roll_deg"] + shift))
+    # Of an angle beyond one degree the difference itself.
+    relative = shift / min(1.0, abs(final["roll_deg"] + shift))
     final["roll_deg"] += shift
     path.write_text(json.dumps(content))
     manifest = json.loads((copy / MANIFEST).read_text())
@@ -145,7 +146,9 @@ def test_numbers_that_differ_are_told_by_how_much(copy, shift, verdict):
     (copy / MANIFEST).write_text(to_json(manifest))
     found = verify(copy)
     assert found.verdict == verdict
-    assert any(line.startswith("platform cpu: another then") for line in found.details)
+    assert any(
+        line.startswith("platform cpu: another as the bundle states") for line in found.details
+    )
     assert found.within == pytest.approx(relative, rel=1e-4)
 
 
@@ -193,14 +196,13 @@ def test_a_large_input_is_referred_to_and_still_watched(log, tmp_path, monkeypat
     assert verify(seal.path, inputs=[source]).verdict == "identical"
     moved = tmp_path / "disk"
     moved.mkdir()
-    shutil.copy(source, moved / "of another name.csv")
-    shutil.copy(source, moved / "mine.csv")
-    source.unlink()
-    # A log of another name stands in the result, so that it is no other log.
-    assert verify(seal.path, inputs=[moved]).verdict == "identical"
-    with (moved / "mine.csv").open("a") as stream:
+    source.rename(moved / "of another name.csv")
+    # The recorded name stands in the result.
+    for given in (moved, moved / "of another name.csv"):
+        assert verify(seal.path, inputs=[given]).verdict == "identical"
+    with (moved / "of another name.csv").open("a") as stream:
         stream.write("\n")
-    changed = verify(seal.path, inputs=[moved])
+    changed = verify(seal.path, inputs=[moved / "of another name.csv"])
     assert changed.details == (f"{source}: changed after it was sealed",)
 
 
@@ -213,7 +215,8 @@ def test_a_folder_that_is_referred_to_may_have_moved(tmp_path):
     manifest = {
         "configuration": {"log": {"path": str(folder)}},
         "inputs": [
-            {"name": str(f), "kept": "reference", "sha256": sha256(f), "role": "log"} for f in files
+            {"name": str(f), "kept": "reference", "sha256": sha256(f), "role": "log", "bytes": 1}
+            for f in files
         ],
     }
     assert found_references(manifest, [tmp_path])[str(folder)] == folder

@@ -486,7 +486,10 @@ def _refuse_escape(manifest: dict[str, Any]) -> None:
                 raise ValueError
         _refuse_unsealed_paths(manifest)
         lists = [manifest[part].values() for part in ("versions", "platform")]
-        if not all(isinstance(v, str) for each in [*lists, manifest["environment"]] for v in each):
+        if not all(isinstance(v, str) for each in lists for v in each):
+            raise ValueError
+        # People hand this list to an installer.
+        if not all(re.fullmatch(r"[\w.-]+==[\w.+!-]+", line) for line in manifest["environment"]):
             raise ValueError
         if not isinstance(manifest["command"], str):
             raise ValueError
@@ -571,7 +574,7 @@ def found_references(manifest: dict[str, Any], given: Sequence[Path]) -> dict[st
             continue
         name = Path(item["name"])
         root = next((f for f in folders if f != name and name.is_relative_to(f)), name)
-        places = [place for one in given for place in _places(name, root, one)]
+        places = [place for one in given for place in _places(name, root, one, item["bytes"])]
         for place in places:
             file = place / name.relative_to(root)
             if file.is_file() and (place is places[-1] or sha256(file) == item["sha256"]):
@@ -584,11 +587,15 @@ def found_references(manifest: dict[str, Any], given: Sequence[Path]) -> dict[st
     return found
 
 
-def _places(name: Path, root: Path, given: Path) -> list[Path]:
-    """Return where a recorded input, or the folder that it is in, may be now."""
+def _places(name: Path, root: Path, given: Path, size: int) -> list[Path]:
+    """Return where a recorded input of that size, or the folder that it is in, may be now."""
     absolute = given.absolute()
     if name.is_relative_to(absolute):
         return [root]
     if not absolute.is_dir():
         return [absolute] if root == name else []
-    return [absolute / name.name] if root == name else [absolute, absolute / root.name]
+    if root != name:
+        return [absolute, absolute / root.name]
+    # It may have another name there; its digest decides.
+    other = sorted(p for p in absolute.iterdir() if p.is_file() and p.stat().st_size == size)
+    return [*other, absolute / name.name]

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from strapdown.cli.shared_options import Quiet, Verbose
+from strapdown.cli.shared_options import Quiet, Verbose, options
 
 EPILOG = (
     "Example: strapdown sign --new-key expert.pem\n\n"
     "Example: strapdown sign drive-navigate --key expert.pem"
 )
+signing = options("Key")
 
 
 def sign(
@@ -20,15 +22,13 @@ def sign(
         Path | None, typer.Argument(metavar="DIR", help="A folder that a run wrote.")
     ] = None,
     key: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Secret key by Ed25519, as PEM or of OpenSSH."),
+        Path | None, signing("FILE", "Secret key by Ed25519, as PEM or of OpenSSH.")
     ] = None,
     new_key: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="Make a key; the public part becomes FILE.pub."),
+        Path | None, signing("FILE", "Make a key; the public part becomes FILE.pub.")
     ] = None,
     password: Annotated[
-        bool, typer.Option("--password", help="Ask for the password of the key.")
+        bool, signing(None, "Ask for the password of the key.", "--password")
     ] = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -46,6 +46,8 @@ def sign(
     if (folder is None) == (new_key is None) or (folder is None) != (key is None):
         raise ConfigError("cli.sign-what", quantity="DIR, --key or --new-key")
     secret = None
+    if password and not sys.stdin.isatty():
+        raise ConfigError("cli.no-terminal", quantity="--password")
     if password:
         secret = str(
             typer.prompt(

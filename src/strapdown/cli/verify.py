@@ -7,38 +7,28 @@ from typing import Annotated
 
 import typer
 
-from strapdown.cli.shared_options import Json, Quiet, Verbose
+from strapdown.cli.shared_options import Json, Quiet, Verbose, options, writing
 
 EPILOG = "Example: strapdown verify alexiev-fig4-attitude"
 CHANGED, IN_PART = 6, 7
+checking = options("What to check")
 
 
 def verify(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="A folder that a run wrote.")],
     seal: Annotated[
-        str | None,
-        typer.Option(metavar="DIGEST", help="The seal that was printed when it was made."),
+        str | None, checking("DIGEST", "The seal that was printed when it was made.")
     ] = None,
     signer: Annotated[
         str | None,
-        typer.Option(
-            metavar="KEY", help="Public key by which it is to be signed: a file, or its name."
-        ),
+        checking("KEY", "Public key by which it is to be signed: a file, or its name."),
     ] = None,
     inputs: Annotated[
         list[Path] | None,
-        typer.Option(
-            "--input",
-            metavar="PATH",
-            help="A file or folder outside DIR that may be read; may be repeated.",
-        ),
+        checking("PATH", "A file or folder outside DIR that may be read; repeatable.", "--input"),
     ] = None,
-    again: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Keep the repeated run in this folder.")
-    ] = None,
-    page: Annotated[
-        Path | None, typer.Option(metavar="FILE.html", help="Write the result on one page.")
-    ] = None,
+    again: Annotated[Path | None, writing("DIR", "Keep the repeated run in this folder.")] = None,
+    page: Annotated[Path | None, writing("FILE.html", "Write the result on one page.")] = None,
     json: Json = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
@@ -58,6 +48,8 @@ def verify(
 
     if page is not None and page.exists():
         raise ConfigError("cli.file-exists", file=str(page), quantity="--page")
+    if page is not None and page.resolve().is_relative_to(folder.resolve()):
+        raise ConfigError("verify.inside", file=str(page), quantity="--page")
     with progress(quiet or json) as report:
         report("running it again", 0.5)
         result = check(folder, seal=seal, signer=signer, inputs=inputs or (), again=again)

@@ -3,9 +3,11 @@
 Another processor or library may round the last digits of a number differently, and other versions
 may draw a page differently. What is compared, by kind of file:
 
-* JSON, CSV and arrays: every number within `EQUAL`; words, units and comments exactly;
+* tables and arrays: the numbers of a column within `EQUAL` of its spread; words, units, comments
+  and names exactly; JSON: a number within `EQUAL` of itself; places within `PLACE`, times and
+  angles within `EQUAL` of a second and a degree;
 * HTML, SVG, KML, GeoJSON and other text: everything between the numbers exactly, the numbers within
-  `EQUAL` or one unit of their last digit, whole numbers exactly;
+  one unit of their last digit, whole numbers exactly;
 * PDF: the same for all objects in it, drawings included.
 
 Where other versions drew (another page, other fonts), the text of a page, an SVG or a PDF is
@@ -16,10 +18,12 @@ A picture of points is not compared: its figure as SVG stands beside it.
 from __future__ import annotations
 
 import base64
+import itertools
 import json
+import logging
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from html.parser import HTMLParser
 from pathlib import Path
@@ -30,13 +34,24 @@ from numpy.typing import NDArray
 
 from strapdown.errors import StrapdownError
 from strapdown.formats import read_raw
-from strapdown.formats.recording import RawLog
+from strapdown.formats.signs import first_bytes
+from strapdown.parsers.process import parse
 
 __all__ = ["EQUAL", "Comparison", "compare_files"]
 
-# A long integration amplifies rounding. A larger difference is a different result.
+#: A long integration amplifies rounding. A larger difference is a different result.
 EQUAL = 1e-6
-ARRAYS = (".csv", ".npz", ".h5", ".mat", ".parquet")
+#: Latitude and longitude: a tenth of a millimetre.
+PLACE = 1e-9  # deg
+# Differences of numbers that are nothing but rounding, in any unit.
+_ROUNDING = 1e-12
+#: Readers of arrays, in a process of their own, and whether the file is as long as what it holds.
+ARRAYS = {
+    ".npz": ("archives.arrays", True),
+    ".h5": ("hdf5.arrays", True),
+    ".mat": ("matlab.arrays", True),
+    ".parquet": ("parquet.table", False),
+}
 _NUMBER = re.compile(r"-?\d+\.?\d*(?:[eE][+-]?\d+)?")
 _OWN_VERSION = re.compile(r"strapdown \d+\.\d+\.\d+[\w.+]*")
 _EMBEDDED = re.compile(r"data:image/svg\+xml;base64,([A-Za-z0-9+/=]+)")
@@ -69,16 +84,20 @@ def compare_files(one: Path, two: Path, *, drawn_alike: bool) -> Comparison:
     """
     ending = one.suffix.lower()
     try:
-        if ending in (".json", ".geojson"):
+        if ending == ".json":
             return Comparison(_difference_of_json(one, two))
         if ending in ARRAYS:
-            return Comparison(_difference_of_tables(read_raw(one), read_raw(two)))
+            return Comparison(_difference_of_arrays(one, two, *ARRAYS[ending]))
+        if ending == ".csv":
+            return Comparison(_difference_of_tables(one, two))
         if ending == ".pdf":
             return _compare_pdf(one, two, drawn_alike)
         texts = [path.read_bytes().decode("utf-8") for path in (one, two)]
     except UnicodeDecodeError:
         return Comparison(0.0, drawing=True) if ending == ".png" else _DIFFERENT
     except (ValueError, RecursionError, StrapdownError):
+        return _DIFFERENT
+    if ending == ".geojson" and says_twice(texts[0]):
         return _DIFFERENT
     if same_text(*texts):
         return Comparison(0.0)
@@ -118,7 +137,8 @@ def _near(one: str, two: str) -> bool:
         # Whole numbers count something; a rounding does not change them but with odds of 1e-6.
         return p == q
     last = min(_unit(one), _unit(two))
-    return abs(p - q) <= max(1.001 * last, EQUAL * max(1.0, abs(p)))
+    # Numbers with all of their digits, as in the scenes of a page, have no last one to round.
+    return abs(p - q) <= max(1.001 * last, PLACE * abs(p), _ROUNDING)
 
 
 def _unit(number: str) -> float:
@@ -128,12 +148,26 @@ def _unit(number: str) -> float:
     return 10.0 ** (int(exponent or 0) - decimals) if abs(int(exponent or 0)) < 300 else 0.0
 
 
-# JSON and columns.
+# JSON, tables and arrays.
+
+
+def says_twice(text: str) -> bool:
+    """Whether an object of JSON has a key twice: two readers could take different ones."""
+    twice: list[str] = []
+
+    def pairs(found: list[tuple[str, Any]]) -> dict[str, Any]:
+        keys = [key for key, _ in found]
+        twice.extend(keys if len(keys) != len(set(keys)) else ())
+        return dict(found)
+
+    json.loads(text, object_pairs_hook=pairs)
+    return bool(twice)
 
 
 def _difference_of_json(one: Path, two: Path) -> float:
-    leaves = [list(_leaves(json.loads(p.read_text(encoding="utf-8")))) for p in (one, two)]
-    if len(leaves[0]) != len(leaves[1]):
+    texts = [p.read_text(encoding="utf-8") for p in (one, two)]
+    leaves = [list(_leaves(json.loads(text))) for text in texts]
+    if len(leaves[0]) != len(leaves[1]) or says_twice(texts[0]):
         return math.inf
     return max(map(_leaf_difference, *leaves), default=0.0)
 
@@ -157,22 +191,60 @@ def _leaf_difference(one: tuple[str, Any], two: tuple[str, Any]) -> float:
     if key != other:
         return math.inf
     if isinstance(x, float) and isinstance(y, float):
-        return _apart(key, np.array([x]), np.array([y]))
+        return _apart(key, np.array([x]), np.array([y]), abs(x))
     if isinstance(x, str) and isinstance(y, str):
         return 0.0 if same_text(x, y) else math.inf
     return 0.0 if x == y and type(x) is type(y) else math.inf
 
 
-def _difference_of_tables(one: RawLog, two: RawLog) -> float:
-    said = [repr((t.units, t.rate, t.sampling, t.axes, t.above)) for t in (one, two)]
-    a, b = one.columns, two.columns
-    if not same_text(*said) or a.keys() != b.keys() or any(a[k].shape != b[k].shape for k in a):
+_LINES = 20_000
+
+
+def _difference_of_tables(one: Path, two: Path) -> float:
+    with one.open(encoding="utf-8", newline="") as a, two.open(encoding="utf-8", newline="") as b:
+        while True:
+            texts = ["".join(itertools.islice(stream, _LINES)) for stream in (a, b)]
+            if texts == ["", ""]:
+                break
+            if _NUMBER.sub("#", texts[0]) != _NUMBER.sub("#", texts[1]):
+                return math.inf
+    first, second = read_raw(one), read_raw(two)
+    said = [repr((t.units, t.above, t.rate)) for t in (first, second)]
+    return _largest(first.columns, second.columns) if same_text(*said) else math.inf
+
+
+def _difference_of_arrays(one: Path, two: Path, reader: str, full: bool) -> float:
+    # What no reader looks at, as a comment of an archive, makes the file longer.
+    if full and one.stat().st_size != two.stat().st_size:
         return math.inf
-    return max((_apart(name, a[name], b[name]) for name in a), default=0.0)
+    if one.suffix.lower() == ".mat" and first_bytes(one, 128) != first_bytes(two, 128):
+        return math.inf
+    first, second = parse(reader, one), parse(reader, two)
+    if "arrays" not in first:
+        return _largest(first, second)
+    said = [repr((f.get("units"), f.get("meta"))) for f in (first, second)]
+    return _largest(first["arrays"], second["arrays"]) if same_text(*said) else math.inf
 
 
-def _apart(name: str, one: NDArray[Any], two: NDArray[Any]) -> float:
-    """Largest difference, relative if a number exceeds 1; infinite if one is not a number."""
+def _largest(one: Mapping[str, NDArray[Any]], two: Mapping[str, NDArray[Any]]) -> float:
+    if list(one) != list(two) or any(one[k].shape != two[k].shape for k in one):
+        return math.inf
+    return max((_apart(n, one[n], two[n], _spread(one[n])) for n in one), default=0.0)
+
+
+def _spread(values: NDArray[Any]) -> float:
+    """Distance between the least and the largest number."""
+    if values.dtype.kind not in "fiu" or not np.isfinite(values).any():
+        return 0.0
+    return float(np.nanmax(values) - np.nanmin(values))
+
+
+def _apart(name: str, one: NDArray[Any], two: NDArray[Any], scale: float) -> float:
+    """Largest difference, as a part of `scale`; infinite if one is not a number.
+
+    A difference that is rounding alone counts as a part of one, and what may be `EQUAL` is less for
+    places, times and angles, whose numbers may be large.
+    """
     if not {one.dtype.kind, two.dtype.kind} <= set("fiu"):
         return 0.0 if np.array_equal(one, two) else math.inf
     # An empty field on both sides is equal.
@@ -180,8 +252,15 @@ def _apart(name: str, one: NDArray[Any], two: NDArray[Any]) -> float:
     if name.endswith("heading_deg"):
         # A heading just below 360 may be just above 0 on another platform.
         apart = np.minimum(apart, np.abs(apart - 360.0))
-    largest = float(np.max(apart / np.fmax(1.0, np.abs(one)), initial=0.0))
-    return largest if math.isfinite(largest) else math.inf
+    if name.startswith(("lat", "lon")):
+        scale = min(scale, PLACE / EQUAL)
+    elif name.endswith(("_s", "_deg")) or name in ("t", "time"):
+        scale = min(scale, 1.0)
+    rounding = _ROUNDING * max(1.0, float(np.max(np.abs(one), initial=0.0, where=np.isfinite(one))))
+    largest = float(np.max(apart, initial=0.0))
+    if not math.isfinite(largest):
+        return math.inf
+    return 0.0 if largest == 0.0 else largest / max(scale, rounding / EQUAL)
 
 
 # The text of a page, and the objects of a PDF.
@@ -232,8 +311,14 @@ def _compare_pdf(one: Path, two: Path, drawn_alike: bool) -> Comparison:
     import pypdf
     from pypdf.errors import PyPdfError
 
+    # A later part of a file replaces objects, in one viewer or in all.
+    data = one.read_bytes()
+    if data.count(b"startxref") != 1 or not data.rstrip().endswith(b"%%EOF"):
+        return _DIFFERENT
+    log = logging.getLogger("pypdf")
+    before, log.disabled = log.disabled, True
     try:
-        readers = [pypdf.PdfReader(path) for path in (one, two)]
+        readers = [pypdf.PdfReader(path, strict=True) for path in (one, two)]
         parts = [list(_pdf_objects(reader)) for reader in readers]
         if len(parts[0]) == len(parts[1]) and all(map(_same_part, *parts)):
             return Comparison(0.0)
@@ -243,6 +328,8 @@ def _compare_pdf(one: Path, two: Path, drawn_alike: bool) -> Comparison:
         said = ["".join(_BLANKS.sub("", p.extract_text()) for p in r.pages) for r in readers]
     except (PyPdfError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return _DIFFERENT  # a damaged file can break the library anywhere
+    finally:
+        log.disabled = before
     return Comparison(0.0, drawing=True) if same_text(*said) else _DIFFERENT
 
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import math
 import re
+import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -40,7 +40,7 @@ from strapdown.report import crash_live
 from strapdown.report.alignment import ALIGNMENT
 from strapdown.report.attitude import write_attitude
 from strapdown.report.coast import COAST
-from strapdown.report.content import EQUAL, Comparison, compare_files
+from strapdown.report.content import EQUAL, Comparison, compare_files, says_twice
 from strapdown.report.crash_case import CRASH
 from strapdown.report.crash_simulation import write_crash_simulation
 from strapdown.report.doctor import DOCTOR
@@ -151,6 +151,8 @@ def verify(
     """
     root = Path(bundle).absolute()
     manifest = read_manifest(root)
+    if again is not None and Path(again).resolve().is_relative_to(root.resolve()):
+        raise ConfigError("verify.inside", file=str(again), quantity="--again")
     digest = sha256(root / MANIFEST)
     moved = found_references(manifest, [Path(path) for path in inputs])
     notes = _beside_the_seal(root, signer)
@@ -170,6 +172,7 @@ def verify(
         raise DataError("report.command-not-known", file=MANIFEST, manifest=manifest["command"])
     with tempfile.TemporaryDirectory(prefix="strapdown-verify-") as folder:
         repeated = Path(folder) / "again" if again is None else Path(again).absolute()
+        moved = _of_recorded_name(moved, Path(folder))
         configuration = resolved(manifest["configuration"], root, moved)
         try:
             sealed = {item["name"] for item in manifest["outputs"]}
@@ -181,6 +184,22 @@ def verify(
                 errors=error.errors()[0]["msg"],
             ) from None
         return _compare(root, repeated, manifest, digest, moved, notes)
+
+
+def _of_recorded_name(moved: dict[str, Path], folder: Path) -> dict[str, Path]:
+    """Give an input that has another name now its recorded one, which stands in the result."""
+    found = {}
+    for number, (name, path) in enumerate(moved.items()):
+        place = path
+        if path.is_file() and path.name != Path(name).name:
+            place = folder / f"input-{number}" / Path(name).name
+            place.parent.mkdir()
+            try:
+                place.symlink_to(path.resolve())
+            except OSError:  # not allowed to everybody on Windows
+                shutil.copyfile(path, place)
+        found[name] = place
+    return found
 
 
 def _digest(seal: str) -> str:
@@ -223,25 +242,12 @@ def _is_ours(root: Path, manifest: dict[str, Any]) -> bool:
     keys = {frozenset(item) for item in manifest["inputs"]}
     keys |= {frozenset({"role", "kept", *item}) for item in manifest["outputs"]}
     return (
-        not _says_twice((root / MANIFEST).read_text(encoding="utf-8"))
+        not says_twice((root / MANIFEST).read_text(encoding="utf-8"))
         and set(manifest) == set(KEYS)
         and keys <= {frozenset({"role", "name", "kept", "sha256", "bytes"})}
         and len(names) == len(set(names))
         and not reserved
     )
-
-
-def _says_twice(text: str) -> bool:
-    """Whether an object of JSON has a key twice."""
-    twice: list[str] = []
-
-    def pairs(found: list[tuple[str, Any]]) -> dict[str, Any]:
-        keys = [key for key, _ in found]
-        twice.extend(keys if len(keys) != len(set(keys)) else ())
-        return dict(found)
-
-    json.loads(text, object_pairs_hook=pairs)
-    return bool(twice)
 
 
 def _compare(
@@ -324,7 +330,7 @@ def _other_configuration(
 
     `exact`: whether both have the same options; another version may have others.
     """
-    before = {str(place.resolve()): name for name, place in moved.items()}
+    before = {str(p): name for name, place in moved.items() for p in (place, place.resolve())}
     had = with_paths(now["configuration"], lambda path: before.get(path, path))
     sealed = manifest["configuration"]
     if not exact:

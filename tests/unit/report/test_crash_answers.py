@@ -510,7 +510,7 @@ def test_options_that_differ_from_the_file_are_named_with_both_values(result, ca
     assert changed_case(case_file.parent, manifest) == []
     sealed["options"]["seed"] = 3
     sealed["units"][0]["trigger_s"] = 1.0
-    assert changed_case(case_file.parent, manifest) == [
+    assert [found.text() for found in changed_case(case_file.parent, manifest)] == [
         "case.toml: unit 'IMU1', trigger_s: 1.0 before, 10.748534 now",
         "case.toml: options, seed: 3 before, 0 now",
     ]

@@ -21,8 +21,8 @@ from strapdown.report import attitude_tables as tables
 from strapdown.report.attitude import attitude_json, write_attitude
 from strapdown.report.attitude_document import KINDS, attitude_document
 from strapdown.report.attitude_tables import standing
+from strapdown.report.content import compare_files
 from strapdown.report.document import document_page
-from strapdown.report.verify import _difference
 
 EVIL = "</script><script>alert(1)</script><img src=x onerror=alert(2)>"
 TERMINAL = 112  # columns
@@ -265,7 +265,7 @@ def test_verify_compares_the_sweep_word_for_word_and_number_for_number(make_benc
         (re.sub(r",100,(\d+\.\d{8})\d*", r",100,\1", text, count=1), 1e-7),
     ]:
         other.write_text(changed)
-        found = _difference(seal.path / "sweep.csv", other)
+        found = compare_files(seal.path / "sweep.csv", other, drawn_alike=True).within
         assert found == expected or 0.0 < found < expected
 
 
