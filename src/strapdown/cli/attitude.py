@@ -317,13 +317,14 @@ MOST_LINES = 8
 def print_comparison(bench: AttitudeComparison) -> None:
     """Print the input of the run, its tables, and the answer last, where it is visible."""
     from strapdown.cli.console import console, print_table
+    from strapdown.errors import printable
     from strapdown.report import attitude_tables as tables
 
     page = console()
     if bench.trials is not None:
         count = len(bench.trials.names)
         page.print(f"First of {count} trials; the answer and the errors by rate hold for all:")
-    page.print(bench.source, style="bold")
+    page.print(printable(bench.source), style="bold")
     if bench.readings:
         page.print("Read as:")
         print_table(

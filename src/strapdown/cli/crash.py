@@ -112,6 +112,7 @@ def crash(
         progress,
     )
     from strapdown.cli.result_folder import claim, default_folder, refuse_result
+    from strapdown.errors import printable
     from strapdown.report.crash_tables import closure_table
     from strapdown.report.values import shown_in
 
@@ -137,9 +138,9 @@ def crash(
     if write.quiet:
         return
     for run, seal in zip(result.runs.values(), seals, strict=True):
-        console().print(run.spec.title, style="bold")
+        console().print(printable(run.spec.title), style="bold")
         if several:
-            console().print(run.vehicle_names[run.number - 1], style="bold")
+            console().print(printable(run.vehicle_names[run.number - 1]), style="bold")
         with shown_in(run.spec.options.units):
             print_crash(run)
         # What both say together is told with the first.

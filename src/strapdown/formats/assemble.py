@@ -715,7 +715,8 @@ def report_weightless(name: str, accel: Array | None, findings: list[Finding]) -
     if accel is None or any(f.code == "io.no-gravity" for f in findings):
         return
     some = accel[:: 1 + len(accel) // SOME]
-    usual = float(np.sqrt(np.median((some * some).sum(axis=1))))
+    with np.errstate(over="ignore"):  # of a corrupt log, which is refused where it is
+        usual = float(np.sqrt(np.median((some * some).sum(axis=1))))
     if usual < WEIGHTLESS:
         reason = Finding("io.evidence-force-too-small", severity="note", usual=usual)
         findings.append(Finding("io.no-gravity", file=name, quantity="accel", reason=reason))
