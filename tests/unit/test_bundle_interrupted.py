@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 import threading
+from typing import ClassVar
 
 import pytest
 from tests.coded import coded
@@ -294,6 +295,67 @@ def test_every_file_and_folder_is_flushed_before_it_takes_its_name(tmp_path, giv
     staging = flushed[renamed[0] - 1]
     assert {p.relative_to(staging) for p in flushed[: renamed[0]] if p != staging} == inside
     assert flushed[renamed[0] :] == [tmp_path]
+
+
+class LikeMsvcrt:
+    """Locks of Windows: of a range of bytes, by EACCES; the same process is refused, too."""
+
+    LK_NBLCK = 2
+    held: ClassVar[list[int]] = []
+
+    @classmethod
+    def locking(cls, number, mode, count):
+        assert (mode, count, os.lseek(number, 0, os.SEEK_CUR)) == (2, 1, 1 << 20)
+        if any(held != number and is_open_on(held, os.fstat(number)) for held in cls.held):
+            raise PermissionError(errno.EACCES, "Permission denied")
+        cls.held.append(number)
+
+
+def is_open_on(number, about):
+    """Whether a file number is still open, and on that file."""
+    try:
+        return os.path.samestat(os.fstat(number), about)
+    except OSError:
+        return False
+
+
+def test_locks_and_renames_as_windows_has_them(tmp_path, given, monkeypatch):
+    monkeypatch.setattr(atomic_folder, "WINDOWS", True)
+    monkeypatch.setattr(atomic_folder, "_exchange", lambda: None)
+    monkeypatch.setitem(sys.modules, "msvcrt", LikeMsvcrt)
+    unlink = atomic_folder.Path.unlink
+
+    def not_open(path, missing_ok=False):
+        # Windows removes no file that is open.
+        if path.exists() and any(is_open_on(n, path.stat()) for n in LikeMsvcrt.held):
+            raise PermissionError(errno.EACCES, "in use", str(path))
+        unlink(path, missing_ok=missing_ok)
+
+    monkeypatch.setattr(atomic_folder.Path, "unlink", not_open)
+    out = tmp_path / "out"
+    write(out, given, "old")
+    write(out, given, "new", force=True)
+    assert text_of(out) == "new"
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["given.csv", "out"]
+    with claimed(out, True):
+        # As another process.
+        monkeypatch.setattr(atomic_folder, "_HELD", {})
+        with pytest.raises(ConfigError, check=coded("bundle.being-written")):
+            write(out, given, "third", force=True)
+    assert text_of(out) == "new"
+
+
+def test_files_are_flushed_as_macos_needs_it(tmp_path, given, monkeypatch):
+    import fcntl
+
+    asked = []
+    monkeypatch.setattr(atomic_folder, "MACOS", True)
+    monkeypatch.setattr(atomic_folder, "_exchange", lambda: None)
+    monkeypatch.setattr(fcntl, "F_FULLFSYNC", 51, raising=False)
+    monkeypatch.setattr(fcntl, "fcntl", lambda number, what: asked.append(what))
+    write(tmp_path / "out", given, "new")
+    # Two files, the copy of the input, the manifest; their folders, and the one around them.
+    assert set(asked) == {51} and len(asked) == 4 + 4 + 1
 
 
 def test_a_file_system_without_locks_is_written_all_the_same(tmp_path, given, monkeypatch):

@@ -26,13 +26,17 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from importlib import import_module
 from pathlib import Path
 from secrets import token_hex
+from typing import Any
 
 from strapdown.errors import ConfigError
 
 __all__ = ["check_destination", "claimed", "replace_file", "written_whole"]
 
+#: What a system promises differs; tests stand in for the others.
+WINDOWS, MACOS = os.name == "nt", sys.platform == "darwin"
 _LOCK = re.compile(r"\.(?P<name>.+)\.lock", re.S)
 _LEFT = re.compile(r"\.(?P<name>.+)\.[0-9a-f]{16}\.(?P<kind>partial|old)", re.S)
 #: Beginning of a lock file, before the number of the process.
@@ -146,7 +150,7 @@ def _locked(out: Path) -> int | None:
         try:
             _take(lock)
         except OSError as error:
-            owner = os.read(lock, 64) if error.errno in _TAKEN and os.name != "nt" else b""
+            owner = os.read(lock, 64) if error.errno in _TAKEN and not WINDOWS else b""
             os.close(lock)
             if error.errno in _NO_LOCKS:
                 path.unlink(missing_ok=True)
@@ -166,23 +170,21 @@ def _locked(out: Path) -> int | None:
 
 def _take(lock: int) -> None:
     """Lock an open file, or raise OSError at once."""
-    if sys.platform == "win32":
-        import msvcrt
-
+    if WINDOWS:
+        msvcrt: Any = import_module("msvcrt")
         # Beyond its content, which others may read.
         os.lseek(lock, 1 << 20, os.SEEK_SET)
         msvcrt.locking(lock, msvcrt.LK_NBLCK, 1)
         os.lseek(lock, 0, os.SEEK_SET)
-    else:
-        import fcntl
-
-        # Of the process, and not of the file: a child that outlives a killed run holds nothing.
-        fcntl.lockf(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return
+    fcntl: Any = import_module("fcntl")
+    # Of the process, and not of the file: a child that outlives a killed run holds nothing.
+    fcntl.lockf(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def _unlock(out: Path, lock: int) -> None:
     """Release a name. Unlike POSIX, Windows cannot remove a file that is open."""
-    if os.name == "nt":
+    if WINDOWS:
         os.close(lock)
         with suppress(OSError):
             _lock_file(out).unlink()
@@ -307,7 +309,7 @@ def _exchange() -> Callable[[bytes, bytes], int] | None:
             rename = library.renameat2
             rename.argtypes = [number, text, number, text, flags]
             return lambda a, b: int(rename(_HERE, a, _HERE, b, _EXCHANGE))
-        if system == "darwin":
+        if MACOS:
             swap = library.renamex_np
             swap.argtypes = [text, text, flags]
             return lambda a, b: int(swap(a, b, _EXCHANGE))
@@ -335,11 +337,10 @@ def _flush(folder: Path) -> None:
 
 def _flush_file(path: Path) -> None:
     # Windows flushes only what may be written.
-    number = os.open(path, os.O_RDWR if os.name == "nt" else os.O_RDONLY)
+    number = os.open(path, os.O_RDWR if WINDOWS else os.O_RDONLY)
     try:
-        if sys.platform == "darwin":
-            import fcntl
-
+        if MACOS:
+            fcntl: Any = import_module("fcntl")
             # fsync of macOS leaves the data in the cache of the disk.
             fcntl.fcntl(number, fcntl.F_FULLFSYNC)
         else:
@@ -354,5 +355,5 @@ def _flush_file(path: Path) -> None:
 
 def _flush_entry(folder: Path) -> None:
     """Flush the names in a folder; Windows does so itself."""
-    if os.name != "nt":
+    if not WINDOWS:
         _flush_file(folder)
