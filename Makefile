@@ -56,7 +56,7 @@ test-slow: $(VENV)/.test
 MINUTES ?= 1
 SEED ?= 0
 fuzz: $(VENV)/.fuzz
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/fuzz --minutes $(MINUTES) --seed $(SEED)
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/fuzz --minutes $(MINUTES) --seed $(SEED) $(FUZZ)
 
 examples: $(VENV)/.test
 	$(PYTEST) -n 2 --dist worksteal -m slow tests/cli/test_manual.py

@@ -379,8 +379,10 @@ class _Top:
     def _behind_a_word(self, line: str, width: int) -> list[str] | None:
         """Names of rows that all begin with one word, which has no name: ``Data,1,2``."""
         words = {fields_of(row, self.separator)[0] for _, row in self.data[:JUDGED]}
+        if len(words) != 1 or width < 2:
+            return None
         word = words.pop()
-        named = _named(line, self.separator, width - 1) if not words and width > 1 else None
+        named = _named(line, self.separator, width - 1)
         # Where the first name is not of a number, the word has it, and another is missing.
         if not named or read_name(named[0]).quantity is None:
             return None
