@@ -359,7 +359,7 @@ def test_files_are_flushed_as_macos_needs_it(tmp_path, given, monkeypatch):
 
 
 def test_a_file_system_without_locks_is_written_all_the_same(tmp_path, given, monkeypatch):
-    def none(lock):
+    def none(lock, within):
         raise OSError(errno.ENOLCK, "No locks available")
 
     monkeypatch.setattr(atomic_folder, "_take", none)

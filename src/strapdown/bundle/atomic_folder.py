@@ -33,7 +33,15 @@ from typing import Any
 
 from strapdown.errors import ConfigError
 
-__all__ = ["check_destination", "claimed", "replace_file", "written_whole"]
+__all__ = [
+    "HeldError",
+    "check_destination",
+    "claimed",
+    "flush_entry",
+    "open_locked",
+    "replace_file",
+    "written_whole",
+]
 
 #: What a system promises differs; tests stand in for the others.
 WINDOWS, MACOS = os.name == "nt", sys.platform == "darwin"
@@ -142,33 +150,57 @@ def _locked(out: Path) -> int | None:
     path = _lock_file(out)
     while True:
         try:
-            lock = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_CLOEXEC", 0), 0o666)
+            lock = open_locked(path)
+        except HeldError as error:
+            raise _held_by(out, error.process) from None
         except OSError as error:
-            raise ConfigError(
-                "bundle.cannot-write", file=str(out), quantity="--out", reason=error.strerror
-            ) from None
-        try:
-            _take(lock)
-        except OSError as error:
-            owner = os.read(lock, 64) if error.errno in _TAKEN and not WINDOWS else b""
-            os.close(lock)
             if error.errno in _NO_LOCKS:
                 path.unlink(missing_ok=True)
                 return None
-            if error.errno not in _TAKEN:
-                raise
-            number = owner.removeprefix(_OWNER).strip()
-            raise _held_by(out, int(number) if number.isdigit() else None) from None
+            raise ConfigError(
+                "bundle.cannot-write", file=str(out), quantity="--out", reason=error.strerror
+            ) from None
         # A run that ended meanwhile has removed the file that was locked.
         with suppress(OSError):
             if os.path.samestat(os.fstat(lock), path.stat()):
-                os.ftruncate(lock, 0)
-                os.write(lock, _OWNER + str(os.getpid()).encode() + b"\n")
                 return lock
         os.close(lock)
 
 
-def _take(lock: int) -> None:
+class HeldError(Exception):
+    """Another process holds a lock.
+
+    `process`: its number, None if it is not known.
+    """
+
+    def __init__(self, process: int | None) -> None:
+        self.process = process
+
+
+def open_locked(path: Path, *, within: bool = False) -> int:
+    """Open a lock file, lock it, and write the number of this process into it.
+
+    `within`: hold off this process, too. The system releases the lock when the file is closed, or
+    the process ends, however it does. HeldError: it is locked. OSError: it cannot be opened, or the
+    file system has no locks.
+    """
+    lock = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_CLOEXEC", 0), 0o666)
+    try:
+        _take(lock, within)
+        os.ftruncate(lock, 0)
+        os.write(lock, _OWNER + str(os.getpid()).encode() + b"\n")
+    except OSError as error:
+        # Windows reads nothing of a file that another process has locked.
+        owner = os.read(lock, 64) if error.errno in _TAKEN and not WINDOWS else b""
+        os.close(lock)
+        if error.errno not in _TAKEN:
+            raise
+        number = owner.removeprefix(_OWNER).strip()
+        raise HeldError(int(number) if number.isdigit() else None) from None
+    return lock
+
+
+def _take(lock: int, within: bool) -> None:
     """Lock an open file, or raise OSError at once."""
     if WINDOWS:
         msvcrt: Any = import_module("msvcrt")
@@ -178,8 +210,10 @@ def _take(lock: int) -> None:
         os.lseek(lock, 0, os.SEEK_SET)
         return
     fcntl: Any = import_module("fcntl")
-    # Of the process, and not of the file: a child that outlives a killed run holds nothing.
-    fcntl.lockf(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    # A lock of the process is not inherited by its children, and an interrupted call of this
+    # process, which left the file open, does not hold off the next.
+    take = fcntl.flock if within else fcntl.lockf
+    take(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def _unlock(out: Path, lock: int) -> None:
@@ -291,7 +325,7 @@ def _put_in_place(staging: Path, out: Path) -> None:
         finally:
             if out.exists():
                 shutil.rmtree(old, ignore_errors=True)
-    _flush_entry(out.parent)
+    flush_entry(out.parent)
 
 
 _HERE = -100  # AT_FDCWD of Linux: paths are absolute, and nothing is relative to it
@@ -332,7 +366,7 @@ def _flush(folder: Path) -> None:
     for path, _, names in os.walk(folder, topdown=False):
         for name in names:
             _flush_file(Path(path) / name)
-        _flush_entry(Path(path))
+        flush_entry(Path(path))
 
 
 def _flush_file(path: Path) -> None:
@@ -353,7 +387,7 @@ def _flush_file(path: Path) -> None:
         os.close(number)
 
 
-def _flush_entry(folder: Path) -> None:
+def flush_entry(folder: Path) -> None:
     """Flush the names in a folder; Windows does so itself."""
     if not WINDOWS:
         _flush_file(folder)

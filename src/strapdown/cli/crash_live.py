@@ -12,12 +12,15 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from strapdown.bundle import write_latency
+from strapdown.bundle.atomic_folder import replace_file
 from strapdown.cli.console import WORDS, print_seal
 from strapdown.cli.live_folder import (
     begin_journal,
-    note_token,
+    open_lines,
+    output_of,
     recovered,
     refuse_beside_recover,
+    remove_empty,
     remove_received,
     sealing,
     warner,
@@ -26,11 +29,10 @@ from strapdown.cli.navigate_live import line_writer
 from strapdown.cli.navigate_tables import print_latency
 from strapdown.cli.result_folder import claim, default_folder, refuse_result
 from strapdown.cli.shared_options import OutFlags, refuse_without_live
-from strapdown.errors import ConfigError, DataError
+from strapdown.errors import ConfigError
 from strapdown.live.crash import receive_crash, recorder_of_case
 from strapdown.live.journal import Journal
 from strapdown.live.replay import MachineClock
-from strapdown.live.sources import open_source
 from strapdown.report.attitude_export import check_export
 from strapdown.report.crash_live import (
     COMMAND,
@@ -74,7 +76,7 @@ def crash_live(cases: Sequence[Path], out: Path | None, write: OutFlags, flags: 
         text = export_detector(
             options.errors, options.variance, mean=options.mean, calibration=known
         )
-        flags.export.write_text(text, encoding="utf-8", newline="\n")
+        replace_file(flags.export, text.encode())
         if not write.quiet:
             typer.echo(f"C99   {flags.export}")
         return
@@ -101,8 +103,7 @@ def recover_crash(
     WORDS.set("file")
     journal = recovered(flags.recover, COMMAND, warner(write.quiet))
     with sealing(journal):
-        folder = out or journal.folder.parent / journal.run["out"]
-        claim(folder, write.force)
+        folder = output_of(journal, out, write.force)
     _run(journal, folder, write, flags)
 
 
@@ -112,10 +113,7 @@ def _run(journal: Journal, folder: Path, write: OutFlags, flags: LiveFlags) -> N
     options = recorder_of(journal.run["configuration"])
     every = journal.run["every"] if flags.every is None else flags.every
     with sealing(journal):
-        source = None
-        if flags.live is not None:
-            source = open_source(flags.live, clock, sys.stdin.buffer, flags.token)
-            note_token(source, flags.token, warn)
+        source = open_lines(flags.live, clock, flags.token, warn)
         got = receive_crash(options, source, clock, line_writer, warn, every, journal)
         if got.rows.count:
             record = journal.folder / RECEIVED
@@ -125,9 +123,7 @@ def _run(journal: Journal, folder: Path, write: OutFlags, flags: LiveFlags) -> N
             )
             journal.sealed(seal.digest)
     if not got.log.watch.samples:
-        journal.close()
-        journal.remove()
-        raise DataError("cli.no-sample", quantity="--live" if source else "--recover")
+        remove_empty(journal, source is not None)
     remove_received(journal, seal.path)
     latency, own = got.tape.latency(), got.processing.latency()
     told: dict[str, Any] = {

@@ -3,21 +3,34 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import typer
 
 from strapdown import __version__
 from strapdown.bundle import named_paths, read_manifest, sha256, source_digest
 from strapdown.cli.console import WORDS
+from strapdown.cli.result_folder import claim
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.live.journal import Journal, received_folder
-from strapdown.live.sources import LineSource
+from strapdown.live.replay import RunClock
+from strapdown.live.sources import LineSource, open_source
 
-__all__ = ["begin_journal", "note_token", "recovered", "remove_received", "sealing", "warner"]
+__all__ = [
+    "begin_journal",
+    "open_lines",
+    "output_of",
+    "recovered",
+    "refuse_beside_recover",
+    "remove_empty",
+    "remove_received",
+    "sealing",
+    "warner",
+]
 
 
 def begin_journal(folder: Path, command: str, run: Mapping[str, Any]) -> Journal:
@@ -85,10 +98,30 @@ def remove_received(journal: Journal, bundle: Path) -> None:
         journal.remove()
 
 
-def note_token(source: LineSource, token: str | None, warn: Callable[[Finding], None]) -> None:
-    """Tell the token that was drawn for commands over the network."""
+def remove_empty(journal: Journal, live: bool) -> NoReturn:
+    """Remove the journal of a run that received nothing: DataError. `live`: whether it listened."""
+    journal.close()
+    journal.remove()
+    raise DataError("cli.no-sample", quantity="--live" if live else "--recover")
+
+
+def output_of(journal: Journal, out: Path | None, force: bool) -> Path:
+    """Hold the folder that a killed run was to write, or `out`, and return it."""
+    folder = out or journal.folder.parent / str(journal.run["out"])
+    claim(folder, force)
+    return folder
+
+
+def open_lines(
+    where: str | None, clock: RunClock, token: str | None, warn: Callable[[Finding], None]
+) -> LineSource | None:
+    """Open the source of a run, if it has one, and tell a token that was drawn for commands."""
+    if where is None:
+        return None
+    source = open_source(where, clock, sys.stdin.buffer, token)
     if source.token is not None and token is None:
         warn(Finding("live.command-token", severity="note", token=source.token))
+    return source
 
 
 def refuse_beside_recover(given: Mapping[str, Any]) -> None:

@@ -13,22 +13,22 @@ from strapdown.bundle import Seal, write_latency, write_timing
 from strapdown.cli.console import Stopwatch, print_seal, progress
 from strapdown.cli.live_folder import (
     begin_journal,
-    note_token,
+    open_lines,
+    output_of,
     recovered,
     refuse_beside_recover,
+    remove_empty,
     remove_received,
     sealing,
     warner,
 )
 from strapdown.cli.navigate_tables import print_latency, print_navigation
-from strapdown.cli.result_folder import claim
 from strapdown.cli.shared_options import OutFlags
 from strapdown.config.navigation import NavigationSpec
-from strapdown.errors import ConfigError, DataError
+from strapdown.errors import ConfigError
 from strapdown.live.journal import Journal
 from strapdown.live.replay import MachineClock
 from strapdown.live.run import LiveRun, live_spec, receive, result_of
-from strapdown.live.sources import open_source
 from strapdown.report.navigation import NAVIGATION
 
 if TYPE_CHECKING:
@@ -78,8 +78,7 @@ def recover_navigation(
     assert flags.recover is not None
     journal = recovered(flags.recover, COMMAND, warner(write.quiet))
     with sealing(journal):
-        folder = out or journal.folder.parent / journal.run["out"]
-        claim(folder, write.force)
+        folder = output_of(journal, out, write.force)
         spec = NavigationSpec.checked(journal.run["configuration"])
         file = _file(journal)
     _run(journal, spec, file, folder, write, flags)
@@ -106,10 +105,7 @@ def _run(
     """Navigate what the journal has, and what comes; and write the bundle."""
     clock, warn, run = MachineClock(), warner(write.quiet), journal.run
     with sealing(journal):
-        source = None
-        if flags.live is not None:
-            source = open_source(flags.live, clock, sys.stdin.buffer, flags.token)
-            note_token(source, flags.token, warn)
+        source = open_lines(flags.live, clock, flags.token, warn)
         lines = run["lines"] if flags.lines is None else flags.lines
         every = run["every"] if flags.every is None else flags.every
         live = receive(spec, source, clock, line_writer, warn, lines, every, journal)
@@ -117,9 +113,7 @@ def _run(
             if live.got.count:
                 seal = _sealed(live, journal, file, folder, write)
     if not live.got.count:
-        journal.close()
-        journal.remove()
-        raise DataError("cli.no-sample", quantity="--live" if source else "--recover")
+        remove_empty(journal, source is not None)
     remove_received(journal, seal.path)
     with redirect_stdout(sys.stderr):
         if not write.quiet and live.latency is not None:

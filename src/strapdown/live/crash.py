@@ -20,7 +20,15 @@ from strapdown.crash.watch import CrashLog, CrashWatch, WatchOptions, watch_opti
 from strapdown.errors import DataError, Finding
 from strapdown.live.gate import FAMILY, STRONGEST, StampGate, ValueLimits
 from strapdown.live.journal import Journal, SpooledRows
-from strapdown.live.lines import END, BadLineError, Sample, Word, check_token, parse_line
+from strapdown.live.lines import (
+    END,
+    BadLineError,
+    Sample,
+    Word,
+    check_token,
+    count_unused,
+    parse_line,
+)
 from strapdown.live.replay import LatencyTape, RunClock
 from strapdown.live.run import received_lines, until_a_signal
 from strapdown.live.sources import LineSource, ReceivedLine
@@ -252,10 +260,7 @@ class CrashReception:
             self.processing.take(began, done)
 
     def _not_used(self, bad: BadLineError, line: ReceivedLine | None) -> None:
-        self.unused[bad.kind] += 1
-        if self.unused[bad.kind] == 1:
-            number = None if line is None else line.number
-            self._warn(Finding("live.line-not-used", line=number, reason=bad.finding))
+        count_unused(self.unused, bad, None if line is None else line.number, self._warn)
 
 
 def _limits(options: WatchOptions) -> ValueLimits:

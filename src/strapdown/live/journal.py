@@ -25,12 +25,13 @@ from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import IO, Any, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.bundle import sha256, to_json
+from strapdown.bundle.atomic_folder import HeldError, flush_entry, open_locked
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.live.lines import Measured, Sample, Word
 
@@ -71,7 +72,7 @@ class Journal:
         Called with a finding when the journal ends because it cannot be written. The run goes on.
     """
 
-    def __init__(self, folder: Path, run: Mapping[str, Any], lock: IO[str]) -> None:
+    def __init__(self, folder: Path, run: Mapping[str, Any], lock: int) -> None:
         self.folder, self.run = folder, run
         self.warn: Callable[[Finding], None] = lambda finding: None
         self._lock = lock
@@ -113,7 +114,7 @@ class Journal:
             (folder / JOURNAL).unlink(missing_ok=True)
             made = cls(folder, run, lock)
         except BaseException:
-            lock.close()
+            os.close(lock)
             raise
         os.write(made._file, MAGIC)
         made._size = len(MAGIC)
@@ -159,7 +160,7 @@ class Journal:
                 os.close(made._file)
                 raise
         except BaseException:
-            lock.close()
+            os.close(lock)
             raise
         made._syncing.start()
         return made
@@ -210,7 +211,7 @@ class Journal:
         os.close(self._file)
         for rows in self._spools:
             rows.close()
-        self._lock.close()
+        os.close(self._lock)
 
     def remove(self) -> None:
         """Delete the journal, and the folder if nothing else is in it; after `close`."""
@@ -343,37 +344,16 @@ def _refuse_data(folder: Path) -> None:
 def _sync_folder(folder: Path) -> None:
     """Bring the names in a folder to the disk, where the system can."""
     with suppress(OSError):
-        file = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(file)
-        finally:
-            os.close(file)
+        flush_entry(folder)
 
 
-def _locked(folder: Path) -> IO[str]:
-    """Return the open lock file; the system releases it when this process ends, however it does."""
-    file = (folder / LOCK).open("a+", encoding="ascii")
+def _locked(folder: Path) -> int:
+    """Return the open lock file of a folder."""
     try:
-        try:
-            import fcntl
-        except ImportError:  # Windows
-            import msvcrt
-
-            # A byte that nobody reads: that system refuses to read a locked one.
-            file.seek(1 << 20)
-            msvcrt.locking(file.fileno(), msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined]
-        else:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        file.seek(0)
-        process = file.read(20).strip() or "?"
-        file.close()
+        return open_locked(folder / LOCK, within=True)
+    except (HeldError, OSError) as error:
+        process = getattr(error, "process", None) or "?"
         raise ConfigError("live.journal-in-use", file=str(folder), process=process) from None
-    file.seek(0)
-    file.truncate()
-    file.write(str(os.getpid()))
-    file.flush()
-    return file
 
 
 class SpooledRows:

@@ -16,6 +16,7 @@ from __future__ import annotations
 import hmac
 import json
 import math
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -50,6 +51,7 @@ __all__ = [
     "StateLines",
     "Word",
     "check_token",
+    "count_unused",
     "parse_line",
 ]
 
@@ -157,6 +159,15 @@ def parse_line(
     raise BadLineError(
         "word", "live.unknown-line", given=_shown(head), word=head[:LONGEST], known=known
     )
+
+
+def count_unused(
+    unused: Counter[str], bad: BadLineError, line: int | None, warn: Callable[[Finding], None]
+) -> None:
+    """Count a line that was not used, and tell the first of its kind."""
+    unused[bad.kind] += 1
+    if unused[bad.kind] == 1:
+        warn(Finding("live.line-not-used", line=line, reason=bad.finding))
 
 
 def check_token(said: Word, token: str | None) -> None:

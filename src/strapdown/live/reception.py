@@ -26,6 +26,7 @@ from strapdown.live.lines import (
     Sample,
     Word,
     check_token,
+    count_unused,
     parse_line,
 )
 from strapdown.live.replay import LatencyTape, RunClock
@@ -408,9 +409,7 @@ class Reception:
             raise BadLineError("command", error.finding) from None
 
     def _not_used(self, bad: BadLineError, line: int | None = None) -> None:
-        self.unused[bad.kind] += 1
-        if self.unused[bad.kind] == 1:
-            self._warn(Finding("live.line-not-used", line=line, reason=bad.finding))
+        count_unused(self.unused, bad, line, self._warn)
 
 
 def _turns(spec: NavigationSpec) -> tuple[Array | None, Array | None]:

@@ -93,11 +93,11 @@ def compare_files(one: Path, two: Path, *, drawn_alike: bool) -> Comparison:
         if ending == ".pdf":
             return _compare_pdf(one, two, drawn_alike)
         texts = [path.read_bytes().decode("utf-8") for path in (one, two)]
+        if ending == ".geojson":
+            json_of(texts[0])
     except UnicodeDecodeError:
         return Comparison(0.0, drawing=True) if ending == ".png" else _DIFFERENT
     except (ValueError, RecursionError, StrapdownError):
-        return _DIFFERENT
-    if ending == ".geojson" and says_twice(texts[0]):
         return _DIFFERENT
     if same_text(*texts):
         return Comparison(0.0)
@@ -151,23 +151,20 @@ def _unit(number: str) -> float:
 # JSON, tables and arrays.
 
 
-def says_twice(text: str) -> bool:
-    """Whether an object of JSON has a key twice: two readers could take different ones."""
-    twice: list[str] = []
+def json_of(text: str) -> Any:
+    """Parse JSON. ValueError, also for a key twice in an object: readers may take either."""
 
     def pairs(found: list[tuple[str, Any]]) -> dict[str, Any]:
-        keys = [key for key, _ in found]
-        twice.extend(keys if len(keys) != len(set(keys)) else ())
-        return dict(found)
+        if len(made := dict(found)) != len(found):
+            raise ValueError("a key twice")
+        return made
 
-    json.loads(text, object_pairs_hook=pairs)
-    return bool(twice)
+    return json.loads(text, object_pairs_hook=pairs)
 
 
 def _difference_of_json(one: Path, two: Path) -> float:
-    texts = [p.read_text(encoding="utf-8") for p in (one, two)]
-    leaves = [list(_leaves(json.loads(text))) for text in texts]
-    if len(leaves[0]) != len(leaves[1]) or says_twice(texts[0]):
+    leaves = [list(_leaves(json_of(p.read_text(encoding="utf-8")))) for p in (one, two)]
+    if len(leaves[0]) != len(leaves[1]):
         return math.inf
     return max(map(_leaf_difference, *leaves), default=0.0)
 

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from strapdown import __version__
-from strapdown.bundle import environment, machine, read_manifest, versions
+from strapdown.bundle import environment, read_manifest
 from strapdown.errors import Finding
 from strapdown.report.document import (
     Block,
@@ -18,7 +18,7 @@ from strapdown.report.document import (
     document_page,
     section,
 )
-from strapdown.report.verify import Verification
+from strapdown.report.verify import Verification, conditions_of
 
 _AGAIN = "The run was repeated from its sealed configuration and inputs"
 _ELSEWHERE = f"{_AGAIN}, on another platform or with other versions"
@@ -79,10 +79,7 @@ def verification_page(
         (item["role"], item["name"], str(item["bytes"]), item["sha256"])
         for item in manifest["inputs"]
     ]
-    conditions = {f.data["name"] for f in result.findings if f.code == "verify.condition"}
-    now = versions() | {f"platform {k}": v for k, v in machine().items()}
-    then = manifest["versions"] | {f"platform {k}": v for k, v in manifest["platform"].items()}
-    names = sorted(now | then)
+    conditions = conditions_of(manifest)
     document = Document(
         title=f"Verification of {root.name}",
         subtitle="A sealed result of strapdown, run again and compared",
@@ -107,9 +104,9 @@ def verification_page(
                 "Versions and platform",
                 TableBlock(
                     ("", "when it was sealed", "now"),
-                    tuple((n, then.get(n, "absent"), now.get(n, "absent")) for n in names),
+                    tuple((name, *pair) for name, pair in conditions.items()),
                     text=(0, 1, 2),
-                    strong=tuple(k for k, n in enumerate(names) if n in conditions),
+                    strong=tuple(k for k, (a, b) in enumerate(conditions.values()) if a != b),
                 ),
             ),
             section("repeat", "To repeat this", *_how(root.name, manifest["environment"])),

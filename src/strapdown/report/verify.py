@@ -40,7 +40,7 @@ from strapdown.report import crash_live
 from strapdown.report.alignment import ALIGNMENT
 from strapdown.report.attitude import write_attitude
 from strapdown.report.coast import COAST
-from strapdown.report.content import EQUAL, Comparison, compare_files, says_twice
+from strapdown.report.content import EQUAL, Comparison, compare_files, json_of
 from strapdown.report.crash_case import CRASH
 from strapdown.report.crash_simulation import write_crash_simulation
 from strapdown.report.doctor import DOCTOR
@@ -237,13 +237,16 @@ def _beside_the_seal(root: Path, signer: str | Path | None) -> list[Finding]:
 
 def _is_ours(root: Path, manifest: dict[str, Any]) -> bool:
     """Whether a manifest says nothing twice, in which readers could differ, and nothing unknown."""
+    try:
+        json_of((root / MANIFEST).read_text(encoding="utf-8"))
+    except ValueError:
+        return False
     names = [item["name"] for item in [*manifest["inputs"], *manifest["outputs"]]]
     reserved = [n for n in names if n in (MANIFEST, TIMESTAMP) or SIGNATURE_FILE.fullmatch(n)]
     keys = {frozenset(item) for item in manifest["inputs"]}
     keys |= {frozenset({"role", "kept", *item}) for item in manifest["outputs"]}
     return (
-        not says_twice((root / MANIFEST).read_text(encoding="utf-8"))
-        and set(manifest) == set(KEYS)
+        set(manifest) == set(KEYS)
         and keys <= {frozenset({"role", "name", "kept", "sha256", "bytes"})}
         and len(names) == len(set(names))
         and not reserved
@@ -348,13 +351,18 @@ def _in_both(one: Any, other: Any) -> Any:
     return one
 
 
-def _other_conditions(manifest: dict[str, Any]) -> Iterator[Finding]:
+def conditions_of(manifest: dict[str, Any]) -> dict[str, tuple[str, str]]:
+    """Return versions and platform, as a manifest states them and as they are now, by name."""
     now = versions() | {f"platform {k}": v for k, v in machine().items()}
     then = manifest["versions"] | {f"platform {k}": v for k, v in manifest["platform"].items()}
-    for name in sorted(now.keys() | then.keys()):
-        if now.get(name) != then.get(name):
-            pair = {"then": then.get(name, "absent"), "now": now.get(name, "absent")}
-            yield Finding("verify.condition", severity="note", name=name, **pair)
+    names = sorted(now.keys() | then.keys())
+    return {name: (then.get(name, "absent"), now.get(name, "absent")) for name in names}
+
+
+def _other_conditions(manifest: dict[str, Any]) -> Iterator[Finding]:
+    for name, (then, now) in conditions_of(manifest).items():
+        if then != now:
+            yield Finding("verify.condition", severity="note", name=name, then=then, now=now)
 
 
 def _other_environment(manifest: dict[str, Any]) -> list[Finding]:
