@@ -13,16 +13,15 @@ import signal
 import sys
 import tempfile
 import time
-import traceback
 from collections import Counter
-from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 from tests.cli.test_crash_live import CASE, GYRO, line, samples
 from tests.cli.test_navigate_live import lines, written
+from tests.faults.forked import start
 
-from strapdown.cli import crash_live, main, navigate_live
+from strapdown.cli import crash_live, navigate_live
 from strapdown.live.journal import MAGIC
 
 RECORD = 65  # of a sample of rates and forces, with its frame
@@ -38,38 +37,17 @@ def received(folder):
     return count - 1
 
 
-def start(folder, *options):
+def begun(folder, *options):
     """The command as a fork, with a pipe to its standard input."""
     read, write = os.pipe()
-    child = os.fork()
-    if child:
-        os.close(read)
-        return child, write
-    os.close(write)
-    os.chdir(folder)
-    os.dup2(read, 0)
-    log = os.open("log", os.O_WRONLY | os.O_CREAT | os.O_APPEND)
-    os.dup2(log, 1)
-    os.dup2(log, 2)
-    sys.stdin, sys.stdout, sys.stderr = os.fdopen(0), os.fdopen(1, "w"), os.fdopen(2, "w")
-    sys.argv = ["strapdown", *options, "--quiet"]
-    try:
-        main.run()
-        code = 0
-    except SystemExit as end:
-        code = end.code if isinstance(end.code, int) else 1
-    except BaseException:
-        traceback.print_exc()
-        code = 1
-    with suppress(OSError):
-        sys.stdout.flush()
-        sys.stderr.flush()
-    os._exit(code)
+    child = start(folder, options, stdin=read, wait=lambda: os.close(write))
+    os.close(read)
+    return child, write
 
 
 def finished(folder, texts, *options):
     """Run to the end, and return the exit code."""
-    child, write = start(folder, *options)
+    child, write = begun(folder, *options)
     with os.fdopen(write, "w") as end:
         end.write("".join(f"{text}\n" for text in texts))
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
@@ -77,7 +55,7 @@ def finished(folder, texts, *options):
 
 def killed(folder, texts, options, size, wait):
     """Run to a kill: once the journal has a size, or after a time; the input ends only then."""
-    child, write = start(folder, *options)
+    child, write = begun(folder, *options)
     os.set_blocking(write, False)
     data, journal = "".join(f"{text}\n" for text in texts).encode(), folder / "out-received/journal"
     due = time.monotonic() + wait
@@ -119,9 +97,9 @@ def kills(name, command, prepare, texts, count, draw):
         reference(len(texts))
         del seals[len(texts)]
         shutil.rmtree(Path(root) / f"ref{len(texts)}")
-        begun = time.monotonic()
+        at = time.monotonic()
         reference(len(texts))
-        whole = time.monotonic() - begun
+        whole = time.monotonic() - at
         for k in range(count):
             folder = Path(root) / str(k)
             folder.mkdir()

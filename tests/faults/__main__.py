@@ -1,9 +1,13 @@
 """Run whole commands under faults, and count what stands at the name of the result afterwards.
 
 ``python -m tests.faults kills 500``   killed at drawn instants
+``python -m tests.faults every``       killed at each system call that changes a name or a file
 ``python -m tests.faults calls 400``   a system call fails (strace): a full disk, an error of the
                                        disk, no more memory; or the process is killed at it
 ``python -m tests.faults pairs 200``   two runs into one name at once
+
+A run is a fork of a process that has all imported, but for two at once and a quarter of the kills,
+which are processes of their own.
 
 After each: the name holds the old or the new result, whole, or nothing where there was none; no
 traceback; and the next run finds and leaves nothing hidden. Exits 1 if one is not so.
@@ -15,12 +19,18 @@ import argparse
 import os
 import random
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from subprocess import DEVNULL
+
+from tests.faults.forked import run_here, start
 
 from strapdown.bundle import MANIFEST, claimed, read_manifest, sha256, unsealed_changes
 
@@ -38,8 +48,16 @@ CALLS = {
     "fcntl": ("ENOLCK",),
     "mmap": ("ENOMEM",),
     "unlink": ("EACCES",),
+    "unlinkat": ("EACCES",),
     "rmdir": ("EACCES",),
 }
+
+
+#: Calls that change what stands on the disk. Between two of them a kill leaves the same.
+CHANGING = (
+    *("openat", "write", "pwrite64", "mkdir", "rename", "renameat2", "fsync", "ftruncate"),
+    *("unlink", "unlinkat", "rmdir", "link", "symlink", "chmod", "fchmod", "utimensat"),
+)
 
 
 class Commands:
@@ -47,10 +65,7 @@ class Commands:
 
     def __init__(self, home: Path) -> None:
         self.home = home
-        drive = home / "drive.toml"
         shutil.copytree(ROOT / "docs" / "examples", home / "examples")
-        example = (ROOT / "docs" / "examples" / "navigate_drive.toml").read_text(encoding="utf-8")
-        drive.write_text(example, encoding="utf-8")
         self.run("simulate", "pole", "--out", home / "pole")
         case = home / "pole" / "case.toml"
         text = case.read_text(encoding="utf-8")
@@ -64,16 +79,54 @@ class Commands:
         self.seals: dict[str, str] = {}
         self.seconds: dict[str, float] = {}
         for name, given in self.given.items():
-            for _ in range(2):  # the second with compiled kernels
+            out = home / name / "out"
+            # Once as a process of its own, and twice here, so that forks find all imported.
+            self.run(*given, "--force", "--out", out)
+            self.seals[name] = sha256(out / MANIFEST)
+            for _ in range(2):
                 begin = time.monotonic()
-                self.run(*given, "--force", "--out", home / name / "out")
+                assert run_here([*given, "--force", "--out", out]) == 0
                 self.seconds[name] = time.monotonic() - begin
-            self.seals[name] = sha256(home / name / "out" / MANIFEST)
+            assert sha256(out / MANIFEST) == self.seals[name]
 
     def run(self, *given: object, before: tuple[str, ...] = ()) -> subprocess.CompletedProcess:
         """Run a command to its end."""
         whole = [*before, *STRAPDOWN, *map(str, given), "--quiet"]
         return subprocess.run(whole, capture_output=True, cwd=self.home, check=False)
+
+    def forked(self, name: str, out: Path, strace: Sequence[str] = ()) -> tuple[int, bytes]:
+        """Run a command as a fork, under strace if it is given; return its status and words."""
+        place = out.parent.parent
+        child, go = held(place, [*self.given[name], "--force", "--out", out])
+        tracer = None
+        if strace:
+            tracer = subprocess.Popen(["strace", "-f", "-p", str(child), *strace], stderr=DEVNULL)
+            while not traced(child):
+                time.sleep(0.002)
+        os.close(go)
+        status = os.waitpid(child, 0)[1]
+        if tracer is not None:
+            tracer.wait()
+        return status, (place / "log").read_bytes()
+
+
+def held(place: Path, words: Sequence[object]) -> tuple[int, int]:
+    """Start a fork that begins when the descriptor that is returned with it is closed."""
+    read, write = os.pipe()
+
+    def wait() -> None:
+        os.close(write)
+        os.read(read, 1)
+
+    child = start(place, words, wait=wait)
+    os.close(read)
+    return child, write
+
+
+def traced(child: int) -> bool:
+    """Whether a tracer has attached to a process."""
+    said = Path(f"/proc/{child}/status").read_text()
+    return "TracerPid:\t0" not in said
 
 
 def judged(out: Path, seals: set[str], told: bytes, had: bool) -> str:
@@ -96,80 +149,134 @@ def judged(out: Path, seals: set[str], told: bytes, had: bool) -> str:
 def kills(commands: Commands, count: int, draw: random.Random) -> Counter[str]:
     """Kill commands at drawn instants; in half of the runs over an old result."""
     found: Counter[str] = Counter()
-    for _ in range(count):
+    for number in range(count):
         name = draw.choice(list(commands.given))
-        had = draw.random() < 0.5
-        with tempfile.TemporaryDirectory() as folder:
-            out = Path(folder) / "deep" / "out"
-            if had:
-                shutil.copytree(commands.home / name / "out", out)
-            child = subprocess.Popen(
-                [*STRAPDOWN, *commands.given[name], "--force", "--out", str(out), "--quiet"],
-                stdout=subprocess.PIPE,
-                stderr=subprocess.STDOUT,
-                cwd=commands.home,
-            )
-            # Most of the writing is at the end.
-            part = draw.choice((draw.uniform(0.0, 1.2), draw.uniform(0.7, 1.1)))
-            time.sleep(part * commands.seconds[name])
-            child.kill()
-            told = child.communicate()[0]
-            ended = "ended" if child.returncode == 0 else "killed"
-            found[f"{name} {ended}, {judged(out, {commands.seals[name]}, told, had)}"] += 1
+        had, whole = draw.random() < 0.5, draw.random() < 0.25
+        # Most of the writing is at the end.
+        part = draw.choice((draw.uniform(0.0, 1.2), draw.uniform(0.7, 1.1)))
+        with placed(commands, name, had) as out:
+            if whole:
+                begin = [*STRAPDOWN, *commands.given[name], "--force", "--out", str(out), "--quiet"]
+                with (out.parent.parent / "log").open("wb") as log:
+                    child = subprocess.Popen(begin, stdout=log, stderr=log, cwd=commands.home).pid
+                time.sleep(part * (commands.seconds[name] + 3.0))
+            else:
+                child, go = held(
+                    out.parent.parent, [*commands.given[name], "--force", "--out", out]
+                )
+                os.close(go)
+                time.sleep(part * commands.seconds[name])
+            os.kill(child, signal.SIGKILL)
+            status = os.waitpid(child, 0)[1]
+            ended = "ended" if status == 0 else "killed"
+            told = (out.parent.parent / "log").read_bytes()
+            state = judged(out, {commands.seals[name]}, told, had)
+            found[f"{name} {'whole ' if whole else ''}{ended}, {state}"] += 1
+        progress(number, found)
+    return found
+
+
+@contextmanager
+def placed(commands: Commands, name: str, had: bool) -> Iterator[Path]:
+    """Give a name for a result, with an old one there or not."""
+    with tempfile.TemporaryDirectory() as folder:
+        out = Path(folder) / "deep" / "out"
+        if had:
+            shutil.copytree(commands.home / name / "out", out)
+        yield out
+
+
+def progress(number: int, found: Counter[str]) -> None:
+    """Print the counts so far after each twentieth run."""
+    if number % 20 == 19:
+        print(number + 1, dict(found), flush=True)
+
+
+def called(commands: Commands, name: str, had: bool) -> list[tuple[str, int]]:
+    """Return the changing calls of a run, in order, each with its number of its kind."""
+    numbers: Counter[str] = Counter()
+    found = []
+    with placed(commands, name, had) as out:
+        file = out.parent.parent / "trace"
+        trace = ("-o", str(file), "-e", f"trace={','.join(CHANGING)}")
+        status, told = commands.forked(name, out, trace)
+        assert status == 0, told
+        for line in file.read_text(errors="replace").splitlines():
+            call = line.split("(")[0].split()[-1]
+            if call in CHANGING and " resumed>" not in line:
+                numbers[call] += 1
+                if call != "openat" or any(word in line for word in ("O_CREAT", "O_TRUNC")):
+                    found.append((call, numbers[call]))
+    return found
+
+
+def faulted(
+    commands: Commands, name: str, had: bool, call: str, fault: str, when: str
+) -> tuple[str, int]:
+    """Run a command with a fault at a call; return what stands at the name and its status."""
+    with placed(commands, name, had) as out:
+        inject = f"inject={call}:{fault}:when={when}"
+        status, told = commands.forked(
+            name, out, ("-o", "/dev/null", "-e", f"trace={call}", "-e", inject)
+        )
+        # Python has no words where it has no memory.
+        told = b"" if call == "mmap" else told
+        try:
+            return judged(out, {commands.seals[name]}, told, had), status
+        except AssertionError as error:
+            print(f"{name}: {inject}: {str(error)[-600:]}", flush=True)
+            return "FAILED", status
+
+
+def every(commands: Commands, count: int, draw: random.Random) -> Counter[str]:
+    """Kill four commands at each call that changes something, over an old result and over none."""
+    found: Counter[str] = Counter()
+    for name in commands.given:
+        for had in (False, True):
+            for number, (call, when) in enumerate(called(commands, name, had)):
+                state, status = faulted(commands, name, had, call, "signal=KILL", str(when))
+                ended = "killed" if os.WIFSIGNALED(status) else "ended"
+                found[f"{name} {'over an old' if had else 'alone'}, {ended}, {state}"] += 1
+                progress(number, found)
     return found
 
 
 def calls(commands: Commands, count: int, draw: random.Random) -> Counter[str]:
     """Let one system call of a command fail, or all from one on; or kill the process at it."""
-    if shutil.which("strace") is None:
-        sys.exit("strace is not installed")
     found: Counter[str] = Counter()
     totals: dict[tuple[str, str], int] = {}
-    for name, given in commands.given.items():
-        with tempfile.TemporaryDirectory() as folder:
-            summary = Path(folder) / "summary"
-            trace = ("strace", "-f", "-c", "-U", "name,calls", "-o", str(summary))
-            commands.run(*given, "--out", Path(folder) / "x" / "out", before=trace)
-            for line in summary.read_text().splitlines():
-                words = line.split()
-                if len(words) == 2 and words[0] in CALLS:
-                    totals[name, words[0]] = int(words[1])
+    for name in commands.given:
+        with placed(commands, name, True) as out:
+            file = out.parent.parent / "trace"
+            traced_calls = ("-o", str(file), "-e", f"trace={','.join(CALLS)}")
+            assert commands.forked(name, out, traced_calls)[0] == 0
+            for line in file.read_text(errors="replace").splitlines():
+                call = line.split("(")[0].split()[-1]
+                if call in CALLS and " resumed>" not in line:
+                    totals[name, call] = totals.get((name, call), 0) + 1
     kinds = sorted(totals)
-    for _ in range(count):
+    for number in range(count):
         name, call = draw.choice(kinds)
-        # The last ones write the result; those at the start load the program.
-        total = totals[name, call]
-        when = draw.randint(max(1, total - 150), total)
-        if draw.random() < 0.3:
+        when = draw.randint(1, totals[name, call])
+        if draw.random() < 0.1:
             fault, what = "signal=KILL", "killed"
         else:
             what = draw.choice(CALLS[call])
             fault = f"error={what}"
         # A folder that can never be removed sends the library's cleaning round in circles.
-        once = "KILL" in fault or call == "rmdir" or draw.random() < 0.5
-        more = "" if once else "+"
+        once = "KILL" in fault or call in ("rmdir", "unlinkat") or draw.random() < 0.5
         had = draw.random() < 0.5
-        with tempfile.TemporaryDirectory() as folder:
-            out = Path(folder) / "out"
-            if had:
-                shutil.copytree(commands.home / name / "out", out)
-            inject = f"inject={call}:{fault}:when={when}{more}"
-            trace = ("strace", "-f", "-o", "/dev/null", "-e", f"trace={call}", "-e", inject)
-            done = commands.run(*commands.given[name], "--force", "--out", out, before=trace)
-            told = b"" if call == "mmap" else done.stdout + done.stderr
-            try:
-                state = judged(out, {commands.seals[name]}, told, had)
-            except AssertionError as error:
-                print(f"{name}: {inject}: {str(error)[-600:]}")
-                state = "FAILED"
-            found[f"{call} {what}, {state}"] += 1
+        state, status = faulted(commands, name, had, call, fault, f"{when}{'' if once else '+'}")
+        code = "signal" if os.WIFSIGNALED(status) else f"code {os.WEXITSTATUS(status)}"
+        found[f"{call} {what}, {code}, {state}"] += 1
+        progress(number, found)
     return found
 
 
 def pairs(commands: Commands, count: int, draw: random.Random) -> Counter[str]:
     """Start two runs into one name within a drawn time; each that says 0 has written it."""
     found: Counter[str] = Counter()
-    for _ in range(count):
+    for number in range(count):
         name = draw.choice(("attitude", "simulate"))
         had = draw.random() < 0.5
         with tempfile.TemporaryDirectory() as folder:
@@ -188,24 +295,27 @@ def pairs(commands: Commands, count: int, draw: random.Random) -> Counter[str]:
                         cwd=commands.home,
                     )
                 )
-                time.sleep(draw.uniform(0.0, 1.3 * commands.seconds[name]))
+                time.sleep(draw.uniform(0.0, 1.3 * (commands.seconds[name] + 3.0)))
             told = b"".join(child.communicate()[0] for child in both)
             codes = sorted(child.returncode for child in both)
             assert codes in ([0, 0], [0, 4]), (codes, told)
             # Two that both end with 0 came one after the other, and by force.
             assert had or codes == [0, 4], codes
             found[f"{name} {codes}, {judged(out, {commands.seals[name]}, told, had)}"] += 1
+        progress(number, found)
     return found
 
 
 def main() -> int:
     """Run one kind of fault and print the counts."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("kind", choices=("kills", "calls", "pairs"))
-    parser.add_argument("count", type=int)
+    parser.add_argument("kind", choices=("kills", "every", "calls", "pairs"))
+    parser.add_argument("count", type=int, nargs="?", default=500)
     parser.add_argument("--seed", type=int, default=0)
     asked = parser.parse_args()
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
+    if asked.kind in ("every", "calls") and shutil.which("strace") is None:
+        sys.exit("strace is not installed")
     with tempfile.TemporaryDirectory(prefix="strapdown-faults-") as home:
         commands = Commands(Path(home))
         draw = random.Random(asked.seed)
