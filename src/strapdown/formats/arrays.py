@@ -87,8 +87,8 @@ def nanoseconds_of(texts: Iterable[object]) -> NDArray[np.int64] | None:
     """Convert dates with times of day to nanoseconds since 1970, UTC where no zone is stated.
 
     `texts` ((n,)): ``2024-06-19 15:27:08.576``, ``19.06.2024 15:27:08,576``, ``06/19/2024 3:27:08
-    PM``. Returns (n,), or None if one is neither. Without a date, or where day and month are
-    ambiguous, since the midnight before the first, as `day_nanoseconds`.
+    PM``. Returns (n,), or None if one is neither, or beyond 1677 to 2262. Without a date, or where
+    day and month are ambiguous, since the midnight before the first, as `day_nanoseconds`.
     """
     found = _matches(texts)
     if found is None:
@@ -99,6 +99,8 @@ def nanoseconds_of(texts: Iterable[object]) -> NDArray[np.int64] | None:
         return _past_midnight(whole)
     zones = {z: _zone(z) for z in {m["zone"] for m in found}}
     since = [days[m["date"]] * _DAY - zones[m["zone"]] for m in found]
+    if max(map(abs, since), default=0) >= 2**63 - 2 * _DAY:
+        return None
     return np.asarray(whole + np.array(since, dtype=np.int64), dtype=np.int64)
 
 

@@ -313,7 +313,7 @@ def _from_json(path: Path) -> dict[str, Stream]:
                 for s in samples
                 if "altitude system" in s.get("sticky", {})
             }
-        except (KeyError, TypeError, ValueError, AttributeError):
+        except (KeyError, TypeError, ValueError, AttributeError, OverflowError):
             raise DataError("io.gopro-json-damaged", file=path.name, quantity=key) from None
         if one.values[0].ndim != 2:
             raise DataError("io.gopro-json-damaged", file=path.name, quantity=key)

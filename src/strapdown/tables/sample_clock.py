@@ -142,10 +142,15 @@ def sample_clock(stamps: Array, values: Array | None = None) -> SampleClock:
         step = float(steps.mean()) if steps.size and steps.mean() > 0.0 else 1.0
         return _as_stamped(stamps, step, [], "even")
     mean = float(steps.mean())
+    usual = float(np.median(steps))
+    near = steps[(steps > 0.5 * usual) & (steps < 1.5 * usual)]
     if in_bursts:
         step, numbers = _of_bursts(stamps, gaps, mean)
-    else:
-        step, numbers = _of_steps(stamps, gaps, steps)
+    elif near.size:
+        # By symmetry the mean of what lies within half a step is the step, however it scatters.
+        step, numbers = _of_steps(stamps, gaps, float(near.mean()))
+    else:  # steps of two lengths, or stamps of which most repeat
+        return _as_stamped(stamps, mean, list(gaps), "irregular")
     # Gaps in the sense of the clock; shorter ones are lost samples.
     long = [g for g in gaps if g.length > GAP_STEPS * step]
     number = np.concatenate([[0], np.cumsum(numbers)])
@@ -212,11 +217,8 @@ def _within(gaps: Sequence[Gap], count: int) -> NDArray[np.bool_]:
     return inside
 
 
-def _of_steps(stamps: Array, gaps: Sequence[Gap], steps: Array) -> tuple[float, Numbers]:
-    """Nominal step, and by how much each sample advances the clock."""
-    usual = float(np.median(steps))
-    # By symmetry the mean of what lies within half a step is the step, however it scatters.
-    step = float(steps[(steps > 0.5 * usual) & (steps < 1.5 * usual)].mean())
+def _of_steps(stamps: Array, gaps: Sequence[Gap], step: float) -> tuple[float, Numbers]:
+    """Nominal step, and by how much each sample advances the clock; `step`: about it."""
     whole = np.diff(stamps)
     advance = np.maximum(np.round(whole / step), 1.0)
     inside = _within(gaps, whole.size)
