@@ -8,6 +8,7 @@ import traceback
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
+from unittest.mock import patch
 
 from strapdown.cli import main
 
@@ -23,6 +24,15 @@ def run_here(words: Sequence[object]) -> int:
         traceback.print_exc()
         return 1
     return 0
+
+
+def warmed(words: Sequence[object]) -> int:
+    """Run a command in this process, so that later forks find all imported; its PDF is empty.
+
+    The threads that lay out a PDF are not in a fork, which would wait for them.
+    """
+    with patch("typst.compile", return_value=b""):
+        return run_here(words)
 
 
 def start(
