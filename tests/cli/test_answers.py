@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 
 import pytest
@@ -32,6 +33,17 @@ def test_a_command_is_given_and_never_the_one_that_was_refused(monkeypatch):
     said = as_stated({"gyro_unit": "deg/s"})
     assert answers(monkeypatch, "attitude a.csv --gyro-unit deg/s", **said) == []
     assert answers(monkeypatch, "attitude a.csv", **as_stated({})) == []
+
+
+def test_a_name_that_steers_a_terminal_is_quoted_and_gives_the_same_words(monkeypatch):
+    name = "time='\x1b[2J\\ \u202e"
+    said = as_stated({"time": name})
+    (line,) = answers(monkeypatch, "attitude a.csv", **said)
+    assert line.isprintable()
+    flags = line.partition(" a.csv ")[2]
+    shell = ["bash", "-c", f"printf '%s\\0' {flags}"]
+    done = subprocess.run(shell, capture_output=True, check=True, env={"LC_ALL": "C.UTF-8"})
+    assert done.stdout.decode().split("\0")[:-1] == ["--columns", f"time={name}"]
 
 
 OPEN = {

@@ -23,7 +23,7 @@ from typer.core import TyperGroup
 
 from strapdown import __version__
 from strapdown.cli.console import RESOURCES, WORDS, logged
-from strapdown.errors import ConfigError, Finding, StrapdownError
+from strapdown.errors import ConfigError, Finding, StrapdownError, printable
 from strapdown.parsers import start_for
 
 _RESEND_S = 0.005
@@ -227,12 +227,24 @@ def _answers(refused: Finding) -> list[str]:
     if set(shlex.split(str(flags))) <= set(given):
         return []
     said = introduced(shlex.split(str(flags)), given)
-    return [f"{said}: strapdown {shlex.join(given)} {flags}"]
+    return [f"{said}: strapdown {_pasted(shlex.join(given))} {_pasted(str(flags))}"]
+
+
+def _pasted(words: str) -> str:
+    """Return words of a command line without control characters, to the same values in bash."""
+    if printable(words) == words:
+        return words
+    return " ".join(
+        shlex.quote(word)
+        if printable(word) == word
+        else "$'" + printable(word.replace("\\", r"\\").replace("'", r"\'")) + "'"
+        for word in shlex.split(words)
+    )
 
 
 def _fail(message: str, code: int) -> NoReturn:
     colour = typer.colors.RED if sys.stderr.isatty() else None
-    typer.secho(f"error: {message}", err=True, fg=colour)
+    typer.secho(f"error: {printable(message, lines=True)}", err=True, fg=colour)
     sys.exit(code)
 
 

@@ -726,6 +726,9 @@ def _whole_lines(
         lines.append(line)
     if amid:
         row, line = amid[0]
+        if not rows:  # its separator is not that of the header
+            count = _count(line, separator)
+            raise DataError("io.csv-field-count", file=name, row=row, count=count, width=width)
         findings.append(
             Finding(
                 "io.comments-among-rows",

@@ -290,3 +290,10 @@ def test_a_broad_trial_with_a_spoiled_dataset_is_refused(tmp_path, spoiled, valu
             file[name] = value if name == spoiled else np.ones((30, width))
     with pytest.raises(DataError, match="shapes"):
         read_log(tmp_path / "synthetic.h5")
+
+
+def test_rows_without_the_separator_of_their_header_are_refused_with_their_row(tmp_path):
+    rows = [HEAD.replace(",", ";"), *(r.replace(",", " ") for r in ROWS)]
+    path = written(tmp_path / "two.csv", "\n".join(rows))
+    with pytest.raises(DataError, check=coded("io.csv-field-count", row=2)):
+        read_log(path, ReadOptions())
