@@ -93,11 +93,10 @@ def commands(home: Path) -> dict[str, Callable[[random.Random], Given]]:
     return {
         "attitude": on_a_log("attitude", "LOG", "--out", "out"),
         "doctor": on_a_log("doctor", "LOG"),
-        "align": on_a_log("align", "LOG", "--lat", "50", "--out", "out"),
+        "align": on_a_log("align", "LOG", *"--lat 50 --sensor adis16470 --out out".split()),
         "convert": on_a_log("convert", "LOG", "out.csv"),
         "init": on_a_log("init", "align", "LOG", "--out", "out.toml"),
         "navigate": on_a_config("navigate", "", run),
-        "align config": on_a_config("align", "alignment", empty),
         "simulate": on_a_config("simulate", "scenario", empty),
         "crash": on_a_case(crash),
     }
@@ -130,7 +129,8 @@ def _of_numbers(file: Path) -> None:
     """Check that a file of results has no NaN that says nothing."""
     if file.suffix == ".json":
         json.loads(file.read_text(encoding="utf-8"), parse_constant=_refused)
-    elif file.suffix == ".csv":
+    # Of a stretch that nothing checked the heading has no check: its name is empty.
+    elif file.suffix == ".csv" and file.name != "heading_integrity.csv":
         text = file.read_text(encoding="utf-8", errors="replace").lower()
         assert ",nan" not in text and ",inf" not in text and ",-inf" not in text, file.name
 
