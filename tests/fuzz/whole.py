@@ -93,7 +93,9 @@ def commands(home: Path) -> dict[str, Callable[[random.Random], Given]]:
     return {
         "attitude": on_a_log("attitude", "LOG", "--out", "out"),
         "doctor": on_a_log("doctor", "LOG"),
-        "align": on_a_log("align", "LOG", *"--lat 50 --sensor adis16470 --out out".split()),
+        "align": on_a_log(
+            "align", "LOG", *["--lat", "50", "--sensor", "adis16470", "--out", "out"]
+        ),
         "convert": on_a_log("convert", "LOG", "out.csv"),
         "init": on_a_log("init", "align", "LOG", "--out", "out.toml"),
         "navigate": on_a_config("navigate", "", run),
