@@ -385,3 +385,17 @@ def test_a_folder_that_is_not_there_is_not_called_empty(tmp_path):
     (tmp_path / "here").mkdir()
     with pytest.raises(DataError, check=coded("bundle.no-manifest")):
         read_manifest(tmp_path / "here")
+
+
+@pytest.mark.parametrize("said", [None, "report.html"])
+def test_a_full_disk_names_the_result_and_no_hidden_folder(tmp_path, given, said):
+    out = tmp_path / "out"
+
+    def fill(folder):
+        raise OSError(errno.ENOSPC, "full", str(folder / said) if said else None)
+
+    with pytest.raises(OSError, match="full") as caught, claimed(out, False):
+        with atomic_folder.written_whole(out, fill) as folder:
+            (folder / "report.html").write_text("text")
+    assert caught.value.filename == str(out)
+    assert list(tmp_path.iterdir()) in ([], [given])

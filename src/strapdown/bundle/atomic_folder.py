@@ -283,8 +283,10 @@ def written_whole(out: Path, seal: Callable[[Path], None]) -> Iterator[Path]:
         seal(staging)
         _flush(staging)
         _put_in_place(staging, out)
-    except BaseException:
+    except BaseException as error:
         shutil.rmtree(staging, ignore_errors=True)
+        if isinstance(error, OSError) and str(error.filename or staging).startswith(str(staging)):
+            error.filename = str(out)  # a full disk names no file, others a hidden folder
         raise
 
 
