@@ -394,8 +394,11 @@ def test_a_full_disk_names_the_result_and_no_hidden_folder(tmp_path, given, said
     def fill(folder):
         raise OSError(errno.ENOSPC, "full", str(folder / said) if said else None)
 
-    with pytest.raises(OSError, match="full") as caught, claimed(out, False):
-        with atomic_folder.written_whole(out, fill) as folder:
-            (folder / "report.html").write_text("text")
+    with (
+        pytest.raises(OSError, match="full") as caught,
+        claimed(out, False),
+        atomic_folder.written_whole(out, fill) as folder,
+    ):
+        (folder / "report.html").write_text("text")
     assert caught.value.filename == str(out)
     assert list(tmp_path.iterdir()) in ([], [given])
