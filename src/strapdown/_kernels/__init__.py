@@ -17,16 +17,19 @@ from numba import config as _config
 
 
 def cache_folder() -> str:
-    """Folder of the compiled kernels, named after the digest of their sources."""
+    """Return the folder of the compiled kernels, named after their digest; "" without a home."""
     digest = hashlib.sha256(_numba_version.encode())
     for source in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(source.read_bytes())
-    base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    try:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    except RuntimeError:
+        return ""
     return str(base / "strapdown" / f"kernels-{digest.hexdigest()[:16]}")
 
 
 # Numba reads the setting where a function is decorated, during these imports; afterwards it is
-# restored for other users of numba in this process.
+# restored for other users of numba in this process. Of an empty one it chooses a folder itself.
 _before = _config.CACHE_DIR
 try:
     if not _before:
@@ -34,8 +37,5 @@ try:
     for _source in sorted(Path(__file__).parent.glob("[a-z]*.py")):
         if _source.stem != "arithmetic":
             import_module(f"strapdown._kernels.{_source.stem}")
-except RuntimeError:
-    # Path.home() without a home; numba then chooses a folder of its own.
-    pass
 finally:
     _config.CACHE_DIR = _before

@@ -111,6 +111,8 @@ def _written(sources: dict[str, str]) -> Path:
     base = os.environ.get("NUMBA_CACHE_DIR") or cache_folder()
     folder = Path(base) / f"single-{digest}"
     try:
+        if not base:
+            raise OSError("no home")
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in sources.items():
             if not (folder / f"{name}.py").exists():

@@ -21,6 +21,8 @@ from numba.core.cpu import CPUTargetOptions
 from numba.core.dispatcher import Dispatcher
 from numba.extending import intrinsic
 
+#: Names of kernels whose compiled code is not kept.
+NOT_KEPT: list[str] = []
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
 
@@ -30,12 +32,17 @@ def njit(**options: Any) -> Callable[[Kernel], Dispatcher[Kernel]]:
     Where a kernel calls another with a number that is written in the source, numba compiles a
     version for that number; so it does for the first value of a loop's variable, and never calls
     that version. The optimizer inserts such numbers without it. No kernel is a callback of C, so
-    none has the wrapper for it.
+    none has the wrapper for it. Where no folder can be written (a read-only installation without
+    a home), each process compiles what it runs.
     """
-    compiled: Any = numba.njit(**{"no_cfunc_wrapper": True, **options})
+    options = {"no_cfunc_wrapper": True, **options}
 
     def decorate(function: Kernel) -> Dispatcher[Kernel]:
-        kernel = compiled(function)
+        try:
+            kernel: Any = numba.njit(**options)(function)
+        except RuntimeError:  # numba's, of a cache without a folder
+            kernel = numba.njit(**{**options, "cache": False})(function)
+            NOT_KEPT.append(function.__name__)
         if hasattr(kernel, "get_call_template"):  # not with NUMBA_DISABLE_JIT
             template = kernel.get_call_template
             kernel.get_call_template = lambda kinds, named: template(

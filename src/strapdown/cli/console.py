@@ -172,7 +172,10 @@ def progress(quiet: bool) -> Iterator[Callable[[str, float], None]]:
         at = "starting"
 
         def compiling(begun: bool) -> None:
-            bar.update(task, description=f"{at} (compiling, once on this machine)" if begun else at)
+            from strapdown._kernels.compilation import NOT_KEPT
+
+            often = "in each run: set NUMBA_CACHE_DIR" if NOT_KEPT else "once on this machine"
+            bar.update(task, description=f"{at} (compiling, {often})" if begun else at)
 
         compilations = Compilations(compiling)
 
