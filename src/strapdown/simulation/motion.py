@@ -460,6 +460,11 @@ _TO_COEFFICIENTS = (np.arange(_NODES) + 0.5)[:, None] * (
 _TOLERANCE = 1e-14
 # Shortest panel, s; below it rounding dominates the truncation error.
 _SHORTEST = 1e-5
+# Most panels, and most in each second, which follow 500 Hz. Of more, the rounding of the
+# instants or of the phases is what is integrated.
+_PANELS, _PANELS_PER_S = 10_000, 1000.0
+# Panels that are evaluated together: some 100 MB.
+_TOGETHER = 20_000
 
 
 @dataclass(frozen=True)
@@ -500,21 +505,28 @@ def integrate_rate(rate: Callable[[ArrayLike], Array], breaks: Sequence[float]) 
     omitted term contributes at most ``2h |c_16| / 33``. Where ``2h |c| / 29`` of the last two terms
     kept (two, because symmetry can make one vanish) exceeds 1e-14 rad, the panel is halved. c
     decreases geometrically for an analytic rate, and the integral over a whole panel is exact to
-    degree 31. The sums over the panels are compensated.
+    degree 31. The sums over the panels are compensated. ConfigError: the rate changes too fast.
     """
     edges = np.unique(np.asarray(breaks, dtype=np.float64))
     left, right = edges[:-1], edges[1:]
     lefts, lengths, series = [], [], []
+    length, done = float(edges[-1] - edges[0]), 0
+    most = max(_PANELS + edges.size, _PANELS_PER_S * length)
     while left.size:
+        if done + left.size > most:
+            raise ConfigError("simulation.motion-too-fast", count=done + left.size, length=length)
         half = 0.5 * (right - left)
-        nodes = left[:, None] + half[:, None] * (1.0 + _X)
-        values = rate(nodes.ravel()).reshape(left.size, _NODES, 3)
-        c = _TO_COEFFICIENTS @ values
+        c = np.empty((left.size, _NODES, 3))
+        for k in range(0, left.size, _TOGETHER):
+            some = slice(k, k + _TOGETHER)
+            nodes = left[some, None] + half[some, None] * (1.0 + _X)
+            c[some] = _TO_COEFFICIENTS @ rate(nodes.ravel()).reshape(-1, _NODES, 3)
         tail = np.abs(c[:, -2:]).max(axis=(1, 2))
         good = (2.0 * half * tail / (2 * _NODES - 3) <= _TOLERANCE) | (half < _SHORTEST)
         lefts.append(left[good])
         lengths.append(half[good])
         series.append(c[good])
+        done += int(good.sum())
         middle = left[~good] + half[~good]
         left, right = np.concatenate([left[~good], middle]), np.concatenate([middle, right[~good]])
     order = np.argsort(np.concatenate(lefts))

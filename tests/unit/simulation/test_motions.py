@@ -10,6 +10,7 @@ import mpmath
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from tests.coded import coded
 
 from strapdown import rotation
 from strapdown.errors import ConfigError
@@ -24,6 +25,7 @@ from strapdown.simulation import (
     SmoothRandom,
     Track,
 )
+from strapdown.simulation.motion import integrate_rate
 
 _spec = importlib.util.spec_from_file_location(
     "exact_motions", Path(__file__).with_name("exact_motions.py")
@@ -419,3 +421,16 @@ def test_pulse_that_its_edges_do_not_fit_into_is_refused():
     with pytest.raises(ConfigError) as refused:
         PulseMotion((Pulse(0, 1.0, 2.0, 1.0),), 4.0, arm=(0.1, 0.0, 0.0))
     assert refused.value.finding.code == "simulation.arm-without-edges"
+
+
+def test_a_rate_that_no_panels_follow_is_refused_in_bounded_memory():
+    def noise(time):
+        return np.sin(1e16 * np.asarray(time))[:, None] * [1.0, 0.0, 0.0]
+
+    with pytest.raises(ConfigError, check=coded("simulation.motion-too-fast")):
+        integrate_rate(noise, [0.0, 12.0])
+    # 400 Hz are followed.
+    turned = integrate_rate(lambda t: np.cos(800.0 * np.pi * t)[:, None] * [1.0, 0, 0], [0.0, 1.0])
+    at = np.linspace(0.0, 1.0, 777)
+    exact = np.sin(800.0 * np.pi * at) / (800.0 * np.pi)
+    np.testing.assert_allclose(turned(at)[:, 0], exact, rtol=0.0, atol=1e-13)
