@@ -33,8 +33,9 @@ from subprocess import DEVNULL
 from tests.faults.forked import start, warmed
 
 from strapdown.bundle import MANIFEST, claimed, read_manifest, sha256, unsealed_changes
+from strapdown.formats import csv
+from strapdown.formats.writers import WRITERS
 
-ROOT = Path(__file__).parents[2]
 STRAPDOWN = [sys.executable, "-m", "strapdown"]
 # Calls that change names and files, and the errors that they may meet.
 CALLS = {
@@ -63,9 +64,9 @@ CHANGING = (
 class Commands:
     """Four commands with results of every kind of file, and the seal of each when it is whole."""
 
-    def __init__(self, home: Path) -> None:
+    def __init__(self, home: Path, alone: str | None = None) -> None:
         self.home = home
-        shutil.copytree(ROOT / "docs" / "examples", home / "examples")
+        write_drive(home / "drive")
         self.run("simulate", "pole", "--out", home / "pole")
         case = home / "pole" / "case.toml"
         text = case.read_text(encoding="utf-8")
@@ -74,11 +75,13 @@ class Commands:
             "attitude": ["attitude", "alexiev-fig4", "--png"],
             "simulate": ["simulate", "alexiev-fig2f", "--format", "all"],
             "crash": ["crash", str(case)],
-            "navigate": ["navigate", str(home / "examples" / "navigate_drive.toml")],
+            "navigate": ["navigate", str(home / "drive" / "run.toml")],
         }
+        self.names = [alone] if alone else list(self.given)
         self.seals: dict[str, str] = {}
         self.seconds: dict[str, float] = {}
-        for name, given in self.given.items():
+        for name in self.names:
+            given = self.given[name]
             out = home / name / "out"
             # Once as a process of its own, and twice here, so that forks find all imported.
             self.run(*given, "--force", "--out", out)
@@ -107,6 +110,19 @@ class Commands:
         if tracer is not None:
             tracer.wait()
         return status, (place / "log").read_bytes()
+
+
+def write_drive(folder: Path) -> None:
+    """Write a drive of five seconds, with its fixes and its configuration."""
+    from tests.cli.test_navigate_live import drive, inside, written
+
+    folder.mkdir()
+    written(folder, '[log]\npath = "log.csv"\n', 'path = "fix.csv"\n')
+    WRITERS["csv"].write(folder / "log.csv", {"imu": drive()})
+    fixes = inside()
+    columns = {"time_s": fixes.index.to_numpy()}
+    columns |= {str(name): fixes[name].to_numpy() for name in fixes.columns}
+    csv.write(folder / "fix.csv", columns, {})
 
 
 def held(place: Path, words: Sequence[object]) -> tuple[int, int]:
@@ -149,7 +165,7 @@ def kills(commands: Commands, count: int, draw: random.Random) -> Counter[str]:
     """Kill commands at drawn instants; in half of the runs over an old result."""
     found: Counter[str] = Counter()
     for number in range(count):
-        name = draw.choice(list(commands.given))
+        name = draw.choice(commands.names)
         had, whole = draw.random() < 0.5, draw.random() < 0.25
         # Most of the writing is at the end.
         part = draw.choice((draw.uniform(0.0, 1.2), draw.uniform(0.7, 1.1)))
@@ -230,7 +246,7 @@ def faulted(
 def every(commands: Commands, count: int, draw: random.Random) -> Counter[str]:
     """Kill four commands at each call that changes something, over an old result and over none."""
     found: Counter[str] = Counter()
-    for name in commands.given:
+    for name in commands.names:
         for had in (False, True):
             for number, (call, when) in enumerate(called(commands, name, had)):
                 state, status = faulted(commands, name, had, call, "signal=KILL", str(when))
@@ -244,7 +260,7 @@ def calls(commands: Commands, count: int, draw: random.Random) -> Counter[str]:
     """Let one system call of a command fail, or all from one on; or kill the process at it."""
     found: Counter[str] = Counter()
     totals: dict[tuple[str, str], int] = {}
-    for name in commands.given:
+    for name in commands.names:
         with placed(commands, name, True) as out:
             file = out.parent.parent / "trace"
             traced_calls = ("-o", str(file), "-e", f"trace={','.join(CALLS)}")
@@ -311,12 +327,13 @@ def main() -> int:
     parser.add_argument("kind", choices=("kills", "every", "calls", "pairs"))
     parser.add_argument("count", type=int, nargs="?", default=500)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--command", choices=("attitude", "simulate", "crash", "navigate"))
     asked = parser.parse_args()
     os.environ["OPENBLAS_NUM_THREADS"] = "1"
     if asked.kind in ("every", "calls") and shutil.which("strace") is None:
         sys.exit("strace is not installed")
     with tempfile.TemporaryDirectory(prefix="strapdown-faults-") as home:
-        commands = Commands(Path(home))
+        commands = Commands(Path(home), asked.command)
         draw = random.Random(asked.seed)
         found = globals()[asked.kind](commands, asked.count, draw)
     for what, number in sorted(found.items()):

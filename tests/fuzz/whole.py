@@ -21,15 +21,13 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.cli.test_navigate_live import drive, inside, written
+from tests.faults.__main__ import write_drive
 from tests.faults.forked import run_here, start, warmed
 from tests.fuzz.mutate import mutated
 from tests.fuzz.targets import TARGETS
 
 from strapdown.bundle import read_manifest, unsealed_changes
 from strapdown.errors import printable
-from strapdown.formats import csv
-from strapdown.formats.writers import WRITERS
 
 #: Of the processor; by the clock four times as long, as other work may go on.
 SECONDS, MEMORY = 30.0, 2 << 30
@@ -79,14 +77,8 @@ def on_a_case(home: Path) -> Callable[[random.Random], Given]:
 def commands(home: Path) -> dict[str, Callable[[random.Random], Given]]:
     """Return the commands by name, after one run of each with sound files."""
     run, crash, empty = (home / name for name in ("run", "crash", "empty"))
-    run.mkdir()
     empty.mkdir()
-    written(run, '[log]\npath = "log.csv"\n', 'path = "fix.csv"\n')
-    WRITERS["csv"].write(run / "log.csv", {"imu": drive()})
-    fixes = inside()
-    columns = {"time_s": fixes.index.to_numpy()}
-    columns |= {str(name): fixes[name].to_numpy() for name in fixes.columns}
-    csv.write(run / "fix.csv", columns, {})
+    write_drive(run)
     assert run_here(["simulate", "pole", "--out", crash]) == 0
     shutil.rmtree(crash / "inputs", ignore_errors=True)
     (crash / "manifest.json").unlink()
