@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.attitude_comparison.sweep import MOST_ACCURATE, Grounds
+from strapdown.dsp.chi_square import chi_square_above
 from strapdown.evaluation.differences import Errors, Known, known_at
 from strapdown.increments import increments_from_imu
 from strapdown.rotation import unit_rotation_angle
@@ -265,12 +266,10 @@ def _solved(design: Array, off: Array) -> tuple[Array, Array]:
 
 def _chance(found: Array, covariance: Array, columns: NDArray[np.int64], part: slice) -> float:
     """Probability that a part is as large by chance."""
-    from scipy.stats import chi2
-
     there = np.flatnonzero((columns >= part.start) & (columns < part.stop))
     x = found[there]
     size = float(x @ np.linalg.pinv(covariance[np.ix_(there, there)]) @ x)
-    return float(chi2.sf(size, there.size))
+    return float(chi_square_above(size, there.size))
 
 
 def _removed(

@@ -16,6 +16,7 @@ from strapdown.attitude_algorithms.algorithm import AttitudeRun, Steps, steps_of
 from strapdown.attitude_algorithms.cost import run_single, single_increments
 from strapdown.attitude_comparison.options import refuse_no_rate
 from strapdown.config import LogSpec, ScenarioSpec
+from strapdown.dsp.chi_square import student_above, student_quantile
 from strapdown.errors import ConfigError, DivergenceError, Finding
 from strapdown.evaluation.differences import Errors, Known, angles_to_errors
 from strapdown.evaluation.reference_points import reference_errors
@@ -465,8 +466,6 @@ def rank(errors: pd.DataFrame) -> pd.DataFrame:
     The interval of the mean is Student's; `luck` is the one-sided probability, by Student's test of
     paired differences, that the next algorithm is in truth no worse.
     """
-    from scipy import stats
-
     by = errors.pivot(index="trial", columns="algorithm", values="error_deg")
     order = by.mean().round(ROUNDED).sort_values(kind="stable").index
     count = len(by)
@@ -475,7 +474,9 @@ def rank(errors: pd.DataFrame) -> pd.DataFrame:
         values = by[name].to_numpy(dtype=np.float64)
         mean, spread = float(values.mean()), np.nan
         if count > 1:
-            spread = float(stats.t.ppf(0.5 + CONFIDENCE / 2.0, count - 1) * stats.sem(values))
+            spread = student_quantile(0.5 + CONFIDENCE / 2.0, count - 1) * float(
+                values.std(ddof=1) / np.sqrt(count)
+            )
         luck = np.nan
         if k + 1 < len(order) and count > 1:
             luck = _luck(by[order[k + 1]].to_numpy(dtype=np.float64) - values)
@@ -494,8 +495,6 @@ def rank(errors: pd.DataFrame) -> pd.DataFrame:
 
 def _luck(worse_by: Array) -> float:
     """Probability of differences with this mean, if the true mean is not positive."""
-    from scipy import stats
-
     spread = float(worse_by.std(ddof=1))
     # Differences due to rounding alone are not significant.
     if float(np.abs(worse_by).max()) < 10.0**-ROUNDED:
@@ -503,7 +502,7 @@ def _luck(worse_by: Array) -> float:
     if spread <= 1e-12 * max(1.0, float(np.abs(worse_by).max())):
         return float(worse_by.mean() < 0.0)
     t = float(worse_by.mean()) / (spread / np.sqrt(len(worse_by)))
-    return float(stats.t.sf(t, len(worse_by) - 1))
+    return student_above(t, len(worse_by) - 1)
 
 
 def worst_sweep(sweeps: Sequence[pd.DataFrame]) -> pd.DataFrame:

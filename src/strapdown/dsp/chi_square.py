@@ -1,4 +1,4 @@
-"""Chi-square and normal distributions, without the load time of scipy.stats; 95 % ellipses."""
+"""Chi-square, normal and Student distributions without loading scipy.stats; 95 % ellipses."""
 
 from __future__ import annotations
 
@@ -56,6 +56,20 @@ def normal_above(value: Any) -> Any:
     from scipy.special import ndtr
 
     return _plain(ndtr(-np.asarray(value)))
+
+
+def student_quantile(share: float, freedom: float) -> float:
+    """Compute the quantile of Student's distribution."""
+    from scipy.special import stdtrit
+
+    return float(stdtrit(freedom, share))
+
+
+def student_above(value: float, freedom: float) -> float:
+    """Compute the probability of Student's distribution above a value."""
+    from scipy.special import stdtr
+
+    return float(stdtr(freedom, -value))
 
 
 def _plain(values: Any) -> Any:

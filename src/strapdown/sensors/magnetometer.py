@@ -8,6 +8,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from strapdown.dsp.chi_square import chi_square_exceeded
 from strapdown.errors import DataError, Finding
 from strapdown.tables import ACCEL, MAG
 from strapdown.tables.checks import as_array
@@ -126,8 +127,6 @@ def calibrate_magnetometer(mag: ArrayLike) -> MagnetometerCalibration:
     the integrated correlation time, in rows (Priestley, Spectral Analysis and Time Series, 5.3.2).
     A rotation between magnetometer and gyro leaves every strength as it is, and is not found.
     """
-    from scipy.stats import chi2
-
     rows = _readings(as_array(mag, 3, "mag"))
     if len(rows) < LEAST:
         raise DataError("attitude.too-few-field-readings", quantity="mag", count=len(rows))
@@ -143,7 +142,7 @@ def calibrate_magnetometer(mag: ArrayLike) -> MagnetometerCalibration:
     if np.linalg.eigvalsh(np.cov(off.T))[0] > COVERED:
         by = _fit(m, best.x, (OFFSET, SOFT))
         scale = by.scatter**2 * by.correlated
-        if (_loss(best, by) - _loss(by, by)) / scale > chi2.isf(CHANCE, 5):
+        if (_loss(best, by) - _loss(by, by)) / scale > chi_square_exceeded(CHANCE, 5):
             best, terms = by, 8
     # By the scatter of the best model; each is a special case of the next.
     gained = (_loss(raw, by) - _loss(best, by)) / (by.scatter**2 * by.correlated)
@@ -157,7 +156,7 @@ def calibrate_magnetometer(mag: ArrayLike) -> MagnetometerCalibration:
         raw_residual=raw.scatter / float(raw.x[FIELD]),
         direction_sd_deg=_direction_sd(by),
         change_deg=_between(m, (m - best.x[OFFSET]) @ A),
-        found=bool(gained > chi2.isf(CHANCE, terms)),
+        found=bool(gained > chi_square_exceeded(CHANCE, terms)),
     )
 
 
