@@ -7,7 +7,6 @@ import math
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
-from scipy.optimize import nnls
 
 from strapdown.constants import MAD_TO_SD
 from strapdown.dsp.samples import true_runs
@@ -229,6 +228,8 @@ def lasting_position_sd(table: pd.DataFrame, delay: float = 0.0) -> tuple[float,
     lags, spread, hidden = np.array(rows).T
     if hidden[-1] > HIDDEN * spread[-1]:
         return None
+    from scipy.optimize import nnls
+
     # A lag shows one independent pair in its own length.
     weight = 1.0 / (np.maximum(spread, np.finfo(np.float64).tiny) * np.sqrt(lags))
     fits = []
