@@ -78,16 +78,19 @@ def write(
     """Write arrays with their units; equal input gives identical bytes.
 
     `units`: written as the attribute ``unit`` of each. `meta`: written as attributes of the file.
+    It is made in memory: where a write fails, HDF5 ends in tracebacks or ends the process.
     """
     import h5py
 
-    with h5py.File(path, "w", track_order=True) as file:
+    made = io.BytesIO()
+    with h5py.File(made, "w", track_order=True) as file:
         for key, value in meta.items():
             file.attrs[key] = value
         for name, array in arrays.items():
             dataset = file.create_dataset(name, data=array, track_times=False)
             if name in units:
                 dataset.attrs["unit"] = units[name]
+    path.write_bytes(made.getbuffer())
 
 
 # MATLAB files up to v7; v7.3 is read as HDF5.

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -66,3 +69,27 @@ def test_an_attitude_comes_back(tmp_path):
     back = read_truth(tmp_path / "truth.csv")
     assert np.array_equal(back[QUATERNION], truth[QUATERNION])
     assert np.array_equal(back.index, truth.index)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no limit of a file's size")
+@pytest.mark.parametrize("suffix", LOG_FORMATS)
+def test_a_full_disk_is_an_error_of_the_system_and_nothing_else(tmp_path, suffix):
+    """The limit of a file's size stands for the disk; HDF5 itself ended the process at it."""
+    code = f"""
+import resource, signal
+from pathlib import Path
+import numpy as np
+from strapdown.formats.writers import WRITERS
+from strapdown.tables import imu_table
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+time = np.arange(1.0, 3001.0) / 100.0
+log = imu_table(time, np.random.default_rng(1).normal(size=(3000, 3)), None, sampling="mean")
+resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+try:
+    WRITERS[{suffix!r}].write(Path("log.{suffix}"), {{"imu": log}})
+except OSError:
+    print("refused")
+"""
+    run = [sys.executable, "-c", code]
+    done = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True, check=True)
+    assert (done.stdout, done.stderr) == ("refused\n", "")
