@@ -8,6 +8,7 @@ the motion since then, not from the initial heading, an alignment or a heading m
 from __future__ import annotations
 
 import math
+from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -36,11 +37,12 @@ from strapdown.navigation.heading_integrity import (
     RECENT,
     SURE,
     HeadingCheck,
-    doubted,
+    doubts_of,
     seconds_of,
 )
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.heading import Heading
+from strapdown.navigation.measurements.measurement import Epochs
 from strapdown.navigation.navigator import Navigator, NavigatorState
 from strapdown.navigation.pipeline import NavigationPipeline
 from strapdown.navigation.preprocessing import NEAR as NEAR_FIXES
@@ -126,7 +128,7 @@ def run_heading_checks(
     done: list[_Check] = []
     heard: list[_Check] = []
     told: list[_Check] = []
-    doubt = False
+    doubted, doubt, asked = doubts_of(record, 3.0 * enough), False, -math.inf
     for at, first, last in zip(begun.tolist(), firsts, [*firsts[1:], len(made.time)], strict=True):
         if len(heard) > 1 and heard[-1].sd <= enough:
             heard = heard[-1:]
@@ -135,8 +137,9 @@ def run_heading_checks(
             if len(heard) > 1:
                 heard = [min(heard, key=lambda one: one.sd)]
             if not doubt:
-                said = [one.evidence() for one in told if one.marks]
-                doubt = doubted(record, said, at, 3.0 * enough)
+                # What came since the last time: a check may last for hours.
+                said = [one.evidence(asked) for one in told if one.marks]
+                doubt, asked = doubted(said, at), at
             fresh = _Check(made, record, run, at, doubt)
             done.append(fresh)
             heard.append(fresh)
@@ -165,14 +168,8 @@ class _Check:
         self.seen: list[tuple[float, Array]] = []
         self.lost = False
         state = self.navigator.begin_from(_begin(self.navigator.filter, record, run, since, doubt))
-        for aid in self.navigator.aids:
-            assert isinstance(aid, Gnss)
-            table = made.tables[aid.name]
-            later = table[index_of(table) > since + aid.time_offset + aid.velocity_delay]
-            if len(later):
-                later.attrs = dict(table.attrs)
-                state = self.navigator.tell(state, aid.name, later)
-        self.state: NavigatorState = state
+        later = {name: _after(since, fixes) for name, fixes in made.fixes.items()}
+        self.state: NavigatorState = replace(state, queues={**state.queues, **later})
 
     @property
     def sd(self) -> float:
@@ -199,14 +196,20 @@ class _Check:
             nu, s = one.innovations.nu[:2], one.innovations.s[:2]
             self.seen.append((one.time, nu / np.sqrt(s)))
 
-    def evidence(self) -> HeadingCheck:
-        """Return the result at each second."""
-        marked = np.array([mark.time for mark in self.marks])
-        seconds = np.arange(math.ceil(self.since + NEAR), math.floor(marked[-1]) + 1.0)
+    def evidence(self, after: float = -math.inf) -> HeadingCheck:
+        """Return the result at each second, or each after an instant."""
+        k = max(bisect_right(self.marks, after, key=lambda mark: mark.time) - 1, 0)
+        marks = self.marks[k:]
+        marked = np.array([mark.time for mark in marks])
+        begin = max(math.ceil(self.since + NEAR), math.floor(max(after, self.since)) + 1.0)
+        seconds = np.arange(begin, math.floor(marked[-1]) + 1.0)
         at = np.searchsorted(marked, seconds + NEAR, side="right") - 1
         seconds, at = seconds[at >= 0], at[at >= 0]
-        covariance = np.array([self.marks[k].covariance for k in at]).reshape(-1, 9, 9)
-        times, rows = np.concatenate(self.times), np.concatenate(self.history)
+        covariance = np.array([marks[k].covariance for k in at]).reshape(-1, 9, 9)
+        # The parts with these seconds, and the end of the one before.
+        ends = [part[-1] if len(part) else -math.inf for part in self.times]
+        first = max(bisect_right(ends, after - 1.0) - 1, 0)
+        times, rows = np.concatenate(self.times[first:]), np.concatenate(self.history[first:])
         near = np.clip(np.searchsorted(times, seconds - NEAR), 0, len(times) - 1)
         near, back = np.unique(near, return_inverse=True)
         own = self.navigator.filter.mechanization.trajectory(times[near], rows[near], None)
@@ -221,10 +224,12 @@ class _Check:
 
     def _scale(self, seconds: Array) -> Array:
         """Factor by which the newest innovations exceed their expected scatter and correlation."""
-        if not self.seen:
+        if not self.seen or not len(seconds):
             return np.ones(len(seconds))
-        time = np.array([t for t, _ in self.seen])
-        u = np.array([x for _, x in self.seen])
+        # No more than what the windows of these seconds hold.
+        k = max(bisect_right(self.seen, seconds[0], key=lambda one: one[0]) - 2 * JUDGED, 0)
+        time = np.array([t for t, _ in self.seen[k:]])
+        u = np.array([x for _, x in self.seen[k:]])
         # All available epochs, up to a full window.
         size = np.minimum(u.shape[0], JUDGED)
         upto = np.searchsorted(time, seconds + NEAR, side="right")
@@ -232,10 +237,16 @@ class _Check:
         full = upto >= size
         every = sliding_window_view(u, size, axis=0).reshape(len(u) - size + 1, -1)
         if size >= FEWEST:
-            out[full] = _scatter(every)[upto[full] - size]
+            out[full] = _scatter(every[upto[full] - size])
         for k in np.flatnonzero(~full & (upto >= FEWEST)).tolist():
             out[k] = _scatter(u[: upto[k]].reshape(1, -1))[0]
         return out
+
+
+def _after(time: float, fixes: Epochs) -> Epochs:
+    """Return the epochs after an instant."""
+    first = int(fixes.time.searchsorted(time, side="right"))
+    return Epochs(fixes.time[first:], fixes.values[first:])
 
 
 def _scatter(u: Array) -> Array:
@@ -294,7 +305,9 @@ class HeadingChecks:
     rows : ndarray, (n, 10)
         Motion increments.
     tables : mapping of str to DataFrame
-        Fixes, thinned.
+        Fixes of each receiver, thinned.
+    fixes : mapping of str to Epochs
+        The same.
     begun : float, s
         Start of the first step.
     """
@@ -303,6 +316,7 @@ class HeadingChecks:
     time: Array
     rows: Array
     tables: Mapping[str, pd.DataFrame]
+    fixes: Mapping[str, Epochs]
     begun: float
 
 
@@ -355,10 +369,11 @@ def heading_checks_of(
         None,
         step=FIXES_APART,
     )
-    thinned = {aid.name: _thinned(tables[aid.name]) for aid in receivers}
+    thinned = {aid.name: _thinned(tables[aid.name]) for aid in aids}
+    fixes = {aid.name: aid.epochs(thinned[aid.name]) for aid in aids}
     begun = float(time[0] - rows[0, 0])
     return HeadingChecks(
-        Navigator(small, aids, mark_interval=FIXES_APART), time, rows, thinned, begun
+        Navigator(small, aids, mark_interval=FIXES_APART), time, rows, thinned, fixes, begun
     )
 
 

@@ -11,7 +11,7 @@ heading check by its own. The check is a solution by fixes that began without a 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -30,7 +30,7 @@ __all__ = [
     "HeadingCheck",
     "HeadingIntegrity",
     "StatusSpan",
-    "doubted",
+    "doubts_of",
     "heading_status",
     "recent_scatter",
     "seconds_of",
@@ -298,23 +298,30 @@ def recent_scatter(record: NavigationRecord) -> Array:
     return worst
 
 
-def doubted(
-    record: NavigationRecord, evidence: Sequence[HeadingCheck], upto: float, trusted_below: float
-) -> bool:
-    """Whether a run was contradicted, or its innovations scattered too much, until an instant.
+def doubts_of(
+    record: NavigationRecord, trusted_below: float
+) -> Callable[[Sequence[HeadingCheck], float], bool]:
+    """Return the test whether a run was contradicted, or scattered too much, until an instant.
 
     Parameters
     ----------
-    evidence : sequence of HeadingCheck
-        Results of the independent checks.
-    upto : float, s
     trusted_below : float, deg
         As of `heading_status`.
+
+    Returns
+    -------
+    callable
+        Of the results of independent checks, and the instant in s.
     """
     seconds = seconds_of(record)
-    before = seconds <= upto
-    apart = _contradicted(seconds, evidence, _own_sd(record, seconds), trusted_below)
-    return bool((apart | (recent_scatter(record) > FAR_OFF))[before].any())
+    own, scattered = _own_sd(record, seconds), recent_scatter(record) > FAR_OFF
+
+    def doubted(evidence: Sequence[HeadingCheck], upto: float) -> bool:
+        until = int(np.searchsorted(seconds, upto, side="right"))
+        apart = _contradicted(seconds[:until], evidence, own[:until], trusted_below)
+        return bool((apart | scattered[:until]).any())
+
+    return doubted
 
 
 def _own_sd(record: NavigationRecord, seconds: Array) -> Array:

@@ -10,7 +10,7 @@ import pytest
 
 from strapdown.config.alignment import sensors_of
 from strapdown.config.navigation import NavigationSpec, make_filter
-from strapdown.navigation.heading_checks import heading_checks_of, run_heading_checks
+from strapdown.navigation.heading_checks import _Check, heading_checks_of, run_heading_checks
 from strapdown.navigation.heading_integrity import SURE
 from strapdown.report.navigation import NAVIGATION
 from strapdown.systems.navigation_run import make_chain, run_navigation
@@ -142,6 +142,33 @@ def test_what_was_wrong_with_a_run_does_not_pass_to_a_later_witness(tmp_path):
     assert len(off) > 30
     # What a witness bounds with 99 % may be beyond that now and then: one error lasts for seconds.
     assert np.mean(off < SURE) > 0.9
+
+
+def test_what_a_check_finds_piece_by_piece_is_what_it_finds_at_once():
+    """Doubts are judged from what came since the last time; the whole judged anew is the same."""
+    spec = drive(laps=3, error=8.0, trust={"repeat": False})
+    result = run_navigation(spec)
+    source, record, sensors = result.source, result.record, sensors_of(spec)
+    chain, filter_ = make_chain(spec, sensors), make_filter(spec, sensors)
+    consistency = result.trust.consistency
+    made = heading_checks_of(filter_, chain, source.imu, source.tables, record, consistency)
+    checks = run_heading_checks(made, record, 0.01)
+    assert max(one.time[-1] - one.since for one in checks) > 120.0
+    whole = _Check.evidence
+
+    def parts(check, after=-np.inf):
+        done = whole(check)
+        for at in (check.since + 7.5, check.since + 61.0, check.since + 62.25):
+            tail, new = whole(check, at), done.time > at
+            for name in ("time", "difference", "sd", "covariance", "scale"):
+                np.testing.assert_array_equal(getattr(tail, name), getattr(done, name)[new])
+        return done
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(_Check, "evidence", parts)
+        again = run_heading_checks(made, record, 0.01)
+    for one, other in zip(checks, again, strict=True):
+        np.testing.assert_array_equal(one.sd, other.sd)
 
 
 def test_gross_errors_are_left_out_of_the_repeated_run():
