@@ -57,7 +57,7 @@ from strapdown.navigation.pipeline import NavigationPipeline
 from strapdown.navigation.preprocessing import GapPolicy, ImuPreprocessor, ends_of
 from strapdown.navigation.record import NavigationRecord, Span, innovation_labels
 from strapdown.navigation.recorder import IntervalRecorder, Recorder
-from strapdown.navigation.replay import PipelineRun, run_batch
+from strapdown.navigation.replay import PipelineRun, relinearized, run_batch
 from strapdown.progress import Progress, silent
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty
@@ -169,6 +169,14 @@ def run_navigation(
             begun_with = chain
         if by_offset:
             run = drive(chain, source.imu, source.tables, recorder, show_mode)
+        if run.smoothed is not None:
+
+            def show_pass(mode: str, share: float) -> None:
+                progress(f"smoothing: {mode}", ENDED)
+
+            run = relinearized(
+                chain, source.imu, source.tables, recorder, run, show_pass, chunk=CHUNK
+            )
     beside = None
     if spec.damping.beside is not None:
         with said_of_file(*tables):
