@@ -26,11 +26,13 @@ from strapdown.errors import ConfigError
 from strapdown.estimation.covariance import Observation
 from strapdown.estimation.error_model import PHYSICAL
 from strapdown.mechanization.mechanization import Mechanization
+from strapdown.nav_state import NavState
 from strapdown.navigation.compiled_engine import compiled
 from strapdown.navigation.engine import SAME_INSTANT
-from strapdown.navigation.navigator import Navigator, Reference
 from strapdown.navigation.measurements.gnss import TINY
-from strapdown.navigation.record import CovarianceSnapshot, NavigationChunk, state_of_row
+from strapdown.navigation.navigator import Navigator, Reference
+from strapdown.navigation.record import CovarianceSnapshot, NavigationChunk
+from strapdown.tables import EULER, GEODETIC, VELOCITY
 from strapdown.tables.checks import is_number
 
 __all__ = ["SMOOTHERS", "RauchTungStriebel", "Smoothed", "Smoothing", "SmoothingTape"]
@@ -197,9 +199,15 @@ class Smoothing:
         time, marked = (np.array([one[k] for one in self._anchors]) for k in (0, 2))
         rows = smoothed.corrected(time, np.array([one[1] for one in self._anchors]))
         table = smoothed.mechanization.trajectory(time, rows)
+        values = table[[*GEODETIC, *VELOCITY, *EULER]].to_numpy().tolist()
         return Reference(
             time,
-            tuple(state_of_row(row) for _, row in table.iterrows()),
+            tuple(
+                NavState.from_degrees(
+                    *row[:3], v_n=row[3:6], roll_deg=row[6], pitch_deg=row[7], heading_deg=row[8]
+                )
+                for row in values
+            ),
             np.array([one[3] for one in self._anchors]) + sensors[smoothed.nodes_at(marked)],
         )
 
