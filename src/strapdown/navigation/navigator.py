@@ -76,6 +76,11 @@ class Reference:
         """Index of the first state after a time."""
         return int(self.time.searchsorted(time + SAME_INSTANT))
 
+    def next_time(self, time: float) -> float:
+        """Time of the first state after a time; infinite after the last."""
+        k = self.next_after(time)
+        return float(self.time[k]) if k < len(self.time) else np.inf
+
 
 @dataclass(frozen=True)
 class Navigator:

@@ -55,12 +55,16 @@ class PipelineRun:
         Smoothed solution, where the navigator has a smoother.
     smoothing : Smoothing or None
         Of which it is.
+    moved : float
+        By how many standard deviations the last pass moved the smoothed states (`Smoothing.moved`);
+        zero without another pass.
     """
 
     record: NavigationRecord
     aligned: tuple[Aligned, ...]
     smoothed: NavigationRecord | None = None
     smoothing: Smoothing | None = None
+    moved: float = 0.0
 
 
 class Recording:
@@ -179,16 +183,16 @@ def relinearized(
         try:
             found = run_batch(again, imu, tables, recorder, progress, chunk)
         except DivergenceError:
-            return run
+            return replace(run, moved=math.inf)
         assert found.smoothed is not None
         assert found.smoothing is not None
         assert run.smoothed is not None
         before, moved = moved, found.smoothing.moved()
         if moved > before:
-            return run
+            return replace(run, moved=moved)
         own = replace(found.smoothed, innovations=run.smoothed.innovations)
         own = replace(own, events=run.smoothed.events, outages=run.smoothed.outages)
-        run = replace(run, smoothed=own, smoothing=found.smoothing)
+        run = replace(run, smoothed=own, smoothing=found.smoothing, moved=moved)
         if moved < SETTLED:
             return run
     return run

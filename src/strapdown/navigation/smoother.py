@@ -118,6 +118,7 @@ class Smoothing:
         self._left: list[Array] = []
         self._anchors: list[tuple[float, Array, float, Array]] = []
         self._mark: CovarianceSnapshot | None = None
+        self._due = -math.inf if navigator.about is None else navigator.about.next_time(-math.inf)
         #: With the corrections of the sensors at each node, and the marks.
         self._result: tuple[Smoothed, Array, Array] | None = None
 
@@ -129,19 +130,22 @@ class Smoothing:
         self._take_anchors(piece)
 
     def _take_anchors(self, piece: NavigationChunk) -> None:
-        """Keep a state each `ANCHORS` seconds, with the last estimates of the sensors before it."""
+        """Keep a state each `ANCHORS` seconds, with the last estimates of the sensors before it.
+
+        A further pass keeps the instants of the first one, at which it follows the reference.
+        """
         marks = [mark for mark in (self._mark, *piece.marks) if mark is not None]
-        if marks:
-            at = np.array([mark.time for mark in marks])
-            newest = self._anchors[-1][0] if self._anchors else -np.inf
-            for k in np.flatnonzero(piece.time >= newest + ANCHORS):
-                time = float(piece.time[k])
-                before = int(at.searchsorted(time + SAME_INSTANT)) - 1
-                if time >= newest + ANCHORS and before >= 0:
-                    newest, mark = time, marks[before]
-                    row = piece.history[k].copy()
-                    self._anchors.append((time, row, mark.time, mark.sensors))
-            self._mark = marks[-1]
+        if not marks:
+            return
+        at, about = np.array([mark.time for mark in marks]), self._navigator.about
+        k = int(piece.time.searchsorted(max(self._due, at[0]) - SAME_INSTANT))
+        while k < len(piece.time):
+            time = float(piece.time[k])
+            mark = marks[int(at.searchsorted(time + SAME_INSTANT)) - 1]
+            self._anchors.append((time, piece.history[k].copy(), mark.time, mark.sensors))
+            self._due = time + ANCHORS if about is None else about.next_time(time)
+            k = int(piece.time.searchsorted(self._due - SAME_INSTANT))
+        self._mark = marks[-1]
 
     def smoothed(self, marks: Array) -> Smoothed:
         """Run the backward pass over the whole history.
