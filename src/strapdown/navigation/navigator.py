@@ -66,11 +66,14 @@ class Reference:
     states : tuple of NavState, (m,)
     sensors : ndarray, (m, k)
         Errors of sensors and aids.
+    marks : ndarray, (n,), s
+        Times of the covariances that are recorded, whatever instants a run about it has.
     """
 
     time: Array
     states: tuple[NavState, ...]
     sensors: Array
+    marks: Array
 
     def next_after(self, time: float) -> int:
         """Index of the first state after a time."""

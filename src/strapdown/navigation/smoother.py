@@ -199,7 +199,7 @@ class Smoothing:
         linear = compiled(navigator.filter) and navigator.damping.feeds_back
         if self._result is None or not self._anchors or not linear:
             return None
-        smoothed, sensors, _ = self._result
+        smoothed, sensors, marks = self._result
         time, marked = (np.array([one[k] for one in self._anchors]) for k in (0, 2))
         rows = smoothed.corrected(time, np.array([one[1] for one in self._anchors]))
         table = smoothed.mechanization.trajectory(time, rows)
@@ -213,6 +213,7 @@ class Smoothing:
                 for row in values
             ),
             np.array([one[3] for one in self._anchors]) + sensors[smoothed.nodes_at(marked)],
+            marks if navigator.about is None else navigator.about.marks,
         )
 
     def moved(self) -> float:

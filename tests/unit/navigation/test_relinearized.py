@@ -128,6 +128,8 @@ def test_what_the_filter_found_remains():
     run = run_batch(chain, imu, tables)
     again = relinearized(chain, imu, tables, None, run)
     assert again.record is run.record
+    np.testing.assert_array_equal(again.smoothed.sd.index, run.record.sd.index)
+    np.testing.assert_array_equal(again.smoothed.trajectory.index, run.record.trajectory.index)
     for name, table in run.smoothed.innovations.items():
         assert again.smoothed.innovations[name] is table
     only = replace(chain.navigator, smoother=RauchTungStriebel(passes=1))
