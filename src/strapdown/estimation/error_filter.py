@@ -253,6 +253,10 @@ class ErrorFilter:
             T = T @ self.model.to_physical(used, time, row)
         return replace(state, covariance=self.form.predict(state.covariance, T, Q))
 
+    def corrected(self, state: FilterState, physical: Array) -> FilterState:
+        """Return a state with physical errors, (p,), subtracted; the covariance stays its own."""
+        return self._fed_back(state, np.eye(len(physical)), physical)
+
     def physical_covariance(self, state: FilterState) -> Array:
         """Return the covariance of the physical errors, (p, p), in level axes."""
         P = self.form.matrix(state.covariance)

@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from strapdown._kernels import filter_loop as kernel
 from strapdown._kernels.growth import growth_arrays, growth_room, padded_width
 from strapdown._kernels.level import LEVEL, NED, WANDER
+from strapdown._kernels.smoothing import GROWTH, KIND, begin_of_move
+from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import DivergenceError
 from strapdown.estimation.covariance import (
     BiermanThornton,
@@ -25,14 +27,15 @@ from strapdown.estimation.covariance import (
 )
 from strapdown.estimation.error_filter import ErrorFilter, Rules, diverged
 from strapdown.estimation.error_model import PHYSICAL, RotationVectorModel, refuse_damped_height
-from strapdown.mechanization.mechanization import Mechanization
+from strapdown.mechanization.mechanization import Mechanization, state_error
 from strapdown.mechanization.ned import NorthEastDown
 from strapdown.mechanization.wander_azimuth import WanderAzimuth
+from strapdown.nav_state import NavState
 from strapdown.navigation.engine import LARGEST_GROUP, SAME_INSTANT, Engine, EngineState, NodeRows
 from strapdown.navigation.measurements.gnss import POSITION_CODE
 from strapdown.navigation.measurements.measurement import Epochs
 
-__all__ = ["CompiledEngine", "compiled"]
+__all__ = ["CompiledEngine", "ReferenceEngine", "compiled"]
 
 Array = NDArray[np.float64]
 
@@ -248,12 +251,16 @@ class CompiledEngine(Engine):
         met = self.filter
         self.filter, taken, seen = self.navigation.observe(met, observations, rules)
         self.nodes.updated(met, taken, self.filter)
+        self._corrected()
+        return seen
+
+    def _corrected(self) -> None:
+        """Continue from the corrected state of the filter, where no group is open."""
         self.mechanization[:], self.row = self.filter.mechanization, self.filter.row
         self._at_covariance[:] = self.mechanization
         self._sensors[:] = self.filter.sensors
         self._covariance[:] = self.filter.covariance
         self._group[0][0] = self.row
-        return seen
 
     def carry(self, T: Array, Q: Array, first: int = 0) -> None:
         """Transform the errors, and add a noise."""
@@ -318,6 +325,92 @@ class CompiledEngine(Engine):
     def _no_covariance(self) -> DivergenceError:
         time = float(self._times[kernel.AT_STEP])
         return DivergenceError("navigation.covariance-lost", quantity="covariance", time=time)
+
+
+class ReferenceEngine(CompiledEngine):
+    """Linearized about a reference instead of the filter's own estimates, for a smoother.
+
+    The state follows the reference, to which `follow` moves it; the estimated errors of the state
+    are kept beside it (`errors`), and so is what a smoother finds, so that the products of all
+    transitions and observations are those of one trajectory. The nodes must be recorded: they hold
+    the transitions.
+    """
+
+    def __init__(self, filter_: ErrorFilter, state: EngineState) -> None:
+        super().__init__(filter_, state)
+        self.errors = state.errors.copy()
+        self._left: list[Array] = []
+
+    def propagate(self, time: Array, rows: Array, history: Array, note_at: float) -> int:
+        """Propagate over steps, as `Engine.propagate`."""
+        made = super().propagate(time, rows, history, note_at)
+        self._carry_errors()
+        return made
+
+    def close(self) -> None:
+        """Propagate covariance and estimates to the newest step."""
+        super().close()
+        self._carry_errors()
+
+    def observe(
+        self, observations: Sequence[Observation], rules: Sequence[Rules]
+    ) -> list[Innovations]:
+        """Update with the observations at the current instant; the state stays."""
+        met, before = self.filter, self.errors
+        self.filter, self.errors, seen = self.navigation.estimate(met, before, observations, rules)
+        self.nodes.updated(met, self.errors - before, self.filter)
+        self._corrected()
+        self._carry_errors()
+        return seen
+
+    def carry(self, T: Array, Q: Array, first: int = 0) -> None:
+        """Transform the errors, and add a noise."""
+        super().carry(T, Q, first)
+        self.errors = T @ self.errors
+        self._carry_errors()
+
+    def follow(self, reference: NavState, sensors: Array) -> None:
+        """Move the state to a reference; what it is moved by goes to the estimated errors.
+
+        Parameters
+        ----------
+        reference : NavState
+            At the newest step.
+        sensors : ndarray, (k,)
+            Errors of the sensors.
+        """
+        self.close()
+        used = self.navigation.mechanization
+        own = used.nav_state(self.mechanization, self.time)
+        apart = state_error(own, reference, find_ellipsoid(used.ellipsoid)).reshape(3, 3)
+        level = apart @ used.level_from_ned(self.row).T
+        moved = np.concatenate([level.ravel(), sensors - self.filter.sensors])
+        self.filter = self.navigation.corrected(self.filter, moved)
+        self.errors = self.errors - moved
+        self._corrected()
+        # A node of its own, where what is left on the output jumps.
+        self.nodes.carried(np.eye(self._n), 0, self.filter)
+        self._carry_errors()
+
+    def left_at_nodes(self) -> Array:
+        """Return what is left on the output at each node."""
+        self._carry_errors()
+        return np.array(self._left).reshape(-1, PHYSICAL)
+
+    def state(self) -> EngineState:
+        """Return the current state."""
+        return replace(super().state(), errors=self.errors.copy())
+
+    def _carry_errors(self) -> None:
+        """Propagate the estimated errors over the new nodes, and record them at each."""
+        n, core = self._n, PHYSICAL * self._n
+        for row in self.nodes.since(len(self._left)):
+            if row[KIND] == GROWTH:
+                move = row[begin_of_move(n) :]
+                grown = move[:core].reshape(PHYSICAL, n) @ self.errors
+                sensors = move[core : core + n - PHYSICAL] * self.errors[PHYSICAL:]
+                self.errors = np.concatenate([grown, sensors])
+            self._left.append(self.errors[:PHYSICAL].copy())
 
 
 #: Engines that hold a state and can continue from it, as long as the state exists.

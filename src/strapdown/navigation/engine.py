@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -167,6 +167,10 @@ class Engine(ABC):
     @abstractmethod
     def shown(self) -> Array:
         """Return the row of the newest step with the estimated errors subtracted."""
+
+    def left_at_nodes(self) -> Array:
+        """Return `NavigationChunk.left`."""
+        return np.empty((0, PHYSICAL))
 
     @abstractmethod
     def state(self) -> EngineState:
@@ -374,6 +378,12 @@ class NodeRows:
         if self.wanted and self.used + count > len(self.room):
             self._full.append(self.room[: self.used])
             self.room, self.used = np.empty_like(self.room), 0
+
+    def since(self, count: int) -> Iterator[Array]:
+        """Yield the rows after the first `count`."""
+        for block in (*self._full, self.room[: self.used]):
+            yield from block[max(count, 0) :]
+            count -= len(block)
 
     def blocks(self) -> tuple[Array, ...]:
         """Return the recorded rows, in blocks of (k, width)."""

@@ -25,7 +25,7 @@ from strapdown.estimation.error_filter import (
 )
 from strapdown.estimation.robust import AdaptiveRule, AdaptiveScale, Rejection, Scales
 from strapdown.nav_state import NavState
-from strapdown.navigation.compiled_engine import CompiledEngine, compiled
+from strapdown.navigation.compiled_engine import CompiledEngine, ReferenceEngine, compiled
 from strapdown.navigation.engine import (
     SAME_INSTANT,
     Engine,
@@ -49,10 +49,40 @@ from strapdown.navigation.record import CovarianceSnapshot, InnovationRecord, Na
 if TYPE_CHECKING:
     from strapdown.navigation.smoother import RauchTungStriebel
 
-__all__ = ["EpochLoop", "Navigator", "NavigatorState", "with_states"]
+__all__ = ["EpochLoop", "Navigator", "NavigatorState", "Reference", "with_states"]
 
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """States about which a filter is linearized, instead of its own estimates.
+
+    Attributes
+    ----------
+    time : ndarray, (m,), s
+        Times of samples, increasing.
+    states : tuple of NavState, (m,)
+    sensors : ndarray, (m, k)
+        Errors of sensors and aids.
+    marks : ndarray, (n,), s
+        Times of the covariances that are recorded, whatever instants a run about it has.
+    """
+
+    time: Array
+    states: tuple[NavState, ...]
+    sensors: Array
+    marks: Array
+
+    def next_after(self, time: float) -> int:
+        """Index of the first state after a time."""
+        return int(self.time.searchsorted(time + SAME_INSTANT))
+
+    def next_time(self, time: float) -> float:
+        """Time of the first state after a time; infinite after the last."""
+        k = self.next_after(time)
+        return float(self.time[k]) if k < len(self.time) else np.inf
 
 
 @dataclass(frozen=True)
@@ -77,6 +107,8 @@ class Navigator:
     smoother : RauchTungStriebel, optional
         If given, the chunks hold the smoother history, too; the filter's result is the same to
         the last bit.
+    about : Reference, optional
+        What a smoothed run is linearized about; the filter's own estimates, if not given.
 
     Raises
     ------
@@ -89,6 +121,7 @@ class Navigator:
     mark_interval: float = 1.0
     damping: Correction = field(default_factory=ClosedLoop)
     smoother: RauchTungStriebel | None = None
+    about: Reference | None = None
 
     def __post_init__(self) -> None:
         if self.smoother is not None and not self.damping.corrects:
@@ -104,8 +137,11 @@ class Navigator:
 
     @cached_property
     def lone_receiver(self) -> Gnss | None:
-        """The only aid, if it is a receiver with white errors, used with its stated accuracy."""
-        if len(self.aids) != 1 or type(self.aids[0]) is not Gnss:
+        """The only aid, if it is a receiver with white errors, used with its stated accuracy.
+
+        None for a filter about a reference: the compiled loop feeds back.
+        """
+        if len(self.aids) != 1 or type(self.aids[0]) is not Gnss or self.about is not None:
             return None
         aid = self.aids[0]
         plain = aid.rule is None and self.filter.rule is None and not aid.states()
@@ -209,6 +245,8 @@ class Navigator:
 
     def engine(self, state: EngineState) -> Engine:
         """Return the engine for a state: compiled, if available for the modules."""
+        if self.about is not None:
+            return ReferenceEngine(self.filter, state)
         if self.damping.feeds_back and compiled(self.filter):
             return CompiledEngine.going_on(self.filter, state)
         return GeneralEngine(self.filter, state, self.damping.feeds_back, self.damping.corrects)
@@ -334,16 +372,21 @@ class EpochLoop:
             self.engine.nodes.began(self.engine.filter)
         self.time: Array = np.empty(0)
         self.history: Array = np.empty((0, navigator.filter.mechanization.row))
+        self.follows = 0 if navigator.about is None else navigator.about.next_after(state.time)
 
     def process(self, time: Array, rows: Array) -> None:
         """Process steps, from epoch to epoch: propagate, split a step, or update."""
         rows = self._prepared(time, rows)
         done = self._fixes(0, time, rows)
         while True:
-            epoch = min((q.time[0] for q in self.queues.values() if q.time.size), default=np.inf)
+            due = min((q.time[0] for q in self.queues.values() if q.time.size), default=np.inf)
+            epoch = min(due, self._next_reference())
             # 1. The epoch is due now.
             if epoch <= self.engine.time + SAME_INSTANT:
-                self._observe(self.engine.time)
+                if due <= self.engine.time + SAME_INSTANT:
+                    self._observe(self.engine.time)
+                else:
+                    self._follow()
                 if done and self.engine.time <= time[done - 1] + SAME_INSTANT:
                     self.history[done - 1] = self.engine.shown()
                 done = self._fixes(done, time, rows)
@@ -363,6 +406,21 @@ class EpochLoop:
                 rows[k] = rest
                 unseen = np.empty((1, self.history.shape[1]))
                 self._propagate(np.array([epoch]), part[None, :], unseen)
+
+    def _next_reference(self) -> float:
+        """Time of the next state of the reference."""
+        about = self.navigator.about
+        if about is None or self.follows == len(about.time):
+            return np.inf
+        return float(about.time[self.follows])
+
+    def _follow(self) -> None:
+        """Move the state to that of the reference."""
+        about, engine = self.navigator.about, self.engine
+        assert about is not None
+        assert isinstance(engine, ReferenceEngine)
+        engine.follow(about.states[self.follows], about.sensors[self.follows])
+        self.follows += 1
 
     def _prepared(self, time: Array, rows: Array) -> Array:
         """Look at steps before they are processed; return those that may be split."""
@@ -465,6 +523,7 @@ class EpochLoop:
             tuple(self.marks),
             tuple(self.late),
             self.engine.nodes.blocks(),
+            self.engine.left_at_nodes(),
         )
 
     def _steady(self, at: float) -> Array | None:
@@ -562,7 +621,8 @@ class EpochLoop:
 
     def _unlearn(self, met: FilterState) -> None:
         """Carry the covariance over the correction of a large tilt (second-order tilt)."""
-        if not self.tilted or not self.navigator.damping.feeds_back:
+        navigator = self.navigator
+        if not self.tilted or not navigator.damping.feeds_back or navigator.about is not None:
             return
         filter_, engine = self.navigator.filter, self.engine
         before = filter_.physical_covariance(met)

@@ -227,6 +227,9 @@ class NavigationChunk:
         Epochs of aids that came when the navigator was beyond their time, and were not used.
     nodes : tuple of ndarray, (k, width)
         Smoother history, if the navigator has a smoother: rows of `NodeRows`.
+    left : ndarray, (k, 9)
+        At each node, in level axes: estimated errors of `history` that are not subtracted from it,
+        where it is about a reference; otherwise (0, 9).
     """
 
     time: Array
@@ -235,6 +238,7 @@ class NavigationChunk:
     marks: tuple[CovarianceSnapshot, ...]
     late: tuple[tuple[str, float], ...] = ()
     nodes: tuple[Array, ...] = ()
+    left: Array = field(default_factory=lambda: np.empty((0, 9)))
 
 
 # Rows that grow without copying earlier ones.

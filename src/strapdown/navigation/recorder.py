@@ -194,6 +194,11 @@ class Tape:
             marks[:, 1:82] = later.covariance.reshape(-1, 81)
             marks[:, 82 : 82 + count] += later.sensors
             marks[:, 82 + count :] = later.sensors_sd
+        if self.navigator.about is not None:
+            times = self.navigator.about.marks
+            nearest = _nearest(marks[:, 0], times)
+            marks, filtered = marks[nearest], filtered[nearest]
+            marks[:, 0] = times
         trajectory = used.trajectory(at, np.array(history), source)
         time = pd.Index(marks[:, 0], name="time")
         covariance = marks[:, 1:82].reshape(-1, 9, 9).copy()
@@ -273,6 +278,12 @@ class Tape:
         seen = one.innovations
         row = np.concatenate([[one.time], seen.nu, seen.s, seen.weight])
         self._seen[one.name] = self._seen[one.name].and_then(row[None, :])
+
+
+def _nearest(time: Array, wanted: Array) -> NDArray[np.intp]:
+    """Indices of the times, increasing, that are nearest to others."""
+    after = np.clip(time.searchsorted(wanted), 1, len(time) - 1)
+    return np.asarray(after - (wanted - time[after - 1] < time[after] - wanted))
 
 
 def _contradictions(

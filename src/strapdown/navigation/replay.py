@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.errors import ConfigError
+from strapdown.errors import ConfigError, DivergenceError
 from strapdown.navigation.engine import SAME_INSTANT
 from strapdown.navigation.modes import Aligned, PipelineChunk
 from strapdown.navigation.pipeline import NavigationPipeline, PipelineState
 from strapdown.navigation.record import Event, NavigationRecord, Span
 from strapdown.navigation.recorder import FullRecorder, Recorder
+from strapdown.navigation.smoother import Smoothing
 from strapdown.progress import Progress, silent
 from strapdown.tables import ACCEL, GYRO, check_imu
 from strapdown.tables.checks import check_columns, source_of, values_of
@@ -25,6 +27,7 @@ __all__ = [
     "Recording",
     "pieces_by_sample",
     "pieces_of",
+    "relinearized",
     "run_batch",
     "run_by_sample",
 ]
@@ -35,6 +38,9 @@ Array = NDArray[np.float64]
 #: Length of a chunk of a record, s.
 CHUNK = 60.0
 CHANNELS = [*GYRO, *ACCEL]
+#: Change of smoothed states, in standard deviations, at which passes end: of the change by the next
+#: one it is of second order.
+SETTLED = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,11 +53,18 @@ class PipelineRun:
         Result of each alignment mode.
     smoothed : NavigationRecord or None
         Smoothed solution, where the navigator has a smoother.
+    smoothing : Smoothing or None
+        Of which it is.
+    moved : float
+        By how many standard deviations the last pass moved the smoothed states (`Smoothing.moved`);
+        zero without another pass.
     """
 
     record: NavigationRecord
     aligned: tuple[Aligned, ...]
     smoothed: NavigationRecord | None = None
+    smoothing: Smoothing | None = None
+    moved: float = 0.0
 
 
 class Recording:
@@ -102,7 +115,7 @@ class Recording:
             },
         )
         smoothed = None if self._smoothing is None else record(smoothing=self._smoothing)
-        return PipelineRun(record(), tuple(self._aligned), smoothed)
+        return PipelineRun(record(), tuple(self._aligned), smoothed, self._smoothing)
 
 
 def run_batch(
@@ -135,6 +148,54 @@ def run_batch(
         share = (piece.time - begin) / max(end - begin, 1e-9)
         progress(piece.mode, float(np.clip(share, 0.0, 1.0)))
     return recording.run(source_of(imu))
+
+
+def relinearized(
+    chain: NavigationPipeline,
+    imu: pd.DataFrame,
+    tables: Mapping[str, pd.DataFrame] | None,
+    recorder: Recorder | None,
+    run: PipelineRun,
+    progress: Progress = silent,
+    chunk: float = CHUNK,
+) -> PipelineRun:
+    """Repeat a smoothed run about its smoothed states, until these stay where they are.
+
+    Parameters
+    ----------
+    chain, imu, tables, recorder, progress, chunk
+        As `run_batch`.
+    run : PipelineRun
+        Of this pipeline over this record.
+
+    Returns
+    -------
+    PipelineRun
+        With another smoothed solution; what the filter found remains. A pass that diverges, or
+        moves farther than the one before, ends it: its result is not used.
+    """
+    smoother, moved = chain.navigator.smoother, math.inf
+    for _ in range(smoother.passes - 1 if smoother is not None else 0):
+        about = run.smoothing.reference() if run.smoothing is not None else None
+        if about is None:
+            return run
+        again = replace(chain, navigator=replace(chain.navigator, about=about))
+        try:
+            found = run_batch(again, imu, tables, recorder, progress, chunk)
+        except DivergenceError:
+            return replace(run, moved=math.inf)
+        assert found.smoothed is not None
+        assert found.smoothing is not None
+        assert run.smoothed is not None
+        before, moved = moved, found.smoothing.moved()
+        if moved > before:
+            return replace(run, moved=moved)
+        own = replace(found.smoothed, innovations=run.smoothed.innovations)
+        own = replace(own, events=run.smoothed.events, outages=run.smoothed.outages)
+        run = replace(run, smoothed=own, smoothing=found.smoothing, moved=moved)
+        if moved < SETTLED:
+            return run
+    return run
 
 
 def run_by_sample(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tempfile
 import weakref
 from collections.abc import Iterator, Sequence
@@ -25,9 +26,13 @@ from strapdown.errors import ConfigError
 from strapdown.estimation.covariance import Observation
 from strapdown.estimation.error_model import PHYSICAL
 from strapdown.mechanization.mechanization import Mechanization
+from strapdown.nav_state import NavState
+from strapdown.navigation.compiled_engine import compiled
 from strapdown.navigation.engine import SAME_INSTANT
-from strapdown.navigation.navigator import Navigator
-from strapdown.navigation.record import NavigationChunk
+from strapdown.navigation.measurements.gnss import TINY
+from strapdown.navigation.navigator import Navigator, Reference
+from strapdown.navigation.record import CovarianceSnapshot, NavigationChunk
+from strapdown.tables import EULER, GEODETIC, VELOCITY
 from strapdown.tables.checks import is_number
 
 __all__ = ["SMOOTHERS", "RauchTungStriebel", "Smoothed", "Smoothing", "SmoothingTape"]
@@ -37,6 +42,9 @@ Array = NDArray[np.float64]
 
 #: Tolerance of the time of a mark, s: before an observation it is a microsecond earlier.
 SAME_MARK = 1.5e-6
+#: Interval at which a further pass follows the smoothed states, s: in between, sensors with their
+#: smoothed errors subtracted leave them by next to nothing.
+ANCHORS = 1.0
 
 
 @dataclass(frozen=True)
@@ -49,19 +57,25 @@ class RauchTungStriebel:
     3.31), computed in the adjoint form of Bryson and Frazier. Where errors only grow it needs no
     inverse, so that exactly known states do no harm.
 
-    It is linear about the filter's own states: where the filter had large errors, as a heading
-    error of tens of degrees, the smoothed states of that time are only as good as the linear model
-    there. Outliers rejected by a rule stay rejected.
+    One pass is linear about the filter's own states, which each observation changes: the products
+    of transitions and observations of one run are then those of different trajectories, and what no
+    observation shows, as a tilt against the accelerometer bias that hides it, seems to be observed
+    (Huang, Mourikis and Roumeliotis, Int. J. Robotics Research 29 (2010) 502). A run is therefore
+    repeated about its smoothed states (`replay.relinearized`): the Gauss-Newton method for the
+    states of highest probability (Bell, SIAM J. Optimization 4 (1994) 626). Outliers rejected by a
+    rule of the last pass are not used.
 
     Attributes
     ----------
     memory : float, MB
         Beyond it the history is written to disk (the folder for temporary files).
+    passes : int
+        Most passes over a record; 1 is linear about the states of the filter.
 
     Raises
     ------
     ConfigError
-        The size is invalid.
+        The size or the number is invalid.
     """
 
     name: ClassVar[str] = "rts"
@@ -69,8 +83,13 @@ class RauchTungStriebel:
     source: ClassVar[str] = "Rauch, Tung and Striebel (1965); Bryson and Frazier (1963)"
 
     memory: float = field(default=256.0, metadata={"unit": "mb"})
+    passes: int = 5
 
     def __post_init__(self) -> None:
+        if not isinstance(self.passes, int) or not 1 <= self.passes <= 100:
+            raise ConfigError(
+                "navigation.smoother-passes", quantity="passes", passes=str(self.passes)
+            )
         if not is_number(self.memory) or not 1.0 <= self.memory <= 1e6:
             raise ConfigError(
                 "navigation.smoother-memory-too-small", quantity="memory_mb", memory=self.memory
@@ -96,11 +115,37 @@ class Smoothing:
     def __init__(self, navigator: Navigator, memory: int) -> None:
         self._tape = SmoothingTape(navigator.filter.model.physical_size, memory)
         self._navigator = navigator
+        self._left: list[Array] = []
+        self._anchors: list[tuple[float, Array, float, Array]] = []
+        self._mark: CovarianceSnapshot | None = None
+        self._due = -math.inf if navigator.about is None else navigator.about.next_time(-math.inf)
+        #: With the corrections of the sensors at each node, and the marks.
+        self._result: tuple[Smoothed, Array, Array] | None = None
 
     def take(self, piece: NavigationChunk) -> None:
         """Append the result of a chunk."""
         for rows in piece.nodes:
             self._tape.take(rows)
+        self._left.append(piece.left)
+        self._take_anchors(piece)
+
+    def _take_anchors(self, piece: NavigationChunk) -> None:
+        """Keep a state each `ANCHORS` seconds, with the last estimates of the sensors before it.
+
+        A further pass keeps the instants of the first one, at which it follows the reference.
+        """
+        marks = [mark for mark in (self._mark, *piece.marks) if mark is not None]
+        if not marks:
+            return
+        at, about = np.array([mark.time for mark in marks]), self._navigator.about
+        k = int(piece.time.searchsorted(max(self._due, at[0]) - SAME_INSTANT))
+        while k < len(piece.time):
+            time = float(piece.time[k])
+            mark = marks[int(at.searchsorted(time + SAME_INSTANT)) - 1]
+            self._anchors.append((time, piece.history[k].copy(), mark.time, mark.sensors))
+            self._due = time + ANCHORS if about is None else about.next_time(time)
+            k = int(piece.time.searchsorted(self._due - SAME_INSTANT))
+        self._mark = marks[-1]
 
     def smoothed(self, marks: Array) -> Smoothed:
         """Run the backward pass over the whole history.
@@ -120,12 +165,9 @@ class Smoothing:
         )
         nodes, place = np.unique(of_mark, return_inverse=True)
         errors = np.empty((len(time), n))
-        mark_errors = np.empty((len(nodes), 9))
         covariance = np.empty((len(nodes), 9, 9))
         sensors_sd = np.empty((len(nodes), n - 9))
         for met, P, turn in self._back(nodes, errors):
-            level = errors[nodes[met], :9].reshape(-1, 3, 3)
-            mark_errors[met] = (level @ turn).reshape(-1, 9)
             for a in (0, 3, 6):
                 for b in (0, 3, 6):
                     covariance[met, a : a + 3, b : b + 3] = (
@@ -133,15 +175,66 @@ class Smoothing:
                     )
             variances = np.diagonal(P, axis1=1, axis2=2)[:, 9:]
             sensors_sd[met] = np.sqrt(np.maximum(variances, 0.0))
-        return Smoothed(
+        smoothed = Smoothed(
             mechanization=self._navigator.filter.mechanization,
             time=time,
             errors=errors[:, :9].copy(),
-            mark_errors=mark_errors[place],
             covariance=covariance[place],
             sensors=errors[of_mark, 9:],
             sensors_sd=sensors_sd[place],
         )
+        left = np.concatenate([np.empty((0, 9)), *self._left])
+        if len(left):
+            smoothed.errors[:] += left
+        self._result = smoothed, errors[:, 9:].copy(), marks
+        return smoothed
+
+    def reference(self) -> Reference | None:
+        """Return the smoothed states, about which another pass is linearized.
+
+        None where no other pass is possible: the errors are not rotation vectors of a compiled
+        closed loop, or there are no states.
+        """
+        navigator = self._navigator
+        linear = compiled(navigator.filter) and navigator.damping.feeds_back
+        if self._result is None or not self._anchors or not linear:
+            return None
+        smoothed, sensors, marks = self._result
+        time, marked = (np.array([one[k] for one in self._anchors]) for k in (0, 2))
+        rows = smoothed.corrected(time, np.array([one[1] for one in self._anchors]))
+        table = smoothed.mechanization.trajectory(time, rows)
+        values = table[[*GEODETIC, *VELOCITY, *EULER]].to_numpy().tolist()
+        return Reference(
+            time,
+            tuple(
+                NavState.from_degrees(
+                    *row[:3], v_n=row[3:6], roll_deg=row[6], pitch_deg=row[7], heading_deg=row[8]
+                )
+                for row in values
+            ),
+            np.array([one[3] for one in self._anchors]) + sensors[smoothed.nodes_at(marked)],
+            marks if navigator.about is None else navigator.about.marks,
+        )
+
+    def moved(self) -> float:
+        """Return how far the smoothed states are from what they were linearized about.
+
+        In standard deviations, the largest of the root mean squares of horizontal and vertical
+        velocity, tilt and heading, where the state follows a reference: between two of these the
+        noise of the sensors moves it. Those of the position act linearly.
+        """
+        if self._result is None or not self._anchors:
+            return math.inf
+        smoothed, _, marks = self._result
+        time = np.array([one[0] for one in self._anchors])
+        before = np.clip(marks.searchsorted(time + SAME_INSTANT) - 1, 0, None)
+        squares = np.square(smoothed.errors[smoothed.nodes_at(time), 3:])
+        variances = np.diagonal(smoothed.covariance[before], axis1=1, axis2=2)[:, 3:]
+        parts = [
+            squares[:, part].sum(axis=1) / np.maximum(variances[:, part].sum(axis=1), TINY)
+            for part in (slice(0, 2), slice(2, 3), slice(3, 5), slice(5, 6))
+        ]
+        return math.sqrt(max(float(part.mean()) for part in parts))
 
     def seen(self, times: Array, observations: Sequence[Observation]) -> tuple[Array, Array]:
         """Return the residuals of unused observations against the smoothed states.
@@ -223,8 +316,6 @@ class Smoothed:
         Of the nodes.
     errors : ndarray, (k, 9)
         Of the state at each, level axes of the mechanization.
-    mark_errors : ndarray, (m, 9)
-        Of the state at each mark, north-east-down.
     covariance : ndarray, (m, 9, 9)
         At the marks, north-east-down.
     sensors : ndarray, (m, s)
@@ -235,10 +326,14 @@ class Smoothed:
     mechanization: Mechanization
     time: Array
     errors: Array
-    mark_errors: Array
     covariance: Array
     sensors: Array
     sensors_sd: Array
+
+    def nodes_at(self, time: Array) -> NDArray[np.intp]:
+        """Return the last node not after each time: with several at an instant, of the output."""
+        right = np.searchsorted(self.time, time + SAME_INSTANT, side="right")
+        return np.asarray(np.clip(right - 1, 0, len(self.time) - 1))
 
     def corrected(self, time: Array, history: Array) -> Array:
         """Return rows of a history with the smoothed corrections applied.
@@ -255,10 +350,8 @@ class Smoothed:
         -------
         ndarray, (n, row)
         """
-        # At an instant with several nodes the last one is of the output state.
-        right = np.searchsorted(self.time, time + SAME_INSTANT, side="right")
-        before = np.clip(right - 1, 0, len(self.time) - 1)
-        after = np.clip(right, 0, len(self.time) - 1)
+        before = self.nodes_at(time)
+        after = np.clip(before + 1, 0, len(self.time) - 1)
         length = self.time[after] - self.time[before]
         part = np.clip(time - self.time[before], 0.0, None)
         share = np.divide(part, length, out=np.zeros_like(part), where=length > 0.0)

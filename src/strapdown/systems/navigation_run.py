@@ -57,7 +57,7 @@ from strapdown.navigation.pipeline import NavigationPipeline
 from strapdown.navigation.preprocessing import GapPolicy, ImuPreprocessor, ends_of
 from strapdown.navigation.record import NavigationRecord, Span, innovation_labels
 from strapdown.navigation.recorder import IntervalRecorder, Recorder
-from strapdown.navigation.replay import PipelineRun, run_batch
+from strapdown.navigation.replay import PipelineRun, relinearized, run_batch
 from strapdown.progress import Progress, silent
 from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty
@@ -100,6 +100,9 @@ CONTINUED, SURELY = 0.05, 3.0
 #: where that is at most this part of what was assumed, and where the assumed one moves the vehicle,
 #: at the speed that is exceeded for a tenth of the time, by so many standard deviations of fixes.
 ASSUMED, BETTER, MOSTLY, DISPLACED = 3.0, 0.5, 0.9, 3.0
+#: Movement of smoothed states by the last pass, in standard deviations, that their bounds do not
+#: cover: a tenth more than the bound of 95 %, if the error is independent of it.
+UNSETTLED = 0.5
 #: Length of a chunk of the record, and interval of progress reports, s.
 CHUNK = 20.0
 _AT_ONCE = partial(run_batch, chunk=CHUNK)
@@ -169,6 +172,14 @@ def run_navigation(
             begun_with = chain
         if by_offset:
             run = drive(chain, source.imu, source.tables, recorder, show_mode)
+        if run.smoothed is not None:
+
+            def show_pass(mode: str, share: float) -> None:
+                progress(f"smoothing: {mode}", ENDED)
+
+            run = relinearized(
+                chain, source.imu, source.tables, recorder, run, show_pass, chunk=CHUNK
+            )
     beside = None
     if spec.damping.beside is not None:
         with said_of_file(*tables):
@@ -233,6 +244,7 @@ def run_navigation(
         *(f for one in run.aligned for f in one.alignment.findings),
         *(() if fine is None or fine.fine is None else fine.fine.findings),
         *_lost_start(chain, source.imu, best.trajectory),
+        *_unsettled(run),
         *by_grade,
         *in_file(by_offset, *tables),
     ]
@@ -413,6 +425,13 @@ def _with_correction(chain: NavigationPipeline, kind: str) -> NavigationPipeline
     """Return a pipeline with another correction by the estimated errors, without a smoother."""
     navigator = replace(chain.navigator, damping=DAMPINGS[kind](), smoother=None)
     return replace(chain, navigator=navigator)
+
+
+def _unsettled(run: PipelineRun) -> tuple[Finding, ...]:
+    """Report smoothed states that another pass moves by more than their bounds allow for."""
+    if run.moved <= UNSETTLED:
+        return ()
+    return (Finding("navigation.smoother-not-settled", quantity="smoother", moved=run.moved),)
 
 
 def _lost_start(

@@ -1,0 +1,154 @@
+"""A smoothed run about its own states: what no observation shows is not thought to be known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+from tests.aided_drives import truth_at
+from tests.coded import coded
+
+from strapdown.errors import ConfigError
+from strapdown.estimation.covariance import COVARIANCES
+from strapdown.estimation.error_filter import ErrorFilter
+from strapdown.estimation.error_model import RotationVectorModel
+from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias
+from strapdown.mechanization import NorthEastDown
+from strapdown.mechanization.mechanization import state_error
+from strapdown.nav_state import NavState
+from strapdown.navigation.measurements.gnss import Gnss
+from strapdown.navigation.modes import KnownStart
+from strapdown.navigation.navigator import Navigator, with_states
+from strapdown.navigation.pipeline import NavigationPipeline
+from strapdown.navigation.recorder import IntervalRecorder
+from strapdown.navigation.replay import SETTLED, relinearized, run_batch
+from strapdown.navigation.smoother import RauchTungStriebel
+from strapdown.simulation import ImuErrors, Origin, PathMotion, Track, TriadErrors, simulate_imu
+from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
+from strapdown.tables import POSITION_SD
+
+#: A phone, rad/s/√Hz, m/s²/√Hz, rad/s, m/s²; and a start of which the heading is known roughly.
+GYRO_NOISE, ACCEL_NOISE, GYRO_BIAS, ACCEL_BIAS = 1e-4, 2e-3, 5e-3, 0.1
+TILT, HEADING = np.radians(0.5), np.radians(10.0)
+FIX = 0.3
+
+
+@cache
+def walk():
+    """A minute and a half at the pace of a walker, straight on but for a stop."""
+    return PathMotion(
+        90.0,
+        Origin(48.0, 11.0, 500.0),
+        heading_deg=60.0,
+        speed=Track((0.0, 4.0, 6.0, 40.0, 42.0, 48.0, 50.0), (0.0, 0.0, 1.4, 1.4, 0.0, 0.0, 1.4)),
+        turn_rate=Track((0.0, 60.0, 61.0, 70.0, 71.0), (0.0, 0.0, 1.0, 1.0, 0.0)),
+    )
+
+
+def started(seed, share):
+    """A pipeline over a walk, its samples and fixes: all errors are this share of their sizes."""
+    rng, motion = np.random.default_rng([seed, 3]), walk()
+    errors = ImuErrors(
+        TriadErrors(
+            noise_density=share * GYRO_NOISE,
+            bias=tuple(share * GYRO_BIAS * rng.standard_normal(3)),
+        ),
+        TriadErrors(
+            noise_density=share * ACCEL_NOISE,
+            bias=tuple(share * ACCEL_BIAS * rng.standard_normal(3)),
+        ),
+    )
+    imu, _ = simulate_imu(motion, errors, rate=50.0, sampling="mean", seed=seed)
+    receiver = GnssReceiver(
+        rate=2.0, position_noise=share * FIX, velocity_noise=1.0, on_excess="unaffected"
+    )
+    fixes = simulate_gnss(motion, receiver, seed=seed)
+    fixes[POSITION_SD] = FIX
+
+    model = RotationVectorModel(
+        (GYRO_NOISE,) * 3, (ACCEL_NOISE,) * 3, (gyro_bias(GYRO_BIAS), accel_bias(ACCEL_BIAS))
+    )
+    filter_ = ErrorFilter(NorthEastDown(), model, COVARIANCES["ud"](), step=0.1)
+    aids = (Gnss(name="gnss", use_velocity=False),)
+    smoother = RauchTungStriebel()
+    navigator = replace(Navigator(with_states(filter_, aids), aids), smoother=smoother)
+    used, truth = filter_.mechanization, truth_at(motion, float(imu.index[0]))
+    sd = np.array([1.0] * 3 + [0.1] * 3 + [TILT, TILT, HEADING])
+    off = used.correct(used.begin(truth), -share * sd * rng.standard_normal(9))
+    start = KnownStart(
+        used.nav_state(off, truth.time),
+        tuple(sd[:3]),
+        tuple(sd[3:6]),
+        tuple(np.degrees(sd[6:])),
+    )
+    return NavigationPipeline(navigator, start=start), imu, {"gnss": fixes}
+
+
+@cache
+def smoothed(seed, share=1.0):
+    """Records of a walk, smoothed once, and about its smoothed states."""
+    chain, imu, tables = started(seed, share)
+    run = run_batch(chain, imu, tables, IntervalRecorder(rate_hz=5.0))
+    again = relinearized(chain, imu, tables, IntervalRecorder(rate_hz=5.0), run)
+    return run.smoothed, again.smoothed, again.smoothing.moved()
+
+
+def tilts(record, part=slice(6, 8)):
+    """Errors of both tilts in the middle of a walk, rad, and their covariance."""
+    k = len(record.sd) // 2
+    row = record.trajectory.index.searchsorted(record.sd.index[k])
+    state = NavState.from_trajectory(record.trajectory.iloc[[row]])
+    error = state_error(state, truth_at(walk(), float(record.trajectory.index[row])))
+    return error[part], record.covariance[k][part, part]
+
+
+def test_the_tilt_that_a_bias_hides_is_as_unknown_as_along_the_true_path():
+    once, again, moved = smoothed(1)
+    # Errors of a hundredth leave the filter on the true path: what is known there is known.
+    there = np.trace(tilts(smoothed(1, 0.01)[0])[1])
+    assert np.trace(tilts(again)[1]) == pytest.approx(there, rel=0.1)
+    assert np.trace(tilts(once)[1]) < 0.7 * there
+    assert moved < SETTLED
+
+
+def test_small_errors_need_no_second_pass():
+    once, again, moved = smoothed(1, 0.01)
+    assert moved < 0.01
+    np.testing.assert_allclose(again.sd.to_numpy(), once.sd.to_numpy(), rtol=0.02)
+    # The same states to a hundredth of a hundredth of their standard deviations.
+    e, P = tilts(once)
+    np.testing.assert_allclose(tilts(again)[0], e, rtol=0.0, atol=1e-3 * np.sqrt(P[0, 0]))
+
+
+def test_what_the_filter_found_remains():
+    chain, imu, tables = started(2, 1.0)
+    run = run_batch(chain, imu, tables)
+    again = relinearized(chain, imu, tables, None, run)
+    assert again.record is run.record
+    np.testing.assert_array_equal(again.smoothed.sd.index, run.record.sd.index)
+    np.testing.assert_array_equal(again.smoothed.trajectory.index, run.record.trajectory.index)
+    for name, table in run.smoothed.innovations.items():
+        assert again.smoothed.innovations[name] is table
+    only = replace(chain.navigator, smoother=RauchTungStriebel(passes=1))
+    assert relinearized(replace(chain, navigator=only), imu, tables, None, run) is run
+
+
+@pytest.mark.slow
+def test_thirty_walks_are_as_wrong_as_they_are_said_to_be():
+    squares = []
+    for seed in range(30):
+        once, again, _ = smoothed(seed)
+        squares.append([e @ np.linalg.solve(P, e) for e, P in map(tilts, (once, again))])
+    # Sums of 60 squares: within the bounds of 99.8 %, which one pass exceeds.
+    one, two = np.sum(squares, axis=0)
+    low, high = chi2.ppf([0.001, 0.999], 60)
+    assert low < two < high < one
+
+
+@pytest.mark.parametrize("passes", [0, 101, 2.0, "two"])
+def test_a_number_of_passes_is_a_small_whole_number(passes):
+    with pytest.raises(ConfigError, check=coded("navigation.smoother-passes")):
+        RauchTungStriebel(passes=passes)
