@@ -1,0 +1,290 @@
+"""Write the C of all kernels and of the Python module that holds them, and compile both."""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import os
+import subprocess
+import sys
+import sysconfig
+import time
+from pathlib import Path
+
+from . import signatures, sources
+from .translate import Function, Translator, _holds_memory
+from .types_of_c import SCALARS, Type, is_array, is_list, is_tuple
+
+HERE = Path(__file__).parent
+NUMPY = {"f8": "NPY_DOUBLE", "f4": "NPY_FLOAT", "i8": "NPY_INT64", "u1": "NPY_UBYTE", "b1": "NPY_BOOL"}
+FLAGS = ["-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fPIC"]
+FLAGS += ["-fvisibility=hidden", "-Wno-unused-function"]
+#: Of x86-64: AVX2 and FMA, in processors since 2013.
+LEVELS = {"base": [], "v3": ["-mavx2", "-mbmi", "-mbmi2"]}
+
+
+class _Module:
+    """The text of the Python module."""
+
+    def __init__(self, translator: Translator) -> None:
+        self.t, self.names = translator, translator.names
+        self.getters: dict[Type, str] = {}
+        self.makers: dict[Type, str] = {}
+        self.helpers: list[str] = []
+
+    def getter(self, kind: Type) -> str:
+        """Name of the function that reads an argument of a type."""
+        if isinstance(kind, str):
+            return f"sd_get_{kind}"
+        if kind in self.getters:
+            return self.getters[kind]
+        name = self.getters[kind] = f"get_{self.names(kind)}"
+        if is_array(kind):
+            _, scalar, n, layout = kind
+            fields = [f"({SCALARS[scalar]} *)PyArray_DATA(a)", *(f"PyArray_DIM(a, {k})" for k in range(n))]
+            if layout == "A":
+                fields += [f"PyArray_STRIDE(a, {k}) / (int64_t)sizeof({SCALARS[scalar]})" for k in range(n)]
+            body = (
+                f"    PyArrayObject *a = sd_array(o, sd_type_{scalar}, {n}, {int(layout == 'C')}, change);\n"
+                f"    if (!a) return -1;\n"
+                f"    *x = ({self.names(kind)}){{{', '.join(fields)}}};\n    return 0;\n"
+            )
+        else:
+            body = f"    if (!PyTuple_Check(o) || PyTuple_GET_SIZE(o) != {len(kind) - 1}) return -1;\n"
+            for k, part in enumerate(kind[1:]):
+                body += f"    if ({self.get(part, f'PyTuple_GET_ITEM(o, {k})', f'&x->f{k}', 'change')}) return -1;\n"
+            body += "    return 0;\n"
+        self.helpers.append(
+            f"static int {name}(PyObject *o, {self.names(kind)} *x, int change) {{\n{body}}}\n"
+        )
+        return name
+
+    def get(self, kind: Type, source: str, target: str, change: str) -> str:
+        last = "" if isinstance(kind, str) else f", {change}"
+        return f"{self.getter(kind)}({source}, {target}{last})"
+
+    def maker(self, kind: Type) -> str:
+        """Name of the function that makes a Python object of a result."""
+        if isinstance(kind, str):
+            return f"sd_py_{kind}"
+        if kind in self.makers:
+            return self.makers[kind]
+        name = self.makers[kind] = f"py_{self.names(kind)}"
+        if is_array(kind):
+            n = kind[2]
+            if kind[3] != "C":
+                raise ValueError("a strided result")
+            sizes = ", ".join(f"x.n{k}" for k in range(n))
+            body = f"    npy_intp sizes[] = {{{sizes}}};\n    return sd_copied(x.data, {NUMPY[kind[1]]}, {n}, sizes);\n"
+        elif is_list(kind):
+            body = (
+                "    PyObject *o = PyList_New(x.n0);\n    if (!o) return NULL;\n"
+                "    for (int64_t k = 0; k < x.n0; k++) {\n"
+                f"        PyObject *one = {self.maker(kind[1])}(x.data[k]);\n"
+                "        if (!one) { Py_DECREF(o); return NULL; }\n"
+                "        PyList_SET_ITEM(o, k, one);\n    }\n    return o;\n"
+            )
+        else:
+            n = len(kind) - 1
+            body = f"    PyObject *o = PyTuple_New({n}), *one;\n    if (!o) return NULL;\n"
+            for k, part in enumerate(kind[1:]):
+                body += f"    if (!(one = {self.maker(part)}(x.f{k}))) {{ Py_DECREF(o); return NULL; }}\n"
+                body += f"    PyTuple_SET_ITEM(o, {k}, one);\n"
+            body += "    return o;\n"
+        self.helpers.append(f"static PyObject *{name}({self.names(kind)} x) {{\n{body}}}\n")
+        return name
+
+    def wrapper(self, name: str, functions: list[Function]) -> str:
+        """Write the function of a kernel that Python calls."""
+        label = name.replace(".", "_")
+        count = len(functions[0].kinds)
+        lines = [f"static PyObject *call_{label}(PyObject *self, PyObject *const *args, Py_ssize_t n) {{"]
+        lines += ["    (void)self;", f'    if (n != {count}) return sd_count("{name}", {count}, n);']
+        lines.append("    int wrong = 0;")
+        for function in functions:
+            lines.append("    {")
+            for k, kind in enumerate(function.kinds):
+                lines.append(f"        {self.names(kind)} a{k};")
+            tests = [
+                f"({self.get(kind, f'args[{k}]', f'&a{k}', str(int(k in function.changes)))} && (wrong = {k + 1}))"
+                for k, kind in enumerate(function.kinds)
+            ]
+            joined = " ||\n              ".join(tests) or "0"
+            lines.append(f"        if (!({joined})) {{")
+            arguments = ", ".join(f"a{k}" for k in range(count))
+            if function.can_raise:
+                lines.append("            int why = setjmp(*table->leave());")
+                lines.append("            if (why) {")
+                lines.append("                table->reset();")
+                lines.append(f'                return sd_failed("{name}", why);')
+                lines.append("            }")
+            call = f"table->{function.name}({arguments})"
+            threads = function.kernel.nogil
+            if function.result is None:
+                if threads:
+                    raise ValueError("without the lock: only with a result")
+                lines += [f"            {call};", "            Py_RETURN_NONE;"]
+            else:
+                if threads:
+                    lines.append(f"            {self.names(function.result)} x;")
+                    lines.append("            PyThreadState *state = PyEval_SaveThread();")
+                    lines.append(f"            x = {call};")
+                    lines.append("            PyEval_RestoreThread(state);")
+                else:
+                    lines.append(f"            {self.names(function.result)} x = {call};")
+                if _holds_memory(function.result):
+                    lines.append(f"            PyObject *o = {self.maker(function.result)}(x);")
+                    lines += ["            table->reset();", "            return o;"]
+                else:
+                    lines.append(f"            return {self.maker(function.result)}(x);")
+            lines += ["        }", "    }"]
+            if function is not functions[-1]:
+                lines.append("    PyErr_Clear();")
+        lines.append(
+            f'    if (!PyErr_Occurred()) sd_wrong("{name}", wrong - 1, "as the kernel declares it", args[wrong - 1]);'
+        )
+        lines += ["    return NULL;", "}", ""]
+        return "\n".join(lines)
+
+
+def generate(package: Path, listed: Path, out: Path) -> int:
+    """Write the three files of C; return the number of functions."""
+    modules = sources.load(package)
+    translator = Translator()
+    public: dict[str, list[Function]] = {}
+    for name, rows in signatures.read(listed).items():
+        module, kernel = name.split(".")
+        public[name] = [translator.function(modules[module][kernel], kinds, True) for kinds in rows]
+    module = _Module(translator)
+    wrappers = [module.wrapper(name, functions) for name, functions in public.items()]
+    every = [f for functions in public.values() for f in functions]
+    type_of = translator.names
+    rows = [
+        f"    {type_of(f.result)} (*{f.name})({', '.join(type_of(k) for k in f.kinds) or 'void'});"
+        for f in every
+    ]
+    out.mkdir(parents=True, exist_ok=True)
+    (out / "prelude.h").write_text((HERE / "prelude.h").read_text())
+    (out / "kernels.h").write_text(
+        "\n".join(
+            [
+                *type_of.text,
+                "typedef struct {",
+                "    jmp_buf *(*leave)(void);",
+                "    void (*reset)(void);",
+                *rows,
+                "} sd_table;",
+                "",
+            ]
+        )
+    )
+    (out / "kernels.c").write_text(
+        "\n".join(
+            [
+                '#include "prelude.h"',
+                '#include "kernels.h"',
+                "",
+                *(f.text for f in translator.order),
+                "static jmp_buf *sd_leave(void) { return &sd_exit; }",
+                "static void sd_reset(void) { sd_end((sd_mark){0, 0}); }",
+                "const sd_table SD_TABLE = {",
+                "    sd_leave, sd_reset,",
+                *(f"    {f.name}," for f in every),
+                "};",
+                "",
+            ]
+        )
+    )
+    digest = hashlib.sha256()
+    for source in sorted(package.glob("*.py")):
+        digest.update(source.read_bytes())
+    methods = [
+        f'    {{"{name}", (PyCFunction)(void (*)(void))call_{name.replace(".", "_")}, METH_FASTCALL, NULL}},'
+        for name in public
+    ]
+    (out / "module.c").write_text(
+        "\n".join(
+            [
+                "#include <Python.h>",
+                '#include "prelude.h"',
+                '#include "kernels.h"',
+                (HERE / "module.h").read_text(),
+                "extern const sd_table table_base;",
+                "#ifdef SD_V3",
+                "extern const sd_table table_v3;",
+                "#endif",
+                "static const sd_table *table = &table_base;",
+                *module.helpers,
+                *wrappers,
+                "static PyMethodDef methods[] = {",
+                *methods,
+                "    {NULL, NULL, 0, NULL}",
+                "};",
+                "static struct PyModuleDef definition = {PyModuleDef_HEAD_INIT, \"_compiled\", NULL, -1, methods,",
+                "                                        NULL, NULL, NULL, NULL};",
+                "PyMODINIT_FUNC PyInit__compiled(void) {",
+                "    import_array();",
+                "#ifdef SD_V3",
+                "    __builtin_cpu_init();",
+                '    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&'
+                ' __builtin_cpu_supports("bmi2") && !getenv("STRAPDOWN_BASE"))',
+                "        table = &table_v3;",
+                "#endif",
+                "    PyObject *made = PyModule_Create(&definition);",
+                f'    if (made) PyModule_AddStringConstant(made, "SOURCES", "{digest.hexdigest()}");',
+                '    if (made) PyModule_AddStringConstant(made, "LEVEL", table == &table_base ? "base" : "v3");',
+                "    return made;",
+                "}",
+                "",
+            ]
+        )
+    )
+    return len(translator.order)
+
+
+def compile_(out: Path, compiler: list[str], flags: list[str], levels: list[str]) -> Path:
+    """Compile and link; return the path of the module."""
+    import numpy as np
+
+    objects = []
+    include = [f"-I{sysconfig.get_path('include')}", f"-I{np.get_include()}"]
+    jobs = [("kernels.c", level, [f"-DSD_TABLE=table_{level}", *LEVELS[level]]) for level in levels]
+    jobs.append(("module.c", "module", ["-DSD_V3"] if "v3" in levels else []))
+    running = []
+    for source, label, more in jobs:
+        target = out / f"{label}.o"
+        objects.append(str(target))
+        command = [*compiler, *FLAGS, *flags, *more, *include, "-c", str(out / source), "-o", str(target)]
+        running.append((subprocess.Popen(command), command))
+    for process, command in running:
+        if process.wait():
+            raise SystemExit(f"failed: {' '.join(command)}")
+    suffix = sysconfig.get_config_var("EXT_SUFFIX")
+    made = out / f"_compiled{suffix}"
+    subprocess.run([*compiler, "-shared", *objects, "-o", str(made), "-lm", "-s"], check=True)
+    return made
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--package", type=Path, default=HERE.parents[1] / "src/strapdown/_kernels")
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--cc", default=os.environ.get("CC", "cc"))
+    parser.add_argument("--flags", default="")
+    parser.add_argument("--levels", default="base,v3")
+    parser.add_argument("--signatures", type=Path, default=HERE / "signatures.txt")
+    options = parser.parse_args()
+    begin = time.perf_counter()
+    count = generate(options.package, options.signatures, options.out)
+    middle = time.perf_counter()
+    made = compile_(options.out, options.cc.split(), options.flags.split(), options.levels.split(","))
+    end = time.perf_counter()
+    print(
+        f"{count} functions written in {middle - begin:.1f} s, compiled in {end - middle:.1f} s: "
+        f"{made} ({made.stat().st_size / 1e6:.2f} MB)",
+        file=sys.stderr,
+    )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,77 @@
+/* From Python's objects to the kernels' arguments, and back. */
+#define NPY_NO_DEPRECATED_API NPY_2_0_API_VERSION
+#define NPY_TARGET_VERSION NPY_2_0_API_VERSION
+#include <numpy/arrayobject.h>
+
+static int sd_wrong(const char *kernel, int argument, const char *wanted, PyObject *given) {
+    PyErr_Format(PyExc_TypeError, "%s: argument %d is to be %s, not %R", kernel, argument + 1, wanted,
+                 (PyObject *)Py_TYPE(given));
+    return -1;
+}
+static int sd_type_f8(int type) { return type == NPY_DOUBLE; }
+static int sd_type_f4(int type) { return type == NPY_FLOAT; }
+static int sd_type_i8(int type) {
+    return type == NPY_INT64 || (sizeof(long) == 8 && type == NPY_LONG) || type == NPY_LONGLONG;
+}
+static int sd_type_u1(int type) { return type == NPY_UBYTE; }
+static int sd_type_b1(int type) { return type == NPY_BOOL; }
+
+/* The array if it has the type, dimensions and layout; otherwise NULL. */
+static PyArrayObject *sd_array(PyObject *o, int (*of_type)(int), int dims, int contiguous, int change) {
+    if (!PyArray_Check(o)) return NULL;
+    PyArrayObject *a = (PyArrayObject *)o;
+    int flags = NPY_ARRAY_ALIGNED | (contiguous ? NPY_ARRAY_C_CONTIGUOUS : 0) |
+                (change ? NPY_ARRAY_WRITEABLE : 0);
+    if (PyArray_NDIM(a) != dims || !of_type(PyArray_TYPE(a)) || !PyArray_CHKFLAGS(a, flags) ||
+        PyArray_ISBYTESWAPPED(a))
+        return NULL;
+    if (!contiguous)
+        for (int k = 0; k < dims; k++)
+            if (PyArray_STRIDE(a, k) % PyArray_ITEMSIZE(a)) return NULL;
+    return a;
+}
+static int sd_get_f8(PyObject *o, double *x) {
+    if (PyFloat_CheckExact(o)) {
+        *x = PyFloat_AS_DOUBLE(o);
+        return 0;
+    }
+    *x = PyFloat_AsDouble(o);
+    return *x == -1.0 && PyErr_Occurred() ? -1 : 0;
+}
+static int sd_get_i8(PyObject *o, int64_t *x) {
+    PyObject *whole = PyNumber_Index(o);
+    if (!whole) return -1;
+    *x = PyLong_AsLongLong(whole);
+    Py_DECREF(whole);
+    return *x == -1 && PyErr_Occurred() ? -1 : 0;
+}
+static int sd_get_b1(PyObject *o, bool *x) {
+    int true_ = PyObject_IsTrue(o);
+    *x = true_ == 1;
+    return true_ < 0 ? -1 : 0;
+}
+static int sd_get_u1(PyObject *o, uint8_t *x) {
+    int64_t i;
+    if (sd_get_i8(o, &i)) return -1;
+    *x = (uint8_t)i;
+    return 0;
+}
+static PyObject *sd_py_f8(double x) { return PyFloat_FromDouble(x); }
+static PyObject *sd_py_i8(int64_t x) { return PyLong_FromLongLong(x); }
+static PyObject *sd_py_b1(bool x) { return PyBool_FromLong(x); }
+static PyObject *sd_copied(const void *data, int type, int dims, npy_intp *sizes) {
+    PyObject *o = PyArray_SimpleNew(dims, sizes, type);
+    if (o) memcpy(PyArray_DATA((PyArrayObject *)o), data, (size_t)PyArray_NBYTES((PyArrayObject *)o));
+    return o;
+}
+static PyObject *sd_failed(const char *kernel, int why) {
+    if (why == SD_NO_MEMORY) return PyErr_NoMemory();
+    if (why == SD_ZERO_DIVISION)
+        PyErr_SetString(PyExc_ZeroDivisionError, "division by zero");
+    else
+        PyErr_Format(PyExc_IndexError, "%s: index is out of bounds", kernel);
+    return NULL;
+}
+static PyObject *sd_count(const char *kernel, int wanted, Py_ssize_t given) {
+    return PyErr_Format(PyExc_TypeError, "%s takes %d arguments, not %zd", kernel, wanted, given);
+}
