@@ -17,6 +17,8 @@ from .types_of_c import SCALARS, Type, is_array, is_list, is_tuple
 
 HERE = Path(__file__).parent
 NUMPY = {"f8": "NPY_DOUBLE", "f4": "NPY_FLOAT", "i8": "NPY_INT64", "u1": "NPY_UBYTE", "b1": "NPY_BOOL"}
+#: The oldest Python: the module serves all from it on.
+ABI = "0x030b0000"
 FLAGS = ["-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fPIC"]
 FLAGS += ["-fvisibility=hidden", "-Wno-unused-function"]
 #: Of x86-64: AVX2 and FMA, in processors since 2013.
@@ -45,22 +47,23 @@ class _Module:
             if layout == "A":
                 fields += [f"PyArray_STRIDE(a, {k}) / (int64_t)sizeof({SCALARS[scalar]})" for k in range(n)]
             body = (
-                f"    PyArrayObject *a = sd_array(o, sd_type_{scalar}, {n}, {int(layout == 'C')}, change);\n"
+                f"    PyArrayObject *a = sd_array(o, {NUMPY[scalar]}, sd_type_{scalar}, {n},\n"
+                f"                                {int(layout == 'C')}, change, held);\n"
                 f"    if (!a) return -1;\n"
                 f"    *x = ({self.names(kind)}){{{', '.join(fields)}}};\n    return 0;\n"
             )
         else:
-            body = f"    if (!PyTuple_Check(o) || PyTuple_GET_SIZE(o) != {len(kind) - 1}) return -1;\n"
+            body = f"    if (!PyTuple_Check(o) || PyTuple_Size(o) != {len(kind) - 1}) return -1;\n"
             for k, part in enumerate(kind[1:]):
-                body += f"    if ({self.get(part, f'PyTuple_GET_ITEM(o, {k})', f'&x->f{k}', 'change')}) return -1;\n"
+                body += f"    if ({self.get(part, f'PyTuple_GetItem(o, {k})', f'&x->f{k}', 'change', 'held')}) return -1;\n"
             body += "    return 0;\n"
         self.helpers.append(
-            f"static int {name}(PyObject *o, {self.names(kind)} *x, int change) {{\n{body}}}\n"
+            f"static int {name}(PyObject *o, {self.names(kind)} *x, int change, sd_held *held) {{\n{body}}}\n"
         )
         return name
 
-    def get(self, kind: Type, source: str, target: str, change: str) -> str:
-        last = "" if isinstance(kind, str) else f", {change}"
+    def get(self, kind: Type, source: str, target: str, change: str, held: str) -> str:
+        last = "" if isinstance(kind, str) else f", {change}, {held}"
         return f"{self.getter(kind)}({source}, {target}{last})"
 
     def maker(self, kind: Type) -> str:
@@ -82,14 +85,14 @@ class _Module:
                 "    for (int64_t k = 0; k < x.n0; k++) {\n"
                 f"        PyObject *one = {self.maker(kind[1])}(x.data[k]);\n"
                 "        if (!one) { Py_DECREF(o); return NULL; }\n"
-                "        PyList_SET_ITEM(o, k, one);\n    }\n    return o;\n"
+                "        PyList_SetItem(o, k, one);\n    }\n    return o;\n"
             )
         else:
             n = len(kind) - 1
             body = f"    PyObject *o = PyTuple_New({n}), *one;\n    if (!o) return NULL;\n"
             for k, part in enumerate(kind[1:]):
                 body += f"    if (!(one = {self.maker(part)}(x.f{k}))) {{ Py_DECREF(o); return NULL; }}\n"
-                body += f"    PyTuple_SET_ITEM(o, {k}, one);\n"
+                body += f"    PyTuple_SetItem(o, {k}, one);\n"
             body += "    return o;\n"
         self.helpers.append(f"static PyObject *{name}({self.names(kind)} x) {{\n{body}}}\n")
         return name
@@ -101,12 +104,14 @@ class _Module:
         lines = [f"static PyObject *call_{label}(PyObject *self, PyObject *const *args, Py_ssize_t n) {{"]
         lines += ["    (void)self;", f'    if (n != {count}) return sd_count("{name}", {count}, n);']
         lines.append("    int wrong = 0;")
+        lines.append("    sd_held held;")
+        lines.append("    held.n = 0;")
         for function in functions:
             lines.append("    {")
             for k, kind in enumerate(function.kinds):
                 lines.append(f"        {self.names(kind)} a{k};")
             tests = [
-                f"({self.get(kind, f'args[{k}]', f'&a{k}', str(int(k in function.changes)))} && (wrong = {k + 1}))"
+                f"({self.get(kind, f'args[{k}]', f'&a{k}', str(int(k in function.changes)), '&held')} && (wrong = {k + 1}))"
                 for k, kind in enumerate(function.kinds)
             ]
             joined = " ||\n              ".join(tests) or "0"
@@ -115,6 +120,7 @@ class _Module:
             if function.can_raise:
                 lines.append("            int why = setjmp(*table->leave());")
                 lines.append("            if (why) {")
+                lines.append("                sd_let_go(&held);")
                 lines.append("                table->reset();")
                 lines.append(f'                return sd_failed("{name}", why);')
                 lines.append("            }")
@@ -123,7 +129,7 @@ class _Module:
             if function.result is None:
                 if threads:
                     raise ValueError("without the lock: only with a result")
-                lines += [f"            {call};", "            Py_RETURN_NONE;"]
+                lines += [f"            {call};", "            sd_let_go(&held);", "            Py_RETURN_NONE;"]
             else:
                 if threads:
                     lines.append(f"            {self.names(function.result)} x;")
@@ -132,12 +138,13 @@ class _Module:
                     lines.append("            PyEval_RestoreThread(state);")
                 else:
                     lines.append(f"            {self.names(function.result)} x = {call};")
+                lines.append("            sd_let_go(&held);")
                 if _holds_memory(function.result):
                     lines.append(f"            PyObject *o = {self.maker(function.result)}(x);")
                     lines += ["            table->reset();", "            return o;"]
                 else:
                     lines.append(f"            return {self.maker(function.result)}(x);")
-            lines += ["        }", "    }"]
+            lines += ["        }", "        sd_let_go(&held);", "    }"]
             if function is not functions[-1]:
                 lines.append("    PyErr_Clear();")
         lines.append(
@@ -199,12 +206,14 @@ def generate(package: Path, listed: Path, out: Path) -> int:
     for source in sorted(package.glob("*.py")):
         digest.update(source.read_bytes())
     methods = [
-        f'    {{"{name}", (PyCFunction)(void (*)(void))call_{name.replace(".", "_")}, METH_FASTCALL, NULL}},'
+        f'    {{"{name.split(".")[0]}", {{"{name.split(".")[1]}", (PyCFunction)(void (*)(void))call_'
+        f'{name.replace(".", "_")}, METH_FASTCALL, NULL}}}},'
         for name in public
     ]
     (out / "module.c").write_text(
         "\n".join(
             [
+                f"#define Py_LIMITED_API {ABI}",
                 "#include <Python.h>",
                 '#include "prelude.h"',
                 '#include "kernels.h"',
@@ -216,23 +225,33 @@ def generate(package: Path, listed: Path, out: Path) -> int:
                 "static const sd_table *table = &table_base;",
                 *module.helpers,
                 *wrappers,
-                "static PyMethodDef methods[] = {",
+                "static struct { const char *module; PyMethodDef method; } kernels[] = {",
                 *methods,
-                "    {NULL, NULL, 0, NULL}",
                 "};",
-                "static struct PyModuleDef definition = {PyModuleDef_HEAD_INIT, \"_compiled\", NULL, -1, methods,",
+                "static struct PyModuleDef definition = {PyModuleDef_HEAD_INIT, \"_compiled\", NULL, -1, NULL,",
                 "                                        NULL, NULL, NULL, NULL};",
                 "PyMODINIT_FUNC PyInit__compiled(void) {",
                 "    import_array();",
                 "#ifdef SD_V3",
                 "    __builtin_cpu_init();",
                 '    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") &&'
-                ' __builtin_cpu_supports("bmi2") && !getenv("STRAPDOWN_BASE"))',
+                ' __builtin_cpu_supports("bmi2") && !getenv("STRAPDOWN_BASELINE"))',
                 "        table = &table_v3;",
                 "#endif",
-                "    PyObject *made = PyModule_Create(&definition);",
-                f'    if (made) PyModule_AddStringConstant(made, "SOURCES", "{digest.hexdigest()}");',
-                '    if (made) PyModule_AddStringConstant(made, "LEVEL", table == &table_base ? "base" : "v3");',
+                "    PyObject *made = PyModule_Create(&definition), *all = PyDict_New();",
+                "    if (!made || !all) return NULL;",
+                "    for (size_t k = 0; k < sizeof kernels / sizeof *kernels; k++) {",
+                f'        PyObject *name = PyUnicode_FromFormat("{sources.PACKAGE}.%s", kernels[k].module);',
+                "        PyObject *call = name ? PyCFunction_NewEx(&kernels[k].method, NULL, name) : NULL;",
+                '        PyObject *key = PyUnicode_FromFormat("%s.%s", kernels[k].module, kernels[k].method.ml_name);',
+                "        if (!call || !key || PyDict_SetItem(all, key, call)) return NULL;",
+                "        Py_DECREF(name);",
+                "        Py_DECREF(call);",
+                "        Py_DECREF(key);",
+                "    }",
+                '    PyModule_AddObject(made, "KERNELS", all);',
+                f'    PyModule_AddStringConstant(made, "SOURCES", "{digest.hexdigest()}");',
+                '    PyModule_AddStringConstant(made, "LEVEL", table == &table_base ? "base" : "v3");',
                 "    return made;",
                 "}",
                 "",
@@ -259,8 +278,7 @@ def compile_(out: Path, compiler: list[str], flags: list[str], levels: list[str]
     for process, command in running:
         if process.wait():
             raise SystemExit(f"failed: {' '.join(command)}")
-    suffix = sysconfig.get_config_var("EXT_SUFFIX")
-    made = out / f"_compiled{suffix}"
+    made = out / f"_compiled{'.pyd' if os.name == 'nt' else '.abi3.so'}"
     subprocess.run([*compiler, "-shared", *objects, "-o", str(made), "-lm", "-s"], check=True)
     return made
 

@@ -16,25 +16,32 @@ static int sd_type_i8(int type) {
 static int sd_type_u1(int type) { return type == NPY_UBYTE; }
 static int sd_type_b1(int type) { return type == NPY_BOOL; }
 
-/* The array if it has the type, dimensions and layout; otherwise NULL. */
-static PyArrayObject *sd_array(PyObject *o, int (*of_type)(int), int dims, int contiguous, int change) {
+/* Arrays that were converted for a call, which end with it. */
+typedef struct { PyObject *array[32]; int n; } sd_held;
+static void sd_let_go(sd_held *held) {
+    while (held->n > 0) Py_DECREF(held->array[--held->n]);
+}
+
+/* The array if it has the type, dimensions and layout, or else such a copy of one that the kernel does
+ * not change and whose numbers the type holds; otherwise NULL. */
+static PyArrayObject *sd_array(PyObject *o, int type, int (*of_type)(int), int dims, int contiguous,
+                               int change, sd_held *held) {
     if (!PyArray_Check(o)) return NULL;
     PyArrayObject *a = (PyArrayObject *)o;
+    if (PyArray_NDIM(a) != dims) return NULL;
     int flags = NPY_ARRAY_ALIGNED | (contiguous ? NPY_ARRAY_C_CONTIGUOUS : 0) |
                 (change ? NPY_ARRAY_WRITEABLE : 0);
-    if (PyArray_NDIM(a) != dims || !of_type(PyArray_TYPE(a)) || !PyArray_CHKFLAGS(a, flags) ||
-        PyArray_ISBYTESWAPPED(a))
-        return NULL;
-    if (!contiguous)
-        for (int k = 0; k < dims; k++)
-            if (PyArray_STRIDE(a, k) % PyArray_ITEMSIZE(a)) return NULL;
-    return a;
+    int good = of_type(PyArray_TYPE(a)) && PyArray_CHKFLAGS(a, flags) && !PyArray_ISBYTESWAPPED(a);
+    if (good && !contiguous)
+        for (int k = 0; k < dims; k++) good &= PyArray_STRIDE(a, k) % PyArray_ITEMSIZE(a) == 0;
+    if (good) return a;
+    if (change || held->n == 32 || !PyArray_CanCastSafely(PyArray_TYPE(a), type)) return NULL;
+    PyObject *copy = PyArray_FROM_OTF(o, type, NPY_ARRAY_CARRAY_RO);
+    if (!copy) return NULL;
+    held->array[held->n++] = copy;
+    return (PyArrayObject *)copy;
 }
 static int sd_get_f8(PyObject *o, double *x) {
-    if (PyFloat_CheckExact(o)) {
-        *x = PyFloat_AS_DOUBLE(o);
-        return 0;
-    }
     *x = PyFloat_AsDouble(o);
     return *x == -1.0 && PyErr_Occurred() ? -1 : 0;
 }
