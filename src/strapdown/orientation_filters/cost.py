@@ -40,7 +40,7 @@ def count_filter_cost(
         `memory` is the size of the record.
     """
     count: Counter[str] = Counter()
-    name = type(chosen).advance_kernel.py_func.__name__.replace("_advance", "_sample")
+    name = type(chosen).advance_kernel.__name__.replace("_advance", "_sample")
     sample = getattr(arithmetic.counted_kernels(_HOME), name)
     record = chosen.begin(begin or None)
     record[orientation.SAMPLES], record[orientation.STEP] = 1.0, step
@@ -66,7 +66,7 @@ def single_precision_attitude(
 ) -> Array:
     """Attitudes, (n, 4), with every operation in single precision."""
     kernel = getattr(
-        arithmetic.single_precision(_HOME), type(chosen).advance_kernel.py_func.__name__
+        arithmetic.single_precision(_HOME), type(chosen).advance_kernel.__name__
     )
     time = imu.index.to_numpy(dtype=np.float64)
     blocks = [
@@ -91,7 +91,7 @@ def time_filters(chosen: Sequence[OrientationEstimator], rate_hz: float = 100.0)
     dt = np.full(count, 1.0 / rate_hz)
     rows = []
     for each in chosen:
-        name = type(each).advance_kernel.py_func.__name__
+        name = type(each).advance_kernel.__name__
         row: dict[str, str | float] = {"algorithm": each.label}
         for column, kind in (("float64_ns", np.float64), ("float32_ns", np.float32)):
             kernel = (
