@@ -16,7 +16,7 @@ from .translate import Function, Translator, _holds_memory
 from .types_of_c import SCALARS, Type, is_array, is_list, is_tuple
 
 HERE = Path(__file__).parent
-NUMPY = {"f8": "NPY_DOUBLE", "f4": "NPY_FLOAT", "i8": "NPY_INT64", "u1": "NPY_UBYTE", "b1": "NPY_BOOL"}
+NUMPY = {"f8": "NPY_DOUBLE", "f4": "NPY_FLOAT", "i8": "NPY_INT64", "u1": "NPY_UBYTE", "i1": "NPY_BYTE", "b1": "NPY_BOOL"}
 #: The oldest Python: the module serves all from it on.
 ABI = "0x030b0000"
 FLAGS = ["-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fPIC"]

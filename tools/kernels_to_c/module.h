@@ -14,6 +14,7 @@ static int sd_type_i8(int type) {
     return type == NPY_INT64 || (sizeof(long) == 8 && type == NPY_LONG) || type == NPY_LONGLONG;
 }
 static int sd_type_u1(int type) { return type == NPY_UBYTE; }
+static int sd_type_i1(int type) { return type == NPY_BYTE; }
 static int sd_type_b1(int type) { return type == NPY_BOOL; }
 
 /* Arrays that were converted for a call, which end with it. */

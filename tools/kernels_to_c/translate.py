@@ -983,6 +983,8 @@ class _Body:
         held = self.kernel.namespace.get(function.id)
         if isinstance(held, Kernel):
             return self._kernel_call(held, node)
+        if function.id == "float" and isinstance(node.args[0], ast.Constant):
+            return self.constant(float(node.args[0].value))  # type: ignore[arg-type]
         values = self.arguments(node.args)
         if isinstance(held, Fma):
             self.fuses = True

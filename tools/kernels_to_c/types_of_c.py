@@ -16,9 +16,10 @@ SCALARS = {
     "i8": "int64_t",
     "u8": "uint64_t",
     "u1": "uint8_t",
+    "i1": "int8_t",
     "b1": "bool",
 }
-_ORDER = ("b1", "u1", "i8", "u8", "f4", "f8")
+_ORDER = ("b1", "u1", "i1", "i8", "u8", "f4", "f8")
 
 
 def is_array(kind: Type) -> bool:
@@ -56,7 +57,7 @@ def unify(a: Type, b: Type) -> Type:
 def arithmetic(a: str, b: str) -> str:
     """Type of a sum or product of two scalars, as in numba."""
     if is_float(a) or is_float(b):
-        return "f4" if {a, b} <= {"f4", "b1", "u1"} else "f8"
+        return "f4" if {a, b} <= {"f4", "b1", "u1", "i1"} else "f8"
     if a in ("u1", "u8") and b in ("u1", "u8"):
         return "u8"
     if "u8" in (a, b) and "i8" in (a, b):
