@@ -5,10 +5,15 @@ from __future__ import annotations
 import argparse
 import hashlib
 import os
+import platform
+import shutil
 import subprocess
 import sys
 import sysconfig
+import tempfile
 import time
+from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
 
 from . import signatures, sources
@@ -16,6 +21,8 @@ from .translate import Function, Translator, _holds_memory
 from .types_of_c import SCALARS, Type, is_array, is_list, is_tuple
 
 HERE = Path(__file__).parent
+PACKAGE = HERE.parents[1] / "src/strapdown/_kernels"
+NAME = "_compiled.pyd" if os.name == "nt" else "_compiled.abi3.so"
 NUMPY = {"f8": "NPY_DOUBLE", "f4": "NPY_FLOAT", "i8": "NPY_INT64", "u1": "NPY_UBYTE", "i1": "NPY_BYTE", "b1": "NPY_BOOL"}
 #: The oldest Python: the module serves all from it on.
 ABI = "0x030b0000"
@@ -262,47 +269,87 @@ def generate(package: Path, listed: Path, out: Path) -> int:
     return len(translator.order)
 
 
-def compile_(out: Path, compiler: list[str], flags: list[str], levels: list[str]) -> Path:
-    """Compile and link; return the path of the module."""
+def system_compiler() -> list[str]:
+    """Return the C compiler: that of the environment's CC, or the system's; empty if there is none."""
+    if "CC" in os.environ:
+        return os.environ["CC"].split()
+    for name in ("cc", "gcc", "clang"):
+        if shutil.which(name):
+            return [name]
+    return []
+
+
+def compiler() -> list[str]:
+    """Return `system_compiler`, or else that of the package `ziglang`."""
+    found = system_compiler()
+    if not found and find_spec("ziglang"):
+        found = [sys.executable, "-m", "ziglang", "cc"]
+    if not found:
+        raise SystemExit("no C compiler: install one, or `pip install ziglang`")
+    return found
+
+
+def compile_(out: Path, command: list[str], flags: list[str], levels: list[str]) -> Path:
+    """Compile what `generate` wrote into a folder, and link it; return the path of the module."""
     import numpy as np
 
-    objects = []
     include = [f"-I{sysconfig.get_path('include')}", f"-I{np.get_include()}"]
     jobs = [("kernels.c", level, [f"-DSD_TABLE=table_{level}", *LEVELS[level]]) for level in levels]
     jobs.append(("module.c", "module", ["-DSD_V3"] if "v3" in levels else []))
-    running = []
+    objects, running = [], []
     for source, label, more in jobs:
-        target = out / f"{label}.o"
-        objects.append(str(target))
-        command = [*compiler, *FLAGS, *flags, *more, *include, "-c", str(out / source), "-o", str(target)]
-        running.append((subprocess.Popen(command), command))
-    for process, command in running:
+        objects.append(str(out / f"{label}.o"))
+        line = [*command, *FLAGS, *flags, *more, *include, "-c", str(out / source), "-o", objects[-1]]
+        running.append((subprocess.Popen(line), line))
+    for process, line in running:
         if process.wait():
-            raise SystemExit(f"failed: {' '.join(command)}")
-    made = out / f"_compiled{'.pyd' if os.name == 'nt' else '.abi3.so'}"
-    subprocess.run([*compiler, "-shared", *objects, "-o", str(made), "-lm", "-s"], check=True)
+            raise SystemExit(f"failed: {' '.join(line)}")
+    made = out / NAME
+    shared = ["-bundle", "-undefined", "dynamic_lookup"] if sys.platform == "darwin" else ["-shared"]
+    subprocess.run([*command, *shared, *objects, "-o", str(made), "-lm"], check=True)
     return made
 
 
+def build(folder: Path, flags: Sequence[str] = (), keep: Path | None = None) -> Path:
+    """Write, compile and put the module into a folder; return its path.
+
+    Parameters
+    ----------
+    folder : Path
+        Where the module is put.
+    flags : sequence of str
+        Further flags of the compiler; ``-DSD_BOUNDS`` checks every index.
+    keep : Path
+        Where the C is kept.
+    """
+    levels = ["base", "v3"] if platform.machine().lower() in ("x86_64", "amd64") else ["base"]
+    with tempfile.TemporaryDirectory() as scratch:
+        out = keep or Path(scratch)
+        begin = time.perf_counter()
+        count = generate(PACKAGE, HERE / "signatures.txt", out)
+        middle = time.perf_counter()
+        made = compile_(out, compiler(), list(flags), levels)
+        print(
+            f"{count} functions: written in {middle - begin:.1f} s, "
+            f"compiled in {time.perf_counter() - middle:.1f} s, {made.stat().st_size / 1e6:.2f} MB",
+            file=sys.stderr,
+        )
+        # Put there whole: another process may have the former one loaded.
+        target = folder / NAME
+        folder.mkdir(parents=True, exist_ok=True)
+        shutil.copy(made, target.with_suffix(".new"))
+        target.with_suffix(".new").replace(target)
+    return target
+
+
 def main() -> None:
+    """Build from the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--package", type=Path, default=HERE.parents[1] / "src/strapdown/_kernels")
-    parser.add_argument("--out", type=Path, required=True)
-    parser.add_argument("--cc", default=os.environ.get("CC", "cc"))
-    parser.add_argument("--flags", default="")
-    parser.add_argument("--levels", default="base,v3")
-    parser.add_argument("--signatures", type=Path, default=HERE / "signatures.txt")
+    parser.add_argument("--folder", type=Path, default=PACKAGE, help="where the module is put")
+    parser.add_argument("--keep", type=Path, help="a folder in which the C is kept")
+    parser.add_argument("--flags", default="", help="further flags of the compiler")
     options = parser.parse_args()
-    begin = time.perf_counter()
-    count = generate(options.package, options.signatures, options.out)
-    middle = time.perf_counter()
-    made = compile_(options.out, options.cc.split(), options.flags.split(), options.levels.split(","))
-    end = time.perf_counter()
-    print(
-        f"{count} functions written in {middle - begin:.1f} s, compiled in {end - middle:.1f} s: "
-        f"{made} ({made.stat().st_size / 1e6:.2f} MB)",
-        file=sys.stderr,
-    )
+    build(options.folder, options.flags.split(), options.keep)
 
 
 if __name__ == "__main__":
