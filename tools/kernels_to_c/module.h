@@ -46,6 +46,12 @@ static int sd_get_f8(PyObject *o, double *x) {
     *x = PyFloat_AsDouble(o);
     return *x == -1.0 && PyErr_Occurred() ? -1 : 0;
 }
+static int sd_get_f4(PyObject *o, float *x) {
+    double wide;
+    if (sd_get_f8(o, &wide)) return -1;
+    *x = (float)wide;
+    return 0;
+}
 static int sd_get_i8(PyObject *o, int64_t *x) {
     PyObject *whole = PyNumber_Index(o);
     if (!whole) return -1;
@@ -65,6 +71,7 @@ static int sd_get_u1(PyObject *o, uint8_t *x) {
     return 0;
 }
 static PyObject *sd_py_f8(double x) { return PyFloat_FromDouble(x); }
+static PyObject *sd_py_f4(float x) { return PyFloat_FromDouble((double)x); }
 static PyObject *sd_py_i8(int64_t x) { return PyLong_FromLongLong(x); }
 static PyObject *sd_py_b1(bool x) { return PyBool_FromLong(x); }
 static PyObject *sd_copied(const void *data, int type, int dims, npy_intp *sizes) {

@@ -139,12 +139,18 @@ static inline bool *sd_ones_b1(int64_t count) {
 /* Python's max and min: the first of equal ones, and of a NaN and a number the first. */
 static inline double sd_max_f8(double a, double b) { return b > a ? b : a; }
 static inline double sd_min_f8(double a, double b) { return b < a ? b : a; }
+static inline float sd_max_f4(float a, float b) { return b > a ? b : a; }
+static inline float sd_min_f4(float a, float b) { return b < a ? b : a; }
 static inline int64_t sd_max_i8(int64_t a, int64_t b) { return b > a ? b : a; }
 static inline int64_t sd_min_i8(int64_t a, int64_t b) { return b < a ? b : a; }
 static inline int64_t sd_abs(int64_t a) { return a < 0 ? -a : a; }
 
 static inline double sd_divided(double a, double b) {
     if (b == 0.0) sd_fail(SD_ZERO_DIVISION);
+    return a / b;
+}
+static inline float sd_divided_f4(float a, float b) {
+    if (b == 0.0f) sd_fail(SD_ZERO_DIVISION);
     return a / b;
 }
 /* Division of integers towards minus infinity, and what it leaves. */

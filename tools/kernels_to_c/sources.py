@@ -7,7 +7,9 @@ collects.
 from __future__ import annotations
 
 import ast
+import sys
 from dataclasses import dataclass, field
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,6 +17,10 @@ from typing import Any
 PACKAGE = "strapdown._kernels"
 #: Not kernels: how they are compiled, their formulas in another arithmetic, and the package.
 OTHERS = ("__init__", "arithmetic", "compilation")
+
+
+#: Begins the names of modules in single precision.
+SINGLE = "single_"
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,19 +66,28 @@ def load(folder: Path) -> dict[str, dict[str, Any]]:
     def njit(**options: Any) -> Any:
         return lambda function: SimpleNamespace(function=function, options=options)
 
+    arithmetic = _arithmetic(folder)
+
     def read(stem: str) -> dict[str, Any]:
         if stem in modules:
             return modules[stem]
         space: dict[str, Any] = {"__name__": f"{PACKAGE}.{stem}"}
         modules[stem] = space
-        tree = ast.parse((folder / f"{stem}.py").read_text(encoding="utf-8"))
+        if stem.startswith(SINGLE):
+            name = stem.removeprefix(SINGLE)
+            text = arithmetic.single_source(name if name in arithmetic.SOURCES else f"{PACKAGE}.{name}")
+        else:
+            text = (folder / f"{stem}.py").read_text(encoding="utf-8")
+        tree = ast.parse(text)
         for statement in tree.body:
             if stem == "compilation":
                 if not (isinstance(statement, ast.FunctionDef) and statement.name == "dot"):
                     continue
                 space.update(njit=njit, IN_PLACE=in_place, fma=Fma())
-            if isinstance(statement, ast.ImportFrom) and str(statement.module).startswith(PACKAGE):
-                other = read(str(statement.module).removeprefix(PACKAGE + "."))
+            home = str(statement.module) if isinstance(statement, ast.ImportFrom) else ""
+            if isinstance(statement, ast.ImportFrom) and home.startswith((PACKAGE, arithmetic.SINGLE)):
+                single = SINGLE if home.startswith(arithmetic.SINGLE) else ""
+                other = read(single + home.rpartition(".")[2])
                 for item in statement.names:
                     space[item.asname or item.name] = other[item.name]
                 continue
@@ -89,4 +104,19 @@ def load(folder: Path) -> dict[str, dict[str, Any]]:
     for path in sorted(folder.glob("*.py")):
         if path.stem not in OTHERS:
             read(path.stem)
+    for name in (*arithmetic.SOURCES, *arithmetic.FURTHER):
+        read(SINGLE + name)
     return modules
+
+
+def _arithmetic(folder: Path) -> Any:
+    """Load the module that rewrites kernels in single precision, without the package."""
+    spec = spec_from_file_location("kernels_arithmetic", folder / "arithmetic.py")
+    assert spec and spec.loader
+    module: Any = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    for name in module.FURTHER:
+        # It reads the file of a loaded module.
+        found = SimpleNamespace(__file__=str(folder / f"{name}.py"))
+        sys.modules.setdefault(f"{PACKAGE}.{name}", found)  # type: ignore[arg-type]
+    return module

@@ -628,6 +628,8 @@ class _Body:
         if isinstance(kind, str) and isinstance(value.kind, str):
             if value.constant is not None and kind == "f8":
                 return Value(_number(float(value.constant)), "f8", constant=float(value.constant))
+            if value.constant is not None and kind == "f4":
+                return self.constant(np.float32(value.constant))
             return Value(f"({SCALARS[kind]}){value.within(UNARY)}", kind, UNARY)
         if is_array(kind) and is_array(value.kind) and kind[3] == "A":
             strided = self.all.names(kind)
@@ -674,6 +676,10 @@ class _Body:
             value = int(value)
             text = str(value) if abs(value) < 2**31 else f"INT64_C({value})"
             return Value(text, "i8", ATOM if value >= 0 else UNARY, constant=value)
+        if isinstance(value, np.float32):
+            text = _number(float(value))
+            text = f"{text}f" if text[-1].isdigit() else f"(float){text}"
+            return Value(text, "f4", ATOM if value >= 0 else UNARY, constant=value)
         if isinstance(value, float | np.floating):
             value = float(value)
             return Value(_number(value), "f8", ATOM if value >= 0 else UNARY, constant=value)
@@ -730,8 +736,8 @@ class _Body:
         return values
 
     def _e_Attribute(self, node: ast.Attribute) -> Value:
-        if isinstance(node.value, ast.Name) and node.value.id in ("math", "np"):
-            return self.constant(getattr({"math": math, "np": np}[node.value.id], node.attr))
+        if isinstance(node.value, ast.Name) and node.value.id in ("math", "np", "_np"):
+            return self.constant(getattr({"math": math, "np": np, "_np": np}[node.value.id], node.attr))
         base = self.expr(node.value)
         if is_array(base.kind) and node.attr == "shape":
             parts = tuple(Value(f"{base.text}.n{k}", "i8") for k in range(base.kind[2]))
@@ -762,7 +768,9 @@ class _Body:
     def binary(self, op: ast.operator, a: Value, b: Value) -> Value:
         """An arithmetic operation."""
         if a.constant is not None and b.constant is not None:
-            folded = _fold(op, a.constant, b.constant)
+            folded = None
+            if (a.kind == "f4") == (b.kind == "f4"):
+                folded = _fold(op, a.constant, b.constant)
             if folded is not None and a.kind not in ("u1", "u8") and b.kind not in ("u1", "u8"):
                 return self.constant(folded)
         if isinstance(op, ast.Pow):
@@ -786,7 +794,7 @@ class _Body:
                 right = b.within(PRODUCT + 1)
                 return Value(f"{a.within(PRODUCT)} / {right if right[0] != '-' else f'({right})'}", kind, PRODUCT)
             self.can_raise = True
-            return Value(f"sd_divided({a.text}, {b.text})", kind)
+            return Value(f"sd_divided{'_f4' if kind == 'f4' else ''}({a.text}, {b.text})", kind)
         if isinstance(op, ast.FloorDiv | ast.Mod):
             if is_float(kind):
                 raise UntranslatableError("// or % of floats")
@@ -826,7 +834,7 @@ class _Body:
         if value.kind == "b1":
             return value
         if isinstance(value.kind, str):
-            zero = "0.0" if is_float(value.kind) else "0"
+            zero = {"f8": "0.0", "f4": "0.0f"}.get(value.kind, "0")
             return Value(f"{value.within(EQUAL + 1)} != {zero}", "b1", EQUAL)
         raise UntranslatableError(f"{value.kind} as a condition")
 
@@ -976,7 +984,7 @@ class _Body:
     def _e_Call(self, node: ast.Call) -> Value:
         function = node.func
         if isinstance(function, ast.Attribute):
-            if isinstance(function.value, ast.Name) and function.value.id in ("math", "np"):
+            if isinstance(function.value, ast.Name) and function.value.id in ("math", "np", "_np"):
                 return self._library(function.attr, node)
             return self._method(self.expr(function.value), function.attr, node)
         assert isinstance(function, ast.Name)
@@ -1054,13 +1062,17 @@ class _Body:
             shape = node.args[0]
             nodes = shape.elts if isinstance(shape, ast.Tuple) else [shape]
             return self._new(name, [self.expr(n) for n in nodes], scalar)
+        if name == "float32" and isinstance(node.args[0], ast.Constant):
+            return self.constant(np.float32(node.args[0].value))
         values = self.arguments(node.args)
-        if name in ("uint8", "uint64", "int64", "float64"):
+        if name in ("uint8", "uint64", "int64", "float64", "float32"):
             return self.cast(values[0], DTYPES[name])
         if name in ("isnan", "isfinite"):
             return Value(f"{name}({self.cast(values[0], 'f8').text}) != 0", "b1", EQUAL)
         if name == "floor":
             return Value(f"(int64_t)floor({self.cast(values[0], 'f8').text})", "i8", UNARY)
+        if name in MATH and all(v.kind == "f4" for v in values):
+            return Value(f"{MATH[name]}f({', '.join(v.text for v in values)})", "f4")
         if name in MATH:
             return Value(f"{MATH[name]}({', '.join(self.cast(v, 'f8').text for v in values)})", "f8")
         raise UntranslatableError(f"function {name}")
@@ -1075,7 +1087,8 @@ class _Body:
             raise UntranslatableError(f"{name} of {kinds}")
         if name == "abs":
             text = values[0].text
-            return Value(f"fabs({text})" if is_float(kinds[0]) else f"sd_abs({text})", kinds[0])
+            function = {"f8": "fabs", "f4": "fabsf"}.get(str(kinds[0]), "sd_abs")
+            return Value(f"{function}({text})", kinds[0])
         if name == "float":
             return self.cast(values[0], "f8")
         if name == "int":

@@ -61,6 +61,17 @@ def _choose() -> tuple[str, dict[str, Callable[..., Any]], str]:
 #: How kernels run; the compiled ones; and their level: "base", or "v3" with AVX2 and FMA.
 MODE, _COMPILED, LEVEL = _choose()
 
+
+
+def delivered(module: str) -> dict[str, Callable[..., Any]]:
+    """Return the compiled kernels of a module by their names; empty where numba compiles."""
+    return {
+        name.rpartition(".")[2]: kernel
+        for name, kernel in _COMPILED.items()
+        if name.startswith(f"{module}.")
+    }
+
+
 #: What a call with an argument of the wrong type raises.
 ARGUMENT_ERRORS: tuple[type[Exception], ...] = (TypeError, ValueError)
 if MODE == "numba":
