@@ -2,7 +2,8 @@
 
 A kernel is translated once for each combination of types with which it is called. Types are found
 from those of the arguments, by passes over the function until the types of its variables no longer
-change. Where a name holds unlike things in turn (a number, then a tuple), it becomes two variables.
+change. Where a name holds unlike things in turn (a number, then a tuple), it becomes two variables;
+so it does for numbers of different types, unless one place reads either of them (as in numba).
 """
 
 from __future__ import annotations
@@ -119,6 +120,10 @@ class _Body:
                 f"{self.kernel.name}: {len(self.parameters)} parameters, {len(function.kinds)} given"
             )
         self.variables: dict[tuple[str, Any], Type] = {}
+        #: Types of numbers that share a variable: name and type to the common one.
+        self.joined: dict[tuple[str, str], str] = {}
+        #: What names may hold at the end of a loop's body, by loop.
+        self.at_end: dict[int, dict[str, frozenset[Any]]] = {}
         self.result: list[Type] = []
         self.at: ast.AST = self.kernel.node
 
@@ -133,9 +138,10 @@ class _Body:
         self.body = body
         try:
             for _ in range(20):
-                before = dict(self.variables), list(self.result)
+                before = dict(self.variables), list(self.result), dict(self.joined), dict(self.at_end)
                 self._pass()
-                if before == (self.variables, self.result):
+                self.variables = {k: v for k, v in self.variables.items() if k in self.seen}
+                if before == (self.variables, self.result, self.joined, self.at_end):
                     break
             else:
                 raise UntranslatableError("types do not settle")
@@ -152,9 +158,11 @@ class _Body:
 
     def _pass(self) -> None:
         self.lines: list[str] = []
-        self.depth, self.loops, self.temporaries, self.guarded = 1, 0, 0, 0
-        self.env: dict[str, Any] = {}
-        self.in_scope: dict[str, Type] = {}
+        self.depth, self.temporaries, self.guarded = 1, 0, 0
+        self.env: dict[str, frozenset[Any]] = {}
+        self.ends: list[list[dict[str, frozenset[Any]]]] = []
+        self.breaks: list[list[dict[str, frozenset[Any]]]] = []
+        self.seen: set[tuple[str, Any]] = set()
         self.allocates = False
         self.buffers: list[str] = []
         self.can_raise = self.fuses = False
@@ -167,21 +175,50 @@ class _Body:
 
     def _declare(self, name: str, kind: Type) -> str:
         """Note that a variable takes a value; return its name in C."""
-        cls = self._class(kind)
+        cls = self._class(name, kind)
         key = (name, cls)
+        if cls[0] == "number":
+            kind = cls[1]
         known = self.variables.get(key)
         joined = kind if known is None else unify(known, kind)
         if joined is None:
             raise UntranslatableError(f"{name} is {known}, then {kind}")
         self.variables[key] = joined
-        self.env[name] = cls
+        self.seen.add(key)
+        self.env[name] = frozenset([cls])
         return self._c_name(name, cls)
 
-    @staticmethod
-    def _class(kind: Type) -> Any:
+    def _class(self, name: str, kind: Type) -> Any:
+        """Which of a name's variables holds a type."""
         if isinstance(kind, str):
-            return "number"
-        return kind[:3] if is_array(kind) else (kind[0], len(kind)) if is_tuple(kind) else kind[0]
+            while (name, kind) in self.joined:
+                kind = self.joined[name, kind]
+            return ("number", kind)
+        return kind[:3] if is_array(kind) else (kind[0], len(kind)) if is_tuple(kind) else kind[:1]
+
+    def _join(self, name: str, classes: frozenset[Any]) -> Any:
+        """Make one variable of those that a place may read."""
+        if any(c[0] != "number" for c in classes):
+            raise UntranslatableError(f"{name} may be of two kinds")
+        kinds = sorted({self._class(name, c[1])[1] for c in classes})
+        common = kinds[0]
+        for kind in kinds[1:]:
+            common = unify(common, kind)
+        for kind in kinds:
+            if kind != common:
+                self.joined[name, kind] = common
+        cls = ("number", common)
+        self.variables.setdefault((name, cls), common)
+        self.seen.add((name, cls))
+        return cls
+
+    @staticmethod
+    def _merged(*envs: dict[str, frozenset[Any]]) -> dict[str, frozenset[Any]]:
+        made: dict[str, frozenset[Any]] = {}
+        for env in envs:
+            for name, classes in env.items():
+                made[name] = made.get(name, frozenset()) | classes
+        return made
 
     def _c_name(self, name: str, cls: Any) -> str:
         classes = [c for n, c in self.variables if n == name]
@@ -202,7 +239,7 @@ class _Body:
         type_of = self.all.names
         heads, begin = [], []
         for name, kind in zip(self.parameters, function.kinds, strict=True):
-            cls = self._class(kind)
+            cls = self._class(name, kind)
             own = self.variables[name, cls]
             text = self._c_name(name, cls)
             if own == kind:
@@ -210,7 +247,7 @@ class _Body:
             else:
                 heads.append(f"{type_of(kind)} {text}_in")
                 begin.append(f"    {self._cast_text(own, kind, f'{text}_in', text)}")
-        given = {(n, self._class(k)) for n, k in zip(self.parameters, function.kinds, strict=True)}
+        given = {(n, self._class(n, k)) for n, k in zip(self.parameters, function.kinds, strict=True)}
         rows: dict[str, list[str]] = {}
         for (name, cls), kind in self.variables.items():
             if (name, cls) not in given and (name, cls) not in self.loop_only():
@@ -243,7 +280,7 @@ class _Body:
         return seen
 
     def loop_only(self) -> set[Any]:
-        return {(n, "number") for n in getattr(self, "loop_names", ()) if n not in self.not_only}
+        return {(n, ("number", "i8")) for n in getattr(self, "loop_names", ()) if n not in self.not_only}
 
     not_only: set[str] = set()
 
@@ -274,10 +311,12 @@ class _Body:
         pass
 
     def _Continue(self, node: ast.Continue) -> bool:
+        self.ends[-1].append(dict(self.env))
         self.emit("continue;")
         return True
 
     def _Break(self, node: ast.Break) -> bool:
+        self.breaks[-1].append(dict(self.env))
         self.emit("break;")
         return True
 
@@ -349,32 +388,38 @@ class _Body:
         if gone:
             self.env = after
         elif not left:
-            self.env = {
-                n: c for n, c in {**self.env, **after}.items()
-                if self.env.get(n, c) == after.get(n, c)
-            }
+            self.env = self._merged(self.env, after)
         return False
+
+    @contextmanager
+    def _body_of(self, node: ast.stmt) -> Any:
+        """Translate the body of a loop: it begins with what stands before it, or at its end."""
+        before = dict(self.env)
+        self.env = self._merged(before, self.at_end.get(id(node), {}))
+        self.ends.append([])
+        self.breaks.append([])
+        yield
+        if not self._block(node.body):  # type: ignore[attr-defined]
+            self.ends[-1].append(self.env)
+        self.at_end[id(node)] = self._merged(*self.ends.pop())
+        self.env = self._merged(before, self.at_end[id(node)], *self.breaks.pop())
 
     def _While(self, node: ast.While) -> None:
         if node.orelse:
             raise UntranslatableError("while ... else")
-        at = len(self.lines)
-        test = self.truth(self.expr(node.test))
-        hoisted = self.lines[at:]
-        del self.lines[at:]
-        if hoisted:
-            self.emit("for (;;) {")
-            self.lines += ["    " + h for h in hoisted]
-            self.depth += 1
-            self.emit(f"if (!({test.text})) break;")
-        else:
-            self.emit(f"while ({test.text}) {{")
-            self.depth += 1
-        self.loops += 1
-        before = dict(self.env)
-        self._block(node.body)
-        self.env = {**self.env, **before}
-        self.loops -= 1
+        with self._body_of(node):
+            at = len(self.lines)
+            test = self.truth(self.expr(node.test))
+            hoisted = self.lines[at:]
+            del self.lines[at:]
+            if hoisted:
+                self.emit("for (;;) {")
+                self.lines += ["    " + h for h in hoisted]
+                self.depth += 1
+                self.emit(f"if (!({test.text})) break;")
+            else:
+                self.emit(f"while ({test.text}) {{")
+                self.depth += 1
         self.depth -= 1
         self.emit("}")
 
@@ -393,6 +438,7 @@ class _Body:
             const = "static " if all(v.constant is not None for v in values) else ""
             self.emit(f"{const}const {SCALARS[kind]} {items}[] = {{{texts}}};")
             text = self._declare(name, kind)
+            self.target = self.env[name]
             self.not_only = self.not_only | {name}
             counter = self.temporary("k")
             self.emit(f"for (int64_t {counter} = 0; {counter} < {len(values)}; {counter}++) {{")
@@ -420,6 +466,7 @@ class _Body:
             self.emit(f"const int64_t {end} = {stop.text};")
             stop = Value(end, "i8")
         text = self._declare(name, "i8")
+        self.target = self.env[name]
         signs = "<" if step > 0 else ">"
         move = {1: "++", -1: "--"}.get(step, f" += {step}" if step > 0 else f" -= {-step}")
         own = name not in stored and not self._read_elsewhere(name)
@@ -446,13 +493,12 @@ class _Body:
 
     def _loop(self, node: ast.For, first: str) -> None:
         self.depth += 1
-        self.loops += 1
         if first:
             self.emit(first)
-        before = dict(self.env)
-        self._block(node.body)
-        self.env = {**self.env, **before}
-        self.loops -= 1
+        with self._body_of(node):
+            # Its variable has its value of this time.
+            assert isinstance(node.target, ast.Name)
+            self.env[node.target.id] = self.target
         self.depth -= 1
         self.emit("}")
 
@@ -543,7 +589,7 @@ class _Body:
             # What an array or a tuple of arrays may share memory with.
             self._alias(name, node)
         text = self._declare(name, value.kind)
-        kind = self.variables[name, self._class(value.kind)]
+        kind = self.variables[name, self._class(name, value.kind)]
         value = self.struct(self.cast(value, kind))
         if value.text != text:
             self.emit(f"{text} = {value.text};")
@@ -589,7 +635,9 @@ class _Body:
         made = self.binary(node.op, place, value)
         if isinstance(target, ast.Name):
             self._declare(target.id, made.kind)
-            place = self.name(target.id)
+            after = self.name(target.id)
+            simple = simple and after == place
+            place = after
         if simple and made.kind == place.kind and place.kind in ("f8", "i8"):
             sign = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}[type(node.op)]
             self.emit(f"{place.text} {sign}= {value.text};")
@@ -693,7 +741,13 @@ class _Body:
 
     def name(self, name: str) -> Value:
         if name in self.env:
-            cls = self.env[name]
+            classes = frozenset(
+                self._class(name, c[1]) if c[0] == "number" else c for c in self.env[name]
+            )
+            cls = next(iter(classes)) if len(classes) == 1 else self._join(name, classes)
+            if (name, cls) not in self.variables:
+                self.variables[name, cls] = cls[1]
+            self.seen.add((name, cls))
             return Value(self._c_name(name, cls), self.variables[name, cls])
         if any(n == name for n, _ in self.variables):
             raise UntranslatableError(f"{name} may have no value, or of two kinds")
