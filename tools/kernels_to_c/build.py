@@ -124,13 +124,15 @@ class _Module:
             joined = " ||\n              ".join(tests) or "0"
             lines.append(f"        if (!({joined})) {{")
             arguments = ", ".join(f"a{k}" for k in range(count))
-            if function.can_raise:
-                lines.append("            int why = setjmp(*table->leave());")
-                lines.append("            if (why) {")
-                lines.append("                sd_let_go(&held);")
-                lines.append("                table->reset();")
-                lines.append(f'                return sd_failed("{name}", why);')
-                lines.append("            }")
+            leave = [
+                "            int why = setjmp(*table->leave());",
+                "            if (why) {",
+                "                sd_let_go(&held);",
+                "                table->reset();",
+                f'                return sd_failed("{name}", why);',
+                "            }",
+            ]
+            lines += leave if function.can_raise else ["#ifdef SD_BOUNDS", *leave, "#endif"]
             call = f"table->{function.name}({arguments})"
             threads = function.kernel.nogil
             if function.result is None:
@@ -154,9 +156,7 @@ class _Module:
             lines += ["        }", "        sd_let_go(&held);", "    }"]
             if function is not functions[-1]:
                 lines.append("    PyErr_Clear();")
-        lines.append(
-            f'    if (!PyErr_Occurred()) sd_wrong("{name}", wrong - 1, "as the kernel declares it", args[wrong - 1]);'
-        )
+        lines.append(f'    PyErr_Clear();\n    sd_wrong("{name}", wrong - 1, args[wrong - 1]);')
         lines += ["    return NULL;", "}", ""]
         return "\n".join(lines)
 

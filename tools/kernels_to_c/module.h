@@ -3,10 +3,9 @@
 #define NPY_TARGET_VERSION NPY_2_0_API_VERSION
 #include <numpy/arrayobject.h>
 
-static int sd_wrong(const char *kernel, int argument, const char *wanted, PyObject *given) {
-    PyErr_Format(PyExc_TypeError, "%s: argument %d is to be %s, not %R", kernel, argument + 1, wanted,
-                 (PyObject *)Py_TYPE(given));
-    return -1;
+static void sd_wrong(const char *kernel, int argument, PyObject *given) {
+    PyErr_Format(PyExc_TypeError, "%s: argument %d is of another type than in signatures.txt: %R", kernel,
+                 argument + 1, (PyObject *)Py_TYPE(given));
 }
 static int sd_type_f8(int type) { return type == NPY_DOUBLE; }
 static int sd_type_f4(int type) { return type == NPY_FLOAT; }

@@ -67,6 +67,7 @@ def load(folder: Path) -> dict[str, dict[str, Any]]:
         return lambda function: SimpleNamespace(function=function, options=options)
 
     arithmetic = _arithmetic(folder)
+    single_home = arithmetic.SINGLE if arithmetic else "_"
 
     def read(stem: str) -> dict[str, Any]:
         if stem in modules:
@@ -85,8 +86,8 @@ def load(folder: Path) -> dict[str, dict[str, Any]]:
                     continue
                 space.update(njit=njit, IN_PLACE=in_place, fma=Fma())
             home = str(statement.module) if isinstance(statement, ast.ImportFrom) else ""
-            if isinstance(statement, ast.ImportFrom) and home.startswith((PACKAGE, arithmetic.SINGLE)):
-                single = SINGLE if home.startswith(arithmetic.SINGLE) else ""
+            if isinstance(statement, ast.ImportFrom) and home.startswith((PACKAGE, single_home)):
+                single = SINGLE if home.startswith(single_home) else ""
                 other = read(single + home.rpartition(".")[2])
                 for item in statement.names:
                     space[item.asname or item.name] = other[item.name]
@@ -104,13 +105,16 @@ def load(folder: Path) -> dict[str, dict[str, Any]]:
     for path in sorted(folder.glob("*.py")):
         if path.stem not in OTHERS:
             read(path.stem)
-    for name in (*arithmetic.SOURCES, *arithmetic.FURTHER):
-        read(SINGLE + name)
+    if arithmetic:
+        for name in (*arithmetic.SOURCES, *arithmetic.FURTHER):
+            read(SINGLE + name)
     return modules
 
 
 def _arithmetic(folder: Path) -> Any:
     """Load the module that rewrites kernels in single precision, without the package."""
+    if not (folder / "arithmetic.py").exists():
+        return None
     spec = spec_from_file_location("kernels_arithmetic", folder / "arithmetic.py")
     assert spec and spec.loader
     module: Any = module_from_spec(spec)
