@@ -18,12 +18,19 @@ from pathlib import Path
 
 from . import signatures, sources
 from .translate import Function, Translator, _holds_memory
-from .types_of_c import SCALARS, Type, is_array, is_list, is_tuple
+from .types_of_c import SCALARS, Type, is_array, is_list
 
 HERE = Path(__file__).parent
 PACKAGE = HERE.parents[1] / "src/strapdown/_kernels"
 NAME = "_compiled.pyd" if os.name == "nt" else "_compiled.abi3.so"
-NUMPY = {"f8": "NPY_DOUBLE", "f4": "NPY_FLOAT", "i8": "NPY_INT64", "u1": "NPY_UBYTE", "i1": "NPY_BYTE", "b1": "NPY_BOOL"}
+NUMPY = {
+    "f8": "NPY_DOUBLE",
+    "f4": "NPY_FLOAT",
+    "i8": "NPY_INT64",
+    "u1": "NPY_UBYTE",
+    "i1": "NPY_BYTE",
+    "b1": "NPY_BOOL",
+}
 #: The oldest Python: the module serves all from it on.
 ABI = "0x030b0000"
 FLAGS = ["-std=c99", "-O3", "-ffp-contract=off", "-fno-math-errno", "-fno-trapping-math", "-fPIC"]
@@ -50,9 +57,14 @@ class _Module:
         name = self.getters[kind] = f"get_{self.names(kind)}"
         if is_array(kind):
             _, scalar, n, layout = kind
-            fields = [f"({SCALARS[scalar]} *)PyArray_DATA(a)", *(f"PyArray_DIM(a, {k})" for k in range(n))]
+            fields = [
+                f"({SCALARS[scalar]} *)PyArray_DATA(a)",
+                *(f"PyArray_DIM(a, {k})" for k in range(n)),
+            ]
             if layout == "A":
-                fields += [f"PyArray_STRIDE(a, {k}) / (int64_t)sizeof({SCALARS[scalar]})" for k in range(n)]
+                fields += [
+                    f"PyArray_STRIDE(a, {k}) / (int64_t)sizeof({SCALARS[scalar]})" for k in range(n)
+                ]
             body = (
                 f"    PyArrayObject *a = sd_array(o, {NUMPY[scalar]}, sd_type_{scalar}, {n},\n"
                 f"                                {int(layout == 'C')}, change, held);\n"
@@ -108,8 +120,13 @@ class _Module:
         """Write the function of a kernel that Python calls."""
         label = name.replace(".", "_")
         count = len(functions[0].kinds)
-        lines = [f"static PyObject *call_{label}(PyObject *self, PyObject *const *args, Py_ssize_t n) {{"]
-        lines += ["    (void)self;", f'    if (n != {count}) return sd_count("{name}", {count}, n);']
+        lines = [
+            f"static PyObject *call_{label}(PyObject *self, PyObject *const *args, Py_ssize_t n) {{"
+        ]
+        lines += [
+            "    (void)self;",
+            f'    if (n != {count}) return sd_count("{name}", {count}, n);',
+        ]
         lines.append("    int wrong = 0;")
         lines.append("    sd_held held;")
         lines.append("    held.n = 0;")
@@ -138,7 +155,11 @@ class _Module:
             if function.result is None:
                 if threads:
                     raise ValueError("without the lock: only with a result")
-                lines += [f"            {call};", "            sd_let_go(&held);", "            Py_RETURN_NONE;"]
+                lines += [
+                    f"            {call};",
+                    "            sd_let_go(&held);",
+                    "            Py_RETURN_NONE;",
+                ]
             else:
                 if threads:
                     lines.append(f"            {self.names(function.result)} x;")
@@ -215,7 +236,7 @@ def generate(package: Path, listed: Path, out: Path) -> int:
             digest.update(source.read_bytes())
     methods = [
         f'    {{"{name.split(".")[0]}", {{"{name.split(".")[1]}", (PyCFunction)(void (*)(void))call_'
-        f'{name.replace(".", "_")}, METH_FASTCALL, NULL}}}},'
+        f"{name.replace('.', '_')}, METH_FASTCALL, NULL}}}},"
         for name in public
     ]
     (out / "module.c").write_text(
@@ -236,7 +257,7 @@ def generate(package: Path, listed: Path, out: Path) -> int:
                 "static struct { const char *module; PyMethodDef method; } kernels[] = {",
                 *methods,
                 "};",
-                "static struct PyModuleDef definition = {PyModuleDef_HEAD_INIT, \"_compiled\", NULL, -1, NULL,",
+                'static struct PyModuleDef definition = {PyModuleDef_HEAD_INIT, "_compiled", NULL, -1, NULL,',
                 "                                        NULL, NULL, NULL, NULL};",
                 "PyMODINIT_FUNC PyInit__compiled(void) {",
                 "    import_array();",
@@ -299,13 +320,25 @@ def compile_(out: Path, command: list[str], flags: list[str], levels: list[str])
     objects, running = [], []
     for source, label, more in jobs:
         objects.append(str(out / f"{label}.o"))
-        line = [*command, *FLAGS, *flags, *more, *include, "-c", str(out / source), "-o", objects[-1]]
+        line = [
+            *command,
+            *FLAGS,
+            *flags,
+            *more,
+            *include,
+            "-c",
+            str(out / source),
+            "-o",
+            objects[-1],
+        ]
         running.append((subprocess.Popen(line), line))
     for process, line in running:
         if process.wait():
             raise SystemExit(f"failed: {' '.join(line)}")
     made = out / NAME
-    shared = ["-bundle", "-undefined", "dynamic_lookup"] if sys.platform == "darwin" else ["-shared"]
+    shared = (
+        ["-bundle", "-undefined", "dynamic_lookup"] if sys.platform == "darwin" else ["-shared"]
+    )
     subprocess.run([*command, *shared, *objects, "-o", str(made), "-lm"], check=True)
     return made
 

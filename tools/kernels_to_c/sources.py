@@ -76,7 +76,9 @@ def load(folder: Path) -> dict[str, dict[str, Any]]:
         modules[stem] = space
         if stem.startswith(SINGLE):
             name = stem.removeprefix(SINGLE)
-            text = arithmetic.single_source(name if name in arithmetic.SOURCES else f"{PACKAGE}.{name}")
+            text = arithmetic.single_source(
+                name if name in arithmetic.SOURCES else f"{PACKAGE}.{name}"
+            )
         else:
             text = (folder / f"{stem}.py").read_text(encoding="utf-8")
         tree = ast.parse(text)

@@ -35,17 +35,23 @@ ATOM, UNARY, PRODUCT, SUM, SHIFT, ORDER, EQUAL, BIT_AND, BIT_OR, AND, OR, CHOICE
     20, 14, 13, 12, 11, 10, 9, 8, 6, 5, 4, 3,
 )  # fmt: skip
 RESERVED = set(
-    "auto break case char const continue default do double else enum extern float for goto if inline "
+    "auto break case char const continue default do double else enum extern float for goto if inline "  # noqa: SIM905
     "int long register restrict return short signed sizeof static struct switch typedef union "
     "unsigned void volatile while bool true false I NAN INFINITY sqrt sin cos atan2 hypot fmod "
     "copysign floor exp expm1 fabs rint cbrt fma pow isnan isfinite memcpy memset".split()
 )
-MATH = {
-    **{n: n for n in "sqrt sin cos tan atan2 hypot fmod copysign exp expm1 log asin acos".split()},
-    "rint": "rint",
-    "cbrt": "cbrt",
+#: Functions of `math` and numpy that C has under the same name.
+MATH = set(
+    "sqrt sin cos tan atan2 hypot fmod copysign exp expm1 log asin acos rint cbrt".split()  # noqa: SIM905
+)
+DTYPES = {
+    "float64": "f8",
+    "float32": "f4",
+    "int64": "i8",
+    "uint8": "u1",
+    "uint64": "u8",
+    "bool_": "b1",
 }
-DTYPES = {"float64": "f8", "float32": "f4", "int64": "i8", "uint8": "u1", "uint64": "u8", "bool_": "b1"}
 
 
 class UntranslatableError(Exception):
@@ -125,6 +131,9 @@ class _Body:
         #: What names may hold at the end of a loop's body, by loop.
         self.at_end: dict[int, dict[str, frozenset[Any]]] = {}
         self.result: list[Type] = []
+        #: Variables of loops: all; and those that are read elsewhere, too.
+        self.loop_names: set[str] = set()
+        self.not_only: set[str] = set()
         self.at: ast.AST = self.kernel.node
 
     # One pass after another.
@@ -138,7 +147,12 @@ class _Body:
         self.body = body
         try:
             for _ in range(20):
-                before = dict(self.variables), list(self.result), dict(self.joined), dict(self.at_end)
+                before = (
+                    dict(self.variables),
+                    list(self.result),
+                    dict(self.joined),
+                    dict(self.at_end),
+                )
                 self._pass()
                 self.variables = {k: v for k, v in self.variables.items() if k in self.seen}
                 if before == (self.variables, self.result, self.joined, self.at_end):
@@ -233,7 +247,8 @@ class _Body:
             result = self.result[0]
         function.result, function.can_raise = result, self.can_raise
         function.changes = frozenset(
-            k for k, n in enumerate(self.parameters)
+            k
+            for k, n in enumerate(self.parameters)
             if any(n in self._roots(c) for c in self.changed)
         )
         type_of = self.all.names
@@ -247,7 +262,9 @@ class _Body:
             else:
                 heads.append(f"{type_of(kind)} {text}_in")
                 begin.append(f"    {self._cast_text(own, kind, f'{text}_in', text)}")
-        given = {(n, self._class(n, k)) for n, k in zip(self.parameters, function.kinds, strict=True)}
+        given = {
+            (n, self._class(n, k)) for n, k in zip(self.parameters, function.kinds, strict=True)
+        }
         rows: dict[str, list[str]] = {}
         for (name, cls), kind in self.variables.items():
             if (name, cls) not in given and (name, cls) not in self.loop_only():
@@ -260,13 +277,14 @@ class _Body:
         lines = list(self.lines)
         if self.frees() and not (lines and lines[-1].strip().startswith("return")):
             lines.append("    sd_end(mark_);")
-        if result is None:
-            result_text = "void"
-        else:
-            result_text = type_of(result)
+        result_text = type_of(result)
         inline = "SD_FUSES " if self.fuses else "ALWAYS_INLINE " if self.kernel.inline else ""
-        function.head = f"{inline}static {result_text} {function.name}({', '.join(heads) or 'void'})"
-        note = "\n".join(f" * {line}".rstrip() for line in self.note.replace("*/", "* /").splitlines())
+        function.head = (
+            f"{inline}static {result_text} {function.name}({', '.join(heads) or 'void'})"
+        )
+        note = "\n".join(
+            f" * {line}".rstrip() for line in self.note.replace("*/", "* /").splitlines()
+        )
         function.text = "\n".join([f"/*{note[2:]} */", function.head, "{", *begin, *lines, "}", ""])
 
     def _roots(self, name: str) -> set[str]:
@@ -280,9 +298,9 @@ class _Body:
         return seen
 
     def loop_only(self) -> set[Any]:
-        return {(n, ("number", "i8")) for n in getattr(self, "loop_names", ()) if n not in self.not_only}
-
-    not_only: set[str] = set()
+        return {
+            (n, ("number", "i8")) for n in getattr(self, "loop_names", ()) if n not in self.not_only
+        }
 
     def frees(self) -> bool:
         """Whether the function gives its memory back (not where it returns some)."""
@@ -326,7 +344,11 @@ class _Body:
         call = node.value
         if isinstance(call, ast.Call) and isinstance(call.func, ast.Attribute):
             base = call.func.value
-            if isinstance(base, ast.Name) and base.id in self.env and call.func.attr in ("append", "clear"):
+            if (
+                isinstance(base, ast.Name)
+                and base.id in self.env
+                and call.func.attr in ("append", "clear")
+            ):
                 self._of_list(base.id, call)
                 return
         value = self.expr(node.value)
@@ -345,7 +367,9 @@ class _Body:
         self.emit(f"{held.text}.data[{held.text}.n0++] = {item.text};")
 
     def _Return(self, node: ast.Return) -> bool:
-        if node.value is None or (isinstance(node.value, ast.Constant) and node.value.value is None):
+        if node.value is None or (
+            isinstance(node.value, ast.Constant) and node.value.value is None
+        ):
             if self.frees():
                 self.emit("sd_end(mark_);")
             self.emit("return;")
@@ -444,7 +468,11 @@ class _Body:
             self.emit(f"for (int64_t {counter} = 0; {counter} < {len(values)}; {counter}++) {{")
             self._loop(node, f"{text} = {items}[{counter}];")
             return
-        if not (isinstance(call, ast.Call) and isinstance(call.func, ast.Name) and call.func.id == "range"):
+        if not (
+            isinstance(call, ast.Call)
+            and isinstance(call.func, ast.Name)
+            and call.func.id == "range"
+        ):
             raise UntranslatableError("for over something else than range or a tuple")
         bounds = [self.expr(a) for a in call.args]
         start = bounds[0] if len(bounds) > 1 else Value("0", "i8", constant=0)
@@ -457,7 +485,7 @@ class _Body:
         stored = _stored(node.body)
         stop_node = call.args[1] if len(bounds) > 1 else call.args[0]
         fixed = not any(
-            isinstance(n, ast.Call | ast.Subscript) and not _is_shape(n)
+            (isinstance(n, ast.Call | ast.Subscript) and not _is_shape(n))
             or (isinstance(n, ast.Name) and n.id in (stored | {name}))
             for n in ast.walk(stop_node)
         )
@@ -485,12 +513,6 @@ class _Body:
             )
             self._loop(node, f"{text} = {counter};")
 
-    @property
-    def loop_names(self) -> set[str]:
-        if not hasattr(self, "_loop_names"):
-            self._loop_names: set[str] = set()
-        return self._loop_names
-
     def _loop(self, node: ast.For, first: str) -> None:
         self.depth += 1
         if first:
@@ -506,7 +528,11 @@ class _Body:
         """Whether a name is used outside the loops over it."""
 
         def visit(node: ast.AST) -> bool:
-            if isinstance(node, ast.For) and isinstance(node.target, ast.Name) and node.target.id == name:
+            if (
+                isinstance(node, ast.For)
+                and isinstance(node.target, ast.Name)
+                and node.target.id == name
+            ):
                 return visit(node.iter)
             if isinstance(node, ast.Name) and node.id == name:
                 return True
@@ -556,7 +582,9 @@ class _Body:
                 raise UntranslatableError("unpacks another number of values")
             if value.parts is None:
                 value = self.hoist(value)
-            parts = value.parts or [Value(f"{value.text}.f{k}", kind) for k, kind in enumerate(kinds)]
+            parts = value.parts or [
+                Value(f"{value.text}.f{k}", kind) for k, kind in enumerate(kinds)
+            ]
             for one, part in zip(target.elts, parts, strict=True):
                 if isinstance(one, ast.Name) and one.id == "_":
                     continue
@@ -791,7 +819,9 @@ class _Body:
 
     def _e_Attribute(self, node: ast.Attribute) -> Value:
         if isinstance(node.value, ast.Name) and node.value.id in ("math", "np", "_np"):
-            return self.constant(getattr({"math": math, "np": np, "_np": np}[node.value.id], node.attr))
+            return self.constant(
+                getattr({"math": math, "np": np, "_np": np}[node.value.id], node.attr)
+            )
         base = self.expr(node.value)
         if is_array(base.kind) and node.attr == "shape":
             parts = tuple(Value(f"{base.text}.n{k}", "i8") for k in range(base.kind[2]))
@@ -835,7 +865,9 @@ class _Body:
         if isinstance(op, ast.Add | ast.Sub | ast.Mult):
             if is_float(kind):
                 a, b = self._float_side(a, kind), self._float_side(b, kind)
-            sign, strength = {ast.Add: ("+", SUM), ast.Sub: ("-", SUM), ast.Mult: ("*", PRODUCT)}[type(op)]
+            sign, strength = {ast.Add: ("+", SUM), ast.Sub: ("-", SUM), ast.Mult: ("*", PRODUCT)}[
+                type(op)
+            ]
             right = b.within(strength + 1)
             if right.startswith("-"):
                 right = f"({right})"
@@ -846,7 +878,11 @@ class _Body:
             a, b = self.cast(a, kind), self.cast(b, kind)
             if self._plain_division(b):
                 right = b.within(PRODUCT + 1)
-                return Value(f"{a.within(PRODUCT)} / {right if right[0] != '-' else f'({right})'}", kind, PRODUCT)
+                return Value(
+                    f"{a.within(PRODUCT)} / {right if right[0] != '-' else f'({right})'}",
+                    kind,
+                    PRODUCT,
+                )
             self.can_raise = True
             return Value(f"sd_divided{'_f4' if kind == 'f4' else ''}({a.text}, {b.text})", kind)
         if isinstance(op, ast.FloorDiv | ast.Mod):
@@ -854,7 +890,11 @@ class _Body:
                 raise UntranslatableError("// or % of floats")
             sign = "/" if isinstance(op, ast.FloorDiv) else "%"
             if kind == "u8":
-                return Value(f"{self.cast(a, kind).within(PRODUCT)} {sign} {self.cast(b, kind).within(UNARY)}", kind, PRODUCT)
+                return Value(
+                    f"{self.cast(a, kind).within(PRODUCT)} {sign} {self.cast(b, kind).within(UNARY)}",
+                    kind,
+                    PRODUCT,
+                )
             name = "sd_quotient" if sign == "/" else "sd_remainder"
             return Value(f"{name}({a.text}, {b.text})", "i8")
         bits = {ast.BitOr: ("|", BIT_OR), ast.BitAnd: ("&", BIT_AND), ast.LShift: ("<<", SHIFT)}
@@ -867,7 +907,11 @@ class _Body:
 
     def _float_side(self, value: Value, kind: str) -> Value:
         # C converts integers itself; a constant is written as a float.
-        return self.cast(value, kind) if value.constant is not None and not is_float(value.kind) else value
+        return (
+            self.cast(value, kind)
+            if value.constant is not None and not is_float(value.kind)
+            else value
+        )
 
     def _power(self, a: Value, b: Value) -> Value:
         if b.constant == 2 and b.kind == "i8":
@@ -912,7 +956,9 @@ class _Body:
                 assert items.parts is not None
                 if not left.text.isidentifier():
                     left = self.hoist(left)
-                text = " || ".join(f"{left.within(ORDER)} == {p.within(ORDER)}" for p in items.parts)
+                text = " || ".join(
+                    f"{left.within(ORDER)} == {p.within(ORDER)}" for p in items.parts
+                )
                 texts.append(f"({text})" if isinstance(op, ast.In) else f"!({text})")
                 continue
             right = self.expr(right_node)
@@ -920,14 +966,16 @@ class _Body:
                 raise UntranslatableError(f"compares {left.kind} and {right.kind}")
             if is_float(left.kind) != is_float(right.kind):
                 left, right = self._float_side(left, "f8"), self._float_side(right, "f8")
-            sign, strength = {
+            sign, _ = {
                 ast.Lt: ("<", ORDER), ast.LtE: ("<=", ORDER), ast.Gt: (">", ORDER),
                 ast.GtE: (">=", ORDER), ast.Eq: ("==", EQUAL), ast.NotEq: ("!=", EQUAL),
             }[type(op)]  # fmt: skip
             texts.append(f"{left.within(SHIFT)} {sign} {right.within(SHIFT)}")
             left = right
         if len(texts) == 1:
-            return Value(texts[0], "b1", EQUAL if " == " in texts[0] or " != " in texts[0] else ORDER)
+            return Value(
+                texts[0], "b1", EQUAL if " == " in texts[0] or " != " in texts[0] else ORDER
+            )
         return Value(" && ".join(texts), "b1", AND)
 
     def _e_IfExp(self, node: ast.IfExp) -> Value:
@@ -968,7 +1016,11 @@ class _Body:
         base = self.struct(base)
         if not base.text.isidentifier():
             base = self.hoist(base)
-        return Value(f"((const {self.all.names(kinds[0])} *)&{base.text})[{index.text}]", kinds[0]) if name else base
+        return (
+            Value(f"((const {self.all.names(kinds[0])} *)&{base.text})[{index.text}]", kinds[0])
+            if name
+            else base
+        )
 
     def _position(self, base: Value, node: ast.expr, axis: int) -> str:
         value = self.expr(node)
@@ -996,7 +1048,9 @@ class _Body:
         _, scalar, n, layout = base.kind
         full = [*index, *[ast.Slice()] * (n - len(index))]
         stride = [
-            f"{base.text}.s{k}" if layout == "A" else " * ".join(f"{base.text}.n{j}" for j in range(k + 1, n)) or "1"
+            f"{base.text}.s{k}"
+            if layout == "A"
+            else " * ".join(f"{base.text}.n{j}" for j in range(k + 1, n)) or "1"
             for k in range(n)
         ]
         offsets, sizes, strides = [], [], []
@@ -1077,20 +1131,30 @@ class _Body:
             sizes = [Value(f"{base.text}.n{k}", "i8") for k in range(base.kind[2])]
             made = self.hoist(self._new("empty", sizes, base.kind[1]))
             counters = [self.temporary("k") for _ in sizes]
-            loops = "".join(f"for (int64_t {c} = 0; {c} < {made.text}.n{k}; {c}++) " for k, c in enumerate(counters))
-            self.emit(f"{loops}{_at(made.text, made.kind, counters)} = {_at(base.text, base.kind, counters)};")
+            loops = "".join(
+                f"for (int64_t {c} = 0; {c} < {made.text}.n{k}; {c}++) "
+                for k, c in enumerate(counters)
+            )
+            self.emit(
+                f"{loops}{_at(made.text, made.kind, counters)} = {_at(base.text, base.kind, counters)};"
+            )
             return made
         if is_array(base.kind) and name == "max" and base.kind[2] == 1 and base.kind[1] == "i8":
             most, k = self.temporary("most"), self.temporary("k")
             self.emit(f"int64_t {most} = {_at(base.text, base.kind, ['0'])};")
             item = _at(base.text, base.kind, [k])
-            self.emit(f"for (int64_t {k} = 1; {k} < {base.text}.n0; {k}++) if ({item} > {most}) {most} = {item};")
+            self.emit(
+                f"for (int64_t {k} = 1; {k} < {base.text}.n0; {k}++) if ({item} > {most}) {most} = {item};"
+            )
             return Value(most, "i8")
         if is_array(base.kind) and name == "reshape" and base.kind[2:] == (1, "C"):
             sizes = self.arguments(node.args)
             kind = ("A", base.kind[1], len(sizes), "C")
             base = self._simple(base)
-            return Value(f"({self.all.names(kind)}){{{base.text}.data, {', '.join(s.text for s in sizes)}}}", kind)
+            return Value(
+                f"({self.all.names(kind)}){{{base.text}.data, {', '.join(s.text for s in sizes)}}}",
+                kind,
+            )
         raise UntranslatableError(f"method {name} of {base.kind}")
 
     def _new(self, name: str, sizes: list[Value], scalar: str) -> Value:
@@ -1126,9 +1190,9 @@ class _Body:
         if name == "floor":
             return Value(f"(int64_t)floor({self.cast(values[0], 'f8').text})", "i8", UNARY)
         if name in MATH and all(v.kind == "f4" for v in values):
-            return Value(f"{MATH[name]}f({', '.join(v.text for v in values)})", "f4")
+            return Value(f"{name}f({', '.join(v.text for v in values)})", "f4")
         if name in MATH:
-            return Value(f"{MATH[name]}({', '.join(self.cast(v, 'f8').text for v in values)})", "f8")
+            return Value(f"{name}({', '.join(self.cast(v, 'f8').text for v in values)})", "f8")
         raise UntranslatableError(f"function {name}")
 
     def _built_in(self, name: str, values: list[Value]) -> Value:

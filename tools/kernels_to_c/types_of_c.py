@@ -86,7 +86,9 @@ class Names:
             _, scalar, n, layout = kind
             name = f"{'array' if layout == 'C' else 'strided'}{n}_{scalar}"
             sizes = ", ".join(f"n{k}" for k in range(n))
-            strides = "" if layout == "C" else " int64_t " + ", ".join(f"s{k}" for k in range(n)) + ";"
+            strides = (
+                "" if layout == "C" else " int64_t " + ", ".join(f"s{k}" for k in range(n)) + ";"
+            )
             self.text.append(
                 f"typedef struct {{ {SCALARS[scalar]} *data; int64_t {sizes};{strides} }} {name};"
             )

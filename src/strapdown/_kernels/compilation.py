@@ -1,6 +1,6 @@
 """How kernels are compiled, the fused product and sum, and the scalar product in lanes.
 
-An installation has the kernels compiled: a translation of these sources to C (`tools/kernels_to_c`).
+An installation has the kernels compiled: these sources, translated to C (`tools/kernels_to_c`).
 Where that is missing, or is of other sources, numba compiles them when they are first called, if it
 is installed. STRAPDOWN_KERNELS chooses: ``compiled``, ``numba``, or ``python`` (interpreted).
 
@@ -62,7 +62,6 @@ def _choose() -> tuple[str, dict[str, Callable[..., Any]], str]:
 MODE, _COMPILED, LEVEL = _choose()
 
 
-
 def delivered(module: str) -> dict[str, Callable[..., Any]]:
     """Return the compiled kernels of a module by their names; empty where numba compiles."""
     return {
@@ -95,10 +94,23 @@ def njit(**options: Any) -> Callable[[Kernel], Any]:
     def decorate(function: Kernel) -> Any:
         home = function.__module__
         if MODE == "python" or (MODE == "compiled" and home.startswith(f"{_PACKAGE}.")):
-            return _COMPILED.get(f"{home.removeprefix(_PACKAGE + '.')}.{function.__name__}", function)
+            name = f"{home.removeprefix(_PACKAGE + '.')}.{function.__name__}"
+            _SOURCES[name] = function
+            return _COMPILED.get(name, function)
         return _by_numba(function, options)
 
     return decorate
+
+
+_SOURCES: dict[str, Callable[..., Any]] = {}
+
+
+def interpreted(kernel: Callable[..., Any]) -> Callable[..., Any]:
+    """Return the Python function that a kernel was made of; kernels that it calls are as ever."""
+    if hasattr(kernel, "py_func"):
+        return kernel.py_func  # type: ignore[no-any-return]
+    home = kernel.__module__.removeprefix(_PACKAGE + ".")
+    return _SOURCES.get(f"{home}.{kernel.__name__}", kernel)
 
 
 def _by_numba(function: Kernel, options: dict[str, Any]) -> Any:
@@ -147,7 +159,7 @@ if MODE == "numba":
         return types.float64(types.float64, types.float64, types.float64), generate
 
     if not config.DISABLE_JIT:
-        fma = _fma
+        fma = _fma  # type: ignore[assignment]
 
 
 @njit(**IN_PLACE, forceinline=True)

@@ -65,9 +65,7 @@ def single_precision_attitude(
     chosen: OrientationEstimator, imu: pd.DataFrame, sampling: str
 ) -> Array:
     """Attitudes, (n, 4), with every operation in single precision."""
-    kernel = getattr(
-        arithmetic.single_precision(_HOME), type(chosen).advance_kernel.__name__
-    )
+    kernel = getattr(arithmetic.single_precision(_HOME), type(chosen).advance_kernel.__name__)
     time = imu.index.to_numpy(dtype=np.float64)
     blocks = [
         np.ascontiguousarray(imu[columns].to_numpy(dtype=np.float32))

@@ -11,13 +11,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tools.kernels_to_c import build, signatures, sources
 
 import strapdown._kernels
 from strapdown._kernels import compilation
-from tools.kernels_to_c import build, signatures, sources
 
 FOLDER = Path(strapdown._kernels.__file__).parent
-SOURCE = '''
+SOURCE = """
 import math
 import numpy as np
 from strapdown._kernels.compilation import IN_PLACE, dot, fma, njit
@@ -108,7 +108,7 @@ def reads(a, i):
 @njit(cache=True)
 def fused(a, b, c, d, n):
     return fma(a, b, c), dot(d, d, n), math.hypot(a, b), np.fmod(a, b), abs(-n)
-'''
+"""
 SIGNATURES = """
 sample.whole(i8, i8)
 sample.larger(f8, f8, f8)
