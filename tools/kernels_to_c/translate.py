@@ -298,9 +298,7 @@ class _Body:
         return seen
 
     def loop_only(self) -> set[Any]:
-        return {
-            (n, ("number", "i8")) for n in getattr(self, "loop_names", ()) if n not in self.not_only
-        }
+        return {(n, ("number", "i8")) for n in self.loop_names if n not in self.not_only}
 
     def frees(self) -> bool:
         """Whether the function gives its memory back (not where it returns some)."""
