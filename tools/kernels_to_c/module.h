@@ -19,11 +19,16 @@ static int sd_type_b1(int type) { return type == NPY_BOOL; }
 /* Arrays that were converted for a call, which end with it. */
 typedef struct { PyObject *array[32]; int n; } sd_held;
 static void sd_let_go(sd_held *held) {
-    while (held->n > 0) Py_DECREF(held->array[--held->n]);
+    while (held->n > 0) {
+        PyArrayObject *copy = (PyArrayObject *)held->array[--held->n];
+        PyArray_ResolveWritebackIfCopy(copy);
+        Py_DECREF(copy);
+    }
 }
 
-/* The array if it has the type, dimensions and layout, or else such a copy of one that the kernel does
- * not change and whose numbers the type holds; otherwise NULL. */
+/* The array if it has the type, dimensions and layout. Or else such a copy: of one that the kernel does
+ * not change where the type holds its numbers; of another layout, and written back, where it does.
+ * Otherwise NULL. */
 static PyArrayObject *sd_array(PyObject *o, int type, int (*of_type)(int), int dims, int contiguous,
                                int change, sd_held *held) {
     if (!PyArray_Check(o)) return NULL;
@@ -35,8 +40,12 @@ static PyArrayObject *sd_array(PyObject *o, int type, int (*of_type)(int), int d
     if (good && !contiguous)
         for (int k = 0; k < dims; k++) good &= PyArray_STRIDE(a, k) % PyArray_ITEMSIZE(a) == 0;
     if (good) return a;
-    if (change || held->n == 32 || !PyArray_CanCastSafely(PyArray_TYPE(a), type)) return NULL;
-    PyObject *copy = PyArray_FROM_OTF(o, type, NPY_ARRAY_CARRAY_RO);
+    if (held->n == 32) return NULL;
+    if (change ? !of_type(PyArray_TYPE(a)) || !PyArray_ISWRITEABLE(a)
+               : !PyArray_CanCastSafely(PyArray_TYPE(a), type))
+        return NULL;
+    PyObject *copy = PyArray_FROM_OTF(
+        o, type, change ? NPY_ARRAY_CARRAY | NPY_ARRAY_WRITEBACKIFCOPY : NPY_ARRAY_CARRAY_RO);
     if (!copy) return NULL;
     held->array[held->n++] = copy;
     return (PyArrayObject *)copy;

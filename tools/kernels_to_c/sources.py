@@ -76,9 +76,15 @@ def load(folder: Path) -> dict[str, dict[str, Any]]:
         modules[stem] = space
         if stem.startswith(SINGLE):
             name = stem.removeprefix(SINGLE)
+            if name in arithmetic.FURTHER and f"{PACKAGE}.{name}" not in sys.modules:
+                # It reads the file of a loaded module.
+                stands_for: Any = SimpleNamespace(__file__=str(folder / f"{name}.py"))
+                sys.modules[f"{PACKAGE}.{name}"] = stands_for
             text = arithmetic.single_source(
                 name if name in arithmetic.SOURCES else f"{PACKAGE}.{name}"
             )
+            if isinstance(sys.modules.get(f"{PACKAGE}.{name}"), SimpleNamespace):
+                del sys.modules[f"{PACKAGE}.{name}"]
         else:
             text = (folder / f"{stem}.py").read_text(encoding="utf-8")
         tree = ast.parse(text)
@@ -121,8 +127,4 @@ def _arithmetic(folder: Path) -> Any:
     assert spec and spec.loader
     module: Any = module_from_spec(spec)
     spec.loader.exec_module(module)
-    for name in module.FURTHER:
-        # It reads the file of a loaded module.
-        found = SimpleNamespace(__file__=str(folder / f"{name}.py"))
-        sys.modules.setdefault(f"{PACKAGE}.{name}", found)  # type: ignore[arg-type]
     return module

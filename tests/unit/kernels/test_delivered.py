@@ -245,7 +245,11 @@ def test_arguments_are_checked(sample):
     # Copied where the kernel only reads; an error where it writes.
     assert sample["mean_rows"](np.ones((2, 3), np.float32))[0].tolist() == [1.0, 1.0, 1.0]
     assert sample["mean_rows"](np.ones((3, 2)).T)[0].tolist() == [1.0, 1.0, 1.0]
-    for wrong in (out.astype(np.float32), np.zeros((6, 2))[:, 0], list(out), 1.0):
+    # Written back into another layout.
+    wide = np.zeros((6, 2))
+    sample["parts"](rows, 0, 1, wide[:, 1])
+    assert wide.T.tolist() == [[0.0] * 6, [1.0, 3.0, 4.0, 7.0, 7.0, 7.0]]
+    for wrong in (out.astype(np.float32), np.zeros((6, 2)), list(out), 1.0):
         with pytest.raises(TypeError, match=r"sample\.parts: argument 4"):
             sample["parts"](rows, 0, 1, wrong)
     out.flags.writeable = False
