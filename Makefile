@@ -8,7 +8,10 @@ PYTEST = PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest
 # A cache of compiled kernels for one run; otherwise its folder is named after their sources.
 FRESH = cache=$$(mktemp -d); trap 'rm -rf "$$cache"' EXIT; NUMBA_CACHE_DIR="$$cache"
 
-.PHONY: demo test fuzz test-slow test-bounds examples papers record mutation check format bench docs audit codes strangers pictures clean
+# What the compiled kernels are made of.
+KERNELS = $(wildcard src/strapdown/_kernels/*.py tools/kernels_to_c/*)
+
+.PHONY: kernels demo test fuzz test-slow test-bounds examples papers record mutation check format bench docs audit codes strangers pictures clean
 .DEFAULT_GOAL := help
 
 help:
@@ -21,13 +24,14 @@ help:
 	@echo "make papers     the tests of the reproduced papers, and the three of them into papers-reproduced"
 	@echo "make check      ruff, format, mypy, import-linter"
 	@echo "make bench      speed and memory as ratios against named alternatives"
+	@echo "make kernels    compile the kernels anew, after a change of their sources"
 	@echo "make audit      known vulnerabilities of the versions in constraints.txt"
 	@echo "make docs       the manual, into docs/_build"
 
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
 
-$(VENV)/.run: pyproject.toml constraints.txt | $(VENV)/bin/python
+$(VENV)/.run: pyproject.toml constraints.txt hatch_build.py $(KERNELS) | $(VENV)/bin/python
 	$(PIP) -e .
 	@touch $@
 
@@ -43,6 +47,10 @@ $(VENV)/.dev: pyproject.toml constraints.txt | $(VENV)/bin/python
 $(VENV)/.fuzz: $(VENV)/.test
 	-$(PIP) -e '.[fuzz]'
 	@touch $@
+
+# In place, after a change of their sources.
+kernels: $(VENV)/bin/python
+	$(BIN)/python -m tools.kernels_to_c.build
 
 demo: $(VENV)/.run
 	$(BIN)/strapdown demo --out demo --force
@@ -62,13 +70,13 @@ examples: $(VENV)/.test
 	$(PYTEST) -n 2 --dist worksteal -m slow tests/cli/test_manual.py
 
 test-bounds: $(VENV)/.test
-	@$(FRESH) NUMBA_BOUNDSCHECK=1 $(PYTEST) tests/unit/kernels tests/contracts
+	@$(FRESH) STRAPDOWN_KERNELS=numba NUMBA_BOUNDSCHECK=1 $(PYTEST) tests/unit/kernels tests/contracts
 
 record: $(VENV)/.run
 	$(BIN)/python tests/record
 
 mutation: $(VENV)/.test
-	@$(FRESH) $(BIN)/python tests/mutation --jobs 2
+	@$(FRESH) STRAPDOWN_KERNELS=numba $(BIN)/python tests/mutation --jobs 2
 
 check: $(VENV)/.dev
 	$(BIN)/ruff check .

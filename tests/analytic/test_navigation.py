@@ -17,6 +17,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from exact_increments import errors, exact_increments, rounding, start_of
 from strapdown import earth, rotation
 from strapdown._kernels import ned_simplified
+from strapdown._kernels.compilation import interpreted
 from strapdown.ellipsoids import ELLIPSOIDS, WGS84
 from strapdown.errors import DivergenceError
 from strapdown.increments import motion_accuracy, motion_increments
@@ -446,7 +447,7 @@ def test_what_a_term_is_worth(term):
 
 def with_misprint(name, misprinted):
     """The kernel of the paper's equations, in Python, with one of its functions replaced."""
-    kernel = ned_simplified.simplified_advance.py_func
+    kernel = interpreted(ned_simplified.simplified_advance)
     names = kernel.__globals__ | {name: misprinted}
     wrong = types.FunctionType(kernel.__code__, names)
 

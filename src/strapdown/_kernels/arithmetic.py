@@ -21,6 +21,8 @@ from pathlib import Path
 from types import ModuleType, SimpleNamespace
 
 SOURCES = ("rotation", "increments", "attitude", "rotation_vector", "orientation")
+#: Further ones of the package that are delivered in single precision.
+FURTHER = ("crash_trigger",)
 PACKAGE = "strapdown._kernels"
 FORMULAS = tuple(f"{PACKAGE}.{name}" for name in SOURCES)
 SINGLE = "_strapdown_single"
@@ -80,9 +82,10 @@ def single_source(module: str) -> str:
 
 @functools.cache
 def single_precision(module: str) -> ModuleType:
-    """Import a kernel module compiled in single precision.
+    """Return a kernel module compiled in single precision.
 
-    The sources are written beside the compiled kernels, because numba keeps compiled code
+    Of the package's own modules, what is called from Python is delivered compiled. Otherwise numba
+    compiles; the sources are written beside its compiled kernels, because it keeps compiled code
     for what has a file alone; where nothing can be written they are compiled anew.
 
     Parameters
@@ -94,6 +97,13 @@ def single_precision(module: str) -> ModuleType:
     -------
     module
     """
+    from strapdown._kernels.compilation import delivered
+
+    kernels = delivered(f"single_{module.removeprefix(PACKAGE + '.')}")
+    if kernels:
+        made = ModuleType(f"{SINGLE}.{module}")
+        vars(made).update(kernels)
+        return made
     if SINGLE not in sys.modules:
         package = ModuleType(SINGLE)
         package.__path__ = [str(_written({n: single_source(n) for n in SOURCES}))]

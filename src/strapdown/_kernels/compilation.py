@@ -1,33 +1,91 @@
 """How kernels are compiled, the fused product and sum, and the scalar product in lanes.
 
-A kernel gives the same bits whether it is compiled, inlined or loaded from the cache, because none
-is compiled with relaxed arithmetic (`fastmath`). A compiler that may contract a product and a sum
-does so where it happens to inline, and of several copies of one function numba runs another when
-kernels come from the cache: the first run of an installation differed from all later ones.
+An installation has the kernels compiled: these sources, translated to C (`tools/kernels_to_c`).
+Where that is missing, or is of other sources, numba compiles them when they are first called, if it
+is installed. STRAPDOWN_KERNELS chooses: ``compiled``, ``numba``, or ``python`` (interpreted).
+
+A kernel gives the same bits in all three, because none is compiled with relaxed arithmetic: neither
+numba's `fastmath`, nor C's contraction of a product and a sum where the compiler happens to inline.
 Where one rounding less keeps what would cancel, or sums in lanes are worth their speed, the source
 says so: `fma` and `dot`.
 """
 
 from __future__ import annotations
 
+import hashlib
+import os
 from collections.abc import Callable
 from fractions import Fraction
+from importlib.util import find_spec
+from pathlib import Path
 from typing import Any, TypeVar
 
-import numba
-from numba import config
-from numba.core import types
-from numba.core.cpu import CPUTargetOptions
-from numba.core.dispatcher import Dispatcher
-from numba.extending import intrinsic
-
-#: Names of kernels whose compiled code is not kept.
+#: Names of kernels that numba compiled and whose code is not kept.
 NOT_KEPT: list[str] = []
 Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
+_PACKAGE = __name__.rpartition(".")[0]
+_HELP = "Install strapdown again with `pip install`, or numba, which compiles them at first use."
 
-def njit(**options: Any) -> Callable[[Kernel], Dispatcher[Kernel]]:
-    """Decorate a kernel: `numba.njit`, with one version for all whole numbers.
+
+def sources_digest() -> str:
+    """SHA-256 of the sources of the kernels, in order of their names."""
+    digest = hashlib.sha256()
+    for source in sorted(Path(__file__).parent.glob("*.py")):
+        if source.stem not in ("__init__", "arithmetic"):
+            digest.update(source.read_bytes())
+    return digest.hexdigest()
+
+
+def _delivered() -> tuple[dict[str, Callable[..., Any]], str]:
+    """Return the compiled kernels by their names, and the processor's level they are for."""
+    try:
+        from strapdown._kernels import _compiled
+    except ImportError:
+        return {}, ""
+    if sources_digest() != _compiled.SOURCES:
+        return {}, ""
+    return _compiled.KERNELS, _compiled.LEVEL
+
+
+def _choose() -> tuple[str, dict[str, Callable[..., Any]], str]:
+    wanted = os.environ.get("STRAPDOWN_KERNELS", "")
+    kernels, level = ({}, "") if wanted in ("numba", "python") else _delivered()
+    if kernels:
+        return "compiled", kernels, level
+    if wanted == "python":
+        return wanted, {}, ""
+    if wanted != "compiled" and find_spec("numba"):
+        return "numba", {}, ""
+    raise ImportError(f"The compiled kernels are missing, or of other sources. {_HELP}")
+
+
+#: How kernels run; the compiled ones; and their level: "base", or "v3" with AVX2 and FMA.
+MODE, _COMPILED, LEVEL = _choose()
+
+
+def delivered(module: str) -> dict[str, Callable[..., Any]]:
+    """Return the compiled kernels of a module by their names; empty where numba compiles."""
+    return {
+        name.rpartition(".")[2]: kernel
+        for name, kernel in _COMPILED.items()
+        if name.startswith(f"{module}.")
+    }
+
+
+#: What a call with an argument of the wrong type raises.
+ARGUMENT_ERRORS: tuple[type[Exception], ...] = (TypeError, ValueError)
+if MODE == "numba":
+    from numba.core.errors import NumbaError
+
+    ARGUMENT_ERRORS = (NumbaError, TypeError, ValueError)
+
+
+def njit(**options: Any) -> Callable[[Kernel], Any]:
+    """Decorate a kernel: the compiled one, or one compiled by numba.
+
+    A kernel that only kernels call is part of those where they are compiled, and is itself
+    interpreted.
 
     Where a kernel calls another with a number that is written in the source, numba compiles a
     version for that number; so it does for the first value of a loop's variable, and never calls
@@ -35,22 +93,45 @@ def njit(**options: Any) -> Callable[[Kernel], Dispatcher[Kernel]]:
     none has the wrapper for it. Where no folder can be written (a read-only installation without
     a home), each process compiles what it runs.
     """
-    options = {"no_cfunc_wrapper": True, **options}
 
-    def decorate(function: Kernel) -> Dispatcher[Kernel]:
-        try:
-            kernel: Any = numba.njit(**options)(function)
-        except RuntimeError:  # numba's, of a cache without a folder
-            kernel = numba.njit(**{**options, "cache": False})(function)
-            NOT_KEPT.append(function.__name__)
-        if hasattr(kernel, "get_call_template"):  # not with NUMBA_DISABLE_JIT
-            template = kernel.get_call_template
-            kernel.get_call_template = lambda kinds, named: template(
-                [types.unliteral(kind) for kind in kinds], named
-            )
-        return kernel  # type: ignore[no-any-return]
+    def decorate(function: Kernel) -> Any:
+        home = function.__module__
+        if MODE == "python" or (MODE == "compiled" and home.startswith(f"{_PACKAGE}.")):
+            name = f"{home.removeprefix(_PACKAGE + '.')}.{function.__name__}"
+            _SOURCES[name] = function
+            return _COMPILED.get(name, function)
+        return _by_numba(function, options)
 
     return decorate
+
+
+_SOURCES: dict[str, Callable[..., Any]] = {}
+
+
+def interpreted(kernel: Callable[..., Any]) -> Callable[..., Any]:
+    """Return the Python function that a kernel was made of; kernels that it calls are as ever."""
+    if hasattr(kernel, "py_func"):
+        return kernel.py_func  # type: ignore[no-any-return]
+    home = kernel.__module__.removeprefix(_PACKAGE + ".")
+    return _SOURCES.get(f"{home}.{kernel.__name__}", kernel)
+
+
+def _by_numba(function: Kernel, options: dict[str, Any]) -> Any:
+    import numba
+    from numba.core import types
+
+    options = {"no_cfunc_wrapper": True, **options}
+    try:
+        kernel: Any = numba.njit(**options)(function)
+    except RuntimeError:  # numba's, of a cache without a folder
+        kernel = numba.njit(**{**options, "cache": False})(function)
+        NOT_KEPT.append(function.__name__)
+    if hasattr(kernel, "get_call_template"):  # not with NUMBA_DISABLE_JIT
+        template = kernel.get_call_template
+        kernel.get_call_template = lambda kinds, named: template(
+            [types.unliteral(kind) for kind in kinds], named
+        )
+    return kernel
 
 
 # Numba counts references to arrays by atomic operations, a third of the time of a kernel of 1 µs.
@@ -58,30 +139,35 @@ def njit(**options: Any) -> Callable[[Kernel], Dispatcher[Kernel]]:
 # kernel that allocates or returns arrays, assigns to slices, or calls one that does: numba refuses
 # to compile it. The option is undocumented: without it kernels are slower, and correct.
 IN_PLACE: dict[str, Any] = {"cache": True, "error_model": "numpy"}
-if hasattr(CPUTargetOptions, "_nrt"):
-    IN_PLACE["_nrt"] = False
 
 
-@intrinsic
-def fma(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
+def fma(a: float, b: float, c: float) -> float:
     """Return ``a b + c``, rounded once (IEEE 754 fusedMultiplyAdd)."""
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        return builder.fma(*arguments)
-
-    return types.float64(types.float64, types.float64, types.float64), generate
-
-
-def _fma_interpreted(a: float, b: float, c: float) -> float:
-    """`fma` where kernels are not compiled (`NUMBA_DISABLE_JIT`): the exact sum, rounded once."""
     try:
         return float(Fraction(float(a)) * Fraction(float(b)) + Fraction(float(c)))
     except (OverflowError, ValueError):  # infinite, or not a number
         return a * b + c
 
 
-if config.DISABLE_JIT:
-    fma = _fma_interpreted  # type: ignore[assignment]
+_fma_interpreted = fma
+if MODE == "numba":
+    from numba import config
+    from numba.core import types
+    from numba.core.cpu import CPUTargetOptions
+    from numba.extending import intrinsic
+
+    if hasattr(CPUTargetOptions, "_nrt"):
+        IN_PLACE["_nrt"] = False
+
+    @intrinsic
+    def _fma(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+            return builder.fma(*arguments)
+
+        return types.float64(types.float64, types.float64, types.float64), generate
+
+    if not config.DISABLE_JIT:
+        fma = _fma  # type: ignore[assignment]
 
 
 @njit(**IN_PLACE, forceinline=True)

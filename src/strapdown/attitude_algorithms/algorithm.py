@@ -9,12 +9,12 @@ from typing import Any, ClassVar, NoReturn
 
 import numpy as np
 import pandas as pd
-from numba.core.errors import NumbaError
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown._kernels import increments as increment_kernel
 from strapdown._kernels import rotation as kernel
+from strapdown._kernels.compilation import ARGUMENT_ERRORS
 from strapdown._kernels.increments import HEAD, LARGEST, MEAN, OPTIONS, SAMPLES, TIME
 from strapdown.errors import DataError, DivergenceError
 from strapdown.tables import DTHETA, THETA, attitude_table, check_sampling_kind
@@ -415,7 +415,7 @@ class AttitudeTracker:
                 gyro = np.asarray(gyro, dtype=np.float64)
             if self._update(self._record, time, gyro) >= 0.0:
                 return
-        except (NumbaError, TypeError, ValueError):
+        except ARGUMENT_ERRORS:
             # Of a type that cannot be compiled for, or not numbers.
             self._refuse(float("nan"), gyro)
         self._refuse(time, gyro)

@@ -70,13 +70,13 @@ class _State(list[Any]):
 
 def kernel_home(algorithm: AttitudeAlgorithm) -> str:
     """Module of an algorithm's kernels: one of `arithmetic.SOURCES`, or a plug-in's."""
-    home: str = type(algorithm).advance_kernel.py_func.__module__
+    home: str = type(algorithm).advance_kernel.__module__
     return home.removeprefix(f"{arithmetic.PACKAGE}.")
 
 
 def step_kernel(algorithm: AttitudeAlgorithm) -> tuple[str, str]:
     """Return the module and the name of the kernel of one step."""
-    name: str = type(algorithm).advance_kernel.py_func.__name__
+    name: str = type(algorithm).advance_kernel.__name__
     return kernel_home(algorithm), name.replace("_advance", "_step")
 
 
@@ -163,7 +163,7 @@ def single_increments(imu: pd.DataFrame, interpolation: str = "linear") -> tuple
 
 def single_kernel(algorithm: AttitudeAlgorithm) -> Any:
     """Return the loop of an algorithm over many steps, compiled in single precision."""
-    name = type(algorithm).advance_kernel.py_func.__name__
+    name = type(algorithm).advance_kernel.__name__
     return getattr(single_precision(kernel_home(algorithm)), name)
 
 

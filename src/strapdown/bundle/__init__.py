@@ -412,12 +412,18 @@ def source_digest() -> str:
 
 def machine() -> dict[str, str]:
     """Platform properties that can change the last bit of a result."""
-    from llvmlite.binding import get_host_cpu_name
+    from strapdown._kernels.compilation import LEVEL
 
+    if LEVEL:
+        processor = LEVEL
+    else:
+        from llvmlite.binding import get_host_cpu_name
+
+        processor = get_host_cpu_name()
     return {
         "system": platform.system(),
         "machine": platform.machine(),
-        "cpu": get_host_cpu_name(),
+        "cpu": processor,
         "libc": " ".join(platform.libc_ver()).strip(),
     }
 

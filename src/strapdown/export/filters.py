@@ -104,7 +104,7 @@ def filter_in_c(
 
 def sample_kernel(chosen: OrientationEstimator) -> str:
     """Name of the kernel of one sample."""
-    name: str = type(chosen).advance_kernel.py_func.__name__
+    name: str = type(chosen).advance_kernel.__name__
     return name.replace("_advance", "_sample")
 
 
@@ -539,7 +539,7 @@ def _run(
 ) -> Array:
     kind: Any = np.float32 if single else np.float64
     module = arithmetic.single_precision(HOME) if single else orientation
-    kernel = getattr(module, type(chosen).advance_kernel.py_func.__name__)
+    kernel = getattr(module, type(chosen).advance_kernel.__name__)
     dt, gyro, accel = (
         np.ascontiguousarray(rows[:, part].astype(kind)) for part in (0, slice(1, 4), slice(4, 7))
     )

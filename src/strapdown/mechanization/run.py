@@ -9,10 +9,10 @@ from typing import NoReturn
 
 import numpy as np
 import pandas as pd
-from numba.core.errors import NumbaError
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown._kernels import sample as kernel
+from strapdown._kernels.compilation import ARGUMENT_ERRORS
 from strapdown._kernels.ned import LARGEST_TURN, LEAP, POLE
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError, DataError, DivergenceError, Finding
@@ -386,7 +386,7 @@ class NavTracker:
             if accel.__class__ is not _ndarray:
                 accel = np.asarray(accel, dtype=np.float64)
             why = self._update(self._record, time, gyro, accel, height)
-        except (NumbaError, TypeError, ValueError):
+        except ARGUMENT_ERRORS:
             # Of a type that cannot be compiled for, or not numbers.
             why = kernel.BAD_SAMPLE
         if why:

@@ -40,7 +40,7 @@ def count_filter_cost(
         `memory` is the size of the record.
     """
     count: Counter[str] = Counter()
-    name = type(chosen).advance_kernel.py_func.__name__.replace("_advance", "_sample")
+    name = type(chosen).advance_kernel.__name__.replace("_advance", "_sample")
     sample = getattr(arithmetic.counted_kernels(_HOME), name)
     record = chosen.begin(begin or None)
     record[orientation.SAMPLES], record[orientation.STEP] = 1.0, step
@@ -65,9 +65,7 @@ def single_precision_attitude(
     chosen: OrientationEstimator, imu: pd.DataFrame, sampling: str
 ) -> Array:
     """Attitudes, (n, 4), with every operation in single precision."""
-    kernel = getattr(
-        arithmetic.single_precision(_HOME), type(chosen).advance_kernel.py_func.__name__
-    )
+    kernel = getattr(arithmetic.single_precision(_HOME), type(chosen).advance_kernel.__name__)
     time = imu.index.to_numpy(dtype=np.float64)
     blocks = [
         np.ascontiguousarray(imu[columns].to_numpy(dtype=np.float32))
@@ -91,7 +89,7 @@ def time_filters(chosen: Sequence[OrientationEstimator], rate_hz: float = 100.0)
     dt = np.full(count, 1.0 / rate_hz)
     rows = []
     for each in chosen:
-        name = type(each).advance_kernel.py_func.__name__
+        name = type(each).advance_kernel.__name__
         row: dict[str, str | float] = {"algorithm": each.label}
         for column, kind in (("float64_ns", np.float64), ("float32_ns", np.float32)):
             kernel = (

@@ -10,11 +10,11 @@ from typing import Any, ClassVar, NoReturn, Self
 
 import numpy as np
 import pandas as pd
-from numba.core.errors import NumbaError
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown._kernels import orientation as kernel
+from strapdown._kernels.compilation import ARGUMENT_ERRORS
 from strapdown._kernels.increments import LARGEST
 from strapdown.attitude_algorithms.algorithm import refuse_sample
 from strapdown.errors import ConfigError, DataError, DivergenceError
@@ -419,7 +419,7 @@ class OrientationTracker:
             field_b = _MISSING if mag is None else np.asarray(mag, dtype=np.float64)
             if self._update(self._record, time, rate, force, field_b) >= 0.0:
                 return
-        except (NumbaError, TypeError, ValueError):
+        except ARGUMENT_ERRORS:
             self._refuse(float("nan"), gyro)
         self._refuse(time, gyro)
 

@@ -5,6 +5,7 @@ import pytest
 
 from strapdown._kernels import earth as earth_kernel
 from strapdown._kernels import wander_errors as kernel
+from strapdown._kernels.compilation import interpreted
 from strapdown._kernels.level import LEVEL
 from strapdown.ellipsoids import WGS84
 from strapdown.estimation.sensor_blocks import (
@@ -55,7 +56,7 @@ def equations(Y, t, alt, rate, force):
     between = N * w * w * e2 / ((M + alt) * (N + alt))
     turn = V[:2] / (N + alt) + between * k * (k @ V[:2])
     omega = np.array([-turn[1], turn[0], 0])
-    slope, down, _, _, _ = earth_kernel.gravity_parts.py_func(
+    slope, down, _, _, _ = interpreted(earth_kernel.gravity_parts)(
         s * s, alt, w, 1 / (M + alt), *EARTH[:4], *EARTH[5:7]
     )
     g = np.array([-s * slope * alt * k[0], -s * slope * alt * k[1], -down])

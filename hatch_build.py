@@ -1,0 +1,49 @@
+"""Build step of the package: compile the kernels (`tools/kernels_to_c`) into the wheel.
+
+With STRAPDOWN_BUILD=none the wheel holds the sources of the kernels alone, for numba.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import sysconfig
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from hatchling.builders.hooks.plugin.interface import BuildHookInterface
+
+ROOT = Path(__file__).parent
+PACKAGE = ROOT / "src/strapdown/_kernels"
+sys.path.insert(0, str(ROOT))
+
+
+class KernelsHook(BuildHookInterface):  # type: ignore[type-arg]
+    """Compile the kernels for a wheel; in place for an editable installation."""
+
+    def dependencies(self) -> list[str]:
+        """Return the C compiler from PyPI where the system has none."""
+        from tools.kernels_to_c.build import system_compiler
+
+        return [] if system_compiler() or _skipped() else ["ziglang>=0.13"]
+
+    def initialize(self, version: str, build_data: dict[str, Any]) -> None:
+        """Compile, and add the library to the wheel."""
+        if self.target_name != "wheel" or _skipped():
+            return
+        from tools.kernels_to_c.build import NAME, build
+
+        if version == "editable":
+            build(PACKAGE)
+        else:
+            folder = Path(tempfile.mkdtemp(prefix="strapdown-kernels-"))
+            made = build(folder)
+            build_data["force_include"][str(made)] = f"strapdown/_kernels/{NAME}"
+        platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
+        build_data["pure_python"] = False
+        build_data["tag"] = f"cp311-abi3-{platform}"
+
+
+def _skipped() -> bool:
+    return os.environ.get("STRAPDOWN_BUILD") == "none"

@@ -1,0 +1,1 @@
+"""Translates the kernels to C and compiles them."""
