@@ -81,7 +81,7 @@ if MODE == "numba":
     ARGUMENT_ERRORS = (NumbaError, TypeError, ValueError)
 
 
-def njit(**options: Any) -> Callable[[Kernel], Any]:
+def njit(**options: Any) -> Callable[[Kernel], Callable[..., Any]]:
     """Decorate a kernel: the compiled one, or one compiled by numba.
 
     A kernel that only kernels call is part of those where they are compiled, and is itself
