@@ -42,4 +42,5 @@ assert "cross" in NOT_KEPT
 """
     # The one locator that is left takes archives alone, as if no folder could be written.
     environment = {**os.environ, "NUMBA_CACHE_LOCATOR_CLASSES": "_ZipCacheLocator"}
+    environment["STRAPDOWN_KERNELS"] = "numba"
     subprocess.run([sys.executable, "-c", code], env=environment, check=True)

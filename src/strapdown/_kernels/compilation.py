@@ -16,8 +16,10 @@ import hashlib
 import os
 from collections.abc import Callable
 from fractions import Fraction
+from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
+from types import FunctionType
 from typing import Any, TypeVar
 
 #: Names of kernels that numba compiled and whose code is not kept.
@@ -98,14 +100,40 @@ def njit(**options: Any) -> Callable[[Kernel], Callable[..., Any]]:
         home = function.__module__
         if MODE == "python" or (MODE == "compiled" and home.startswith(f"{_PACKAGE}.")):
             name = f"{home.removeprefix(_PACKAGE + '.')}.{function.__name__}"
-            _SOURCES[name] = function
-            return _COMPILED.get(name, function)
+            kernel = _COMPILED.get(name, function)
+            _SOURCES[name], _OF[id(kernel)] = function, (function, options)
+            return kernel
+        if MODE == "compiled":
+            # A kernel of a plug-in: interpreted without numba, which compiles it with ours.
+            if not find_spec("numba"):
+                return function
+            function.__globals__.update(_for_numba(function))
         return _by_numba(function, options)
 
     return decorate
 
 
 _SOURCES: dict[str, Callable[..., Any]] = {}
+#: Source and options of each delivered kernel, and what numba made of them for plug-ins.
+_OF: dict[int, tuple[Any, dict[str, Any]]] = {}
+_MADE: dict[int, Any] = {}
+
+
+def _for_numba(function: Callable[..., Any]) -> dict[str, Any]:
+    """Return our kernels among the names that a function uses, as numba can call them."""
+    found = {}
+    for name in function.__code__.co_names:
+        kernel = function.__globals__.get(name)
+        if kernel is fma:
+            found[name] = _fma_of_numba()
+        elif id(kernel) in _OF:
+            if id(kernel) not in _MADE:
+                source, options = _OF[id(kernel)]
+                known = {**source.__globals__, **_for_numba(source)}
+                copied = FunctionType(source.__code__, known, source.__name__)
+                _MADE[id(kernel)] = _by_numba(copied, {**options, "cache": False})
+            found[name] = _MADE[id(kernel)]
+    return found
 
 
 def interpreted(kernel: Callable[..., Any]) -> Callable[..., Any]:
@@ -149,25 +177,30 @@ def fma(a: float, b: float, c: float) -> float:
         return a * b + c
 
 
-_fma_interpreted = fma
-if MODE == "numba":
-    from numba import config
+@cache
+def _fma_of_numba() -> Any:
     from numba.core import types
-    from numba.core.cpu import CPUTargetOptions
     from numba.extending import intrinsic
 
-    if hasattr(CPUTargetOptions, "_nrt"):
-        IN_PLACE["_nrt"] = False
-
     @intrinsic
-    def _fma(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
+    def fused(typing_context: Any, a: Any, b: Any, c: Any) -> Any:
         def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
             return builder.fma(*arguments)
 
         return types.float64(types.float64, types.float64, types.float64), generate
 
+    return fused
+
+
+_fma_interpreted = fma
+if MODE == "numba":
+    from numba import config
+    from numba.core.cpu import CPUTargetOptions
+
+    if hasattr(CPUTargetOptions, "_nrt"):
+        IN_PLACE["_nrt"] = False
     if not config.DISABLE_JIT:
-        fma = _fma  # type: ignore[assignment]
+        fma = _fma_of_numba()
 
 
 @njit(**IN_PLACE, forceinline=True)

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from numba import njit
-
+from strapdown._kernels.compilation import njit
 from strapdown._kernels.increments import HEAD, OPTIONS, take_sample
 from strapdown.attitude_algorithms.algorithm import Accuracy, AttitudeAlgorithm
 
 
-@njit
+@njit()
 def first_order_step(state, dt, tx, ty, tz, dx, dy, dz, a, b):
     """``q <- normalize(q + q (0, theta) / 2)``, of (4,) and rad; every step has these arguments."""
     w = state[0] - 0.5 * (state[1] * tx + state[2] * ty + state[3] * tz)
@@ -25,7 +24,7 @@ def first_order_step(state, dt, tx, ty, tz, dx, dy, dz, a, b):
     state[3] = z / norm
 
 
-@njit
+@njit()
 def first_order_advance(state, dt, theta, dtheta, history, a, b):
     """Advance over increments, writing the attitude after each into `history`."""
     for k in range(theta.shape[0]):
@@ -36,7 +35,7 @@ def first_order_advance(state, dt, theta, dtheta, history, a, b):
             history[k, i] = state[i]
 
 
-@njit
+@njit()
 def first_order_update(record, time, rate):
     """Advance by one sample; both loops call one step, so that they give the same bits."""
     dt, tx, ty, tz, dx, dy, dz = take_sample(record, time, rate)
