@@ -6,6 +6,7 @@ With STRAPDOWN_BUILD=none the wheel holds the sources of the kernels alone, for 
 from __future__ import annotations
 
 import os
+import subprocess
 import sys
 import sysconfig
 import tempfile
@@ -29,16 +30,19 @@ class KernelsHook(BuildHookInterface):  # type: ignore[type-arg]
         return [] if system_compiler() or _skipped() else ["ziglang>=0.13"]
 
     def initialize(self, version: str, build_data: dict[str, Any]) -> None:
-        """Compile, and add the library to the wheel."""
+        """Compile, and add the library to the wheel; without it numba compiles at first use."""
         if self.target_name != "wheel" or _skipped():
             return
         from tools.kernels_to_c.build import NAME, build
 
-        if version == "editable":
-            build(PACKAGE)
-        else:
-            folder = Path(tempfile.mkdtemp(prefix="strapdown-kernels-"))
+        editable = version == "editable"
+        folder = PACKAGE if editable else Path(tempfile.mkdtemp(prefix="strapdown-kernels-"))
+        try:
             made = build(folder)
+        except (SystemExit, OSError, subprocess.CalledProcessError) as error:
+            self.app.display_warning(f"the kernels were not compiled ({error}): numba will do it")
+            return
+        if not editable:
             build_data["force_include"][str(made)] = f"strapdown/_kernels/{NAME}"
         platform = sysconfig.get_platform().replace("-", "_").replace(".", "_")
         build_data["pure_python"] = False
@@ -46,4 +50,5 @@ class KernelsHook(BuildHookInterface):  # type: ignore[type-arg]
 
 
 def _skipped() -> bool:
-    return os.environ.get("STRAPDOWN_BUILD") == "none"
+    # Not tried on Windows yet: there numba is among the dependencies.
+    return os.environ.get("STRAPDOWN_BUILD") == "none" or sys.platform == "win32"
