@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import norm
 
 from strapdown.errors import ConfigError
-from strapdown.navigation.heading_integrity import SURE, doubted, heading_status, recent_scatter
+from strapdown.navigation.heading_integrity import SURE, doubts_of, heading_status, recent_scatter
 from strapdown.navigation.record import NavigationRecord
 
 SECONDS = 200
@@ -174,18 +174,18 @@ def test_limits_must_be_in_order():
 
 def test_a_run_is_doubted_from_when_a_witness_contradicts_it():
     one, late = record_of(0.1), heard(2.0, 0.1, begin=99)
-    assert not doubted(one, [late], 99.0, 3.0)
-    assert doubted(one, [late], 100.0, 3.0)
+    assert not doubts_of(one, 3.0)([late], 99.0)
+    assert doubts_of(one, 3.0)([late], 100.0)
     # By less than half of the limit nothing is contradicted.
-    assert not doubted(one, [heard(1.4, 0.1)], 150.0, 3.0)
+    assert not doubts_of(one, 3.0)([heard(1.4, 0.1)], 150.0)
 
 
 def test_a_run_is_doubted_from_when_its_observations_scatter():
     u = np.where(np.arange(SECONDS + 1.0) < 100.0, 1.0, 3.9)
     one = record_of(0.1, innovations(u))
-    assert not doubted(one, [], 100.0, 3.0)
+    assert not doubts_of(one, 3.0)([], 100.0)
     # Half a minute later they are all that is looked at.
-    assert doubted(one, [], 130.0, 3.0)
+    assert doubts_of(one, 3.0)([], 130.0)
     # What was doubted once stays so.
     u = np.where((np.arange(SECONDS + 1.0) < 100.0) | (np.arange(SECONDS + 1.0) > 130.0), 1.0, 3.9)
-    assert doubted(record_of(0.1, innovations(u)), [], 190.0, 3.0)
+    assert doubts_of(record_of(0.1, innovations(u)), 3.0)([], 190.0)
