@@ -86,6 +86,9 @@ def start(target: Target, text: str | None, limit: float | None) -> int:
             os.dup2(silent, 1)
             os.dup2(silent, 2)
             resource.setrlimit(resource.RLIMIT_CPU, (int(limit) + 1, int(limit) + 1))
+        if "_kernels/" in target.source:
+            # Not those that are delivered, which no mutant changes.
+            os.environ["STRAPDOWN_KERNELS"] = "numba"
         if not target.jit:
             numba.config.DISABLE_JIT = True
             os.environ["NUMBA_DISABLE_JIT"] = "1"
