@@ -280,6 +280,7 @@ def generate(package: Path, listed: Path, out: Path) -> int:
                 "    }",
                 '    PyModule_AddObject(made, "KERNELS", all);',
                 f'    PyModule_AddStringConstant(made, "SOURCES", "{digest.hexdigest()}");',
+                '    PyModule_AddStringConstant(made, "COMPILER", __VERSION__);',
                 '    PyModule_AddStringConstant(made, "LEVEL", table == &table_base ? "base" : "v3");',
                 "    return made;",
                 "}",

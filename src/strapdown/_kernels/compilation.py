@@ -40,14 +40,14 @@ def sources_digest() -> str:
 
 
 def _delivered() -> tuple[dict[str, Callable[..., Any]], str]:
-    """Return the compiled kernels by their names, and the processor's level they are for."""
+    """Return the compiled kernels by their names, and by what and for what processors."""
     try:
         from strapdown._kernels import _compiled
     except ImportError:
         return {}, ""
     if sources_digest() != _compiled.SOURCES:
         return {}, ""
-    return _compiled.KERNELS, _compiled.LEVEL
+    return _compiled.KERNELS, f"{_compiled.COMPILER}, {_compiled.LEVEL}"
 
 
 def _choose() -> tuple[str, dict[str, Callable[..., Any]], str]:
@@ -62,8 +62,9 @@ def _choose() -> tuple[str, dict[str, Callable[..., Any]], str]:
     raise ImportError(f"The compiled kernels are missing, or of other sources. {_HELP}")
 
 
-#: How kernels run; the compiled ones; and their level: "base", or "v3" with AVX2 and FMA.
-MODE, _COMPILED, LEVEL = _choose()
+#: How kernels run; the compiled ones; and the compiler with the level of its code: "base", or "v3"
+#: with AVX2 and FMA.
+MODE, _COMPILED, COMPILER = _choose()
 
 
 def delivered(module: str) -> dict[str, Callable[..., Any]]:

@@ -16,7 +16,7 @@ import platform
 import re
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, distribution, version
 from pathlib import Path
@@ -410,20 +410,27 @@ def source_digest() -> str:
     return digest.hexdigest()
 
 
+@functools.cache
+def _processor() -> str:
+    """Return the model of the processor, by which numpy and BLAS choose their code."""
+    with suppress(OSError):
+        first = Path("/proc/cpuinfo").read_text(encoding="utf-8").partition("\n\n")[0]
+        said = dict(re.findall(r"(.+?)\s*: (.*)", first))
+        keys = ("model name", "cpu family", "model", "CPU implementer", "CPU part")
+        if found := [said[key].strip() for key in keys if key in said]:
+            return " ".join(found)
+    return platform.processor()
+
+
 def machine() -> dict[str, str]:
     """Platform properties that can change the last bit of a result."""
-    from strapdown._kernels.compilation import LEVEL
+    from strapdown._kernels.compilation import COMPILER, MODE
 
-    if LEVEL:
-        processor = LEVEL
-    else:
-        from llvmlite.binding import get_host_cpu_name
-
-        processor = get_host_cpu_name()
     return {
         "system": platform.system(),
         "machine": platform.machine(),
-        "cpu": processor,
+        "cpu": _processor(),
+        "kernels": COMPILER or MODE,
         "libc": " ".join(platform.libc_ver()).strip(),
     }
 
