@@ -8,8 +8,8 @@ PYTEST = PYTHONDONTWRITEBYTECODE= OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest
 # A cache of compiled kernels for one run; otherwise its folder is named after their sources.
 FRESH = cache=$$(mktemp -d); trap 'rm -rf "$$cache"' EXIT; NUMBA_CACHE_DIR="$$cache"
 
-# What the compiled kernels are made of.
-KERNELS = $(wildcard src/strapdown/_kernels/*.py tools/kernels_to_c/*)
+# What an installation is made of, but for modules that it finds in place.
+INSTALLED = pyproject.toml constraints.txt hatch_build.py $(wildcard src/strapdown/_kernels/*.py tools/kernels_to_c/*.*)
 
 .PHONY: kernels demo test fuzz test-slow test-bounds examples papers record mutation check format bench docs audit codes strangers pictures clean
 .DEFAULT_GOAL := help
@@ -31,15 +31,15 @@ help:
 $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
 
-$(VENV)/.run: pyproject.toml constraints.txt hatch_build.py $(KERNELS) | $(VENV)/bin/python
+$(VENV)/.run: $(INSTALLED) | $(VENV)/bin/python
 	$(PIP) -e .
 	@touch $@
 
-$(VENV)/.test: pyproject.toml constraints.txt | $(VENV)/bin/python
+$(VENV)/.test: $(INSTALLED) | $(VENV)/bin/python
 	$(PIP) -e '.[test]'
 	@touch $@ $(VENV)/.run
 
-$(VENV)/.dev: pyproject.toml constraints.txt | $(VENV)/bin/python
+$(VENV)/.dev: $(INSTALLED) | $(VENV)/bin/python
 	$(PIP) -e '.[dev]'
 	@touch $@ $(VENV)/.test $(VENV)/.run
 
