@@ -76,7 +76,7 @@ record: $(VENV)/.run
 	$(BIN)/python tests/record
 
 mutation: $(VENV)/.test
-	@$(FRESH) STRAPDOWN_KERNELS=numba $(BIN)/python tests/mutation --jobs 2
+	@$(FRESH) $(BIN)/python tests/mutation --jobs 2
 
 check: $(VENV)/.dev
 	$(BIN)/ruff check .

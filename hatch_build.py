@@ -15,9 +15,7 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-ROOT = Path(__file__).parent
-PACKAGE = ROOT / "src/strapdown/_kernels"
-sys.path.insert(0, str(ROOT))
+sys.path.insert(0, str(Path(__file__).parent))
 
 
 class KernelsHook(BuildHookInterface):  # type: ignore[type-arg]
@@ -33,7 +31,7 @@ class KernelsHook(BuildHookInterface):  # type: ignore[type-arg]
         """Compile, and add the library to the wheel; without it numba compiles at first use."""
         if self.target_name != "wheel" or _skipped():
             return
-        from tools.kernels_to_c.build import NAME, build
+        from tools.kernels_to_c.build import NAME, PACKAGE, build
 
         editable = version == "editable"
         folder = PACKAGE if editable else Path(tempfile.mkdtemp(prefix="strapdown-kernels-"))

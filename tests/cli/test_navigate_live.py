@@ -49,6 +49,17 @@ def written(folder, head, aid=""):
     return path
 
 
+def recorded(folder):
+    """The drive in files, with its fixes; its configuration."""
+    WRITERS["csv"].write(folder / "log.csv", {"imu": drive()})
+    table = inside()
+    columns = {"time_s": table.index.to_numpy()}
+    csv.write(
+        folder / "fix.csv", columns | {str(c): table[c].to_numpy() for c in table.columns}, {}
+    )
+    return written(folder, '[log]\npath = "log.csv"\n', 'path = "fix.csv"\n')
+
+
 def lines(until=5.0):
     imu = drive()
     out = [
@@ -102,12 +113,7 @@ def test_standard_input_to_its_end_is_the_batch_run(live, run_cli):
     # The same from files, at once.
     other = live / "batch"
     other.mkdir()
-    WRITERS["csv"].write(other / "log.csv", {"imu": drive()})
-    table = inside()
-    columns = {"time_s": table.index.to_numpy()}
-    csv.write(other / "fix.csv", columns | {str(c): table[c].to_numpy() for c in table.columns}, {})
-    path = written(other, '[log]\npath = "log.csv"\n', 'path = "fix.csv"\n')
-    done = run_cli("navigate", path, "--out", other / "out", "-q")
+    done = run_cli("navigate", recorded(other), "--out", other / "out", "-q")
     assert done.code == 0, done.err
     np.testing.assert_array_equal(trajectory(live / "out"), trajectory(other / "out"))
 

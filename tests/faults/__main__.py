@@ -25,16 +25,15 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from subprocess import DEVNULL
 
+from tests.cli.test_navigate_live import recorded
 from tests.faults.forked import start, warmed
 
 from strapdown.bundle import MANIFEST, claimed, read_manifest, sha256, unsealed_changes
-from strapdown.formats import csv
-from strapdown.formats.writers import WRITERS
 
 STRAPDOWN = [sys.executable, "-m", "strapdown"]
 # Calls that change names and files, and the errors that they may meet.
@@ -66,7 +65,8 @@ class Commands:
 
     def __init__(self, home: Path, alone: str | None = None) -> None:
         self.home = home
-        write_drive(home / "drive")
+        (home / "drive").mkdir()
+        drive = recorded(home / "drive")
         self.run("simulate", "pole", "--out", home / "pole")
         case = home / "pole" / "case.toml"
         text = case.read_text(encoding="utf-8")
@@ -75,7 +75,7 @@ class Commands:
             "attitude": ["attitude", "alexiev-fig4", "--png"],
             "simulate": ["simulate", "alexiev-fig2f", "--format", "all"],
             "crash": ["crash", str(case)],
-            "navigate": ["navigate", str(home / "drive" / "run.toml")],
+            "navigate": ["navigate", str(drive)],
         }
         self.names = [alone] if alone else list(self.given)
         self.seals: dict[str, str] = {}
@@ -91,9 +91,9 @@ class Commands:
                 assert warmed([*given, "--force", "--out", home / name / "warm"]) == 0
                 self.seconds[name] = time.monotonic() - begin
 
-    def run(self, *given: object, before: tuple[str, ...] = ()) -> subprocess.CompletedProcess:
+    def run(self, *given: object) -> subprocess.CompletedProcess:
         """Run a command to its end."""
-        whole = [*before, *STRAPDOWN, *map(str, given), "--quiet"]
+        whole = [*STRAPDOWN, *map(str, given), "--quiet"]
         return subprocess.run(whole, capture_output=True, cwd=self.home, check=False)
 
     def forked(self, name: str, out: Path, strace: Sequence[str] = ()) -> tuple[int, bytes]:
@@ -110,19 +110,6 @@ class Commands:
         if tracer is not None:
             tracer.wait()
         return status, (place / "log").read_bytes()
-
-
-def write_drive(folder: Path) -> None:
-    """Write a drive of five seconds, with its fixes and its configuration."""
-    from tests.cli.test_navigate_live import drive, inside, written
-
-    folder.mkdir()
-    written(folder, '[log]\npath = "log.csv"\n', 'path = "fix.csv"\n')
-    WRITERS["csv"].write(folder / "log.csv", {"imu": drive()})
-    fixes = inside()
-    columns = {"time_s": fixes.index.to_numpy()}
-    columns |= {str(name): fixes[name].to_numpy() for name in fixes.columns}
-    csv.write(folder / "fix.csv", columns, {})
 
 
 def held(place: Path, words: Sequence[object]) -> tuple[int, int]:
@@ -207,22 +194,28 @@ def progress(number: int, found: Counter[str]) -> None:
         print(number + 1, dict(found), flush=True)
 
 
-def called(commands: Commands, name: str, had: bool) -> list[tuple[str, int]]:
-    """Return the changing calls of a run, in order, each with its number of its kind."""
+def called(
+    commands: Commands, name: str, had: bool, wanted: Iterable[str]
+) -> list[tuple[str, int, str]]:
+    """Return the wanted calls of a run, in order: name, number of its kind, and the line of it."""
     numbers: Counter[str] = Counter()
     found = []
     with placed(commands, name, had) as out:
         file = out.parent.parent / "trace"
-        trace = ("-o", str(file), "-e", f"trace={','.join(CHANGING)}")
+        trace = ("-o", str(file), "-e", f"trace={','.join(wanted)}")
         status, told = commands.forked(name, out, trace)
         assert status == 0, told
         for line in file.read_text(errors="replace").splitlines():
             call = line.split("(")[0].split()[-1]
-            if call in CHANGING and " resumed>" not in line:
+            if call in wanted and " resumed>" not in line:
                 numbers[call] += 1
-                if call != "openat" or any(word in line for word in ("O_CREAT", "O_TRUNC")):
-                    found.append((call, numbers[call]))
+                found.append((call, numbers[call], line))
     return found
+
+
+def changes(call: str, line: str) -> bool:
+    """Whether a call of `CHANGING` does: a file may be opened to be read."""
+    return call != "openat" or "O_CREAT" in line or "O_TRUNC" in line
 
 
 def faulted(
@@ -248,7 +241,9 @@ def every(commands: Commands, count: int, draw: random.Random) -> Counter[str]:
     found: Counter[str] = Counter()
     for name in commands.names:
         for had in (False, True):
-            for number, (call, when) in enumerate(called(commands, name, had)):
+            met = called(commands, name, had, CHANGING)
+            kept = [(call, when) for call, when, line in met if changes(call, line)]
+            for number, (call, when) in enumerate(kept):
                 state, status = faulted(commands, name, had, call, "signal=KILL", str(when))
                 ended = "killed" if os.WIFSIGNALED(status) else "ended"
                 found[f"{name} {'over an old' if had else 'alone'}, {ended}, {state}"] += 1
@@ -261,14 +256,7 @@ def calls(commands: Commands, count: int, draw: random.Random) -> Counter[str]:
     found: Counter[str] = Counter()
     totals: dict[tuple[str, str], int] = {}
     for name in commands.names:
-        with placed(commands, name, True) as out:
-            file = out.parent.parent / "trace"
-            traced_calls = ("-o", str(file), "-e", f"trace={','.join(CALLS)}")
-            assert commands.forked(name, out, traced_calls)[0] == 0
-            for line in file.read_text(errors="replace").splitlines():
-                call = line.split("(")[0].split()[-1]
-                if call in CALLS and " resumed>" not in line:
-                    totals[name, call] = totals.get((name, call), 0) + 1
+        totals |= {(name, call): number for call, number, _ in called(commands, name, True, CALLS)}
     kinds = sorted(totals)
     for number in range(count):
         name, call = draw.choice(kinds)

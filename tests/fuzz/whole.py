@@ -21,7 +21,7 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.faults.__main__ import write_drive
+from tests.cli.test_navigate_live import recorded
 from tests.faults.forked import run_here, start, warmed
 from tests.fuzz.mutate import mutated
 from tests.fuzz.targets import TARGETS
@@ -78,7 +78,8 @@ def commands(home: Path) -> dict[str, Callable[[random.Random], Given]]:
     """Return the commands by name, after one run of each with sound files."""
     run, crash, empty = (home / name for name in ("run", "crash", "empty"))
     empty.mkdir()
-    write_drive(run)
+    run.mkdir()
+    recorded(run)
     assert run_here(["simulate", "pole", "--out", crash]) == 0
     shutil.rmtree(crash / "inputs", ignore_errors=True)
     (crash / "manifest.json").unlink()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import hashlib
 import os
 import platform
 import shutil
@@ -230,10 +229,7 @@ def generate(package: Path, listed: Path, out: Path) -> int:
             ]
         )
     )
-    digest = hashlib.sha256()
-    for source in sorted(package.glob("*.py")):
-        if source.stem not in ("__init__", "arithmetic"):
-            digest.update(source.read_bytes())
+    digest = modules["compilation"]["sources_digest"]()
     methods = [
         f'    {{"{name.split(".")[0]}", {{"{name.split(".")[1]}", (PyCFunction)(void (*)(void))call_'
         f"{name.replace('.', '_')}, METH_FASTCALL, NULL}}}},"
@@ -279,7 +275,7 @@ def generate(package: Path, listed: Path, out: Path) -> int:
                 "        Py_DECREF(key);",
                 "    }",
                 '    PyModule_AddObject(made, "KERNELS", all);',
-                f'    PyModule_AddStringConstant(made, "SOURCES", "{digest.hexdigest()}");',
+                f'    PyModule_AddStringConstant(made, "SOURCES", "{digest}");',
                 '    PyModule_AddStringConstant(made, "COMPILER", __VERSION__);',
                 '    PyModule_AddStringConstant(made, "LEVEL", table == &table_base ? "base" : "v3");',
                 "    return made;",

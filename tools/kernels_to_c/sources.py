@@ -7,6 +7,7 @@ collects.
 from __future__ import annotations
 
 import ast
+import hashlib
 import sys
 from dataclasses import dataclass, field
 from importlib.util import module_from_spec, spec_from_file_location
@@ -90,9 +91,11 @@ def load(folder: Path) -> dict[str, dict[str, Any]]:
         tree = ast.parse(text)
         for statement in tree.body:
             if stem == "compilation":
-                if not (isinstance(statement, ast.FunctionDef) and statement.name == "dot"):
+                used = ("dot", "sources_digest")
+                if not (isinstance(statement, ast.FunctionDef) and statement.name in used):
                     continue
-                space.update(njit=njit, IN_PLACE=in_place, fma=Fma())
+                space.update(njit=njit, IN_PLACE=in_place, fma=Fma(), hashlib=hashlib, Path=Path)
+                space.update(__file__=str(folder / "compilation.py"))
             home = str(statement.module) if isinstance(statement, ast.ImportFrom) else ""
             if isinstance(statement, ast.ImportFrom) and home.startswith((PACKAGE, single_home)):
                 single = SINGLE if home.startswith(single_home) else ""

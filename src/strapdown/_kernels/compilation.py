@@ -31,10 +31,10 @@ _HELP = "Install strapdown again with `pip install`, or numba, which compiles th
 
 
 def sources_digest() -> str:
-    """SHA-256 of the sources of the kernels, in order of their names."""
+    """SHA-256 of what the kernels are made of; `tools/kernels_to_c` writes it into the library."""
     digest = hashlib.sha256()
     for source in sorted(Path(__file__).parent.glob("*.py")):
-        if source.stem not in ("__init__", "arithmetic"):
+        if source.stem != "__init__":
             digest.update(source.read_bytes())
     return digest.hexdigest()
 
@@ -52,9 +52,9 @@ def _delivered() -> tuple[dict[str, Callable[..., Any]], str]:
 
 def _choose() -> tuple[str, dict[str, Callable[..., Any]], str]:
     wanted = os.environ.get("STRAPDOWN_KERNELS", "")
-    kernels, level = ({}, "") if wanted in ("numba", "python") else _delivered()
+    kernels, compiler = ({}, "") if wanted in ("numba", "python") else _delivered()
     if kernels:
-        return "compiled", kernels, level
+        return "compiled", kernels, compiler
     if wanted == "python":
         return wanted, {}, ""
     if wanted != "compiled" and find_spec("numba"):

@@ -59,7 +59,7 @@ def test_single_precision_is_single_in_every_operation(tmp_path):
     """In a process and a cache of its own: numba shows the code of what it has just compiled."""
     done = subprocess.run(
         [sys.executable, "-c", LOOK, str(Path(__file__).parent)],
-        env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path)},
+        env=os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), "STRAPDOWN_KERNELS": "numba"},
         capture_output=True,
         text=True,
     )
