@@ -28,6 +28,7 @@ from strapdown._kernels.ned import COSINE, LAT, PRIME, SINE, ned_advance
 from strapdown._kernels.ned import Q as Q_NB
 from strapdown._kernels.ned import V as V_N
 from strapdown._kernels.psi_model import HELD_ROWS, means_of_steps, psi_dynamics
+from strapdown._kernels.robust import PLAIN, UD, WD, take_linear
 from strapdown._kernels.rotation import dcm_from_quat
 from strapdown._kernels.rotation_vector import cross
 from strapdown._kernels.smoothing import (
@@ -42,8 +43,6 @@ from strapdown._kernels.smoothing import (
 from strapdown._kernels.wander import Q_WB, earth_axis, wander_advance
 from strapdown._kernels.wander import V as V_W
 
-# Forms of a covariance: the matrix, by two updates; its factors, by two.
-JOSEPH, PLAIN, UD, WD = 0, 1, 2, 3
 # Status of a call: done; a covariance is due to be recorded; the mechanization diverged; the
 # covariance is invalid; the rows for a smoother are full.
 ALL, NOTE, DIVERGED, BAD, FULL = 0, 1, 2, 3, 4
@@ -229,8 +228,8 @@ def over_steps(
 CODE, VALUE, VARIANCE = 0, 1, 4
 # Record of an observation: innovation, its expected variance, weight.
 TOLD = 3
-# Status of an invalid observation.
-BAD_FIX = 5
+# Status of an invalid observation, and of one beyond the linear range of its rule.
+BAD_FIX, ASK = 5, 6
 
 
 @njit(cache=True, error_model="numpy")
@@ -377,6 +376,8 @@ def over_fixes(
     place_code,
     fix_time,
     fixes,
+    rule,
+    scales,
     told,
     aged,
     marked_at,
@@ -390,7 +391,9 @@ def over_fixes(
     before it, [:, 0], where the last one is more than `aged` seconds old (otherwise its time is
     NaN). Return the status, the steps made, those of the open
     group, the fixes processed, and the rows filled for a smoother. The call ends early as
-    `over_steps`, or where these rows are full. Instants within `same` seconds count as one.
+    `over_steps`, or where these rows are full; and before a fix beyond the linear range of `rule`
+    (`robust`; empty: full weight), which learns `scales`, (2, 3, 9), of positions and velocities.
+    Instants within `same` seconds count as one.
     """
     which, form, _ = kinds
     state, at_covariance, covariance, sensors, times, last = states
@@ -402,6 +405,7 @@ def over_fixes(
     turn, P, after = np.empty((3, 3)), np.empty((n, n)), np.empty((size, size))
     cut = np.empty((2, rows.shape[1]))
     between = np.empty((1, history.shape[1]))
+    ruled, before = rule.shape[0] > 0, np.empty((size, size))
     done, total = 0, time.shape[0]
     while done < fix_time.shape[0]:
         epoch = fix_time[done]
@@ -483,7 +487,20 @@ def over_fixes(
             )
         if notes.shape[0] > 0:
             pack_covariance(form >= UD, covariance, P, notes[noted], begin_of_move(n))
-        if form == UD:
+        wrong = -1
+        if ruled:
+            for i in range(size):
+                for j in range(size):
+                    before[i, j] = covariance[i, j]
+            learned = scales[0] if of_place else scales[1]
+            if not take_linear(
+                form, covariance, x, z, H, R, rule, learned, epoch, of_place, told[done]
+            ):
+                for i in range(size):
+                    for j in range(size):
+                        covariance[i, j] = before[i, j]
+                return ASK, made, count, done, noted
+        elif form == UD:
             wrong = ud_update(covariance, x, z, H, R, told[done])
         elif form == WD:
             wrong = wd_epoch(

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown._kernels.filter_loop import ASK, NOTE
 from strapdown._kernels.motion_increments import split_increment
 from strapdown._kernels.sums import STEADY, steady_motion
 from strapdown.errors import ConfigError
@@ -23,7 +24,14 @@ from strapdown.estimation.error_filter import (
     turned_force,
     unlearnt_force,
 )
-from strapdown.estimation.robust import AdaptiveRule, AdaptiveScale, Rejection, Scales
+from strapdown.estimation.robust import (
+    AdaptiveRule,
+    AdaptiveScale,
+    Rejection,
+    Scales,
+    ScaleState,
+    linear_range,
+)
 from strapdown.nav_state import NavState
 from strapdown.navigation.compiled_engine import CompiledEngine, ReferenceEngine, compiled
 from strapdown.navigation.engine import (
@@ -36,7 +44,13 @@ from strapdown.navigation.engine import (
     begun,
 )
 from strapdown.navigation.filter_options import ClosedLoop, Correction
-from strapdown.navigation.measurements.gnss import HORIZONTAL_CODE, PLACE, Gnss
+from strapdown.navigation.measurements.gnss import (
+    HORIZONTAL_CODE,
+    PLACE,
+    POSITION_CODE,
+    VELOCITY_CODE,
+    Gnss,
+)
 from strapdown.navigation.measurements.measurement import (
     Epochs,
     ImuDerivedMeasurement,
@@ -137,15 +151,19 @@ class Navigator:
 
     @cached_property
     def lone_receiver(self) -> Gnss | None:
-        """The only aid, if it is a receiver with white errors, used with its stated accuracy.
+        """The only aid, if it is a receiver with white errors, and its rule has a linear range.
 
         None for a filter about a reference: the compiled loop feeds back.
         """
         if len(self.aids) != 1 or type(self.aids[0]) is not Gnss or self.about is not None:
             return None
         aid = self.aids[0]
-        plain = aid.rule is None and self.filter.rule is None and not aid.states()
-        return aid if plain else None
+        return aid if not aid.states() and self.linear_range is not None else None
+
+    @cached_property
+    def linear_range(self) -> Array | None:
+        """Rule of the first aid, as `robust.linear_range`."""
+        return linear_range(self.aids[0].rule or self.filter.rule)
 
     @cached_property
     def by_name(self) -> dict[str, Measurement]:
@@ -454,11 +472,17 @@ class EpochLoop:
         return False
 
     def _fixes(self, made: int, time: Array, rows: Array) -> int:
-        """Process the fixes of a single receiver, up to one without VD; return the steps."""
+        """Process the fixes of a single receiver; return the steps.
+
+        Up to one without VD, or beyond the linear range of its rule.
+        """
         aid, engine = self.navigator.lone_receiver, self.engine
         if aid is None or not isinstance(engine, CompiledEngine) or self.tilted:
             return made
-        arm = np.asarray(aid.lever_arm, dtype=np.float64)
+        rule = self.navigator.linear_range
+        assert rule is not None
+        learned = self._learned(aid)
+        receiver = np.asarray(aid.lever_arm, dtype=np.float64), rule, learned
         interval = self.navigator.mark_interval * (1.0 - 1e-9)
         queue = self.queues[aid.name]
         while made < len(time):
@@ -471,16 +495,30 @@ class EpochLoop:
                 break
             usual = Epochs(queue.time[:whole], queue.values[:whole])
             notes = (self.marked + interval, interval, AGED)
-            made, fixed, stopped = engine.propagate_with_fixes(
-                time, rows, self.history, made, notes, arm, usual
+            made, fixed, why = engine.propagate_with_fixes(
+                time, rows, self.history, made, notes, receiver, usual
             )
             done = len(fixed[0])
             self._fixed(aid, queue, fixed)
+            if isinstance(aid.rule or self.navigator.filter.rule, AdaptiveRule):
+                for code in set(queue.values[:done, 0].tolist()):
+                    scales = learned[0 if code == POSITION_CODE else 1]
+                    self.scales[aid.names(code)[0]] = tuple(map(ScaleState.of, scales.tolist()))
             queue = Epochs(queue.time[done:], queue.values[done:])
-            if stopped:
+            if why == NOTE:
                 self.mark()
+            if why == ASK:
+                break
         self.queues[aid.name] = queue
         return made
+
+    def _learned(self, aid: Gnss) -> Array:
+        """Scales that the rule of a receiver learned, of positions and velocities, (2, 3, 9)."""
+        rule = aid.rule or self.navigator.filter.rule
+        if not isinstance(rule, AdaptiveRule):
+            return np.zeros((2, 3, len(ScaleState._fields)))
+        names = (aid.names(code)[0] for code in (POSITION_CODE, VELOCITY_CODE))
+        return np.array([self.scales.get(name) or rule.begin(3) for name in names])
 
     def _fixed(self, aid: Gnss, fixes: Epochs, fixed: tuple[Array, ...]) -> None:
         """Record the results of position fixes."""
