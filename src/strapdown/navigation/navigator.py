@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown._kernels.filter_loop import ASK, NOTE
+from strapdown._kernels.filter_loop import ASK, NOTE, turn_blocks
 from strapdown._kernels.motion_increments import split_increment
 from strapdown._kernels.sums import STEADY, steady_motion
 from strapdown.errors import ConfigError
@@ -677,10 +677,11 @@ class EpochLoop:
         """Record covariance and estimates, with a time stamp so much earlier."""
         filter_, state = self.navigator.filter, self.engine.filter
         P, left = filter_.physical_covariance(state), self.engine.left()
-        turn = np.kron(np.eye(3), filter_.mechanization.level_from_ned(state.row))
+        C_nl, ned = filter_.mechanization.level_from_ned(state.row).T, np.empty((9, 9))
+        turn_blocks(np.ascontiguousarray(C_nl), P[:9, :9] + left[:, None] * left, ned)
         mark = CovarianceSnapshot(
             state.time - before,
-            turn.T @ (P[:9, :9] + np.outer(left, left)) @ turn,
+            ned,
             self.engine.estimates(filter_),
             self._sd(state.time, P),
         )
@@ -689,6 +690,8 @@ class EpochLoop:
     def _sd(self, time: float, P: Array) -> Array:
         """Standard deviations of the sensor errors; refuses an invalid covariance."""
         variances, model = np.diagonal(P), self.navigator.filter.model
+        if variances.min() >= 0.0:
+            return np.sqrt(variances[9:])
         kinds = np.concatenate(
             [np.repeat(variances[:9].reshape(3, 3).max(axis=1), 3), np.square(model.stacked.sd)]
         )
