@@ -152,6 +152,11 @@ def running_integral(time: Array, values: Array, *, means: bool = False) -> Arra
     The trapezoids equal `scipy.integrate.cumulative_trapezoid` to the last bit; importing that
     takes a fifth of a second, for every log with velocities.
     """
-    steps = np.diff(time).reshape(-1, *[1] * (values.ndim - 1))
-    middle = values[1:] if means else 0.5 * (values[1:] + values[:-1])
-    return np.concatenate([np.zeros_like(values[:1]), np.cumsum(middle * steps, axis=0)])
+    steps, out = np.diff(time), np.zeros(values.shape)
+    # Column by column: a long log takes a large part of the memory.
+    for column, upto in zip(
+        values.reshape(len(out), -1).T, out.reshape(len(out), -1).T, strict=True
+    ):
+        middle = column[1:] if means else 0.5 * (column[1:] + column[:-1])
+        np.cumsum(middle * steps, out=upto[1:])
+    return out

@@ -780,15 +780,13 @@ def linear_range(rule: UpdateRule | None) -> NDArray[np.float64] | None:
     """
     if rule is None:
         return np.empty(0)
-    if type(rule) not in (RobustUpdate, AdaptiveRule) or not rule.influence.linear > 0.0:
+    if not isinstance(rule, RobustUpdate | AdaptiveRule) or not rule.influence.linear > 0.0:
         return None
-    options = AdaptiveScale().kernel_options
-    if isinstance(rule, AdaptiveRule):
-        options = rule.scale.kernel_options
-    out = options.copy()
-    out[kernel.LINEAR] = rule.influence.linear
+    learns = isinstance(rule, AdaptiveRule)
+    out = (rule.scale if isinstance(rule, AdaptiveRule) else AdaptiveScale()).kernel_options.copy()
+    out[kernel.LINEAR], out[kernel.LEARNS] = rule.influence.linear, float(learns)
     if isinstance(rule, RobustUpdate):
-        out[kernel.FACTOR], out[kernel.LEARNS] = rule.scale, 0.0
+        out[kernel.FACTOR] = rule.scale
     return out
 
 

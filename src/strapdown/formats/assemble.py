@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError, Finding, check_choice
-from strapdown.formats.arrays import numbers, ticks_of
+from strapdown.formats.arrays import as_rows, numbers, ticks_of
 from strapdown.formats.clocks import (
     RELATIVE,
     Clock,
@@ -82,7 +82,7 @@ Array = NDArray[np.float64]
 
 
 def assemble(raw: RawLog, options: ReadOptions) -> Recording:
-    """Convert raw columns to a recording.
+    """Convert raw columns to a recording, which may take their memory.
 
     `options`: the user's statements override those of the file, which override column names.
     DataError: a value, a stamp or a unit cannot be used; the message names file, row and remedy.
@@ -180,18 +180,20 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
             )
         )
     readings = [time_reading(raw, found, stamps, int(kept[0]))]
-    # Column by column in one block, which the table keeps: a long log takes a large part of the
-    # memory.
-    block = np.empty((3 * len(units), kept.size)).T
-    body = {triad: block[:, 3 * k : 3 * k + 3] for k, triad in enumerate(units)}
+    body, block = _block(values, units, kept.size)
     summed = {t for t, (unit, _) in units.items() if unit in SUMS[t]}
-    for triad, (unit, why) in units.items():
-        first = values[triad][kept[0]].copy()
-        factor = factor_of(unit, {**UNITS[triad], **SUMS[triad]})
-        _turn(values.pop(triad), axes, factor, kept, body[triad])
+    begins = {triad: values[triad][kept[0]].copy() for triad in units}
+    factors = {t: factor_of(unit, {**UNITS[t], **SUMS[t]}) for t, (unit, _) in units.items()}
+    for begin in range(0, kept.size, AT_ONCE):
+        rows = slice(begin, begin + AT_ONCE)
+        used = {triad: values[triad][kept[rows]] for triad in units}
+        for triad in units:
+            _turn(used[triad], axes, factors[triad], body[triad][rows])
+    del values
+    for triad in units:
         if triad in summed:
             body[triad] /= intervals(time, kept)
-        readings += _readings_of_triad(found, triad, axes, (unit, why), first)
+        readings += _readings_of_triad(found, triad, axes, units[triad], begins[triad])
     if summed:
         sampling = sampling_of_sums(summed, set(units), options.sampling, raw.name, findings)
     else:
@@ -440,13 +442,31 @@ def require_accel(recording: Recording) -> None:
         )
 
 
-def _turn(values: Array, axes: Axes, factor: float, kept: NDArray[np.int64], body: Array) -> None:
-    """Write the used rows of a triad in body axes and SI units to `body`."""
+#: Samples that are converted at a time.
+AT_ONCE = 1 << 16
+
+
+def _block(
+    values: Mapping[str, Array], triads: Iterable[str], count: int
+) -> tuple[dict[str, Array], Array]:
+    """Return where the triads of a table go, by name, and all of it, (count, 3 k).
+
+    Column by column in one array, which the table keeps: a long log takes a large part of the
+    memory. The array of the log itself, if all its rows are used and these columns are together.
+    """
+    names = list(triads)
+    columns = [values[triad].T[k] for triad in names for k in range(3)]
+    columns.sort(key=lambda one: int(one.__array_interface__["data"][0]))
+    rows = as_rows(columns) if columns[0].size == count else None
+    block = (np.empty((3 * len(names), count)) if rows is None else rows).T
+    return {triad: block[:, 3 * k : 3 * k + 3] for k, triad in enumerate(names)}, block
+
+
+def _turn(values: Array, axes: Axes, factor: float, body: Array) -> None:
+    """Write samples of a triad in body axes and SI units to `body`."""
     for j, (axis, sign) in enumerate(zip(axes.axis, axes.sign, strict=True)):
-        column = values[:, axis]
-        used = column if kept.size == column.size else column[kept]
         with np.errstate(over="ignore"):  # what is no force or rate is refused below
-            np.multiply(used, sign * factor, out=body[:, j])
+            np.multiply(values[:, axis], sign * factor, out=body[:, j])
 
 
 def _readings_of_triad(

@@ -15,7 +15,12 @@ from strapdown.errors import DataError, Finding
 from strapdown.sensors.rest import MAX_ACCEL_SD, MAX_GYRO_SD, QUIET_FACTOR, QUIET_QUANTILE, ROUNDING
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO
-from strapdown.tables.checks import check_columns, check_time, index_of, source_of, values_of
+from strapdown.tables.checks import (
+    check_columns,
+    check_time,
+    index_of,
+    source_of,
+)
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -199,7 +204,10 @@ def health_log(
             least_samples=LEAST_SAMPLES,
         )
     check_time(time, source)
-    values = np.ascontiguousarray(values_of(imu, names).T)
+    # Without a copy where the table holds these columns alone, one after the other.
+    values = (imu if list(imu.columns) == names else imu[names]).to_numpy(dtype=np.float64).T
+    if values.strides[-1] != values.itemsize:
+        values = np.ascontiguousarray(values)
     wrong = ~np.isfinite(values)
     return HealthLog(source, time, tuple(names), values, wrong, sensors, gravity, false_alarm)
 

@@ -397,16 +397,17 @@ def find_stuck(log: HealthLog) -> list[ChannelFault]:
       20th longest; with fewer than 2000, of those exceeded by a tenth and a hundredth);
     - 10 samples.
     """
-    same = np.zeros((len(log.names), log.time.size), dtype=bool)
-    same[:, 1:] = log.values[:, 1:] == log.values[:, :-1]
-    sums = np.concatenate([np.zeros((len(same), 1)), np.cumsum(same, axis=1)], axis=1)
+    # How many samples repeat the one before, up to each.
+    sums = np.zeros((len(log.names), log.time.size + 1), dtype=np.int32)
+    for values, upto in zip(log.values, sums, strict=True):
+        np.cumsum(values[1:] == values[:-1], out=upto[2:])
     faults = []
     for k in range(len(log.names)):
         faults += _stuck_runs(log, k, sums)
     return faults
 
 
-def _stuck_runs(log: HealthLog, k: int, sums: Array) -> list[ChannelFault]:
+def _stuck_runs(log: HealthLog, k: int, sums: NDArray[np.int32]) -> list[ChannelFault]:
     n = log.time.size
     starts, lengths = equal_runs(log.values[k])
     whole = int(lengths.max()) >= n - int((~np.isfinite(log.values[k])).sum())
@@ -439,7 +440,7 @@ def _tail(lengths: NDArray[np.int64], false_alarm: float) -> float:
     return limit if math.isfinite(limit) else 0.0
 
 
-def _around(sums: Array, a: NDArray[np.int64], b: NDArray[np.int64], n: int) -> Array:
+def _around(sums: NDArray[np.int32], a: NDArray[np.int64], b: NDArray[np.int64], n: int) -> Array:
     """Upper bound of the fraction of repetitions about each run."""
     left, right = np.maximum(a - AROUND, 0), np.minimum(b + AROUND, n)
     repeats = sums[a] - sums[left] + sums[right] - sums[b]
@@ -452,7 +453,7 @@ def _around(sums: Array, a: NDArray[np.int64], b: NDArray[np.int64], n: int) -> 
     return np.asarray(np.where(pairs > LEAST_RUN, bound, 0.0))
 
 
-def _others_live(sums: Array, k: int, a: int, b: int) -> bool:
+def _others_live(sums: NDArray[np.int32], k: int, a: int, b: int) -> bool:
     """Whether any other channel changes meanwhile; otherwise the whole log is constant."""
     moved = (sums[:, b] - sums[:, a + 1]) < b - a - 1
     moved[k] = False

@@ -203,6 +203,11 @@ def values_of(table: pd.DataFrame, columns: Sequence[str]) -> Array:
     return np.require(there.to_numpy(dtype=np.float64), requirements=["C", "W"])
 
 
+def channels_of(table: pd.DataFrame, columns: Sequence[str]) -> list[Array]:
+    """Return columns to be read, each an array of floats: without a copy where they are floats."""
+    return [table[name].to_numpy(dtype=np.float64) for name in columns]
+
+
 def index_of(table: pd.DataFrame) -> Array:
     """Return the stamps as floats."""
     return np.asarray(table.index.to_numpy(), dtype=np.float64)
