@@ -114,7 +114,10 @@ class Recording:
                 name: tuple(span for of, span in self._outages if of == name) for name in names
             },
         )
-        smoothed = None if self._smoothing is None else record(smoothing=self._smoothing)
+        smoothed = None
+        if self._smoothing is not None:
+            smoothed = record(smoothing=self._smoothing)
+            self._smoothing.release()
         return PipelineRun(record(), tuple(self._aligned), smoothed, self._smoothing)
 
 
