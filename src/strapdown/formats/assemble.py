@@ -65,6 +65,7 @@ from strapdown.formats.triad_units import (
 )
 from strapdown.formats.vocabularies import EULERS, QUATERNIONS
 from strapdown.tables import ACCEL, SAMPLINGS, attitude_table, find_gaps, imu_of_columns
+from strapdown.tables.on_disk import let_go
 from strapdown.units import TIME_UNITS, factor_of, parse_unit
 
 __all__ = [
@@ -104,6 +105,7 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
         found = find_columns(raw, dataclasses.replace(options, columns={}))
     findings = [*raw.findings, *unused]
     values = values_of_triads(raw, found, findings)
+    let_go(values["gyro"])
     ticks, dated = (
         ticks_of(raw, found["time"].source, found["time"].unit)
         if "time" in found
@@ -114,6 +116,7 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     bursts = None if shared is None or even is not None else spread_bursts(shared)
     ticks = even.ticks if even is not None else bursts.ticks if bursts is not None else ticks
     said = told_by_numbers(raw, found, options, values, ticks, dated)
+    let_go(values["gyro"])
     axes = body_axes(raw, options, said, findings)
     units = units_of_triads(raw, found, options, values, said, findings, questions)
     values = {t: values[t] for t in units}
@@ -125,6 +128,7 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
         questions.ask(error.finding, **_repair(error.finding, len(values["gyro"])))
         questions.refuse()
         raise
+    let_go(values["gyro"])
     try:
         stamps = stamps_of_log(raw, found, ticks, dated, options, finite, said, findings)
     except DataError as error:
@@ -189,6 +193,7 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
         used = {triad: values[triad][kept[rows]] for triad in units}
         for triad in units:
             _turn(used[triad], axes, factors[triad], body[triad][rows])
+        let_go(block)
     del values
     for triad in units:
         if triad in summed:
@@ -199,11 +204,16 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     else:
         sampling = sampling_of_rates(raw, options, findings)
     report_gaps(raw.name, time, body["gyro"], findings)
+    let_go(block)
     _refuse_impossible(raw.name, body, lambda k: raw.row(int(kept[k])))
+    let_go(block)
     report_absurd(raw.name, body["gyro"], lambda k: raw.row(int(kept[k])), findings)
+    let_go(block)
     report_weightless(raw.name, body.get("accel"), findings)
+    let_go(block)
     columns = [f"{triad}_{a}" for triad in units for a in AXES]
     imu = imu_of_columns(time, block, columns, sampling=sampling, source=raw.name)
+    let_go(block)
     if not axes.stated:
         imu.attrs["axes"] = AXES_OF_SENSOR
     imu.attrs["sensor_axes"] = ",".join(

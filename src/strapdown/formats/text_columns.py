@@ -15,6 +15,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.tables import on_disk
+
 __all__ = ["NULLS", "Columns", "columns_at_once", "parsed", "single_blanks"]
 
 Columns = list[NDArray[Any]]
@@ -24,6 +26,8 @@ NULLS = ("", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "NULL", "null", "None")
 BLOCK = 1 << 20
 #: Bytes that are parsed at a time where all columns are numbers; they stay in the cache.
 STREAMED = 1 << 18
+#: Rows of a long table that are kept in memory while it is read.
+KEPT = 1 << 18
 # Null bytes and unusual line breaks, which are regular in no text.
 _ODD = (b"\0", b"\x0b", b"\x0c", b"\x1c", b"\x1d", b"\x1e")
 # Types of numbers; each holds those before it.
@@ -102,7 +106,7 @@ def _streamed(
     size = len(view) if isinstance(source, bytes) else source.stat().st_size - start
     # Doubles are rows of one array, which the table of the log keeps.
     room = int(1.02 * size / width) + 16
-    block = np.empty((sum(doubles), room))
+    block = on_disk.room((sum(doubles), room))
     whole = np.empty((len(doubles) - len(block), room), dtype=np.int64)
     rows = 0
     try:
@@ -124,9 +128,12 @@ def _streamed(
                     if parsed_now.null_count:
                         return None
                     column[rows:end] = parsed_now.to_numpy()
+                if end // KEPT > rows // KEPT:
+                    on_disk.let_go(block)
                 rows = end
     except pa.ArrowInvalid:
         return None
+    on_disk.let_go(block)
     return [column[:rows] for column in _columns(block, whole, doubles)]
 
 

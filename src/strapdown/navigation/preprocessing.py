@@ -25,6 +25,7 @@ from strapdown.sensors.saturation import ROUNDING
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import index_of, is_number, values_of
+from strapdown.tables.on_disk import let_go
 
 __all__ = [
     "NEAR",
@@ -67,6 +68,7 @@ def steps_of(
     at = 0
     for cut in cuts:
         values = values_of(imu.iloc[at:cut], [*GYRO, *ACCEL])
+        let_go(imu)
         state, steps = intake.advance(state, time[at:cut], values, cut == len(time))
         at = cut
         used = (steps.time > begin + NEAR) & (steps.time <= end + NEAR)

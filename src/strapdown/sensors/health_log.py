@@ -21,6 +21,7 @@ from strapdown.tables.checks import (
     index_of,
     source_of,
 )
+from strapdown.tables.on_disk import let_go
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -232,6 +233,7 @@ def _blocks(log: HealthLog) -> Blocks:
     mean, sd, noise, white = (np.zeros(shape) for _ in range(4))
     valid = np.ones(shape, dtype=bool)
     for k in range(len(log.names)):
+        let_go(log.values)
         cut = log.values[k, : count * size].reshape(count, size)
         bad = log.wrong[k, : count * size].reshape(count, size).any(axis=1)
         valid[:, k] = ~bad

@@ -294,7 +294,7 @@ def _refuse_degrees(imu: pd.DataFrame, sensors: ImuUncertainty) -> None:
     if not ((times > DEGREES[0]) & (times < DEGREES[1])).all():
         return
     # A vehicle does not turn around within a second.
-    if float(np.quantile(np.abs(channels_of(imu, GYRO)), 0.99)) > WILD:
+    if float(np.quantile([np.abs(one) for one in channels_of(imu, GYRO)], 0.99)) > WILD:
         raise DataError(
             "navigation.gyros-seem-in-deg-per-s",
             file=source_of(imu),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from numbers import Real
 
@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.errors import DataError
+from strapdown.tables.on_disk import let_go
 
 Array = NDArray[np.float64]
 
@@ -203,9 +204,12 @@ def values_of(table: pd.DataFrame, columns: Sequence[str]) -> Array:
     return np.require(there.to_numpy(dtype=np.float64), requirements=["C", "W"])
 
 
-def channels_of(table: pd.DataFrame, columns: Sequence[str]) -> list[Array]:
-    """Return columns to be read, each an array of floats: without a copy where they are floats."""
-    return [table[name].to_numpy(dtype=np.float64) for name in columns]
+def channels_of(table: pd.DataFrame, columns: Sequence[str]) -> Iterator[Array]:
+    """Yield columns to be read, each an array of floats: without a copy where they are floats."""
+    for name in columns:
+        channel = table[name].to_numpy(dtype=np.float64)
+        yield channel
+        let_go(channel)
 
 
 def index_of(table: pd.DataFrame) -> Array:
