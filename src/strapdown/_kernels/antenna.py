@@ -63,7 +63,7 @@ def antenna(level, up, earth, arm, arm_at, gyro_terms, accel_terms, felt, steady
                 moves[k, arm_at + j] = c[3 * k + j]
     value[POSITION, 0], value[POSITION, 1], value[POSITION, 2] = rx, ry, rz
     if upto >= VELOCITY:
-        sx, sy, sz = earth[RATE] * level[AXIS], earth[RATE] * level[AXIS + 1], 0.0
+        sx, sy = earth[RATE] * level[AXIS], earth[RATE] * level[AXIS + 1]
         sz = earth[RATE] * level[AXIS + 2]
         ix, iy, iz = turned(c, felt[0], felt[1], felt[2])
         wx, wy, wz = ix - sx, iy - sy, iz - sz

@@ -518,7 +518,14 @@ class EpochLoop:
         if not isinstance(rule, AdaptiveRule):
             return np.zeros((2, 3, len(ScaleState._fields)))
         names = (aid.names(code)[0] for code in (POSITION_CODE, VELOCITY_CODE))
-        return np.array([self.scales.get(name) or rule.begin(3) for name in names])
+        return np.array([self._scales(rule, name, 3) for name in names])
+
+    def _scales(self, rule: AdaptiveRule, name: str, size: int) -> Scales:
+        """Scales learned of the components of an observation, or their begin.
+
+        A velocity has two components or three.
+        """
+        return (*self.scales.get(name, ()), *rule.begin(size))[:size]
 
     def _fixed(self, aid: Gnss, fixes: Epochs, fixed: tuple[Array, ...]) -> None:
         """Record the results of position fixes."""
@@ -640,7 +647,7 @@ class EpochLoop:
         asked: list[Rules] = []
         for rule, one in zip(rules, observations, strict=True):
             if isinstance(rule, AdaptiveRule):
-                scales = self.scales.get(one.name) or rule.begin(one.z.size)
+                scales = self._scales(rule, one.name, one.z.size)
                 away = _is_away(scales, one, view)
                 asked.append(away or rule.rules(scales))
             else:
@@ -650,11 +657,13 @@ class EpochLoop:
         self._unlearn(met)
         for rule, one, nu in zip(rules, observations, innovations, strict=True):
             if isinstance(rule, AdaptiveRule):
-                before = self.scales.get(one.name) or rule.begin(one.z.size)
+                before = self._scales(rule, one.name, one.z.size)
                 after = rule.after(before, nu, one.R)
                 if set(one.labels) <= set(PLACE):
                     after = rule.jumped((before, after), nu, self.engine.time, _reach)
-                self.scales[one.name] = after
+                # A component that is not of this one keeps what it learned.
+                others = self.scales.get(one.name, ())[len(after) :]
+                self.scales[one.name] = (*after, *others)
         return innovations
 
     def _unlearn(self, met: FilterState) -> None:

@@ -205,6 +205,24 @@ def test_a_compiled_loop_takes_what_is_in_the_linear_range_of_a_rule(log, monkey
     assert bool(fast[3].scales) == isinstance(rule, AdaptiveRule)
 
 
+def test_velocities_of_two_components_and_of_three_learn_together(log, monkeypatch):
+    """As of a receiver that outputs speed and course until it has a vertical velocity."""
+    time, rows, fixes = log
+    level = fixes.copy()
+    level.iloc[:30, level.columns.get_loc(VELOCITY_SD[2])] = np.inf
+    level.iloc[50:55, level.columns.get_loc(VELOCITY_SD[2])] = np.inf
+    navigator, state = started(aids=RULED)
+    fast = run((time, rows, level), navigator, state)
+    sizes = [len(one.labels) for one in fast[2] if one.name == "rtk.velocity"]
+    assert set(sizes) == {2, 3}
+    assert len(fast[3].scales["rtk.velocity"]) == 3
+    monkeypatch.setattr(navigator_module, "compiled", lambda _: False)
+    slow = run((time, rows, level), navigator, state)
+    np.testing.assert_allclose(fast[0], slow[0], rtol=1e-9, atol=1e-9)
+    for name, learned in fast[3].scales.items():
+        np.testing.assert_allclose(learned, slow[3].scales[name], rtol=1e-7, atol=1e-9)
+
+
 @pytest.mark.parametrize("model", ["rotation_vector", "quaternions"])
 @pytest.mark.parametrize("damping", [None, OpenLoop()], ids=["feedback", "feedforward"])
 def test_errors_are_found_and_as_large_as_is_said(log, model, damping):

@@ -342,7 +342,8 @@ def _integrals(
     stamps: Array, imu: pd.DataFrame, columns: list[str], means: bool
 ) -> tuple[Array, Array]:
     """Integrals of three channels, (m, 3), at times no closer than the search needs."""
-    each = max(1, int(NODES / float(np.median(np.diff(stamps)))))
+    # Steps are rounded decimal fractions.
+    each = max(1, int(NODES / float(np.median(np.diff(stamps))) + 1e-6))
     last = len(stamps) - 1
     kept = np.append(np.arange(0, last, each), last)
     channels = channels_of(imu, columns)
