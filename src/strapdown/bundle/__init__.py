@@ -366,7 +366,7 @@ def versions() -> dict[str, str]:
 
 
 #: Extras with readers, references and signatures; the others are for development.
-RUN_EXTRAS = ("logs", "mavlink", "peers", "sign")
+RUN_EXTRAS = ("logs", "mavlink", "pdf", "peers", "sign")
 
 
 @functools.cache

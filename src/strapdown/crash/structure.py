@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+
 # At the top, so that it is loaded where a run limits its threads (`systems.one_thread`).
 from scipy.linalg import solve_triangular
 

@@ -14,11 +14,9 @@ from importlib.resources import files
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
-from xml.etree import ElementTree
 
 from strapdown.errors import DataError, Finding, Words
 from strapdown.report.chart import Chart
-from strapdown.report.chart_svg import still
 
 if TYPE_CHECKING:
     from strapdown.report.scene import Scene
@@ -450,6 +448,8 @@ def draw_stills(document: Document) -> tuple[str, ...]:
     tuple of str
         One SVG per chart, in document order.
     """
+    from strapdown.report.chart_svg import still
+
     return tuple(still(c) for c in drawings(document.plain) if isinstance(c, Chart))
 
 
@@ -568,6 +568,8 @@ class _Writer:
         }
 
     def _picture(self, picture: Picture) -> dict[str, Any]:
+        from xml.etree import ElementTree
+
         try:
             ElementTree.fromstring(picture.svg)
         except ElementTree.ParseError as error:
