@@ -147,8 +147,7 @@ class Compilations:
 @contextmanager
 def progress(quiet: bool) -> Iterator[Callable[[str, float], None]]:
     """Show the stage and the share done on the terminal, and erase them at the end."""
-    out = console(err=True)
-    if quiet or not out.is_terminal:
+    if quiet or not (out := console(err=True)).is_terminal:
         yield lambda stage, share: None
         return
     from rich.progress import (

@@ -18,8 +18,8 @@ from strapdown.report.document import (
     Paragraph,
     Picture,
     Section,
-    document_page,
 )
+from strapdown.report.document_html import document_page
 from strapdown.report.values import decimals, plain
 
 _MS_TO_KMH = 3.6

@@ -16,11 +16,11 @@ from strapdown.formats import csv
 from strapdown.progress import Progress, silent
 from strapdown.report.document import (
     Document,
-    document_page,
     draw_stills,
     write_drawings,
     write_text,
 )
+from strapdown.report.document_html import document_page
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables.checks import index_of
 

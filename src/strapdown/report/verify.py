@@ -304,7 +304,7 @@ def _compare(
 
 
 #: Packages that draw pages, figures and PDF.
-DRAWING = ("strapdown", "strapdown source", "jinja2", "typst")
+DRAWING = ("strapdown", "strapdown source", "typst")
 #: Codes of files that were not compared as a whole.
 PARTIAL = ("verify.drawing", "verify.not-compared")
 
