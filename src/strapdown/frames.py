@@ -62,8 +62,8 @@ def ecef_from_geodetic(place: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> Arr
         A latitude is beyond 90 deg, a longitude beyond 360 deg, a height outside of -1e6 to
         1e9 m, a value not finite, or the shape is wrong.
     """
-    columns, leading = _columns(place, ("lat_deg", "lon_deg", "alt"), "place")
-    return _ecef(*columns, ellipsoid).reshape((*leading, 3))
+    (lat, lon, alt), leading = _columns(place, ("lat_deg", "lon_deg", "alt"), "place")
+    return _ecef(lat, lon, alt, ellipsoid).reshape((*leading, 3))
 
 
 def geodetic_from_ecef(position: ArrayLike, *, ellipsoid: Ellipsoid = WGS84) -> Array:

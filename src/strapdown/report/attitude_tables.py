@@ -421,7 +421,7 @@ def _parts(bench: AttitudeComparison) -> tuple[list[str], dict[str, dict[str, st
 def _lowest_rate(bench: AttitudeComparison, algorithm: str) -> str:
     """Lowest rate of averaged samples down to which the algorithm error is within tolerance."""
     grid = sweep_grid(bench, "sum", "own_deg")
-    errors = zip(grid.columns.tolist(), grid.loc[algorithm].tolist(), strict=True)
+    errors = zip(grid.columns.tolist(), grid.loc[algorithm].to_list(), strict=True)
     within = list(takewhile(lambda cell: cell[1] <= bench.answer.tolerance_deg, errors))
     return f"{float(within[-1][0]):.3g} Hz" if within else _NONE
 

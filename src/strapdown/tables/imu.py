@@ -29,7 +29,7 @@ from strapdown.tables.checks import (
     index_of,
     joined,
     source_of,
-    values_of,
+    view_of,
 )
 
 SAMPLINGS = ("instantaneous", "mean")
@@ -144,10 +144,7 @@ def check_imu(table: pd.DataFrame) -> None:
             count=len(table),
         )
     check_time(index_of(table), source)
-    # No copy in another layout only to check it.
-    whole = list(table.columns) == columns
-    values = table.to_numpy(dtype=np.float64) if whole else values_of(table, columns)
-    check_rows(values, columns, source)
+    check_rows(view_of(table, columns), columns, source)
 
 
 # Increments tables: integrated angular rate per step, before any algorithm.
