@@ -19,7 +19,6 @@ from strapdown.formats.join import join
 from strapdown.formats.known_formats import lacking, selected
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, head
-from strapdown.formats.trajectory_writers import one_line
 from strapdown.formats.writing import (
     FileOptions,
     Tables,
@@ -108,6 +107,8 @@ def write_gpx(path: Path, tables: Tables, options: FileOptions) -> list[Finding]
 
     DataError: the clock is not related to UTC, or there are neither fixes nor a trajectory.
     """
+    from strapdown.formats.trajectory_writers import one_line
+
     options.require_wgs84("GPX")
     gnss, findings = fixes_of(tables, "GPX")
     stamps, said = dates(gnss, options, "GPX")
