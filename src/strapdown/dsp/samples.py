@@ -1,4 +1,4 @@
-"""Samples of a signal: checks before filters, runs of flags, white noise, running integral."""
+"""Samples of a signal: checks before filters, runs of flags, white noise, moving mean, integral."""
 
 from __future__ import annotations
 
@@ -139,6 +139,20 @@ def white_sd(values: Array) -> Array:
     equal steps. Returns (...), in their unit.
     """
     return np.asarray(np.sqrt(np.square(np.diff(values, n=2, axis=0)).mean(axis=0) / 6.0))
+
+
+def moving_mean(values: Array, width: int) -> Array:
+    """Average over the `width` samples about each; the first and last samples continue beyond.
+
+    `values` ((n, ...)). Returns (n, ...): ``scipy.ndimage.uniform_filter1d(mode="nearest")`` to the
+    last bit, without its import, which takes longer than reading a log.
+    """
+    before = width // 2
+    ends = (np.repeat(values[:1], before, axis=0), np.repeat(values[-1:], width - 1 - before, 0))
+    padded = np.concatenate([ends[0], values, ends[1]])
+    steps = padded[width:] - padded[:-width]
+    first = np.cumsum(padded[:width], axis=0)[-1:]
+    return np.asarray(np.cumsum(np.concatenate([first, steps]), axis=0) / width)
 
 
 def running_integral(time: Array, values: Array, *, means: bool = False) -> Array:

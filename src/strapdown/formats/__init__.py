@@ -73,6 +73,7 @@ __all__ = [
     "read_raw",
     "reader_of",
     "readers_of",
+    "recording_of",
 ]
 
 
@@ -595,7 +596,11 @@ def read_log(path: str | Path, options: ReadOptions | None = None) -> Recording:
         The log cannot be used; the message names file, row, quantity and remedy.
     """
     asked = options or ReadOptions()
-    raw = read_raw(Path(path), asked.format)
+    return recording_of(read_raw(Path(path), asked.format), asked)
+
+
+def recording_of(raw: RawLog, asked: ReadOptions) -> Recording:
+    """Convert raw columns of inertial sensors as `read_log`; a table of another kind is refused."""
     known = {*asked.columns, *names_of_quantities(raw)}
     if not any(q.startswith("gyro") for q in known) and not known.issuperset(BODY_RATES):
         _refuse_other_table(raw)

@@ -20,6 +20,7 @@ from strapdown.tables.checks import (
     check_time,
     index_of,
     source_of,
+    view_of,
 )
 from strapdown.tables.on_disk import let_go
 
@@ -205,8 +206,7 @@ def health_log(
             least_samples=LEAST_SAMPLES,
         )
     check_time(time, source)
-    # Without a copy where the table holds these columns alone, one after the other.
-    values = (imu if list(imu.columns) == names else imu[names]).to_numpy(dtype=np.float64).T
+    values = view_of(imu, names).T
     if values.strides[-1] != values.itemsize:
         values = np.ascontiguousarray(values)
     wrong = ~np.isfinite(values)

@@ -30,7 +30,7 @@ from strapdown.tables.checks import (
     index_of,
     joined,
     source_of,
-    values_of,
+    view_of,
 )
 
 SAMPLINGS = ("instantaneous", "mean")
@@ -149,7 +149,7 @@ def check_imu(table: pd.DataFrame) -> None:
     with np.errstate(invalid="ignore", over="ignore"):
         finite = all(np.isfinite(one.sum()) for one in channels_of(table, columns))
     if not finite:
-        check_rows(values_of(table, columns), columns, source)
+        check_rows(view_of(table, columns), columns, source)
 
 
 # Increments tables: integrated angular rate per step, before any algorithm.
