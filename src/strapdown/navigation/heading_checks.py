@@ -268,7 +268,7 @@ class _Check:
             windows = sliding_window_view(u, size, axis=0)
             at = np.flatnonzero(full)
             for some in np.array_split(at, range(AT_ONCE, len(at), AT_ONCE)):
-                out[some] = _scatter(windows[upto[some] - size].reshape(len(some), -1))
+                out[some] = _scatter(windows[upto[some] - size].reshape(len(some), 2 * size))
         for k in np.flatnonzero(~full & (upto >= FEWEST)).tolist():
             out[k] = _scatter(u[: upto[k]].reshape(1, -1))[0]
         return out
