@@ -82,10 +82,10 @@ __all__ = [
 Array = NDArray[np.float64]
 
 
-def assemble(raw: RawLog, options: ReadOptions) -> Recording:
+def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Recording:
     """Convert raw columns to a recording, which may take their memory.
 
-    `options`: the user's statements override those of the file, which override column names.
+    `keep`: whether the columns are used again, and left as they are. `options`: the user's statements override those of the file, which override column names.
     DataError: a value, a stamp or a unit cannot be used; the message names file, row and remedy.
     ConfigError: an option names a column that does not exist.
     """
@@ -184,7 +184,7 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
             )
         )
     readings = [time_reading(raw, found, stamps, int(kept[0]))]
-    body, block = _block(values, units, kept.size)
+    body, block = _block(values, units, kept.size, keep)
     summed = {t for t, (unit, _) in units.items() if unit in SUMS[t]}
     begins = {triad: values[triad][kept[0]].copy() for triad in units}
     factors = {t: factor_of(unit, {**UNITS[t], **SUMS[t]}) for t, (unit, _) in units.items()}
@@ -457,7 +457,7 @@ AT_ONCE = 1 << 16
 
 
 def _block(
-    values: Mapping[str, Array], triads: Iterable[str], count: int
+    values: Mapping[str, Array], triads: Iterable[str], count: int, keep: bool
 ) -> tuple[dict[str, Array], Array]:
     """Return where the triads of a table go, by name, and all of it, (count, 3 k).
 
@@ -467,7 +467,7 @@ def _block(
     names = list(triads)
     columns = [values[triad].T[k] for triad in names for k in range(3)]
     columns.sort(key=lambda one: int(one.__array_interface__["data"][0]))
-    rows = as_rows(columns) if columns[0].size == count else None
+    rows = as_rows(columns) if columns[0].size == count and not keep else None
     block = (np.empty((3 * len(names), count)) if rows is None else rows).T
     return {triad: block[:, 3 * k : 3 * k + 3] for k, triad in enumerate(names)}, block
 
