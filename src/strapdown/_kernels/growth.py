@@ -17,7 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from strapdown._kernels.compilation import IN_PLACE, njit
+from strapdown._kernels.compilation import IN_PLACE, dot, njit
+from strapdown._kernels.covariance import EPSILON, not_finite
 
 CORE = 9
 SIXTH = 1.0 / 6.0
@@ -26,6 +27,8 @@ LANES = 16
 PANEL = CORE * LANES
 # Columns of velocity and attitude, by which white noise enters; the first sensor's.
 VELOCITY, ATTITUDE, SENSORS = 3, 6, 9
+# Columns of white noise.
+WHITE = 6
 # Sensor states treated with the core: a bias of each axis of two triads.
 WITH_CORE = 6
 
@@ -204,8 +207,8 @@ def add_product(a, m, first, second, third, fourth, out):
 
 
 @njit(**IN_PLACE, forceinline=True)
-def times_covariance(phi, P, wide, out):
-    """Fill the panels of ``Phi P``; `wide` takes P in panels, (panels, rows by fours, LANES)."""
+def in_panels(P, wide):
+    """Fill `wide`, (panels, rows by fours, LANES), with the numbers of P."""
     n = P.shape[0]
     for p in range(wide.shape[0]):
         end = min(n - LANES * p, LANES)
@@ -213,6 +216,11 @@ def times_covariance(phi, P, wide, out):
             row = P[m, LANES * p : LANES * p + end]
             for j in range(end):
                 wide[p, m, j] = row[j]
+
+
+@njit(**IN_PLACE, forceinline=True)
+def times_panels(phi, wide, out):
+    """Fill the panels of the core's rows of ``Phi P``, of a matrix P in `in_panels`."""
     for p in range(wide.shape[0]):
         part, panel = wide[p], out[p]
         for j in range(PANEL):
@@ -268,7 +276,8 @@ def grown_covariance(P, growth, room):
     phi, lift, weight, tail, own = growth
     _, half, weighted, _, wide = room
     n, k = P.shape[0], tail.shape[0]
-    times_covariance(phi, P, wide, half)
+    in_panels(P, wide)
+    times_panels(phi, wide, half)
     noisy, entering, by = weighted[0], lift[0], weight[0]
     for i in range(CORE):
         for j in range(LANES):
@@ -295,6 +304,114 @@ def grown_covariance(P, growth, room):
         if bad < 0 and not 0.0 <= P[i, i] < math.inf:
             bad = i
     return bad
+
+
+def factor_room(n: int) -> tuple[Any, ...]:
+    """Work arrays of `grown_factors`: rows to orthogonalize; weights, weighted, squares."""
+    width = LANES + padded_width(2 * (n - CORE))
+    return np.zeros((n, width)), np.zeros((3, max(width, n)))
+
+
+@njit(**IN_PLACE, forceinline=True)
+def orthogonalize(W, work, last, stop, at, size, ud):
+    """Turn rows of W, from `last` down to `stop`, into rows of U and D, in place.
+
+    Modified weighted Gram-Schmidt (Bierman 1977, Section VI.4) over the `size` columns from `at`
+    on, a multiple of LANES; those before are zero in these rows. A row that others explain to
+    rounding leaves D = 0 and no direction.
+    """
+    d, weighted, whole = work[0, at : at + size], work[1], work[2]
+    for i in range(last + 1):
+        row = W[i, at : at + size]
+        for k in range(size):
+            weighted[k] = d[k] * row[k]
+        whole[i] = dot(weighted, row, size)
+    for j in range(last, stop - 1, -1):
+        row = W[j, at : at + size]
+        for k in range(size):
+            weighted[k] = d[k] * row[k]
+        total = dot(weighted, row, size)
+        if total <= size * EPSILON * EPSILON * whole[j]:
+            for i in range(j):
+                ud[i, j] = 0.0
+            ud[j, j] = 0.0
+            continue
+        ud[j, j] = total
+        inverse = 1.0 / total
+        for i in range(j):
+            other = W[i, at : at + size]
+            share = inverse * dot(weighted, other, size)
+            ud[i, j] = share
+            for k in range(size):
+                other[k] -= share * row[k]
+
+
+@njit(**IN_PLACE)
+def grown_factors(ud, growth, room, rows, work):
+    """Replace the factors of P by those of ``Phi P Phi' + Q`` (Thornton, by blocks).
+
+    P = U D U'; an array holds U above its diagonal and D on it. Constant sensors at the end keep
+    their rows of U and D, and their columns are those of Phi U. What is left, the core and the
+    sensors before, is orthogonalized as ``[Phi U, G]``, with the columns that noise enters by as
+    they are; columns of sensors and of their noise are zero in no row of theirs alone, and so come
+    last. `growth` is of `growth_of_step`, `rows` and `work` of `factor_room`.
+
+    Return -1, or the first state whose variance is not finite.
+    """
+    phi, lift, weight, tail, own = growth
+    _, half, _, _, wide = room
+    n, k = ud.shape[0], tail.shape[0]
+    in_panels(ud, wide)
+    for m in range(n):
+        wide[m // LANES, m, m % LANES] = 1.0
+    times_panels(phi, wide, half)
+    taking = 0
+    for s in range(k):
+        if tail[s] != 1.0 or weight[(SENSORS + s) // LANES, (SENSORS + s) % LANES] != 0.0:
+            taking = s + 1
+    d = work[0]
+    for i in range(CORE):
+        d[i] = ud[i, i]
+        for j in range(LANES):
+            rows[i, j] = half[0, LANES * i + j]
+        # The six columns of white noise, in place of the sensors'.
+        for j in range(WHITE):
+            rows[i, CORE + j] = lift[0, LANES * i + VELOCITY + j]
+        rows[i, CORE + WHITE] = 0.0
+    for j in range(WHITE):
+        d[CORE + j] = weight[0, VELOCITY + j]
+    d[CORE + WHITE] = 0.0
+    for s in range(taking, k):
+        p, j = (SENSORS + s) // LANES, (SENSORS + s) % LANES
+        # What is known has no direction, which would grow to no end.
+        by = 1.0 if ud[SENSORS + s, SENSORS + s] != 0.0 else 0.0
+        for i in range(CORE):
+            ud[i, SENSORS + s] = by * half[p, LANES * i + j]
+        for m in range(taking):
+            ud[SENSORS + m, SENSORS + s] *= by * tail[m]
+    if taking == 0:
+        orthogonalize(rows, work, CORE - 1, 0, 0, LANES, ud)
+        return not_finite(ud)
+    size = 2 * taking
+    size += (LANES - size % LANES) % LANES
+    for i in range(SENSORS + taking):
+        for j in range(size):
+            rows[i, LANES + j] = 0.0
+    for j in range(size):
+        d[LANES + j] = 0.0
+    for s in range(taking):
+        p, j = (SENSORS + s) // LANES, (SENSORS + s) % LANES
+        d[LANES + s], d[LANES + taking + s] = ud[SENSORS + s, SENSORS + s], weight[p, j]
+        for i in range(CORE):
+            rows[i, LANES + s] = half[p, LANES * i + j]
+            rows[i, LANES + taking + s] = lift[p, LANES * i + j]
+        for m in range(s):
+            rows[SENSORS + m, LANES + s] = tail[m] * ud[SENSORS + m, SENSORS + s]
+        rows[SENSORS + s, LANES + s] = tail[s]
+        rows[SENSORS + s, LANES + taking + s] = own[s]
+    orthogonalize(rows, work, SENSORS + taking - 1, SENSORS, LANES, size, ud)
+    orthogonalize(rows, work, CORE - 1, 0, 0, LANES + size, ud)
+    return not_finite(ud)
 
 
 @njit(**IN_PLACE)
