@@ -414,10 +414,10 @@ def grown_factors(ud, growth, room, columns, work):
             taking = s + 1
     d, done = work[0], work[1]
     end = WITHOUT_SENSORS + 2 * taking
-    for c in range(end):
-        column = columns[c]
-        for i in range(CORE, rows):
-            column[i] = 0.0
+    if taking > 0:
+        for c in range(end):
+            for i in range(CORE, rows):
+                columns[c, i] = 0.0
     for j in range(CORE):
         core_of_column(turned, ud, j, columns[j])
         d[j] = ud[j, j]
