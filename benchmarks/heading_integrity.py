@@ -16,7 +16,7 @@ import numpy as np
 from benchmarks import heading_fixes as fixes
 from benchmarks import heading_rests as rests
 from benchmarks.heading_case import LIMIT, Case, run
-from strapdown.navigation.heading_integrity import COLOURS
+from strapdown.navigation.heading_integrity import STATUSES
 
 SCENARIOS: dict[str, Callable[[int], Case]] = {
     "as stated": fixes.nominal,
@@ -37,9 +37,9 @@ def main(seeds: int, names: list[str]) -> None:
         "scenario | drives | seconds | green | amber | red | good that are green | false green |"
         " wrong that the bound believes | wrong: green amber red"
     )
-    total = np.zeros((3, 2), dtype=int)
+    total = np.zeros((len(STATUSES), 2), dtype=int)
     for name in names or SCENARIOS:
-        table, believed, drives = np.zeros((3, 2), dtype=int), 0, set()
+        table, believed, drives = np.zeros_like(total), 0, set()
         failed = 0
         for seed in range(seeds):
             try:
@@ -49,9 +49,9 @@ def main(seeds: int, names: list[str]) -> None:
                 print("  ", name, seed, type(error_).__name__, error_)
                 continue
             wrong = np.abs(error) > LIMIT
-            for colour in range(3):
+            for status in range(len(STATUSES)):
                 for bad in range(2):
-                    table[colour, bad] += int(((light == colour) & (wrong == bool(bad))).sum())
+                    table[status, bad] += int(((light == status) & (wrong == bool(bad))).sum())
             believed += int((wrong & (bound <= LIMIT)).sum())
             if ((light == 0) & wrong).any():
                 drives.add(seed)
@@ -74,7 +74,6 @@ def row(name: str, drives: int, table: np.ndarray, believed: int) -> None:
         f" | within {table[:, 0].tolist()} beyond {table[:, 1].tolist()}",
         flush=True,
     )
-    assert len(COLOURS) == 3
 
 
 if __name__ == "__main__":

@@ -1,7 +1,6 @@
-"""A drive of 57 min with 200 Hz increments and a fix a second, beside KF-GINS.
+"""A drive of 57 min with 200 Hz increments and a fix a second, and its configuration.
 
-The recorded RTK track and the generator are those of the measuring sticks beside the recordings;
-so are the figures of KF-GINS, which was run there: in C++, with 21 states, from files to files.
+The recorded RTK track and the generator are those of the measuring sticks beside the recordings.
 """
 
 from __future__ import annotations
@@ -10,19 +9,10 @@ import json
 import os
 import subprocess
 import sys
-import tempfile
-from collections.abc import Iterator
 from pathlib import Path
-from statistics import median
-from time import perf_counter
-
-from benchmarks.measure import Ratio
 
 DATA = Path(os.environ.get("STRAPDOWN_DATA", Path(__file__).parents[2] / "shared/data")).resolve()
 BENCH = DATA.parent / "bench" / "kfgins"
-#: Samples a second, input and output included.
-KF_GINS = 43_600.0
-ROUNDS = 3
 FILE = """[log]
 path = "{folder}/Leador-A15-sim.txt"
 from_s = {begin}
@@ -104,32 +94,3 @@ def written(folder: Path, fixes: str) -> str:
         attitude_sd=sd["rph_deg"],
         arm=told["lever_frd_m"],
     )
-
-
-def ratios() -> Iterator[Ratio]:
-    if lacking := missing():
-        print(f"{lacking}: the drive beside KF-GINS is left out")
-        return
-    with tempfile.TemporaryDirectory(prefix="strapdown-") as name:
-        folder = Path(name)
-        generate(folder)
-        file, out = folder / "run.toml", folder / "out"
-        file.write_text(written(folder, "GNSS-RTK-sim.txt"))
-        command = [sys.executable, "-m", "strapdown", "navigate", str(file)]
-        whole, alone = [], []
-        for _ in range(ROUNDS + 1):
-            start = perf_counter()
-            subprocess.run([*command, "--out", str(out), "--force", "-q"], check=True)
-            whole.append(perf_counter() - start)
-            told = json.loads((out / "timing.json").read_text())["seconds"]
-            alone.append(told["navigation"])
-        with (out / "trajectory.nav").open("rb") as stream:
-            samples = sum(1 for _ in stream)
-    for what, seconds, limit in (
-        ("57 min at 200 Hz, the filter of 21 states, a sample", alone, None),
-        ("the same by the command, from text to report, a sample", whole, 1 / 3),
-    ):
-        # The first compiles.
-        taken = median(seconds[1:]) / samples
-        against = f"KF-GINS, files to files ({KF_GINS:,.0f}/s, as measured once)"
-        yield Ratio(what, 1e6 * taken, against, 1e6 / KF_GINS, "µs", limit)

@@ -96,16 +96,15 @@ class NavState:
         """
         lat, lon, alt, north, east, down, w, x, y, z = numbers
         norm = math.sqrt(w * w + x * x + y * y + z * z)
-        whole = math.isfinite(time + lat + lon + alt + north + east + down + norm)
         near = abs(lat) <= 0.5 * math.pi and abs(lon) <= math.pi and abs(norm - 1.0) < 0.01
-        if not (whole and near):
+        if not (near and math.isfinite(time + alt + north + east + down)):
             return cls(time, lat, lon, alt, np.array([north, east, down]), np.array([w, x, y, z]))
-        v_n = np.array([north, east, down])
-        q_nb = np.array([w / norm, x / norm, y / norm, z / norm])
-        v_n.setflags(write=False)
-        q_nb.setflags(write=False)
+        both = np.array((north, east, down, w / norm, x / norm, y / norm, z / norm))
+        both.setflags(False)
         made = object.__new__(cls)
-        made.__dict__.update(time=time, lat=lat, lon=lon, alt=alt, v_n=v_n, q_nb=q_nb)
+        own = made.__dict__
+        own["time"], own["lat"], own["lon"], own["alt"] = time, lat, lon, alt
+        own["v_n"], own["q_nb"] = both[:3], both[3:]
         return made
 
     @classmethod

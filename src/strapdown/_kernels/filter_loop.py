@@ -13,9 +13,9 @@ import numpy as np
 from strapdown._kernels.antenna import POSITION, VELOCITY, antenna
 from strapdown._kernels.compensation import compensate, errors_of_states
 from strapdown._kernels.compilation import IN_PLACE, njit
-from strapdown._kernels.covariance import dense_update, ud_update, udu_matrix, udu_predict, wd_epoch
+from strapdown._kernels.covariance import dense_update, ud_update, udu_matrix, wd_epoch
 from strapdown._kernels.earth import E2, A, displacement
-from strapdown._kernels.growth import grown_covariance, growth_of_step, unfold_growth
+from strapdown._kernels.growth import grown_covariance, grown_factors, growth_of_step
 from strapdown._kernels.level import (
     LEVEL,
     WANDER,
@@ -101,17 +101,10 @@ def matrix_over_group(states, room):
     return grown_covariance(states[2], room[1], room[2])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**IN_PLACE)
 def factors_over_group(states, room):
     """Propagate the factors of a covariance over a group; return -1, or the first invalid state."""
-    _, growth, _, _, _, whole, added, after = room
-    unfold_growth(growth, whole, added)
-    bad = udu_predict(states[2], whole, added, after)
-    covariance = states[2]
-    for i in range(covariance.shape[0]):
-        for j in range(covariance.shape[1]):
-            covariance[i, j] = after[i, j]
-    return bad
+    return grown_factors(states[2], room[1], room[2], room[6], room[7])
 
 
 @njit(**IN_PLACE)

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from strapdown._kernels.compilation import IN_PLACE, njit
+from strapdown._kernels.covariance import EPSILON, not_finite
 
 CORE = 9
 SIXTH = 1.0 / 6.0
@@ -26,6 +27,8 @@ LANES = 16
 PANEL = CORE * LANES
 # Columns of velocity and attitude, by which white noise enters; the first sensor's.
 VELOCITY, ATTITUDE, SENSORS = 3, 6, 9
+# Columns of white noise; of the core with it, made even.
+WHITE, WITHOUT_SENSORS = 6, 16
 # Sensor states treated with the core: a bias of each axis of two triads.
 WITH_CORE = 6
 
@@ -295,6 +298,163 @@ def grown_covariance(P, growth, room):
         if bad < 0 and not 0.0 <= P[i, i] < math.inf:
             bad = i
     return bad
+
+
+def factor_room(n: int) -> tuple[Any, ...]:
+    """Work arrays of `grown_factors`: columns to orthogonalize, and rows of numbers of each."""
+    columns, rows = WITHOUT_SENSORS + 2 * (n - CORE), (n + 3) // 4 * 4
+    return np.zeros((columns, rows)), np.zeros((5, max(columns, rows)))
+
+
+@njit(**IN_PLACE, forceinline=True)
+def orthogonalize(columns, work, last, stop, at, end, ud):
+    """Turn the rows `last` down to `stop` of a matrix W, given by columns, into U and D, in place.
+
+    Modified weighted Gram-Schmidt (Bierman 1977, Section VI.4) over the columns from `at` to
+    `end`, an even number; the others are zero in these rows. A row that others explain to rounding
+    leaves D = 0 and no direction. Four rows are treated at once; that those are changed, too, which
+    are done with, does no harm.
+    """
+    d, own, weighted, whole, share = work[0], work[1], work[2], work[3], work[4]
+    for i in range(0, last + 1, 4):
+        s0 = s1 = s2 = s3 = 0.0
+        for c in range(at, end):
+            column = columns[c]
+            s0 += d[c] * (column[i] * column[i])
+            s1 += d[c] * (column[i + 1] * column[i + 1])
+            s2 += d[c] * (column[i + 2] * column[i + 2])
+            s3 += d[c] * (column[i + 3] * column[i + 3])
+        whole[i], whole[i + 1], whole[i + 2], whole[i + 3] = s0, s1, s2, s3
+    for j in range(last, stop - 1, -1):
+        s0 = s1 = 0.0
+        for c in range(at, end, 2):
+            x, y = columns[c, j], columns[c + 1, j]
+            own[c], own[c + 1] = x, y
+            weighted[c], weighted[c + 1] = d[c] * x, d[c + 1] * y
+            s0 += weighted[c] * x
+            s1 += weighted[c + 1] * y
+        total = s0 + s1
+        if total <= (end - at) * EPSILON * EPSILON * whole[j]:
+            for i in range(j):
+                ud[i, j] = 0.0
+            ud[j, j] = 0.0
+            continue
+        ud[j, j] = total
+        inverse = 1.0 / total
+        for i in range(0, j, 4):
+            s0 = s1 = s2 = s3 = t0 = t1 = t2 = t3 = 0.0
+            for c in range(at, end, 2):
+                column, w = columns[c], weighted[c]
+                s0 += w * column[i]
+                s1 += w * column[i + 1]
+                s2 += w * column[i + 2]
+                s3 += w * column[i + 3]
+                column, w = columns[c + 1], weighted[c + 1]
+                t0 += w * column[i]
+                t1 += w * column[i + 1]
+                t2 += w * column[i + 2]
+                t3 += w * column[i + 3]
+            s0, s1 = inverse * (s0 + t0), inverse * (s1 + t1)
+            s2, s3 = inverse * (s2 + t2), inverse * (s3 + t3)
+            share[i], share[i + 1], share[i + 2], share[i + 3] = s0, s1, s2, s3
+            for c in range(at, end):
+                part, x = columns[c, i : i + 4], own[c]
+                part[0], part[1], part[2], part[3] = (
+                    part[0] - s0 * x,
+                    part[1] - s1 * x,
+                    part[2] - s2 * x,
+                    part[3] - s3 * x,
+                )
+        for i in range(j):
+            ud[i, j] = share[i]
+
+
+@njit(**IN_PLACE, forceinline=True)
+def core_of_column(turned, ud, j, column):
+    """Fill the core's numbers of column j of ``Phi U``; `turned` has the columns of Phi as rows."""
+    row = turned[j]
+    a0, a1, a2, a3 = row[0], row[1], row[2], row[3]
+    a4, a5, a6, a7, a8 = row[4], row[5], row[6], row[7], row[8]
+    for m in range(j):
+        row, u = turned[m], ud[m, j]
+        a0 += u * row[0]
+        a1 += u * row[1]
+        a2 += u * row[2]
+        a3 += u * row[3]
+        a4 += u * row[4]
+        a5 += u * row[5]
+        a6 += u * row[6]
+        a7 += u * row[7]
+        a8 += u * row[8]
+    column[0], column[1], column[2], column[3] = a0, a1, a2, a3
+    column[4], column[5], column[6], column[7], column[8] = a4, a5, a6, a7, a8
+
+
+@njit(**IN_PLACE)
+def grown_factors(ud, growth, room, columns, work):
+    """Replace the factors of P by those of ``Phi P Phi' + Q`` (Thornton, by blocks).
+
+    P = U D U'; an array holds U above its diagonal and D on it. Constant sensors at the end keep
+    their rows of U and D, and their columns are those of Phi U. What is left, the core and the
+    sensors before, is orthogonalized as ``[Phi U, G]``, where G are the columns by which noise
+    enters. `growth` is of `growth_of_step`, `columns` and `work` of `factor_room`.
+
+    Return -1, or the first state whose variance is not finite.
+    """
+    phi, lift, weight, tail, own = growth
+    turned = room[4][0]
+    k, rows = tail.shape[0], columns.shape[1]
+    for m in range(ud.shape[0]):
+        panel, at = phi[m // LANES], m % LANES
+        for i in range(CORE):
+            turned[m, i] = panel[LANES * i + at]
+    taking = 0
+    for s in range(k):
+        if tail[s] != 1.0 or weight[(SENSORS + s) // LANES, (SENSORS + s) % LANES] != 0.0:
+            taking = s + 1
+    d, done = work[0], work[1]
+    end = WITHOUT_SENSORS + 2 * taking
+    if taking > 0:
+        for c in range(end):
+            for i in range(CORE, rows):
+                columns[c, i] = 0.0
+    for j in range(CORE):
+        core_of_column(turned, ud, j, columns[j])
+        d[j] = ud[j, j]
+    # Six columns of white noise, and one to make their number even.
+    for j in range(WHITE):
+        column = columns[CORE + j]
+        for i in range(CORE):
+            column[i] = lift[0, LANES * i + VELOCITY + j]
+        d[CORE + j] = weight[0, VELOCITY + j]
+    for i in range(CORE):
+        columns[CORE + WHITE, i] = 0.0
+    d[CORE + WHITE] = 0.0
+    for s in range(taking):
+        p, at, j = (SENSORS + s) // LANES, (SENSORS + s) % LANES, SENSORS + s
+        column, noisy = columns[WITHOUT_SENSORS + s], columns[WITHOUT_SENSORS + taking + s]
+        core_of_column(turned, ud, j, column)
+        for m in range(s):
+            column[SENSORS + m] = tail[m] * ud[SENSORS + m, j]
+        for i in range(CORE):
+            noisy[i] = lift[p, LANES * i + at]
+        column[j], noisy[j] = tail[s], own[s]
+        d[WITHOUT_SENSORS + s] = ud[j, j]
+        d[WITHOUT_SENSORS + taking + s] = weight[p, at]
+    for j in range(SENSORS + taking, SENSORS + k):
+        core_of_column(turned, ud, j, done)
+        # What is known has no direction, which would grow to no end.
+        by = 1.0 if ud[j, j] != 0.0 else 0.0
+        for i in range(CORE):
+            ud[i, j] = by * done[i]
+        for m in range(taking):
+            ud[SENSORS + m, j] *= by * tail[m]
+    if taking == 0:
+        orthogonalize(columns, work, CORE - 1, 0, 0, WITHOUT_SENSORS, ud)
+    else:
+        orthogonalize(columns, work, CORE + taking - 1, SENSORS, WITHOUT_SENSORS, end, ud)
+        orthogonalize(columns, work, CORE - 1, 0, 0, end, ud)
+    return not_finite(ud)
 
 
 @njit(**IN_PLACE)

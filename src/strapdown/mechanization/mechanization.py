@@ -21,6 +21,7 @@ from strapdown._kernels.ned import (
     LARGEST_TURN,
     LAT,
     LEAP,
+    LON,
     POLE,
     ROW,
     Q,
@@ -160,8 +161,9 @@ class Mechanization(ABC):
 
         `time` (s).
         """
-        lat, lon, *others = state[LAT : Q + 4].tolist()
-        return NavState.of_numbers(time, (lat, math.remainder(lon, 2.0 * math.pi), *others))
+        numbers = state[LAT : Q + 4].tolist()
+        numbers[LON] = math.remainder(numbers[LON], 2.0 * math.pi)
+        return NavState.of_numbers(time, numbers)
 
     def kernel_options(self) -> Array:
         """Options and limits for the kernels."""

@@ -458,4 +458,4 @@ class NavTracker:
     def state(self) -> NavState:
         """Position, velocity and attitude at the last sample."""
         record = self._record
-        return self._mechanization.nav_state(record[kernel.STATE :], float(record[kernel.TIME]))
+        return self._mechanization.nav_state(record[kernel.STATE :], record.item(kernel.TIME))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown._kernels import filter_loop as kernel
-from strapdown._kernels.growth import growth_arrays, growth_room, padded_width
+from strapdown._kernels.growth import factor_room, growth_arrays, growth_room, padded_width
 from strapdown._kernels.level import LEVEL, NED, WANDER
 from strapdown._kernels.robust import JOSEPH, PLAIN, UD, WD
 from strapdown._kernels.smoothing import GROWTH, KIND, begin_of_move
@@ -110,8 +110,7 @@ class CompiledEngine(Engine):
             np.empty((6, 3)),
             np.empty((1, LEVEL)),
             np.empty((n, n)),
-            np.empty((n, n)),
-            np.empty((n, n)),
+            *factor_room(n),
         )
         self._room = (closing, np.empty((7, 3)), np.empty((7, 3)), np.empty(0))
         self._count = len(state.open_rows)

@@ -538,12 +538,22 @@ class EpochLoop:
             InnovationRecord(at, *names[code], nu)
             for at, code, nu in zip(after, codes, told, strict=True)
         ]
+        if not count:
+            return
         times = times - [JUST_BEFORE, 0.0]
         made = np.isfinite(times)
-        for mark in map(CovarianceSnapshot, times[made].tolist(), *(each[made] for each in marks)):
-            self._add_mark(mark)
-        if count:
-            self.observed = after[-1]
+        stamps = times[made]
+        # Without a copy where there is a mark before each fix: of an hour they are many.
+        kept = [each.reshape(-1, *each.shape[2:]) if made.all() else each[made] for each in marks]
+        new = list(map(CovarianceSnapshot, stamps.tolist(), *kept))
+        if (np.diff(stamps) > SAME_INSTANT).all():
+            self._add_mark(new[0])
+            self.marks += new[1:]
+            self.marked = new[-1].time
+        else:
+            for mark in new:
+                self._add_mark(mark)
+        self.observed = after[-1]
 
     def state(self) -> NavigatorState:
         """Current state."""

@@ -8,10 +8,14 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
+from strapdown._kernels.compilation import interpreted
+from strapdown._kernels.covariance import udu_factor, udu_predict
 from strapdown._kernels.growth import (
     CORE,
     compose_growth,
+    factor_room,
     grown_covariance,
+    grown_factors,
     growth_arrays,
     growth_of_step,
     growth_room,
@@ -224,3 +228,170 @@ def test_two_steps_are_one_after_the_other(n):
     sizes = np.abs(second[0]) @ np.abs(first[1]) @ np.abs(second[0]).T + np.abs(second[1])
     assert (np.abs(Q - expected) <= rounding(n) * sizes).all()
     assert (Q == Q.T).all()
+
+
+def steady(step, first):
+    """The step with constant sensors from the given one on, without noise of their own."""
+    f, decay, dt, C, gyro, accel, drive, held = step.arguments
+    decay, drive = decay.copy(), drive.copy()
+    decay[first:] = drive[first:] = 0.0
+    step.A[CORE:, CORE:] = -np.diag(decay)
+    step.S[CORE:, CORE:] = np.diag(drive**2)
+    return Step(step.A, step.S, dt, held, (f, decay, dt, C, gyro, accel, drive, held))
+
+
+def factored(P):
+    ud = np.empty_like(P)
+    assert udu_factor(P, ud) == -1
+    return ud
+
+
+def grown_ud(step, ud):
+    growth, room = grown(step)
+    out = ud.copy()
+    assert grown_factors(out, growth, room, *factor_room(step.n)) == -1
+    return out
+
+
+def product(ud):
+    """U D U' in twice the precision."""
+    wide = np.asarray(ud, dtype=np.longdouble)
+    U = np.triu(wide, 1) + np.eye(len(wide))
+    return (U * np.diagonal(wide)) @ U.T
+
+
+def largest_error(step, ud, out):
+    """Bound of the error of P by rounding.
+
+    Of each row of [Phi U, G] an operation errs by a rounding of its length, and Gram-Schmidt loses
+    in orthogonality what a row loses in length until it is D.
+    """
+    Phi, _ = unfolded(step)
+    U = np.abs(np.triu(ud, 1)) + np.eye(step.n)
+    sizes = (np.abs(Phi) @ U) ** 2 @ np.diagonal(ud)
+    part = largest_part(step.A, 0.5 * step.dt)
+    sizes += step.dt * np.diagonal(part @ turned_sizes(step) @ part.T)
+    left = np.diagonal(out)
+    lost = np.sqrt((sizes[left > 0.0] / left[left > 0.0]).max())
+    columns = step.n + 6 + step.n - CORE
+    return rounding(step.n + columns) * lost * np.sqrt(sizes * sizes[:, None])
+
+
+@pytest.mark.parametrize("first", [0, 1, 2, None])
+@pytest.mark.parametrize("held", HELD)
+@pytest.mark.parametrize("n", (CORE, *SIZES))
+def test_factors_grow_as_the_covariance(n, held, first):
+    """Within rounding; and as near as the dense form where units are 10¹² apart."""
+    step = step_of(n, held)
+    if first is not None:
+        step = steady(step, first)
+    rng = np.random.default_rng(n)
+    Phi, Q = unfolded(step)
+    exact = [np.asarray(each, dtype=np.longdouble) for each in (Phi, Q)]
+    for spread in (0.0, 6.0):
+        X = rng.normal(size=(n, n)) * 10.0 ** rng.uniform(-spread, spread, (n, 1))
+        ud = factored(X @ X.T)
+        out, reference = grown_ud(step, ud), np.empty((n, n))
+        expected = exact[0] @ product(ud) @ exact[0].T + exact[1]
+        error = np.abs(product(out) - expected)
+        assert (error <= largest_error(step, ud, out)).all()
+        assert udu_predict(ud, Phi, Q, reference) == -1
+        sd = np.sqrt(np.diagonal(expected))
+        dense, blocks = (
+            (each / sd / sd[:, None]).max()
+            for each in (np.abs(product(reference) - expected), error)
+        )
+        assert blocks <= dense + rounding(n)
+        assert (np.diagonal(out) >= 0.0).all()
+        assert not np.tril(out, -1).any()
+        if first is not None:
+            # Nothing happens to what is constant.
+            kept = slice(CORE + first, None)
+            assert np.array_equal(out[kept, kept], ud[kept, kept])
+
+
+@pytest.mark.parametrize("n", SIZES)
+def test_factors_are_those_of_the_dense_form(n):
+    step = step_of(n)
+    ud = factored(np.cov(np.random.default_rng(n).normal(size=(n, 3 * n))))
+    out, reference = grown_ud(step, ud), np.empty((n, n))
+    assert udu_predict(ud, *unfolded(step), reference) == -1
+    # Both have the error of the bound; U and D of P have its condition.
+    P = np.asarray(product(reference), dtype=np.float64)
+    condition = np.linalg.cond(P / np.sqrt(np.diagonal(P) * np.diagonal(P)[:, None]))
+    size = largest_error(step, ud, out) / np.sqrt(np.diagonal(P) * np.diagonal(P)[:, None])
+    scale = np.sqrt(np.diagonal(P)[:, None] / np.diagonal(P))
+    assert np.abs((out - reference) / scale)[np.triu_indices(n, 1)].max() <= (
+        2.0 * condition * size.max()
+    )
+    np.testing.assert_allclose(
+        np.diagonal(out), np.diagonal(reference), rtol=2.0 * condition * size.max()
+    )
+
+
+def test_known_states_stay_known():
+    """No variance and no noise: D stays zero, and U has no direction."""
+    step = steady(step_of(15, HELD[1]), 0)
+    f, decay, dt, C, _, _, drive, held = step.arguments
+    still = Step(step.A, 0.0 * step.S, dt, held, (f, decay, dt, C, *np.zeros((2, 3)), drive, held))
+    assert not grown_ud(still, np.zeros((15, 15))).any()
+    one = np.zeros((15, 15))
+    one[14, 14] = 4.0
+    out = grown_ud(still, one)
+    Phi, _ = unfolded(still)
+    assert np.array_equal(out[:14, 14], Phi[:14, 14])
+    assert out[14, 14] == 4.0
+    assert not out[:, :14].any()
+
+
+def test_a_sensor_that_forgets_within_a_step_has_its_noise_alone():
+    step = step_of(12, dt=0.05)
+    step.arguments[1][:] = [0.0, 1e5, 0.0]
+    step.arguments[6][:] = [0.0, 3.0, 0.0]
+    growth, room = grown(step)
+    assert growth[3][1] == 0.0
+    ud = factored(np.eye(12) + 0.5)
+    out = ud.copy()
+    assert grown_factors(out, growth, room, *factor_room(12)) == -1
+    assert np.isfinite(out).all()
+    Phi, Q = unfolded(step)
+    expected = Phi @ (np.eye(12) + 0.5) @ Phi.T + Q
+    size = np.sqrt(np.diagonal(expected))
+    error = np.abs(np.asarray(product(out), dtype=np.float64) - expected)
+    assert (error <= 1e-12 * size * size[:, None]).all()
+    assert Q[10, 10] == 0.0
+    assert out[10, 10] == 0.0
+
+
+@pytest.mark.parametrize("n", (15, 24))
+def test_factors_are_filled_anew_by_each_step(n):
+    growth, room, work = growth_arrays(n), growth_room(n), factor_room(n)
+    before = steady(step_of(n, seed=1), 2)
+    growth_of_step(*before.arguments, growth, room)
+    grown_factors(factored(2.0 * np.eye(n) + 1.0), growth, room, *work)
+    step = steady(step_of(n, seed=2), 2)
+    growth_of_step(*step.arguments, growth, room)
+    out = factored(np.eye(n) + 1.0)
+    grown_factors(out, growth, room, *work)
+    assert np.array_equal(out, grown_ud(step, factored(np.eye(n) + 1.0)))
+
+
+@pytest.mark.parametrize("bad", [0, 4, 14])
+def test_a_factor_that_is_no_number_is_told(bad):
+    step = steady(step_of(15, dt=1e-9), 0)
+    growth, room = grown(step)
+    ud = np.eye(15)
+    ud[bad, bad] = np.nan
+    first = grown_factors(ud, growth, room, *factor_room(15))
+    # What is not a number spreads to the states that depend on it.
+    assert 0 <= first <= bad
+    assert np.isnan(ud[first, first])
+
+
+def test_interpreted_factors_are_the_compiled_ones():
+    for step in (step_of(15), steady(step_of(15), 0), steady(step_of(24, HELD[1]), 3)):
+        ud = factored(np.cov(np.random.default_rng(3).normal(size=(step.n, 60))))
+        growth, room = grown(step)
+        out = ud.copy()
+        interpreted(grown_factors)(out, growth, room, *factor_room(step.n))
+        assert np.array_equal(out, grown_ud(step, ud))
