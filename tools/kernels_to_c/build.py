@@ -15,9 +15,11 @@ from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
-from . import signatures, sources
-from .translate import Function, Translator, _holds_memory
-from .types_of_c import SCALARS, Type, is_array, is_list
+from strapdown.export import sources
+from strapdown.export.translate import Function, Translator, holds_memory
+from strapdown.export.types_of_c import SCALARS, Type, is_array, is_list
+
+from . import signatures
 
 HERE = Path(__file__).parent
 PACKAGE = HERE.parents[1] / "src/strapdown/_kernels"
@@ -168,7 +170,7 @@ class _Module:
                 else:
                     lines.append(f"            {self.names(function.result)} x = {call};")
                 lines.append("            sd_let_go(&held);")
-                if _holds_memory(function.result):
+                if holds_memory(function.result):
                     lines.append(f"            PyObject *o = {self.maker(function.result)}(x);")
                     lines += ["            table->reset();", "            return o;"]
                 else:

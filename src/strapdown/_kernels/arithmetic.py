@@ -48,7 +48,8 @@ class _InSingle(ast.NodeTransformer):
         # A constant of the module is worked out in double precision, and rounded once.
         if _is_inexact(node.value):
             node.value = _single(node.value)
-        return node
+            return node
+        return self.generic_visit(node)
 
     def visit_ImportFrom(self, node: ast.ImportFrom) -> ast.AST:
         if node.module in FORMULAS:

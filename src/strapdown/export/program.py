@@ -12,26 +12,33 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.export.configuration import Channel, SensorConfiguration
+from strapdown.export.device import WIDTH, comment, number, wrapped
 from strapdown.export.kernels import Kernels
-from strapdown.export.translate import WIDTH, comment, number, wrapped
 
 Array = NDArray[np.float64]
 
 # Math functions with a macro for each precision.
-MACROS = ("SQRT", "SIN", "COS", "ATAN2", "HYPOT", "FABS", "FMOD", "FMAX", "FMIN", "COPYSIGN")
+MACROS = (
+    *("SQRT", "SIN", "COS", "ATAN2", "HYPOT", "FABS", "FMOD", "FMAX", "FMIN", "COPYSIGN"),
+    *("EXP", "FMA", "TAN", "EXPM1", "LOG", "ASIN", "ACOS", "RINT", "CBRT"),
+)
 
 
-def precision_lines(body: str) -> str:
-    """Type of a number and the functions of the math library in use, for each precision."""
+def precision_lines(body: str, types: Sequence[str] = (), default: str = "float") -> str:
+    """Type of a number and the functions of the math library in use, for each precision.
+
+    `types`: definitions of what functions return. `default`: precision without ``-DREAL``.
+    """
     used = [m for m in MACROS if re.search(rf"\b{m}\(", body)]
     single = "\n".join(f"#define {m} {m.lower()}f" for m in used)
     double = "\n".join(f"#define {m} {m.lower()}" for m in used)
+    results = "\n".join(["", *types, ""]) if types else ""
     pi = "#define PI R(3.141592653589793)\n" if re.search(r"\bPI\b", body) else ""
     return f"""\
 #include <math.h>
 
 #ifndef REAL
-#define REAL float
+#define REAL {default}
 #endif
 typedef REAL real_t;
 #define R(x) ((real_t)(x))
@@ -50,7 +57,7 @@ typedef REAL real_t;
 #else
 #error "REAL must be float or double"
 #endif
-{pi}"""
+{pi}{results}"""
 
 
 def constant_lines(kernels: Kernels) -> str:

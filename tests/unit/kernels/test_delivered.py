@@ -11,10 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tools.kernels_to_c import build, signatures, sources
+from tools.kernels_to_c import build, signatures
 
 import strapdown._kernels
 from strapdown._kernels import compilation
+from strapdown.export import sources
 
 FOLDER = Path(strapdown._kernels.__file__).parent
 SOURCE = """
