@@ -9,10 +9,18 @@ import pandas as pd
 from numpy.typing import ArrayLike
 
 from strapdown.attitude_algorithms import AttitudeAlgorithm
-from strapdown.export.algorithms import algorithm_in_c, sampling_kind
+from strapdown.attitude_algorithms.cost import count_cost
+from strapdown.export.algorithms import (
+    algorithm_in_c,
+    algorithm_kernels,
+    sampling_kind,
+    shape_of,
+)
 from strapdown.export.configuration import SensorConfiguration
-from strapdown.export.filters import filter_in_c
+from strapdown.export.cost import most_operations
+from strapdown.export.filters import filter_in_c, filter_kernels, sample_kernel
 from strapdown.export.micropython import algorithm_in_python, filter_in_python
+from strapdown.export.steps import ExportedFile
 from strapdown.orientation_filters import OrientationEstimator
 from strapdown.tables import GYRO, MAG
 
@@ -123,3 +131,17 @@ def _of_filter(
         "magnetometer": magnetometer,
         "sampling": "mean" if kind == "mean" else "instantaneous",
     }
+
+
+def export_attitude(
+    chosen: AttitudeAlgorithm | OrientationEstimator, writer: Callable[..., str]
+) -> ExportedFile:
+    """Write an algorithm or a filter by `export_c` or `export_micropython`, with its operations."""
+    if isinstance(chosen, AttitudeAlgorithm):
+        kernels, step, _ = algorithm_kernels(chosen, shape_of(chosen), "linear")
+        memory = count_cost(chosen).memory
+    else:
+        kernels, memory = filter_kernels(chosen, True, "instantaneous"), chosen.size
+        step = kernels.namespace[sample_kernel(chosen)]
+    largest = {name: high for name, (_, high) in kernels.ranges.items()}
+    return ExportedFile(chosen.label, writer(chosen), most_operations(step, largest), memory)

@@ -180,6 +180,10 @@ class DeviceBody(Body):
         self.new = outer
         return left
 
+    def _c_name(self, name: str, cls: Any) -> str:
+        text = super()._c_name(name, cls)
+        return f"{text}_" if text == "R" else text  # that of the literals
+
     def _declarations(self, names: set[str]) -> list[str]:
         rows: dict[str, list[str]] = {}
         for (name, cls), kind in self.variables.items():
@@ -380,13 +384,19 @@ def _first_use(block: list[ast.stmt], name: str) -> ast.stmt:
     outside = isinstance(first, ast.If | ast.While) and name in _names([first.test])
     if len(holding) > 1 or len(inner) != 1 or outside:
         return first
-    if not isinstance(first, ast.If):
-        # In a loop only what each round sets before it reads it: else it is of the round before.
-        begin = next(node for node in inner[0] if name in _names([node]))
-        sets = isinstance(begin, ast.Assign) and name in stored([begin])
-        if not sets or name in loaded([begin]):
-            return first
+    # In a loop only what each round sets before it reads it: else it is of the round before.
+    if not (isinstance(first, ast.If) or _sets_first(inner[0], name)):
+        return first
     return _first_use(inner[0], name)
+
+
+def _sets_first(block: list[ast.stmt], name: str) -> bool:
+    """Whether statements set a name before they read it."""
+    holding = [node for node in block if name in _names([node])]
+    begin = holding[0]
+    if isinstance(begin, ast.For) and len(holding) == 1 and name not in _names([begin.iter]):
+        return _sets_first(begin.body, name)
+    return isinstance(begin, ast.Assign) and name in stored([begin]) - loaded([begin])
 
 
 def _blocks(node: ast.stmt) -> list[list[ast.stmt]]:

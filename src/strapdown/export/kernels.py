@@ -11,7 +11,8 @@ import ast
 import copy
 import functools
 import itertools
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -19,8 +20,8 @@ from typing import Any
 from strapdown import _kernels
 from strapdown._kernels.arithmetic import PACKAGE, SOURCES
 from strapdown.export.device import loaded, stored, walk
-from strapdown.export.sources import CONSTANTS, Constant, Kernel, load
-from strapdown.export.translate import UntranslatableError
+from strapdown.export.sources import CONSTANTS, Constant, Fma, Kernel, load
+from strapdown.export.translate import Translator, UntranslatableError
 from strapdown.export.types_of_c import Type
 
 # Knowledge of a number before the program runs: its value (v, v), or the range of an integer.
@@ -30,34 +31,38 @@ Env = dict[str, Span]
 
 
 @functools.cache
-def _modules(home: str) -> dict[str, dict[str, Any]]:
-    return load(Path(_kernels.__file__).parent, (home, *SOURCES))
+def _modules(*names: str) -> dict[str, dict[str, Any]]:
+    return load(Path(_kernels.__file__).parent, names)
 
 
 @dataclass
 class Kernels:
     """The kernels of a module and those that it imports, and the functions required so far.
 
-    `home`: module of the kernels (`attitude_algorithms.cost.kernel_home`). `ranges`: for a variable
-    with an integer value at run time: the least and the greatest. `fixed`: numbers of the state and
-    calls, as they are written, whose value is known. `functions`: in the order of definition.
+    `home`: module of the kernels (`attitude_algorithms.cost.kernel_home`), `others` further ones.
+    `ranges`: for a variable with an integer value at run time: the least and the greatest. `fixed`:
+    numbers of the state and calls, as they are written, whose value is known. `functions`: in the
+    order of definition.
     """
 
     home: str
     ranges: dict[str, tuple[int, int]] = field(default_factory=dict)
     fixed: dict[str, float] = field(default_factory=dict)
     functions: list[Kernel] = field(default_factory=list)
+    others: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         self.home = self.home.removeprefix(f"{PACKAGE}.")
-        self._modules = _modules(self.home)
+        self._homes = (self.home, *self.others, *SOURCES)
+        self._modules = _modules(*self._homes)
         self._made: dict[tuple[object, ...], Kernel] = {}
+        self._widths: dict[Kernel, dict[str, int]] = {}
         #: What the names in specialized functions mean: functions and constants.
         self.namespace: dict[str, Any] = {}
 
     def source(self, name: str) -> Kernel:
         """Return a kernel of the home, or of the modules that all files use."""
-        for module in (self.home, *SOURCES):
+        for module in self._homes:
             if isinstance(held := self._modules[module].get(name), Kernel):
                 return held
         raise KeyError(name)
@@ -72,10 +77,22 @@ class Kernels:
         return [Constant(c.module, name, c.value, c.comment) for name, c in rows]
 
     def require(
-        self, name: str, options: Env | None = None, keep: tuple[int, ...] | None = None
+        self,
+        name: str,
+        options: Env | None = None,
+        keep: tuple[int, ...] | None = None,
+        sizes: Mapping[str, tuple[int, ...]] | None = None,
     ) -> Kernel:
-        """Specialize a kernel, by its name, and all that it calls: see `specialised`."""
-        return self.specialised(self.source(name), options, keep)
+        """Specialize a kernel, by its name, and all that it calls: see `specialised`.
+
+        `sizes`: of its arrays, by parameter.
+        """
+        options, sizes = options or {}, sizes or {}
+        for array, shape in sizes.items():
+            options |= {f"{array}.shape[{k}]": (n, n) for k, n in enumerate(shape)}
+        function = self.specialised(self.source(name), options, keep)
+        self._widths[function] = {n: shape[1] for n, shape in sizes.items() if len(shape) == 2}
+        return function
 
     def specialised(
         self, kernel: Kernel, options: Env | None = None, keep: tuple[int, ...] | None = None
@@ -122,22 +139,18 @@ class Kernels:
             self.namespace[name] = constant
         return name
 
-    def in_c(self, translator: Any, shapes: dict[str, dict[str, int]] | None = None) -> list[str]:
-        """Translate all functions by a `device_translator`; return their texts.
-
-        `shapes`: of required functions, the width of parameters that are matrices.
-        """
+    def in_c(self, translator: Translator) -> list[str]:
+        """Translate all functions by a `device_translator`; return their texts."""
         made = translator.order
         # Callers first: they give the types of what they call.
         for function in reversed(self.functions):
             if not any(m.kernel is function for m in made):
-                widths = (shapes or {}).get(function.name, {})
-                translator.function(function, self._kinds(function, widths), True)
+                translator.function(function, self._kinds(function), True)
         place = {id(function): k for k, function in enumerate(self.functions)}
         return [m.text for m in sorted(made, key=lambda m: place[id(m.kernel)])]
 
-    def _kinds(self, function: Kernel, widths: dict[str, int]) -> list[Type]:
-        arrays = self._arrays(function)
+    def _kinds(self, function: Kernel) -> list[Type]:
+        arrays, widths = self._arrays(function), self._widths.get(function, {})
         return [
             ("A", "f8", 2, "C", widths[p])
             if p in widths
@@ -168,6 +181,11 @@ class Specialiser:
     def __init__(self, kernels: Kernels, kernel: Kernel, env: Env) -> None:
         self.kernels, self.kernel, self.env = kernels, kernel, env
         self.own = {*kernel.parameters, *stored(kernel.node.body)}
+        self.stores = Counter(
+            n.id
+            for n in walk(kernel.node.body)
+            if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
+        )
 
     # --- statements -----------------------------------------------------------------------
 
@@ -187,9 +205,14 @@ class Specialiser:
         new: ast.stmt
         if isinstance(node, ast.Pass | ast.Break | ast.Continue):
             return [node]
-        if isinstance(node, ast.Assign) and self.remember_sizes(node):
-            return []
+        old = node
         if isinstance(node, ast.Assign):
+            if self.makes_arrays(node.value):
+                return self.inlined(node)
+            known = self.without_known(node)
+            if known is None:
+                return []
+            node = known
             targets = [self.target(t) for t in node.targets]
             new = ast.Assign(targets, self.expression(node.value))
             self.remember(node.targets[0])
@@ -210,7 +233,7 @@ class Specialiser:
             new = ast.While(self.expression(node.test), self.block(node.body), [])
         else:
             raise refused("statement outside the subset", node)
-        return [like(new, node)]
+        return [like(new, old)]
 
     def target(self, node: ast.expr) -> ast.expr:
         """Specialize the target of an assignment."""
@@ -228,26 +251,74 @@ class Specialiser:
         if isinstance(target, ast.Name) and target.id in self.kernels.ranges:
             self.env[target.id] = self.kernels.ranges[target.id]
 
-    def remember_sizes(self, node: ast.Assign) -> bool:
-        """Store sizes of arrays that an assignment gives; whether that is all that it does."""
+    def without_known(self, node: ast.Assign) -> ast.Assign | None:
+        """Store sizes and options that an assignment gives to names; return what else it does."""
         target, value = node.targets[0], node.value
         if isinstance(value, ast.Attribute) and value.attr == "shape":
-            known = [self.env.get(f"{ast.unparse(value)}[{k}]") for k in range(2)]
-            names = target.elts if isinstance(target, ast.Tuple) else []
-            for name, span in zip(names, known, strict=False):
-                if isinstance(name, ast.Name) and span:
-                    self.env[name.id] = span
-            return bool(names) and all(known[: len(names)])
-        size = self.env.get(ast.unparse(value)) if isinstance(value, ast.Subscript) else None
-        if isinstance(target, ast.Name) and size:
-            self.env[target.id] = size
-            return True
+            axes = range(len(target.elts)) if isinstance(target, ast.Tuple) else ()
+            value = ast.Tuple(
+                [ast.parse(f"{ast.unparse(value)}[{k}]", mode="eval").body for k in axes]
+            )
         each = isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
         pairs = zip(target.elts, value.elts, strict=True) if each else [(target, value)]  # type: ignore[attr-defined]
+        left = []
         for name, part in pairs:
             if isinstance(name, ast.Name):
+                fixed = self.fixed(part)
+                if fixed is not None and self.stores[name.id] == 1:
+                    self.env[name.id] = (fixed, fixed)
+                    continue
                 self.env |= self.sizes(name.id, part)
-        return False
+            left.append((name, part))
+        if each and left:
+            new = ast.Assign(
+                [ast.Tuple([n for n, _ in left], ast.Store())],
+                ast.Tuple([v for _, v in left], ast.Load()),
+            )
+            return ast.copy_location(new, node)
+        return node if left else None
+
+    def makes_arrays(self, node: ast.expr) -> bool:
+        """Whether an expression calls a kernel that makes arrays and returns them."""
+        kernel = self.held(node.func) if isinstance(node, ast.Call) else None
+        if not isinstance(kernel, Kernel):
+            return False
+        last = kernel.node.body[-1]
+        parts = (
+            last.value.elts
+            if isinstance(last, ast.Return) and isinstance(last.value, ast.Tuple)
+            else []
+        )
+        names = {part.id for part in parts if isinstance(part, ast.Name)}
+        assigned = (n for n in walk(kernel.node.body) if isinstance(n, ast.Assign))
+        return any("np." in ast.unparse(n.value) and names & stored([n]) for n in assigned)
+
+    def inlined(self, node: ast.Assign) -> list[ast.stmt]:
+        """Put the statements of a kernel that returns arrays in the place of its call."""
+        target, call = node.targets[0], node.value
+        assert isinstance(call, ast.Call) and isinstance(target, ast.Tuple)
+        kernel: Kernel = self.held(call.func)
+        if kernel.namespace is not self.kernel.namespace:
+            raise refused("arrays of another module", node)
+        body = copy.deepcopy(without_docstring(kernel.node.body))
+        own = stored(body)
+        names = {name: f"{name}_" for name in own & self.own}
+        returned: Any = body[-1].value  # type: ignore[attr-defined]
+        for part, place in zip(returned.elts, target.elts, strict=True):
+            if isinstance(part, ast.Name) and part.id in own and isinstance(place, ast.Name):
+                names[part.id] = place.id
+        values = dict(zip(kernel.parameters, call.args, strict=True))
+        body = [Named(names, values).visit(statement) for statement in body]
+        self.own |= stored(body)
+        self.stores.update(
+            n.id for n in walk(body) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
+        )
+        *done, last = self.block(body)
+        assert isinstance(last, ast.Return) and isinstance(last.value, ast.Tuple)
+        for place, part in zip(target.elts, last.value.elts, strict=True):
+            if ast.unparse(place) != ast.unparse(part):
+                done.append(like(ast.Assign([place], part), node))
+        return done
 
     def each(self, node: ast.For, values: ast.Tuple) -> list[ast.stmt]:
         """Unroll a loop over a tuple."""
@@ -256,7 +327,7 @@ class Specialiser:
         out: list[ast.stmt] = []
         for value in values.elts:
             out += self.block(
-                [Put(node.target.id, value).visit(copy.deepcopy(s)) for s in node.body]
+                [Named({}, {node.target.id: value}).visit(copy.deepcopy(s)) for s in node.body]
             )
         return out
 
@@ -320,6 +391,8 @@ class Specialiser:
     def call(self, node: ast.Call) -> ast.expr:
         """Call the function specialized for the known arguments."""
         kernel = self.held(node.func)
+        if isinstance(kernel, Fma):
+            self.kernels.namespace["fma"] = kernel
         if not isinstance(kernel, Kernel):
             return ast.copy_location(
                 ast.Call(node.func, [self.expression(a) for a in node.args], node.keywords), node
@@ -397,7 +470,7 @@ class Specialiser:
         if isinstance(node, ast.BinOp):
             a, b = self.span(node.left), self.span(node.right)
             operation = ARITHMETIC.get(type(node.op))
-            if a and b and operation:
+            if a and b and operation and (type(node.op) is not ast.Mod or a[0] == a[1]):
                 corners = [operation(p, q) for p in a for q in b]
                 return min(corners), max(corners)
         return None
@@ -433,6 +506,7 @@ ARITHMETIC: dict[type[ast.operator], Callable[[Number, Number], Number]] = {
     ast.Add: lambda a, b: a + b,
     ast.Sub: lambda a, b: a - b,
     ast.Mult: lambda a, b: a * b,
+    ast.Mod: lambda a, b: a % b,
 }
 
 
@@ -490,15 +564,17 @@ def refused(what: str, node: ast.AST) -> UntranslatableError:
     return UntranslatableError(f"line {line}: {what}: {ast.unparse(node)}")
 
 
-class Put(ast.NodeTransformer):
-    """Replace a name by an expression."""
+class Named(ast.NodeTransformer):
+    """Give variables other names, and put values in the place of parameters."""
 
-    def __init__(self, name: str, value: ast.expr) -> None:
-        self.name, self.value = name, value
+    def __init__(self, names: dict[str, str], values: dict[str, ast.expr]) -> None:
+        self.names, self.values = names, values
 
     def visit_Name(self, node: ast.Name) -> ast.expr:
         """Replace the name."""
-        return self.value if node.id == self.name else node
+        if node.id in self.values:
+            return copy.deepcopy(self.values[node.id])
+        return ast.copy_location(ast.Name(self.names.get(node.id, node.id), node.ctx), node)
 
 
 class Keep(ast.NodeTransformer):

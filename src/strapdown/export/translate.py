@@ -101,7 +101,7 @@ class Translator:
         self.integer = self.names("i8")
         self.made: dict[Any, Function] = {}
         self.order: list[Function] = []
-        self.taken: dict[str, int] = {}
+        self.taken: set[str] = set()
         self.warnings: list[str] = []
 
     def function(self, kernel: Kernel, kinds: Iterable[Type], ieee: bool) -> Function:
@@ -110,9 +110,11 @@ class Translator:
         ieee = ieee if kernel.inline else kernel.ieee_division
         key = (kernel, kinds, ieee)
         if key not in self.made:
-            number = self.taken.get(kernel.c_name, 0) + 1
-            self.taken[kernel.c_name] = number
-            name = kernel.c_name if number == 1 else f"{kernel.c_name}_{number}"
+            name, number = kernel.c_name, 1
+            while name in self.taken:
+                number += 1
+                name = f"{kernel.c_name}_{number}"
+            self.taken.add(name)
             function = Function(kernel, kinds, ieee, name)
             self.body(self, function).translate()
             self.made[key] = function
