@@ -93,11 +93,13 @@ class Translator:
     """Translates kernels and all that they call.
 
     `body`: what writes a function, for another kind of C than that of the library. `names`: names
-    of its types.
+    of its types. `lines`: whether each statement has the line of the kernel's source.
     """
 
-    def __init__(self, body: type[Body] | None = None, names: Names | None = None) -> None:
-        self.body, self.names = body or Body, names or Names()
+    def __init__(
+        self, body: type[Body] | None = None, names: Names | None = None, lines: bool = False
+    ) -> None:
+        self.body, self.names, self.lines = body or Body, names or Names(), lines
         self.integer = self.names("i8")
         self.made: dict[Any, Function] = {}
         self.order: list[Function] = []
@@ -318,6 +320,8 @@ class Body:
     # Statements.
 
     def emit(self, text: str) -> None:
+        if self.all.lines and hasattr(self.at, "lineno"):
+            self.lines.append(f'#line {self.at.lineno} "{self.kernel.module}.py"')
         self.lines.append("    " * self.depth + text)
 
     def _block(self, statements: Iterable[ast.stmt]) -> bool:
