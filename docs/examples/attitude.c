@@ -253,18 +253,44 @@ void attitude_euler(const struct attitude *a, real_t euler[3])
 
 #ifdef ATTITUDE_TEST
 #include <float.h>
+#endif
+#if defined ATTITUDE_TEST || defined ATTITUDE_FILTER
 #include <stdio.h>
 
-#define ROWS 48
-#define LAG 0 /* samples by which the attitude is behind */
+/* Numbers of a row: dt in s, rates in rad/s. */
+#define COLUMNS 4
+#define RESULTS 4
 
-static const real_t start[4] = {
-        R(1.0), 
-        R(0.0), 
-        R(0.0), 
+static void test_start(struct attitude *s)
+{
+    static const real_t start[4] = {
+        R(1.0),
+        R(0.0),
+        R(0.0),
         R(0.0)};
-/* Dt in s, rates in rad/s; single precision holds each exactly. */
-static const double samples[ROWS][4] = {
+    attitude_init(s, start);
+}
+
+/* Take a row. Returns the number of its results, less than none if it is refused. */
+static int test_take(struct attitude *s, const double *v, double *out)
+{
+    const real_t gyro[3] = {R(v[1]), R(v[2]), R(v[3])};
+    const int refused = attitude_update(s, R(v[0]), gyro);
+    real_t q[4];
+    attitude_quaternion(s, q);
+    for (int i = 0; i < 4; i++) {
+        out[i] = (double)q[i];
+    }
+    return refused ? -RESULTS : RESULTS;
+}
+#endif
+
+#ifdef ATTITUDE_TEST
+#define ROWS 48
+#define TEST_FIRST 0 /* samples by which the attitude is behind */
+
+/* Single precision holds each exactly. */
+static const double test_rows[ROWS][COLUMNS] = {
     {0.0, 0.0, 0.0, 0.0},
     {0.0625, 0.20000000298023224, 0.062666155397892, 0.06118737533688545},
     {0.0625, 0.4000000059604645, 0.15581561625003815, 0.027194742113351822},
@@ -316,7 +342,7 @@ static const double samples[ROWS][4] = {
 };
 
 /* q_nb at each sample, by the kernels of strapdown in the same precision. */
-static const double expected[ROWS][4] = {
+static const double test_expected[ROWS][RESULTS] = {
 #if JOIN(IS_, REAL) == IS_float
     {1.0, 0.0, 0.0, 0.0},
     {0.9999941807982302, 0.003124994155017384, 0.0009791567203155354, 0.0009560509005225091},
@@ -418,38 +444,37 @@ static const double expected[ROWS][4] = {
 #endif
 };
 
-/* 48 steps of 32 roundings that another compiler or another sine may make otherwise. */
-#define EPSILON (sizeof(real_t) == sizeof(float) ? (double)FLT_EPSILON : DBL_EPSILON)
-#define BOUND (1536 * EPSILON)
-
 /* Angle between the attitude and an expected one, rad. */
-static double apart(const struct attitude *a, const double *q_nb)
+static double test_apart(const double *q, const double *q_nb)
 {
-    real_t q[4];
     double sum = 0.0, difference = 0.0;
-    attitude_quaternion(a, q);
     for (int i = 0; i < 4; i++) {
-        difference += ((double)q[i] - q_nb[i]) * ((double)q[i] - q_nb[i]);
-        sum += ((double)q[i] + q_nb[i]) * ((double)q[i] + q_nb[i]);
+        difference += (q[i] - q_nb[i]) * (q[i] - q_nb[i]);
+        sum += (q[i] + q_nb[i]) * (q[i] + q_nb[i]);
     }
     return 2.0 * sqrt(difference < sum ? difference : sum);
 }
 
+/* 48 steps of 32 roundings that another compiler or another sine may make otherwise. */
+#define EPSILON (sizeof(real_t) == sizeof(float) ? (double)FLT_EPSILON : DBL_EPSILON)
+#define BOUND (1536 * EPSILON)
+
 int main(void)
 {
-    struct attitude a;
+    static struct attitude s;
+    static double v[COLUMNS], out[RESULTS];
     double largest = 0.0;
     int failed = 0;
-    attitude_init(&a, start);
-    for (int k = 0; k < ROWS + LAG; k++) {
-        if (k < ROWS) {
-            const real_t gyro[3] = {R(samples[k][1]), R(samples[k][2]), R(samples[k][3])};
-            failed |= attitude_update(&a, R(samples[k][0]), gyro);
+    test_start(&s);
+    for (int k = 0; k < ROWS; k++) {
+        for (int i = 0; i < COLUMNS; i++) {
+            v[i] = test_rows[k][i];
         }
-        if (k >= LAG) {
-            const double angle = apart(&a, expected[k - LAG]);
-            failed |= !(angle <= BOUND); /* so written NaN fails, too */
-            largest = angle > largest ? angle : largest;
+        failed |= test_take(&s, v, out) < 0;
+        if (k >= TEST_FIRST) {
+            const double off = test_apart(out, test_expected[k - TEST_FIRST]);
+            failed |= !(off <= BOUND); /* so written NaN fails, too */
+            largest = off > largest ? off : largest;
         }
     }
     printf("largest difference %.3g rad, bound %.3g rad: %s\n", largest, BOUND,
@@ -459,34 +484,29 @@ int main(void)
 #endif
 
 #ifdef ATTITUDE_FILTER
-#include <stdio.h>
-
-static void put(const struct attitude *a)
+static void test_put(int count, const double *out)
 {
-    real_t q[4];
-    attitude_quaternion(a, q);
-    for (int i = 0; i < 4; i++) {
-        printf("%.17g%c", (double)q[i], i < 3 ? ' ' : '\n');
+    for (int i = 0; i < count; i++) {
+        printf("%.17g%c", out[i], i + 1 < count ? ' ' : '\n');
     }
 }
 
 int main(void)
 {
-    static const real_t start[4] = {
-        R(1.0), 
-        R(0.0), 
-        R(0.0), 
-        R(0.0)};
-    struct attitude a;
-    attitude_init(&a, start);
-    double dt, x, y, z;
-    while (scanf("%lf %lf %lf %lf", &dt, &x, &y, &z) == 4) {
-        const real_t gyro[3] = {R(x), R(y), R(z)};
-        if (attitude_update(&a, R(dt), gyro)) {
-            fprintf(stderr, "refused: %g %g %g %g\n", dt, x, y, z);
+    static struct attitude s;
+    static double v[COLUMNS], out[RESULTS];
+    int column = 0;
+    test_start(&s);
+    while (scanf("%lf", v + column) == 1) {
+        column = (column + 1) % COLUMNS;
+        if (column == 0) {
+            const int count = test_take(&s, v, out);
+            if (count < 0) {
+                fprintf(stderr, "refused\n");
+            }
+            test_put(count < 0 ? -count : count, out);
         }
-        put(&a);
     }
-    return 0;
+    return column != 0;
 }
 #endif

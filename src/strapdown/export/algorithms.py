@@ -26,11 +26,11 @@ from strapdown.export.program import (
     ROUNDINGS,
     SAMPLES,
     Array,
-    Pipe,
     Vector,
+    attitude_harness,
+    attitude_test,
     c_rows,
     constant_lines,
-    main_program,
     precision_lines,
     unit_lines,
 )
@@ -63,21 +63,16 @@ def algorithm_in_c(
     body = "\n".join(filter(None, [*functions, ends, sample]))
     start = rotation.normalise(q_nb)
     vector = make_vector(algorithm, start, kind, imu, configuration)
-    pipe = Pipe(
-        take=TAKE_RATES if configuration is None else TAKE_RAW,
-        read=READ_RATES if configuration is None else READ_RAW,
-        columns="dt in s, rates in rad/s" if configuration is None else "raw readings",
-        bound=_bound(vector),
-        start=start,
-        lag=around.lag,
-    )
+    words = "dt in s, rates in rad/s" if configuration is None else "raw readings"
+    take = TAKE_RATES if configuration is None else TAKE_RAW
+    harness = attitude_harness(take, words, vector, start, around.lag)
     parts = [
         _header(algorithm, around, size, configuration),
         precision_lines(body, translator.names.text),
         _interface(shape, around, size, configuration),
         constant_lines(kernels),
         body,
-        main_program(vector, pipe),
+        attitude_test(harness, vector, _bound(vector)),
     ]
     return "\n".join(parts)
 
@@ -582,27 +577,12 @@ ANGLES = unpacked("euler_from_quat(q[0], q[1], q[2], q[3])", _state(3, "euler"))
 # How the test passes samples.
 
 TAKE_RATES = """\
-            const real_t gyro[3] = {R(samples[k][1]), R(samples[k][2]), R(samples[k][3])};
-            failed |= attitude_update(&a, R(samples[k][0]), gyro);"""
-READ_RATES = """\
-    double dt, x, y, z;
-    while (scanf("%lf %lf %lf %lf", &dt, &x, &y, &z) == 4) {
-        const real_t gyro[3] = {R(x), R(y), R(z)};
-        if (attitude_update(&a, R(dt), gyro)) {
-            fprintf(stderr, "refused: %g %g %g %g\\n", dt, x, y, z);
-        }"""
+    const real_t gyro[3] = {R(v[1]), R(v[2]), R(v[3])};
+    const int refused = attitude_update(s, R(v[0]), gyro);"""
 TAKE_RAW = """\
-            const real_t raw[3] = {R(samples[k][0]), R(samples[k][1]), R(samples[k][2])};
-            real_t q[4];
-            failed |= attitude_sample(&a, raw, q);"""
-READ_RAW = """\
-    double x, y, z;
-    while (scanf("%lf %lf %lf", &x, &y, &z) == 3) {
-        const real_t raw[3] = {R(x), R(y), R(z)};
-        real_t q[4];
-        if (attitude_sample(&a, raw, q)) {
-            fprintf(stderr, "refused: %g %g %g\\n", x, y, z);
-        }"""
+    const real_t raw[3] = {R(v[0]), R(v[1]), R(v[2])};
+    real_t turned[4];
+    const int refused = attitude_sample(s, raw, turned);"""
 
 
 def _bound(vector: Vector) -> str:

@@ -22,11 +22,11 @@ from strapdown.export.program import (
     ROUNDINGS,
     SAMPLES,
     Array,
-    Pipe,
     Vector,
+    attitude_harness,
+    attitude_test,
     c_rows,
     constant_lines,
-    main_program,
     precision_lines,
     unit_lines,
 )
@@ -86,20 +86,16 @@ def filter_in_c(
         )
     vector = filter_vector(chosen, magnetometer, sampling, q_nb, imu, configuration)
     body = "\n".join([*functions, ends])
-    pipe = Pipe(
-        take=_take(magnetometer, configuration is not None),
-        read=_read(magnetometer, configuration is not None),
-        columns=_columns(magnetometer, configuration is not None),
-        bound=bound_words(vector),
-        start=None if q_nb is None else rotation.normalise(q_nb),
-    )
+    raw = configuration is not None
+    start = None if q_nb is None else rotation.normalise(q_nb)
+    harness = attitude_harness(_take(magnetometer, raw), _columns(magnetometer, raw), vector, start)
     parts = [
         _header(chosen, magnetometer, sampling, configuration),
         precision_lines(body, translator.names.text),
         interface,
         constant_lines(kernels),
         body,
-        main_program(vector, pipe),
+        attitude_test(harness, vector, bound_words(vector)),
     ]
     return "\n".join(parts)
 
@@ -386,22 +382,6 @@ def _sample(configuration: SensorConfiguration, magnetometer: bool) -> str:
 # How the test passes samples.
 
 
-def _arrays(magnetometer: bool, source: str, indent: str, first: int) -> str:
-    lines = []
-    for k, name in enumerate(SENSORS[: 2 + magnetometer]):
-        values = ", ".join(f"R({source}[{first + 3 * k + i}])" for i in range(3))
-        lines.append(f"{indent}const real_t {name}[3] = {{{values}}};")
-    return "\n".join(lines)
-
-
-def _call(magnetometer: bool, raw: bool, source: str) -> str:
-    first = 0 if raw else 1
-    dt = "" if raw else f"R({source}[0]), "
-    field = f",\n                {source}[{first + 6}] < 1e29 ? mag : 0" if magnetometer else ""
-    name, last = ("attitude_sample", ", q") if raw else ("attitude_update", "")
-    return f"{name}(&a, {dt}gyro, {source}[{first + 3}] < 1e29 ? accel : 0{field}{last})"
-
-
 def _columns(magnetometer: bool, raw: bool) -> str:
     what = (
         "raw readings of gyro, accelerometer" if raw else "dt in s, rates in rad/s, forces in m/s²"
@@ -411,30 +391,17 @@ def _columns(magnetometer: bool, raw: bool) -> str:
 
 
 def _take(magnetometer: bool, raw: bool) -> str:
-    return (
-        "            const double *v = samples[k];\n"
-        + _arrays(magnetometer, "v", " " * 12, 0 if raw else 1)
-        + ("\n            real_t q[4];" if raw else "")
-        + f"\n            failed |= {_call(magnetometer, raw, 'v')};"
-    )
-
-
-def _read(magnetometer: bool, raw: bool) -> str:
-    count = 3 * (2 + magnetometer) + (not raw)
-    lines = [f"    double v[{count}];", "    for (;;) {"]
-    lines += [
-        f"        for (int i = 0; i < {count}; i++) {{",
-        '            if (scanf("%lf", v + i) != 1) {',
-        "                return i != 0;",
-        "            }",
-        "        }",
-        _arrays(magnetometer, "v", " " * 8, 0 if raw else 1),
-        *(("        real_t q[4];",) if raw else ()),
-        f"        if ({_call(magnetometer, raw, 'v')}) {{",
-        '            fprintf(stderr, "refused\\n");',
-        "        }",
-    ]
-    return "\n".join(lines)
+    first = 0 if raw else 1
+    lines = []
+    for k, name in enumerate(SENSORS[: 2 + magnetometer]):
+        values = ", ".join(f"R(v[{first + 3 * k + i}])" for i in range(3))
+        lines.append(f"    const real_t {name}[3] = {{{values}}};")
+    field = f", v[{first + 6}] < 1e29 ? mag : 0" if magnetometer else ""
+    given = f"gyro, v[{first + 3}] < 1e29 ? accel : 0{field}"
+    if raw:
+        lines.append("    real_t turned[4];")
+    call = f"sample(s, {given}, turned)" if raw else f"update(s, R(v[0]), {given})"
+    return "\n".join([*lines, *wrapped(f"const int refused = attitude_{call};", "    ")])
 
 
 # The test vector.

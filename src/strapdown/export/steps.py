@@ -19,7 +19,13 @@ from strapdown.errors import ConfigError
 from strapdown.export.cost import most_operations
 from strapdown.export.device import comment, device_translator, number, unpacked, wrapped
 from strapdown.export.kernels import Kernels
-from strapdown.export.program import ROUNDINGS, constant_lines, precision_lines
+from strapdown.export.program import (
+    ROUNDINGS,
+    Harness,
+    constant_lines,
+    precision_lines,
+    test_program,
+)
 from strapdown.export.sources import Kernel
 from strapdown.mechanization import Mechanization, NorthEastDown, WanderAzimuth
 from strapdown.nav_state import NavState
@@ -760,28 +766,9 @@ STEPS: dict[str, tuple[type[Any], Callable[[Any], StepParts], str]] = {
 
 # Test: rows that follow from a seed, and the results of the last one.
 
-_TEST = """\
-#if defined {upper}_TEST || defined {upper}_FILTER
-#include <stdio.h>
-
-#define COLUMNS {columns}
-#define RESULTS {results}
-
-static void test_start(struct {name} *s)
-{{
-{start}}}
-
-/* Take a row of numbers; returns how many results it gives. */
-static int test_take(struct {name} *s, const double *v, double *out)
-{{
-{take}}}
-#endif
-
-#ifdef {upper}_TEST
-#include <float.h>
-
+_DATA = """\
 #define ROWS {rows}
-#define EPSILON (sizeof(real_t) == sizeof(float) ? (double)FLT_EPSILON : DBL_EPSILON)
+#define TEST_FIRST (ROWS - 1)
 
 /* Numbers of a row: a middle, and a range times what the seed gives, -1/2 to 1/2. */
 static const double test_middle[COLUMNS] = {{
@@ -789,60 +776,29 @@ static const double test_middle[COLUMNS] = {{
 static const double test_range[COLUMNS] = {{
     {range}}};
 /* Results of the last row, by the kernels of strapdown in double precision. */
-static const double test_expected[RESULTS] = {{
-    {expected}}};
-/* Largest of each on the way: every row may have {roundings} roundings of it that another compiler
- * makes otherwise.
- */
+static const double test_expected[1][RESULTS] = {{{{
+    {expected}}}}};
+/* Largest of each on the way. */
 static const double test_largest[RESULTS] = {{
     {largest}}};
 
-int main(void)
+static double test_apart(const double *found, const double *expected)
 {{
-    static struct {name} s;
-    static double v[COLUMNS], out[RESULTS];
     double worst = 0.0;
-    unsigned long seed = 1;
-    test_start(&s);
-    for (int k = 0; k < ROWS; k++) {{
-        for (int i = 0; i < COLUMNS; i++) {{
-            seed = (seed * 1664525UL + 1013904223UL) & 0xffffffffUL;
-            v[i] = test_middle[i] + test_range[i] * ((double)seed / 4294967296.0 - 0.5);
-        }}
-        (void)test_take(&s, v, out);
-    }}
     for (int i = 0; i < RESULTS; i++) {{
-        const double off = fabs(out[i] - test_expected[i]) / test_largest[i];
+        const double off = fabs(found[i] - expected[i]) / test_largest[i];
         worst = off <= worst ? worst : off; /* so written NaN is kept */
     }}
-    const double bound = ROWS * {roundings} * EPSILON;
-    const int failed = !(worst <= bound);
-    printf("largest relative difference %.3g, bound %.3g: %s\\n", worst, bound,
-        failed ? "FAILED" : "passed");
-    return failed;
+    return worst;
 }}
-#endif
-
-#ifdef {upper}_FILTER
-int main(void)
-{{
-    static struct {name} s;
-    static double v[COLUMNS], out[RESULTS];
-    test_start(&s);
-    for (;;) {{
-        for (int i = 0; i < COLUMNS; i++) {{
-            if (scanf("%lf", v + i) != 1) {{
-                return i != 0;
-            }}
-        }}
-        const int count = test_take(&s, v, out);
-        for (int i = 0; i < count; i++) {{
-            printf("%.17g%c", out[i], i + 1 < count ? ' ' : '\\n');
-        }}
-    }}
-}}
-#endif
 """
+
+_ROW = """\
+        static unsigned long seed = 1;
+        for (int i = 0; i < COLUMNS; i++) {
+            seed = (seed * 1664525UL + 1013904223UL) & 0xffffffffUL;
+            v[i] = test_middle[i] + test_range[i] * ((double)seed / 4294967296.0 - 0.5);
+        }"""
 
 
 def _test(parts: StepParts) -> str:
@@ -851,21 +807,26 @@ def _test(parts: StepParts) -> str:
     while len(found) < 4:  # a low-pass waits for its first output
         count *= 2
         found = parts.run(drawn_rows(parts.rows, count))
-    largest = np.maximum(np.abs(found).max(axis=0), 1e-3)
-    return _TEST.format(
-        upper=parts.name.upper(),
-        name=parts.name,
-        columns=parts.rows.shape[1],
-        results=found.shape[1],
-        start=parts.start,
-        take=parts.take,
+    data = _DATA.format(
         rows=count,
         middle=_numbers(parts.rows[0]),
         range=_numbers(parts.rows[1]),
         expected=_numbers(found[-1]),
-        largest=_numbers([float(f"{v:.2g}") for v in largest]),
-        roundings=ROUNDINGS,
+        largest=_numbers([float(f"{max(v, 1e-3):.2g}") for v in np.abs(found).max(axis=0)]),
     )
+    harness = Harness(
+        parts.name,
+        parts.rows.shape[1],
+        found.shape[1],
+        parts.columns,
+        parts.start.rstrip("\n"),
+        parts.take.rstrip("\n"),
+    )
+    bound = (
+        f"{count} rows of {ROUNDINGS} roundings that another compiler or another sine may make "
+        "otherwise, relative to the largest of each result"
+    )
+    return test_program(harness, data, _ROW, bound, float(count * ROUNDINGS))
 
 
 def _numbers(values: Sequence[float] | Array) -> str:
