@@ -157,8 +157,8 @@ def kernels_of(module: str) -> ast.Module:
     module : str
         As in `single_precision`.
     """
-    if module in SOURCES:
-        path = Path(__file__).with_name(f"{module}.py")
+    path = Path(__file__).with_name(f"{module.removeprefix(f'{PACKAGE}.')}.py")
+    if path.exists():
         return ast.parse(path.read_text(encoding="utf-8"))
     tree = ast.parse(Path(str(sys.modules[module].__file__)).read_text(encoding="utf-8"))
     kept = [node for node in tree.body if _of_kernels(node)]

@@ -45,15 +45,15 @@ def _delivered(library: str) -> tuple[dict[str, Callable[..., Any]], str]:
     try:
         if library:
             spec: Any = spec_from_file_location(f"{_PACKAGE}._compiled", library)
-            _compiled = module_from_spec(spec)
-            spec.loader.exec_module(_compiled)
+            made: Any = module_from_spec(spec)
+            spec.loader.exec_module(made)
         else:
-            from strapdown._kernels import _compiled
+            from strapdown._kernels import _compiled as made
     except ImportError:
         return {}, ""
-    if sources_digest() != _compiled.SOURCES:
+    if sources_digest() != made.SOURCES:
         return {}, ""
-    return _compiled.KERNELS, f"{_compiled.COMPILER}, {_compiled.LEVEL}"
+    return made.KERNELS, f"{made.COMPILER}, {made.LEVEL}"
 
 
 def _choose() -> tuple[str, dict[str, Callable[..., Any]], str]:

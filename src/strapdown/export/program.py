@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from strapdown.export.configuration import Channel, SensorConfiguration
 from strapdown.export.device import WIDTH, comment, number, wrapped
 from strapdown.export.kernels import Kernels
+from strapdown.export.sources import Kernel
 
 Array = NDArray[np.float64]
 
@@ -302,6 +303,117 @@ static const double test_expected[ROWS][RESULTS] = {{
             v[i] = test_rows[k][i];
         }"""
     return test_program(harness, data, row, bound, vector.roundings, " rad")
+
+
+# A step that is none of an attitude.
+
+#: Rows of the test, whose numbers follow from a seed.
+ROWS = 64
+
+
+@dataclass(frozen=True)
+class StepParts:
+    """What a file is made of.
+
+    `harness`: how a test passes rows of numbers. `gives`: what results of a row are, in words.
+    `step`: the kernel of a call, `call` that of the file. `codes`: results by name. `rows` (two):
+    middle and range of the numbers of a row. `run`: results of rows by the kernels, as far as
+    there are any.
+    """
+
+    title: str
+    words: Sequence[str]
+    kernels: Kernels
+    step: Kernel
+    call: str
+    memory: int
+    codes: dict[str, int]
+    interface: str
+    code: str
+    harness: Harness
+    gives: str
+    rows: Array
+    run: Callable[[Array], Array]
+
+
+def drawn_rows(rows: Array, count: int) -> Array:
+    """Rows of the test: a middle, and a range times a number of -1/2 to 1/2 that a seed gives."""
+    middle, span = rows
+    seed, out = 1, np.empty((count, len(middle)))
+    for k in range(count):
+        for j in range(len(middle)):
+            seed = (seed * 1664525 + 1013904223) & 0xFFFFFFFF
+            out[k, j] = middle[j] + span[j] * (seed / 4294967296.0 - 0.5)
+    return out
+
+
+def listed(values: Sequence[float] | Array, indent: str = " " * 8) -> str:
+    """Literals of numbers, wrapped."""
+    text = ", ".join(number(float(v)) for v in values)
+    return "\n".join(wrapped(text, indent)).strip().replace("\n    " + indent, "\n" + indent)
+
+
+# Test: rows that follow from a seed, and the results of the last one.
+
+_STEP_DATA = """\
+#define ROWS {rows}
+#define TEST_FIRST (ROWS - 1)
+
+/* Numbers of a row: a middle, and a range times what the seed gives, -1/2 to 1/2. */
+static const double test_middle[COLUMNS] = {{
+    {middle}}};
+static const double test_range[COLUMNS] = {{
+    {range}}};
+/* Results of the last row, by the kernels of strapdown in double precision. */
+static const double test_expected[1][RESULTS] = {{{{
+    {expected}}}}};
+/* Largest of each on the way. */
+static const double test_largest[RESULTS] = {{
+    {largest}}};
+
+static double test_apart(const double *found, const double *expected)
+{{
+    double worst = 0.0;
+    for (int i = 0; i < RESULTS; i++) {{
+        const double off = fabs(found[i] - expected[i]) / test_largest[i];
+        worst = off <= worst ? worst : off; /* so written NaN is kept */
+    }}
+    return worst;
+}}
+"""
+
+_STEP_ROW = """\
+        static unsigned long seed = 1;
+        for (int i = 0; i < COLUMNS; i++) {
+            seed = (seed * 1664525UL + 1013904223UL) & 0xffffffffUL;
+            v[i] = test_middle[i] + test_range[i] * ((double)seed / 4294967296.0 - 0.5);
+        }"""
+
+
+def step_test(parts: StepParts) -> str:
+    """Return the end of a file of a step."""
+    count = ROWS
+    found = parts.run(drawn_rows(parts.rows, count))
+    while len(found) < 4:  # a low-pass waits for its first output
+        count *= 2
+        found = parts.run(drawn_rows(parts.rows, count))
+    data = _STEP_DATA.format(
+        rows=count,
+        middle=_numbers(parts.rows[0]),
+        range=_numbers(parts.rows[1]),
+        expected=_numbers(found[-1]),
+        largest=_numbers([float(f"{max(v, 1e-3):.2g}") for v in np.abs(found).max(axis=0)]),
+    )
+    bound = (
+        f"{count} rows of {ROUNDINGS} roundings that another compiler or another sine may make "
+        "otherwise, relative to the largest of each result"
+    )
+    return test_program(parts.harness, data, _STEP_ROW, bound, float(count * ROUNDINGS))
+
+
+def _numbers(values: Sequence[float] | Array) -> str:
+    text = ", ".join(repr(float(v)) for v in values)
+    return "\n".join(wrapped(text, "    ")).strip().replace("\n        ", "\n    ")
 
 
 def unit_lines(configuration: SensorConfiguration, sensors: Sequence[str]) -> str:

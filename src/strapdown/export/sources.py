@@ -9,8 +9,7 @@ from __future__ import annotations
 import ast
 import hashlib
 import sys
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
@@ -100,8 +99,7 @@ def load(folder: Path, wanted: Iterable[str] | None = None) -> dict[str, dict[st
         if stem.startswith(SINGLE):
             name = stem.removeprefix(SINGLE)
             home = name if name in arithmetic.SOURCES else f"{PACKAGE}.{name}"
-            with _standing_for(home, folder / f"{name}.py"):
-                return ast.parse(arithmetic.single_source(home)), []
+            return ast.parse(arithmetic.single_source(home)), []
         path = folder / f"{stem}.py"
         if path.exists():
             text = path.read_text(encoding="utf-8")
@@ -169,20 +167,6 @@ def load(folder: Path, wanted: Iterable[str] | None = None) -> dict[str, dict[st
         for name in (*arithmetic.SOURCES, *arithmetic.FURTHER):
             read(SINGLE + name)
     return modules
-
-
-@contextmanager
-def _standing_for(home: str, path: Path) -> Iterator[None]:
-    """Let a module be found by its name, for one that reads the file of a loaded module."""
-    if home in sys.modules:
-        yield
-        return
-    stands_for: Any = SimpleNamespace(__file__=str(path))
-    sys.modules[home] = stands_for
-    try:
-        yield
-    finally:
-        del sys.modules[home]
 
 
 def attach_comments(tree: ast.Module, lines: list[str]) -> None:
