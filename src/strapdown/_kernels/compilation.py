@@ -18,6 +18,7 @@ import os
 from collections.abc import Callable
 from fractions import Fraction
 from functools import cache
+from importlib import import_module
 from importlib.util import find_spec, module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import FunctionType
@@ -42,13 +43,14 @@ def sources_digest() -> str:
 
 def _delivered(library: str) -> tuple[dict[str, Callable[..., Any]], str]:
     """Return the compiled kernels by their names, and by what and for what processors."""
+    made: Any
     try:
         if library:
             spec: Any = spec_from_file_location(f"{_PACKAGE}._compiled", library)
-            made: Any = module_from_spec(spec)
+            made = module_from_spec(spec)
             spec.loader.exec_module(made)
         else:
-            from strapdown._kernels import _compiled as made
+            made = import_module(f"{_PACKAGE}._compiled")
     except ImportError:
         return {}, ""
     if sources_digest() != made.SOURCES:

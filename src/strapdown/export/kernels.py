@@ -467,6 +467,9 @@ class Specialiser:
             kind = {"int": int, "float": float}.get(node.func.id)
             inside = self.span(node.args[0])
             return (kind(inside[0]), kind(inside[1])) if kind and inside else None
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+            inside = self.span(node.operand)
+            return (-inside[1], -inside[0]) if inside else None
         if isinstance(node, ast.BinOp):
             a, b = self.span(node.left), self.span(node.right)
             operation = ARITHMETIC.get(type(node.op))
