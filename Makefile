@@ -70,7 +70,9 @@ examples: $(VENV)/.test
 	$(PYTEST) -n 2 --dist worksteal -m slow tests/cli/test_manual.py
 
 test-bounds: $(VENV)/.test
-	@$(FRESH) STRAPDOWN_KERNELS=numba NUMBA_BOUNDSCHECK=1 $(PYTEST) tests/unit/kernels tests/contracts
+	@folder=$$(mktemp -d); trap 'rm -rf "$$folder"' EXIT; \
+	$(BIN)/python -m tools.kernels_to_c.build --folder "$$folder" --flags="-DSD_BOUNDS -O1" && \
+	STRAPDOWN_KERNELS=$$(echo "$$folder"/_compiled.*) $(PYTEST) tests/unit/kernels tests/contracts
 
 record: $(VENV)/.run
 	$(BIN)/python tests/record

@@ -15,7 +15,8 @@ from typing import Any
 
 from hatchling.builders.hooks.plugin.interface import BuildHookInterface
 
-sys.path.insert(0, str(Path(__file__).parent))
+# The translator is of the package, and needs none of what the package depends on.
+sys.path[:0] = [str(Path(__file__).parent), str(Path(__file__).parent / "src")]
 
 
 class KernelsHook(BuildHookInterface):  # type: ignore[type-arg]

@@ -56,6 +56,10 @@ typedef REAL real_t;
 #endif
 #define PI R(3.141592653589793)
 
+typedef struct { real_t f0, f1, f2; } real3;
+typedef struct { real_t f0, f1; } real2;
+typedef struct { real_t f0, f1, f2, f3; } real4;
+
 struct attitude {
     /* Quaternion w, x, y, z. */
     real_t state[4];
@@ -88,7 +92,7 @@ void attitude_euler(const struct attitude *a, real_t euler[3]);
 #define GIMBAL_LOCK R(1e-14)
 
 /* Cos(x) and sin(x)/(2x) for u = x^2: the limits of Alexiev (21) and (22), x = |r|/2. */
-static void half_angle(real_t u, real_t *out1, real_t *out2)
+static real2 half_angle(real_t u)
 {
     if (u < SERIES_LIMIT) {
         real_t c = R(1.0) - u * (R(0.5) - u * (R(1.0) / R(24.0) - u * (R(1.0) / R(720.0) - u
@@ -96,68 +100,60 @@ static void half_angle(real_t u, real_t *out1, real_t *out2)
             / R(479001600.0)))))));
         real_t s = R(0.5) * (R(1.0) - u * (R(1.0) / R(6.0) - u * (R(1.0) / R(120.0) - u * (R(1.0)
             / R(5040.0) - u * (R(1.0) / R(362880.0) - u * (R(1.0) / R(39916800.0)))))));
-        *out1 = c;
-        *out2 = s;
-        return;
+        const real2 t1_ = {c, s};
+        return t1_;
     }
     real_t x = SQRT(u);
-    *out1 = COS(x);
-    *out2 = R(0.5) * SIN(x) / x;
+    const real2 t2_ = {COS(x), R(0.5) * SIN(x) / x};
+    return t2_;
 }
 
 /* Exponential: Alexiev (14)-(17), with the series near zero that they lack. */
-static void quat_from_rotvec(real_t x, real_t y, real_t z, real_t *out1, real_t *out2, real_t *out3,
-    real_t *out4)
+static real4 quat_from_rotvec(real_t x, real_t y, real_t z)
 {
-    real_t c, s;
-    half_angle(R(0.25) * (x * x + y * y + z * z), &c, &s);
-    *out1 = c;
-    *out2 = s * x;
-    *out3 = s * y;
-    *out4 = s * z;
+    const real2 t1_ = half_angle(R(0.25) * (x * x + y * y + z * z));
+    real_t c = t1_.f0, s = t1_.f1;
+    const real4 t2_ = {c, s * x, s * y, s * z};
+    return t2_;
 }
 
 /* A (x) sigma_q of Alexiev (20); order 0 is the limit of the series. */
-static void quaternion_increment(real_t x, real_t y, real_t z, real_t *out1, real_t *out2,
-    real_t *out3, real_t *out4)
+static real4 quaternion_increment(real_t x, real_t y, real_t z)
 {
-    quat_from_rotvec(x, y, z, out1, out2, out3, out4);
+    return quat_from_rotvec(x, y, z);
 }
 
 /* Hamilton product: q_ac = q_ab q_bc. */
-static void quat_multiply(real_t aw, real_t ax, real_t ay, real_t az, real_t bw, real_t bx,
-    real_t by, real_t bz, real_t *out1, real_t *out2, real_t *out3, real_t *out4)
+static real4 quat_multiply(real_t aw, real_t ax, real_t ay, real_t az, real_t bw, real_t bx,
+    real_t by, real_t bz)
 {
-    *out1 = aw * bw - ax * bx - ay * by - az * bz;
-    *out2 = aw * bx + ax * bw + ay * bz - az * by;
-    *out3 = aw * by - ax * bz + ay * bw + az * bx;
-    *out4 = aw * bz + ax * by - ay * bx + az * bw;
+    const real4 t1_ = {aw * bw - ax * bx - ay * by - az * bz, aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx, aw * bz + ax * by - ay * bx + az * bw};
+    return t1_;
 }
 
 /* Scale to unit norm; the zero quaternion gives NaN, which the tables refuse. */
-static void quat_normalise(real_t w, real_t x, real_t y, real_t z, real_t *out1, real_t *out2,
-    real_t *out3, real_t *out4)
+static real4 quat_normalise(real_t w, real_t x, real_t y, real_t z)
 {
     real_t k = R(1.0) / SQRT(w * w + x * x + y * y + z * z);
-    *out1 = w * k;
-    *out2 = x * k;
-    *out3 = y * k;
-    *out4 = z * k;
+    const real4 t1_ = {w * k, x * k, y * k, z * k};
+    return t1_;
 }
 
-static void quaternion_turned(real_t w, real_t x, real_t y, real_t z, real_t tx, real_t ty,
-    real_t tz, real_t *out1, real_t *out2, real_t *out3, real_t *out4)
+static real4 quaternion_turned(real_t w, real_t x, real_t y, real_t z, real_t tx, real_t ty,
+    real_t tz)
 {
-    real_t dw, dx, dy, dz;
-    quaternion_increment(tx, ty, tz, &dw, &dx, &dy, &dz);
-    quat_multiply(w, x, y, z, dw, dx, dy, dz, &w, &x, &y, &z);
-    quat_normalise(w, x, y, z, out1, out2, out3, out4);
+    const real4 t1_ = quaternion_increment(tx, ty, tz);
+    real_t dw = t1_.f0, dx = t1_.f1, dy = t1_.f2, dz = t1_.f3;
+    const real4 t2_ = quat_multiply(w, x, y, z, dw, dx, dy, dz);
+    w = t2_.f0; x = t2_.f1; y = t2_.f2; z = t2_.f3;
+    return quat_normalise(w, x, y, z);
 }
 
 static void quaternion_step(real_t *state, real_t tx, real_t ty, real_t tz)
 {
-    quaternion_turned(state[0], state[1], state[2], state[3], tx, ty, tz, &state[0], &state[1],
-        &state[2], &state[3]);
+    const real4 t1_ = quaternion_turned(state[0], state[1], state[2], state[3], tx, ty, tz);
+    state[0] = t1_.f0; state[1] = t1_.f1; state[2] = t1_.f2; state[3] = t1_.f3;
 }
 
 /* Theta and dtheta of one axis: trapezoid of instantaneous rates, or a mean rate. */
@@ -186,8 +182,7 @@ static real_t wrap_pi(real_t angle)
  * doi:10.1371/journal.pone.0276302) keep full accuracy at every pitch, where the usual arcsine
  * loses half its digits near +-90 deg.
  */
-static void euler_from_quat(real_t w, real_t x, real_t y, real_t z, real_t *out1, real_t *out2,
-    real_t *out3)
+static real3 euler_from_quat(real_t w, real_t x, real_t y, real_t z)
 {
     real_t up = HYPOT(w + y, z - x);
     real_t down = HYPOT(w - y, z + x);
@@ -199,15 +194,15 @@ static void euler_from_quat(real_t w, real_t x, real_t y, real_t z, real_t *out1
     } else if (up < GIMBAL_LOCK) {
         half_difference = half_sum;
     }
-    *out1 = wrap_pi(half_sum - half_difference);
-    *out2 = pitch;
-    *out3 = wrap_pi(half_sum + half_difference);
+    const real3 t1_ = {wrap_pi(half_sum - half_difference), pitch, wrap_pi(half_sum
+        + half_difference)};
+    return t1_;
 }
 
 void attitude_init(struct attitude *a, const real_t q_nb[4])
 {
-    real_t w, x, y, z;
-    quat_normalise(q_nb[0], q_nb[1], q_nb[2], q_nb[3], &w, &x, &y, &z);
+    const real4 unit = quat_normalise(q_nb[0], q_nb[1], q_nb[2], q_nb[3]);
+    const real_t w = unit.f0, x = unit.f1, y = unit.f2, z = unit.f3;
     a->state[0] = w;
     a->state[1] = x;
     a->state[2] = y;
@@ -244,31 +239,58 @@ int attitude_update(struct attitude *a, real_t dt, const real_t gyro[3])
 
 void attitude_quaternion(const struct attitude *a, real_t q_nb[4])
 {
-    quat_normalise(a->state[0], a->state[1], a->state[2], a->state[3],
-        &q_nb[0], &q_nb[1], &q_nb[2], &q_nb[3]);
+    const real4 result = quat_normalise(a->state[0], a->state[1], a->state[2], a->state[3]);
+    q_nb[0] = result.f0; q_nb[1] = result.f1; q_nb[2] = result.f2; q_nb[3] = result.f3;
 }
 
 void attitude_euler(const struct attitude *a, real_t euler[3])
 {
     real_t q[4];
     attitude_quaternion(a, q);
-    euler_from_quat(q[0], q[1], q[2], q[3], &euler[0], &euler[1], &euler[2]);
+    const real3 result = euler_from_quat(q[0], q[1], q[2], q[3]);
+    euler[0] = result.f0; euler[1] = result.f1; euler[2] = result.f2;
 }
 
 #ifdef ATTITUDE_TEST
 #include <float.h>
+#endif
+#if defined ATTITUDE_TEST || defined ATTITUDE_FILTER
 #include <stdio.h>
 
-#define ROWS 48
-#define LAG 0 /* samples by which the attitude is behind */
+/* Numbers of a row: dt in s, rates in rad/s. */
+#define COLUMNS 4
+#define RESULTS 4
 
-static const real_t start[4] = {
-        R(1.0), 
-        R(0.0), 
-        R(0.0), 
+static void test_start(struct attitude *s)
+{
+    static const real_t start[4] = {
+        R(1.0),
+        R(0.0),
+        R(0.0),
         R(0.0)};
-/* Dt in s, rates in rad/s; single precision holds each exactly. */
-static const double samples[ROWS][4] = {
+    attitude_init(s, start);
+}
+
+/* Take a row. Returns the number of its results, less than none if it is refused. */
+static int test_take(struct attitude *s, const double *v, double *out)
+{
+    const real_t gyro[3] = {R(v[1]), R(v[2]), R(v[3])};
+    const int refused = attitude_update(s, R(v[0]), gyro);
+    real_t q[4];
+    attitude_quaternion(s, q);
+    for (int i = 0; i < 4; i++) {
+        out[i] = (double)q[i];
+    }
+    return refused ? -RESULTS : RESULTS;
+}
+#endif
+
+#ifdef ATTITUDE_TEST
+#define ROWS 48
+#define TEST_FIRST 0 /* samples by which the attitude is behind */
+
+/* Single precision holds each exactly. */
+static const double test_rows[ROWS][COLUMNS] = {
     {0.0, 0.0, 0.0, 0.0},
     {0.0625, 0.20000000298023224, 0.062666155397892, 0.06118737533688545},
     {0.0625, 0.4000000059604645, 0.15581561625003815, 0.027194742113351822},
@@ -320,7 +342,7 @@ static const double samples[ROWS][4] = {
 };
 
 /* q_nb at each sample, by the kernels of strapdown in the same precision. */
-static const double expected[ROWS][4] = {
+static const double test_expected[ROWS][RESULTS] = {
 #if JOIN(IS_, REAL) == IS_float
     {1.0, 0.0, 0.0, 0.0},
     {0.9999941807982302, 0.003124994155017384, 0.0009791567203155354, 0.0009560509005225091},
@@ -422,38 +444,37 @@ static const double expected[ROWS][4] = {
 #endif
 };
 
-/* 48 steps of 32 roundings that another compiler or another sine may make otherwise. */
-#define EPSILON (sizeof(real_t) == sizeof(float) ? (double)FLT_EPSILON : DBL_EPSILON)
-#define BOUND (1536 * EPSILON)
-
 /* Angle between the attitude and an expected one, rad. */
-static double apart(const struct attitude *a, const double *q_nb)
+static double test_apart(const double *q, const double *q_nb)
 {
-    real_t q[4];
     double sum = 0.0, difference = 0.0;
-    attitude_quaternion(a, q);
     for (int i = 0; i < 4; i++) {
-        difference += ((double)q[i] - q_nb[i]) * ((double)q[i] - q_nb[i]);
-        sum += ((double)q[i] + q_nb[i]) * ((double)q[i] + q_nb[i]);
+        difference += (q[i] - q_nb[i]) * (q[i] - q_nb[i]);
+        sum += (q[i] + q_nb[i]) * (q[i] + q_nb[i]);
     }
     return 2.0 * sqrt(difference < sum ? difference : sum);
 }
 
+/* 48 steps of 32 roundings that another compiler or another sine may make otherwise. */
+#define EPSILON (sizeof(real_t) == sizeof(float) ? (double)FLT_EPSILON : DBL_EPSILON)
+#define BOUND (1536 * EPSILON)
+
 int main(void)
 {
-    struct attitude a;
+    static struct attitude s;
+    static double v[COLUMNS], out[RESULTS];
     double largest = 0.0;
     int failed = 0;
-    attitude_init(&a, start);
-    for (int k = 0; k < ROWS + LAG; k++) {
-        if (k < ROWS) {
-            const real_t gyro[3] = {R(samples[k][1]), R(samples[k][2]), R(samples[k][3])};
-            failed |= attitude_update(&a, R(samples[k][0]), gyro);
+    test_start(&s);
+    for (int k = 0; k < ROWS; k++) {
+        for (int i = 0; i < COLUMNS; i++) {
+            v[i] = test_rows[k][i];
         }
-        if (k >= LAG) {
-            const double angle = apart(&a, expected[k - LAG]);
-            failed |= !(angle <= BOUND); /* so written NaN fails, too */
-            largest = angle > largest ? angle : largest;
+        failed |= test_take(&s, v, out) < 0;
+        if (k >= TEST_FIRST) {
+            const double off = test_apart(out, test_expected[k - TEST_FIRST]);
+            failed |= !(off <= BOUND); /* so written NaN fails, too */
+            largest = off > largest ? off : largest;
         }
     }
     printf("largest difference %.3g rad, bound %.3g rad: %s\n", largest, BOUND,
@@ -463,34 +484,29 @@ int main(void)
 #endif
 
 #ifdef ATTITUDE_FILTER
-#include <stdio.h>
-
-static void put(const struct attitude *a)
+static void test_put(int count, const double *out)
 {
-    real_t q[4];
-    attitude_quaternion(a, q);
-    for (int i = 0; i < 4; i++) {
-        printf("%.17g%c", (double)q[i], i < 3 ? ' ' : '\n');
+    for (int i = 0; i < count; i++) {
+        printf("%.17g%c", out[i], i + 1 < count ? ' ' : '\n');
     }
 }
 
 int main(void)
 {
-    static const real_t start[4] = {
-        R(1.0), 
-        R(0.0), 
-        R(0.0), 
-        R(0.0)};
-    struct attitude a;
-    attitude_init(&a, start);
-    double dt, x, y, z;
-    while (scanf("%lf %lf %lf %lf", &dt, &x, &y, &z) == 4) {
-        const real_t gyro[3] = {R(x), R(y), R(z)};
-        if (attitude_update(&a, R(dt), gyro)) {
-            fprintf(stderr, "refused: %g %g %g %g\n", dt, x, y, z);
+    static struct attitude s;
+    static double v[COLUMNS], out[RESULTS];
+    int column = 0;
+    test_start(&s);
+    while (scanf("%lf", v + column) == 1) {
+        column = (column + 1) % COLUMNS;
+        if (column == 0) {
+            const int count = test_take(&s, v, out);
+            if (count < 0) {
+                fprintf(stderr, "refused\n");
+            }
+            test_put(count < 0 ? -count : count, out);
         }
-        put(&a);
     }
-    return 0;
+    return column != 0;
 }
 #endif

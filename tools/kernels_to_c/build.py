@@ -15,9 +15,11 @@ from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
-from . import signatures, sources
-from .translate import Function, Translator, _holds_memory
-from .types_of_c import SCALARS, Type, is_array, is_list
+from strapdown.export import sources
+from strapdown.export.translate import Function, Translator, holds_memory
+from strapdown.export.types_of_c import SCALARS, Type, is_array, is_list
+
+from . import signatures
 
 HERE = Path(__file__).parent
 PACKAGE = HERE.parents[1] / "src/strapdown/_kernels"
@@ -147,7 +149,9 @@ class _Module:
                 "            if (why) {",
                 "                sd_let_go(&held);",
                 "                table->reset();",
-                f'                return sd_failed("{name}", why);',
+                "                int line;",
+                "                const char *file = table->where(&line);",
+                f'                return sd_failed("{name}", why, file, line);',
                 "            }",
             ]
             lines += leave if function.can_raise else ["#ifdef SD_BOUNDS", *leave, "#endif"]
@@ -170,7 +174,7 @@ class _Module:
                 else:
                     lines.append(f"            {self.names(function.result)} x = {call};")
                 lines.append("            sd_let_go(&held);")
-                if _holds_memory(function.result):
+                if holds_memory(function.result):
                     lines.append(f"            PyObject *o = {self.maker(function.result)}(x);")
                     lines += ["            table->reset();", "            return o;"]
                 else:
@@ -183,10 +187,13 @@ class _Module:
         return "\n".join(lines)
 
 
-def generate(package: Path, listed: Path, out: Path) -> int:
-    """Write the three files of C; return the number of functions."""
+def generate(package: Path, listed: Path, out: Path, lines: bool = False) -> int:
+    """Write the three files of C; return the number of functions.
+
+    `lines`: whether each statement has the line of the kernel's source, for ``-DSD_BOUNDS``.
+    """
     modules = sources.load(package)
-    translator = Translator()
+    translator = Translator(lines=lines)
     public: dict[str, list[Function]] = {}
     for name, rows in signatures.read(listed).items():
         module, kernel = name.split(".")
@@ -208,6 +215,7 @@ def generate(package: Path, listed: Path, out: Path) -> int:
                 "typedef struct {",
                 "    jmp_buf *(*leave)(void);",
                 "    void (*reset)(void);",
+                "    const char *(*where)(int *line);",
                 *rows,
                 "} sd_table;",
                 "",
@@ -223,8 +231,9 @@ def generate(package: Path, listed: Path, out: Path) -> int:
                 *(f.text for f in translator.order),
                 "static jmp_buf *sd_leave(void) { return &sd_exit; }",
                 "static void sd_reset(void) { sd_end((sd_mark){0, 0}); }",
+                "static const char *sd_where(int *line) { *line = sd_line; return sd_file; }",
                 "const sd_table SD_TABLE = {",
-                "    sd_leave, sd_reset,",
+                "    sd_leave, sd_reset, sd_where,",
                 *(f"    {f.name}," for f in every),
                 "};",
                 "",
@@ -350,15 +359,19 @@ def build(folder: Path, flags: Sequence[str] = (), keep: Path | None = None) -> 
     folder : Path
         Where the module is put.
     flags : sequence of str
-        Further flags of the compiler; ``-DSD_BOUNDS`` checks every index.
+        Further flags of the compiler; ``-DSD_BOUNDS`` checks every index, and an IndexError names
+        the kernel that was called, and file and line of the index.
     keep : Path
         Where the C is kept.
     """
     levels = ["base", "v3"] if platform.machine().lower() in ("x86_64", "amd64") else ["base"]
+    if "-DSD_BOUNDS" in flags:  # for tests: one level suffices, as all give the same bits
+        levels = levels[:1]
     with tempfile.TemporaryDirectory() as scratch:
         out = keep or Path(scratch)
         begin = time.perf_counter()
-        count = generate(PACKAGE, HERE / "signatures.txt", out)
+        bounds = "-DSD_BOUNDS" in flags
+        count = generate(PACKAGE, HERE / "signatures.txt", out, bounds)
         middle = time.perf_counter()
         made = compile_(out, compiler(), list(flags), levels)
         print(

@@ -87,12 +87,12 @@ static PyObject *sd_copied(const void *data, int type, int dims, npy_intp *sizes
     if (o) memcpy(PyArray_DATA((PyArrayObject *)o), data, (size_t)PyArray_NBYTES((PyArrayObject *)o));
     return o;
 }
-static PyObject *sd_failed(const char *kernel, int why) {
+static PyObject *sd_failed(const char *kernel, int why, const char *file, int line) {
     if (why == SD_NO_MEMORY) return PyErr_NoMemory();
     if (why == SD_ZERO_DIVISION)
         PyErr_SetString(PyExc_ZeroDivisionError, "division by zero");
     else
-        PyErr_Format(PyExc_IndexError, "%s: index is out of bounds", kernel);
+        PyErr_Format(PyExc_IndexError, "%s: index is out of bounds in %s, line %d", kernel, file, line);
     return NULL;
 }
 static PyObject *sd_count(const char *kernel, int wanted, Py_ssize_t given) {

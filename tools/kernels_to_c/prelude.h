@@ -33,12 +33,20 @@ __attribute__((noreturn, cold, noinline))
 #endif
 static void sd_fail(int why) { longjmp(sd_exit, why); }
 
+/* With SD_BOUNDS, which index left its array: file and line of the kernel's source. */
+static SD_THREAD const char *sd_file = "";
+static SD_THREAD int sd_line;
+
 #ifdef SD_BOUNDS
-static inline int64_t sd_at(int64_t i, int64_t n) {
-    if (i < 0 || i >= n) sd_fail(SD_OUT_OF_BOUNDS);
+static inline int64_t sd_at(int64_t i, int64_t n, const char *file, int line) {
+    if (i < 0 || i >= n) {
+        sd_file = file;
+        sd_line = line;
+        sd_fail(SD_OUT_OF_BOUNDS);
+    }
     return i;
 }
-#define SD_AT(i, n) sd_at(i, n)
+#define SD_AT(i, n) sd_at(i, n, __FILE__, __LINE__)
 #else
 #define SD_AT(i, n) (i)
 #endif

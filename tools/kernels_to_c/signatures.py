@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from .types_of_c import Type, is_array, is_tuple
+from strapdown.export.types_of_c import Type, is_array, is_tuple
 
 _TOKEN = re.compile(r"\s*(?:([a-z]\d)(s?)(\[[:,]*\])?|([(),]))")
 

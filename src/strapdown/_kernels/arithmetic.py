@@ -48,7 +48,8 @@ class _InSingle(ast.NodeTransformer):
         # A constant of the module is worked out in double precision, and rounded once.
         if _is_inexact(node.value):
             node.value = _single(node.value)
-        return node
+            return node
+        return self.generic_visit(node)
 
     def visit_ImportFrom(self, node: ast.ImportFrom) -> ast.AST:
         if node.module in FORMULAS:
@@ -156,8 +157,8 @@ def kernels_of(module: str) -> ast.Module:
     module : str
         As in `single_precision`.
     """
-    if module in SOURCES:
-        path = Path(__file__).with_name(f"{module}.py")
+    path = Path(__file__).with_name(f"{module.removeprefix(f'{PACKAGE}.')}.py")
+    if path.exists():
         return ast.parse(path.read_text(encoding="utf-8"))
     tree = ast.parse(Path(str(sys.modules[module].__file__)).read_text(encoding="utf-8"))
     kept = [node for node in tree.body if _of_kernels(node)]

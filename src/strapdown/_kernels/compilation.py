@@ -2,7 +2,8 @@
 
 An installation has the kernels compiled: these sources, translated to C (`tools/kernels_to_c`).
 Where that is missing, or is of other sources, numba compiles them when they are first called, if it
-is installed. STRAPDOWN_KERNELS chooses: ``compiled``, ``numba``, or ``python`` (interpreted).
+is installed. STRAPDOWN_KERNELS chooses: ``compiled``, ``numba``, ``python`` (interpreted), or the
+path of another library of these sources, as of one that checks every index.
 
 A kernel gives the same bits in all three, because none is compiled with relaxed arithmetic: neither
 numba's `fastmath`, nor C's contraction of a product and a sum where the compiler happens to inline.
@@ -17,7 +18,8 @@ import os
 from collections.abc import Callable
 from fractions import Fraction
 from functools import cache
-from importlib.util import find_spec
+from importlib import import_module
+from importlib.util import find_spec, module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import FunctionType
 from typing import Any, TypeVar
@@ -39,25 +41,32 @@ def sources_digest() -> str:
     return digest.hexdigest()
 
 
-def _delivered() -> tuple[dict[str, Callable[..., Any]], str]:
+def _delivered(library: str) -> tuple[dict[str, Callable[..., Any]], str]:
     """Return the compiled kernels by their names, and by what and for what processors."""
+    made: Any
     try:
-        from strapdown._kernels import _compiled
+        if library:
+            spec: Any = spec_from_file_location(f"{_PACKAGE}._compiled", library)
+            made = module_from_spec(spec)
+            spec.loader.exec_module(made)
+        else:
+            made = import_module(f"{_PACKAGE}._compiled")
     except ImportError:
         return {}, ""
-    if sources_digest() != _compiled.SOURCES:
+    if sources_digest() != made.SOURCES:
         return {}, ""
-    return _compiled.KERNELS, f"{_compiled.COMPILER}, {_compiled.LEVEL}"
+    return made.KERNELS, f"{made.COMPILER}, {made.LEVEL}"
 
 
 def _choose() -> tuple[str, dict[str, Callable[..., Any]], str]:
     wanted = os.environ.get("STRAPDOWN_KERNELS", "")
-    kernels, compiler = ({}, "") if wanted in ("numba", "python") else _delivered()
+    library = wanted if os.sep in wanted else ""
+    kernels, compiler = ({}, "") if wanted in ("numba", "python") else _delivered(library)
     if kernels:
         return "compiled", kernels, compiler
     if wanted == "python":
         return wanted, {}, ""
-    if wanted != "compiled" and find_spec("numba"):
+    if wanted != "compiled" and not library and find_spec("numba"):
         return "numba", {}, ""
     raise ImportError(f"The compiled kernels are missing, or of other sources. {_HELP}")
 

@@ -47,6 +47,7 @@ COMMANDS = (
     "simulate",
     "verify",
     "sign",
+    "export",
     "modules",
     "demo",
 )

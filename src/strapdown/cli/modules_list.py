@@ -11,6 +11,7 @@ from strapdown.config.choice import SLOTS, options_of
 from strapdown.config.motions import KINDS
 from strapdown.ellipsoids import ELLIPSOIDS
 from strapdown.errors import Finding
+from strapdown.export.steps import STEPS
 from strapdown.formats import READERS, Reader
 from strapdown.formats.crash_records import CRASH_READERS
 from strapdown.formats.writers import WRITERS
@@ -143,6 +144,15 @@ def _tables() -> Iterator[tuple[str, str, Mapping[str, Any], Columns]]:
         if name != "mechanization":
             title = f"{slot.title} ([{name}] of a chain{_UNSAID.get(name, '')})"
             yield name, title, slot.entries, _MODULE
+    yield (
+        "exports",
+        "As C for a device (strapdown export), beside the algorithms and filters above",
+        STEPS,
+        {
+            "options": lambda _, step: [f.name for f in fields(step[0])],
+            "summary": lambda _, step: step[2],
+        },
+    )
     yield (
         "standstill_detectors",
         "Detectors of a standstill (detector = … of a measurement)",

@@ -20,20 +20,21 @@ from strapdown.attitude_algorithms.cost import count_cost, kernel_home, step_ker
 from strapdown.constants import CORTEX_M4F_CYCLES
 from strapdown.errors import ConfigError, check_choice
 from strapdown.export.configuration import SensorConfiguration
-from strapdown.export.kernels import Function, Kernels
+from strapdown.export.device import WIDTH, comment, device_translator, unpacked
+from strapdown.export.kernels import Kernels
 from strapdown.export.program import (
     ROUNDINGS,
     SAMPLES,
     Array,
-    Pipe,
     Vector,
+    attitude_harness,
+    attitude_test,
     c_rows,
     constant_lines,
-    main_program,
     precision_lines,
     unit_lines,
 )
-from strapdown.export.translate import WIDTH, Translator, comment
+from strapdown.export.sources import Kernel
 from strapdown.increments import BETWEEN_STAMPS
 from strapdown.tables import GYRO, check_imu, check_sampling_kind
 
@@ -49,33 +50,29 @@ def algorithm_in_c(
     """Write an attitude algorithm as one C99 file with its own test: `export_c`."""
     around, shape = SAMPLINGS[kind], shape_of(algorithm)
     kernels, step, increments = algorithm_kernels(algorithm, shape, kind)
-    translator = Translator(kernels)
-    functions = ["\n".join(translator.function(f)) + "\n" for f in kernels.functions]
+    translator = device_translator()
+    functions, size = kernels.in_c(translator), count_cost(algorithm).memory
     ends = ENDS.format(
         begin=shape.begin,
-        clear=_rest(shape, translator.state_size) + CLEAR[kind],
+        clear=_rest(shape, size) + CLEAR[kind],
         update=_update(around, step, increments),
         read=shape.read,
+        angles=ANGLES,
     )
     sample = "" if configuration is None else _sample(configuration)
     body = "\n".join(filter(None, [*functions, ends, sample]))
     start = rotation.normalise(q_nb)
     vector = make_vector(algorithm, start, kind, imu, configuration)
-    pipe = Pipe(
-        take=TAKE_RATES if configuration is None else TAKE_RAW,
-        read=READ_RATES if configuration is None else READ_RAW,
-        columns="dt in s, rates in rad/s" if configuration is None else "raw readings",
-        bound=_bound(vector),
-        start=start,
-        lag=around.lag,
-    )
+    words = "dt in s, rates in rad/s" if configuration is None else "raw readings"
+    take = TAKE_RATES if configuration is None else TAKE_RAW
+    harness = attitude_harness(take, words, vector, start, around.lag)
     parts = [
-        _header(algorithm, around, translator.state_size, configuration),
-        precision_lines(body),
-        _interface(shape, around, translator.state_size, configuration),
+        _header(algorithm, around, size, configuration),
+        precision_lines(body, translator.names.text),
+        _interface(shape, around, size, configuration),
         constant_lines(kernels),
         body,
-        main_program(vector, pipe),
+        attitude_test(harness, vector, _bound(vector)),
     ]
     return "\n".join(parts)
 
@@ -108,7 +105,7 @@ def sampling_kind(interpolation: str, sampling: str | None, imu: pd.DataFrame | 
 
 def algorithm_kernels(
     algorithm: AttitudeAlgorithm, shape: Shape, kind: str
-) -> tuple[Kernels, Function, Function]:
+) -> tuple[Kernels, Kernel, Kernel]:
     """Kernels of an algorithm, among them its step and the increments of one axis."""
     kernels = Kernels(kernel_home(algorithm), shape.ranges(algorithm))
     step = _require_step(kernels, algorithm)
@@ -118,13 +115,13 @@ def algorithm_kernels(
     return kernels, step, increments
 
 
-def _require_step(kernels: Kernels, algorithm: AttitudeAlgorithm) -> Function:
+def _require_step(kernels: Kernels, algorithm: AttitudeAlgorithm) -> Kernel:
     name = step_kernel(algorithm)[1]
-    options = zip(kernels.parameters(name)[-2:], algorithm.kernel_options(), strict=True)
+    options = zip(kernels.source(name).parameters[-2:], algorithm.kernel_options(), strict=True)
     return kernels.require(name, {option: (value, value) for option, value in options})
 
 
-def _require_increments(kernels: Kernels, kind: str, change: bool) -> Function:
+def _require_increments(kernels: Kernels, kind: str, change: bool) -> Kernel:
     if kind == "cubic":
         kernels.require("neighbour")
         return kernels.require("cubic_mean")
@@ -150,24 +147,24 @@ def _rest(shape: Shape, size: int) -> str:
     return head + "        a->state[i] = R(0.0);\n    }\n"
 
 
-def _update(around: Sampling, step: Function, increments: Function) -> str:
+def _update(around: Sampling, step: Kernel, increments: Kernel) -> str:
     change = "dx" in step.parameters
     of = {"state": "a->state", "dt": "dt"}
     of |= {f"t{axis}": f"theta[{i}]" for i, axis in enumerate("xyz")}
     zero = around is SAMPLINGS["mean"]
     of |= {f"d{axis}": "R(0.0)" if zero else f"dtheta[{i}]" for i, axis in enumerate("xyz")}
     call = f"{step.name}({', '.join(of[p] for p in step.parameters)});"
-    results = ", &theta[i], &dtheta[i]);" if change else ");"
-    taken = "increment(a->rate[i], gyro[i], dt" + results
+    taken = "increment(a->rate[i], gyro[i], dt)"
+    both = unpacked(taken, ("theta[i]", "dtheta[i]"), " " * 12).lstrip()
     words = {
         "DTHETA": "dtheta[i] = (last - first) * dt;" if change else "",
         "THETA": "theta[3], dtheta[3]" if change else "theta[3]",
-        "INCREMENT": taken if change else f"theta[i] = {taken}",
+        "INCREMENT": both if change else f"theta[i] = {taken};",
         "STEP": call,
     }
     lines = []
-    for line in around.code.split("\n"):
-        new = re.sub(r"\b(" + "|".join(words) + r")\b", lambda m: words[m.group()], line)
+    text = re.sub(r"\b(" + "|".join(words) + r")\b", lambda m: words[m.group()], around.code)
+    for new, line in zip(text.split("\n"), text.split("\n"), strict=True):
         indent = line[: len(line) - len(line.lstrip())]
         if new.strip() or not line.strip():
             lines += textwrap.wrap(
@@ -235,16 +232,21 @@ def _interface(
 # written once in C. The formulas it calls are translated.
 
 
-_PLACES = "&q_nb[0], &q_nb[1], &q_nb[2], &q_nb[3]"
-_UNIT = f"quat_normalise(a->state[0], a->state[1], a->state[2], a->state[3],\n        {_PLACES});"
-_ANGLES = f"quat_from_euler(a->state[0], a->state[1], a->state[2],\n        {_PLACES});"
-_FROM_ANGLES = "euler_from_quat(w, x, y, z, &a->state[0], &a->state[1], &a->state[2]);"
+def _state(count: int, of: str = "a->state") -> list[str]:
+    return [f"{of}[{i}]" for i in range(count)]
+
+
+def _read(kernel: str, count: int, of: str = "a->state") -> str:
+    return unpacked(f"{kernel}({', '.join(_state(count, of))})", _state(4, "q_nb")).lstrip()
+
+
+_UNIT = _read("quat_normalise", 4)
+_ANGLES = _read("quat_from_euler", 3)
+_FROM_ANGLES = unpacked("euler_from_quat(w, x, y, z)", _state(3)).lstrip()
 _COPY = """a->state[0] = w;
     a->state[1] = x;
     a->state[2] = y;
     a->state[3] = z;"""
-_ROWS = """quat_from_dcm({0}[0], {0}[1], {0}[2], {0}[3], {0}[4], {0}[5],
-        {0}[6], {0}[7], {0}[8], &q_nb[0], &q_nb[1], &q_nb[2], &q_nb[3]);"""
 
 # Nearest rotation in the Frobenius norm. Newton's iteration finds it from every matrix whose
 # singular values are below sqrt(3), as they are when their squares sum to 3.
@@ -288,8 +290,8 @@ _IN_PYTHON = ("self.state[:4] = w, x, y, z", "return quat_normalise(*self.state[
 _BY_QUATERNION = Shape("quaternion w, x, y, z", _COPY, _UNIT, 4, (), _IN_PYTHON)
 _BY_MATRIX = Shape(
     "C_nb row by row, steps since it was orthogonalised",
-    "dcm_from_quat(w, x, y, z, a->state);",
-    _ROWS.format("a->state"),
+    unpacked("dcm_from_quat(w, x, y, z)", _state(9)).lstrip(),
+    _read("quat_from_dcm", 9),
     9,
     ("dcm_from_quat", "quat_from_dcm"),
     ("self.state[:9] = dcm_from_quat(w, x, y, z)", "return quat_from_dcm(*self.state[:9])"),
@@ -297,7 +299,7 @@ _BY_MATRIX = Shape(
 _TRUNCATED = Shape(
     _BY_MATRIX.state,
     _BY_MATRIX.begin,
-    NEAREST + _ROWS.format("m"),
+    NEAREST + _read("quat_from_dcm", 9, "m"),
     9,
     (*_BY_MATRIX.kernels, "orthogonalise"),
     (
@@ -548,8 +550,8 @@ int attitude_sample(struct attitude *a, const real_t raw[3], real_t q_nb[4])
 ENDS = """\
 void attitude_init(struct attitude *a, const real_t q_nb[4])
 {{
-    real_t w, x, y, z;
-    quat_normalise(q_nb[0], q_nb[1], q_nb[2], q_nb[3], &w, &x, &y, &z);
+    const real4 unit = quat_normalise(q_nb[0], q_nb[1], q_nb[2], q_nb[3]);
+    const real_t w = unit.f0, x = unit.f1, y = unit.f2, z = unit.f3;
     {begin}
 {clear}}}
 
@@ -563,35 +565,24 @@ void attitude_euler(const struct attitude *a, real_t euler[3])
 {{
     real_t q[4];
     attitude_quaternion(a, q);
-    euler_from_quat(q[0], q[1], q[2], q[3], &euler[0], &euler[1], &euler[2]);
+{angles}
 }}
 """
+
+
+#: Statements that put the angles of a quaternion ``q`` into ``euler``.
+ANGLES = unpacked("euler_from_quat(q[0], q[1], q[2], q[3])", _state(3, "euler"))
 
 
 # How the test passes samples.
 
 TAKE_RATES = """\
-            const real_t gyro[3] = {R(samples[k][1]), R(samples[k][2]), R(samples[k][3])};
-            failed |= attitude_update(&a, R(samples[k][0]), gyro);"""
-READ_RATES = """\
-    double dt, x, y, z;
-    while (scanf("%lf %lf %lf %lf", &dt, &x, &y, &z) == 4) {
-        const real_t gyro[3] = {R(x), R(y), R(z)};
-        if (attitude_update(&a, R(dt), gyro)) {
-            fprintf(stderr, "refused: %g %g %g %g\\n", dt, x, y, z);
-        }"""
+    const real_t gyro[3] = {R(v[1]), R(v[2]), R(v[3])};
+    const int refused = attitude_update(s, R(v[0]), gyro);"""
 TAKE_RAW = """\
-            const real_t raw[3] = {R(samples[k][0]), R(samples[k][1]), R(samples[k][2])};
-            real_t q[4];
-            failed |= attitude_sample(&a, raw, q);"""
-READ_RAW = """\
-    double x, y, z;
-    while (scanf("%lf %lf %lf", &x, &y, &z) == 3) {
-        const real_t raw[3] = {R(x), R(y), R(z)};
-        real_t q[4];
-        if (attitude_sample(&a, raw, q)) {
-            fprintf(stderr, "refused: %g %g %g\\n", x, y, z);
-        }"""
+    const real_t raw[3] = {R(v[0]), R(v[1]), R(v[2])};
+    real_t turned[4];
+    const int refused = attitude_sample(s, raw, turned);"""
 
 
 def _bound(vector: Vector) -> str:

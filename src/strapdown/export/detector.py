@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from strapdown._kernels import arithmetic
 from strapdown._kernels import crash_trigger as kernel
+from strapdown.export.device import comment, device_translator, unpacked
 from strapdown.export.kernels import Kernels
 from strapdown.export.program import (
     ROUNDINGS,
@@ -18,7 +19,6 @@ from strapdown.export.program import (
     constant_lines,
     precision_lines,
 )
-from strapdown.export.translate import Translator, comment
 
 Array = NDArray[np.float64]
 
@@ -46,21 +46,24 @@ def export_detector(
     for name in ("begin", "spread"):
         kernels.require(name)
     kernels.require("take", {"mean": (mean, mean)})
-    translator = Translator(kernels)
-    functions = ["\n".join(translator.function(f)) + "\n" for f in kernels.functions]
+    translator = device_translator()
+    functions = kernels.in_c(translator)
     body = "\n".join(functions)
     codes = {name: getattr(kernel, name) for name in CODES}
     used = {c.name for c in kernels.constants()}
     more = "".join(f"#define {n} {v}\n" for n, v in codes.items() if n not in used)
     parts = [
         _header(mean, calibration),
-        precision_lines(body + _WRAPPER),
+        precision_lines(body + _WRAPPER, translator.names.text),
         constant_lines(kernels) + more,
         _INTERFACE.format(size=kernel.SIZE),
         body,
         _WRAPPER.format(
             errors=",\n    ".join(f"R({float(v)!r})" for v in errors),
             variance=f"R({float(variance)!r})",
+            variances=unpacked(
+                "spread(state, stated_errors)", [f"variance[{i}]" for i in range(3)]
+            ),
         ),
         _test(np.asarray(errors, dtype=np.float64), variance, mean),
     ]
@@ -142,7 +145,7 @@ int crash_update(struct crash *c, real_t dt, const real_t sample[6])
 int crash_delta_v(const struct crash *c, real_t delta_v[2], real_t variance[3])
 {{
     const real_t *state = c->state;
-    spread(state, stated_errors, &variance[0], &variance[1], &variance[2]);
+{variances}
     delta_v[0] = state[DELTA];
     delta_v[1] = state[DELTA + 1];
     return (state[SAFE] <= state[SINCE]) + 2 * (state[SAFE + 1] <= state[SINCE]);

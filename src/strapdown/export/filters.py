@@ -14,21 +14,22 @@ from strapdown import rotation
 from strapdown._kernels import arithmetic, orientation
 from strapdown.constants import CORTEX_M4F_CYCLES
 from strapdown.errors import DataError
+from strapdown.export.algorithms import ANGLES
 from strapdown.export.configuration import SensorConfiguration
+from strapdown.export.device import comment, device_translator, number, unpacked, wrapped
 from strapdown.export.kernels import Kernels
 from strapdown.export.program import (
     ROUNDINGS,
     SAMPLES,
     Array,
-    Pipe,
     Vector,
+    attitude_harness,
+    attitude_test,
     c_rows,
     constant_lines,
-    main_program,
     precision_lines,
     unit_lines,
 )
-from strapdown.export.translate import Translator, comment, number, wrapped
 from strapdown.orientation_filters import OrientationEstimator
 from strapdown.orientation_filters.cost import count_filter_cost
 from strapdown.tables import ACCEL, GYRO, MAG
@@ -52,8 +53,8 @@ def filter_in_c(
 ) -> str:
     """Write an orientation filter as one C99 file with its own test: `export_c`."""
     kernels = filter_kernels(chosen, magnetometer, sampling)
-    translator = Translator(kernels)
-    functions = ["\n".join(translator.function(f)) + "\n" for f in kernels.functions]
+    translator = device_translator()
+    functions = kernels.in_c(translator)
     sensors = SENSORS[: 2 + magnetometer]
     field = ", const real_t *mag" if magnetometer else ""
     interface = _INTERFACE.format(
@@ -70,6 +71,7 @@ def filter_in_c(
         fields=", m[0], m[1], m[2]" if magnetometer else "",
         missing=_MISSING_FIELD if magnetometer else "",
         turn=_turn(chosen, magnetometer),
+        angles=ANGLES,
     )
     if states_deviation(chosen):
         interface += _SD_PROTOTYPE
@@ -84,20 +86,16 @@ def filter_in_c(
         )
     vector = filter_vector(chosen, magnetometer, sampling, q_nb, imu, configuration)
     body = "\n".join([*functions, ends])
-    pipe = Pipe(
-        take=_take(magnetometer, configuration is not None),
-        read=_read(magnetometer, configuration is not None),
-        columns=_columns(magnetometer, configuration is not None),
-        bound=bound_words(vector),
-        start=None if q_nb is None else rotation.normalise(q_nb),
-    )
+    raw = configuration is not None
+    start = None if q_nb is None else rotation.normalise(q_nb)
+    harness = attitude_harness(_take(magnetometer, raw), _columns(magnetometer, raw), vector, start)
     parts = [
         _header(chosen, magnetometer, sampling, configuration),
-        precision_lines(body),
+        precision_lines(body, translator.names.text),
         interface,
         constant_lines(kernels),
         body,
-        main_program(vector, pipe),
+        attitude_test(harness, vector, bound_words(vector)),
     ]
     return "\n".join(parts)
 
@@ -287,7 +285,7 @@ void attitude_euler(const struct attitude *a, real_t euler[3])
 {{
     real_t q[4];
     attitude_quaternion(a, q);
-    euler_from_quat(q[0], q[1], q[2], q[3], &euler[0], &euler[1], &euler[2]);
+{angles}
 }}
 
 void attitude_gyro_bias(const struct attitude *a, real_t bias[3])
@@ -298,7 +296,7 @@ void attitude_gyro_bias(const struct attitude *a, real_t bias[3])
 }}
 """
 _MISSING_FIELD = "    const real_t *m = mag ? mag : none;\n"
-_UNIT = "    quat_normalise({}, &q_nb[0], &q_nb[1], &q_nb[2], &q_nb[3]);\n"
+_TARGETS = [f"q_nb[{i}]" for i in range(4)]
 
 
 def _begin(chosen: OrientationEstimator, sampling: str) -> str:
@@ -306,10 +304,11 @@ def _begin(chosen: OrientationEstimator, sampling: str) -> str:
         [f"r{head}] = {number(float(value))};" for head, value in (x.split("] ") for x in lines)]
         for lines in begin_lines(chosen, sampling)
     )
-    given = "quat_normalise(q_nb[0], q_nb[1], q_nb[2], q_nb[3], &r[Q], &r[Q + 1], &r[Q + 2],"
+    unit = "quat_normalise(q_nb[0], q_nb[1], q_nb[2], q_nb[3])"
+    given = unpacked(unit, ("r[Q]", "r[Q + 1]", "r[Q + 2]", "r[Q + 3]"), " " * 8)
     lines = [
         *(f"    {line}" for line in always),
-        *("    if (q_nb) {", f"        {given}", "            &r[Q + 3]);"),
+        *("    if (q_nb) {", given),
         *(f"        {line}" for line in then),
         "    }",
     ]
@@ -317,19 +316,20 @@ def _begin(chosen: OrientationEstimator, sampling: str) -> str:
 
 
 def _turn(chosen: OrientationEstimator, magnetometer: bool) -> str:
-    plain = _UNIT.format("w, x, y, z")
+    plain = unpacked("quat_normalise(w, x, y, z)", _TARGETS) + "\n"
     if not (magnetometer and chosen.declination):
         return plain
     half = 0.5 * radians(chosen.declination)
     c, s = number(cos(half)), number(sin(half))
+    turned = "c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w"
     return (
         f"    /* From magnetic to true north: half of the declination. */\n"
         f"    const real_t c = {c}, s = {s};\n"
-        "    if (r[HEADED] == R(0.0)) {\n    "
-        + plain
-        + "        return;\n    }\n"
-        + "    quat_normalise(c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w,\n"
-        + "        &q_nb[0], &q_nb[1], &q_nb[2], &q_nb[3]);\n"
+        "    if (r[HEADED] == R(0.0)) {\n"
+        + unpacked("quat_normalise(w, x, y, z)", _TARGETS, " " * 8)
+        + "\n        return;\n    }\n"
+        + unpacked(f"quat_normalise({turned})", _TARGETS)
+        + "\n"
     )
 
 
@@ -338,13 +338,13 @@ def _sd(chosen: OrientationEstimator, magnetometer: bool) -> str:
     dd = "p[2 * N + 2]"
     if magnetometer:
         dd += f" + (r[HEADED] != R(0.0) ? {number(own)} : R(0.0))"
+    terms = f"r[Q], r[Q + 1], r[Q + 2], r[Q + 3], p[0], p[1], p[2], p[N + 1], p[N + 2], {dd}"
+    lines = unpacked(f"euler_deviation({terms})", ("sd[0]", "sd[1]", "sd[2]"))
     return f"""
 void attitude_euler_sd(const struct attitude *a, real_t sd[3])
 {{
     const real_t *r = a->record, *p = a->record + P;
-    euler_deviation(r[Q], r[Q + 1], r[Q + 2], r[Q + 3], p[0], p[1], p[2], p[N + 1], p[N + 2],
-        {dd},
-        &sd[0], &sd[1], &sd[2]);
+{lines}
 }}
 """
 
@@ -382,22 +382,6 @@ def _sample(configuration: SensorConfiguration, magnetometer: bool) -> str:
 # How the test passes samples.
 
 
-def _arrays(magnetometer: bool, source: str, indent: str, first: int) -> str:
-    lines = []
-    for k, name in enumerate(SENSORS[: 2 + magnetometer]):
-        values = ", ".join(f"R({source}[{first + 3 * k + i}])" for i in range(3))
-        lines.append(f"{indent}const real_t {name}[3] = {{{values}}};")
-    return "\n".join(lines)
-
-
-def _call(magnetometer: bool, raw: bool, source: str) -> str:
-    first = 0 if raw else 1
-    dt = "" if raw else f"R({source}[0]), "
-    field = f",\n                {source}[{first + 6}] < 1e29 ? mag : 0" if magnetometer else ""
-    name, last = ("attitude_sample", ", q") if raw else ("attitude_update", "")
-    return f"{name}(&a, {dt}gyro, {source}[{first + 3}] < 1e29 ? accel : 0{field}{last})"
-
-
 def _columns(magnetometer: bool, raw: bool) -> str:
     what = (
         "raw readings of gyro, accelerometer" if raw else "dt in s, rates in rad/s, forces in m/s²"
@@ -407,30 +391,17 @@ def _columns(magnetometer: bool, raw: bool) -> str:
 
 
 def _take(magnetometer: bool, raw: bool) -> str:
-    return (
-        "            const double *v = samples[k];\n"
-        + _arrays(magnetometer, "v", " " * 12, 0 if raw else 1)
-        + ("\n            real_t q[4];" if raw else "")
-        + f"\n            failed |= {_call(magnetometer, raw, 'v')};"
-    )
-
-
-def _read(magnetometer: bool, raw: bool) -> str:
-    count = 3 * (2 + magnetometer) + (not raw)
-    lines = [f"    double v[{count}];", "    for (;;) {"]
-    lines += [
-        f"        for (int i = 0; i < {count}; i++) {{",
-        '            if (scanf("%lf", v + i) != 1) {',
-        "                return i != 0;",
-        "            }",
-        "        }",
-        _arrays(magnetometer, "v", " " * 8, 0 if raw else 1),
-        *(("        real_t q[4];",) if raw else ()),
-        f"        if ({_call(magnetometer, raw, 'v')}) {{",
-        '            fprintf(stderr, "refused\\n");',
-        "        }",
-    ]
-    return "\n".join(lines)
+    first = 0 if raw else 1
+    lines = []
+    for k, name in enumerate(SENSORS[: 2 + magnetometer]):
+        values = ", ".join(f"R(v[{first + 3 * k + i}])" for i in range(3))
+        lines.append(f"    const real_t {name}[3] = {{{values}}};")
+    field = f", v[{first + 6}] < 1e29 ? mag : 0" if magnetometer else ""
+    given = f"gyro, v[{first + 3}] < 1e29 ? accel : 0{field}"
+    if raw:
+        lines.append("    real_t turned[4];")
+    call = f"sample(s, {given}, turned)" if raw else f"update(s, R(v[0]), {given})"
+    return "\n".join([*lines, *wrapped(f"const int refused = attitude_{call};", "    ")])
 
 
 # The test vector.

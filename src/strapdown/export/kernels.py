@@ -1,149 +1,191 @@
-"""Specialized kernel functions and their sources."""
+"""Kernels with their options as constants: what a file for a device is made of.
+
+The kernels take their options as numbers. A kernel is read as a syntax tree and followed from its
+first function: conditions on options are decided, and excluded branches and unused parameters and
+variables are dropped. The same formulas remain in the same order. This part is independent of C.
+"""
 
 from __future__ import annotations
 
 import ast
 import copy
-import inspect
-from collections.abc import Callable, Iterable, Iterator
+import functools
+import itertools
+from collections import Counter
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
-from strapdown._kernels.arithmetic import SOURCES, kernel_module, kernels_of
+from strapdown import _kernels
+from strapdown._kernels.arithmetic import PACKAGE, SOURCES
+from strapdown.export.device import loaded, stored, walk
+from strapdown.export.sources import CONSTANTS, Constant, Fma, Kernel, load
+from strapdown.export.translate import Translator, UntranslatableError
+from strapdown.export.types_of_c import Type
 
-
-@dataclass
-class Function:
-    """One function of a kernel, specialized.
-
-    `name`: name of the kernel; a second version has a number appended. `doc`: first paragraphs of
-    its docstring. `parameters`: parameters that are still used. `body`: statements; ``comment`` of
-    each holds the comment lines above it. `results`: number of returned values.
-    """
-
-    name: str
-    doc: str
-    parameters: list[str]
-    body: list[ast.stmt]
-    results: int
+# Knowledge of a number before the program runs: its value (v, v), or the range of an integer.
+Number = float | int
+Span = tuple[Number, Number]
+Env = dict[str, Span]
 
 
-@dataclass(frozen=True)
-class Constant:
-    """A constant of a kernel module with the comment above it."""
-
-    name: str
-    value: Number
-    comment: str
+@functools.cache
+def _modules(*names: str) -> dict[str, dict[str, Any]]:
+    return load(Path(_kernels.__file__).parent, names)
 
 
 @dataclass
 class Kernels:
-    """The sources of all kernels, and the functions required so far.
+    """The kernels of a module and those that it imports, and the functions required so far.
 
-    `home`: module of the algorithm's kernels (`attitude_algorithms.cost.kernel_home`). `ranges`:
-    for a variable with an integer value at run time: the least and the greatest. `fixed`: numbers
-    of the state and calls, as they are written, whose value is known. `functions`: in the order of
-    definition.
+    `home`: module of the kernels (`attitude_algorithms.cost.kernel_home`), `others` further ones.
+    `ranges`: for a variable with an integer value at run time: the least and the greatest. `fixed`:
+    numbers of the state and calls, as they are written, whose value is known. `functions`: in the
+    order of definition.
     """
 
     home: str
     ranges: dict[str, tuple[int, int]] = field(default_factory=dict)
     fixed: dict[str, float] = field(default_factory=dict)
-    functions: list[Function] = field(default_factory=list)
+    functions: list[Kernel] = field(default_factory=list)
+    others: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        self._sources: dict[str, ast.FunctionDef] = {}
-        self._constants: dict[str, Constant] = {}
-        self._made: dict[tuple[object, ...], Function] = {}
-        for name in dict.fromkeys((*SOURCES, self.home)):
-            module = kernel_module(name)
-            tree = kernels_of(name)
-            attach_comments(tree, inspect.getsource(module).splitlines())
-            for node in tree.body:
-                if isinstance(node, ast.FunctionDef):
-                    self._sources[node.name] = node
-                elif isinstance(node, ast.Assign):
-                    for target in ast.walk(node.targets[0]):
-                        if isinstance(target, ast.Name):
-                            value, about = getattr(module, target.id), getattr(node, "comment", "")
-                            self._constants[target.id] = Constant(target.id, value, about)
+        self.home = self.home.removeprefix(f"{PACKAGE}.")
+        self._homes = (self.home, *self.others, *SOURCES)
+        self._modules = _modules(*self._homes)
+        self._made: dict[tuple[object, ...], Kernel] = {}
+        self._widths: dict[Kernel, dict[str, int]] = {}
+        #: What the names in specialized functions mean: functions and constants.
+        self.namespace: dict[str, Any] = {}
+
+    def source(self, name: str) -> Kernel:
+        """Return a kernel of the home, or of the modules that all files use."""
+        for module in self._homes:
+            if isinstance(held := self._modules[module].get(name), Kernel):
+                return held
+        raise KeyError(name)
 
     def constants(self) -> list[Constant]:
         """Return the constants that the functions use, in the order of the sources."""
-        used = {name for f in self.functions for name in loaded(f.body)}
-        return [c for c in self._constants.values() if c.name in used]
+        used = loaded([f.node for f in self.functions])
+        held = {n: c for n, c in self.namespace.items() if isinstance(c, Constant) and n in used}
+        spaces = [space[CONSTANTS].values() for space in self._modules.values()]
+        place = {id(c): k for k, c in enumerate(itertools.chain(*spaces))}
+        rows = sorted(held.items(), key=lambda row: place[id(row[1])])
+        return [Constant(c.module, name, c.value, c.comment) for name, c in rows]
 
     def require(
-        self, name: str, options: Env | None = None, keep: tuple[int, ...] | None = None
-    ) -> Function:
-        """Specialize a function and all functions that it calls.
+        self,
+        name: str,
+        options: Env | None = None,
+        keep: tuple[int, ...] | None = None,
+        sizes: Mapping[str, tuple[int, ...]] | None = None,
+    ) -> Kernel:
+        """Specialize a kernel, by its name, and all that it calls: see `specialised`.
 
-        `name`: a function of a kernel module. `options`: known values of its parameters. `keep`:
+        `sizes`: of its arrays, by parameter.
+        """
+        options, sizes = options or {}, sizes or {}
+        for array, shape in sizes.items():
+            options |= {f"{array}.shape[{k}]": (n, n) for k, n in enumerate(shape)}
+        function = self.specialised(self.source(name), options, keep)
+        self._widths[function] = {n: shape[1] for n, shape in sizes.items() if len(shape) == 2}
+        return function
+
+    def specialised(
+        self, kernel: Kernel, options: Env | None = None, keep: tuple[int, ...] | None = None
+    ) -> Kernel:
+        """Specialize a kernel and all functions that it calls.
+
+        `options`: known values of its parameters, and sizes of its arrays (``x.shape[0]``). `keep`:
         results to keep, by position; by default all.
         """
         options = options or {}
-        key = (name, tuple(sorted(options.items())), keep)
+        key = (kernel, tuple(sorted(options.items())), keep)
         if key not in self._made:
-            node = self._sources[name]
-            body = Specialiser(self, dict(options)).block(without_docstring(node.body))
+            body = Specialiser(self, kernel, dict(options)).block(
+                without_docstring(kernel.node.body)
+            )
             if keep is not None:
                 body = [Keep(keep).visit(s) for s in body]
             body = without_unused(body)
             used = loaded(body)
-            versions = sum(made[0] == name for made in self._made)
-            self._made[key] = function = Function(
-                name=f"{name}_{versions + 1}" if versions else name,
-                doc=ast.get_docstring(node) or "",
-                parameters=[a.arg for a in node.args.args if a.arg in used],
-                body=body,
-                results=self._results(body),
+            name, versions = kernel.name, 1
+            while name in self.namespace:
+                versions += 1
+                name = f"{kernel.name}_{versions}"
+            arguments = [ast.arg(a) for a in kernel.parameters if a in used]
+            doc = ast.get_docstring(kernel.node)
+            node = ast.FunctionDef(
+                name=name,
+                args=ast.arguments([], arguments, None, [], [], None, []),
+                body=[*([ast.Expr(ast.Constant(doc))] if doc else []), *body],
+                decorator_list=[],
             )
+            function = Kernel("", name, ast.fix_missing_locations(node), self.namespace)
+            self._made[key] = self.namespace[name] = function
             self.functions.append(function)
         return self._made[key]
 
-    def named(self, name: str) -> Function | None:
-        """Return the specialized function of that name."""
-        return next((f for f in self.functions if f.name == name), None)
+    def constant_name(self, constant: Constant) -> str:
+        """Return the name under which a constant of a module stands in the file."""
+        name = constant.name
+        held = self.namespace.setdefault(name, constant)
+        if (held.module, held.name) != (constant.module, constant.name):
+            # Of two modules with one name for two numbers.
+            name = f"{constant.module.upper()}_{constant.name}"
+            self.namespace[name] = constant
+        return name
 
-    def is_kernel(self, name: str) -> bool:
-        """Whether there is a kernel of that name."""
-        return name in self._sources
+    def in_c(self, translator: Translator) -> list[str]:
+        """Translate all functions by a `device_translator`; return their texts."""
+        made = translator.order
+        # Callers first: they give the types of what they call.
+        for function in reversed(self.functions):
+            if not any(m.kernel is function for m in made):
+                translator.function(function, self._kinds(function), True)
+        place = {id(function): k for k, function in enumerate(self.functions)}
+        return [m.text for m in sorted(made, key=lambda m: place[id(m.kernel)])]
 
-    def parameters(self, name: str) -> list[str]:
-        """Return the parameters that a kernel has in the source."""
-        return [a.arg for a in self._sources[name].args.args]
+    def _kinds(self, function: Kernel) -> list[Type]:
+        arrays, widths = self._arrays(function), self._widths.get(function, {})
+        return [
+            ("A", "f8", 2, "C", widths[p])
+            if p in widths
+            else ("A", "f8", 1, "C")
+            if p in arrays
+            else "f8"
+            for p in function.parameters
+        ]
 
-    def span(self, name: str) -> Span | None:
-        """Return the value of a module constant."""
-        constant = self._constants.get(name)
-        return (constant.value, constant.value) if constant else None
-
-    def _results(self, body: list[ast.stmt]) -> int:
-        for node in walk(body):
-            if isinstance(node, ast.Return):
-                value = node.value
-                if isinstance(value, ast.Tuple):
-                    return len(value.elts)
-                if isinstance(value, ast.Call) and isinstance(value.func, ast.Name):
-                    other = self.named(value.func.id)
-                    return other.results if other else 1
-                return 1 if value is not None else 0
-        return 0
-
-
-# Specialization of the kernels of one algorithm, with its options as constants.
-#
-# The kernels take their options as numbers. A kernel is read as a syntax tree and followed from
-# its first function: conditions on options are decided, and excluded branches and unused
-# parameters and variables are dropped. The same formulas remain in the same order. This part is
-# independent of C.
+    def _arrays(self, function: Kernel) -> set[str]:
+        """Names with an index here, or that are passed to where they have one."""
+        arrays = set()
+        for node in walk(function.node.body):
+            if isinstance(node, ast.Subscript) and isinstance(node.value, ast.Name):
+                arrays.add(node.value.id)
+            elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+                other = self.namespace.get(node.func.id)
+                if isinstance(other, Kernel):
+                    inner = self._arrays(other)
+                    pairs = zip(other.parameters, node.args, strict=True)
+                    arrays |= {a.id for p, a in pairs if p in inner and isinstance(a, ast.Name)}
+        return arrays
 
 
 class Specialiser:
     """One function, with the known values of its names."""
 
-    def __init__(self, kernels: Kernels, env: Env) -> None:
-        self.kernels, self.env = kernels, env
+    def __init__(self, kernels: Kernels, kernel: Kernel, env: Env) -> None:
+        self.kernels, self.kernel, self.env = kernels, kernel, env
+        self.own = {*kernel.parameters, *stored(kernel.node.body)}
+        self.stores = Counter(
+            n.id
+            for n in walk(kernel.node.body)
+            if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
+        )
 
     # --- statements -----------------------------------------------------------------------
 
@@ -161,13 +203,23 @@ class Specialiser:
         if isinstance(node, ast.If):
             return self.branch(node)
         new: ast.stmt
-        if isinstance(node, ast.Assign) and len(node.targets) == 1:
-            new = ast.Assign([self.target(node.targets[0])], self.expression(node.value))
+        if isinstance(node, ast.Pass | ast.Break | ast.Continue):
+            return [node]
+        old = node
+        if isinstance(node, ast.Assign):
+            if self.makes_arrays(node.value):
+                return self.inlined(node)
+            known = self.without_known(node)
+            if known is None:
+                return []
+            node = known
+            targets = [self.target(t) for t in node.targets]
+            new = ast.Assign(targets, self.expression(node.value))
             self.remember(node.targets[0])
         elif isinstance(node, ast.AugAssign):
             target = self.target(node.target)
             if not isinstance(target, ast.Name | ast.Subscript):
-                raise UntranslatableError("statement outside the subset", node)
+                raise refused("statement outside the subset", node)
             new = ast.AugAssign(target, node.op, self.expression(node.value))
         elif isinstance(node, ast.Return):
             new = ast.Return(None if node.value is None else self.expression(node.value))
@@ -180,8 +232,8 @@ class Specialiser:
         elif isinstance(node, ast.While):
             new = ast.While(self.expression(node.test), self.block(node.body), [])
         else:
-            raise UntranslatableError("statement outside the subset", node)
-        return [like(new, node)]
+            raise refused("statement outside the subset", node)
+        return [like(new, old)]
 
     def target(self, node: ast.expr) -> ast.expr:
         """Specialize the target of an assignment."""
@@ -191,7 +243,7 @@ class Specialiser:
                 and isinstance(part.ctx, ast.Store)
                 and part.id in self.env
             ):
-                raise UntranslatableError("an option is given another value", node)
+                raise refused("an option is given another value", node)
         return self.expression(node)
 
     def remember(self, target: ast.expr) -> None:
@@ -199,14 +251,83 @@ class Specialiser:
         if isinstance(target, ast.Name) and target.id in self.kernels.ranges:
             self.env[target.id] = self.kernels.ranges[target.id]
 
+    def without_known(self, node: ast.Assign) -> ast.Assign | None:
+        """Store sizes and options that an assignment gives to names; return what else it does."""
+        target, value = node.targets[0], node.value
+        if isinstance(value, ast.Attribute) and value.attr == "shape":
+            axes = range(len(target.elts)) if isinstance(target, ast.Tuple) else ()
+            value = ast.Tuple(
+                [ast.parse(f"{ast.unparse(value)}[{k}]", mode="eval").body for k in axes]
+            )
+        each = isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
+        pairs = zip(target.elts, value.elts, strict=True) if each else [(target, value)]  # type: ignore[attr-defined]
+        left = []
+        for name, part in pairs:
+            if isinstance(name, ast.Name):
+                fixed = self.fixed(part)
+                if fixed is not None and self.stores[name.id] == 1:
+                    self.env[name.id] = (fixed, fixed)
+                    continue
+                self.env |= self.sizes(name.id, part)
+            left.append((name, part))
+        if each and left:
+            new = ast.Assign(
+                [ast.Tuple([n for n, _ in left], ast.Store())],
+                ast.Tuple([v for _, v in left], ast.Load()),
+            )
+            return ast.copy_location(new, node)
+        return node if left else None
+
+    def makes_arrays(self, node: ast.expr) -> bool:
+        """Whether an expression calls a kernel that makes arrays and returns them."""
+        kernel = self.held(node.func) if isinstance(node, ast.Call) else None
+        if not isinstance(kernel, Kernel):
+            return False
+        last = kernel.node.body[-1]
+        parts = (
+            last.value.elts
+            if isinstance(last, ast.Return) and isinstance(last.value, ast.Tuple)
+            else []
+        )
+        names = {part.id for part in parts if isinstance(part, ast.Name)}
+        assigned = (n for n in walk(kernel.node.body) if isinstance(n, ast.Assign))
+        return any("np." in ast.unparse(n.value) and names & stored([n]) for n in assigned)
+
+    def inlined(self, node: ast.Assign) -> list[ast.stmt]:
+        """Put the statements of a kernel that returns arrays in the place of its call."""
+        target, call = node.targets[0], node.value
+        assert isinstance(call, ast.Call) and isinstance(target, ast.Tuple)
+        kernel: Kernel = self.held(call.func)
+        if kernel.namespace is not self.kernel.namespace:
+            raise refused("arrays of another module", node)
+        body = copy.deepcopy(without_docstring(kernel.node.body))
+        own = stored(body)
+        names = {name: f"{name}_" for name in own & self.own}
+        returned: Any = body[-1].value  # type: ignore[attr-defined]
+        for part, place in zip(returned.elts, target.elts, strict=True):
+            if isinstance(part, ast.Name) and part.id in own and isinstance(place, ast.Name):
+                names[part.id] = place.id
+        values = dict(zip(kernel.parameters, call.args, strict=True))
+        body = [Named(names, values).visit(statement) for statement in body]
+        self.own |= stored(body)
+        self.stores.update(
+            n.id for n in walk(body) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
+        )
+        *done, last = self.block(body)
+        assert isinstance(last, ast.Return) and isinstance(last.value, ast.Tuple)
+        for place, part in zip(target.elts, last.value.elts, strict=True):
+            if ast.unparse(place) != ast.unparse(part):
+                done.append(like(ast.Assign([place], part), node))
+        return done
+
     def each(self, node: ast.For, values: ast.Tuple) -> list[ast.stmt]:
         """Unroll a loop over a tuple."""
         if not isinstance(node.target, ast.Name):
-            raise UntranslatableError("loop over more than one name", node)
+            raise refused("loop over more than one name", node)
         out: list[ast.stmt] = []
         for value in values.elts:
             out += self.block(
-                [Put(node.target.id, value).visit(copy.deepcopy(s)) for s in node.body]
+                [Named({}, {node.target.id: value}).visit(copy.deepcopy(s)) for s in node.body]
             )
         return out
 
@@ -232,7 +353,11 @@ class Specialiser:
     # --- expressions ----------------------------------------------------------------------
 
     def expression(self, node: ast.expr) -> ast.expr:
-        """Substitute known values."""
+        """Substitute known values, and the names that constants of modules have in the file."""
+        constant = self.constant(node)
+        if constant is not None:
+            known = ast.Name(self.kernels.constant_name(constant), ast.Load())
+            return ast.copy_location(known, node)
         fixed = self.fixed(node)
         if fixed is not None:
             return ast.copy_location(ast.Constant(fixed), node)
@@ -265,16 +390,50 @@ class Specialiser:
 
     def call(self, node: ast.Call) -> ast.expr:
         """Call the function specialized for the known arguments."""
-        if not isinstance(node.func, ast.Name) or not self.kernels.is_kernel(node.func.id):
+        kernel = self.held(node.func)
+        if isinstance(kernel, Fma):
+            self.kernels.namespace["fma"] = kernel
+        if not isinstance(kernel, Kernel):
             return ast.copy_location(
-                ast.Call(node.func, [self.expression(a) for a in node.args], []), node
+                ast.Call(node.func, [self.expression(a) for a in node.args], node.keywords), node
             )
-        names = self.kernels.parameters(node.func.id)
-        arguments = dict(zip(names, node.args, strict=True))
+        arguments = dict(zip(kernel.parameters, node.args, strict=True))
         known = {n: s for n, a in arguments.items() if self.depends(a) and (s := self.span(a))}
-        function = self.kernels.require(node.func.id, known)
+        for name, argument in arguments.items():
+            known |= self.sizes(name, argument)
+        function = self.kernels.specialised(kernel, known)
         values = [self.expression(arguments[n]) for n in function.parameters]
         return ast.copy_location(ast.Call(ast.Name(function.name, ast.Load()), values, []), node)
+
+    def held(self, node: ast.expr) -> Any:
+        """Return what a name of the module holds, which is none of the function."""
+        if not isinstance(node, ast.Name) or node.id in self.own:
+            return None
+        return self.kernel.namespace.get(node.id)
+
+    def constant(self, node: ast.expr) -> Constant | None:
+        """Return the constant of a module that a name means."""
+        if isinstance(node, ast.Name) and node.id not in self.own and node.id not in self.env:
+            known: Constant | None = self.kernel.namespace[CONSTANTS].get(node.id)
+            return known
+        return None
+
+    def sizes(self, name: str, node: ast.expr) -> Env:
+        """Return the sizes of an array, as those of a name that it gets."""
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in ("np.empty", "np.zeros"):
+            shape = node.args[0]
+            spans = [
+                self.span(n) for n in (shape.elts if isinstance(shape, ast.Tuple) else [shape])
+            ]
+            return {f"{name}.shape[{k}]": span for k, span in enumerate(spans) if span}
+        rows = isinstance(node, ast.Subscript) and not isinstance(node.slice, ast.Slice | ast.Tuple)
+        base = node.value if rows else node  # type: ignore[attr-defined]
+        found = {}
+        for axis in range(rows, 2):
+            known = self.env.get(f"{ast.unparse(base)}.shape[{axis}]")
+            if known:
+                found[f"{name}.shape[{axis - rows}]"] = known
+        return found
 
     # --- known values ---------------------------------------------------------------------
 
@@ -287,7 +446,10 @@ class Specialiser:
         read = isinstance(node, ast.Call) or (
             isinstance(node, ast.Subscript) and isinstance(node.ctx, ast.Load)
         )
-        return self.kernels.fixed.get(ast.unparse(node)) if read else None
+        if not read:
+            return None
+        text = ast.unparse(node)
+        return self.env[text][0] if text in self.env else self.kernels.fixed.get(text)
 
     def span(self, node: ast.expr) -> Span | None:
         """Value or range of an expression, if options or constants determine it."""
@@ -296,16 +458,22 @@ class Specialiser:
         fixed = self.fixed(node)
         if fixed is not None:
             return fixed, fixed
-        if isinstance(node, ast.Name):
-            return self.env.get(node.id) or self.kernels.span(node.id)
+        if isinstance(node, ast.Name) and node.id in self.env:
+            return self.env[node.id]
+        constant = self.constant(node)
+        if constant is not None and isinstance(constant.value, int | float):
+            return constant.value, constant.value
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and len(node.args) == 1:
             kind = {"int": int, "float": float}.get(node.func.id)
             inside = self.span(node.args[0])
             return (kind(inside[0]), kind(inside[1])) if kind and inside else None
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+            inside = self.span(node.operand)
+            return (-inside[1], -inside[0]) if inside else None
         if isinstance(node, ast.BinOp):
             a, b = self.span(node.left), self.span(node.right)
             operation = ARITHMETIC.get(type(node.op))
-            if a and b and operation:
+            if a and b and operation and (type(node.op) is not ast.Mod or a[0] == a[1]):
                 corners = [operation(p, q) for p in a for q in b]
                 return min(corners), max(corners)
         return None
@@ -337,19 +505,11 @@ class Specialiser:
         return self.depends(node) or any(self.fixed(p) is not None for p in parts)
 
 
-# Knowledge of a number before the program runs: its value, or its range.
-
-
-Number = float | int
-# A scalar is (v, v); an integer known only by range is (low, high).
-Span = tuple[Number, Number]
-Env = dict[str, Span]
-
-
 ARITHMETIC: dict[type[ast.operator], Callable[[Number, Number], Number]] = {
     ast.Add: lambda a, b: a + b,
     ast.Sub: lambda a, b: a - b,
     ast.Mult: lambda a, b: a * b,
+    ast.Mod: lambda a, b: a % b,
 }
 
 
@@ -401,22 +561,23 @@ def without(span: Span, value: Number) -> Span:
 # Analysis and transformation of kernel syntax trees.
 
 
-class UntranslatableError(Exception):
-    """A kernel is outside the subset of Python that can be translated."""
+def refused(what: str, node: ast.AST) -> UntranslatableError:
+    """The error of a kernel that is outside the subset of Python that can be translated."""
+    line = getattr(node, "lineno", "?")
+    return UntranslatableError(f"line {line}: {what}: {ast.unparse(node)}")
 
-    def __init__(self, what: str, node: ast.AST) -> None:
-        super().__init__(f"line {getattr(node, 'lineno', '?')}: {what}: {ast.unparse(node)}")
 
+class Named(ast.NodeTransformer):
+    """Give variables other names, and put values in the place of parameters."""
 
-class Put(ast.NodeTransformer):
-    """Replace a name by an expression."""
-
-    def __init__(self, name: str, value: ast.expr) -> None:
-        self.name, self.value = name, value
+    def __init__(self, names: dict[str, str], values: dict[str, ast.expr]) -> None:
+        self.names, self.values = names, values
 
     def visit_Name(self, node: ast.Name) -> ast.expr:
         """Replace the name."""
-        return self.value if node.id == self.name else node
+        if node.id in self.values:
+            return copy.deepcopy(self.values[node.id])
+        return ast.copy_location(ast.Name(self.names.get(node.id, node.id), node.ctx), node)
 
 
 class Keep(ast.NodeTransformer):
@@ -428,7 +589,7 @@ class Keep(ast.NodeTransformer):
     def visit_Return(self, node: ast.Return) -> ast.Return:
         """Choose from a tuple."""
         if not isinstance(node.value, ast.Tuple):
-            raise UntranslatableError("results that cannot be chosen from", node)
+            raise refused("results that cannot be chosen from", node)
         values = [node.value.elts[i] for i in self.keep]
         node.value = values[0] if len(values) == 1 else ast.Tuple(values, ast.Load())
         return node
@@ -439,23 +600,6 @@ def like(new: ast.stmt, old: ast.stmt) -> ast.stmt:
     ast.copy_location(new, old)
     new.comment = getattr(old, "comment", "")  # type: ignore[attr-defined]
     return new
-
-
-def walk(body: Iterable[ast.AST]) -> Iterator[ast.AST]:
-    """Iterate over every node of some statements."""
-    for node in body:
-        yield from ast.walk(node)
-
-
-def loaded(body: Iterable[ast.AST]) -> set[str]:
-    """Return the names that are read; targets of augmented assignments are included."""
-    names = set()
-    for node in walk(body):
-        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
-            names.add(node.id)
-        elif isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name):
-            names.add(node.target.id)
-    return names
 
 
 def without_docstring(body: list[ast.stmt]) -> list[ast.stmt]:
@@ -481,7 +625,7 @@ def _assignments_to(body: list[ast.stmt], used: set[str]) -> list[ast.stmt]:
         if isinstance(node, ast.If | ast.For | ast.While):
             node.body = _assignments_to(node.body, used)
             node.orelse = _assignments_to(node.orelse, used)
-        elif isinstance(node, ast.Assign):
+        elif isinstance(node, ast.Assign) and len(node.targets) == 1:
             target, value = node.targets[0], node.value
             if isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple):
                 pairs = [
@@ -496,64 +640,3 @@ def _assignments_to(body: list[ast.stmt], used: set[str]) -> list[ast.stmt]:
                 continue
         out.append(node)
     return out
-
-
-def attach_comments(tree: ast.Module, lines: list[str]) -> None:
-    """Attach to each statement the comment lines directly above it."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.stmt) and not isinstance(node, ast.FunctionDef):
-            at = node.lineno - 2
-            found: list[str] = []
-            while at >= 0 and lines[at].lstrip().startswith("# ") and "# ---" not in lines[at]:
-                found.insert(0, lines[at].strip()[2:])
-                at -= 1
-            node.comment = " ".join(found)  # type: ignore[attr-defined]
-
-
-# --- declaration of variables -------------------------------------------------------------
-
-
-def first_uses(body: list[ast.stmt], names: set[str]) -> dict[int, set[str]]:
-    """For each name, find the innermost block with all its uses, and its first statement there."""
-    places: dict[int, set[str]] = {}
-    for name in names:
-        block = body
-        while True:
-            holding = [node for node in block if name in _names([node])]
-            first = holding[0]
-            inner = [b for b in _blocks(first) if name in _names(b)]
-            outside = isinstance(first, ast.If | ast.While) and name in _names([first.test])
-            if len(holding) > 1 or len(inner) != 1 or outside:
-                break
-            block = inner[0]
-        places.setdefault(id(first), set()).add(name)
-    return places
-
-
-def _blocks(node: ast.stmt) -> list[list[ast.stmt]]:
-    if isinstance(node, ast.If):
-        return [node.body, node.orelse]
-    return [node.body] if isinstance(node, ast.For | ast.While) else []
-
-
-def _names(body: Iterable[ast.AST]) -> set[str]:
-    return {n.id for n in walk(body) if isinstance(n, ast.Name)}
-
-
-def stored(body: Iterable[ast.AST]) -> Iterator[str]:
-    """Names that are assigned."""
-    for node in walk(body):
-        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store):
-            yield node.id
-
-
-def plain_name(node: ast.expr) -> str:
-    """The name that an expression consists of, or an empty string."""
-    return node.id if isinstance(node, ast.Name) else ""
-
-
-def name_of(node: ast.expr) -> str:
-    """The name of an expression that must be a name."""
-    if not isinstance(node, ast.Name):
-        raise UntranslatableError("a plain name is expected", node)
-    return node.id

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import copy
 import importlib
 import textwrap
 from collections.abc import Sequence
@@ -20,6 +21,7 @@ from strapdown.export.algorithms import (
     shape_of,
 )
 from strapdown.export.configuration import SensorConfiguration
+from strapdown.export.device import WIDTH
 from strapdown.export.filters import (
     SENSORS,
     begin_lines,
@@ -29,9 +31,9 @@ from strapdown.export.filters import (
     states_deviation,
     title_of,
 )
-from strapdown.export.kernels import Function, Kernels
+from strapdown.export.kernels import Kernels
 from strapdown.export.program import Array, Vector
-from strapdown.export.translate import WIDTH
+from strapdown.export.sources import Kernel
 from strapdown.orientation_filters import OrientationEstimator
 
 
@@ -137,13 +139,12 @@ def _turn(chosen: OrientationEstimator, magnetometer: bool) -> str:
     )
 
 
-def _source(function: Function) -> str:
+def _source(function: Kernel) -> str:
     """A specialized kernel as Python, in the functions that MicroPython has."""
-    arguments = ast.arguments([], [ast.arg(p) for p in function.parameters], None, [], [], None, [])
-    doc = [ast.Expr(ast.Constant(function.doc.partition("\n")[0]))] if function.doc else []
-    body: list[ast.stmt] = [*doc, *function.body]
-    made = ast.FunctionDef(name=function.name, args=arguments, body=body, decorator_list=[])
-    text = ast.unparse(ast.fix_missing_locations(made))
+    node = copy.deepcopy(function.node)
+    if doc := ast.get_docstring(node):
+        node.body[0] = ast.Expr(ast.Constant(doc.partition("\n")[0]))
+    text = ast.unparse(ast.fix_missing_locations(node))
     return text.replace("np.", "math.").replace("math.hypot(", "hypot(") + "\n"
 
 

@@ -5,33 +5,41 @@ from __future__ import annotations
 import itertools
 import re
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.export.configuration import Channel, SensorConfiguration
+from strapdown.export.device import WIDTH, comment, number, wrapped
 from strapdown.export.kernels import Kernels
-from strapdown.export.translate import WIDTH, comment, number, wrapped
+from strapdown.export.sources import Kernel
 
 Array = NDArray[np.float64]
 
 # Math functions with a macro for each precision.
-MACROS = ("SQRT", "SIN", "COS", "ATAN2", "HYPOT", "FABS", "FMOD", "FMAX", "FMIN", "COPYSIGN")
+MACROS = (
+    *("SQRT", "SIN", "COS", "ATAN2", "HYPOT", "FABS", "FMOD", "FMAX", "FMIN", "COPYSIGN"),
+    *("EXP", "FMA", "TAN", "EXPM1", "LOG", "ASIN", "ACOS", "RINT", "CBRT"),
+)
 
 
-def precision_lines(body: str) -> str:
-    """Type of a number and the functions of the math library in use, for each precision."""
+def precision_lines(body: str, types: Sequence[str] = (), default: str = "float") -> str:
+    """Type of a number and the functions of the math library in use, for each precision.
+
+    `types`: definitions of what functions return. `default`: precision without ``-DREAL``.
+    """
     used = [m for m in MACROS if re.search(rf"\b{m}\(", body)]
     single = "\n".join(f"#define {m} {m.lower()}f" for m in used)
     double = "\n".join(f"#define {m} {m.lower()}" for m in used)
+    results = "\n".join(["", *types, ""]) if types else ""
     pi = "#define PI R(3.141592653589793)\n" if re.search(r"\bPI\b", body) else ""
     return f"""\
 #include <math.h>
 
 #ifndef REAL
-#define REAL float
+#define REAL {default}
 #endif
 typedef REAL real_t;
 #define R(x) ((real_t)(x))
@@ -50,7 +58,7 @@ typedef REAL real_t;
 #else
 #error "REAL must be float or double"
 #endif
-{pi}"""
+{pi}{results}"""
 
 
 def constant_lines(kernels: Kernels) -> str:
@@ -99,146 +107,313 @@ class Vector:
         return len(self.samples) * ROUNDINGS * self.condition
 
 
-# Test at the end of the C file: a vector with its attitudes, and a filter for a pipe.
+# Test at the end of a C file, and a program that takes rows from a pipe.
 
-_TEST = """\
-#ifdef ATTITUDE_TEST
+_PROGRAM = """\
+#ifdef {upper}_TEST
 #include <float.h>
+#endif
+#if defined {upper}_TEST || defined {upper}_FILTER
 #include <stdio.h>
 
-#define ROWS {n}
-#define LAG {lag} /* samples by which the attitude is behind */
+{words}
+#define COLUMNS {columns}
+#define RESULTS {results}
 
-{start}{what}
-static const double samples[ROWS][{columns}] = {{
-{samples}
-}};
+static void test_start(struct {name} *s)
+{{
+{start}
+}}
 
-/* q_nb at each sample, by the kernels of strapdown in the same precision. */
-static const double expected[ROWS][4] = {{
-#if JOIN(IS_, REAL) == IS_float
-{single}
-#else
-{double}
+/* Take a row. Returns the number of its results, less than none if it is refused. */
+static int test_take(struct {name} *s, const double *v, double *out)
+{{
+{take}
+}}
 #endif
-}};
 
+#ifdef {upper}_TEST
+{data}
 {bound}
 #define EPSILON (sizeof(real_t) == sizeof(float) ? (double)FLT_EPSILON : DBL_EPSILON)
 #define BOUND ({roundings} * EPSILON)
 
-/* Angle between the attitude and an expected one, rad. */
-static double apart(const struct attitude *a, const double *q_nb)
-{{
-    real_t q[4];
-    double sum = 0.0, difference = 0.0;
-    attitude_quaternion(a, q);
-    for (int i = 0; i < 4; i++) {{
-        difference += ((double)q[i] - q_nb[i]) * ((double)q[i] - q_nb[i]);
-        sum += ((double)q[i] + q_nb[i]) * ((double)q[i] + q_nb[i]);
-    }}
-    return 2.0 * sqrt(difference < sum ? difference : sum);
-}}
-
 int main(void)
 {{
-    struct attitude a;
+    static struct {name} s;
+    static double v[COLUMNS], out[RESULTS];
     double largest = 0.0;
     int failed = 0;
-    attitude_init(&a, {begin});
-    for (int k = 0; k < ROWS + LAG; k++) {{
-        if (k < ROWS) {{
-{take}
-        }}{finish}
-        if (k >= LAG) {{
-            const double angle = apart(&a, expected[k - LAG]);
-            failed |= !(angle <= BOUND); /* so written NaN fails, too */
-            largest = angle > largest ? angle : largest;
+    test_start(&s);
+    for (int k = 0; k < ROWS{plus}; k++) {{
+{row}
+        if (k >= TEST_FIRST) {{
+            const double off = test_apart(out, test_expected[k - TEST_FIRST]);
+            failed |= !(off <= BOUND); /* so written NaN fails, too */
+            largest = off > largest ? off : largest;
         }}
     }}
-    printf("largest difference %.3g rad, bound %.3g rad: %s\\n", largest, BOUND,
+    printf("largest difference %.3g{unit}, bound %.3g{unit}: %s\\n", largest, BOUND,
         failed ? "FAILED" : "passed");
     return failed;
 }}
 #endif
 
-#ifdef ATTITUDE_FILTER
-#include <stdio.h>
-
-static void put(const struct attitude *a)
+#ifdef {upper}_FILTER
+static void test_put(int count, const double *out)
 {{
-    real_t q[4];
-    attitude_quaternion(a, q);
-    for (int i = 0; i < 4; i++) {{
-        printf("%.17g%c", (double)q[i], i < 3 ? ' ' : '\\n');
+    for (int i = 0; i < count; i++) {{
+        printf("%.17g%c", out[i], i + 1 < count ? ' ' : '\\n');
     }}
 }}
 
 int main(void)
 {{
-{from_}    struct attitude a;
-    attitude_init(&a, {begin});
-{read}
-        put(&a);
+    static struct {name} s;
+    static double v[COLUMNS], out[RESULTS];
+    int column = 0;
+    test_start(&s);
+    while (scanf("%lf", v + column) == 1) {{
+        column = (column + 1) % COLUMNS;
+        if (column == 0) {{
+            const int count = test_take(&s, v, out);
+            if (count < 0) {{
+                fprintf(stderr, "refused\\n");
+            }}
+            test_put(count < 0 ? -count : count, out);
+        }}
     }}
-{last}    return 0;
+{last}    return column != 0;
 }}
 #endif
-"""
-_FINISH = """ else {
-            attitude_finish(&a);
-        }"""
-_LAST = """\
-    attitude_finish(&a);
-    put(&a);
 """
 
 
 @dataclass(frozen=True)
-class Pipe:
-    """How a test passes samples to the functions of the file.
+class Harness:
+    """How a test passes rows of numbers to the functions of a file.
 
-    `take`: statements that give sample k to it. `read`: those that read lines of the pipe and give
-    them. `columns`: what a sample consists of, in words. `bound`: why the bound is what it is.
-    `start` ((4,)): initial attitude; None: found from the samples. `lag`: delay of the attitude in
-    samples.
+    `name`: of its structure, ``s`` is one. `columns`, `results`: numbers of a row and its results.
+    `words`: what a row consists of. `start`: statements that begin. `take`: those that give a row
+    ``v`` and fill ``out``. `finish`: those at the end, if there are any, which fill ``out``. `lag`:
+    rows by which results are late.
     """
 
+    name: str
+    columns: int
+    results: int
+    words: str
+    start: str
     take: str
-    read: str
-    columns: str
-    bound: str
-    start: Array | None = None
+    finish: str = ""
     lag: int = 0
 
 
-def main_program(vector: Vector, pipe: Pipe) -> str:
-    """Return the end of the file, which is compiled only for a test."""
-    words = f"{pipe.columns[0].upper()}{pipe.columns[1:]}"
-    begin = ("", "0") if pipe.start is None else (_start("start", pipe.start), "start")
-    return _TEST.format(
-        what="\n".join(comment(f"{words}; single precision holds each exactly.")),
-        columns=vector.samples.shape[1],
-        take=pipe.take,
-        read=pipe.read,
-        n=len(vector.samples),
-        lag=pipe.lag,
-        start=begin[0],
-        begin=begin[1],
-        samples=braced(vector.samples),
-        single=braced(vector.single),
-        double=braced(vector.double),
-        bound="\n".join(comment(f"{pipe.bound}.")),
-        roundings=f"{vector.roundings:.4g}".replace("e+0", "e"),
-        finish=_FINISH if pipe.lag else "",
-        last=_LAST if pipe.lag else "",
-        from_="" if pipe.start is None else f"    {_start('start', pipe.start)}",
+def test_program(
+    harness: Harness, data: str, row: str, bound: str, roundings: float, unit: str = ""
+) -> str:
+    """Return the end of a file, which is compiled only for a test.
+
+    `data`: definitions of ROWS, of TEST_FIRST, the first row with a result that is compared, of
+    ``test_expected`` and ``test_apart``. `row`: statements that put row k into ``v``. `bound`: why
+    the bound is what it is. `roundings`: the bound in eps of the precision.
+    """
+    take = "failed |= test_take(&s, v, out) < 0;"
+    rows = f"{row}\n        {take}"
+    if harness.finish:
+        inside = "\n".join(f"    {line}" for line in rows.split("\n"))
+        finish = textwrap.indent(harness.finish, " " * 8)
+        rows = f"        if (k < ROWS) {{\n{inside}\n        }} else {{\n{finish}\n        }}"
+    return _PROGRAM.format(
+        upper=harness.name.upper(),
+        **{key: getattr(harness, key) for key in ("name", "columns", "results", "take")},
+        words="\n".join(comment(f"Numbers of a row: {harness.words}.")),
+        start=harness.start,
+        data=data,
+        bound="\n".join(comment(f"{bound}.")),
+        roundings=f"{roundings:.4g}".replace("e+0", "e"),
+        plus=" + TEST_FIRST" if harness.lag else "",
+        row=rows,
+        unit=unit,
+        last=f"{harness.finish}\n    test_put(RESULTS, out);\n" if harness.finish else "",
     )
 
 
-def _start(name: str, q_nb: Array) -> str:
-    values = ", ".join(f"R({float(v)!r})" for v in q_nb)
-    return f"static const real_t {name}[4] = {{{values}}};\n".replace("R(", "\n        R(")
+_APART = """\
+/* Angle between the attitude and an expected one, rad. */
+static double test_apart(const double *q, const double *q_nb)
+{
+    double sum = 0.0, difference = 0.0;
+    for (int i = 0; i < 4; i++) {
+        difference += (q[i] - q_nb[i]) * (q[i] - q_nb[i]);
+        sum += (q[i] + q_nb[i]) * (q[i] + q_nb[i]);
+    }
+    return 2.0 * sqrt(difference < sum ? difference : sum);
+}
+"""
+
+
+def attitude_harness(
+    take: str, words: str, vector: Vector, start: Array | None, lag: int = 0
+) -> Harness:
+    """How a test passes rows to the functions of an attitude.
+
+    `take`: statements that give a row ``v`` and set ``refused``. `start` ((4,)): initial attitude;
+    None: found from the samples.
+    """
+    begin = "    attitude_init(s, 0);"
+    if start is not None:
+        values = ",\n        ".join(number(float(v)) for v in start)
+        begin = f"    static const real_t start[4] = {{\n        {values}}};\n"
+        begin += "    attitude_init(s, start);"
+    read = """\
+    real_t q[4];
+    attitude_quaternion({}s, q);
+    for (int i = 0; i < 4; i++) {{
+        out[i] = (double)q[i];
+    }}"""
+    finish = f"    attitude_finish(&s);\n{read.format('&')}" if lag else ""
+    taken = f"{take}\n{read.format('')}\n    return refused ? -RESULTS : RESULTS;"
+    return Harness("attitude", vector.samples.shape[1], 4, words, begin, taken, finish, lag)
+
+
+def attitude_test(harness: Harness, vector: Vector, bound: str) -> str:
+    """Return the end of a file of an attitude: a vector with its attitudes."""
+    data = f"""\
+#define ROWS {len(vector.samples)}
+#define TEST_FIRST {harness.lag} /* samples by which the attitude is behind */
+
+/* Single precision holds each exactly. */
+static const double test_rows[ROWS][COLUMNS] = {{
+{braced(vector.samples)}
+}};
+
+/* q_nb at each sample, by the kernels of strapdown in the same precision. */
+static const double test_expected[ROWS][RESULTS] = {{
+#if JOIN(IS_, REAL) == IS_float
+{braced(vector.single)}
+#else
+{braced(vector.double)}
+#endif
+}};
+
+{_APART}"""
+    row = """\
+        for (int i = 0; i < COLUMNS; i++) {
+            v[i] = test_rows[k][i];
+        }"""
+    return test_program(harness, data, row, bound, vector.roundings, " rad")
+
+
+# A step that is none of an attitude.
+
+#: Rows of the test, whose numbers follow from a seed.
+ROWS = 64
+
+
+@dataclass(frozen=True)
+class StepParts:
+    """What a file is made of.
+
+    `harness`: how a test passes rows of numbers. `gives`: what results of a row are, in words.
+    `step`: the kernel of a call, `call` that of the file. `codes`: results by name. `rows` (two):
+    middle and range of the numbers of a row. `run`: results of rows by the kernels, as far as
+    there are any.
+    """
+
+    title: str
+    words: Sequence[str]
+    kernels: Kernels
+    step: Kernel
+    call: str
+    memory: int
+    codes: dict[str, int]
+    interface: str
+    code: str
+    harness: Harness
+    gives: str
+    rows: Array
+    run: Callable[[Array], Array]
+
+
+def drawn_rows(rows: Array, count: int) -> Array:
+    """Rows of the test: a middle, and a range times a number of -1/2 to 1/2 that a seed gives."""
+    middle, span = rows
+    seed, out = 1, np.empty((count, len(middle)))
+    for k in range(count):
+        for j in range(len(middle)):
+            seed = (seed * 1664525 + 1013904223) & 0xFFFFFFFF
+            out[k, j] = middle[j] + span[j] * (seed / 4294967296.0 - 0.5)
+    return out
+
+
+def listed(values: Sequence[float] | Array, indent: str = " " * 8) -> str:
+    """Literals of numbers, wrapped."""
+    text = ", ".join(number(float(v)) for v in values)
+    return "\n".join(wrapped(text, indent)).strip().replace("\n    " + indent, "\n" + indent)
+
+
+# Test: rows that follow from a seed, and the results of the last one.
+
+_STEP_DATA = """\
+#define ROWS {rows}
+#define TEST_FIRST (ROWS - 1)
+
+/* Numbers of a row: a middle, and a range times what the seed gives, -1/2 to 1/2. */
+static const double test_middle[COLUMNS] = {{
+    {middle}}};
+static const double test_range[COLUMNS] = {{
+    {range}}};
+/* Results of the last row, by the kernels of strapdown in double precision. */
+static const double test_expected[1][RESULTS] = {{{{
+    {expected}}}}};
+/* Largest of each on the way. */
+static const double test_largest[RESULTS] = {{
+    {largest}}};
+
+static double test_apart(const double *found, const double *expected)
+{{
+    double worst = 0.0;
+    for (int i = 0; i < RESULTS; i++) {{
+        const double off = fabs(found[i] - expected[i]) / test_largest[i];
+        worst = off <= worst ? worst : off; /* so written NaN is kept */
+    }}
+    return worst;
+}}
+"""
+
+_STEP_ROW = """\
+        static unsigned long seed = 1;
+        for (int i = 0; i < COLUMNS; i++) {
+            seed = (seed * 1664525UL + 1013904223UL) & 0xffffffffUL;
+            v[i] = test_middle[i] + test_range[i] * ((double)seed / 4294967296.0 - 0.5);
+        }"""
+
+
+def step_test(parts: StepParts) -> str:
+    """Return the end of a file of a step."""
+    count = ROWS
+    found = parts.run(drawn_rows(parts.rows, count))
+    while len(found) < 4:  # a low-pass waits for its first output
+        count *= 2
+        found = parts.run(drawn_rows(parts.rows, count))
+    data = _STEP_DATA.format(
+        rows=count,
+        middle=_numbers(parts.rows[0]),
+        range=_numbers(parts.rows[1]),
+        expected=_numbers(found[-1]),
+        largest=_numbers([float(f"{max(v, 1e-3):.2g}") for v in np.abs(found).max(axis=0)]),
+    )
+    bound = (
+        f"{count} rows of {ROUNDINGS} roundings that another compiler or another sine may make "
+        "otherwise, relative to the largest of each result"
+    )
+    return test_program(parts.harness, data, _STEP_ROW, bound, float(count * ROUNDINGS))
+
+
+def _numbers(values: Sequence[float] | Array) -> str:
+    text = ", ".join(repr(float(v)) for v in values)
+    return "\n".join(wrapped(text, "    ")).strip().replace("\n        ", "\n    ")
 
 
 def unit_lines(configuration: SensorConfiguration, sensors: Sequence[str]) -> str:

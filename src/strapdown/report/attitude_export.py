@@ -15,6 +15,8 @@ from strapdown.attitude_comparison.comparison import AttitudeComparison
 from strapdown.bundle.atomic_folder import replace_file
 from strapdown.errors import ConfigError
 from strapdown.export import Channel, SensorConfiguration, export_c, export_micropython
+from strapdown.export.attitude import export_attitude
+from strapdown.export.steps import STEPS, ExportedFile, step_in_c
 from strapdown.formats.columns import parse_axes
 from strapdown.increments import increments_from_imu
 from strapdown.orientation_filters import FILTERS, OrientationEstimator, is_filter, make_filter
@@ -39,7 +41,10 @@ VECTOR = 64
 
 
 def check_export(
-    path: Path | None, force: bool, suffixes: Collection[str] = tuple(WRITERS)
+    path: Path | None,
+    force: bool,
+    suffixes: Collection[str] = tuple(WRITERS),
+    quantity: str = "--export",
 ) -> None:
     """Reject a path that cannot be written, before the run starts.
 
@@ -56,13 +61,13 @@ def check_export(
         raise ConfigError(
             "report.export-suffix",
             file=str(path),
-            quantity="--export",
+            quantity=quantity,
             suffixes=" or ".join(suffixes),
         )
     if path.is_dir() or (path.exists() and not force):
-        raise ConfigError("report.already", file=str(path), quantity="--export")
+        raise ConfigError("report.already", file=str(path), quantity=quantity)
     if not path.parent.is_dir():
-        raise ConfigError("report.no-such-folder", file=str(path.parent), quantity="--export")
+        raise ConfigError("report.no-such-folder", file=str(path.parent), quantity=quantity)
 
 
 def named_for_export(name: str) -> AttitudeAlgorithm | OrientationEstimator:
@@ -73,7 +78,20 @@ def named_for_export(name: str) -> AttitudeAlgorithm | OrientationEstimator:
     ConfigError
         The name, an option or a value is unknown.
     """
-    return make_filter(name) if is_filter(name) else make_algorithm(name, tuple(FILTERS))
+    return make_filter(name) if is_filter(name) else make_algorithm(name, (*FILTERS, *STEPS))
+
+
+def export_module(text: str, suffix: str) -> ExportedFile:
+    """Write a module as one file: of `STEPS`, an algorithm or a filter.
+
+    `text`: its name, with options. `suffix`: of the file, which gives the language. ConfigError:
+    the name, an option or a value is unknown, or there is no such file of this module.
+    """
+    if text.strip().lower().partition(":")[0] not in STEPS:
+        return export_attitude(named_for_export(text), WRITERS[suffix][1])
+    if suffix != ".c":
+        raise ConfigError("report.export-c-alone", quantity="FILE", name=text)
+    return step_in_c(text)
 
 
 def chosen_for_export(

@@ -22,8 +22,9 @@ from strapdown.attitude_algorithms.cost import count_cost, step_kernel
 from strapdown.errors import ConfigError, DataError
 from strapdown.export import Channel, SensorConfiguration, export_c
 from strapdown.export.algorithms import SHAPES
-from strapdown.export.kernels import Kernels, UntranslatableError
-from strapdown.export.translate import Translator
+from strapdown.export.device import device_translator
+from strapdown.export.kernels import Kernels
+from strapdown.export.translate import UntranslatableError
 from strapdown.increments import increments_from_imu
 from strapdown.report.attitude_export import write_export
 from strapdown.tables import GYRO, QUATERNION, imu_table, increments_table
@@ -367,9 +368,9 @@ def test_what_is_not_of_use_is_left_out():
 
 def test_a_kernel_outside_the_subset_is_refused():
     kernels = Kernels("increments")
-    function = kernels.require("increments")  # two indices
+    kernels.require("increments")  # arrays of unknown size
     with pytest.raises(UntranslatableError, match=r"line .*dt\.shape"):
-        Translator(kernels).function(function)
+        kernels.in_c(device_translator())
 
 
 def test_what_is_not_understood_is_named():

@@ -17,7 +17,7 @@ from strapdown import rotation
 from strapdown._kernels import arithmetic, orientation
 from strapdown.errors import ConfigError, DataError
 from strapdown.export import Channel, SensorConfiguration, export_c
-from strapdown.export.filters import filter_motion, options_of, sample_kernel, states_deviation
+from strapdown.export.filters import filter_motion, options_of, states_deviation
 from strapdown.orientation_filters import FILTERS, make_filter, run_filter
 from strapdown.orientation_filters.filter import euler_sd
 from strapdown.report.attitude_export import write_export
@@ -98,15 +98,16 @@ def test_it_gives_the_bits_of_the_kernel(tmp_path, variant, magnetometer, single
     table = np.array([[float.fromhex(v) for v in line.split()] for line in found.splitlines()])
     number = np.float32 if single else np.float64
     module = arithmetic.single_precision("orientation") if single else orientation
-    sample = getattr(module, sample_kernel(chosen))
+    advance = getattr(module, type(chosen).advance_kernel.__name__)
     record = chosen.begin(None, sampling).astype(number)
     # The file has the options as constants, and counts no time.
     left_out = [getattr(orientation, name) for name in options_of(chosen, sampling)]
     seen = np.setdiff1d(np.arange(chosen.size), [*left_out, orientation.TIME])
     assert table.shape[0] == len(rows)
     for row, got in zip(rows, table, strict=True):
-        values = [number(v) for v in (*row, *[np.nan] * (10 - len(row)))]
-        sample(record, *values)
+        parts = [np.ascontiguousarray(row[k : k + 3][None], number) for k in (1, 4, 7)]
+        parts[2] = parts[2].reshape(-1, 3)
+        advance(record, row[:1].astype(number), *parts, np.empty((1, chosen.row), number))
         assert got[0] == 0.0
         np.testing.assert_array_equal(got[1:][seen], record[seen].astype(np.float64))
         q = chosen.attitudes(record[None, orientation.Q : orientation.Q + 4], record)

@@ -11,10 +11,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tools.kernels_to_c import build, signatures, sources
+from tools.kernels_to_c import build, signatures
 
 import strapdown._kernels
 from strapdown._kernels import compilation
+from strapdown.export import sources
 
 FOLDER = Path(strapdown._kernels.__file__).parent
 SOURCE = """
@@ -106,6 +107,13 @@ def reads(a, i):
 
 
 @njit(cache=True)
+def reads_twice(a, i):
+    first = reads(a, 0)
+    second = reads(a, i)
+    return first + second
+
+
+@njit(cache=True)
 def fused(a, b, c, d, n):
     return fma(a, b, c), dot(d, d, n), math.hypot(a, b), np.fmod(a, b), abs(-n)
 """
@@ -120,6 +128,7 @@ sample.counted(i8)
 sample.parts(f8[:,:], i8, i8, f8[:])
 sample.mean_rows(f8[:,:])
 sample.reads(f8[:], i8)
+sample.reads_twice(f8[:], i8)
 sample.fused(f8, f8, f8, f8[:], i8)
 """
 
@@ -163,7 +172,7 @@ def sample(request, tmp_path_factory):
         shutil.copy(FOLDER / name, folder)
     (folder / "sample.py").write_text(SOURCE)
     (folder / "signatures.txt").write_text(SIGNATURES)
-    build.generate(folder, folder / "signatures.txt", folder)
+    build.generate(folder, folder / "signatures.txt", folder, bool(request.param))
     levels = ["base", "v3"] if platform.machine() == "x86_64" else ["base"]
     made = build.compile_(folder, build.system_compiler(), ["-O1", *request.param], levels)
     spec = spec_from_file_location("_compiled", made)
@@ -263,9 +272,12 @@ def test_arguments_are_checked(sample):
 def test_bounds_are_checked_in_the_build_for_it(sample, request):
     assert sample["reads"](np.arange(3.0), 2) == 2.0
     if "[bounds]" in request.node.name:
-        for index in (3, -1):
-            with pytest.raises(IndexError):
-                sample["reads"](np.arange(3.0), index)
+        line = SOURCE.splitlines().index("    return a[i]") + 1
+        for name in ("reads", "reads_twice"):
+            said = rf"sample\.{name}: index is out of bounds in sample\.py, line {line}$"
+            for index in (3, -1):
+                with pytest.raises(IndexError, match=said):
+                    sample[name](np.arange(3.0), index)
 
 
 @compiler

@@ -68,6 +68,8 @@ def arithmetic(a: str, b: str) -> str:
 class Names:
     """Names in C of the types used, and their definitions in order."""
 
+    scalars = SCALARS
+
     def __init__(self) -> None:
         self.known: dict[Type, str] = {}
         self.text: list[str] = []
@@ -76,7 +78,7 @@ class Names:
         if kind is None:
             return "void"
         if isinstance(kind, str):
-            return SCALARS[kind]
+            return self.scalars[kind]
         if kind not in self.known:
             self.known[kind] = self._define(kind)
         return self.known[kind]
@@ -98,12 +100,12 @@ class Names:
             name = f"list_{inner}"
             self.text.append(f"typedef struct {{ {inner} *data; int64_t n0, room; }} {name};")
             return name
-        inner = [self(part) for part in kind[1:]]
+        parts = [self(part) for part in kind[1:]]
         if len(set(kind[1:])) == 1 and isinstance(kind[1], str):
             name = f"{kind[1]}x{len(kind) - 1}"
         else:
             name = f"tuple{len([k for k in self.known.values() if k.startswith('tuple')]) + 1}"
             self.known[kind] = name
-        fields = " ".join(f"{part} f{k};" for k, part in enumerate(inner))
+        fields = " ".join(f"{part} f{k};" for k, part in enumerate(parts))
         self.text.append(f"typedef struct {{ {fields} }} {name};")
         return name
