@@ -410,7 +410,7 @@ def _parts(bench: AttitudeComparison) -> tuple[list[str], dict[str, dict[str, st
         if len(bench.sweep):
             grid, limit = sweep_grid(bench, "sum", "own_deg"), bench.answer.tolerance_deg
             cells[f"≤ {limit:g}° to"] = {
-                s.algorithm: _lowest_rate(grid.loc[s.algorithm], limit) for s in bench.shares
+                s.algorithm: _lowest_rate(grid.T[s.algorithm], limit) for s in bench.shares
             }
         cells["float32"] = {s.algorithm: degrees(s.single_deg[2]) for s in bench.shares}
     if bench.costs:
