@@ -294,16 +294,23 @@ def nearest(word: str, known: Iterable[str], also: Iterable[str] = ()) -> str:
 
 
 @cache
-def _catalogue(room: str) -> Mapping[str, Mapping[str, str]]:
+def _entries(room: str) -> Mapping[str, str]:
+    file = resources.files("strapdown").joinpath("messages", f"{room}.toml")
+    _, *parts = re.split(r"(?m)^\[([\w-]+)\]$", file.read_text(encoding="utf-8"))
+    return dict(zip(parts[::2], parts[1::2], strict=True))
+
+
+@cache
+def _entry(code: str) -> Mapping[str, str]:
+    """Entry of the catalogue; a whole room takes longer to parse than a log of 2,000 rows."""
     import tomllib
 
-    file = resources.files("strapdown").joinpath("messages", f"{room}.toml")
-    return tomllib.loads(file.read_text(encoding="utf-8"))
+    room, _, name = code.partition(".")
+    return tomllib.loads(_entries(room)[name])
 
 
 def _template(code: str, part: str, words: Words) -> str:
-    room, _, name = code.partition(".")
-    entry = _catalogue(room)[name]
+    entry = _entry(code)
     forms = {"python": (), "cli": ("_cli",), "file": ("_file", "_cli")}[words]
     return next((entry[part + form] for form in (*forms, "") if part + form in entry), "")
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from strapdown import errors
 from strapdown.errors import Finding
 
 SOURCE = Path(__file__).parents[2] / "src" / "strapdown"
@@ -198,3 +199,8 @@ def test_a_finding_is_data_and_does_not_change():
     moved = one.replace(row=7, severity="note")
     assert (moved.row, moved.severity, moved.data, one.row) == (7, "note", one.data, 3)
     assert moved != one and hash(moved.replace(row=3, severity="warning")) == hash(one)
+
+
+def test_an_entry_alone_is_that_of_the_whole_catalogue():
+    assert {code: errors._entry(code) for code in CATALOGUE} == CATALOGUE
+    assert [f"{r}.{name}" for r in sorted(ROOMS) for name in errors._entries(r)] == list(CATALOGUE)

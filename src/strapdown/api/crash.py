@@ -119,7 +119,8 @@ class CrashRun(CaseResult):
         out : str or Path
             New folder.
         report : bool
-            Whether to write page, PDF and figures as well.
+            Whether to write page, PDF and figures as well; without the extra ``pdf`` no PDF,
+            of which the logger warns.
         force : bool
             Overwrite an existing bundle.
         progress : callable, optional

@@ -313,17 +313,22 @@ _BROKEN = (
 
 def readers_of(path: Path) -> Iterator[tuple[str, Reader]]:
     """Yield the readers that recognize a file or folder, those of plug-ins last."""
-    others, broken = plugins("reader", Reader)
     data = first_bytes(path, HEAD)
-    for name, reader in (*READERS.items(), *others.items()):
+    for name, reader in itertools.chain(READERS.items(), _of_others()):
         try:
             signs = reader.detect
             if signs(path, data) if isinstance(signs, Signs) else signs(path):
                 yield name, reader
         except _BROKEN:  # a file that breaks the detection of a format is not of it
             _log.debug("%s: %s", path.name, reader.title, exc_info=True)
+
+
+def _of_others() -> Iterator[tuple[str, Reader]]:
+    """Readers of plug-ins, which are searched for where no reader of ours recognizes a file."""
+    others, broken = plugins("reader", Reader)
     for one in broken:
         _log.warning("%s", one)
+    yield from others.items()
 
 
 #: Newest detections, by path: what it was made from, and its result.

@@ -304,20 +304,22 @@ def _sweep(bench: AttitudeComparison) -> Chart:
     judged = bool(bench.scores)
     panels = []
     for meaning in meanings:
-        part = bench.sweep[bench.sweep["meaning"] == meaning]
+        part = bench.sweep[bench.sweep["meaning"] == meaning].sort_values("rate_hz")
+        columns = (part[c].tolist() for c in ("algorithm", "rate_hz", "own_deg", "error_deg"))
+        cells = list(zip(*columns, strict=True))
         lines = []
         for k, run in enumerate(bench.runs):
-            rows = part[part["algorithm"] == run.algorithm].sort_values("rate_hz")
-            if rows.empty:
+            rows = np.array([cell[1:] for cell in cells if cell[0] == run.algorithm])
+            if not rows.size:
                 continue
-            rate = rows["rate_hz"].to_numpy(dtype=np.float64)
+            rate, own, error = rows.T.copy()
             style = look(k)
             if judged:
                 lines.append(
                     Line(
                         f"{run.algorithm}, algorithm error",
                         rate,
-                        _shown(rows["own_deg"]),
+                        _shown(own),
                         style["colour"],
                         style["dash"],
                         width=0.7,
@@ -328,7 +330,7 @@ def _sweep(bench: AttitudeComparison) -> Chart:
                 Line(
                     run.algorithm,
                     rate,
-                    _shown(rows["error_deg"]),
+                    _shown(error),
                     style["colour"],
                     style["dash"],
                     # Decreasing widths keep coinciding curves visible.

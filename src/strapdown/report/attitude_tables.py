@@ -408,8 +408,9 @@ def _parts(bench: AttitudeComparison) -> tuple[list[str], dict[str, dict[str, st
                 for s in bench.shares
             }
         if len(bench.sweep):
-            cells[f"≤ {bench.answer.tolerance_deg:g}° to"] = {
-                s.algorithm: _lowest_rate(bench, s.algorithm) for s in bench.shares
+            grid, limit = sweep_grid(bench, "sum", "own_deg"), bench.answer.tolerance_deg
+            cells[f"≤ {limit:g}° to"] = {
+                s.algorithm: _lowest_rate(grid.T[s.algorithm], limit) for s in bench.shares
             }
         cells["float32"] = {s.algorithm: degrees(s.single_deg[2]) for s in bench.shares}
     if bench.costs:
@@ -418,12 +419,10 @@ def _parts(bench: AttitudeComparison) -> tuple[list[str], dict[str, dict[str, st
     return list(cells), cells
 
 
-def _lowest_rate(bench: AttitudeComparison, algorithm: str) -> str:
+def _lowest_rate(errors: pd.Series, limit: float) -> str:
     """Lowest rate of averaged samples down to which the algorithm error is within tolerance."""
-    grid = sweep_grid(bench, "sum", "own_deg")
-    errors = zip(grid.columns.tolist(), grid.loc[algorithm].to_list(), strict=True)
-    within = list(takewhile(lambda cell: cell[1] <= bench.answer.tolerance_deg, errors))
-    return f"{float(within[-1][0]):.3g} Hz" if within else _NONE
+    within = list(takewhile(lambda cell: cell[1] <= limit, errors.items()))
+    return f"{within[-1][0]:.3g} Hz" if within else _NONE
 
 
 def _part_note(bench: AttitudeComparison) -> str:

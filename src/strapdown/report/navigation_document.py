@@ -244,14 +244,12 @@ def _not_told(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
     sd = evaluation.run.filtered.sensors_sd
     if len(sd) < 2:
         return []
-    names = []
+    names, first, last = [], sd.iloc[0], sd.iloc[-1]
     for block in evaluation.states:
-        first = sd[list(block.columns)].iloc[0].to_numpy()
-        last = sd[list(block.columns)].iloc[-1].to_numpy()
         some = [
             label
-            for label, a, b in zip(block.labels, first, last, strict=True)
-            if a > 0.0 and b > (1.0 - _FELL) * a
+            for label, column in zip(block.labels, block.columns, strict=True)
+            if first[column] > 0.0 and last[column] > (1.0 - _FELL) * first[column]
         ]
         if some:
             names.append(f"{block.name} {', '.join(some)}" if len(block.labels) > 1 else block.name)

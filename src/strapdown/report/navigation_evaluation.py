@@ -37,7 +37,7 @@ from strapdown.report.document import Trust, reason
 from strapdown.report.values import shown_unit
 from strapdown.systems.navigation_run import NavigationRun
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
-from strapdown.tables.checks import index_of, values_of
+from strapdown.tables.checks import index_of, values_of, view_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -532,7 +532,7 @@ def blocks_of(record: NavigationRecord) -> tuple[ShownStates, ...]:
     for name, columns in state_groups(record).items():
         labels = [c.removeprefix(name).lstrip("_") for c in columns]
         # The unit must suit both the estimates and their standard deviations.
-        sizes = [record.sensors[columns].to_numpy(), record.sensors_sd[columns].to_numpy()]
+        sizes = [view_of(table, columns) for table in (record.sensors, record.sensors_sd)]
         size = max((float(np.nanmax(np.abs(v))) for v in sizes if v.size), default=0.0)
         factor, unit = shown_unit(record.units.get(columns[0], ""), size)
         aid, dot, own = name.rpartition(".")
