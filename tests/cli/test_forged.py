@@ -156,6 +156,22 @@ def test_and_is_never_confirmed_where_another_version_is_stated(
     assert name in {f.file for f in found.findings}
 
 
+@pytest.mark.parametrize(("kind", "verdict"), [("navigate", "identical"), ("crash", "changed")])
+def test_another_typst_is_another_condition_where_it_laid_something_out(
+    sealed, again, tmp_path, kind, verdict
+):
+    again(kind)
+    copy = shutil.copytree(sealed / kind, tmp_path / "copy")
+    # A page with other letters has other bytes, which the same conditions do not excuse.
+    if kind == "crash":
+        (copy / "report.pdf").write_bytes((copy / "report.pdf").read_bytes() + b"%")
+    seal_again(copy, elsewhere=False, change=lambda m: m["versions"].pop("typst"))
+    found = verify(copy)
+    assert found.verdict == verdict
+    named = {f.data["name"] for f in found.findings if f.code == "verify.condition"}
+    assert named == ({"typst"} if kind == "crash" else set())
+
+
 def test_an_honest_bundle_of_another_version_is_confirmed(sealed, again, tmp_path):
     again("crash")
     copy = shutil.copytree(sealed / "crash", tmp_path / "copy")
