@@ -20,7 +20,7 @@ from strapdown.attitude_algorithms.cost import count_cost, kernel_home, step_ker
 from strapdown.constants import CORTEX_M4F_CYCLES
 from strapdown.errors import ConfigError, check_choice
 from strapdown.export.configuration import SensorConfiguration
-from strapdown.export.device import WIDTH, comment, device_translator, unpacked
+from strapdown.export.device import comment, device_translator, unpacked
 from strapdown.export.kernels import Kernels
 from strapdown.export.program import (
     ROUNDINGS,
@@ -35,6 +35,7 @@ from strapdown.export.program import (
     unit_lines,
 )
 from strapdown.export.sources import Kernel
+from strapdown.export.types_of_c import WIDTH
 from strapdown.increments import BETWEEN_STAMPS
 from strapdown.tables import GYRO, check_imu, check_sampling_kind
 

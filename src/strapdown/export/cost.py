@@ -9,10 +9,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from strapdown.constants import CORTEX_M4F_CYCLES
-from strapdown.export.device import walk
 from strapdown.export.kernels import refused
 from strapdown.export.sources import Constant, Fma, Kernel
-from strapdown.export.translate import MATH
+from strapdown.export.translate import MATH, walk
 
 OPERATORS = {ast.Add: "add", ast.Sub: "add", ast.Mult: "multiply", ast.Div: "divide"}
 #: Calls of the math library that are not like a sine; abs, max, min and tests of a number cost what

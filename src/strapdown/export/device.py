@@ -24,10 +24,9 @@ from strapdown.export.translate import (
     Translator,
     UntranslatableError,
     Value,
+    loaded,
 )
-from strapdown.export.types_of_c import Names, Type, is_array, is_tuple
-
-WIDTH = 100
+from strapdown.export.types_of_c import TIE, WIDTH, Names, Type, is_array, is_tuple, wrapped
 
 
 def comment(text: str, indent: str = "") -> list[str]:
@@ -46,23 +45,7 @@ def comment(text: str, indent: str = "") -> list[str]:
     ]
 
 
-#: A blank at which no line is broken.
-TIE = "\xa0"
 RESULT = re.compile(rf"{TIE}={TIE}t\d+_\.f\d+;$")
-OPERATOR = re.compile(r"(?<= )([-+*/%<>?:]|[<>=!]=|&&|\|\|) ")
-
-
-def wrapped(text: str, indent: str) -> list[str]:
-    """One statement, broken at blanks, before operators, where it is too long."""
-    lines = textwrap.wrap(
-        OPERATOR.sub(rf"\1{TIE}", text),
-        WIDTH,
-        initial_indent=indent,
-        subsequent_indent=indent + "    ",
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
-    return [line.replace(TIE, " ") for line in lines]
 
 
 def number(value: float) -> str:
@@ -91,7 +74,7 @@ class DeviceNames(Names):
     def declared(self, kind: Type, name: str, const: bool = False) -> str:
         """Declare a variable or a parameter; a matrix, of a type ``(..., width)``, by its rows."""
         if not is_array(kind):
-            return f"{self(kind)}{TIE}{name}"
+            return super().declared(kind, name)
         if kind[2] == 1:
             return f"{f'const{TIE}' if const else ''}{self(kind[1])}{TIE}*{name}"
         # Not constant: C99 has no conversion to an array of constants.
@@ -116,11 +99,7 @@ class DeviceBody(Body):
 
     def translate(self) -> None:
         """Fill the function's text and result."""
-        body = self.body = self.kernel.node.body
-        loops = {n.target.id for n in walk(body) if isinstance(n, ast.For)}  # type: ignore[attr-defined]
-        loops = {name for name in loops if not self._read_elsewhere(name)}
-        self.declare_at = first_uses(body, set(stored(body)) - set(self.parameters) - loops)
-        self.used, self.new, self.written = loaded(body), set[str](), set[str]()
+        self.used, self.written = loaded(self.kernel.node.body), set[str]()
         super().translate()
 
     def _pass(self) -> None:
@@ -166,35 +145,16 @@ class DeviceBody(Body):
         self.temporaries += 1
         return f"{name}{self.temporaries}_"
 
-    def _block(self, statements: Iterable[ast.stmt]) -> bool:
-        outer, left = self.new, False
-        for statement in statements:
-            if text := getattr(statement, "comment", ""):
-                self.lines += comment(text, "    " * self.depth)
-            self.new = set(self.declare_at.get(id(statement), ()))
-            at = len(self.lines)
-            left = super()._block([statement])
-            self.lines[at:at] = self._declarations(self.new)
-            if left:
-                break
-        self.new = outer
-        return left
+    def _comment(self, statement: ast.stmt) -> None:
+        if text := getattr(statement, "comment", ""):
+            self.lines += comment(text, "    " * self.depth)
+
+    def _is_const(self, name: str) -> bool:
+        return name not in self.written
 
     def _c_name(self, name: str, cls: Any) -> str:
         text = super()._c_name(name, cls)
         return f"{text}_" if text == "R" else text  # that of the literals
-
-    def _declarations(self, names: set[str]) -> list[str]:
-        rows: dict[str, list[str]] = {}
-        for (name, cls), kind in self.variables.items():
-            if name in names and (name, cls) in self.seen:
-                text = self._type_names().declared(
-                    kind, self._c_name(name, cls), name not in self.written
-                )
-                head, _, last = text.rpartition(TIE)
-                rows.setdefault(head, []).append(last)
-        lines = (f"{head} {', '.join(sorted(last))};" for head, last in sorted(rows.items()))
-        return [row for line in lines for row in wrapped(line, "    " * self.depth)]
 
     def _If(self, node: ast.If) -> bool:
         at, indent = len(self.lines), "    " * self.depth
@@ -222,13 +182,6 @@ class DeviceBody(Body):
         elif len(rows) > 1 and all(RESULT.search(row) for row in rows):
             lines = textwrap.wrap(" ".join(rows), WIDTH - len(indent))
             self.lines[at:] = [indent + line.replace(TIE, " ") for line in lines]
-
-    def _place(self, name: str, text: str, kind: Type) -> str:
-        alone = sum(n == name for n, _ in self.variables) == 1
-        if name not in self.new or not alone:
-            return text
-        self.new.discard(name)
-        return self._type_names().declared(kind, text, name not in self.written)
 
     def _unread(self, name: str) -> bool:
         return name not in self.used
@@ -364,65 +317,3 @@ NEW = "\0"
 def device_translator() -> Translator:
     """Return a translator that writes C for a device."""
     return Translator(DeviceBody, DeviceNames())
-
-
-# Where variables begin.
-
-
-def first_uses(body: list[ast.stmt], names: set[str]) -> dict[int, set[str]]:
-    """For each name, find the innermost block with all its uses, and its first statement there."""
-    places: dict[int, set[str]] = {}
-    for name in names:
-        places.setdefault(id(_first_use(body, name)), set()).add(name)
-    return places
-
-
-def _first_use(block: list[ast.stmt], name: str) -> ast.stmt:
-    holding = [node for node in block if name in _names([node])]
-    first = holding[0]
-    inner = [b for b in _blocks(first) if name in _names(b)]
-    outside = isinstance(first, ast.If | ast.While) and name in _names([first.test])
-    if len(holding) > 1 or len(inner) != 1 or outside:
-        return first
-    # In a loop only what each round sets before it reads it: else it is of the round before.
-    if not (isinstance(first, ast.If) or _sets_first(inner[0], name)):
-        return first
-    return _first_use(inner[0], name)
-
-
-def _sets_first(block: list[ast.stmt], name: str) -> bool:
-    """Whether statements set a name before they read it."""
-    holding = [node for node in block if name in _names([node])]
-    begin = holding[0]
-    if isinstance(begin, ast.For) and len(holding) == 1 and name not in _names([begin.iter]):
-        return _sets_first(begin.body, name)
-    return isinstance(begin, ast.Assign) and name in stored([begin]) - loaded([begin])
-
-
-def _blocks(node: ast.stmt) -> list[list[ast.stmt]]:
-    if isinstance(node, ast.If):
-        return [node.body, node.orelse]
-    return [node.body] if isinstance(node, ast.For | ast.While) else []
-
-
-def _names(body: Iterable[ast.AST]) -> set[str]:
-    return {n.id for n in walk(body) if isinstance(n, ast.Name)}
-
-
-def walk(body: Iterable[ast.AST]) -> Iterable[ast.AST]:
-    """Iterate over every node of some statements."""
-    for node in body:
-        yield from ast.walk(node)
-
-
-def stored(body: Iterable[ast.AST]) -> set[str]:
-    """Return the names that are assigned."""
-    return {n.id for n in walk(body) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
-
-
-def loaded(body: Iterable[ast.AST]) -> set[str]:
-    """Return the names that are read; targets of augmented assignments are included."""
-    body = list(body)
-    names = {n.id for n in walk(body) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
-    augmented = (n.target for n in walk(body) if isinstance(n, ast.AugAssign))
-    return names | {t.id for t in augmented if isinstance(t, ast.Name)}

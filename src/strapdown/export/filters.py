@@ -16,7 +16,7 @@ from strapdown.constants import CORTEX_M4F_CYCLES
 from strapdown.errors import DataError
 from strapdown.export.algorithms import ANGLES
 from strapdown.export.configuration import SensorConfiguration
-from strapdown.export.device import comment, device_translator, number, unpacked, wrapped
+from strapdown.export.device import comment, device_translator, number, unpacked
 from strapdown.export.kernels import Kernels
 from strapdown.export.program import (
     ROUNDINGS,
@@ -30,6 +30,7 @@ from strapdown.export.program import (
     precision_lines,
     unit_lines,
 )
+from strapdown.export.types_of_c import wrapped
 from strapdown.orientation_filters import OrientationEstimator
 from strapdown.orientation_filters.cost import count_filter_cost
 from strapdown.tables import ACCEL, GYRO, MAG

@@ -19,9 +19,8 @@ from typing import Any
 
 from strapdown import _kernels
 from strapdown._kernels.arithmetic import PACKAGE, SOURCES
-from strapdown.export.device import loaded, stored, walk
 from strapdown.export.sources import CONSTANTS, Constant, Fma, Kernel, load
-from strapdown.export.translate import Translator, UntranslatableError
+from strapdown.export.translate import Translator, UntranslatableError, loaded, stored, walk
 from strapdown.export.types_of_c import Type
 
 # Knowledge of a number before the program runs: its value (v, v), or the range of an integer.

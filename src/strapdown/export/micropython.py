@@ -21,7 +21,6 @@ from strapdown.export.algorithms import (
     shape_of,
 )
 from strapdown.export.configuration import SensorConfiguration
-from strapdown.export.device import WIDTH
 from strapdown.export.filters import (
     SENSORS,
     begin_lines,
@@ -34,6 +33,7 @@ from strapdown.export.filters import (
 from strapdown.export.kernels import Kernels
 from strapdown.export.program import Array, Vector
 from strapdown.export.sources import Kernel
+from strapdown.export.types_of_c import WIDTH
 from strapdown.orientation_filters import OrientationEstimator
 
 

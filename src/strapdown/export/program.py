@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.export.configuration import Channel, SensorConfiguration
-from strapdown.export.device import WIDTH, comment, number, wrapped
+from strapdown.export.device import comment, number
 from strapdown.export.kernels import Kernels
 from strapdown.export.sources import Kernel
+from strapdown.export.types_of_c import WIDTH, wrapped
 
 Array = NDArray[np.float64]
 

@@ -20,6 +20,7 @@ import numpy as np
 from strapdown.export.sources import Fma, Kernel
 from strapdown.export.types_of_c import (
     SCALARS,
+    TIE,
     Names,
     Type,
     arithmetic,
@@ -28,6 +29,7 @@ from strapdown.export.types_of_c import (
     is_list,
     is_tuple,
     unify,
+    wrapped,
 )
 
 # Precedences of C.
@@ -140,9 +142,6 @@ class Body:
         #: What names may hold at the end of a loop's body, by loop.
         self.at_end: dict[int, dict[str, frozenset[Any]]] = {}
         self.result: list[Type] = []
-        #: Variables of loops: all; and those that are read elsewhere, too.
-        self.loop_names: set[str] = set()
-        self.not_only: set[str] = set()
         self.at: ast.AST = self.kernel.node
 
     # One pass after another.
@@ -154,6 +153,17 @@ class Body:
         if isinstance(body[0], ast.Expr) and isinstance(body[0].value, ast.Constant):
             self.note, body = str(body[0].value.value), body[1:]
         self.body = body
+        loops = [n for n in walk(body) if isinstance(n, ast.For)]
+        # Not those over a tuple, or that the body of a loop sets.
+        others = [n.target for n in loops if not isinstance(n.iter, ast.Call)]
+        names = stored(n.target for n in loops) - _names(others)
+        for n in loops:
+            if stored([n.target]) & stored(n.body):
+                names -= stored([n.target])
+        #: Variables that are declared in the head of their loops.
+        self.headed = {x for x in names if not self._read_elsewhere(x)}
+        own = stored(body) - set(self.parameters) - self.headed
+        self.declare_at, self.new = first_uses(body, own), set[str]()
         try:
             for _ in range(20):
                 before = (
@@ -272,15 +282,6 @@ class Body:
             else:
                 heads.append(f"{type_of(kind)} {text}_in")
                 begin.append(f"    {self._cast_text(own, kind, f'{text}_in', text)}")
-        given = {
-            (n, self._class(n, k)) for n, k in zip(self.parameters, function.kinds, strict=True)
-        }
-        rows: dict[str, list[str]] = {}
-        for (name, cls), kind in self.variables.items():
-            if (name, cls) not in given and (name, cls) not in self.loop_only():
-                rows.setdefault(type_of(kind), []).append(self._c_name(name, cls))
-        for kind_text, names in rows.items():
-            begin += _wrapped(f"    {kind_text} ", names)
         begin += [f"    {b}" for b in self.buffers]
         if self.frees():
             begin.append("    const sd_mark mark_ = sd_begin();")
@@ -307,9 +308,6 @@ class Body:
                 todo += self.alias.get(n, ())
         return seen
 
-    def loop_only(self) -> set[Any]:
-        return {(n, ("number", "i8")) for n in self.loop_names if n not in self.not_only}
-
     def frees(self) -> bool:
         """Whether the function gives its memory back (not where it returns some)."""
         return self.allocates and not any(holds_memory(k) for k in self.result)
@@ -326,14 +324,38 @@ class Body:
 
     def _block(self, statements: Iterable[ast.stmt]) -> bool:
         """Translate statements; return whether the last one leaves the block."""
+        outer, left = self.new, False
         for statement in statements:
-            self.at = statement
+            self.at, self.new = statement, set(self.declare_at.get(id(statement), ()))
             method = getattr(self, f"_{type(statement).__name__}", None)
             if method is None:
                 raise UntranslatableError(f"statement {type(statement).__name__}")
-            if method(statement):
-                return True
+            self._comment(statement)
+            begin = len(self.lines)
+            left = bool(method(statement))
+            self.lines[begin:begin] = self._declarations(self.new)
+            if left:
+                break
+        self.new = outer
+        return left
+
+    def _comment(self, statement: ast.stmt) -> None:
+        """Write what stands above a statement."""
+
+    def _is_const(self, name: str) -> bool:
+        """Whether nothing changes what an array's name points to."""
         return False
+
+    def _declarations(self, names: set[str]) -> list[str]:
+        """Declare variables that a statement does not begin with."""
+        rows: dict[str, list[str]] = {}
+        for (name, cls), kind in self.variables.items():
+            if name in names:
+                text = self.all.names.declared(kind, self._c_name(name, cls), self._is_const(name))
+                head, _, last = text.rpartition(TIE)
+                rows.setdefault(head, []).append(last)
+        texts = (f"{head} {', '.join(sorted(last))};" for head, last in sorted(rows.items()))
+        return [line for text in texts for line in wrapped(text, "    " * self.depth)]
 
     def _Pass(self, node: ast.Pass) -> None:
         pass
@@ -473,7 +495,6 @@ class Body:
             self.emit(f"{const}const {self.all.names(kind)} {items}[] = {{{texts}}};")
             text = self._declare(name, kind)
             self.target = self.env[name]
-            self.not_only = self.not_only | {name}
             counter = self.temporary("k")
             self.emit(
                 f"for ({self.all.integer} {counter} = 0; {counter} < {len(values)}; {counter}++) {{"
@@ -494,11 +515,10 @@ class Body:
             if not isinstance(bounds[2].constant, int) or bounds[2].constant == 0:
                 raise UntranslatableError("step of a range that is no constant")
             step = bounds[2].constant
-        stored = _stored(node.body)
         stop_node = call.args[1] if len(bounds) > 1 else call.args[0]
         fixed = not any(
             (isinstance(n, ast.Call | ast.Subscript) and not _is_shape(n))
-            or (isinstance(n, ast.Name) and n.id in (stored | {name}))
+            or (isinstance(n, ast.Name) and n.id in (stored(node.body) | {name}))
             for n in ast.walk(stop_node)
         )
         if not fixed:
@@ -511,16 +531,13 @@ class Body:
         move = {1: "++", -1: "--"}.get(
             step, f" += {bounds[-1].text}" if step > 0 else f" -= {-step}"
         )
-        own = name not in stored and not self._read_elsewhere(name)
-        if own:
-            self.loop_names.add(name)
+        if name in self.headed:
             self.emit(
                 f"for ({self.all.integer} {text} = {start.text}; {text} {signs} {stop.within(SUM)}; {text}{move}) {{"
             )
             self._loop(node, "")
         else:
             counter = self.temporary("k")
-            self.not_only = self.not_only | {name}
             self.emit(
                 f"for ({self.all.integer} {counter} = {start.text}; {counter} {signs} {stop.within(SUM)};"
                 f" {counter}{move}) {{"
@@ -637,8 +654,12 @@ class Body:
             self.emit(f"{self._place(name, text, kind)} = {value.text};")
 
     def _place(self, name: str, text: str, kind: Type) -> str:
-        """The left side of an assignment to a name, which is `text` in C."""
-        return text
+        """The left side of an assignment to a name, which is `text` in C; where it begins there."""
+        alone = sum(n == name for n, _ in self.variables) == 1
+        if name not in self.new or not alone:
+            return text
+        self.new.discard(name)
+        return self.all.names.declared(kind, text, self._is_const(name)).replace(TIE, " ")
 
     def _unread(self, name: str) -> bool:
         """Whether a result that is assigned to a name is not used."""
@@ -1278,15 +1299,6 @@ def _at(text: str, kind: Type, places: list[str]) -> str:
     return f"{head}{n}({text}, {', '.join(places)})"
 
 
-def _stored(statements: list[ast.stmt]) -> set[str]:
-    return {
-        n.id
-        for s in statements
-        for n in ast.walk(s)
-        if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)
-    }
-
-
 def _is_shape(node: ast.AST) -> bool:
     return (
         isinstance(node, ast.Subscript)
@@ -1312,11 +1324,69 @@ def _fold(op: ast.operator, a: Any, b: Any) -> Any:
     return operations[type(op)]() if type(op) in operations else None
 
 
-def _wrapped(head: str, names: list[str]) -> list[str]:
-    lines, row = [], head
-    for k, name in enumerate(names):
-        row += name + (";" if k == len(names) - 1 else ", ")
-        if len(row) > 90 and k < len(names) - 1:
-            lines.append(row.rstrip())
-            row = "        "
-    return [*lines, row]
+# Where variables begin.
+
+
+def first_uses(body: list[ast.stmt], names: set[str]) -> dict[int, set[str]]:
+    """For each name, find the innermost block with all its uses, and its first statement there."""
+    places: dict[int, set[str]] = {}
+    for name in names:
+        places.setdefault(id(_first_use(body, name)), set()).add(name)
+    return places
+
+
+def _first_use(block: list[ast.stmt], name: str) -> ast.stmt:
+    holding = [node for node in block if name in _names([node])]
+    first = holding[0]
+    inner = [b for b in _blocks(first) if name in _names(b)]
+    outside = name in _names(_heads(first))
+    if len(holding) > 1 or len(inner) != 1 or outside:
+        return first
+    # In a loop only what each round sets before it reads it: else it is of the round before.
+    if not (isinstance(first, ast.If) or _sets_first(inner[0], name)):
+        return first
+    return _first_use(inner[0], name)
+
+
+def _sets_first(block: list[ast.stmt], name: str) -> bool:
+    """Whether statements set a name before they read it."""
+    holding = [node for node in block if name in _names([node])]
+    begin = holding[0]
+    if isinstance(begin, ast.For) and len(holding) == 1 and name not in _names([begin.iter]):
+        return name in stored([begin.target]) or _sets_first(begin.body, name)
+    return isinstance(begin, ast.Assign) and name in stored([begin]) - loaded([begin])
+
+
+def _heads(node: ast.stmt) -> list[ast.AST]:
+    if isinstance(node, ast.For):
+        return [node.target, node.iter]
+    return [node.test] if isinstance(node, ast.If | ast.While) else []
+
+
+def _blocks(node: ast.stmt) -> list[list[ast.stmt]]:
+    if isinstance(node, ast.If):
+        return [node.body, node.orelse]
+    return [node.body] if isinstance(node, ast.For | ast.While) else []
+
+
+def _names(body: Iterable[ast.AST]) -> set[str]:
+    return {n.id for n in walk(body) if isinstance(n, ast.Name)}
+
+
+def walk(body: Iterable[ast.AST]) -> Iterable[ast.AST]:
+    """Iterate over every node of some statements."""
+    for node in body:
+        yield from ast.walk(node)
+
+
+def stored(body: Iterable[ast.AST]) -> set[str]:
+    """Return the names that are assigned."""
+    return {n.id for n in walk(body) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
+
+
+def loaded(body: Iterable[ast.AST]) -> set[str]:
+    """Return the names that are read; targets of augmented assignments are included."""
+    body = list(body)
+    names = {n.id for n in walk(body) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
+    augmented = (n.target for n in walk(body) if isinstance(n, ast.AugAssign))
+    return names | {t.id for t in augmented if isinstance(t, ast.Name)}

@@ -6,9 +6,30 @@ or "A" (any strides, counted in elements); a tuple ``("T", type, ...)``; a list 
 
 from __future__ import annotations
 
+import re
+import textwrap
 from typing import Any
 
 Type = Any
+
+WIDTH = 100
+#: A blank at which no line is broken.
+TIE = "\xa0"
+OPERATOR = re.compile(r"(?<= )([-+*/%<>?:]|[<>=!]=|&&|\|\|) ")
+
+
+def wrapped(text: str, indent: str) -> list[str]:
+    """One statement, broken at blanks, before operators, where it is too long."""
+    lines = textwrap.wrap(
+        OPERATOR.sub(rf"\1{TIE}", text),
+        WIDTH,
+        initial_indent=indent,
+        subsequent_indent=indent + "    ",
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
+    return [line.replace(TIE, " ") for line in lines]
+
 
 SCALARS = {
     "f8": "double",
@@ -82,6 +103,10 @@ class Names:
         if kind not in self.known:
             self.known[kind] = self._define(kind)
         return self.known[kind]
+
+    def declared(self, kind: Type, name: str, const: bool = False) -> str:
+        """Declare a variable, or a parameter."""
+        return f"{self(kind)}{TIE}{name}"
 
     def _define(self, kind: Type) -> str:
         if is_array(kind):
