@@ -32,7 +32,7 @@ $(VENV)/bin/python:
 	$(PYTHON) -m venv $(VENV)
 
 $(VENV)/.run: $(INSTALLED) | $(VENV)/bin/python
-	$(PIP) -e .
+	$(PIP) -e '.[pdf]'
 	@touch $@
 
 $(VENV)/.test: $(INSTALLED) | $(VENV)/bin/python

@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from importlib import import_module
+from importlib.resources import as_file, files
 from types import ModuleType
 
 import pytest
@@ -14,9 +15,25 @@ import pytest
 HEAVY = ("numba", "pandas", "typst", "jinja2", "scipy", "h5py", "pyarrow")
 
 
-def loaded_after(code: str) -> set[str]:
-    """Heavy packages in sys.modules after `code`."""
-    tell = f"import json, sys\nprint(json.dumps([m for m in {HEAVY!r} if m in sys.modules]))"
+#: What no run needs that is asked for nothing of it, and what draws a report.
+OF_OTHER_RUNS = (
+    *("numba", "typst", "jinja2", "h5py", "matplotlib", "plotly", "pymap3d", "pypdf"),
+    *("scipy.ndimage", "scipy.signal"),
+    *("strapdown.export", "strapdown.peers", "strapdown.simulation", "strapdown.live"),
+    *("strapdown.report.document_pdf", "strapdown.report.attitude_export"),
+)
+DRAWING = tuple(
+    f"strapdown.report.{name}"
+    for name in (
+        *("chart_svg", "svg_drawing", "scene", "plan"),
+        *("attitude_charts", "attitude_document", "navigation_charts", "navigation_plan"),
+    )
+)
+
+
+def loaded_after(code: str, modules: tuple[str, ...] = HEAVY) -> set[str]:
+    """Those of some modules that are in sys.modules after `code`."""
+    tell = f"import json, sys\nprint(json.dumps([m for m in {modules!r} if m in sys.modules]))"
     text = f"{code}\n{tell}"
     done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True)
     return set(json.loads(done.stdout.splitlines()[-1]))
@@ -54,6 +71,44 @@ def test_help_loads_nothing_heavy(arguments):
         "from strapdown.cli.main import run\ntry:\n run()\nexcept SystemExit: pass"
     )
     assert loaded_after(code) == set()
+
+
+def loaded_by(arguments: list[str], modules: tuple[str, ...]) -> set[str]:
+    code = (
+        f"import sys\nsys.argv = ['strapdown', *{arguments!r}]\n"
+        "from strapdown.cli.main import run\n"
+        "try:\n run()\nexcept SystemExit as ended:\n assert not ended.code"
+    )
+    return loaded_after(code, modules)
+
+
+@pytest.fixture(scope="module")
+def turn(tmp_path_factory):
+    """Two seconds of a unit that turns about its vertical."""
+    log = tmp_path_factory.mktemp("log") / "turn.csv"
+    rows = [f"{0.01 * k:.2f},0,0,{0.1 + 0.001 * (k % 7)},0,0,-9.8" for k in range(200)]
+    log.write_text("\n".join(["time,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z", *rows]))
+    return log
+
+
+def test_attitude_loads_what_it_uses(turn, tmp_path):
+    run = ["attitude", str(turn), "--gyro-unit", "rad/s", "--quiet", "--out"]
+    assert loaded_by([*run, str(tmp_path / "a")], (*OF_OTHER_RUNS, "scipy")) == set()
+    assert loaded_by([*run, str(tmp_path / "b"), "--no-report"], DRAWING) == set()
+    assert (tmp_path / "a" / "report.html").is_file()
+
+
+@pytest.mark.slow
+def test_navigate_loads_what_it_uses(tmp_path):
+    # Of scipy the distributions, and the spline by which the delay of a receiver is found.
+    data = files("strapdown") / "demo_data"
+    text = (data / "phone.toml").read_text(encoding="utf-8")
+    with as_file(data / "comma2k19") as recording:
+        file = tmp_path / "phone.toml"
+        file.write_text(text.replace("phone-recording", recording.as_posix()))
+        run = ["navigate", str(file), "--quiet", "--out"]
+        assert loaded_by([*run, str(tmp_path / "a")], OF_OTHER_RUNS) == set()
+        assert loaded_by([*run, str(tmp_path / "b"), "--no-report"], DRAWING) == set()
 
 
 def test_the_public_names_are_there():

@@ -232,3 +232,36 @@ def test_lines_of_the_help_break_where_the_terminal_ends_alone(run_cli):
             if line.strip() and following.strip():
                 word = following.split()[0]
                 assert len(line.rstrip()) + 1 + len(word) >= width - 1, (command, line)
+
+
+def data_of(folder):
+    """Bytes of the sealed outputs but page and figures, by name."""
+    manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
+    return {
+        item["name"]: item["sha256"]
+        for item in manifest["outputs"]
+        if not item["name"].startswith(("report.", "figures/"))
+    }, manifest["configuration"]
+
+
+def test_without_a_report_the_data_are_the_same_and_verify_repeats_them(here, run_cli):
+    run_cli("attitude", "alexiev-fig4", "--quiet", "--out", "with")
+    found = run_cli("attitude", "alexiev-fig4", "--no-report", "--out", "without")
+    assert f"Open  {here / 'without' / 'attitude.json'}" in found.out.replace("\n", "")
+    (all_data, stated), (data, lacking) = data_of(here / "with"), data_of(here / "without")
+    assert data == all_data
+    assert lacking == {**stated, "report": False}
+    assert not (here / "without" / "report.html").exists()
+    assert not (here / "without" / "figures").exists()
+    assert json.loads(run_cli("verify", "without", "--json").out)["verdict"] == "identical"
+
+
+def test_png_without_a_report_or_without_typst_is_refused_before_the_run(
+    here, run_cli, monkeypatch
+):
+    found = run_cli("attitude", "alexiev-fig4", "--no-report", "--png")
+    assert found.code == 4 and "--png" in found.err
+    monkeypatch.setitem(sys.modules, "typst", None)
+    found = run_cli("attitude", "alexiev-fig4", "--png")
+    assert found.code == 4 and "strapdown[pdf]" in found.err
+    assert list(here.iterdir()) == []

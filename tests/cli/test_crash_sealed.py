@@ -306,3 +306,37 @@ def test_the_seal_depends_on_nothing_around(sealed_crash, tmp_path, name):
         check=True,
     )  # fmt: skip
     assert done.stdout.split()[-1] == sealed_crash.out.split()[-1]
+
+
+def test_without_typst_the_pdf_is_left_out_and_both_output_and_seal_say_so(
+    light_case, tmp_path, run_cli, monkeypatch
+):
+    with monkeypatch.context() as without:
+        without.setitem(sys.modules, "typst", None)
+        done = run_cli("crash", light_case, "--out", tmp_path / "out")
+        assert done.code == 0
+        assert "pip install 'strapdown[pdf]'" in done.err
+        names = {path.name for path in (tmp_path / "out").iterdir()}
+        assert "report.html" in names and "report.pdf" not in names
+        manifest = json.loads((tmp_path / "out" / "manifest.json").read_text())
+        assert manifest["configuration"]["pdf"] is False
+    # Repeated where typst is installed, as it was sealed.
+    again = run_cli("verify", tmp_path / "out", "--json")
+    assert json.loads(again.out)["verdict"] == "identical"
+
+
+def test_a_sealed_pdf_is_not_repeated_without_typst(sealed_crash, run_cli, monkeypatch):
+    monkeypatch.setitem(sys.modules, "typst", None)
+    done = run_cli("verify", sealed_crash.folder)
+    assert done.code == 4 and "pip install 'strapdown[pdf]'" in done.err
+
+
+@pytest.mark.slow
+def test_without_a_report_a_case_has_its_data_and_its_seal(light_case, tmp_path, run_cli):
+    done = run_cli("crash", light_case, "--no-report", "--out", tmp_path / "out")
+    assert done.code == 0, done.err
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert {"crash.json", "trajectory.csv", "manifest.json"} <= names
+    assert not names & {"report.html", "report.pdf", "figures"}
+    again = run_cli("verify", tmp_path / "out", "--json")
+    assert json.loads(again.out)["verdict"] == "identical"

@@ -82,6 +82,20 @@ def test_there_and_back_is_within_rounding_everywhere(name, alt):
     assert np.abs(found[:, 2] - alt).max() < 2.0 * rounding(alt)
 
 
+def test_each_formula_has_the_bits_of_pymap3d():
+    drawn = np.random.default_rng(8)
+    places = drawn.uniform([-90.0, -180.0, -1e3], [90.0, 180.0, 1e5], (500, 3))
+    origin = [47.3, 8.5, 420.0]
+    wgs84 = frames.WGS84
+    theirs = pymap3d.Ellipsoid(wgs84.semi_major_axis, wgs84.semi_minor_axis, name="wgs84")
+    ecef = np.column_stack(pymap3d.geodetic2ecef(*places.T, theirs))
+    np.testing.assert_array_equal(frames.ecef_from_geodetic(places), ecef)
+    ned = np.column_stack(pymap3d.ecef2ned(*ecef.T, *origin, theirs))
+    np.testing.assert_array_equal(frames.ned_from_ecef(ecef, origin), ned)
+    back = np.column_stack(pymap3d.ned2ecef(*ned.T, *origin, theirs))
+    np.testing.assert_array_equal(frames.ecef_from_ned(ned, origin), back)
+
+
 def test_near_the_surface_pymap3d_says_the_same():
     places = grid(1500.0)
     ecef = frames.ecef_from_geodetic(places)

@@ -257,7 +257,7 @@ def counted_kernels(module: str) -> SimpleNamespace:
                 namespace |= {item.name: other[item.name] for item in node.names}
         elif isinstance(node, ast.FunctionDef):
             node.decorator_list = []
-    exec(compile(ast.fix_missing_locations(tree), f"{module} (counted)", "exec"), namespace)
+    exec(compile(tree, f"{module} (counted)", "exec"), namespace)
     # Only now, so that the constants of the module are numbers.
     namespace["math"] = namespace["np"] = _CountedMath
     return SimpleNamespace(**namespace)

@@ -10,12 +10,14 @@ import math
 
 import numpy as np
 
+from strapdown._kernels.antenna import POSITION, VELOCITY, antenna
 from strapdown._kernels.compensation import compensate, errors_of_states
 from strapdown._kernels.compilation import IN_PLACE, njit
 from strapdown._kernels.covariance import dense_update, ud_update, udu_matrix, wd_epoch
-from strapdown._kernels.earth import E2, RATE, A, displacement
+from strapdown._kernels.earth import E2, A, displacement
 from strapdown._kernels.growth import grown_covariance, grown_factors, growth_of_step
 from strapdown._kernels.level import (
+    LEVEL,
     WANDER,
     level_place,
     ned_correct,
@@ -26,10 +28,8 @@ from strapdown._kernels.level import (
 from strapdown._kernels.motion_increments import split_increment
 from strapdown._kernels.ned import COSINE, LAT, PRIME, SINE, ned_advance
 from strapdown._kernels.ned import Q as Q_NB
-from strapdown._kernels.ned import V as V_N
 from strapdown._kernels.psi_model import HELD_ROWS, means_of_steps, psi_dynamics
-from strapdown._kernels.rotation import dcm_from_quat
-from strapdown._kernels.rotation_vector import cross
+from strapdown._kernels.robust import PLAIN, UD, WD, take_linear
 from strapdown._kernels.smoothing import (
     GROWTH,
     UPDATE,
@@ -39,11 +39,8 @@ from strapdown._kernels.smoothing import (
     move_by_growth,
     pack_covariance,
 )
-from strapdown._kernels.wander import Q_WB, earth_axis, wander_advance
-from strapdown._kernels.wander import V as V_W
+from strapdown._kernels.wander import Q_WB, wander_advance
 
-# Forms of a covariance: the matrix, by two updates; its factors, by two.
-JOSEPH, PLAIN, UD, WD = 0, 1, 2, 3
 # Status of a call: done; a covariance is due to be recorded; the mechanization diverged; the
 # covariance is invalid; the rows for a smoother are full.
 ALL, NOTE, DIVERGED, BAD, FULL = 0, 1, 2, 3, 4
@@ -222,88 +219,45 @@ def over_steps(
 CODE, VALUE, VARIANCE = 0, 1, 4
 # Record of an observation: innovation, its expected variance, weight.
 TOLD = 3
-# Status of an invalid observation.
-BAD_FIX = 5
+# Status of an invalid observation, and of one beyond the linear range of its rule.
+BAD_FIX, ASK = 5, 6
 
 
 @njit(cache=True, error_model="numpy")
-def swept(which, state, earth, gyro_terms, last, c, x, y, w, speed, h):
-    """Add the effect of a lever arm to a velocity and to its sensitivity to the errors; level axes.
-
-    ``W x r`` of the arm r = (x, y, w), with ``W = C w_ib - w_ie`` the rate of the body relative to
-    the Earth; `c` is C_lb, `last` the newest increment.
-    """
-    if which == WANDER:
-        kx, ky, kz = earth_axis(state[0], state[1], state[2], state[3])
-    else:
-        kx, ky, kz = state[COSINE], 0.0, -state[SINE]
-    p, q, r = last[1] / last[0], last[2] / last[0], last[3] / last[0]
-    ix = c[0] * p + c[1] * q + c[2] * r
-    iy = c[3] * p + c[4] * q + c[5] * r
-    iz = c[6] * p + c[7] * q + c[8] * r
-    wx, wy, wz = ix - earth[RATE] * kx, iy - earth[RATE] * ky, iz - earth[RATE] * kz
-    sx, sy, sz = cross(wx, wy, wz, x, y, w)
-    speed[0] += sx
-    speed[1] += sy
-    speed[2] += sz
-    for j in range(3):
-        # By a turn e_j: the arm by -r x e_j, the rate of the body by -(C w_ib) x e_j.
-        ex, ey, ez = 1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2)
-        ax, ay, az = cross(wx, wy, wz, *cross(x, y, w, ex, ey, ez))
-        bx, by, bz = cross(x, y, w, *cross(ix, iy, iz, ex, ey, ez))
-        h[0, 6 + j] += bx - ax
-        h[1, 6 + j] += by - ay
-        h[2, 6 + j] += bz - az
-    for e in range(gyro_terms.shape[0]):
-        m, axis, j = int(gyro_terms[e, 0]), int(gyro_terms[e, 1]), 9 + int(gyro_terms[e, 2])
-        weight = gyro_terms[e, 3]
-        if m > 0:
-            weight *= last[m] / last[0]
-        dx, dy, dz = cross(x, y, w, c[axis], c[3 + axis], c[6 + axis])
-        h[0, j] -= weight * dx
-        h[1, j] -= weight * dy
-        h[2, j] -= weight * dz
-
-
-@njit(cache=True, error_model="numpy")
-def meet_fix(which, state, earth, gyro_terms, last, arm, of_place, fix, turn, z, h, H, R):
+def meet_fix(which, row, state, earth, gyro_terms, last, arm, of_place, fix, room, z, H, R):
     """Fill the observation of an antenna's fix: computed - measured, north, east, down.
 
-    `arm` is that of the antenna, body axes; `h` is a work array as large as H.
+    `row`: of the history, (1, row). `arm` is that of the antenna, body axes. `room`: arrays to work
+    in, the first of which is filled with C_nl, level to north-east-down.
     """
-    q_at, v_at = (Q_WB, V_W) if which == WANDER else (Q_NB, V_N)
+    turn, level, felt, value, derivative = room
+    up, upto = -1.0, POSITION if of_place else VELOCITY
+    if which == WANDER:
+        up = 1.0
+        wander_levels(row, earth, level)
+    else:
+        ned_levels(row, earth, level)
     lat, lon, alt = level_place(which, state, turn)
-    c = dcm_from_quat(state[q_at], state[q_at + 1], state[q_at + 2], state[q_at + 3])
-    x = c[0] * arm[0] + c[1] * arm[1] + c[2] * arm[2]
-    y = c[3] * arm[0] + c[4] * arm[1] + c[5] * arm[2]
-    w = c[6] * arm[0] + c[7] * arm[1] + c[8] * arm[2]
-    for i in range(3):
-        R[i] = fix[VARIANCE + i]
-        for j in range(h.shape[1]):
-            h[i, j] = 0.0
-    told = np.empty(3)
+    for i in range(6):
+        felt[i] = last[1 + i] / last[0]
+    antenna(
+        level[0], up, earth, arm, -1, gyro_terms, gyro_terms, felt, felt, upto, value, derivative
+    )
     if of_place:
-        told[0], told[1], told[2] = x, y, w
         z[0], z[1], z[2] = displacement(
             lat, lon, alt, fix[VALUE], fix[VALUE + 1], fix[VALUE + 2], earth[A], earth[E2]
         )
-        h[0, 0] = h[1, 1] = h[2, 2] = 1.0
-        # -[arm x]
-        h[0, 7], h[0, 8] = w, -y
-        h[1, 6], h[1, 8] = -w, x
-        h[2, 6], h[2, 7] = y, -x
-    else:
-        for i in range(3):
-            told[i] = state[v_at + i]
-            z[i] = -fix[VALUE + i]
-            h[i, 3 + i] = 1.0
-        if x != 0.0 or y != 0.0 or w != 0.0:
-            swept(which, state, earth, gyro_terms, last, c, x, y, w, told, h)
     for i in range(3):
+        if not of_place:
+            z[i] = -fix[VALUE + i]
+        R[i] = fix[VARIANCE + i]
         for j in range(3):
-            z[i] += turn[i, j] * told[j]
+            z[i] += turn[i, j] * value[upto, j]
         for j in range(H.shape[1]):
-            H[i, j] = turn[i, 0] * h[0, j] + turn[i, 1] * h[1, j] + turn[i, 2] * h[2, j]
+            total = 0.0
+            for k in range(3):
+                total += turn[i, k] * derivative[upto, k, j]
+            H[i, j] = total
 
 
 @njit(cache=True, error_model="numpy")
@@ -321,6 +275,20 @@ def take_off(which, state, sensors, earth, x):
 
 
 @njit(cache=True, error_model="numpy")
+def turn_blocks(turn, P, out):
+    """Fill the covariance (9, 9) of three vectors, rotated by one matrix (3, 3)."""
+    for a in range(0, 9, 3):
+        for b in range(0, 9, 3):
+            for i in range(3):
+                for j in range(3):
+                    total = 0.0
+                    for m in range(3):
+                        for k in range(3):
+                            total += turn[i, m] * P[a + m, b + k] * turn[j, k]
+                    out[a + i, b + j] = total
+
+
+@njit(cache=True, error_model="numpy")
 def mark(form, same_axes, covariance, sensors, turn, P, marked, marked_sensors, marked_sd):
     """Fill a snapshot: covariance of nine errors in NED, estimates, standard deviations."""
     if form >= UD:
@@ -329,20 +297,12 @@ def mark(form, same_axes, covariance, sensors, turn, P, marked, marked_sensors, 
         for i in range(P.shape[0]):
             for j in range(P.shape[1]):
                 P[i, j] = covariance[i, j]
-    for a in range(0, 9, 3):
-        for b in range(0, 9, 3):
-            if same_axes:
-                for i in range(3):
-                    for j in range(3):
-                        marked[a + i, b + j] = P[a + i, b + j]
-                continue
-            for i in range(3):
-                for j in range(3):
-                    total = 0.0
-                    for m in range(3):
-                        for k in range(3):
-                            total += turn[i, m] * P[a + m, b + k] * turn[j, k]
-                    marked[a + i, b + j] = total
+    if same_axes:
+        for i in range(9):
+            for j in range(9):
+                marked[i, j] = P[i, j]
+    else:
+        turn_blocks(turn, P, marked)
     for j in range(sensors.shape[0]):
         marked_sensors[j] = sensors[j]
         marked_sd[j] = math.sqrt(P[9 + j, 9 + j])
@@ -370,6 +330,8 @@ def over_fixes(
     place_code,
     fix_time,
     fixes,
+    rule,
+    scales,
     told,
     aged,
     marked_at,
@@ -383,7 +345,9 @@ def over_fixes(
     before it, [:, 0], where the last one is more than `aged` seconds old (otherwise its time is
     NaN). Return the status, the steps made, those of the open
     group, the fixes processed, and the rows filled for a smoother. The call ends early as
-    `over_steps`, or where these rows are full. Instants within `same` seconds count as one.
+    `over_steps`, or where these rows are full; and before a fix beyond the linear range of `rule`
+    (`robust`; empty: full weight), which learns `scales`, (2, 3, 9), of positions and velocities.
+    Instants within `same` seconds count as one.
     """
     which, form, _ = kinds
     state, at_covariance, covariance, sensors, times, last = states
@@ -391,10 +355,12 @@ def over_fixes(
     earth = model[6]
     n, size = 9 + sensors.shape[0], covariance.shape[0]
     x, z, R = np.empty(size), np.empty(3), np.empty(3)
-    h, H = np.empty((3, size)), np.empty((3, size))
-    turn, P, after = np.empty((3, 3)), np.empty((n, n)), np.empty((size, size))
+    H, turn, P = np.empty((3, size)), np.empty((3, 3)), np.empty((n, n))
+    after = np.empty((size, size))
+    meeting = turn, np.empty((1, LEVEL)), np.empty(6), np.empty((3, 3)), np.empty((3, 3, size))
     cut = np.empty((2, rows.shape[1]))
     between = np.empty((1, history.shape[1]))
+    ruled, before = rule.shape[0] > 0, np.empty((size, size))
     done, total = 0, time.shape[0]
     while done < fix_time.shape[0]:
         epoch = fix_time[done]
@@ -455,7 +421,8 @@ def over_fixes(
         if bad >= 0:
             return BAD, made, count, done, noted
         of_place = fixes[done, CODE] == place_code
-        meet_fix(which, state, earth, model[0], last, arm, of_place, fixes[done], turn, z, h, H, R)
+        row, fix = open_history[:1], fixes[done]
+        meet_fix(which, row, state, earth, model[0], last, arm, of_place, fix, meeting, z, H, R)
         for j in range(size):
             x[j] = 0.0
         for j in range(3):
@@ -476,7 +443,20 @@ def over_fixes(
             )
         if notes.shape[0] > 0:
             pack_covariance(form >= UD, covariance, P, notes[noted], begin_of_move(n))
-        if form == UD:
+        wrong = -1
+        if ruled:
+            for i in range(size):
+                for j in range(size):
+                    before[i, j] = covariance[i, j]
+            learned = scales[0] if of_place else scales[1]
+            if not take_linear(
+                form, covariance, x, z, H, R, rule, learned, epoch, of_place, told[done]
+            ):
+                for i in range(size):
+                    for j in range(size):
+                        covariance[i, j] = before[i, j]
+                return ASK, made, count, done, noted
+        elif form == UD:
             wrong = ud_update(covariance, x, z, H, R, told[done])
         elif form == WD:
             wrong = wd_epoch(

@@ -18,6 +18,7 @@ from strapdown._kernels.compilation import ARGUMENT_ERRORS
 from strapdown._kernels.increments import HEAD, LARGEST, MEAN, OPTIONS, SAMPLES, TIME
 from strapdown.errors import DataError, DivergenceError
 from strapdown.tables import DTHETA, THETA, attitude_table, check_sampling_kind
+from strapdown.tables.checks import values_of
 
 Array = NDArray[np.float64]
 
@@ -40,11 +41,8 @@ class Steps:
 
 def steps_of(increments: pd.DataFrame) -> Steps:
     """Return the arrays of an Increments table, without its time stamps."""
-    return Steps(
-        np.ascontiguousarray(increments["dt"].to_numpy(dtype=np.float64)),
-        np.ascontiguousarray(increments[THETA].to_numpy(dtype=np.float64)),
-        np.ascontiguousarray(increments[DTHETA].to_numpy(dtype=np.float64)),
-    )
+    dt, theta, dtheta = (values_of(increments, block) for block in (["dt"], THETA, DTHETA))
+    return Steps(dt[:, 0], theta, dtheta)
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import takewhile
 
 import numpy as np
 import pandas as pd
@@ -159,18 +160,17 @@ def choices(evidence: Evidence, column: str, limit: float, meaning: str = "sum")
     A sensor of a lower rate averages over its samples (``sum``); a program that reads one sample in
     several leaves the rest out (``drop``).
     """
+    part = evidence.sweep[evidence.sweep["meaning"] == meaning].sort_values("factor")
+    columns = (part[name].tolist() for name in ("algorithm", "rate_hz", column, "own_deg"))
+    cells = list(zip(*columns, strict=True))
     found = []
     for cost in evidence.costs:
-        cells = evidence.sweep[
-            (evidence.sweep["algorithm"] == cost.algorithm) & (evidence.sweep["meaning"] == meaning)
-        ].sort_values("factor")
-        # With an algorithm error above the total error it passes by chance.
-        passes = cells[[column, "own_deg"]].max(axis=1).to_numpy() <= limit
-        # A lower rate that passes where a higher one fails passes by chance.
-        count = len(passes) if passes.all() else int(np.argmin(passes))
-        if count:
-            last = cells.iloc[count - 1]
-            found.append(Choice(cost, meaning, float(last["rate_hz"]), float(last[column])))
+        own = (cell[1:] for cell in cells if cell[0] == cost.algorithm)
+        # With an algorithm error above the total error it passes by chance, and so does a lower
+        # rate where a higher one fails.
+        if passing := list(takewhile(lambda cell: np.fmax(*cell[1:]) <= limit, own)):
+            rate, error, _ = passing[-1]
+            found.append(Choice(cost, meaning, float(rate), float(error)))
     return sorted(found, key=lambda c: c.cost.cycles)
 
 

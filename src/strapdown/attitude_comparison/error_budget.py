@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.attitude_comparison.sweep import MOST_ACCURATE, Grounds
 from strapdown.dsp.chi_square import chi_square_above
+from strapdown.dsp.samples import moving_mean
 from strapdown.evaluation.differences import Errors, Known, known_at
 from strapdown.increments import increments_from_imu
 from strapdown.rotation import unit_rotation_angle
@@ -233,7 +234,7 @@ def _equations(
     c_bn = c_nb[b].transpose(0, 2, 1)
     bias = c_bn @ turn
     scale = c_bn @ weighed.reshape(-1, 3, 9)
-    smooth = _smoothed(rate, max(1, round(0.02 / grounds.clock.step)))
+    smooth = moving_mean(rate, max(1, round(0.02 / grounds.clock.step)))
     turned = c_bn @ (c_nb[a] @ smooth[a][:, :, None])
     ended = smooth[b][:, :, None]
     since = (time - middle)[:, None, None]
@@ -246,12 +247,6 @@ def _equations(
     )
     design = np.concatenate([clock, bias, scale], axis=2)
     return design.reshape(-1, UNKNOWNS), np.asarray(left).reshape(-1)
-
-
-def _smoothed(rate: Array, width: int) -> Array:
-    from scipy.ndimage import uniform_filter1d
-
-    return np.asarray(uniform_filter1d(rate, width, axis=0, mode="nearest"))
 
 
 def _solved(design: Array, off: Array) -> tuple[Array, Array]:

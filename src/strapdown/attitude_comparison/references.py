@@ -419,14 +419,14 @@ def motion_finding(chosen: OrientationEstimator, imu: pd.DataFrame) -> Finding:
 
 def _with_first_heading(q: Array, stamps: pd.Index, source: AttitudeSource) -> Array:
     """Attitudes rotated about the vertical to the first known one."""
-    from strapdown.peers import align_heading
-
     if source.truth is None or source.scored is None:
         return q
     known = source.truth[source.scored]
     known = known[(known.index >= stamps[0]) & (known.index <= stamps[-1])]
     if known.empty:
         return q
+    from strapdown.peers import align_heading
+
     first = known[QUATERNION].to_numpy(dtype=np.float64)[0]
     return align_heading(q, first, int(np.searchsorted(stamps.to_numpy(), float(known.index[0]))))
 

@@ -20,7 +20,7 @@ from strapdown.config.sources import read_options
 from strapdown.earth import magnetic_field
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.evaluation.differences import attitude_at, error_angles, gyro_turns
-from strapdown.formats import read_log
+from strapdown.formats import read_raw, recording_of
 from strapdown.formats.clocks import year_of
 from strapdown.formats.inference.rotation_rate import signed_permutations
 from strapdown.formats.recording import Origin, Reading, Recording
@@ -93,11 +93,13 @@ def read_source(spec: AttitudeSpec) -> AttitudeSource:
     """Read the log, or simulate the scenario, of a specification."""
     asked = spec.source
     if isinstance(asked, LogSpec):
-        log = read_log(asked.path, read_options(asked, asked.axes))
+        options = read_options(asked, asked.axes)
+        raw = read_raw(asked.path, options.format)
+        log = recording_of(raw, options)
         axes, findings = asked.axes, log.findings
         if axes is None and (by_gravity := _axes_by_gravity(log)) is not None:
             axes = str(by_gravity.data["example"])
-            log = read_log(asked.path, read_options(asked, axes))
+            log = recording_of(raw, read_options(asked, axes))
             findings = (
                 *(f for f in log.findings if f.code not in AXES_OPEN),
                 Finding(

@@ -24,6 +24,7 @@ from strapdown.increments import increments_from_imu
 from strapdown.progress import Progress
 from strapdown.rotation import unit_rotation_angle
 from strapdown.tables import DTHETA, QUATERNION, THETA, increments_table
+from strapdown.tables.checks import values_of
 from strapdown.tables.sample_clock import SampleClock
 
 Array = NDArray[np.float64]
@@ -331,12 +332,12 @@ def sum_increments(increments: pd.DataFrame, samples: NDArray[np.int64]) -> pd.D
         return increments
     begin = samples[:-1]
     dt = np.add.reduceat(increments["dt"].to_numpy(), begin)
-    theta = np.add.reduceat(increments[THETA].to_numpy(), begin, axis=0)
+    theta = np.add.reduceat(values_of(increments, THETA), begin, axis=0)
     ends = increments.index.to_numpy(dtype=np.float64)[samples[1:] - 1]
     # A step of a single increment keeps its rate.
     single = np.diff(samples) == 1
     change = np.zeros_like(theta)
-    change[single] = increments[DTHETA].to_numpy()[begin[single]]
+    change[single] = values_of(increments, DTHETA)[begin[single]]
     return increments_table(ends, dt, theta, change)
 
 
@@ -407,7 +408,7 @@ def find_shares(
         of_sensor = grounds.truth.errors(own.q_nb)
     shares = []
     for algorithm, run in zip(algorithms, runs, strict=True):
-        q = run.attitude[QUATERNION].to_numpy()
+        q = values_of(run.attitude, QUATERNION)
         if clean is None:
             mine, sensor = own.errors(q), of_sensor
         else:

@@ -18,7 +18,7 @@ import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, distribution, version
+from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any
 
@@ -357,16 +357,28 @@ PACKAGES = (
 def versions() -> dict[str, str]:
     """Versions of the packages that affect results, and the digest of our own sources."""
     found = {"python": platform.python_version(), "strapdown source": source_digest()}
-    for name in PACKAGES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            continue
-    return found
+    return found | {name: own[0] for name in PACKAGES if (own := _installed(name)) is not None}
+
+
+@functools.cache
+def _installed(name: str) -> tuple[str, tuple[str, ...]] | None:
+    """Version of an installed package, and the lines of what it requires.
+
+    By its file METADATA: `importlib.metadata` parses the whole of each as an e-mail, which takes
+    longer than the digest of all our sources.
+    """
+    try:
+        package = distribution(name)
+    except PackageNotFoundError:
+        return None
+    head = (package.read_text("METADATA") or "").partition("\n\n")[0]
+    if not (stated := re.findall(r"(?m)^Version: (.*)$", head)):
+        return package.version, tuple(package.requires or ())
+    return stated[0], tuple(re.findall(r"(?m)^Requires-Dist: (.*)$", head))
 
 
 #: Extras with readers, references and signatures; the others are for development.
-RUN_EXTRAS = ("logs", "mavlink", "peers", "sign")
+RUN_EXTRAS = ("logs", "mavlink", "pdf", "peers", "sign")
 
 
 @functools.cache
@@ -383,12 +395,10 @@ def environment() -> tuple[str, ...]:
         key = re.sub(r"[-_.]+", "-", name).lower()
         if key in found:
             continue
-        try:
-            package = distribution(name)
-        except PackageNotFoundError:
+        if (package := _installed(name)) is None:
             continue  # of an extra, or of another platform
-        found[key] = package.version
-        for line in package.requires or ():
+        found[key], requires = package
+        for line in requires:
             extra = re.search(r"extra\s*==\s*[\"']([\w-]+)", line)
             if extra is None or (key == "strapdown" and extra[1] in RUN_EXTRAS):
                 wanted.append(re.split(r"[\s;<>=!~\[(]", line, maxsplit=1)[0])
@@ -403,10 +413,15 @@ def source_digest() -> str:
     """
     root = Path(__file__).parents[1]
     digest = hashlib.sha256()
-    for path in sorted(root.rglob("*")):
-        if path.is_file() and path.suffix in (".py", ".toml", ".j2", ".html", ".js", ".css"):
-            content = hashlib.sha256(path.read_bytes()).hexdigest()
-            digest.update(f"{path.relative_to(root).as_posix()} {content}\n".encode())
+    names = (
+        os.path.relpath(os.path.join(folder, name), root)  # noqa: PTH118
+        for folder, _, files in os.walk(root)
+        for name in files
+        if name.endswith((".py", ".toml", ".typ", ".jinja", ".html", ".js", ".css"))
+    )
+    for name in sorted(name.replace(os.sep, "/") for name in names):
+        content = hashlib.sha256((root / name).read_bytes()).hexdigest()
+        digest.update(f"{name} {content}\n".encode())
     return digest.hexdigest()
 
 

@@ -15,7 +15,7 @@ from strapdown.cli.shared_options import (
     Height,
     LogFlags,
     Longitude,
-    OutFlags,
+    ReportFlags,
     Sensor,
     as_flag,
     fix_flags,
@@ -105,7 +105,7 @@ def align(
     log: LogFlags,
     fixes: FixFlags,
     out: Annotated[Path | None, folder_to_make("LOG-align")] = None,
-    write: OutFlags,
+    write: ReportFlags,
 ) -> None:
     """Find roll, pitch and heading of a stationary body from its gyros and accelerometers.
 
@@ -148,7 +148,7 @@ def align(
         result, seal = done
         print_alignment(result)
         print_findings(result.findings, MOST)
-        print_seal(seal, "report.html")
+        print_seal(seal, "align.json")
 
 
 def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -12,7 +13,7 @@ from strapdown.cli.shared_options import (
     Height,
     LogFlags,
     Longitude,
-    OutFlags,
+    ReportFlags,
     folder_to_make,
     running,
     spread,
@@ -21,7 +22,6 @@ from strapdown.cli.shared_options import (
 )
 
 if TYPE_CHECKING:
-    import pandas as pd
     from rich.console import Console
 
     from strapdown.attitude_comparison.comparison import AttitudeComparison
@@ -170,7 +170,8 @@ class FileFlags:
         bool,
         writing(
             None,
-            "Print how long a sample takes on this machine (it is in timing.json, too).",
+            "Measure how long a sample takes on this machine, and print it (timing.json has it, "
+            "too).",
             "--timing",
         ),
     ] = False
@@ -193,7 +194,7 @@ def attitude(
     log: LogFlags,
     files: FileFlags,
     out: Annotated[Path | None, folder_to_make("LOG-attitude")] = None,
-    write: OutFlags,
+    write: ReportFlags,
 ) -> None:
     """Find the simplest attitude algorithm, and the lowest rate, of sufficient accuracy.
 
@@ -201,56 +202,48 @@ def attitude(
     them with the known attitude, splits their error into the sensor's and their own, counts their
     cost, and writes the answer with tables, JSON, CSV, a report page and its figures.
     """
-    import pandas as pd
-
     from strapdown.api.attitude import compare_attitude
-    from strapdown.attitude_algorithms import make_algorithm
-    from strapdown.attitude_algorithms.cost import time_algorithms
     from strapdown.bundle import to_json, write_timing
     from strapdown.cli.console import Stopwatch, console, print_findings, print_seal, progress
     from strapdown.cli.result_folder import claim, default_folder, refuse_result
     from strapdown.errors import ConfigError
-    from strapdown.orientation_filters import FILTERS, make_filter
-    from strapdown.orientation_filters.cost import time_filters
     from strapdown.report.attitude import attitude_json
-    from strapdown.report.attitude_export import (
-        WRITERS,
-        check_export,
-        chosen_for_export,
-        named_for_export,
-        write_export,
-    )
 
+    if files.png:
+        from strapdown.report.document_pdf import typst_library
+
+        if write.no_report:
+            raise ConfigError("report.png-without-report", quantity="--png")
+        typst_library()  # before the run
     for source in sources:
         refuse_result(source, "log")
     folder = out or default_folder(sources[0], "attitude")
     claim(folder, write.force)
-    check_export(files.export, write.force)
-    if files.export_of is not None:
-        if files.export is None:
-            raise ConfigError("report.export-of-alone", quantity="--export-of")
-        named_for_export(files.export_of)
+    if files.export is not None:
+        from strapdown.report import attitude_export as export
+
+        export.check_export(files.export, write.force)
+        if files.export_of is not None:
+            export.named_for_export(files.export_of)
+    elif files.export_of is not None:
+        raise ConfigError("report.export-of-alone", quantity="--export-of")
     with progress(write.quiet or write.json) as show:
         report = Stopwatch(show)
         bench = compare_attitude(sources, options=_options(compare, log), progress=report)
         if files.export is not None:
-            chosen_for_export(bench, files.export_of)
+            export.chosen_for_export(bench, files.export_of)
         report("writing", 0.95)
-        seal = bench.save(folder, force=write.force, png=files.png)
+        seal = bench.save(folder, report=not write.no_report, force=write.force, png=files.png)
         if files.export is not None:
-            exported = write_export(bench, files.export, files.export_of, force=write.force)
-        report("timing", 0.99)
-        own_filters = any(peer.cost is not None for peer in bench.peers)
-        taken = pd.concat(
-            [
-                time_algorithms([make_algorithm(run.algorithm) for run in bench.runs]),
-                *([time_filters([make_filter(name) for name in FILTERS])] if own_filters else []),
-            ]
-        )
+            exported = export.write_export(bench, files.export, files.export_of, force=write.force)
+        taken = {}
+        if files.timing:
+            report("timing", 0.99)
+            taken = _sample_times(bench)
         report.stop()
         of_sample = {
-            str(name): {"float64": round(double, 1), "float32": round(single, 1)}
-            for name, double, single in taken.itertuples(index=False)
+            name: {"float64": round(double, 1), "float32": round(single, 1)}
+            for name, (double, single) in taken.items()
         }
         write_timing(seal, report.seconds, of_sample)
     if write.json:
@@ -259,12 +252,12 @@ def attitude(
     if write.quiet:
         return
     print_comparison(bench)
-    if files.timing:
+    if taken:
         _print_speed(taken)
     print_findings(bench.findings)
-    print_seal(seal, "report.html")
+    print_seal(seal, "attitude.json")
     if files.export is not None:
-        language = WRITERS[files.export.suffix.lower()][0]
+        language = export.WRITERS[files.export.suffix.lower()][0]
         console().print(f"{language}   {files.export}: {exported}", soft_wrap=True)
 
 
@@ -365,14 +358,28 @@ def print_comparison(bench: AttitudeComparison) -> None:
         page.print(f"  {line}")
 
 
-def _print_speed(taken: pd.DataFrame) -> None:
+def _sample_times(bench: AttitudeComparison) -> dict[str, tuple[float, float]]:
+    """Time of a sample of each algorithm and filter on this machine, float64 and float32, ns."""
+    from strapdown.attitude_algorithms import make_algorithm
+    from strapdown.attitude_algorithms.cost import time_algorithms
+    from strapdown.orientation_filters import FILTERS, make_filter
+    from strapdown.orientation_filters.cost import time_filters
+
+    tables = [time_algorithms([make_algorithm(run.algorithm) for run in bench.runs])]
+    if any(peer.cost is not None for peer in bench.peers):
+        tables.append(time_filters([make_filter(name) for name in FILTERS]))
+    rows = (row for table in tables for row in table.itertuples(index=False))
+    return {str(name): (double, single) for name, double, single in rows}
+
+
+def _print_speed(taken: Mapping[str, tuple[float, float]]) -> None:
     """Print the time per sample of each algorithm and filter on this machine."""
     from strapdown.cli.console import console, print_table
 
     console().print("\nTime of a sample on this machine")
     print_table(
         ["algorithm", "float64, ns", "float32, ns"],
-        [[str(a), f"{d:.3g}", f"{f:.3g}"] for a, d, f in taken.itertuples(index=False)],
+        [[name, f"{d:.3g}", f"{f:.3g}"] for name, (d, f) in taken.items()],
     )
 
 

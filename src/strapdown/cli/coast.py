@@ -13,7 +13,7 @@ from strapdown.cli.shared_options import (
     BEGIN,
     END,
     LENGTH,
-    OutFlags,
+    ReportFlags,
     as_flag,
     folder_to_make,
     module_of_flag,
@@ -157,7 +157,7 @@ def coast(
     start: StartFlags,
     run: OutageFlags,
     out: Annotated[Path | None, folder_to_make("SENSOR-coast, or DRIVE-coast")] = None,
-    write: OutFlags,
+    write: ReportFlags,
 ) -> None:
     """Predict the drift during a GNSS outage, and the sources of the drift.
 
@@ -189,7 +189,7 @@ def coast(
         result, seal = done
         print_coast(result)
         print_findings(result.findings)
-        print_seal(seal, "report.html")
+        print_seal(seal, "coast.json")
 
 
 def coast_of_flags(

@@ -147,8 +147,7 @@ class Compilations:
 @contextmanager
 def progress(quiet: bool) -> Iterator[Callable[[str, float], None]]:
     """Show the stage and the share done on the terminal, and erase them at the end."""
-    out = console(err=True)
-    if quiet or not out.is_terminal:
+    if quiet or not (out := console(err=True)).is_terminal:
         yield lambda stage, share: None
         return
     from rich.progress import (
@@ -277,7 +276,7 @@ def print_findings(findings: Sequence[Finding], most: int | None = None) -> None
         if remedy:
             out.print(remedy, style="dim")
     if most is not None and len(findings) > most:
-        more = f"{len(findings) - most} more; see the report"
+        more = f"{len(findings) - most} more; see the result"
         out.print(f"note: {more}", style="yellow")
 
 
@@ -295,8 +294,8 @@ def _joined(findings: Sequence[Finding]) -> list[Finding]:
 
 
 def print_seal(seal: Seal, look_at: str) -> None:
-    """Print the written folder, the file to open, and the seal."""
-    out = console()
+    """Print the written folder, the file to open, which is its page if it has one, and the seal."""
+    out, page = console(), seal.path / "report.html"
     out.print(f"\nWrote {seal.path}")
-    out.print(f"Open  {seal.path / look_at}")
+    out.print(f"Open  {page if page.is_file() else seal.path / look_at}")
     out.print(f"Seal  sha256 {seal.digest}")

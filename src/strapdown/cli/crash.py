@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from strapdown.cli.shared_options import (
-    OutFlags,
     Recover,
+    ReportFlags,
     Token,
     folder_to_make,
     missing_argument,
@@ -77,13 +77,14 @@ def crash(
     *,
     flags: LiveFlags,
     out: Annotated[Path | None, folder_to_make("CASE-crash, with --live CASE-crash-live")] = None,
-    write: OutFlags,
+    write: ReportFlags,
 ) -> None:
     """Reconstruct a crash: delta-V, direction of force, severity and path, each with its bound.
 
-    Reads the records that the case names and writes a report (HTML and PDF), JSON, CSV and
-    figures, sealed so that any change is found. Two vehicles are held against each other as well:
-    momentum, closing speed, restitution and energy; each has its report in a folder of its own.
+    Reads the records that the case names and writes a report (HTML; PDF where the extra 'pdf' is
+    installed), JSON, CSV and figures, sealed so that any change is found. Two vehicles are held
+    against each other as well: momentum, closing speed, restitution and energy; each has its report
+    in a folder of its own.
 
     With --live, samples are watched as they arrive, and delta-V so far, direction of force and
     severity of a crash are written as lines of JSON.
@@ -126,7 +127,7 @@ def crash(
     with progress(write.quiet or write.json) as show:
         report = Stopwatch(show)
         result = reconstruct(*cases, progress=report)
-        first = result.save(folder, force=write.force, progress=report)
+        first = result.save(folder, report=not write.no_report, force=write.force, progress=report)
         report.stop()
         write_timing(first, report.seconds)
     folders = [folder / number if several else folder for number in result.runs]
@@ -146,7 +147,7 @@ def crash(
         # What both say together is told with the first.
         both = run.closure.findings if run.closure is not None and run.number > 1 else ()
         print_findings([found for found in run.findings if found not in both])
-        print_seal(seal, "report.html")
+        print_seal(seal, "crash.json")
     with shown_in(result.spec.options.units):
         closure = closure_table(result) if several else None
     if closure is not None:
@@ -193,6 +194,6 @@ def print_crash(result: CaseResult) -> None:
             out.print(f"  - {spaced(f'{source}: {text}' if source else text)}")
     found = limitations(result)
     if found:
-        out.print("\nLimitations (details in the report):")
+        out.print("\nLimitations (details in the result):")
         for _, head, _ in found:
             out.print(f"  - {spaced(head)}")

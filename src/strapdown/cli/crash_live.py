@@ -28,7 +28,7 @@ from strapdown.cli.live_folder import (
 from strapdown.cli.navigate_live import line_writer
 from strapdown.cli.navigate_tables import print_latency
 from strapdown.cli.result_folder import claim, default_folder, refuse_result
-from strapdown.cli.shared_options import OutFlags, refuse_without_live
+from strapdown.cli.shared_options import ReportFlags, refuse_without_live
 from strapdown.errors import ConfigError
 from strapdown.live.crash import receive_crash, recorder_of_case
 from strapdown.live.journal import Journal
@@ -49,7 +49,9 @@ if TYPE_CHECKING:
 EVERY = 0.01
 
 
-def crash_live(cases: Sequence[Path], out: Path | None, write: OutFlags, flags: LiveFlags) -> None:
+def crash_live(
+    cases: Sequence[Path], out: Path | None, write: ReportFlags, flags: LiveFlags
+) -> None:
     """Detect crashes in lines, or write the detection as C.
 
     Standard output holds the estimates only; all else goes to standard error.
@@ -88,7 +90,7 @@ def crash_live(cases: Sequence[Path], out: Path | None, write: OutFlags, flags: 
 
 
 def recover_crash(
-    cases: Sequence[Path] | None, out: Path | None, write: OutFlags, flags: LiveFlags
+    cases: Sequence[Path] | None, out: Path | None, write: ReportFlags, flags: LiveFlags
 ) -> None:
     """Finish, or with ``--live`` continue, a run that was killed, from what it had received."""
     refuse_beside_recover(
@@ -107,7 +109,7 @@ def recover_crash(
     _run(journal, folder, write, flags)
 
 
-def _run(journal: Journal, folder: Path, write: OutFlags, flags: LiveFlags) -> None:
+def _run(journal: Journal, folder: Path, write: ReportFlags, flags: LiveFlags) -> None:
     """Detect crashes in what the journal has, and in what comes; and write the bundle."""
     clock, warn = MachineClock(), warner(write.quiet)
     options = recorder_of(journal.run["configuration"])

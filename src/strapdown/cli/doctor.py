@@ -13,7 +13,7 @@ from strapdown.cli.shared_options import (
     LOG_FLAGS,
     FixFlags,
     LogFlags,
-    OutFlags,
+    ReportFlags,
     as_flag,
     fix_keys,
     folder_to_make,
@@ -53,7 +53,7 @@ def doctor(
     flags: LogFlags,
     fixes: FixFlags,
     out: Annotated[Path | None, folder_to_make("LOG-doctor")] = None,
-    write: OutFlags,
+    write: ReportFlags,
 ) -> None:
     """Examine logs: what is in them, what is wrong, the fix, and what they suffice for.
 
@@ -87,7 +87,7 @@ def doctor(
         for one in result.logs:
             print_log(one, paths, tables=write.verbose)
         print_findings(result.between)
-        print_seal(seal, "report.html")
+        print_seal(seal, "doctor.json")
     if fix is not None:
         files = write_clean_log(found[0], fix, force=write.force)
         if done is not None:
@@ -128,7 +128,7 @@ def print_log(one: LogDiagnosis, paths: Mapping[str, str], *, tables: bool) -> N
         if fix:
             out.print(f"   {_cut(fix)}", style="dim")
     if len(faults) > MOST:
-        out.print(f"   {len(faults) - MOST} more; see the report", style="yellow")
+        out.print(f"   {len(faults) - MOST} more; see the result", style="yellow")
     for note in one.notes:
         if note.code == "io.columns-not-used":
             out.print(_cut(note.sentence("cli")), style="dim")

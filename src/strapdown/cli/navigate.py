@@ -15,8 +15,8 @@ from strapdown.cli.shared_options import (
     Height,
     LogFlags,
     Longitude,
-    OutFlags,
     Recover,
+    ReportFlags,
     Sensor,
     Token,
     as_flag,
@@ -138,7 +138,7 @@ def navigate(
     log: LogFlags,
     fixes: FixFlags,
     out: Annotated[Path | None, folder_to_make("LOG-navigate")] = None,
-    write: OutFlags,
+    write: ReportFlags,
 ) -> None:
     """Find position, velocity and attitude over a record, by inertial sensors and measurements."""
     from strapdown.bundle import write_latency
@@ -214,7 +214,7 @@ def navigate(
         found = None if played is None else played.tape.latency()
         if found is not None:
             print_latency(found, f"played, pace {pace}")
-        print_seal(seal, "report.html")
+        print_seal(seal, "navigation.json")
 
 
 def navigation_of_flags(log: Path, given: Mapping[str, Any]) -> NavigationSpec:

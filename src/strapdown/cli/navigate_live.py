@@ -23,7 +23,7 @@ from strapdown.cli.live_folder import (
     warner,
 )
 from strapdown.cli.navigate_tables import print_latency, print_navigation
-from strapdown.cli.shared_options import OutFlags
+from strapdown.cli.shared_options import ReportFlags
 from strapdown.config.navigation import NavigationSpec
 from strapdown.errors import ConfigError
 from strapdown.live.journal import Journal
@@ -39,7 +39,7 @@ EVERY, LINES = 1.0, "json"
 
 
 def navigate_live(
-    file: Path, folder: Path, write: OutFlags, flags: NavigateFlags, given: Mapping[str, Any]
+    file: Path, folder: Path, write: ReportFlags, flags: NavigateFlags, given: Mapping[str, Any]
 ) -> None:
     """Navigate by lines, and write the bundle at their end.
 
@@ -68,7 +68,7 @@ def navigate_live(
 
 
 def recover_navigation(
-    out: Path | None, write: OutFlags, flags: NavigateFlags, given: Mapping[str, Any]
+    out: Path | None, write: ReportFlags, flags: NavigateFlags, given: Mapping[str, Any]
 ) -> None:
     """Finish, or with ``--live`` continue, a run that was killed, from what it had received.
 
@@ -99,7 +99,7 @@ def _run(
     spec: NavigationSpec,
     file: Path,
     folder: Path,
-    write: OutFlags,
+    write: ReportFlags,
     flags: NavigateFlags,
 ) -> None:
     """Navigate what the journal has, and what comes; and write the bundle."""
@@ -119,19 +119,21 @@ def _run(
         if not write.quiet and live.latency is not None:
             print_latency(live.latency, flags.live or "")
         if not write.quiet:
-            print_seal(seal, "report.html")
+            print_seal(seal, "navigation.json")
     if live.error is not None:
         raise live.error
 
 
-def _sealed(live: LiveRun, journal: Journal, file: Path, folder: Path, write: OutFlags) -> Seal:
+def _sealed(live: LiveRun, journal: Journal, file: Path, folder: Path, write: ReportFlags) -> Seal:
     """Write the bundle."""
     with progress(write.quiet) as show:
         report = Stopwatch(show)
         result = result_of(live, journal.folder, file, report)
         if live.run is None and live.error is not None:
             raise live.error
-        seal = NAVIGATION.write(result, folder, force=write.force, progress=report)
+        seal = NAVIGATION.write(
+            result, folder, report=not write.no_report, force=write.force, progress=report
+        )
         journal.sealed(seal.digest)
         report.stop()
         write_timing(seal, report.seconds)

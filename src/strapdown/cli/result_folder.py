@@ -13,7 +13,7 @@ from strapdown.errors import ConfigError, DataError, Finding
 
 if TYPE_CHECKING:
     from strapdown.bundle import Seal
-    from strapdown.cli.shared_options import OutFlags
+    from strapdown.cli.shared_options import ReportFlags
     from strapdown.config.alignment import AlignmentSpec
     from strapdown.config.navigation import NavigationSpec
 
@@ -79,7 +79,8 @@ def refuse_result(source: str | Path, wanted: str) -> None:
 
 def _hints(path: Path, command: str, manifest: Mapping[str, Any]) -> Iterator[Finding]:
     """Yield the possible commands for a result folder."""
-    yield Finding("cli.hint-open", severity="note", report=path / "report.html", folder=path)
+    if (path / "report.html").is_file():
+        yield Finding("cli.hint-open", severity="note", report=path / "report.html", folder=path)
     if command == "navigate":
         yield Finding("cli.hint-coast", severity="note", folder=path)
     own = next((i for i in manifest["inputs"] if i["role"] in ("log", "case")), None)
@@ -101,7 +102,7 @@ def claim(folder: Path, force: bool) -> None:
 def run_and_save(
     compute: Callable[[Stopwatch], Any],
     folder: Path,
-    write: OutFlags,
+    write: ReportFlags,
     answer: str,
     *more: Callable[[Seal], None],
 ) -> tuple[Any, Seal] | None:
@@ -118,7 +119,9 @@ def run_and_save(
     with progress(write.quiet or write.json) as show:
         report = Stopwatch(show)
         result = compute(report)
-        seal: Seal = result.save(folder, force=write.force, progress=report)
+        seal: Seal = result.save(
+            folder, report=not write.no_report, force=write.force, progress=report
+        )
         report.stop()
         write_timing(seal, report.seconds)
         for one in more:

@@ -292,6 +292,21 @@ class OutFlags:
     verbose: Verbose = False
 
 
+@dataclass(frozen=True)
+class ReportFlags(OutFlags):
+    """`OutFlags` for a command that writes a report."""
+
+    no_report: Annotated[
+        bool,
+        writing(
+            None,
+            "Write no page and no figures: the data, the findings and the seal alone, which "
+            "strapdown verify repeats likewise.",
+            "--no-report",
+        ),
+    ] = False
+
+
 def spread(command: Callable[..., None]) -> Callable[..., None]:
     """Expand the option sets of a command into separate flags.
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY as GRAVITY
 from strapdown.crash.acceleration import force_at_rest
+from strapdown.dsp.samples import moving_mean
 from strapdown.errors import DataError
 from strapdown.sensors.crash_unit import (
     SHAPES,
@@ -192,8 +193,8 @@ class _UnitEffects:
         sd = triad.uncertainty.axis("vibration_rectification")
         if not any(sd):
             return
-        fast = self.felt - moving_mean(self.felt, self.time)
-        variance = moving_mean(fast**2, self.time)
+        fast = self.felt - slow_part(self.felt, self.time)
+        variance = slow_part(fast**2, self.time)
         for axis in range(3):
             if sd[axis] > 0.0:
                 one = sd[axis] * np.where(spoke[:, axis], variance[:, axis], 0.0)
@@ -310,13 +311,11 @@ class _UnitEffects:
             self._add(name, TIMING, force, self.time_sd * slope)
 
 
-def moving_mean(values: Array, time: Array) -> Array:
+def slow_part(values: Array, time: Array) -> Array:
     """Mean of values, (n, k), about each stamp over the time of `VIBRATION`."""
-    from scipy.ndimage import uniform_filter1d
-
     step = float(np.median(np.diff(time)))
     width = max(3, 2 * round(0.5 * VIBRATION / step) + 1)
-    return np.asarray(uniform_filter1d(values, width, axis=0, mode="nearest"))
+    return moving_mean(values, width)
 
 
 def _sd(covariances: Array) -> Array:
@@ -356,7 +355,7 @@ def assumed_effects(prepared: PreparedUnit, lever_arm: Array) -> Iterator[Assume
             at_rest = force_at_rest(level.roll_deg, level.pitch_deg, GRAVITY)
         else:
             at_rest = np.asarray(rest.accel_mean)
-        free = moving_mean((force - at_rest) @ (np.eye(3) - axes), time)
+        free = slow_part((force - at_rest) @ (np.eye(3) - axes), time)
         shapes = turning_shapes(time, turning.over, sampling, np.linalg.norm(free, axis=1))
         yield from _of_turning(turning, turns, (time, shapes), force, lever_arm)
     if unit.assumed is not None and axes.any():

@@ -1,4 +1,4 @@
-"""Samples of a signal: checks before filters, runs of flags, white noise, running integral."""
+"""Samples of a signal: checks before filters, runs of flags, white noise, moving mean, integral."""
 
 from __future__ import annotations
 
@@ -141,6 +141,20 @@ def white_sd(values: Array) -> Array:
     return np.asarray(np.sqrt(np.square(np.diff(values, n=2, axis=0)).mean(axis=0) / 6.0))
 
 
+def moving_mean(values: Array, width: int) -> Array:
+    """Average over the `width` samples about each; the first and last samples continue beyond.
+
+    `values` ((n, ...)). Returns (n, ...): ``scipy.ndimage.uniform_filter1d(mode="nearest")`` to the
+    last bit, without its import, which takes longer than reading a log.
+    """
+    before = width // 2
+    ends = (np.repeat(values[:1], before, axis=0), np.repeat(values[-1:], width - 1 - before, 0))
+    padded = np.concatenate([ends[0], values, ends[1]])
+    steps = padded[width:] - padded[:-width]
+    first = np.cumsum(padded[:width], axis=0)[-1:]
+    return np.asarray(np.cumsum(np.concatenate([first, steps]), axis=0) / width)
+
+
 def running_integral(time: Array, values: Array, *, means: bool = False) -> Array:
     """Integrate samples from the first stamp to each.
 
@@ -152,6 +166,11 @@ def running_integral(time: Array, values: Array, *, means: bool = False) -> Arra
     The trapezoids equal `scipy.integrate.cumulative_trapezoid` to the last bit; importing that
     takes a fifth of a second, for every log with velocities.
     """
-    steps = np.diff(time).reshape(-1, *[1] * (values.ndim - 1))
-    middle = values[1:] if means else 0.5 * (values[1:] + values[:-1])
-    return np.concatenate([np.zeros_like(values[:1]), np.cumsum(middle * steps, axis=0)])
+    steps, out = np.diff(time), np.zeros(values.shape)
+    # Column by column: a long log takes a large part of the memory.
+    for column, upto in zip(
+        values.reshape(len(out), -1).T, out.reshape(len(out), -1).T, strict=True
+    ):
+        middle = column[1:] if means else 0.5 * (column[1:] + column[:-1])
+        np.cumsum(middle * steps, out=upto[1:])
+    return out

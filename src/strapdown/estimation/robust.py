@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar, NamedTuple
@@ -12,8 +12,9 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown._kernels import robust as kernel
 from strapdown.errors import ConfigError
-from strapdown.estimation.covariance import Innovations, Step
+from strapdown.estimation.covariance import Innovations, Step, UpdateRule
 
 
 @dataclass(frozen=True)
@@ -544,6 +545,12 @@ class ScaleState(NamedTuple):
     held: float = -math.inf
     since: float = math.inf
 
+    @classmethod
+    def of(cls, numbers: Sequence[float]) -> ScaleState:
+        """Return the state of numbers in the order of the attributes."""
+        square, information, rejected, settled, *newest = numbers
+        return cls(square, information, int(rejected), int(settled), *newest)
+
     @property
     def factor(self) -> float:
         """Standard deviation of a good observation relative to the stated one."""
@@ -620,12 +627,15 @@ class AdaptiveScale:
                 )
 
     @cached_property
-    def _expected(self) -> tuple[float, float]:
-        """Mean of the clipped square of a normal number, and the part within the clip."""
+    def kernel_options(self) -> NDArray[np.float64]:
+        """The options as kernels take them, with an infinite linear range."""
+        # Mean of the clipped square of a normal number, and the part within the clip.
         k = self.clip
         inside = math.erf(k / math.sqrt(2.0))
         within = inside - k * math.sqrt(2.0 / math.pi) * math.exp(-0.5 * k * k)
-        return within + k * k * (1.0 - inside), within
+        mean = within + k * k * (1.0 - inside)
+        lowest, highest = 2.0 * math.log(self.lowest), 2.0 * math.log(self.highest)
+        return np.array([math.inf, 1.0, 1.0, self.memory, lowest, highest, k, mean, within])
 
     def begin(self) -> ScaleState:
         """Return the initial state: the stated variance."""
@@ -651,17 +661,9 @@ class AdaptiveScale:
         else:
             settled = state.settled + 1 if weight >= HALF and not state.rejected else 0
             state = state._replace(rejected=0, settled=settled)
-        own = math.exp(state.log_square) * r
-        total = s + own
-        if not (math.isfinite(nu) and total > 0.0 and own > 0.0):
-            return state
-        share = own / total
-        mean, within = self._expected
-        excess = min(nu * nu / total, self.clip * self.clip) - mean
-        information = state.information
-        information += share * share * (1.0 - information / self.memory)
-        square = state.log_square + share * excess / (within * information)
-        square = min(max(square, 2.0 * math.log(self.lowest)), 2.0 * math.log(self.highest))
+        square, information = kernel.learned_scale(
+            state.log_square, state.information, nu, s, r, self.kernel_options
+        )
         return state._replace(log_square=square, information=information)
 
     def jumped(
@@ -769,6 +771,23 @@ class AdaptiveRule:
                 strict=True,
             )
         )
+
+
+def linear_range(rule: UpdateRule | None) -> NDArray[np.float64] | None:
+    """Return a rule within its linear range, as kernels take it; empty for full weight.
+
+    None where it has no such range, or is another one.
+    """
+    if rule is None:
+        return np.empty(0)
+    if not isinstance(rule, RobustUpdate | AdaptiveRule) or not rule.influence.linear > 0.0:
+        return None
+    learns = isinstance(rule, AdaptiveRule)
+    out = (rule.scale if isinstance(rule, AdaptiveRule) else AdaptiveScale()).kernel_options.copy()
+    out[kernel.LINEAR], out[kernel.LEARNS] = rule.influence.linear, float(learns)
+    if isinstance(rule, RobustUpdate):
+        out[kernel.FACTOR] = rule.scale
+    return out
 
 
 UPDATE_RULES: dict[str, type[RobustUpdate] | type[PaperUpdate] | type[AdaptiveRule]] = {

@@ -40,7 +40,7 @@ def attitude_at(attitude: pd.DataFrame, time: ArrayLike) -> Array:
         one to the next.
     """
     stamps = attitude.index.to_numpy(dtype=np.float64)
-    q = attitude[QUATERNION].to_numpy(dtype=np.float64)
+    q = values_of(attitude, QUATERNION)
     t = np.asarray(time, dtype=np.float64)
     right = np.clip(np.searchsorted(stamps, t, side="left"), 0, len(stamps) - 1)
     out: Array = q[right].copy()
@@ -71,7 +71,7 @@ def error_angles(attitude: pd.DataFrame, truth: pd.DataFrame) -> pd.Series:
     """
     stamps = truth.index.to_numpy(dtype=np.float64)
     inside = (stamps >= attitude.index[0]) & (stamps <= attitude.index[-1])
-    known = truth[QUATERNION].to_numpy(dtype=np.float64)[inside]
+    known = values_of(truth, QUATERNION)[inside]
     angles = unit_rotation_angle(attitude_at(attitude, stamps[inside]), known)
     return pd.Series(angles, index=pd.Index(stamps[inside], name="time"), name="error")
 
@@ -91,11 +91,9 @@ def largest_differences(runs: tuple[AttitudeRun, ...]) -> pd.DataFrame:
     """
     names = [run.algorithm for run in runs]
     table = pd.DataFrame(0.0, index=names, columns=names)
+    q = [values_of(run.attitude, QUATERNION) for run in runs]
     for a, b in combinations(range(len(runs)), 2):
-        angle = unit_rotation_angle(
-            runs[a].attitude[QUATERNION].to_numpy(), runs[b].attitude[QUATERNION].to_numpy()
-        )
-        table.iloc[a, b] = table.iloc[b, a] = float(angle.max())
+        table.iloc[a, b] = table.iloc[b, a] = float(unit_rotation_angle(q[a], q[b]).max())
     return table
 
 

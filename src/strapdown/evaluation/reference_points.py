@@ -121,24 +121,18 @@ _AXIS_NAMES = {
 }
 _SD = rf"(?:\s+sd\s+(?P<sd>{NUMBER}))?"
 _FORMS = (
-    re.compile(rf"(?P<at>{INSTANT})\s+same\s+as\s+(?P<since>{INSTANT}){_SD}", re.I),
-    re.compile(
-        rf"(?P<at>{INSTANT})\s+(?P<turns>{NUMBER})\s+turns?\s+about\s+(?P<axis>[+-]?\w+)\s+"
-        rf"since\s+(?P<since>{INSTANT}){_SD}",
-        re.I,
-    ),
-    re.compile(
-        rf"(?P<at>{INSTANT})\s+roll\s+(?P<roll>{NUMBER})\s+pitch\s+(?P<pitch>{NUMBER})"
-        rf"(?:\s+heading\s+(?P<heading>{NUMBER}))?{_SD}",
-        re.I,
-    ),
+    rf"(?P<at>{INSTANT})\s+same\s+as\s+(?P<since>{INSTANT}){_SD}",
+    rf"(?P<at>{INSTANT})\s+(?P<turns>{NUMBER})\s+turns?\s+about\s+(?P<axis>[+-]?\w+)\s+"
+    rf"since\s+(?P<since>{INSTANT}){_SD}",
+    rf"(?P<at>{INSTANT})\s+roll\s+(?P<roll>{NUMBER})\s+pitch\s+(?P<pitch>{NUMBER})"
+    rf"(?:\s+heading\s+(?P<heading>{NUMBER}))?{_SD}",
 )
 
 
 def parse_reference(text: str, start: float, end: float) -> dict[str, object]:
     """Parse one reference point as a row of `references_table`; instants from start to end."""
     plain = re.sub(r"[:=]", " ", re.sub(r"same-as", "same as", text.partition("#")[0])).strip()
-    match = next((m for form in _FORMS if (m := form.fullmatch(plain))), None)
+    match = next((m for form in _FORMS if (m := re.fullmatch(form, plain, re.I))), None)
     if match is None:
         raise ConfigError("evaluation.not-understood-2", quantity="reference", text=text)
     said = match.groupdict()

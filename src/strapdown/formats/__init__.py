@@ -73,6 +73,7 @@ __all__ = [
     "read_raw",
     "reader_of",
     "readers_of",
+    "recording_of",
 ]
 
 
@@ -595,11 +596,18 @@ def read_log(path: str | Path, options: ReadOptions | None = None) -> Recording:
         The log cannot be used; the message names file, row, quantity and remedy.
     """
     asked = options or ReadOptions()
-    raw = read_raw(Path(path), asked.format)
+    return recording_of(read_raw(Path(path), asked.format), asked, keep=False)
+
+
+def recording_of(raw: RawLog, asked: ReadOptions, *, keep: bool = True) -> Recording:
+    """Convert raw columns of inertial sensors as `read_log`; a table of another kind is refused.
+
+    `keep`: whether the columns may be converted again; otherwise the recording takes their memory.
+    """
     known = {*asked.columns, *names_of_quantities(raw)}
     if not any(q.startswith("gyro") for q in known) and not known.issuperset(BODY_RATES):
         _refuse_other_table(raw)
-    return assemble(raw, asked)
+    return assemble(raw, asked, keep=keep)
 
 
 def _refuse_other_table(raw: RawLog) -> None:

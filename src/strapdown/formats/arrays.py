@@ -323,6 +323,26 @@ def numbers(raw: RawLog, source: str, quantity: str) -> NDArray[Any]:
     return found
 
 
+def as_rows(parts: Sequence[NDArray[Any]]) -> NDArray[np.float64] | None:
+    """Return columns of doubles that are successive rows of one array as these rows, (k, n).
+
+    None if they are not, or may not be written.
+    """
+    base = parts[0].base
+    if not isinstance(base, np.ndarray) or base.ndim != 2 or base.dtype != np.float64:
+        return None
+    if not (base.flags.c_contiguous and base.flags.writeable and base.size):
+        return None
+    if any(p.base is not base or p.shape != parts[0].shape or p.ndim != 1 for p in parts):
+        return None
+    begin = base.__array_interface__["data"][0]
+    at = [p.__array_interface__["data"][0] - begin for p in parts]
+    row = at[0] // base.strides[0]
+    rows = base[row : row + len(parts), : parts[0].size]
+    same = [k * base.strides[0] for k in range(row, row + len(parts))] == at
+    return rows if same and all(p.strides == (8,) for p in parts) else None
+
+
 def ticks_of(raw: RawLog, source: str, unit: str | None = None) -> tuple[NDArray[Any], bool]:
     """Return stamps as numbers; dates and times of day as nanoseconds, and True.
 

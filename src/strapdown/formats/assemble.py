@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError, Finding, check_choice
-from strapdown.formats.arrays import numbers, ticks_of
+from strapdown.formats.arrays import as_rows, numbers, ticks_of
 from strapdown.formats.clocks import (
     RELATIVE,
     Clock,
@@ -65,6 +65,7 @@ from strapdown.formats.triad_units import (
 )
 from strapdown.formats.vocabularies import EULERS, QUATERNIONS
 from strapdown.tables import ACCEL, SAMPLINGS, attitude_table, find_gaps, imu_of_columns
+from strapdown.tables.on_disk import let_go
 from strapdown.units import TIME_UNITS, factor_of, parse_unit
 
 __all__ = [
@@ -81,10 +82,10 @@ __all__ = [
 Array = NDArray[np.float64]
 
 
-def assemble(raw: RawLog, options: ReadOptions) -> Recording:
-    """Convert raw columns to a recording.
+def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Recording:
+    """Convert raw columns to a recording, which may take their memory.
 
-    `options`: the user's statements override those of the file, which override column names.
+    `keep`: whether the columns are used again, and left as they are. `options`: the user's statements override those of the file, which override column names.
     DataError: a value, a stamp or a unit cannot be used; the message names file, row and remedy.
     ConfigError: an option names a column that does not exist.
     """
@@ -104,6 +105,7 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
         found = find_columns(raw, dataclasses.replace(options, columns={}))
     findings = [*raw.findings, *unused]
     values = values_of_triads(raw, found, findings)
+    let_go(values["gyro"])
     ticks, dated = (
         ticks_of(raw, found["time"].source, found["time"].unit)
         if "time" in found
@@ -114,6 +116,7 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
     bursts = None if shared is None or even is not None else spread_bursts(shared)
     ticks = even.ticks if even is not None else bursts.ticks if bursts is not None else ticks
     said = told_by_numbers(raw, found, options, values, ticks, dated)
+    let_go(values["gyro"])
     axes = body_axes(raw, options, said, findings)
     units = units_of_triads(raw, found, options, values, said, findings, questions)
     values = {t: values[t] for t in units}
@@ -125,6 +128,7 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
         questions.ask(error.finding, **_repair(error.finding, len(values["gyro"])))
         questions.refuse()
         raise
+    let_go(values["gyro"])
     try:
         stamps = stamps_of_log(raw, found, ticks, dated, options, finite, said, findings)
     except DataError as error:
@@ -180,28 +184,36 @@ def assemble(raw: RawLog, options: ReadOptions) -> Recording:
             )
         )
     readings = [time_reading(raw, found, stamps, int(kept[0]))]
-    # Column by column in one block, which the table keeps: a long log takes a large part of the
-    # memory.
-    block = np.empty((3 * len(units), kept.size)).T
-    body = {triad: block[:, 3 * k : 3 * k + 3] for k, triad in enumerate(units)}
+    body, block = _block(values, units, kept.size, keep)
     summed = {t for t, (unit, _) in units.items() if unit in SUMS[t]}
-    for triad, (unit, why) in units.items():
-        first = values[triad][kept[0]].copy()
-        factor = factor_of(unit, {**UNITS[triad], **SUMS[triad]})
-        _turn(values.pop(triad), axes, factor, kept, body[triad])
+    begins = {triad: values[triad][kept[0]].copy() for triad in units}
+    factors = {t: factor_of(unit, {**UNITS[t], **SUMS[t]}) for t, (unit, _) in units.items()}
+    for begin in range(0, kept.size, AT_ONCE):
+        rows = slice(begin, begin + AT_ONCE)
+        used = {triad: values[triad][kept[rows]] for triad in units}
+        for triad in units:
+            _turn(used[triad], axes, factors[triad], body[triad][rows])
+        let_go(block)
+    del values
+    for triad in units:
         if triad in summed:
             body[triad] /= intervals(time, kept)
-        readings += _readings_of_triad(found, triad, axes, (unit, why), first)
+        readings += _readings_of_triad(found, triad, axes, units[triad], begins[triad])
     if summed:
         sampling = sampling_of_sums(summed, set(units), options.sampling, raw.name, findings)
     else:
         sampling = sampling_of_rates(raw, options, findings)
     report_gaps(raw.name, time, body["gyro"], findings)
+    let_go(block)
     _refuse_impossible(raw.name, body, lambda k: raw.row(int(kept[k])))
+    let_go(block)
     report_absurd(raw.name, body["gyro"], lambda k: raw.row(int(kept[k])), findings)
+    let_go(block)
     report_weightless(raw.name, body.get("accel"), findings)
+    let_go(block)
     columns = [f"{triad}_{a}" for triad in units for a in AXES]
     imu = imu_of_columns(time, block, columns, sampling=sampling, source=raw.name)
+    let_go(block)
     if not axes.stated:
         imu.attrs["axes"] = AXES_OF_SENSOR
     imu.attrs["sensor_axes"] = ",".join(
@@ -440,13 +452,31 @@ def require_accel(recording: Recording) -> None:
         )
 
 
-def _turn(values: Array, axes: Axes, factor: float, kept: NDArray[np.int64], body: Array) -> None:
-    """Write the used rows of a triad in body axes and SI units to `body`."""
+#: Samples that are converted at a time.
+AT_ONCE = 1 << 16
+
+
+def _block(
+    values: Mapping[str, Array], triads: Iterable[str], count: int, keep: bool
+) -> tuple[dict[str, Array], Array]:
+    """Return where the triads of a table go, by name, and all of it, (count, 3 k).
+
+    Column by column in one array, which the table keeps: a long log takes a large part of the
+    memory. The array of the log itself, if all its rows are used and these columns are together.
+    """
+    names = list(triads)
+    columns = [values[triad].T[k] for triad in names for k in range(3)]
+    columns.sort(key=lambda one: int(one.__array_interface__["data"][0]))
+    rows = as_rows(columns) if columns[0].size == count and not keep else None
+    block = (np.empty((3 * len(names), count)) if rows is None else rows).T
+    return {triad: block[:, 3 * k : 3 * k + 3] for k, triad in enumerate(names)}, block
+
+
+def _turn(values: Array, axes: Axes, factor: float, body: Array) -> None:
+    """Write samples of a triad in body axes and SI units to `body`."""
     for j, (axis, sign) in enumerate(zip(axes.axis, axes.sign, strict=True)):
-        column = values[:, axis]
-        used = column if kept.size == column.size else column[kept]
         with np.errstate(over="ignore"):  # what is no force or rate is refused below
-            np.multiply(used, sign * factor, out=body[:, j])
+            np.multiply(values[:, axis], sign * factor, out=body[:, j])
 
 
 def _readings_of_triad(

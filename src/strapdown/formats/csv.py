@@ -820,6 +820,10 @@ def _comma_is_decimal(lines: list[str], separator: str | None) -> bool:
     return any("," in n for n in numbers) and not any("." in n for n in numbers)
 
 
+#: Rows that are written at a time.
+WRITTEN = 1 << 16
+
+
 def write(path: Path, columns: dict[str, NDArray[Any]], comments: dict[str, str]) -> None:
     """Write columns as text, with the fewest digits that reproduce each number exactly.
 
@@ -833,8 +837,6 @@ def write(path: Path, columns: dict[str, NDArray[Any]], comments: dict[str, str]
     head.append(",".join(columns))
     with path.open("wb") as stream:
         stream.write(("\n".join(head) + "\n").encode())
-        pa_csv.write_csv(
-            pa.table({k: pa.array(v) for k, v in columns.items()}),
-            stream,
-            pa_csv.WriteOptions(include_header=False),
-        )
+        for begin in range(0, len(next(iter(columns.values()), ())), WRITTEN):
+            rows = {k: pa.array(v[begin : begin + WRITTEN]) for k, v in columns.items()}
+            pa_csv.write_csv(pa.table(rows), stream, pa_csv.WriteOptions(include_header=False))

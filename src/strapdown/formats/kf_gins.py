@@ -21,7 +21,6 @@ from strapdown.formats.clocks import GPS, WEEK, Clock, clock_of, unrolled, with_
 from strapdown.formats.gnss_fixes import Fixes
 from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.signs import HEAD, Signs, first_bytes
-from strapdown.formats.trajectory_writers import write_decimals
 from strapdown.formats.triad_units import intervals
 from strapdown.formats.writing import (
     SECOND,
@@ -353,6 +352,8 @@ def write_nav(path: Path, trajectory: pd.DataFrame, options: FileOptions | None 
         week, seconds = clock.week + more, seconds - WEEK * more
     values = values_of(trajectory, TRAJECTORY)
     columns = [week, seconds, *values[:, :8].T, np.mod(values[:, 8], 360.0)]
+    from strapdown.formats.trajectory_writers import write_decimals
+
     write_decimals(path, columns, DECIMALS)
 
 

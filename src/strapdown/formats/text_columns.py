@@ -15,6 +15,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.tables import on_disk
+
 __all__ = ["NULLS", "Columns", "columns_at_once", "parsed", "single_blanks"]
 
 Columns = list[NDArray[Any]]
@@ -24,6 +26,8 @@ NULLS = ("", "nan", "NaN", "NAN", "-nan", "NA", "N/A", "NULL", "null", "None")
 BLOCK = 1 << 20
 #: Bytes that are parsed at a time where all columns are numbers; they stay in the cache.
 STREAMED = 1 << 18
+#: Rows of a long table that are kept in memory while it is read.
+KEPT = 1 << 18
 # Null bytes and unusual line breaks, which are regular in no text.
 _ODD = (b"\0", b"\x0b", b"\x0c", b"\x1c", b"\x1d", b"\x1e")
 # Types of numbers; each holds those before it.
@@ -95,15 +99,15 @@ def _streamed(
     import pyarrow.csv as pa_csv
 
     # Arrow reads whole numbers with an x as hexadecimal.
-    whole = any(str(t) == "int64" for t in types.values())
-    if whole and any(b"x" in b or b"X" in b for b in _blocks(source, start)):
+    doubles = [str(t) != "int64" for t in types.values()]
+    if not all(doubles) and any(b"x" in b or b"X" in b for b in _blocks(source, start)):
         return None
     view = memoryview(source)[start:] if isinstance(source, bytes) else b""
     size = len(view) if isinstance(source, bytes) else source.stat().st_size - start
-    columns = [
-        np.empty(int(1.02 * size / width) + 16, np.int64 if str(t) == "int64" else np.float64)
-        for t in types.values()
-    ]
+    # Doubles are rows of one array, which the table of the log keeps.
+    room = int(1.02 * size / width) + 16
+    block = on_disk.room((sum(doubles), room))
+    whole = np.empty((len(doubles) - len(block), room), dtype=np.int64)
     rows = 0
     try:
         with (
@@ -116,16 +120,30 @@ def _streamed(
             options[0].block_size = STREAMED
             for batch in pa_csv.open_csv(held, *options):
                 end = rows + batch.num_rows
-                for k, parsed_now in enumerate(batch.columns):
+                if end > room:
+                    more = ((0, 0), (0, 2 * end - room))
+                    block, whole, room = np.pad(block, more), np.pad(whole, more), 2 * end
+                held_now = _columns(block, whole, doubles)
+                for column, parsed_now in zip(held_now, batch.columns, strict=True):
                     if parsed_now.null_count:
                         return None
-                    if end > columns[k].size:
-                        columns[k] = np.resize(columns[k], 2 * end)
-                    columns[k][rows:end] = parsed_now.to_numpy()
+                    column[rows:end] = parsed_now.to_numpy()
+                if end // KEPT > rows // KEPT:
+                    on_disk.let_go(block)
                 rows = end
     except pa.ArrowInvalid:
         return None
-    return [column[:rows] for column in columns]
+    on_disk.let_go(block)
+    return [column[:rows] for column in _columns(block, whole, doubles)]
+
+
+def _columns(
+    block: NDArray[Any], whole: NDArray[Any], doubles: Sequence[bool]
+) -> Iterator[NDArray[Any]]:
+    """Yield the columns, in the order of the text, from those of doubles and of whole numbers."""
+    of_doubles, of_whole = iter(block), iter(whole)
+    for double in doubles:
+        yield next(of_doubles if double else of_whole)
 
 
 def _blocks(source: bytes | Path, start: int) -> Iterator[bytes]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from datetime import UTC, datetime
+from html import escape
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import escape
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +19,6 @@ from strapdown.formats.join import join
 from strapdown.formats.known_formats import lacking, selected
 from strapdown.formats.recording import RawLog
 from strapdown.formats.signs import Signs, head
-from strapdown.formats.trajectory_writers import one_line
 from strapdown.formats.writing import (
     FileOptions,
     Tables,
@@ -108,13 +107,15 @@ def write_gpx(path: Path, tables: Tables, options: FileOptions) -> list[Finding]
 
     DataError: the clock is not related to UTC, or there are neither fixes nor a trajectory.
     """
+    from strapdown.formats.trajectory_writers import one_line
+
     options.require_wgs84("GPX")
     gnss, findings = fixes_of(tables, "GPX")
     stamps, said = dates(gnss, options, "GPX")
     over_sea, geoid, warned = heights_of(gnss, options)
     findings += [*said, *warned, *fixes_not_held("GPX", gnss, position_sd=False)]
     speed, course = (v.tolist() for v in over_ground(gnss))
-    lines = [_BEGIN.format(name=escape(one_line(options.name)))]
+    lines = [_BEGIN.format(name=escape(one_line(options.name), quote=False))]
     quality = values_of(gnss, ["quality"])[:, 0].astype(int).tolist()
     places = zip(*values_of(gnss, ["lat", "lon"]).T.tolist(), over_sea.tolist(), strict=True)
     for k, ((lat, lon, ele), date) in enumerate(zip(places, iso_dates(stamps), strict=True)):

@@ -6,10 +6,10 @@ import heapq
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from html import escape
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import escape
 
 import numpy as np
 import pandas as pd
@@ -387,8 +387,8 @@ def write_kml(path: Path, trajectory: pd.DataFrame, options: FileOptions | None 
     lines = [
         _HEAD,
         "<Document>",
-        f"<name>{escape(one_line(chosen.name))}</name>",
-        f"<description>{escape(_description(thinned, chosen))}</description>",
+        f"<name>{escape(one_line(chosen.name), quote=False)}</name>",
+        f"<description>{escape(_description(thinned, chosen), quote=False)}</description>",
         _STYLE,
     ]
     if len(points) > 1:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.formats.arrays import numbers
+from strapdown.formats.arrays import as_rows, numbers
 from strapdown.formats.columns import parse_axes, read_name
 from strapdown.formats.find_columns import AXES, Column
 from strapdown.formats.inference.conclusion import THRESHOLD, Inference
@@ -256,7 +256,8 @@ def _not_used(raw: RawLog, triad: str, code: str, **data: Any) -> Finding:
 def _triad(raw: RawLog, found: dict[str, Column], triad: str) -> Array:
     parts = [numbers(raw, found[f"{triad}_{a}"].source, f"{triad}_{a}") for a in AXES]
     # Column by column, as it came and as the Imu table has it.
-    return np.stack(parts, dtype=np.float64, casting="unsafe").T
+    rows = as_rows(parts)
+    return np.stack(parts, dtype=np.float64, casting="unsafe").T if rows is None else rows.T
 
 
 def left_out(raw: RawLog, triad: str, error: DataError) -> Finding:

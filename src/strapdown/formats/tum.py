@@ -23,7 +23,6 @@ from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import Clock, clock_of_name, with_clock
 from strapdown.formats.signs import HEAD, Signs
-from strapdown.formats.trajectory_writers import one_line
 from strapdown.formats.writing import TUM_FRAMES, FileOptions
 from strapdown.frames import ecef_from_geodetic, geodetic_from_ecef, q_ne
 from strapdown.rotation import Q_NED_ENU
@@ -111,6 +110,8 @@ def write_tum(
     -----
     The quaternion is scalar last, body to world. The format does not include velocities.
     """
+    from strapdown.formats.trajectory_writers import one_line
+
     chosen = options or FileOptions()
     check_trajectory(trajectory)
     if trajectory.empty:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from strapdown._kernels import filter_loop as kernel
 from strapdown._kernels.growth import factor_room, growth_arrays, growth_room, padded_width
 from strapdown._kernels.level import LEVEL, NED, WANDER
+from strapdown._kernels.robust import JOSEPH, PLAIN, UD, WD
 from strapdown._kernels.smoothing import GROWTH, KIND, begin_of_move
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import DivergenceError
@@ -42,10 +43,10 @@ Array = NDArray[np.float64]
 # Exactly these types: a subclass may behave differently.
 MECHANIZATIONS: dict[type[Mechanization], int] = {NorthEastDown: NED, WanderAzimuth: WANDER}
 FORMS: dict[type[CovarianceForm], int] = {
-    Joseph: kernel.JOSEPH,
-    Plain: kernel.PLAIN,
-    BiermanThornton: kernel.UD,
-    Chernodarov: kernel.WD,
+    Joseph: JOSEPH,
+    Plain: PLAIN,
+    BiermanThornton: UD,
+    Chernodarov: WD,
 }
 
 
@@ -149,9 +150,9 @@ class CompiledEngine(Engine):
         history: Array,
         made: int,
         notes: tuple[float, float, float],
-        arm: Array,
+        receiver: tuple[Array, Array, Array],
         fixes: Epochs,
-    ) -> tuple[int, tuple[Array, ...], bool]:
+    ) -> tuple[int, tuple[Array, ...], int]:
         """Process steps, and fixes with white errors, to the end of either.
 
         Parameters
@@ -163,8 +164,9 @@ class CompiledEngine(Engine):
         notes : tuple of float, (3,), s
             Time to stop at, as of `propagate`; from a mark to the next such time; age of a mark
             beyond which another is made before a fix.
-        arm : ndarray, (3,), m
-            Of the antenna.
+        receiver : tuple of ndarray
+            Arm of the antenna (3,), m; rule (`robust.linear_range`); scales that it learned, of
+            positions and velocities (2, 3, 9): they are changed.
         fixes : Epochs
             Of `measurements.gnss.Gnss`.
 
@@ -175,9 +177,11 @@ class CompiledEngine(Engine):
             Innovation, its predicted variance and weight (m, 3, 3); then, as of a
             `CovarianceSnapshot` before (NaN without one) and after each, times (m, 2), s,
             covariance (m, 2, 9, 9), sensors and their sd (m, 2, k).
-        noted : bool
-            Whether it stopped for a covariance to be noted.
+        why : int
+            Why it stopped: `filter_loop.ALL`, `NOTE` for a covariance to be noted, `ASK` before a
+            fix beyond the linear range of the rule.
         """
+        arm, rule, scales = receiver
         (note_at, interval, aged), size, k = notes, len(fixes.time), self._n - 9
         told, at, noted = (
             np.empty((size, kernel.TOLD, 3)),
@@ -210,6 +214,8 @@ class CompiledEngine(Engine):
                 POSITION_CODE,
                 fixes.time[done:],
                 fixes.values[done:],
+                rule,
+                scales,
                 told[done:],
                 aged,
                 at[done:],
@@ -222,7 +228,7 @@ class CompiledEngine(Engine):
             raise bad_observation(0, told[done, 0, 0], told[done, 1, 0], fixes.values[done, 4:])
         self._after(why, time, made)
         fixed = tuple(each[:done] for each in (told, at, noted, sensors, sd))
-        return int(made), fixed, why == kernel.NOTE
+        return int(made), fixed, why
 
     def close(self) -> None:
         """Propagate the covariance to the newest step."""

@@ -8,7 +8,6 @@ the motion since then, not from the initial heading, an alignment or a heading m
 from __future__ import annotations
 
 import math
-from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -48,7 +47,7 @@ from strapdown.navigation.pipeline import NavigationPipeline
 from strapdown.navigation.preprocessing import NEAR as NEAR_FIXES
 from strapdown.navigation.preprocessing import joined_steps
 from strapdown.navigation.record import (
-    CovarianceSnapshot,
+    GrowingRows,
     NavigationChunk,
     NavigationRecord,
     state_of_row,
@@ -88,6 +87,8 @@ DOUBTED_TILT = 2.0
 TURN, RENEWED, HEARD = 60.0, 180.0, 20.0
 #: Epochs over which the scatter of the innovations is judged, and the fewest needed.
 JUDGED, FEWEST = 60, 8
+#: Windows that are judged at a time.
+AT_ONCE = 1000
 #: Limit of a normalized innovation in the estimate of their scatter.
 CLIP = 3.0
 #: Stamps within this are equal, s.
@@ -138,8 +139,11 @@ def run_heading_checks(
                 heard = [min(heard, key=lambda one: one.sd)]
             if not doubt:
                 # What came since the last time: a check may last for hours.
-                said = [one.evidence(asked) for one in told if one.marks]
+                said = [one.evidence(asked) for one in told if one.marks.count]
                 doubt, asked = doubted(said, at), at
+            for ended in told:
+                if ended not in heard:
+                    ended.finish()
             fresh = _Check(made, record, run, at, doubt)
             done.append(fresh)
             heard.append(fresh)
@@ -147,7 +151,7 @@ def run_heading_checks(
         for one in heard:
             one.over(made.time[first:last], made.rows[first:last])
         heard = [one for one in heard if not one.lost]
-    return [one.evidence() for one in done if one.marks]
+    return [one.finish() for one in done if one.result is not None or one.marks.count]
 
 
 class _Check:
@@ -162,24 +166,26 @@ class _Check:
         doubt: bool,
     ) -> None:
         self.navigator, self.run, self.since = made.navigator, run, since
-        self.marks: list[CovarianceSnapshot] = []
-        self.times: list[Array] = []
-        self.history: list[Array] = []
-        self.seen: list[tuple[float, Array]] = []
+        #: Times with covariances, of each second the row of the history, and innovations.
+        self.marks, self.seen = GrowingRows.of(1 + 81), GrowingRows.of(3)
+        self.history = GrowingRows.of(1 + made.navigator.filter.mechanization.row)
+        self.newest = since
+        self.result: HeadingCheck | None = None
         self.lost = False
         state = self.navigator.begin_from(_begin(self.navigator.filter, record, run, since, doubt))
         later = {name: _after(since, fixes) for name, fixes in made.fixes.items()}
-        self.state: NavigatorState = replace(state, queues={**state.queues, **later})
+        self.state: NavigatorState | None = replace(state, queues={**state.queues, **later})
 
     @property
     def sd(self) -> float:
         """Filter standard deviation of the heading at the newest snapshot, deg."""
-        if not self.marks:
+        if not self.marks.count:
             return math.inf
-        return math.degrees(math.sqrt(max(float(self.marks[-1].covariance[8, 8]), 0.0)))
+        return math.degrees(math.sqrt(max(float(self.marks.rows[-1, -1]), 0.0)))
 
     def over(self, time: Array, rows: Array) -> None:
         """Process steps; a diverged check gives no more results."""
+        assert self.state is not None
         try:
             self.state, piece = self.navigator.advance(self.state, time, rows.copy())
         except (DivergenceError, DataError):
@@ -187,29 +193,52 @@ class _Check:
             return
         self._take(piece)
 
+    def finish(self) -> HeadingCheck:
+        """Return the whole result; what it was made of is not kept."""
+        if self.result is None:
+            self.result, self.state = self.evidence(), None
+            self.marks, self.seen, self.history = (
+                of.without_first(of.count) for of in (self.marks, self.seen, self.history)
+            )
+        return self.result
+
     def _take(self, piece: NavigationChunk) -> None:
-        self.marks += piece.marks
-        self.times.append(piece.time)
-        self.history.append(piece.history)
-        for one in piece.seen:
+        if piece.marks:
+            rows = np.array([[mark.time, *mark.covariance.ravel()] for mark in piece.marks])
+            self.marks = self.marks.and_then(rows)
+        if len(piece.time):
+            # The first of each second.
+            seconds = np.arange(math.floor(self.newest), math.floor(piece.time[-1]) + 2.0)
+            seconds = seconds[seconds - NEAR > self.newest]
+            at = np.unique(piece.time.searchsorted(seconds - NEAR))
+            at = at[at < len(piece.time)]
+            rows = np.column_stack([piece.time[at], piece.history[at]])
+            self.history, self.newest = self.history.and_then(rows), float(piece.time[-1])
+        if piece.seen:
             # The vertical innovation does not observe the heading.
-            nu, s = one.innovations.nu[:2], one.innovations.s[:2]
-            self.seen.append((one.time, nu / np.sqrt(s)))
+            nu, s = (
+                np.array([of[:2] for of in one])
+                for one in zip(
+                    *((seen.innovations.nu, seen.innovations.s) for seen in piece.seen),
+                    strict=True,
+                )
+            )
+            time = [one.time for one in piece.seen]
+            self.seen = self.seen.and_then(np.column_stack([time, nu / np.sqrt(s)]))
 
     def evidence(self, after: float = -math.inf) -> HeadingCheck:
         """Return the result at each second, or each after an instant."""
-        k = max(bisect_right(self.marks, after, key=lambda mark: mark.time) - 1, 0)
-        marks = self.marks[k:]
-        marked = np.array([mark.time for mark in marks])
+        k = max(int(self.marks.rows[:, 0].searchsorted(after, side="right")) - 1, 0)
+        marked = self.marks.rows[k:, 0]
         begin = max(math.ceil(self.since + NEAR), math.floor(max(after, self.since)) + 1.0)
         seconds = np.arange(begin, math.floor(marked[-1]) + 1.0)
         at = np.searchsorted(marked, seconds + NEAR, side="right") - 1
         seconds, at = seconds[at >= 0], at[at >= 0]
-        covariance = np.array([marks[k].covariance for k in at]).reshape(-1, 9, 9)
-        # The parts with these seconds, and the end of the one before.
-        ends = [part[-1] if len(part) else -math.inf for part in self.times]
-        first = max(bisect_right(ends, after - 1.0) - 1, 0)
-        times, rows = np.concatenate(self.times[first:]), np.concatenate(self.history[first:])
+        covariance = self.marks.rows[k + at, 1:].reshape(-1, 9, 9)
+        # The rows of these seconds.
+        first = max(int(self.history.rows[:, 0].searchsorted(after - 1.0)) - 1, 0)
+        times = self.history.rows[first:, 0].copy()
+        rows = self.history.rows[first:, 1:].copy()
         near = np.clip(np.searchsorted(times, seconds - NEAR), 0, len(times) - 1)
         near, back = np.unique(near, return_inverse=True)
         own = self.navigator.filter.mechanization.trajectory(times[near], rows[near], None)
@@ -224,20 +253,22 @@ class _Check:
 
     def _scale(self, seconds: Array) -> Array:
         """Factor by which the newest innovations exceed their expected scatter and correlation."""
-        if not self.seen or not len(seconds):
+        if not self.seen.count or not len(seconds):
             return np.ones(len(seconds))
         # No more than what the windows of these seconds hold.
-        k = max(bisect_right(self.seen, seconds[0], key=lambda one: one[0]) - 2 * JUDGED, 0)
-        time = np.array([t for t, _ in self.seen[k:]])
-        u = np.array([x for _, x in self.seen[k:]])
+        seen = self.seen.rows
+        k = max(int(seen[:, 0].searchsorted(seconds[0], side="right")) - 2 * JUDGED, 0)
+        time, u = seen[k:, 0], seen[k:, 1:]
         # All available epochs, up to a full window.
         size = np.minimum(u.shape[0], JUDGED)
         upto = np.searchsorted(time, seconds + NEAR, side="right")
         out = np.ones(len(seconds))
         full = upto >= size
-        every = sliding_window_view(u, size, axis=0).reshape(len(u) - size + 1, -1)
         if size >= FEWEST:
-            out[full] = _scatter(every[upto[full] - size])
+            windows = sliding_window_view(u, size, axis=0)
+            at = np.flatnonzero(full)
+            for some in np.array_split(at, range(AT_ONCE, len(at), AT_ONCE)):
+                out[some] = _scatter(windows[upto[some] - size].reshape(len(some), 2 * size))
         for k in np.flatnonzero(~full & (upto >= FEWEST)).tolist():
             out[k] = _scatter(u[: upto[k]].reshape(1, -1))[0]
         return out

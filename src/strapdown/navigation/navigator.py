@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown._kernels.filter_loop import ASK, NOTE, turn_blocks
 from strapdown._kernels.motion_increments import split_increment
 from strapdown._kernels.sums import STEADY, steady_motion
 from strapdown.errors import ConfigError
@@ -23,7 +24,14 @@ from strapdown.estimation.error_filter import (
     turned_force,
     unlearnt_force,
 )
-from strapdown.estimation.robust import AdaptiveRule, AdaptiveScale, Rejection, Scales
+from strapdown.estimation.robust import (
+    AdaptiveRule,
+    AdaptiveScale,
+    Rejection,
+    Scales,
+    ScaleState,
+    linear_range,
+)
 from strapdown.nav_state import NavState
 from strapdown.navigation.compiled_engine import CompiledEngine, ReferenceEngine, compiled
 from strapdown.navigation.engine import (
@@ -36,7 +44,13 @@ from strapdown.navigation.engine import (
     begun,
 )
 from strapdown.navigation.filter_options import ClosedLoop, Correction
-from strapdown.navigation.measurements.gnss import HORIZONTAL_CODE, PLACE, Gnss
+from strapdown.navigation.measurements.gnss import (
+    HORIZONTAL_CODE,
+    PLACE,
+    POSITION_CODE,
+    VELOCITY_CODE,
+    Gnss,
+)
 from strapdown.navigation.measurements.measurement import (
     Epochs,
     ImuDerivedMeasurement,
@@ -137,15 +151,19 @@ class Navigator:
 
     @cached_property
     def lone_receiver(self) -> Gnss | None:
-        """The only aid, if it is a receiver with white errors, used with its stated accuracy.
+        """The only aid, if it is a receiver with white errors, and its rule has a linear range.
 
         None for a filter about a reference: the compiled loop feeds back.
         """
         if len(self.aids) != 1 or type(self.aids[0]) is not Gnss or self.about is not None:
             return None
         aid = self.aids[0]
-        plain = aid.rule is None and self.filter.rule is None and not aid.states()
-        return aid if plain else None
+        return aid if not aid.states() and self.linear_range is not None else None
+
+    @cached_property
+    def linear_range(self) -> Array | None:
+        """Rule of the first aid, as `robust.linear_range`."""
+        return linear_range(self.aids[0].rule or self.filter.rule)
 
     @cached_property
     def by_name(self) -> dict[str, Measurement]:
@@ -454,11 +472,17 @@ class EpochLoop:
         return False
 
     def _fixes(self, made: int, time: Array, rows: Array) -> int:
-        """Process the fixes of a single receiver, up to one without VD; return the steps."""
+        """Process the fixes of a single receiver; return the steps.
+
+        Up to one without VD, or beyond the linear range of its rule.
+        """
         aid, engine = self.navigator.lone_receiver, self.engine
         if aid is None or not isinstance(engine, CompiledEngine) or self.tilted:
             return made
-        arm = np.asarray(aid.lever_arm, dtype=np.float64)
+        rule = self.navigator.linear_range
+        assert rule is not None
+        learned = self._learned(aid)
+        receiver = np.asarray(aid.lever_arm, dtype=np.float64), rule, learned
         interval = self.navigator.mark_interval * (1.0 - 1e-9)
         queue = self.queues[aid.name]
         while made < len(time):
@@ -471,16 +495,37 @@ class EpochLoop:
                 break
             usual = Epochs(queue.time[:whole], queue.values[:whole])
             notes = (self.marked + interval, interval, AGED)
-            made, fixed, stopped = engine.propagate_with_fixes(
-                time, rows, self.history, made, notes, arm, usual
+            made, fixed, why = engine.propagate_with_fixes(
+                time, rows, self.history, made, notes, receiver, usual
             )
             done = len(fixed[0])
             self._fixed(aid, queue, fixed)
+            if isinstance(aid.rule or self.navigator.filter.rule, AdaptiveRule):
+                for code in set(queue.values[:done, 0].tolist()):
+                    scales = learned[0 if code == POSITION_CODE else 1]
+                    self.scales[aid.names(code)[0]] = tuple(map(ScaleState.of, scales.tolist()))
             queue = Epochs(queue.time[done:], queue.values[done:])
-            if stopped:
+            if why == NOTE:
                 self.mark()
+            if why == ASK:
+                break
         self.queues[aid.name] = queue
         return made
+
+    def _learned(self, aid: Gnss) -> Array:
+        """Scales that the rule of a receiver learned, of positions and velocities, (2, 3, 9)."""
+        rule = aid.rule or self.navigator.filter.rule
+        if not isinstance(rule, AdaptiveRule):
+            return np.zeros((2, 3, len(ScaleState._fields)))
+        names = (aid.names(code)[0] for code in (POSITION_CODE, VELOCITY_CODE))
+        return np.array([self._scales(rule, name, 3) for name in names])
+
+    def _scales(self, rule: AdaptiveRule, name: str, size: int) -> Scales:
+        """Scales learned of the components of an observation, or their begin.
+
+        A velocity has two components or three.
+        """
+        return (*self.scales.get(name, ()), *rule.begin(size))[:size]
 
     def _fixed(self, aid: Gnss, fixes: Epochs, fixed: tuple[Array, ...]) -> None:
         """Record the results of position fixes."""
@@ -612,7 +657,7 @@ class EpochLoop:
         asked: list[Rules] = []
         for rule, one in zip(rules, observations, strict=True):
             if isinstance(rule, AdaptiveRule):
-                scales = self.scales.get(one.name) or rule.begin(one.z.size)
+                scales = self._scales(rule, one.name, one.z.size)
                 away = _is_away(scales, one, view)
                 asked.append(away or rule.rules(scales))
             else:
@@ -622,11 +667,13 @@ class EpochLoop:
         self._unlearn(met)
         for rule, one, nu in zip(rules, observations, innovations, strict=True):
             if isinstance(rule, AdaptiveRule):
-                before = self.scales.get(one.name) or rule.begin(one.z.size)
+                before = self._scales(rule, one.name, one.z.size)
                 after = rule.after(before, nu, one.R)
                 if set(one.labels) <= set(PLACE):
                     after = rule.jumped((before, after), nu, self.engine.time, _reach)
-                self.scales[one.name] = after
+                # A component that is not of this one keeps what it learned.
+                others = self.scales.get(one.name, ())[len(after) :]
+                self.scales[one.name] = (*after, *others)
         return innovations
 
     def _unlearn(self, met: FilterState) -> None:
@@ -649,10 +696,11 @@ class EpochLoop:
         """Record covariance and estimates, with a time stamp so much earlier."""
         filter_, state = self.navigator.filter, self.engine.filter
         P, left = filter_.physical_covariance(state), self.engine.left()
-        turn = np.kron(np.eye(3), filter_.mechanization.level_from_ned(state.row))
+        C_nl, ned = filter_.mechanization.level_from_ned(state.row).T, np.empty((9, 9))
+        turn_blocks(np.ascontiguousarray(C_nl), P[:9, :9] + left[:, None] * left, ned)
         mark = CovarianceSnapshot(
             state.time - before,
-            turn.T @ (P[:9, :9] + np.outer(left, left)) @ turn,
+            ned,
             self.engine.estimates(filter_),
             self._sd(state.time, P),
         )
@@ -661,6 +709,8 @@ class EpochLoop:
     def _sd(self, time: float, P: Array) -> Array:
         """Standard deviations of the sensor errors; refuses an invalid covariance."""
         variances, model = np.diagonal(P), self.navigator.filter.model
+        if variances.min() >= 0.0:
+            return np.sqrt(variances[9:])
         kinds = np.concatenate(
             [np.repeat(variances[:9].reshape(3, 3).max(axis=1), 3), np.square(model.stacked.sd)]
         )

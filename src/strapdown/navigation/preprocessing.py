@@ -25,6 +25,7 @@ from strapdown.sensors.saturation import ROUNDING
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import index_of, is_number, values_of
+from strapdown.tables.on_disk import let_go
 
 __all__ = [
     "NEAR",
@@ -59,14 +60,16 @@ def steps_of(
     intake: ImuPreprocessor, imu: pd.DataFrame, begin: float, end: float
 ) -> Iterator[tuple[Array, Array]]:
     """Yield the motion increments within a span, a minute at a time: ends, s, and rows, (n, 10)."""
-    time, values = index_of(imu), values_of(imu, [*GYRO, *ACCEL])
+    time = index_of(imu)
     state = intake.begin(imu.attrs["sampling"], None)
     cuts = np.searchsorted(
         time, [*np.arange(time[0] + AT_ONCE, time[-1], AT_ONCE), np.inf]
     ).tolist()
     at = 0
     for cut in cuts:
-        state, steps = intake.advance(state, time[at:cut], values[at:cut], cut == len(time))
+        values = values_of(imu.iloc[at:cut], [*GYRO, *ACCEL])
+        let_go(imu)
+        state, steps = intake.advance(state, time[at:cut], values, cut == len(time))
         at = cut
         used = (steps.time > begin + NEAR) & (steps.time <= end + NEAR)
         if used.any():

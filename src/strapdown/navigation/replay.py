@@ -21,6 +21,7 @@ from strapdown.navigation.smoother import Smoothing
 from strapdown.progress import Progress, silent
 from strapdown.tables import ACCEL, GYRO, check_imu
 from strapdown.tables.checks import check_columns, source_of, values_of
+from strapdown.tables.on_disk import let_go
 
 __all__ = [
     "PipelineRun",
@@ -114,7 +115,10 @@ class Recording:
                 name: tuple(span for of, span in self._outages if of == name) for name in names
             },
         )
-        smoothed = None if self._smoothing is None else record(smoothing=self._smoothing)
+        smoothed = None
+        if self._smoothing is not None:
+            smoothed = record(smoothing=self._smoothing)
+            self._smoothing.release()
         return PipelineRun(record(), tuple(self._aligned), smoothed, self._smoothing)
 
 
@@ -240,6 +244,7 @@ def pieces_of(
     for at in range(0, len(time), size):
         last = at + size >= len(time)
         values = values_of(imu.iloc[at : at + size], CHANNELS)
+        let_go(imu)
         state, piece = chain.advance(state, time[at : at + size], values, last)
         yield piece
 

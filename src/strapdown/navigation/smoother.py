@@ -82,7 +82,7 @@ class RauchTungStriebel:
     summary: ClassVar[str] = "fixed interval: every state by all observations, later ones too"
     source: ClassVar[str] = "Rauch, Tung and Striebel (1965); Bryson and Frazier (1963)"
 
-    memory: float = field(default=256.0, metadata={"unit": "mb"})
+    memory: float = field(default=64.0, metadata={"unit": "mb"})
     passes: int = 5
 
     def __post_init__(self) -> None:
@@ -114,7 +114,7 @@ class Smoothing:
 
     def __init__(self, navigator: Navigator, memory: int) -> None:
         self._tape = SmoothingTape(navigator.filter.model.physical_size, memory)
-        self._navigator = navigator
+        self._navigator, self._memory = navigator, memory
         self._left: list[Array] = []
         self._anchors: list[tuple[float, Array, float, Array]] = []
         self._mark: CovarianceSnapshot | None = None
@@ -188,6 +188,10 @@ class Smoothing:
             smoothed.errors[:] += left
         self._result = smoothed, errors[:, 9:].copy(), marks
         return smoothed
+
+    def release(self) -> None:
+        """Drop the history, of which the smoothed states have been made."""
+        self._tape = SmoothingTape(self._tape.size, self._memory)
 
     def reference(self) -> Reference | None:
         """Return the smoothed states, about which another pass is linearized.

@@ -19,6 +19,7 @@ from strapdown._kernels.increments import LARGEST
 from strapdown.attitude_algorithms.algorithm import refuse_sample
 from strapdown.errors import ConfigError, DataError, DivergenceError
 from strapdown.tables import ACCEL, GYRO, MAG, check_sampling_kind
+from strapdown.tables.checks import values_of
 
 Array = NDArray[np.float64]
 
@@ -150,9 +151,7 @@ class OrientationEstimator(ABC):
         if len(time):
             before = time[0] if record[kernel.SAMPLES] == 0 else record[kernel.TIME]
             blocks = [
-                np.ascontiguousarray(imu[columns].to_numpy(dtype=np.float64))
-                if set(columns) <= set(imu.columns)
-                else np.empty((0, 3))
+                values_of(imu, columns) if set(columns) <= set(imu.columns) else np.empty((0, 3))
                 for columns in (GYRO, ACCEL, MAG)
             ]
             type(self).advance_kernel(after, np.diff(time, prepend=before), *blocks, history)

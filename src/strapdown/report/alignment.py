@@ -44,13 +44,15 @@ def _run(configuration: dict[str, Any]) -> AlignmentRun:
     return run_alignment(spec, file_of(configuration))
 
 
-def _write(result: AlignmentRun, folder: Path, name: str, report: bool, progress: Progress) -> None:
+def _write(
+    result: AlignmentRun, folder: Path, name: str, forms: tuple[str, ...], progress: Progress
+) -> None:
     write_json(folder / "align.json", alignment_json(result))
     comments = as_comments(CONVENTIONS)
     write_table(_attitude(result), folder / "attitude.csv", comments)
     if result.fine is not None:
         write_table(_history(result.fine.history), folder / "fine.csv", comments)
-    if report:
+    if forms:
         write_report(alignment_document(result, name), folder, progress)
 
 

@@ -14,8 +14,6 @@ from strapdown.bundle import Seal, write_bundle, write_json
 from strapdown.evaluation.reference_points import Score
 from strapdown.formats import csv
 from strapdown.report import attitude_tables as words
-from strapdown.report.attitude_charts import charts
-from strapdown.report.attitude_document import attitude_document
 from strapdown.report.attitude_tables import (
     budget_json,
     clock_json,
@@ -23,7 +21,6 @@ from strapdown.report.attitude_tables import (
     share_basis,
     source_of,
 )
-from strapdown.report.chart_svg import ChartFigure
 from strapdown.report.document import finding_json
 from strapdown.report.report_bundle import as_comments, finite, write_report
 from strapdown.tables import EULER, QUATERNION
@@ -72,6 +69,10 @@ def write_attitude(
         if len(bench.sweep):
             _write_sweep(bench, folder / "sweep.csv")
         if report:
+            from strapdown.report.attitude_charts import charts
+            from strapdown.report.attitude_document import attitude_document
+            from strapdown.report.chart_svg import ChartFigure
+
             drawn = charts(bench)
             write_report(attitude_document(bench, drawn), folder)
             for chart in drawn if png else ():

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import asdict
+from itertools import takewhile
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pandas as pd
 
 from strapdown.attitude_algorithms import ALGORITHMS
@@ -285,12 +287,14 @@ def chosen_run(bench: AttitudeComparison) -> AttitudeRun:
     )
 
 
-def sweep_grid(bench: AttitudeComparison, meaning: str) -> pd.DataFrame:
+def sweep_grid(bench: AttitudeComparison, meaning: str, column: str = "error_deg") -> pd.DataFrame:
     """Return the errors of one method of lowering the rate.
 
     Parameters
     ----------
     meaning : {'drop', 'sum'}
+    column : str
+        Of the sweep.
 
     Returns
     -------
@@ -302,10 +306,12 @@ def sweep_grid(bench: AttitudeComparison, meaning: str) -> pd.DataFrame:
     if not len(bench.sweep):
         return pd.DataFrame(index=names)
     part = bench.sweep[bench.sweep["meaning"] == meaning]
-    grid = part.pivot_table(
-        index="algorithm", columns="rate_hz", values="error_deg", aggfunc="max", dropna=False
-    )
-    return grid.reindex(index=names)[sorted(grid.columns, reverse=True)]
+    rates = sorted(set(part["rate_hz"].tolist()), reverse=True)
+    grid = np.full((len(names), len(rates)), np.nan)
+    for name, rate, error in part[["algorithm", "rate_hz", column]].itertuples(index=False):
+        cell = names.index(name), rates.index(rate)
+        grid[cell] = np.fmax(grid[cell], error)
+    return pd.DataFrame(grid, index=names, columns=rates)
 
 
 def like_with_like(bench: AttitudeComparison) -> tuple[list[PeerRun], list[PeerRun]]:
@@ -414,11 +420,10 @@ def _parts(bench: AttitudeComparison) -> tuple[list[str], dict[str, dict[str, st
 
 def _lowest_rate(bench: AttitudeComparison, algorithm: str) -> str:
     """Lowest rate of averaged samples down to which the algorithm error is within tolerance."""
-    cells = bench.sweep[
-        (bench.sweep["algorithm"] == algorithm) & (bench.sweep["meaning"] == "sum")
-    ].sort_values("factor")
-    within = (cells["own_deg"] <= bench.answer.tolerance_deg).cummin()
-    return f"{float(cells.loc[within, 'rate_hz'].min()):.3g} Hz" if within.any() else _NONE
+    grid = sweep_grid(bench, "sum", "own_deg")
+    errors = zip(grid.columns.tolist(), grid.loc[algorithm].to_list(), strict=True)
+    within = list(takewhile(lambda cell: cell[1] <= bench.answer.tolerance_deg, errors))
+    return f"{float(within[-1][0]):.3g} Hz" if within else _NONE
 
 
 def _part_note(bench: AttitudeComparison) -> str:

@@ -114,10 +114,12 @@ def _run(configuration: dict[str, Any]) -> OutageRun:
     return run_coast(spec, navigation, file_of(configuration))
 
 
-def _write(result: OutageRun, folder: Path, name: str, report: bool, progress: Progress) -> None:
+def _write(
+    result: OutageRun, folder: Path, name: str, forms: tuple[str, ...], progress: Progress
+) -> None:
     write_json(folder / "coast.json", coast_json(result))
     write_coast_tables(result, folder)
-    if report:
+    if forms:
         write_report(coast_document(result, name), folder, progress)
 
 

@@ -32,7 +32,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from strapdown.errors import StrapdownError
+from strapdown.errors import ConfigError, StrapdownError
 from strapdown.formats import read_raw
 from strapdown.formats.signs import first_bytes
 from strapdown.parsers.process import parse
@@ -305,8 +305,11 @@ def _joined(parts: Iterable[str]) -> str:
 
 
 def _compare_pdf(one: Path, two: Path, drawn_alike: bool) -> Comparison:
-    import pypdf
-    from pypdf.errors import PyPdfError
+    try:
+        import pypdf
+        from pypdf.errors import PyPdfError
+    except ImportError:
+        raise ConfigError("report.pdf-not-compared", file=one.name) from None
 
     # A later part of a file replaces objects, in one viewer or in all.
     data = one.read_bytes()

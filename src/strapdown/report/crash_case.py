@@ -32,7 +32,6 @@ from strapdown.formats.crash_writers import write_mme
 from strapdown.progress import Progress
 from strapdown.report import crash_words
 from strapdown.report.chart import Array
-from strapdown.report.crash_document import crash_document
 from strapdown.report.crash_tables import DRIVE_QUANTITIES
 from strapdown.report.document import finding_json
 from strapdown.report.document_pdf import write_pdf
@@ -68,17 +67,22 @@ def _run(configuration: dict[str, Any]) -> CaseResult:
     return run_cases(cases)[number - 1]
 
 
-def _write(result: CaseResult, folder: Path, name: str, report: bool, progress: Progress) -> None:
+def _write(
+    result: CaseResult, folder: Path, name: str, forms: tuple[str, ...], progress: Progress
+) -> None:
     _write_numbers(result, folder)
-    if report:
+    if forms:
+        from strapdown.report.crash_document import crash_document
+
         document = crash_document(result, name)
         stills = write_report(document, folder, progress)
+    if "pdf" in forms:
         progress("setting the PDF", 0.95)
         write_pdf(document, folder / "report.pdf", stills=stills)
 
 
 #: Page, PDF, JSON, tables and figures of a crash case.
-CRASH = ReportBundle("crash", _configuration, _run, _write)
+CRASH = ReportBundle("crash", _configuration, _run, _write, pdf=True)
 
 
 def _write_numbers(result: CaseResult, folder: Path) -> None:

@@ -18,8 +18,8 @@ from strapdown.report.document import (
     Paragraph,
     Picture,
     Section,
-    document_page,
 )
+from strapdown.report.document_html import document_page
 from strapdown.report.values import decimals, plain
 
 _MS_TO_KMH = 3.6
@@ -143,7 +143,9 @@ def _blocks(run: Shown, folder: Path) -> Iterator[Block]:
     truth = shown_truth(bundle, None if run.records is None else folder / run.records)
     if truth:
         yield Items((("Against the truth", truth),))
-    yield Links(tuple((f"{quote(run.slug)}/{page}", words) for page, words in run.pages))
+    # A PDF is there if the extra for it is installed.
+    pages = ((page, words) for page, words in run.pages if (bundle / page).is_file())
+    yield Links(tuple((f"{quote(run.slug)}/{page}", words) for page, words in pages))
     for figure in run.figures:
         drawn = (bundle / "figures" / f"{figure}.svg").read_text(encoding="utf-8")
         name = figure.replace("-", " ")

@@ -70,9 +70,11 @@ def _run(configuration: dict[str, Any]) -> Diagnosis:
     return run_doctor(DoctorSpec.checked(configuration["doctor"]))
 
 
-def _write(result: Diagnosis, folder: Path, name: str, report: bool, progress: Progress) -> None:
+def _write(
+    result: Diagnosis, folder: Path, name: str, forms: tuple[str, ...], progress: Progress
+) -> None:
     write_json(folder / "doctor.json", diagnosis_json(result))
-    if report:
+    if forms:
         write_report(doctor_document(result, name), folder, progress, figures=False)
 
 

@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import json
 import re
 import unicodedata
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass, replace
-from functools import cache, cached_property
-from importlib.resources import files
+from functools import cached_property
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
-from xml.etree import ElementTree
 
 from strapdown.errors import DataError, Finding, Words
 from strapdown.report.chart import Chart
-from strapdown.report.chart_svg import still
 
 if TYPE_CHECKING:
     from strapdown.report.scene import Scene
@@ -450,6 +444,8 @@ def draw_stills(document: Document) -> tuple[str, ...]:
     tuple of str
         One SVG per chart, in document order.
     """
+    from strapdown.report.chart_svg import still
+
     return tuple(still(c) for c in drawings(document.plain) if isinstance(c, Chart))
 
 
@@ -568,6 +564,8 @@ class _Writer:
         }
 
     def _picture(self, picture: Picture) -> dict[str, Any]:
+        from xml.etree import ElementTree
+
         try:
             ElementTree.fromstring(picture.svg)
         except ElementTree.ParseError as error:
@@ -642,88 +640,3 @@ def write_drawings(document: Document, stills: Sequence[str], folder: Path) -> N
 def write_text(path: Path, text: str) -> None:
     """Write a text file, the same bytes on every system."""
     path.write_text(text, encoding="utf-8", newline="\n")
-
-
-# A document as one page that needs no network, and works without scripts.
-
-
-_TITLE_ELEMENT = re.compile("<title>.*?</title>", re.DOTALL)
-
-
-def document_page(document: Document, *, stills: Sequence[str] | None = None) -> str:
-    """Lay out a document as an HTML page.
-
-    Parameters
-    ----------
-    document : Document
-        Its texts are made plain, then escaped.
-    stills : sequence of str, optional
-        Drawn charts from `draw_stills`, if already made.
-
-    Returns
-    -------
-    str
-        HTML, the same for the same document, whole without scripts but for scenes that move.
-        Charts are SVG of `chart_svg`, with every text escaped; pictures are embedded as images,
-        which cannot run scripts or fetch resources. A content policy in the page allows its own
-        script and no other.
-    """
-    from markupsafe import Markup
-
-    drawn = draw_stills(document) if stills is None else stills
-    data = document_data(document, drawn, _image, alive=True)
-    sections = (block for section in data["sections"] for block in section["blocks"])
-    alive = False
-    for block in (*data["front"], *sections):
-        if "svg" in block:
-            # The browser would show a title wherever the pointer rests on the chart.
-            drawn_svg = _TITLE_ELEMENT.sub("", block["svg"], count=1)
-            block["svg"] = Markup(drawn_svg.replace(' xmlns="http://www.w3.org/2000/svg"', "", 1))
-        elif "scene" in block:
-            block["json"] = _embedded(block["scene"].data())
-        else:
-            continue
-        alive = True
-    script = files("strapdown.report").joinpath("templates", "document.js").read_text("utf-8")
-    page: str = _template().render(
-        document=data,
-        script=Markup(script) if alive else "",
-        policy=_digest(script) if alive else "'none'",
-    )
-    return page
-
-
-@cache
-def _template() -> Any:
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    environment = Environment(
-        loader=PackageLoader("strapdown.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    return environment.get_template("document.html")
-
-
-def _image(svg: str) -> str:
-    # A lone surrogate has no UTF-8.
-    whole = base64.b64encode(svg.encode("utf-8", "replace")).decode("ascii")
-    return f"data:image/svg+xml;base64,{whole}"
-
-
-def _digest(script: str) -> str:
-    """Digest of a script for the page's content policy; an unlisted script does not run."""
-    whole = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
-    return f"'sha256-{whole}'"
-
-
-def _embedded(figure: Mapping[str, Any]) -> Any:
-    """Encode JSON for a script element; no text in it can end the element or begin another."""
-    from markupsafe import Markup
-
-    text = json.dumps(figure, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
-    for char in "<>&":
-        text = text.replace(char, f"\\u{ord(char):04x}")
-    return Markup(text)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import re
 import tempfile
 from collections.abc import Sequence
@@ -14,6 +15,7 @@ from typing import Any
 from strapdown.errors import ConfigError, DataError
 from strapdown.report.document import Document, document_data, draw_stills
 
+_log = logging.getLogger("strapdown")
 _TEMPLATE = "document.typ"
 
 
@@ -110,6 +112,16 @@ def typst_library() -> Any:
     except ImportError as error:
         raise ConfigError("report.pdf-laid-out-typst-not") from error
     return typst
+
+
+def can_lay_out() -> bool:
+    """Whether typst is installed; where it is not, a warning says what is left out."""
+    try:
+        typst_library()
+    except ConfigError as error:
+        _log.warning("%s", error.finding.replace(severity="warning"))
+        return False
+    return True
 
 
 # Characters that the fonts inside typst can show.

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -19,16 +18,13 @@ from strapdown.formats import csv
 from strapdown.formats.clocks import clock_of
 from strapdown.formats.writers import write_trajectory
 from strapdown.formats.writing import FileOptions
+from strapdown.lazy_names import Choices
 from strapdown.navigation.consistency import Inconsistency
 from strapdown.navigation.heading_integrity import REASONS, STATUSES
 from strapdown.navigation.integrity import QUANTITY_REASONS, Repeated
 from strapdown.navigation.record import NavigationRecord
 from strapdown.progress import Progress
-from strapdown.report import navigation_charts as charts
-from strapdown.report.chart import Chart
-from strapdown.report.chart_svg import ChartFigure
 from strapdown.report.document import finding_json
-from strapdown.report.navigation_charts import innovation_chart
 from strapdown.report.navigation_document import (
     CONVENTIONS,
     cautions,
@@ -43,12 +39,7 @@ from strapdown.report.navigation_evaluation import (
     rms,
     trust,
 )
-from strapdown.report.navigation_plan import plan_chart
-from strapdown.report.paired_corrections import (
-    paired_chart,
-    paired_json,
-    write_paired,
-)
+from strapdown.report.paired_corrections import paired_json, write_paired
 from strapdown.report.report_bundle import (
     ReportBundle,
     as_comments,
@@ -70,6 +61,9 @@ from strapdown.systems.navigation_run import NavigationRun, run_navigation, with
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
 from strapdown.tables.checks import index_of
 
+if TYPE_CHECKING:
+    from strapdown.report.chart_svg import ChartFigure
+
 
 def _configuration(result: NavigationRun) -> dict[str, Any]:
     return with_file({"navigation": result.spec.plain()}, result)
@@ -81,13 +75,13 @@ def _run(configuration: dict[str, Any]) -> NavigationRun:
 
 
 def _write_all(
-    result: NavigationRun, folder: Path, name: str, report: bool, progress: Progress
+    result: NavigationRun, folder: Path, name: str, forms: tuple[str, ...], progress: Progress
 ) -> None:
     evaluation = NavigationEvaluation(result)
     write_json(folder / "navigation.json", navigation_json(evaluation))
     write_navigation_files(evaluation, folder)
-    if report:
-        write_integrity(evaluation, folder)
+    write_integrity(evaluation, folder)
+    if forms:
         document = navigation_document(evaluation, name)
         write_report(document, folder, progress, figures=result.spec.output.figures)
 
@@ -99,14 +93,16 @@ NAVIGATION = ReportBundle("navigate", _configuration, _run, _write_all)
 # Charts of a navigation run as figures for a notebook.
 
 
-KINDS: dict[str, Callable[[NavigationEvaluation], Chart | None]] = {
-    "plan": plan_chart,
-    "bound": charts.bound_chart,
-    "height": charts.height_chart,
-    "velocity": charts.velocity_chart,
-    "attitude": charts.attitude_chart,
-    "paired": paired_chart,
-}
+KINDS = Choices(
+    {
+        "plan": "strapdown.report.navigation_plan:plan_chart",
+        "bound": "strapdown.report.navigation_charts:bound_chart",
+        "height": "strapdown.report.navigation_charts:height_chart",
+        "velocity": "strapdown.report.navigation_charts:velocity_chart",
+        "attitude": "strapdown.report.navigation_charts:attitude_chart",
+        "paired": "strapdown.report.paired_corrections:paired_chart",
+    }
+)
 
 
 def plot(result: NavigationRun, kind: str) -> ChartFigure:
@@ -122,6 +118,9 @@ def plot(result: NavigationRun, kind: str) -> ChartFigure:
     ConfigError
         The chart does not exist.
     """
+    from strapdown.report.chart_svg import ChartFigure
+    from strapdown.report.navigation_charts import innovation_chart
+
     evaluation = NavigationEvaluation(result)
     observed = {one.name: one for one in evaluation.agreements}
     if kind in observed:

@@ -12,7 +12,6 @@ from strapdown.constants import TWO_SIDED_95
 from strapdown.dsp.chi_square import plane_bound
 from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.navigation.truth_comparison import SmootherConsistency
-from strapdown.report import navigation_charts as charts
 from strapdown.report.chart import BLUE, GREY, Array, Chart, Panel, curve
 from strapdown.report.chart import BUCKETS_OVER_TIME as BUCKETS
 from strapdown.report.document import (
@@ -32,20 +31,12 @@ from strapdown.report.document import (
     run_again,
     section,
 )
-from strapdown.report.navigation_charts import (
-    error_charts,
-    innovation_chart,
-    nees_chart,
-    nis_chart,
-    over_time,
-)
 from strapdown.report.navigation_evaluation import (
     NavigationEvaluation,
     distance_over_ground,
     state_groups,
     trust,
 )
-from strapdown.report.navigation_plan import plan_chart
 from strapdown.report.paired_corrections import paired_chart, paired_table
 from strapdown.report.values import (
     GAP,
@@ -294,6 +285,8 @@ UNITS = dict.fromkeys(NED, "m") | dict.fromkeys(VELOCITY, "m/s") | dict.fromkeys
 
 def smoothing_chart(evaluation: NavigationEvaluation) -> Chart | None:
     """Bounds of position, height and heading over time, filter and smoother."""
+    from strapdown.report.navigation_charts import over_time
+
     forward, record = evaluation.run.forward, evaluation.record
     if forward is None:
         return None
@@ -673,6 +666,9 @@ def navigation_document(evaluation: NavigationEvaluation, name: str) -> Document
     name : str
         Folder name, for the verification command; no command if empty.
     """
+    from strapdown.report import navigation_charts as charts
+    from strapdown.report.navigation_plan import plan_chart
+
     run = evaluation.run
     verdict = trust(evaluation)
     plan = plan_chart(evaluation)
@@ -694,8 +690,8 @@ def navigation_document(evaluation: NavigationEvaluation, name: str) -> Document
             "truth",
             f"Against {evaluation.truth_name}",
             error_table(evaluation),
-            *error_charts(evaluation),
-            nees_chart(evaluation),
+            *charts.error_charts(evaluation),
+            charts.nees_chart(evaluation),
         ),
         section(
             "paired",
@@ -789,6 +785,8 @@ def _kind(module: ChoiceSpec, slot: str) -> str:
 
 
 def _observations(evaluation: NavigationEvaluation) -> tuple[Block | None, ...]:
+    from strapdown.report.navigation_charts import innovation_chart, nis_chart
+
     if not evaluation.agreements:
         return (Paragraph("No measurement was processed: inertial sensors alone."),)
     rows: list[tuple[str, str]] = []

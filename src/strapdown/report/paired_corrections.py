@@ -15,7 +15,6 @@ from strapdown.formats import csv
 from strapdown.report.chart import BLUE, VERMILLION, Chart, Panel, curve
 from strapdown.report.chart import BUCKETS_OVER_TIME as BUCKETS
 from strapdown.report.document import TableBlock
-from strapdown.report.navigation_charts import over_time
 from strapdown.report.navigation_evaluation import NavigationEvaluation, reference_words, rms
 from strapdown.report.values import duration_words, length_words, plain
 
@@ -71,6 +70,8 @@ def paired_table(evaluation: NavigationEvaluation) -> TableBlock | None:
 
 def paired_chart(evaluation: NavigationEvaluation) -> Chart | None:
     """Errors of ground velocity and of position over time, both solutions in one chart."""
+    from strapdown.report.navigation_charts import over_time
+
     pair = evaluation.pair
     if not pair:
         return None

@@ -16,11 +16,11 @@ from strapdown.formats import csv
 from strapdown.progress import Progress, silent
 from strapdown.report.document import (
     Document,
-    document_page,
     draw_stills,
     write_drawings,
     write_text,
 )
+from strapdown.report.document_html import document_page
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables.checks import index_of
 
@@ -48,13 +48,16 @@ class ReportBundle(Generic[R]):
         From a sealed configuration to the run.
     write_files : callable
         Writes the files of a run into a folder. Takes the run, the folder, the name shown in the
-        report, whether to write pages and figures, and progress.
+        report, the forms of the report (``html``, ``pdf``; none for the data alone), and progress.
+    pdf : bool
+        Whether the report is a PDF, too, where typst is installed.
     """
 
     command: str
     configuration: Callable[[R], dict[str, Any]]
     run: Callable[[dict[str, Any]], R]
-    write_files: Callable[[R, Path, str, bool, Progress], None]
+    write_files: Callable[[R, Path, str, tuple[str, ...], Progress], None]
+    pdf: bool = False
 
     @one_thread()
     def write(
@@ -64,6 +67,7 @@ class ReportBundle(Generic[R]):
         *,
         name: str | None = None,
         report: bool = True,
+        pdf: bool | None = None,
         force: bool = False,
         progress: Progress = silent,
     ) -> Seal:
@@ -78,6 +82,9 @@ class ReportBundle(Generic[R]):
             Folder name shown in the report; by default that of `out`.
         report : bool
             Whether to write pages and figures; recorded in the seal if not.
+        pdf : bool, optional
+            Whether to write the PDF of a report that has one; by default where typst is installed,
+            and recorded in the seal if not.
         force : bool
             Overwrite an existing bundle.
         progress : callable, optional
@@ -85,8 +92,17 @@ class ReportBundle(Generic[R]):
         Raises
         ------
         ConfigError
-            `out` exists and may not be replaced.
+            `out` exists and may not be replaced, or `pdf` is wanted and typst is not installed.
         """
+        forms: tuple[str, ...] = ("html",) if report else ()
+        left_out = {} if report else {"report": False}
+        if report and self.pdf:
+            from strapdown.report.document_pdf import can_lay_out
+
+            if can_lay_out() if pdf is None else pdf:
+                forms = ("html", "pdf")
+            else:
+                left_out = {"pdf": False}
         name = Path(out).absolute().name if name is None else name
         seals: list[Seal] = []
         with write_bundle(
@@ -95,21 +111,26 @@ class ReportBundle(Generic[R]):
             configuration={
                 "name": name,
                 **self.configuration(result),
-                **({} if report else {"report": False}),
+                **left_out,
             },
             inputs=result.inputs,
             force=force,
             seals=seals,
         ) as folder:
             progress("writing the tables", 0.8)
-            self.write_files(result, folder, name, report, progress)
+            self.write_files(result, folder, name, forms, progress)
             progress("sealing", 0.97)
         return seals[0]
 
-    def rerun(self, configuration: dict[str, Any], out: Path, *, report: bool = True) -> Seal:
-        """Re-run a sealed bundle from its configuration, with or without its report."""
+    def rerun(self, configuration: dict[str, Any], out: Path) -> Seal:
+        """Re-run a sealed bundle from its configuration, with its report as it was."""
+        report, pdf = (bool(configuration.get(key, True)) for key in ("report", "pdf"))
+        if report and pdf and self.pdf:
+            from strapdown.report.document_pdf import typst_library
+
+            typst_library()  # before the run, as its PDF is to be compared
         name = str(configuration["name"])
-        return self.write(self.run(configuration), out, name=name, report=report)
+        return self.write(self.run(configuration), out, name=name, report=report, pdf=pdf)
 
 
 def file_of(configuration: dict[str, Any], key: str = "file_path") -> Path | None:

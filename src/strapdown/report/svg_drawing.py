@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from xml.sax.saxutils import escape, quoteattr
+from html import escape
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -103,7 +103,7 @@ class Drawing:
             f'<svg xmlns="http://www.w3.org/2000/svg" {size} {view} role="img" '
             'font-family="Helvetica, Arial, DejaVu Sans, sans-serif">'
         )
-        title = f"<title>{escape(_kept(self.alt))}</title>" if self.alt else ""
+        title = f"<title>{_escaped(self.alt)}</title>" if self.alt else ""
         paper = (
             f'<rect width="{number(self.width)}" height="{number(self.height)}" fill="#ffffff"/>'
         )
@@ -271,7 +271,7 @@ class Drawing:
             )
         place = f'x="{number(x)}" y="{number(y + 0.35 * size)}"'
         look = f'font-size="{number(size)}" fill="{colour}"'
-        self._parts.append(f"<text {place} {look}{more}>{escape(_kept(text))}</text>")
+        self._parts.append(f"<text {place} {look}{more}>{_escaped(text)}</text>")
         self.boxes.append((text, box))
         return box
 
@@ -365,13 +365,17 @@ def _steps(points: Array) -> str:
 
 
 def _attributes(values: Mapping[str, str]) -> str:
-    return "".join(
-        f" {name.rstrip('_').replace('_', '-')}={quoteattr(_kept(text))}"
-        for name, text in values.items()
-    )
+    quoted = ((name, _escaped(text).replace('"', "&quot;")) for name, text in values.items())
+    return "".join(f' {name.rstrip("_").replace("_", "-")}="{text}"' for name, text in quoted)
+
+
+def _escaped(text: str) -> str:
+    """Escape a text for XML, and remove characters that it does not allow."""
+    if not (text.isascii() and text.isprintable()):
+        text = _kept(text)
+    return escape(text, quote=False)
 
 
 def _kept(text: str) -> str:
-    """Remove characters that XML does not allow."""
     kept = "".join(c if c >= " " and not "\ud800" <= c <= "\udfff" else " " for c in text)
     return "".join(c for c in kept if c not in "\ufffe\uffff\x7f")

@@ -48,7 +48,6 @@ from strapdown.report.document import (
     paragraph,
     section,
 )
-from strapdown.report.navigation_charts import bar, span_names
 from strapdown.report.navigation_evaluation import NavigationEvaluation
 from strapdown.report.values import GAP, duration_words, half, length_words, plain, share_words
 from strapdown.report.values import stamp as instant
@@ -504,6 +503,8 @@ def heading_error(result: NavigationRun, time: Array) -> Array | None:
 
 def heading_chart(result: NavigationRun) -> Chart:
     """Heading integrity of each second, with the bounds that determine it."""
+    from strapdown.report.navigation_charts import bar, span_names
+
     heading = result.trust.heading
     table = heading.table
     time = index_of(table)

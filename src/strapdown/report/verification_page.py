@@ -15,9 +15,9 @@ from strapdown.report.document import (
     Items,
     Paragraph,
     TableBlock,
-    document_page,
     section,
 )
+from strapdown.report.document_html import document_page
 from strapdown.report.verify import Verification, conditions_of
 
 _AGAIN = "The run was repeated from its sealed configuration and inputs"

@@ -91,12 +91,12 @@ BUNDLES: dict[str, ReportBundle[Any]] = {
 
 def _rerun(command: str, configuration: dict[str, Any], out: Path, sealed: set[str]) -> None:
     """Repeat a run from its configuration; `sealed`: names of the sealed files."""
-    # Page and figures change no number; PNG figures are not part of the configuration.
-    report = bool(configuration.get("report", True))
     if command in BUNDLES:
-        BUNDLES[command].rerun(configuration, out, report=report)
+        BUNDLES[command].rerun(configuration, out)
     elif command == "attitude":
         keys = {key: value for key, value in configuration.items() if key != "report"}
+        report = bool(configuration.get("report", True))
+        # PNG figures are not part of the configuration.
         png = any(name.endswith(".png") for name in sealed)
         bench = run_comparison(AttitudeSpec.model_validate(keys))
         write_attitude(bench, out, png=png, report=report)
@@ -304,7 +304,7 @@ def _compare(
 
 
 #: Packages that draw pages, figures and PDF.
-DRAWING = ("strapdown", "strapdown source", "jinja2", "typst")
+DRAWING = ("strapdown", "strapdown source", "typst")
 #: Codes of files that were not compared as a whole.
 PARTIAL = ("verify.drawing", "verify.not-compared")
 

@@ -15,7 +15,14 @@ from strapdown.errors import DataError, Finding
 from strapdown.sensors.rest import MAX_ACCEL_SD, MAX_GYRO_SD, QUIET_FACTOR, QUIET_QUANTILE, ROUNDING
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO
-from strapdown.tables.checks import check_columns, check_time, index_of, source_of, values_of
+from strapdown.tables.checks import (
+    check_columns,
+    check_time,
+    index_of,
+    source_of,
+    view_of,
+)
+from strapdown.tables.on_disk import let_go
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -199,7 +206,9 @@ def health_log(
             least_samples=LEAST_SAMPLES,
         )
     check_time(time, source)
-    values = np.ascontiguousarray(values_of(imu, names).T)
+    values = view_of(imu, names).T
+    if values.strides[-1] != values.itemsize:
+        values = np.ascontiguousarray(values)
     wrong = ~np.isfinite(values)
     return HealthLog(source, time, tuple(names), values, wrong, sensors, gravity, false_alarm)
 
@@ -224,6 +233,7 @@ def _blocks(log: HealthLog) -> Blocks:
     mean, sd, noise, white = (np.zeros(shape) for _ in range(4))
     valid = np.ones(shape, dtype=bool)
     for k in range(len(log.names)):
+        let_go(log.values)
         cut = log.values[k, : count * size].reshape(count, size)
         bad = log.wrong[k, : count * size].reshape(count, size).any(axis=1)
         valid[:, k] = ~bad

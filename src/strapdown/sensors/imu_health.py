@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from statistics import NormalDist
 
 import numpy as np
@@ -30,6 +31,7 @@ from strapdown.sensors.health_log import (
 from strapdown.sensors.saturation import find_limits
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO
+from strapdown.tables.on_disk import let_go
 
 Array = NDArray[np.float64]
 
@@ -42,6 +44,7 @@ def find_saturated(log: HealthLog) -> list[ChannelFault]:
     faults = []
     join = max(round(SAME_FAULT * log.rate), 1)
     for k in range(len(log.names)):
+        let_go(log.values)
         known = ~log.wrong[k]
         # Two samples do not form a flat top, nor does a channel that is constant.
         if known.sum() < 3:
@@ -373,6 +376,7 @@ def find_missing(log: HealthLog) -> list[ChannelFault]:
     faults = []
     join = max(round(SAME_BURST * log.rate), 1)
     for k in range(len(log.names)):
+        let_go(log.values)
         gone = ~np.isfinite(log.values[k])
         if not gone.any():
             continue
@@ -397,16 +401,25 @@ def find_stuck(log: HealthLog) -> list[ChannelFault]:
       20th longest; with fewer than 2000, of those exceeded by a tenth and a hundredth);
     - 10 samples.
     """
-    same = np.zeros((len(log.names), log.time.size), dtype=bool)
-    same[:, 1:] = log.values[:, 1:] == log.values[:, :-1]
-    sums = np.concatenate([np.zeros((len(same), 1)), np.cumsum(same, axis=1)], axis=1)
+
+    @cache
+    def repeats() -> NDArray[np.int32]:
+        """How many samples of each channel repeat the one before, up to each."""
+        sums = np.zeros((len(log.names), log.time.size + 1), dtype=np.int32)
+        for values, upto in zip(log.values, sums, strict=True):
+            np.cumsum(values[1:] == values[:-1], out=upto[2:])
+        return sums
+
     faults = []
     for k in range(len(log.names)):
-        faults += _stuck_runs(log, k, sums)
+        let_go(log.values)
+        faults += _stuck_runs(log, k, repeats)
     return faults
 
 
-def _stuck_runs(log: HealthLog, k: int, sums: Array) -> list[ChannelFault]:
+def _stuck_runs(
+    log: HealthLog, k: int, repeats: Callable[[], NDArray[np.int32]]
+) -> list[ChannelFault]:
     n = log.time.size
     starts, lengths = equal_runs(log.values[k])
     whole = int(lengths.max()) >= n - int((~np.isfinite(log.values[k])).sum())
@@ -414,6 +427,7 @@ def _stuck_runs(log: HealthLog, k: int, sums: Array) -> list[ChannelFault]:
     most = np.flatnonzero(lengths >= max(LEAST_RUN, math.ceil(tail)))
     if not most.size:
         return []
+    sums = repeats()
     a, b = starts[most], starts[most] + lengths[most]  # one past the last
     limit = np.maximum(
         longest_by_chance(_around(sums[k], a, b, n), n, log.false_alarm), max(tail, LEAST_RUN)
@@ -439,7 +453,7 @@ def _tail(lengths: NDArray[np.int64], false_alarm: float) -> float:
     return limit if math.isfinite(limit) else 0.0
 
 
-def _around(sums: Array, a: NDArray[np.int64], b: NDArray[np.int64], n: int) -> Array:
+def _around(sums: NDArray[np.int32], a: NDArray[np.int64], b: NDArray[np.int64], n: int) -> Array:
     """Upper bound of the fraction of repetitions about each run."""
     left, right = np.maximum(a - AROUND, 0), np.minimum(b + AROUND, n)
     repeats = sums[a] - sums[left] + sums[right] - sums[b]
@@ -452,7 +466,7 @@ def _around(sums: Array, a: NDArray[np.int64], b: NDArray[np.int64], n: int) -> 
     return np.asarray(np.where(pairs > LEAST_RUN, bound, 0.0))
 
 
-def _others_live(sums: Array, k: int, a: int, b: int) -> bool:
+def _others_live(sums: NDArray[np.int32], k: int, a: int, b: int) -> bool:
     """Whether any other channel changes meanwhile; otherwise the whole log is constant."""
     moved = (sums[:, b] - sums[:, a + 1]) < b - a - 1
     moved[k] = False

@@ -21,7 +21,7 @@ from strapdown.sensors.health_log import LEAST_SAMPLES, ChannelFault
 from strapdown.sensors.imu_health import check_imu_channels
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, usable
-from strapdown.tables.checks import index_of, source_of, values_of
+from strapdown.tables.checks import channels_of, index_of, source_of, values_of
 
 __all__ = ["channel_findings", "look_through", "saturated_findings"]
 
@@ -288,11 +288,13 @@ def _refuse_degrees(imu: pd.DataFrame, sensors: ImuUncertainty) -> None:
     density = np.asarray(sensors.gyro.axis("noise_density"))
     if not density.all():
         return
-    second = np.diff(values_of(imu, GYRO), n=2, axis=0)
-    times = np.sqrt(np.median(np.square(second), axis=0) / MEDIAN / 6.0 * step) / density
+    second = (np.diff(rates, n=2) for rates in channels_of(imu, GYRO))
+    scatter = np.array([np.median(np.square(one)) for one in second])
+    times = np.sqrt(scatter / MEDIAN / 6.0 * step) / density
+    if not ((times > DEGREES[0]) & (times < DEGREES[1])).all():
+        return
     # A vehicle does not turn around within a second.
-    wild = float(np.quantile(np.abs(values_of(imu, GYRO)), 0.99)) > WILD
-    if wild and ((times > DEGREES[0]) & (times < DEGREES[1])).all():
+    if float(np.quantile([np.abs(one) for one in channels_of(imu, GYRO)], 0.99)) > WILD:
         raise DataError(
             "navigation.gyros-seem-in-deg-per-s",
             file=source_of(imu),
@@ -308,10 +310,11 @@ MEDIAN, WILD = 0.4549364, 6.0
 
 def _refuse_unit(imu: pd.DataFrame) -> None:
     """Refuse accelerometers whose usual reading is gravity in another unit."""
-    time, force = index_of(imu), values_of(imu, ACCEL)
+    time = index_of(imu)
     starts = np.unique(np.searchsorted(time, np.arange(time[0], time[-1], FIRST)))
-    count = np.diff(np.append(starts, len(time)))[:, None]
-    size = np.median(np.linalg.norm(np.add.reduceat(force, starts) / count, axis=1))
+    count = np.diff(np.append(starts, len(time)))
+    means = [np.add.reduceat(force, starts) / count for force in channels_of(imu, ACCEL)]
+    size = np.median(np.linalg.norm(means, axis=0))
     for unit, factor in (("g", 1.0 / STANDARD_GRAVITY), ("m/s2", STANDARD_GRAVITY)):
         wanted = STANDARD_GRAVITY * factor
         if abs(size / wanted - 1.0) < NEAR:

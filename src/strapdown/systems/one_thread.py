@@ -16,9 +16,7 @@ def one_thread() -> Iterator[None]:
     depends on their number: a relative change of 1e-14, which changes bytes of a sealed file. The
     number of threads is restored afterwards.
     """
-    # Only loaded libraries can be limited.
-    import numpy  # noqa: F401
-    import scipy.linalg  # noqa: F401
+    import numpy  # noqa: F401, as only loaded libraries can be limited
     from threadpoolctl import threadpool_limits
 
     with threadpool_limits(limits=1, user_api="blas"):

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from numbers import Real
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.errors import DataError
+from strapdown.tables.on_disk import let_go
 
 Array = NDArray[np.float64]
-
-#: Rows up to which a table counts as short.
-FEW = 8
 
 
 def as_array(values: ArrayLike, columns: int | None, name: str, source: str | None = None) -> Array:
@@ -79,10 +78,10 @@ def checked_values(table: pd.DataFrame, columns: Sequence[str], sd: Sequence[str
     source = source_of(table)
     check_columns(table, [*columns, *sd], source)
     check_time(index_of(table), source)
-    values = values_of(table, columns)
+    values = view_of(table, columns)
     check_rows(values, columns, source)
     if sd:
-        spread = values_of(table, sd)
+        spread = view_of(table, sd)
         refuse_cell(~(spread > 0.0), "tables.no-standard-deviation", source, sd, values=spread)
     return values
 
@@ -185,22 +184,39 @@ def is_number(value: object) -> bool:
 
 
 def values_of(table: pd.DataFrame, columns: Sequence[str]) -> Array:
-    """Return columns as one contiguous array of floats."""
+    """Return columns as one contiguous array of floats, which is the caller's own."""
+    return np.require(view_of(table, columns), requirements=["C", "W", "O"])
+
+
+def view_of(table: pd.DataFrame, columns: Sequence[str]) -> Array:
+    """Return columns as floats to be read, of a table made here without a copy.
+
+    Such a table is one block, of which pandas gives a view; a copy of its columns, selected by
+    name, would take several times what a kernel does with them.
+    """
     own, wanted = list(table.columns), list(columns)
-    if own != wanted and len(table) <= FEW and set(wanted) <= set(own):
-        # For a single row of a stream, selecting columns by name would dominate the cost.
-        whole = table.to_numpy()
-        if whole.dtype == np.float64:
-            return np.ascontiguousarray(whole[:, [own.index(name) for name in wanted]])
-    if own != wanted and len(set(own)) == len(own):
-        # Column by column: selecting them at once is slower on most tables.
-        out = np.empty((len(table), len(wanted)))
-        for k, name in enumerate(wanted):
-            out[:, k] = table[name].to_numpy(dtype=np.float64)
-        return out
-    there = table if own == wanted else table[wanted]
-    # Numba compiles a kernel again for a read-only array, as a view of a table is.
-    return np.require(there.to_numpy(dtype=np.float64), requirements=["C", "W"])
+    if not wanted or len(set(own)) < len(own) or not set(wanted) <= set(own):
+        return np.asarray(table[wanted].to_numpy(dtype=np.float64))
+    manager: Any = getattr(table, "_mgr", None)
+    whole = table.to_numpy() if getattr(manager, "is_single_block", False) else None
+    places = [own.index(name) for name in wanted]
+    if whole is None or whole.dtype != np.float64:
+        parts = [table[name].to_numpy(dtype=np.float64) for name in wanted]
+    elif places == [*range(places[0], places[0] + len(places))]:
+        return whole[:, places[0] : places[0] + len(places)]
+    else:
+        parts = [whole[:, place] for place in places]
+    out = np.empty((len(table), len(wanted)))
+    for k, part in enumerate(parts):
+        out[:, k] = part
+    return out
+
+
+def channels_of(table: pd.DataFrame, columns: Sequence[str]) -> Iterator[Array]:
+    """Yield columns to be read, each an array of floats; each is let go of after its use."""
+    for channel in view_of(table, columns).T:
+        yield channel
+        let_go(channel)
 
 
 def index_of(table: pd.DataFrame) -> Array:
@@ -210,7 +226,7 @@ def index_of(table: pd.DataFrame) -> Array:
 
 def check_steps(table: pd.DataFrame, source: str | None) -> None:
     """Check that steps are positive and do not overlap."""
-    time, dt = index_of(table), values_of(table, ["dt"])[:, 0]
+    time, dt = index_of(table), view_of(table, ["dt"])[:, 0]
     # Resolution of stamps of epoch size.
     slack = 8.0 * float(np.spacing(np.abs(time).max(initial=1.0)))
     overlap = (dt <= 0.0) | np.r_[False, time[1:] - dt[1:] < time[:-1] - slack]

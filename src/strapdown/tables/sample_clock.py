@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown.dsp.samples import moving_mean
 from strapdown.tables.checks import Gap, find_gaps
 
 __all__ = ["SampleClock", "sample_clock"]
@@ -341,8 +342,6 @@ def _fitted(
 
     Each stretch has its own origin; a slow drift is followed.
     """
-    from scipy.ndimage import uniform_filter1d
-
     bounds = np.array([0, *(g.sample for g in gaps), stamps.size])
     pieces = [slice(a, b) for a, b in pairwise(bounds)]
     taken = np.ones(stamps.size, dtype=bool)
@@ -368,7 +367,7 @@ def _fitted(
             fitted[piece] = held[0] + share * (held[-1] - held[0]) if in_bursts else held
             continue
         width = min(WINDOW if not in_bursts else WINDOW // 2, rest.size)
-        slow = uniform_filter1d(rest, width, mode="nearest")
+        slow = moving_mean(rest, width)
         off = rest - slow
         late = float(np.median(off) - np.quantile(off, 0.05)) if in_bursts else 0.0
         known = np.interp(number[piece], number[piece][here], slow)

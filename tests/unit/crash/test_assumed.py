@@ -24,7 +24,7 @@ from strapdown.crash.consistency import compare_units
 from strapdown.crash.delta_v import delta_v
 from strapdown.crash.drive_entry import DriveEntry, start_from_drive
 from strapdown.crash.entry import Entry
-from strapdown.crash.measuring_point import MISSING_AXIS, NO_TURNING, moving_mean
+from strapdown.crash.measuring_point import MISSING_AXIS, NO_TURNING, slow_part
 from strapdown.crash.path import sample_paths
 from strapdown.crash.preparation import Preparation, prepare_unit
 from strapdown.crash.reconstruction import CrashOptions, reconstruct_crash
@@ -135,7 +135,7 @@ class TestEffects:
         def rates(time):
             out = np.zeros((2, time.size, 3))
             # As the moving mean of a recorder has the force.
-            felt = moving_mean(pushed(time)[:, None], time)[:, 0]
+            felt = slow_part(pushed(time)[:, None], time)[:, 0]
             profiles = turning_shapes(time, (0, 0.15), "mean", felt)
             out[:, :, axis] = np.radians(4.0) * part * profiles
             return out

@@ -1,12 +1,13 @@
-"""Running integrals against scipy's, and against means of a signal whose integral is known."""
+"""Running integrals and moving means against scipy's, and against a signal of known integral."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 from scipy.integrate import cumulative_trapezoid
+from scipy.ndimage import uniform_filter1d
 
-from strapdown.dsp.samples import running_integral
+from strapdown.dsp.samples import moving_mean, running_integral
 
 
 @pytest.mark.parametrize("shape", [(), (3,), (3, 2)])
@@ -35,3 +36,13 @@ def test_means_give_the_integral_that_they_were_made_of():
 
 def test_one_stamp_has_nothing_behind_it():
     assert running_integral(np.array([7.0]), np.array([[1.0, 2.0]])).tolist() == [[0.0, 0.0]]
+
+
+@pytest.mark.parametrize(("count", "width"), [(400, 201), (57, 10), (9, 9), (5, 2), (3, 4), (7, 1)])
+@pytest.mark.parametrize("shape", [(), (3,)])
+def test_moving_means_are_those_of_scipy(count, width, shape):
+    values = np.random.default_rng(5).normal(size=(count, *shape))
+    # The same sums in the same order: a window, then what enters less what leaves.
+    np.testing.assert_array_equal(
+        moving_mean(values, width), uniform_filter1d(values, width, axis=0, mode="nearest")
+    )

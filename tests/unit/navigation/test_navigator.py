@@ -14,7 +14,14 @@ from strapdown.errors import ConfigError, DivergenceError
 from strapdown.estimation.covariance import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.error_model import ERROR_MODELS
-from strapdown.estimation.robust import PaperUpdate, Tukey
+from strapdown.estimation.robust import (
+    AdaptiveRule,
+    Huber,
+    Igg3,
+    PaperUpdate,
+    RobustUpdate,
+    Tukey,
+)
 from strapdown.estimation.sensor_blocks import accel_bias, gauss_markov, gyro_bias, gyro_scale
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown, WanderAzimuth
@@ -106,6 +113,8 @@ def run(log, navigator, state, cuts=(), late=False):
 LONE = (Gnss(name="rtk", use_velocity=False, lever_arm=ARM),)
 # Places and velocities at instants of their own, as joint epochs are met in one go by one engine.
 BOTH = (Gnss(name="rtk", lever_arm=ARM, velocity_delay=0.1),)
+# The compiled loop takes what is in the linear range of the rule, and asks for the rest.
+RULED = (replace(BOTH[0], rule=AdaptiveRule(Igg3())),)
 OTHERS = (
     Gnss(name="rtk", lever_arm=ARM, lever_arm_sd=0.05, time_offset_sd=0.02),
     Gnss(name="spare", use_position=False),
@@ -113,7 +122,9 @@ OTHERS = (
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("aids", [LONE, BOTH, OTHERS], ids=["lone", "both", "others"])
+@pytest.mark.parametrize(
+    "aids", [LONE, BOTH, RULED, OTHERS], ids=["lone", "both", "ruled", "others"]
+)
 @pytest.mark.parametrize("form", list(COVARIANCES))
 @pytest.mark.parametrize("mechanization", list(MECHANIZATIONS))
 def test_cut_anywhere_the_numbers_are_the_same(log, mechanization, form, aids):
@@ -124,7 +135,7 @@ def test_cut_anywhere_the_numbers_are_the_same(log, mechanization, form, aids):
     count = len(log[0])
     for cuts in (np.sort(rng.choice(count - 1, 12, replace=False)) + 1, range(1, count)):
         for late in (False, True):
-            if late and (len(cuts) < 100 or aids is BOTH):
+            if late and (len(cuts) < 100 or aids in (BOTH, RULED)):
                 # A fix that lies before samples that were already given comes too late, and so
                 # does a velocity of a while ago.
                 continue
@@ -145,7 +156,9 @@ def same(a, b):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("aids", [LONE, BOTH, OTHERS], ids=["lone", "both", "others"])
+@pytest.mark.parametrize(
+    "aids", [LONE, BOTH, RULED, OTHERS], ids=["lone", "both", "ruled", "others"]
+)
 @pytest.mark.parametrize("form", list(COVARIANCES))
 @pytest.mark.parametrize("mechanization", list(MECHANIZATIONS))
 def test_both_engines_give_the_same_but_for_rounding(log, monkeypatch, mechanization, form, aids):
@@ -166,6 +179,48 @@ def test_both_engines_give_the_same_but_for_rounding(log, monkeypatch, mechaniza
     for one, other in zip(fast[2], slow[2], strict=True):
         assert (one.time, one.name, one.labels) == (other.time, other.name, other.labels)
         np.testing.assert_allclose(one.innovations.nu, other.innovations.nu, rtol=1e-7, atol=1e-9)
+
+
+@pytest.mark.parametrize("form", list(COVARIANCES))
+@pytest.mark.parametrize("rule", [AdaptiveRule(Igg3()), RobustUpdate(Huber(2.0), 1.2)])
+def test_a_compiled_loop_takes_what_is_in_the_linear_range_of_a_rule(log, monkeypatch, rule, form):
+    time, rows, fixes = log
+    wrong = fixes.copy()
+    wrong.iloc[20:24, wrong.columns.get_loc("alt")] += 8.0
+    navigator, state = started(form=form, aids=(replace(BOTH[0], rule=rule),))
+    fast = run((time, rows, wrong), navigator, state)
+    taken = [one.observation is None for one in fast[2]]
+    assert 0.5 < np.mean(taken) < 0.95
+    monkeypatch.setattr(navigator_module, "compiled", lambda _: False)
+    slow = run((time, rows, wrong), navigator, state)
+    np.testing.assert_allclose(fast[0], slow[0], rtol=1e-9, atol=1e-9)
+    for one, other in zip(fast[2], slow[2], strict=True):
+        assert (one.time, one.name, one.labels) == (other.time, other.name, other.labels)
+        for part in ("nu", "s", "weight"):
+            a, b = getattr(one.innovations, part), getattr(other.innovations, part)
+            np.testing.assert_allclose(a, b, rtol=1e-7, atol=1e-9)
+    assert fast[3].scales.keys() == slow[3].scales.keys()
+    for name, learned in fast[3].scales.items():
+        np.testing.assert_allclose(learned, slow[3].scales[name], rtol=1e-7, atol=1e-9)
+    assert bool(fast[3].scales) == isinstance(rule, AdaptiveRule)
+
+
+def test_velocities_of_two_components_and_of_three_learn_together(log, monkeypatch):
+    """As of a receiver that outputs speed and course until it has a vertical velocity."""
+    time, rows, fixes = log
+    level = fixes.copy()
+    level.iloc[:30, level.columns.get_loc(VELOCITY_SD[2])] = np.inf
+    level.iloc[50:55, level.columns.get_loc(VELOCITY_SD[2])] = np.inf
+    navigator, state = started(aids=RULED)
+    fast = run((time, rows, level), navigator, state)
+    sizes = [len(one.labels) for one in fast[2] if one.name == "rtk.velocity"]
+    assert set(sizes) == {2, 3}
+    assert len(fast[3].scales["rtk.velocity"]) == 3
+    monkeypatch.setattr(navigator_module, "compiled", lambda _: False)
+    slow = run((time, rows, level), navigator, state)
+    np.testing.assert_allclose(fast[0], slow[0], rtol=1e-9, atol=1e-9)
+    for name, learned in fast[3].scales.items():
+        np.testing.assert_allclose(learned, slow[3].scales[name], rtol=1e-7, atol=1e-9)
 
 
 @pytest.mark.parametrize("model", ["rotation_vector", "quaternions"])

@@ -20,9 +20,9 @@ from strapdown.report.document import (
     KeyFigure,
     KeyFigures,
     Picture,
-    document_page,
     draw_stills,
 )
+from strapdown.report.document_html import document_page
 
 sys.path.insert(0, str(Path(__file__).parent))
 from rich_document import EVIL, picture, rich_document

@@ -24,9 +24,9 @@ from strapdown.report.document import (
     Paragraph,
     Picture,
     TableBlock,
-    document_page,
     draw_stills,
 )
+from strapdown.report.document_html import document_page
 from strapdown.report.document_pdf import shown, write_pdf
 
 sys.path.insert(0, str(Path(__file__).parent))

@@ -153,7 +153,7 @@ def test_the_answer_on_the_terminal_fits_40_lines(result, capsys):
     # The paths and the seal take four lines.
     printed = capsys.readouterr()
     assert len((printed.out + printed.err).splitlines()) <= 36
-    assert "more; see the report" in printed.err
+    assert "more; see the result" in printed.err
 
 
 def test_the_bound_of_a_test_outage_is_that_at_its_largest_error():

@@ -20,8 +20,8 @@ from strapdown.report.document import (
     KeyFigures,
     Paragraph,
     TableBlock,
-    document_page,
 )
+from strapdown.report.document_html import document_page
 from strapdown.report.navigation_charts import bound_chart, error_charts, height_chart
 from strapdown.report.navigation_document import (
     cautions,

@@ -12,7 +12,7 @@ from strapdown.report.attitude import write_attitude
 from strapdown.report.attitude_charts import charts
 from strapdown.report.attitude_document import attitude_document
 from strapdown.report.chart import BUCKETS, break_jumps, curve
-from strapdown.report.document import document_page
+from strapdown.report.document_html import document_page
 
 EVIL = "</script><script>alert(1)</script><!--<img src=x onerror=alert(2)>"
 

@@ -22,7 +22,7 @@ from strapdown.report.attitude import attitude_json, write_attitude
 from strapdown.report.attitude_document import KINDS, attitude_document
 from strapdown.report.attitude_tables import standing
 from strapdown.report.content import compare_files
-from strapdown.report.document import document_page
+from strapdown.report.document_html import document_page
 
 EVIL = "</script><script>alert(1)</script><img src=x onerror=alert(2)>"
 TERMINAL = 112  # columns

@@ -10,11 +10,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown._kernels.level import AXIS
-from strapdown.earth import gravity
+from strapdown._kernels.antenna import ACCELERATION, POSITION, VELOCITY, antenna
+from strapdown._kernels.earth import displacement
 from strapdown.errors import ConfigError, DataError
 from strapdown.estimation.covariance import Observation
-from strapdown.estimation.error_model import PHYSICAL
 from strapdown.estimation.sensor_blocks import (
     gauss_markov,
     lever_arm,
@@ -23,19 +22,12 @@ from strapdown.estimation.sensor_blocks import (
     unseen,
 )
 from strapdown.estimation.sensor_states import SensorStates
-from strapdown.mechanization.mechanization import displacement_between
-from strapdown.nav_state import NavState
 from strapdown.navigation.measurements.measurement import (
-    DISPLACEMENT,
-    ROTATION,
-    VELOCITY,
     Epochs,
     TabulatedMeasurement,
     View,
     check_number,
 )
-from strapdown.navigation.measurements.vehicle import turn_of_body
-from strapdown.rotation import cross_matrix
 from strapdown.tables import GEODETIC, GNSS, POSITION_SD, VELOCITY_SD, check_gnss
 from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
 from strapdown.tables.checks import index_of, is_number, source_of, values_of
@@ -279,11 +271,13 @@ class Gnss(TabulatedMeasurement):
     def observe(self, view: View, values: Array) -> list[Observation]:
         """Return the innovation of a position or velocity, NED: computed − measured."""
         arm = arm_of(view, self._arm, np.asarray(self.lever_arm))
-        place, velocity, acceleration = moving(view, arm, self._arm)
-        of_place = values[0] == POSITION_CODE
-        computed = place if of_place else velocity
+        of_place, late_by = values[0] == POSITION_CODE, view.has(self._offset)
+        upto = ACCELERATION if late_by else POSITION if of_place else VELOCITY
+        motion = moving(view, arm, self._arm, upto)
+        computed = motion[POSITION if of_place else VELOCITY]
         C_nl, variance = view.C_ln.T, values[4:]
-        if view.has(self._offset):
+        if late_by:
+            place, velocity, acceleration = motion
             late = float(view.estimate(self._offset)[0])
             speed = velocity.after(acceleration, late)
             shift = speed if of_place else acceleration
@@ -292,14 +286,14 @@ class Gnss(TabulatedMeasurement):
                 computed = place.after(velocity, late).after(acceleration, 0.5 * late**2)
         z, H = C_nl @ computed.value, C_nl @ computed.H
         unclear = np.zeros(3)
-        if view.has(self._offset):
+        if late_by:
             of, dof = C_nl @ shift.value, C_nl @ shift.H
             by_offset, unclear = _by_offset(view, self._offset, float(values[0]), of, dof)
             H[:, view.place(self._offset)] = -by_offset[:, None]
         if of_place:
-            lat, lon, alt = values[1:4].tolist()
-            measured = NavState(view.time, lat, lon, alt, np.zeros(3), view.here.q_nb)
-            z += displacement_between(view.here, measured, view.ellipsoid)
+            here, figure = view.here, view.ellipsoid
+            a, e2 = figure.semi_major_axis, figure.eccentricity_squared
+            z += displacement(here.lat, here.lon, here.alt, *values[1:4].tolist(), a, e2)
             error, share = self._error, self.position_correlated_share
             if self._floats(variance):
                 error, share = self._float, FLOAT_SHARE
@@ -391,16 +385,6 @@ def _refuse_certain(
 
 
 # Motion of an antenna by the navigator's state, and its sensitivity to the navigator's errors.
-#
-# With the arm r of the antenna in level axes, ``W = C_lb w_ib - w_ie`` the rate of the body
-# relative to the Earth and f the specific force, relative to the Earth
-#
-#     position     p + r
-#     velocity     v + W x r
-#     acceleration f + g - 2 w_ie x v + W x (W x r)
-#
-# Gravity g includes the centrifugal part. The angular acceleration term, ``W' x r``, is unknown and
-# neglected, as is the change of g with position.
 
 
 @dataclass(frozen=True, eq=False)
@@ -427,7 +411,7 @@ def arm_of(view: View, name: str, assumed: Array) -> Array:
     return assumed - view.estimate(name) if view.has(name) else assumed
 
 
-def moving(view: View, arm: Array, arm_name: str) -> tuple[Moving, Moving, Moving]:
+def moving(view: View, arm: Array, arm_name: str, upto: int = ACCELERATION) -> list[Moving]:
     """Return position, velocity and acceleration of the antenna relative to the body.
 
     Parameters
@@ -436,65 +420,32 @@ def moving(view: View, arm: Array, arm_name: str) -> tuple[Moving, Moving, Movin
         Body axes, minus the estimate of its error.
     arm_name : str
         Name of the block of states of its error, which may be absent.
+    upto : int
+        `antenna.POSITION`, `VELOCITY` or `ACCELERATION`: the last that is computed.
 
     Returns
     -------
-    place : Moving, m
-        The value is the arm: antenna minus body position. H includes the position error, too.
-    velocity : Moving, m/s
-        Relative to the Earth.
-    acceleration : Moving, m/s²
+    list of Moving
+        Position, m: the value is the arm, antenna minus body position, and H includes the position
+        error, too. Velocity, m/s, and acceleration, m/s², relative to the Earth; that is of
+        `View.steady`, if known.
     """
-    C = view.C_lb
-    r = C @ arm
-    spin = view.ellipsoid.rotation_rate * view.level[AXIS : AXIS + 3]
-    turn, of_turn = turn_of_body(view)
-    W = C @ turn
-    arm_at = view.place(arm_name) if view.has(arm_name) else None
-    across, turning = cross_matrix(r), cross_matrix(W)
-
-    d_arm = np.zeros((3, view.columns))
-    d_arm[:, ROTATION] = -across
-    if arm_at is not None:
-        d_arm[:, arm_at] = C
-    d_W = C @ of_turn
-    d_W[:, ROTATION] -= turning
-
-    swept = turning @ r
-    d_swept = turning @ d_arm - across @ d_W
-    place = Moving(r, d_arm + _at(DISPLACEMENT, view.columns))
-    velocity = Moving(view.velocity + swept, d_swept + _at(VELOCITY, view.columns))
-
-    rate, felt = _steady(view)
-    force = C @ felt
-    W = C @ rate - spin
-    turning = cross_matrix(W)
-    swept = turning @ r
-    d_swept = turning @ d_arm - across @ d_W
-    here = view.here
-    g = gravity(math.degrees(here.lat), here.alt, ellipsoid=view.ellipsoid)
-    value = force + view.C_ln @ g - 2.0 * np.cross(spin, view.velocity) + turning @ swept
-    d_acc = turning @ d_swept - cross_matrix(swept) @ d_W
-    d_acc[:, ROTATION] -= cross_matrix(force)
-    d_acc[:, VELOCITY] -= 2.0 * cross_matrix(spin)
-    felt = np.concatenate([[1.0], view.rate, view.force])
-    d_acc[:, PHYSICAL:] += C @ np.tensordot(felt, view.model.stacked.accel, 1)
-    return place, velocity, Moving(value, d_acc)
-
-
-def _at(where: slice, columns: int) -> Array:
-    out = np.zeros((3, columns))
-    out[:, where] = np.eye(3)
-    return out
-
-
-def _steady(view: View) -> tuple[Array, Array]:
-    """Rate and force without vibration, if known, with the estimated errors subtracted."""
-    if view.steady is None:
-        return view.rate, view.force
-    stacked = view.model.stacked
-    felt = np.concatenate([[1.0], view.steady])
-    return (
-        view.steady[:3] - np.tensordot(felt, stacked.gyro, 1) @ view.sensors,
-        view.steady[3:] - np.tensordot(felt, stacked.accel, 1) @ view.sensors,
+    used, stacked = view.mechanization, view.model.stacked
+    felt = np.concatenate([view.rate, view.force])
+    steady = felt if view.steady is None else view.without_errors(view.steady)
+    value, H = np.empty((3, 3)), np.empty((3, 3, view.columns))
+    antenna(
+        view.level,
+        used.level_up,
+        view.ellipsoid.parameters(),
+        arm,
+        view.place(arm_name).start if view.has(arm_name) else -1,
+        stacked.gyro_terms,
+        stacked.accel_terms,
+        felt,
+        steady,
+        upto,
+        value,
+        H,
     )
+    return [Moving(value[i], H[i]) for i in range(upto + 1)]

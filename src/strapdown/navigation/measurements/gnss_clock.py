@@ -15,7 +15,7 @@ from strapdown.dsp.samples import running_integral
 from strapdown.errors import DataError, Finding
 from strapdown.frames import place_difference
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY, VELOCITY_SD, usable
-from strapdown.tables.checks import RELATIVE, index_of, source_of, values_of
+from strapdown.tables.checks import RELATIVE, channels_of, index_of, source_of, values_of
 
 __all__ = [
     "TimeOffset",
@@ -50,6 +50,8 @@ ARM, ABOUT, CORRELATED = 1.0, 0.1, 2.0
 #: Number of steps needed; fraction of the changes that the sensors must explain; and factor by
 #: which the best offset's residual must be below that of any other more than a second from it.
 LEAST_STEPS, LEAST_SHARE, CLEAR = 20, 0.6, 1.3
+#: Of more steps the first are used: two hours of fixes each second know an offset to milliseconds.
+MOST_STEPS = 7200
 LONGEST_STEP = 1.5
 #: An offset is reported from so many standard deviations, and at least this, s.
 SURE, LEAST_OFFSET = 3.0, 0.02
@@ -267,14 +269,21 @@ def _best(
     used = used & (begin - room >= stamps[0]) & (end + room <= stamps[-1])
     if used.sum() < LEAST_STEPS:
         return None
+    if used.sum() > MOST_STEPS:
+        first, *_, last = np.flatnonzero(used)[:MOST_STEPS].tolist()
+        at, per_rate = at[first : last + 2], per_rate[first : last + 2]
+        change, used = change[first : last + 1], used[first : last + 1]
+        begin, end = at[:-1], at[1:]
+        imu = imu.iloc[slice(*np.searchsorted(stamps, [at[0] - room, at[-1] + room]))]
+        stamps = index_of(imu)
     # A course is as accurate as it is fast.
     weight = 1.0 / (0.5 * (per_rate[1:] + per_rate[:-1]))[used]
     change, lasting = weight * change[used], weight * (end - begin)[used]
     means = imu.attrs["sampling"] == "mean"
-    nodes, sums = _integrals(stamps, values_of(imu, columns), means)
+    nodes, sums = _integrals(stamps, imu, columns, means)
     turned = sums
     if columns != GYRO:
-        turned = _integrals(stamps, values_of(imu, GYRO), means)[1]
+        turned = _integrals(stamps, imu, GYRO, means)[1]
 
     between, before, after = (np.empty((len(at), 3)) for _ in range(3))
     X = np.empty((len(change), 7))
@@ -329,13 +338,17 @@ def _best(
     return TimeOffset(offset, sd, share, by)
 
 
-def _integrals(stamps: Array, values: Array, means: bool) -> tuple[Array, Array]:
+def _integrals(
+    stamps: Array, imu: pd.DataFrame, columns: list[str], means: bool
+) -> tuple[Array, Array]:
     """Integrals of three channels, (m, 3), at times no closer than the search needs."""
-    sums = running_integral(stamps, values, means=means)
-    each = max(1, int(NODES / float(np.median(np.diff(stamps)))))
+    # Steps are rounded decimal fractions.
+    each = max(1, int(NODES / float(np.median(np.diff(stamps))) + 1e-6))
     last = len(stamps) - 1
     kept = np.append(np.arange(0, last, each), last)
-    return stamps[kept], sums[kept]
+    channels = channels_of(imu, columns)
+    sums = [running_integral(stamps, one, means=means)[kept] for one in channels]
+    return stamps[kept], np.column_stack(sums)
 
 
 def _difference(time: Array, stamps: Array, *, shared: bool) -> tuple[str, dict[str, Any]]:

@@ -113,7 +113,8 @@ class Magnetometer(TabulatedMeasurement):
 
     def epochs(self, table: pd.DataFrame) -> Epochs:
         """Return an epoch for each reading; see `TabulatedMeasurement.epochs`."""
-        return Epochs(index_of(table), checked_values(table, MAG))
+        checked_values(table, MAG)
+        return Epochs(index_of(table), values_of(table, MAG))
 
     def observe(self, view: View, values: Array) -> list[Observation]:
         """Return the innovation of the field along the axes of the body: computed − measured."""

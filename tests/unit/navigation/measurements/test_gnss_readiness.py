@@ -16,6 +16,7 @@ from tests.gnss_faults import Frozen, Outage, Outliers, inject_gnss_faults
 
 import town_drive as town
 from strapdown.errors import DataError
+from strapdown.navigation.measurements import gnss_clock
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.gnss_clock import (
     check_overlap,
@@ -113,6 +114,20 @@ def test_the_offset_of_the_clocks_is_found_to_a_tenth_of_a_second(offset):
     # What the filter is to find is not told again.
     assert not find_time_offset(table, imu(), found.offset)
     assert not find_time_offset(table, imu(), 0.0, 0.0, assumed_sd=abs(offset))
+
+
+def test_the_first_steps_are_enough_for_the_offset_of_a_long_record(monkeypatch):
+    table = remade(town.fixes(time_offset=0.15, velocity_noise=0.02))
+    whole = time_offset(table, imu())
+    monkeypatch.setattr(gnss_clock, "MOST_STEPS", len(table) // 2)
+    half = time_offset(table, imu())
+    assert half.offset != whole.offset
+    assert half.offset == pytest.approx(0.15, abs=3.0 * half.sd)
+    # What comes later is not looked at.
+    later = table.copy()
+    later.attrs = dict(table.attrs)
+    later.iloc[-20:, later.columns.get_loc("VN")] += 30.0
+    assert time_offset(later, imu()) == half
 
 
 def test_places_alone_are_enough_for_the_offset():

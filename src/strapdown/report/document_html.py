@@ -1,0 +1,282 @@
+"""A document as one page that needs no network, and works without scripts."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from importlib.resources import files
+from typing import Any
+
+from strapdown.report.document import Document, document_data, draw_stills
+
+_TITLE_ELEMENT = re.compile("<title>.*?</title>", re.DOTALL)
+_PLACE = re.compile(r"\{\{ (?:policy|title|body) \}\}")
+_SIGNS = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", "'": "&#39;", '"': "&#34;"})
+#: Characters from which a cell is wide.
+_LONG = 30
+_HOW_TO = (
+    '<span class="livenote"> In a chart: point for values, drag to zoom, double-click to return, '
+    "click a name in the legend to hide it.</span>"
+)
+
+
+def document_page(document: Document, *, stills: Sequence[str] | None = None) -> str:
+    """Lay out a document as an HTML page.
+
+    Parameters
+    ----------
+    document : Document
+        Its texts are made plain, then escaped.
+    stills : sequence of str, optional
+        Drawn charts from `draw_stills`, if already made.
+
+    Returns
+    -------
+    str
+        HTML, the same for the same document, whole without scripts but for scenes that move.
+        Charts are SVG of `chart_svg`, with every text escaped; pictures are embedded as images,
+        which cannot run scripts or fetch resources. A content policy in the page allows its own
+        script and no other.
+    """
+    drawn = draw_stills(document) if stills is None else stills
+    data = document_data(document, drawn, _image, alive=True)
+    sections = (block for section in data["sections"] for block in section["blocks"])
+    kinds = {block["kind"] for block in (*data["front"], *sections)}
+    templates = files("strapdown.report").joinpath("templates")
+    script = ""
+    if kinds & {"chart", "animation"}:
+        script = templates.joinpath("document.js").read_text("utf-8")
+    begin, between, after, end = _PLACE.split(
+        templates.joinpath("document.html").read_text("utf-8")
+    )
+    policy, title = _text(_digest(script) if script else "'none'"), _text(data["title"])
+    return f"{begin}{policy}{between}{title}{after}{_body(data, script)}{end}".removesuffix("\n")
+
+
+def _text(text: str) -> str:
+    """Escape a text for an element or an attribute."""
+    return str(text).translate(_SIGNS)
+
+
+def _body(data: Mapping[str, Any], script: str) -> str:
+    sections, facts, links = data["sections"], data["facts"], data["links"]
+    contents = "".join(
+        f'<li><span class="no" aria-hidden="true">{one["number"]}</span>'
+        f'<a href="#{_text(one["anchor"])}">{_text(one["title"])}</a></li>'
+        for one in sections
+    )
+    return "".join(
+        [
+            '<a class="skip" href="#contents">Skip to the contents</a>' if sections else "",
+            f"\n<main>\n<header>\n<h1>{_text(data['title'])}</h1>\n",
+            f'<p class="subtitle">{_text(data["subtitle"])}</p>' if data["subtitle"] else "",
+            _facts(facts) if facts else "",
+            _links(links) if links else "",
+            "\n</header>\n",
+            *map(_block, data["front"]),
+            '<nav id="contents" aria-labelledby="contents-head">'
+            f'<h2 id="contents-head">Contents</h2>\n<ol>{contents}</ol></nav>\n'
+            if sections
+            else "",
+            *map(_section, sections),
+            f"<footer>{_text(data['footer'])}{_HOW_TO if script else ''}</footer>"
+            if data["footer"] or script
+            else "",
+            "\n</main>\n",
+            f"<script>{script}</script>" if script else "",
+        ]
+    )
+
+
+def _section(section: Mapping[str, Any]) -> str:
+    anchor = _text(section["anchor"])
+    return (
+        f'<section aria-labelledby="{anchor}">\n<h2 id="{anchor}"><span class="no">'
+        f"{section['number']}</span><span>{_text(section['title'])}</span></h2>\n"
+        f"{''.join(map(_block, section['blocks']))}</section>\n"
+    )
+
+
+def _block(block: Mapping[str, Any]) -> str:
+    """One block of any kind, with a line end after it."""
+    match block["kind"]:
+        case "paragraph":
+            return _paragraph(block["style"], _text(block["text"]))
+        case "items":
+            return _items(block)
+        case "links":
+            return f"{_links(block['rows'])}\n"
+        case "facts":
+            return f"{_facts(block['rows'])}\n"
+        case "table":
+            return _table(block)
+        case "chart":
+            return _chart(block)
+        case "animation":
+            return _animation(block)
+        case "picture":
+            return f"<figure>{_picture(block)}{_caption(block, 'Figure')}</figure>\n"
+        case _:
+            return _key_figures(block)
+
+
+def _paragraph(style: str, text: str) -> str:
+    if style == "mono":
+        return f"<pre>{text}</pre>\n"
+    if style == "plain":
+        return f"<p>{text}</p>\n"
+    role = ' role="note"' if style == "warning" else ""
+    return f'<p class="{style}"{role}>{text}</p>\n'
+
+
+def _items(block: Mapping[str, Any]) -> str:
+    tag = "ol" if block["numbered"] else "ul"
+    rows = "".join(
+        f"<li>{f'<b>{_text(head)}</b>' if head else ''}{' – ' if head and text else ''}"
+        f"{_text(text)}</li>"
+        for head, text in block["rows"]
+    )
+    return f"<{tag}>{rows}</{tag}>\n"
+
+
+def _links(rows: Iterable[tuple[str, str]]) -> str:
+    shown = " · ".join(f'<a href="{_text(file)}">{_text(text)}</a>' for file, text in rows)
+    return f'<p class="links">{shown}</p>'
+
+
+def _facts(rows: Iterable[tuple[str, str]]) -> str:
+    shown = "".join(f"<dt>{_text(name)}</dt><dd>{_text(text)}</dd>" for name, text in rows)
+    return f'<dl class="facts">{shown}</dl>'
+
+
+def _label(block: Mapping[str, Any], kind: str) -> str:
+    """Number, title and caption of a table or a figure."""
+    number = f"<b>{kind} {block['number']}.</b> " if block["number"] else ""
+    title = f"<b>{_text(block['title'])}.</b> " if block["title"] else ""
+    return f"{number}{title}{_text(block['caption'])}"
+
+
+def _caption(block: Mapping[str, Any], kind: str) -> str:
+    return f"<figcaption>{_label(block, kind)}</figcaption>"
+
+
+def _table(block: Mapping[str, Any]) -> str:
+    words = block["words"]
+    caption = f"<caption>{_label(block, 'Table')}</caption>" if block["number"] else ""
+    names = "".join(
+        ('<th scope="col">' if word else '<th scope="col" class="num">') + f"{_text(name)}</th>"
+        for name, word in zip(block["columns"], words, strict=True)
+    )
+    rows = "".join(
+        ('<tr class="strong">' if strong else "<tr>")
+        + "".join(
+            _head(cell, word) if k == 0 else _cell(cell, word, mark)
+            for k, (cell, word, mark) in enumerate(zip(row, words, passed, strict=True))
+        )
+        + "</tr>\n"
+        for row, passed, strong in zip(block["rows"], block["passed"], block["strong"], strict=True)
+    )
+    label = _text(block["title"] or block["caption"] or "Table")
+    return (
+        f'<div class="table"><div class="scroll" tabindex="0" role="region" aria-label="{label}">'
+        f"<table>\n{caption}<thead><tr>{names}</tr></thead>\n<tbody>{rows}</tbody>\n"
+        "</table></div></div>\n"
+    )
+
+
+def _head(cell: str, word: bool) -> str:
+    look = ("" if word else "num") + (" long" if len(cell) >= _LONG else "")
+    return f'<th scope="row" class="{look}">{_text(cell)}</th>'
+
+
+def _cell(cell: str, word: bool, passed: bool) -> str:
+    look = "" if word else "num"
+    look += " long" if len(cell) >= _LONG else "" if word else " short"
+    return f'<td class="{look}{" passed" if passed else ""}">{_text(cell)}</td>'
+
+
+def _chart(block: Mapping[str, Any]) -> str:
+    # The browser would show a title wherever the pointer rests on the chart.
+    svg = _TITLE_ELEMENT.sub("", block["svg"], count=1)
+    svg = svg.replace(' xmlns="http://www.w3.org/2000/svg"', "", 1)
+    return (
+        f'<figure data-figure="chart" data-x-label="{_text(block["x_label"])}">\n'
+        f'<div class="chart" role="group" aria-label="{_text(block["alt"])}">{svg}</div>\n'
+        f'<div class="tip" hidden></div>\n{_caption(block, "Figure")}\n</figure>\n'
+    )
+
+
+def _animation(block: Mapping[str, Any]) -> str:
+    scene, alt, title = block["scene"], _text(block["alt"]), _text(block["title"])
+    still = '<p class="still note">This scene needs scripts.</p>'
+    if block["still"]:
+        still = f'<img class="still" src="{_text(block["still"])}" alt="{alt}">'
+    legend = "".join(
+        f'<span><i style="border-color:{_text(entry["colour"])}'
+        f'{";border-top-style:dashed" if entry["dash"] else ""}"></i>{_text(entry["name"])}</span>'
+        for entry in scene.legend
+    )
+    notes = "".join(
+        f'<span class="{name}"> {_text(block[key])}</span>'
+        for name, key in (("livenote", "live_caption"), ("stillnote", "still_caption"))
+        if block[key]
+    )
+    return (
+        f'<figure data-figure="scene">\n{still}\n'
+        f'<div class="scene"><canvas role="img" aria-label="{alt}" '
+        f'style="height:{_text(scene.height)}px"></canvas>\n<p class="legend">{legend}</p></div>\n'
+        '<div class="controls" hidden><button type="button">Play</button><input type="range" '
+        f'min="0" value="0" step="1" aria-label="Frame of: {title}"><output></output></div>\n'
+        f"<figcaption>{_label(block, 'Figure')}{notes}</figcaption>\n"
+        f'<script type="application/json">{_embedded(scene.data())}</script>\n</figure>\n'
+    )
+
+
+def _picture(block: Mapping[str, Any]) -> str:
+    width = f"{block['width_mm'] / 1.7:.1f}"
+    return f'<img src="{_text(block["still"])}" alt="{_text(block["alt"])}" style="width:{width}%">'
+
+
+def _key_figures(block: Mapping[str, Any]) -> str:
+    keys = "".join(map(_key_figure, block["figures"]))
+    pictures = "".join(
+        f'<figure style="flex-grow:{one["width_mm"]:.0f}">{_picture(one)}{_caption(one, "")}'
+        "</figure>"
+        for one in block["pictures"]
+    )
+    below = f'<div class="keypictures">{pictures}</div>' if pictures else ""
+    return f'<dl class="keys">{keys}</dl>\n{below}'
+
+
+def _key_figure(key: Mapping[str, str]) -> str:
+    # The bound goes to the next line as a whole.
+    value, *bounds = (_text(part) for part in key["value"].split("\u00a0±\u00a0"))
+    parts = f"<span>{value}</span>" + "".join(f" <span>±&nbsp;{one}</span>" for one in bounds)
+    note = f'<dd class="remark">{_text(key["note"])}</dd>' if key["note"] else ""
+    return (
+        f'<div><dt>{_text(key["name"])}</dt><dd class="value">{parts}</dd>'
+        f'<dd class="bound">{_text(key["bound"])}</dd>{note}</div>'
+    )
+
+
+def _image(svg: str) -> str:
+    # A lone surrogate has no UTF-8.
+    whole = base64.b64encode(svg.encode("utf-8", "replace")).decode("ascii")
+    return f"data:image/svg+xml;base64,{whole}"
+
+
+def _digest(script: str) -> str:
+    """Digest of a script for the page's content policy; an unlisted script does not run."""
+    whole = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
+    return f"'sha256-{whole}'"
+
+
+def _embedded(figure: Mapping[str, Any]) -> str:
+    """Encode JSON for a script element; no text in it can end the element or begin another."""
+    text = json.dumps(figure, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
+    for char in "<>&":
+        text = text.replace(char, f"\\u{ord(char):04x}")
+    return text
