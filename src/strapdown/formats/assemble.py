@@ -85,7 +85,8 @@ Array = NDArray[np.float64]
 def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Recording:
     """Convert raw columns to a recording, which may take their memory.
 
-    `keep`: whether the columns are used again, and left as they are. `options`: the user's statements override those of the file, which override column names.
+    `options`: the user's statements override those of the file, which override column names.
+    `keep`: whether the columns are used again, and left as they are.
     DataError: a value, a stamp or a unit cannot be used; the message names file, row and remedy.
     ConfigError: an option names a column that does not exist.
     """
