@@ -100,7 +100,7 @@ class NavState:
         if not (near and math.isfinite(time + alt + north + east + down)):
             return cls(time, lat, lon, alt, np.array([north, east, down]), np.array([w, x, y, z]))
         both = np.array((north, east, down, w / norm, x / norm, y / norm, z / norm))
-        both.setflags(False)
+        both.setflags(write=False)
         made = object.__new__(cls)
         own = made.__dict__
         own["time"], own["lat"], own["lon"], own["alt"] = time, lat, lon, alt
