@@ -67,7 +67,7 @@ def attitude() -> Iterator[Row]:
     time = np.arange(SAMPLES) * STEP
     imu = imu_table(time, gyro)
     for what, job, limit in (
-        ("attitude, `sd.attitude` from table to table, a sample", lambda: sd.attitude(imu), 4.8),
+        ("attitude, `sd.attitude` from table to table, a sample", lambda: sd.attitude(imu), 6.0),
         ("attitude, `sd.attitude` of arrays, a sample", lambda: sd.attitude(time, gyro), 3.5),
     ):
         ours, theirs = by_turns(job, batch, rounds=9, per=per)
