@@ -68,8 +68,9 @@ def test_every_option_stands_in_a_group_and_the_usual_ones_come_last():
     for name, command in COMMANDS.items():
         assert all(p.rich_help_panel for p in options(command)), name
         written = [p.name for p in options(command) if p.rich_help_panel == OUT_PANEL]
-        known = ("out", "force", "json", "quiet", "verbose", "no_report")
-        usual = [n for n in known if n in written]
+        usual = [
+            n for n in ("out", "no_report", "force", "json", "quiet", "verbose") if n in written
+        ]
         assert written[len(written) - len(usual) :] == usual, name
     assert {
         name for name, c in COMMANDS.items() if any(p.name == "json" for p in options(c))

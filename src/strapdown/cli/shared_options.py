@@ -293,7 +293,7 @@ class OutFlags:
 
 
 @dataclass(frozen=True)
-class ReportFlags(OutFlags):
+class ReportFlags:
     """`OutFlags` for a command that writes a report."""
 
     no_report: Annotated[
@@ -305,6 +305,10 @@ class ReportFlags(OutFlags):
             "--no-report",
         ),
     ] = False
+    force: Force = False
+    json: Json = False
+    quiet: Quiet = False
+    verbose: Verbose = False
 
 
 def spread(command: Callable[..., None]) -> Callable[..., None]:
