@@ -23,7 +23,7 @@ COMMANDS = {
 READS_A_LOG = ("attitude", "align", "navigate", "init align", "init navigate")
 TABULAR = {
     *("attitude", "align", "navigate", "coast", "crash", "simulate", "verify", "modules"),
-    *("doctor", "convert"),
+    *("doctor", "convert", "export"),
 }
 #: What one word says of two things: of a scenario beside a log, of a start beside a place.
 OF_ITS_OWN = {
