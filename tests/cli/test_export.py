@@ -15,7 +15,7 @@ def test_what_it_writes_and_says(tmp_path, run_cli):
     assert done.code == 0, done.err
     made = step_in_c("ud:states=4,observations=1")
     assert file.read_text(encoding="utf-8") == made.text
-    assert "At most 36 add, 52 multiply, 9 divide a call; 20 numbers" in done.out
+    assert "At most 36 add, 52 multiply, 9 divide each time; 20 numbers" in done.out
     done = run_cli("export", "ud:states=4,observations=1", str(file), "--force", "--json")
     told = json.loads(done.out)
     assert told["operations"] == made.operations
@@ -54,6 +54,15 @@ def test_a_file_is_not_overwritten(tmp_path, run_cli):
     file.write_text("mine")
     assert run_cli("export", "ned", str(file)).code == 4
     assert file.read_text() == "mine"
+
+
+def test_neither_a_folder_nor_another_module_is_exported(tmp_path, run_cli):
+    (tmp_path / "a.c").mkdir()
+    assert "it is a folder" in run_cli("export", "ned", str(tmp_path / "a.c"), "--force").err
+    for module, near in (("nde", "did you mean 'ned'"), ("joseph", "Known: ned")):
+        done = run_cli("export", module, str(tmp_path / "b.c"))
+        assert done.code == 4
+        assert near in done.err
 
 
 def test_the_modules_are_listed(run_cli):

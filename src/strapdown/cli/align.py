@@ -148,7 +148,7 @@ def align(
         result, seal = done
         print_alignment(result)
         print_findings(result.findings, MOST)
-        print_seal(seal, "align.json")
+        print_seal(seal, "align.json", write.no_report)
 
 
 def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:

@@ -255,7 +255,7 @@ def attitude(
     if taken:
         _print_speed(taken)
     print_findings(bench.findings)
-    print_seal(seal, "attitude.json")
+    print_seal(seal, "attitude.json", write.no_report)
     if files.export is not None:
         language = export.WRITERS[files.export.suffix.lower()][0]
         console().print(f"{language}   {files.export}: {exported}", soft_wrap=True)

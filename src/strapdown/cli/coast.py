@@ -189,7 +189,7 @@ def coast(
         result, seal = done
         print_coast(result)
         print_findings(result.findings)
-        print_seal(seal, "coast.json")
+        print_seal(seal, "coast.json", write.no_report)
 
 
 def coast_of_flags(

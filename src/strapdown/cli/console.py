@@ -293,9 +293,12 @@ def _joined(findings: Sequence[Finding]) -> list[Finding]:
     ]
 
 
-def print_seal(seal: Seal, look_at: str) -> None:
+def print_seal(seal: Seal, look_at: str, no_report: bool = False) -> None:
     """Print the written folder, the file to open, which is its page if it has one, and the seal."""
     out, page = console(), seal.path / "report.html"
     out.print(f"\nWrote {seal.path}")
-    out.print(f"Open  {page if page.is_file() else seal.path / look_at}")
+    if no_report:
+        out.print(f"Data  {seal.path / look_at}; no page, as --no-report asks")
+    else:
+        out.print(f"Open  {page if page.is_file() else seal.path / look_at}")
     out.print(f"Seal  sha256 {seal.digest}")

@@ -147,7 +147,7 @@ def crash(
         # What both say together is told with the first.
         both = run.closure.findings if run.closure is not None and run.number > 1 else ()
         print_findings([found for found in run.findings if found not in both])
-        print_seal(seal, "crash.json")
+        print_seal(seal, "crash.json", write.no_report)
     with shown_in(result.spec.options.units):
         closure = closure_table(result) if several else None
     if closure is not None:

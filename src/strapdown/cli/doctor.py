@@ -87,7 +87,7 @@ def doctor(
         for one in result.logs:
             print_log(one, paths, tables=write.verbose)
         print_findings(result.between)
-        print_seal(seal, "doctor.json")
+        print_seal(seal, "doctor.json", write.no_report)
     if fix is not None:
         files = write_clean_log(found[0], fix, force=write.force)
         if done is not None:

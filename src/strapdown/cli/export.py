@@ -53,4 +53,6 @@ def export(
     elif not write.quiet:
         listed = ", ".join(f"{n} {kind}" for kind, n in made.operations.items() if n)
         console().print(f"{language}   {file}: {made.name}", soft_wrap=True)
-        console().print(f"At most {listed} a call; {made.memory} numbers of memory", soft_wrap=True)
+        console().print(
+            f"At most {listed} each time; {made.memory} numbers of memory", soft_wrap=True
+        )

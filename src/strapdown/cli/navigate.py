@@ -214,7 +214,7 @@ def navigate(
         found = None if played is None else played.tape.latency()
         if found is not None:
             print_latency(found, f"played, pace {pace}")
-        print_seal(seal, "navigation.json")
+        print_seal(seal, "navigation.json", write.no_report)
 
 
 def navigation_of_flags(log: Path, given: Mapping[str, Any]) -> NavigationSpec:

@@ -119,7 +119,7 @@ def _run(
         if not write.quiet and live.latency is not None:
             print_latency(live.latency, flags.live or "")
         if not write.quiet:
-            print_seal(seal, "navigation.json")
+            print_seal(seal, "navigation.json", write.no_report)
     if live.error is not None:
         raise live.error
 

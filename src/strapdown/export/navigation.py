@@ -199,7 +199,7 @@ def navigation_parts(chosen: Mechanization) -> StepParts:
         "history": (1, chosen.row),
     }
     step = kernels.require(advance, keep=(1,), sizes=sizes)
-    kernels.require("linear_motion")
+    motion = kernels.require("linear_motion")
     if wander:
         kernels.require("wander_from_geodetic")
         kernels.require("wander_places", sizes={"history": (1, 12), "out": (1, 10)})
@@ -264,6 +264,7 @@ def navigation_parts(chosen: Mechanization) -> StepParts:
         kernels=kernels,
         step=step,
         call="step",
+        before=(motion, "increments"),
         memory=size,
         codes={k: v for k, v in codes.items() if k != ("POLE" if wander else "LEAP")},
         interface=_NAVIGATION.format(
@@ -301,6 +302,7 @@ def navigation_parts(chosen: Mechanization) -> StepParts:
                 place=listed(PLACE), velocity=listed(VELOCITY), attitude=listed(ATTITUDE)
             ),
             _NAVIGATION_TAKE.format(argument=", R(v[10])" if damped else ""),
+            answers=True,
         ),
         gives="latitude, longitude, height, velocity and quaternion",
         rows=rows,

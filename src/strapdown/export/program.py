@@ -126,7 +126,7 @@ static void test_start(struct {name} *s)
 {start}
 }}
 
-/* Take a row. Returns the number of its results, less than none if it is refused. */
+/* Take a row. Returns the number of its results, {refusal} if it is refused. */
 static int test_take(struct {name} *s, const double *v, double *out)
 {{
 {take}
@@ -178,7 +178,7 @@ int main(void)
         column = (column + 1) % COLUMNS;
         if (column == 0) {{
             const int count = test_take(&s, v, out);
-            if (count < 0) {{
+            if (count {refused}) {{
                 fprintf(stderr, "refused\\n");
             }}
             test_put(count < 0 ? -count : count, out);
@@ -197,7 +197,7 @@ class Harness:
     `name`: of its structure, ``s`` is one. `columns`, `results`: numbers of a row and its results.
     `words`: what a row consists of. `start`: statements that begin. `take`: those that give a row
     ``v`` and fill ``out``. `finish`: those at the end, if there are any, which fill ``out``. `lag`:
-    rows by which results are late.
+    rows by which results are late. `answers`: whether each row has results, unless it is refused.
     """
 
     name: str
@@ -208,6 +208,7 @@ class Harness:
     take: str
     finish: str = ""
     lag: int = 0
+    answers: bool = False
 
 
 def test_program(
@@ -228,6 +229,8 @@ def test_program(
     return _PROGRAM.format(
         upper=harness.name.upper(),
         **{key: getattr(harness, key) for key in ("name", "columns", "results", "take")},
+        refused="<= 0" if harness.answers else "< 0",
+        refusal="none" if harness.answers else "less than none",
         words="\n".join(comment(f"Numbers of a row: {harness.words}.")),
         start=harness.start,
         data=data,
@@ -317,7 +320,8 @@ class StepParts:
     """What a file is made of.
 
     `harness`: how a test passes rows of numbers. `gives`: what results of a row are, in words.
-    `step`: the kernel of a call, `call` that of the file. `codes`: results by name. `rows` (two):
+    `step`: the kernel of a call, `call` that of the file. `before`: the kernel and the call that
+    make what it takes, for each sample. `codes`: results by name. `rows` (two):
     middle and range of the numbers of a row. `run`: results of rows by the kernels, as far as
     there are any.
     """
@@ -335,6 +339,7 @@ class StepParts:
     gives: str
     rows: Array
     run: Callable[[Array], Array]
+    before: tuple[Kernel, str] | None = None
 
 
 def drawn_rows(rows: Array, count: int) -> Array:

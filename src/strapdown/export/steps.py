@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import Any
@@ -91,8 +92,8 @@ def _check_range(name: str, value: float, low: float, high: float) -> None:
 class ExportedFile:
     """An exported file, and what it costs.
 
-    `operations`: most of a call, by kind (`cost.most_operations`). `memory`: numbers that are kept
-    between calls.
+    `operations`: most of what is called for a sample, by kind (`cost.most_operations`). `memory`:
+    numbers that are kept between calls.
     """
 
     name: str
@@ -110,7 +111,11 @@ def step_in_c(text: str) -> ExportedFile:
     name = text.strip().lower().partition(":")[0]
     translator = device_translator()
     functions = parts.kernels.in_c(translator)
-    operations = most_operations(parts.step)
+    operations, calls = most_operations(parts.step), [parts.call]
+    if parts.before is not None:
+        motion, call = parts.before
+        operations = dict(Counter(operations) + Counter(most_operations(motion)))
+        calls = [call, *calls]
     body = "\n".join([*functions, parts.code])
     test = step_test(parts)
     version = importlib.import_module("strapdown").__version__
@@ -125,7 +130,7 @@ def step_in_c(text: str) -> ExportedFile:
         f"{parts.title}.",
         f"{name}: {options}. Written by strapdown {version} from the kernels that it runs itself.",
         *parts.words,
-        f"Operations of {name_c}_{parts.call}, at most: {counts}. "
+        f"Operations of {' and '.join(f'{name_c}_{call}' for call in calls)}, at most: {counts}. "
         f"Memory: {parts.memory} numbers between calls, no heap.",
         "Double precision; -DREAL=float for single. With -ffp-contract=off it gives the bits of "
         f"strapdown in double precision. Test: cc -std=c99 -O2 -D{upper}_TEST FILE.c -lm && "
@@ -410,6 +415,7 @@ def _update(chosen: Update, weighted: bool) -> StepParts:
             "observations, their variances, and the rows of H",
             _UPDATE_START,
             _UPDATE_TAKE,
+            answers=True,
         ),
         gives="the estimate, D and the first row of U",
         rows=rows,

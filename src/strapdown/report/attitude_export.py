@@ -10,16 +10,17 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from strapdown.attitude_algorithms import AttitudeAlgorithm, make_algorithm
+from strapdown.attitude_algorithms import ALGORITHMS, AttitudeAlgorithm, make_algorithm
 from strapdown.attitude_comparison.comparison import AttitudeComparison
 from strapdown.bundle.atomic_folder import replace_file
-from strapdown.errors import ConfigError
+from strapdown.errors import ConfigError, check_choice
 from strapdown.export import Channel, SensorConfiguration, export_c, export_micropython
 from strapdown.export.attitude import export_attitude
 from strapdown.export.steps import STEPS, ExportedFile, step_in_c
 from strapdown.formats.columns import parse_axes
 from strapdown.increments import increments_from_imu
 from strapdown.orientation_filters import FILTERS, OrientationEstimator, is_filter, make_filter
+from strapdown.plugins import plugin
 from strapdown.tables import ACCEL, GYRO, MAG, QUATERNION, THETA, imu_table
 from strapdown.tables.checks import index_of
 from strapdown.units import (
@@ -64,7 +65,9 @@ def check_export(
             quantity=quantity,
             suffixes=" or ".join(suffixes),
         )
-    if path.is_dir() or (path.exists() and not force):
+    if path.is_dir():
+        raise ConfigError("report.export-is-folder", file=str(path), quantity=quantity)
+    if path.exists() and not force:
         raise ConfigError("report.already", file=str(path), quantity=quantity)
     if not path.parent.is_dir():
         raise ConfigError("report.no-such-folder", file=str(path.parent), quantity=quantity)
@@ -87,7 +90,11 @@ def export_module(text: str, suffix: str) -> ExportedFile:
     `text`: its name, with options. `suffix`: of the file, which gives the language. ConfigError:
     the name, an option or a value is unknown, or there is no such file of this module.
     """
-    if text.strip().lower().partition(":")[0] not in STEPS:
+    name = text.strip().lower().partition(":")[0]
+    if name not in STEPS:
+        known = (*STEPS, *ALGORITHMS, *FILTERS)
+        if plugin("attitude", name, AttitudeAlgorithm) is None:
+            check_choice("report.export-unknown", known, quantity="MODULE", name=name)
         return export_attitude(named_for_export(text), WRITERS[suffix][1])
     if suffix != ".c":
         raise ConfigError("report.export-c-alone", quantity="FILE", name=text)

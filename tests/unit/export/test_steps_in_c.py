@@ -130,13 +130,17 @@ def test_a_step_that_is_refused_changes_nothing(tmp_path, variant):
 
 @needs_compiler
 @pytest.mark.parametrize("variant", ["ud", "wd"])
-def test_an_invalid_observation_is_named(tmp_path, variant):
-    """The program writes nothing for a row with a negative variance, or one that is no number."""
+def test_an_invalid_observation_is_refused(tmp_path, variant):
+    """The program writes no result for a row with a negative variance, or one that is no number."""
     rows = drawn(step_parts(variant)[1], 2)
     for column, value in ((4, -1.0), (1, np.nan), (10, np.inf)):
         bad = rows.copy()
         bad[1, column] = value
         assert len(through_c(tmp_path, variant, bad)) == 1
+    program = build(tmp_path, step_in_c(variant).text, "-DCOVARIANCE_FILTER")
+    given = "\n".join(" ".join(map(repr, row)) for row in bad.tolist())
+    done = subprocess.run([program], input=given, capture_output=True, text=True, check=False)
+    assert done.stderr == "refused\n"
 
 
 @pytest.mark.skipif(shutil.which("g++") is None, reason="no C++ compiler: install g++")
