@@ -101,7 +101,7 @@ def test_a_second_log_and_rests(here, run_cli, logs):
         (["--reference-log", "nosuch.csv"], "does not exist"),
         (["--export", "nosuch/x.c"], "the folder does not exist"),
         (["--export", "there.c"], "the file exists"),
-        (["--export", "folder.c", "--force"], "the file exists"),
+        (["--export", "folder.c", "--force"], "it is a folder"),
         (["--export", "log.csv", "--force"], "must end in .c or .py"),
         (["--export-of", "quaternion"], "no file to write it to"),
         (["--export", "x.c", "--export-of", "quaternoin"], "quaternoin"),

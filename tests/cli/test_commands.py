@@ -247,7 +247,7 @@ def data_of(folder):
 def test_without_a_report_the_data_are_the_same_and_verify_repeats_them(here, run_cli):
     run_cli("attitude", "alexiev-fig4", "--quiet", "--out", "with")
     found = run_cli("attitude", "alexiev-fig4", "--no-report", "--out", "without")
-    assert f"Open  {here / 'without' / 'attitude.json'}" in found.out.replace("\n", "")
+    assert f"Data  {here / 'without' / 'attitude.json'}" in found.out.replace("\n", "")
     (all_data, stated), (data, lacking) = data_of(here / "with"), data_of(here / "without")
     assert data == all_data
     assert lacking == {**stated, "report": False}
