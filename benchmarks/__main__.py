@@ -47,7 +47,7 @@ def machine() -> str:
     if about.exists():
         found = re.search(r"^model name\s*: (.*)$", about.read_text(), flags=re.M)
         name = found.group(1) if found else name
-    return f"{name}; kernels: {COMPILER or MODE}"
+    return f"{name}; kernels by {COMPILER or MODE}"
 
 
 def write_page(rows: list[Row]) -> None:

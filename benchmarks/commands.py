@@ -68,9 +68,9 @@ def seconds(uses: list[Usage]) -> tuple[float, ...]:
 
 def start_up() -> Iterator[Row]:
     jobs = (
-        ("import strapdown", ["-c", "import strapdown"], 0.15),
-        ("strapdown --help", ["-m", "strapdown", "--help"], 0.8),
-        ("strapdown attitude --help", ["-m", "strapdown", "attitude", "--help"], 1.0),
+        ("`import strapdown`", ["-c", "import strapdown"], 0.15),
+        ("`strapdown --help`", ["-m", "strapdown", "--help"], 0.8),
+        ("`strapdown attitude --help`", ["-m", "strapdown", "attitude", "--help"], 1.0),
     )
     for what, words, goal in jobs:
         ours, theirs = [], []
