@@ -780,14 +780,16 @@ def linear_range(rule: UpdateRule | None) -> NDArray[np.float64] | None:
     """
     if rule is None:
         return np.empty(0)
-    if not isinstance(rule, RobustUpdate | AdaptiveRule) or not rule.influence.linear > 0.0:
-        return None
-    learns = isinstance(rule, AdaptiveRule)
-    out = (rule.scale if isinstance(rule, AdaptiveRule) else AdaptiveScale()).kernel_options.copy()
-    out[kernel.LINEAR], out[kernel.LEARNS] = rule.influence.linear, float(learns)
-    if isinstance(rule, RobustUpdate):
+    # Exactly these types: a subclass may behave differently.
+    if type(rule) is AdaptiveRule:
+        out = rule.scale.kernel_options.copy()
+    elif type(rule) is RobustUpdate:
+        out = np.zeros(kernel.WITHIN + 1)
         out[kernel.FACTOR] = rule.scale
-    return out
+    else:
+        return None
+    out[kernel.LINEAR] = rule.influence.linear
+    return out if out[kernel.LINEAR] > 0.0 else None
 
 
 UPDATE_RULES: dict[str, type[RobustUpdate] | type[PaperUpdate] | type[AdaptiveRule]] = {

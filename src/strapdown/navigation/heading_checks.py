@@ -142,7 +142,7 @@ def run_heading_checks(
                 said = [one.evidence(asked) for one in told if one.marks.count]
                 doubt, asked = doubted(said, at), at
             for ended in told:
-                if ended not in heard:
+                if ended not in heard and ended.marks.count:
                     ended.finish()
             fresh = _Check(made, record, run, at, doubt)
             done.append(fresh)
@@ -216,13 +216,8 @@ class _Check:
             self.history, self.newest = self.history.and_then(rows), float(piece.time[-1])
         if piece.seen:
             # The vertical innovation does not observe the heading.
-            nu, s = (
-                np.array([of[:2] for of in one])
-                for one in zip(
-                    *((seen.innovations.nu, seen.innovations.s) for seen in piece.seen),
-                    strict=True,
-                )
-            )
+            nu = np.array([one.innovations.nu[:2] for one in piece.seen])
+            s = np.array([one.innovations.s[:2] for one in piece.seen])
             time = [one.time for one in piece.seen]
             self.seen = self.seen.and_then(np.column_stack([time, nu / np.sqrt(s)]))
 

@@ -8,7 +8,16 @@ import pytest
 
 from strapdown.errors import ConfigError
 from strapdown.estimation.covariance import Joseph
-from strapdown.estimation.robust import INFLUENCES, AdaptiveScale, Huber, ScaleState, Tukey
+from strapdown.estimation.robust import (
+    INFLUENCES,
+    AdaptiveRule,
+    AdaptiveScale,
+    Huber,
+    RobustUpdate,
+    ScaleState,
+    Tukey,
+    linear_range,
+)
 
 H, ONE = np.ones((1, 1)), np.ones(1)
 
@@ -135,3 +144,15 @@ def test_bounds_hold_and_start_is_the_stated_variance():
 def test_options_are_checked(wrong, what):
     with pytest.raises(ConfigError, match=what):
         AdaptiveScale(**wrong)
+
+
+def test_a_loop_takes_within_their_linear_range_exactly_the_rules_that_it_knows():
+    class Own(RobustUpdate):
+        pass
+
+    assert linear_range(None).size == 0
+    assert linear_range(RobustUpdate(Huber(2.0), 1.5))[:3].tolist() == [2.0, 1.5, 0.0]
+    assert linear_range(AdaptiveRule(Huber(2.0)))[:3].tolist() == [2.0, 1.0, 1.0]
+    # A subclass may have another step, and Tukey's function is linear nowhere.
+    for rule in (Own(Huber()), RobustUpdate(Tukey()), AdaptiveRule(Tukey())):
+        assert linear_range(rule) is None

@@ -170,6 +170,19 @@ def test_what_a_check_finds_piece_by_piece_is_what_it_finds_at_once():
     for one, other in zip(checks, again, strict=True):
         np.testing.assert_array_equal(one.sd, other.sd)
 
+    over = _Check.over
+
+    def diverging(check, time, rows):
+        check.lost = check.since > 60.0
+        if not check.lost:
+            over(check, time, rows)
+
+    # One that diverges before its first mark has no result.
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(_Check, "over", diverging)
+        left = run_heading_checks(made, record, 0.01)
+    assert [one.since for one in left] == [one.since for one in checks if one.since <= 60.0]
+
 
 def test_gross_errors_are_left_out_of_the_repeated_run():
     result = run_navigation(drive(outliers=0.1))
