@@ -25,6 +25,8 @@ from strapdown._kernels.rotation_vector import cross
 
 # What is computed: the position, the velocity too, the acceleration too.
 POSITION, VELOCITY, ACCELERATION = 0, 1, 2
+# Columns of the errors of velocity, of rotation, and of the sensors.
+SPEED, ROTATION, SENSORS = 3, 6, 9
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -55,10 +57,9 @@ def antenna(level, up, earth, arm, arm_at, gyro_terms, accel_terms, felt, steady
                 H[i, k, j] = 0.0
     # Derivatives of the arm, in rows, and of W.
     moves, spins = H[POSITION], np.zeros((3, columns))
-    for j in range(3):
-        ex, ey, ez = 1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2)
-        moves[0, 6 + j], moves[1, 6 + j], moves[2, 6 + j] = cross(ex, ey, ez, rx, ry, rz)
-        if arm_at >= 0:
+    add_turn(1.0, rx, ry, rz, ROTATION, moves)
+    if arm_at >= 0:
+        for j in range(3):
             for k in range(3):
                 moves[k, arm_at + j] = c[3 * k + j]
     value[POSITION, 0], value[POSITION, 1], value[POSITION, 2] = rx, ry, rz
@@ -67,15 +68,9 @@ def antenna(level, up, earth, arm, arm_at, gyro_terms, accel_terms, felt, steady
         sz = earth[RATE] * level[AXIS + 2]
         ix, iy, iz = turned(c, felt[0], felt[1], felt[2])
         wx, wy, wz = ix - sx, iy - sy, iz - sz
-        for j in range(3):
-            ex, ey, ez = 1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2)
-            # The attitude turns what the gyros measure.
-            spins[0, 6 + j], spins[1, 6 + j], spins[2, 6 + j] = cross(ex, ey, ez, ix, iy, iz)
-        for e in range(gyro_terms.shape[0]):
-            m, axis, j = int(gyro_terms[e, 0]), int(gyro_terms[e, 1]), 9 + int(gyro_terms[e, 2])
-            weight = gyro_terms[e, 3] if m == 0 else gyro_terms[e, 3] * felt[m - 1]
-            for k in range(3):
-                spins[k, j] += weight * c[3 * k + axis]
+        # The attitude turns what the gyros measure.
+        add_turn(1.0, ix, iy, iz, ROTATION, spins)
+        add_errors(gyro_terms, felt, c, spins)
         vx, vy, vz = level[V_L], level[V_L + 1], level[V_L + 2]
         qx, qy, qz = swept(wx, wy, wz, rx, ry, rz, moves, spins, H[VELOCITY])
         value[VELOCITY, 0], value[VELOCITY, 1], value[VELOCITY, 2] = vx + qx, vy + qy, vz + qz
@@ -91,23 +86,34 @@ def antenna(level, up, earth, arm, arm_at, gyro_terms, accel_terms, felt, steady
             value[ACCELERATION, 0] = fx + gx - 2.0 * kx + ax
             value[ACCELERATION, 1] = fy + gy - 2.0 * ky + ay
             value[ACCELERATION, 2] = fz + gz - 2.0 * kz + az
-            of = H[ACCELERATION]
-            for j in range(3):
-                ex, ey, ez = 1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2)
-                tx, ty, tz = cross(ex, ey, ez, fx, fy, fz)
-                ux, uy, uz = cross(sx, sy, sz, ex, ey, ez)
-                of[0, 6 + j], of[0, 3 + j] = of[0, 6 + j] + tx, of[0, 3 + j] - 2.0 * ux
-                of[1, 6 + j], of[1, 3 + j] = of[1, 6 + j] + ty, of[1, 3 + j] - 2.0 * uy
-                of[2, 6 + j], of[2, 3 + j] = of[2, 6 + j] + tz, of[2, 3 + j] - 2.0 * uz
-            for e in range(accel_terms.shape[0]):
-                m, axis, j = int(accel_terms[e, 0]), int(accel_terms[e, 1]), int(accel_terms[e, 2])
-                weight = accel_terms[e, 3] if m == 0 else accel_terms[e, 3] * felt[m - 1]
-                for k in range(3):
-                    of[k, 9 + j] += weight * c[3 * k + axis]
+            add_turn(1.0, fx, fy, fz, ROTATION, H[ACCELERATION])
+            add_turn(2.0, sx, sy, sz, SPEED, H[ACCELERATION])
+            add_errors(accel_terms, felt, c, H[ACCELERATION])
         for k in range(3):
-            H[VELOCITY, k, 3 + k] += 1.0
+            H[VELOCITY, k, SPEED + k] += 1.0
     for k in range(3):
         H[POSITION, k, k] += 1.0
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def add_turn(factor, x, y, z, at, out):
+    """Add ``factor (e_j x v)`` of a vector v to the columns from `at` on: e_j is the j-th axis."""
+    for j in range(3):
+        ex, ey, ez = 1.0 * (j == 0), 1.0 * (j == 1), 1.0 * (j == 2)
+        tx, ty, tz = cross(ex, ey, ez, x, y, z)
+        out[0, at + j] += factor * tx
+        out[1, at + j] += factor * ty
+        out[2, at + j] += factor * tz
+
+
+@njit(cache=True, error_model="numpy", inline="always")
+def add_errors(terms, felt, c, out):
+    """Add the errors of a triad in level axes, by its terms at a rate and a force."""
+    for e in range(terms.shape[0]):
+        m, axis, j = int(terms[e, 0]), int(terms[e, 1]), SENSORS + int(terms[e, 2])
+        weight = terms[e, 3] if m == 0 else terms[e, 3] * felt[m - 1]
+        for k in range(3):
+            out[k, j] += weight * c[3 * k + axis]
 
 
 @njit(cache=True, error_model="numpy", inline="always")

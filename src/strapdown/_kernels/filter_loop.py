@@ -360,7 +360,7 @@ def over_fixes(
     meeting = turn, np.empty((1, LEVEL)), np.empty(6), np.empty((3, 3)), np.empty((3, 3, size))
     cut = np.empty((2, rows.shape[1]))
     between = np.empty((1, history.shape[1]))
-    ruled, before = rule.shape[0] > 0, np.empty((size, size))
+    ruled = rule.shape[0] > 0
     done, total = 0, time.shape[0]
     while done < fix_time.shape[0]:
         epoch = fix_time[done]
@@ -447,14 +447,9 @@ def over_fixes(
         if ruled:
             for i in range(size):
                 for j in range(size):
-                    before[i, j] = covariance[i, j]
+                    after[i, j] = covariance[i, j]
             learned = scales[0] if of_place else scales[1]
-            if not take_linear(
-                form, covariance, x, z, H, R, rule, learned, epoch, of_place, told[done]
-            ):
-                for i in range(size):
-                    for j in range(size):
-                        covariance[i, j] = before[i, j]
+            if not take_linear(form, after, x, z, H, R, rule, learned, epoch, of_place, told[done]):
                 return ASK, made, count, done, noted
         elif form == UD:
             wrong = ud_update(covariance, x, z, H, R, told[done])
@@ -462,11 +457,12 @@ def over_fixes(
             wrong = wd_epoch(
                 covariance, covariance, covariance, False, x, z, H, R, told[done], after
             )
+        else:
+            wrong = dense_update(covariance, x, z, H, R, form != PLAIN, told[done])
+        if ruled or form == WD:
             for i in range(size):
                 for j in range(size):
                     covariance[i, j] = after[i, j]
-        else:
-            wrong = dense_update(covariance, x, z, H, R, form != PLAIN, told[done])
         if wrong != -1:
             return BAD_FIX, made, count, done, noted
         take_off(which, state, sensors, earth, x)

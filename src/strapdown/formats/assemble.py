@@ -205,16 +205,12 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     else:
         sampling = sampling_of_rates(raw, options, findings)
     report_gaps(raw.name, time, body["gyro"], findings)
-    let_go(block)
     _refuse_impossible(raw.name, body, lambda k: raw.row(int(kept[k])))
-    let_go(block)
     report_absurd(raw.name, body["gyro"], lambda k: raw.row(int(kept[k])), findings)
     let_go(block)
     report_weightless(raw.name, body.get("accel"), findings)
-    let_go(block)
     columns = [f"{triad}_{a}" for triad in units for a in AXES]
     imu = imu_of_columns(time, block, columns, sampling=sampling, source=raw.name)
-    let_go(block)
     if not axes.stated:
         imu.attrs["axes"] = AXES_OF_SENSOR
     imu.attrs["sensor_axes"] = ",".join(
@@ -675,6 +671,7 @@ def _refuse_impossible(name: str, body: Mapping[str, Array], row: Callable[[int]
         "accel": ("io.force-impossible", IMPOSSIBLE_FORCE),
     }
     for triad, (code, limit) in limits.items():
+        let_go(body["gyro"])
         if triad not in body or max(body[triad].max(), -body[triad].min()) <= limit:
             continue
         at, k = (int(i) for i in np.argwhere(~(np.abs(body[triad]) <= limit))[0])

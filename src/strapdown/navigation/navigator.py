@@ -481,8 +481,6 @@ class EpochLoop:
             return made
         rule = self.navigator.linear_range
         assert rule is not None
-        learned = self._learned(aid)
-        receiver = np.asarray(aid.lever_arm, dtype=np.float64), rule, learned
         interval = self.navigator.mark_interval * (1.0 - 1e-9)
         queue = self.queues[aid.name]
         while made < len(time):
@@ -495,6 +493,8 @@ class EpochLoop:
                 break
             usual = Epochs(queue.time[:whole], queue.values[:whole])
             notes = (self.marked + interval, interval, AGED)
+            learned = self._learned(aid)
+            receiver = np.asarray(aid.lever_arm, dtype=np.float64), rule, learned
             made, fixed, why = engine.propagate_with_fixes(
                 time, rows, self.history, made, notes, receiver, usual
             )
