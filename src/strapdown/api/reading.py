@@ -208,6 +208,10 @@ class Streams(Mapping[str, pd.DataFrame]):
     def __contains__(self, name: object) -> bool:
         return name in self._tables
 
+    def get(self, name: str, default: Any = None) -> Any:
+        """Return the stream of this name, or `default` where the recording has none."""
+        return self._tables.get(name, default)
+
     def __iter__(self) -> Iterator[str]:
         return iter(self._tables)
 

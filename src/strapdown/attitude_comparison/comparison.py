@@ -76,7 +76,13 @@ from strapdown.increments import increments_from_imu
 from strapdown.orientation_filters import is_filter
 from strapdown.progress import Progress, silent
 from strapdown.sensors.magnetometer import calibrate_magnetometer, without_iron
-from strapdown.sensors.rest import RestStretch, find_rests, gyro_bias_from_rests, without_gyro_bias
+from strapdown.sensors.rest import (
+    RestStretch,
+    could_be_a_turn,
+    find_rests,
+    gyro_bias_from_rests,
+    without_gyro_bias,
+)
 from strapdown.systems.inputs import part_of_log
 from strapdown.tables import ACCEL, GYRO, MAG, references_table
 from strapdown.tables.checks import index_of, values_of
@@ -383,6 +389,8 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
         raise DataError("attitude.fewer-than-two-samples-left", file=source.name, begin=begin)
     if second is not None and source.truth is None:
         source = truth_of_second(source, second, imu, q_nb)
+    if spec.gyro_bias.lower() == "auto" and bias["rad_per_s"] is not None:
+        findings += _turn_or_bias(rests[0], source)
     findings = [*source.findings, *findings]
     clock = clock.of(index_of(imu))
     increments = increments_from_imu(imu, spec.interpolation)
@@ -626,6 +634,22 @@ def _field_turned(imu: pd.DataFrame, rest: RestStretch) -> bool:
         return False
     off = np.linalg.norm(np.array(parts) - parts[0], axis=1)
     return bool(off.max() > TURNED * np.linalg.norm(parts[0]))
+
+
+def _turn_or_bias(rest: RestStretch, source: AttitudeSource) -> list[Finding]:
+    """Doubt whether a rest is one, where no magnetometer tells it from a steady turn."""
+    if set(MAG) <= set(source.imu.columns) or not could_be_a_turn(rest):
+        return []
+    return [
+        Finding(
+            "attitude.bias-or-turn",
+            file=source.name,
+            quantity="gyro",
+            severity="warning",
+            bias=float(np.degrees(np.linalg.norm(rest.gyro_mean))),
+            duration=rest.end - rest.start,
+        )
+    ]
 
 
 def _significant(rest: RestStretch) -> bool:

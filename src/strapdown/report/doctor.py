@@ -117,6 +117,8 @@ def headline(one: LogDiagnosis) -> str:
     """Say what a log is fit for, in one sentence."""
     if not uses(one):
         held = " and ".join(str(s["name"]) for s in one.data["streams"])
+        if log := one.data["fixes_for"]:
+            return f"{one.name}: {held}, examined as the fixes of {log}."
         return f"{one.name}: {held} without inertial samples; give it beside an IMU log."
     words = {"yes": "fit for {}", "with limits": "fit for {} with limits", "no": "not fit for {}"}
     by_answer: dict[str, list[str]] = {}

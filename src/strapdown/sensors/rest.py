@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -31,14 +32,21 @@ QUIET_FACTOR = 3.0
 # a log in continuous motion is not taken for rest.
 MAX_GYRO_SD = 0.03  # rad/s, of the three axes together
 MAX_ACCEL_SD = 0.3  # m/s²
-# A vehicle that speeds up smoothly turns no gyro: specific force changes from one second to the
-# next, by more than biases do and than four standard deviations of the means of two windows.
-LAG = 1.0  # s
+# A vehicle that speeds up or turns smoothly shakes neither sensor: specific force or rate changes
+# over seconds by more than biases do and than four standard deviations of the means of windows.
+LAGS = (1.0, 2.0, 4.0, 8.0)  # s
 MAX_ACCEL_CHANGE = 0.1  # m/s²
+MAX_RATE_CHANGE = 0.0035  # rad/s, 0.2 deg/s
+# What remains beside such a change is a rest where it does not continue it: where the second and
+# the fourth of five parts differ by a tenth of that at most, beyond noise.
+PARTS_BESIDE, SHARE_BESIDE = 5, 0.1
 # The zero-rate output of a low-cost gyro may be off by 20 deg/s (MPU-6050 data sheet, revision 3.4,
 # section 6.1).
 MAX_MEAN_RATE = 0.36  # rad/s
 SAME_BIAS = 0.01  # rad/s: rests of one log share their bias to within this
+# A mean rate about the vertical is a bias or a steady turn. Gyros of phones are specified to
+# 1 deg/s or less (ICM-42688-P: 0.5; LSM6DSO: 1), older hobby parts show several.
+COULD_TURN = 0.0175  # rad/s, 1 deg/s
 # A noise-free (simulated) sensor is at rest where it is constant to rounding.
 ROUNDING = 1e-9  # rad/s
 # Number of parts of a rest whose means give the standard deviation of the overall mean.
@@ -121,10 +129,11 @@ def find_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
     Returns
     -------
     tuple of RestStretch
-        In order of time, each at least 1 s long. A single stretch does not distinguish a slow
-        rotation at a constant rate about the vertical from a bias: it is rejected only if another
-        stretch of the log has a bias that differs by more than 0.01 rad/s. Neither is a steady
-        acceleration distinguished from a tilt; one that changes is.
+        In order of time, each at least 1 s long. A rate that changes by 0.2 deg/s or a specific
+        force that changes by 0.1 m/s² within 8 s, beyond noise, is motion. A single stretch does
+        not distinguish a rotation at a constant rate about the vertical from a bias: it is rejected
+        only if another stretch of the log has a bias that differs by more than 0.01 rad/s; see
+        `could_be_a_turn`. Neither is a steady acceleration distinguished from a tilt.
     """
     time = imu.index.to_numpy(dtype=np.float64)
     gyro = imu[GYRO].to_numpy(dtype=np.float64)
@@ -132,18 +141,23 @@ def find_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
     starts, ends = _windows(time)
     if not len(starts):
         return ()
-    gyro_sd = _window_sd(gyro, starts, ends)
+    gyro_sd, rate = _window_sd(gyro, starts, ends), _window_mean(gyro, starts, ends)
     quiet = max(QUIET_FACTOR * float(np.quantile(gyro_sd, QUIET_QUANTILE)), ROUNDING)
     still = gyro_sd <= min(quiet, MAX_GYRO_SD)
-    still &= np.abs(_window_mean(gyro, starts, ends)).max(axis=1) <= MAX_MEAN_RATE
+    still &= np.abs(rate).max(axis=1) <= MAX_MEAN_RATE
+    root = np.sqrt(ends - starts)
+    slow = [(rate, gyro_sd / root, MAX_RATE_CHANGE)]
     if accel is not None:
         accel_sd = _window_sd(accel, starts, ends)
         still &= accel_sd <= MAX_ACCEL_SD
-        still &= ~_accelerates(time, accel, accel_sd, still, (starts, ends))
+        slow.append((_window_mean(accel, starts, ends), accel_sd / root, MAX_ACCEL_CHANGE))
+    drifts = _drifts(time[starts], slow, still)
+    joined = time[starts[1:]] - time[ends[:-1] - 1] < LEAST_LENGTH
     rests = [
         _stretch(time, gyro, accel, int(starts[a]), int(ends[b]))
-        for a, b in _runs(still, time[starts[1:]] - time[ends[:-1] - 1] < LEAST_LENGTH)
+        for a, b in _runs(still & ~drifts, joined)
         if time[ends[b] - 1] - time[starts[a]] >= LEAST_LENGTH
+        and not _continues(slow, drifts, np.arange(a, b + 1))
     ]
     return of_one_bias(rests)
 
@@ -179,27 +193,53 @@ def _window_sd(values: Array, starts: Indices, ends: Indices) -> Array:
     return np.asarray(np.sqrt(variances), dtype=np.float64)
 
 
-def _accelerates(
-    time: Array,
-    accel: Array,
-    accel_sd: Array,
+def _drifts(
+    start: Array,
+    slow: Sequence[tuple[Array, Array, float]],
     still: NDArray[np.bool_],
-    windows: tuple[Indices, Indices],
+    lags: Sequence[float] = LAGS,
 ) -> NDArray[np.bool_]:
-    """Whether, within still windows, the mean of one is not that of the window a second later."""
-    starts, ends = windows
-    mean = _window_mean(accel, starts, ends)
-    ahead = np.minimum(np.searchsorted(time[starts], time[starts] + LAG - 1e-9), len(starts) - 1)
-    count = np.cumsum(still)
-    together = still & (count[ahead] - count == ahead - np.arange(len(starts)))
-    together &= time[starts[ahead]] - time[starts] <= LAG + WINDOW
-    variance = accel_sd**2 / (ends - starts)
-    limit = MAX_ACCEL_CHANGE + 4.0 * np.sqrt(variance + variance[ahead])
-    moved = together & (np.linalg.norm(mean[ahead] - mean, axis=1) > limit)
-    changes = np.zeros(len(starts) + 1, dtype=np.int64)
-    np.add.at(changes, np.flatnonzero(moved), 1)
-    np.add.at(changes, ahead[moved] + 1, -1)
-    return np.asarray(np.cumsum(changes)[:-1] > 0)
+    """Whether, within still windows, the mean of some is not that of others up to 8 s later.
+
+    `start` ((n,), s) of each window; `slow`: means ((n, 3)), their standard deviations ((n,)), and
+    the change of a stationary sensor. Both means are over half a lag, so that a jolt is no drift.
+    Windows between two that differ are marked, at the shortest lag first: what it marks is not
+    compared over a longer one.
+    """
+    index, left = np.arange(len(start)), still.copy()
+    totals = [np.vstack([np.zeros(3), np.cumsum(mean, axis=0)]) for mean, _, _ in slow]
+    for lag in lags:
+        past = np.maximum(np.searchsorted(start, start + 0.5 * lag - 1e-9), index + 1)
+        ahead = np.minimum(np.searchsorted(start, start + lag - 1e-9), len(start) - 1)
+        last, count = past[ahead] - 1, np.cumsum(left)
+        together = left & (count[last] - count == last - index)
+        together &= start[last] - start <= 1.5 * lag + WINDOW
+        changes = np.zeros(len(start) + 1, dtype=np.int64)
+        for total, (_, sd, most) in zip(totals, slow, strict=True):
+            average = (total[past] - total[:-1]) / (past - index)[:, None]
+            limit = most + 4.0 * np.sqrt(sd**2 + sd[ahead] ** 2)
+            moved = together & (np.linalg.norm(average[ahead] - average, axis=1) > limit)
+            np.add.at(changes, np.flatnonzero(moved), 1)
+            np.add.at(changes, last[moved] + 1, -1)
+        left &= np.cumsum(changes)[:-1] == 0
+    return np.asarray(still & ~left)
+
+
+def _continues(
+    slow: Sequence[tuple[Array, Array, float]], drifts: NDArray[np.bool_], run: Indices
+) -> bool:
+    """Whether a run of windows is beside a drift and continues it; see `_drifts`."""
+    if not drifts[max(run[0] - 1, 0) : run[-1] + 2].any():
+        return False
+    early, late = (np.array_split(run, PARTS_BESIDE)[k] for k in (1, PARTS_BESIDE - 2))
+    if not late.size:
+        return True
+    for mean, sd, most in slow:
+        change = np.linalg.norm(mean[late].mean(axis=0) - mean[early].mean(axis=0))
+        noise = 4.0 * math.sqrt(2.0 / late.size) * float(sd[run].max())
+        if change > SHARE_BESIDE * most + noise:
+            return True
+    return False
 
 
 def _runs(still: NDArray[np.bool_], joined: NDArray[np.bool_]) -> list[tuple[int, int]]:
@@ -276,6 +316,19 @@ def sd_of_mean(time: Array, values: Array) -> Array:
     return np.asarray(np.maximum(white, means.std(axis=0, ddof=1) / np.sqrt(parts)))
 
 
+def could_be_a_turn(rest: RestStretch) -> bool:
+    """Whether the mean rate of a rest could be that of a steady turn about the vertical.
+
+    About another axis than the vertical a turn would tilt the specific force. True as well if the
+    rate exceeds 1 deg/s and there is no specific force.
+    """
+    mean = np.array(rest.gyro_mean)
+    if rest.accel_mean is None:
+        return bool(np.linalg.norm(mean) > COULD_TURN)
+    force = np.array(rest.accel_mean)
+    return bool(abs(mean @ force) > COULD_TURN * np.linalg.norm(force))
+
+
 def _stretch(time: Array, gyro: Array, accel: Array | None, a: int, b: int) -> RestStretch:
     force = None if accel is None else accel[a:b]
     return RestStretch(
@@ -309,6 +362,7 @@ def of_one_bias(rests: list[RestStretch]) -> tuple[RestStretch, ...]:
 SHAKING_WINDOW = 4.0  # s
 BLOCKS = 8
 STEP = 1.0  # s
+SHAKING_LAGS = (4.0, 8.0)  # s
 MAX_GYRO_SCATTER = 0.0044  # rad/s, 0.25 deg/s: root of the summed variances of the block means
 MAX_ACCEL_SCATTER = 0.065  # m/s²
 # A hand or a foot exceeds these regardless of its means, and so does a vibrating motor mount.
@@ -343,40 +397,51 @@ def find_shaking_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
         return ()
     time = imu.index.to_numpy(dtype=np.float64)
     values = imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64)
-    spans: list[tuple[float, float]] = []
     end = time[-1] - SHAKING_WINDOW + 1e-9
-    for start in occupied_grid(time, end, STEP, SHAKING_WINDOW):
-        if not _shakes_in_place(time, values, float(start)):
-            continue
-        if spans and start <= spans[-1][1]:
-            spans[-1] = (spans[-1][0], float(start) + SHAKING_WINDOW)
-        else:
-            spans.append((float(start), float(start) + SHAKING_WINDOW))
+    starts = occupied_grid(time, end, STEP, SHAKING_WINDOW)
+    means = [_shaking_mean(time, values, float(start)) for start in starts]
+    shakes = np.array([one is not None for one in means], dtype=bool)
+    if not shakes.any():
+        return ()
+    table = np.array([np.zeros(8) if one is None else one for one in means])
+    slow = [
+        (table[:, :3], table[:, 6], MAX_RATE_CHANGE),
+        (table[:, 3:6], table[:, 7], MAX_ACCEL_CHANGE),
+    ]
+    drifts = _drifts(starts, slow, shakes, SHAKING_LAGS)
+    spans: list[tuple[float, float]] = []
+    kept = np.flatnonzero(shakes & ~drifts)
+    # Windows that overlap or touch are of one rest.
+    for run in np.split(kept, np.flatnonzero(np.diff(starts[kept]) > SHAKING_WINDOW) + 1):
+        if run.size and not _continues(slow, drifts, run):
+            spans.append((float(starts[run[0]]), float(starts[run[-1]]) + SHAKING_WINDOW))
     return of_one_bias([rest_between(imu, a, b, grade="shaking") for a, b in spans])
 
 
-def _shakes_in_place(time: Array, values: Array, start: float) -> bool:
+def _shaking_mean(time: Array, values: Array, start: float) -> Array | None:
+    """Means of a window that vibrates about one attitude, and sd of the means of either triad.
+
+    (8,); None of another window.
+    """
     edges = np.searchsorted(time, start + np.linspace(0.0, SHAKING_WINDOW, BLOCKS + 1))
     if np.diff(edges).min() < 3:
-        return False
+        return None
     whole = values[edges[0] : edges[-1]]
     mean, variance = whole.mean(axis=0), whole.var(axis=0)
-    if (
-        np.sqrt(variance[:3].sum()) > SHAKING_MAX_GYRO_SD
-        or np.sqrt(variance[3:].sum()) > SHAKING_MAX_ACCEL_SD
-    ):
-        return False
-    size = float(np.sqrt(mean[3:] @ mean[3:]))
-    if not NEAR_GRAVITY[0] <= size <= NEAR_GRAVITY[1]:
-        return False
-    if np.sqrt(mean[:3] @ mean[:3]) > MAX_MEAN_RATE:
-        return False
     means = np.add.reduceat(whole, edges[:-1] - edges[0], axis=0) / np.diff(edges)[:, None]
     scatter = means.var(axis=0)
-    return bool(
-        np.sqrt(scatter[:3].sum()) <= MAX_GYRO_SCATTER
+    shakes = (
+        np.sqrt(variance[:3].sum()) <= SHAKING_MAX_GYRO_SD
+        and np.sqrt(variance[3:].sum()) <= SHAKING_MAX_ACCEL_SD
+        and NEAR_GRAVITY[0] <= np.sqrt(mean[3:] @ mean[3:]) <= NEAR_GRAVITY[1]
+        and np.sqrt(mean[:3] @ mean[:3]) <= MAX_MEAN_RATE
+        and np.sqrt(scatter[:3].sum()) <= MAX_GYRO_SCATTER
         and np.sqrt(scatter[3:].sum()) <= MAX_ACCEL_SCATTER
     )
+    # From block to block, so that a drift is no noise.
+    noise = 0.5 * np.square(np.diff(means, axis=0)).mean(axis=0)
+    sd = np.sqrt(np.array([noise[:3].sum(), noise[3:].sum()]) / BLOCKS)
+    return np.concatenate([mean, sd]) if shakes else None
 
 
 def find_rests_of_every_grade(imu: pd.DataFrame) -> tuple[RestStretch, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import shlex
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -43,12 +43,16 @@ from strapdown.navigation.measurements.gnss_readiness import gnss_readiness
 from strapdown.progress import Progress, silent
 from strapdown.sensors.health_log import LEAST_SAMPLES
 from strapdown.sensors.imu_health import ImuHealth, check_imu_channels
-from strapdown.sensors.rest import RestStretch, find_rests_of_every_grade
+from strapdown.sensors.rest import RestStretch, could_be_a_turn, find_rests_of_every_grade
 from strapdown.sensors.sampling_health import check_sampling, quantization_step
 from strapdown.systems.alignment_source import body_record
 from strapdown.systems.inputs import Memory, SavedRun
 from strapdown.systems.navigation_checks import MOST, longest_faults, unusable_samples
-from strapdown.systems.navigation_proposal import CODE_POSITION_SD, CODE_VELOCITY_SD
+from strapdown.systems.navigation_proposal import (
+    CODE_POSITION_SD,
+    CODE_VELOCITY_SD,
+    first_motion,
+)
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GYRO, POSITION_SD, find_gaps
 from strapdown.tables.checks import index_of, values_of
@@ -203,7 +207,9 @@ def run_doctor(spec: DoctorSpec, progress: Progress = silent) -> Diagnosis:
     alone = [k for k, one in enumerate(logs) if "gnss" in one.streams and "imu" not in one.streams]
     for k, one in enumerate(logs):
         if alone and "imu" in one.streams and "gnss" not in one.streams:
-            logs[k] = _with_fixes(one, logs[alone[0]])
+            fixes = logs[alone[0]]
+            logs[k] = _with_fixes(one, fixes)
+            logs[alone[0]] = replace(fixes, data={**fixes.data, "fixes_for": one.name})
     between = (*(e.finding for e in unread), *_between(logs))
     findings = tuple(f for one in logs for f in (*one.questions, *one.faults, *one.notes))
     inputs = tuple(input_files("log", x.log.path, _files(x)) for x in logs)
@@ -239,6 +245,7 @@ def _diagnose(log: LogTable, axes: str | None, fixes: FixesTable | None) -> LogD
     rests: tuple[RestStretch, ...] = ()
     if inertial.imu is not None:
         health, rests, found = _channels(inertial.imu)
+        rests = _unmoved(rests, streams)
         findings += found
         findings += _reference_against(streams)
     clock, found = _fixes_against(streams)
@@ -265,9 +272,10 @@ def _diagnose(log: LogTable, axes: str | None, fixes: FixesTable | None) -> LogD
         "stamps": None if inertial.imu is None else _steps(inertial.imu),
         "channels": {} if health is None else _channel_facts(streams["imu"], health),
         "stationary": [_rest(streams["imu"], rest) for rest in rests],
-        "gravity": _gravity(inertial, rests),
+        "gravity": _gravity(inertial.imu, inertial.findings, rests),
         "receiver_clock": clock,
         "fixes_from": None,
+        "fixes_for": None,
         "impact": impact,
         "crash_record": _crash_record(log.path) if lacks else None,
         "temperature": _temperature(streams),
@@ -298,12 +306,19 @@ def _with_fixes(one: LogDiagnosis, other: LogDiagnosis) -> LogDiagnosis:
     streams = {**one.streams, "gnss": other.streams["gnss"]}
     clock, found = _fixes_against(streams)
     found = [f for f in found if f not in (*other.faults, *other.notes)]
-    more = {"receiver_clock": clock, "fixes_from": other.name}
+    rests = _unmoved(one.rests, streams)
+    more = {
+        "receiver_clock": clock,
+        "fixes_from": other.name,
+        "stationary": [_rest(one.streams["imu"], rest) for rest in rests],
+        "gravity": _gravity(one.streams["imu"], (*one.faults, *one.notes), rests),
+    }
     listed = [*one.data["streams"], *(s for s in other.data["streams"] if s["name"] == "gnss")]
     return _judged(
         replace(
             one,
             streams=streams,
+            rests=rests,
             faults=(*one.faults, *(f for f in found if f.severity != "note")),
             notes=(*one.notes, *(f for f in found if f.severity == "note")),
             data={**one.data, **more, "streams": listed},
@@ -452,6 +467,22 @@ def _channels(
     held = any(f.code == "sensors.samples-held" for f in sampling)
     faults = [f for f in health.faults if f.kind != "noisy" or not held]
     return health, find_rests_of_every_grade(imu), [*longest_faults(imu, faults), *sampling]
+
+
+def _unmoved(
+    rests: tuple[RestStretch, ...], streams: Mapping[str, pd.DataFrame]
+) -> tuple[RestStretch, ...]:
+    """Rests in which fixes show no motion: a steady turn is still to a gyro, too."""
+    if "gnss" not in streams:
+        return rests
+    fixes, _ = _on_clock(streams["gnss"], streams["imu"])
+    time = index_of(fixes)
+    inside = [fixes[(time >= rest.start) & (time <= rest.end)] for rest in rests]
+    return tuple(
+        rest
+        for rest, part in zip(rests, inside, strict=True)
+        if len(part) < 2 or first_motion(part)[0] is None
+    )
 
 
 def _fixes_against(
@@ -632,12 +663,13 @@ def _rest(imu: pd.DataFrame, rest: RestStretch) -> dict[str, Any]:
     }
 
 
-def _gravity(inertial: _Inertial, rests: Sequence[RestStretch]) -> dict[str, Any] | None:
+def _gravity(
+    imu: pd.DataFrame | None, findings: Iterable[Finding], rests: Sequence[RestStretch]
+) -> dict[str, Any] | None:
     """Whether the specific force has gravity, with its size at rest."""
-    imu = inertial.imu
     if imu is None or ACCEL[0] not in imu.columns:
         return None
-    removed = any(f.code == "io.no-gravity" for f in inertial.findings)
+    removed = any(f.code == "io.no-gravity" for f in findings)
     at_rest = [float(np.linalg.norm(r.accel_mean)) for r in rests if r.accel_mean is not None]
     usual = float(np.median(np.linalg.norm(values_of(imu, ACCEL), axis=1)))
     return {
@@ -786,9 +818,10 @@ def _bias(one: LogDiagnosis) -> Finding:
         return Finding("doctor.bias-unknown", file=one.name)
     rest = max(one.rests, key=lambda r: r.end - r.start)
     sd = float(np.max(rest.gyro_mean_sd or rest.gyro_sd))
+    turn = could_be_a_turn(rest) and "gnss" not in one.streams
     return Finding(
-        "doctor.bias-from-rest",
-        severity="note",
+        "doctor.bias-or-turn" if turn else "doctor.bias-from-rest",
+        severity="warning" if turn else "note",
         file=one.name,
         bias=float(np.degrees(np.linalg.norm(rest.gyro_mean))),
         duration=rest.end - rest.start,

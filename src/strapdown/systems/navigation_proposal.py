@@ -445,7 +445,7 @@ def _motion(imu: pd.DataFrame, fixes: pd.DataFrame | None) -> tuple[float, bool]
     within = (at >= time[0]) & (at <= time[-1])
     if within.sum() < 2:
         return 0.0, False
-    begins, fastest = _moving(fixes[within])
+    begins, fastest = first_motion(fixes[within])
     rest = float((at[within][begins] if begins is not None else time[-1]) - time[0])
     first = float(at[within][0])
     if begins == 0:
@@ -458,7 +458,7 @@ def _motion(imu: pd.DataFrame, fixes: pd.DataFrame | None) -> tuple[float, bool]
     return max(rest, 0.0), fastest > DRIVES
 
 
-def _moving(fixes: pd.DataFrame) -> tuple[int | None, float]:
+def first_motion(fixes: pd.DataFrame) -> tuple[int | None, float]:
     """Begin of the first motion, and the greatest significant speed over ground.
 
     Where the receiver measures no speed: the distance between two positions minus that explained

@@ -191,6 +191,8 @@ def test_streams_of_a_file_by_name(tmp_path, rest):
     assert "imu: 6001 rows" in repr(streams) or "imu: 6000 rows" in repr(streams)
     with pytest.raises(DataError, check=coded("api.unknown-stream", file="log.csv")):
         streams["gnss"]
+    assert streams.get("gnss") is None
+    assert streams.get("imu") is streams["imu"]
     (tmp_path / "fixes.csv").write_text(
         "time_s,lat_deg,lon_deg,alt_m,north_sd_m,east_sd_m,down_sd_m\n0,1,2,3,1,1,1\n1,1,2,3,1,1,1\n"
     )

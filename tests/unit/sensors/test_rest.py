@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 
-from strapdown.sensors.rest import find_rests, sd_of_mean
+from strapdown.sensors.rest import (
+    could_be_a_turn,
+    find_rests,
+    find_rests_of_every_grade,
+    sd_of_mean,
+)
 from strapdown.tables import imu_table
 
 
@@ -109,3 +115,71 @@ def test_a_mean_of_two_seconds_of_rocking_is_not_white_noise():
     # longer than the part scatters less than it is off; as white noise it is off by fifteen.
     off = np.abs(swing.mean(axis=0))
     assert np.median(off / sd) < 3.0 < 10.0 < np.median(off / (swing.std(axis=0) / np.sqrt(120)))
+
+
+def lap(seconds=120.0, rate=100, gyro_sd=3e-4, accel_sd=8e-3, seed=3):
+    """A vehicle that laps an ellipse smoothly: level, its nose along the way, without vibration.
+
+    Semi-axes 150 and 90 m, a lap in 80 s: rates of 2.7 to 7.5 deg/s and forces along the way of up
+    to 0.4 m/s², both always changing. Exact rates and forces but for the sensors' noise.
+    """
+    rng = np.random.default_rng(seed)
+    time = np.arange(int(seconds * rate)) / rate
+    w, a, b = 2.0 * np.pi / 80.0, 150.0, 90.0
+    c, s = np.cos(w * time), np.sin(w * time)
+    velocity = np.stack([-a * w * s, b * w * c])
+    acceleration = np.stack([-a * w * w * c, -b * w * w * s])
+    speed = np.hypot(*velocity)
+    turn = (velocity[0] * acceleration[1] - velocity[1] * acceleration[0]) / speed**2
+    along = (velocity * acceleration).sum(axis=0) / speed
+    zero = np.zeros_like(time)
+    gyro = np.column_stack([zero, zero, turn]) + gyro_sd * rng.normal(size=(time.size, 3))
+    force = np.column_stack([along, turn * speed, zero - 9.81])
+    return imu_table(time, gyro, force + accel_sd * rng.normal(size=gyro.shape))
+
+
+@pytest.mark.parametrize("seconds", [20.0, 60.0, 120.0])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_smooth_drive_that_always_turns_is_never_at_rest(seconds, seed):
+    """Its quietest twentieth is as quiet as a rest; over seconds, rate and force change."""
+    table = lap(seconds, seed=seed)
+    assert find_rests(table) == ()
+    assert find_rests_of_every_grade(table) == ()
+
+
+def test_a_rest_before_a_smooth_drive_remains():
+    still, drive = log(100, 3e-4, [], seconds=10.0), lap(60.0)
+    drive.index = drive.index + 10.0
+    first, *more = find_rests_of_every_grade(pd.concat([still, drive]))
+    assert not more
+    assert first.start == 0.0
+    # The step to the drive is that of a window, 0.5 s long and one in 0.25 s; a comparison over 2 s
+    # marks no window before that.
+    assert 8.0 < first.end <= 10.5
+
+
+def test_a_jolt_ends_no_rest_for_longer_than_it_lasts():
+    """Half a second in which somebody leans on a parked car: no drift over seconds."""
+    table = log(100, 2e-3, [], seconds=30.0)
+    table.loc[(table.index >= 15.0) & (table.index < 15.5), "gyro_x"] += 0.5
+    rests = find_rests(table)
+    assert [(round(r.start), round(r.end)) for r in rests] == [(0, 15), (16, 30)]
+
+
+@pytest.mark.parametrize(
+    ("rate", "force", "turns"),
+    [
+        ((0.0, 0.0, 0.06), (0.0, 0.0, -9.81), True),
+        ((0.0, 0.0, 0.015), (0.0, 0.0, -9.81), False),
+        ((0.06, 0.0, 0.0), (0.0, 0.0, -9.81), False),
+        ((0.06, 0.0, 0.0), (-9.81, 0.0, 0.0), True),
+        ((0.06, 0.0, 0.0), None, True),
+    ],
+)
+def test_a_rate_about_the_vertical_could_be_a_turn(rate, force, turns):
+    table = log(100, 1e-3, [], bias=rate, accel=False)
+    if force is not None:
+        noise = 0.01 * np.random.default_rng(1).normal(size=(len(table), 3))
+        table = imu_table(table.index, table.to_numpy()[:, :3], np.array(force) + noise)
+    (rest,) = find_rests(table)
+    assert could_be_a_turn(rest) == turns

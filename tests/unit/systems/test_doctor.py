@@ -22,6 +22,7 @@ from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation import simulate_imu
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
 from strapdown.systems.doctor import USES
+from strapdown.tables import gnss_table
 
 RATE, REST, MOVING = 100.0, 20.0, 60.0
 G = 9.81
@@ -469,3 +470,49 @@ def test_an_accelerometer_of_an_open_unit_is_not_said_to_be_missing(sound, tmp_p
     )
     assert "doctor.accel-open" in {f.code for f in open_.logs[0].fit["attitude"]}
     assert "doctor.no-leveling" in {f.code for f in lacks.logs[0].fit["attitude"]}
+
+
+@pytest.fixture
+def circle(tmp_path):
+    """A minute of a steady turn of 3 deg/s at 10 m/s, and fixes of it: logs of both."""
+    rng, time = np.random.default_rng(4), np.arange(0.0, 60.0, 0.01)
+    turn, speed = np.radians(3.0), 10.0
+    still, noise = np.zeros_like(time), rng.normal(size=(time.size, 6))
+    gyro = np.column_stack([still, still, still + turn]) + 1e-4 * noise[:, :3]
+    accel = np.column_stack([still, still + turn * speed, still - 9.81]) + 0.01 * noise[:, 3:]
+    log, fixes = tmp_path / "circle.csv", tmp_path / "fixes.csv"
+    written(pd.DataFrame(np.column_stack([time, gyro, accel]), columns=COLUMNS), log)
+    at, radius = time[::100], speed / turn / 6.37e6
+    lat = 45.0 + np.degrees(radius * np.sin(turn * at))
+    lon = 10.0 + np.degrees(radius * (1.0 - np.cos(turn * at))) / np.cos(np.radians(45.0))
+    place = np.column_stack([lat, lon, 0.0 * at])
+    velocity = speed * np.column_stack([np.cos(turn * at), np.sin(turn * at), 0.0 * at])
+    gnss = gnss_table(at, place, velocity, np.ones((at.size, 3)), np.full((at.size, 3), 0.1))
+    csv.write(fixes, table_columns(gnss), {})
+    return log, fixes
+
+
+def test_fixes_that_move_end_what_the_samples_take_for_a_rest(circle):
+    log, fixes = circle
+    (alone,) = sd.doctor(log).logs
+    assert len(alone.rests) == len(alone.data["stationary"]) == 1
+    assert [f.code for f in alone.fit["attitude"]].count("doctor.bias-or-turn") == 1
+    assert alone.answer("attitude") == "with limits"
+    one, of_fixes = sd.doctor([log, fixes]).logs
+    assert one.rests == ()
+    assert one.data["stationary"] == []
+    assert one.data["gravity"]["at_rest_m_per_s2"] is None
+    assert "doctor.bias-unknown" in [f.code for f in one.fit["attitude"]]
+    assert of_fixes.data["fixes_for"] == one.name
+    assert one.data["fixes_for"] is None
+
+
+def test_fixes_of_a_rest_leave_it(circle, tmp_path):
+    log, fixes = circle
+    table = read_gnss(fixes)
+    table[["lat", "lon"]] = [45.0, 10.0]
+    table[["VN", "VE", "VD"]] = 0.0
+    csv.write(fixes, table_columns(table), {})
+    one, _ = sd.doctor([log, fixes]).logs
+    assert len(one.rests) == 1
+    assert "doctor.bias-from-rest" in [f.code for f in one.fit["attitude"]]

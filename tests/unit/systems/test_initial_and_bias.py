@@ -5,13 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from tests.coded import coded
 
 from strapdown.api.attitude import compare_attitude
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats.writers import WRITERS
-from strapdown.tables import GYRO, imu_table
+from strapdown.tables import ACCEL, GYRO, MAG, imu_table
 
 BIAS = np.array([0.02, -0.03, 0.01])
 
@@ -127,3 +128,27 @@ def test_a_summary_of_nothing_still_has_its_columns(log):
     summary = compare_attitude(log).summary
     assert len(summary) == 0
     assert {"algorithm", "against", "error_deg"} <= set(summary.columns)
+
+
+@pytest.mark.parametrize(("rate", "doubted"), [(0.05, True), (0.01, False)])
+def test_a_large_bias_may_be_a_turn_and_stated_ones_are_not_doubted(tmp_path, rate, doubted):
+    """Level, ten seconds of a rate about the vertical, a turn about another axis, again ten."""
+    rng, time = np.random.default_rng(2), np.arange(2500) * 0.01
+    gyro = 1e-4 * rng.normal(size=(2500, 3)) + [0.0, 0.0, rate]
+    gyro[1000:1500, 0] += np.sin(2.0 * np.pi * time[:500] / 5.0)
+    force = np.array([0.0, 0.0, -9.81]) + 0.01 * rng.normal(size=gyro.shape)
+    path = tmp_path / "log.csv"
+    WRITERS["csv"].write(path, {"imu": imu_table(time, gyro, force)})
+    found = compare_attitude(path)
+    assert ("attitude.bias-or-turn" in [f.code for f in found.findings]) == doubted
+    assert found.gyro_bias["rad_per_s"][2] == pytest.approx(rate, abs=1e-5)
+    for stated in ("rest", (0.0, 0.0, rate), "none"):
+        stated_codes = [f.code for f in compare_attitude(path, gyro_bias=stated).findings]
+        assert "attitude.bias-or-turn" not in stated_codes
+    # A magnetic field that stays tells a rest from a turn.
+    field = np.tile([20.0, 0.0, 40.0], (2500, 1)) + 0.1 * rng.normal(size=gyro.shape)
+    units = dict.fromkeys(GYRO, "rad/s") | dict.fromkeys(ACCEL, "m/s2") | dict.fromkeys(MAG, "uT")
+    names = ["time_s", *(f"{name}_{unit}" for name, unit in units.items())]
+    columns = np.column_stack([time, gyro, force, field])
+    pd.DataFrame(columns, columns=names).to_csv(path, index=False)
+    assert "attitude.bias-or-turn" not in [f.code for f in compare_attitude(path).findings]

@@ -10,9 +10,9 @@ from strapdown.systems.navigation_proposal import (
     _alignment,
     _levelled,
     _motion,
-    _moving,
     _quiet,
     _rest,
+    first_motion,
 )
 from strapdown.tables import gnss_table, imu_table
 
@@ -35,7 +35,7 @@ def fixes(speed: float, noise: float = 0.0) -> pd.DataFrame:
 
 @pytest.mark.parametrize("speed", [5.0, 10.0, 30.0])
 def test_a_drive_is_seen_though_a_step_is_shorter_than_the_errors(speed):
-    begins, fastest = _moving(fixes(speed))
+    begins, fastest = first_motion(fixes(speed))
     # Two fixes tell a way that is 4.5 standard deviations of their difference, and 0.5 m/s more;
     # windows double, so that the one that shows it is at most twice as long, and begins in the
     # rest by no more.
@@ -47,7 +47,7 @@ def test_a_drive_is_seen_though_a_step_is_shorter_than_the_errors(speed):
 def test_a_rest_whose_places_scatter_is_no_drive():
     # 1200 fixes and 11 lags: 13000 pairs, of which 4.5 standard deviations leave 0.5 in two
     # components, and fewer in the one that scatters here.
-    begins, fastest = _moving(fixes(0.0, noise=SD))
+    begins, fastest = first_motion(fixes(0.0, noise=SD))
     assert begins is None
     assert fastest <= 0.5
 
@@ -117,5 +117,5 @@ def test_a_phone_at_rest_does_not_move_by_the_noise_of_its_speed():
     for begins in (60, 30):
         velocity = noise + np.where(time >= begins, 1.4, 0.0)[:, None] * [1.0, 0.0, 0.0]
         table = gnss_table(time, place, velocity, np.full((60, 3), SD), sd, source="fixes.csv")
-        found = _moving(table)[0]
+        found = first_motion(table)[0]
         assert found is None if begins == 60 else abs(found - begins) <= 3
