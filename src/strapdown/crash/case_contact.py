@@ -241,7 +241,7 @@ def _deformation_apart(results: Sequence[CaseResult], closure: Closure) -> Itera
     energies = [r.deformation.energy for r in results if r.deformation.energy is not None]
     lost = closure.energy
     if len(energies) == len(results) and lost is not None:
-        whole = sum(e.value for e in energies)
+        whole = math.fsum(e.value for e in energies)
         half = math.hypot(lost.half_width, *(e.half_width for e in energies))
         if abs(whole - lost.value) > half:
             yield Finding(

@@ -538,7 +538,9 @@ def _clock(name: str, values: Array, heading: Heading, why: str) -> tuple[Clock,
     shares = {str(v): p for v, p in ((said.value, said.confidence), *said.alternatives) if v}
     within = {u: p for u, p in shares.items() if SLOWEST <= rates[u] <= FASTEST}
     # A step of one is a sample count as often as a millisecond.
-    total = sum(within.values()) + (1.0 if _counts(values) and heading.quantity != "time" else 0.0)
+    total = math.fsum(within.values()) + (
+        1.0 if _counts(values) and heading.quantity != "time" else 0.0
+    )
     best = max(within, key=lambda u: within[u], default="s")
     time = values * TIME_UNITS[best]
     if within and within[best] >= THRESHOLD * total:

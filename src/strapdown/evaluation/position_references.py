@@ -12,6 +12,7 @@ forward along the run's north, right, and down.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -321,7 +322,7 @@ def _score(
         time=place.time,
         since=place.since,
         legs=len(legs),
-        seconds=sum(leg.seconds for leg in legs),
+        seconds=math.fsum(leg.seconds for leg in legs),
         moved_m=_triple(moved),
         moved_corrected_m=_triple(corrected),
         expected_m=place.moved,
@@ -345,7 +346,7 @@ def _sd(
     of_bias = np.repeat([errors.accel_bias_sd, errors.gyro_bias_sd], 3)
     variance = np.square(by_bias * of_bias).sum()
     variance += np.square(by_tilt * np.radians(errors.tilt_sd_deg)).sum()
-    variance += 3.0 * noise**2 * sum(p[2] for p in parts)
+    variance += 3.0 * noise**2 * math.fsum(p[2] for p in parts)
     return float(np.sqrt(variance))
 
 

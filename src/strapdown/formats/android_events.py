@@ -178,7 +178,7 @@ def _are_of_android(rows: list[tuple[str, ...]]) -> bool:
     sizes: dict[str | None, list[float]] = {}
     for field, *values in rows:
         try:
-            size = math.sqrt(sum(float(v) ** 2 for v in values))
+            size = math.sqrt(math.fsum(float(v) ** 2 for v in values))
         except ValueError:
             return False
         sizes.setdefault(kind_of(field), []).append(size)

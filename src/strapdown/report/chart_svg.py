@@ -428,7 +428,7 @@ def _height(chart: Chart) -> float:
         return 3.2
     titles = 0.18 * sum(bool(panel.title) for panel in chart.panels)
     alone = 0.6 * (len(chart.panels) == 1)
-    return 0.85 + 0.95 * sum(panel.height for panel in chart.panels) + titles + alone
+    return 0.85 + 0.95 * math.fsum(panel.height for panel in chart.panels) + titles + alone
 
 
 def _frames(chart: Chart, start: float, height: float) -> list[Frame]:
@@ -444,7 +444,7 @@ def _frames(chart: Chart, start: float, height: float) -> list[Frame]:
         above, below = max(a for a, _ in rooms), max(b for _, b in rooms)
         spans = [(start + above, height - below)] * count
     else:
-        used = sum(a + b for a, b in rooms) + _BETWEEN * (count - 1)
+        used = math.fsum(a + b for a, b in rooms) + _BETWEEN * (count - 1)
         ratios = np.array([panel.height for panel in chart.panels])
         free = np.maximum(height - start - used, 20.0 * count) * ratios / ratios.sum()
         spans, top = [], start
@@ -597,7 +597,7 @@ def _across(chart: Chart, sides: list[tuple[float, float]]) -> list[tuple[float,
     if not chart.beside:
         left, right = max(a for a, _ in sides), max(b for _, b in sides)
         return [(left, _WIDTH - right)] * len(sides)
-    free = (_WIDTH - sum(a + b for a, b in sides)) / len(sides)
+    free = (_WIDTH - math.fsum(a + b for a, b in sides)) / len(sides)
     found, at = [], 0.0
     for left, right in sides:
         found.append((at + left, at + left + free))

@@ -652,7 +652,7 @@ def budget_chart(result: OutageRun) -> Chart:
     if found.aids:
         parts.append((aids_name, float(found.aids["horizontal"][-1]) / whole))
     kept = sorted((p for p in parts if abs(p[1]) >= _LEAST_PART), key=lambda p: -p[1])
-    rest = sum(p for _, p in parts) - sum(p for _, p in kept)
+    rest = math.fsum(p for _, p in parts) - math.fsum(p for _, p in kept)
     if abs(rest) >= _LEAST_PART:
         kept.append(("all others", rest))
     values = 100.0 * np.array([p for _, p in kept])

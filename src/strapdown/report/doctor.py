@@ -420,7 +420,7 @@ def _facts(one: LogDiagnosis) -> tuple[tuple[str, str], ...]:
     if warm := data["temperature"]:
         rows.append(("Temperature", f"{warm['least_degc']:.4g} to {warm['largest_degc']:.4g} °C"))
     if rests := data["stationary"]:
-        total = sum(r["to_s"] - r["from_s"] for r in rests)
+        total = math.fsum(r["to_s"] - r["from_s"] for r in rests)
         count = f"{len(rests)} stretches" if len(rests) > 1 else "1 stretch"
         rows.append(("Stationary", f"{count}, {duration_words(total)} in all"))
     return tuple(rows)

@@ -171,7 +171,7 @@ def _outages(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
     outages = longest_outages(evaluation)
     if not outages:
         return []
-    total = sum(s.end - s.begin for _, s, _ in outages)
+    total = math.fsum(s.end - s.begin for _, s, _ in outages)
     aid, span, bound = max(outages, key=lambda o: o[2])
     count = "one outage" if len(outages) == 1 else f"{len(outages)} outages"
     return [

@@ -227,8 +227,8 @@ def place_labels(
     for k in sorted(range(len(labels)), key=lambda j: (-len(labels[j]), j)):
         boxes = [_box(unit[k], place, len(labels[k])) for place in PLACES]
         covered = [
-            4.0 * sum(overlap(box, other) for other in taken)
-            + sum(overlap(box, dots[j]) for j in _touched(box, dots) if j != k)
+            4.0 * math.fsum(overlap(box, other) for other in taken)
+            + math.fsum(overlap(box, dots[j]) for j in _touched(box, dots) if j != k)
             + _outside(box)
             # Prefer a near position if none overlaps.
             + 1e-7 * number

@@ -54,7 +54,7 @@ def tick_words(value: float, step: float) -> str:
 
 def text_width(text: str, size: float, bold: bool = False) -> float:
     """Upper estimate of the width of a line of text in pixels."""
-    ems = sum(0.40 if c in _NARROW else 0.95 if c in _WIDE else 0.64 for c in text)
+    ems = math.fsum(0.40 if c in _NARROW else 0.95 if c in _WIDE else 0.64 for c in text)
     return ems * size * (1.08 if bold else 1.0)
 
 
@@ -312,8 +312,8 @@ class Drawing:
             anchor = "start" if dx > 0.1 else "end" if dx < -0.1 else "middle"
             place = (at[0] + dx, at[1] + dy)
             box = self.box_of(place, text, size, anchor=anchor, bold=bold)
-            covered = sum(overlap(box, other) for _, other in self.boxes)
-            covered += sum(overlap(box, other) for other in avoid)
+            covered = math.fsum(overlap(box, other) for _, other in self.boxes)
+            covered += math.fsum(overlap(box, other) for other in avoid)
             outside = max(2.0 - box[0], box[2] - self.width + 2.0, 0.0)
             outside += max(2.0 - box[1], box[3] - self.height + 2.0, 0.0)
             cost = covered + 50.0 * outside + 0.5 * math.hypot(dx, dy)

@@ -161,7 +161,7 @@ def _sd(log: HealthLog, columns: list[str], mean: Array, size: float, duration: 
             terms.append(triad.axis("nonlinearity_2")[axis] * size**2 / full)
         if gyro:
             terms.append(triad.axis("g_sensitivity")[axis] * log.gravity[1])
-        out[axis] = math.sqrt(sum(t * t for t in terms))
+        out[axis] = math.sqrt(math.fsum(t * t for t in terms))
     return out
 
 

@@ -465,7 +465,7 @@ def find_rests_of_every_grade(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
         inside = [r for r in still if r.start < shaking.end and shaking.start < r.end]
         start = min([shaking.start, *(r.start for r in inside)])
         end = max([shaking.end, *(r.end for r in inside)])
-        covered = sum(r.end - r.start for r in inside)
+        covered = math.fsum(r.end - r.start for r in inside)
         if inside and end - start - covered <= SHAKING_WINDOW:
             continue
         still = [r for r in still if r not in inside]

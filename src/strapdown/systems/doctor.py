@@ -599,8 +599,8 @@ def _impact(imu: pd.DataFrame) -> dict[str, float] | None:
 def _stream(name: str, table: pd.DataFrame) -> dict[str, Any]:
     time = index_of(table)
     gaps = find_gaps(time) if (np.diff(time) > 0.0).all() else []
-    lost = float(sum(g.length - g.usual for g in gaps))
-    lasting = float(time[-1] - time[0]) - float(sum(g.length for g in gaps))
+    lost = float(math.fsum(g.length - g.usual for g in gaps))
+    lasting = float(time[-1] - time[0]) - float(math.fsum(g.length for g in gaps))
     clock = clock_of(table)
     return {
         "name": name,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -430,7 +431,7 @@ def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference,
     found = posterior(weights)
     units = _summed(found, 0)
     forms = _summed(found, 1)
-    counted = sum(p for f, p in forms.items() if str(f).startswith("counts"))
+    counted = math.fsum(p for f, p in forms.items() if str(f).startswith("counts"))
     forms["rate"] = forms.get("rate", 0.0) + counted
     norm = {"piece": PIECE, "norm": usual, "spread_percent": 100 * spread}
     best = next(iter(units))
