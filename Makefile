@@ -11,7 +11,7 @@ FRESH = cache=$$(mktemp -d); trap 'rm -rf "$$cache"' EXIT; NUMBA_CACHE_DIR="$$ca
 # What an installation is made of, but for modules that it finds in place.
 INSTALLED = pyproject.toml constraints.txt hatch_build.py $(wildcard src/strapdown/_kernels/*.py tools/kernels_to_c/*.*)
 
-.PHONY: kernels demo test fuzz test-slow test-bounds examples papers record mutation check format bench docs audit codes strangers pictures clean
+.PHONY: kernels demo test fuzz test-slow test-bounds examples papers record mutation check format bench docs audit codes strangers pictures wheels clean
 .DEFAULT_GOAL := help
 
 help:
@@ -25,6 +25,7 @@ help:
 	@echo "make check      ruff, format, mypy, import-linter"
 	@echo "make bench      speed and memory as ratios against named alternatives"
 	@echo "make kernels    compile the kernels anew, after a change of their sources"
+	@echo "make wheels     one wheel under several Pythons, compared to the byte; PYTHONS='python3.11 python3.12'"
 	@echo "make audit      known vulnerabilities of the versions in constraints.txt"
 	@echo "make docs       the manual, into docs/_build"
 
@@ -92,6 +93,10 @@ format: $(VENV)/.dev
 
 bench: $(VENV)/.dev
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m benchmarks
+
+PYTHONS ?= python3.11 python3.12 python3.13
+wheels: $(VENV)/.dev
+	@$(BIN)/python tools/try_wheel.py $(PYTHONS)
 
 codes: $(VENV)/.test
 	STRAPDOWN_WRITE_CODES=1 $(PYTEST) -m '' tests/cli/test_bad_input.py
