@@ -15,7 +15,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 from tests.gnss_faults import Frozen, Outage, Outliers, WrongSd, inject_gnss_faults
 
 import town_drive as town
-from strapdown.estimation.robust import AdaptiveRule, Hampel, RobustUpdate, Tukey
+from strapdown.estimation.robust import FEW, AdaptiveRule, Hampel, RobustUpdate, Tukey
 
 SETTLED = 30.0
 OUTAGE = (60.0, 120.0)
@@ -67,14 +67,14 @@ def test_an_error_that_grew_beyond_its_bound_is_taken_off_within_a_few_fixes(rul
     size, piece = after_outage(rule, sds)
     assert size > 20.0
     weights = np.array([o.innovations.weight[:2] for o in piece.seen if o.name == "gnss.position"])
-    # No more than `patience` in a row are refused of any component.
+    # No more than few in a row are refused of any component: an outage of a minute explains them.
     longest = 0
     for column in weights.T:
         refused = 0
         for weight in column:
             refused = 0 if weight > 0.0 else refused + 1
             longest = max(longest, refused)
-    assert longest <= rule.scale.patience
+    assert longest <= FEW
     # The first that is taken leaves what a fix of 1 m leaves; 12 fixes are 6 s.
     e = np.hypot(*town.off(piece)[:, :2].T)
     assert e[piece.time > OUTAGE[1] + 8.0].max() < 0.1 * size

@@ -498,6 +498,8 @@ class PaperUpdate:
 HUBER = Huber()
 #: Weight of an observation that agrees with the estimate, and how many in a row show that they do.
 HALF, SETTLES = 0.5, 5
+#: Rejections in a row that an estimate can have earned by itself, after which one is taken.
+FEW = 2
 #: Faults of receivers, as of a wrong ambiguity or by reflections, last this long at most, s.
 DOUBT = 60.0
 #: Standard deviations within which an observation that jumped agrees with the estimate again.
@@ -572,12 +574,13 @@ class AdaptiveScale:
     deviations, Tukey's does, one by one, though together they leave no doubt. After `patience`
     rejections in a row `rule` therefore gives Huber's function, which never rejects.
 
-    An estimate goes wrong by degrees. Observations that agreed with it, and jump further than it
-    can have moved since the last one, are faulty themselves, now or until now: a jump begins a
-    fault, or ends one that the estimate had followed. For the first speaks how long they agreed
-    before, for the second how long they disagree. With faults of any length the two are equally
-    likely after the same time: they are rejected until they return, as long as they had agreed, and
-    for `doubt` seconds at most.
+    An estimate goes wrong by degrees: a position within what it can have moved since the last
+    observation, as after an outage, shows its own error, and after `FEW` rejections one is taken.
+    Observations that agreed with it, and jump further than that, are faulty themselves, now or
+    until now: a jump begins a fault, or ends one that the estimate had followed. For the first
+    speaks how long they agreed before, for the second how long they disagree. With faults of any
+    length the two are equally likely after the same time: they are rejected until they return, as
+    long as they had agreed, and for `doubt` seconds at most.
 
     The object is stateless: its user keeps the learned `ScaleState`.
 
@@ -644,7 +647,9 @@ class AdaptiveScale:
 
     def rule(self, state: ScaleState, influence: Influence) -> RobustUpdate:
         """Return the rule of the next observation."""
-        given = HUBER if state.rejected >= self.patience else influence
+        grown = state.time > -math.inf and state.held == -math.inf
+        patience = min(FEW, self.patience) if grown else self.patience
+        given = HUBER if state.rejected >= patience else influence
         return RobustUpdate(given, state.factor)
 
     def after(
@@ -680,8 +685,10 @@ class AdaptiveScale:
         # doubted as it was.
         if after.rejected == 1 and before.settled >= SETTLES and far:
             jump, held = nu, time + min(self.doubt, time - since)
-        elif after.rejected == 1 and not far:
+        elif after.rejected == 1 and abs(nu) <= reach:
             held = -math.inf
+        elif after.rejected == 1 and (math.isinf(held) or not far):
+            held = time
         # After rejections the observations returned, or the estimate went to them.
         went = after.rejected == 0 and before.rejected > 0 and nu * before.nu >= 0.5 * before.nu**2
         if went or math.isinf(since):

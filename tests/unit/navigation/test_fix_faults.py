@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from tests import town_drive as town
 
-from strapdown.estimation.robust import AdaptiveRule, AdaptiveScale, Igg3
+from strapdown.estimation.robust import FEW, HUBER, AdaptiveRule, AdaptiveScale, Igg3
 from strapdown.frames import geodetic_from_ned
 from strapdown.navigation.heading_checks import _known
 from strapdown.navigation.measurements.clock_windows import unsure_steps
@@ -97,6 +97,25 @@ def test_a_receiver_is_rejected_for_as_long_as_it_had_agreed(before, step):
     # Ten rejections that ended because the estimate went to them do: since then they have agreed.
     followed = [20.0] * 11 + [2.0] + [0.3] * 5
     assert sum(jumps([*followed, *[-20.0] * 60], before=3, step=step)[len(followed) :]) == 6
+
+
+@pytest.mark.parametrize(("gap", "refused"), [(4.0, FEW), (3.0, RULE.scale.patience)])
+def test_an_error_that_an_outage_can_have_made_is_taken_off_after_few_fixes(gap, refused):
+    """With 3 m/s² a solution goes 24 m wrong in four seconds, and in three no more than 13.5 m."""
+    scale, state, rejected = RULE.scale, RULE.scale.begin(), 0
+    for k in range(12):
+        state = scale.jumped(state, scale.after(state, 0.3, 1.0, 1.0), 0.3, float(k), 1.5)
+    for k in range(15):
+        time = 11.0 + gap + k
+        update = scale.rule(state, RULE.influence)
+        weight = update.influence.weight(20.0 / 1.5)
+        rejected += weight == 0.0
+        if weight > 0.0:
+            break
+        after = scale.after(state, 20.0, 1.0, 1.0, weight)
+        state = scale.jumped(state, after, 20.0, time, 1.5 * (time - state.time) ** 2)
+    assert update.influence == HUBER
+    assert rejected == refused
 
 
 def test_a_receiver_that_returns_for_a_moment_is_doubted_as_it_was():
