@@ -160,7 +160,7 @@ def navigate(
     if beside is not None and gnss is not None:
         raise ConfigError("cli.fixes-twice", quantity="--gnss", files=[str(gnss), str(beside)])
 
-    def draft(folder: Path, _: Progress) -> Any:
+    def draft(folder: Path, report: Progress) -> Any:
         keys = fix_keys(fixes.given(), gnss or beside)
         receiver = specify(FixesTable, **{"path": str(log), **keys}) if keys else None
         proposed = draft_navigation(
@@ -170,6 +170,7 @@ def navigate(
             gnss=receiver,
             sensor=sensor,
             foot=foot,
+            progress=report,
         )
         return (proposed,)
 

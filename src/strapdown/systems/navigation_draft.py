@@ -22,6 +22,7 @@ from strapdown.errors import DataError, Finding
 from strapdown.estimation.sensor_blocks import STATED_STATES, resting_sd, states_that_are_stated
 from strapdown.formats.gnss_fixes import POSITION_SDS, VELOCITY_SDS
 from strapdown.frames import ways_between
+from strapdown.progress import Progress, silent
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.aid_proposal import Magnetic, propose_aids, propose_magnetometer
@@ -60,6 +61,7 @@ def draft_navigation(
     gnss: FixesTable | None = None,
     sensor: str | None = None,
     foot: bool = False,
+    progress: Progress = silent,
 ) -> ProposedAlignment:
     """Write the proposed navigation configuration of a log.
 
@@ -69,12 +71,13 @@ def draft_navigation(
         With a readable path.
     folder : Path
         Folder of the configuration; other files are named relative to it.
-    axes, gnss, sensor
+    axes, gnss, sensor, progress
         As `propose`.
     foot : bool
         Whether the unit is on a shoe: zero-velocity updates at its stances (`on_foot`).
     """
-    made = propose(log, axes=axes, gnss=gnss, sensor=sensor)
+    made = propose(log, axes=axes, gnss=gnss, sensor=sensor, progress=progress)
+    progress("magnetometer and other measurements", 0.9)
     # The aids of the recording are of a file alone: other callers of `propose` state theirs.
     site = made.table.get("site")
     place = None if site is None else (site["lat_deg"], site["lon_deg"], site["alt_m"])

@@ -47,6 +47,7 @@ from strapdown.navigation.measurements.gnss_readiness import (
     white_velocity_sd,
     without_repeats,
 )
+from strapdown.progress import Progress, silent
 from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV, load_sensor
 from strapdown.sensors.rest import LEAST_LENGTH, find_rests_of_every_grade
 from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty, stated_imu
@@ -196,6 +197,7 @@ def propose(
     sensor: str | None = None,
     site: tuple[float, float, float] | None = None,
     heading_deg: float | None = None,
+    progress: Progress = silent,
 ) -> Proposal:
     """Propose how to navigate with a log and its fixes.
 
@@ -214,7 +216,10 @@ def propose(
         Latitude and longitude in deg, height in m; that of the fixes, or of the log, if not given.
     heading_deg : float, optional
         Heading of the body at the start.
+    progress : callable, optional
+        Called with a stage and the share that is done.
     """
+    progress("reading", 0.1)
     recording, imu, findings = body_record(log, AxesTable(axes=axes))
     require_accel(recording)
     table: dict[str, Any] = {"log": log.model_dump(exclude_none=True), "axes": {"axes": axes}}
@@ -240,6 +245,7 @@ def propose(
         place = (start.lat_deg, start.lon_deg, start.alt)
     if place is not None:
         table["site"] = dict(zip(("lat_deg", "lon_deg", "alt_m"), place, strict=True))
+    progress("finding rests and noise", 0.3)
     until, drives = _motion(imu, fixes)
     quiet = _quiet(imu, until)
     scatter = _scatter(imu)
@@ -263,6 +269,7 @@ def propose(
     clock: dict[str, Any] = {}
     if fixes is not None:
         assert gnss is not None  # whence the fixes are
+        progress("comparing the clocks of fixes and samples", 0.5)
         clock, step = _clock(fixes, imu, drives, sensors)
         if step is not None:
             found = step_finding(fixes, imu, step, corrected=step.certain)
@@ -273,7 +280,13 @@ def propose(
                 moved = 0.0 if shifted is None else shifted.data["shift"]
                 gnss = _corrected(gnss, step, moved)
             made = propose(
-                part, axes=axes, gnss=gnss, sensor=sensor, site=site, heading_deg=heading_deg
+                part,
+                axes=axes,
+                gnss=gnss,
+                sensor=sensor,
+                site=site,
+                heading_deg=heading_deg,
+                progress=progress,
             )
             return replace(made, findings=(*made.findings, found))
         if step is not None:
@@ -282,6 +295,7 @@ def propose(
         if step is None and (unsure := unsure_steps(fixes)) and clock.get("time_offset_sd_s"):
             clock["clock_unsure_s"] = tuple((round(at, 3), sd) for at, sd in unsure)
     if fixes is not None and sensors is not None and chosen["coarse"]["kind"] == "gnss_course":
+        progress("trying alignments", 0.7)
         chosen, how, tried = _tried(chosen, how, imu, fixes, sensors, levelled, clock)
         findings = (*findings, *tried)
     table |= chosen
