@@ -6,6 +6,7 @@ import re
 import unicodedata
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 from strapdown.errors import ConfigError, check_choice
 from strapdown.formats.vocabularies import (
@@ -293,16 +294,17 @@ def _without_chip(text: str) -> tuple[str, str]:
     return (" ".join(kept), "".join(chip).lower()) if kept and chip else (text, "")
 
 
-def _english(word: str) -> list[str]:
+@lru_cache(maxsize=8192)
+def _english(word: str) -> tuple[str, ...]:
     """Return a word in English, if it is one of `ABROAD`; Gierrate becomes yaw and rate."""
     plain = without_accents(word)
     for english, stems in ABROAD.items():
         stem = next((s for s in stems if plain.startswith(s)), "")
         if stem and english in TURNS:
-            return [english, *(_english(plain[len(stem) :]) if plain != stem else [])]
+            return (english, *(_english(plain[len(stem) :]) if plain != stem else ()))
         if stem:
-            return [english]
-    return [plain]
+            return (english,)
+    return (plain,)
 
 
 def without_accents(text: str) -> str:
