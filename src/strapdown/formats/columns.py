@@ -129,6 +129,10 @@ def read_name(name: str, of: Vocabulary = LOGS, unit: str = "") -> ColumnName:
     ``gps_lat``, ``Lateral Delta-V (km/h)``. `of`: vocabulary of its file. `unit`: stated apart from
     the name, as in a row of units; counts where the name has none, and first in a crash record.
     """
+    return (_read_once if len(name) <= LONGEST else _read_name)(name, of, unit)
+
+
+def _read_name(name: str, of: Vocabulary, unit: str) -> ColumnName:
     text, index = unicodedata.normalize("NFC", name).strip(), ""
     if of.sensors and (match := INDEXED.fullmatch(text)):
         text, index = match.groups()
@@ -144,6 +148,11 @@ def read_name(name: str, of: Vocabulary = LOGS, unit: str = "") -> ColumnName:
     else:
         bare, written = text, ""
     return _of_heading(bare, written or unit, said, of) if of.stems else said
+
+
+#: Names of up to so many letters are kept with their meaning: a table asks for each several times.
+LONGEST = 100
+_read_once = lru_cache(maxsize=1 << 14)(_read_name)
 
 
 def split_brackets(text: str) -> tuple[str, str]:
@@ -294,7 +303,6 @@ def _without_chip(text: str) -> tuple[str, str]:
     return (" ".join(kept), "".join(chip).lower()) if kept and chip else (text, "")
 
 
-@lru_cache(maxsize=8192)
 def _english(word: str) -> tuple[str, ...]:
     """Return a word in English, if it is one of `ABROAD`; Gierrate becomes yaw and rate."""
     plain = without_accents(word)
