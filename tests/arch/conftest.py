@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import gc
 from pathlib import Path
 
 import pytest
@@ -13,7 +14,12 @@ SOURCE = Path(__file__).parents[2] / "src" / "strapdown"
 @pytest.fixture(scope="session")
 def nodes() -> dict[Path, tuple[ast.AST, ...]]:
     """Every node of every module by its path."""
-    return {
+    # Each of a million nodes lives as long as the run: no collection need look at them.
+    gc.disable()
+    found = {
         path: tuple(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
         for path in SOURCE.rglob("*.py")
     }
+    gc.freeze()
+    gc.enable()
+    return found

@@ -117,7 +117,7 @@ def test_each_difficulty_is_drawn_and_no_two_of_one_column():
 @pytest.mark.parametrize("accel", ACCELS)
 def test_file_is_read_as_what_it_is(tmp_path, gyro, accel):
     facts = first(difficulties=["none"], accel=True, kind="sway")
-    facts |= {"gyro": gyro, "accel_named": accel, "axes": "right-forward-up"}
+    facts |= {"gyro": gyro, "accel_named": accel, "axes": "right-forward-up", "duration_s": 6.0}
     made = make(facts, tmp_path)
     imu = sd.read_imu(made.log)
     names = ["gyro_x", "gyro_y", "gyro_z"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
+from pathlib import Path
 
 import pytest
 from tests.coded import coded
@@ -25,7 +26,11 @@ def sealed(sealed_crash, tmp_path_factory, run_cli):
     flags = ("--quiet", "--out")
     attitude = ("attitude", "alexiev-fig4", "--png", "--algorithms", "quaternion")
     assert run_cli(*attitude, *flags, root / "attitude").code == 0
-    drive = "docs/examples/navigate_drive.toml"
+    text = Path("docs/examples/navigate_drive.toml").read_text(encoding="utf-8")
+    drive = tmp_path_factory.mktemp("drive") / "drive.toml"
+    for long, short in (("duration_s = 40.0", "duration_s = 12.0"), ("80.0, 110.0", "52.0, 60.0")):
+        text = text.replace(long, short)
+    drive.write_text(text, encoding="utf-8")
     assert run_cli("navigate", drive, *flags, root / "navigate").code == 0
     shutil.copytree(sealed_crash.folder, root / "crash")
     simulated = ("simulate", "alexiev-fig2f", "--format", "all", "--rate", "20")

@@ -59,25 +59,29 @@ class Difference:
     old: str
     new: str
     size: str
+    relative: float = np.inf  # of the largest absolute value of the old array, where both are one
 
 
 @dataclass(frozen=True)
 class Change:
-    """A line of changes.toml: what is meant to change."""
+    """A line of changes.toml: what is meant to change, by at most `relative` if it is stated."""
 
     run: str
     quantity: str
     reason: str
     changelog: str
+    relative: float = np.inf
 
     def covers(self, difference):
-        return fnmatchcase(difference.run, self.run) and fnmatchcase(
-            difference.quantity, self.quantity
+        return (
+            fnmatchcase(difference.run, self.run)
+            and fnmatchcase(difference.quantity, self.quantity)
+            and difference.relative <= self.relative
         )
 
 
 def read_changes(path):
-    """Read changes.toml; every entry has run, quantity, reason and changelog."""
+    """Read changes.toml; every entry has run, quantity, reason and changelog, some `relative`."""
     entries = tomllib.loads(path.read_text(encoding="utf-8")).get("change", [])
     return [Change(**entry) for entry in entries]
 
@@ -130,7 +134,9 @@ def _arrays(run, quantity, old, new, tolerances):
     size = f"{int(changed.sum())} of {changed.size}, at most {worst:.3g}"
     if scale:
         size += f" ({worst / scale:.2g} of the largest)"
-    return Difference(run, quantity, repr(float(old[at])), repr(float(new[at])), size)
+    # A change of what is not finite has no size.
+    share = worst / scale if scale and np.isfinite(apart[changed]).all() else np.inf
+    return Difference(run, quantity, repr(float(old[at])), repr(float(new[at])), size, share)
 
 
 def compare_runs(run, old, new, tolerances=TOLERANCES):

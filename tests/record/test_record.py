@@ -114,6 +114,19 @@ def test_a_listed_change_passes_and_must_be_in_the_changelog(record, sides):
     assert not outcome(record, folder, [change(record, "nav/lon")], "steeper").good
 
 
+def test_a_listed_change_holds_up_to_its_size_alone(record, sides):
+    folder, values = sides
+    listed = [record["compare"].Change("a", "nav/*", "another order", "steeper", 1e-9)]
+    for size, good in ((2e-9, True), (3e-9, False), (np.inf, False), (np.nan, False)):
+        other = values.copy()
+        other[1, 0] += size
+        arrays = {"nav/lat": other}
+        write(folder / "new", {**arrays, "nav/rms": np.array([1.0])}, {"heading": "red"})
+        assert outcome(record, folder, listed, "steeper").good is good
+    write(folder / "new", {"nav/lat": values, "nav/rms": np.ones(2)}, {"heading": "red"})
+    assert not outcome(record, folder, listed, "steeper").good
+
+
 def test_a_listed_change_that_does_not_occur_is_an_error(record, sides):
     told = outcome(record, sides[0], [change(record)], "steeper")
     assert not told.good

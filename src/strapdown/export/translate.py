@@ -1330,22 +1330,35 @@ def _fold(op: ast.operator, a: Any, b: Any) -> Any:
 def first_uses(body: list[ast.stmt], names: set[str]) -> dict[int, set[str]]:
     """For each name, find the innermost block with all its uses, and its first statement there."""
     places: dict[int, set[str]] = {}
-    for name in names:
-        places.setdefault(id(_first_use(body, name)), set()).add(name)
+    _place(body, names, places)
     return places
 
 
-def _first_use(block: list[ast.stmt], name: str) -> ast.stmt:
-    holding = [node for node in block if name in _names([node])]
-    first = holding[0]
-    inner = [b for b in _blocks(first) if name in _names(b)]
-    outside = name in _names(_heads(first))
-    if len(holding) > 1 or len(inner) != 1 or outside:
-        return first
-    # In a loop only what each round sets before it reads it: else it is of the round before.
-    if not (isinstance(first, ast.If) or _sets_first(inner[0], name)):
-        return first
-    return _first_use(inner[0], name)
+def _place(block: list[ast.stmt], names: set[str], places: dict[int, set[str]]) -> None:
+    """Add the first statements of names that are used nowhere but in a block."""
+    holding: dict[str, list[ast.stmt]] = {name: [] for name in names}
+    for node in block:
+        for name in names & _names([node]):
+            holding[name].append(node)
+    for first in block:
+        alone = {name for name in names if holding[name] == [first]}
+        heads = _names(_heads(first))
+        used = [(b, alone & _names(b)) for b in _blocks(first)] if alone else []
+        for k, (inner, own) in enumerate(used):
+            elsewhere = heads.union(*(others for j, (_, others) in enumerate(used) if j != k))
+            # In a loop only what each round sets before it reads it: else it is of the round
+            # before.
+            deeper = {
+                name
+                for name in own - elsewhere
+                if isinstance(first, ast.If) or _sets_first(inner, name)
+            }
+            alone -= deeper
+            if deeper:
+                _place(inner, deeper, places)
+        later = {name for name in names if holding[name][:1] == [first] and holding[name][1:]}
+        if alone or later:
+            places.setdefault(id(first), set()).update(alone | later)
 
 
 def _sets_first(block: list[ast.stmt], name: str) -> bool:
@@ -1386,7 +1399,10 @@ def stored(body: Iterable[ast.AST]) -> set[str]:
 
 def loaded(body: Iterable[ast.AST]) -> set[str]:
     """Return the names that are read; targets of augmented assignments are included."""
-    body = list(body)
-    names = {n.id for n in walk(body) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load)}
-    augmented = (n.target for n in walk(body) if isinstance(n, ast.AugAssign))
-    return names | {t.id for t in augmented if isinstance(t, ast.Name)}
+    names: set[str] = set()
+    for n in walk(body):
+        if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Load):
+            names.add(n.id)
+        elif isinstance(n, ast.AugAssign) and isinstance(n.target, ast.Name):
+            names.add(n.target.id)
+    return names

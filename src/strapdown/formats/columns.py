@@ -6,6 +6,7 @@ import re
 import unicodedata
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 from strapdown.errors import ConfigError, check_choice
 from strapdown.formats.vocabularies import (
@@ -128,6 +129,10 @@ def read_name(name: str, of: Vocabulary = LOGS, unit: str = "") -> ColumnName:
     ``gps_lat``, ``Lateral Delta-V (km/h)``. `of`: vocabulary of its file. `unit`: stated apart from
     the name, as in a row of units; counts where the name has none, and first in a crash record.
     """
+    return (_read_once if len(name) <= LONGEST else _read_name)(name, of, unit)
+
+
+def _read_name(name: str, of: Vocabulary, unit: str) -> ColumnName:
     text, index = unicodedata.normalize("NFC", name).strip(), ""
     if of.sensors and (match := INDEXED.fullmatch(text)):
         text, index = match.groups()
@@ -143,6 +148,11 @@ def read_name(name: str, of: Vocabulary = LOGS, unit: str = "") -> ColumnName:
     else:
         bare, written = text, ""
     return _of_heading(bare, written or unit, said, of) if of.stems else said
+
+
+#: Names of up to so many letters are kept with their meaning: a table asks for each several times.
+LONGEST = 100
+_read_once = lru_cache(maxsize=1 << 14)(_read_name)
 
 
 def split_brackets(text: str) -> tuple[str, str]:
@@ -293,16 +303,16 @@ def _without_chip(text: str) -> tuple[str, str]:
     return (" ".join(kept), "".join(chip).lower()) if kept and chip else (text, "")
 
 
-def _english(word: str) -> list[str]:
+def _english(word: str) -> tuple[str, ...]:
     """Return a word in English, if it is one of `ABROAD`; Gierrate becomes yaw and rate."""
     plain = without_accents(word)
     for english, stems in ABROAD.items():
         stem = next((s for s in stems if plain.startswith(s)), "")
         if stem and english in TURNS:
-            return [english, *(_english(plain[len(stem) :]) if plain != stem else [])]
+            return (english, *(_english(plain[len(stem) :]) if plain != stem else ()))
         if stem:
-            return [english]
-    return [plain]
+            return (english,)
+    return (plain,)
 
 
 def without_accents(text: str) -> str:

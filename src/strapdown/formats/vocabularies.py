@@ -52,7 +52,7 @@ class Quantity:
     negative: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Vocabulary:
     """Names in one kind of file.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pandas as pd
@@ -29,6 +29,10 @@ FIRST_SCATTER, ROUNDS, STEPS = 0.02, 4, 15
 FINEST = 1e-4
 #: Chance at which readings of a perfect magnetometer are called wrong: beyond three sigma.
 CHANCE = 0.0027
+#: Scatters of the strength in the spread of the readings along their longest axis, and in the
+#: field, from which a turn made them. Of noise alone a sphere as small as itself is closest: the
+#: strength of three components scatters by 0.67 of one, about 1.6 (chi of three).
+TURNED, FIELD_SEEN = 2.0, 3.0
 #: Variance of the directions seen along the axis with least, a third if all are, from which soft
 #: iron is looked for: of a cap of 40 deg, or a band of 15 deg.
 COVERED = 0.02
@@ -135,6 +139,9 @@ def calibrate_magnetometer(mag: ArrayLike) -> MagnetometerCalibration:
     m = m / size
     start = _sphere(m)
     raw, best = _fit(m, start, ()), _fit(m, start, (OFFSET,))
+    spread = float(np.sqrt(np.linalg.eigvalsh(np.cov(m.T))[-1]))
+    if min(spread / TURNED, best.x[FIELD] / FIELD_SEEN) <= best.scatter:
+        best = replace(raw, covariance=np.diag([OFFSET_PRIOR**2] * 3 + [0.0] * 6))
     by, terms = best, 3
     # Of a plane of readings soft iron would flatten the noise across it.
     off = m - best.x[OFFSET]
@@ -264,15 +271,22 @@ def _sphere(m: Array) -> Array:
     return np.concatenate([a[:3], [np.sqrt(max(a[3] + a[:3] @ a[:3], 1e-6))], np.zeros(5)])
 
 
-def _residual(m: Array, x: Array) -> tuple[Array, Array]:
-    """Strength less the field's, (n,), and its derivatives, (n, 9)."""
+def _calibrated(m: Array, x: Array) -> tuple[Array, Array, Array, Array]:
+    """Strength less the field's, (n,), calibrated readings, those without hard iron, soft iron."""
     A = np.eye(3) + np.tensordot(x[SOFT], SHAPES, 1)
     off = m - x[OFFSET]
     v = off @ A
-    norm = np.linalg.norm(v, axis=1)
-    unit = v / np.maximum(norm, 1e-9)[:, None]
-    shape = np.einsum("ni,kij,nj->nk", unit, SHAPES, off)
-    return norm - x[FIELD], np.column_stack([-unit @ A, -np.ones(len(m)), shape])
+    return np.linalg.norm(v, axis=1) - x[FIELD], v, off, A
+
+
+def _residual(m: Array, x: Array, soft: bool = True) -> tuple[Array, Array]:
+    """Strength less the field's, (n,), and its derivatives, (n, 9); (n, 4) without soft iron."""
+    e, v, off, A = _calibrated(m, x)
+    unit = v / np.maximum(np.linalg.norm(v, axis=1), 1e-9)[:, None]
+    columns = [-unit @ A, -np.ones(len(m))]
+    if soft:
+        columns.append(np.einsum("ni,kij,nj->nk", unit, SHAPES, off))
+    return e, np.column_stack(columns)
 
 
 def _fit(m: Array, start: Array, free: tuple[slice, ...]) -> _Fit:
@@ -293,10 +307,10 @@ def _fit(m: Array, start: Array, free: tuple[slice, ...]) -> _Fit:
     for _ in range(ROUNDS):
         damping = 0.0
         for _ in range(STEPS):
-            e, J = _residual(m, x)
+            e, J = _residual(m, x, SOFT in free)
             weight = np.minimum(1.0, HUBER * scatter / np.maximum(np.abs(e), 1e-12))
             information = weight / (scatter**2 * correlated)
-            J = J[:, open_]
+            J = J[:, open_[: J.shape[1]]]
             gradient = J.T @ (e * information) + prior * x[open_]
             normal = J.T @ (J * information[:, None]) + np.diag(prior)
             cost = _cost(e, scatter, correlated, prior, x[open_])
@@ -305,7 +319,10 @@ def _fit(m: Array, start: Array, free: tuple[slice, ...]) -> _Fit:
                 step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), gradient)
                 tried = x.copy()
                 tried[open_] -= step
-                if _cost(_residual(m, tried)[0], scatter, correlated, prior, tried[open_]) <= cost:
+                if (
+                    _cost(_calibrated(m, tried)[0], scatter, correlated, prior, tried[open_])
+                    <= cost
+                ):
                     x, damping = tried, 0.1 * damping if damping > 1e-6 else 0.0
                     break
                 damping = max(10.0 * damping, 1e-4)

@@ -151,9 +151,9 @@ def test_a_run_shows_itself_and_cannot_be_changed(of_files):
         of_files.plot("gnss.positoin")
 
 
-def test_a_lever_arm_reaches_the_filter(folder, of_files):
+def test_a_lever_arm_reaches_the_filter(folder, short):
     run = sd.navigate(
-        folder / "drive.csv",
+        short[0],
         [sd.Gnss(folder / "fixes.csv", lever_arm_m=(1.0, 0.0, -1.0))],
         sensor=SENSOR,
         smooth=True,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -45,14 +46,14 @@ def reconstructed(seed):
 
 
 @pytest.fixture(scope="module")
-def cases():
-    return [reconstructed(seed) for seed in range(SEEDS)]
+def case():
+    return cache(reconstructed)
 
 
 @pytest.mark.slow
-def test_speed_and_path_are_as_wrong_as_they_say(cases):
+def test_speed_and_path_are_as_wrong_as_they_say(case):
     speeds, places = [], []
-    for _, _, entry, state, path in cases:
+    for _, _, entry, state, path in map(case, range(SEEDS)):
         true = CRASH.motion.trajectory(np.array([IMPACT + entry.time]))[VELOCITY].to_numpy()[0]
         speeds.append((np.hypot(*entry.velocity[:2]) - np.hypot(*true[:2])) / state.speed_sd)
         exact = MountedMotion(CRASH.motion, Mounting()).kinematics_from(
@@ -67,8 +68,8 @@ def test_speed_and_path_are_as_wrong_as_they_say(cases):
     assert (np.mean(np.square(places), axis=0) > 0.1).all()
 
 
-def test_the_budget_has_the_entry_and_what_is_left_of_the_unit(cases):
-    at, _, entry, _, path = cases[0]
+def test_the_budget_has_the_entry_and_what_is_left_of_the_unit(case):
+    at, _, entry, _, path = case(0)
     shares = path.variances()
     assert {CONTRIBUTOR, "accelerometer bias", "scale factor", "mounting"} <= set(shares.index)
     # The level at rest is no unknown: the attitude is that of the drive.
@@ -81,8 +82,8 @@ def test_the_budget_has_the_entry_and_what_is_left_of_the_unit(cases):
     assert np.allclose(shares.sum(), np.diagonal(path.covariance[-1]))
 
 
-def test_what_the_receiver_says_of_the_crash_does_not_matter(cases):
-    at, fixes, entry, _, _ = cases[1]
+def test_what_the_receiver_says_of_the_crash_does_not_matter(case):
+    at, fixes, entry, _, _ = case(1)
     wild = fixes.copy()
     wild.attrs = dict(fixes.attrs)
     wild.loc[wild.index >= 0.0, [*VELOCITY]] += 30.0
@@ -97,10 +98,10 @@ def test_what_the_receiver_says_of_the_crash_does_not_matter(cases):
     assert at.name == again.name
 
 
-def test_a_mean_of_units_has_no_entry_of_its_own(cases):
+def test_a_mean_of_units_has_no_entry_of_its_own(case):
     from dataclasses import replace
 
-    at, fixes, *_ = cases[0]
+    at, fixes, *_ = case(0)
     with pytest.raises(
         DataError, check=coded("crash.mean-several-units-no-sensors", quantity="entry")
     ):
@@ -135,8 +136,8 @@ def test_units_that_find_their_own_biases_are_compared_with_them():
         ({"before": np.nan}, "entry from the drive, before: nan is not a number"),
     ],
 )
-def test_what_cannot_be_is_told(cases, options, words):
-    _, fixes, *_ = cases[0]
+def test_what_cannot_be_is_told(case, options, words):
+    _, fixes, *_ = case(0)
     with pytest.raises(ConfigError, match=words):
         DriveEntry(fixes, **options)
 

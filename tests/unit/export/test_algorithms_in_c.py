@@ -228,7 +228,7 @@ def test_large_turns_take_sine_and_cosine(tmp_path, variant):
 def test_its_own_test_passes(tmp_path, variant, kind, precision):
     text = export_c(make_algorithm(variant), **KINDS[kind], q_nb=START)
     assert max(map(len, text.splitlines())) <= 100
-    out = run(build(tmp_path, text, f"-DREAL={precision}", "-DATTITUDE_TEST"))
+    out = run(build(tmp_path, text, "-O0", f"-DREAL={precision}", "-DATTITUDE_TEST"))
     assert out.rstrip().endswith("passed")
 
 
@@ -254,7 +254,8 @@ def test_its_own_test_can_fail(tmp_path, variant, right, wrong):
     if right == "k <= 3":  # a range ends before its bound
         right, wrong = "k < 4", "k < 3"
     assert right in text
-    program = build(tmp_path, text.replace(right, wrong), "-DREAL=double", "-DATTITUDE_TEST")
+    wrong_text = text.replace(right, wrong)
+    program = build(tmp_path, wrong_text, "-O0", "-DREAL=double", "-DATTITUDE_TEST")
     done = subprocess.run([program], capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert "FAILED" in done.stdout
@@ -337,7 +338,7 @@ def test_the_first_samples_of_a_log_can_be_the_test(tmp_path):
     assert "mean rate" in text  # taken from the log
     assert "#define ROWS 47" in text  # the first mean began before the log
     for real in ("float", "double"):
-        run(build(tmp_path, text, f"-DREAL={real}", "-DATTITUDE_TEST"))
+        run(build(tmp_path, text, "-O0", f"-DREAL={real}", "-DATTITUDE_TEST"))
 
 
 @pytest.mark.parametrize("variant", VARIANTS)
@@ -430,8 +431,9 @@ def test_configured_file_takes_the_readings_of_the_sensor(tmp_path, kind, real):
     imu = imu_table(t, rates, sampling=sampling)
     text = export_c(algorithm, **KINDS[kind], q_nb=START, imu=imu, configuration=SENSOR)
     assert max(map(len, text.splitlines())) <= 100
-    assert run(build(tmp_path, text, f"-DREAL={real}", "-DATTITUDE_TEST")).endswith("passed\n")
-    program = build(tmp_path, text, f"-DREAL={real}", "-DATTITUDE_FILTER")
+    made = build(tmp_path, text, "-O0", f"-DREAL={real}", "-DATTITUDE_TEST")
+    assert run(made).endswith("passed\n")
+    program = build(tmp_path, text, "-O0", f"-DREAL={real}", "-DATTITUDE_FILTER")
     given = "\n".join(" ".join(repr(float(v)) for v in row) for row in raw)
     found = np.array([line.split() for line in run(program, given).splitlines()], dtype=float)
     steps = increments_from_imu(imu, KINDS[kind].get("interpolation", "linear"))
@@ -467,7 +469,7 @@ def test_its_test_finds_a_wrong_configuration(tmp_path, right, wrong):
     t, _, rates = readings()
     text = export_c(make_algorithm("quaternion"), imu=imu_table(t, rates), configuration=SENSOR)
     assert right in text
-    program = build(tmp_path, text.replace(right, wrong, 1), "-DATTITUDE_TEST")
+    program = build(tmp_path, text.replace(right, wrong, 1), "-O0", "-DATTITUDE_TEST")
     assert subprocess.run([program], capture_output=True, check=False).returncode == 1
 
 

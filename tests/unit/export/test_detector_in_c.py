@@ -85,7 +85,7 @@ def test_the_c_file_gives_the_bits_of_the_kernel(tmp_path, single, mean):
 @pytest.mark.parametrize("real", ["float", "double"])
 def test_its_own_test_passes_and_notices_a_wrong_threshold(tmp_path, real, mean):
     text = export_detector(ERRORS, VARIANCE, mean=mean)
-    program = build(tmp_path, text, f"-DREAL={real}", "-DCRASH_TEST")
+    program = build(tmp_path, text, "-O0", f"-DREAL={real}", "-DCRASH_TEST")
     assert subprocess.run([program], capture_output=True, check=False).returncode == 0
     for right, wrong in (
         ("#define TRIGGER R(2.2222222222222223)", "#define TRIGGER R(6.0)"),
@@ -93,7 +93,8 @@ def test_its_own_test_passes_and_notices_a_wrong_threshold(tmp_path, real, mean)
         ("state[MEAN + 1] * t", "state[MEAN] * t"),
     ):
         assert right in text
-        program = build(tmp_path, text.replace(right, wrong), f"-DREAL={real}", "-DCRASH_TEST")
+        flags = ("-O0", f"-DREAL={real}", "-DCRASH_TEST")
+        program = build(tmp_path, text.replace(right, wrong), *flags)
         assert subprocess.run([program], capture_output=True, check=False).returncode == 1, wrong
 
 

@@ -85,7 +85,7 @@ def test_its_own_test_passes(tmp_path, variant, real):
     text = step_in_c(variant).text
     assert max(map(len, text.splitlines())) <= 100
     name = step_parts(variant)[1].harness.name.upper()
-    out = run(build(tmp_path, text, f"-DREAL={real}", f"-D{name}_TEST"))
+    out = run(build(tmp_path, text, "-O0", f"-DREAL={real}", f"-D{name}_TEST"))
     assert out.rstrip().endswith("passed")
 
 
@@ -110,7 +110,7 @@ def test_its_own_test_passes(tmp_path, variant, real):
 def test_its_own_test_can_fail(tmp_path, variant, right, wrong):
     text, name = step_in_c(variant).text, step_parts(variant)[1].harness.name.upper()
     assert text.count(right) == 1
-    program = build(tmp_path, text.replace(right, wrong), f"-D{name}_TEST")
+    program = build(tmp_path, text.replace(right, wrong), "-O0", f"-D{name}_TEST")
     done = subprocess.run([program], capture_output=True, text=True, check=False)
     assert done.returncode == 1
     assert "FAILED" in done.stdout
@@ -124,8 +124,8 @@ def test_a_step_that_is_refused_changes_nothing(tmp_path, variant):
     bad[:3, 0] = 0.0, -0.01, np.nan
     bad[3, 4] = 1e5  # faster than the limit
     bad[4, 9] = np.nan
-    mixed = through_c(tmp_path, variant, np.vstack([rows[:6], bad, rows[6:]]))
-    np.testing.assert_array_equal(mixed, through_c(tmp_path, variant, rows))
+    mixed = through_c(tmp_path, variant, np.vstack([rows[:6], bad, rows[6:]]), "-O0")
+    np.testing.assert_array_equal(mixed, through_c(tmp_path, variant, rows, "-O0"))
 
 
 @needs_compiler
@@ -136,8 +136,8 @@ def test_an_invalid_observation_is_refused(tmp_path, variant):
     for column, value in ((4, -1.0), (1, np.nan), (10, np.inf)):
         bad = rows.copy()
         bad[1, column] = value
-        assert len(through_c(tmp_path, variant, bad)) == 1
-    program = build(tmp_path, step_in_c(variant).text, "-DCOVARIANCE_FILTER")
+        assert len(through_c(tmp_path, variant, bad, "-O0")) == 1
+    program = build(tmp_path, step_in_c(variant).text, "-O0", "-DCOVARIANCE_FILTER")
     given = "\n".join(" ".join(map(repr, row)) for row in bad.tolist())
     done = subprocess.run([program], input=given, capture_output=True, text=True, check=False)
     assert done.stderr == "refused\n"
@@ -164,7 +164,8 @@ def test_the_head_states_what_it_costs(variant):
     head = " ".join(made.text.partition("*/")[0].replace("\n *", " ").split())
     listed = ", ".join(f"{n} {kind}" for kind, n in made.operations.items() if n)
     assert f"at most: {listed}. Memory: {made.memory} numbers" in head
-    assert made == steps.step_in_c(variant)
+    if ":" not in variant:
+        assert made == steps.step_in_c(variant)
 
 
 def test_what_a_mode_of_the_height_does_not_need_is_left_out():

@@ -72,8 +72,7 @@ def test_an_attitude_comes_back(tmp_path):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="no limit of a file's size")
-@pytest.mark.parametrize("suffix", LOG_FORMATS)
-def test_a_full_disk_is_an_error_of_the_system_and_nothing_else(tmp_path, suffix):
+def test_a_full_disk_is_an_error_of_the_system_and_nothing_else(tmp_path):
     """The limit of a file's size stands for the disk; HDF5 itself ended the process at it."""
     code = f"""
 import resource, signal
@@ -85,11 +84,13 @@ signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 time = np.arange(1.0, 3001.0) / 100.0
 log = imu_table(time, np.random.default_rng(1).normal(size=(3000, 3)), None, sampling="mean")
 resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
-try:
-    WRITERS[{suffix!r}].write(Path("log.{suffix}"), {{"imu": log}})
-except OSError:
-    print("refused")
+for suffix in {tuple(LOG_FORMATS)!r}:
+    try:
+        WRITERS[suffix].write(Path("log").with_suffix("." + suffix), {{"imu": log}})
+    except OSError:
+        print(suffix, "refused", flush=True)
 """
     run = [sys.executable, "-c", code]
     done = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True, check=True)
-    assert (done.stdout, done.stderr) == ("refused\n", "")
+    refused = "".join(f"{suffix} refused\n" for suffix in LOG_FORMATS)
+    assert (done.stdout, done.stderr) == (refused, "")

@@ -146,7 +146,7 @@ def test_what_was_wrong_with_a_run_does_not_pass_to_a_later_witness(tmp_path):
 
 def test_what_a_check_finds_piece_by_piece_is_what_it_finds_at_once():
     """Doubts are judged from what came since the last time; the whole judged anew is the same."""
-    spec = drive(laps=3, error=8.0, trust={"repeat": False})
+    spec = drive(laps=2, error=8.0, trust={"repeat": False})
     result = run_navigation(spec)
     source, record, sensors = result.source, result.record, sensors_of(spec)
     chain, filter_ = make_chain(spec, sensors), make_filter(spec, sensors)

@@ -162,3 +162,18 @@ def test_a_field_that_never_changes_shows_no_iron():
     found = calibrate_magnetometer(np.tile([20.0, 0.0, 44.0], (2000, 1)))
     assert not found.significant
     assert (found.hard_iron_sd > STRENGTH / 4.0).sum() >= 2
+
+
+@pytest.mark.parametrize(("sd", "across"), [(0.05, 1.0), (0.4, 1.0), (2.0, 1.4)])
+def test_noise_of_a_body_that_rests_is_no_iron(sd, across):
+    """A sphere as small as the noise lies closer to such readings than one of the field's size."""
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        noise = rng.normal(0.0, sd, (1000, 3)) * [1.0, 1.0, across]
+        mag = STRENGTH * directions(rng, 1) + noise
+        found = calibrate_magnetometer(mag)
+        assert not found.found
+        assert found.direction_sd_deg > 45.0
+        imu, used, _, said = without_iron(samples(mag, np.tile([0.0, 0.0, -9.81], (1000, 1))))
+        assert (used, said) == (None, ())
+        assert (imu[MAG].to_numpy() == mag).all()

@@ -18,7 +18,7 @@ from strapdown.navigation.measurements.clock_windows import Offsets
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.sensors.triad_errors import ImuErrors
 from strapdown.simulation import simulate_imu
-from strapdown.systems import navigation_proposal
+from strapdown.systems import navigation_draft, navigation_proposal
 from strapdown.systems.navigation_draft import draft_navigation
 from strapdown.systems.navigation_proposal import (
     APART,
@@ -180,7 +180,7 @@ def test_two_estimates_of_an_offset_are_joined_or_contradict_each_other():
 
 
 def stepped(folder, size, at=40.0, outage=0.0):
-    """Files of a drive with fixes by a clock that steps; the time of the file is from 1970."""
+    """What is proposed and written for a drive by a clock that steps; its time is from 1970."""
     zero = 1_700_000_000.0
     names = [*(f"gyro_{a}_rad_s" for a in "xyz"), *(f"accel_{a}_m_s2" for a in "xyz")]
     log = imu()[[*GYRO, *ACCEL]].set_axis(names, axis=1).set_axis(imu().index + zero)
@@ -191,13 +191,27 @@ def stepped(folder, size, at=40.0, outage=0.0):
     stamps = table.index.to_numpy()
     late = np.where(stamps >= at, size, 0.0)
     table.set_axis(stamps + zero + late).rename_axis("time").to_csv(folder / "fixes.csv")
-    log = LogTable(path=str(folder / "log.csv"))
-    return propose(log, gnss=FixesTable(path=str(folder / "fixes.csv")), sensor="adis16495-1")
+    log, given = (str(folder / name) for name in ("log.csv", "fixes.csv"))
+    made = []
+
+    def proposed(*arguments, **options):
+        made.append(propose(*arguments, **options))
+        return made[-1]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(navigation_draft, "propose", proposed)
+        draft = draft_navigation(
+            LogTable(path=log),
+            gnss=FixesTable(path=given),
+            sensor="adis16495-1",
+            folder=folder,
+        )
+    return made[0], tomllib.loads(draft.text)["aiding"]["gnss"]
 
 
 @pytest.mark.parametrize("size", [0.617, pytest.param(-0.1, marks=pytest.mark.slow)])
 def test_a_step_of_the_clock_is_corrected_in_what_is_proposed(tmp_path, size):
-    made = stepped(tmp_path, size)
+    made, written = stepped(tmp_path, size)
     (found,) = (f for f in made.findings if "clock-step" in f.code)
     assert found.code == "navigation.clock-step-corrected"
     ((stamp, by),) = made.table["aiding"]["gnss"]["clock_steps_s"]
@@ -210,22 +224,18 @@ def test_a_step_of_the_clock_is_corrected_in_what_is_proposed(tmp_path, size):
     )
     assert "to_s" not in made.table["log"]
     assert "from_s" not in made.table["log"]
-    given = FixesTable(path=str(tmp_path / "fixes.csv"))
-    draft = draft_navigation(LogTable(path=str(tmp_path / "log.csv")), gnss=given, folder=tmp_path)
-    written = tomllib.loads(draft.text)["aiding"]["gnss"]["clock_steps_s"]
-    assert written == [[pytest.approx(stamp), pytest.approx(by)]]
+    assert written["clock_steps_s"] == [[pytest.approx(stamp), pytest.approx(by)]]
 
 
 def test_a_clock_that_may_have_stepped_in_an_outage_is_unsure_from_then_on(tmp_path):
-    made = stepped(tmp_path, 0.15, outage=15.0)
+    made, written = stepped(tmp_path, 0.15, outage=15.0)
     aid = made.table["aiding"]["gnss"]
     ((at, sd),) = aid["clock_unsure_s"]
     # On the time of the run, whose first sample is at zero.
     assert at == pytest.approx(32.5, abs=0.3)
     assert sd == pytest.approx(0.25, abs=1e-3)
     assert aid["time_offset_sd_s"] > 0.0
-    given = FixesTable(path=str(tmp_path / "fixes.csv"))
-    draft = draft_navigation(LogTable(path=str(tmp_path / "log.csv")), gnss=given, folder=tmp_path)
-    written = tomllib.loads(draft.text)["aiding"]["gnss"]["clock_unsure_s"]
-    assert written == [[pytest.approx(at), pytest.approx(sd)]]
-    assert "clock_unsure_s" not in stepped(tmp_path, 0.0, outage=15.0).table["aiding"]["gnss"]
+    assert written["clock_unsure_s"] == [[pytest.approx(at), pytest.approx(sd)]]
+    made, written = stepped(tmp_path, 0.0, outage=15.0)
+    assert "clock_unsure_s" not in made.table["aiding"]["gnss"]
+    assert "clock_unsure_s" not in written
