@@ -65,8 +65,7 @@ from strapdown.attitude_comparison.sweep import (
     worst_sweep,
 )
 from strapdown.bundle import InputFiles, Seal, check_destination, input_files
-from strapdown.config import LogSpec
-from strapdown.config.sources import read_options
+from strapdown.config.sources import LogSpec
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.evaluation.differences import known_at, largest_differences
 from strapdown.evaluation.reference_points import SamePose, Score, score_references
@@ -77,7 +76,7 @@ from strapdown.orientation_filters import is_filter
 from strapdown.progress import Progress, silent
 from strapdown.sensors.magnetometer import calibrate_magnetometer, without_iron
 from strapdown.sensors.rest import RestStretch, find_rests, gyro_bias_from_rests, without_gyro_bias
-from strapdown.systems.inputs import part_of_log
+from strapdown.systems.inputs import part_of_log, read_options
 from strapdown.tables import ACCEL, GYRO, MAG, references_table
 from strapdown.tables.checks import index_of, values_of
 from strapdown.tables.sample_clock import SampleClock
@@ -528,7 +527,12 @@ def _gyro_bias(
     bias: Sequence[float]
     choice = spec.gyro_bias.lower()
     if choice == "auto":
-        choice = "rest" if rests and _significant(rests[0]) else "nothing"
+        choice = "nothing"
+        if rests:
+            # Whether the mean of the rest differs from zero by more than chance.
+            scatter = np.asarray(rests[0].gyro_mean_sd or rests[0].gyro_sd)
+            if (np.abs(rests[0].gyro_mean) > BIAS_SIGNIFICANT * scatter).any():
+                choice = "rest"
         if choice == "rest" and _field_turned(imu, rests[0]):
             choice = "turned"
     if spec.gyro_bias_path is not None:
@@ -626,12 +630,6 @@ def _field_turned(imu: pd.DataFrame, rest: RestStretch) -> bool:
         return False
     off = np.linalg.norm(np.array(parts) - parts[0], axis=1)
     return bool(off.max() > TURNED * np.linalg.norm(parts[0]))
-
-
-def _significant(rest: RestStretch) -> bool:
-    """Whether the mean of a rest differs from zero by more than chance."""
-    mean = np.abs(rest.gyro_mean)
-    return bool((mean > BIAS_SIGNIFICANT * np.asarray(rest.gyro_mean_sd or rest.gyro_sd)).any())
 
 
 def _stated_bias(text: str) -> tuple[list[float], str]:

@@ -15,7 +15,7 @@ from strapdown.attitude_algorithms import AttitudeAlgorithm, RotationVector, att
 from strapdown.attitude_algorithms.algorithm import AttitudeRun, Steps, steps_of
 from strapdown.attitude_algorithms.cost import run_single, single_increments
 from strapdown.attitude_comparison.options import refuse_no_rate
-from strapdown.config import LogSpec, ScenarioSpec
+from strapdown.config.sources import LogSpec, ScenarioSpec
 from strapdown.dsp.chi_square import student_above, student_quantile
 from strapdown.errors import ConfigError, DivergenceError, Finding
 from strapdown.evaluation.differences import Errors, Known, angles_to_errors
@@ -146,7 +146,13 @@ class Grounds:
         else:
             clean = None
             increments = increments_from_imu(imu, interpolation)
-            known = _known_after_gaps(clock, truth)
+            # Rows after gaps at which the truth is first known, with the truth.
+            known: list[tuple[int, Array]] = []
+            for begin, end in clock.stretches[1:] if truth is not None else ():
+                counted = np.flatnonzero(truth.counts[begin:end])
+                if counted.size:
+                    row = begin + int(counted[0])
+                    known.append((row, truth.q_nb[row]))
             best = attitude_history(MOST_ACCURATE, increments, q_nb, known)
             there = {row for row, _ in known}
             restarts = tuple(
@@ -158,20 +164,9 @@ class Grounds:
             own = Known(best, np.ones(len(best), dtype=bool))
         return cls(imu, q_nb, interpolation, references, truth, own, clean, clock, restarts)
 
-    def history(
-        self,
-        algorithm: AttitudeAlgorithm,
-        increments: pd.DataFrame | Steps,
-        samples: NDArray[np.int64] | None = None,
-    ) -> Array:
-        """Attitude by an algorithm, anew after each gap; `samples`: the rows, at a lower rate."""
-        return attitude_history(algorithm, increments, self.q_nb, self.restarts_at(samples))
-
-    def restarts_at(self, samples: NDArray[np.int64] | None) -> tuple[tuple[int, Array], ...]:
-        """Return the restarts by the rows of a lower rate."""
-        if samples is None:
-            return self.restarts
-        return tuple((int(np.searchsorted(samples, row)), q) for row, q in self.restarts)
+    def history(self, algorithm: AttitudeAlgorithm, increments: pd.DataFrame | Steps) -> Array:
+        """Attitude by an algorithm, anew after each gap."""
+        return attitude_history(algorithm, increments, self.q_nb, self.restarts)
 
     def samples(self, factor: int) -> NDArray[np.int64]:
         """Rows of a lower rate, with the rows at which runs begin anew."""
@@ -199,19 +194,6 @@ class Grounds:
         )
         sensor = rotation.compose(rotation.conjugate(without), with_errors)
         return self.truth.errors(rotation.compose(self.own.q_nb, sensor))
-
-
-def _known_after_gaps(clock: SampleClock, truth: Known | None) -> list[tuple[int, Array]]:
-    """Rows after gaps at which the truth is first known, with the truth."""
-    if truth is None:
-        return []
-    found = []
-    for begin, end in clock.stretches[1:]:
-        counted = np.flatnonzero(truth.counts[begin:end])
-        if counted.size:
-            row = begin + int(counted[0])
-            found.append((row, truth.q_nb[row]))
-    return found
 
 
 def lower_factor(clock: SampleClock, factors: Sequence[int]) -> int | None:
@@ -296,7 +278,7 @@ def sweep_rates(
             grounds,
             own=grounds.own.at(samples),
             truth=None if grounds.truth is None else grounds.truth.at(samples),
-            restarts=grounds.restarts_at(samples),
+            restarts=tuple((int(np.searchsorted(samples, row)), q) for row, q in grounds.restarts),
         )
         for algorithm in algorithms:
             rows.append(

@@ -23,9 +23,10 @@ from pathlib import Path
 from typing import Any
 
 from strapdown.bundle import atomic_folder
+from strapdown.bundle.atomic_folder import MANIFEST, claimed
+from strapdown.bundle.atomic_folder import check_destination as check_destination
 from strapdown.errors import ConfigError, DataError, Finding, printable
 
-MANIFEST = "manifest.json"
 TIMING = "timing.json"
 LATENCY = "latency.json"
 #: Answer of a timestamp authority (RFC 3161) to the digest of the manifest.
@@ -102,25 +103,6 @@ def files_of(root: Path) -> list[str]:
     """Everything but folders; a link to a folder is not a folder of the bundle."""
     found = (p for p in root.rglob("*") if p.is_symlink() or not p.is_dir())
     return sorted(p.relative_to(root).as_posix() for p in found)
-
-
-# The destination, before and during a run.
-
-
-def check_destination(out: Path, force: bool) -> None:
-    """Refuse a folder that must not be written.
-
-    `force`: allow a bundle, or an empty folder, to be replaced.
-    """
-    atomic_folder.check_destination(out, force, MANIFEST)
-
-
-@contextmanager
-def claimed(out: Path, force: bool) -> Iterator[Path]:
-    """Hold a destination for the duration of a run, as `atomic_folder.claimed`, and check it."""
-    with atomic_folder.claimed(out) as folder:
-        check_destination(folder, force)
-        yield folder
 
 
 # Files beside the seal, because clocks differ.

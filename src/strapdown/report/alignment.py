@@ -20,7 +20,6 @@ from strapdown.report.alignment_document import (
     limits,
     trust,
 )
-from strapdown.report.document import finding_json
 from strapdown.report.report_bundle import (
     ReportBundle,
     as_comments,
@@ -130,7 +129,7 @@ def alignment_json(result: AlignmentRun) -> dict[str, Any]:
             "coarse": _rows(result.readiness.coarse),
             "fine": _rows(_thinned(result.readiness.fine)),
             "refused": [
-                {"time_s": t, "finding": finding_json(f)} for t, f in result.readiness.refused
+                {"time_s": t, "finding": f.plain("file")} for t, f in result.readiness.refused
             ],
         },
         "after_a_turn": [
@@ -147,7 +146,7 @@ def alignment_json(result: AlignmentRun) -> dict[str, Any]:
         "method": spec.model_dump(
             mode="json", include={"prefilter", "coarse", "fine"}, serialize_as_any=True
         ),
-        "findings": [finding_json(f) for f in result.findings],
+        "findings": [f.plain("file") for f in result.findings],
     }
     return finite(data)
 

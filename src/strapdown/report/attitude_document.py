@@ -46,6 +46,12 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
     made = {c.slug: c for c in (charts(bench) if drawn is None else drawn)}
     chart = made.get
     answer = bench.answer
+    # Warnings stand beside the answer; notes and remedies follow below.
+    warnings = [
+        f"{f.quantity}: {f.sentence('python')}." if f.quantity else f"{f.sentence('python')}."
+        for f in bench.findings
+        if f.severity != "note"
+    ]
     sections = (
         section(
             "rates",
@@ -121,7 +127,7 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
             _key_figures(bench),
             Paragraph(answer.sentence, "lead"),
             Paragraph(tables.standing(bench)),
-            *_named_items("To be considered beside it:", _warnings(bench)),
+            *_named_items("To be considered beside it:", warnings),
             *_named_items("Why:", answer.why),
             *_named_items("What would help:", answer.helps),
             None if bench.scores else Paragraph(tables.HOW_TO_REFERENCE),
@@ -132,15 +138,6 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
         sections,
         bench.source,
     )
-
-
-def _warnings(bench: AttitudeComparison) -> list[str]:
-    """Sentences of the warnings, which stand beside the answer; notes and remedies follow below."""
-    return [
-        f"{f.quantity}: {f.sentence('python')}." if f.quantity else f"{f.sentence('python')}."
-        for f in bench.findings
-        if f.severity != "note"
-    ]
 
 
 def _key_figures(bench: AttitudeComparison) -> KeyFigures | None:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict
 from itertools import takewhile
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
@@ -408,21 +407,17 @@ def _parts(bench: AttitudeComparison) -> tuple[list[str], dict[str, dict[str, st
                 for s in bench.shares
             }
         if len(bench.sweep):
-            grid, limit = sweep_grid(bench, "sum", "own_deg"), bench.answer.tolerance_deg
-            cells[f"≤ {limit:g}° to"] = {
-                s.algorithm: _lowest_rate(grid.T[s.algorithm], limit) for s in bench.shares
-            }
+            # Lowest rate of averaged samples down to which the algorithm error is within tolerance.
+            limit, lowest = bench.answer.tolerance_deg, {}
+            for name, errors in sweep_grid(bench, "sum", "own_deg").T.items():
+                within = list(takewhile(lambda cell: cell[1] <= limit, errors.items()))
+                lowest[str(name)] = f"{within[-1][0]:.3g} Hz" if within else _NONE
+            cells[f"≤ {limit:g}° to"] = {s.algorithm: lowest[s.algorithm] for s in bench.shares}
         cells["float32"] = {s.algorithm: degrees(s.single_deg[2]) for s in bench.shares}
     if bench.costs:
         cells["cycles"] = {c.algorithm: number(c.cycles) for c in bench.costs}
         cells["memory"] = {c.algorithm: str(c.memory) for c in bench.costs}
     return list(cells), cells
-
-
-def _lowest_rate(errors: pd.Series, limit: float) -> str:
-    """Lowest rate of averaged samples down to which the algorithm error is within tolerance."""
-    within = list(takewhile(lambda cell: cell[1] <= limit, errors.items()))
-    return f"{within[-1][0]:.3g} Hz" if within else _NONE
 
 
 def _part_note(bench: AttitudeComparison) -> str:
@@ -568,35 +563,6 @@ def budget_table(bench: AttitudeComparison) -> TableBlock | None:
     )
 
 
-def budget_json(bench: AttitudeComparison) -> dict[str, Any] | None:
-    """Parts of the sensor error as plain data."""
-    budget = bench.budget
-    if budget is None:
-        return None
-    return {
-        "delay_s": budget.delay_s,
-        "delay_sd_s": budget.delay_sd,
-        "drift_ppm": budget.drift_ppm,
-        "drift_sd_ppm": budget.drift_sd_ppm,
-        "bias_rad_per_s": budget.bias.tolist(),
-        "matrix": budget.matrix.tolist(),
-        "parts": budget.parts.to_dict("records"),
-    }
-
-
-def clock_json(bench: AttitudeComparison) -> dict[str, Any]:
-    """Nominal rate, gaps and nature of the stamps as plain data."""
-    clock = bench.clock
-    return {
-        "rate_hz": clock.rate_hz,
-        "stamps": clock.kind,
-        "repaired": clock.repaired,
-        "spread_s": clock.spread,
-        "lost_samples": clock.lost,
-        "gaps": [{"start_s": g.start, "end_s": g.end} for g in clock.gaps],
-    }
-
-
 def luck_words(luck: float) -> str:
     """Return whether a rank difference to the next algorithm is due to chance."""
     if not math.isfinite(luck):
@@ -653,8 +619,8 @@ def peer_table(bench: AttitudeComparison) -> TableBlock | None:
         (f"strapdown {name}", degrees(error) if judged else _NONE, "", "gyro")
         for name, error in full_rate_errors(bench).items()
     ]
-    rows += [(p.peer, _peer_error(p), "", p.aiding) for p in alone]
-    rows += [(p.peer, "", _peer_error(p), p.aiding) for p in aided]
+    rows += [(p.peer, degrees(largest_known(p.scores)), "", p.aiding) for p in alone]
+    rows += [(p.peer, "", degrees(largest_known(p.scores)), p.aiding) for p in aided]
     return TableBlock(
         ("library", "gyro alone", "aided", "uses"),
         tuple(rows),
@@ -716,11 +682,6 @@ def _filter_row(peer: PeerRun) -> tuple[str, ...]:
     return (name, sensors[peer.aiding], *parts, *of_kernel)
 
 
-def _peer_error(peer: PeerRun) -> str:
-    error = largest_known(peer.scores)
-    return _NONE if error is None else degrees(error)
-
-
 # Dead-reckoned positions and the second log.
 
 
@@ -768,23 +729,3 @@ def offer_lines(bench: AttitudeComparison) -> list[str]:
         f"{offer.sd_deg:.2g}°; {offer.caveat})"
         for offer in bench.offers[:4]
     ]
-
-
-def places_json(bench: AttitudeComparison) -> dict[str, Any]:
-    """Positions, proposed reference points and the second log as plain data."""
-    return {
-        "positions": [asdict(place) for place in bench.places],
-        "offered_references": [asdict(offer) for offer in bench.offers],
-        "second_log": None if bench.second is None else _second_json(bench.second),
-    }
-
-
-# Each key carries the unit of its value.
-_UNITS = {
-    **dict.fromkeys(("start", "end", "middle", "offset", "offset_sd", "smoothing"), "_s"),
-    **dict.fromkeys(("bias", "bias_sd", "residual"), "_rad_per_s"),
-}
-
-
-def _second_json(second: SecondLog) -> dict[str, Any]:
-    return {key + _UNITS.get(key, ""): value for key, value in asdict(second).items()}

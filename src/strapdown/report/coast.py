@@ -26,7 +26,6 @@ from strapdown.report.coast_document import (
     remedy,
     start_words,
 )
-from strapdown.report.document import finding_json
 from strapdown.report.report_bundle import (
     ReportBundle,
     file_of,
@@ -200,7 +199,7 @@ def coast_json(result: OutageRun) -> dict[str, Any]:
             }
             for d in drifts_of(result)
         ],
-        "findings": [finding_json(f) for f in result.findings],
+        "findings": [f.plain("file") for f in result.findings],
     }
     return finite(data)
 

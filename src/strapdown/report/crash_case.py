@@ -21,8 +21,7 @@ from strapdown.crash.closure import Closure, Figure
 from strapdown.crash.consistency import UnitComparison
 from strapdown.crash.crash_type import CrashType
 from strapdown.crash.delta_v_bound import EventChanges, VelocityChange
-from strapdown.crash.drive_entry import determined
-from strapdown.crash.entry import EntryState
+from strapdown.crash.entry import EntryState, determined
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import CrashPath
 from strapdown.crash.pdof import NedPdof
@@ -33,7 +32,6 @@ from strapdown.progress import Progress
 from strapdown.report import crash_words
 from strapdown.report.chart import Array
 from strapdown.report.crash_tables import DRIVE_QUANTITIES
-from strapdown.report.document import finding_json
 from strapdown.report.document_pdf import write_pdf
 from strapdown.report.report_bundle import (
     ReportBundle,
@@ -206,7 +204,7 @@ def _json(result: CaseResult) -> dict[str, Any]:
         "limitations": _pairs([one[1:] for one in crash_words.limitations(result)]),
         "contradictions": _pairs(crash_words.contradictions(result)),
         "not_shown": _pairs(crash_words.not_shown(result)),
-        "findings": [finding_json(f) for f in result.findings],
+        "findings": [f.plain("file") for f in result.findings],
         "case": _named(result.spec.model_dump(mode="json", exclude_none=True)),
     }
 
@@ -445,7 +443,7 @@ def _closure(result: CaseResult, closure: Closure) -> dict[str, Any]:
         "energy_equivalent_speed_m_per_s": [_bounded(f) for f in closure.energy_equivalent_speed],
         "explained_by": []
         if result.blame is None
-        else [finding_json(one.finding) for one in result.blame.candidates],
+        else [one.finding.plain("file") for one in result.blame.candidates],
     }
 
 

@@ -13,7 +13,7 @@ from strapdown.crash.case import CaseResult
 from strapdown.crash.case_contact import main_event
 from strapdown.crash.closure import Figure
 from strapdown.crash.delta_v_bound import VelocityChange
-from strapdown.crash.drive_entry import determined
+from strapdown.crash.entry import determined
 from strapdown.crash.pdof import AngleInterval, Pdof
 from strapdown.report.document import TableBlock
 from strapdown.report.values import (

@@ -13,7 +13,6 @@ from strapdown.crash.case import CaseResult
 from strapdown.crash.case_contact import OF_DRIVES, main_event
 from strapdown.crash.closure import Closure
 from strapdown.crash.delta_v_bound import VelocityChange
-from strapdown.crash.drive_entry import CAR
 from strapdown.crash.pdof import Pdof
 from strapdown.crash.reconstruction import UnitReconstruction
 from strapdown.errors import Finding
@@ -1175,6 +1174,8 @@ def assumptions(result: CaseResult) -> tuple[tuple[str, str], ...]:
             )
         )
     if entry.kind in OF_DRIVES and (entry.slip_sd_deg or entry.speed_path is not None):
+        from strapdown.crash.drive_entry import CAR
+
         slip = TWO_SIDED_95 * (entry.slip_sd_deg or CAR["side_slip_sd_deg"])
         found.append(
             (

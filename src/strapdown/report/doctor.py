@@ -41,7 +41,6 @@ from strapdown.report.document import (
     TableBlock,
     blocks,
     capital,
-    finding_json,
     findings_list,
     paragraph,
     run_again,
@@ -107,7 +106,7 @@ def diagnosis_json(result: Diagnosis) -> dict[str, Any]:
 
 
 def _listed(findings: Iterable[Finding]) -> list[Any]:
-    return [finding_json(one, "cli") for one in findings]
+    return [one.plain("cli") for one in findings]
 
 
 # The answer, which page and terminal share.

@@ -171,16 +171,12 @@ def as_comments(rows: Iterable[tuple[str, str]]) -> dict[str, str]:
     return {name.lower().replace(" ", "_"): text for name, text in rows}
 
 
-def finite(data: dict[str, Any]) -> dict[str, Any]:
+def finite(value: Any) -> Any:
     """Return plain data for JSON, which has no NaN and no infinity: these are null."""
-    return {str(key): _finite(value) for key, value in data.items()}
-
-
-def _finite(value: Any) -> Any:
     if isinstance(value, dict):
-        return finite(value)
+        return {str(key): finite(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
+        return [finite(item) for item in value]
     if isinstance(value, np.generic):
         value = value.item()
     return None if isinstance(value, float) and not math.isfinite(value) else value
