@@ -148,11 +148,10 @@ class Grounds:
             increments = increments_from_imu(imu, interpolation)
             # Rows after gaps at which the truth is first known, with the truth.
             known: list[tuple[int, Array]] = []
-            for begin, end in clock.stretches[1:] if truth is not None else ():
-                counted = np.flatnonzero(truth.counts[begin:end])
-                if counted.size:
-                    row = begin + int(counted[0])
-                    known.append((row, truth.q_nb[row]))
+            if truth is not None:
+                counted = ((k, np.flatnonzero(truth.counts[k:m])) for k, m in clock.stretches[1:])
+                rows = [k + int(there[0]) for k, there in counted if there.size]
+                known = [(row, truth.q_nb[row]) for row in rows]
             best = attitude_history(MOST_ACCURATE, increments, q_nb, known)
             there = {row for row, _ in known}
             restarts = tuple(

@@ -23,8 +23,9 @@ from pathlib import Path
 from typing import Any
 
 from strapdown.bundle import atomic_folder
-from strapdown.bundle.atomic_folder import MANIFEST, claimed
+from strapdown.bundle.atomic_folder import MANIFEST as MANIFEST
 from strapdown.bundle.atomic_folder import check_destination as check_destination
+from strapdown.bundle.atomic_folder import claimed as claimed
 from strapdown.errors import ConfigError, DataError, Finding, printable
 
 TIMING = "timing.json"

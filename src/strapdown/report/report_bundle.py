@@ -34,6 +34,7 @@ class Ran(Protocol):
 
 
 R = TypeVar("R", bound=Ran)
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -171,12 +172,13 @@ def as_comments(rows: Iterable[tuple[str, str]]) -> dict[str, str]:
     return {name.lower().replace(" ", "_"): text for name, text in rows}
 
 
-def finite(value: Any) -> Any:
+def finite(value: T) -> T:
     """Return plain data for JSON, which has no NaN and no infinity: these are null."""
-    if isinstance(value, dict):
-        return {str(key): finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite(item) for item in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    made: Any = value.item() if isinstance(value, np.generic) else value
+    if isinstance(made, dict):
+        made = {str(key): finite(item) for key, item in made.items()}
+    elif isinstance(made, list | tuple):
+        made = [finite(item) for item in made]
+    elif isinstance(made, float) and not math.isfinite(made):
+        made = None
+    return made  # type: ignore[no-any-return]

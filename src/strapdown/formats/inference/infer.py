@@ -121,14 +121,11 @@ def infer_signals(signals: Signals) -> tuple[Inference, ...]:
         if gravity.value == "present" and gravity.confidence > 0.9:
             heard.append(infer_up(accel, step))
             # Motion cannot decide the sign of the accelerometer, only the axes can.
-            told = (
-                evidence("io.evidence-signs-turn-alike"),
-                evidence("io.evidence-sign-of-gravity"),
-            )
+            signs = evidence("io.evidence-signs-turn-alike")
+            told_of_sign = (signs, evidence("io.evidence-sign-of-gravity"))
+            other = (("gravity", 0.05),)
             heard.append(
-                Inference(
-                    "accel_sign", "reaction", 0.95, told, (("gravity", 0.05),), "--accel-unit"
-                )
+                Inference("accel_sign", "reaction", 0.95, told_of_sign, other, "--accel-unit")
             )
             assert signals.accel is not None
             force = signals.accel / usual
