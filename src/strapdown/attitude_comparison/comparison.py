@@ -57,9 +57,8 @@ from strapdown.attitude_comparison.sweep import (
     choose_factors,
     find_shares,
     gather,
-    lower_factor,
     not_judged,
-    passes_at,
+    sweep_on,
     sweep_rates,
     trial_names,
     worst_sweep,
@@ -419,15 +418,8 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
         algorithms, grounds, factors, lambda stage, share: progress(stage, 0.3 + 0.65 * share)
     )
     between = source.sampling_error_deg or between_samples(grounds)
-    lowest = sweep["rate_hz"].min()
-    while not spec.rates_hz and (lower := lower_factor(clock, factors)) is not None:
-        if not passes_at(sweep, lowest, spec.tolerance_deg):
-            break
-        factors = (*factors, lower)
-        sweep = pd.concat(
-            [sweep, sweep_rates(algorithms, grounds, (lower,), silent)], ignore_index=True
-        )
-        lowest = sweep["rate_hz"].min()
+    if not spec.rates_hz:
+        sweep = sweep_on(sweep, algorithms, grounds, spec.tolerance_deg)
     of_field, north, iron, field_input = _of_field(spec, source, imu, findings)
     beside = run_beside(spec.peers, source, of_field, q_nb, references, findings, north)
     evidence = replace(

@@ -21,7 +21,7 @@ from strapdown.errors import ConfigError, DivergenceError, Finding
 from strapdown.evaluation.differences import Errors, Known, angles_to_errors
 from strapdown.evaluation.reference_points import reference_errors
 from strapdown.increments import increments_from_imu
-from strapdown.progress import Progress
+from strapdown.progress import Progress, silent
 from strapdown.rotation import unit_rotation_angle
 from strapdown.tables import DTHETA, QUATERNION, THETA, increments_table
 from strapdown.tables.checks import values_of
@@ -195,12 +195,6 @@ class Grounds:
         return self.truth.errors(rotation.compose(self.own.q_nb, sensor))
 
 
-def lower_factor(clock: SampleClock, factors: Sequence[int]) -> int | None:
-    """Return half the lowest rate that was tried, while enough samples remain."""
-    lower = 2 * max(factors)
-    return lower if (clock.number.size - 1) // lower >= LEAST_STEPS else None
-
-
 def choose_factors(
     clock: SampleClock, rates: Sequence[float], findings: list[Finding]
 ) -> tuple[int, ...]:
@@ -235,12 +229,6 @@ def choose_factors(
                 )
             )
     return tuple(sorted(factors))
-
-
-def passes_at(sweep: pd.DataFrame, rate_hz: float, limit: float) -> bool:
-    """Whether the own error of any algorithm with averaged samples is within a limit at a rate."""
-    cells = sweep[(sweep["meaning"] == "sum") & (sweep["rate_hz"] == rate_hz)]
-    return bool((cells["own_deg"] <= limit).any())
 
 
 def sweep_rates(
@@ -286,6 +274,24 @@ def sweep_rates(
                 | _cell(algorithm, there, steps, error_free, used)
             )
     return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def sweep_on(
+    sweep: pd.DataFrame, algorithms: Sequence[AttitudeAlgorithm], grounds: Grounds, limit: float
+) -> pd.DataFrame:
+    """Halve the rate further, while averaged samples of any algorithm keep its own error within.
+
+    `limit` (deg). At the end too few samples remain.
+    """
+    factor = int(sweep["factor"].max())
+    while (grounds.clock.number.size - 1) // (2 * factor) >= LEAST_STEPS:
+        lowest = sweep[(sweep["meaning"] == "sum") & (sweep["factor"] == factor)]
+        if not (lowest["own_deg"] <= limit).any():
+            break
+        factor *= 2
+        further = sweep_rates(algorithms, grounds, (factor,), silent)
+        sweep = pd.concat([sweep, further], ignore_index=True)
+    return sweep
 
 
 def error_at_full_rate(algorithm: AttitudeAlgorithm, grounds: Grounds) -> float:

@@ -408,26 +408,21 @@ def source_digest() -> str:
     return digest.hexdigest()
 
 
-@functools.cache
-def _processor() -> str:
-    """Return the model of the processor, by which numpy and BLAS choose their code."""
-    with suppress(OSError):
-        first = Path("/proc/cpuinfo").read_text(encoding="utf-8").partition("\n\n")[0]
-        said = dict(re.findall(r"(.+?)\s*: (.*)", first))
-        keys = ("model name", "cpu family", "model", "CPU implementer", "CPU part")
-        if found := [said[key].strip() for key in keys if key in said]:
-            return " ".join(found)
-    return platform.processor()
-
-
 def machine() -> dict[str, str]:
     """Platform properties that can change the last bit of a result."""
     from strapdown._kernels.compilation import COMPILER, MODE
 
+    # The model of the processor, by which numpy and BLAS choose their code.
+    model: list[str] = []
+    with suppress(OSError):
+        first = Path("/proc/cpuinfo").read_text(encoding="utf-8").partition("\n\n")[0]
+        said = dict(re.findall(r"(.+?)\s*: (.*)", first))
+        keys = ("model name", "cpu family", "model", "CPU implementer", "CPU part")
+        model = [said[key].strip() for key in keys if key in said]
     return {
         "system": platform.system(),
         "machine": platform.machine(),
-        "cpu": _processor(),
+        "cpu": " ".join(model) if model else platform.processor(),
         "kernels": COMPILER or MODE,
         "libc": " ".join(platform.libc_ver()).strip(),
     }

@@ -61,7 +61,7 @@ from strapdown.tables.checks import index_of
 
 if TYPE_CHECKING:
     from strapdown.navigation.truth_comparison import SolutionScore
-from strapdown.report.chart_svg import ChartFigure
+    from strapdown.report.chart_svg import ChartFigure
 
 
 def _configuration(result: NavigationRun) -> dict[str, Any]:
