@@ -26,7 +26,6 @@ from strapdown.report.report_bundle import (
     file_of,
     finite,
     with_file,
-    write_report,
     write_table,
 )
 from strapdown.systems.alignment_run import AlignmentRun, run_alignment
@@ -52,6 +51,8 @@ def _write(
     if result.fine is not None:
         write_table(_history(result.fine.history), folder / "fine.csv", comments)
     if forms:
+        from strapdown.report.document_html import write_report
+
         write_report(alignment_document(result, name), folder, progress)
 
 

@@ -13,12 +13,12 @@ from strapdown.attitude_comparison.comparison import AttitudeComparison
 from strapdown.bundle import Seal, write_bundle, write_json
 from strapdown.evaluation.reference_points import Score
 from strapdown.formats import csv
-from strapdown.report import attitude_tables as words
-from strapdown.report.attitude_tables import (
+from strapdown.report import attitude_words as words
+from strapdown.report.attitude_words import (
     share_basis,
     source_of,
 )
-from strapdown.report.report_bundle import as_comments, finite, write_report
+from strapdown.report.report_bundle import as_comments, finite
 from strapdown.tables import EULER, QUATERNION
 from strapdown.tables.checks import index_of
 
@@ -68,6 +68,7 @@ def write_attitude(
             from strapdown.report.attitude_charts import charts
             from strapdown.report.attitude_document import attitude_document
             from strapdown.report.chart_svg import ChartFigure
+            from strapdown.report.document_html import write_report
 
             drawn = charts(bench)
             write_report(attitude_document(bench, drawn), folder)

@@ -31,7 +31,6 @@ from strapdown.report.report_bundle import (
     file_of,
     finite,
     with_file,
-    write_report,
 )
 from strapdown.report.values import spaced
 from strapdown.sensors.catalogue import SENSORS
@@ -119,6 +118,8 @@ def _write(
     write_json(folder / "coast.json", coast_json(result))
     write_coast_tables(result, folder)
     if forms:
+        from strapdown.report.document_html import write_report
+
         write_report(coast_document(result, name), folder, progress)
 
 

@@ -39,7 +39,6 @@ from strapdown.report.report_bundle import (
     file_of,
     finite,
     with_file,
-    write_report,
     write_table,
 )
 from strapdown.report.values import AXES, shown_in, spaced
@@ -71,6 +70,7 @@ def _write(
     _write_numbers(result, folder)
     if forms:
         from strapdown.report.crash_document import crash_document
+        from strapdown.report.document_html import write_report
 
         document = crash_document(result, name)
         stills = write_report(document, folder, progress)

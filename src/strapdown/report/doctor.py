@@ -46,7 +46,7 @@ from strapdown.report.document import (
     run_again,
     section,
 )
-from strapdown.report.report_bundle import ReportBundle, finite, write_report
+from strapdown.report.report_bundle import ReportBundle, finite
 from strapdown.report.values import duration_words, instant, small
 from strapdown.systems.doctor import USES, Diagnosis, LogDiagnosis, refused_fixes, run_doctor
 from strapdown.tables import ACCEL, GEODETIC, GYRO, VELOCITY, VELOCITY_SD, find_gaps
@@ -74,6 +74,8 @@ def _write(
 ) -> None:
     write_json(folder / "doctor.json", diagnosis_json(result))
     if forms:
+        from strapdown.report.document_html import write_report
+
         write_report(doctor_document(result, name), folder, progress, figures=False)
 
 

@@ -8,9 +8,17 @@ import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
-from strapdown.report.document import Document, document_data, draw_stills
+from strapdown.progress import Progress, silent
+from strapdown.report.document import (
+    Document,
+    document_data,
+    draw_stills,
+    write_drawings,
+    write_text,
+)
 
 _TITLE_ELEMENT = re.compile("<title>.*?</title>", re.DOTALL)
 _PLACE = re.compile(r"\{\{ (?:policy|title|body) \}\}")
@@ -21,6 +29,19 @@ _HOW_TO = (
     '<span class="livenote"> In a chart: point for values, drag to zoom, double-click to return, '
     "click a name in the legend to hide it.</span>"
 )
+
+
+def write_report(
+    document: Document, folder: Path, progress: Progress = silent, *, figures: bool = True
+) -> tuple[str, ...]:
+    """Write ``report.html`` and, in ``figures``, its drawings; return the drawn charts."""
+    progress("drawing the figures", 0.86)
+    stills = draw_stills(document)
+    if figures:
+        write_drawings(document, stills, folder / "figures")
+    progress("writing the page", 0.93)
+    write_text(folder / "report.html", document_page(document, stills=stills))
+    return stills
 
 
 def document_page(document: Document, *, stills: Sequence[str] | None = None) -> str:

@@ -44,7 +44,6 @@ from strapdown.report.report_bundle import (
     file_of,
     finite,
     with_file,
-    write_report,
     write_table,
 )
 from strapdown.report.values import spaced
@@ -81,6 +80,8 @@ def _write_all(
     write_navigation_files(evaluation, folder)
     write_integrity(evaluation, folder)
     if forms:
+        from strapdown.report.document_html import write_report
+
         document = navigation_document(evaluation, name)
         write_report(document, folder, progress, figures=result.spec.output.figures)
 

@@ -14,13 +14,6 @@ import pandas as pd
 from strapdown.bundle import InputFiles, Seal, write_bundle
 from strapdown.formats import csv
 from strapdown.progress import Progress, silent
-from strapdown.report.document import (
-    Document,
-    draw_stills,
-    write_drawings,
-    write_text,
-)
-from strapdown.report.document_html import document_page
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables.checks import index_of
 
@@ -146,19 +139,6 @@ def with_file(
     """Return a configuration with the path of its own file among the inputs, if it had one."""
     file = next((str(i.path) for i in result.inputs if i.role == role), None)
     return configuration if file is None else {**configuration, key: file}
-
-
-def write_report(
-    document: Document, folder: Path, progress: Progress = silent, *, figures: bool = True
-) -> tuple[str, ...]:
-    """Write ``report.html`` and, in ``figures``, its drawings; return the drawn charts."""
-    progress("drawing the figures", 0.86)
-    stills = draw_stills(document)
-    if figures:
-        write_drawings(document, stills, folder / "figures")
-    progress("writing the page", 0.93)
-    write_text(folder / "report.html", document_page(document, stills=stills))
-    return stills
 
 
 def write_table(table: pd.DataFrame, path: Path, comments: dict[str, str]) -> None:
