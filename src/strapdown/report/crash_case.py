@@ -30,9 +30,6 @@ from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.formats.crash_writers import write_mme
 from strapdown.progress import Progress
 from strapdown.report import crash_words
-from strapdown.report.chart import Array
-from strapdown.report.crash_tables import DRIVE_QUANTITIES
-from strapdown.report.document_pdf import write_pdf
 from strapdown.report.report_bundle import (
     ReportBundle,
     as_comments,
@@ -43,7 +40,7 @@ from strapdown.report.report_bundle import (
 )
 from strapdown.report.values import AXES, shown_in, spaced
 from strapdown.tables import ACCEL, EULER, GYRO, NED, VELOCITY
-from strapdown.tables.checks import index_of
+from strapdown.tables.checks import Array, index_of
 from strapdown.units import FORCES, LENGTHS, MOMENTS, SPEEDS
 
 
@@ -75,6 +72,8 @@ def _write(
         document = crash_document(result, name)
         stills = write_report(document, folder, progress)
     if "pdf" in forms:
+        from strapdown.report.document_pdf import write_pdf
+
         progress("setting the PDF", 0.95)
         write_pdf(document, folder / "report.pdf", stills=stills)
 
@@ -273,7 +272,7 @@ def _drive(drive: EntryState) -> dict[str, Any]:
     rows = []
     table = drive.calibration
     for what in () if table is None else table.to_dict("records"):
-        key, _, size, _ = DRIVE_QUANTITIES[what["quantity"]]
+        key, _, size, _ = crash_words.DRIVE_QUANTITIES[what["quantity"]]
         half, stated, kept = (
             TWO_SIDED_95 * x / size for x in (what["sd"], what["stated"], what["in_crash"])
         )
