@@ -13,7 +13,7 @@ import pytest
 
 import strapdown.report.crash_case as module
 from strapdown.bundle import read_manifest, unsealed_changes
-from strapdown.report import report_bundle
+from strapdown.report import document_html
 
 
 def start(case, folder, *options):
@@ -79,8 +79,8 @@ def test_a_disk_that_is_full_is_said_and_nothing_is_left(
     def full(*given, **options):
         raise OSError(errno.ENOSPC, "No space left on device", str(tmp_path / "out"))
 
-    monkeypatch.setattr(report_bundle, "draw_stills", lambda document: ["<svg/>"] * 99)
-    monkeypatch.setattr(report_bundle, "document_page", lambda document, stills=(): "")
+    monkeypatch.setattr(document_html, "draw_stills", lambda document: ["<svg/>"] * 99)
+    monkeypatch.setattr(document_html, "document_page", lambda document, stills=(): "")
     monkeypatch.setattr(module, fails, full)
     done = run_cli("crash", light_case, "--out", tmp_path / "deep" / "out")
     assert done.code == 4
