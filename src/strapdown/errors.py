@@ -25,7 +25,7 @@ from __future__ import annotations
 import difflib
 import re
 import string
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from copy import copy
 from functools import cache
 from importlib import resources
@@ -166,10 +166,15 @@ class Finding:
         where += [f"line {self.line}"] if self.line is not None else []
         return [*where, printable(self.quantity)] if self.quantity else where
 
-    def plain(self) -> dict[str, Any]:
-        """Return it as data for JSON: code, severity, location, data, without a sentence."""
+    def plain(self, words: Words | None = None) -> dict[str, Any]:
+        """Return it as data for JSON: code, severity, location, data.
+
+        `words`: with its sentence and remedy in these words, for people.
+        """
         where = {n: getattr(self, n) for n in _LOCATION if getattr(self, n) is not None}
-        return {"code": self.code, "severity": self.severity, **where, "data": _json(self.data)}
+        said = {"sentence": self.sentence(words), "remedy": self.advice(words)} if words else {}
+        data = {"data": _json(self.data), **said}
+        return {"code": self.code, "severity": self.severity, **where, **data}
 
     def __str__(self) -> str:
         return self.text()
@@ -309,14 +314,10 @@ def _entry(code: str) -> Mapping[str, str]:
     return tomllib.loads(_entries(room)[name])
 
 
-def _template(code: str, part: str, words: Words) -> str:
-    entry = _entry(code)
-    forms = {"python": (), "cli": ("_cli",), "file": ("_file", "_cli")}[words]
-    return next((entry[part + form] for form in (*forms, "") if part + form in entry), "")
-
-
 def _text(finding: Finding, part: str, words: Words) -> str:
-    template = _template(finding.code, part, words)
+    entry = _entry(finding.code)
+    forms = {"python": (), "cli": ("_cli",), "file": ("_file", "_cli")}[words]
+    template = next((entry[part + form] for form in (*forms, "") if part + form in entry), "")
     return _Sentence(words).vformat(template, (), finding.data) if template else ""
 
 
@@ -374,11 +375,9 @@ def printable(text: str, *, lines: bool = False, json: bool = False) -> str:
         With ``\x1b``, ``\n`` or ``\u202e`` for such characters, and ``\xff`` for a byte of a file
         name that is no text.
     """
-    return text if text.isascii() and text.isprintable() else _ODD.sub(_escape(lines, json), text)
+    if text.isascii() and text.isprintable():
+        return text
 
-
-@cache
-def _escape(lines: bool, json: bool) -> Callable[[re.Match[str]], str]:
     def escaped(found: re.Match[str]) -> str:
         char = found[0]
         if char.isprintable() or (lines and char in "\n\t"):
@@ -390,7 +389,7 @@ def _escape(lines: bool, json: bool) -> Callable[[re.Match[str]], str]:
             return f"\\x{ord(char) - 0xDC00:02x}"
         return char.encode("unicode_escape").decode()
 
-    return escaped
+    return _ODD.sub(escaped, text)
 
 
 def _plain(value: Any) -> Any:

@@ -79,12 +79,9 @@ def compose(q_ab: ArrayLike, q_bc: ArrayLike) -> Array:
     -------
     ndarray, (..., 4)
     """
-    a, lead_a = _unit_quaternions(q_ab, "q_ab")
-    b, lead_b = _unit_quaternions(q_bc, "q_bc")
-    leading = _common_shape(lead_a, lead_b)
-    left = _spread(a, lead_a, leading)
-    out = np.empty_like(left)
-    kernel.quats_multiply(left, _spread(b, lead_b, leading), out)
+    a, b, leading = _broadcast(_unit_quaternions(q_ab, "q_ab"), _unit_quaternions(q_bc, "q_bc"))
+    out = np.empty_like(a)
+    kernel.quats_multiply(a, b, out)
     return out.reshape((*leading, 4))
 
 
@@ -133,12 +130,10 @@ def rotate(q_ab: ArrayLike, v_b: ArrayLike) -> Array:
     -------
     ndarray, (..., 3), the unit of `v_b`
     """
-    q, lead_q = _unit_quaternions(q_ab, "quaternion")
-    v, lead_v = _rows_of(v_b, (3,), "vector")
-    leading = _common_shape(lead_q, lead_v)
-    vectors = _spread(v, lead_v, leading)
-    out = np.empty_like(vectors)
-    kernel.quats_rotate(_spread(q, lead_q, leading), vectors, out)
+    rotations, vectors = _unit_quaternions(q_ab, "quaternion"), _rows_of(v_b, (3,), "vector")
+    q, v, leading = _broadcast(rotations, vectors)
+    out = np.empty_like(v)
+    kernel.quats_rotate(q, v, out)
     return out.reshape((*leading, 3))
 
 
@@ -447,11 +442,7 @@ def rotation_angle(q_1: ArrayLike, q_2: ArrayLike) -> Array:
     ndarray, (...), deg
         Between 0 and 180; right to about 1e-15 rad, however small.
     """
-    (a, lead_a), (b, lead_b) = _unit_quaternions(q_1, "q_1"), _unit_quaternions(q_2, "q_2")
-    leading = _common_shape(lead_a, lead_b)
-    if lead_a != lead_b:
-        a = np.broadcast_to(a.reshape((*lead_a, 4)), (*leading, 4)).reshape(-1, 4)
-        b = np.broadcast_to(b.reshape((*lead_b, 4)), (*leading, 4)).reshape(-1, 4)
+    a, b, leading = _broadcast(_unit_quaternions(q_1, "q_1"), _unit_quaternions(q_2, "q_2"))
     return unit_rotation_angle(a, b).reshape(leading)
 
 
@@ -468,7 +459,7 @@ def unit_rotation_angle(q_1: Array, q_2: Array) -> Array:
     ndarray, (n,), deg
     """
     out = np.empty(len(q_1))
-    kernel.quats_angle(_for_kernels(q_1), _for_kernels(q_2), out)
+    kernel.quats_angle(*(np.require(q, requirements=["C", "W"]) for q in (q_1, q_2)), out)
     return np.asarray(np.degrees(out))
 
 
@@ -491,20 +482,20 @@ def within_half_turn(angles_deg: Array) -> Array:
 # Arguments as rows for the kernels.
 
 
-def _for_kernels(array: Array) -> Array:
-    """C-contiguous and writable: numba compiles a kernel again for other arrays."""
-    return np.require(array, requirements=["C", "W"])
+#: Rows, and the leading shape.
+Rows = tuple[Array, tuple[int, ...]]
 
 
-def _rows_of(values: ArrayLike, shape: tuple[int, ...], name: str) -> tuple[Array, tuple[int, ...]]:
-    """Return `values` as C-contiguous rows and the leading shape."""
+def _rows_of(values: ArrayLike, shape: tuple[int, ...], name: str) -> Rows:
+    """Return `values` as rows for the kernels, and the leading shape."""
     array = np.asarray(values, dtype=np.float64)
     depth = array.ndim - len(shape)
     if depth < 0 or array.shape[depth:] != shape:
         raise DataError(
             "geodesy.shape-does-not-end-2", quantity=name, shape=array.shape, shape_2=shape
         )
-    rows = _for_kernels(array.reshape(-1, math.prod(shape)))
+    # C-contiguous and writable: numba compiles a kernel again for other arrays.
+    rows = np.require(array.reshape(-1, math.prod(shape)), requirements=["C", "W"])
     # A square that overflows is as useless as infinity.
     if rows.size and not (rows.max() < LARGEST and rows.min() > -LARGEST):
         good = np.abs(rows) < LARGEST
@@ -519,7 +510,7 @@ def _rows_of(values: ArrayLike, shape: tuple[int, ...], name: str) -> tuple[Arra
     return rows, array.shape[:depth]
 
 
-def _unit_quaternions(q: ArrayLike, name: str) -> tuple[Array, tuple[int, ...]]:
+def _unit_quaternions(q: ArrayLike, name: str) -> Rows:
     """Return quaternions as rows of norm 1 and the leading shape; norms must be 1 within 1 %."""
     rows, leading = _rows_of(q, (4,), name)
     w, x, y, z = rows.T
@@ -533,7 +524,7 @@ def _unit_quaternions(q: ArrayLike, name: str) -> tuple[Array, tuple[int, ...]]:
     return rows / norm[:, None], leading
 
 
-def _proper_matrices(dcm: ArrayLike) -> tuple[Array, tuple[int, ...]]:
+def _proper_matrices(dcm: ArrayLike) -> Rows:
     """Return matrices as rows of nine and the leading shape; rotations within 1 %."""
     rows, leading = _rows_of(dcm, (3, 3), "direction cosine matrix")
     matrices = rows.reshape(-1, 3, 3)
@@ -550,23 +541,21 @@ def _proper_matrices(dcm: ArrayLike) -> tuple[Array, tuple[int, ...]]:
     return rows, leading
 
 
-def _common_shape(a: tuple[int, ...], b: tuple[int, ...]) -> tuple[int, ...]:
-    """Return the common broadcast leading shape."""
-    if a == b:
-        return a
+def _broadcast(one: Rows, two: Rows) -> tuple[Array, Array, tuple[int, ...]]:
+    """Return the rows of both, each repeated to their common leading shape, and this shape."""
+    (a, of_a), (b, of_b) = one, two
+    if of_a == of_b:
+        return a, b, of_a
     try:
-        return np.broadcast_shapes(a, b)
+        leading = np.broadcast_shapes(of_a, of_b)
     except ValueError:
-        raise DataError("geodesy.leading-shapes-do-not-go", a=a, b=b) from None
-
-
-def _spread(rows: Array, lead: tuple[int, ...], leading: tuple[int, ...]) -> Array:
-    """Repeat rows, C-contiguous, as their leading shape is broadcast to a common one."""
-    if lead == leading:
-        return rows
-    width = rows.shape[1]
-    spread = np.broadcast_to(rows.reshape((*lead, width)), (*leading, width))
-    return _for_kernels(spread.reshape(-1, width))
+        raise DataError("geodesy.leading-shapes-do-not-go", a=of_a, b=of_b) from None
+    spread = []
+    for rows, own in (one, two):
+        width = rows.shape[1]
+        whole = np.broadcast_to(rows.reshape((*own, width)), (*leading, width)).reshape(-1, width)
+        spread.append(np.require(whole, requirements=["C", "W"]))
+    return spread[0], spread[1], leading
 
 
 def _apply(

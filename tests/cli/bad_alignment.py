@@ -250,7 +250,7 @@ def _transposed(folder: Path) -> None:
 
 def alignment_section(mktemp, run_cli) -> str:
     """What `strapdown align` says of each case, as the page has it."""
-    import strapdown.report.report_bundle as module
+    import strapdown.report.document_html as module
 
     parts = [HEAD]
     with pytest.MonkeyPatch.context() as patch:

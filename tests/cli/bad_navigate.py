@@ -347,7 +347,7 @@ NAVIGATE_CASES = (
 
 def undrawn(patch: pytest.MonkeyPatch) -> None:
     """Without figures and page, which take most of the time and change no number."""
-    import strapdown.report.report_bundle as module
+    import strapdown.report.document_html as module
 
     patch.setattr(module, "draw_stills", lambda document: [])
     patch.setattr(module, "write_drawings", lambda *given: None)

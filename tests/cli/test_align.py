@@ -20,7 +20,7 @@ from strapdown.formats import read_raw
 @pytest.fixture
 def undrawn(monkeypatch):
     """Without figures and page, which take most of the time and change no number."""
-    import strapdown.report.report_bundle as module
+    import strapdown.report.document_html as module
 
     monkeypatch.setattr(module, "draw_stills", lambda document: [])
     monkeypatch.setattr(module, "write_drawings", lambda *given: None)

@@ -96,7 +96,7 @@ def page(tmp_path_factory, run_cli, crash_said):
 def crash_said(tmp_path_factory, run_cli):
     """What `strapdown crash` says of each case, and its exit code."""
     import strapdown.report.crash_case as crash_case
-    import strapdown.report.report_bundle as module
+    import strapdown.report.document_html as module
 
     root = tmp_path_factory.mktemp("crash-cases")
     assert run_cli("simulate", "pole", "-q", "--out", root / "pole").code == 0

@@ -224,15 +224,14 @@ def test_it_says_what_to_open_and_the_seal(sealed_crash):
 @pytest.fixture
 def quick(monkeypatch, sealed_crash):
     """The command with everything but the drawing, which the other tests have."""
-    import strapdown.report.crash_case as crash_case
-    import strapdown.report.report_bundle as module
+    from strapdown.report import document_html, document_pdf
 
     def write(document, path, *, stills=None):
         path.write_bytes(b"%PDF-")
 
-    monkeypatch.setattr(crash_case, "write_pdf", write)
-    monkeypatch.setattr(module, "draw_stills", lambda document: ["<svg/>"] * 99)
-    monkeypatch.setattr(module, "document_page", lambda document, stills=(): "<html></html>")
+    monkeypatch.setattr(document_pdf, "write_pdf", write)
+    monkeypatch.setattr(document_html, "draw_stills", lambda document: ["<svg/>"] * 99)
+    monkeypatch.setattr(document_html, "document_page", lambda document, stills=(): "<html></html>")
     return sealed_crash.records / "case.toml"
 
 

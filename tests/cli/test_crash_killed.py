@@ -11,9 +11,8 @@ import time
 
 import pytest
 
-import strapdown.report.crash_case as module
 from strapdown.bundle import read_manifest, unsealed_changes
-from strapdown.report import report_bundle
+from strapdown.report import crash_case, document_html, document_pdf
 
 
 def start(case, folder, *options):
@@ -72,15 +71,17 @@ def test_whenever_it_is_stopped(sealed_crash, tmp_path, instant, sent, force):
         assert job.returncode in (0, 128 + 15, 130)
 
 
-@pytest.mark.parametrize("fails", ["crash_json", "write_pdf"])
+@pytest.mark.parametrize(
+    ("module", "fails"), [(crash_case, "crash_json"), (document_pdf, "write_pdf")]
+)
 def test_a_disk_that_is_full_is_said_and_nothing_is_left(
-    sealed_crash, light_case, run_cli, tmp_path, monkeypatch, fails
+    sealed_crash, light_case, run_cli, tmp_path, monkeypatch, module, fails
 ):
     def full(*given, **options):
         raise OSError(errno.ENOSPC, "No space left on device", str(tmp_path / "out"))
 
-    monkeypatch.setattr(report_bundle, "draw_stills", lambda document: ["<svg/>"] * 99)
-    monkeypatch.setattr(report_bundle, "document_page", lambda document, stills=(): "")
+    monkeypatch.setattr(document_html, "draw_stills", lambda document: ["<svg/>"] * 99)
+    monkeypatch.setattr(document_html, "document_page", lambda document, stills=(): "")
     monkeypatch.setattr(module, fails, full)
     done = run_cli("crash", light_case, "--out", tmp_path / "deep" / "out")
     assert done.code == 4

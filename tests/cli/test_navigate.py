@@ -293,7 +293,7 @@ def test_bad_input_leaves_nothing_and_says_why(case, run_cli, tmp_path, undrawn_
 DROPPED = """
 import os, signal, time, weakref
 from strapdown.cli import main
-from strapdown.report import report_bundle
+from strapdown.report import document_html
 
 # A shell that ignores interrupts hands that on to its jobs.
 signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -316,7 +316,7 @@ def draw_stills(document):
         found = drawn(document)
     return found
 
-drawn, report_bundle.draw_stills = report_bundle.draw_stills, draw_stills
+drawn, document_html.draw_stills = document_html.draw_stills, draw_stills
 main.run()
 """
 

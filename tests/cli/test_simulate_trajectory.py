@@ -10,8 +10,7 @@ import pandas as pd
 import pytest
 
 from strapdown import read_log, simulate, verify
-from strapdown.config import TrajectorySpec
-from strapdown.config.motions import KINDS
+from strapdown.config.motions import KINDS, TrajectorySpec
 from strapdown.ellipsoids import ELLIPSOIDS
 from strapdown.simulation import ImuErrors, Origin, StationaryMotion, simulate_imu
 from strapdown.systems.trajectory_source import simulate_trajectory

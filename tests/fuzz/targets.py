@@ -137,7 +137,7 @@ def _scenario(path: Path) -> None:
 
 
 def _case(path: Path) -> None:
-    from strapdown.config import CaseSpec
+    from strapdown.config.crash_case import CaseSpec
 
     CaseSpec.read(path, files=False)
 

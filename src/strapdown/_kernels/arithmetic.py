@@ -17,8 +17,10 @@ import os
 import sys
 import tempfile
 from collections import Counter
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
+from typing import Any, Self
 
 SOURCES = ("rotation", "increments", "attitude", "rotation_vector", "orientation")
 #: Further ones of the package that are delivered in single precision.
@@ -115,6 +117,17 @@ def single_precision(module: str) -> ModuleType:
     return importlib.import_module(f"{SINGLE}.{name}")
 
 
+def kernel_home(kernel: Callable[..., Any]) -> str:
+    """Module of a kernel: one of `SOURCES`, or a plug-in's."""
+    return kernel.__module__.removeprefix(f"{PACKAGE}.")
+
+
+def single_kernel(kernel: Callable[..., Any]) -> Callable[..., Any]:
+    """Return a kernel compiled in single precision."""
+    single: Callable[..., Any] = getattr(single_precision(kernel_home(kernel)), kernel.__name__)
+    return single
+
+
 def _written(sources: dict[str, str]) -> Path:
     from strapdown._kernels import cache_folder
 
@@ -175,68 +188,52 @@ def _of_kernels(node: ast.stmt) -> bool:
     return isinstance(node, ast.FunctionDef | ast.Assign)
 
 
-class Counted:
-    """A number that notes every operation on it."""
+class Counted(float):
+    """A number that notes every operation on it; it compares and converts as its value."""
 
-    __slots__ = ("count", "value")
+    __slots__ = ("count",)
+    count: Counter[str]
 
-    def __init__(self, value: float, count: Counter[str]) -> None:
-        self.value, self.count = float(value), count
+    def __new__(cls, value: float, count: Counter[str]) -> Self:
+        number = super().__new__(cls, value)
+        number.count = count
+        return number
 
-    def _by(self, kind: str, value: float) -> Counted:
-        self.count[kind] += 1
-        return Counted(value, self.count)
 
-    def __add__(self, other: Counted | float) -> Counted:
-        return self._by("add", self.value + float(other))
+def counting(kind: str, operation: Callable[..., float]) -> Callable[..., float]:
+    """Return an operation that is noted as one of `kind`, if its first number is `Counted`.
 
-    __radd__ = __add__
+    Without a kind it costs nothing: a change of sign is part of what follows.
+    """
 
-    def __sub__(self, other: Counted | float) -> Counted:
-        return self._by("add", self.value - float(other))
+    def counted(first: float, *others: float) -> float:
+        value = operation(first, *others)
+        if not isinstance(first, Counted):
+            return value
+        if kind:
+            first.count[kind] += 1
+        return Counted(value, first.count)
 
-    def __rsub__(self, other: Counted | float) -> Counted:
-        return self._by("add", float(other) - self.value)
+    return counted
 
-    def __mul__(self, other: Counted | float) -> Counted:
-        return self._by("multiply", self.value * float(other))
 
-    __rmul__ = __mul__
+for _kind, _names in {
+    "add": "add radd sub rsub",
+    "multiply": "mul rmul",
+    "divide": "truediv rtruediv",
+    "": "neg abs",
+}.items():
+    for _name in _names.split():
+        setattr(Counted, f"__{_name}__", counting(_kind, getattr(float, f"__{_name}__")))
 
-    def __truediv__(self, other: Counted | float) -> Counted:
-        return self._by("divide", self.value / float(other))
-
-    def __rtruediv__(self, other: Counted | float) -> Counted:
-        return self._by("divide", float(other) / self.value)
-
-    def __neg__(self) -> Counted:
-        return Counted(-self.value, self.count)
-
-    def __abs__(self) -> Counted:
-        return Counted(abs(self.value), self.count)
-
-    def __float__(self) -> float:
-        return self.value
-
-    def __int__(self) -> int:
-        return int(self.value)
-
-    def __lt__(self, other: Counted | float) -> bool:
-        return self.value < float(other)
-
-    def __le__(self, other: Counted | float) -> bool:
-        return self.value <= float(other)
-
-    def __gt__(self, other: Counted | float) -> bool:
-        return self.value > float(other)
-
-    def __ge__(self, other: Counted | float) -> bool:
-        return self.value >= float(other)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Counted | float | int) and self.value == float(other)
-
-    __hash__ = None  # type: ignore[assignment]
+#: The functions of `math` that kernels call.
+COUNTED_MATH = {
+    "sqrt": counting("sqrt", math.sqrt),
+    **{name: counting("trig", getattr(math, name)) for name in ("sin", "cos", "atan2")},
+    "fmod": counting("divide", math.fmod),
+    "copysign": math.copysign,
+    "pi": math.pi,
+}
 
 
 @functools.cache
@@ -260,39 +257,5 @@ def counted_kernels(module: str) -> SimpleNamespace:
             node.decorator_list = []
     exec(compile(tree, f"{module} (counted)", "exec"), namespace)
     # Only now, so that the constants of the module are numbers.
-    namespace["math"] = namespace["np"] = _CountedMath
+    namespace["math"] = namespace["np"] = SimpleNamespace(**COUNTED_MATH)
     return SimpleNamespace(**namespace)
-
-
-class _CountedMath:
-    """The functions of `math` that kernels call."""
-
-    @staticmethod
-    def _of(kind: str, value: float, x: Counted | float) -> Counted | float:
-        return x._by(kind, value) if isinstance(x, Counted) else value
-
-    @staticmethod
-    def sqrt(x: Counted | float) -> Counted | float:
-        return _CountedMath._of("sqrt", math.sqrt(x), x)
-
-    @staticmethod
-    def sin(x: Counted | float) -> Counted | float:
-        return _CountedMath._of("trig", math.sin(x), x)
-
-    @staticmethod
-    def cos(x: Counted | float) -> Counted | float:
-        return _CountedMath._of("trig", math.cos(x), x)
-
-    @staticmethod
-    def atan2(y: Counted | float, x: Counted | float) -> Counted | float:
-        return _CountedMath._of("trig", math.atan2(y, x), y)
-
-    @staticmethod
-    def fmod(x: Counted | float, y: float) -> Counted | float:
-        return _CountedMath._of("divide", math.fmod(x, y), x)
-
-    @staticmethod
-    def copysign(x: float, y: Counted | float) -> float:
-        return math.copysign(x, y)
-
-    pi = math.pi

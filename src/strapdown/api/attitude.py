@@ -599,7 +599,8 @@ def compare_attitude(
         check_choice("api.unknown-option", known, quantity="options", name=name)
     if algorithms is not None:
         changes["algorithms"] = algorithms
-    if _is_named(source):
+    named = source if isinstance(source, list | tuple) else [source]
+    if all(isinstance(one, str | Path) for one in named):
         return run_comparison(
             replace(options or AttitudeOptions(), **changes).specify(source), progress
         )
@@ -623,11 +624,3 @@ def compare_attitude(
 def _on_disk(memory: Memory, result: AttitudeComparison) -> Iterator[AttitudeComparison]:
     with memory.as_files() as folder:
         yield moved(result, "specification", NOWHERE, folder)
-
-
-def _is_named(source: Any) -> bool:
-    """Whether a source is one path or name, or several."""
-    if isinstance(source, str | Path):
-        return True
-    several = isinstance(source, list | tuple)
-    return several and all(isinstance(one, str | Path) for one in source)

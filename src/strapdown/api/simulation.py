@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 from strapdown.api.reading import GnssFixes, Imu
 from strapdown.attitude_comparison.source import simulate_scenario
 from strapdown.bundle import Seal
-from strapdown.config import (
+from strapdown.config.motions import TrajectorySpec
+from strapdown.config.sources import (
     CrashSimulationSpec,
     ScenarioSpec,
     SimulateSpec,
-    TrajectorySpec,
-    specify,
+    is_scenario_file,
 )
-from strapdown.config.sources import is_scenario_file
+from strapdown.config.spec import specify
 from strapdown.errors import ConfigError
 from strapdown.simulation import SCENARIOS, GnssReceiver, simulate_gnss
 from strapdown.simulation.crash_cases import CASES, RecordedCase, find_case, record_case

@@ -23,13 +23,6 @@ from strapdown.tables.checks import values_of
 Array = NDArray[np.float64]
 
 
-def quaternions_from_angles(roll_pitch_heading: Array) -> Array:
-    """Quaternions of 3-2-1 angles in rad, (n, 3), of any size: pitch beyond ±90° is legal."""
-    q = np.empty((len(roll_pitch_heading), 4))
-    kernel.quats_from_eulers(np.ascontiguousarray(roll_pitch_heading), q)
-    return q
-
-
 @dataclass(frozen=True)
 class Steps:
     """Increments for the kernels: (n,) s, (n, 3) rad, (n, 3) rad."""
@@ -69,7 +62,8 @@ class Accuracy:
 class AttitudeAlgorithm(ABC):
     """One attitude algorithm with its options; stateless.
 
-    By default the state is the quaternion ``q_nb``.
+    By default the state is the quaternion ``q_nb``, or, of `width` 3, roll, pitch and heading in
+    rad, of any size: a pitch beyond ±90° is legal.
 
     Attributes
     ----------
@@ -101,10 +95,16 @@ class AttitudeAlgorithm(ABC):
 
     def begin(self, q_nb: Array) -> Array:
         """Return the state of an attitude given as a unit quaternion, shape (4,)."""
+        if self.width == 3:
+            return np.radians(rotation.euler_from_quaternion(q_nb))
         return np.array(q_nb, dtype=np.float64)
 
     def quaternions(self, history: Array) -> Array:
         """Return unit quaternions ``q_nb``, (n, 4), of `width` numbers a row."""
+        if self.width == 3:
+            q = np.empty((len(history), 4))
+            kernel.quats_from_eulers(np.ascontiguousarray(history), q)
+            return q
         w, x, y, z = history.T
         return np.asarray(history / np.sqrt(w * w + x * x + y * y + z * z)[:, None])
 
@@ -115,7 +115,9 @@ class AttitudeAlgorithm(ABC):
 
     def kernel_options(self) -> tuple[float, float]:
         """Return the two options for the kernels, as numbers; zero for a missing one."""
-        return 0.0, 0.0
+        options = [float(getattr(self, f.name)) for f in fields(self)]
+        first, second, *_ = *options, 0.0, 0.0
+        return first, second
 
     def diagnostics(self, state: Array, time: Array) -> dict[str, float]:
         """Return the algorithm's diagnostics after a run.
@@ -390,7 +392,8 @@ class AttitudeTracker:
         self._record = np.concatenate([head, algorithm.begin(unit)])
         self._update = type(algorithm).update_kernel
         # Whether the state begins with the quaternion itself.
-        self._plain = type(algorithm).quaternions is AttitudeAlgorithm.quaternions
+        inherited = type(algorithm).quaternions is AttitudeAlgorithm.quaternions
+        self._plain = inherited and algorithm.width == 4
 
     def update(self, time: float, gyro: Array | Sequence[float]) -> None:
         """Process one sample.

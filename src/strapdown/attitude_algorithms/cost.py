@@ -68,26 +68,15 @@ class _State(list[Any]):
         super().__setitem__(index, value)
 
 
-def kernel_home(algorithm: AttitudeAlgorithm) -> str:
-    """Module of an algorithm's kernels: one of `arithmetic.SOURCES`, or a plug-in's."""
-    home: str = type(algorithm).advance_kernel.__module__
-    return home.removeprefix(f"{arithmetic.PACKAGE}.")
-
-
-def step_kernel(algorithm: AttitudeAlgorithm) -> tuple[str, str]:
-    """Return the module and the name of the kernel of one step."""
-    name: str = type(algorithm).advance_kernel.__name__
-    return kernel_home(algorithm), name.replace("_advance", "_step")
-
-
 def count_cost(algorithm: AttitudeAlgorithm, dt: ArrayLike | None = None) -> Cost:
     """Count the operations of one sample, averaged over steps `dt` in s of a log."""
     lengths = np.full(STEPS, 0.01) if dt is None else np.asarray(dt, dtype=np.float64)
     first = max(0, (len(lengths) - STEPS) // 2)
     middle = np.resize(lengths[first : first + STEPS], STEPS)
     count: Counter[str] = Counter()
-    home, name = step_kernel(algorithm)
-    step = getattr(arithmetic.counted_kernels(home), name)
+    kernel = type(algorithm).advance_kernel
+    kernels = arithmetic.counted_kernels(arithmetic.kernel_home(kernel))
+    step = getattr(kernels, kernel.__name__.replace("_advance", "_step"))
     start = algorithm.begin(rotation.quaternion_from_euler([20.0, -35.0, 250.0]))
     state = _State(arithmetic.Counted(float(v), count) for v in start)
     for k, length in enumerate(middle.tolist()):
@@ -122,10 +111,9 @@ def time_algorithms(algorithms: Sequence[AttitudeAlgorithm]) -> pd.DataFrame:
     for algorithm in algorithms:
         begun = algorithm.begin(np.array([1.0, 0.0, 0.0, 0.0]))
         row: dict[str, str | float] = {"algorithm": algorithm.label}
-        kernels = {"float64_ns": type(algorithm).advance_kernel, "float32_ns": None}
-        for column, kernel in kernels.items():
-            kind = np.float64 if kernel is not None else np.float32
-            run = kernel if kernel is not None else single_kernel(algorithm)
+        kernel = type(algorithm).advance_kernel
+        for column, kind in (("float64_ns", np.float64), ("float32_ns", np.float32)):
+            run = kernel if kind is np.float64 else arithmetic.single_kernel(kernel)
             history = np.empty((_STEPS, algorithm.width), kind)
             inputs = [a.astype(kind) for a in (dt, theta, change)]
             options = [kind(option) for option in algorithm.kernel_options()]
@@ -161,12 +149,6 @@ def single_increments(imu: pd.DataFrame, interpolation: str = "linear") -> tuple
     return dt, theta, dtheta
 
 
-def single_kernel(algorithm: AttitudeAlgorithm) -> Any:
-    """Return the loop of an algorithm over many steps, compiled in single precision."""
-    name = type(algorithm).advance_kernel.__name__
-    return getattr(single_precision(kernel_home(algorithm)), name)
-
-
 def run_single(
     algorithm: AttitudeAlgorithm,
     increments: tuple[Single, ...],
@@ -175,12 +157,13 @@ def run_single(
 ) -> Array:
     """Quaternions, (n+1, 4), of an algorithm with every operation in single precision."""
     dt, theta, dtheta = increments
+    advance = arithmetic.single_kernel(type(algorithm).advance_kernel)
     options = [np.float32(option) for option in algorithm.kernel_options()]
     out = []
     for part, start in pieces_of(len(dt), q_nb, restarts):
         state = algorithm.begin(rotation.normalise(start)).astype(np.float32)
         first = state[None, : algorithm.width].astype(np.float64)
         history = np.empty((part.stop - part.start, algorithm.width), np.float32)
-        single_kernel(algorithm)(state, dt[part], theta[part], dtheta[part], history, *options)
+        advance(state, dt[part], theta[part], dtheta[part], history, *options)
         out.append(algorithm.quaternions(np.vstack([first, history.astype(np.float64)])))
     return np.vstack(out)

@@ -71,10 +71,6 @@ class DirectionCosine(AttitudeAlgorithm):
         """Two, whatever the order of the series: truncation only scales the matrix."""
         return Accuracy(increments=2, rates=2, coning=2)
 
-    def kernel_options(self) -> tuple[float, float]:
-        """Return the order and the steps between re-orthogonalizations."""
-        return float(self.order), float(self.orthogonalise_every)
-
     def diagnostics(self, state: Array, time: Array) -> dict[str, float]:
         """Return the largest element of C^T C - I at the end."""
         matrix = state[:9].reshape(3, 3)

@@ -7,14 +7,8 @@ from typing import Literal
 
 import numpy as np
 
-from strapdown import rotation
 from strapdown._kernels import attitude as kernel
-from strapdown.attitude_algorithms.algorithm import (
-    Accuracy,
-    Array,
-    AttitudeAlgorithm,
-    quaternions_from_angles,
-)
+from strapdown.attitude_algorithms.algorithm import Accuracy, Array, AttitudeAlgorithm
 from strapdown.errors import ConfigError
 
 
@@ -49,12 +43,8 @@ class EulerKrylov(AttitudeAlgorithm):
 
     def begin(self, q_nb: Array) -> Array:
         """Return roll, pitch, heading in rad, least |cos(pitch)|, its step, steps so far."""
-        roll, pitch, heading = np.radians(rotation.euler_from_quaternion(q_nb))
-        return np.array([roll, pitch, heading, abs(np.cos(pitch)), 0.0, 0.0])
-
-    def quaternions(self, history: Array) -> Array:
-        """Convert the angles to quaternions; pitch beyond ±90° is a legal angle here."""
-        return quaternions_from_angles(history)
+        angles = super().begin(q_nb)
+        return np.array([*angles, abs(np.cos(angles[1])), 0.0, 0.0])
 
     @property
     def accuracy(self) -> Accuracy:

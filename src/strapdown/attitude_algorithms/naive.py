@@ -4,16 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from strapdown import rotation
 from strapdown._kernels import attitude as kernel
-from strapdown.attitude_algorithms.algorithm import (
-    Accuracy,
-    Array,
-    AttitudeAlgorithm,
-    quaternions_from_angles,
-)
+from strapdown.attitude_algorithms.algorithm import Accuracy, AttitudeAlgorithm
 
 
 @dataclass(frozen=True)
@@ -32,14 +24,6 @@ class Naive(AttitudeAlgorithm):
     width = 3
     advance_kernel = staticmethod(kernel.naive_advance)
     update_kernel = staticmethod(kernel.naive_update)
-
-    def begin(self, q_nb: Array) -> Array:
-        """Return roll, pitch, heading in rad."""
-        return np.radians(rotation.euler_from_quaternion(q_nb))
-
-    def quaternions(self, history: Array) -> Array:
-        """Read the sums as 3-2-1 angles, whatever their size."""
-        return quaternions_from_angles(history)
 
     @property
     def accuracy(self) -> Accuracy:

@@ -46,10 +46,6 @@ class Quaternion(AttitudeAlgorithm):
         """Two, whatever the order of the series: 2 atan(r/2) is r to that order already."""
         return Accuracy(increments=2, rates=2, coning=2)
 
-    def kernel_options(self) -> tuple[float, float]:
-        """Return the order and whether to normalize."""
-        return float(self.order), float(self.normalise)
-
     def diagnostics(self, state: Array, time: Array) -> dict[str, float]:
         """Return the deviation of the norm from 1 at the end."""
         return {"norm_error": float(np.sqrt(state @ state) - 1.0)}

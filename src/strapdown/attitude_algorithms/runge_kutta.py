@@ -38,10 +38,6 @@ class RungeKutta(AttitudeAlgorithm):
         """Four with rates of that order, and two from increments alone."""
         return Accuracy(increments=2, rates=4, coning=2)
 
-    def kernel_options(self) -> tuple[float, float]:
-        """Return whether to normalize."""
-        return float(self.normalise), 0.0
-
     def diagnostics(self, state: Array, time: Array) -> dict[str, float]:
         """Return the deviation of the norm from 1 at the end."""
         return {"norm_error": float(np.sqrt(state @ state) - 1.0)}

@@ -57,16 +57,14 @@ from strapdown.attitude_comparison.sweep import (
     choose_factors,
     find_shares,
     gather,
-    lower_factor,
     not_judged,
-    passes_at,
+    sweep_on,
     sweep_rates,
     trial_names,
     worst_sweep,
 )
 from strapdown.bundle import InputFiles, Seal, check_destination, input_files
-from strapdown.config import LogSpec
-from strapdown.config.sources import read_options
+from strapdown.config.sources import LogSpec
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.evaluation.differences import known_at, largest_differences
 from strapdown.evaluation.reference_points import SamePose, Score, score_references
@@ -83,7 +81,7 @@ from strapdown.sensors.rest import (
     gyro_bias_from_rests,
     without_gyro_bias,
 )
-from strapdown.systems.inputs import part_of_log
+from strapdown.systems.inputs import part_of_log, read_options
 from strapdown.tables import ACCEL, GYRO, MAG, references_table
 from strapdown.tables.checks import index_of, values_of
 from strapdown.tables.sample_clock import SampleClock
@@ -428,15 +426,8 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
         algorithms, grounds, factors, lambda stage, share: progress(stage, 0.3 + 0.65 * share)
     )
     between = source.sampling_error_deg or between_samples(grounds)
-    lowest = sweep["rate_hz"].min()
-    while not spec.rates_hz and (lower := lower_factor(clock, factors)) is not None:
-        if not passes_at(sweep, lowest, spec.tolerance_deg):
-            break
-        factors = (*factors, lower)
-        sweep = pd.concat(
-            [sweep, sweep_rates(algorithms, grounds, (lower,), silent)], ignore_index=True
-        )
-        lowest = sweep["rate_hz"].min()
+    if not spec.rates_hz:
+        sweep = sweep_on(sweep, algorithms, grounds, spec.tolerance_deg)
     of_field, north, iron, field_input = _of_field(spec, source, imu, findings)
     beside = run_beside(spec.peers, source, of_field, q_nb, references, findings, north)
     evidence = replace(
@@ -536,7 +527,12 @@ def _gyro_bias(
     bias: Sequence[float]
     choice = spec.gyro_bias.lower()
     if choice == "auto":
-        choice = "rest" if rests and _significant(rests[0]) else "nothing"
+        choice = "nothing"
+        if rests:
+            # Whether the mean of the rest differs from zero by more than chance.
+            scatter = np.asarray(rests[0].gyro_mean_sd or rests[0].gyro_sd)
+            if (np.abs(rests[0].gyro_mean) > BIAS_SIGNIFICANT * scatter).any():
+                choice = "rest"
         if choice == "rest" and _field_turned(imu, rests[0]):
             choice = "turned"
     if spec.gyro_bias_path is not None:
@@ -650,12 +646,6 @@ def _turn_or_bias(rest: RestStretch, source: AttitudeSource) -> list[Finding]:
             duration=rest.end - rest.start,
         )
     ]
-
-
-def _significant(rest: RestStretch) -> bool:
-    """Whether the mean of a rest differs from zero by more than chance."""
-    mean = np.abs(rest.gyro_mean)
-    return bool((mean > BIAS_SIGNIFICANT * np.asarray(rest.gyro_mean_sd or rest.gyro_sd)).any())
 
 
 def _stated_bias(text: str) -> tuple[list[float], str]:

@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike
 from pydantic import Field, FiniteFloat
 
 from strapdown.attitude_algorithms import ALGORITHMS
-from strapdown.config import LogSpec, ScenarioSpec
-from strapdown.config.sources import is_scenario_file
+from strapdown.config.sources import LogSpec, ScenarioSpec, is_scenario_file
 from strapdown.config.spec import Spec, specify
 from strapdown.errors import ConfigError
 from strapdown.systems.inputs import check_part

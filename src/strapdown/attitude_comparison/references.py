@@ -16,7 +16,7 @@ from strapdown.attitude_algorithms.algorithm import AttitudeRun
 from strapdown.attitude_comparison.options import AttitudeSpec
 from strapdown.attitude_comparison.source import AttitudeSource
 from strapdown.bundle import input_files
-from strapdown.config import ScenarioSpec
+from strapdown.config.sources import ScenarioSpec
 from strapdown.constants import TWO_SIDED_95
 from strapdown.errors import ConfigError, Finding
 from strapdown.evaluation.differences import error_angles, known_at

@@ -15,8 +15,7 @@ from strapdown import rotation
 from strapdown.attitude_algorithms import Quaternion, run_attitude
 from strapdown.attitude_comparison.options import AttitudeSpec
 from strapdown.bundle import InputFiles, input_files, sensor_file
-from strapdown.config import LogSpec, ScenarioSpec
-from strapdown.config.sources import read_options
+from strapdown.config.sources import LogSpec, ScenarioSpec
 from strapdown.earth import magnetic_field
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.evaluation.differences import attitude_at, error_angles, gyro_turns
@@ -25,7 +24,7 @@ from strapdown.formats.clocks import year_of
 from strapdown.formats.inference.rotation_rate import signed_permutations
 from strapdown.formats.recording import Origin, Reading, Recording
 from strapdown.increments import increments_from_imu
-from strapdown.sensors.catalogue import load_sensor
+from strapdown.systems.inputs import read_options
 from strapdown.tables import ACCEL, GYRO, QUATERNION, find_gaps
 from strapdown.tables.checks import MAG, index_of, values_of
 from strapdown.tables.sample_clock import SampleClock, sample_clock
@@ -86,6 +85,8 @@ def scenario_errors(spec: ScenarioSpec) -> ImuErrors:
         from strapdown.systems.trajectory_source import scenario_of
 
         return scenario_of(spec).errors
+    from strapdown.sensors.catalogue import load_sensor
+
     return load_sensor(spec.sensor).draw(spec.seed)
 
 
@@ -97,7 +98,11 @@ def read_source(spec: AttitudeSpec) -> AttitudeSource:
         raw = read_raw(asked.path, options.format)
         log = recording_of(raw, options)
         axes, findings = asked.axes, log.findings
-        if axes is None and (by_gravity := _axes_by_gravity(log)) is not None:
+        # Another axis than z points down, by gravity, where no file states the axes.
+        by_gravity = next(
+            (f for f in log.findings if f.code in AXES_OPEN and "example" in f.data), None
+        )
+        if axes is None and by_gravity is not None:
             axes = str(by_gravity.data["example"])
             log = recording_of(raw, read_options(asked, axes))
             findings = (
@@ -150,11 +155,6 @@ def read_source(spec: AttitudeSpec) -> AttitudeSource:
         sampling_error_deg=(float(lost.iloc[-1]), float(lost.max())),
         clean=clean,
     )
-
-
-def _axes_by_gravity(log: Recording) -> Finding | None:
-    """Finding that another axis than z points down, by gravity, where no file states the axes."""
-    return next((f for f in log.findings if f.code in AXES_OPEN and "example" in f.data), None)
 
 
 #: Windows in which the rotation of a gyro is compared with that of a truth, and the fewest of them;

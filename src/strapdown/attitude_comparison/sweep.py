@@ -15,13 +15,13 @@ from strapdown.attitude_algorithms import AttitudeAlgorithm, RotationVector, att
 from strapdown.attitude_algorithms.algorithm import AttitudeRun, Steps, steps_of
 from strapdown.attitude_algorithms.cost import run_single, single_increments
 from strapdown.attitude_comparison.options import refuse_no_rate
-from strapdown.config import LogSpec, ScenarioSpec
+from strapdown.config.sources import LogSpec, ScenarioSpec
 from strapdown.dsp.chi_square import student_above, student_quantile
 from strapdown.errors import ConfigError, DivergenceError, Finding
 from strapdown.evaluation.differences import Errors, Known, angles_to_errors
 from strapdown.evaluation.reference_points import reference_errors
 from strapdown.increments import increments_from_imu
-from strapdown.progress import Progress
+from strapdown.progress import Progress, silent
 from strapdown.rotation import unit_rotation_angle
 from strapdown.tables import DTHETA, QUATERNION, THETA, increments_table
 from strapdown.tables.checks import values_of
@@ -146,7 +146,12 @@ class Grounds:
         else:
             clean = None
             increments = increments_from_imu(imu, interpolation)
-            known = _known_after_gaps(clock, truth)
+            # Rows after gaps at which the truth is first known, with the truth.
+            known: list[tuple[int, Array]] = []
+            if truth is not None:
+                counted = ((k, np.flatnonzero(truth.counts[k:m])) for k, m in clock.stretches[1:])
+                rows = [k + int(there[0]) for k, there in counted if there.size]
+                known = [(row, truth.q_nb[row]) for row in rows]
             best = attitude_history(MOST_ACCURATE, increments, q_nb, known)
             there = {row for row, _ in known}
             restarts = tuple(
@@ -158,20 +163,9 @@ class Grounds:
             own = Known(best, np.ones(len(best), dtype=bool))
         return cls(imu, q_nb, interpolation, references, truth, own, clean, clock, restarts)
 
-    def history(
-        self,
-        algorithm: AttitudeAlgorithm,
-        increments: pd.DataFrame | Steps,
-        samples: NDArray[np.int64] | None = None,
-    ) -> Array:
-        """Attitude by an algorithm, anew after each gap; `samples`: the rows, at a lower rate."""
-        return attitude_history(algorithm, increments, self.q_nb, self.restarts_at(samples))
-
-    def restarts_at(self, samples: NDArray[np.int64] | None) -> tuple[tuple[int, Array], ...]:
-        """Return the restarts by the rows of a lower rate."""
-        if samples is None:
-            return self.restarts
-        return tuple((int(np.searchsorted(samples, row)), q) for row, q in self.restarts)
+    def history(self, algorithm: AttitudeAlgorithm, increments: pd.DataFrame | Steps) -> Array:
+        """Attitude by an algorithm, anew after each gap."""
+        return attitude_history(algorithm, increments, self.q_nb, self.restarts)
 
     def samples(self, factor: int) -> NDArray[np.int64]:
         """Rows of a lower rate, with the rows at which runs begin anew."""
@@ -199,25 +193,6 @@ class Grounds:
         )
         sensor = rotation.compose(rotation.conjugate(without), with_errors)
         return self.truth.errors(rotation.compose(self.own.q_nb, sensor))
-
-
-def _known_after_gaps(clock: SampleClock, truth: Known | None) -> list[tuple[int, Array]]:
-    """Rows after gaps at which the truth is first known, with the truth."""
-    if truth is None:
-        return []
-    found = []
-    for begin, end in clock.stretches[1:]:
-        counted = np.flatnonzero(truth.counts[begin:end])
-        if counted.size:
-            row = begin + int(counted[0])
-            found.append((row, truth.q_nb[row]))
-    return found
-
-
-def lower_factor(clock: SampleClock, factors: Sequence[int]) -> int | None:
-    """Return half the lowest rate that was tried, while enough samples remain."""
-    lower = 2 * max(factors)
-    return lower if (clock.number.size - 1) // lower >= LEAST_STEPS else None
 
 
 def choose_factors(
@@ -256,12 +231,6 @@ def choose_factors(
     return tuple(sorted(factors))
 
 
-def passes_at(sweep: pd.DataFrame, rate_hz: float, limit: float) -> bool:
-    """Whether the own error of any algorithm with averaged samples is within a limit at a rate."""
-    cells = sweep[(sweep["meaning"] == "sum") & (sweep["rate_hz"] == rate_hz)]
-    return bool((cells["own_deg"] <= limit).any())
-
-
 def sweep_rates(
     algorithms: Sequence[AttitudeAlgorithm],
     grounds: Grounds,
@@ -296,7 +265,7 @@ def sweep_rates(
             grounds,
             own=grounds.own.at(samples),
             truth=None if grounds.truth is None else grounds.truth.at(samples),
-            restarts=grounds.restarts_at(samples),
+            restarts=tuple((int(np.searchsorted(samples, row)), q) for row, q in grounds.restarts),
         )
         for algorithm in algorithms:
             rows.append(
@@ -305,6 +274,24 @@ def sweep_rates(
                 | _cell(algorithm, there, steps, error_free, used)
             )
     return pd.DataFrame(rows, columns=COLUMNS)
+
+
+def sweep_on(
+    sweep: pd.DataFrame, algorithms: Sequence[AttitudeAlgorithm], grounds: Grounds, limit: float
+) -> pd.DataFrame:
+    """Halve the rate further, while averaged samples of any algorithm keep its own error within.
+
+    `limit` (deg). At the end too few samples remain.
+    """
+    factor = int(sweep["factor"].max())
+    while (grounds.clock.number.size - 1) // (2 * factor) >= LEAST_STEPS:
+        lowest = sweep[(sweep["meaning"] == "sum") & (sweep["factor"] == factor)]
+        if not (lowest["own_deg"] <= limit).any():
+            break
+        factor *= 2
+        further = sweep_rates(algorithms, grounds, (factor,), silent)
+        sweep = pd.concat([sweep, further], ignore_index=True)
+    return sweep
 
 
 def error_at_full_rate(algorithm: AttitudeAlgorithm, grounds: Grounds) -> float:

@@ -23,9 +23,11 @@ from pathlib import Path
 from typing import Any
 
 from strapdown.bundle import atomic_folder
+from strapdown.bundle.atomic_folder import MANIFEST as MANIFEST
+from strapdown.bundle.atomic_folder import check_destination as check_destination
+from strapdown.bundle.atomic_folder import claimed as claimed
 from strapdown.errors import ConfigError, DataError, Finding, printable
 
-MANIFEST = "manifest.json"
 TIMING = "timing.json"
 LATENCY = "latency.json"
 #: Answer of a timestamp authority (RFC 3161) to the digest of the manifest.
@@ -102,25 +104,6 @@ def files_of(root: Path) -> list[str]:
     """Everything but folders; a link to a folder is not a folder of the bundle."""
     found = (p for p in root.rglob("*") if p.is_symlink() or not p.is_dir())
     return sorted(p.relative_to(root).as_posix() for p in found)
-
-
-# The destination, before and during a run.
-
-
-def check_destination(out: Path, force: bool) -> None:
-    """Refuse a folder that must not be written.
-
-    `force`: allow a bundle, or an empty folder, to be replaced.
-    """
-    atomic_folder.check_destination(out, force, MANIFEST)
-
-
-@contextmanager
-def claimed(out: Path, force: bool) -> Iterator[Path]:
-    """Hold a destination for the duration of a run, as `atomic_folder.claimed`, and check it."""
-    with atomic_folder.claimed(out) as folder:
-        check_destination(folder, force)
-        yield folder
 
 
 # Files beside the seal, because clocks differ.
@@ -425,26 +408,21 @@ def source_digest() -> str:
     return digest.hexdigest()
 
 
-@functools.cache
-def _processor() -> str:
-    """Return the model of the processor, by which numpy and BLAS choose their code."""
-    with suppress(OSError):
-        first = Path("/proc/cpuinfo").read_text(encoding="utf-8").partition("\n\n")[0]
-        said = dict(re.findall(r"(.+?)\s*: (.*)", first))
-        keys = ("model name", "cpu family", "model", "CPU implementer", "CPU part")
-        if found := [said[key].strip() for key in keys if key in said]:
-            return " ".join(found)
-    return platform.processor()
-
-
 def machine() -> dict[str, str]:
     """Platform properties that can change the last bit of a result."""
     from strapdown._kernels.compilation import COMPILER, MODE
 
+    # The model of the processor, by which numpy and BLAS choose their code.
+    model: list[str] = []
+    with suppress(OSError):
+        first = Path("/proc/cpuinfo").read_text(encoding="utf-8").partition("\n\n")[0]
+        said = dict(re.findall(r"(.+?)\s*: (.*)", first))
+        keys = ("model name", "cpu family", "model", "CPU implementer", "CPU part")
+        model = [said[key].strip() for key in keys if key in said]
     return {
         "system": platform.system(),
         "machine": platform.machine(),
-        "cpu": _processor(),
+        "cpu": " ".join(model) if model else platform.processor(),
         "kernels": COMPILER or MODE,
         "libc": " ".join(platform.libc_ver()).strip(),
     }

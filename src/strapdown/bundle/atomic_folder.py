@@ -43,6 +43,7 @@ __all__ = [
     "written_whole",
 ]
 
+MANIFEST = "manifest.json"
 #: What a system promises differs; tests stand in for the others.
 WINDOWS, MACOS = os.name == "nt", sys.platform == "darwin"
 _LOCK = re.compile(r"\.(?P<name>.+)\.lock", re.S)
@@ -54,11 +55,10 @@ _NO_LOCKS = {errno.ENOLCK, errno.ENOTSUP, errno.EOPNOTSUPP, errno.EINVAL, errno.
 _TAKEN = {errno.EACCES, errno.EAGAIN, errno.EDEADLK}
 
 
-def check_destination(out: Path, force: bool, complete: str) -> None:
+def check_destination(out: Path, force: bool) -> None:
     """Refuse a folder that must not be written.
 
-    `force`: allow a complete folder, which has the file `complete`, or an empty one, to be
-    replaced.
+    `force`: allow a bundle, which has a manifest, or an empty folder, to be replaced.
     """
     if not out.exists():
         # Report before a long run a write error that would occur after it.
@@ -70,7 +70,7 @@ def check_destination(out: Path, force: bool, complete: str) -> None:
         return
     if not force:
         raise ConfigError("bundle.folder-exists", file=str(out), quantity="--out")
-    if not (out.is_dir() and (out / complete).is_file()):
+    if not (out.is_dir() and (out / MANIFEST).is_file()):
         raise ConfigError("bundle.not-a-bundle", file=str(out), quantity="--out")
 
 
@@ -84,7 +84,7 @@ _HELD: dict[Path, tuple[int]] = {}
 
 
 @contextmanager
-def claimed(out: Path) -> Iterator[Path]:
+def claimed(out: Path, force: bool = False) -> Iterator[Path]:
     """Hold the name of an output, so that no other run writes it, and restore or collect leftovers.
 
     Folders above it are created, and removed if they are empty at the end. A thread that holds
@@ -93,7 +93,7 @@ def claimed(out: Path) -> Iterator[Path]:
     Raises
     ------
     ConfigError
-        Another run holds the name, or its folder cannot be created.
+        Another run holds the name, its folder cannot be created, or as `check_destination`.
     """
     out = Path(os.path.realpath(out))
     me = (threading.get_ident(),)
@@ -101,16 +101,24 @@ def claimed(out: Path) -> Iterator[Path]:
     if holder is not me:
         if holder != me:
             raise _held_by(out, os.getpid())
+        check_destination(out, force)
         yield out
         return
     made = [p for p in out.parents if not p.exists()]
     lock = None
     try:
-        _make_parent(out)
+        try:
+            out.parent.mkdir(parents=True, exist_ok=True)
+        except OSError:
+            parent = next(p for p in out.parents if p.exists())
+            raise ConfigError(
+                "bundle.not-writable", file=str(out), quantity="--out", parent=parent
+            ) from None
         lock = _locked(out)
         if lock is not None:
             with suppress(OSError):
                 _collect_all(out)
+        check_destination(out, force)
         yield out
     finally:
         if lock is not None:
@@ -120,16 +128,6 @@ def claimed(out: Path) -> Iterator[Path]:
         with suppress(OSError):
             for parent in made:
                 parent.rmdir()
-
-
-def _make_parent(out: Path) -> None:
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        parent = next(p for p in out.parents if p.exists())
-        raise ConfigError(
-            "bundle.not-writable", file=str(out), quantity="--out", parent=parent
-        ) from None
 
 
 def _held_by(out: Path, process: int | None) -> ConfigError:
@@ -220,12 +218,10 @@ def _unlock(out: Path, lock: int) -> None:
     """Release a name. Unlike POSIX, Windows cannot remove a file that is open."""
     if WINDOWS:
         os.close(lock)
-        with suppress(OSError):
-            _lock_file(out).unlink()
-        return
     with suppress(OSError):
         _lock_file(out).unlink()
-    os.close(lock)
+    if not WINDOWS:
+        os.close(lock)
 
 
 # What a killed run left.
@@ -281,7 +277,10 @@ def written_whole(out: Path, seal: Callable[[Path], None]) -> Iterator[Path]:
         staging.mkdir()
         yield staging
         seal(staging)
-        _flush(staging)
+        for path, _, names in os.walk(staging, topdown=False):
+            for name in names:
+                _flush_file(Path(path) / name)
+            flush_entry(Path(path))
         _put_in_place(staging, out)
     except BaseException as error:
         shutil.rmtree(staging, ignore_errors=True)
@@ -361,14 +360,6 @@ def _exchanged(one: Path, two: Path) -> bool:
 
 
 # To the disk: after a power cut, too, a folder is whole or absent.
-
-
-def _flush(folder: Path) -> None:
-    """Flush every file and folder below a folder, and it."""
-    for path, _, names in os.walk(folder, topdown=False):
-        for name in names:
-            _flush_file(Path(path) / name)
-        flush_entry(Path(path))
 
 
 def _flush_file(path: Path) -> None:

@@ -312,6 +312,7 @@ def print_comparison(bench: AttitudeComparison) -> None:
     from strapdown.cli.console import console, print_table
     from strapdown.errors import printable
     from strapdown.report import attitude_tables as tables
+    from strapdown.report import attitude_words as words
 
     page = console()
     if bench.trials is not None:
@@ -322,9 +323,9 @@ def print_comparison(bench: AttitudeComparison) -> None:
         page.print("Read as:")
         print_table(
             ["column", "taken as", "unit", "first value"],
-            [[r.source, r.quantity, r.unit, tables.first_value(r)] for r in bench.readings],
+            [[r.source, r.quantity, r.unit, words.first_value(r)] for r in bench.readings],
         )
-    for name, text in tables.facts(bench):
+    for name, text in words.facts(bench):
         page.print(f"{name}: {text}")
     shown = [
         *tables.result_tables(bench),
@@ -338,21 +339,21 @@ def print_comparison(bench: AttitudeComparison) -> None:
     for table in shown:
         if table is not None:
             _print_table(table, page)
-    points = tables.reference_lines(bench)
+    points = words.reference_lines(bench)
     for point in points[:MOST_LINES]:
         page.print(point)
     if len(points) > MOST_LINES:
         page.print(f"and {len(points) - MOST_LINES} more reference points, in the report")
     page.print(bench.answer.sentence, style="bold")
-    page.print(tables.standing(bench))
+    page.print(words.standing(bench))
     for title, lines in (("Why", bench.answer.why), ("What would help", bench.answer.helps)):
         if lines:
             page.print(f"{title}:")
         for line in lines:
             page.print(f"  - {line}")
     if not bench.scores:
-        page.print(tables.HOW_TO_REFERENCE)
-    if offers := tables.offer_lines(bench):
+        page.print(words.HOW_TO_REFERENCE)
+    if offers := words.offer_lines(bench):
         page.print("Rests of similar attitude, possible reference points:")
     for line in offers:
         page.print(f"  {line}")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -17,7 +18,7 @@ from strapdown.cli.shared_options import (
     as_flag,
     folder_to_make,
     module_of_flag,
-    options,
+    option,
     running,
     spread,
 )
@@ -32,9 +33,9 @@ EPILOG = (
     "Example: strapdown coast adis16470 --outage 60 --speed 15 --with no_slip\n\n"
     "Example: strapdown coast drive-navigate --outage 30 (a folder of strapdown navigate)"
 )
-moving = options("Motion, for a sensor")
-starting = options("Initial standard deviations, for a sensor")
-during = options("Instants, for a navigation run")
+moving = partial(option, "Motion, for a sensor")
+starting = partial(option, "Initial standard deviations, for a sensor")
+during = partial(option, "Instants, for a navigation run")
 
 #: Flags by key path of the specification.
 FLAGS = {

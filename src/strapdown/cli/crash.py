@@ -114,7 +114,6 @@ def crash(
     )
     from strapdown.cli.result_folder import claim, default_folder, refuse_result
     from strapdown.errors import printable
-    from strapdown.report.crash_tables import closure_table
     from strapdown.report.values import shown_in
 
     for case in cases:
@@ -148,11 +147,14 @@ def crash(
         both = run.closure.findings if run.closure is not None and run.number > 1 else ()
         print_findings([found for found in run.findings if found not in both])
         print_seal(seal, "crash.json", write.no_report)
-    with shown_in(result.spec.options.units):
-        closure = closure_table(result) if several else None
-    if closure is not None:
-        console().print("Closure of both vehicles", style="bold")
-        print_block(closure)
+    if several:
+        from strapdown.report.crash_tables import closure_table
+
+        with shown_in(result.spec.options.units):
+            closure = closure_table(result)
+        if closure is not None:
+            console().print("Closure of both vehicles", style="bold")
+            print_block(closure)
 
 
 def print_crash(result: CaseResult) -> None:

@@ -10,7 +10,7 @@ import inspect
 import logging
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, fields, is_dataclass
-from functools import wraps
+from functools import partial, wraps
 from pathlib import Path
 from typing import Annotated, Any, get_type_hints
 
@@ -19,20 +19,16 @@ import typer
 from strapdown.errors import ConfigError
 
 
-def options(panel: str) -> Callable[..., Any]:
-    """Return a maker of the options that the help lists together."""
-
-    def option(metavar: str | None, text: str, *flags: str, **more: Any) -> Any:
-        return typer.Option(*flags, metavar=metavar, help=text, rich_help_panel=panel, **more)
-
-    return option
+def option(panel: str, metavar: str | None, text: str, *flags: str, **more: Any) -> Any:
+    """Return an option; the help lists those of a panel together."""
+    return typer.Option(*flags, metavar=metavar, help=text, rich_help_panel=panel, **more)
 
 
-reading = options("How to read the log")
-fixes = options("How to read the fixes")
-running = options("What to run")
-with_what = options("Where, and with what")
-writing = options("What to write")
+reading = partial(option, "How to read the log")
+fixes = partial(option, "How to read the fixes")
+running = partial(option, "What to run")
+with_what = partial(option, "Where, and with what")
+writing = partial(option, "What to write")
 BEGIN = "Begin at this stamp; {}, if not given."
 END = "End at this stamp; the last, if not given."
 LENGTH = "Length of the part to use, instead of --to."
@@ -243,20 +239,20 @@ def folder_to_make(name: str) -> Any:
 Force = Annotated[bool, writing(None, "Overwrite an existing result.", "--force")]
 
 
-def log_level(level: int) -> Callable[[bool], bool]:
-    """Callback of a flag that sets the lowest level of shown log messages."""
+#: Lowest level of shown log messages, by the flag that asks for it.
+LEVELS = {"quiet": logging.ERROR, "verbose": logging.INFO}
 
-    def shown(asked: bool) -> bool:
-        if asked:
-            logging.getLogger("strapdown").setLevel(level)
-        return asked
 
-    return shown
+def set_level(flag: typer.CallbackParam, asked: bool) -> bool:
+    """Set the lowest level of shown log messages, where a flag asks for it."""
+    if asked:
+        logging.getLogger("strapdown").setLevel(LEVELS[str(flag.name)])
+    return asked
 
 
 Quiet = Annotated[
     bool,
-    writing(None, "Print errors only.", "--quiet", "-q", callback=log_level(logging.ERROR)),
+    writing(None, "Print errors only.", "--quiet", "-q", callback=set_level),
 ]
 Verbose = Annotated[
     bool,
@@ -265,7 +261,7 @@ Verbose = Annotated[
         "Print each stage with its duration, which reader took which file, and all tables.",
         "--verbose",
         "-v",
-        callback=log_level(logging.INFO),
+        callback=set_level,
     ),
 ]
 

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import sys
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from strapdown.cli.shared_options import Quiet, Verbose, options
+from strapdown.cli.shared_options import Quiet, Verbose, option
 
 EPILOG = (
     "Example: strapdown sign --new-key expert.pem\n\n"
     "Example: strapdown sign drive-navigate --key expert.pem"
 )
-signing = options("Key")
+signing = partial(option, "Key")
 
 
 def sign(

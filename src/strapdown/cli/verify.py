@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from strapdown.cli.shared_options import Json, Quiet, Verbose, options, writing
+from strapdown.cli.shared_options import Json, Quiet, Verbose, option, writing
 
 EPILOG = "Example: strapdown verify alexiev-fig4-attitude"
 CHANGED, IN_PART = 6, 7
-checking = options("What to check")
+checking = partial(option, "What to check")
 
 
 def verify(

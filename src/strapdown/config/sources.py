@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 from pydantic import Field, FiniteFloat, StrictInt, model_validator
 
 from strapdown.config.reading import FileSpec
 from strapdown.config.spec import NotNegative, Number, Positive, Spec, Triple, refuse
 from strapdown.config.toml_file import read_toml
-from strapdown.formats.recording import ReadOptions
-
-if TYPE_CHECKING:
-    from strapdown.config.alignment import LogTable
 
 __all__ = [
     "CrashSimulationSpec",
@@ -22,7 +18,6 @@ __all__ = [
     "ScenarioFile",
     "ScenarioSpec",
     "SimulateSpec",
-    "read_options",
 ]
 
 
@@ -152,21 +147,6 @@ class LogSpec(Spec):
     sampling: str | None = None
     rate_hz: FiniteFloat | None = None
     repair: bool = False
-
-
-def read_options(log: LogSpec | LogTable, axes: str | None) -> ReadOptions:
-    """Return the options with which the file of a log is read, its axes as letters."""
-    return ReadOptions(
-        format=log.format,
-        columns=dict(log.columns),
-        gyro_unit=log.gyro_unit,
-        accel_unit=log.accel_unit,
-        time_unit=log.time_unit,
-        axes=axes,
-        sampling=log.sampling,
-        rate=log.rate_hz,
-        repair=log.repair,
-    )
 
 
 class SimulateSpec(Spec):

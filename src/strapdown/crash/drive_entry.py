@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
-from strapdown.crash.entry import ATTITUDE, STATES, Entry, EntryState, biases_off
+from strapdown.crash.entry import ATTITUDE, NARROWED, STATES, Entry, EntryState, biases_off
 from strapdown.crash.entry import VELOCITY as VELOCITY_COLUMNS
 from strapdown.crash.entry_estimate import (
     AVERAGED,
@@ -402,15 +402,8 @@ _OF_CRASH = frozenset((STRUCTURE, TIMING))
 # A scale factor of a drive holds in the crash only so far beyond it, where no nonlinearity is
 # stated.
 BEYOND = 3.0
-# An unknown that a drive leaves less certain than this, of what was stated, was not determined.
-NARROWED = 0.9
 # An estimate beyond so many standard deviations of what was stated contradicts it.
 SIGMAS = 4.0
-
-
-def determined(what: Mapping[Any, Any]) -> bool:
-    """Whether the drive determined the error of a row of `EntryState.calibration`."""
-    return bool(what["sd"] <= NARROWED * what["stated"])
 
 
 @dataclass(frozen=True, eq=False)

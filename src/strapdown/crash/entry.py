@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -221,6 +221,15 @@ def _times(size: float, direction: Triple) -> Triple:
 POSITION, VELOCITY, ATTITUDE = slice(0, 3), slice(3, 6), slice(6, 9)
 GYRO_BIAS, ACCEL_BIAS = slice(9, 12), slice(12, 15)
 STATES = 15
+
+
+# An unknown that a drive leaves less certain than this, of what was stated, was not determined.
+NARROWED = 0.9
+
+
+def determined(what: Mapping[Any, Any]) -> bool:
+    """Whether the drive determined the error of a row of `EntryState.calibration`."""
+    return bool(what["sd"] <= NARROWED * what["stated"])
 
 
 @dataclass(frozen=True, eq=False)

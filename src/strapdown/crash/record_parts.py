@@ -26,9 +26,9 @@ from strapdown.formats.crash_samples import (
 )
 from strapdown.formats.inference.conclusion import (
     THRESHOLD,
+    Steps,
     infer_accel,
     infer_time_unit,
-    mean_step,
     posterior,
 )
 from strapdown.formats.inference.rotation_rate import infer_gyro
@@ -523,7 +523,7 @@ def likely_rate(values: Array) -> float:
 
 
 def _clock(name: str, values: Array, heading: Heading, why: str) -> tuple[Clock, Array]:
-    step = mean_step(values)
+    step = Steps.of(values).mean
     rates = {u: 1.0 / (step * factor) for u, factor in TIME_UNITS.items()}
     if heading.unit in TIME_UNITS:
         # Dates and times of day are read in ns, a unit that the heading does not name.

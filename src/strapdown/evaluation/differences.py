@@ -4,18 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import combinations
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
-from strapdown.attitude_algorithms.algorithm import AttitudeRun
 from strapdown.dsp.samples import running_integral
 from strapdown.errors import Finding
 from strapdown.rotation import unit_rotation_angle
 from strapdown.tables import EULER, GYRO, QUATERNION
 from strapdown.tables.checks import index_of, values_of
+
+if TYPE_CHECKING:
+    from strapdown.attitude_algorithms.algorithm import AttitudeRun
 
 __all__ = ["attitude_at", "error_angles", "largest_differences", "rotation_contradicted"]
 

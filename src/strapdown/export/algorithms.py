@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from strapdown import rotation
 from strapdown._kernels import arithmetic
 from strapdown.attitude_algorithms import AttitudeAlgorithm
-from strapdown.attitude_algorithms.cost import count_cost, kernel_home, step_kernel
+from strapdown.attitude_algorithms.cost import count_cost
 from strapdown.constants import CORTEX_M4F_CYCLES
 from strapdown.errors import ConfigError, check_choice
 from strapdown.export.configuration import SensorConfiguration
@@ -108,7 +108,7 @@ def algorithm_kernels(
     algorithm: AttitudeAlgorithm, shape: Shape, kind: str
 ) -> tuple[Kernels, Kernel, Kernel]:
     """Kernels of an algorithm, among them its step and the increments of one axis."""
-    kernels = Kernels(kernel_home(algorithm), shape.ranges(algorithm))
+    kernels = Kernels(arithmetic.kernel_home(algorithm.advance_kernel), shape.ranges(algorithm))
     step = _require_step(kernels, algorithm)
     increments = _require_increments(kernels, kind, "dx" in step.parameters)
     for name in ("quat_normalise", "euler_from_quat", *shape.kernels):
@@ -117,7 +117,7 @@ def algorithm_kernels(
 
 
 def _require_step(kernels: Kernels, algorithm: AttitudeAlgorithm) -> Kernel:
-    name = step_kernel(algorithm)[1]
+    name = algorithm.advance_kernel.__name__.replace("_advance", "_step")
     options = zip(kernels.source(name).parameters[-2:], algorithm.kernel_options(), strict=True)
     return kernels.require(name, {option: (value, value) for option, value in options})
 
@@ -654,7 +654,7 @@ def _run(
     algorithm: AttitudeAlgorithm, rows: Array, q_nb: Array, kind: str, single: bool
 ) -> tuple[Array, Array]:
     number: Any = np.float32 if single else np.float64
-    home = kernel_home(algorithm)
+    home = arithmetic.kernel_home(algorithm.advance_kernel)
 
     def module(name: str) -> Any:
         if single:

@@ -38,7 +38,7 @@ def _modules(*names: str) -> dict[str, dict[str, Any]]:
 class Kernels:
     """The kernels of a module and those that it imports, and the functions required so far.
 
-    `home`: module of the kernels (`attitude_algorithms.cost.kernel_home`), `others` further ones.
+    `home`: module of the kernels (`arithmetic.kernel_home`), `others` further ones.
     `ranges`: for a variable with an integer value at run time: the least and the greatest. `fixed`:
     numbers of the state and calls, as they are written, whose value is known. `functions`: in the
     order of definition.

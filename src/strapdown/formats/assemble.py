@@ -298,9 +298,11 @@ SLOWEST = 2.0
 
 def _unused(raw: RawLog, found: dict[str, Column]) -> list[Finding]:
     """List the columns that neither a quantity takes nor a fix."""
-    used = {column.source for column in found.values()} | names_of_fixes(raw)
-    names = [name for name in raw.columns if name and name not in used]
-    if not names:
+    used = {column.source for column in found.values()}
+    if not (names := [name for name in raw.columns if name and name not in used]):
+        return []
+    fixes = names_of_fixes(raw)
+    if not (names := [name for name in names if name not in fixes]):
         return []
     out = [Finding("io.columns-not-used", file=raw.name, severity="note", names=names)]
     if not set(ACCEL) & set(found):

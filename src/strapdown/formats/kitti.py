@@ -29,7 +29,6 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.ellipsoids import WGS84
 from strapdown.errors import DataError, Finding
-from strapdown.evaluation.trajectory_differences import trajectory_at
 from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
 from strapdown.formats.clocks import RELATIVE, UNIX, Clock, with_clock
@@ -350,6 +349,8 @@ def write(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
         findings += [*said, *imu_not_held("KITTI", imu), *_left_out(imu, inside)]
         if not inside.any():
             raise DataError("io.written-no-overlap", file=imu.attrs.get("source"), form="KITTI")
+        from strapdown.evaluation.trajectory_differences import trajectory_at
+
         # Doubles of seconds since 1970 are too coarse to interpolate by.
         moved = track.set_axis(pd.Index((stamps - stamps[0]) * 1e-9, name="time"))
         same = np.isin(own[inside], stamps)

@@ -95,7 +95,7 @@ def _calibration(
     path: Path, unit: UnitSpec
 ) -> Callable[[str, str, ArrayLike], tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """Return what gives the error of a quantity of a sensor on three axes, and its bound."""
-    from strapdown.report.crash_tables import DRIVE_QUANTITIES
+    from strapdown.report.crash_words import DRIVE_QUANTITIES
 
     file = path / "crash.json" if path.is_dir() else path
     try:

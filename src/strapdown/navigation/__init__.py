@@ -14,7 +14,7 @@ if TYPE_CHECKING:
         NoCorrection,
         OpenLoop,
     )
-    from strapdown.navigation.measurements import Gnss
+    from strapdown.navigation.measurements.gnss import Gnss
     from strapdown.navigation.navigator import Navigator
     from strapdown.navigation.record import NavigationChunk
 
@@ -34,7 +34,7 @@ load_on_first_use(
     {
         "engine": "LostCovarianceError",
         "filter_options": "ClosedLoop Correction NoCorrection OpenLoop",
-        "measurements": "Gnss",
+        "measurements.gnss": "Gnss",
         "navigator": "Navigator",
         "record": "NavigationChunk",
     },

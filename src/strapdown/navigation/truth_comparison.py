@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
 from strapdown._kernels import earth as kernel
-from strapdown.dsp.chi_square import chi_square_exceeded, chi_square_quantile, normal_quantile
+from strapdown.constants import TWO_SIDED_95
+from strapdown.dsp.chi_square import (
+    chi_square_exceeded,
+    chi_square_quantile,
+    normal_quantile,
+    plane_bound,
+    plane_reach,
+)
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import DataError, Finding
 from strapdown.evaluation.trajectory_differences import (
@@ -26,9 +34,11 @@ from strapdown.navigation.record import NavigationRecord, standard_deviations
 from strapdown.tables import (
     EULER,
     GEODETIC,
+    NED,
     POSITION_SD,
     TRAJECTORY,
     TRAJECTORY_ERROR,
+    VELOCITY,
     places_of,
 )
 
@@ -40,6 +50,7 @@ __all__ = [
     "PARTS",
     "SHARE",
     "SmootherConsistency",
+    "SolutionScore",
     "TruthComparison",
     "band_of_mean",
     "bounds",
@@ -69,6 +80,35 @@ NEAR = 1.5
 # Share of a variance that is not determined by other components: with less, rounding of the nine
 # leaves a normalized square fewer than three digits.
 OWN_VARIANCE = 1e3 * 9 * np.finfo(np.float64).eps
+
+
+#: Longest time that one instant represents, s, or three usual steps if longer.
+LONGEST = 1.5
+
+
+@dataclass(frozen=True)
+class SolutionScore:
+    """Errors of one quantity over a run.
+
+    Attributes
+    ----------
+    rms : float
+        Weighted by time: instants are dense where measurements are frequent, sparse in an outage.
+    largest_at : float, s
+    bound : float
+        Root mean square of the 95 % bounds.
+    share : float
+        Share of the time in which the error is within its bound; NaN for a quantity without a
+        variance of its own, as a height that is held.
+    """
+
+    quantity: str
+    unit: str
+    rms: float
+    largest: float
+    largest_at: float
+    bound: float
+    share: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,6 +154,66 @@ class TruthComparison:
     inside: dict[str, float]
     table: pd.DataFrame
     findings: tuple[Finding, ...] = ()
+
+    def error(self, column: str) -> Array:
+        """Errors of a quantity, (n,): m, m/s, deg."""
+        return self.differences[column].to_numpy(dtype=np.float64)
+
+    def bound(self, column: str) -> Array:
+        """95 % bounds of the errors of a quantity, (n,)."""
+        return TWO_SIDED_95 * self.sd[column].to_numpy(dtype=np.float64)
+
+    @cached_property
+    def scores(self) -> tuple[SolutionScore, ...]:
+        """Scores of each quantity, and of the horizontal position."""
+        units = (
+            dict.fromkeys(NED, "m") | dict.fromkeys(VELOCITY, "m/s") | dict.fromkeys(EULER, "deg")
+        )
+        found = [self._score(n, u, self.error(n), self.bound(n)) for n, u in units.items()]
+        inside = self.table["inside"]
+        for k, score in enumerate(found):
+            if np.isnan(inside.get(score.quantity, 0.0)):
+                found[k] = replace(score, share=np.nan)
+        size = np.hypot(*(self.error(n) for n in NED[:2]))
+        return self._score("horizontal", "m", size, self._plane(size)), *found
+
+    def score(self, quantity: str) -> SolutionScore:
+        """Score of one quantity."""
+        return next(s for s in self.scores if s.quantity == quantity)
+
+    def _plane(self, size: Array) -> Array:
+        """Radius of the 95 % ellipse in the direction of the horizontal error, (n,), m.
+
+        The error is within it if and only if it is within the ellipse.
+        """
+        covariance = self.covariance
+        if "horizontal" not in self.nees:
+            return plane_bound(covariance)
+        distance = np.sqrt(self.nees["horizontal"].to_numpy(dtype=np.float64))
+        return plane_reach(size, distance, covariance)
+
+    @cached_property
+    def _weight(self) -> Array:
+        """Share of the time that each instant represents, (n,)."""
+        steps = np.diff(self.time)
+        if not steps.size:
+            return np.ones(len(self.time)) / len(self.time)
+        # A long gap of the truth counts only up to this limit.
+        steps = np.minimum(steps, max(LONGEST, 3.0 * float(np.median(steps))))
+        about = 0.5 * (np.append(steps, 0.0) + np.insert(steps, 0, 0.0))
+        return np.asarray(about / about.sum())
+
+    def _score(self, name: str, unit: str, error: Array, bound: Array) -> SolutionScore:
+        worst = int(np.argmax(np.abs(error)))
+        return SolutionScore(
+            name,
+            unit,
+            float(np.sqrt(self._weight @ np.square(error))),
+            float(abs(error[worst])),
+            float(self.time[worst]),
+            float(np.sqrt(self._weight @ np.square(bound))),
+            float(min(1.0, self._weight[np.abs(error) <= bound].sum())),
+        )
 
 
 def compare_with_truth(

@@ -16,7 +16,6 @@ from strapdown.constants import CORTEX_M4F_CYCLES
 from strapdown.orientation_filters.filter import Array, OrientationEstimator
 from strapdown.tables import ACCEL, GYRO, MAG
 
-_HOME = "orientation"
 #: Samples over which operations are averaged; whole blocks of every usual rate.
 SAMPLES = 120
 
@@ -40,8 +39,9 @@ def count_filter_cost(
         `memory` is the size of the record.
     """
     count: Counter[str] = Counter()
-    name = type(chosen).advance_kernel.__name__.replace("_advance", "_sample")
-    sample = getattr(arithmetic.counted_kernels(_HOME), name)
+    kernel = type(chosen).advance_kernel
+    kernels = arithmetic.counted_kernels(arithmetic.kernel_home(kernel))
+    sample = getattr(kernels, kernel.__name__.replace("_advance", "_sample"))
     record = chosen.begin(begin or None)
     record[orientation.SAMPLES], record[orientation.STEP] = 1.0, step
     state = [arithmetic.Counted(float(v), count) for v in record]
@@ -61,11 +61,11 @@ def count_filter_cost(
     )
 
 
-def single_precision_attitude(
-    chosen: OrientationEstimator, imu: pd.DataFrame, sampling: str
-) -> Array:
-    """Attitudes, (n, 4), with every operation in single precision."""
-    kernel = getattr(arithmetic.single_precision(_HOME), type(chosen).advance_kernel.__name__)
+def single_precision_error_deg(
+    chosen: OrientationEstimator, imu: pd.DataFrame, sampling: str, q_nb: Array
+) -> float:
+    """Largest rotation angle, deg, from the attitudes `q_nb`, (n, 4), to single precision's."""
+    kernel = arithmetic.single_kernel(type(chosen).advance_kernel)
     time = imu.index.to_numpy(dtype=np.float64)
     blocks = [
         np.ascontiguousarray(imu[columns].to_numpy(dtype=np.float32))
@@ -76,7 +76,8 @@ def single_precision_attitude(
     record = chosen.begin(None, sampling).astype(np.float32)
     history = np.empty((len(time), chosen.row), np.float32)
     kernel(record, np.diff(time, prepend=time[0]).astype(np.float32), *blocks, history)
-    return chosen.attitudes(history[:, :4].astype(np.float64), record.astype(np.float64))
+    single = chosen.attitudes(history[:, :4].astype(np.float64), record.astype(np.float64))
+    return float(np.max(rotation.rotation_angle(single, q_nb)))
 
 
 def time_filters(chosen: Sequence[OrientationEstimator], rate_hz: float = 100.0) -> pd.DataFrame:
@@ -89,14 +90,11 @@ def time_filters(chosen: Sequence[OrientationEstimator], rate_hz: float = 100.0)
     dt = np.full(count, 1.0 / rate_hz)
     rows = []
     for each in chosen:
-        name = type(each).advance_kernel.__name__
         row: dict[str, str | float] = {"algorithm": each.label}
         for column, kind in (("float64_ns", np.float64), ("float32_ns", np.float32)):
-            kernel = (
-                type(each).advance_kernel
-                if kind is np.float64
-                else getattr(arithmetic.single_precision(_HOME), name)
-            )
+            kernel = type(each).advance_kernel
+            if kind is np.float32:
+                kernel = arithmetic.single_kernel(kernel)
             inputs = [a.astype(kind) for a in (dt, gyro, accel, mag)]
             history = np.empty((count, each.row), kind)
             best = np.inf
@@ -108,11 +106,3 @@ def time_filters(chosen: Sequence[OrientationEstimator], rate_hz: float = 100.0)
             row[column] = best / count * 1e9
         rows.append(row)
     return pd.DataFrame(rows)
-
-
-def single_precision_error_deg(
-    chosen: OrientationEstimator, imu: pd.DataFrame, sampling: str, q_nb: Array
-) -> float:
-    """Largest rotation angle, deg, between single and double precision over a record."""
-    apart = rotation.rotation_angle(single_precision_attitude(chosen, imu, sampling), q_nb)
-    return float(np.max(apart))

@@ -20,14 +20,12 @@ from strapdown.report.alignment_document import (
     limits,
     trust,
 )
-from strapdown.report.document import finding_json
 from strapdown.report.report_bundle import (
     ReportBundle,
     as_comments,
     file_of,
     finite,
     with_file,
-    write_report,
     write_table,
 )
 from strapdown.systems.alignment_run import AlignmentRun, run_alignment
@@ -53,6 +51,8 @@ def _write(
     if result.fine is not None:
         write_table(_history(result.fine.history), folder / "fine.csv", comments)
     if forms:
+        from strapdown.report.document_html import write_report
+
         write_report(alignment_document(result, name), folder, progress)
 
 
@@ -130,7 +130,7 @@ def alignment_json(result: AlignmentRun) -> dict[str, Any]:
             "coarse": _rows(result.readiness.coarse),
             "fine": _rows(_thinned(result.readiness.fine)),
             "refused": [
-                {"time_s": t, "finding": finding_json(f)} for t, f in result.readiness.refused
+                {"time_s": t, "finding": f.plain("file")} for t, f in result.readiness.refused
             ],
         },
         "after_a_turn": [
@@ -147,7 +147,7 @@ def alignment_json(result: AlignmentRun) -> dict[str, Any]:
         "method": spec.model_dump(
             mode="json", include={"prefilter", "coarse", "fine"}, serialize_as_any=True
         ),
-        "findings": [finding_json(f) for f in result.findings],
+        "findings": [f.plain("file") for f in result.findings],
     }
     return finite(data)
 

@@ -13,16 +13,12 @@ from strapdown.attitude_comparison.comparison import AttitudeComparison
 from strapdown.bundle import Seal, write_bundle, write_json
 from strapdown.evaluation.reference_points import Score
 from strapdown.formats import csv
-from strapdown.report import attitude_tables as words
-from strapdown.report.attitude_tables import (
-    budget_json,
-    clock_json,
-    places_json,
+from strapdown.report import attitude_words as words
+from strapdown.report.attitude_words import (
     share_basis,
     source_of,
 )
-from strapdown.report.document import finding_json
-from strapdown.report.report_bundle import as_comments, finite, write_report
+from strapdown.report.report_bundle import as_comments, finite
 from strapdown.tables import EULER, QUATERNION
 from strapdown.tables.checks import index_of
 
@@ -72,6 +68,7 @@ def write_attitude(
             from strapdown.report.attitude_charts import charts
             from strapdown.report.attitude_document import attitude_document
             from strapdown.report.chart_svg import ChartFigure
+            from strapdown.report.document_html import write_report
 
             drawn = charts(bench)
             write_report(attitude_document(bench, drawn), folder)
@@ -116,6 +113,13 @@ def _write_sweep(bench: AttitudeComparison, path: Path) -> None:
 # Plain data of the attitude bench.
 
 
+# Each key of a second log carries the unit of its value.
+_UNITS = {
+    **dict.fromkeys(("start", "end", "middle", "offset", "offset_sd", "smoothing"), "_s"),
+    **dict.fromkeys(("bias", "bias_sd", "residual"), "_rad_per_s"),
+}
+
+
 def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
     """Return a bench as plain data; every key carries its unit."""
     # Operations and cycles are per sample; memory is in numbers.
@@ -131,7 +135,7 @@ def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
         }
         for cost in bench.costs
     }
-    three = ("final", "rms", "max")
+    clock, budget, three = bench.clock, bench.budget, ("final", "rms", "max")
     shares = {
         s.algorithm: {
             key: None if values is None else dict(zip(three, values, strict=True))
@@ -150,8 +154,25 @@ def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
         "conventions": dict(words.CONVENTIONS),
         "initial": bench.initial,
         "gyro_bias": bench.gyro_bias,
-        "clock": clock_json(bench),
-        "sensor_error_parts": budget_json(bench),
+        "clock": {
+            "rate_hz": clock.rate_hz,
+            "stamps": clock.kind,
+            "repaired": clock.repaired,
+            "spread_s": clock.spread,
+            "lost_samples": clock.lost,
+            "gaps": [{"start_s": g.start, "end_s": g.end} for g in clock.gaps],
+        },
+        "sensor_error_parts": None
+        if budget is None
+        else {
+            "delay_s": budget.delay_s,
+            "delay_sd_s": budget.delay_sd,
+            "drift_ppm": budget.drift_ppm,
+            "drift_sd_ppm": budget.drift_sd_ppm,
+            "bias_rad_per_s": budget.bias.tolist(),
+            "matrix": budget.matrix.tolist(),
+            "parts": budget.parts.to_dict("records"),
+        },
         "headline": f"{bench.answer.sentence} {words.standing(bench)}",
         "answer": asdict(bench.answer),
         "algorithms": [
@@ -188,7 +209,11 @@ def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
             }
             for peer in bench.peers
         ],
-        **places_json(bench),
+        "positions": [asdict(place) for place in bench.places],
+        "offered_references": [asdict(offer) for offer in bench.offers],
+        "second_log": None
+        if bench.second is None
+        else {key + _UNITS.get(key, ""): value for key, value in asdict(bench.second).items()},
         "sampling_error_deg": None
         if bench.sampling_error_deg is None
         else dict(zip(("final", "max"), bench.sampling_error_deg, strict=True)),
@@ -207,7 +232,7 @@ def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
             for r in bench.rests
         ],
         "readings": [vars(r) for r in bench.readings],
-        "findings": [finding_json(f, "python") for f in bench.findings],
+        "findings": [f.plain("python") for f in bench.findings],
     }
     return finite(data)
 

@@ -10,7 +10,7 @@ import pandas as pd
 from strapdown.attitude_comparison.comparison import AttitudeComparison
 from strapdown.attitude_comparison.references import PeerRun
 from strapdown.evaluation.differences import error_angles
-from strapdown.report.attitude_tables import (
+from strapdown.report.attitude_words import (
     MEANINGS,
     full_rate_errors,
     largest_known,

@@ -13,14 +13,10 @@ from strapdown.attitude_comparison.comparison import AttitudeComparison
 from strapdown.errors import ConfigError, check_choice
 from strapdown.evaluation.differences import attitude_at
 from strapdown.report import attitude_tables as tables
+from strapdown.report import attitude_words as words
 from strapdown.report.attitude_charts import charts
-from strapdown.report.attitude_tables import (
-    MEANINGS,
-    chosen_run,
-    full_rate_errors,
-    result_tables,
-    sweep_grid,
-)
+from strapdown.report.attitude_tables import result_tables
+from strapdown.report.attitude_words import MEANINGS, chosen_run, full_rate_errors, sweep_grid
 from strapdown.report.chart import AXIS_COLOURS, BLACK, GREY, Chart
 from strapdown.report.chart_svg import ChartFigure
 from strapdown.report.document import (
@@ -46,6 +42,12 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
     made = {c.slug: c for c in (charts(bench) if drawn is None else drawn)}
     chart = made.get
     answer = bench.answer
+    # Warnings stand beside the answer; notes and remedies follow below.
+    warnings = [
+        f"{f.quantity}: {f.sentence('python')}." if f.quantity else f"{f.sentence('python')}."
+        for f in bench.findings
+        if f.severity != "note"
+    ]
     sections = (
         section(
             "rates",
@@ -71,7 +73,7 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
             chart("reference-error"),
             chart("difference"),
             tables.difference_table(bench),
-            *_named_items("Reference points:", tables.reference_lines(bench)),
+            *_named_items("Reference points:", words.reference_lines(bench)),
         ),
         section(
             "parts",
@@ -89,11 +91,11 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
         section(
             "inputs",
             "Inputs and assumptions",
-            Facts(tuple(tables.facts(bench))),
+            Facts(tuple(words.facts(bench))),
             TableBlock(
                 ("column", "taken as", "unit", "first value", "because"),
                 tuple(
-                    (r.source, r.quantity, r.unit, tables.first_value(r), r.why)
+                    (r.source, r.quantity, r.unit, words.first_value(r), r.why)
                     for r in bench.readings
                 ),
                 (0, 1, 2, 4),
@@ -102,7 +104,7 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
             if bench.readings
             else None,
         ),
-        section("conventions", "Conventions", Facts(tables.CONVENTIONS)),
+        section("conventions", "Conventions", Facts(words.CONVENTIONS)),
         section(
             "again",
             "Verification",
@@ -120,27 +122,18 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
         blocks(
             _key_figures(bench),
             Paragraph(answer.sentence, "lead"),
-            Paragraph(tables.standing(bench)),
-            *_named_items("To be considered beside it:", _warnings(bench)),
+            Paragraph(words.standing(bench)),
+            *_named_items("To be considered beside it:", warnings),
             *_named_items("Why:", answer.why),
             *_named_items("What would help:", answer.helps),
-            None if bench.scores else Paragraph(tables.HOW_TO_REFERENCE),
+            None if bench.scores else Paragraph(words.HOW_TO_REFERENCE),
             *_named_items(
-                "Rests of similar attitude, possible reference points:", tables.offer_lines(bench)
+                "Rests of similar attitude, possible reference points:", words.offer_lines(bench)
             ),
         ),
         sections,
         bench.source,
     )
-
-
-def _warnings(bench: AttitudeComparison) -> list[str]:
-    """Sentences of the warnings, which stand beside the answer; notes and remedies follow below."""
-    return [
-        f"{f.quantity}: {f.sentence('python')}." if f.quantity else f"{f.sentence('python')}."
-        for f in bench.findings
-        if f.severity != "note"
-    ]
 
 
 def _key_figures(bench: AttitudeComparison) -> KeyFigures | None:
@@ -149,8 +142,9 @@ def _key_figures(bench: AttitudeComparison) -> KeyFigures | None:
     if answer.algorithm is None:
         return None
     alone = answer.verdict == "sensor"  # beside its errors the algorithm's own are small
-    words = ("All that integration needs", "At a rate of")
-    names = words if alone else ("Simplest sufficient algorithm", "Lowest sufficient rate")
+    names = ("Simplest sufficient algorithm", "Lowest sufficient rate")
+    if alone:
+        names = ("All that integration needs", "At a rate of")
     figures = [KeyFigure(names[0], answer.algorithm, "")]
     rate, meaning, error = answer.rate_hz, answer.meaning, math.nan
     if rate is not None:
@@ -165,7 +159,7 @@ def _key_figures(bench: AttitudeComparison) -> KeyFigures | None:
     bound = f"tolerance {answer.tolerance_deg:g}°"
     if alone:
         whose, bound = "largest error, the sensor's included", f"beyond the {bound}"
-    figures.append(KeyFigure(whose.capitalize(), tables.degrees(error), bound))
+    figures.append(KeyFigure(whose.capitalize(), words.degrees(error), bound))
     return KeyFigures(tuple(figures))
 
 
@@ -295,7 +289,7 @@ def short_html(bench: AttitudeComparison) -> str:
     parts = [
         f"<div><b>{escape(bench.source)}</b></div>",
         f'<p style="font-size:1.25em;margin:.3em 0"><b>{escape(bench.answer.sentence)}</b></p>',
-        f'<p style="margin:.3em 0">{escape(tables.standing(bench))}</p>',
+        f'<p style="margin:.3em 0">{escape(words.standing(bench))}</p>',
         *(_table(table) for table in result_tables(bench)),
     ]
     return "<div>" + "".join(parts) + "</div>"

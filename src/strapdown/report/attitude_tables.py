@@ -1,340 +1,25 @@
-"""Results of the attitude bench in words and rows, shared by terminal and page."""
+"""Tables of the attitude bench, shared by terminal and page."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import asdict
 from itertools import takewhile
-from typing import TYPE_CHECKING, Any
 
-import numpy as np
-import pandas as pd
-
-from strapdown.attitude_algorithms import ALGORITHMS
-from strapdown.attitude_algorithms.algorithm import AttitudeRun
 from strapdown.attitude_comparison.comparison import AttitudeComparison
-from strapdown.attitude_comparison.references import PeerRun, passed_pole
-from strapdown.evaluation.reference_points import Score, in_words
-from strapdown.formats.recording import Reading
+from strapdown.attitude_comparison.references import PeerRun
+from strapdown.evaluation.reference_points import Score
+from strapdown.report.attitude_words import (
+    MEANINGS,
+    condition,
+    degrees,
+    full_rate_errors,
+    largest_known,
+    like_with_like,
+    share_basis,
+    source_of,
+    sweep_grid,
+)
 from strapdown.report.document import TableBlock
-
-if TYPE_CHECKING:
-    from strapdown.evaluation.second_log import SecondLog
-
-CONVENTIONS = (
-    ("Body axes", "x forward, y right, z down"),
-    ("Local level", "north, east, down; without a north reference, the initial heading"),
-    ("Attitude", "q_nb and C_nb turn a vector from body axes to local level; scalar first"),
-    (
-        "Angles",
-        "3-2-1: heading 0–360° clockwise from north, pitch ±90° nose up, roll ±180° "
-        "right side down",
-    ),
-    ("Error", "rotation angle |log(C_est^T C_ref)| in degrees, whatever the axis"),
-    ("Earth rate", "neglected, as in Alexiev (2021): 15°/h"),
-)
-HOW_TO_REFERENCE = (
-    "No reference. Give a known attitude: "
-    "--reference 'end same as start' (returned to its initial attitude), "
-    "--reference 'end 2 turns about z since start', "
-    "--reference '12.5 roll 0 pitch 0 heading 90', or --reference TRUTH.csv."
-)
-
-
-# Two exact algorithms that differ by less are taken as equal.
-AGREE = 1e-6  # deg
-
-
-def degrees(value: float | None) -> str:
-    """Format an angle to three significant digits; rounding errors are named as such."""
-    if value is None:
-        return "–"
-    if abs(value) < 1e-9:
-        return "< 1e-9°"
-    if abs(value) < 1e-3:
-        return f"{value:.1e}°"
-    return f"{value:.3g}°" if abs(value) < 100 else f"{value:.1f}°"
-
-
-def seconds(value: float) -> str:
-    """Format an instant to a millisecond."""
-    return f"{value:.3f}".rstrip("0").rstrip(".") + " s"
-
-
-def standing(bench: AttitudeComparison) -> str:
-    """Return the final errors of the algorithms in one or two sentences."""
-    scores = [s for s in bench.scores if s.against == "truth"]
-    if scores:
-        answer = f"At {seconds(scores[0].time)}, {_ranked(bench, scores, 'from the truth')}."
-    elif bench.scores:
-        last = len(bench.references)
-        scores = [s for s in bench.scores if s.reference == last]
-        answer = f"At reference point R{last}, {_ranked(bench, scores, 'from it')}."
-    elif len(bench.runs) > 1:
-        table = bench.differences_deg.to_numpy()
-        a, b = (bench.runs[k].algorithm for k in divmod(int(table.argmax()), len(table)))
-        answer = (
-            f"The algorithms differ by up to {degrees(float(table.max()))} ({a} against {b}) on "
-            "these samples."
-        )
-    else:
-        answer = f"{bench.runs[0].algorithm} ran over the log."
-    return answer + _whose_error(bench, scores)
-
-
-def _ranked(bench: AttitudeComparison, scores: list[Score], off: str) -> str:
-    ranked = sorted(scores, key=lambda s: s.error_deg)
-    worst = ranked[-1]
-    # A run through the pole may be near the truth by chance; it is not named as the best.
-    lost = {r.algorithm for r in bench.runs if passed_pole(r)}
-    best = next((s for s in ranked if s.algorithm not in lost), ranked[0])
-    # Algorithms with equal displayed errors are named together.
-    level = [
-        s.algorithm
-        for s in scores
-        if degrees(s.error_deg) == degrees(best.error_deg)
-        and (s is best or s.algorithm not in lost)
-    ]
-    verb = "are" if len(level) > 1 else "is"
-    text = f"{_listed(level)} {verb} {degrees(best.error_deg)} {off}"
-    if worst.algorithm not in level:
-        text += f"; {worst.algorithm} is {degrees(worst.error_deg)}"
-    return text
-
-
-def _listed(names: list[str]) -> str:
-    return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
-
-
-# Share of the total error below which the algorithm error does not explain it.
-SMALL_SHARE = 0.1
-
-
-def _whose_error(bench: AttitudeComparison, scores: list[Score]) -> str:
-    """Exclude the algorithms as the error source when two exact ones agree."""
-    names = [run.algorithm for run in bench.runs]
-    exact = [s for s in scores if s.algorithm == "quaternion"]
-    if not {"dcm", "quaternion"} <= set(names) or not exact or exact[0].error_deg < AGREE:
-        return ""
-    pair = [names.index("dcm"), names.index("quaternion")]
-    if bench.differences_deg.to_numpy()[*pair] > AGREE:
-        return ""
-    own = next((s.own_deg[2] for s in bench.shares if s.algorithm == "quaternion"), 0.0)
-    if own > SMALL_SHARE * exact[0].error_deg:
-        # They agree but share the error of an axis that turns within the step.
-        return ""
-    return (
-        " Direction cosines and quaternion agree to rounding: the remaining error is due to the "
-        "sensor, its rate, its bias or the reference, not to arithmetic."
-    )
-
-
-def condition(diagnostics: dict[str, float]) -> str:
-    """Diagnostics of an algorithm in words."""
-    parts = []
-    if "closest_to_pole_deg" in diagnostics:
-        near = diagnostics["closest_to_pole_deg"]
-        how = f"±90° pitch {degrees(near)} off" if near else "through ±90° pitch"
-        parts.append(f"{how} at {seconds(diagnostics['closest_to_pole_time_s'])}")
-    if "orthogonality_loss" in diagnostics:
-        parts.append(f"|CᵀC − I| = {diagnostics['orthogonality_loss']:.1e}")
-    if "norm_error" in diagnostics:
-        parts.append(f"|q| − 1 = {diagnostics['norm_error']:.1e}")
-    return "; ".join(parts) or "–"
-
-
-def first_value(reading: Reading) -> str:
-    """The first value of a column, in display form."""
-    return reading.first if isinstance(reading.first, str) else f"{reading.first:.6g}"
-
-
-def reference_lines(bench: AttitudeComparison) -> list[str]:
-    """Each reference point in words, with the turned angle where turns were counted."""
-    lines = []
-    for number, (_, row) in enumerate(bench.references.iterrows(), start=1):
-        text = f"R{number}: {in_words(row)}"
-        score = next((s for s in bench.scores if s.reference == number), None)
-        if score is not None and score.turned_deg is not None and score.expected_deg:
-            share = score.turned_deg / score.expected_deg - 1.0
-            text += (
-                f"; the gyro turned {score.turned_deg:.1f}° of {score.expected_deg:.1f}° "
-                f"({100 * share:+.2f} %: scale factor, bias and handling)"
-            )
-        if score is not None and score.sd_deg is not None:
-            text += f"; known to {score.sd_deg:g}° (1σ)"
-        lines.append(text)
-    return lines
-
-
-def facts(bench: AttitudeComparison) -> list[tuple[str, str]]:
-    """Inputs and assumptions of the run."""
-    i, removed = bench.initial, str(bench.gyro_bias["from"])
-    if (bias := bench.gyro_bias["rad_per_s"]) is not None:
-        values = ", ".join(f"{math.degrees(v):.4f}" for v in bias)
-        removed = f"({values}) deg/s about forward, right, down removed: {removed}"
-    found = [
-        ("Log", bench.description),
-        (
-            "Initial attitude",
-            f"roll {i['roll_deg']:.3f}°, pitch {i['pitch_deg']:.3f}°, heading "
-            f"{i['heading_deg']:.3f}° at {seconds(i['time_s'])}: {i['from']}",
-        ),
-        ("Gyro bias", removed),
-    ]
-    if bench.truth is not None:
-        found.append(("Truth", _truth_words(bench)))
-    if bench.second is not None:
-        found.append(("Second log", second_words(bench.second)))
-    if bench.sampling_error_deg is not None:
-        final, most = bench.sampling_error_deg
-        how = (
-            "error of exact arithmetic on noise-free samples at this rate"
-            if bench.specification["source"]["kind"] == "scenario"
-            else "estimate: rates interpolated linearly between their stamps, against cubically"
-        )
-        found.append(
-            (
-                "Sampling error",
-                f"{degrees(final)} at the end, {degrees(most)} at most: {how}",
-            )
-        )
-    if bench.rests:
-        shown = [
-            f"{seconds(r.start)} to {seconds(r.end)}, mean rate "
-            f"({', '.join(f'{math.degrees(v):.3f}' for v in r.gyro_mean)}) deg/s"
-            for r in bench.rests[:6]
-        ]
-        if (more := len(bench.rests) - len(shown)) > 0:
-            shown.append(f"and {more} more")
-        found.append(("At rest", "; ".join(shown)))
-    elif not bench.scores:
-        found.append(("At rest", "no stationary stretch of a second or more was found"))
-    return found
-
-
-def _truth_words(bench: AttitudeComparison) -> str:
-    assert bench.truth is not None
-    counted = bench.truth.index[bench.scored]
-    if not len(counted):
-        return f"known at {len(bench.truth)} samples, none of which counts"
-    return (
-        f"known at {len(bench.truth)} samples; {len(counted)} of them count, from "
-        f"{seconds(float(counted[0]))} to {seconds(float(counted[-1]))}"
-    )
-
-
-def second_words(second: SecondLog) -> str:
-    """Clock, mounting and scale of a second log relative to the first, with standard deviations."""
-    roll, pitch, heading = second.mounting_deg
-    sd = max(second.mounting_sd_deg)
-    return (
-        f"its clock is {second.offset:.4f} s ahead (1σ {second.offset_sd:.2g} s) and runs "
-        f"{second.drift_ppm:+.3g} ppm (1σ {second.drift_sd_ppm:.2g}); mounted at roll {roll:.2f}°, "
-        f"pitch {pitch:.2f}°, heading {heading:.2f}° (1σ up to {sd:.2g}°); ratio of scale factors "
-        f"{second.scale:.5f} (1σ {second.scale_sd:.2g}); correlation of the rates "
-        f"{100 * second.correlation:.1f} %"
-    )
-
-
-# Numbers of a bench that several tables and charts share.
-
-
-#: Methods of lowering the sample rate, with their labels.
-MEANINGS = {
-    "sum": "samples averaged",
-    "drop": "samples left out",
-}
-
-
-def largest_known(scores: Sequence[Score]) -> float | None:
-    """Largest finite error against a known attitude, deg; None if there is none."""
-    found = [s.error_deg if s.max_deg is None else s.max_deg for s in scores]
-    return max((e for e in found if math.isfinite(e)), default=None)
-
-
-def full_rate_errors(bench: AttitudeComparison) -> dict[str, float]:
-    """Return the error by which each algorithm is judged, at the log's own rate.
-
-    Returns
-    -------
-    dict of str to float
-        In deg, in the order of the runs: the largest error against known attitudes, else the
-        algorithm error.
-    """
-    own = {share.algorithm: share.own_deg[2] for share in bench.shares}
-    swept: dict[str, float] = {}
-    if len(bench.sweep):
-        rows = bench.sweep[bench.sweep["factor"] == 1]
-        swept = dict(zip(rows["algorithm"].tolist(), rows["error_deg"].tolist(), strict=True))
-    errors = {}
-    for run in bench.runs:
-        name = run.algorithm
-        known = largest_known([s for s in bench.scores if s.algorithm == name])
-        errors[name] = swept.get(name, own.get(name, math.nan) if known is None else known)
-    return errors
-
-
-def chosen_run(bench: AttitudeComparison) -> AttitudeRun:
-    """Return the run of the recommended algorithm, else that with the smallest error."""
-    for run in bench.runs:
-        if run.algorithm == bench.answer.algorithm:
-            return run
-    errors = full_rate_errors(bench)
-    return min(
-        bench.runs,
-        key=lambda r: errors[r.algorithm] if math.isfinite(errors[r.algorithm]) else math.inf,
-    )
-
-
-def sweep_grid(bench: AttitudeComparison, meaning: str, column: str = "error_deg") -> pd.DataFrame:
-    """Return the errors of one method of lowering the rate.
-
-    Parameters
-    ----------
-    meaning : {'drop', 'sum'}
-    column : str
-        Of the sweep.
-
-    Returns
-    -------
-    DataFrame
-        In deg: algorithms in the order of the runs, rates in Hz from high to low; NaN where an
-        algorithm did not run.
-    """
-    names = [run.algorithm for run in bench.runs]
-    if not len(bench.sweep):
-        return pd.DataFrame(index=names)
-    part = bench.sweep[bench.sweep["meaning"] == meaning]
-    rates = sorted(set(part["rate_hz"].tolist()), reverse=True)
-    grid = np.full((len(names), len(rates)), np.nan)
-    for name, rate, error in part[["algorithm", "rate_hz", column]].itertuples(index=False):
-        cell = names.index(name), rates.index(rate)
-        grid[cell] = np.fmax(grid[cell], error)
-    return pd.DataFrame(grid, index=names, columns=rates)
-
-
-def like_with_like(bench: AttitudeComparison) -> tuple[list[PeerRun], list[PeerRun]]:
-    """Split the other libraries into gyro-only ones, as the bench's own are, and aided ones."""
-    alone = [p for p in bench.peers if p.aiding == "gyro"]
-    return alone, [p for p in bench.peers if p.aiding != "gyro"]
-
-
-def share_basis(bench: AttitudeComparison) -> str:
-    """Return whether the shares are exact or estimates."""
-    if bench.specification["source"]["kind"] == "scenario":
-        return "Exact: each algorithm also ran on simulated samples without sensor errors."
-    own = (
-        "Estimate: the algorithm error is the difference from the most accurate algorithm on the "
-        "same samples"
-    )
-    if any(share.sensor_deg is not None for share in bench.shares):
-        return own + ", the sensor error that one's error against the truth."
-    return own + "; the sensor error is unknown without a truth."
-
-
-# Tables of the attitude bench, shared by terminal and page.
-
 
 # With more comparisons the error contributions no longer fit in a terminal.
 _MOST_BESIDE = 4
@@ -408,21 +93,17 @@ def _parts(bench: AttitudeComparison) -> tuple[list[str], dict[str, dict[str, st
                 for s in bench.shares
             }
         if len(bench.sweep):
-            grid, limit = sweep_grid(bench, "sum", "own_deg"), bench.answer.tolerance_deg
-            cells[f"≤ {limit:g}° to"] = {
-                s.algorithm: _lowest_rate(grid.T[s.algorithm], limit) for s in bench.shares
-            }
+            # Lowest rate of averaged samples down to which the algorithm error is within tolerance.
+            limit, lowest = bench.answer.tolerance_deg, {}
+            for name, errors in sweep_grid(bench, "sum", "own_deg").T.items():
+                within = list(takewhile(lambda cell: cell[1] <= limit, errors.items()))
+                lowest[str(name)] = f"{within[-1][0]:.3g} Hz" if within else _NONE
+            cells[f"≤ {limit:g}° to"] = {s.algorithm: lowest[s.algorithm] for s in bench.shares}
         cells["float32"] = {s.algorithm: degrees(s.single_deg[2]) for s in bench.shares}
     if bench.costs:
         cells["cycles"] = {c.algorithm: number(c.cycles) for c in bench.costs}
         cells["memory"] = {c.algorithm: str(c.memory) for c in bench.costs}
     return list(cells), cells
-
-
-def _lowest_rate(errors: pd.Series, limit: float) -> str:
-    """Lowest rate of averaged samples down to which the algorithm error is within tolerance."""
-    within = list(takewhile(lambda cell: cell[1] <= limit, errors.items()))
-    return f"{within[-1][0]:.3g} Hz" if within else _NONE
 
 
 def _part_note(bench: AttitudeComparison) -> str:
@@ -437,13 +118,6 @@ def _part_note(bench: AttitudeComparison) -> str:
         + f"and to single precision. {share_basis(bench)} cycles: of a Cortex-M4F per sample; "
         "memory: numbers kept between samples."
     )
-
-
-def source_of(run: AttitudeRun) -> str:
-    """Source of an algorithm, as ``Alexiev (2021) Eq. (2)``."""
-    cls = ALGORITHMS.get(run.algorithm.partition(":")[0])
-    source = "" if cls is None else cls.source
-    return f"{source} Eq. {run.equations}".strip() if run.equations else source
 
 
 def condition_table(bench: AttitudeComparison) -> TableBlock:
@@ -568,35 +242,6 @@ def budget_table(bench: AttitudeComparison) -> TableBlock | None:
     )
 
 
-def budget_json(bench: AttitudeComparison) -> dict[str, Any] | None:
-    """Parts of the sensor error as plain data."""
-    budget = bench.budget
-    if budget is None:
-        return None
-    return {
-        "delay_s": budget.delay_s,
-        "delay_sd_s": budget.delay_sd,
-        "drift_ppm": budget.drift_ppm,
-        "drift_sd_ppm": budget.drift_sd_ppm,
-        "bias_rad_per_s": budget.bias.tolist(),
-        "matrix": budget.matrix.tolist(),
-        "parts": budget.parts.to_dict("records"),
-    }
-
-
-def clock_json(bench: AttitudeComparison) -> dict[str, Any]:
-    """Nominal rate, gaps and nature of the stamps as plain data."""
-    clock = bench.clock
-    return {
-        "rate_hz": clock.rate_hz,
-        "stamps": clock.kind,
-        "repaired": clock.repaired,
-        "spread_s": clock.spread,
-        "lost_samples": clock.lost,
-        "gaps": [{"start_s": g.start, "end_s": g.end} for g in clock.gaps],
-    }
-
-
 def luck_words(luck: float) -> str:
     """Return whether a rank difference to the next algorithm is due to chance."""
     if not math.isfinite(luck):
@@ -653,8 +298,8 @@ def peer_table(bench: AttitudeComparison) -> TableBlock | None:
         (f"strapdown {name}", degrees(error) if judged else _NONE, "", "gyro")
         for name, error in full_rate_errors(bench).items()
     ]
-    rows += [(p.peer, _peer_error(p), "", p.aiding) for p in alone]
-    rows += [(p.peer, "", _peer_error(p), p.aiding) for p in aided]
+    rows += [(p.peer, degrees(largest_known(p.scores)), "", p.aiding) for p in alone]
+    rows += [(p.peer, "", degrees(largest_known(p.scores)), p.aiding) for p in aided]
     return TableBlock(
         ("library", "gyro alone", "aided", "uses"),
         tuple(rows),
@@ -716,11 +361,6 @@ def _filter_row(peer: PeerRun) -> tuple[str, ...]:
     return (name, sensors[peer.aiding], *parts, *of_kernel)
 
 
-def _peer_error(peer: PeerRun) -> str:
-    error = largest_known(peer.scores)
-    return _NONE if error is None else degrees(error)
-
-
 # Dead-reckoned positions and the second log.
 
 
@@ -759,32 +399,3 @@ def place_table(bench: AttitudeComparison) -> TableBlock | None:
         "and noise of a consumer sensor, without scale factors.",
         title="Positions, dead-reckoned between rests",
     )
-
-
-def offer_lines(bench: AttitudeComparison) -> list[str]:
-    """Stationary stretches of similar attitude, proposed as reference points."""
-    return [
-        f"--reference '{offer.words}' ({offer.apart_deg:.2g}° apart by gravity, 1σ "
-        f"{offer.sd_deg:.2g}°; {offer.caveat})"
-        for offer in bench.offers[:4]
-    ]
-
-
-def places_json(bench: AttitudeComparison) -> dict[str, Any]:
-    """Positions, proposed reference points and the second log as plain data."""
-    return {
-        "positions": [asdict(place) for place in bench.places],
-        "offered_references": [asdict(offer) for offer in bench.offers],
-        "second_log": None if bench.second is None else _second_json(bench.second),
-    }
-
-
-# Each key carries the unit of its value.
-_UNITS = {
-    **dict.fromkeys(("start", "end", "middle", "offset", "offset_sd", "smoothing"), "_s"),
-    **dict.fromkeys(("bias", "bias_sd", "residual"), "_rad_per_s"),
-}
-
-
-def _second_json(second: SecondLog) -> dict[str, Any]:
-    return {key + _UNITS.get(key, ""): value for key, value in asdict(second).items()}

@@ -26,13 +26,11 @@ from strapdown.report.coast_document import (
     remedy,
     start_words,
 )
-from strapdown.report.document import finding_json
 from strapdown.report.report_bundle import (
     ReportBundle,
     file_of,
     finite,
     with_file,
-    write_report,
 )
 from strapdown.report.values import spaced
 from strapdown.sensors.catalogue import SENSORS
@@ -120,6 +118,8 @@ def _write(
     write_json(folder / "coast.json", coast_json(result))
     write_coast_tables(result, folder)
     if forms:
+        from strapdown.report.document_html import write_report
+
         write_report(coast_document(result, name), folder, progress)
 
 
@@ -200,7 +200,7 @@ def coast_json(result: OutageRun) -> dict[str, Any]:
             }
             for d in drifts_of(result)
         ],
-        "findings": [finding_json(f) for f in result.findings],
+        "findings": [f.plain("file") for f in result.findings],
     }
     return finite(data)
 

@@ -21,8 +21,7 @@ from strapdown.crash.closure import Closure, Figure
 from strapdown.crash.consistency import UnitComparison
 from strapdown.crash.crash_type import CrashType
 from strapdown.crash.delta_v_bound import EventChanges, VelocityChange
-from strapdown.crash.drive_entry import determined
-from strapdown.crash.entry import EntryState
+from strapdown.crash.entry import EntryState, determined
 from strapdown.crash.events import CrashEvent
 from strapdown.crash.path import CrashPath
 from strapdown.crash.pdof import NedPdof
@@ -31,22 +30,17 @@ from strapdown.formats.crash_record import CrashChannel, CrashRecord
 from strapdown.formats.crash_writers import write_mme
 from strapdown.progress import Progress
 from strapdown.report import crash_words
-from strapdown.report.chart import Array
-from strapdown.report.crash_tables import DRIVE_QUANTITIES
-from strapdown.report.document import finding_json
-from strapdown.report.document_pdf import write_pdf
 from strapdown.report.report_bundle import (
     ReportBundle,
     as_comments,
     file_of,
     finite,
     with_file,
-    write_report,
     write_table,
 )
 from strapdown.report.values import AXES, shown_in, spaced
 from strapdown.tables import ACCEL, EULER, GYRO, NED, VELOCITY
-from strapdown.tables.checks import index_of
+from strapdown.tables.checks import Array, index_of
 from strapdown.units import FORCES, LENGTHS, MOMENTS, SPEEDS
 
 
@@ -73,10 +67,13 @@ def _write(
     _write_numbers(result, folder)
     if forms:
         from strapdown.report.crash_document import crash_document
+        from strapdown.report.document_html import write_report
 
         document = crash_document(result, name)
         stills = write_report(document, folder, progress)
     if "pdf" in forms:
+        from strapdown.report.document_pdf import write_pdf
+
         progress("setting the PDF", 0.95)
         write_pdf(document, folder / "report.pdf", stills=stills)
 
@@ -206,7 +203,7 @@ def _json(result: CaseResult) -> dict[str, Any]:
         "limitations": _pairs([one[1:] for one in crash_words.limitations(result)]),
         "contradictions": _pairs(crash_words.contradictions(result)),
         "not_shown": _pairs(crash_words.not_shown(result)),
-        "findings": [finding_json(f) for f in result.findings],
+        "findings": [f.plain("file") for f in result.findings],
         "case": _named(result.spec.model_dump(mode="json", exclude_none=True)),
     }
 
@@ -275,7 +272,7 @@ def _drive(drive: EntryState) -> dict[str, Any]:
     rows = []
     table = drive.calibration
     for what in () if table is None else table.to_dict("records"):
-        key, _, size, _ = DRIVE_QUANTITIES[what["quantity"]]
+        key, _, size, _ = crash_words.DRIVE_QUANTITIES[what["quantity"]]
         half, stated, kept = (
             TWO_SIDED_95 * x / size for x in (what["sd"], what["stated"], what["in_crash"])
         )
@@ -445,7 +442,7 @@ def _closure(result: CaseResult, closure: Closure) -> dict[str, Any]:
         "energy_equivalent_speed_m_per_s": [_bounded(f) for f in closure.energy_equivalent_speed],
         "explained_by": []
         if result.blame is None
-        else [finding_json(one.finding) for one in result.blame.candidates],
+        else [one.finding.plain("file") for one in result.blame.candidates],
     }
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from strapdown import earth
 from strapdown.bundle import Seal, check_destination, write_bundle, write_json
-from strapdown.config import CrashSimulationSpec
+from strapdown.config.sources import CrashSimulationSpec
 from strapdown.crash.pdof import pdof
 from strapdown.errors import check_choice
 from strapdown.formats.crash_record import QUANTITIES, CrashChannel, CrashRecord

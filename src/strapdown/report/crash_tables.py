@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
@@ -13,8 +12,9 @@ from strapdown.crash.case import CaseResult
 from strapdown.crash.case_contact import main_event
 from strapdown.crash.closure import Figure
 from strapdown.crash.delta_v_bound import VelocityChange
-from strapdown.crash.drive_entry import determined
+from strapdown.crash.entry import determined
 from strapdown.crash.pdof import AngleInterval, Pdof
+from strapdown.report.crash_words import DEG, DRIVE_QUANTITIES
 from strapdown.report.document import TableBlock
 from strapdown.report.values import (
     GAP,
@@ -526,9 +526,6 @@ def _named(unit: str, result: CaseResult) -> str:
 # Inputs of a crash report: records, recorders, sensors, files.
 
 
-DEG = math.degrees(1.0)
-
-
 def records_table(result: CaseResult) -> TableBlock:
     """Return the channels taken from each record, and their recorder."""
     rows = []
@@ -604,30 +601,6 @@ def units_table(result: CaseResult) -> TableBlock:
         caption="Mounting positions from the vehicle's origin; angles turn vehicle axes into the "
         "recorder's. 95 % bounds.",
     )
-
-
-class DriveQuantity(NamedTuple):
-    """A quantity that a drive determines: its key in JSON, unit, and names on axes 0 to 2."""
-
-    key: str
-    symbol: str
-    size: float
-    names: tuple[str, ...]
-
-
-_BIAS, _SCALE = (tuple(f"{what} {axis}" for axis in "xyz") for what in ("bias", "scale factor"))
-#: By the quantities of `EntryState.calibration`; `size` is that of the unit, in SI.
-DRIVE_QUANTITIES: dict[str, DriveQuantity] = {
-    "bias": DriveQuantity("accelerometer_bias_m_per_s2", "m/s²", 1.0, _BIAS),
-    "scale": DriveQuantity("accelerometer_scale_percent", "%", 0.01, _SCALE),
-    "gyro bias": DriveQuantity("gyro_bias_deg_per_s", "°/s", 1.0 / DEG, _BIAS),
-    "gyro scale": DriveQuantity("gyro_scale_percent", "%", 0.01, _SCALE),
-    "mounting": DriveQuantity(
-        "mounting_deg", "°", 1.0 / DEG, ("mounting roll", "mounting pitch", "mounting yaw")
-    ),
-    "speed scale": DriveQuantity("speed_scale_percent", "%", 0.01, ("scale of the wheels",)),
-    "speed delay": DriveQuantity("speed_delay_s", "s", 1.0, ("delay of the wheels",)),
-}
 
 
 def drive_table(result: CaseResult) -> TableBlock | None:

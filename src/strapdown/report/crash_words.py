@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -13,12 +14,10 @@ from strapdown.crash.case import CaseResult
 from strapdown.crash.case_contact import OF_DRIVES, main_event
 from strapdown.crash.closure import Closure
 from strapdown.crash.delta_v_bound import VelocityChange
-from strapdown.crash.drive_entry import CAR
 from strapdown.crash.pdof import Pdof
 from strapdown.crash.reconstruction import UnitReconstruction
 from strapdown.errors import Finding
 from strapdown.formats.crash_record import CrashRecord
-from strapdown.report.document import KeyFigure
 from strapdown.report.values import (
     AXES,
     GAP,
@@ -45,6 +44,9 @@ from strapdown.report.values import (
 )
 from strapdown.sensors.pre_crash import PreparedUnit
 from strapdown.tables import NED, VELOCITY
+
+if TYPE_CHECKING:
+    from strapdown.report.document import KeyFigure
 
 TYPES = {
     "front": "an impact from the front",
@@ -104,6 +106,8 @@ def direction(unit: UnitReconstruction, number: int) -> str:
 
 def key_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
     """Return the key figures of page one."""
+    from strapdown.report.document import KeyFigure
+
     unit = result.reconstruction.main
     number = main_event(unit)
     figures: list[KeyFigure] = []
@@ -344,6 +348,8 @@ def apart_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
     result : CaseResult
         Of recorders that disagree.
     """
+    from strapdown.report.document import KeyFigure
+
     units = result.reconstruction.units
     spans = [span for span in map(_span, units) if span is not None]
     value = "no event"
@@ -1175,6 +1181,8 @@ def assumptions(result: CaseResult) -> tuple[tuple[str, str], ...]:
             )
         )
     if entry.kind in OF_DRIVES and (entry.slip_sd_deg or entry.speed_path is not None):
+        from strapdown.crash.drive_entry import CAR
+
         slip = TWO_SIDED_95 * (entry.slip_sd_deg or CAR["side_slip_sd_deg"])
         found.append(
             (
@@ -1245,3 +1253,33 @@ def how_to_verify() -> tuple[tuple[str, str], ...]:
             "crash.json, with their units in the names.",
         ),
     )
+
+
+# Quantities that a drive determines.
+
+
+DEG = math.degrees(1.0)
+
+
+class DriveQuantity(NamedTuple):
+    """A quantity that a drive determines: its key in JSON, unit, and names on axes 0 to 2."""
+
+    key: str
+    symbol: str
+    size: float
+    names: tuple[str, ...]
+
+
+_BIAS, _SCALE = (tuple(f"{what} {axis}" for axis in "xyz") for what in ("bias", "scale factor"))
+#: By the quantities of `EntryState.calibration`; `size` is that of the unit, in SI.
+DRIVE_QUANTITIES: dict[str, DriveQuantity] = {
+    "bias": DriveQuantity("accelerometer_bias_m_per_s2", "m/s²", 1.0, _BIAS),
+    "scale": DriveQuantity("accelerometer_scale_percent", "%", 0.01, _SCALE),
+    "gyro bias": DriveQuantity("gyro_bias_deg_per_s", "°/s", 1.0 / DEG, _BIAS),
+    "gyro scale": DriveQuantity("gyro_scale_percent", "%", 0.01, _SCALE),
+    "mounting": DriveQuantity(
+        "mounting_deg", "°", 1.0 / DEG, ("mounting roll", "mounting pitch", "mounting yaw")
+    ),
+    "speed scale": DriveQuantity("speed_scale_percent", "%", 0.01, ("scale of the wheels",)),
+    "speed delay": DriveQuantity("speed_delay_s", "s", 1.0, ("delay of the wheels",)),
+}

@@ -41,13 +41,12 @@ from strapdown.report.document import (
     TableBlock,
     blocks,
     capital,
-    finding_json,
     findings_list,
     paragraph,
     run_again,
     section,
 )
-from strapdown.report.report_bundle import ReportBundle, finite, write_report
+from strapdown.report.report_bundle import ReportBundle, finite
 from strapdown.report.values import duration_words, instant, small
 from strapdown.systems.doctor import USES, Diagnosis, LogDiagnosis, refused_fixes, run_doctor
 from strapdown.tables import ACCEL, GEODETIC, GYRO, VELOCITY, VELOCITY_SD, find_gaps
@@ -75,6 +74,8 @@ def _write(
 ) -> None:
     write_json(folder / "doctor.json", diagnosis_json(result))
     if forms:
+        from strapdown.report.document_html import write_report
+
         write_report(doctor_document(result, name), folder, progress, figures=False)
 
 
@@ -107,7 +108,7 @@ def diagnosis_json(result: Diagnosis) -> dict[str, Any]:
 
 
 def _listed(findings: Iterable[Finding]) -> list[Any]:
-    return [finding_json(one, "cli") for one in findings]
+    return [one.plain("cli") for one in findings]
 
 
 # The answer, which page and terminal share.

@@ -230,12 +230,6 @@ def findings_list(findings: Iterable[Finding], words: Words = "python") -> Items
     return Items(tuple(rows)) if rows else Paragraph("None.")
 
 
-def finding_json(finding: Finding, words: Words = "file") -> dict[str, Any]:
-    """Return a finding for programs, with its sentence and remedy for people."""
-    said = {"sentence": finding.sentence(words), "remedy": finding.advice(words)}
-    return {**finding.plain(), **said}
-
-
 # Whether an answer can be trusted, and why.
 
 
@@ -308,8 +302,8 @@ class Trust:
         """Return the verdict for programs."""
         return {
             "verdict": self.verdict,
-            "for": [finding_json(f) for f in self.supporting],
-            "against": [finding_json(f) for f in self.against],
+            "for": [f.plain("file") for f in self.supporting],
+            "against": [f.plain("file") for f in self.against],
         }
 
 
@@ -349,20 +343,19 @@ def _plain(value: T, limit: int) -> T:
     elif isinstance(value, tuple):
         made = tuple(_plain(item, limit) for item in value)
     elif is_dataclass(value) and not isinstance(value, type):
-        made = replace(value, **{f.name: _field(value, f.name) for f in fields(value) if f.init})
+        limits, plain = _LIMITS.get(type(value), {}), {}
+        for name in (f.name for f in fields(value) if f.init):
+            part, most = getattr(value, name), limits.get(name, _LABEL)
+            if name == "slug":
+                plain[name] = _SLUG.sub("-", part)[:80].strip("-") or "part"
+            elif isinstance(value, Picture) and name == "svg":
+                plain[name] = plain_text(part, _MARKED * len(part) + 1, lines=True)
+            elif isinstance(value, Paragraph) and value.kind == "mono" and name == "text":
+                plain[name] = plain_text(part, most, lines=True)
+            else:
+                plain[name] = _plain(part, most)
+        made = replace(value, **plain)
     return made  # type: ignore[no-any-return]
-
-
-def _field(owner: Any, name: str) -> Any:
-    value = getattr(owner, name)
-    limit = _LIMITS.get(type(owner), {}).get(name, _LABEL)
-    if name == "slug":
-        return _SLUG.sub("-", value)[:80].strip("-") or "part"
-    if isinstance(owner, Picture) and name == "svg":
-        return plain_text(value, _MARKED * len(value) + 1, lines=True)
-    if isinstance(owner, Paragraph) and owner.kind == "mono" and name == "text":
-        return plain_text(value, limit, lines=True)
-    return _plain(value, limit)
 
 
 # Sanitizing of external text: no control characters, no invisible characters.
@@ -374,6 +367,8 @@ _MOST_COMBINING = 3
 # Control, format (direction, zero width), lone surrogates, private use: no glyph of their own.
 _SHAPELESS = frozenset({"Cc", "Cf", "Cs", "Co"})
 _COMBINING = frozenset({"Mn", "Me"})
+# Anything but printable ASCII, which needs no look.
+_OTHER = re.compile(r"[^ -~]+")
 
 
 def plain_text(text: str, limit: int = 4000, *, lines: bool = False) -> str:
@@ -395,21 +390,9 @@ def plain_text(text: str, limit: int = 4000, *, lines: bool = False) -> str:
         width U+200D, a lone surrogate) are written as ``[U+202E]``, as are combining marks after
         the third on one letter. Plain text is unchanged, so the operation is idempotent.
     """
-    marked = _marked(text[:limit].replace("\r\n", "\n"), "\n" if lines else " ")
-    if len(text) <= limit and len(marked) <= limit:
-        return marked
-    count = _CUT.format(len(text))
-    return marked[: max(0, limit - len(count))] + count
-
-
-# Anything but printable ASCII, which needs no look.
-_OTHER = re.compile(r"[^ -~]+")
-
-
-def _marked(text: str, end_of_line: str) -> str:
-    """Return text with a mark for each character without a glyph of its own."""
 
     def marked(found: re.Match[str]) -> str:
+        """Characters with a mark for each that has no glyph of its own."""
         out: list[str] = []
         combining = 0
         for char in found[0]:
@@ -418,7 +401,7 @@ def _marked(text: str, end_of_line: str) -> str:
             # No characters, and never will be.
             never = ord(char) & 0xFFFE == 0xFFFE or 0xFDD0 <= ord(char) <= 0xFDEF
             if char in "\n\r\u2028\u2029":
-                out.append(end_of_line)
+                out.append("\n" if lines else " ")
             elif char == "\t":
                 out.append(" ")
             elif kind in _SHAPELESS or never or combining > _MOST_COMBINING:
@@ -427,7 +410,11 @@ def _marked(text: str, end_of_line: str) -> str:
                 out.append(char)
         return "".join(out)
 
-    return _OTHER.sub(marked, text)
+    made = _OTHER.sub(marked, text[:limit].replace("\r\n", "\n"))
+    if len(text) <= limit and len(made) <= limit:
+        return made
+    count = _CUT.format(len(text))
+    return made[: max(0, limit - len(count))] + count
 
 
 # A document as plain data, from which page and PDF are laid out alike.

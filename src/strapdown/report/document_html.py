@@ -8,9 +8,17 @@ import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
-from strapdown.report.document import Document, document_data, draw_stills
+from strapdown.progress import Progress, silent
+from strapdown.report.document import (
+    Document,
+    document_data,
+    draw_stills,
+    write_drawings,
+    write_text,
+)
 
 _TITLE_ELEMENT = re.compile("<title>.*?</title>", re.DOTALL)
 _PLACE = re.compile(r"\{\{ (?:policy|title|body) \}\}")
@@ -21,6 +29,19 @@ _HOW_TO = (
     '<span class="livenote"> In a chart: point for values, drag to zoom, double-click to return, '
     "click a name in the legend to hide it.</span>"
 )
+
+
+def write_report(
+    document: Document, folder: Path, progress: Progress = silent, *, figures: bool = True
+) -> tuple[str, ...]:
+    """Write ``report.html`` and, in ``figures``, its drawings; return the drawn charts."""
+    progress("drawing the figures", 0.86)
+    stills = draw_stills(document)
+    if figures:
+        write_drawings(document, stills, folder / "figures")
+    progress("writing the page", 0.93)
+    write_text(folder / "report.html", document_page(document, stills=stills))
+    return stills
 
 
 def document_page(document: Document, *, stills: Sequence[str] | None = None) -> str:
@@ -68,6 +89,14 @@ def _body(data: Mapping[str, Any], script: str) -> str:
         f'<a href="#{_text(one["anchor"])}">{_text(one["title"])}</a></li>'
         for one in sections
     )
+    shown = []
+    for one in sections:
+        anchor = _text(one["anchor"])
+        shown.append(
+            f'<section aria-labelledby="{anchor}">\n<h2 id="{anchor}"><span class="no">'
+            f"{one['number']}</span><span>{_text(one['title'])}</span></h2>\n"
+            f"{''.join(map(_block, one['blocks']))}</section>\n"
+        )
     return "".join(
         [
             '<a class="skip" href="#contents">Skip to the contents</a>' if sections else "",
@@ -81,22 +110,13 @@ def _body(data: Mapping[str, Any], script: str) -> str:
             f'<h2 id="contents-head">Contents</h2>\n<ol>{contents}</ol></nav>\n'
             if sections
             else "",
-            *map(_section, sections),
+            *shown,
             f"<footer>{_text(data['footer'])}{_HOW_TO if script else ''}</footer>"
             if data["footer"] or script
             else "",
             "\n</main>\n",
             f"<script>{script}</script>" if script else "",
         ]
-    )
-
-
-def _section(section: Mapping[str, Any]) -> str:
-    anchor = _text(section["anchor"])
-    return (
-        f'<section aria-labelledby="{anchor}">\n<h2 id="{anchor}"><span class="no">'
-        f"{section['number']}</span><span>{_text(section['title'])}</span></h2>\n"
-        f"{''.join(map(_block, section['blocks']))}</section>\n"
     )
 
 
@@ -173,7 +193,7 @@ def _table(block: Mapping[str, Any]) -> str:
     rows = "".join(
         ('<tr class="strong">' if strong else "<tr>")
         + "".join(
-            _head(cell, word) if k == 0 else _cell(cell, word, mark)
+            _cell(cell, word, mark, head=k == 0)
             for k, (cell, word, mark) in enumerate(zip(row, words, passed, strict=True))
         )
         + "</tr>\n"
@@ -187,14 +207,11 @@ def _table(block: Mapping[str, Any]) -> str:
     )
 
 
-def _head(cell: str, word: bool) -> str:
-    look = ("" if word else "num") + (" long" if len(cell) >= _LONG else "")
-    return f'<th scope="row" class="{look}">{_text(cell)}</th>'
-
-
-def _cell(cell: str, word: bool, passed: bool) -> str:
+def _cell(cell: str, word: bool, passed: bool, *, head: bool) -> str:
     look = "" if word else "num"
-    look += " long" if len(cell) >= _LONG else "" if word else " short"
+    look += " long" if len(cell) >= _LONG else "" if word or head else " short"
+    if head:
+        return f'<th scope="row" class="{look}">{_text(cell)}</th>'
     return f'<td class="{look}{" passed" if passed else ""}">{_text(cell)}</td>'
 
 

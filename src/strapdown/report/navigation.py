@@ -24,7 +24,6 @@ from strapdown.navigation.heading_integrity import REASONS, STATUSES
 from strapdown.navigation.integrity import QUANTITY_REASONS, Repeated
 from strapdown.navigation.record import NavigationRecord
 from strapdown.progress import Progress
-from strapdown.report.document import finding_json
 from strapdown.report.navigation_document import (
     CONVENTIONS,
     cautions,
@@ -34,7 +33,6 @@ from strapdown.report.navigation_document import (
 from strapdown.report.navigation_evaluation import (
     Agreement,
     NavigationEvaluation,
-    SolutionScore,
     distance_over_ground,
     rms,
     trust,
@@ -46,7 +44,6 @@ from strapdown.report.report_bundle import (
     file_of,
     finite,
     with_file,
-    write_report,
     write_table,
 )
 from strapdown.report.values import spaced
@@ -62,6 +59,7 @@ from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
 from strapdown.tables.checks import index_of
 
 if TYPE_CHECKING:
+    from strapdown.navigation.truth_comparison import SolutionScore
     from strapdown.report.chart_svg import ChartFigure
 
 
@@ -82,6 +80,8 @@ def _write_all(
     write_navigation_files(evaluation, folder)
     write_integrity(evaluation, folder)
     if forms:
+        from strapdown.report.document_html import write_report
+
         document = navigation_document(evaluation, name)
         write_report(document, folder, progress, figures=result.spec.output.figures)
 
@@ -221,7 +221,7 @@ def navigation_json(evaluation: NavigationEvaluation) -> dict[str, Any]:
         "control_points": _points(evaluation),
         "paired": paired_json(evaluation),
         "method": _method(result),
-        "findings": [finding_json(f) for f in result.findings],
+        "findings": [f.plain("file") for f in result.findings],
     }
     return finite(data)
 
@@ -259,13 +259,14 @@ def _against(evaluation: NavigationEvaluation) -> dict[str, Any] | None:
     errors = evaluation.errors
     if errors is None:
         return None
+    freedom = errors.freedom.get("all", 0)
     return {
         "name": evaluation.truth_name,
         "instants": len(errors.time),
         "from_s": float(errors.time[0]),
         "to_s": float(errors.time[-1]),
-        "mean_nees": errors.nees.mean() if errors.freedom else None,
-        "nees_of": errors.freedom,
+        "mean_nees": errors.nees["all"].to_numpy().mean() if freedom else None,
+        "nees_of": freedom,
         "errors": {score.quantity: _score(score) for score in errors.scores},
     }
 
@@ -495,7 +496,7 @@ def verdict_json(evaluation: NavigationEvaluation) -> dict[str, Any]:
             "trusted_below_deg": heading.trusted_below,
             "rejected_beyond_deg": heading.rejected_beyond,
             "confirmed": not trust.unconfirmed,
-            "why_not": [finding_json(f) for f in trust.unconfirmed],
+            "why_not": [f.plain("file") for f in trust.unconfirmed],
             "confirmed_by": check_words(trust) or None,
             "share": {one: heading.share(one) for one in STATUSES},
             "at_end": spans[-1].status if spans else None,
@@ -549,7 +550,7 @@ def _repeated(repeated: Repeated, result: NavigationRun) -> dict[str, Any]:
     out: dict[str, Any] = {
         "without": repeated.change.what,
         "answer": spaced(repeated_words(result)),
-        "failed": None if repeated.failed is None else finding_json(repeated.failed),
+        "failed": None if repeated.failed is None else repeated.failed.plain("file"),
         "left": [_doubt(i) for i in repeated.left],
     }
     if repeated.differences is not None:

@@ -453,10 +453,11 @@ def error_charts(evaluation: NavigationEvaluation) -> tuple[Chart, ...]:
 def nees_chart(evaluation: NavigationEvaluation) -> Chart | None:
     """NEES of position, velocity and attitude; None without a truth or without bounds."""
     errors = evaluation.errors
-    if errors is None or not errors.freedom:
+    freedom = 0 if errors is None else errors.freedom.get("all", 0)
+    if errors is None or not freedom:
         return None
-    low, high = bounds(errors.freedom)
-    nees = np.maximum(errors.nees, _LEAST)
+    low, high = bounds(freedom)
+    nees = np.maximum(errors.nees["all"].to_numpy(), _LEAST)
     panel = Panel(
         "NEES",
         (curve("position, velocity and attitude", errors.time, nees, BLUE, buckets=BUCKETS),),
@@ -466,7 +467,7 @@ def nees_chart(evaluation: NavigationEvaluation) -> Chart | None:
     return over_time(
         "nees",
         "Normalized estimation error squared (NEES)",
-        f"Expected value {errors.freedom}; at one instant 95 % of many runs lie between the "
+        f"Expected value {freedom}; at one instant 95 % of many runs lie between the "
         "levels. The errors of one run are correlated in time.",
         (panel,),
         evaluation.record,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -12,8 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.config.navigation import make_aids
-from strapdown.constants import TWO_SIDED_95
-from strapdown.dsp.chi_square import plane_bound, plane_reach
+from strapdown.dsp.chi_square import plane_bound
 from strapdown.dsp.samples import true_runs
 from strapdown.errors import Finding
 from strapdown.estimation.robust import AdaptiveScale
@@ -36,7 +35,7 @@ from strapdown.report.chart import Array
 from strapdown.report.document import Trust, reason
 from strapdown.report.values import shown_unit
 from strapdown.systems.navigation_run import NavigationRun
-from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
+from strapdown.tables import EULER, GEODETIC, VELOCITY
 from strapdown.tables.checks import index_of, values_of, view_of
 
 
@@ -84,12 +83,12 @@ class NavigationEvaluation:
         return agreements(self.record, lasting(make_aids(self.run.spec)))
 
     @cached_property
-    def errors(self) -> NavigationErrors | None:
+    def errors(self) -> TruthComparison | None:
         """Errors against the truth, which has an instant in common with the run, else DataError."""
         return self._errors(self.record)
 
     @cached_property
-    def forward_errors(self) -> NavigationErrors | None:
+    def forward_errors(self) -> TruthComparison | None:
         """Errors of the filter alone, for a smoothed run."""
         return None if self.run.forward is None else self._errors(self.run.forward)
 
@@ -108,17 +107,15 @@ class NavigationEvaluation:
     @property
     def all_findings(self) -> tuple[Finding, ...]:
         """Findings of the run and of its comparison with the truth."""
-        more = () if self.errors is None else self.errors.comparison.findings
+        more = () if self.errors is None else self.errors.findings
         return (*self.run.findings, *more)
 
-    def _errors(self, record: NavigationRecord) -> NavigationErrors | None:
+    def _errors(self, record: NavigationRecord) -> TruthComparison | None:
         truth = self.run.source.truth
         if truth is None:
             return None
-        return NavigationErrors(
-            compare_with_truth(
-                record.trajectory, record.sd.index, record.covariance, truth, self.run.ellipsoid
-            )
+        return compare_with_truth(
+            record.trajectory, record.sd.index, record.covariance, truth, self.run.ellipsoid
         )
 
 
@@ -292,122 +289,6 @@ def _agreement(name: str, table: pd.DataFrame, stated: bool) -> Agreement:
         lasting=ratio * math.sqrt((1.0 + rho) / (1.0 - rho)) if rho > 0.0 else ratio,
         stated=stated,
     )
-
-
-# A navigation run against its truth: errors, their bounds, and consistency.
-
-
-#: Longest time that one instant represents, s, or three usual steps if longer.
-LONGEST = 1.5
-
-
-@dataclass(frozen=True)
-class SolutionScore:
-    """Errors of one quantity over a run.
-
-    Attributes
-    ----------
-    rms : float
-        Weighted by time: instants are dense where measurements are frequent, sparse in an outage.
-    largest_at : float, s
-    bound : float
-        Root mean square of the 95 % bounds.
-    share : float
-        Share of the time in which the error is within its bound; NaN for a quantity without a
-        variance of its own, as a height that is held.
-    """
-
-    quantity: str
-    unit: str
-    rms: float
-    largest: float
-    largest_at: float
-    bound: float
-    share: float
-
-
-@dataclass(frozen=True, eq=False)
-class NavigationErrors:
-    """Errors against the truth, with the run's own bounds."""
-
-    comparison: TruthComparison
-
-    @property
-    def time(self) -> Array:
-        """Times of the compared samples, (n,), s."""
-        return self.comparison.time
-
-    @property
-    def nees(self) -> Array:
-        """Normalized error squared (NEES) of position, velocity and attitude, (n,)."""
-        if not self.freedom:
-            return np.full(len(self.time), np.nan)
-        return self.comparison.nees["all"].to_numpy(dtype=np.float64)
-
-    @property
-    def freedom(self) -> int:
-        """Degrees of freedom of the NEES: errors for which the run has states."""
-        return self.comparison.freedom.get("all", 0)
-
-    def error(self, column: str) -> Array:
-        """Errors of a quantity, (n,): m, m/s, deg."""
-        return self.comparison.differences[column].to_numpy(dtype=np.float64)
-
-    def bound(self, column: str) -> Array:
-        """95 % bounds of the errors of a quantity, (n,)."""
-        return TWO_SIDED_95 * self.comparison.sd[column].to_numpy(dtype=np.float64)
-
-    @cached_property
-    def scores(self) -> tuple[SolutionScore, ...]:
-        """Scores of each quantity, and of the horizontal position."""
-        units = (
-            dict.fromkeys(NED, "m") | dict.fromkeys(VELOCITY, "m/s") | dict.fromkeys(EULER, "deg")
-        )
-        found = [self._score(n, u, self.error(n), self.bound(n)) for n, u in units.items()]
-        inside = self.comparison.table["inside"]
-        for k, score in enumerate(found):
-            if np.isnan(inside.get(score.quantity, 0.0)):
-                found[k] = replace(score, share=np.nan)
-        size = np.hypot(*(self.error(n) for n in NED[:2]))
-        return self._score("horizontal", "m", size, self._plane(size)), *found
-
-    def score(self, quantity: str) -> SolutionScore:
-        """Score of one quantity."""
-        return next(s for s in self.scores if s.quantity == quantity)
-
-    def _plane(self, size: Array) -> Array:
-        """Radius of the 95 % ellipse in the direction of the horizontal error, (n,), m.
-
-        The error is within it if and only if it is within the ellipse.
-        """
-        covariance = self.comparison.covariance
-        if "horizontal" not in self.comparison.nees:
-            return plane_bound(covariance)
-        distance = np.sqrt(self.comparison.nees["horizontal"].to_numpy(dtype=np.float64))
-        return plane_reach(size, distance, covariance)
-
-    @cached_property
-    def _weight(self) -> Array:
-        """Share of the time that each instant represents, (n,)."""
-        steps = np.diff(self.time)
-        if not steps.size:
-            return np.ones(len(self.time)) / len(self.time)
-        # A long gap of the truth counts only up to this limit.
-        steps = np.minimum(steps, max(LONGEST, 3.0 * float(np.median(steps))))
-        about = 0.5 * (np.append(steps, 0.0) + np.insert(steps, 0, 0.0))
-        return np.asarray(about / about.sum())
-
-    def _score(self, name: str, unit: str, error: Array, bound: Array) -> SolutionScore:
-        worst = int(np.argmax(np.abs(error)))
-        return SolutionScore(
-            name,
-            unit,
-            float(np.sqrt(self._weight @ np.square(error))),
-            float(abs(error[worst])),
-            float(self.time[worst]),
-            float(np.sqrt(self._weight @ np.square(bound))),
-            float(min(1.0, self._weight[np.abs(error) <= bound].sum())),
-        )
 
 
 # A record navigated twice, with two corrections of the estimated errors: errors of both.

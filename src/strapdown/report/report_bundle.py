@@ -14,13 +14,6 @@ import pandas as pd
 from strapdown.bundle import InputFiles, Seal, write_bundle
 from strapdown.formats import csv
 from strapdown.progress import Progress, silent
-from strapdown.report.document import (
-    Document,
-    draw_stills,
-    write_drawings,
-    write_text,
-)
-from strapdown.report.document_html import document_page
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables.checks import index_of
 
@@ -34,6 +27,7 @@ class Ran(Protocol):
 
 
 R = TypeVar("R", bound=Ran)
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -147,19 +141,6 @@ def with_file(
     return configuration if file is None else {**configuration, key: file}
 
 
-def write_report(
-    document: Document, folder: Path, progress: Progress = silent, *, figures: bool = True
-) -> tuple[str, ...]:
-    """Write ``report.html`` and, in ``figures``, its drawings; return the drawn charts."""
-    progress("drawing the figures", 0.86)
-    stills = draw_stills(document)
-    if figures:
-        write_drawings(document, stills, folder / "figures")
-    progress("writing the page", 0.93)
-    write_text(folder / "report.html", document_page(document, stills=stills))
-    return stills
-
-
 def write_table(table: pd.DataFrame, path: Path, comments: dict[str, str]) -> None:
     """Write a table over time as CSV, with shortest round-trip numbers and comments on top."""
     columns = {str(c): table[c].to_numpy() for c in table.columns}
@@ -171,16 +152,13 @@ def as_comments(rows: Iterable[tuple[str, str]]) -> dict[str, str]:
     return {name.lower().replace(" ", "_"): text for name, text in rows}
 
 
-def finite(data: dict[str, Any]) -> dict[str, Any]:
+def finite(value: T) -> T:
     """Return plain data for JSON, which has no NaN and no infinity: these are null."""
-    return {str(key): _finite(value) for key, value in data.items()}
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return finite(value)
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    made: Any = value.item() if isinstance(value, np.generic) else value
+    if isinstance(made, dict):
+        made = {str(key): finite(item) for key, item in made.items()}
+    elif isinstance(made, list | tuple):
+        made = [finite(item) for item in made]
+    elif isinstance(made, float) and not math.isfinite(made):
+        made = None
+    return made  # type: ignore[no-any-return]

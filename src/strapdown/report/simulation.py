@@ -11,7 +11,8 @@ import pandas as pd
 
 from strapdown.attitude_comparison.source import scenario_errors, simulate_scenario
 from strapdown.bundle import Seal, check_destination, sensor_file, write_bundle, write_json
-from strapdown.config import SimulateSpec, TrajectorySpec
+from strapdown.config.motions import TrajectorySpec
+from strapdown.config.sources import SimulateSpec
 from strapdown.ellipsoids import WGS84, Ellipsoid, find_ellipsoid
 from strapdown.errors import check_choice
 from strapdown.formats.trajectory_writers import one_line, thin

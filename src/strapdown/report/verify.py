@@ -32,9 +32,10 @@ from strapdown.bundle import (
     with_paths,
 )
 from strapdown.bundle.signature import signatures, signer_of
-from strapdown.config import CrashSimulationSpec, SimulateSpec, TrajectorySpec
 from strapdown.config.crash_case import CaseSpec
+from strapdown.config.motions import TrajectorySpec
 from strapdown.config.reading import changed_options
+from strapdown.config.sources import CrashSimulationSpec, SimulateSpec
 from strapdown.errors import ConfigError, DataError, Finding, Severity, StrapdownError
 from strapdown.report import crash_live
 from strapdown.report.alignment import ALIGNMENT

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from strapdown.bundle import InputFiles, input_files, sensor_file
 from strapdown.config.alignment import AlignmentSpec, AxesTable, LogTable
-from strapdown.config.sources import read_options
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import Finding
 from strapdown.formats import files_of, read_log
@@ -27,7 +26,7 @@ from strapdown.sensors.triad_errors import (
     check_axes_matrix,
     report_transposed,
 )
-from strapdown.systems.inputs import part_of_log, refuse_long_span
+from strapdown.systems.inputs import part_of_log, read_options, refuse_long_span
 from strapdown.tables import ACCEL, EULER, GYRO
 from strapdown.tables.checks import values_of
 

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
-from typing import Any, ClassVar, Self, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, Self, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -17,7 +17,12 @@ import pandas as pd
 from strapdown.bundle import InputFiles, Seal, check_destination, input_files, with_paths
 from strapdown.config.reading import FileSpec
 from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.formats.recording import ReadOptions
 from strapdown.progress import Progress, silent
+
+if TYPE_CHECKING:
+    from strapdown.config.alignment import LogTable
+    from strapdown.config.sources import LogSpec
 
 __all__ = [
     "NOWHERE",
@@ -28,6 +33,7 @@ __all__ = [
     "moved",
     "moved_paths",
     "part_of_log",
+    "read_options",
     "refuse_long_span",
 ]
 
@@ -54,6 +60,21 @@ def check_part(from_s: float | None, to_s: float | None, duration_s: float | Non
         raise ConfigError(
             "io.part-ends-before-it-begins", quantity="--to", to_s=to_s, from_s=from_s
         )
+
+
+def read_options(log: LogSpec | LogTable, axes: str | None) -> ReadOptions:
+    """Return the options with which the file of a log is read, its axes as letters."""
+    return ReadOptions(
+        format=log.format,
+        columns=dict(log.columns),
+        gyro_unit=log.gyro_unit,
+        accel_unit=log.accel_unit,
+        time_unit=log.time_unit,
+        axes=axes,
+        sampling=log.sampling,
+        rate=log.rate_hz,
+        repair=log.repair,
+    )
 
 
 def part_of_log(

@@ -11,9 +11,11 @@ import numpy as np
 import pandas as pd
 
 from strapdown import rotation
-from strapdown.config import ScenarioSpec, TrajectorySpec, motions
+from strapdown.config import motions
 from strapdown.config.alignment import SimulationTable
+from strapdown.config.motions import TrajectorySpec
 from strapdown.config.navigation import NavigationSimulationTable
+from strapdown.config.sources import ScenarioSpec
 from strapdown.config.spec import AngleWaveSpec
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from strapdown.config import CaseSpec
+from strapdown.config.crash_case import CaseSpec
 
 TEXT = """\
 title = "Impact on a pole"

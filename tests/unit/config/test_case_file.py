@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from good_case import TEXT, read, write
 
 from strapdown.bundle import names_file
-from strapdown.config import CaseSpec
+from strapdown.config.crash_case import CaseSpec
 from strapdown.errors import ConfigError
 
 

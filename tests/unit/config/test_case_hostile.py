@@ -16,7 +16,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from good_case import TEXT, write
 
-from strapdown.config import CaseSpec
+from strapdown.config.crash_case import CaseSpec
 from strapdown.errors import ConfigError, StrapdownError
 
 #: Longer messages would fill a screen.

@@ -19,7 +19,7 @@ from strapdown.evaluation.reference_points import (
 )
 from strapdown.formats.references import read_reference_words
 from strapdown.increments import increments_from_imu
-from strapdown.report.attitude_tables import standing
+from strapdown.report.attitude_words import standing
 from strapdown.tables import imu_table
 
 

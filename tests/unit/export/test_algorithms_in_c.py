@@ -18,7 +18,7 @@ import strapdown as sd
 from strapdown import rotation
 from strapdown._kernels import arithmetic
 from strapdown.attitude_algorithms import ALGORITHMS, make_algorithm, run_attitude
-from strapdown.attitude_algorithms.cost import count_cost, step_kernel
+from strapdown.attitude_algorithms.cost import count_cost
 from strapdown.errors import ConfigError, DataError
 from strapdown.export import Channel, SensorConfiguration, export_c
 from strapdown.export.algorithms import SHAPES
@@ -141,7 +141,7 @@ def by_kernels(variant: str, rows: np.ndarray, single: bool):
     """The state after every sample by the kernels, in either precision."""
     algorithm = make_algorithm(variant)
     kind = np.float32 if single else np.float64
-    home = step_kernel(algorithm)[0]
+    home = arithmetic.kernel_home(algorithm.advance_kernel)
     if single:
         kernel, increments = map(arithmetic.single_precision, (home, "increments"))
     else:

@@ -17,7 +17,6 @@ from strapdown.navigation.truth_comparison import (
     compare_with_truth,
     state_errors,
 )
-from strapdown.report.navigation_evaluation import NavigationErrors
 from strapdown.simulation.earth_motion import Origin
 from strapdown.simulation.spline_motion import SineVelocityMotion
 from strapdown.systems.navigation_run import run_navigation
@@ -207,7 +206,7 @@ def test_a_held_height_of_17_states_is_not_estimated():
     }
     assert np.isfinite(out.nees.to_numpy()).all()
     assert np.isnan(out.table.loc["VD", "inside"])
-    scores = {one.quantity: one for one in NavigationErrors(out).scores}
+    scores = {one.quantity: one for one in out.scores}
     assert [name for name, one in scores.items() if np.isnan(one.share)] == ["down", "VD"]
 
 

@@ -11,7 +11,7 @@ import pytest
 from strapdown import rotation
 from strapdown.evaluation.differences import attitude_at
 from strapdown.report.attitude_document import MOST_FRAMES, body_animation
-from strapdown.report.attitude_tables import chosen_run
+from strapdown.report.attitude_words import chosen_run
 
 
 def times_of(animation):

@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 
 from strapdown.report.attitude_charts import LEAST_ERROR, charts
-from strapdown.report.attitude_tables import share_basis
+from strapdown.report.attitude_words import share_basis
 from strapdown.report.chart import DASHES, SERIES_COLOURS, Level, look
 from strapdown.report.chart_svg import entries, still
 from strapdown.report.plan import PLACES, place_labels

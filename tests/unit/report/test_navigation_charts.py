@@ -291,8 +291,8 @@ def test_errors_are_beside_their_bounds():
     assert score.bound == pytest.approx(PLANE_95 * 3.0, rel=1e-6)
     assert score.share == 1.0
     # One of the plane, 1 m by 2 m down, 0.25 deg by 0.5 deg of heading.
-    assert found.nees == pytest.approx(1.0 + 0.25 + 0.25, rel=1e-4)
-    assert found.freedom == 9
+    assert found.nees["all"].to_numpy() == pytest.approx(1.0 + 0.25 + 0.25, rel=1e-4)
+    assert found.freedom["all"] == 9
     place = error_charts(given)[0]
     assert place.panels[1].lines[0].y == pytest.approx(3.0 * np.cos(TURN), rel=1e-6)
     assert nees_chart(given).panels[1].levels[1].y == pytest.approx(19.0228, abs=1e-4)

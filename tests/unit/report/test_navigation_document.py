@@ -93,7 +93,7 @@ def test_what_is_not_estimated_has_no_bound_of_zero():
     assert not [one for one in trust(found).reasons if one.data.get("component") == "height"]
     figures = key_figures(found)
     assert NOT_ESTIMATED in figures[1].bound
-    assert found.errors.freedom == 8
+    assert found.errors.freedom["all"] == 8
     bounds = bound_chart(found).panels
     assert NOT_ESTIMATED in bounds[1].y_label
     assert [line.name for line in bounds[1].lines] == ["horizontal"]

@@ -20,7 +20,7 @@ from strapdown.formats import read_raw
 from strapdown.report import attitude_tables as tables
 from strapdown.report.attitude import attitude_json, write_attitude
 from strapdown.report.attitude_document import KINDS, attitude_document
-from strapdown.report.attitude_tables import standing
+from strapdown.report.attitude_words import standing
 from strapdown.report.content import compare_files
 from strapdown.report.document_html import document_page
 

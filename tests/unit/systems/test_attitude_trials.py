@@ -11,7 +11,7 @@ from tests.coded import coded
 from strapdown import simulate
 from strapdown.api.attitude import compare_attitude
 from strapdown.attitude_comparison.sweep import rank, trial_names, worst_sweep
-from strapdown.config import LogSpec, ScenarioSpec
+from strapdown.config.sources import LogSpec, ScenarioSpec
 from strapdown.errors import ConfigError
 from strapdown.formats.writers import WRITERS
 from strapdown.simulation import ImuErrors, find_scenario, simulate_imu

@@ -9,7 +9,8 @@ import pytest
 
 from strapdown import compare_attitude, rotation, simulate, verify
 from strapdown.attitude_comparison.source import simulate_scenario
-from strapdown.config import ScenarioSpec, specify
+from strapdown.config.sources import ScenarioSpec
+from strapdown.config.spec import specify
 from strapdown.errors import ConfigError
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.simulation import find_scenario, simulate_imu

@@ -121,17 +121,22 @@ def posterior(log_weights: dict[K, float]) -> dict[K, float]:
     return dict(pairs)
 
 
+def marginal(probabilities: Mapping[tuple[Any, ...], float], key: int) -> dict[Any, float]:
+    """Sum the probabilities of hypotheses that share one of their parts; in descending order."""
+    out: dict[Any, float] = {}
+    for hypothesis, p in probabilities.items():
+        out[hypothesis[key]] = out.get(hypothesis[key], 0.0) + p
+    return dict(sorted(out.items(), key=lambda p: -p[1]))
+
+
 def conclude(
     quantity: str,
     probabilities: Mapping[str, float] | Mapping[str | None, float],
     evidence: tuple[Finding, ...],
     flag: str = "",
 ) -> Inference:
-    """Make an `Inference` of the most probable answer.
-
-    `probabilities`: the most probable first, as from `posterior`.
-    """
-    (value, confidence), *others = probabilities.items()
+    """Make an `Inference` of the most probable answer."""
+    (value, confidence), *others = sorted(probabilities.items(), key=lambda p: -p[1])
     alternatives = tuple((v, p) for v, p in others if p >= 1e-4)
     return Inference(quantity, value, confidence, evidence, alternatives, flag)
 
@@ -256,11 +261,6 @@ def time_evidence(steps: Steps, unit: str) -> tuple[Finding, ...]:
         year = 1970 + first * factor / 31_556_952.0
         told.append(evidence("io.evidence-year-of-first-stamp", year=int(year)))
     return tuple(told)
-
-
-def mean_step(stamps: NDArray[Any]) -> float:
-    """Average the forward steps within 50 times their median; see `Steps`."""
-    return Steps.of(stamps).mean
 
 
 def infer_rate(steps: Steps, unit: str) -> Inference:
@@ -429,8 +429,7 @@ def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference,
         add(None, f"counts {k}", prior, calm * 0.45 / sd / (1.0 + off * off / 3.0) ** 2)
     add(None, "other", _PRIOR_FORM["other"], (calm + swings) / _DECADES)
     found = posterior(weights)
-    units = _summed(found, 0)
-    forms = _summed(found, 1)
+    units, forms = marginal(found, 0), marginal(found, 1)
     counted = math.fsum(p for f, p in forms.items() if str(f).startswith("counts"))
     forms["rate"] = forms.get("rate", 0.0) + counted
     norm = {"piece": PIECE, "norm": usual, "spread_percent": 100 * spread}
@@ -443,20 +442,16 @@ def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference,
     if whole:
         named = {f"g/{c:.0f}": forms.get(f"counts {k}", 0.0) for k, c in enumerate(_COUNTS)}
         told += evidence_of_counts(named)
-    gravity = posterior_of(
-        {
-            "present": forms.get("rate", 0.0) + forms.get("increment", 0.0),
-            "removed": forms.get("linear", 0.0),
-            None: forms.get("other", 0.0),
-        }
-    )
-    form = posterior_of(
-        {
-            "rate": forms.get("rate", 0.0) + forms.get("linear", 0.0),
-            "increment": forms.get("increment", 0.0),
-            None: forms.get("other", 0.0),
-        }
-    )
+    gravity = {
+        "present": forms.get("rate", 0.0) + forms.get("increment", 0.0),
+        "removed": forms.get("linear", 0.0),
+        None: forms.get("other", 0.0),
+    }
+    form = {
+        "rate": forms.get("rate", 0.0) + forms.get("linear", 0.0),
+        "increment": forms.get("increment", 0.0),
+        None: forms.get("other", 0.0),
+    }
     tell = (*told, evidence("io.evidence-mean-vector", share=direction))
     return (
         conclude("accel_unit", units, told, flag),
@@ -464,18 +459,6 @@ def infer_accel(accel: Array, step: float | None) -> tuple[Inference, Inference,
         conclude("gravity", gravity, tell),
         usual,
     )
-
-
-def posterior_of(probabilities: dict[str | None, float]) -> dict[str | None, float]:
-    """Sort probabilities in descending order."""
-    return dict(sorted(probabilities.items(), key=lambda p: -p[1]))
-
-
-def _summed(found: dict[tuple[str | None, str], float], key: int) -> dict[str | None, float]:
-    out: dict[str | None, float] = {}
-    for hypothesis, p in found.items():
-        out[hypothesis[key]] = out.get(hypothesis[key], 0.0) + p
-    return posterior_of(out)
 
 
 def infer_up(accel: Array, step: float | None) -> Inference:

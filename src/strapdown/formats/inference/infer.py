@@ -108,18 +108,25 @@ def infer_signals(signals: Signals) -> tuple[Inference, ...]:
     # All stamps tell of the clock; of the rest a part is enough.
     signals, starts = _part(signals, step)
     force = None
-    accel = _finite_rows(signals.accel)
+    accel = _finite(signals.accel)
     heard: list[Inference] = []
     if accel is not None:
         unit, form, gravity, usual = infer_accel(accel, step)
         arm = _arm(signals, step, starts)
         heard = [unit, form, gravity]
-        if arm is not None and arm.hides_gravity:
+        if arm is not None and arm.locks_turn and arm.alone > ARM_ALONE:
+            # The force is explained without gravity.
             heard = [_doubted(i, arm) for i in heard]
             gravity = heard[2]
         if gravity.value == "present" and gravity.confidence > 0.9:
             heard.append(infer_up(accel, step))
-            heard.append(_sign())
+            # Motion cannot decide the sign of the accelerometer, only the axes can.
+            signs = evidence("io.evidence-signs-turn-alike")
+            told_of_sign = (signs, evidence("io.evidence-sign-of-gravity"))
+            other = (("gravity", 0.05),)
+            heard.append(
+                Inference("accel_sign", "reaction", 0.95, told_of_sign, other, "--accel-unit")
+            )
             assert signals.accel is not None
             force = signals.accel / usual
         elif gravity.value is None and _steady(accel):
@@ -132,9 +139,12 @@ def infer_signals(signals: Signals) -> tuple[Inference, ...]:
     if signals.gyro is not None and len(signals.gyro) > 1:
         ticks, gyro, force = _increasing(signals, force)
         if len(gyro) > 1:
-            *turned, joint = infer_gyro(
-                ticks, gyro, force, times or {"s": 1.0}, _increments(heard), _in_mg(heard)
-            )
+            # The prior of gyro increments is that of the accelerometer, within bounds.
+            summed = 0.01
+            if heard:
+                summed = float(np.clip(_share(heard, "accel_form", "increment"), 1e-3, 0.95))
+            milli = _share(heard, "accel_unit", "mg")
+            *turned, joint = infer_gyro(ticks, gyro, force, times or {"s": 1.0}, summed, milli)
             if times and next(iter(joint)) != next(iter(times)):
                 # A rotation that fits only in another unit of time is a doubt, not a proof.
                 times = {u: min(p, 0.5) for u, p in times.items()}
@@ -154,7 +164,7 @@ def infer_signals(signals: Signals) -> tuple[Inference, ...]:
         out.append(infer_time_faults(steps))
     out += turned
     out += heard
-    mag = _finite_rows(signals.mag)
+    mag = _finite(signals.mag)
     if mag is not None:
         out.append(infer_mag_unit(mag))
     return tuple(out)
@@ -221,29 +231,11 @@ def _steady(accel: Array) -> bool:
     return bool(np.std(norms) < 0.2 * np.mean(norms))
 
 
-def _increments(heard: list[Inference]) -> float:
-    """Return the prior of gyro increments: that of the accelerometer, within bounds."""
-    form = next((i for i in heard if i.quantity == "accel_form"), None)
-    if form is None:
-        return 0.01
-    shares = dict(((form.value, form.confidence), *form.alternatives))
-    return float(np.clip(shares.get("increment", 0.0), 1e-3, 0.95))
-
-
-def _in_mg(heard: list[Inference]) -> float:
-    """Return the probability that the accelerometer is in mg."""
-    unit = next((i for i in heard if i.quantity == "accel_unit"), None)
-    shares = {} if unit is None else dict(((unit.value, unit.confidence), *unit.alternatives))
-    return float(shares.get("mg", 0.0))
-
-
-def _sign() -> Inference:
-    """Infer the sign of the accelerometer: motion cannot decide it, only the axes can."""
-    told = (
-        evidence("io.evidence-signs-turn-alike"),
-        evidence("io.evidence-sign-of-gravity"),
-    )
-    return Inference("accel_sign", "reaction", 0.95, told, (("gravity", 0.05),), "--accel-unit")
+def _share(heard: list[Inference], quantity: str, value: str) -> float:
+    """Return the probability of an answer about the accelerometer."""
+    one = next((i for i in heard if i.quantity == quantity), None)
+    shares = {} if one is None else dict(((one.value, one.confidence), *one.alternatives))
+    return float(shares.get(value, 0.0))
 
 
 def _below(values: NDArray[Any] | None, limit: float) -> NDArray[Any] | None:
@@ -256,19 +248,13 @@ def _below(values: NDArray[Any] | None, limit: float) -> NDArray[Any] | None:
 
 
 def _finite(values: NDArray[Any] | None) -> NDArray[Any] | None:
+    """Select the finite stamps, or the rows of finite values; None if fewer than two are."""
     if values is None:
         return None
     # A sum is finite if every term is.
-    whole = values.dtype.kind != "f" or np.isfinite(values.sum())
-    kept = values if whole else values[np.isfinite(values)]
-    return kept if kept.size > 1 else None
-
-
-def _finite_rows(values: Array | None) -> Array | None:
-    if values is None:
-        return None
-    kept = values if np.isfinite(values.sum()) else values[np.isfinite(values).all(axis=1)]
-    return kept if len(kept) > 1 else None
+    if values.dtype.kind == "f" and not np.isfinite(values.sum()):
+        values = values[np.isfinite(values.reshape(len(values), -1)).all(axis=1)]
+    return values if len(values) > 1 else None
 
 
 def _increasing(signals: Signals, force: Array | None) -> tuple[Array, Array, Array | None]:
@@ -329,11 +315,6 @@ class Arm:
     alone: float
     in_step: float
     frequency: float
-
-    @property
-    def hides_gravity(self) -> bool:
-        """Whether the force is explained without gravity."""
-        return self.locks_turn and self.alone > ARM_ALONE
 
     @property
     def locks_turn(self) -> bool:

@@ -14,10 +14,11 @@ from strapdown.dsp.samples import occupied_grid, running_integral
 from strapdown.errors import Finding
 from strapdown.formats.inference.conclusion import (
     Inference,
+    Steps,
     conclude,
     evidence,
     evidence_of_counts,
-    mean_step,
+    marginal,
     posterior,
 )
 from strapdown.units import GYRO_UNITS, TIME_UNITS
@@ -129,7 +130,7 @@ def infer_gyro(
     stood: list[Finding] = []
     for tau, share in likely.items():
         factor = TIME_UNITS[tau]
-        step = mean_step(ticks) * factor
+        step = Steps.of(ticks).mean * factor
         candidates: dict[tuple[str | None, str], tuple[float, float]] = {}
         for k, count in enumerate(_COUNTS):
             prior = _PRIOR_COUNTS / len(_COUNTS) * (1.0 if whole else _BROKEN_COUNTS)
@@ -203,15 +204,15 @@ def infer_gyro(
             merged = (hypothesis[0], kind, hypothesis[2], hypothesis[3])
             total[merged] = total.get(merged, 0.0) + p / len(pooled)
     told = (*_evidence(largest, scales, total), *stood)
-    best = next(iter(_marginal(total, 0)))
+    best = next(iter(marginal(total, 0)))
     if best is not None and steps[best][1]:
         told += (evidence("io.evidence-steps-of-sensor", step=steps[best][0], unit=best),)
     if whole and scales:
         told += evidence_of_counts(counts)
-    axes = {k or None: v for k, v in _marginal(total, 2).items()}
-    said_unit = conclude("gyro_unit", _marginal(total, 0), told, "--gyro-unit")
-    said_form = conclude("gyro_form", _marginal(total, 1), told)
-    times = {str(k): v for k, v in _marginal(total, 3).items()}
+    axes = {k or None: v for k, v in marginal(total, 2).items()}
+    said_unit = conclude("gyro_unit", marginal(total, 0), told, "--gyro-unit")
+    said_form = conclude("gyro_form", marginal(total, 1), told)
+    times = {str(k): v for k, v in marginal(total, 3).items()}
     return said_unit, said_form, conclude("gyro_axes", axes, told, "--columns"), times
 
 
@@ -284,25 +285,18 @@ def _written_step(gyro: Array) -> tuple[float, float]:
     return found
 
 
-def _marginal(total: dict[Hypothesis, float], key: int) -> dict[str | None, float]:
-    out: dict[str | None, float] = {}
-    for hypothesis, p in total.items():
-        out[hypothesis[key]] = out.get(hypothesis[key], 0.0) + p
-    return dict(sorted(out.items(), key=lambda p: -p[1]))
-
-
 def _evidence(
     largest: float,
     scales: list[tuple[Turn, float]],
     total: dict[Hypothesis, float],
 ) -> tuple[Finding, ...]:
-    unit = next(iter(_marginal(total, 0)))
+    unit = next(iter(marginal(total, 0)))
     told = []
     if scales:
         turn = max(scales, key=lambda s: (s[1], s[0].signal))[0]
         _, left = turn.free()
         explained = 1.0 - left / turn.gram[9, 9]
-        name = next((n for n in _marginal(total, 2) if n), "x,y,z")
+        name = next((n for n in marginal(total, 2) if n), "x,y,z")
         names, matrices = signed_permutations()
         m = matrices[names.index(name)].reshape(9)
         norm = float(m @ turn.gram[:9, 9] / max(m @ turn.gram[:9, :9] @ m, 1e-300))

@@ -2,37 +2,22 @@
 
 from __future__ import annotations
 
-from strapdown.navigation.measurements.barometer import Barometer
-from strapdown.navigation.measurements.gnss import Gnss
-from strapdown.navigation.measurements.heading import Heading
-from strapdown.navigation.measurements.magnetometer import Magnetometer
-from strapdown.navigation.measurements.measurement import Measurement
-from strapdown.navigation.measurements.standstill import ZeroRate, ZeroVelocity
-from strapdown.navigation.measurements.vehicle import BodyVelocity, NoSlip, Odometer
+from collections.abc import MutableMapping
 
-__all__ = [
-    "AIDS",
-    "Barometer",
-    "BodyVelocity",
-    "Gnss",
-    "Heading",
-    "Magnetometer",
-    "Measurement",
-    "NoSlip",
-    "Odometer",
-    "ZeroRate",
-    "ZeroVelocity",
-]
+from strapdown.lazy_names import Choices
+from strapdown.navigation.measurements.measurement import Measurement
 
 #: Measurements by their kind in a configuration; plug-ins are added.
-AIDS: dict[str, type[Measurement]] = {
-    "gnss": Gnss,
-    "zero_velocity": ZeroVelocity,
-    "zero_rate": ZeroRate,
-    "no_slip": NoSlip,
-    "odometer": Odometer,
-    "body_velocity": BodyVelocity,
-    "barometer": Barometer,
-    "heading": Heading,
-    "magnetometer": Magnetometer,
-}
+AIDS: MutableMapping[str, type[Measurement]] = Choices(
+    {
+        "gnss": "strapdown.navigation.measurements.gnss:Gnss",
+        "zero_velocity": "strapdown.navigation.measurements.standstill:ZeroVelocity",
+        "zero_rate": "strapdown.navigation.measurements.standstill:ZeroRate",
+        "no_slip": "strapdown.navigation.measurements.vehicle:NoSlip",
+        "odometer": "strapdown.navigation.measurements.vehicle:Odometer",
+        "body_velocity": "strapdown.navigation.measurements.vehicle:BodyVelocity",
+        "barometer": "strapdown.navigation.measurements.barometer:Barometer",
+        "heading": "strapdown.navigation.measurements.heading:Heading",
+        "magnetometer": "strapdown.navigation.measurements.magnetometer:Magnetometer",
+    }
+)
