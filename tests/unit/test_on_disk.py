@@ -24,7 +24,7 @@ def resident():
 
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems keep arrays in memory")
 def test_what_is_let_go_takes_no_memory_and_is_read_again():
-    rows = on_disk.room((3, on_disk.LARGE // 8))
+    rows = on_disk.room((3, 1 << 23))
     assert isinstance(rows.base, mmap.mmap)
     before = resident()
     rows[:] = np.arange(rows.shape[1])

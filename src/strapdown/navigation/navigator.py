@@ -77,7 +77,8 @@ class Reference:
     ----------
     time : ndarray, (m,), s
         Times of samples, increasing.
-    states : tuple of NavState, (m,)
+    states : ndarray, (m, 9)
+        As the columns of a Trajectory table.
     sensors : ndarray, (m, k)
         Errors of sensors and aids.
     marks : ndarray, (n,), s
@@ -85,9 +86,16 @@ class Reference:
     """
 
     time: Array
-    states: tuple[NavState, ...]
+    states: Array
     sensors: Array
     marks: Array
+
+    def state(self, k: int) -> NavState:
+        """Return a state; without its time."""
+        row = self.states[k].tolist()
+        return NavState.from_degrees(
+            *row[:3], v_n=row[3:6], roll_deg=row[6], pitch_deg=row[7], heading_deg=row[8]
+        )
 
     def next_after(self, time: float) -> int:
         """Index of the first state after a time."""
@@ -437,7 +445,7 @@ class EpochLoop:
         about, engine = self.navigator.about, self.engine
         assert about is not None
         assert isinstance(engine, ReferenceEngine)
-        engine.follow(about.states[self.follows], about.sensors[self.follows])
+        engine.follow(about.state(self.follows), about.sensors[self.follows])
         self.follows += 1
 
     def _prepared(self, time: Array, rows: Array) -> Array:

@@ -72,6 +72,7 @@ from strapdown.systems.navigation_source import (
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import EULER, GEODETIC, POSITION_SD, VELOCITY
 from strapdown.tables.checks import source_of, values_of
+from strapdown.tables.on_disk import let_go_of_all
 
 if TYPE_CHECKING:
     from strapdown.evaluation.control_points import ControlPointScore
@@ -155,6 +156,7 @@ def run_navigation(
         else:
             channels = channel_findings(source.imu, sensors, spec.start, source.tables)
     looked, channels = in_file(looked, *tables), in_file(channels, *tables)
+    let_go_of_all()
     chain = make_chain(spec, sensors)
     recorder: Recorder = spec.recorder.make(ellipsoid=spec.ellipsoid)
 
@@ -190,6 +192,7 @@ def run_navigation(
                 recorder,
                 lambda mode, share: progress(f"{spec.damping.beside}: {mode}", ENDED),
             ).record
+    let_go_of_all()
     progress("comparing", ENDED)
     best = run.smoothed or run.record
     differences, errors = _against_truth(best.trajectory, source, spec)
@@ -221,6 +224,7 @@ def run_navigation(
             begun,
             after,
         )
+    let_go_of_all()
     trust = assess_integrity(
         chain,
         make_filter(spec, sensors),
@@ -235,6 +239,7 @@ def run_navigation(
     if trust.inconsistencies and spec.trust.repeat:
         with said_of_file(*tables):
             by_grade = _explained_by_grade(spec, sensors, source, run.record, after)
+    let_go_of_all()
     aligned = {one.mode: one for one in run.aligned}
     coarse, fine = aligned.get("coarse"), aligned.get("fine")
     findings = [

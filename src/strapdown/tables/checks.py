@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.errors import DataError
-from strapdown.tables.on_disk import let_go
+from strapdown.tables.on_disk import let_go, parts_of
 
 Array = NDArray[np.float64]
 
@@ -119,8 +119,11 @@ def check_rows(values: Array, columns: Sequence[str], source: str | None) -> Non
     """Check that every value is finite; the message names the first that is not."""
     # A sum is finite only if every term is. It needs no memory and is several times faster than
     # a check of each value.
+    total = 0.0
     with np.errstate(invalid="ignore", over="ignore"):
-        total = values.sum()
+        for part in parts_of(*values.shape):
+            total += values[part].sum()
+            let_go(values)
     if np.isfinite(total):
         return
     bad = ~np.isfinite(values)
@@ -141,9 +144,12 @@ def check_rows(values: Array, columns: Sequence[str], source: str | None) -> Non
 def check_time(time: Array, source: str | None) -> None:
     """Check that stamps are finite and advance."""
     check_rows(time[:, None], ["time"], source)
-    steps = np.diff(time)
-    if steps.size and not steps.min() > 0.0:
-        row = int(np.argmax(steps <= 0.0)) + 1
+    for part in parts_of(len(time) - 1, 1):
+        steps = np.diff(time[part.start : part.stop + 1])
+        let_go(time)
+        if steps.min() > 0.0:
+            continue
+        row = part.start + int(np.argmax(steps <= 0.0)) + 1
         raise DataError(
             "tables.time-does-not-advance-followed",
             file=source,
