@@ -15,7 +15,6 @@ from strapdown.errors import DataError, Finding
 from strapdown.frames import ecef_from_geodetic, geodetic_from_ecef, place_difference, q_ne
 from strapdown.tables import (
     EULER,
-    GEODETIC,
     NED,
     TRAJECTORY,
     VELOCITY,

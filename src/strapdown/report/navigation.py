@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from strapdown.alignment.alignment import Alignment
 from strapdown.bundle import write_json
