@@ -148,7 +148,7 @@ def standard_deviations(
         sd[part] = np.sqrt(np.where(without[part], 0.0, variance))
         sd[part, 6:] = euler_sd(euler[part], P[:, 6:, 6:])
         on_disk.let_go(covariance)
-    index = pd.Index(as_array(time, None, "time", source), name="time")
+    index = pd.Index(as_array(time, None, "time", source), name="time", copy=False)
     table = pd.DataFrame(sd, index=index, columns=TRAJECTORY_ERROR, copy=False)
     table.attrs["source"] = source
     check_trajectory_error(table)

@@ -193,7 +193,7 @@ class Tape:
         if self.navigator.about is not None:
             stamps = self.navigator.about.marks
             kept = _nearest(marks[:, 0], stamps)
-        time = pd.Index(stamps, name="time")
+        time = pd.Index(stamps, name="time", copy=False)
         covariance = on_disk.room((len(kept), 9, 9))
         sensors, sensors_sd = (on_disk.room((len(kept), count)) for _ in range(2))
         contradictions = list(self._contradictions())
@@ -296,7 +296,7 @@ def _trajectory(
             history = later.corrected(time[part], history)
         used.fill_trajectory(history, rows[part])
         on_disk.let_go_of_all()
-    index = pd.Index(time, name="time")
+    index = pd.Index(time, name="time", copy=False)
     table = pd.DataFrame(rows, index=index, columns=TRAJECTORY, copy=False)
     table.attrs["source"] = source
     check_trajectory(table)

@@ -10,14 +10,24 @@ import mmap
 import os
 import tempfile
 import weakref
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-__all__ = ["LARGE", "PART", "let_go", "let_go_of_all", "parts_of", "room", "stored"]
+__all__ = [
+    "LARGE",
+    "PART",
+    "filled",
+    "let_go",
+    "let_go_of_all",
+    "parts_of",
+    "room",
+    "step_range",
+    "stored",
+]
 
 #: Bytes from which on an array is in a file.
 LARGE = 1 << 22
@@ -61,6 +71,27 @@ def stored(array: NDArray[Any], rows: NDArray[Any] | None = None) -> NDArray[Any
         let_go(array)
         let_go(out)
     return out
+
+
+def filled(
+    count: int, numbers: Callable[[slice], NDArray[Any]], kind: type[np.generic] = np.float64
+) -> NDArray[Any]:
+    """Return a `room` of so many numbers, filled with those of each slice in turn."""
+    out = room((count,), kind)
+    for part in parts_of(count, 1):
+        out[part] = numbers(part)
+        let_go(out)
+    return out
+
+
+def step_range(time: NDArray[Any]) -> tuple[float, float]:
+    """Return the smallest and the largest step of stamps, of two at least; NaN if one is NaN."""
+    low, high = np.inf, -np.inf
+    for part in parts_of(len(time) - 1, 1):
+        steps = np.diff(time[part.start : part.stop + 1])
+        low, high = np.minimum(low, steps.min()), np.maximum(high, steps.max())
+        let_go(time)
+    return float(low), float(high)
 
 
 def let_go(array: NDArray[Any] | pd.DataFrame) -> None:
