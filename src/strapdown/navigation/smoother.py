@@ -13,6 +13,7 @@ from typing import IO, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown import rotation
 from strapdown._kernels.smoothing import (
     COVARIANCE,
     TIME,
@@ -31,7 +32,7 @@ from strapdown.navigation.engine import SAME_INSTANT
 from strapdown.navigation.measurements.gnss import TINY
 from strapdown.navigation.navigator import Navigator, Reference
 from strapdown.navigation.record import CovarianceSnapshot, GrowingRows, NavigationChunk
-from strapdown.tables import TRAJECTORY, on_disk
+from strapdown.tables import on_disk
 from strapdown.tables.checks import is_number
 
 __all__ = ["SMOOTHERS", "RauchTungStriebel", "Smoothed", "Smoothing", "SmoothingTape"]
@@ -211,15 +212,17 @@ class Smoothing:
             return None
         smoothed, sensors, marks = self._result
         anchors = self._anchors.rows
-        time, found = anchors[:, 0].copy(), on_disk.room((len(anchors), len(TRAJECTORY)))
+        time, states = anchors[:, 0].copy(), on_disk.room((len(anchors), 10))
         errors = on_disk.stored(anchors[:, 2 + self._row :])
         for part in on_disk.parts_of(*anchors.shape):
             rows = smoothed.corrected(time[part], anchors[part, 2 : 2 + self._row])
-            found[part] = smoothed.mechanization.trajectory(time[part], rows)
+            table = smoothed.mechanization.trajectory(time[part], rows).to_numpy()
+            states[part, :2], states[part, 2:6] = np.radians(table[:, :2]), table[:, 2:6]
+            states[part, 6:] = rotation.quaternion_from_euler(table[:, 6:])
             errors[part] += sensors[smoothed.nodes_at(anchors[part, 1])]
             on_disk.let_go_of_all()
         about = marks if navigator.about is None else navigator.about.marks
-        return Reference(time, found, errors, about)
+        return Reference(time, states, errors, about)
 
     def moved(self) -> float:
         """Return how far the smoothed states are from what they were linearized about.
