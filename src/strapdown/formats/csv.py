@@ -822,7 +822,7 @@ def _comma_is_decimal(lines: list[str], separator: str | None) -> bool:
 
 
 #: Rows that are written at a time.
-WRITTEN = 1 << 16
+WRITTEN = 1 << 14
 
 
 def write(path: Path, columns: dict[str, NDArray[Any]], comments: dict[str, str]) -> None:

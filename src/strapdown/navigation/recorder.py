@@ -186,13 +186,14 @@ class Tape:
             # Another value, of which a later mark knows nothing.
             marks = self._marks.and_then(self._newest_mark).rows
         count = model.stacked.sd.size
-        later = None if smoothing is None else smoothing.smoothed(marks[:, 0].copy())
+        at_marks = on_disk.stored(marks[:, 0])
+        later = None if smoothing is None else smoothing.smoothed(at_marks)
         trajectory = _trajectory(used, states, later, source)
         # Rows of the marks that are kept, and their times.
-        kept, stamps = np.arange(len(marks)), marks[:, 0].copy()
+        kept, stamps = np.arange(len(marks)), at_marks
         if self.navigator.about is not None:
             stamps = self.navigator.about.marks
-            kept = _nearest(marks[:, 0], stamps)
+            kept = _nearest(at_marks, stamps)
         time = pd.Index(stamps, name="time", copy=False)
         covariance = on_disk.room((len(kept), 9, 9))
         sensors, sensors_sd = (on_disk.room((len(kept), count)) for _ in range(2))
@@ -218,7 +219,7 @@ class Tape:
             P[:, without, :] = P[:, :, without] = np.nan
             on_disk.let_go_of_all()
         nearest = np.clip(trajectory.index.searchsorted(time), 0, len(trajectory) - 1)
-        euler = view_of(trajectory, EULER)[nearest]
+        euler = on_disk.stored(view_of(trajectory, EULER), nearest)
         labels = list(model.layout.labels())[model.layout.size - count :]
         units = [one.block.unit for one in model.sensors for _ in one.block.labels]
         return NavigationRecord(

@@ -60,7 +60,7 @@ from strapdown.report.verdict import (
 from strapdown.systems.navigation_run import NavigationRun, run_navigation, withheld_aid
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
 from strapdown.tables.checks import index_of
-from strapdown.tables.on_disk import let_go_of_all
+from strapdown.tables.on_disk import tidy
 
 if TYPE_CHECKING:
     from strapdown.report.chart_svg import ChartFigure
@@ -80,11 +80,13 @@ def _write_all(
 ) -> None:
     evaluation = NavigationEvaluation(result)
     write_json(folder / "navigation.json", navigation_json(evaluation))
-    let_go_of_all()
+    tidy()
     write_navigation_files(evaluation, folder)
     write_integrity(evaluation, folder)
+    tidy()
     if forms:
         document = navigation_document(evaluation, name)
+        tidy()
         write_report(document, folder, progress, figures=result.spec.output.figures)
 
 
@@ -423,6 +425,7 @@ def _write_states(
     for form in result.spec.output.files:
         path = folder / f"trajectory.{form}"
         write_trajectory(path, record.trajectory, name=result.source.name, options=options)
+        tidy()
     sd = record.sd.rename(columns={c: f"{c}_sd_{UNITS[str(c)]}" for c in record.sd.columns})
     without = {"not_estimated": " ".join(record.not_estimated)} if record.not_estimated else {}
     write_table(sd, folder / "sd.csv", {**comments, **without})

@@ -38,6 +38,7 @@ from strapdown.report.values import shown_unit
 from strapdown.systems.navigation_run import NavigationRun
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
 from strapdown.tables.checks import index_of, values_of, view_of
+from strapdown.tables.on_disk import let_go, parts_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,7 +60,11 @@ class NavigationEvaluation:
     @cached_property
     def bounds(self) -> Array:
         """95 % bounds of the horizontal position at the covariance marks, (n,), m."""
-        return plane_bound(self.record.covariance)
+        covariance, out = self.record.covariance, np.empty(len(self.record.covariance))
+        for part in parts_of(len(out), 81):
+            out[part] = plane_bound(covariance[part])
+            let_go(covariance)
+        return out
 
     @cached_property
     def outages(self) -> tuple[tuple[str, Span, float | None], ...]:

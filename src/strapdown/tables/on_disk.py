@@ -6,11 +6,13 @@ part, however long the log is.
 
 from __future__ import annotations
 
+import ctypes
 import mmap
 import os
 import tempfile
 import weakref
 from collections.abc import Callable, Iterator
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -27,6 +29,7 @@ __all__ = [
     "room",
     "step_range",
     "stored",
+    "tidy",
 ]
 
 #: Bytes from which on an array is in a file.
@@ -107,6 +110,26 @@ def let_go(array: NDArray[Any] | pd.DataFrame) -> None:
 
 
 def let_go_of_all() -> None:
-    """Give back the memory of all arrays of `room`, as between two stages of a run."""
+    """Give back the memory of all arrays of `room`."""
     for mapped in list(_MAPS):
         mapped.madvise(mmap.MADV_DONTNEED)
+
+
+def tidy() -> None:
+    """Give back all memory that is not in use, as between two stages of a run.
+
+    What arrays in memory have left free is kept by the C library otherwise, where smaller ones lie
+    between.
+    """
+    let_go_of_all()
+    if (trim := _trim()) is not None:
+        trim(0)
+
+
+@cache
+def _trim() -> Any:
+    """The function of the GNU C library that gives back free memory; None without it."""
+    try:
+        return getattr(ctypes.CDLL(None), "malloc_trim", None)
+    except (OSError, TypeError):
+        return None
