@@ -31,11 +31,11 @@ from strapdown.tables import (
     TRAJECTORY_ERROR,
     places_of,
 )
+from strapdown.tables.checks import index_of, view_of
+from strapdown.tables.on_disk import let_go_of_all, parts_of
 
 if TYPE_CHECKING:
     from strapdown.simulation.earth_motion import EarthMotion
-from strapdown.tables.checks import index_of, view_of
-from strapdown.tables.on_disk import let_go_of_all, parts_of
 
 __all__ = [
     "COMPONENTS",
