@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import mmap
+import sys
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.stats import chi2
 from tests.aided_drives import truth_at
@@ -27,9 +30,10 @@ from strapdown.navigation.pipeline import NavigationPipeline
 from strapdown.navigation.recorder import IntervalRecorder
 from strapdown.navigation.replay import SETTLED, relinearized, run_batch
 from strapdown.navigation.smoother import RauchTungStriebel
+from strapdown.navigation.truth_comparison import smoother_consistency
 from strapdown.simulation import ImuErrors, Origin, PathMotion, Track, TriadErrors, simulate_imu
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
-from strapdown.tables import POSITION_SD, VELOCITY
+from strapdown.tables import POSITION_SD, VELOCITY, on_disk
 
 #: A phone, rad/s/√Hz, m/s²/√Hz, rad/s, m/s²; and a start of which the heading is known roughly.
 GYRO_NOISE, ACCEL_NOISE, GYRO_BIAS, ACCEL_BIAS = 1e-4, 2e-3, 5e-3, 0.1
@@ -192,3 +196,38 @@ def test_the_compiled_loop_of_a_pass_is_its_reference_engine(monkeypatch, mechan
     at = asked.trajectory.index.searchsorted(asked.sd.index).clip(max=len(asked.trajectory) - 1)
     apart = (compiled.trajectory - asked.trajectory)[VELOCITY].to_numpy()[at] / sd[:, 3:6]
     assert np.abs(apart).max() < bound
+
+
+def on_disk_of(array):
+    """Whether an array is of a file."""
+    while isinstance(array, np.ndarray):
+        array = array.base
+    return isinstance(array, mmap.mmap)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems keep arrays in memory")
+def test_what_a_run_keeps_is_on_the_disk_and_made_part_by_part(monkeypatch):
+    chain, imu, tables = started(1, 1.0)
+    recorder = IntervalRecorder(rate_hz=5.0)
+    run = run_batch(chain, imu, tables, recorder)
+    whole = relinearized(chain, imu, tables, recorder, run)
+    # Every array, and a few rows at a time.
+    monkeypatch.setattr(on_disk, "LARGE", 1)
+    monkeypatch.setattr(on_disk, "PART", 8 * 81 * 7)
+    run = run_batch(chain, imu, tables, recorder)
+    parts = relinearized(chain, imu, tables, recorder, run)
+    for one, other in ((whole.record, parts.record), (whole.smoothed, parts.smoothed)):
+        np.testing.assert_array_equal(other.covariance, one.covariance)
+        assert on_disk_of(other.covariance)
+        for name in ("trajectory", "sd", "sensors", "sensors_sd"):
+            found, wanted = getattr(other, name), getattr(one, name)
+            pd.testing.assert_frame_equal(found, wanted, check_exact=True)
+            assert on_disk_of(found.to_numpy()), name
+    found, wanted = parts.smoothing.reference(), whole.smoothing.reference()
+    for name in ("time", "states", "sensors", "marks"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(wanted, name))
+    assert on_disk_of(found.states)
+    assert on_disk_of(found.sensors)
+    assert smoother_consistency(parts.record, parts.smoothed).rms.tolist() == (
+        smoother_consistency(whole.record, whole.smoothed).rms.tolist()
+    )
