@@ -236,13 +236,16 @@ class Smoothing:
         smoothed, _, marks = self._result
         time = self._anchors.rows[:, 0].copy()
         before = np.clip(marks.searchsorted(time + SAME_INSTANT) - 1, 0, None)
-        squares = np.square(smoothed.errors[smoothed.nodes_at(time), 3:])
-        variances = np.diagonal(smoothed.covariance, axis1=1, axis2=2)[before, 3:]
-        parts = [
-            squares[:, part].sum(axis=1) / np.maximum(variances[:, part].sum(axis=1), TINY)
-            for part in (slice(0, 2), slice(2, 3), slice(3, 5), slice(5, 6))
-        ]
-        return math.sqrt(max(float(part.mean()) for part in parts))
+        apart = np.empty((4, len(time)))
+        for part in on_disk.parts_of(len(time), 81):
+            nodes = smoothed.nodes_at(time[part])
+            squares = np.square(smoothed.errors[nodes, 3:])
+            variances = np.diagonal(smoothed.covariance, axis1=1, axis2=2)[before[part], 3:]
+            for k, own in enumerate((slice(0, 2), slice(2, 3), slice(3, 5), slice(5, 6))):
+                apart[k, part] = squares[:, own].sum(axis=1)
+                apart[k, part] /= np.maximum(variances[:, own].sum(axis=1), TINY)
+            on_disk.let_go_of_all()
+        return math.sqrt(max(float(own.mean()) for own in apart))
 
     def seen(self, times: Array, observations: Sequence[Observation]) -> tuple[Array, Array]:
         """Return the residuals of unused observations against the smoothed states.
@@ -428,15 +431,19 @@ class SmoothingTape:
         for k in range(len(self._chunks) - 1, -1, -1):
             last = k + 1 == len(self._chunks)
             yield self._chunks[k][: self._used if last else CHUNK]
+            on_disk.let_go(self._chunks[k])
         for k in range(self._written - 1, -1, -1):
             yield self._read(k)
 
     def _new_chunk(self) -> None:
+        if self._chunks:
+            on_disk.let_go(self._chunks[-1])
         most = max(self._memory // (8 * CHUNK * self._width), 1)
         if len(self._chunks) < most:
-            self._chunks.append(np.empty((CHUNK, self._width)))
+            self._chunks.append(on_disk.room((CHUNK, self._width)))
         else:
             self._write(self._chunks[0])
+            on_disk.let_go(self._chunks[0])
             self._chunks.append(self._chunks.pop(0))
         self._used = 0
 

@@ -484,6 +484,7 @@ def smoother_consistency(
         Of one run.
     """
     columns = list(TRAJECTORY_ERROR)
+    let_go_of_all()
     rows, marks = index_of(forward.trajectory), index_of(forward.sd)
     # A mark belongs to the first row after it, unless a later mark precedes that row.
     row = np.searchsorted(rows, marks - 1e-7)

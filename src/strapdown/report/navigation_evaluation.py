@@ -60,11 +60,7 @@ class NavigationEvaluation:
     @cached_property
     def bounds(self) -> Array:
         """95 % bounds of the horizontal position at the covariance marks, (n,), m."""
-        covariance, out = self.record.covariance, np.empty(len(self.record.covariance))
-        for part in parts_of(len(out), 81):
-            out[part] = plane_bound(covariance[part])
-            let_go(covariance)
-        return out
+        return horizontal_bounds(self.record)
 
     @cached_property
     def outages(self) -> tuple[tuple[str, Span, float | None], ...]:
@@ -125,6 +121,15 @@ class NavigationEvaluation:
                 record.trajectory, record.sd.index, record.covariance, truth, self.run.ellipsoid
             )
         )
+
+
+def horizontal_bounds(record: NavigationRecord) -> Array:
+    """95 % bounds of the horizontal position at the covariance marks, (n,), m."""
+    out = np.empty(len(record.covariance))
+    for part in parts_of(len(out), 81):
+        out[part] = plane_bound(record.covariance[part])
+        let_go(record.covariance)
+    return out
 
 
 # Consistency of innovations: size and whiteness, against the filter's expectation.

@@ -69,7 +69,9 @@ def stored(array: NDArray[Any], rows: NDArray[Any] | None = None) -> NDArray[Any
     """Return a copy in a `room` of its own, of all rows or of those of some indices."""
     count = len(array) if rows is None else len(rows)
     out = room((count, *array.shape[1:]), array.dtype.type)
-    for part in parts_of(count, int(np.prod(array.shape[1:]))):
+    # What lies between the rows of a column of a table is read with them.
+    width = max(int(np.prod(array.shape[1:])), *(abs(step) // 8 for step in array.strides[:1]))
+    for part in parts_of(count, width):
         out[part] = array[part if rows is None else rows[part]]
         let_go(array)
         let_go(out)
@@ -102,6 +104,8 @@ def let_go(array: NDArray[Any] | pd.DataFrame) -> None:
 
     The numbers are read from the file when they are used again.
     """
+    if isinstance(array, pd.DataFrame):
+        let_go(array.index.to_numpy())
     base: Any = array.iloc[:, 0].to_numpy() if isinstance(array, pd.DataFrame) else array
     while isinstance(base, np.ndarray):
         base = base.base
