@@ -124,7 +124,7 @@ def short_runs() -> Iterator[Row]:
 
 def long_runs() -> Iterator[Row]:
     """Memory of one, two and four hours, and the time of the heading check."""
-    checks, filters = {}, {}
+    checks, filters, peaks = {}, {}, {}
     for hours, smooth in ((1, (False, True)), (2, (False,)), (4, (False, True))):
         with tempfile.TemporaryDirectory(prefix="strapdown-") as name:
             folder = Path(name) / "drive"
@@ -137,8 +137,12 @@ def long_runs() -> Iterator[Row]:
                 if hours == 2:
                     continue
                 what = f"navigate, {hours} h at 100 Hz{', smoothed' * smoothed}: peak memory"
-                limit = MEMORY_LIMITS[hours, smoothed]
-                yield Row(what, (used.peak,), "the aim", (MOST_MEMORY,), "MiB", 1.0, limit)
+                yield Row(what, (used.peak,), "the aim", (MOST_MEMORY,), "MiB", 1.0)
+                peaks[hours, smoothed] = used.peak
+    for smoothed in (False, True):
+        what = f"navigate, 4 h at 100 Hz{', smoothed' * smoothed}: peak memory"
+        ours, theirs = ((peaks[hours, smoothed],) for hours in (4, 1))
+        yield Row(what, ours, "of 1 h", theirs, "MiB", FLAT)
     for hours, check in checks.items():
         what = f"heading check over {hours} h"
         yield Row(what, (check,), "the filter alone", (filters[hours],), "s", 0.2, 2.8)
@@ -146,8 +150,8 @@ def long_runs() -> Iterator[Row]:
     yield Row("heading check over 4 h", (checks[4],), "4 times that of 1 h", grown, "s", 1.1)
 
 
-#: A little above what is measured, by hours and whether smoothed.
-MEMORY_LIMITS = {(1, False): 1.0, (1, True): 1.1, (4, False): 1.0, (4, True): 2.8}
+#: Memory that does not grow with the length of a log, but for the page caches of what is in use.
+FLAT = 1.3
 
 
 def text_table() -> Iterator[Row]:

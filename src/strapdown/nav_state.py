@@ -107,6 +107,11 @@ class NavState:
         own["v_n"], own["q_nb"] = both[:3], both[3:]
         return made
 
+    @property
+    def numbers(self) -> Array:
+        """The ten numbers of a kernel, as `of_numbers` takes them."""
+        return np.array([self.lat, self.lon, self.alt, *self.v_n, *self.q_nb])
+
     @classmethod
     def from_degrees(
         cls,

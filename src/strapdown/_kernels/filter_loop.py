@@ -22,8 +22,10 @@ from strapdown._kernels.level import (
     level_place,
     ned_correct,
     ned_levels,
+    state_error,
     wander_correct,
     wander_levels,
+    wander_places,
 )
 from strapdown._kernels.motion_increments import split_increment
 from strapdown._kernels.ned import COSINE, LAT, PRIME, SINE, ned_advance
@@ -31,7 +33,10 @@ from strapdown._kernels.ned import Q as Q_NB
 from strapdown._kernels.psi_model import HELD_ROWS, means_of_steps, psi_dynamics
 from strapdown._kernels.robust import PLAIN, UD, WD, take_linear
 from strapdown._kernels.smoothing import (
+    CARRIED,
+    CORE,
     GROWTH,
+    KIND,
     UPDATE,
     begin_of_move,
     begin_of_taken,
@@ -308,6 +313,60 @@ def mark(form, same_axes, covariance, sensors, turn, P, marked, marked_sensors, 
         marked_sd[j] = math.sqrt(P[9 + j, 9 + j])
 
 
+# A filter about a reference: the state follows it, and the estimated errors are kept beside.
+
+
+@njit(cache=True, error_model="numpy")
+def carry_errors(notes, carried, noted, errors, left):
+    """Propagate errors over the rows from one to another, and fill those of the state at each."""
+    n = errors.shape[0]
+    at = begin_of_move(n)
+    grown = np.empty(n)
+    for k in range(carried, noted):
+        row = notes[k]
+        if row[KIND] == GROWTH:
+            for i in range(CORE):
+                total = 0.0
+                for j in range(n):
+                    total += row[at + i * n + j] * errors[j]
+                grown[i] = total
+            for i in range(CORE, n):
+                grown[i] = row[at + CORE * n + i - CORE] * errors[i]
+            for i in range(n):
+                errors[i] = grown[i]
+        for i in range(CORE):
+            left[k, i] = errors[i]
+
+
+@njit(cache=True, error_model="numpy")
+def follow(which, states, earth, reference, reference_sensors, turn, errors):
+    """Move a state to a reference, (10,); what it is moved by goes to the errors.
+
+    `reference`: as of `level.state_error`. `turn`, (3, 3), to work in.
+    """
+    state, sensors = states[0], states[3]
+    n = errors.shape[0]
+    own, apart, moved = np.empty((1, 10)), np.empty(9), np.empty(n)
+    if which == WANDER:
+        wander_places(state.reshape(1, state.shape[0]), own)
+    else:
+        for j in range(10):
+            own[0, j] = state[j]
+    state_error(own[0], reference, earth, apart)
+    level_place(which, state, turn)
+    for a in range(0, 9, 3):
+        for i in range(3):
+            total = 0.0
+            for j in range(3):
+                total += turn[j, i] * apart[a + j]
+            moved[a + i] = total
+    for j in range(sensors.shape[0]):
+        moved[9 + j] = reference_sensors[j] - sensors[j]
+    take_off(which, state, sensors, earth, moved)
+    for j in range(n):
+        errors[j] -= moved[j]
+
+
 @njit(cache=True, error_model="numpy")
 def over_fixes(
     kinds,
@@ -338,6 +397,7 @@ def over_fixes(
     marked,
     marked_sensors,
     marked_sd,
+    about,
 ):
     """Advance over steps and fixes, to the end of either, after the given number of steps.
 
@@ -348,8 +408,14 @@ def over_fixes(
     `over_steps`, or where these rows are full; and before a fix beyond the linear range of `rule`
     (`robust`; empty: full weight), which learns `scales`, (2, 3, 9), of positions and velocities.
     Instants within `same` seconds count as one.
+
+    `about`: estimated errors (n,), those of the state that are left at each row of `notes`; and
+    times, states (m, 10) and sensor errors of a reference, which the state follows at these times
+    (`follow`). The errors are then kept beside the state. Without a reference all are empty. The
+    last number that is returned is that of the references followed.
     """
     which, form, _ = kinds
+    errors, left, reference_time, references, reference_sensors = about
     state, at_covariance, covariance, sensors, times, last = states
     open_history, _ = group
     earth = model[6]
@@ -360,10 +426,15 @@ def over_fixes(
     meeting = turn, np.empty((1, LEVEL)), np.empty(6), np.empty((3, 3)), np.empty((3, 3, size))
     cut = np.empty((2, rows.shape[1]))
     between = np.empty((1, history.shape[1]))
-    ruled = rule.shape[0] > 0
-    done, total = 0, time.shape[0]
-    while done < fix_time.shape[0]:
-        epoch = fix_time[done]
+    instant = np.empty(1)
+    ruled, feeds_back = rule.shape[0] > 0, errors.shape[0] == 0
+    done, followed, carried, total = 0, 0, noted, time.shape[0]
+    why = ALL
+    while done < fix_time.shape[0] or followed < reference_time.shape[0]:
+        due = math.inf if done == fix_time.shape[0] else fix_time[done]
+        epoch = due
+        if followed < reference_time.shape[0]:
+            epoch = min(due, reference_time[followed])
         if epoch > times[AT_STEP] + same:
             if made == total:
                 break
@@ -390,9 +461,10 @@ def over_fixes(
             )
             made += went
             if why != ALL:
-                return why, made, count, done, noted
+                break
             if inside:
                 split_increment(rows[end], epoch - times[AT_STEP], cut[0], cut[1])
+                instant[0] = epoch
                 why, went, count, noted = over_steps(
                     kinds,
                     model,
@@ -402,7 +474,7 @@ def over_fixes(
                     room,
                     step,
                     note_at,
-                    fix_time[done : done + 1],
+                    instant,
                     cut[:1],
                     between,
                     notes,
@@ -412,23 +484,56 @@ def over_fixes(
                     for j in range(rows.shape[1]):
                         rows[end, j] = cut[1, j]
                 if why != ALL:
-                    return why, made, count, done, noted
+                    break
             continue
         if notes.shape[0] > 0 and noted + 2 > notes.shape[0]:
-            return FULL, made, count, done, noted
+            why = FULL
+            break
         bad, noted = close_group(kinds, model, states, group, count, room[0], notes, noted)
         count = 0
         if bad >= 0:
-            return BAD, made, count, done, noted
+            why = BAD
+            break
+        if not feeds_back:
+            carry_errors(notes, carried, noted, errors, left)
+            carried = noted
+        if due > times[AT_STEP] + same:
+            follow(
+                which,
+                states,
+                earth,
+                references[followed],
+                reference_sensors[followed],
+                turn,
+                errors,
+            )
+            # A row of its own, where what is left on the output jumps: no error is transformed.
+            head_row(which, form >= UD, states, times[AT_STEP], CARRIED, P, notes[noted])
+            for j in range(1 + 3 * n):
+                notes[noted, begin_of_move(n) + j] = 0.0
+            for j in range(3):
+                notes[noted, begin_of_move(n) + 1 + j * n + j] = 1.0
+            noted += 1
+            carry_errors(notes, carried, noted, errors, left)
+            carried = noted
+            for j in range(open_history.shape[1]):
+                open_history[0, j] = state[j]
+            for j in range(state.shape[0]):
+                at_covariance[j] = state[j]
+            if made > 0 and times[AT_STEP] <= time[made - 1] + same:
+                for j in range(history.shape[1]):
+                    history[made - 1, j] = state[j]
+            followed += 1
+            continue
         of_place = fixes[done, CODE] == place_code
         row, fix = open_history[:1], fixes[done]
         meet_fix(which, row, state, earth, model[0], last, arm, of_place, fix, meeting, z, H, R)
         for j in range(size):
-            x[j] = 0.0
+            x[j] = 0.0 if feeds_back else errors[j]
         for j in range(3):
             told[done, 2, j] = 1.0
         marked_at[done, 0] = math.nan
-        if note_at > -math.inf and epoch > note_at - interval + aged:
+        if note_at > -math.inf and due > note_at - interval + aged:
             marked_at[done, 0] = times[AT_STEP]
             mark(
                 form,
@@ -441,6 +546,9 @@ def over_fixes(
                 marked_sensors[done, 0],
                 marked_sd[done, 0],
             )
+            if not feeds_back:
+                for j in range(sensors.shape[0]):
+                    marked_sensors[done, 0, j] += errors[9 + j]
         if notes.shape[0] > 0:
             pack_covariance(form >= UD, covariance, P, notes[noted], begin_of_move(n))
         wrong = -1
@@ -449,8 +557,9 @@ def over_fixes(
                 for j in range(size):
                     after[i, j] = covariance[i, j]
             learned = scales[0] if of_place else scales[1]
-            if not take_linear(form, after, x, z, H, R, rule, learned, epoch, of_place, told[done]):
-                return ASK, made, count, done, noted
+            if not take_linear(form, after, x, z, H, R, rule, learned, due, of_place, told[done]):
+                why = ASK
+                break
         elif form == UD:
             wrong = ud_update(covariance, x, z, H, R, told[done])
         elif form == WD:
@@ -464,14 +573,21 @@ def over_fixes(
                 for j in range(size):
                     covariance[i, j] = after[i, j]
         if wrong != -1:
-            return BAD_FIX, made, count, done, noted
-        take_off(which, state, sensors, earth, x)
+            why = BAD_FIX
+            break
+        if feeds_back:
+            take_off(which, state, sensors, earth, x)
         level_place(which, state, turn)
         if notes.shape[0] > 0:
             head_row(which, form >= UD, states, times[AT_STEP], UPDATE, P, notes[noted])
             for j in range(n):
-                notes[noted, begin_of_taken(n) + j] = x[j]
+                notes[noted, begin_of_taken(n) + j] = x[j] if feeds_back else x[j] - errors[j]
             noted += 1
+        if not feeds_back:
+            for j in range(n):
+                errors[j] = x[j]
+            carry_errors(notes, carried, noted, errors, left)
+            carried = noted
         marked_at[done, 1] = times[AT_STEP]
         mark(
             form,
@@ -484,6 +600,9 @@ def over_fixes(
             marked_sensors[done, 1],
             marked_sd[done, 1],
         )
+        if not feeds_back:
+            for j in range(sensors.shape[0]):
+                marked_sensors[done, 1, j] += errors[9 + j]
         for j in range(open_history.shape[1]):
             open_history[0, j] = state[j]
         for j in range(state.shape[0]):
@@ -493,4 +612,6 @@ def over_fixes(
                 history[made - 1, j] = state[j]
         note_at = times[AT_COVARIANCE] + interval
         done += 1
-    return ALL, made, count, done, noted
+    if not feeds_back:
+        carry_errors(notes, carried, noted, errors, left)
+    return why, made, count, done, noted, followed

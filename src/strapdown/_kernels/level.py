@@ -13,7 +13,7 @@ import math
 import numpy as np
 
 from strapdown._kernels.compilation import IN_PLACE, njit
-from strapdown._kernels.earth import E2, A, radii, transport_rate
+from strapdown._kernels.earth import E2, A, displacement, ned_from_ecef, radii, transport_rate
 from strapdown._kernels.ned import ALT as NED_ALT
 from strapdown._kernels.ned import LAT, LON, Q, V, displace, level_turn, turn_back
 from strapdown._kernels.rotation import (
@@ -22,6 +22,7 @@ from strapdown._kernels.rotation import (
     quat_from_rotvec,
     quat_multiply,
     quat_normalise,
+    rotvec_from_quat,
     wrap_pi,
 )
 from strapdown._kernels.wander import ALT as WANDER_ALT
@@ -115,6 +116,35 @@ def ned_correct_rows(rows, errors, earth):
     """Remove an error from each row, in place."""
     for i in range(rows.shape[0]):
         ned_correct(rows[i], errors[i], earth)
+
+
+@njit(cache=True, error_model="numpy")
+def state_error(row, true, earth, out):
+    """Fill the error of a row of a history from a true one, (9,), as `ned_correct` removes it.
+
+    `row`, `true`, of both the first ten numbers: latitude, longitude, height, velocity and
+    quaternion.
+    """
+    out[0], out[1], out[2] = displacement(
+        row[LAT],
+        row[LON],
+        row[NED_ALT],
+        true[LAT],
+        true[LON],
+        true[NED_ALT],
+        earth[A],
+        earth[E2],
+    )
+    aw, ax, ay, az = ned_from_ecef(row[LAT], row[LON])
+    bw, bx, by, bz = ned_from_ecef(true[LAT], true[LON])
+    # From the true local level to that of the row.
+    fw, fx, fy, fz = quat_multiply(aw, ax, ay, az, bw, -bx, -by, -bz)
+    vn, ve, vd = turn_back(fw, -fx, -fy, -fz, true[V], true[V + 1], true[V + 2])
+    out[3], out[4], out[5] = row[V] - vn, row[V + 1] - ve, row[V + 2] - vd
+    tw, tx, ty, tz = quat_multiply(fw, fx, fy, fz, true[Q], true[Q + 1], true[Q + 2], true[Q + 3])
+    dw, dx, dy, dz = quat_multiply(row[Q], row[Q + 1], row[Q + 2], row[Q + 3], tw, -tx, -ty, -tz)
+    dw, dx, dy, dz = quat_normalise(dw, dx, dy, dz)
+    out[6], out[7], out[8] = rotvec_from_quat(dw, dx, dy, dz)
 
 
 # Wander azimuth, and its conversion from and to north-east-down.

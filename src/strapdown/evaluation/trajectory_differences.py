@@ -15,8 +15,8 @@ from strapdown.errors import DataError, Finding
 from strapdown.frames import ecef_from_geodetic, geodetic_from_ecef, place_difference, q_ne
 from strapdown.tables import (
     EULER,
-    GEODETIC,
     NED,
+    TRAJECTORY,
     VELOCITY,
     check_trajectory,
     check_trajectory_error,
@@ -25,6 +25,8 @@ from strapdown.tables import (
     trajectory_error_table,
     trajectory_table,
 )
+from strapdown.tables.checks import view_of
+from strapdown.tables.on_disk import let_go
 
 __all__ = [
     "ROTATION_ERROR",
@@ -236,6 +238,8 @@ def _interpolated(time: Array, reference: pd.DataFrame, ellipsoid: Ellipsoid) ->
 # Time stamps of one rate that were summed and not multiplied differ by this share of a step at
 # most; interpolating so close to a row has no cost.
 SAME_BEAT = 1e-6
+#: Instants that are interpolated at a time.
+AT_ONCE = 10_000
 
 
 @dataclass(frozen=True)
@@ -359,23 +363,25 @@ def trajectory_at(
             stamps=stamps[0],
             stamps_2=stamps[-1],
         )
-    out = trajectory[[*GEODETIC, *VELOCITY, *EULER]].to_numpy(dtype=np.float64)[nearest]
-    if not same.all():
-        apart = t[~same]
-        after = np.clip(np.searchsorted(stamps, apart), 1, len(stamps) - 1)
+    out = view_of(trajectory, TRAJECTORY)[nearest]
+    apart = np.flatnonzero(~same)
+    # Part by part: what lies between takes much more memory than the instants themselves.
+    for some in np.array_split(apart, range(AT_ONCE, len(apart), AT_ONCE)) if len(apart) else ():
+        after = np.clip(np.searchsorted(stamps, t[some]), 1, len(stamps) - 1)
         used = slice(int(after.min()) - 1, int(after.max()) + 1)
         nodes = _nodes(trajectory.iloc[used], ellipsoid)
         after = after - used.start
-        r, v, q_eb = _between(nodes, after - 1, after, apart)
+        r, v, q_eb = _between(nodes, after - 1, after, t[some])
         place = geodetic_from_ecef(r, ellipsoid=ellipsoid)
         to_level = q_ne(place[:, 0], place[:, 1])
-        out[~same] = np.hstack(
+        out[some] = np.hstack(
             [
                 place,
                 rotation.rotate(to_level, v),
                 rotation.euler_from_quaternion(rotation.compose(to_level, q_eb)),
             ]
         )
+        let_go(trajectory)
     return trajectory_table(
         t, out[:, :3], out[:, 3:6], out[:, 6:], source=trajectory.attrs.get("source")
     )

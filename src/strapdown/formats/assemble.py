@@ -65,7 +65,8 @@ from strapdown.formats.triad_units import (
 )
 from strapdown.formats.vocabularies import EULERS, QUATERNIONS
 from strapdown.tables import ACCEL, SAMPLINGS, attitude_table, find_gaps, imu_of_columns
-from strapdown.tables.on_disk import let_go
+from strapdown.tables.checks import all_finite
+from strapdown.tables.on_disk import filled, let_go, stored
 from strapdown.units import TIME_UNITS, factor_of, parse_unit
 
 __all__ = [
@@ -147,8 +148,12 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
             questions.refuse()
             raise
     questions.refuse()
-    kept = np.flatnonzero(finite)[stamps.keep]
-    time = stamps.seconds[stamps.keep]
+    if finite.all() and stamps.keep.all():
+        kept = filled(finite.size, lambda part: np.arange(part.start, part.stop), np.int64)
+        time = stamps.seconds
+    else:
+        kept = stored(np.flatnonzero(finite)[stamps.keep])
+        time = stored(stamps.seconds, np.flatnonzero(stamps.keep))
     if time.size < 2:
         raise DataError(
             "io.too-few-samples",
@@ -195,6 +200,7 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
         for triad in units:
             _turn(used[triad], axes, factors[triad], body[triad][rows])
         let_go(block)
+        let_go(kept)
     del values
     for triad in units:
         if triad in summed:
@@ -385,10 +391,10 @@ def _by_sensor(raw: RawLog, found: dict[str, Column]) -> list[RawLog]:
     for triad in ("gyro", "accel", "mag"):
         columns = [raw.columns[found[q].source] for a in AXES if (q := f"{triad}_{a}") in found]
         if len(columns) == 3 and all(c.dtype.kind == "f" for c in columns):
-            if any(np.isnan(c.sum()) for c in columns):
-                there[triad] = ~np.logical_and.reduce([np.isnan(c) for c in columns])
-            else:  # a sum is a number only if every term is
+            if all(all_finite(c) for c in columns):
                 there[triad] = np.ones(columns[0].size, dtype=bool)
+            else:
+                there[triad] = ~np.logical_and.reduce([np.isnan(c) for c in columns])
     left_out: list[Finding] = []
     if "accel" in there and found["accel_x"].basis == "name":
         # Rows may say their sensor in a column of text: linear acceleration has no gravity.
@@ -514,11 +520,12 @@ def stamps_of_log(
     and repairs are appended. DataError: time is missing, or cannot be used. ConfigError: the stated
     rate is invalid.
     """
-    rows = np.flatnonzero(finite)
+    rows = np.flatnonzero(finite) if ticks is None or not finite.all() else None
     rate = options.rate or raw.rate
     if options.rate is not None and not (np.isfinite(options.rate) and options.rate > 0):
         raise ConfigError("io.rate-not-positive", quantity="--rate", rate=options.rate)
     if ticks is None:
+        assert rows is not None
         if rate is None:
             raise DataError("io.time-column-missing", file=raw.name, quantity="time")
         why = f"no time column: {rate:g} Hz as stated"
@@ -572,11 +579,11 @@ def stamps_of_log(
                 said["time_unit"].finding("io.time-unit-inferred", file=raw.name, quantity="time")
             )
     stamps = read_stamps(
-        ticks[rows],
+        ticks if rows is None else ticks[rows],
         unit,
         why,
         file=raw.name,
-        row=lambda k: raw.row(int(rows[k])),
+        row=lambda k: raw.row(k if rows is None else int(rows[k])),
         repair=options.repair,
     )
     findings += stamps.findings
@@ -673,19 +680,27 @@ def _refuse_impossible(name: str, body: Mapping[str, Array], row: Callable[[int]
         "accel": ("io.force-impossible", IMPOSSIBLE_FORCE),
     }
     for triad, (code, limit) in limits.items():
-        let_go(body["gyro"])
-        if triad not in body or max(body[triad].max(), -body[triad].min()) <= limit:
+        if triad not in body or _largest(body[triad]).max() <= limit:
             continue
         at, k = (int(i) for i in np.argwhere(~(np.abs(body[triad]) <= limit))[0])
         quantity = f"{triad}_{PLAUSIBILITY_AXES[k]}"
         raise DataError(code, file=name, row=row(at), quantity=quantity, value=body[triad][at, k])
 
 
+def _largest(values: Array) -> Array:
+    """Largest magnitude of each channel; NaN where one is NaN."""
+    out = np.empty(values.shape[1])
+    for k, channel in enumerate(values.T):
+        out[k] = np.maximum(channel.max(), -channel.min())
+        let_go(values)
+    return out
+
+
 def report_absurd(
     name: str, gyro: Array, row: Callable[[int], int], findings: list[Finding]
 ) -> None:
     """Report rates that are implausible, or clipped at the sensor's full scale."""
-    largest = np.maximum(gyro.max(axis=0), -gyro.min(axis=0))
+    largest = _largest(gyro)
     k = int(largest.argmax())
     lasting = 0.0
     if LASTING_RATE < largest[k] <= ABSURD_RATE:
@@ -744,7 +759,10 @@ def report_weightless(name: str, accel: Array | None, findings: list[Finding]) -
     """Report a specific force too small for gravity, which the numbers left open without a unit."""
     if accel is None or any(f.code == "io.no-gravity" for f in findings):
         return
-    some = accel[:: 1 + len(accel) // SOME]
+    some = np.empty((len(range(0, len(accel), 1 + len(accel) // SOME)), 3))
+    for k, channel in enumerate(accel.T):
+        some[:, k] = channel[:: 1 + len(accel) // SOME]
+        let_go(accel)
     with np.errstate(over="ignore"):  # of a corrupt log, which is refused where it is
         usual = float(np.sqrt(np.median((some * some).sum(axis=1))))
     if usual < WEIGHTLESS:
@@ -768,14 +786,12 @@ def finite_rows(
     """
     blocks = dict(values)
     if ticks is not None:
-        blocks = {"time": ticks[:, None].astype(np.float64)} | blocks
+        blocks = {"time": ticks[:, None].astype(np.float64, copy=False)} | blocks
     keep = np.ones(len(values["gyro"]), dtype=bool)
     for name, block in blocks.items():
-        if np.isfinite(block.sum()):  # only if every term is; much faster than a check of each
+        if all_finite(block):
             continue
         bad = ~np.isfinite(block)
-        if not bad.any():
-            continue
         row, column = (int(i) for i in np.argwhere(bad)[0])
         quantity = name if name == "time" else f"{name}_{AXES[column]}"
         count = int(bad.any(axis=1).sum())

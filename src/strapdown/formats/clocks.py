@@ -35,6 +35,7 @@ from strapdown.formats.inference.conclusion import (
 )
 from strapdown.formats.recording import Origin
 from strapdown.tables.checks import RELATIVE
+from strapdown.tables.on_disk import filled, let_go, step_range
 from strapdown.tables.sample_clock import sample_clock
 from strapdown.units import TIME_UNITS
 
@@ -227,9 +228,9 @@ def unrolled(time: Array) -> tuple[Array, list[int]]:
     A rollover is a decrease of more than half a week, from the last hour of a week to the
     first hour of the next.
     """
-    steps = np.diff(time)
-    if not steps.size or steps.min() >= 0.0:
+    if len(time) < 2 or step_range(time)[0] >= 0.0:
         return time, []
+    steps = np.diff(time)
     falls = np.flatnonzero(
         (steps < -0.5 * WEEK) & (time[:-1] > WEEK - 3600.0) & (time[1:] < 3600.0)
     )
@@ -425,10 +426,13 @@ def spread_bursts(stamps: NDArray[Any]) -> SpreadBursts | None:
     if stamps.dtype.kind not in "iuf" or stamps.size < FEWEST_STAMPS:
         return None
     exact = differenced(stamps)
-    since = (exact - exact[0]).astype(np.float64)
+    since = filled(len(exact), lambda part: (exact[part] - exact[0]).astype(np.float64))
+    least, _ = step_range(since)
+    if least < 0.0 or least > 0.0:
+        return None
     steps = np.diff(since)
     shared = int(np.count_nonzero(steps == 0.0))
-    if steps.min() < 0.0 or shared == 0:
+    if not shared:
         return None
     clock = sample_clock(since)
     size = stamps.size / (int(np.count_nonzero(steps > 0.5 * clock.step)) + 1)
@@ -535,13 +539,16 @@ def read_stamps(
                     severity="note",
                 )
             )
-    ticks = (stamps - stamps[0]).astype(np.float64)  # exact, before a factor rounds it
+    # Exact, before a factor rounds it.
+    ticks = filled(len(stamps), lambda part: (stamps[part] - stamps[0]).astype(np.float64))
+    let_go(stamps)
     if not repair:
         _refuse_backward(stamps, ticks, file, row)
     keep, ticks = _repaired(stamps, ticks, file, findings)
+    kept = slice(None) if keep.all() else keep
     if unit is None:
-        unit, why = _evident_unit(stamps[keep], file, findings, only_seconds)
-    elif (usual := _mean_step(ticks[keep]) * TIME_UNITS[unit]) > 0 and not (
+        unit, why = _evident_unit(stamps[kept], file, findings, only_seconds)
+    elif (usual := _mean_step(ticks[kept]) * TIME_UNITS[unit]) > 0 and not (
         PLAUSIBLE_STEP[0] <= usual <= 4 * PLAUSIBLE_STEP[1]
     ):
         findings.append(
@@ -569,7 +576,9 @@ def read_stamps(
                     unit=unit,
                 )
             )
-    seconds = _since(first, unit, origin) + ticks * factor
+    since = _since(first, unit, origin)
+    seconds = filled(len(ticks), lambda part: since + ticks[part] * factor)
+    let_go(ticks)
     keep = _without_pauses(seconds, keep, repair, file, row, findings)
     return Stamps(seconds, unit, why, keep, origin, findings)
 
@@ -683,6 +692,8 @@ def _mean_step(ticks: Array) -> float:
 def _refuse_backward(
     stamps: NDArray[Any], ticks: Array, file: str, row: Callable[[int], int]
 ) -> None:
+    if len(ticks) < 2 or step_range(ticks)[0] > 0.0:
+        return
     steps = np.diff(ticks)
     bad = np.flatnonzero(steps <= 0)
     if not bad.size:
@@ -740,9 +751,9 @@ def usual_step(steps: Array) -> float:
 def _repaired(
     stamps: NDArray[Any], ticks: Array, file: str, findings: list[Finding]
 ) -> tuple[NDArray[np.bool_], Array]:
-    steps = np.diff(ticks)
-    if not steps.size or steps.min() > 0:
+    if len(ticks) < 2 or step_range(ticks)[0] > 0.0:
         return np.ones(ticks.size, dtype=bool), ticks
+    steps = np.diff(ticks)
     usual = usual_step(steps)
     added = np.zeros(ticks.size)
     for k in np.flatnonzero(steps < 0):

@@ -27,6 +27,7 @@ from strapdown.formats.preamble import stated_by_keys, stated_rate, stated_units
 from strapdown.formats.recording import RawLog, stated_by
 from strapdown.formats.signs import HEAD, Signs, first_bytes
 from strapdown.formats.text_columns import NULLS, Columns, columns_at_once, parsed
+from strapdown.tables.on_disk import let_go
 from strapdown.units import OF_LOGS, unit_of
 
 SUFFIXES = (".csv", ".txt", ".tsv", ".dat")
@@ -821,7 +822,7 @@ def _comma_is_decimal(lines: list[str], separator: str | None) -> bool:
 
 
 #: Rows that are written at a time.
-WRITTEN = 1 << 16
+WRITTEN = 1 << 14
 
 
 def write(path: Path, columns: dict[str, NDArray[Any]], comments: dict[str, str]) -> None:
@@ -840,3 +841,5 @@ def write(path: Path, columns: dict[str, NDArray[Any]], comments: dict[str, str]
         for begin in range(0, len(next(iter(columns.values()), ())), WRITTEN):
             rows = {k: pa.array(v[begin : begin + WRITTEN]) for k, v in columns.items()}
             pa_csv.write_csv(pa.table(rows), stream, pa_csv.WriteOptions(include_header=False))
+            for values in columns.values():
+                let_go(values)

@@ -134,6 +134,7 @@ def _streamed(
     except pa.ArrowInvalid:
         return None
     on_disk.let_go(block)
+    pa.default_memory_pool().release_unused()
     return [column[:rows] for column in _columns(block, whole, doubles)]
 
 

@@ -36,6 +36,7 @@ from strapdown.tables import (
     check_trajectory_error,
     places_of,
 )
+from strapdown.tables.on_disk import let_go
 
 __all__ = [
     "DECIMALS",
@@ -547,6 +548,7 @@ def thin(trajectory: pd.DataFrame, most: int, ellipsoid: Ellipsoid = WGS84) -> T
         return Thinned(np.arange(n), n, 0.0)
     time = trajectory.index.to_numpy(dtype=np.float64)
     place = ecef_from_geodetic(places_of(trajectory), ellipsoid=ellipsoid)
+    let_go(trajectory)
     pieces = max(1, min(-(-n // LONGEST_PIECE), (most - 1) // 2))
     kept = sorted({int(k) for k in np.linspace(0, n - 1, pieces + 1).round()})
     heap: list[tuple[float, int, int, int]] = []

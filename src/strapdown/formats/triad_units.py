@@ -17,6 +17,7 @@ from strapdown.formats.inference.conclusion import THRESHOLD, Inference
 from strapdown.formats.inference.infer import Signals, infer_signals
 from strapdown.formats.recording import Questions, RawLog, ReadOptions
 from strapdown.formats.vocabularies import APPLE
+from strapdown.tables.checks import all_finite
 from strapdown.units import (
     ACCEL_SUMS,
     ACCEL_UNITS,
@@ -238,7 +239,7 @@ def values_of_triads(
         except DataError as error:
             findings.append(left_out(raw, triad, error))
             continue
-        bad = np.zeros(1, dtype=bool) if np.isfinite(block.sum()) else ~np.isfinite(block)
+        bad = np.zeros(1, dtype=bool) if all_finite(block) else ~np.isfinite(block)
         if bad.all():
             findings.append(_not_used(raw, triad, "io.left-out-without-number"))
         elif triad == "mag" and bad.any():

@@ -12,10 +12,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown import rotation
 from strapdown._kernels import earth as kernel
 from strapdown._kernels.earth import RATE
 from strapdown._kernels.level import LEVEL, ned_correct, ned_correct_rows, ned_levels
+from strapdown._kernels.level import state_error as kernel_of_error
 from strapdown._kernels.ned import (
     ALT,
     LARGEST_TURN,
@@ -31,7 +31,6 @@ from strapdown._kernels.ned import (
 )
 from strapdown.ellipsoids import WGS84, Ellipsoid, find_ellipsoid
 from strapdown.errors import ConfigError, DataError, DivergenceError, Finding, check_choice
-from strapdown.frames import q_ne
 from strapdown.nav_state import NavState
 from strapdown.tables import MOTION, TRAJECTORY, check_trajectory
 from strapdown.tables.checks import is_number, values_of
@@ -366,13 +365,9 @@ def state_error(state: NavState, truth: NavState, ellipsoid: Ellipsoid = WGS84) 
         of the velocities as vectors in m/s, and the rotation vector in rad of the attitude relative
         to the Earth, ``C_state = exp([psi x]) C_true``. `Mechanization.correct` subtracts it.
     """
-    apart = displacement_between(state, truth, ellipsoid)
-    # From the truth's local level to that of the state.
-    between = rotation.compose(_q_ne(state), rotation.conjugate(_q_ne(truth)))
-    psi = rotation.rotation_vector_from_quaternion(
-        rotation.compose(state.q_nb, rotation.conjugate(rotation.compose(between, truth.q_nb)))
-    )
-    return np.concatenate([apart, state.v_n - rotation.rotate(between, truth.v_n), psi])
+    error = np.empty(9)
+    kernel_of_error(state.numbers, truth.numbers, ellipsoid.parameters(), error)
+    return error
 
 
 def displacement_between(state: NavState, truth: NavState, ellipsoid: Ellipsoid = WGS84) -> Array:
@@ -389,7 +384,3 @@ def displacement_between(state: NavState, truth: NavState, ellipsoid: Ellipsoid 
             ellipsoid.eccentricity_squared,
         )
     )
-
-
-def _q_ne(state: NavState) -> Array:
-    return q_ne(math.degrees(state.lat), math.degrees(state.lon))

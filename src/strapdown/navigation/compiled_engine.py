@@ -13,7 +13,6 @@ from strapdown._kernels import filter_loop as kernel
 from strapdown._kernels.growth import factor_room, growth_arrays, growth_room, padded_width
 from strapdown._kernels.level import LEVEL, NED, WANDER
 from strapdown._kernels.robust import JOSEPH, PLAIN, UD, WD
-from strapdown._kernels.smoothing import GROWTH, KIND, begin_of_move
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import DivergenceError
 from strapdown.estimation.covariance import (
@@ -48,6 +47,10 @@ FORMS: dict[type[CovarianceForm], int] = {
     BiermanThornton: UD,
     Chernodarov: WD,
 }
+
+
+#: Times, states and sensor errors of no reference.
+NO_REFERENCES = np.empty(0), np.empty((0, 10)), np.empty((0, 0))
 
 
 def compiled(filter_: ErrorFilter) -> bool:
@@ -152,7 +155,8 @@ class CompiledEngine(Engine):
         notes: tuple[float, float, float],
         receiver: tuple[Array, Array, Array],
         fixes: Epochs,
-    ) -> tuple[int, tuple[Array, ...], int]:
+        references: tuple[Array, Array, Array] = NO_REFERENCES,
+    ) -> tuple[int, tuple[Array, ...], int, int]:
         """Process steps, and fixes with white errors, to the end of either.
 
         Parameters
@@ -169,6 +173,8 @@ class CompiledEngine(Engine):
             positions and velocities (2, 3, 9): they are changed.
         fixes : Epochs
             Of `measurements.gnss.Gnss`.
+        references : tuple of ndarray
+            Times, states and sensor errors, as of a `Reference`, that a `ReferenceEngine` follows.
 
         Returns
         -------
@@ -180,6 +186,8 @@ class CompiledEngine(Engine):
         why : int
             Why it stopped: `filter_loop.ALL`, `NOTE` for a covariance to be noted, `ASK` before a
             fix beyond the linear range of the rule.
+        followed : int
+            References that were followed.
         """
         arm, rule, scales = receiver
         (note_at, interval, aged), size, k = notes, len(fixes.time), self._n - 9
@@ -189,11 +197,14 @@ class CompiledEngine(Engine):
             np.empty((size, 2, 9, 9)),
         )
         sensors, sd = np.empty((size, 2, k)), np.empty((size, 2, k))
-        why, done = kernel.FULL, 0
+        why, done, followed = kernel.FULL, 0, 0
+        errors = self._beside()
         while why == kernel.FULL:
             # A fix needs a propagation and an update.
             self.nodes.make_room(2)
-            why, made, self._count, more, self.nodes.used = kernel.over_fixes(
+            first = self.nodes.used
+            left = np.empty((len(self.nodes.room), PHYSICAL))
+            why, made, self._count, more, self.nodes.used, passed = kernel.over_fixes(
                 self._kinds,
                 self._model,
                 self._states,
@@ -222,13 +233,22 @@ class CompiledEngine(Engine):
                 noted[done:],
                 sensors[done:],
                 sd[done:],
+                (errors, left, *(of[followed:] for of in references)),
             )
-            done += more
+            done, followed = done + more, followed + passed
+            self._keep(errors, left[first : self.nodes.used])
         if why == kernel.BAD_FIX:
             raise bad_observation(0, told[done, 0, 0], told[done, 1, 0], fixes.values[done, 4:])
         self._after(why, time, made)
         fixed = tuple(each[:done] for each in (told, at, noted, sensors, sd))
-        return int(made), fixed, why
+        return int(made), fixed, why, followed
+
+    def _beside(self) -> Array:
+        """Estimated errors that are kept beside the state, (n,); none where they are fed back."""
+        return np.empty(0)
+
+    def _keep(self, errors: Array, left: Array) -> None:
+        """Take the errors that a loop kept beside the state, and those left at its new nodes."""
 
     def close(self) -> None:
         """Propagate the covariance to the newest step."""
@@ -344,7 +364,9 @@ class ReferenceEngine(CompiledEngine):
     def __init__(self, filter_: ErrorFilter, state: EngineState) -> None:
         super().__init__(filter_, state)
         self.errors = state.errors.copy()
+        #: Of each node that the errors have been carried over, in parts.
         self._left: list[Array] = []
+        self._carried = 0
 
     def propagate(self, time: Array, rows: Array, history: Array, note_at: float) -> int:
         """Propagate over steps, as `Engine.propagate`."""
@@ -374,20 +396,21 @@ class ReferenceEngine(CompiledEngine):
         self.errors = T @ self.errors
         self._carry_errors()
 
-    def follow(self, reference: NavState, sensors: Array) -> None:
+    def follow(self, reference: Array, sensors: Array) -> None:
         """Move the state to a reference; what it is moved by goes to the estimated errors.
 
         Parameters
         ----------
-        reference : NavState
-            At the newest step.
+        reference : ndarray, (10,)
+            At the newest step, as of a `Reference`.
         sensors : ndarray, (k,)
             Errors of the sensors.
         """
         self.close()
         used = self.navigation.mechanization
         own = used.nav_state(self.mechanization, self.time)
-        apart = state_error(own, reference, find_ellipsoid(used.ellipsoid)).reshape(3, 3)
+        true = NavState.of_numbers(self.time, reference.tolist())
+        apart = state_error(own, true, find_ellipsoid(used.ellipsoid)).reshape(3, 3)
         level = apart @ used.level_from_ned(self.row).T
         moved = np.concatenate([level.ravel(), sensors - self.filter.sensors])
         self.filter = self.navigation.corrected(self.filter, moved)
@@ -400,22 +423,27 @@ class ReferenceEngine(CompiledEngine):
     def left_at_nodes(self) -> Array:
         """Return what is left on the output at each node."""
         self._carry_errors()
-        return np.array(self._left).reshape(-1, PHYSICAL)
+        return np.concatenate([np.empty((0, PHYSICAL)), *self._left])
 
     def state(self) -> EngineState:
         """Return the current state."""
         return replace(super().state(), errors=self.errors.copy())
 
+    def _beside(self) -> Array:
+        self._carry_errors()
+        return self.errors.copy()
+
+    def _keep(self, errors: Array, left: Array) -> None:
+        self.errors = errors.copy()
+        self._left.append(left)
+        self._carried += len(left)
+
     def _carry_errors(self) -> None:
         """Propagate the estimated errors over the new nodes, and record them at each."""
-        n, core = self._n, PHYSICAL * self._n
-        for row in self.nodes.since(len(self._left)):
-            if row[KIND] == GROWTH:
-                move = row[begin_of_move(n) :]
-                grown = move[:core].reshape(PHYSICAL, n) @ self.errors
-                sensors = move[core : core + n - PHYSICAL] * self.errors[PHYSICAL:]
-                self.errors = np.concatenate([grown, sensors])
-            self._left.append(self.errors[:PHYSICAL].copy())
+        for rows in self.nodes.since(self._carried):
+            errors, left = self.errors.copy(), np.empty((len(rows), PHYSICAL))
+            kernel.carry_errors(rows, 0, len(rows), errors, left)
+            self._keep(errors, left)
 
 
 #: Engines that hold a state and can continue from it, as long as the state exists.

@@ -380,9 +380,10 @@ class NodeRows:
             self.room, self.used = np.empty_like(self.room), 0
 
     def since(self, count: int) -> Iterator[Array]:
-        """Yield the rows after the first `count`."""
+        """Yield the rows after the first `count`, in blocks."""
         for block in (*self._full, self.room[: self.used]):
-            yield from block[max(count, 0) :]
+            if len(block) > max(count, 0):
+                yield block[max(count, 0) :]
             count -= len(block)
 
     def blocks(self) -> tuple[Array, ...]:

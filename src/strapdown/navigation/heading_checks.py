@@ -54,7 +54,7 @@ from strapdown.navigation.record import (
 )
 from strapdown.rotation import euler_sd
 from strapdown.sensors.uncertainty import ImuUncertainty
-from strapdown.tables import EULER
+from strapdown.tables import EULER, on_disk
 from strapdown.tables.checks import index_of, values_of
 
 __all__ = [
@@ -150,6 +150,7 @@ def run_heading_checks(
             told = list(heard)
         for one in heard:
             one.over(made.time[first:last], made.rows[first:last])
+        on_disk.let_go_of_all()
         heard = [one for one in heard if not one.lost]
     return [one.finish() for one in done if one.result is not None or one.marks.count]
 
@@ -229,14 +230,15 @@ class _Check:
         seconds = np.arange(begin, math.floor(marked[-1]) + 1.0)
         at = np.searchsorted(marked, seconds + NEAR, side="right") - 1
         seconds, at = seconds[at >= 0], at[at >= 0]
-        covariance = self.marks.rows[k + at, 1:].reshape(-1, 9, 9)
+        covariance = on_disk.stored(self.marks.rows[:, 1:], k + at).reshape(-1, 9, 9)
         # The rows of these seconds.
         first = max(int(self.history.rows[:, 0].searchsorted(after - 1.0)) - 1, 0)
-        times = self.history.rows[first:, 0].copy()
-        rows = self.history.rows[first:, 1:].copy()
+        history = self.history.rows[first:]
+        times = history[:, 0].copy()
         near = np.clip(np.searchsorted(times, seconds - NEAR), 0, len(times) - 1)
         near, back = np.unique(near, return_inverse=True)
-        own = self.navigator.filter.mechanization.trajectory(times[near], rows[near], None)
+        rows = np.ascontiguousarray(history[near, 1:])
+        own = self.navigator.filter.mechanization.trajectory(times[near], rows, None)
         heading = self.run["heading"].to_numpy(dtype=np.float64)
         heading = heading[np.searchsorted(index_of(self.run), times[near] - NEAR)]
         apart = rotation.within_half_turn(heading - own["heading"].to_numpy(dtype=np.float64))[back]

@@ -33,7 +33,12 @@ from strapdown.estimation.robust import (
     linear_range,
 )
 from strapdown.nav_state import NavState
-from strapdown.navigation.compiled_engine import CompiledEngine, ReferenceEngine, compiled
+from strapdown.navigation.compiled_engine import (
+    NO_REFERENCES,
+    CompiledEngine,
+    ReferenceEngine,
+    compiled,
+)
 from strapdown.navigation.engine import (
     SAME_INSTANT,
     Engine,
@@ -77,7 +82,9 @@ class Reference:
     ----------
     time : ndarray, (m,), s
         Times of samples, increasing.
-    states : tuple of NavState, (m,)
+    states : ndarray, (m, 10)
+        Latitude and longitude, rad, height, m, velocity, m/s, and quaternion, body to
+        north-east-down.
     sensors : ndarray, (m, k)
         Errors of sensors and aids.
     marks : ndarray, (n,), s
@@ -85,9 +92,14 @@ class Reference:
     """
 
     time: Array
-    states: tuple[NavState, ...]
+    states: Array
     sensors: Array
     marks: Array
+
+    def part(self, first: int, until: float) -> tuple[Array, Array, Array]:
+        """Times, states and sensor errors from an index on, before a time."""
+        last = max(first, int(self.time.searchsorted(until)))
+        return self.time[first:last], self.states[first:last], self.sensors[first:last]
 
     def next_after(self, time: float) -> int:
         """Index of the first state after a time."""
@@ -151,11 +163,8 @@ class Navigator:
 
     @cached_property
     def lone_receiver(self) -> Gnss | None:
-        """The only aid, if it is a receiver with white errors, and its rule has a linear range.
-
-        None for a filter about a reference: the compiled loop feeds back.
-        """
-        if len(self.aids) != 1 or type(self.aids[0]) is not Gnss or self.about is not None:
+        """The only aid, if it is a receiver with white errors, and its rule has a linear range."""
+        if len(self.aids) != 1 or type(self.aids[0]) is not Gnss:
             return None
         aid = self.aids[0]
         return aid if not aid.states() and self.linear_range is not None else None
@@ -472,12 +481,14 @@ class EpochLoop:
         return False
 
     def _fixes(self, made: int, time: Array, rows: Array) -> int:
-        """Process the fixes of a single receiver; return the steps.
+        """Process the fixes of a single receiver, and follow a reference; return the steps.
 
-        Up to one without VD, or beyond the linear range of its rule.
+        Up to a fix without VD, or beyond the linear range of its rule.
         """
-        aid, engine = self.navigator.lone_receiver, self.engine
-        if aid is None or not isinstance(engine, CompiledEngine) or self.tilted:
+        aid, engine, about = self.navigator.lone_receiver, self.engine, self.navigator.about
+        if aid is None or not isinstance(engine, CompiledEngine):
+            return made
+        if self.tilted and about is None:
             return made
         rule = self.navigator.linear_range
         assert rule is not None
@@ -492,13 +503,17 @@ class EpochLoop:
             if not whole:
                 break
             usual = Epochs(queue.time[:whole], queue.values[:whole])
+            references = NO_REFERENCES
+            if about is not None:
+                end = time[-1] + SAME_INSTANT if whole == due else queue.time[whole] - SAME_INSTANT
+                references = about.part(self.follows, float(end))
             notes = (self.marked + interval, interval, AGED)
             learned = self._learned(aid)
             receiver = np.asarray(aid.lever_arm, dtype=np.float64), rule, learned
-            made, fixed, why = engine.propagate_with_fixes(
-                time, rows, self.history, made, notes, receiver, usual
+            made, fixed, why, followed = engine.propagate_with_fixes(
+                time, rows, self.history, made, notes, receiver, usual, references
             )
-            done = len(fixed[0])
+            done, self.follows = len(fixed[0]), self.follows + followed
             self._fixed(aid, queue, fixed)
             if isinstance(aid.rule or self.navigator.filter.rule, AdaptiveRule):
                 for code in set(queue.values[:done, 0].tolist()):

@@ -80,15 +80,15 @@ def joined_steps(
     intake: ImuPreprocessor, imu: pd.DataFrame, begin: float, end: float
 ) -> tuple[Array, Array]:
     """Return the motion increments within a span, as `steps_of`, joined to a tenth of a second."""
-    ends, joined = [np.empty(0)], [np.empty((0, 10))]
+    ends, joined = GrowingRows.of(1), GrowingRows.of(10)
     for time, rows in steps_of(intake, imu, begin, end):
         dt = np.ascontiguousarray(rows[:, 0])
         last, out = np.empty(len(dt), dtype=np.int64), np.empty_like(rows)
         samples = max(1, round(JOINED / float(np.median(dt))))
         count = int(join_blocks(dt, samples, rows, last, out))
-        ends.append(time[last[:count]])
-        joined.append(out[:count].copy())
-    return np.concatenate(ends), np.concatenate(joined)
+        ends = ends.and_then(time[last[:count], None])
+        joined = joined.and_then(out[:count])
+    return ends.rows[:, 0], joined.rows
 
 
 # Pre-filter of a pipeline: drifting stamps on its even grid, lost samples interpolated.

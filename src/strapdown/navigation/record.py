@@ -14,7 +14,15 @@ from strapdown.errors import Finding
 from strapdown.estimation.covariance import Innovations, Observation
 from strapdown.nav_state import NavState
 from strapdown.rotation import euler_sd
-from strapdown.tables import EULER, GEODETIC, VELOCITY, trajectory_error_table
+from strapdown.tables import (
+    EULER,
+    GEODETIC,
+    TRAJECTORY_ERROR,
+    VELOCITY,
+    check_trajectory_error,
+    on_disk,
+)
+from strapdown.tables.checks import as_array
 
 __all__ = [
     "CovarianceSnapshot",
@@ -131,13 +139,21 @@ def standard_deviations(
     source : str, optional
         Name for messages.
     """
-    variance = np.diagonal(covariance, axis1=1, axis2=2)
-    without = np.isnan(variance)
-    sd = np.sqrt(np.where(without, 0.0, variance))
-    table = trajectory_error_table(
-        time, sd[:, :3], sd[:, 3:6], euler_sd(euler, covariance[:, 6:, 6:]), source
-    )
-    return table.mask(without)
+    sd = on_disk.room((len(covariance), len(TRAJECTORY_ERROR)))
+    without = np.empty(sd.shape, dtype=np.bool_)
+    for part in on_disk.parts_of(len(covariance), 81):
+        P = covariance[part]
+        variance = np.diagonal(P, axis1=1, axis2=2)
+        without[part] = np.isnan(variance)
+        sd[part] = np.sqrt(np.where(without[part], 0.0, variance))
+        sd[part, 6:] = euler_sd(euler[part], P[:, 6:, 6:])
+        on_disk.let_go(covariance)
+    index = pd.Index(as_array(time, None, "time", source), name="time", copy=False)
+    table = pd.DataFrame(sd, index=index, columns=TRAJECTORY_ERROR, copy=False)
+    table.attrs["source"] = source
+    check_trajectory_error(table)
+    sd[without] = np.nan
+    return table
 
 
 def state_of_row(row: pd.Series) -> NavState:
@@ -257,7 +273,8 @@ class _Room:
 class GrowingRows:
     """Rows of numbers: an immutable value; longer values share its memory.
 
-    Appending to the newest value costs only the new rows; appending to an older one copies it.
+    Appending to the newest value costs only the new rows; appending to an older one copies it. Many
+    rows are in a file (`on_disk.room`), of which the newest are in memory.
     """
 
     room: _Room
@@ -276,11 +293,17 @@ class GrowingRows:
     def and_then(self, rows: Array) -> GrowingRows:
         """Return these rows with further ones, (k, columns), appended."""
         room, count = self.room, self.count + len(rows)
+        width = room.buffer.shape[1]
         if room.used != self.count or count > len(room.buffer):
             size = max(FIRST_ROOM, count + count // 2)
-            room = _Room(np.empty((size, room.buffer.shape[1])), self.count)
-            room.buffer[: self.count] = self.rows
+            room = _Room(on_disk.room((size, width)), self.count)
+            for part in on_disk.parts_of(self.count, width):
+                room.buffer[part] = self.rows[part]
+                on_disk.let_go(self.room.buffer)
+                on_disk.let_go(room.buffer)
         room.buffer[self.count : count] = rows
+        if 8 * width * self.count // on_disk.PART < 8 * width * count // on_disk.PART:
+            on_disk.let_go(room.buffer)
         room.used = count
         return GrowingRows(room, count)
 

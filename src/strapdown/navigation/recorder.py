@@ -27,11 +27,12 @@ from strapdown.navigation.record import (
     Span,
     standard_deviations,
 )
-from strapdown.tables import EULER
-from strapdown.tables.checks import is_number
+from strapdown.tables import EULER, TRAJECTORY, check_trajectory, on_disk
+from strapdown.tables.checks import is_number, view_of
 
 if TYPE_CHECKING:
-    from strapdown.navigation.smoother import Smoothing
+    from strapdown.mechanization.mechanization import Mechanization
+    from strapdown.navigation.smoother import Smoothed, Smoothing
 
 __all__ = ["RECORDERS", "FullRecorder", "IntervalRecorder", "Recorder", "Tape", "record_of"]
 
@@ -177,51 +178,56 @@ class Tape:
         DataError
             The record is empty.
         """
-        states = self._states.rows
+        states, marks = self._states.rows, self._marks.rows
         if not len(states):
             raise DataError("navigation.no-step", file=source, quantity="time")
         used, model = self.navigator.filter.mechanization, self.navigator.filter.model
-        marks = self._marks.rows
         if self._newest_mark is not None:
-            marks = np.vstack([marks, self._newest_mark])
+            # Another value, of which a later mark knows nothing.
+            marks = self._marks.and_then(self._newest_mark).rows
         count = model.stacked.sd.size
-        at, history = states[:, 0].copy(), states[:, 1:]
-        filtered = marks[:, 1:82].reshape(-1, 9, 9)
-        if smoothing is not None:
-            later = smoothing.smoothed(marks[:, 0])
-            history = later.corrected(at, history)
-            marks = marks.copy()
-            marks[:, 1:82] = later.covariance.reshape(-1, 81)
-            marks[:, 82 : 82 + count] += later.sensors
-            marks[:, 82 + count :] = later.sensors_sd
+        at_marks = on_disk.stored(marks[:, 0])
+        later = None if smoothing is None else smoothing.smoothed(at_marks)
+        trajectory = _trajectory(used, states, later, source)
+        # Rows of the marks that are kept, and their times.
+        kept, stamps = np.arange(len(marks)), at_marks
         if self.navigator.about is not None:
-            times = self.navigator.about.marks
-            nearest = _nearest(marks[:, 0], times)
-            marks, filtered = marks[nearest], filtered[nearest]
-            marks[:, 0] = times
-        trajectory = used.trajectory(at, np.array(history), source)
-        time = pd.Index(marks[:, 0], name="time")
-        covariance = marks[:, 1:82].reshape(-1, 9, 9).copy()
-        for component, begin, end, size in self._contradictions():
-            within = (marks[:, 0] >= begin) & (marks[:, 0] <= end)
-            # A correction of one position corrects all else by their covariance with it.
-            P = filtered[within]
-            own = P[:, component, component, None]
-            moved = size * P[:, :, component] / np.maximum(own, TINY)
-            moved[:, component] = size
-            covariance[within] += moved[:, :, None] * moved[:, None, :]
+            stamps = self.navigator.about.marks
+            kept = _nearest(at_marks, stamps)
+        time = pd.Index(stamps, name="time", copy=False)
+        covariance = on_disk.room((len(kept), 9, 9))
+        sensors, sensors_sd = (on_disk.room((len(kept), count)) for _ in range(2))
+        contradictions = list(self._contradictions())
         without = ~np.array(model.estimated(used))
-        covariance[:, without, :] = covariance[:, :, without] = np.nan
+        for part in on_disk.parts_of(len(kept), marks.shape[1]):
+            rows, at = kept[part], stamps[part]
+            found = marks[rows]
+            filtered = found[:, 1:82].reshape(-1, 9, 9)
+            P, sensors[part] = covariance[part], found[:, 82 : 82 + count]
+            if later is None:
+                P[:], sensors_sd[part] = filtered, found[:, 82 + count :]
+            else:
+                P[:], sensors_sd[part] = later.covariance[rows], later.sensors_sd[rows]
+                sensors[part] += later.sensors[rows]
+            for component, begin, end, size in contradictions:
+                within = (at >= begin) & (at <= end)
+                # A correction of one position corrects all else by their covariance with it.
+                own = filtered[within, component, component, None]
+                moved = size * filtered[within, :, component] / np.maximum(own, TINY)
+                moved[:, component] = size
+                P[within] += moved[:, :, None] * moved[:, None, :]
+            P[:, without, :] = P[:, :, without] = np.nan
+            on_disk.let_go_of_all()
         nearest = np.clip(trajectory.index.searchsorted(time), 0, len(trajectory) - 1)
-        euler = trajectory[EULER].to_numpy()[nearest]
+        euler = on_disk.stored(view_of(trajectory, EULER), nearest)
         labels = list(model.layout.labels())[model.layout.size - count :]
         units = [one.block.unit for one in model.sensors for _ in one.block.labels]
         return NavigationRecord(
             trajectory=trajectory,
             sd=standard_deviations(time, covariance, euler, source),
             covariance=covariance,
-            sensors=pd.DataFrame(marks[:, 82 : 82 + count].copy(), index=time, columns=labels),
-            sensors_sd=pd.DataFrame(marks[:, 82 + count :].copy(), index=time, columns=labels),
+            sensors=pd.DataFrame(sensors, index=time, columns=labels, copy=False),
+            sensors_sd=pd.DataFrame(sensors_sd, index=time, columns=labels, copy=False),
             units=dict(zip(labels, units, strict=True)),
             innovations={
                 name: _table(rows.rows, self._labels[name]) for name, rows in self._seen.items()
@@ -278,6 +284,24 @@ class Tape:
         seen = one.innovations
         row = np.concatenate([[one.time], seen.nu, seen.s, seen.weight])
         self._seen[one.name] = self._seen[one.name].and_then(row[None, :])
+
+
+def _trajectory(
+    used: Mechanization, states: Array, later: Smoothed | None, source: str | None
+) -> pd.DataFrame:
+    """Trajectory table of recorded states, with the corrections of a smoother."""
+    rows, time = on_disk.room((len(states), len(TRAJECTORY))), on_disk.stored(states[:, 0])
+    for part in on_disk.parts_of(*states.shape):
+        history = np.array(states[part, 1:])
+        if later is not None:
+            history = later.corrected(time[part], history)
+        used.fill_trajectory(history, rows[part])
+        on_disk.let_go_of_all()
+    index = pd.Index(time, name="time", copy=False)
+    table = pd.DataFrame(rows, index=index, columns=TRAJECTORY, copy=False)
+    table.attrs["source"] = source
+    check_trajectory(table)
+    return table
 
 
 def _nearest(time: Array, wanted: Array) -> NDArray[np.intp]:

@@ -19,9 +19,8 @@ from strapdown.navigation.record import Event, NavigationRecord, Span
 from strapdown.navigation.recorder import FullRecorder, Recorder
 from strapdown.navigation.smoother import Smoothing
 from strapdown.progress import Progress, silent
-from strapdown.tables import ACCEL, GYRO, check_imu
+from strapdown.tables import ACCEL, GYRO, check_imu, on_disk
 from strapdown.tables.checks import check_columns, source_of, values_of
-from strapdown.tables.on_disk import let_go
 
 __all__ = [
     "PipelineRun",
@@ -117,8 +116,10 @@ class Recording:
         )
         smoothed = None
         if self._smoothing is not None:
+            on_disk.tidy()
             smoothed = record(smoothing=self._smoothing)
             self._smoothing.release()
+            on_disk.tidy()
         return PipelineRun(record(), tuple(self._aligned), smoothed, self._smoothing)
 
 
@@ -195,6 +196,7 @@ def relinearized(
         if moved > before:
             return replace(run, moved=moved)
         own = replace(found.smoothed, innovations=run.smoothed.innovations)
+        on_disk.tidy()
         own = replace(own, events=run.smoothed.events, outages=run.smoothed.outages)
         run = replace(run, smoothed=own, smoothing=found.smoothing, moved=moved)
         if moved < SETTLED:
@@ -244,7 +246,7 @@ def pieces_of(
     for at in range(0, len(time), size):
         last = at + size >= len(time)
         values = values_of(imu.iloc[at : at + size], CHANNELS)
-        let_go(imu)
+        on_disk.let_go(imu)
         state, piece = chain.advance(state, time[at : at + size], values, last)
         yield piece
 

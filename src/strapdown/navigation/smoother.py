@@ -13,6 +13,7 @@ from typing import IO, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from strapdown import rotation
 from strapdown._kernels.smoothing import (
     COVARIANCE,
     TIME,
@@ -26,13 +27,12 @@ from strapdown.errors import ConfigError
 from strapdown.estimation.covariance import Observation
 from strapdown.estimation.error_model import PHYSICAL
 from strapdown.mechanization.mechanization import Mechanization
-from strapdown.nav_state import NavState
 from strapdown.navigation.compiled_engine import compiled
 from strapdown.navigation.engine import SAME_INSTANT
 from strapdown.navigation.measurements.gnss import TINY
 from strapdown.navigation.navigator import Navigator, Reference
-from strapdown.navigation.record import CovarianceSnapshot, NavigationChunk
-from strapdown.tables import EULER, GEODETIC, VELOCITY
+from strapdown.navigation.record import CovarianceSnapshot, GrowingRows, NavigationChunk
+from strapdown.tables import on_disk
 from strapdown.tables.checks import is_number
 
 __all__ = ["SMOOTHERS", "RauchTungStriebel", "Smoothed", "Smoothing", "SmoothingTape"]
@@ -115,8 +115,11 @@ class Smoothing:
     def __init__(self, navigator: Navigator, memory: int) -> None:
         self._tape = SmoothingTape(navigator.filter.model.physical_size, memory)
         self._navigator, self._memory = navigator, memory
-        self._left: list[Array] = []
-        self._anchors: list[tuple[float, Array, float, Array]] = []
+        model = navigator.filter.model
+        self._left = GrowingRows.of(PHYSICAL)
+        #: Time, that of the last mark, row of the history, estimates of the sensors at the mark.
+        self._row = navigator.filter.mechanization.row
+        self._anchors = GrowingRows.of(2 + self._row + model.stacked.sd.size)
         self._mark: CovarianceSnapshot | None = None
         self._due = -math.inf if navigator.about is None else navigator.about.next_time(-math.inf)
         #: With the corrections of the sensors at each node, and the marks.
@@ -126,7 +129,7 @@ class Smoothing:
         """Append the result of a chunk."""
         for rows in piece.nodes:
             self._tape.take(rows)
-        self._left.append(piece.left)
+        self._left = self._left.and_then(piece.left)
         self._take_anchors(piece)
 
     def _take_anchors(self, piece: NavigationChunk) -> None:
@@ -142,7 +145,8 @@ class Smoothing:
         while k < len(piece.time):
             time = float(piece.time[k])
             mark = marks[int(at.searchsorted(time + SAME_INSTANT)) - 1]
-            self._anchors.append((time, piece.history[k].copy(), mark.time, mark.sensors))
+            anchor = np.concatenate([[time, mark.time], piece.history[k], mark.sensors])
+            self._anchors = self._anchors.and_then(anchor[None, :])
             self._due = time + ANCHORS if about is None else about.next_time(time)
             k = int(piece.time.searchsorted(self._due - SAME_INSTANT))
         self._mark = marks[-1]
@@ -164,9 +168,9 @@ class Smoothing:
             of_mark,
         )
         nodes, place = np.unique(of_mark, return_inverse=True)
-        errors = np.empty((len(time), n))
-        covariance = np.empty((len(nodes), 9, 9))
-        sensors_sd = np.empty((len(nodes), n - 9))
+        errors = on_disk.room((len(time), n))
+        covariance = on_disk.room((len(nodes), 9, 9))
+        sensors_sd = on_disk.room((len(nodes), n - 9))
         for met, P, turn in self._back(nodes, errors):
             for a in (0, 3, 6):
                 for b in (0, 3, 6):
@@ -175,18 +179,21 @@ class Smoothing:
                     )
             variances = np.diagonal(P, axis1=1, axis2=2)[:, 9:]
             sensors_sd[met] = np.sqrt(np.maximum(variances, 0.0))
+            on_disk.let_go_of_all()
+        sensors = on_disk.stored(errors[:, 9:], of_mark)
+        left = self._left.rows
+        for part in on_disk.parts_of(len(left), n):
+            errors[part, :9] += left[part]
+            on_disk.let_go_of_all()
         smoothed = Smoothed(
             mechanization=self._navigator.filter.mechanization,
             time=time,
-            errors=errors[:, :9].copy(),
-            covariance=covariance[place],
-            sensors=errors[of_mark, 9:],
-            sensors_sd=sensors_sd[place],
+            errors=errors[:, :9],
+            covariance=on_disk.stored(covariance, place),
+            sensors=sensors,
+            sensors_sd=on_disk.stored(sensors_sd, place),
         )
-        left = np.concatenate([np.empty((0, 9)), *self._left])
-        if len(left):
-            smoothed.errors[:] += left
-        self._result = smoothed, errors[:, 9:].copy(), marks
+        self._result = smoothed, errors[:, 9:], marks
         return smoothed
 
     def release(self) -> None:
@@ -201,24 +208,21 @@ class Smoothing:
         """
         navigator = self._navigator
         linear = compiled(navigator.filter) and navigator.damping.feeds_back
-        if self._result is None or not self._anchors or not linear:
+        if self._result is None or not self._anchors.count or not linear:
             return None
         smoothed, sensors, marks = self._result
-        time, marked = (np.array([one[k] for one in self._anchors]) for k in (0, 2))
-        rows = smoothed.corrected(time, np.array([one[1] for one in self._anchors]))
-        table = smoothed.mechanization.trajectory(time, rows)
-        values = table[[*GEODETIC, *VELOCITY, *EULER]].to_numpy().tolist()
-        return Reference(
-            time,
-            tuple(
-                NavState.from_degrees(
-                    *row[:3], v_n=row[3:6], roll_deg=row[6], pitch_deg=row[7], heading_deg=row[8]
-                )
-                for row in values
-            ),
-            np.array([one[3] for one in self._anchors]) + sensors[smoothed.nodes_at(marked)],
-            marks if navigator.about is None else navigator.about.marks,
-        )
+        anchors = self._anchors.rows
+        time, states = anchors[:, 0].copy(), on_disk.room((len(anchors), 10))
+        errors = on_disk.stored(anchors[:, 2 + self._row :])
+        for part in on_disk.parts_of(*anchors.shape):
+            rows = smoothed.corrected(time[part], anchors[part, 2 : 2 + self._row])
+            table = smoothed.mechanization.trajectory(time[part], rows).to_numpy()
+            states[part, :2], states[part, 2:6] = np.radians(table[:, :2]), table[:, 2:6]
+            states[part, 6:] = rotation.quaternion_from_euler(table[:, 6:])
+            errors[part] += sensors[smoothed.nodes_at(anchors[part, 1])]
+            on_disk.let_go_of_all()
+        about = marks if navigator.about is None else navigator.about.marks
+        return Reference(time, states, errors, about)
 
     def moved(self) -> float:
         """Return how far the smoothed states are from what they were linearized about.
@@ -227,18 +231,21 @@ class Smoothing:
         velocity, tilt and heading, where the state follows a reference: between two of these the
         noise of the sensors moves it. Those of the position act linearly.
         """
-        if self._result is None or not self._anchors:
+        if self._result is None or not self._anchors.count:
             return math.inf
         smoothed, _, marks = self._result
-        time = np.array([one[0] for one in self._anchors])
+        time = self._anchors.rows[:, 0].copy()
         before = np.clip(marks.searchsorted(time + SAME_INSTANT) - 1, 0, None)
-        squares = np.square(smoothed.errors[smoothed.nodes_at(time), 3:])
-        variances = np.diagonal(smoothed.covariance[before], axis1=1, axis2=2)[:, 3:]
-        parts = [
-            squares[:, part].sum(axis=1) / np.maximum(variances[:, part].sum(axis=1), TINY)
-            for part in (slice(0, 2), slice(2, 3), slice(3, 5), slice(5, 6))
-        ]
-        return math.sqrt(max(float(part.mean()) for part in parts))
+        apart = np.empty((4, len(time)))
+        for part in on_disk.parts_of(len(time), 81):
+            nodes = smoothed.nodes_at(time[part])
+            squares = np.square(smoothed.errors[nodes, 3:])
+            variances = np.diagonal(smoothed.covariance, axis1=1, axis2=2)[before[part], 3:]
+            for k, own in enumerate((slice(0, 2), slice(2, 3), slice(3, 5), slice(5, 6))):
+                apart[k, part] = squares[:, own].sum(axis=1)
+                apart[k, part] /= np.maximum(variances[:, own].sum(axis=1), TINY)
+            on_disk.let_go_of_all()
+        return math.sqrt(max(float(own.mean()) for own in apart))
 
     def seen(self, times: Array, observations: Sequence[Observation]) -> tuple[Array, Array]:
         """Return the residuals of unused observations against the smoothed states.
@@ -424,15 +431,19 @@ class SmoothingTape:
         for k in range(len(self._chunks) - 1, -1, -1):
             last = k + 1 == len(self._chunks)
             yield self._chunks[k][: self._used if last else CHUNK]
+            on_disk.let_go(self._chunks[k])
         for k in range(self._written - 1, -1, -1):
             yield self._read(k)
 
     def _new_chunk(self) -> None:
+        if self._chunks:
+            on_disk.let_go(self._chunks[-1])
         most = max(self._memory // (8 * CHUNK * self._width), 1)
         if len(self._chunks) < most:
-            self._chunks.append(np.empty((CHUNK, self._width)))
+            self._chunks.append(on_disk.room((CHUNK, self._width)))
         else:
             self._write(self._chunks[0])
+            on_disk.let_go(self._chunks[0])
             self._chunks.append(self._chunks.pop(0))
         self._used = 0
 

@@ -41,6 +41,8 @@ from strapdown.tables import (
     VELOCITY,
     places_of,
 )
+from strapdown.tables.checks import index_of, view_of
+from strapdown.tables.on_disk import let_go_of_all, parts_of
 
 if TYPE_CHECKING:
     from strapdown.simulation.earth_motion import EarthMotion
@@ -582,18 +584,31 @@ def smoother_consistency(
         Of one run.
     """
     columns = list(TRAJECTORY_ERROR)
-    apart = trajectory_differences(forward.trajectory, smoothed.trajectory, ellipsoid)
-    rows, marks = apart.index.to_numpy(), forward.sd.index.to_numpy()
+    let_go_of_all()
+    rows, marks = index_of(forward.trajectory), index_of(forward.sd)
     # A mark belongs to the first row after it, unless a later mark precedes that row.
     row = np.searchsorted(rows, marks - 1e-7)
-    kept = np.append(row[1:] > row[:-1], True) & (row < len(rows))
-    values = apart[columns].to_numpy()[row[kept]]
-    less = np.square(forward.sd[columns].to_numpy()[kept])
-    more = less - np.square(smoothed.sd[columns].to_numpy()[kept])
-    told = more > TOLD * less
-    z = np.where(told, values / np.sqrt(np.where(told, more, 1.0)), np.nan)
-    count = told.sum(axis=0)
-    inside = (np.abs(z) <= WITHIN).sum(axis=0)
-    squares = np.where(told, np.square(z), 0.0).sum(axis=0)
+    kept = np.flatnonzero(np.append(row[1:] > row[:-1], True) & (row < len(rows)))
+    count, inside = (np.zeros(len(columns), dtype=np.int64) for _ in range(2))
+    squares = np.zeros((1, len(columns)))
+    for part in parts_of(len(kept), 81):
+        at = row[kept[part]]
+        values = view_of(
+            trajectory_differences(
+                forward.trajectory.iloc[at], smoothed.trajectory.iloc[at], ellipsoid
+            ),
+            columns,
+        )
+        less = np.square(view_of(forward.sd, columns)[kept[part]])
+        more = less - np.square(view_of(smoothed.sd, columns)[kept[part]])
+        told = more > TOLD * less
+        z = np.where(told, values / np.sqrt(np.where(told, more, 1.0)), np.nan)
+        count += told.sum(axis=0)
+        inside += (np.abs(z) <= WITHIN).sum(axis=0)
+        # Row by row, as of the whole.
+        new = np.concatenate([squares, np.where(told, np.square(z), 0.0)])
+        squares = new.sum(axis=0, keepdims=True)
+        let_go_of_all()
+    squares = squares[0]
     of = np.where(count > 0, count, np.nan)
     return SmootherConsistency(tuple(columns), count, inside / of, np.sqrt(squares / of))

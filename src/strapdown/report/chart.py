@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.dsp.samples import true_runs
+from strapdown.tables.on_disk import let_go_of_all
 
 Array = NDArray[np.float64]
 
@@ -337,6 +338,8 @@ def kept_rows(columns: tuple[Array, ...], buckets: int = BUCKETS_OVER_TIME) -> N
             first + np.argmax(np.where(gap, -np.inf, body), axis=1),
             (first + np.argmax(gap, axis=1))[gap.any(axis=1)],
         ]
+    # A chart that is drawn has no use of the tables that it is drawn from.
+    let_go_of_all()
     rows = np.unique(np.concatenate(keep))
     return rows[rows < n]
 

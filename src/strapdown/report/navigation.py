@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pandas as pd
 
 from strapdown.alignment.alignment import Alignment
 from strapdown.bundle import write_json
@@ -24,6 +23,7 @@ from strapdown.navigation.heading_integrity import REASONS, STATUSES
 from strapdown.navigation.integrity import QUANTITY_REASONS, Repeated
 from strapdown.navigation.record import NavigationRecord
 from strapdown.progress import Progress
+from strapdown.report.chart import Array
 from strapdown.report.navigation_document import (
     CONVENTIONS,
     cautions,
@@ -57,6 +57,7 @@ from strapdown.report.verdict import (
 from strapdown.systems.navigation_run import NavigationRun, run_navigation, withheld_aid
 from strapdown.tables import EULER, GEODETIC, NED, VELOCITY
 from strapdown.tables.checks import index_of
+from strapdown.tables.on_disk import tidy
 
 if TYPE_CHECKING:
     from strapdown.navigation.truth_comparison import SolutionScore
@@ -77,12 +78,15 @@ def _write_all(
 ) -> None:
     evaluation = NavigationEvaluation(result)
     write_json(folder / "navigation.json", navigation_json(evaluation))
+    tidy()
     write_navigation_files(evaluation, folder)
     write_integrity(evaluation, folder)
+    tidy()
     if forms:
         from strapdown.report.document_html import write_report
 
         document = navigation_document(evaluation, name)
+        tidy()
         write_report(document, folder, progress, figures=result.spec.output.figures)
 
 
@@ -422,19 +426,20 @@ def _write_states(
     for form in result.spec.output.files:
         path = folder / f"trajectory.{form}"
         write_trajectory(path, record.trajectory, name=result.source.name, options=options)
+        tidy()
     sd = record.sd.rename(columns={c: f"{c}_sd_{UNITS[str(c)]}" for c in record.sd.columns})
     without = {"not_estimated": " ".join(record.not_estimated)} if record.not_estimated else {}
     write_table(sd, folder / "sd.csv", {**comments, **without})
-    write_table(_sensors(record), folder / "sensor_errors.csv", comments)
+    csv.write(folder / "sensor_errors.csv", _sensors(record), comments)
 
 
-def _sensors(record: NavigationRecord) -> pd.DataFrame:
-    """Estimates with their standard deviations and units."""
+def _sensors(record: NavigationRecord) -> dict[str, Array]:
+    """Times, and estimates with their standard deviations, by names with units."""
     units = {n: _WORDS.get(u, u.replace("/", "_per_")) for n, u in record.units.items()}
     ends = {n: f"_{u}" if u else "" for n, u in units.items()}
-    estimates = record.sensors.rename(columns={n: f"{n}{e}" for n, e in ends.items()})
-    sd = record.sensors_sd.rename(columns={n: f"{n}_sd{e}" for n, e in ends.items()})
-    return pd.concat([estimates, sd], axis=1)
+    estimates = {f"{n}{e}": record.sensors[n].to_numpy() for n, e in ends.items()}
+    sd = {f"{n}_sd{e}": record.sensors_sd[n].to_numpy() for n, e in ends.items()}
+    return {"time_s": index_of(record.sensors), **estimates, **sd}
 
 
 def _column(name: str) -> str:

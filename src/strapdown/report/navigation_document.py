@@ -9,7 +9,6 @@ import numpy as np
 from strapdown import __version__
 from strapdown.config.choice import ChoiceSpec
 from strapdown.constants import TWO_SIDED_95
-from strapdown.dsp.chi_square import plane_bound
 from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.navigation.truth_comparison import SmootherConsistency
 from strapdown.report.chart import BLUE, GREY, Array, Chart, Panel, curve
@@ -34,6 +33,7 @@ from strapdown.report.document import (
 from strapdown.report.navigation_evaluation import (
     NavigationEvaluation,
     distance_over_ground,
+    horizontal_bounds,
     state_groups,
     trust,
 )
@@ -376,7 +376,7 @@ def smoothing_words(evaluation: NavigationEvaluation) -> str | None:
     if forward is None:
         return None
     before, after = (
-        float(np.median(plane_bound(one.covariance))) for one in (forward, evaluation.record)
+        float(np.median(horizontal_bounds(one))) for one in (forward, evaluation.record)
     )
     heading = [float(np.median(_bound(one, "heading"))) for one in (forward, evaluation.record)]
     return (
@@ -414,7 +414,7 @@ def _apart(agreement: SmootherConsistency, k: int) -> bool:
 def _bound(record: NavigationRecord, column: str) -> Array:
     """95 % bound of a component, or of the horizontal position, at the covariance marks."""
     if column == "horizontal":
-        return plane_bound(record.covariance)
+        return horizontal_bounds(record)
     return TWO_SIDED_95 * record.sd[column].to_numpy(dtype=np.float64)
 
 

@@ -22,7 +22,7 @@ from strapdown.tables.checks import (
     source_of,
     view_of,
 )
-from strapdown.tables.on_disk import let_go
+from strapdown.tables.on_disk import let_go, parts_of, room
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -209,7 +209,11 @@ def health_log(
     values = view_of(imu, names).T
     if values.strides[-1] != values.itemsize:
         values = np.ascontiguousarray(values)
-    wrong = ~np.isfinite(values)
+    wrong = room(values.shape, np.bool_)
+    for channel, out in zip(values, wrong, strict=True):
+        np.logical_not(np.isfinite(channel), out=out)
+        let_go(values)
+        let_go(wrong)
     return HealthLog(source, time, tuple(names), values, wrong, sensors, gravity, false_alarm)
 
 
@@ -233,18 +237,21 @@ def _blocks(log: HealthLog) -> Blocks:
     mean, sd, noise, white = (np.zeros(shape) for _ in range(4))
     valid = np.ones(shape, dtype=bool)
     for k in range(len(log.names)):
-        let_go(log.values)
-        cut = log.values[k, : count * size].reshape(count, size)
-        bad = log.wrong[k, : count * size].reshape(count, size).any(axis=1)
-        valid[:, k] = ~bad
-        mean[:, k] = np.where(bad, 0.0, cut.mean(axis=1))
-        cut = cut - mean[:, k, None]
-        first = np.diff(cut, axis=1)
-        ones = (first**2).mean(axis=1) / 2.0
-        twos = (np.diff(first, axis=1) ** 2).mean(axis=1) / 6.0
-        sd[:, k] = np.sqrt((cut**2).mean(axis=1))
-        noise[:, k] = np.sqrt(twos)
-        white[:, k] = np.divide(twos, ones, out=np.zeros_like(ones), where=ones > 0.0)
+        for at in parts_of(count, size):
+            span = slice(at.start * size, at.stop * size)
+            cut = log.values[k, span].reshape(-1, size)
+            bad = log.wrong[k, span].reshape(-1, size).any(axis=1)
+            valid[at, k] = ~bad
+            mean[at, k] = np.where(bad, 0.0, cut.mean(axis=1))
+            cut = cut - mean[at, k, None]
+            first = np.diff(cut, axis=1)
+            ones = (first**2).mean(axis=1) / 2.0
+            twos = (np.diff(first, axis=1) ** 2).mean(axis=1) / 6.0
+            sd[at, k] = np.sqrt((cut**2).mean(axis=1))
+            noise[at, k] = np.sqrt(twos)
+            white[at, k] = np.divide(twos, ones, out=np.zeros_like(ones), where=ones > 0.0)
+            let_go(log.values)
+            let_go(log.wrong)
     for array in (sd, noise, white):
         array[~valid] = 0.0
     return Blocks(size, mean, sd, noise, white, valid)
@@ -288,13 +295,22 @@ def tail_limit(
 Indices = NDArray[np.int64]
 
 
-def equal_runs(v: Array) -> tuple[Indices, Indices]:
-    """Starts and lengths of runs of equal values; a NaN equals no other value.
+def equal_runs(v: Array) -> tuple[Indices, Indices, int]:
+    """Starts and lengths of runs of equal values, of two at least, and the number of all runs.
 
-    `v` ((n,)). Returns `starts`, `lengths` ((m,)).
+    `v` ((n,)): a NaN equals no other value. Returns `starts`, `lengths` ((m,)).
     """
-    starts = np.flatnonzero(np.concatenate([[True], np.diff(v) != 0.0]))
-    return starts.astype(np.int64), np.diff(np.append(starts, v.size)).astype(np.int64)
+    edges = np.zeros(v.size + 1, dtype=np.int8)
+    repeats = 0
+    for part in parts_of(v.size - 1, 1):
+        same = np.diff(v[part.start : part.stop + 1]) == 0.0
+        repeats += int(np.count_nonzero(same))
+        # One where a run begins, less one after its last repetition.
+        edges[part] += same
+        edges[part.start + 1 : part.stop + 1] -= same
+        let_go(v)
+    starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    return starts.astype(np.int64), (ends - starts + 1).astype(np.int64), v.size - repeats
 
 
 def longest_by_chance(repeats: Array, samples: int, false_alarm: float) -> Array:

@@ -31,7 +31,7 @@ from strapdown.sensors.health_log import (
 from strapdown.sensors.saturation import find_limits
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GYRO
-from strapdown.tables.on_disk import let_go
+from strapdown.tables.on_disk import let_go, room, stored
 
 Array = NDArray[np.float64]
 
@@ -46,15 +46,18 @@ def find_saturated(log: HealthLog) -> list[ChannelFault]:
     for k in range(len(log.names)):
         let_go(log.values)
         known = ~log.wrong[k]
+        let_go(log.wrong)
         # Two samples do not form a flat top, nor does a channel that is constant.
         if known.sum() < 3:
             continue
         full, step = log.stated(k, "full_scale", np.inf), log.stated(k, "quantization")
-        values = log.values[k, known]
+        # Without a copy of a sound channel: a long log takes a large part of the memory.
+        used = slice(None) if known.all() else known
+        values = log.values[k, used]
         if float(values.min()) == float(values.max()):
             continue
         limits = find_limits(
-            log.time[known],
+            log.time[used],
             values[:, None],
             np.array([full]),
             np.array([step]),
@@ -405,9 +408,12 @@ def find_stuck(log: HealthLog) -> list[ChannelFault]:
     @cache
     def repeats() -> NDArray[np.int32]:
         """How many samples of each channel repeat the one before, up to each."""
-        sums = np.zeros((len(log.names), log.time.size + 1), dtype=np.int32)
+        sums = room((len(log.names), log.time.size + 1), np.int32)
         for values, upto in zip(log.values, sums, strict=True):
+            upto[:2] = 0
             np.cumsum(values[1:] == values[:-1], out=upto[2:])
+            let_go(values)
+            let_go(sums)
         return sums
 
     faults = []
@@ -421,9 +427,9 @@ def _stuck_runs(
     log: HealthLog, k: int, repeats: Callable[[], NDArray[np.int32]]
 ) -> list[ChannelFault]:
     n = log.time.size
-    starts, lengths = equal_runs(log.values[k])
-    whole = int(lengths.max()) >= n - int((~np.isfinite(log.values[k])).sum())
-    tail = 0.0 if whole else _tail(lengths, log.false_alarm)
+    starts, lengths, count = equal_runs(log.values[k])
+    whole = int(lengths.max(initial=1)) >= int(np.isfinite(log.values[k]).sum())
+    tail = 0.0 if whole else _tail(lengths, count, log.false_alarm)
     most = np.flatnonzero(lengths >= max(LEAST_RUN, math.ceil(tail)))
     if not most.size:
         return []
@@ -446,9 +452,12 @@ def _stuck_runs(
     ]
 
 
-def _tail(lengths: NDArray[np.int64], false_alarm: float) -> float:
-    near, far = min(NEAR_RANK, lengths.size // 10), min(FAR_RANK, lengths.size // 100)
-    limit = tail_limit(lengths, near, far, false_alarm, slack=TAIL_SLACK)
+def _tail(lengths: NDArray[np.int64], count: int, false_alarm: float) -> float:
+    """Limit of so many lengths, of which those not given are one."""
+    near, far = min(NEAR_RANK, count // 10), min(FAR_RANK, count // 100)
+    longest = np.concatenate([np.ones(near), lengths])
+    longest = np.partition(longest, lengths.size)[lengths.size :] if near else longest
+    limit = tail_limit(longest, near, far, false_alarm, slack=TAIL_SLACK)
     # Fewer than 100 runs do not define a tail; the other limits apply.
     return limit if math.isfinite(limit) else 0.0
 
@@ -800,7 +809,7 @@ def check_imu_channels(
         faults += found
         # Later tests exclude the samples; an implausible mean excludes none.
         if found and kind != "implausible":
-            wrong = log.wrong.copy()
+            wrong = stored(log.wrong)
             for fault in found:
                 wrong[log.names.index(fault.channel), fault.first : fault.last + 1] = True
             log = replace(log, wrong=wrong)

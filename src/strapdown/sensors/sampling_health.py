@@ -10,7 +10,6 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.errors import Finding
-from strapdown.sensors.health_log import equal_runs
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import index_of, source_of, values_of
 
@@ -131,7 +130,8 @@ def _held(imu: pd.DataFrame) -> list[Finding]:
             continue
         values = values_of(imu, columns)
         new = np.any(values[1:] != values[:-1], axis=1)
-        _, lengths = equal_runs(np.cumsum(np.concatenate([[0], new])).astype(np.float64))
+        starts = np.flatnonzero(np.concatenate([[True], new]))
+        lengths = np.diff(np.append(starts, len(values)))
         length = float(lengths.mean())
         if lengths.size < LEAST_STEPS or length < HELD:
             continue

@@ -79,11 +79,12 @@ def find_limits(
         y, full = values[:, k], float(full_scale[k])
         slack = max(float(quantization[k]), ROUNDING * full) if np.isfinite(full) else 0.0
         own = y if held is None else y[~held[:, k]]
-        beyond[k] = bool(np.abs(own).max(initial=0.0) > full + slack)
+        # Not by the magnitudes of all: a long log takes a large part of the memory.
+        beyond[k] = bool(max(own.max(initial=0.0), -own.min(initial=0.0)) > full + slack)
         if np.isfinite(full):
             clipped[:, k] = (np.abs(y) >= full - slack) & (np.abs(y) <= full + slack)
         for sign in (1.0, -1.0):
-            flat = _flat_extreme(time, sign * y, full, longest_flat)
+            flat = _flat_extreme(time, y, sign, full, longest_flat)
             if flat is None or flat.all() or (flat & ~clipped[:, k]).sum() == 0:
                 continue
             end = float(y[flat][0])
@@ -96,17 +97,18 @@ def find_limits(
     return RangeLimits(lower, upper, clipped, found, beyond)
 
 
-def _flat_extreme(time: Array, y: Array, full: float, longest: float) -> Mask | None:
-    """Samples at the largest value, if it appears to be an end of the range."""
+def _flat_extreme(time: Array, y: Array, sign: float, full: float, longest: float) -> Mask | None:
+    """Samples at the largest or smallest value, if it appears to be an end of the range."""
     if y.size < LEAST_FLAT:
         return None
-    top = float(y.max())
-    at = y == top
+    at = y == (y.max() if sign > 0.0 else y.min())
     edges = np.diff(np.r_[False, at, False].astype(np.int8))
     starts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
     # Most records return here, before the sort below.
     if (ends - starts).max() < LEAST_FLAT:
         return None
+    y = y if sign > 0.0 else -y
+    top = float(y.max())
     floor = LEAST_PART * max(full if np.isfinite(full) else 0.0, float(np.abs(y).max()))
     usual = float(np.median(y))
     if top <= 0.0 or top == usual:

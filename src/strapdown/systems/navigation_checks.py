@@ -22,6 +22,7 @@ from strapdown.sensors.imu_health import check_imu_channels
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, usable
 from strapdown.tables.checks import channels_of, index_of, source_of, values_of
+from strapdown.tables.on_disk import filled, let_go
 
 __all__ = ["channel_findings", "look_through", "saturated_findings"]
 
@@ -284,12 +285,12 @@ def _without(imu: pd.DataFrame, fault: ChannelFault) -> int:
 
 def _refuse_degrees(imu: pd.DataFrame, sensors: ImuUncertainty) -> None:
     """Refuse gyros whose noise on every axis fits deg/s read as rad/s."""
-    step = float(np.median(np.diff(index_of(imu))))
+    step = _median_of_differences(index_of(imu), 1)
     density = np.asarray(sensors.gyro.axis("noise_density"))
     if not density.all():
         return
-    second = (np.diff(rates, n=2) for rates in channels_of(imu, GYRO))
-    scatter = np.array([np.median(np.square(one)) for one in second])
+    channels = channels_of(imu, GYRO)
+    scatter = np.array([_median_of_differences(rates, 2) for rates in channels])
     times = np.sqrt(scatter / MEDIAN / 6.0 * step) / density
     if not ((times > DEGREES[0]) & (times < DEGREES[1])).all():
         return
@@ -302,6 +303,17 @@ def _refuse_degrees(imu: pd.DataFrame, sensors: ImuUncertainty) -> None:
             times=times.min(),
             times_2=times.max(),
         )
+
+
+def _median_of_differences(values: np.ndarray, order: int) -> float:
+    """Median of the steps of numbers, or of the squares of their second differences."""
+
+    def differences(part: slice) -> np.ndarray:
+        of_part = np.diff(values[part.start : part.stop + order], n=order)
+        let_go(values)
+        return of_part if order == 1 else np.square(of_part)
+
+    return float(np.median(filled(len(values) - order, differences), overwrite_input=True))
 
 
 #: Median of the square of a standard normal number, and a rate in rad/s.

@@ -72,6 +72,7 @@ from strapdown.systems.navigation_source import (
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import EULER, GEODETIC, POSITION_SD, VELOCITY
 from strapdown.tables.checks import source_of, values_of
+from strapdown.tables.on_disk import tidy
 
 if TYPE_CHECKING:
     from strapdown.evaluation.control_points import ControlPointScore
@@ -144,17 +145,20 @@ def run_navigation(
     """
     progress("reading", 0.02)
     source = read_navigation_source(spec)
+    tidy()
     progress("looking through", 0.1)
     sensors = sensors_of(spec)
     tables = (source.imu, *source.tables.values())
     with said_of_file(*tables):
         looked = look_through(spec, source.imu, source.tables)
+        tidy()
         # Simulated errors are as specified; but the motion may exceed the range of the sensors.
         if spec.log is None:
             channels = saturated_findings(source.imu, sensors)
         else:
             channels = channel_findings(source.imu, sensors, spec.start, source.tables)
     looked, channels = in_file(looked, *tables), in_file(channels, *tables)
+    tidy()
     chain = make_chain(spec, sensors)
     recorder: Recorder = spec.recorder.make(ellipsoid=spec.ellipsoid)
 
@@ -190,6 +194,7 @@ def run_navigation(
                 recorder,
                 lambda mode, share: progress(f"{spec.damping.beside}: {mode}", ENDED),
             ).record
+    tidy()
     progress("comparing", ENDED)
     best = run.smoothed or run.record
     differences, errors = _against_truth(best.trajectory, source, spec)
@@ -221,6 +226,7 @@ def run_navigation(
             begun,
             after,
         )
+    tidy()
     trust = assess_integrity(
         chain,
         make_filter(spec, sensors),
@@ -235,6 +241,7 @@ def run_navigation(
     if trust.inconsistencies and spec.trust.repeat:
         with said_of_file(*tables):
             by_grade = _explained_by_grade(spec, sensors, source, run.record, after)
+    tidy()
     aligned = {one.mode: one for one in run.aligned}
     coarse, fine = aligned.get("coarse"), aligned.get("fine")
     findings = [

@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.errors import DataError
-from strapdown.tables.on_disk import let_go
+from strapdown.tables.on_disk import let_go, parts_of, step_range
 
 Array = NDArray[np.float64]
 
@@ -115,13 +115,22 @@ def check_latitude(lat: Array, lon: Array, source: str | None) -> None:
     refuse_row(np.abs(lat) > 90.0, code, source, "lat", lat=lat)
 
 
+def all_finite(values: Array) -> bool:
+    """Whether every number of an array, (n, ...), is finite; it is let go of."""
+    for part in parts_of(len(values), int(np.prod(values.shape[1:]))):
+        # A sum is finite only if every term is. It needs no memory and is several times faster
+        # than a check of each value.
+        with np.errstate(invalid="ignore", over="ignore"):
+            finite = np.isfinite(values[part].sum()) or np.isfinite(values[part]).all()
+        let_go(values)
+        if not finite:
+            return False
+    return True
+
+
 def check_rows(values: Array, columns: Sequence[str], source: str | None) -> None:
     """Check that every value is finite; the message names the first that is not."""
-    # A sum is finite only if every term is. It needs no memory and is several times faster than
-    # a check of each value.
-    with np.errstate(invalid="ignore", over="ignore"):
-        total = values.sum()
-    if np.isfinite(total):
+    if all_finite(values):
         return
     bad = ~np.isfinite(values)
     if bad.any():
@@ -141,9 +150,12 @@ def check_rows(values: Array, columns: Sequence[str], source: str | None) -> Non
 def check_time(time: Array, source: str | None) -> None:
     """Check that stamps are finite and advance."""
     check_rows(time[:, None], ["time"], source)
-    steps = np.diff(time)
-    if steps.size and not steps.min() > 0.0:
-        row = int(np.argmax(steps <= 0.0)) + 1
+    for part in parts_of(len(time) - 1, 1):
+        steps = np.diff(time[part.start : part.stop + 1])
+        let_go(time)
+        if steps.min() > 0.0:
+            continue
+        row = part.start + int(np.argmax(steps <= 0.0)) + 1
         raise DataError(
             "tables.time-does-not-advance-followed",
             file=source,
@@ -292,9 +304,10 @@ def find_gaps(time: ArrayLike) -> list[Gap]:
     Returns in order of time.
     """
     stamps = np.asarray(time, dtype=np.float64)
-    steps = np.diff(stamps)
-    if steps.size < 2 or steps.max() <= 3.0 * steps.min():
+    least, most = step_range(stamps)
+    if len(stamps) < 3 or most <= 3.0 * least:
         return []  # faster, as most records are regular
+    steps = np.diff(stamps)
     usual = float(np.quantile(steps, 0.95, method="lower"))
     return [
         Gap(float(stamps[k]), float(stamps[k + 1]), usual, int(k) + 1)

@@ -19,6 +19,7 @@ from strapdown.tables.checks import (
     PHI,
     THETA,
     Array,
+    all_finite,
     as_array,
     channels_of,
     check_columns,
@@ -102,11 +103,11 @@ def imu_of_columns(
     sampling: str = "instantaneous",
     source: str | None = None,
 ) -> pd.DataFrame:
-    """Make an Imu table of an array, which it keeps without a copy; otherwise as `imu_table`.
+    """Make an Imu table of arrays, which it keeps without a copy; otherwise as `imu_table`.
 
     `time` ((n,), s). `values` ((n, m)): by `columns`, of `GYRO`, `ACCEL`, `MAG`.
     """
-    index = pd.Index(time, name="time")
+    index = pd.Index(time, name="time", copy=False)
     table: pd.DataFrame = pd.DataFrame(values, index=index, columns=list(columns), copy=False)
     table.attrs = {"sampling": sampling, "source": source, "axes": "forward-right-down"}
     check_imu(table)
@@ -146,9 +147,7 @@ def check_imu(table: pd.DataFrame) -> None:
         )
     check_time(index_of(table), source)
     # Channel by channel, and no copy only to find that all are numbers.
-    with np.errstate(invalid="ignore", over="ignore"):
-        finite = all(np.isfinite(one.sum()) for one in channels_of(table, columns))
-    if not finite:
+    if not all(all_finite(one) for one in channels_of(table, columns)):
         check_rows(view_of(table, columns), columns, source)
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import mmap
+import sys
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.stats import chi2
 from tests.aided_drives import truth_at
@@ -16,9 +19,10 @@ from strapdown.estimation.covariance import COVARIANCES
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.error_model import RotationVectorModel
 from strapdown.estimation.sensor_blocks import accel_bias, gyro_bias
-from strapdown.mechanization import NorthEastDown
+from strapdown.mechanization import NorthEastDown, WanderAzimuth
 from strapdown.mechanization.mechanization import state_error
 from strapdown.nav_state import NavState
+from strapdown.navigation.compiled_engine import ReferenceEngine
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.modes import KnownStart
 from strapdown.navigation.navigator import Navigator, with_states
@@ -26,9 +30,10 @@ from strapdown.navigation.pipeline import NavigationPipeline
 from strapdown.navigation.recorder import IntervalRecorder
 from strapdown.navigation.replay import SETTLED, relinearized, run_batch
 from strapdown.navigation.smoother import RauchTungStriebel
+from strapdown.navigation.truth_comparison import smoother_consistency
 from strapdown.simulation import ImuErrors, Origin, PathMotion, Track, TriadErrors, simulate_imu
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
-from strapdown.tables import POSITION_SD
+from strapdown.tables import POSITION_SD, VELOCITY, on_disk
 
 #: A phone, rad/s/√Hz, m/s²/√Hz, rad/s, m/s²; and a start of which the heading is known roughly.
 GYRO_NOISE, ACCEL_NOISE, GYRO_BIAS, ACCEL_BIAS = 1e-4, 2e-3, 5e-3, 0.1
@@ -152,3 +157,77 @@ def test_thirty_walks_are_as_wrong_as_they_are_said_to_be():
 def test_a_number_of_passes_is_a_small_whole_number(passes):
     with pytest.raises(ConfigError, check=coded("navigation.smoother-passes")):
         RauchTungStriebel(passes=passes)
+
+
+@pytest.mark.parametrize("mechanization", [NorthEastDown(), WanderAzimuth()])
+@pytest.mark.parametrize("form", ["joseph", "ud", "wd"])
+def test_the_compiled_loop_of_a_pass_is_its_reference_engine(monkeypatch, mechanization, form):
+    chain, imu, tables = started(1, 1.0)
+    filter_ = replace(chain.navigator.filter, form=COVARIANCES[form](), mechanization=mechanization)
+    chain = replace(chain, navigator=replace(chain.navigator, filter=filter_))
+    run = run_batch(chain, imu, tables, IntervalRecorder(rate_hz=5.0))
+    followed = []
+    follow = ReferenceEngine.follow
+
+    def counted(engine, *reference):
+        followed.append(engine.time)
+        follow(engine, *reference)
+
+    monkeypatch.setattr(ReferenceEngine, "follow", counted)
+    compiled = relinearized(chain, imu, tables, IntervalRecorder(rate_hz=5.0), run).smoothed
+    assert not followed
+    monkeypatch.setattr(Navigator, "lone_receiver", None)
+    asked = relinearized(chain, imu, tables, IntervalRecorder(rate_hz=5.0), run).smoothed
+    assert len(followed) > 80
+    # Both sum the same rows, each of which adds a rounding of the filter's covariance: in units of
+    # the smoothed one, which is what is left of it, and by the condition of what is inverted.
+    sd = np.hstack([np.sqrt(np.diagonal(asked.covariance, axis1=1, axis2=2)), asked.sensors_sd])
+    wide = np.hstack(
+        [np.sqrt(np.diagonal(run.record.covariance, axis1=1, axis2=2)), run.record.sensors_sd]
+    )
+    correlation = run.record.covariance / (wide[:, :9, None] * wide[:, None, :9])
+    rows = 90 * (10 + 2 * 2 + 1)
+    bound = np.finfo(float).eps * rows * np.linalg.cond(correlation).max()
+    bound *= np.square(wide / sd).max()
+    assert bound < 1e-4
+    off = (compiled.sensors - asked.sensors) / asked.sensors_sd
+    assert np.abs(off.to_numpy()).max() < bound
+    assert np.abs(compiled.sensors_sd / asked.sensors_sd - 1.0).to_numpy().max() < bound
+    at = asked.trajectory.index.searchsorted(asked.sd.index).clip(max=len(asked.trajectory) - 1)
+    apart = (compiled.trajectory - asked.trajectory)[VELOCITY].to_numpy()[at] / sd[:, 3:6]
+    assert np.abs(apart).max() < bound
+
+
+def on_disk_of(array):
+    """Whether an array is of a file."""
+    while isinstance(array, np.ndarray):
+        array = array.base
+    return isinstance(array, mmap.mmap)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems keep arrays in memory")
+def test_what_a_run_keeps_is_on_the_disk_and_made_part_by_part(monkeypatch):
+    chain, imu, tables = started(1, 1.0)
+    recorder = IntervalRecorder(rate_hz=5.0)
+    run = run_batch(chain, imu, tables, recorder)
+    whole = relinearized(chain, imu, tables, recorder, run)
+    # Every array, and a few rows at a time.
+    monkeypatch.setattr(on_disk, "LARGE", 1)
+    monkeypatch.setattr(on_disk, "PART", 8 * 81 * 7)
+    run = run_batch(chain, imu, tables, recorder)
+    parts = relinearized(chain, imu, tables, recorder, run)
+    for one, other in ((whole.record, parts.record), (whole.smoothed, parts.smoothed)):
+        np.testing.assert_array_equal(other.covariance, one.covariance)
+        assert on_disk_of(other.covariance)
+        for name in ("trajectory", "sd", "sensors", "sensors_sd"):
+            found, wanted = getattr(other, name), getattr(one, name)
+            pd.testing.assert_frame_equal(found, wanted, check_exact=True)
+            assert on_disk_of(found.to_numpy()), name
+    found, wanted = parts.smoothing.reference(), whole.smoothing.reference()
+    for name in ("time", "states", "sensors", "marks"):
+        np.testing.assert_array_equal(getattr(found, name), getattr(wanted, name))
+    assert on_disk_of(found.states)
+    assert on_disk_of(found.sensors)
+    assert smoother_consistency(parts.record, parts.smoothed).rms.tolist() == (
+        smoother_consistency(whole.record, whole.smoothed).rms.tolist()
+    )

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from strapdown.constants import MAD_TO_SD, STANDARD_GRAVITY
 from strapdown.errors import Finding
+from strapdown.tables.on_disk import filled, let_go, stored
 from strapdown.units import TIME_UNITS
 
 __all__ = ["THRESHOLD", "Inference", "conclude", "differenced", "evidence", "posterior"]
@@ -188,7 +189,9 @@ class Steps:
     @classmethod
     def of(cls, stamps: NDArray[Any]) -> Steps:
         """Compute the steps of stamps."""
-        steps = np.diff(differenced(stamps)).astype(np.float64, copy=False)
+        exact = differenced(stamps)
+        steps = filled(len(exact) - 1, lambda part: np.diff(exact[part.start : part.stop + 1]))
+        let_go(exact)
         # No copy where all are forward.
         forward = steps if steps.size and steps.min() > 0 else steps[steps > 0]
         if not forward.size:
@@ -200,7 +203,8 @@ class Steps:
         # Rows of one burst that share a stamp count, too.
         repeats = steps.size - int(np.count_nonzero(steps))
         mean = float(usual.sum() / (usual.size + repeats))
-        return cls(stamps, steps, forward, mean, float(np.median(forward)))
+        median = float(np.median(stored(forward), overwrite_input=True))
+        return cls(stamps, steps, forward, mean, median)
 
 
 def differenced(stamps: NDArray[Any]) -> NDArray[Any]:

@@ -28,6 +28,8 @@ from strapdown.formats.inference.conclusion import (
 )
 from strapdown.formats.inference.rotation_rate import infer_gyro
 from strapdown.formats.recording import RawLog, ReadOptions
+from strapdown.tables.checks import all_finite
+from strapdown.tables.on_disk import let_go
 from strapdown.units import MAG_UNITS, TIME_UNITS, parse_unit
 
 Array = NDArray[np.float64]
@@ -193,19 +195,24 @@ def _part(signals: Signals, step: float | None) -> tuple[Signals, list[int]]:
     if size <= LARGEST:
         all_rows: dict[str, Any] = {t: _below(v, HUGE) for t, v in triads.items()}
         return replace(signals, **all_rows), [0]
-    rows = np.arange(size)
-    if not all(np.isfinite(v.sum()) for v in triads.values()):
+    rows = None
+    if not all(all_finite(v) for v in triads.values()):
         full = np.logical_and.reduce([np.isfinite(v).all(axis=1) for v in triads.values()])
-        rows = np.flatnonzero(full) if full.any() else rows
+        rows = np.flatnonzero(full) if full.any() else None
+    size = size if rows is None else rows.size
     count, width = LEAST_PARTS, LARGEST // LEAST_PARTS
     if step is not None:
         count = int(np.clip(LARGEST * step / PART, LEAST_PARTS, MOST_PARTS))
         width = max(LARGEST // count, round(LEAST_PART / step))
-    if count * width >= rows.size:
-        count, width = 1, rows.size
-    firsts = np.linspace(0, rows.size - width, count).astype(np.int64)
-    rows = rows[(firsts[:, None] + np.arange(width)).reshape(-1)]
-    part: dict[str, Any] = {t: _below(v[rows], HUGE) for t, v in triads.items()}
+    if count * width >= size:
+        count, width = 1, size
+    firsts = np.linspace(0, size - width, count).astype(np.int64)
+    some = (firsts[:, None] + np.arange(width)).reshape(-1)
+    rows = some if rows is None else rows[some]
+    part: dict[str, Any] = {}
+    for triad, values in triads.items():
+        part[triad] = _below(values[rows], HUGE)
+        let_go(values)
     if signals.stamps is not None:
         part["stamps"] = signals.stamps[rows]
     return replace(signals, **part), list(range(0, count * width, width))

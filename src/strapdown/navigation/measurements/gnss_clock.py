@@ -16,6 +16,7 @@ from strapdown.errors import DataError, Finding
 from strapdown.frames import place_difference
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY, VELOCITY_SD, usable
 from strapdown.tables.checks import RELATIVE, channels_of, index_of, source_of, values_of
+from strapdown.tables.on_disk import filled
 
 __all__ = [
     "TimeOffset",
@@ -342,9 +343,11 @@ def _integrals(
     stamps: Array, imu: pd.DataFrame, columns: list[str], means: bool
 ) -> tuple[Array, Array]:
     """Integrals of three channels, (m, 3), at times no closer than the search needs."""
-    # Steps are rounded decimal fractions.
-    each = max(1, int(NODES / float(np.median(np.diff(stamps))) + 1e-6))
     last = len(stamps) - 1
+    steps = filled(last, lambda part: np.diff(stamps[part.start : part.stop + 1]))
+    # Steps are rounded decimal fractions.
+    each = max(1, int(NODES / float(np.median(steps, overwrite_input=True)) + 1e-6))
+    del steps
     kept = np.append(np.arange(0, last, each), last)
     channels = channels_of(imu, columns)
     sums = [running_integral(stamps, one, means=means)[kept] for one in channels]
