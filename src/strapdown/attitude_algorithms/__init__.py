@@ -92,7 +92,7 @@ def make_algorithm(text: str, others: Sequence[str] = ()) -> AttitudeAlgorithm:
 
 
 def with_options(cls: type[Any], name: str, rest: str) -> Any:
-    """Make a dataclass from its options as text, ``option=value,option=value``."""
+    """Make a dataclass from its options as text, ``option=value,option=value/value``."""
     known = {f.name: f.default for f in fields(cls)}
     options: dict[str, object] = {}
     for item in filter(None, (part.strip() for part in rest.split(","))):
@@ -123,6 +123,11 @@ def _option(name: str, key: str, value: str, default: object) -> object:
     elif isinstance(default, float):
         try:
             return float(value)
+        except ValueError:
+            code = "attitude.option-not-number"
+    elif isinstance(default, tuple):
+        try:
+            return tuple(float(one) for one in value.split("/"))
         except ValueError:
             code = "attitude.option-not-number"
     else:

@@ -120,10 +120,7 @@ def step_in_c(text: str) -> ExportedFile:
     test = step_test(parts)
     version = importlib.import_module("strapdown").__version__
     counts = ", ".join(f"{count} {kind}" for kind, count in operations.items() if count)
-    options = ", ".join(
-        f"{f.name}={getattr(chosen, f.name)}".lower().replace("(", "").replace(")", "")
-        for f in fields(chosen)
-    )
+    options = ", ".join(f"{f.name}={_value(getattr(chosen, f.name))}" for f in fields(chosen))
     name_c = parts.harness.name
     upper = name_c.upper()
     head = [
@@ -149,6 +146,11 @@ def step_in_c(text: str) -> ExportedFile:
         test,
     ]
     return ExportedFile(text, "\n".join(lines), operations, parts.memory)
+
+
+def _value(value: object) -> str:
+    """Text of an option, as it can be given."""
+    return "/".join(map(str, value)) if isinstance(value, tuple) else str(value).lower()
 
 
 def step_parts(text: str) -> tuple[Any, StepParts]:

@@ -260,12 +260,23 @@ def test_no_step_of_an_algorithm_takes_more(name):
         assert all(getattr(cost, kind) == most for kind, most in made.operations.items())
 
 
+@pytest.mark.parametrize("given", ["ned:height_limits=-100/2000", *STEPS])
+def test_options_in_the_head_are_those_that_can_be_given(given):
+    made, name = step_in_c(given), given.partition(":")[0]
+    head = " ".join(made.text.partition("*/")[0].replace("\n *", " ").split())
+    stated = re.search(rf"{name}: (.+?)\. Written by", head)[1]
+    again = steps.step_in_c(f"{name}:{stated.replace(', ', ',')}")
+    assert again.text == made.text
+
+
 def test_what_is_not_possible_is_named():
     for text, code in (
         ("wd:states=99", "report.export-range"),
         ("low_pass:rate=300", "report.export-rate"),
         ("ned:height=high", "mechanization.nothing-height-can"),
         ("ud:state=3", "attitude.no-option"),
+        ("ned:height_limits=1", "mechanization.no-two-heights"),
+        ("ned:height_limits=low/high", "attitude.option-not-number"),
     ):
         with pytest.raises(ConfigError, check=coded(code)):
             step_in_c(text)
