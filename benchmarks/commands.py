@@ -150,7 +150,7 @@ def long_runs() -> Iterator[Row]:
     yield Row("heading check over 4 h", (checks[4],), "4 times that of 1 h", grown, "s", 1.1)
 
 
-#: Memory that does not grow with the length of a log, but for the page caches of what is in use.
+#: Four hours of a log over one: what is kept of each step is on the disk.
 FLAT = 1.3
 
 

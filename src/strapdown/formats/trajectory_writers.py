@@ -36,7 +36,7 @@ from strapdown.tables import (
     check_trajectory_error,
     places_of,
 )
-from strapdown.tables.on_disk import let_go
+from strapdown.tables.on_disk import let_go, parts_of
 
 __all__ = [
     "DECIMALS",
@@ -547,8 +547,11 @@ def thin(trajectory: pd.DataFrame, most: int, ellipsoid: Ellipsoid = WGS84) -> T
     if n <= most:
         return Thinned(np.arange(n), n, 0.0)
     time = trajectory.index.to_numpy(dtype=np.float64)
-    place = ecef_from_geodetic(places_of(trajectory), ellipsoid=ellipsoid)
-    let_go(trajectory)
+    place = np.empty((n, 3))
+    for part in parts_of(n, len(TRAJECTORY)):
+        of_part = places_of(trajectory.iloc[part])
+        place[part] = ecef_from_geodetic(of_part, ellipsoid=ellipsoid)
+        let_go(trajectory)
     pieces = max(1, min(-(-n // LONGEST_PIECE), (most - 1) // 2))
     kept = sorted({int(k) for k in np.linspace(0, n - 1, pieces + 1).round()})
     heap: list[tuple[float, int, int, int]] = []

@@ -225,7 +225,7 @@ class _Check:
     def evidence(self, after: float = -math.inf) -> HeadingCheck:
         """Return the result at each second, or each after an instant."""
         k = max(int(self.marks.rows[:, 0].searchsorted(after, side="right")) - 1, 0)
-        marked = self.marks.rows[k:, 0]
+        marked = on_disk.stored(self.marks.rows[k:, 0])
         begin = max(math.ceil(self.since + NEAR), math.floor(max(after, self.since)) + 1.0)
         seconds = np.arange(begin, math.floor(marked[-1]) + 1.0)
         at = np.searchsorted(marked, seconds + NEAR, side="right") - 1

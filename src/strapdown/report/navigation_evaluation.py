@@ -37,7 +37,7 @@ from strapdown.report.values import shown_unit
 from strapdown.systems.navigation_run import NavigationRun
 from strapdown.tables import EULER, GEODETIC, VELOCITY
 from strapdown.tables.checks import index_of, values_of, view_of
-from strapdown.tables.on_disk import let_go, parts_of
+from strapdown.tables.on_disk import let_go, let_go_of_all, parts_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -425,6 +425,7 @@ def blocks_of(record: NavigationRecord) -> tuple[ShownStates, ...]:
         # The unit must suit both the estimates and their standard deviations.
         sizes = [view_of(table, columns) for table in (record.sensors, record.sensors_sd)]
         size = max((float(np.nanmax(np.abs(v))) for v in sizes if v.size), default=0.0)
+        let_go_of_all()
         factor, unit = shown_unit(record.units.get(columns[0], ""), size)
         aid, dot, own = name.rpartition(".")
         words = own.replace("_", " ")
@@ -457,6 +458,7 @@ def distance_over_ground(trajectory: pd.DataFrame) -> float:
     """Distance over ground, m: the horizontal speed integrated by the trapezoidal rule."""
     time = index_of(trajectory)
     speed = np.hypot(*(trajectory[c].to_numpy(dtype=np.float64) for c in ("VN", "VE")))
+    let_go(trajectory)
     return float(np.trapezoid(speed, time))
 
 
