@@ -130,6 +130,7 @@ FORGED = [
     ("navigate", "trajectory.csv", swapped(b"# ", b"# not ")),
     ("simulate", "log.h5", swapped(b"rad/s", b"deg/s")),
     ("navigate", "verdict.json", swapped(b"true", b"false")),
+    ("navigate", "verdict.json", swapped(b'"horizontal_position": {', b'"vertical_velocity2": {')),
     ("attitude", "figures/cost.png", lambda data: data[:-30] + b"\0" + data[-29:]),
 ]
 

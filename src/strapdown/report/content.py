@@ -169,23 +169,26 @@ def _difference_of_json(one: Path, two: Path) -> float:
     return max(map(_leaf_difference, *leaves), default=0.0)
 
 
-def _leaves(value: Any, key: str = "") -> Iterator[tuple[str, Any]]:
-    """Every value in JSON with the name of its field; an empty list or object, too."""
+_Leaf = tuple[tuple[str | int, ...], str, Any]
+
+
+def _leaves(value: Any, path: tuple[str | int, ...] = (), key: str = "") -> Iterator[_Leaf]:
+    """Every value in JSON with its place and the name of its field; an empty list, too."""
     if isinstance(value, dict) and value:
         for name, item in value.items():
-            yield from _leaves(item, name)
+            yield from _leaves(item, (*path, name), name)
     elif isinstance(value, list) and value:
-        for item in value:
-            yield from _leaves(item, key)
+        for k, item in enumerate(value):
+            yield from _leaves(item, (*path, k), key)
     elif isinstance(value, int | float) and not isinstance(value, bool):
-        yield key, float(value)
+        yield path, key, float(value)
     else:
-        yield key, value
+        yield path, key, value
 
 
-def _leaf_difference(one: tuple[str, Any], two: tuple[str, Any]) -> float:
-    (key, x), (other, y) = one, two
-    if key != other:
+def _leaf_difference(one: _Leaf, two: _Leaf) -> float:
+    (place, key, x), (other, _, y) = one, two
+    if place != other:
         return math.inf
     if isinstance(x, float) and isinstance(y, float):
         return _apart(key, np.array([x]), np.array([y]), abs(x))
