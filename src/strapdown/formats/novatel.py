@@ -21,7 +21,6 @@ up, clockwise from north.
 
 from __future__ import annotations
 
-import math
 import re
 import struct
 import zlib
@@ -303,6 +302,6 @@ def _values(path: Path, lines: list[str]) -> dict[str, Any]:
             first, *rest = (np.array(part, dtype=np.float64) for part in parts)
             # The sign is that of the degrees, which may be -0.
             sign = np.array([-1.0 if field.startswith("-") else 1.0 for field in parts[0]])
-            small = math.fsum(v / 60.0 ** (j + 1) for j, v in enumerate(rest))
+            small = sum(v / 60.0 ** (j + 1) for j, v in enumerate(rest))
             out[name] = sign * (np.abs(first) + small)
     return out

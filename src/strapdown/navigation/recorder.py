@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from strapdown.dsp.samples import true_runs
 from strapdown.errors import ConfigError, DataError
-from strapdown.estimation.robust import DOUBT, AdaptiveRule
+from strapdown.estimation.robust import DOUBT, FEW, AdaptiveRule
 from strapdown.navigation.measurements.gnss import PLACE, TINY
 from strapdown.navigation.navigator import JUST_BEFORE, Navigator
 from strapdown.navigation.record import (
@@ -320,9 +320,10 @@ def _contradictions(
     A receiver that is rejected so many times in a row is believed again, by and by, and either it
     or the solution was wrong. What separated the two is a part of the uncertainty until it jumps
     back, or for `DOUBT` if it does not; one that returns by itself was wrong until then. After an
-    outage the solution was wrong, as it is while an error swings out.
+    outage the solution was wrong, as it is while an error swings out, and where the receiver is
+    believed sooner.
     """
-    spans = _long_rejections(rejected, patience)
+    spans = _long_rejections(rejected, min(FEW, patience))
     if not spans:
         return
     first = [float(nu[span.start]) for span in spans]
@@ -332,12 +333,14 @@ def _contradictions(
         # The last estimate needs as many observations to settle.
         settled = min(span.stop + patience, len(time))
         size, end = float(np.abs(nu[span]).max()), float(time[settled - 1])
+        long = span.stop - span.start >= patience
         if span.stop < len(time) and abs(nu[span.stop]) < 0.5 * abs(nu[span.stop - 1]):
-            yield float(time[span.start]), float(time[span.stop]), size
+            if long:
+                yield float(time[span.start]), float(time[span.stop]), size
             back = False
             continue
         lately = bool(after_gap[max(span.start - SETTLES, 0) : span.start + 1].any())
-        if lately or back or span.start <= swings:
+        if lately or not long or back or span.start <= swings:
             yield float(time[span.start]), end, size
             back, swings = False, settled + patience
             continue
@@ -350,7 +353,7 @@ def _contradictions(
 
 
 def _long_rejections(rejected: NDArray[np.bool_], patience: int) -> list[slice]:
-    """Spans that begin with so many rejections in a row that the adaptive rule takes the next.
+    """Spans that begin with so many rejections in a row.
 
     Others that follow it, after a few that were taken, are the same: an error swings out.
     """
