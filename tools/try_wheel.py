@@ -24,8 +24,9 @@ DIFFER = {"manifest.json", "timing.json", "index.html"}
 def main(pythons: list[str]) -> int:
     """Return 1 if a file of one version differs from that of the first, 2 if a Python is missing."""
     paths = {name: shutil.which(Path(name).expanduser()) for name in pythons}
-    if missing := [name for name, path in paths.items() if path is None]:
-        print(f"not found: {', '.join(missing)}; make wheels PYTHONS='…'", file=sys.stderr)
+    missing = [name for name, path in paths.items() if path is None]
+    if missing or len(paths) < 2:
+        print(f"two Pythons are needed; not found: {', '.join(missing)}", file=sys.stderr)
         return 2
     with tempfile.TemporaryDirectory(prefix="strapdown-wheels-") as folder:
         base = Path(folder)

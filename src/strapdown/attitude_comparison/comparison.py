@@ -77,6 +77,7 @@ from strapdown.sensors.magnetometer import calibrate_magnetometer, without_iron
 from strapdown.sensors.rest import (
     RestStretch,
     could_be_a_turn,
+    field_turned,
     find_rests,
     gyro_bias_from_rests,
     without_gyro_bias,
@@ -98,8 +99,6 @@ Array = NDArray[np.float64]
 
 #: Standard deviations from which the mean rate at rest is a bias.
 BIAS_SIGNIFICANT = 3.0
-#: Parts of a rest whose mean fields are compared; a share of the field by which they may differ.
-TURN_PARTS, TURNED = 8, 0.1
 
 
 @dataclass(frozen=True, repr=False)
@@ -533,7 +532,7 @@ def _gyro_bias(
             scatter = np.asarray(rests[0].gyro_mean_sd or rests[0].gyro_sd)
             if (np.abs(rests[0].gyro_mean) > BIAS_SIGNIFICANT * scatter).any():
                 choice = "rest"
-        if choice == "rest" and _field_turned(imu, rests[0]):
+        if choice == "rest" and field_turned(imu, rests[0]):
             choice = "turned"
     if spec.gyro_bias_path is not None:
         log = spec.source
@@ -618,18 +617,6 @@ def _of_field(
         if used is not None:
             iron = {"hard_iron": used.hard_iron.tolist(), "soft_iron": used.soft_iron.tolist()}
     return imu, (declination, sd), iron, files
-
-
-def _field_turned(imu: pd.DataFrame, rest: RestStretch) -> bool:
-    """Whether the magnetic field turns in a rest: it is a steady, slow turn then."""
-    if not set(MAG) <= set(imu.columns):
-        return False
-    mag = imu.loc[rest.start : rest.end, MAG].dropna().to_numpy(dtype=np.float64)
-    parts = [part.mean(axis=0) for part in np.array_split(mag, TURN_PARTS) if len(part)]
-    if len(parts) < TURN_PARTS:
-        return False
-    off = np.linalg.norm(np.array(parts) - parts[0], axis=1)
-    return bool(off.max() > TURNED * np.linalg.norm(parts[0]))
 
 
 def _turn_or_bias(rest: RestStretch, source: AttitudeSource) -> list[Finding]:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from strapdown.dsp.samples import occupied_grid
 from strapdown.errors import DataError
 from strapdown.sensors.triad_errors import triad_of
-from strapdown.tables import ACCEL, GYRO
+from strapdown.tables import ACCEL, GYRO, MAG
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
@@ -37,8 +37,8 @@ MAX_ACCEL_SD = 0.3  # m/s²
 LAGS = (1.0, 2.0, 4.0, 8.0)  # s
 MAX_ACCEL_CHANGE = 0.1  # m/s²
 MAX_RATE_CHANGE = 0.0035  # rad/s, 0.2 deg/s
-# What remains beside such a change is a rest where it does not continue it: where the second and
-# the fourth of five parts differ by a tenth of that at most, beyond noise.
+# What remains beside such a change is a rest where it does not continue it: where the three inner
+# ones of five parts differ by a tenth of that in 8 s at most, beyond noise.
 PARTS_BESIDE, SHARE_BESIDE = 5, 0.1
 # The zero-rate output of a low-cost gyro may be off by 20 deg/s (MPU-6050 data sheet, revision 3.4,
 # section 6.1).
@@ -47,6 +47,8 @@ SAME_BIAS = 0.01  # rad/s: rests of one log share their bias to within this
 # A mean rate about the vertical is a bias or a steady turn. Gyros of phones are specified to
 # 1 deg/s or less (ICM-42688-P: 0.5; LSM6DSO: 1), older hobby parts show several.
 COULD_TURN = 0.0175  # rad/s, 1 deg/s
+# Parts of a rest whose mean fields are compared; a share of the field by which they may differ.
+TURN_PARTS, TURNED = 8, 0.1
 # A noise-free (simulated) sensor is at rest where it is constant to rounding.
 ROUNDING = 1e-9  # rad/s
 # Number of parts of a rest whose means give the standard deviation of the overall mean.
@@ -157,7 +159,7 @@ def find_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
         _stretch(time, gyro, accel, int(starts[a]), int(ends[b]))
         for a, b in _runs(still & ~drifts, joined)
         if time[ends[b] - 1] - time[starts[a]] >= LEAST_LENGTH
-        and not _continues(slow, drifts, np.arange(a, b + 1))
+        and not _continues(time[starts], slow, drifts, np.arange(a, b + 1))
     ]
     return of_one_bias(rests)
 
@@ -226,19 +228,26 @@ def _drifts(
 
 
 def _continues(
-    slow: Sequence[tuple[Array, Array, float]], drifts: NDArray[np.bool_], run: Indices
+    start: Array,
+    slow: Sequence[tuple[Array, Array, float]],
+    drifts: NDArray[np.bool_],
+    run: Indices,
 ) -> bool:
     """Whether a run of windows is beside a drift and continues it; see `_drifts`."""
     if not drifts[max(run[0] - 1, 0) : run[-1] + 2].any():
         return False
-    early, late = (np.array_split(run, PARTS_BESIDE)[k] for k in (1, PARTS_BESIDE - 2))
-    if not late.size:
+    if run.size < PARTS_BESIDE:
         return True
+    inner = np.array_split(run, PARTS_BESIDE)[1:-1]
+    middle = [float(start[part].mean()) for part in inner]
     for mean, sd, most in slow:
-        change = np.linalg.norm(mean[late].mean(axis=0) - mean[early].mean(axis=0))
-        noise = 4.0 * math.sqrt(2.0 / late.size) * float(sd[run].max())
-        if change > SHARE_BESIDE * most + noise:
-            return True
+        noise = 4.0 * math.sqrt(2.0 / min(part.size for part in inner)) * float(sd[run].max())
+        means = [mean[part].mean(axis=0) for part in inner]
+        for one, other in ((0, 1), (1, 2), (0, 2)):
+            slowly = max((middle[other] - middle[one]) / LAGS[-1], 1.0)
+            change = np.linalg.norm(means[other] - means[one])
+            if change > SHARE_BESIDE * most * slowly + noise:
+                return True
     return False
 
 
@@ -329,6 +338,18 @@ def could_be_a_turn(rest: RestStretch) -> bool:
     return bool(abs(mean @ force) > COULD_TURN * np.linalg.norm(force))
 
 
+def field_turned(imu: pd.DataFrame, rest: RestStretch) -> bool:
+    """Whether the magnetic field turns in a rest: it is a steady, slow turn then."""
+    if not set(MAG) <= set(imu.columns):
+        return False
+    mag = imu.loc[rest.start : rest.end, MAG].dropna().to_numpy(dtype=np.float64)
+    parts = [part.mean(axis=0) for part in np.array_split(mag, TURN_PARTS) if len(part)]
+    if len(parts) < TURN_PARTS:
+        return False
+    off = np.linalg.norm(np.array(parts) - parts[0], axis=1)
+    return bool(off.max() > TURNED * np.linalg.norm(parts[0]))
+
+
 def _stretch(time: Array, gyro: Array, accel: Array | None, a: int, b: int) -> RestStretch:
     force = None if accel is None else accel[a:b]
     return RestStretch(
@@ -411,10 +432,16 @@ def find_shaking_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
     drifts = _drifts(starts, slow, shakes, SHAKING_LAGS)
     spans: list[tuple[float, float]] = []
     kept = np.flatnonzero(shakes & ~drifts)
-    # Windows that overlap or touch are of one rest.
-    for run in np.split(kept, np.flatnonzero(np.diff(starts[kept]) > SHAKING_WINDOW) + 1):
-        if run.size and not _continues(slow, drifts, run):
-            spans.append((float(starts[run[0]]), float(starts[run[-1]]) + SHAKING_WINDOW))
+    # Windows that overlap or touch are of one rest, if they agree: it may have moved between them.
+    apart = np.diff(starts[kept]) > SHAKING_WINDOW
+    for mean, sd, most in slow:
+        noise = 4.0 * np.hypot(sd[kept[1:]], sd[kept[:-1]])
+        apart |= np.linalg.norm(np.diff(mean[kept], axis=0), axis=1) > most + noise
+    for run in np.split(kept, np.flatnonzero(apart) + 1):
+        if run.size and not _continues(starts, slow, drifts, run):
+            begin, end = float(starts[run[0]]), float(starts[run[-1]]) + SHAKING_WINDOW
+            spans.append((max(begin, spans[-1][1]) if spans else begin, end))
+    spans = [(a, b) for a, b in spans if b - a >= LEAST_LENGTH]
     return of_one_bias([rest_between(imu, a, b, grade="shaking") for a, b in spans])
 
 

@@ -38,12 +38,20 @@ from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.gnss_fixes import GnssOptions
 from strapdown.formats.recording import ABSENT, PLACEHOLDERS, RawLog, Recording
 from strapdown.formats.trajectory_readers import read_trajectory
+from strapdown.frames import ways_between
 from strapdown.navigation.measurements.gnss_clock import time_offset
 from strapdown.navigation.measurements.gnss_readiness import gnss_readiness
 from strapdown.progress import Progress, silent
 from strapdown.sensors.health_log import LEAST_SAMPLES
 from strapdown.sensors.imu_health import ImuHealth, check_imu_channels
-from strapdown.sensors.rest import RestStretch, could_be_a_turn, find_rests_of_every_grade
+from strapdown.sensors.rest import (
+    LEAST_LENGTH,
+    RestStretch,
+    could_be_a_turn,
+    field_turned,
+    find_rests_of_every_grade,
+    rest_between,
+)
 from strapdown.sensors.sampling_health import check_sampling, quantization_step
 from strapdown.systems.alignment_source import body_record
 from strapdown.systems.inputs import Memory, SavedRun
@@ -54,7 +62,7 @@ from strapdown.systems.navigation_proposal import (
     first_motion,
 )
 from strapdown.systems.one_thread import one_thread
-from strapdown.tables import ACCEL, GYRO, POSITION_SD, find_gaps
+from strapdown.tables import ACCEL, GEODETIC, GYRO, MAG, POSITION_SD, find_gaps
 from strapdown.tables.checks import index_of, values_of
 
 __all__ = ["USES", "Diagnosis", "LogDiagnosis", "refused_fixes", "run_doctor"]
@@ -69,6 +77,8 @@ ROUNDS = 4
 LEAST_RATE, USELESS_RATE = 20.0, 4.0
 #: Rate of delta-V in 49 CFR 563, Hz; its interval, s, and the change that is an event, m/s.
 EVENT_RATE, EVENT, EVENT_DV = 100.0, 0.15, 8.0 / 3.6
+#: Fixes before the first that shows a motion in which it may have begun.
+MARGIN = 2
 #: Mean before an event that is subtracted with gravity, s.
 BEFORE = 0.5
 
@@ -472,17 +482,26 @@ def _channels(
 def _unmoved(
     rests: tuple[RestStretch, ...], streams: Mapping[str, pd.DataFrame]
 ) -> tuple[RestStretch, ...]:
-    """Rests in which fixes show no motion: a steady turn is still to a gyro, too."""
+    """Rests until the fixes in them move, and in which the magnetic field does not turn.
+
+    A steady turn and a constant speed are still to gyros and accelerometers, too.
+    """
+    imu = streams["imu"]
+    rests = tuple(rest for rest in rests if not field_turned(imu, rest))
     if "gnss" not in streams:
         return rests
-    fixes, _ = _on_clock(streams["gnss"], streams["imu"])
-    time = index_of(fixes)
-    inside = [fixes[(time >= rest.start) & (time <= rest.end)] for rest in rests]
-    return tuple(
-        rest
-        for rest, part in zip(rests, inside, strict=True)
-        if len(part) < 2 or first_motion(part)[0] is None
-    )
+    fixes = _known_sd(_on_clock(streams["gnss"], imu)[0])
+    kept, time = [], index_of(fixes)
+    for rest in rests:
+        inside = (time >= rest.start) & (time <= rest.end)
+        moved = first_motion(fixes[inside])[0] if inside.sum() > 1 else None
+        if moved is None:
+            kept.append(rest)
+            continue
+        end = float(time[inside][max(moved - MARGIN, 0)])
+        if end - rest.start >= LEAST_LENGTH:
+            kept.append(rest_between(imu, rest.start, end, grade=rest.grade))
+    return tuple(kept)
 
 
 def _fixes_against(
@@ -812,13 +831,39 @@ def _rate(one: LogDiagnosis) -> float:
     return next(float(s["rate_hz"]) for s in one.data["streams"] if s["name"] == "imu")
 
 
+def _decided(one: LogDiagnosis, rest: RestStretch) -> bool:
+    """Whether more than gyros and accelerometers show that a rest is one.
+
+    A magnetic field that stays, or fixes over half of it that stay within their errors.
+    """
+    if set(MAG) <= set(one.streams["imu"].columns):
+        return True
+    if "gnss" not in one.streams:
+        return False
+    fixes = _known_sd(_on_clock(one.streams["gnss"], one.streams["imu"])[0])
+    time = index_of(fixes)
+    inside = (time >= rest.start) & (time <= rest.end)
+    if inside.sum() < 2 or np.ptp(time[inside]) < 0.5 * (rest.end - rest.start):
+        return False
+    way = ways_between(values_of(fixes, GEODETIC)[inside][[0, -1]])
+    sd = values_of(fixes, POSITION_SD)[inside][[0, -1], :2].max(axis=1)
+    return bool(way[0] <= 2.0 * float(np.hypot(*sd)))
+
+
+def _known_sd(fixes: pd.DataFrame) -> pd.DataFrame:
+    """Fixes with the standard deviation of a code receiver where they state none."""
+    fixes, sd = fixes.copy(), values_of(fixes, POSITION_SD)
+    fixes[POSITION_SD] = np.where(np.isfinite(sd), sd, CODE_POSITION_SD)
+    return fixes
+
+
 def _bias(one: LogDiagnosis) -> Finding:
     """How well the gyro bias is known from the longest rest."""
     if not one.rests:
         return Finding("doctor.bias-unknown", file=one.name)
     rest = max(one.rests, key=lambda r: r.end - r.start)
     sd = float(np.max(rest.gyro_mean_sd or rest.gyro_sd))
-    turn = could_be_a_turn(rest) and "gnss" not in one.streams
+    turn = could_be_a_turn(rest) and not _decided(one, rest)
     return Finding(
         "doctor.bias-or-turn" if turn else "doctor.bias-from-rest",
         severity="warning" if turn else "note",

@@ -39,10 +39,13 @@ PART = 1 << 21
 _MAPS: weakref.WeakSet[mmap.mmap] = weakref.WeakSet()
 
 
-def room(shape: tuple[int, ...], kind: type[np.generic] = np.float64) -> NDArray[Any]:
+def room(
+    shape: tuple[int, ...], kind: np.dtype[Any] | type[np.generic] = np.float64
+) -> NDArray[Any]:
     """Return an array to be filled; in memory if it is small, or if the disk has no place for it.
 
-    The file is in the folder for temporary files, without a name, and gone with the array.
+    The file is in the folder for temporary files, without a name, and gone with the array. A
+    process that forks shares it with its child. In memory on macOS and Windows.
     """
     size = np.dtype(kind).itemsize * int(np.prod(shape))
     if size >= LARGE and hasattr(os, "posix_fallocate") and hasattr(mmap, "MADV_DONTNEED"):
@@ -68,7 +71,7 @@ def parts_of(rows: int, width: int) -> Iterator[slice]:
 def stored(array: NDArray[Any], rows: NDArray[Any] | None = None) -> NDArray[Any]:
     """Return a copy in a `room` of its own, of all rows or of those of some indices."""
     count = len(array) if rows is None else len(rows)
-    out = room((count, *array.shape[1:]), array.dtype.type)
+    out = room((count, *array.shape[1:]), array.dtype)
     # What lies between the rows of a column of a table is read with them.
     width = max(int(np.prod(array.shape[1:])), *(abs(step) // 8 for step in array.strides[:1]))
     for part in parts_of(count, width):

@@ -183,3 +183,35 @@ def test_a_rate_about_the_vertical_could_be_a_turn(rate, force, turns):
         table = imu_table(table.index, table.to_numpy()[:, :3], np.array(force) + noise)
     (rest,) = find_rests(table)
     assert could_be_a_turn(rest) == turns
+
+
+@pytest.mark.parametrize("phase", [0.0, 0.25, 0.6])
+def test_two_rests_with_a_motion_between_are_not_one(phase):
+    """A table that turns at 5 deg/s for a minute, and one that stays; the windows of 4 s touch."""
+    time = np.arange(10000) / 100
+    rng, zero = np.random.default_rng(0), np.zeros(10000)
+    at = np.array([20.0, 20.2, 80.0, 80.2]) + phase
+    turn = np.interp(time, at, np.radians([0.0, 5.0, 5.0, 0.0]))
+    push = np.interp(time, at, [0.0, 0.3, 0.3, 0.0])
+    level = np.column_stack([zero, zero, zero - 9.81]) + 0.01 * rng.normal(size=(10000, 3))
+    noise = 1e-3 * rng.normal(size=(10000, 3))
+    turned = imu_table(time, noise + np.column_stack([zero, zero, turn]), level)
+    pushed = imu_table(time, noise, level + np.column_stack([push, zero, zero]))
+    for table in (turned, pushed):
+        rests = find_rests_of_every_grade(table)
+        assert not any(r.start < 19.0 and r.end > 22.0 + phase for r in rests)
+        assert rests[0].start == 0.0
+        assert rests[0].end == pytest.approx(20.0 + phase, abs=1.1)
+
+
+def test_a_slow_drift_of_the_sensor_before_a_nudge_is_still_a_rest():
+    """Ten minutes in which the accelerometer creeps by 3 mg, then a tilt by a degree."""
+    time = np.arange(0.0, 630.0, 0.02)
+    rng, zero = np.random.default_rng(1), np.zeros_like(time)
+    creep = 0.03 * np.minimum(time / 600.0, 1.0) + np.interp(time, [600.0, 603.0], [0.0, 0.17])
+    force = np.column_stack([creep, zero, zero - 9.81]) + 0.01 * rng.normal(size=(time.size, 3))
+    before, after = find_rests(imu_table(time, 1e-3 * rng.normal(size=force.shape), force))
+    assert (before.start, after.end) == (0.0, pytest.approx(630.0, abs=0.1))
+    # A comparison over 8 s marks no more than the twelve around the change.
+    assert before.end > 588.0
+    assert after.start < 615.0

@@ -516,3 +516,48 @@ def test_fixes_of_a_rest_leave_it(circle, tmp_path):
     one, _ = sd.doctor([log, fixes]).logs
     assert len(one.rests) == 1
     assert "doctor.bias-from-rest" in [f.code for f in one.fit["attitude"]]
+
+
+def test_fixes_cut_a_rest_where_they_begin_to_move(tmp_path):
+    """A train: 40 s in its station, then at constant speed; the samples show a rest of a minute."""
+    rng, time = np.random.default_rng(6), np.arange(0.0, 60.0, 0.01)
+    noise = rng.normal(size=(time.size, 6))
+    table = np.column_stack([time, 1e-4 * noise[:, :3], 0.01 * noise[:, 3:]])
+    table[:, 6] -= 9.81
+    log, fixes = tmp_path / "train.csv", tmp_path / "fixes.csv"
+    written(pd.DataFrame(table, columns=COLUMNS), log)
+    at = time[::100]
+    north = 10.0 * np.maximum(at - 40.0, 0.0)
+    # No standard deviations: those of a code receiver are taken.
+    rows = [
+        f"{t},{45.0 + np.degrees(n / 6.37e6):.9f},10.0,100.0"
+        for t, n in zip(at, north, strict=True)
+    ]
+    fixes.write_text("\n".join(["time_s,lat_deg,lon_deg,alt_m", *rows]) + "\n")
+    (alone,) = sd.doctor(log).logs
+    assert alone.rests[0].end == pytest.approx(59.99)
+    one, _ = sd.doctor([log, fixes]).logs
+    (rest,) = one.rests
+    assert rest.start == 0.0
+    # Positions of 5 m each show 10 m/s beyond doubt after two or three seconds; two fixes less.
+    assert 37.0 <= rest.end <= 45.0
+
+
+def test_a_magnetometer_decides_between_bias_and_turn(tmp_path):
+    rng, time = np.random.default_rng(6), np.arange(0.0, 60.0, 0.01)
+    noise, zero = rng.normal(size=(time.size, 9)), np.zeros_like(time)
+    gyro = 1e-4 * noise[:, :3] + [0.0, 0.0, np.radians(5.0)]
+    accel = 0.01 * noise[:, 3:6] + [0.0, 0.0, -9.81]
+    names = [*COLUMNS, *(f"mag_{a}_uT" for a in "xyz")]
+    angle = np.radians(5.0) * time
+    for turns, count in ((True, 0), (False, 1)):
+        a = angle if turns else zero
+        field = 0.1 * noise[:, 6:] + np.column_stack([20 * np.cos(a), -20 * np.sin(a), zero + 40])
+        path = tmp_path / f"{turns}.csv"
+        rows = np.column_stack([time, gyro, accel, field])
+        pd.DataFrame(rows, columns=names).to_csv(path, index=False)
+        (one,) = sd.doctor(path).logs
+        assert len(one.rests) == count
+        said = [f.code for f in one.fit["attitude"]]
+        assert "doctor.bias-or-turn" not in said
+        assert ("doctor.bias-from-rest" in said) == (count == 1)
