@@ -9,7 +9,7 @@ import pandas as pd
 import pytest
 from tests import town_drive as town
 
-from strapdown.estimation.robust import FEW, HUBER, AdaptiveRule, AdaptiveScale, Igg3
+from strapdown.estimation.robust import HUBER, AdaptiveRule, AdaptiveScale, Igg3
 from strapdown.frames import geodetic_from_ned
 from strapdown.navigation.heading_checks import _known
 from strapdown.navigation.measurements.clock_windows import unsure_steps
@@ -99,7 +99,7 @@ def test_a_receiver_is_rejected_for_as_long_as_it_had_agreed(before, step):
     assert sum(jumps([*followed, *[-20.0] * 60], before=3, step=step)[len(followed) :]) == 6
 
 
-@pytest.mark.parametrize(("gap", "refused"), [(4.0, FEW), (3.0, RULE.scale.patience)])
+@pytest.mark.parametrize(("gap", "refused"), [(4.0, 2), (3.0, 10)])
 def test_an_error_that_an_outage_can_have_made_is_taken_off_after_few_fixes(gap, refused):
     """With 3 m/s² a solution goes 24 m wrong in four seconds, and in three no more than 13.5 m."""
     scale, state, rejected = RULE.scale, RULE.scale.begin(), 0
@@ -116,6 +116,14 @@ def test_an_error_that_an_outage_can_have_made_is_taken_off_after_few_fixes(gap,
         state = scale.jumped(state, after, 20.0, time, 1.5 * (time - state.time) ** 2)
     assert update.influence == HUBER
     assert rejected == refused
+
+
+@pytest.mark.parametrize(("taken", "spans"), [(0.9, [(50.0, 56.0, 1.0)]), (0.1, [])])
+def test_after_few_rejections_a_receiver_is_a_part_of_the_bound_until_it_has_settled(taken, spans):
+    """Ten observations of half a second from the first that was taken; none if it came back."""
+    time, nu, rejected = 0.5 * np.arange(400), np.zeros(400), np.zeros(400, bool)
+    nu[100:103], rejected[100:103], nu[103] = 1.0, True, taken
+    assert list(_contradictions(time, nu, rejected, 10)) == spans
 
 
 def test_a_receiver_that_returns_for_a_moment_is_doubted_as_it_was():

@@ -215,3 +215,16 @@ def test_a_slow_drift_of_the_sensor_before_a_nudge_is_still_a_rest():
     # A comparison over 8 s marks no more than the twelve around the change.
     assert before.end > 588.0
     assert after.start < 615.0
+
+
+def test_a_touch_of_half_a_second_is_no_drift():
+    """0.26 deg/s for as long as a window: beyond the limit in one, within it over half a lag."""
+    rng, time = np.random.default_rng(2), np.arange(3000) / 100
+    gyro = 3e-4 * rng.normal(size=(3000, 3))
+    gyro[:, 1] += np.where((time >= 15.0) & (time < 15.5), 0.0045, 0.0)
+    # A quarter of the windows scatter more, so that the touch is still within three times theirs.
+    gyro[:, 0] += np.where(
+        time < 12.0, 1.2e-3 * rng.normal(size=3000), 1.2e-3 * np.sin(300.0 * time)
+    )
+    (rest,) = find_rests(imu_table(time, gyro))
+    assert rest.end - rest.start > 29.0

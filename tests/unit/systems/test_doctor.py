@@ -561,3 +561,15 @@ def test_a_magnetometer_decides_between_bias_and_turn(tmp_path):
         said = [f.code for f in one.fit["attitude"]]
         assert "doctor.bias-or-turn" not in said
         assert ("doctor.bias-from-rest" in said) == (count == 1)
+
+
+def test_fixes_that_may_move_do_not_decide(circle):
+    """Four seconds of the turn, and positions without a standard deviation: 30 m are no rest."""
+    log, fixes = circle
+    log.write_text("".join(log.read_text().splitlines(keepends=True)[:361]))
+    table = pd.read_csv(fixes).iloc[:4]
+    kept = [name for name in table.columns if not name.startswith(("V", "v")) and "sd" not in name]
+    table[kept].to_csv(fixes, index=False)
+    one, _ = sd.doctor([log, fixes]).logs
+    assert len(one.rests) == 1
+    assert "doctor.bias-or-turn" in [f.code for f in one.fit["attitude"]]
