@@ -368,6 +368,18 @@ def follow(which, states, earth, reference, reference_sensors, turn, errors):
 
 
 @njit(cache=True, error_model="numpy")
+def go_on_from(state, open_history, at_covariance, history, row):
+    """Begin a group of steps at a changed state; it is shown in a row, too, unless that is -1."""
+    for j in range(open_history.shape[1]):
+        open_history[0, j] = state[j]
+    for j in range(state.shape[0]):
+        at_covariance[j] = state[j]
+    if row >= 0:
+        for j in range(history.shape[1]):
+            history[row, j] = state[j]
+
+
+@njit(cache=True, error_model="numpy")
 def over_fixes(
     kinds,
     model,
@@ -516,13 +528,8 @@ def over_fixes(
             noted += 1
             carry_errors(notes, carried, noted, errors, left)
             carried = noted
-            for j in range(open_history.shape[1]):
-                open_history[0, j] = state[j]
-            for j in range(state.shape[0]):
-                at_covariance[j] = state[j]
-            if made > 0 and times[AT_STEP] <= time[made - 1] + same:
-                for j in range(history.shape[1]):
-                    history[made - 1, j] = state[j]
+            ends = made > 0 and times[AT_STEP] <= time[made - 1] + same
+            go_on_from(state, open_history, at_covariance, history, made - 1 if ends else -1)
             followed += 1
             continue
         of_place = fixes[done, CODE] == place_code
@@ -603,13 +610,8 @@ def over_fixes(
         if not feeds_back:
             for j in range(sensors.shape[0]):
                 marked_sensors[done, 1, j] += errors[9 + j]
-        for j in range(open_history.shape[1]):
-            open_history[0, j] = state[j]
-        for j in range(state.shape[0]):
-            at_covariance[j] = state[j]
-        if made > 0 and times[AT_STEP] <= time[made - 1] + same:
-            for j in range(history.shape[1]):
-                history[made - 1, j] = state[j]
+        ends = made > 0 and times[AT_STEP] <= time[made - 1] + same
+        go_on_from(state, open_history, at_covariance, history, made - 1 if ends else -1)
         note_at = times[AT_COVARIANCE] + interval
         done += 1
     if not feeds_back:

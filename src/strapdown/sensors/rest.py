@@ -153,13 +153,14 @@ def find_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
         accel_sd = _window_sd(accel, starts, ends)
         still &= accel_sd <= MAX_ACCEL_SD
         slow.append((_window_mean(accel, starts, ends), accel_sd / root, MAX_ACCEL_CHANGE))
-    drifts = _drifts(time[starts], slow, still)
-    joined = time[starts[1:]] - time[ends[:-1] - 1] < LEAST_LENGTH
+    begins = time[starts]
+    drifts = _drifts(begins, slow, still)
+    joined = begins[1:] - time[ends[:-1] - 1] < LEAST_LENGTH
     rests = [
         _stretch(time, gyro, accel, int(starts[a]), int(ends[b]))
         for a, b in _runs(still & ~drifts, joined)
-        if time[ends[b] - 1] - time[starts[a]] >= LEAST_LENGTH
-        and not _continues(time[starts], slow, drifts, np.arange(a, b + 1))
+        if time[ends[b] - 1] - begins[a] >= LEAST_LENGTH
+        and not _continues(begins, slow, drifts, np.arange(a, b + 1))
     ]
     return of_one_bias(rests)
 

@@ -490,7 +490,7 @@ def _unmoved(
     rests = tuple(rest for rest in rests if not field_turned(imu, rest))
     if "gnss" not in streams:
         return rests
-    fixes = _known_sd(_on_clock(streams["gnss"], imu)[0])
+    fixes = _comparable(streams)
     kept, time = [], index_of(fixes)
     for rest in rests:
         inside = (time >= rest.start) & (time <= rest.end)
@@ -618,8 +618,8 @@ def _impact(imu: pd.DataFrame) -> dict[str, float] | None:
 def _stream(name: str, table: pd.DataFrame) -> dict[str, Any]:
     time = index_of(table)
     gaps = find_gaps(time) if (np.diff(time) > 0.0).all() else []
-    lost = float(math.fsum(g.length - g.usual for g in gaps))
-    lasting = float(time[-1] - time[0]) - float(math.fsum(g.length for g in gaps))
+    lost = math.fsum(g.length - g.usual for g in gaps)
+    lasting = float(time[-1] - time[0]) - math.fsum(g.length for g in gaps)
     clock = clock_of(table)
     return {
         "name": name,
@@ -840,7 +840,7 @@ def _decided(one: LogDiagnosis, rest: RestStretch) -> bool:
         return True
     if "gnss" not in one.streams:
         return False
-    fixes = _known_sd(_on_clock(one.streams["gnss"], one.streams["imu"])[0])
+    fixes = _comparable(one.streams)
     time = index_of(fixes)
     inside = (time >= rest.start) & (time <= rest.end)
     if inside.sum() < 2 or np.ptp(time[inside]) < 0.5 * (rest.end - rest.start):
@@ -850,9 +850,10 @@ def _decided(one: LogDiagnosis, rest: RestStretch) -> bool:
     return bool(way[0] <= 2.0 * float(np.hypot(*sd)))
 
 
-def _known_sd(fixes: pd.DataFrame) -> pd.DataFrame:
-    """Fixes with the standard deviation of a code receiver where they state none."""
-    fixes, sd = fixes.copy(), values_of(fixes, POSITION_SD)
+def _comparable(streams: Mapping[str, pd.DataFrame]) -> pd.DataFrame:
+    """Fixes on the clock of the samples, with the sd of a code receiver where they state none."""
+    fixes = _on_clock(streams["gnss"], streams["imu"])[0].copy()
+    sd = values_of(fixes, POSITION_SD)
     fixes[POSITION_SD] = np.where(np.isfinite(sd), sd, CODE_POSITION_SD)
     return fixes
 
