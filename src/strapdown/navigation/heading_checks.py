@@ -48,6 +48,7 @@ from strapdown.navigation.preprocessing import NEAR as NEAR_FIXES
 from strapdown.navigation.preprocessing import joined_steps
 from strapdown.navigation.record import (
     GrowingRows,
+    InnovationColumns,
     NavigationChunk,
     NavigationRecord,
     state_of_row,
@@ -204,9 +205,9 @@ class _Check:
         return self.result
 
     def _take(self, piece: NavigationChunk) -> None:
-        if piece.marks:
-            rows = np.array([[mark.time, *mark.covariance.ravel()] for mark in piece.marks])
-            self.marks = self.marks.and_then(rows)
+        if len(piece.marks):
+            flat = piece.marks.covariance.reshape(-1, 81)
+            self.marks = self.marks.and_then(np.column_stack([piece.marks.time, flat]))
         if len(piece.time):
             # The first of each second.
             seconds = np.arange(math.floor(self.newest), math.floor(piece.time[-1]) + 2.0)
@@ -217,10 +218,8 @@ class _Check:
             self.history, self.newest = self.history.and_then(rows), float(piece.time[-1])
         if piece.seen:
             # The vertical innovation does not observe the heading.
-            nu = np.array([one.innovations.nu[:2] for one in piece.seen])
-            s = np.array([one.innovations.s[:2] for one in piece.seen])
-            time = [one.time for one in piece.seen]
-            self.seen = self.seen.and_then(np.column_stack([time, nu / np.sqrt(s)]))
+            rows = np.concatenate([_horizontal(of) for of in piece.seen.by_name()])
+            self.seen = self.seen.and_then(rows[np.argsort(rows[:, 0], kind="stable")])
 
     def evidence(self, after: float = -math.inf) -> HeadingCheck:
         """Return the result at each second, or each after an instant."""
@@ -269,6 +268,12 @@ class _Check:
         for k in np.flatnonzero(~full & (upto >= FEWEST)).tolist():
             out[k] = _scatter(u[: upto[k]].reshape(1, -1))[0]
         return out
+
+
+def _horizontal(of: InnovationColumns) -> Array:
+    """Times, and innovations of two components over their expected standard deviations, (m, 3)."""
+    told = of.innovations
+    return np.column_stack([of.time, told.nu[:, :2] / np.sqrt(told.s[:, :2])])
 
 
 def _after(time: float, fixes: Epochs) -> Epochs:

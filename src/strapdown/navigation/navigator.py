@@ -63,7 +63,12 @@ from strapdown.navigation.measurements.measurement import (
     TabulatedMeasurement,
     View,
 )
-from strapdown.navigation.record import CovarianceSnapshot, InnovationRecord, NavigationChunk
+from strapdown.navigation.record import (
+    CovarianceSnapshots,
+    InnovationColumns,
+    InnovationRecords,
+    NavigationChunk,
+)
 
 if TYPE_CHECKING:
     from strapdown.navigation.smoother import RauchTungStriebel
@@ -391,8 +396,8 @@ class EpochLoop:
         self.steady = state.steady.copy()
         self.begun_steady = state.steady
         self.steadies: Array | None = None
-        self.seen: list[InnovationRecord] = []
-        self.marks: list[CovarianceSnapshot] = []
+        self.seen: list[InnovationColumns] = []
+        self.marks: list[CovarianceSnapshots] = []
         self.late: list[tuple[str, float]] = []
         self.engine.nodes = NodeRows(navigator.filter, navigator.smoother is not None)
         if state.marked == -np.inf:
@@ -544,31 +549,20 @@ class EpochLoop:
 
     def _fixed(self, aid: Gnss, fixes: Epochs, fixed: tuple[Array, ...]) -> None:
         """Record the results of position fixes."""
-        innovations, times, *marks = fixed
-        count, after = len(times), times[:, 1].tolist()
-        codes = fixes.values[:count, 0].tolist()
-        names = {code: aid.names(code) for code in set(codes)}
-        told = map(Innovations, innovations[:, 0], innovations[:, 1], innovations[:, 2])
-        self.seen += [
-            InnovationRecord(at, *names[code], nu)
-            for at, code, nu in zip(after, codes, told, strict=True)
-        ]
-        if not count:
+        told, times, *marks = fixed
+        if not len(times):
             return
-        times = times - [JUST_BEFORE, 0.0]
+        codes = fixes.values[: len(times), 0]
+        for code in dict.fromkeys(codes.tolist()):
+            of = codes == code
+            innovations = Innovations(*told[of].transpose(1, 0, 2))
+            self.seen.append(InnovationColumns(*aid.names(code), times[of, 1], innovations))
         made = np.isfinite(times)
-        stamps = times[made]
+        stamps = (times - [JUST_BEFORE, 0.0])[made]
         # Without a copy where there is a mark before each fix: of an hour they are many.
         kept = [each.reshape(-1, *each.shape[2:]) if made.all() else each[made] for each in marks]
-        new = list(map(CovarianceSnapshot, stamps.tolist(), *kept))
-        if (np.diff(stamps) > SAME_INSTANT).all():
-            self._add_mark(new[0])
-            self.marks += new[1:]
-            self.marked = new[-1].time
-        else:
-            for mark in new:
-                self._add_mark(mark)
-        self.observed = after[-1]
+        self.marks.append(CovarianceSnapshots(stamps, *kept))
+        self.marked, self.observed = float(stamps[-1]), float(times[-1, 1])
 
     def state(self) -> NavigatorState:
         """Current state."""
@@ -589,8 +583,8 @@ class EpochLoop:
         return NavigationChunk(
             self.time,
             self.history,
-            tuple(self.seen),
-            tuple(self.marks),
+            InnovationRecords(self.seen),
+            CovarianceSnapshots.joined(self.marks, SAME_INSTANT),
             tuple(self.late),
             self.engine.nodes.blocks(),
             self.engine.left_at_nodes(),
@@ -650,10 +644,10 @@ class EpochLoop:
             known = [self.engine.known(one) for one in observations]
             rules = [aid.rule or filter_.rule for aid, _ in told]
             innovations = self._told(rules, observations, view)
-            self.seen += [
-                InnovationRecord(at, one.name, one.labels, nu, one)
-                for one, nu in zip(known, innovations, strict=True)
-            ]
+            for one, nu in zip(known, innovations, strict=True):
+                row = Innovations(nu.nu[None], nu.s[None], nu.weight[None])
+                columns = InnovationColumns(one.name, one.labels, np.array([at]), row, one)
+                self.seen.append(columns)
         self.mark()
 
     def _forget(self, at: float) -> None:
@@ -713,13 +707,10 @@ class EpochLoop:
         P, left = filter_.physical_covariance(state), self.engine.left()
         C_nl, ned = filter_.mechanization.level_from_ned(state.row).T, np.empty((9, 9))
         turn_blocks(np.ascontiguousarray(C_nl), P[:9, :9] + left[:, None] * left, ned)
-        mark = CovarianceSnapshot(
-            state.time - before,
-            ned,
-            self.engine.estimates(filter_),
-            self._sd(state.time, P),
-        )
-        self._add_mark(mark)
+        self.marked = state.time - before
+        estimates, sd = self.engine.estimates(filter_), self._sd(state.time, P)
+        row = CovarianceSnapshots(np.array([self.marked]), ned[None], estimates[None], sd[None])
+        self.marks.append(row)
 
     def _sd(self, time: float, P: Array) -> Array:
         """Standard deviations of the sensor errors; refuses an invalid covariance."""
@@ -742,9 +733,3 @@ class EpochLoop:
                 time=time,
             )
         return np.sqrt(np.maximum(variances[9:], 0.0))
-
-    def _add_mark(self, mark: CovarianceSnapshot) -> None:
-        if self.marks and self.marks[-1].time >= mark.time - SAME_INSTANT:
-            self.marks.pop()
-        self.marks.append(mark)
-        self.marked = mark.time

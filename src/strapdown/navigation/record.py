@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 import pandas as pd
@@ -26,9 +27,12 @@ from strapdown.tables.checks import as_array
 
 __all__ = [
     "CovarianceSnapshot",
+    "CovarianceSnapshots",
     "Event",
     "GrowingRows",
+    "InnovationColumns",
     "InnovationRecord",
+    "InnovationRecords",
     "NavigationChunk",
     "NavigationRecord",
     "Span",
@@ -193,6 +197,68 @@ class InnovationRecord(NamedTuple):
     observation: Observation | None = None
 
 
+class InnovationColumns(NamedTuple):
+    """Observations of one name, by columns: m instants, c components.
+
+    Attributes
+    ----------
+    name, labels
+        As of an `InnovationRecord`.
+    time : ndarray, (m,), s
+    innovations : Innovations
+        Arrays (m, c).
+    observation : Observation, optional
+        Of a single one.
+    """
+
+    name: str
+    labels: tuple[str, ...]
+    time: Array
+    innovations: Innovations
+    observation: Observation | None = None
+
+    def each(self) -> Iterator[InnovationRecord]:
+        """Return the single observations."""
+        told = self.innovations
+        for at, *rows in zip(self.time.tolist(), told.nu, told.s, told.weight, strict=True):
+            yield InnovationRecord(at, self.name, self.labels, Innovations(*rows), self.observation)
+
+
+@dataclass(frozen=True, eq=False)
+class InnovationRecords(Sequence[InnovationRecord]):
+    """Observations of a chunk, in the order of time; those of one instant in that of the parts."""
+
+    parts: Sequence[InnovationColumns] = ()
+
+    @cached_property
+    def _each(self) -> list[InnovationRecord]:
+        every = (one for part in self.parts for one in part.each())
+        return sorted(every, key=lambda one: one.time)
+
+    def by_name(self) -> Iterator[InnovationColumns]:
+        """Return the observations of each name, by its components."""
+        found: dict[tuple[str, tuple[str, ...]], list[InnovationColumns]] = {}
+        for part in self.parts:
+            found.setdefault((part.name, part.labels), []).append(part)
+        for (name, labels), of in found.items():
+            told = [(one.innovations.nu, one.innovations.s, one.innovations.weight) for one in of]
+            columns = map(np.concatenate, zip(*told, strict=True))
+            time = np.concatenate([one.time for one in of])
+            yield InnovationColumns(name, labels, time, Innovations(*columns))
+
+    def __len__(self) -> int:
+        return sum(len(part.time) for part in self.parts)
+
+    @overload
+    def __getitem__(self, k: int) -> InnovationRecord: ...
+
+    @overload
+    def __getitem__(self, k: slice) -> list[InnovationRecord]: ...
+
+    def __getitem__(self, k: int | slice) -> InnovationRecord | list[InnovationRecord]:
+        return self._each[k]
+
+
 def innovation_labels(innovations: pd.DataFrame) -> list[str]:
     """Return the labels of the components in a table of innovations, with units.
 
@@ -225,6 +291,43 @@ class CovarianceSnapshot(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
+class CovarianceSnapshots(Sequence[CovarianceSnapshot]):
+    """Snapshots of a chunk, by columns: the attributes of one, (m, …) each."""
+
+    time: Array
+    covariance: Array
+    sensors: Array
+    sensors_sd: Array
+
+    @classmethod
+    def joined(cls, parts: Sequence[CovarianceSnapshots], same: float) -> CovarianceSnapshots:
+        """Join parts, in order; of snapshots within `same` seconds the last one counts."""
+        parts = [part for part in parts if len(part)]
+        if not parts:
+            return cls(np.empty(0), np.empty((0, 9, 9)), np.empty((0, 0)), np.empty((0, 0)))
+        names = [one.name for one in fields(cls)]
+        columns = [[getattr(part, name) for part in parts] for name in names]
+        whole = [of[0] if len(of) == 1 else np.concatenate(of) for of in columns]
+        newer = np.diff(whole[0], append=np.inf) > same
+        return cls(*(whole if newer.all() else (of[newer] for of in whole)))
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @overload
+    def __getitem__(self, k: int) -> CovarianceSnapshot: ...
+
+    @overload
+    def __getitem__(self, k: slice) -> CovarianceSnapshots: ...
+
+    def __getitem__(self, k: int | slice) -> CovarianceSnapshot | CovarianceSnapshots:
+        columns = self.covariance[k], self.sensors[k], self.sensors_sd[k]
+        if isinstance(k, slice):
+            return CovarianceSnapshots(self.time[k], *columns)
+        return CovarianceSnapshot(float(self.time[k]), *columns)
+
+
+@dataclass(frozen=True, eq=False)
 class NavigationChunk:
     """Result of a chunk of a log.
 
@@ -234,9 +337,9 @@ class NavigationChunk:
         Ends of the steps.
     history : ndarray, (n, row)
         Rows of the mechanization then, with the estimates subtracted.
-    seen : tuple of Seen
+    seen : InnovationRecords
         In the order in which they were taken.
-    marks : tuple of Mark
+    marks : CovarianceSnapshots
         At every epoch, and at least as often as the navigator's `mark_interval`; where an outage
         ends, before it, too. The newest sample has one by `Navigator.finish`.
     late : tuple of (str, float)
@@ -250,8 +353,8 @@ class NavigationChunk:
 
     time: Array
     history: Array
-    seen: tuple[InnovationRecord, ...]
-    marks: tuple[CovarianceSnapshot, ...]
+    seen: InnovationRecords
+    marks: CovarianceSnapshots
     late: tuple[tuple[str, float], ...] = ()
     nodes: tuple[Array, ...] = ()
     left: Array = field(default_factory=lambda: np.empty((0, 9)))

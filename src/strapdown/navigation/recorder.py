@@ -18,10 +18,9 @@ from strapdown.estimation.robust import DOUBT, FEW, AdaptiveRule
 from strapdown.navigation.measurements.gnss import PLACE, TINY
 from strapdown.navigation.navigator import JUST_BEFORE, Navigator
 from strapdown.navigation.record import (
-    CovarianceSnapshot,
+    CovarianceSnapshots,
     Event,
     GrowingRows,
-    InnovationRecord,
     NavigationChunk,
     NavigationRecord,
     Span,
@@ -133,12 +132,14 @@ class Tape:
     _seen: dict[str, GrowingRows] = field(init=False, repr=False, default_factory=dict)
     _state_cell: float = field(init=False, repr=False, default=-math.inf)
     _mark_cell: float = field(init=False, repr=False, default=-math.inf)
-    _newest_mark: Array | None = field(init=False, repr=False, default=None)
+    #: The newest mark, where it is not among them, (0 or 1, …).
+    _newest: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         count = self.navigator.filter.model.stacked.sd.size
         self._states = GrowingRows.of(1 + self.navigator.filter.mechanization.row)
         self._marks = GrowingRows.of(1 + 81 + 2 * count)
+        self._newest = self._marks.rows
 
     def take(self, piece: NavigationChunk) -> None:
         """Append the result of a chunk."""
@@ -149,10 +150,14 @@ class Tape:
             self._state_cell = float(cells[-1])
             rows = np.column_stack([piece.time[first], piece.history[first]])
             self._states = self._states.and_then(rows)
-        for mark in piece.marks:
-            self._mark(mark)
-        for one in piece.seen:
-            self._observed(one)
+        self._take_marks(piece.marks)
+        for of in piece.seen.by_name():
+            if of.name not in self._seen:
+                self._labels[of.name] = of.labels
+                self._seen[of.name] = GrowingRows.of(1 + 3 * len(of.labels))
+            told = of.innovations
+            rows = np.column_stack([of.time, told.nu, told.s, told.weight])
+            self._seen[of.name] = self._seen[of.name].and_then(rows)
 
     def record(
         self,
@@ -182,9 +187,9 @@ class Tape:
         if not len(states):
             raise DataError("navigation.no-step", file=source, quantity="time")
         used, model = self.navigator.filter.mechanization, self.navigator.filter.model
-        if self._newest_mark is not None:
+        if len(self._newest):
             # Another value, of which a later mark knows nothing.
-            marks = self._marks.and_then(self._newest_mark).rows
+            marks = self._marks.and_then(self._newest).rows
         count = model.stacked.sd.size
         at_marks = on_disk.stored(marks[:, 0])
         later = None if smoothing is None else smoothing.smoothed(at_marks)
@@ -258,32 +263,37 @@ class Tape:
             return time
         return np.floor(time * self.rate + NEAR)
 
-    def _mark(self, mark: CovarianceSnapshot) -> None:
-        row = np.concatenate([[mark.time], mark.covariance.ravel(), mark.sensors, mark.sensors_sd])[
-            None, :
-        ]
-        cell = float(self._cells(np.array([mark.time]))[0])
-        # The newest one is kept separately, so that the last of a run is always recorded.
-        if cell > self._mark_cell:
-            newest = self._newest_mark
-            if newest is not None and mark.time <= newest[0, 0] + PAIR:
-                row = np.vstack([newest, row])
-            self._marks = self._marks.and_then(row)
-            self._mark_cell, self._newest_mark = cell, None
-        elif mark.time == self._marks.rows[-1, 0]:
-            self._marks.rows[-1] = row
-        elif mark.time <= self._marks.rows[-1, 0] + PAIR:
-            self._marks = self._marks.and_then(row)
-        else:
-            self._newest_mark = row
+    def _take_marks(self, marks: CovarianceSnapshots) -> None:
+        """Keep the first mark of each interval, and one that is next to it.
 
-    def _observed(self, one: InnovationRecord) -> None:
-        if one.name not in self._seen:
-            self._labels[one.name] = one.labels
-            self._seen[one.name] = GrowingRows.of(1 + 3 * len(one.labels))
-        seen = one.innovations
-        row = np.concatenate([[one.time], seen.nu, seen.s, seen.weight])
-        self._seen[one.name] = self._seen[one.name].and_then(row[None, :])
+        The newest one is kept separately, so that the last of a run is always recorded.
+        """
+        if not len(marks):
+            return
+        flat = marks.covariance.reshape(len(marks), -1)
+        rows = np.column_stack([marks.time, flat, marks.sensors, marks.sensors_sd])
+        cells, newest = [self._mark_cell] * len(self._newest), -1
+        cells += self._cells(marks.time).tolist()
+        rows = np.concatenate([self._newest, rows])
+        kept: list[int] = []
+        last = float(self._marks.rows[-1, 0]) if self._marks.count else -math.inf
+        for k, (time, cell) in enumerate(zip(rows[:, 0].tolist(), cells, strict=True)):
+            if cell > self._mark_cell:
+                if newest >= 0 and time <= rows[newest, 0] + PAIR:
+                    kept.append(newest)
+                kept.append(k)
+                self._mark_cell, newest = cell, -1
+            elif time == last and kept:
+                kept[-1] = k
+            elif time == last:
+                self._marks.rows[-1] = rows[k]
+            elif time <= last + PAIR:
+                kept.append(k)
+            else:
+                newest = k
+            last = float(rows[kept[-1], 0]) if kept else last
+        self._marks = self._marks.and_then(rows[kept])
+        self._newest = rows[newest : newest + 1].copy() if newest >= 0 else self._newest[:0]
 
 
 def _trajectory(

@@ -31,7 +31,7 @@ from strapdown.navigation.compiled_engine import compiled
 from strapdown.navigation.engine import SAME_INSTANT
 from strapdown.navigation.measurements.gnss import TINY
 from strapdown.navigation.navigator import Navigator, Reference
-from strapdown.navigation.record import CovarianceSnapshot, GrowingRows, NavigationChunk
+from strapdown.navigation.record import CovarianceSnapshots, GrowingRows, NavigationChunk
 from strapdown.tables import on_disk
 from strapdown.tables.checks import is_number
 
@@ -120,7 +120,7 @@ class Smoothing:
         #: Time, that of the last mark, row of the history, estimates of the sensors at the mark.
         self._row = navigator.filter.mechanization.row
         self._anchors = GrowingRows.of(2 + self._row + model.stacked.sd.size)
-        self._mark: CovarianceSnapshot | None = None
+        self._newest = CovarianceSnapshots.joined((), 0.0)
         self._due = -math.inf if navigator.about is None else navigator.about.next_time(-math.inf)
         #: With the corrections of the sensors at each node, and the marks.
         self._result: tuple[Smoothed, Array, Array] | None = None
@@ -137,10 +137,10 @@ class Smoothing:
 
         A further pass keeps the instants of the first one, at which it follows the reference.
         """
-        marks = [mark for mark in (self._mark, *piece.marks) if mark is not None]
-        if not marks:
+        marks = CovarianceSnapshots.joined([self._newest, piece.marks], -math.inf)
+        if not len(marks):
             return
-        at, about = np.array([mark.time for mark in marks]), self._navigator.about
+        at, about = marks.time, self._navigator.about
         k = int(piece.time.searchsorted(max(self._due, at[0]) - SAME_INSTANT))
         while k < len(piece.time):
             time = float(piece.time[k])
@@ -149,7 +149,7 @@ class Smoothing:
             self._anchors = self._anchors.and_then(anchor[None, :])
             self._due = time + ANCHORS if about is None else about.next_time(time)
             k = int(piece.time.searchsorted(self._due - SAME_INSTANT))
-        self._mark = marks[-1]
+        self._newest = marks[-1:]
 
     def smoothed(self, marks: Array) -> Smoothed:
         """Run the backward pass over the whole history.

@@ -15,9 +15,10 @@ from strapdown.mechanization import MECHANIZATIONS
 from strapdown.nav_state import NavState
 from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.record import (
-    CovarianceSnapshot,
+    CovarianceSnapshots,
     Event,
-    InnovationRecord,
+    InnovationColumns,
+    InnovationRecords,
     NavigationChunk,
     Span,
 )
@@ -35,14 +36,10 @@ def run(rate=100.0, length=3.0, begin=7.003):
     history = np.tile(row, (len(time), 1))
     history[:, 2] += np.arange(len(time))
     at = time[::20]
-    marks = tuple(
-        CovarianceSnapshot(t, np.eye(9) * t, np.full(6, t), np.ones(6)) for t in at.tolist()
-    )
-    one = np.ones(1)
-    seen = tuple(
-        InnovationRecord(t, "baro.height", ("up, m",), Innovations(t * one, 2.0 * one, one))
-        for t in at
-    )
+    m, one = len(at), at[:, None]
+    marks = CovarianceSnapshots(at, np.eye(9) * at[:, None, None], np.tile(one, 6), np.ones((m, 6)))
+    told = Innovations(one, 2.0 * np.ones((m, 1)), np.ones((m, 1)))
+    seen = InnovationRecords((InnovationColumns("baro.height", ("up, m",), at, told),))
     return NavigationChunk(time, history, seen, marks)
 
 
@@ -58,14 +55,11 @@ def cut(piece, edges):
     out = []
     for a, b in pairwise(bounds):
         at = (piece.time >= a) & (piece.time < b)
-        out.append(
-            NavigationChunk(
-                piece.time[at],
-                piece.history[at],
-                tuple(s for s in piece.seen if a <= s.time < b),
-                tuple(m for m in piece.marks if a <= m.time < b),
-            )
-        )
+        part = slice(*piece.marks.time.searchsorted([a, b]).tolist())
+        (of,) = piece.seen.parts
+        told = Innovations(*(getattr(of.innovations, n)[part] for n in ("nu", "s", "weight")))
+        seen = InnovationRecords((of._replace(time=of.time[part], innovations=told),))
+        out.append(NavigationChunk(piece.time[at], piece.history[at], seen, piece.marks[part]))
     return out
 
 
@@ -114,12 +108,13 @@ def test_events_and_spans_are_handed_on():
 
 
 def test_a_mark_that_is_told_again_is_the_later_one():
-    mark = CovarianceSnapshot(7.1, np.eye(9), np.zeros(6), np.ones(6))
-    again = CovarianceSnapshot(7.1, 2.0 * np.eye(9), np.ones(6), np.ones(6))
+    none, row = InnovationRecords(), np.ones((1, 6))
+    mark = CovarianceSnapshots(np.array([7.1]), np.eye(9)[None], 0.0 * row, row)
+    again = CovarianceSnapshots(np.array([7.1]), 2.0 * np.eye(9)[None], row, row)
     piece = run(length=0.2)
     pieces = [
-        NavigationChunk(piece.time[:10], piece.history[:10], (), (mark,)),
-        NavigationChunk(piece.time[10:], piece.history[10:], (), (again,)),
+        NavigationChunk(piece.time[:10], piece.history[:10], none, mark),
+        NavigationChunk(piece.time[10:], piece.history[10:], none, again),
     ]
     for recorder in (FullRecorder(), IntervalRecorder(1.0)):
         record = kept(recorder, pieces)
