@@ -29,6 +29,7 @@ from strapdown.evaluation.trajectory_differences import trajectory_at
 from strapdown.frames import q_ne
 from strapdown.mechanization.ned import NorthEastDown
 from strapdown.mechanization.wander_azimuth import WanderAzimuth
+from strapdown.nav_state import NavState
 from strapdown.navigation.consistency import ObservationConsistency
 from strapdown.navigation.gyrocompass import Compass
 from strapdown.navigation.heading_integrity import (
@@ -51,12 +52,11 @@ from strapdown.navigation.record import (
     InnovationColumns,
     NavigationChunk,
     NavigationRecord,
-    state_of_row,
 )
 from strapdown.rotation import euler_sd
 from strapdown.sensors.uncertainty import ImuUncertainty
-from strapdown.tables import EULER, on_disk
-from strapdown.tables.checks import index_of, values_of
+from strapdown.tables import EULER, TRAJECTORY, on_disk
+from strapdown.tables.checks import index_of, values_of, view_of
 
 __all__ = [
     "LONGEST",
@@ -88,8 +88,6 @@ DOUBTED_TILT = 2.0
 TURN, RENEWED, HEARD = 60.0, 180.0, 20.0
 #: Epochs over which the scatter of the innovations is judged, and the fewest needed.
 JUDGED, FEWEST = 60, 8
-#: Windows that are judged at a time.
-AT_ONCE = 1000
 #: Limit of a normalized innovation in the estimate of their scatter.
 CLIP = 3.0
 #: Stamps within this are equal, s.
@@ -125,12 +123,11 @@ def run_heading_checks(
     firsts = np.searchsorted(made.time, cuts + NEAR, side="right").tolist()
     begun = np.array([made.time[k - 1] if k else made.begun for k in firsts])
     wanted = np.unique(np.concatenate([begun, made.time[places]]))
-    ellipsoid = find_ellipsoid(made.navigator.filter.mechanization.ellipsoid)
-    run = trajectory_at(record.trajectory, wanted, ellipsoid)
+    run = _Run.of(made.navigator.filter, record, wanted)
     done: list[_Check] = []
     heard: list[_Check] = []
     told: list[_Check] = []
-    doubted, doubt, asked = doubts_of(record, 3.0 * enough), False, -math.inf
+    doubted, doubt = doubts_of(record, 3.0 * enough), False
     for at, first, last in zip(begun.tolist(), firsts, [*firsts[1:], len(made.time)], strict=True):
         if len(heard) > 1 and heard[-1].sd <= enough:
             heard = heard[-1:]
@@ -138,14 +135,13 @@ def run_heading_checks(
         if youngest >= (RENEWED if heard and heard[-1].sd <= enough else TURN) - HEARD / 2.0:
             if len(heard) > 1:
                 heard = [min(heard, key=lambda one: one.sd)]
-            if not doubt:
-                # What came since the last time: a check may last for hours.
-                said = [one.evidence(asked) for one in told if one.marks.count]
-                doubt, asked = doubted(said, at), at
+            # What came since the last time: a check may last for hours.
+            said = [one.evidence() for one in told if one.marks.count]
+            doubt = doubt or doubted(said, at)
             for ended in told:
                 if ended not in heard and ended.marks.count:
                     ended.finish()
-            fresh = _Check(made, record, run, at, doubt)
+            fresh = _Check(made, run, at, doubt)
             done.append(fresh)
             heard.append(fresh)
             told = list(heard)
@@ -156,25 +152,54 @@ def run_heading_checks(
     return [one.finish() for one in done if one.result is not None or one.marks.count]
 
 
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """What a heading check takes of the run.
+
+    Attributes
+    ----------
+    time : ndarray, (n,), s
+        Ends of steps, of each second and of each part of the record.
+    rows : ndarray, (n, 9)
+        Rows of a Trajectory table.
+    marks : ndarray, (m,), s
+    covariance : ndarray, (m, 9, 9)
+    sensors, sensors_sd : ndarray, (m, k)
+        As of a `NavigationRecord`, of the sensor errors of the check.
+    """
+
+    time: Array
+    rows: Array
+    marks: Array
+    covariance: Array
+    sensors: Array
+    sensors_sd: Array
+
+    @classmethod
+    def of(cls, filter_: ErrorFilter, record: NavigationRecord, time: Array) -> _Run:
+        """Return what checks by a filter take at some instants."""
+        ellipsoid = find_ellipsoid(filter_.mechanization.ellipsoid)
+        rows = values_of(trajectory_at(record.trajectory, time, ellipsoid), TRAJECTORY)
+        names = list(filter_.model.layout.labels())[9:]
+        told = (view_of(table, names) for table in (record.sensors, record.sensors_sd))
+        return cls(time, rows, index_of(record.sd), record.covariance, *told)
+
+
 class _Check:
     """Heading check in progress."""
 
-    def __init__(
-        self,
-        made: HeadingChecks,
-        record: NavigationRecord,
-        run: pd.DataFrame,
-        since: float,
-        doubt: bool,
-    ) -> None:
+    def __init__(self, made: HeadingChecks, run: _Run, since: float, doubt: bool) -> None:
         self.navigator, self.run, self.since = made.navigator, run, since
-        #: Times with covariances, of each second the row of the history, and innovations.
+        #: Times with covariances, of each second the row of the history, and innovations: as far
+        #: as evidence is still to come from them.
         self.marks, self.seen = GrowingRows.of(1 + 81), GrowingRows.of(3)
         self.history = GrowingRows.of(1 + made.navigator.filter.mechanization.row)
-        self.newest = since
+        #: Of each second: time, difference, standard deviation, scale, covariance.
+        self.found = GrowingRows.of(4 + 81)
+        self.newest, self.second = since, float(math.ceil(since + NEAR))
         self.result: HeadingCheck | None = None
         self.lost = False
-        state = self.navigator.begin_from(_begin(self.navigator.filter, record, run, since, doubt))
+        state = self.navigator.begin_from(_begin(self.navigator.filter, run, since, doubt))
         later = {name: _after(since, fixes) for name, fixes in made.fixes.items()}
         self.state: NavigatorState | None = replace(state, queues={**state.queues, **later})
 
@@ -198,10 +223,9 @@ class _Check:
     def finish(self) -> HeadingCheck:
         """Return the whole result; what it was made of is not kept."""
         if self.result is None:
-            self.result, self.state = self.evidence(), None
-            self.marks, self.seen, self.history = (
-                of.without_first(of.count) for of in (self.marks, self.seen, self.history)
-            )
+            self.evidence()
+            self.result, self.state = _result(self.since, self.found.rows), None
+            self.found = self.found.without_first(self.found.count)
         return self.result
 
     def _take(self, piece: NavigationChunk) -> None:
@@ -221,53 +245,46 @@ class _Check:
             rows = np.concatenate([_horizontal(of) for of in piece.seen.by_name()])
             self.seen = self.seen.and_then(rows[np.argsort(rows[:, 0], kind="stable")])
 
-    def evidence(self, after: float = -math.inf) -> HeadingCheck:
-        """Return the result at each second, or each after an instant."""
-        k = max(int(self.marks.rows[:, 0].searchsorted(after, side="right")) - 1, 0)
-        marked = on_disk.stored(self.marks.rows[k:, 0])
-        begin = max(math.ceil(self.since + NEAR), math.floor(max(after, self.since)) + 1.0)
-        seconds = np.arange(begin, math.floor(marked[-1]) + 1.0)
-        at = np.searchsorted(marked, seconds + NEAR, side="right") - 1
+    def evidence(self) -> HeadingCheck:
+        """Return the result at each second since the last call."""
+        marks, history = self.marks.rows, self.history.rows
+        seconds = np.arange(self.second, math.floor(marks[-1, 0]) + 1.0)
+        at = np.searchsorted(marks[:, 0], seconds + NEAR, side="right") - 1
         seconds, at = seconds[at >= 0], at[at >= 0]
-        covariance = on_disk.stored(self.marks.rows[:, 1:], k + at).reshape(-1, 9, 9)
-        # The rows of these seconds.
-        first = max(int(self.history.rows[:, 0].searchsorted(after - 1.0)) - 1, 0)
-        history = self.history.rows[first:]
-        times = history[:, 0].copy()
-        near = np.clip(np.searchsorted(times, seconds - NEAR), 0, len(times) - 1)
-        near, back = np.unique(near, return_inverse=True)
+        if not len(seconds):
+            return _result(self.since, self.found.rows[:0])
+        near = np.searchsorted(history[:, 0], seconds - NEAR).clip(0, len(history) - 1)
+        own = np.empty((len(near), len(TRAJECTORY)))
         rows = np.ascontiguousarray(history[near, 1:])
-        own = self.navigator.filter.mechanization.trajectory(times[near], rows, None)
-        heading = self.run["heading"].to_numpy(dtype=np.float64)
-        heading = heading[np.searchsorted(index_of(self.run), times[near] - NEAR)]
-        apart = rotation.within_half_turn(heading - own["heading"].to_numpy(dtype=np.float64))[back]
-        euler = own[EULER].to_numpy(dtype=np.float64)[back]
-        scale = self._scale(seconds)
-        sd = euler_sd(euler, covariance[:, 6:, 6:])[:, 2] if len(seconds) else seconds
+        self.navigator.filter.mechanization.fill_trajectory(rows, own)
+        of_run = self.run.rows[np.searchsorted(self.run.time, history[near, 0] - NEAR), -1]
+        covariance, scale = marks[at, 1:], self._scale(seconds)
+        sd = euler_sd(own[:, 6:], covariance.reshape(-1, 9, 9)[:, 6:, 6:])[:, 2]
         sd = np.hypot(scale * sd, LEAST_HEADING)
-        return HeadingCheck(self.since, seconds, apart, sd, "motion", scale, covariance)
+        apart = rotation.within_half_turn(of_run - own[:, -1])
+        first = self.found.count
+        new = np.column_stack([seconds, apart, sd, scale, covariance])
+        self.found, self.second = self.found.and_then(new), float(seconds[-1]) + 1.0
+        self.marks = self.marks.without_first(int(at[-1]))
+        self.history = self.history.without_first(int(near[-1]))
+        self.seen = self.seen.without_first(max(self.seen.count - 2 * JUDGED, 0))
+        return _result(self.since, self.found.rows[first:])
 
     def _scale(self, seconds: Array) -> Array:
         """Factor by which the newest innovations exceed their expected scatter and correlation."""
-        if not self.seen.count or not len(seconds):
-            return np.ones(len(seconds))
-        # No more than what the windows of these seconds hold.
         seen = self.seen.rows
-        k = max(int(seen[:, 0].searchsorted(seconds[0], side="right")) - 2 * JUDGED, 0)
-        time, u = seen[k:, 0], seen[k:, 1:]
-        # All available epochs, up to a full window.
-        size = np.minimum(u.shape[0], JUDGED)
-        upto = np.searchsorted(time, seconds + NEAR, side="right")
-        out = np.ones(len(seconds))
-        full = upto >= size
-        if size >= FEWEST:
-            windows = sliding_window_view(u, size, axis=0)
-            at = np.flatnonzero(full)
-            for some in np.array_split(at, range(AT_ONCE, len(at), AT_ONCE)):
-                out[some] = _scatter(windows[upto[some] - size].reshape(len(some), 2 * size))
-        for k in np.flatnonzero(~full & (upto >= FEWEST)).tolist():
-            out[k] = _scatter(u[: upto[k]].reshape(1, -1))[0]
-        return out
+        upto = np.searchsorted(seen[:, 0], seconds + NEAR, side="right")
+        # Fewer than a full window at the start of a check.
+        u = np.concatenate([np.full((JUDGED, 2), np.nan), seen[:, 1:]])
+        windows = sliding_window_view(u, JUDGED, axis=0)[upto].reshape(len(seconds), 2 * JUDGED)
+        return np.where(upto < FEWEST, 1.0, _scatter(windows))
+
+
+def _result(since: float, found: Array) -> HeadingCheck:
+    """Result of a check, of rows of `_Check.found`."""
+    time, difference, sd, scale = (on_disk.stored(found[:, k]) for k in range(4))
+    covariance = on_disk.stored(found[:, 4:]).reshape(-1, 9, 9)
+    return HeadingCheck(since, time, difference, sd, "motion", scale, covariance)
 
 
 def _horizontal(of: InnovationColumns) -> Array:
@@ -283,23 +300,28 @@ def _after(time: float, fixes: Epochs) -> Epochs:
 
 
 def _scatter(u: Array) -> Array:
-    """Scatter of rows of normalized innovations, 1 or more; a few gross errors count little."""
-    whole = np.sqrt(np.minimum(u * u, CLIP**2).mean(axis=1))
-    middle = MAD_TO_SD * np.median(np.abs(u), axis=1)
-    return np.asarray(np.maximum(1.0, np.maximum(whole, middle)))
+    """Scatter of rows of normalized innovations, 1 or more; a few gross errors count little.
+
+    What is not a number is not there.
+    """
+    sizes = np.sort(np.abs(u), axis=1)
+    count = np.maximum(np.isfinite(sizes).sum(axis=1), 1)
+    whole = np.sqrt(np.nansum(np.minimum(sizes, CLIP) ** 2, axis=1) / count)
+    halves = np.stack([(count - 1) // 2, count // 2], axis=1)
+    middle = MAD_TO_SD * np.take_along_axis(sizes, halves, axis=1).mean(axis=1)
+    return np.asarray(np.maximum(1.0, np.fmax(whole, middle)))
 
 
-def _begin(
-    filter_: ErrorFilter, record: NavigationRecord, run: pd.DataFrame, at: float, doubt: bool
-) -> FilterState:
+def _begin(filter_: ErrorFilter, run: _Run, at: float, doubt: bool) -> FilterState:
     """State at an instant of a run, with a practically unknown heading."""
-    model = filter_.model
-    row = run.iloc[int(np.searchsorted(index_of(run), at - NEAR))]
-    start = replace(state_of_row(row), time=at)
-    marks = record.sd.index.to_numpy(dtype=np.float64)
-    k = max(int(np.searchsorted(marks, at + NEAR, side="right")) - 1, 0)
+    row = run.rows[int(np.searchsorted(run.time, at - NEAR))]
+    lat, lon, alt, _, _, _, roll, pitch, heading = row.tolist()
+    start = NavState.from_degrees(
+        lat, lon, alt, v_n=row[3:6], roll_deg=roll, pitch_deg=pitch, heading_deg=heading
+    )
+    k = max(int(np.searchsorted(run.marks, at + NEAR, side="right")) - 1, 0)
     # Without what the run does not estimate, as its height.
-    P = LOOSER**2 * np.nan_to_num(record.covariance[k])
+    P = LOOSER**2 * np.nan_to_num(run.covariance[k])
     P[8, :8] = P[:8, 8] = 0.0
     P[8, 8] = max(math.radians(UNKNOWN) ** 2, float(P[8, 8]))
     tilt = DOUBTED_TILT if doubt else LEAST_TILT
@@ -309,13 +331,10 @@ def _begin(
             * np.array([1.0] * 8 + [0.0])
         )
     )
-    names = list(model.layout.labels())[9:]
     k = 0 if doubt else k
-    sd = LOOSER * record.sensors_sd[names].iloc[k].to_numpy(dtype=np.float64)
-    whole = np.diag(np.concatenate([np.zeros(9), np.square(sd)]))
+    whole = np.diag(np.concatenate([np.zeros(9), np.square(LOOSER * run.sensors_sd[k])]))
     whole[:9, :9] = P
-    told = record.sensors[names].iloc[k].to_numpy(dtype=np.float64)
-    return replace(filter_.begin(start, whole), sensors=told)
+    return replace(filter_.begin(replace(start, time=at), whole), sensors=np.array(run.sensors[k]))
 
 
 # Filter, joined increments and thinned fixes of the heading checks.
