@@ -31,7 +31,7 @@ from strapdown._kernels.motion_increments import split_increment
 from strapdown._kernels.ned import COSINE, LAT, PRIME, SINE, ned_advance
 from strapdown._kernels.ned import Q as Q_NB
 from strapdown._kernels.psi_model import HELD_ROWS, means_of_steps, psi_dynamics
-from strapdown._kernels.robust import PLAIN, UD, WD, take_linear
+from strapdown._kernels.robust import PLAIN, UD, WD, take_by_steps
 from strapdown._kernels.smoothing import (
     CARRIED,
     CORE,
@@ -403,6 +403,7 @@ def over_fixes(
     fixes,
     rule,
     scales,
+    steps,
     told,
     aged,
     marked_at,
@@ -418,7 +419,8 @@ def over_fixes(
     NaN). Return the status, the steps made, those of the open
     group, the fixes processed, and the rows filled for a smoother. The call ends early as
     `over_steps`, or where these rows are full; and before a fix beyond the linear range of `rule`
-    (`robust`; empty: full weight), which learns `scales`, (2, 3, 9), of positions and velocities.
+    (`robust`; empty: full weight), which learns `scales`, (2, 3, 9), of positions and velocities,
+    unless its `steps`, (3, 5), are known.
     Instants within `same` seconds count as one.
 
     `about`: estimated errors (n,), those of the state that are left at each row of `notes`; and
@@ -564,7 +566,9 @@ def over_fixes(
                 for j in range(size):
                     after[i, j] = covariance[i, j]
             learned = scales[0] if of_place else scales[1]
-            if not take_linear(form, after, x, z, H, R, rule, learned, due, of_place, told[done]):
+            if not take_by_steps(
+                form, after, x, z, H, R, rule, learned, steps, due, of_place, told[done]
+            ):
                 why = ASK
                 break
         elif form == UD:

@@ -1,7 +1,7 @@
 """Observations within the linear range of a robust rule, and the learned scale of their errors.
 
 Within that range a robust update is Kalman's with a scaled variance: a compiled loop takes such
-observations, whatever the influence function is beyond it, and leaves the others to the rule.
+observations, whatever the influence function is beyond it, and asks the rule for the others.
 """
 
 from __future__ import annotations
@@ -31,6 +31,13 @@ JOSEPH, PLAIN, UD, WD = 0, 1, 2, 3
 LINEAR, FACTOR, LEARNS, MEMORY, LOWEST, HIGHEST, CLIP, MEAN, WITHIN = range(9)
 # Layout of a learned scale: `estimation.robust.ScaleState`.
 LOG_SQUARE, INFORMATION, REJECTED, SETTLED, NU, TIME, JUMP, HELD, SINCE = range(9)
+# Weight from which on an observation agrees with the estimate.
+HALF = 0.5
+# Layout of a step beyond the linear range, of each component: whether it is known (`NO`, `YES`) or
+# asked for (`ASKED`); then what `estimation.covariance.UpdateRule.step` gives, moved, slope,
+# variance and weight, or, asked for, what it takes: innovation and variance of the prediction.
+NO, YES, ASKED = 0.0, 1.0, -1.0
+KNOWN, MOVED, SLOPE, VARIANCE, WEIGHT = range(5)
 
 
 @njit(cache=True, error_model="numpy")
@@ -51,12 +58,14 @@ def learned_scale(log_square, information, nu, s, r, rule):
 
 
 @njit(cache=True, error_model="numpy")
-def take_linear(form, covariance, x, z, H, R, rule, scales, time, of_place, told):
-    """Process the components of an observation; return whether all are in the linear range.
+def take_by_steps(form, covariance, x, z, H, R, rule, scales, steps, time, of_place, told):
+    """Process the components of an observation; return whether all were processed.
 
-    `scales` ((l, 9)): of each component, changed. `told`: innovations, ``h P h' + R``, weights.
-    Where False is returned, covariance and x are undefined, and `scales` are as before; so it is
-    after a rejection, and in a time in which the observation is doubted.
+    `scales` ((l, 9)): of each component, changed. `steps` ((l, 5)): known steps of components
+    beyond the linear range; the first whose step is not known is asked for. `told`: innovations,
+    ``h P h' + R``, weights. Where False is returned, covariance and x are undefined, and `scales`
+    are as before; so it is, without a step asked for, after a rejection, and in a time in which the
+    observation is doubted.
     """
     count = z.shape[0]
     if rule[LEARNS] != 0.0:
@@ -78,20 +87,29 @@ def take_linear(form, covariance, x, z, H, R, rule, scales, time, of_place, told
         if rule[LEARNS] != 0.0:
             factor = math.exp(0.5 * scales[j, LOG_SQUARE])
         r = R[j] * (factor * factor)
-        # An infinite range of an exact observation is not a number.
-        if not (abs(nu) <= rule[LINEAR] * math.sqrt(s + r) or r == 0.0):
-            return False
         if not (math.isfinite(nu) and math.isfinite(s) and R[j] >= 0.0):
             return False
+        moved, slope, weight = nu, 1.0, 1.0
+        # An infinite range of an exact observation is not a number.
+        if not (abs(nu) <= rule[LINEAR] * math.sqrt(s + r) or r == 0.0):
+            if steps[j, KNOWN] != YES:
+                steps[j, KNOWN], steps[j, MOVED], steps[j, SLOPE] = ASKED, nu, s
+                return False
+            moved, slope, r, weight = (
+                steps[j, MOVED],
+                steps[j, SLOPE],
+                steps[j, VARIANCE],
+                steps[j, WEIGHT],
+            )
         if form == WD:
-            wd_take(W, d, x, H, j, work, s, nu, 1.0, r)
+            wd_take(W, d, x, H, j, work, s, moved, slope, r)
         elif form == UD:
-            ud_take(W, d, x, H, j, work, s, nu, 1.0, r)
+            ud_take(W, d, x, H, j, work, s, moved, slope, r)
         elif form == JOSEPH:
-            joseph_take(W, d, x, H, j, work, s, nu, 1.0, r)
+            joseph_take(W, d, x, H, j, work, s, moved, slope, r)
         else:
-            plain_take(W, d, x, H, j, work, s, nu, 1.0, r)
-        told[0, j], told[1, j], told[2, j] = nu, s + R[j], 1.0
+            plain_take(W, d, x, H, j, work, s, moved, slope, r)
+        told[0, j], told[1, j], told[2, j] = nu, s + R[j], weight
     if form == WD and wd_finish(W, d, covariance) >= 0:
         return False
     if rule[LEARNS] != 0.0:
@@ -100,9 +118,11 @@ def take_linear(form, covariance, x, z, H, R, rule, scales, time, of_place, told
             now[LOG_SQUARE], now[INFORMATION] = learned_scale(
                 now[LOG_SQUARE], now[INFORMATION], told[0, j], told[1, j] - R[j], R[j], rule
             )
-            now[SETTLED] += 1.0
+            now[SETTLED] = now[SETTLED] + 1.0 if told[2, j] >= HALF else 0.0
             if of_place:
                 now[NU], now[TIME] = told[0, j], time
                 if not math.isfinite(now[SINCE]):
                     now[SINCE], now[HELD] = time, -math.inf
+    for j in range(count):
+        steps[j, KNOWN] = NO
     return True

@@ -496,8 +496,8 @@ class PaperUpdate:
 
 
 HUBER = Huber()
-#: Weight of an observation that agrees with the estimate, and how many in a row show that they do.
-HALF, SETTLES = 0.5, 5
+#: Observations in a row that show that they agree with the estimate (`kernel.HALF`).
+SETTLES = 5
 #: Rejections in a row that an estimate can have earned by itself, after which one is taken.
 FEW = 2
 #: Faults of receivers, as of a wrong ambiguity or by reflections, last this long at most, s.
@@ -664,7 +664,7 @@ class AdaptiveScale:
         if weight == 0.0:
             state = state._replace(rejected=state.rejected + 1)
         else:
-            settled = state.settled + 1 if weight >= HALF and not state.rejected else 0
+            settled = state.settled + 1 if weight >= kernel.HALF and not state.rejected else 0
             state = state._replace(rejected=0, settled=settled)
         square, information = kernel.learned_scale(
             state.log_square, state.information, nu, s, r, self.kernel_options
@@ -783,7 +783,7 @@ class AdaptiveRule:
 def linear_range(rule: UpdateRule | None) -> NDArray[np.float64] | None:
     """Return a rule within its linear range, as kernels take it; empty for full weight.
 
-    None where it has no such range, or is another one.
+    None for another rule.
     """
     if rule is None:
         return np.empty(0)
@@ -796,7 +796,7 @@ def linear_range(rule: UpdateRule | None) -> NDArray[np.float64] | None:
     else:
         return None
     out[kernel.LINEAR] = rule.influence.linear
-    return out if out[kernel.LINEAR] > 0.0 else None
+    return out
 
 
 UPDATE_RULES: dict[str, type[RobustUpdate] | type[PaperUpdate] | type[AdaptiveRule]] = {

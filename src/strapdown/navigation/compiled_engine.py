@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from weakref import WeakKeyDictionary
 
@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown._kernels import filter_loop as kernel
+from strapdown._kernels import robust
 from strapdown._kernels.growth import factor_room, growth_arrays, growth_room, padded_width
 from strapdown._kernels.level import LEVEL, NED, WANDER
 from strapdown._kernels.robust import JOSEPH, PLAIN, UD, WD
@@ -23,6 +24,7 @@ from strapdown.estimation.covariance import (
     Joseph,
     Observation,
     Plain,
+    Step,
     bad_observation,
 )
 from strapdown.estimation.error_filter import ErrorFilter, Rules, diverged
@@ -49,6 +51,9 @@ FORMS: dict[type[CovarianceForm], int] = {
 }
 
 
+#: Step of a rule (`UpdateRule.step`) for a code and a component of a fix, its innovation, the
+#: variance of the prediction, its own.
+StepOf = Callable[[float, int, float, float, float], Step]
 #: Times, states and sensor errors of no reference.
 NO_REFERENCES = np.empty(0), np.empty((0, 10)), np.empty((0, 0))
 
@@ -153,7 +158,7 @@ class CompiledEngine(Engine):
         history: Array,
         made: int,
         notes: tuple[float, float, float],
-        receiver: tuple[Array, Array, Array],
+        receiver: tuple[Array, Array, Array, StepOf],
         fixes: Epochs,
         references: tuple[Array, Array, Array] = NO_REFERENCES,
     ) -> tuple[int, tuple[Array, ...], int, int]:
@@ -170,7 +175,7 @@ class CompiledEngine(Engine):
             beyond which another is made before a fix.
         receiver : tuple of ndarray
             Arm of the antenna (3,), m; rule (`robust.linear_range`); scales that it learned, of
-            positions and velocities (2, 3, 9): they are changed.
+            positions and velocities (2, 3, 9): they are changed; and its step beyond the range.
         fixes : Epochs
             Of `measurements.gnss.Gnss`.
         references : tuple of ndarray
@@ -185,11 +190,11 @@ class CompiledEngine(Engine):
             covariance (m, 2, 9, 9), sensors and their sd (m, 2, k).
         why : int
             Why it stopped: `filter_loop.ALL`, `NOTE` for a covariance to be noted, `ASK` before a
-            fix beyond the linear range of the rule.
+            fix that was rejected, or is doubted.
         followed : int
             References that were followed.
         """
-        arm, rule, scales = receiver
+        arm, rule, scales, step_of = receiver
         (note_at, interval, aged), size, k = notes, len(fixes.time), self._n - 9
         told, at, noted = (
             np.empty((size, kernel.TOLD, 3)),
@@ -197,9 +202,11 @@ class CompiledEngine(Engine):
             np.empty((size, 2, 9, 9)),
         )
         sensors, sd = np.empty((size, 2, k)), np.empty((size, 2, k))
-        why, done, followed = kernel.FULL, 0, 0
+        steps, (why, done, followed) = np.zeros((3, 5)), (kernel.FULL, 0, 0)
         errors = self._beside()
-        while why == kernel.FULL:
+        while why == kernel.FULL or (
+            why == kernel.ASK and _has_step(steps, fixes.values[done], step_of)
+        ):
             # A fix needs a propagation and an update.
             self.nodes.make_room(2)
             first = self.nodes.used
@@ -227,6 +234,7 @@ class CompiledEngine(Engine):
                 fixes.values[done:],
                 rule,
                 scales,
+                steps,
                 told[done:],
                 aged,
                 at[done:],
@@ -350,6 +358,17 @@ class CompiledEngine(Engine):
     def _no_covariance(self) -> DivergenceError:
         time = float(self._times[kernel.AT_STEP])
         return DivergenceError("navigation.covariance-lost", quantity="covariance", time=time)
+
+
+def _has_step(steps: Array, fix: Array, step_of: StepOf) -> bool:
+    """Whether the rule takes the component of a fix that a loop asked for; its step is filled."""
+    for j in np.flatnonzero(steps[:, robust.KNOWN] == robust.ASKED).tolist():
+        nu, s = steps[j, robust.MOVED], steps[j, robust.SLOPE]
+        taken = step_of(fix[kernel.CODE], j, float(nu), float(s), float(fix[kernel.VARIANCE + j]))
+        if taken[-1] != 0.0:
+            steps[j] = robust.YES, *taken
+            return True
+    return False
 
 
 class ReferenceEngine(CompiledEngine):

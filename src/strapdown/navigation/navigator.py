@@ -15,7 +15,7 @@ from strapdown._kernels.filter_loop import ASK, NOTE, turn_blocks
 from strapdown._kernels.motion_increments import split_increment
 from strapdown._kernels.sums import STEADY, steady_motion
 from strapdown.errors import ConfigError
-from strapdown.estimation.covariance import Innovations, Observation, UpdateRule
+from strapdown.estimation.covariance import Innovations, Observation, Step, UpdateRule
 from strapdown.estimation.error_filter import (
     ErrorFilter,
     FilterState,
@@ -488,7 +488,7 @@ class EpochLoop:
     def _fixes(self, made: int, time: Array, rows: Array) -> int:
         """Process the fixes of a single receiver, and follow a reference; return the steps.
 
-        Up to a fix without VD, or beyond the linear range of its rule.
+        Up to a fix without VD, or one that is rejected or doubted.
         """
         aid, engine, about = self.navigator.lone_receiver, self.engine, self.navigator.about
         if aid is None or not isinstance(engine, CompiledEngine):
@@ -514,7 +514,8 @@ class EpochLoop:
                 references = about.part(self.follows, float(end))
             notes = (self.marked + interval, interval, AGED)
             learned = self._learned(aid)
-            receiver = np.asarray(aid.lever_arm, dtype=np.float64), rule, learned
+            arm = np.asarray(aid.lever_arm, dtype=np.float64)
+            receiver = arm, rule, learned, partial(self._step, aid, learned)
             made, fixed, why, followed = engine.propagate_with_fixes(
                 time, rows, self.history, made, notes, receiver, usual, references
             )
@@ -531,6 +532,17 @@ class EpochLoop:
                 break
         self.queues[aid.name] = queue
         return made
+
+    def _step(
+        self, aid: Gnss, learned: Array, code: float, j: int, nu: float, s: float, r: float
+    ) -> Step:
+        """Step of the rule of a receiver for a component of a fix; see `UpdateRule.step`."""
+        rule = aid.rule or self.navigator.filter.rule
+        assert rule is not None
+        if isinstance(rule, AdaptiveRule):
+            scale = ScaleState.of(learned[0 if code == POSITION_CODE else 1, j].tolist())
+            rule = rule.scale.rule(scale, rule.influence)
+        return rule.step(nu, s, r)
 
     def _learned(self, aid: Gnss) -> Array:
         """Scales that the rule of a receiver learned, of positions and velocities, (2, 3, 9)."""

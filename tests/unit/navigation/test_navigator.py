@@ -182,15 +182,26 @@ def test_both_engines_give_the_same_but_for_rounding(log, monkeypatch, mechaniza
 
 
 @pytest.mark.parametrize("form", list(COVARIANCES))
-@pytest.mark.parametrize("rule", [AdaptiveRule(Igg3()), RobustUpdate(Huber(2.0), 1.2)])
-def test_a_compiled_loop_takes_what_is_in_the_linear_range_of_a_rule(log, monkeypatch, rule, form):
+@pytest.mark.parametrize(
+    "rule",
+    [AdaptiveRule(Igg3()), RobustUpdate(Huber(2.0), 1.2), RobustUpdate(Tukey())],
+    ids=["igg3", "huber", "tukey"],
+)
+def test_a_compiled_loop_takes_what_a_rule_takes_at_all(log, monkeypatch, rule, form):
     time, rows, fixes = log
     wrong = fixes.copy()
     wrong.iloc[20:24, wrong.columns.get_loc("alt")] += 8.0
     navigator, state = started(form=form, aids=(replace(BOTH[0], rule=rule),))
     fast = run((time, rows, wrong), navigator, state)
-    taken = [one.observation is None for one in fast[2]]
-    assert 0.5 < np.mean(taken) < 0.95
+    weights = np.array([one.innovations.weight for one in fast[2]])
+    # The loop asks for the step beyond the linear range, and leaves what is rejected.
+    taken = np.array([one.observation is None for one in fast[2]])
+    reduced = ((weights > 0.0) & (weights < 1.0)).any(axis=1)
+    assert (reduced & taken).sum() > 5
+    assert not taken[(weights == 0.0).any(axis=1)].any()
+    if isinstance(rule, RobustUpdate):
+        assert taken[(weights > 0.0).all(axis=1)].all()
+    assert (weights == 0.0).any() == (not isinstance(rule.influence, Huber))
     monkeypatch.setattr(navigator_module, "compiled", lambda _: False)
     slow = run((time, rows, wrong), navigator, state)
     np.testing.assert_allclose(fast[0], slow[0], rtol=1e-9, atol=1e-9)
