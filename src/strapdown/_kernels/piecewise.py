@@ -45,6 +45,24 @@ def lines(knots, values, time, out):
 
 
 @njit(cache=True)
+def farthest(time, place, first, last):
+    """Row between two others, of `place`, (n, 3), farthest from their line at its time.
+
+    Returns its squared distance and its index, `first` where no row is between them.
+    """
+    span = time[last] - time[first]
+    worst, at = -1.0, first
+    for i in range(first + 1, last):
+        share, square = (time[i] - time[first]) / span, 0.0
+        for j in range(3):
+            line = place[first, j] + share * (place[last, j] - place[first, j])
+            square += (place[i, j] - line) * (place[i, j] - line)
+        if square > worst:
+            worst, at = square, i
+    return worst, at
+
+
+@njit(cache=True)
 def legendre_sums(edges, before, series, time, out):
     """Fill ``out = before + series`` at each instant by Clenshaw's recursion.
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import heapq
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
@@ -15,6 +16,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from strapdown._kernels.piecewise import farthest
 from strapdown.ellipsoids import WGS84, Ellipsoid
 from strapdown.errors import DataError
 from strapdown.evaluation.trajectory_differences import ROTATION_ERROR
@@ -558,8 +560,8 @@ def thin(trajectory: pd.DataFrame, most: int, ellipsoid: Ellipsoid = WGS84) -> T
 
     def push(first: int, last: int) -> None:
         if last - first > 1:
-            distance, at = _farthest(time, place, first, last)
-            heapq.heappush(heap, (-distance, first, last, at))
+            square, at = farthest(time, place, first, last)
+            heapq.heappush(heap, (-math.sqrt(square), first, last, at))
 
     for first, last in pairwise(list(kept)):
         push(first, last)
@@ -569,13 +571,3 @@ def thin(trajectory: pd.DataFrame, most: int, ellipsoid: Ellipsoid = WGS84) -> T
         push(first, at)
         push(at, last)
     return Thinned(np.array(sorted(kept)), n, -heap[0][0] if heap else 0.0)
-
-
-def _farthest(time: Array, place: Array, first: int, last: int) -> tuple[float, int]:
-    """Find the position farthest from the line at its time; return distance and row."""
-    inner = slice(first + 1, last)
-    share = (time[inner] - time[first]) / (time[last] - time[first])
-    line = place[first] + share[:, None] * (place[last] - place[first])
-    squares = np.square(place[inner] - line).sum(axis=1)
-    worst = int(np.argmax(squares))
-    return float(np.sqrt(squares[worst])), first + 1 + worst
