@@ -289,28 +289,31 @@ def _best(
     between, before, after = (np.empty((len(at), 3)) for _ in range(3))
     X = np.empty((len(change), 7))
     X[:, 3] = lasting
-    stiff = 0.0
 
-    def misfit(offset: float) -> float:
+    def fit_at(offset: float) -> tuple[Array, Array]:
+        """Fill X; return the normal equations."""
         piecewise.lines(nodes, sums, at - offset, between)
         X[:, :3] = np.diff(between, axis=0)[used] * weight[:, None]
         piecewise.lines(nodes, turned, at - offset - 0.5 * ABOUT, before)
         piecewise.lines(nodes, turned, at - offset + 0.5 * ABOUT, after)
         rate = (after - before) * (per_rate / ABOUT)[:, None]
         X[:, 4:] = np.diff(rate, axis=0)[used] * weight[:, None]
-        # By the small normal equations, which keep enough digits for the comparison.
-        normal = X.T @ X
-        normal[[4, 5, 6], [4, 5, 6]] += stiff
-        fit, *_ = np.linalg.lstsq(normal, X.T @ change, rcond=None)
-        off = float(np.square(change - X @ fit).sum())
-        return off + stiff * float(fit[4:] @ fit[4:])
+        return X.T @ X, X.T @ change
 
+    def misfit(normal: Array, product: Array, stiff: float) -> float:
+        """Sum of squares; the normal equations keep enough digits for a comparison."""
+        prior = np.diag([0.0, 0.0, 0.0, 0.0, stiff, stiff, stiff])
+        fit, *_ = np.linalg.lstsq(normal + prior, product, rcond=None)
+        return squares + float(fit @ ((normal + prior) @ fit - 2.0 * product))
+
+    squares = float(change @ change)
     whole = float(np.square(change - change.mean()).sum())
     grid = np.arange(-most, most + 0.5 * STEP, STEP)
-    costs = np.array([misfit(float(one)) for one in grid])
-    variance = CORRELATED**2 * float(costs.min()) / max(len(change) - 8, 1)
+    fits = [fit_at(float(one)) for one in grid]
+    least = min(misfit(*fit, 0.0) for fit in fits)
+    variance = CORRELATED**2 * least / max(len(change) - 8, 1)
     stiff = variance / ARM**2
-    costs = np.array([misfit(float(one)) for one in grid])
+    costs = np.array([misfit(*fit, stiff) for fit in fits])
     k = int(np.argmin(costs))
     share = 1.0 - float(costs[k]) / whole if whole > 0.0 else 0.0
     away = np.abs(grid - grid[k]) > 1.0
@@ -322,7 +325,7 @@ def _best(
         return None
     # Again near the minimum, with a step that is wide against its noise and narrow against motions.
     fine = grid[k] + np.arange(-AROUND, AROUND + 1) * FINE_STEP
-    near = np.array([misfit(float(one)) for one in fine])
+    near = np.array([misfit(*fit_at(float(one)), stiff) for one in fine])
     best = min(max(int(np.argmin(near)), FITTED), len(fine) - 1 - FITTED)
     part = slice(best - FITTED, best + FITTED + 1)
     second, first, level = np.polyfit(fine[part] - fine[best], near[part], 2)
