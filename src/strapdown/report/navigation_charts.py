@@ -42,6 +42,7 @@ from strapdown.report.navigation_evaluation import (
 from strapdown.report.values import NOT_ESTIMATED, plain
 from strapdown.tables import EULER, NED, VELOCITY
 from strapdown.tables.checks import index_of
+from strapdown.tables.on_disk import stored
 
 TIME = "time, s"
 BOUND = "95 % bound"
@@ -241,9 +242,12 @@ def _block_chart(record: NavigationRecord, block: ShownStates) -> Chart:
     time = index_of(record.sensors)
     panels = []
     for k, (column, label) in enumerate(zip(block.columns, block.labels, strict=True)):
-        value = block.factor * record.sensors[column].to_numpy(dtype=np.float64)
-        sd = record.sensors_sd[column].to_numpy(dtype=np.float64)
-        reach = TWO_SIDED_95 * block.factor * sd
+        # A column at a time: the pages of a long table hold all its columns.
+        told, sd = (
+            stored(table[column].to_numpy(dtype=np.float64))
+            for table in (record.sensors, record.sensors_sd)
+        )
+        value, reach = block.factor * told, TWO_SIDED_95 * block.factor * sd
         colour = AXIS_COLOURS[k % 3]
         line = curve("estimate", time, value, colour, width=1.6, buckets=BUCKETS)
         fill: Fill = thin_fill(BOUND, time, value - reach, value + reach, colour)
