@@ -454,11 +454,16 @@ def _columns(path: str, form: str) -> RawLog | None:
 
 
 def _crash_record(path: str) -> int | None:
-    """Return the number of channels that the file has as a crash record."""
+    """Return the number of channels that the file has as a crash record.
+
+    None where no channel can be an acceleration, a rate or a velocity, as in a table of attitudes.
+    """
     try:
-        return len(read_crash_record(path).channels)
+        channels = read_crash_record(path).channels
     except StrapdownError:
         return None
+    useless = all(one.quantity in ("time", "counter", "other") for one in channels)
+    return None if useless else len(channels)
 
 
 # Checks across channels and streams.

@@ -573,3 +573,15 @@ def test_fixes_that_may_move_do_not_decide(circle):
     one, _ = sd.doctor([log, fixes]).logs
     assert len(one.rests) == 1
     assert "doctor.bias-or-turn" in [f.code for f in one.fit["attitude"]]
+
+
+@pytest.mark.parametrize("unit", ["deg", "g"])
+def test_a_table_of_attitudes_alone_is_no_crash_record(tmp_path, unit):
+    time = np.arange(0.0, 2.0, 0.001)
+    names = ["roll_deg", "pitch_deg", "yaw_deg"] if unit == "deg" else ["ax_g", "ay_g", "az_g"]
+    columns = {name: np.sin(k + time) for k, name in enumerate(names)}
+    pd.DataFrame({"time": time} | columns).to_csv(tmp_path / "log.csv", index=False)
+    (one,) = sd.doctor(tmp_path / "log.csv").logs
+    read = "doctor.crash-record" in [f.code for f in one.fit["crash"]]
+    assert read == (unit == "g")
+    assert read == all(f.severity != "error" for f in one.fit["crash"])
