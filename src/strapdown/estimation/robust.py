@@ -618,6 +618,10 @@ class AdaptiveScale:
                 raise ConfigError(
                     "estimation.adaptive-scale-not-above", quantity=name, name=name, value=value
                 )
+        if self.patience != int(self.patience):
+            raise ConfigError(
+                "estimation.patience-not-whole", quantity="patience", value=self.patience
+            )
         for below, above in (("prior", "memory"), ("lowest", "highest")):
             if getattr(self, below) > getattr(self, above):
                 raise ConfigError(

@@ -137,6 +137,7 @@ def test_bounds_hold_and_start_is_the_stated_variance():
     [
         ({"memory": 0.0}, "memory = 0.0"),
         ({"clip": math.inf}, "clip = inf"),
+        ({"patience": 2.5}, "patience = 2.5 .* not a whole number"),
         ({"prior": 200.0}, "prior = 200 of the adaptive scale is above memory = 100"),
         ({"lowest": 200.0}, "lowest = 200 .* above highest = 100"),
     ],
