@@ -204,17 +204,22 @@ def _state_panel(
     record = evaluation.record
     time = index_of(record.trajectory)
     if shown is None:
-        shown = record.trajectory[column].to_numpy(dtype=np.float64), at_marks(record, column)
+        shown = _column(record.trajectory, column), at_marks(record, column)
     values, here = shown
     lines = [curve("navigated", time, values, BLUE, width=1.3, buckets=BUCKETS)]
     if evaluation.run.source.truth is not None:
         lines.append(_true(evaluation, column, values))
     at = index_of(record.sd)
-    half = TWO_SIDED_95 * record.sd[error].to_numpy(dtype=np.float64)
+    half = TWO_SIDED_95 * _column(record.sd, error)
     if np.isnan(half).all():
         return Panel(f"{label} ({NOT_ESTIMATED})", tuple(lines), height=0.8)
     fill = thin_fill(BOUND, at, here - half, here + half, BLUE, opacity=0.25)
     return Panel(label, tuple(lines), fills=(fill,), height=0.8)
+
+
+def _column(table: pd.DataFrame, name: str) -> Array:
+    """A column of a long table, whose pages in memory would hold all the columns."""
+    return stored(table[name].to_numpy(dtype=np.float64))
 
 
 def _true(evaluation: NavigationEvaluation, column: str, navigated: Array) -> Line:
@@ -242,11 +247,7 @@ def _block_chart(record: NavigationRecord, block: ShownStates) -> Chart:
     time = index_of(record.sensors)
     panels = []
     for k, (column, label) in enumerate(zip(block.columns, block.labels, strict=True)):
-        # A column at a time: the pages of a long table hold all its columns.
-        told, sd = (
-            stored(table[column].to_numpy(dtype=np.float64))
-            for table in (record.sensors, record.sensors_sd)
-        )
+        told, sd = (_column(table, column) for table in (record.sensors, record.sensors_sd))
         value, reach = block.factor * told, TWO_SIDED_95 * block.factor * sd
         colour = AXIS_COLOURS[k % 3]
         line = curve("estimate", time, value, colour, width=1.6, buckets=BUCKETS)
