@@ -155,7 +155,7 @@ def moving_mean(values: Array, width: int) -> Array:
     return np.asarray(np.cumsum(np.concatenate([first, steps]), axis=0) / width)
 
 
-#: Samples that are integrated at a time.
+#: Numbers that are integrated at a time.
 AT_ONCE = 1 << 16
 
 
@@ -171,15 +171,14 @@ def running_integral(time: Array, values: Array, *, means: bool = False) -> Arra
     takes a fifth of a second, for every log with velocities.
     """
     out = np.zeros(values.shape)
+    columns, sums = values.reshape(len(out), -1), out.reshape(len(out), -1)
     # Part by part: a long log takes a large part of the memory.
-    for column, upto in zip(
-        values.reshape(len(out), -1).T, out.reshape(len(out), -1).T, strict=True
-    ):
-        for at in range(0, len(out) - 1, AT_ONCE):
-            part = column[at : at + AT_ONCE + 1]
-            middle = part[1:] if means else 0.5 * (part[1:] + part[:-1])
-            steps = middle * np.diff(time[at : at + AT_ONCE + 1])
-            if at:
-                steps[0] += upto[at]
-            np.cumsum(steps, out=upto[at + 1 : at + AT_ONCE + 1])
+    rows = max(AT_ONCE // max(columns.shape[1], 1), 1)
+    for at in range(0, len(out) - 1, rows):
+        part = columns[at : at + rows + 1]
+        steps = part[1:] if means else 0.5 * (part[1:] + part[:-1])
+        steps = steps * np.diff(time[at : at + rows + 1])[:, None]
+        if at:
+            steps[0] += sums[at]
+        np.cumsum(steps, axis=0, out=sums[at + 1 : at + rows + 1])
     return out
