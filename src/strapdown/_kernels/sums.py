@@ -159,3 +159,22 @@ def steady_motion(rows, memory_time, memory, out):
         for k in range(6):
             memory[k] += part * (rows[i, 1 + k] / dt - memory[k])
             out[i, k] = memory[k]
+
+
+@njit(cache=True)
+def window_moments(values, starts, ends, mean, variance):
+    """Fill mean and variance, (m, k), of columns (n, k) over windows of samples.
+
+    The variance of each about its own mean: of running sums the rounding would appear as noise.
+    """
+    for w in range(starts.shape[0]):
+        count = ends[w] - starts[w]
+        for j in range(values.shape[1]):
+            total = 0.0
+            for i in range(starts[w], ends[w]):
+                total += values[i, j]
+            middle = total / count
+            total = 0.0
+            for i in range(starts[w], ends[w]):
+                total += (values[i, j] - middle) * (values[i, j] - middle)
+            mean[w, j], variance[w, j] = middle, total / count

@@ -10,6 +10,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from strapdown._kernels.sums import window_moments
 from strapdown.dsp.samples import occupied_grid
 from strapdown.errors import DataError
 from strapdown.sensors.triad_errors import triad_of
@@ -143,16 +144,18 @@ def find_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
     starts, ends = _windows(time)
     if not len(starts):
         return ()
-    gyro_sd, rate = _window_sd(gyro, starts, ends), _window_mean(gyro, starts, ends)
+    rate, variance = _window_moments(gyro, starts, ends)
+    gyro_sd = np.sqrt(variance.sum(axis=1))
     quiet = max(QUIET_FACTOR * float(np.quantile(gyro_sd, QUIET_QUANTILE)), ROUNDING)
     still = gyro_sd <= min(quiet, MAX_GYRO_SD)
     still &= np.abs(rate).max(axis=1) <= MAX_MEAN_RATE
     root = np.sqrt(ends - starts)
     slow = [(rate, gyro_sd / root, MAX_RATE_CHANGE)]
     if accel is not None:
-        accel_sd = _window_sd(accel, starts, ends)
+        force, variance = _window_moments(accel, starts, ends)
+        accel_sd = np.sqrt(variance.sum(axis=1))
         still &= accel_sd <= MAX_ACCEL_SD
-        slow.append((_window_mean(accel, starts, ends), accel_sd / root, MAX_ACCEL_CHANGE))
+        slow.append((force, accel_sd / root, MAX_ACCEL_CHANGE))
     begins = time[starts]
     drifts = _drifts(begins, slow, still)
     joined = begins[1:] - time[ends[:-1] - 1] < LEAST_LENGTH
@@ -182,18 +185,11 @@ def _windows(time: Array) -> tuple[Indices, Indices]:
     return starts[enough].astype(np.int64), ends[enough].astype(np.int64)
 
 
-def _window_mean(values: Array, starts: Indices, ends: Indices) -> Array:
-    return np.array([values[a:b].mean(axis=0) for a, b in zip(starts, ends, strict=True)])
-
-
-def _window_sd(values: Array, starts: Indices, ends: Indices) -> Array:
-    """Root of the summed variances of the axes, per window.
-
-    Computed per window rather than by running sums, whose rounding would appear as noise in a
-    noise-free record.
-    """
-    variances = [values[a:b].var(axis=0).sum() for a, b in zip(starts, ends, strict=True)]
-    return np.asarray(np.sqrt(variances), dtype=np.float64)
+def _window_moments(values: Array, starts: Indices, ends: Indices) -> tuple[Array, Array]:
+    """Means and variances, (m, k), of columns (n, k) over windows."""
+    mean, variance = (np.empty((len(starts), values.shape[1])) for _ in range(2))
+    window_moments(np.ascontiguousarray(values), *map(np.array, (starts, ends)), mean, variance)
+    return mean, variance
 
 
 def _drifts(
@@ -322,7 +318,7 @@ def sd_of_mean(time: Array, values: Array) -> Array:
         power = np.maximum(np.square(off).sum(axis=0), TINY)
         r = np.clip((off[1:] * off[:-1]).sum(axis=0) / power, 0.0, 1.0 - 2.0 / n)
         return np.asarray(white * np.sqrt((1.0 + r) / (1.0 - r)), dtype=np.float64)
-    means = _window_mean(values, edges[:-1], edges[1:])
+    means, _ = _window_moments(values, edges[:-1], edges[1:])
     return np.asarray(np.maximum(white, means.std(axis=0, ddof=1) / np.sqrt(parts)))
 
 
@@ -421,23 +417,21 @@ def find_shaking_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
     values = imu[[*GYRO, *ACCEL]].to_numpy(dtype=np.float64)
     end = time[-1] - SHAKING_WINDOW + 1e-9
     starts = occupied_grid(time, end, STEP, SHAKING_WINDOW)
-    means = [_shaking_mean(time, values, float(start)) for start in starts]
-    shakes = np.array([one is not None for one in means], dtype=bool)
+    shakes, mean, sd = _shaking_means(time, values, starts)
     if not shakes.any():
         return ()
-    table = np.array([np.zeros(8) if one is None else one for one in means])
     slow = [
-        (table[:, :3], table[:, 6], MAX_RATE_CHANGE),
-        (table[:, 3:6], table[:, 7], MAX_ACCEL_CHANGE),
+        (mean[:, :3], sd[:, 0], MAX_RATE_CHANGE),
+        (mean[:, 3:], sd[:, 1], MAX_ACCEL_CHANGE),
     ]
     drifts = _drifts(starts, slow, shakes, SHAKING_LAGS)
     spans: list[tuple[float, float]] = []
     kept = np.flatnonzero(shakes & ~drifts)
     # Windows that overlap or touch are of one rest, if they agree: it may have moved between them.
     apart = np.diff(starts[kept]) > SHAKING_WINDOW
-    for mean, sd, most in slow:
-        noise = 4.0 * np.hypot(sd[kept[1:]], sd[kept[:-1]])
-        apart |= np.linalg.norm(np.diff(mean[kept], axis=0), axis=1) > most + noise
+    for means, sd_of, most in slow:
+        noise = 4.0 * np.hypot(sd_of[kept[1:]], sd_of[kept[:-1]])
+        apart |= np.linalg.norm(np.diff(means[kept], axis=0), axis=1) > most + noise
     for run in np.split(kept, np.flatnonzero(apart) + 1):
         if run.size and not _continues(starts, slow, drifts, run):
             begin, end = float(starts[run[0]]), float(starts[run[-1]]) + SHAKING_WINDOW
@@ -446,30 +440,38 @@ def find_shaking_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
     return of_one_bias([rest_between(imu, a, b, grade="shaking") for a, b in spans])
 
 
-def _shaking_mean(time: Array, values: Array, start: float) -> Array | None:
-    """Means of a window that vibrates about one attitude, and sd of the means of either triad.
+def _shaking_means(
+    time: Array, values: Array, starts: Array
+) -> tuple[NDArray[np.bool_], Array, Array]:
+    """Windows that vibrate about one attitude, (m,); means (m, 6), and sd of either triad (m, 2).
 
-    (8,); None of another window.
+    Both are zero for other windows.
     """
-    edges = np.searchsorted(time, start + np.linspace(0.0, SHAKING_WINDOW, BLOCKS + 1))
-    if np.diff(edges).min() < 3:
-        return None
-    whole = values[edges[0] : edges[-1]]
-    mean, variance = whole.mean(axis=0), whole.var(axis=0)
-    means = np.add.reduceat(whole, edges[:-1] - edges[0], axis=0) / np.diff(edges)[:, None]
-    scatter = means.var(axis=0)
-    shakes = (
-        np.sqrt(variance[:3].sum()) <= SHAKING_MAX_GYRO_SD
-        and np.sqrt(variance[3:].sum()) <= SHAKING_MAX_ACCEL_SD
-        and NEAR_GRAVITY[0] <= np.sqrt(mean[3:] @ mean[3:]) <= NEAR_GRAVITY[1]
-        and np.sqrt(mean[:3] @ mean[:3]) <= MAX_MEAN_RATE
-        and np.sqrt(scatter[:3].sum()) <= MAX_GYRO_SCATTER
-        and np.sqrt(scatter[3:].sum()) <= MAX_ACCEL_SCATTER
+    shakes, count = np.zeros(len(starts), dtype=np.bool_), len(starts)
+    mean, sd = np.zeros((count, 6)), np.zeros((count, 2))
+    offsets = np.linspace(0.0, SHAKING_WINDOW, BLOCKS + 1)
+    edges = np.searchsorted(time, starts[:, None] + offsets)
+    full = np.flatnonzero(np.diff(edges, axis=1).min(axis=1) >= 3)
+    edges = edges[full]
+    of, variance = _window_moments(values, edges[:, 0], edges[:, -1])
+    means, _ = _window_moments(values, edges[:, :-1].ravel(), edges[:, 1:].ravel())
+    means = means.reshape(-1, BLOCKS, 6)
+    scatter = means.var(axis=1)
+    size, largest = np.linalg.norm(of[:, 3:], axis=1), np.linalg.norm(of[:, :3], axis=1)
+    good = (
+        (np.sqrt(variance[:, :3].sum(axis=1)) <= SHAKING_MAX_GYRO_SD)
+        & (np.sqrt(variance[:, 3:].sum(axis=1)) <= SHAKING_MAX_ACCEL_SD)
+        & (size >= NEAR_GRAVITY[0])
+        & (size <= NEAR_GRAVITY[1])
+        & (largest <= MAX_MEAN_RATE)
+        & (np.sqrt(scatter[:, :3].sum(axis=1)) <= MAX_GYRO_SCATTER)
+        & (np.sqrt(scatter[:, 3:].sum(axis=1)) <= MAX_ACCEL_SCATTER)
     )
     # From block to block, so that a drift is no noise.
-    noise = 0.5 * np.square(np.diff(means, axis=0)).mean(axis=0)
-    sd = np.sqrt(np.array([noise[:3].sum(), noise[3:].sum()]) / BLOCKS)
-    return np.concatenate([mean, sd]) if shakes else None
+    noise = 0.5 * np.square(np.diff(means[good], axis=1)).mean(axis=1)
+    shakes[full[good]], mean[full[good]] = True, of[good]
+    sd[full[good]] = np.sqrt(noise.reshape(-1, 2, 3).sum(axis=2) / BLOCKS)
+    return shakes, mean, sd
 
 
 def find_rests_of_every_grade(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
