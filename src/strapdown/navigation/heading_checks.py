@@ -83,9 +83,8 @@ LEAST_PLACE, LEAST_VELOCITY, LEAST_TILT = 0.1, 0.05, 0.2
 #: The same for roll and pitch after the run became doubtful, deg: the tilt that a velocity change
 #: at 0.2 g leaves where the heading is off by 10 deg.
 DOUBTED_TILT = 2.0
-#: Interval between checks, s; the same once one is accurate enough; length of the parts in which
-#: the record is processed.
-TURN, RENEWED, HEARD = 60.0, 180.0, 20.0
+#: Interval between checks, s, by which the record is processed, and once one is accurate enough.
+TURN, RENEWED = 60.0, 180.0
 #: Epochs over which the scatter of the innovations is judged, and the fewest needed.
 JUDGED, FEWEST = 60, 8
 #: Limit of a normalized innovation in the estimate of their scatter.
@@ -117,7 +116,7 @@ def run_heading_checks(
         In order of `since`.
     """
     end = float(made.time[-1])
-    cuts = np.arange(made.begun, end, HEARD)
+    cuts = np.arange(made.begun, end, TURN)
     seconds = np.arange(math.ceil(made.begun + NEAR), math.floor(end) + 1.0)
     places = np.clip(np.searchsorted(made.time, seconds - NEAR), 0, len(made.time) - 1)
     firsts = np.searchsorted(made.time, cuts + NEAR, side="right").tolist()
@@ -132,7 +131,7 @@ def run_heading_checks(
         if len(heard) > 1 and heard[-1].sd <= enough:
             heard = heard[-1:]
         youngest = at - heard[-1].since if heard else math.inf
-        if youngest >= (RENEWED if heard and heard[-1].sd <= enough else TURN) - HEARD / 2.0:
+        if youngest >= (RENEWED if heard and heard[-1].sd <= enough else TURN) - TURN / 2.0:
             if len(heard) > 1:
                 heard = [min(heard, key=lambda one: one.sd)]
             # What came since the last time: a check may last for hours.
