@@ -1,20 +1,25 @@
-"""Crash reconstruction: the Monte Carlo beside the mechanization that it repeats."""
+"""Crash reconstruction: the Monte Carlo beside the mechanization that it repeats, its memory."""
 
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.measure import Row, by_turns
+from benchmarks.commands import FLAT, MOST_MEMORY
+from benchmarks.measure import Row, by_turns, strapdown
 
 RUNS = 10_000
 RATE = 200.0
 # Runs that are navigated by one call of the bare mechanization, as many as the Monte Carlo takes.
 TOGETHER = 64
+# Runs of a case as `init` proposes it, and fifty times as many.
+PROPOSED, MANY = 2_000, 100_000
 
 
 def monte_carlo() -> Iterator[Row]:
@@ -45,6 +50,26 @@ def monte_carlo() -> Iterator[Row]:
     what = f"crash, {RUNS} possible paths, {len(path.names)} unknowns, a step"
     theirs = tuple(share * t for t in theirs)
     yield Row(what, ours, "bare mechanization", theirs, "ns", 2.5, 2.9)
+    yield from memory()
+
+
+def memory() -> Iterator[Row]:
+    """Memory of a whole case, report and PDF included."""
+    peaks = {}
+    with tempfile.TemporaryDirectory(prefix="strapdown-") as name:
+        folder = Path(name)
+        strapdown("simulate", "pole", "-q", "--out", "pole", folder=folder)
+        case = folder / "pole" / "case.toml"
+        text = case.read_text(encoding="utf-8")
+        said = f"monte_carlo_runs = {PROPOSED}"
+        assert said in text
+        for runs in (PROPOSED, MANY):
+            case.write_text(text.replace(said, f"monte_carlo_runs = {runs}"), encoding="utf-8")
+            used = strapdown("crash", str(case), "-q", "--force", "--out", "out", folder=folder)
+            peaks[runs] = (used.peak,)
+    what = f"crash, a case with {MANY} possible paths: peak memory"
+    yield Row(what, peaks[MANY], "the aim", (MOST_MEMORY,), "MiB", 1.0)
+    yield Row(what, peaks[MANY], f"of {PROPOSED}", peaks[PROPOSED], "MiB", FLAT)
 
 
 def _path() -> Any:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import mmap
 import sys
-from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
+from tests.resident import resident
 
 from strapdown.formats import csv
 from strapdown.formats.assemble import assemble
@@ -20,16 +20,12 @@ from strapdown.tables import imu_table, on_disk
 from strapdown.tables.checks import all_finite
 
 
-def resident():
-    """Bytes of mapped files in memory."""
-    lines = Path("/proc/self/status").read_text().splitlines()
-    return 1024 * next(int(line.split()[1]) for line in lines if line.startswith("RssFile"))
-
-
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems keep arrays in memory")
 def test_what_is_let_go_takes_no_memory_and_is_read_again():
     rows = on_disk.room((3, 1 << 23))
     assert isinstance(rows.base, mmap.mmap)
+    assert isinstance(on_disk.room((3, 5), large=120, most=1).base, mmap.mmap)
+    assert on_disk.room((3, 5), large=121).base is None
     before = resident()
     rows[:] = np.arange(rows.shape[1])
     filled = resident()
@@ -54,6 +50,10 @@ def test_small_arrays_and_those_without_a_place_are_in_memory(monkeypatch):
     monkeypatch.setattr(on_disk.os, "posix_fallocate", full)
     rows = on_disk.room((1, on_disk.LARGE // 8))
     assert rows.base is None
+    assert on_disk.room((3, 5), most=120).base is None
+    for large in (1, 1000):
+        with pytest.raises(MemoryError):
+            on_disk.room((3, 5), large=large, most=119)
     assert rows.shape == (1, on_disk.LARGE // 8)
     on_disk.let_go(rows)
     on_disk.let_go(pd.DataFrame({"word": ["a", "b"]}))

@@ -142,13 +142,25 @@ def perturbed_runs(
                 added[j, i] = noise_sd[j, i] * noise[n, j, i]
         first[:] = 0.0
         for p in range(unknowns):
-            x = draws[n, p]
             for j in range(9):
-                first[j] += x * start[p, j]
-            for j in range(6):
-                if used[p, j]:
-                    for i in range(steps):
-                        added[j, i] += x * effects[p, j, i]
+                first[j] += draws[n, p] * start[p, j]
+        for j in range(6):
+            waiting = -1
+            for p in range(unknowns):
+                if not used[p, j]:
+                    continue
+                if waiting < 0:
+                    waiting = p
+                    continue
+                # Two at a time: half of the loads and stores of what they are added to.
+                x, y = draws[n, waiting], draws[n, p]
+                for i in range(steps):
+                    added[j, i] = added[j, i] + x * effects[waiting, j, i] + y * effects[p, j, i]
+                waiting = -1
+            if waiting >= 0:
+                x = draws[n, waiting]
+                for i in range(steps):
+                    added[j, i] += x * effects[waiting, j, i]
         for i in range(steps):
             half = 0.5 * rows[i, 0]
             mine[i, 0] = rows[i, 0]

@@ -340,7 +340,7 @@ class OptionsSpec(Spec):
     #: On the Earth, from the equator at altitude to the poles.
     gravity_m_per_s2: Annotated[Number, Field(gt=9.7, lt=9.9)] = 9.80665
     zero_at: Literal["interval", "threshold"] = "interval"
-    monte_carlo_runs: StrictInt = Field(default=2000, ge=0, le=100_000)
+    monte_carlo_runs: StrictInt = Field(default=2000, ge=0, le=1_000_000)
     seed: StrictInt = Field(default=0, ge=0)
     #: The largest that is possible: dry asphalt.
     tire_friction: Annotated[Number, Field(ge=0.0, le=2.0)] = Field(

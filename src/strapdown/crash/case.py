@@ -76,8 +76,8 @@ if TYPE_CHECKING:
 
 # Standard deviation of a speed of the wheels, and of the place of an axle that is stated.
 SPEED_SD, AXLE_SD = 0.1, 0.05  # m/s, m
-# Most numbers of a Monte Carlo in memory: half a gigabyte.
-MOST_NUMBERS = 64_000_000
+# Most numbers of a Monte Carlo, in a file: 16 GB.
+MOST_NUMBERS = 2_000_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,7 +266,7 @@ def run_case(
     )
     findings += made.findings
     progress("drawing possible paths", 0.4)
-    samples, said = _samples(made.main.path, options.monte_carlo_runs, options.seed)
+    samples, said = _samples(made.main.path, options.monte_carlo_runs, options.seed, progress)
     findings += said
     deformation, stated = deformed(spec, made, tables)
     references = tuple(
@@ -459,13 +459,21 @@ def _preparation(spec: CaseSpec) -> dict[str, dict[str, object]]:
     return made
 
 
-def _samples(path: CrashPath, runs: int, seed: int) -> tuple[PathSamples | None, list[Finding]]:
+def _samples(
+    path: CrashPath, runs: int, seed: int, progress: Progress
+) -> tuple[PathSamples | None, list[Finding]]:
     if runs == 0:
         return None, []
     most = max(2, MOST_NUMBERS // (9 * len(path.time)))
+    samples = sample_paths(
+        path,
+        runs=min(runs, most),
+        seed=seed,
+        progress=lambda stage, share: progress(stage, 0.4 + 0.35 * share),
+    )
     if runs <= most:
-        return sample_paths(path, runs=runs, seed=seed), []
-    return sample_paths(path, runs=most, seed=seed), [
+        return samples, []
+    return samples, [
         Finding(
             "crash.runs-samples-would-need-more",
             quantity="options, monte_carlo_runs",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
@@ -29,11 +30,13 @@ from strapdown.errors import ConfigError, DataError, DivergenceError
 from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown
 from strapdown.nav_state import NavState
+from strapdown.progress import Progress, silent
 from strapdown.rotation import cross_matrix
 from strapdown.sensors.pre_crash import Levelling
 from strapdown.sensors.triad_errors import triad_of
 from strapdown.tables import ACCEL, EULER, GYRO, MOTION, NED, POSITION_SD
 from strapdown.tables import VELOCITY as VELOCITIES
+from strapdown.tables.on_disk import let_go, parts_of, room, tidy
 
 Array = NDArray[np.float64]
 
@@ -674,13 +677,20 @@ def to_stamp(imu: pd.DataFrame, effects: SampleEffects, instant: float, row: int
 # Number of runs that share one stream of random numbers: part of the meaning of a seed,
 # unlike the number of cores.
 TOGETHER = 64
-# One gigabyte of paths.
-MOST_RUNS = 100_000
+# Of 750 ms at 200 Hz, 11 GB of paths.
+MOST_RUNS = 1_000_000
+# Bytes of paths from which on they are in a file, and that are made in memory at the most.
+LARGE, MOST_IN_MEMORY = 1 << 27, 1 << 31
+# Streams after which memory is given back: some 40 MB of paths in a file.
+STREAMS = 64
 
 
 @dataclass(frozen=True, eq=False)
 class PathSamples:
     """Simulated paths, as differences from the reconstructed one.
+
+    Many runs are in an unnamed file in the folder for temporary files, of which the part in use is
+    in memory; the numbers of all runs at one sample are together.
 
     Attributes
     ----------
@@ -699,18 +709,36 @@ class PathSamples:
     @property
     def covariance(self) -> Array:
         """About their mean, (n, 9, 9)."""
-        centred = self.errors - self.errors.mean(axis=0)
-        return np.asarray(np.einsum("rni,rnj->nij", centred, centred) / (len(centred) - 1))
+        runs, count, width = self.errors.shape
+        out = np.empty((count, width, width))
+        for part in parts_of(count, width * runs):
+            # In the order of the runs, in which the sums are taken.
+            centred = self.errors[:, part].copy(order="C")
+            let_go(self.errors)
+            centred -= centred.mean(axis=0)
+            out[part] = np.einsum("rni,rnj->nij", centred, centred) / (runs - 1)
+        return out
 
-    def interval(self, share: float = 0.95) -> tuple[Array, Array]:
-        """Bounds of the central fraction `share` of the runs, each (n, 9)."""
-        edge = 0.5 * (1.0 - share)
-        low, high = np.quantile(self.errors, [edge, 1.0 - edge], axis=0)
-        return low, high
+    def interval(self, share: float = 0.95, columns: slice = slice(None)) -> tuple[Array, Array]:
+        """Bounds of the central fraction `share` of the runs, each (n, 9), or of some columns."""
+        edges = [0.5 * (1.0 - share), 1.0 - 0.5 * (1.0 - share)]
+        runs, count, _ = self.errors.shape
+        values = self.errors[:, :, columns].transpose(2, 1, 0)
+        out = np.empty((2, count, len(values)))
+        for part in parts_of(count, runs):
+            for column, rows in enumerate(values):
+                out[:, part, column] = np.quantile(rows[part], edges, axis=1)
+                let_go(self.errors)
+        return out[0], out[1]
 
 
 def sample_paths(
-    path: CrashPath, *, runs: int = 10_000, seed: int = 0, workers: int | None = None
+    path: CrashPath,
+    *,
+    runs: int = 10_000,
+    seed: int = 0,
+    workers: int | None = None,
+    progress: Progress = silent,
 ) -> PathSamples:
     """Draw Monte Carlo paths.
 
@@ -721,25 +749,29 @@ def sample_paths(
     ----------
     path : CrashPath
     runs : int
+        Up to a million, in 72 bytes of the disk a sample of each; memory does not grow with them.
     seed : int
         The same seed gives bitwise the same runs on any number of cores; a larger number of
         runs extends a smaller one with the same seed.
     workers : int, optional
         Threads; by default all cores.
+    progress : callable, optional
+        Called with a stage and the share that is done.
 
     Raises
     ------
     ConfigError
-        `runs` is less than 2 or too large, or a seed or a number of workers is not valid.
+        `runs` is less than 2, too large, or more than the disk has room for; or a seed or a number
+        of workers is not valid.
     """
     _check(path, runs, seed, workers)
     unknowns = len(path.names)
-    draws = np.empty((runs, unknowns))
-    errors = np.empty((runs, len(path.time), 9))
-    back, ahead = path.legs
-    views = (errors[:, : path.anchor + 1][:, ::-1], errors[:, path.anchor :])
+    numbers = 9 * len(path.time)
+    kept = _room(runs, numbers + unknowns)
+    errors = kept[:numbers, :runs].T.reshape(runs, -1, 9)
+    draws = kept[numbers:, :runs].T
     prepared = []
-    for leg, view in zip((back, ahead), views, strict=True):
+    for leg in path.legs:
         start = path.start.copy()
         if leg.backward:
             start[:, VELOCITY] *= -1.0
@@ -748,7 +780,6 @@ def sample_paths(
         prepared.append(
             (
                 leg,
-                view,
                 active,
                 start[active],
                 np.ascontiguousarray(leg.effects[active]),
@@ -763,7 +794,9 @@ def sample_paths(
         )
         mine = generator.standard_normal((TOGETHER, unknowns))[: rows.stop - rows.start]
         draws[rows] = mine
-        for leg, view, active, start, effects, used in prepared:
+        own = errors[rows]
+        for leg, active, start, effects, used in prepared:
+            view = own[:, path.anchor :: -1] if leg.backward else own[:, path.anchor :]
             steps = len(leg.rows)
             # Single precision suffices for noise and halves the memory.
             noise = generator.standard_normal((TOGETHER, 6, steps), dtype=np.float32)
@@ -779,15 +812,37 @@ def sample_paths(
                 noise,
                 leg.earth,
                 leg.options,
-                view[rows],
+                view,
             )
             if leg.backward:
-                view[rows, :, VELOCITY] *= -1.0
+                view[..., VELOCITY] *= -1.0
+        if (number + 1) % STREAMS == 0:
+            let_go(kept)
 
     chunks = range((runs + TOGETHER - 1) // TOGETHER)
     with ThreadPoolExecutor(workers or os.cpu_count()) as pool:
-        list(pool.map(chunk, chunks))
+        for number, _ in enumerate(pool.map(chunk, chunks), start=1):
+            if number % STREAMS == 0:
+                progress("drawing possible paths", number / len(chunks))
+    tidy()
     return PathSamples(path.time, errors, draws)
+
+
+def _room(runs: int, numbers: int) -> Array:
+    """Room for so many numbers of each run, (numbers, at least runs)."""
+    # A run writes all its numbers. Were their distance even in lines of the cache, they would share
+    # a few places there.
+    width = 8 * (math.ceil(runs / 8) | 1)
+    try:
+        return room((numbers, width), large=LARGE, most=MOST_IN_MEMORY)
+    except MemoryError:
+        raise ConfigError(
+            "crash.runs-have-no-place",
+            quantity="runs",
+            runs=runs,
+            size=8e-9 * numbers * width,
+            folder=tempfile.gettempdir(),
+        ) from None
 
 
 def _check(path: object, runs: object, seed: object, workers: object) -> None:

@@ -69,6 +69,8 @@ def _write(
         from strapdown.report.crash_document import crash_document
         from strapdown.report.document_html import write_report
 
+        if result.samples is not None:
+            progress("bounds of the possible paths", 0.82)
         document = crash_document(result, name)
         stills = write_report(document, folder, progress)
     if "pdf" in forms:

@@ -45,6 +45,7 @@ from strapdown.sensors.crash_unit import CrashUnit, RecordedTriad
 from strapdown.sensors.synchronise import SynchronisedUnit
 from strapdown.tables import ACCEL, EULER, GYRO, NED, VELOCITY
 from strapdown.tables.checks import index_of
+from strapdown.tables.on_disk import let_go, parts_of
 
 _TURNS = ("roll", "pitch", "yaw")
 _ANGLES = ("roll", "pitch", "heading")
@@ -333,6 +334,8 @@ def near_levels(
 
 # Instants at which the Monte Carlo bounds are taken; they are as smooth as the path.
 _INSTANTS = 160
+# Numbers of a run while its angles are computed.
+_WIDTH = 64
 _STEADY = 1e-3
 
 
@@ -457,24 +460,26 @@ def _sampled(samples: PathSamples | None, first: int) -> list[Array] | None:
     """Low and high ends of the Monte Carlo 95 % interval for three columns of its errors."""
     if samples is None:
         return None
-    low, high = samples.interval(0.95)
-    return [np.stack([low[:, k], high[:, k]]) for k in range(first, first + 3)]
+    low, high = samples.interval(0.95, slice(first, first + 3))
+    return [np.stack([low[:, k], high[:, k]]) for k in range(3)]
 
 
 def _sampled_angles(path: CrashPath, samples: PathSamples | None) -> list[Array] | None:
     if samples is None:
         return None
     rows = np.unique(np.linspace(0, len(path.time) - 1, _INSTANTS).astype(int))
-    out = [np.full((2, len(path.time)), np.nan) for _ in EULER]
+    out = np.full((3, 2, len(path.time)), np.nan)
+    off = np.empty((3, len(samples.errors)))
     nominal = rotation.euler_from_quaternion(path.q_nb)
     for row in rows.tolist():
-        # The error angles are applied after the computed attitude.
-        turned = rotation.quaternion_from_rotation_vector(samples.errors[:, row, :3])
-        true = rotation.euler_from_quaternion(rotation.compose(turned, path.q_nb[row]))
-        off = rotation.within_half_turn(true - nominal[row])
-        for k in range(3):
-            out[k][:, row] = np.quantile(off[:, k], [0.025, 0.975])
-    return out
+        for part in parts_of(len(samples.errors), _WIDTH):
+            # The error angles are applied after the computed attitude.
+            turned = rotation.quaternion_from_rotation_vector(samples.errors[part, row, :3])
+            true = rotation.euler_from_quaternion(rotation.compose(turned, path.q_nb[row]))
+            off[:, part] = rotation.within_half_turn(true - nominal[row]).T
+        let_go(samples.errors)
+        out[..., row] = np.quantile(off, [0.025, 0.975], axis=1).T
+    return list(out)
 
 
 def _panels(

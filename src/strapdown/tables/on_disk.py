@@ -7,6 +7,7 @@ part, however long the log is.
 from __future__ import annotations
 
 import ctypes
+import math
 import mmap
 import os
 import tempfile
@@ -40,15 +41,26 @@ _MAPS: weakref.WeakSet[mmap.mmap] = weakref.WeakSet()
 
 
 def room(
-    shape: tuple[int, ...], kind: np.dtype[Any] | type[np.generic] = np.float64
+    shape: tuple[int, ...],
+    kind: np.dtype[Any] | type[np.generic] = np.float64,
+    *,
+    large: int | None = None,
+    most: float = math.inf,
 ) -> NDArray[Any]:
     """Return an array to be filled; in memory if it is small, or if the disk has no place for it.
 
     The file is in the folder for temporary files, without a name, and gone with the array. A
     process that forks shares it with its child. In memory on macOS and Windows.
+
+    `large`: bytes from which on it is in a file, `LARGE` by default. `MemoryError`: it is not, and
+    has more than `most` bytes.
     """
-    size = np.dtype(kind).itemsize * int(np.prod(shape))
-    if size >= LARGE and hasattr(os, "posix_fallocate") and hasattr(mmap, "MADV_DONTNEED"):
+    size = np.dtype(kind).itemsize * math.prod(shape)
+    if (
+        size >= (LARGE if large is None else large)
+        and hasattr(os, "posix_fallocate")
+        and hasattr(mmap, "MADV_DONTNEED")
+    ):
         try:
             with tempfile.TemporaryFile() as file:
                 # A page that the disk has no place for would end the process by a signal.
@@ -58,6 +70,8 @@ def room(
             return np.ndarray(shape, kind, buffer=mapped)
         except OSError:
             pass
+    if size > most:
+        raise MemoryError(size)
     return np.empty(shape, kind)
 
 

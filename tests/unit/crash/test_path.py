@@ -2,28 +2,36 @@
 
 from __future__ import annotations
 
+import mmap
+import sys
+import tempfile
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from tests.coded import coded
+from tests.resident import resident
 from tests.unit.crash.crash_case import RATE, prepared
 
 from strapdown import rotation
 from strapdown._kernels.crash_errors import perturbed_runs
+from strapdown.crash import case as crash_case
+from strapdown.crash import path as crash_path
 from strapdown.crash.combine_units import combine_effects
 from strapdown.crash.delta_v_bound import resolved_delta_v_bound
 from strapdown.crash.entry import Entry
 from strapdown.crash.measuring_point import unit_effects
 from strapdown.crash.path import PLACE, VELOCITY, reconstruct_path, sample_paths
 from strapdown.errors import ConfigError, DataError
+from strapdown.report.crash_signals import attitude_chart
 from strapdown.sensors.crash_unit import Mounting
 from strapdown.sensors.lever_arm import move_unit
 from strapdown.sensors.pre_crash import Levelling
 from strapdown.simulation import ImuErrors, simulate_imu
 from strapdown.simulation.crash_motion import CrashMotion, HaversinePulse
 from strapdown.simulation.earth_motion import Origin
-from strapdown.tables import ACCEL, GYRO, NED
+from strapdown.tables import ACCEL, GYRO, NED, on_disk
 
 IMPACT = 2.0
 LENGTH = 0.113
@@ -233,6 +241,18 @@ def test_linear_covariance_and_monte_carlo_agree(case):
     )
 
 
+def test_a_run_has_the_errors_of_its_draws(case):
+    *_, path = case
+    runs = 500
+    samples = sample_paths(path, runs=runs, seed=3)
+    linear = np.einsum("rp,pni->rni", samples.draws, path.errors)
+    # What is left is the noise, which is not among the draws: its standard deviation by n runs to
+    # 1/sqrt(2 n), four of them. Over the tenth of a second before the entry nothing else is.
+    left = samples.errors[:, 0] - linear[:, 0]
+    noise = np.sqrt(np.diagonal(path.noise_covariance[0]))
+    assert np.abs(left.std(axis=0) / noise - 1.0).max() < 4.0 / np.sqrt(2.0 * runs)
+
+
 def test_monte_carlo_does_not_know_the_cores(case):
     *_, path = case
     one = sample_paths(path, runs=200, seed=5, workers=1)
@@ -242,8 +262,173 @@ def test_monte_carlo_does_not_know_the_cores(case):
     assert np.array_equal(one.errors, more.errors[:200])
     assert not np.array_equal(one.errors, sample_paths(path, runs=200, seed=6).errors)
     assert len(sample_paths(path, runs=2).errors) == 2
-    with pytest.raises(ConfigError, match="runs"):
-        sample_paths(path, runs=1)
+    for runs in (1, 1_000_001):
+        with pytest.raises(
+            ConfigError,
+            check=coded("crash.runs-out-of-range", quantity="runs", most_runs=1_000_000),
+        ):
+            sample_paths(path, runs=runs)
+
+
+def test_runs_in_a_file_say_what_runs_in_memory_say(case, monkeypatch):
+    *_, path = case
+    runs = 345
+    whole = sample_paths(path, runs=runs, seed=5)
+    assert whole.errors.nbytes > on_disk.LARGE
+    assert _base(whole.errors) is None
+    errors = np.ascontiguousarray(whole.errors)
+    assert errors.shape == (runs, len(path.time), 9)
+    centred = errors - errors.mean(axis=0)
+    covariance = np.einsum("rni,rnj->nij", centred, centred) / (runs - 1)
+    assert np.array_equal(whole.covariance, covariance)
+    # In memory all samples are one part; then some samples of a column, and one.
+    for samples in (len(path.time), 7, 1):
+        monkeypatch.setattr(on_disk, "PART", 8 * runs * samples)
+        monkeypatch.setattr(crash_path, "LARGE", 1)
+        monkeypatch.setattr(crash_path, "STREAMS", 2)
+        filed = sample_paths(path, runs=runs, seed=5, workers=2)
+        assert sys.platform != "linux" or isinstance(_base(filed.errors), mmap.mmap)
+        assert np.array_equal(filed.errors, errors)
+        assert np.array_equal(filed.draws, whole.draws)
+        assert np.array_equal(filed.covariance, covariance)
+        for share in (0.95, 0.5):
+            edges = [0.5 * (1.0 - share), 1.0 - 0.5 * (1.0 - share)]
+            bounds = np.quantile(errors, edges, axis=0)
+            assert np.array_equal(filed.interval(share), bounds)
+            assert np.array_equal(filed.interval(share, PLACE), bounds[..., PLACE])
+    assert np.array_equal(filed.interval(), filed.interval(0.95))
+
+
+def _base(array):
+    while isinstance(array, np.ndarray):
+        array = array.base
+    return array
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems keep the runs in memory")
+def test_memory_does_not_grow_with_the_runs(case, monkeypatch):
+    *_, path = case
+    monkeypatch.setattr(crash_path, "LARGE", 1)
+    monkeypatch.setattr(crash_path, "STREAMS", 8)
+    before, during = resident(), []
+
+    def report(stage, share):
+        during.append((stage, share, resident() - before))
+
+    # A page holds 512 runs of a number, and so do 8 streams.
+    samples = sample_paths(path, runs=20 * 512 + 1, seed=1, workers=1, progress=report)
+    size = samples.errors.nbytes + samples.draws.nbytes
+    assert [stage for stage, *_ in during] == ["drawing possible paths"] * 20
+    assert [share for _, share, _ in during] == [(8 * k + 8) / 161 for k in range(20)]
+    # The streams since memory was last given back are in two pages of each number at the most, and
+    # the thread goes on while it is looked at.
+    assert max(held for *_, held in during) < 0.25 * size
+    assert resident() - before < 0.02 * size
+    # What is made of them takes parts of 2 MiB: of a quantity at all samples, 14 MB.
+    tracemalloc.start()
+    for use in (
+        samples.interval,
+        lambda: samples.covariance,
+        lambda: attitude_chart(path, samples=samples),
+    ):
+        tracemalloc.reset_peak()
+        use()
+        assert tracemalloc.get_traced_memory()[1] < 5 * on_disk.PART
+        assert resident() - before < 0.02 * size
+    tracemalloc.stop()
+
+
+def test_runs_without_a_place_on_the_disk(case, monkeypatch):
+    *_, path = case
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(crash_path, "LARGE", 1)
+    monkeypatch.setattr(on_disk.os, "posix_fallocate", full, raising=False)
+    assert _base(sample_paths(path, runs=100).errors) is None
+    numbers = 9 * len(path.time) + len(path.names)
+    # 100 runs are 13 lines of 8 numbers.
+    size = 8 * 13 * 8 * numbers
+    monkeypatch.setattr(crash_path, "MOST_IN_MEMORY", size)
+    assert len(sample_paths(path, runs=100).errors) == 100
+    monkeypatch.setattr(crash_path, "MOST_IN_MEMORY", size - 1)
+    with pytest.raises(
+        ConfigError,
+        check=coded(
+            "crash.runs-have-no-place",
+            quantity="runs",
+            runs=100,
+            size=pytest.approx(1e-9 * size),
+            folder=tempfile.gettempdir(),
+        ),
+    ):
+        sample_paths(path, runs=100)
+
+
+@pytest.mark.parametrize("runs", [2, 8, 100, 128, 512])
+def test_numbers_of_a_run_do_not_share_places_in_a_cache(case, runs):
+    *_, path = case
+    apart = sample_paths(path, runs=runs).errors.strides[2]
+    assert apart >= 8 * runs
+    assert apart % 128 == 64
+
+
+def test_a_case_draws_what_fits_in_a_file_and_says_so(case, monkeypatch):
+    *_, path = case
+    monkeypatch.setattr(crash_path, "STREAMS", 1)
+    shares = []
+
+    def drawn(runs):
+        shares.clear()
+        samples, findings = crash_case._samples(
+            path, runs, 3, lambda _, share: shares.append(share)
+        )
+        return samples, findings
+
+    assert drawn(0) == (None, [])
+    monkeypatch.setattr(crash_case, "MOST_NUMBERS", 9 * len(path.time) * 100 + 5)
+    samples, findings = drawn(100)
+    assert np.array_equal(samples.errors, sample_paths(path, runs=100, seed=3).errors)
+    assert findings == []
+    assert shares == pytest.approx([0.4 + 0.35 * 0.5, 0.75])
+    samples, (finding,) = drawn(101)
+    assert len(samples.errors) == 100
+    assert finding.code == "crash.runs-samples-would-need-more"
+    assert finding.data == {"runs": 101, "count": len(path.time), "most": 100}
+
+
+def test_effects_are_added_in_the_order_of_the_unknowns(case):
+    *_, path = case
+    leg, runs = path.legs[1], 3
+    rng = np.random.default_rng(2)
+    steps, unknowns = len(leg.rows), 6
+    start, draws = 1e-3 * rng.normal(size=(unknowns, 9)), rng.normal(size=(runs, unknowns))
+    effects = 1e-3 * rng.normal(size=(unknowns, 6, steps))
+    noise = rng.normal(size=(runs, 6, steps)).astype(np.float32)
+    used = np.ones((unknowns, 6), dtype=bool)
+    # None, one, two, three, five and six of them.
+    for j, unused in enumerate([range(6), [1, 2, 3, 4, 5], [0, 2, 3, 5], [1, 2, 4], [3], []]):
+        used[list(unused), j] = False
+
+    def navigated(start, effects, used, noise_sd, draws, noise):
+        out = np.empty((len(draws), steps + 1, 9))
+        state, rows, nominal = leg.state, leg.rows, leg.nominal
+        about = (start, effects, used, noise_sd, draws, noise, leg.earth, leg.options, out)
+        assert perturbed_runs(state, rows, nominal, *about) == len(draws)
+        return out
+
+    found = navigated(start, effects, used, leg.noise_sd, draws, noise)
+    for run in range(runs):
+        first, added = np.zeros((1, 9)), leg.noise_sd * noise[run]
+        for p in range(unknowns):
+            first[0] += draws[run, p] * start[p]
+            added += np.where(used[p, :, None], draws[run, p] * effects[p], 0.0)
+        # The sums themselves, as one unknown of the start and as a noise.
+        one = np.ones((1, 6, steps), dtype=np.float32)
+        nothing = np.zeros((1, 6, steps)), np.zeros((1, 6), dtype=bool)
+        alone = navigated(first, *nothing, added, np.ones((1, 1)), one)
+        assert np.array_equal(found[run], alone[0])
 
 
 def test_noise_alone(case):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from tests.unit.report.crash_results import crash_case, figures_of
 
+from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.crash.case_contact import main_event
 from strapdown.crash.delta_v_bound import body_delta_v_bound
@@ -22,9 +23,13 @@ from strapdown.report.crash_charts import (
     risk_chart,
 )
 from strapdown.report.crash_outline import event_marks, marks_apart, path_moments
-from strapdown.report.crash_signals import flags_in_vehicle_axes, in_vehicle_axes
+from strapdown.report.crash_signals import (
+    attitude_chart,
+    flags_in_vehicle_axes,
+    in_vehicle_axes,
+)
 from strapdown.sensors.crash_unit import Mounting
-from strapdown.tables import EULER, NED
+from strapdown.tables import EULER, NED, on_disk
 
 ALONE = ("IMU1",)
 
@@ -176,6 +181,26 @@ def test_the_path_over_time_has_linear_and_sampled_bounds():
         sampled = float(ends[1].y[-1] - ends[0].y[-1])
         # Quantiles of 400 runs are within 10 % of their own with three sigma.
         assert sampled == pytest.approx(linear, rel=0.2), axis
+
+
+def test_sampled_angles_are_those_of_all_runs_together(monkeypatch):
+    result = crash_case()
+    path, errors = result.reconstruction.main.path, result.samples.errors
+    turned = rotation.quaternion_from_rotation_vector(errors[:, -1, :3])
+    true = rotation.euler_from_quaternion(rotation.compose(turned, path.q_nb[-1]))
+    off = rotation.within_half_turn(true - rotation.euler_from_quaternion(path.q_nb[-1]))
+    bounds = np.quantile(off, [0.025, 0.975], axis=0)
+    whole = attitude_chart(path, samples=result.samples)
+    # A few runs at a time, the last of them alone.
+    monkeypatch.setattr(on_disk, "PART", 8 * 64 * 7)
+    assert len(errors) % 7 == 1
+    parts = attitude_chart(path, samples=result.samples)
+    for k, (one, other) in enumerate(zip(whole.panels, parts.panels, strict=True)):
+        ends = [line.y for line in other.lines if line.name == "95 %, Monte Carlo"]
+        own = other.lines[0].y[-1]
+        np.testing.assert_allclose([end[-1] - own for end in ends], bounds[:, k], atol=1e-10)
+        for line, again in zip(one.lines, other.lines, strict=True):
+            assert np.array_equal(line.y, again.y)
 
 
 def test_a_reference_chart_has_the_errors_and_their_bound():
