@@ -551,7 +551,7 @@ def imu_of_arrays(
     source: str | None = None,
 ) -> pd.DataFrame:
     """An Imu table from arrays, stored column by column like one that is read."""
-    return imu_table(t, gyro, accel, sampling=sampling, source=source, order="F")
+    return imu_table(t, gyro, accel, sampling=sampling, source=source, by_column=True)
 
 
 def _digest(table: pd.DataFrame) -> str:

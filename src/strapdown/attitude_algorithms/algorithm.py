@@ -249,8 +249,7 @@ def history_of_samples(
         stop = min(start + CHUNK, len(time) - 1)
         dt = np.diff(time[start : stop + 1])
         steps = Steps(dt, theta[: len(dt)], dtheta[: len(dt)])
-        part = rate[start : stop + 1]
-        increment_kernel.increments(dt, part, mean, steps.theta, steps.dtheta)
+        increment_kernel.increments(dt, rate[start : stop + 1], mean, steps.theta, steps.dtheta)
         state, history = algorithm.advance(state, steps)
         _refuse_overflow(algorithm, history, start)
         out[start + 1 : stop + 1] = algorithm.quaternions(history)
@@ -444,7 +443,8 @@ class AttitudeTracker:
     def roll_pitch_heading(self) -> Array:
         """The attitude as 3-2-1 angles, (3,), deg."""
         if not self._plain:
-            return rotation.euler_from_quaternion(self._row())
+            w, x, y, z, _ = kernel.unit_quat(*self._row())
+            return np.array(kernel.euler_degrees_from_quat(w, x, y, z))
         out = np.empty(3)
         kernel.unit_euler_degrees(self._record, HEAD, out)
         return out

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 import pandas as pd
@@ -49,7 +48,7 @@ def imu_table(
     *,
     sampling: str = "instantaneous",
     source: str | None = None,
-    order: Literal["C", "F"] = "C",
+    by_column: bool = False,
 ) -> pd.DataFrame:
     """Make an Imu table.
 
@@ -67,9 +66,9 @@ def imu_table(
         Whether a row holds the value at its stamp or the mean over the interval ending there.
     source : str, optional
         Name for messages.
-    order : {'C', 'F'}
-        Whether a row or a column is contiguous in memory, on which the last bit of a sum over a
-        column depends.
+    by_column : bool
+        Whether a column is contiguous in memory, as of a table that is read: the last bit of a sum
+        over a column depends on it.
 
     Returns
     -------
@@ -86,8 +85,8 @@ def imu_table(
     given = {"gyro": gyro, "accel": accel, "mag": mag}
     blocks = {name: as_array(x, 3, name, source) for name, x in given.items() if x is not None}
     check_same_length(source, time=stamps, **blocks)
-    values = np.empty((len(stamps), 3 * len(blocks)), order=order)
-    np.concatenate(list(blocks.values()), axis=1, out=values)
+    room = np.empty((len(stamps), 3 * len(blocks)), order="F") if by_column else None
+    values = np.concatenate(list(blocks.values()), axis=1, out=room)
     columns = [f"{name}_{axis}" for name in blocks for axis in "xyz"]
     return imu_of_columns(stamps, values, columns, sampling=sampling, source=source)
 
