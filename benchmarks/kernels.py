@@ -62,16 +62,16 @@ def attitude() -> Iterator[Row]:
         )
         # Both must have done the same work for the ratio to mean anything: rounding apart.
         assert np.abs(history - out[1:]).max() < 1e-9
-        yield Row(what, ours, "the same in C", theirs, "ns", 1.15, 1.3)
+        yield Row(what, ours, "the same in C", theirs, "ns", 1.15)
 
     time = np.arange(SAMPLES) * STEP
     imu = imu_table(time, gyro)
-    for what, job, limit in (
-        ("attitude, `sd.attitude` from table to table, a sample", lambda: sd.attitude(imu), 6.0),
-        ("attitude, `sd.attitude` of arrays, a sample", lambda: sd.attitude(time, gyro), 3.5),
+    for what, job in (
+        ("attitude, `sd.attitude` from table to table, a sample", lambda: sd.attitude(imu)),
+        ("attitude, `sd.attitude` of arrays, a sample", lambda: sd.attitude(time, gyro)),
     ):
         ours, theirs = by_turns(job, batch, rounds=9, per=per)
-        yield Row(what, ours, "its kernel", theirs, "ns", 3.0, limit)
+        yield Row(what, ours, "its kernel", theirs, "ns", 3.0)
 
     def one_by_one() -> None:
         update = AttitudeTracker(Quaternion()).update
@@ -91,7 +91,7 @@ def attitude() -> Iterator[Row]:
 
     ours, theirs = by_turns(angles, one_by_one, rounds=9, per=NS / PART)
     what = "attitude, angles of a tracker, a read"
-    yield Row(what, ours, "its update with one sample", theirs, "ns", 2.5, 4.5)
+    yield Row(what, ours, "its update with one sample", theirs, "ns", 2.5)
     yield from comparison()
 
 
@@ -190,9 +190,10 @@ def mechanization() -> Iterator[Row]:
     rows, history = np.empty((SAMPLES - 1, 10)), np.empty((SAMPLES - 1, 10))
     none, earth, options = np.empty(0), WGS84.parameters(), used.kernel_options()
     imu = imu_table(np.arange(SAMPLES) * STEP, gyro, accel)
+    samples = np.hstack([gyro, accel])
 
     def batch() -> None:
-        increments.motion_increments_linear(dt, gyro, accel, False, rows)
+        increments.motion_increments_linear(dt, samples, False, rows)
         kernel.ned_advance(begin.copy(), rows, none, earth, options, history)
 
     def from_table() -> Any:
@@ -227,14 +228,14 @@ def mechanization() -> Iterator[Row]:
         ours, theirs = by_turns(batch, in_c, per=per)
         # Both must have done the same work: a minute apart by less than their methods differ.
         assert np.abs(history[5998, 3:6] - out[5999, 3:6]).max() < 1e-2
-        yield Row(of_batch, ours, "the same in C", theirs, "ns", 1.15, 1.5)
+        yield Row(of_batch, ours, "the same in C", theirs, "ns", 1.15, 1.35)
         ours, theirs = by_turns(from_table, in_c, rounds=9, per=per)
-        yield Row(of_table, ours, "the same in C", theirs, "ns", 1.7, 4.4)
+        yield Row(of_table, ours, "the same in C", theirs, "ns", 1.7, 3.4)
         ours, theirs = by_turns(states, in_c, rounds=9)
         ours = tuple(NS / PART * t for t in ours)
         theirs = tuple(NS / SAMPLES * t for t in theirs)
         # Two microseconds beside 84 ns, as both were on one machine.
-        yield Row(of_state, ours, "a step in C", theirs, "ns", 24.0, 40.0)
+        yield Row(of_state, ours, "a step in C", theirs, "ns", 24.0)
 
     what, against = of_table, "python-ins, its public functions"
     try:
@@ -249,7 +250,7 @@ def mechanization() -> Iterator[Row]:
             rounds=7,
             per=per,
         )
-        yield Row(what, ours, against, theirs, "ns", 0.2, 0.42)
+        yield Row(what, ours, against, theirs, "ns", 0.2, 0.32)
 
     wandering = WanderAzimuth(**LIMITS)
     at_start = wandering.begin(start)
@@ -262,7 +263,9 @@ def mechanization() -> Iterator[Row]:
     )
     # The same motion, to what the two methods differ by.
     assert np.abs(wandered[5998, 4] - history[5998, 2]) < 1e-3
-    yield Row("mechanization, wander azimuth, a step", ours, "north-east-down", theirs, "ns", 1.5)
+    # 126 ns beside 91, which were 99 before its quaternion was inlined.
+    what = "mechanization, wander azimuth, a step"
+    yield Row(what, ours, "north-east-down", theirs, "ns", 1.5, 1.6)
 
     stamps = (np.arange(PART) * STEP).tolist()
     turned, felt = list(gyro[:PART]), list(accel[:PART])

@@ -194,8 +194,13 @@ static real3 euler_from_quat(real_t w, real_t x, real_t y, real_t z)
     } else if (up < GIMBAL_LOCK) {
         half_difference = half_sum;
     }
-    const real3 t1_ = {wrap_pi(half_sum - half_difference), pitch, wrap_pi(half_sum
-        + half_difference)};
+    real_t roll = half_sum - half_difference, heading = half_sum + half_difference;
+    /* A remainder takes longer than to see that nothing is to be wrapped. */
+    if (FABS(roll) >= PI || FABS(heading) >= PI) {
+        roll = wrap_pi(roll);
+        heading = wrap_pi(heading);
+    }
+    const real3 t1_ = {roll, pitch, heading};
     return t1_;
 }
 

@@ -17,11 +17,18 @@ from strapdown.tables import (
     GYRO,
     MOTION,
     check_imu,
-    check_motion_increments,
     imu_table,
     increments_table,
 )
-from strapdown.tables.checks import as_array, check_same_length, check_time, values_of
+from strapdown.tables.checks import (
+    as_array,
+    check_rows,
+    check_same_length,
+    check_time,
+    source_of,
+    values_of,
+    view_of,
+)
 
 Array = NDArray[np.float64]
 #: Of rates at the stamps.
@@ -130,26 +137,27 @@ def motion_increments(
     """
     mean = _check(imu, samples, interpolation, rows)
     time = np.ascontiguousarray(imu.index.to_numpy(dtype=np.float64))
-    rate, force = values_of(imu, GYRO), values_of(imu, ACCEL)
+    values = np.ascontiguousarray(view_of(imu, [*GYRO, *ACCEL]))
     dt = np.diff(time)
     out = np.empty((len(dt), len(MOTION)))
     scratch = np.empty((kernel.ROWS, kernel.WIDEST))
     ends: NDArray[Any] = time[1:]
     if samples == 1 and interpolation == "linear":
-        kernel.motion_increments_linear(dt, rate, force, mean, out)
+        kernel.motion_increments_linear(dt, values, mean, out)
     elif interpolation == "cubic":
-        kernel.motion_increments_neighbours(dt, rate, force, mean, scratch, out)
+        kernel.motion_increments_neighbours(dt, values, mean, scratch, out)
     else:
-        kernel.motion_increments_blocks(dt, rate, force, mean, samples, scratch, out)
+        kernel.motion_increments_blocks(dt, values, mean, samples, scratch, out)
     if rows == "block" and samples > 1:
         last = np.empty(len(dt), dtype=np.int64)
         joined = np.empty_like(out)
         count = kernel.join_blocks(dt, samples, out, last, joined)
         # The step length equals the stamp difference, to the last bit.
         ends, out = ends[last[:count]], joined[:count].copy()
-    table = pd.DataFrame(out, index=pd.Index(ends, name="time"), columns=MOTION, copy=False)
+    index = pd.Index(ends, name="time", copy=False)
+    table = pd.DataFrame(out, index=index, columns=MOTION, copy=False)
     table.attrs["source"] = imu.attrs.get("source")
-    check_motion_increments(table)
+    check_rows(out, MOTION, source_of(imu))
     return table
 
 
@@ -243,14 +251,13 @@ class IncrementStream:
         stamps = np.concatenate([state.time, time])
         samples = np.concatenate([state.values, values])
         dt = np.diff(stamps)
-        rate, force = (np.ascontiguousarray(samples[:, k : k + 3]) for k in (0, 3))
         out = np.empty((dt.size, 10))
         if self.interpolation == "linear":
-            kernel.motion_increments_linear(dt, rate, force, state.mean, out)
+            kernel.motion_increments_linear(dt, samples, state.mean, out)
             upto = dt.size
         else:
             scratch = np.empty((kernel.ROWS, kernel.WIDEST))
-            kernel.motion_increments_neighbours(dt, rate, force, state.mean, scratch, out)
+            kernel.motion_increments_neighbours(dt, samples, state.mean, scratch, out)
             upto = dt.size if last else max(dt.size - 1, state.done)
         # Keep the step before the next one: it gives the slope of a mean, and is its neighbor.
         keep = max(upto - 1, 0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +10,7 @@ import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
+from strapdown._kernels.ned import nav_numbers
 from strapdown.errors import DataError
 from strapdown.tables import EULER, check_trajectory, places_of, trajectory_table
 from strapdown.tables.checks import is_number
@@ -88,23 +88,21 @@ class NavState:
         object.__setattr__(self, "q_nb", q_nb)
 
     @classmethod
-    def of_numbers(cls, time: float, numbers: Sequence[float]) -> NavState:
-        """Make a state from ten numbers of a kernel: lat, lon, alt, v_n, q_nb.
+    def of_numbers(cls, time: float, numbers: Array) -> NavState:
+        """Make a state from numbers of a kernel: lat, lon of any turn, alt, v_n, q_nb, and others.
 
         The checks are those of the constructor, without what arrays of three and four numbers cost:
         a live system asks for its state after each sample.
         """
-        lat, lon, alt, north, east, down, w, x, y, z = numbers
-        norm = math.sqrt(w * w + x * x + y * y + z * z)
-        near = abs(lat) <= 0.5 * math.pi and abs(lon) <= math.pi and abs(norm - 1.0) < 0.01
-        if not (near and math.isfinite(time + alt + north + east + down)):
-            return cls(time, lat, lon, alt, np.array([north, east, down]), np.array([w, x, y, z]))
-        both = np.array((north, east, down, w / norm, x / norm, y / norm, z / norm))
-        both.setflags(write=False)
+        own = np.empty(10)
+        lat, lon, alt, good = nav_numbers(numbers, own)
+        if not (good and math.isfinite(time)):
+            return cls(time, lat, lon, alt, numbers[3:6], numbers[6:10])
+        own.setflags(write=False)
         made = object.__new__(cls)
-        own = made.__dict__
-        own["time"], own["lat"], own["lon"], own["alt"] = time, lat, lon, alt
-        own["v_n"], own["q_nb"] = both[:3], both[3:]
+        v_n, q_nb = own[3:6], own[6:]
+        fields = {"time": time, "lat": lat, "lon": lon, "alt": alt, "v_n": v_n, "q_nb": q_nb}
+        object.__setattr__(made, "__dict__", fields)
         return made
 
     @property

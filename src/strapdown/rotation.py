@@ -513,15 +513,14 @@ def _rows_of(values: ArrayLike, shape: tuple[int, ...], name: str) -> Rows:
 def _unit_quaternions(q: ArrayLike, name: str) -> Rows:
     """Return quaternions as rows of norm 1 and the leading shape; norms must be 1 within 1 %."""
     rows, leading = _rows_of(q, (4,), name)
-    w, x, y, z = rows.T
-    norm = np.sqrt(w * w + x * x + y * y + z * z)
-    far = np.abs(norm - 1.0) > _TOLERANCE
-    if far.any():
-        bad = int(np.argmax(far))
+    unit = np.empty_like(rows)
+    far = kernel.unit_quats(rows, _TOLERANCE, unit)
+    if far >= 0:
+        norm = float(np.sqrt(rows[far] @ rows[far]))
         raise DataError(
-            "geodesy.rotation-needs-quaternion-norm", row=bad + 1, quantity=name, norm=norm[bad]
+            "geodesy.rotation-needs-quaternion-norm", row=far + 1, quantity=name, norm=norm
         )
-    return rows / norm[:, None], leading
+    return unit, leading
 
 
 def _proper_matrices(dcm: ArrayLike) -> Rows:

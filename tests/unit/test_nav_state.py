@@ -27,6 +27,47 @@ def state(**parts):
     return NavState(**(given | parts))
 
 
+def row(**parts):
+    """Numbers of a kernel, of which more than ten may follow."""
+    given = {"lat": 0.9, "lon": -2.0, "alt": 120.0, "v_n": (1.0, 2.0, 3.0), "q_nb": LEVEL}
+    return np.hstack([*(given | parts).values(), 0.5, 0.5])
+
+
+def test_numbers_of_a_kernel_are_what_the_constructor_makes_of_them():
+    q_nb = np.array([0.8, -0.3, 0.5, 0.1]) * 1.001
+    made, known = NavState.of_numbers(3.0, row(q_nb=q_nb)), state(q_nb=q_nb)
+    assert made.numbers.tolist() == known.numbers.tolist()
+    assert repr(made) == repr(known)
+    assert not (made.v_n.flags.writeable or made.q_nb.flags.writeable)
+
+
+@pytest.mark.parametrize("turns", [-2, -1, 0, 1, 2])
+def test_a_longitude_of_any_turn_is_within_half_a_turn(turns):
+    lon = NavState.of_numbers(0.0, row(lon=-2.0 + 2.0 * math.pi * turns)).lon
+    assert lon == pytest.approx(-2.0, abs=4e-15)
+    assert NavState.of_numbers(0.0, row(lon=-math.pi)).lon == math.pi
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        {"alt": math.nan},
+        {"lat": math.nan},
+        {"v_n": (0.0, math.inf, 0.0)},
+        {"lat": 1.6},
+        {"q_nb": 0.98 * LEVEL},
+        {"q_nb": 0.0 * LEVEL},
+    ],
+)
+def test_numbers_of_a_kernel_that_are_no_state(parts):
+    with pytest.raises(DataError) as refused:
+        state(**parts)
+    with pytest.raises(DataError, check=coded(refused.value.finding.code)):
+        NavState.of_numbers(3.0, row(**parts))
+    with pytest.raises(DataError, check=coded("mechanization.not-finite-number")):
+        NavState.of_numbers(math.inf, row())
+
+
 def test_degrees_and_tables_come_back():
     made = NavState.from_degrees(
         55.5,

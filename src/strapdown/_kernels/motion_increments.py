@@ -172,7 +172,7 @@ def mean_motion(dt, before, w0x, w0y, w0z, w1x, w1y, w1z, f0x, f0y, f0z, f1x, f1
     )
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", inline="always")
 def put_motion(out, k, dt, motion):
     """Store a row: dt, phi, dv, dr."""
     px, py, pz, vx, vy, vz, rx, ry, rz = motion
@@ -183,8 +183,8 @@ def put_motion(out, k, dt, motion):
 
 
 @njit(cache=True, error_model="numpy")
-def motion_increments_linear(dt, rate, force, mean, out):
-    """Fill out, (n-1, 10): dt, phi, dv, dr of the steps between n samples.
+def motion_increments_linear(dt, samples, mean, out):
+    """Fill out, (n-1, 10): dt, phi, dv, dr of the steps between n samples of rate and force.
 
     The interval of the first mean ends where the first step begins; its length is not known,
     and taken for that of the first step.
@@ -199,18 +199,18 @@ def motion_increments_linear(dt, rate, force, mean, out):
                 mean_motion(
                     dt[k],
                     before,
-                    rate[k, 0],
-                    rate[k, 1],
-                    rate[k, 2],
-                    rate[k + 1, 0],
-                    rate[k + 1, 1],
-                    rate[k + 1, 2],
-                    force[k, 0],
-                    force[k, 1],
-                    force[k, 2],
-                    force[k + 1, 0],
-                    force[k + 1, 1],
-                    force[k + 1, 2],
+                    samples[k, 0],
+                    samples[k, 1],
+                    samples[k, 2],
+                    samples[k + 1, 0],
+                    samples[k + 1, 1],
+                    samples[k + 1, 2],
+                    samples[k, 3],
+                    samples[k, 4],
+                    samples[k, 5],
+                    samples[k + 1, 3],
+                    samples[k + 1, 4],
+                    samples[k + 1, 5],
                 ),
             )
             before = dt[k]
@@ -222,20 +222,31 @@ def motion_increments_linear(dt, rate, force, mean, out):
             dt[k],
             linear_motion(
                 dt[k],
-                rate[k, 0],
-                rate[k, 1],
-                rate[k, 2],
-                rate[k + 1, 0],
-                rate[k + 1, 1],
-                rate[k + 1, 2],
-                force[k, 0],
-                force[k, 1],
-                force[k, 2],
-                force[k + 1, 0],
-                force[k + 1, 1],
-                force[k + 1, 2],
+                samples[k, 0],
+                samples[k, 1],
+                samples[k, 2],
+                samples[k + 1, 0],
+                samples[k + 1, 1],
+                samples[k + 1, 2],
+                samples[k, 3],
+                samples[k, 4],
+                samples[k, 5],
+                samples[k + 1, 3],
+                samples[k + 1, 4],
+                samples[k + 1, 5],
             ),
         )
+
+
+@njit(cache=True)
+def largest_turn(rows):
+    """Row and axis of the largest component of phi."""
+    row, axis, largest = 0, 0, -1.0
+    for k in range(rows.shape[0]):
+        for j in range(3):
+            if abs(rows[k, 1 + j]) > largest:
+                row, axis, largest = k, j, abs(rows[k, 1 + j])
+    return row, axis
 
 
 # Polynomials through several samples, to sixth order.
@@ -356,7 +367,7 @@ def sixth_order_motion(dt, low, mid, high):
 
 
 @njit(cache=True, error_model="numpy")
-def fit_window(dt, rate, force, mean, first, count, scratch):
+def fit_window(dt, samples, mean, first, count, scratch):
     """Newton's polynomial of rate and force over the steps of a window.
 
     Its nodes are the stamps, in units of the window's length. Means are the first divided
@@ -375,9 +386,8 @@ def fit_window(dt, rate, force, mean, first, count, scratch):
     if mean:
         values, higher, start = count, 1, first + 1
     for i in range(values):
-        for j in range(3):
-            scratch[i, j] = rate[start + i, j]
-            scratch[i, 3 + j] = force[start + i, j]
+        for j in range(6):
+            scratch[i, j] = samples[start + i, j]
     for k in range(1, values):
         for i in range(values - 1, k - 1, -1):
             m = 1.0 / (scratch[NODES, i + higher] - scratch[NODES, i - k])
@@ -436,7 +446,7 @@ def block_length(dt, start, samples):
 
 
 @njit(cache=True, error_model="numpy")
-def motion_increments_blocks(dt, rate, force, mean, samples, scratch, out):
+def motion_increments_blocks(dt, samples, mean, size, scratch, out):
     """Fill out, (n-1, 10), each step with the polynomial of its block.
 
     A block that a gap or the end of the log cuts short borrows steps before it, if they are
@@ -444,11 +454,11 @@ def motion_increments_blocks(dt, rate, force, mean, samples, scratch, out):
     """
     start = 0
     while start < dt.shape[0]:
-        count = block_length(dt, start, samples)
+        count = block_length(dt, start, size)
         first = start
-        while first > 0 and start + count - first < samples and alike(dt[first - 1], dt[start]):
+        while first > 0 and start + count - first < size and alike(dt[first - 1], dt[start]):
             first -= 1
-        values = fit_window(dt, rate, force, mean, first, start + count - first, scratch)
+        values = fit_window(dt, samples, mean, first, start + count - first, scratch)
         for k in range(start, start + count):
             motion = window_motion(dt[k], mean, k - first, values, scratch)
             put_motion(out, k, dt[k], motion)
@@ -456,7 +466,7 @@ def motion_increments_blocks(dt, rate, force, mean, samples, scratch, out):
 
 
 @njit(cache=True, error_model="numpy")
-def motion_increments_neighbours(dt, rate, force, mean, scratch, out):
+def motion_increments_neighbours(dt, samples, mean, scratch, out):
     """Fill out, (n-1, 10), each step with the polynomial that its two neighbours share."""
     for k in range(dt.shape[0]):
         first, count = k, 1
@@ -464,7 +474,7 @@ def motion_increments_neighbours(dt, rate, force, mean, scratch, out):
             first, count = k - 1, 2
         if k + 1 < dt.shape[0] and neighbour(dt[k], dt[k + 1]) > 0.0:
             count += 1
-        values = fit_window(dt, rate, force, mean, first, count, scratch)
+        values = fit_window(dt, samples, mean, first, count, scratch)
         put_motion(out, k, dt[k], window_motion(dt[k], mean, k - first, values, scratch))
 
 

@@ -23,6 +23,7 @@ from strapdown._kernels.rotation import (
     euler_degrees_from_quat,
     quat_from_rotvec,
     quat_multiply,
+    unit_quat,
     wrap_pi,
 )
 
@@ -66,9 +67,9 @@ def rotate(c11, c12, c13, c21, c22, c23, c31, c32, c33, x, y, z):
 @njit(cache=True, inline="always")
 def turn_back(w, x, y, z, a, b, c):
     """Vector (a, b, c) by the inverse of the rotation of a unit quaternion."""
-    p = 2.0 * (b * z - c * y)
-    q = 2.0 * (c * x - a * z)
-    r = 2.0 * (a * y - b * x)
+    # Twice the vector, which is known before the rotation; doubling is exact.
+    d, e, f = 2.0 * a, 2.0 * b, 2.0 * c
+    p, q, r = e * z - f * y, f * x - d * z, d * y - e * x
     return a + w * p + q * z - r * y, b + w * q + r * x - p * z, c + w * r + p * y - q * x
 
 
@@ -108,13 +109,20 @@ def level_turn(s, c, dlat, turn):
     change of latitude, h, and the latitude between the two, l. h, at most 1e-4 for a step of 1 km,
     is kept to second order, y to third. Also returns sine and cosine of the new latitude.
     """
-    h = 0.5 * dlat
+    # Halves are exact wherever they are taken: not of `dlat`, for which all else waits.
     y = 0.5 * turn
     y2 = y * y
-    sine, cosine = s + c * h, c - s * h
+    sine, cosine = s + 0.5 * c * dlat, c - 0.5 * s * dlat
     sy = y * (1.0 - SIXTH * y2)
-    w = 1.0 - 0.5 * (y2 + h * h)
-    return w, sy * cosine, -(1.0 - 0.5 * y2) * h, -sy * sine, s + dlat * cosine, c - dlat * sine
+    w = 1.0 - (0.5 * y2 + 0.25 * dlat * (0.5 * dlat))
+    return (
+        w,
+        sy * cosine,
+        (0.25 * y2 - 0.5) * dlat,
+        -sy * sine,
+        s + dlat * cosine,
+        c - dlat * sine,
+    )
 
 
 @njit(cache=True, error_model="numpy", inline="always")
@@ -395,6 +403,23 @@ def reverse_increments(increments, out):
             uy * dt - increments[i, 8],
             uz * dt - increments[i, 9],
         )
+
+
+@njit(cache=True)
+def nav_numbers(row, out):
+    """Numbers of a row with the longitude within half a turn and the quaternion of norm 1.
+
+    Returns latitude, longitude and height, and whether the row is a state: finite, its latitude
+    within a right angle, its quaternion of norm 1 to 1 %.
+    """
+    w, x, y, z, norm = unit_quat(row[Q], row[Q + 1], row[Q + 2], row[Q + 3])
+    lat, lon, alt = row[LAT], wrap_pi(row[LON]), row[ALT]
+    out[0], out[1], out[2] = lat, lon, alt
+    out[3], out[4], out[5] = row[V], row[V + 1], row[V + 2]
+    out[6], out[7], out[8], out[9] = w, x, y, z
+    # So written NaN fails, too.
+    near = abs(lat) <= 0.5 * math.pi and abs(lon) <= math.pi and abs(norm - 1.0) < 0.01
+    return lat, lon, alt, near and math.isfinite(alt + row[V] + row[V + 1] + row[V + 2])
 
 
 @njit(cache=True)

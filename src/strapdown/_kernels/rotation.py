@@ -29,7 +29,8 @@ GIMBAL_LOCK = 1e-14
 DEGREES = 180.0 / math.pi
 
 
-@njit(cache=True)
+# Inlined: a step that calls it keeps its numbers in registers (`ned`: 91 ns instead of 99).
+@njit(cache=True, inline="always")
 def half_angle(u):
     """Cos(x) and sin(x)/(2x) for u = x^2: the limits of Alexiev (21) and (22), x = |r|/2."""
     if u < SERIES_LIMIT:
@@ -88,7 +89,7 @@ def quat_multiply(aw, ax, ay, az, bw, bx, by, bz):
     )
 
 
-@njit(cache=True)
+@njit(cache=True, inline="always")
 def quat_from_rotvec(x, y, z):
     """Exponential: Alexiev (14)-(17), with the series near zero that they lack."""
     c, s = half_angle(0.25 * (x * x + y * y + z * z))
@@ -232,11 +233,11 @@ def euler_from_quat(w, x, y, z):
         half_sum = half_difference
     elif up < GIMBAL_LOCK:
         half_difference = half_sum
-    return (
-        wrap_pi(half_sum - half_difference),
-        pitch,
-        wrap_pi(half_sum + half_difference),
-    )
+    roll, heading = half_sum - half_difference, half_sum + half_difference
+    # A remainder takes longer than to see that nothing is to be wrapped.
+    if abs(roll) >= math.pi or abs(heading) >= math.pi:
+        roll, heading = wrap_pi(roll), wrap_pi(heading)
+    return roll, pitch, heading
 
 
 @njit(cache=True)
@@ -312,24 +313,42 @@ def euler_degrees_from_quat(w, x, y, z):
     return roll * DEGREES, pitch * DEGREES, heading
 
 
-@njit(cache=True)
-def unit_quat(a, first):
-    """Four numbers of an array, from `first` on, scaled to norm 1."""
-    w, x, y, z = a[first], a[first + 1], a[first + 2], a[first + 3]
+@njit(cache=True, error_model="numpy")
+def unit_quat(w, x, y, z):
+    """Scale to norm 1 by quotients, as tables are; the norm is returned, too."""
     norm = math.sqrt(w * w + x * x + y * y + z * z)
-    return w / norm, x / norm, y / norm, z / norm
+    return w / norm, x / norm, y / norm, z / norm, norm
 
 
 @njit(cache=True)
-def unit_euler_degrees(a, first):
+def unit_quats(q, tolerance, out):
+    """Apply `unit_quat` to each row; return the first whose norm is not 1 to `tolerance`, or -1."""
+    far = -1
+    for i in range(q.shape[0]):
+        w, x, y, z, norm = unit_quat(q[i, 0], q[i, 1], q[i, 2], q[i, 3])
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = w, x, y, z
+        if far < 0 and abs(norm - 1.0) > tolerance:
+            far = i
+    return far
+
+
+@njit(cache=True)
+def unit_quat_of(a, first, out):
+    """Apply `unit_quat` to four numbers of an array, from `first` on."""
+    w, x, y, z, _ = unit_quat(a[first], a[first + 1], a[first + 2], a[first + 3])
+    out[0], out[1], out[2], out[3] = w, x, y, z
+
+
+@njit(cache=True)
+def unit_euler_degrees(a, first, out):
     """As `euler_degrees_from_quat` of four numbers of an array, as a table has it.
 
     There the quaternion is scaled to norm 1, and once more where its angles are computed, which can
     change its last bit.
     """
-    w, x, y, z = unit_quat(a, first)
-    norm = math.sqrt(w * w + x * x + y * y + z * z)
-    return euler_degrees_from_quat(w / norm, x / norm, y / norm, z / norm)
+    w, x, y, z, _ = unit_quat(a[first], a[first + 1], a[first + 2], a[first + 3])
+    w, x, y, z, _ = unit_quat(w, x, y, z)
+    out[0], out[1], out[2] = euler_degrees_from_quat(w, x, y, z)
 
 
 @njit(cache=True)

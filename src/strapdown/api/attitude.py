@@ -44,8 +44,8 @@ from strapdown.sensors.magnetometer import (
 )
 from strapdown.sensors.rest import find_rests
 from strapdown.systems.inputs import NOWHERE, Memory, moved
-from strapdown.tables import ACCEL, EULER, GYRO, MAG, QUATERNION, attitude_table, check_imu
-from strapdown.tables.checks import as_array, check_same_length
+from strapdown.tables import ACCEL, EULER, GYRO, MAG, QUATERNION, attitude_table
+from strapdown.tables.checks import as_array, check_same_length, view_of
 from strapdown.tables.imu import imu_of_columns
 
 if TYPE_CHECKING:
@@ -81,11 +81,9 @@ class Attitude(pd.DataFrame):
     """
 
     @classmethod
-    def _of(cls, time: Array, q_nb: Array) -> Attitude:
+    def _of(cls, time: pd.Index, q_nb: Array) -> Attitude:
         """A table of checked stamps and unit quaternions, with its angles to be computed."""
-        table = pd.DataFrame(
-            q_nb, index=pd.Index(time.copy(), name="time"), columns=QUATERNION, copy=False
-        )
+        table = pd.DataFrame(q_nb, index=time, columns=QUATERNION, copy=False)
         out = cls(table)
         out.__dict__["_quaternions"] = q_nb
         return out
@@ -237,13 +235,11 @@ def attitude(
     )
     mean = imu.attrs["sampling"] == "mean"
     if interpolation == "linear" or mean:
-        if gyro is None:
-            check_imu(imu)  # a table may have been changed since it was read
-        rate = imu[GYRO].to_numpy(dtype=np.float64)
-        history = history_of_samples(chosen, time, rate, mean, q_nb)
+        history = history_of_samples(chosen, time, view_of(imu, GYRO), mean, q_nb)
     else:
         history = attitude_history(chosen, increments_from_imu(imu, interpolation), q_nb)
-    out = Attitude._of(time, history)
+    # The stamps of a table cannot change; an array of the caller can.
+    out = Attitude._of(imu.index if gyro is None else imu.index.copy(deep=True), history)
     out.attrs = {
         "source": name,
         "algorithm": chosen.label,

@@ -28,6 +28,7 @@ from strapdown.formats.gnss_files import read_gnss as read_gnss_table
 from strapdown.formats.gnss_fixes import GnssOptions
 from strapdown.formats.recording import ABSENT
 from strapdown.tables import ACCEL, GYRO, QUATERNION, imu_table
+from strapdown.tables.checks import view_of
 
 if TYPE_CHECKING:
     from strapdown.config.alignment import LogTable
@@ -533,7 +534,7 @@ def _imu_of(source: pd.DataFrame) -> pd.DataFrame:
             "api.missing-columns", quantity="imu", missing=missing, columns=source.columns
         )
     try:
-        values = given[triads].to_numpy(dtype=np.float64)
+        values = view_of(given, triads)
         stamps = given.index.to_numpy(dtype=np.float64)
     except (TypeError, ValueError):
         raise DataError("api.not-numeric", quantity="imu") from None
@@ -549,16 +550,8 @@ def imu_of_arrays(
     sampling: str = "instantaneous",
     source: str | None = None,
 ) -> pd.DataFrame:
-    """An Imu table from arrays, stored column by column like one that is read.
-
-    The last bit of a sum over a column depends on the memory layout.
-    """
-    made = imu_table(t, gyro, accel, sampling=sampling, source=source)
-    out = pd.DataFrame(
-        np.asfortranarray(made.to_numpy()), index=made.index, columns=made.columns, copy=False
-    )
-    out.attrs = dict(made.attrs)
-    return out
+    """An Imu table from arrays, stored column by column like one that is read."""
+    return imu_table(t, gyro, accel, sampling=sampling, source=source, by_column=True)
 
 
 def _digest(table: pd.DataFrame) -> str:

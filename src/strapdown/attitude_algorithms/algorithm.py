@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields
@@ -101,12 +102,12 @@ class AttitudeAlgorithm(ABC):
 
     def quaternions(self, history: Array) -> Array:
         """Return unit quaternions ``q_nb``, (n, 4), of `width` numbers a row."""
+        q = np.empty((len(history), 4))
         if self.width == 3:
-            q = np.empty((len(history), 4))
-            kernel.quats_from_eulers(np.ascontiguousarray(history), q)
-            return q
-        w, x, y, z = history.T
-        return np.asarray(history / np.sqrt(w * w + x * x + y * y + z * z)[:, None])
+            kernel.quats_from_eulers(history, q)
+        else:
+            kernel.unit_quats(history, math.inf, q)
+        return q
 
     @property
     @abstractmethod
@@ -248,8 +249,7 @@ def history_of_samples(
         stop = min(start + CHUNK, len(time) - 1)
         dt = np.diff(time[start : stop + 1])
         steps = Steps(dt, theta[: len(dt)], dtheta[: len(dt)])
-        part = np.ascontiguousarray(rate[start : stop + 1])
-        increment_kernel.increments(dt, part, mean, steps.theta, steps.dtheta)
+        increment_kernel.increments(dt, rate[start : stop + 1], mean, steps.theta, steps.dtheta)
         state, history = algorithm.advance(state, steps)
         _refuse_overflow(algorithm, history, start)
         out[start + 1 : stop + 1] = algorithm.quaternions(history)
@@ -433,11 +433,18 @@ class AttitudeTracker:
     @property
     def quaternion(self) -> Array:
         """The attitude ``q_nb``, (4,), unit norm."""
-        return np.array(kernel.unit_quat(self._record, HEAD)) if self._plain else self._row()
+        if not self._plain:
+            return self._row()
+        out = np.empty(4)
+        kernel.unit_quat_of(self._record, HEAD, out)
+        return out
 
     @property
     def roll_pitch_heading(self) -> Array:
         """The attitude as 3-2-1 angles, (3,), deg."""
-        if self._plain:
-            return np.array(kernel.unit_euler_degrees(self._record, HEAD))
-        return np.array(kernel.euler_degrees_from_quat(*kernel.unit_quat(self._row(), 0)))
+        if not self._plain:
+            w, x, y, z, _ = kernel.unit_quat(*self._row())
+            return np.array(kernel.euler_degrees_from_quat(w, x, y, z))
+        out = np.empty(3)
+        kernel.unit_euler_degrees(self._record, HEAD, out)
+        return out

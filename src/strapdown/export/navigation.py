@@ -191,7 +191,7 @@ def navigation_parts(chosen: Mechanization) -> StepParts:
         others=("wander", "motion_increments"),
     )
     advance = "wander_advance" if wander else "ned_advance"
-    start = NavState.of_numbers(0.0, (*PLACE, *VELOCITY, *ATTITUDE))
+    start = NavState.of_numbers(0.0, np.array([*PLACE, *VELOCITY, *ATTITUDE]))
     size = len(chosen.begin(start))
     sizes = {
         "increments": (1, 10),

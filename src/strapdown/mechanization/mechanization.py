@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,10 +20,8 @@ from strapdown._kernels.ned import (
     LARGEST_TURN,
     LAT,
     LEAP,
-    LON,
     POLE,
     ROW,
-    Q,
     V,
     reverse_increments,
     trajectory_rows,
@@ -160,9 +157,7 @@ class Mechanization(ABC):
 
         `time` (s).
         """
-        numbers = state[LAT : Q + 4].tolist()
-        numbers[LON] = math.remainder(numbers[LON], 2.0 * math.pi)
-        return NavState.of_numbers(time, numbers)
+        return NavState.of_numbers(time, state)
 
     def kernel_options(self) -> Array:
         """Options and limits for the kernels."""

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from strapdown._kernels import sample as kernel
 from strapdown._kernels.compilation import ARGUMENT_ERRORS
+from strapdown._kernels.motion_increments import largest_turn
 from strapdown._kernels.ned import LARGEST_TURN, LEAP, POLE
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError, DataError, DivergenceError, Finding
@@ -26,13 +27,14 @@ from strapdown.tables import (
     MOTION,
     PHI,
     check_imu,
-    check_motion_increments,
     check_sampling_kind,
 )
 from strapdown.tables.checks import (
     check_columns,
     check_rows,
+    check_steps,
     check_time,
+    checked_values,
     index_of,
     is_number,
     source_of,
@@ -115,17 +117,16 @@ def run_mechanization(
     ConfigError
         `longest_step` is not a valid time.
     """
-    check_motion_increments(increments)
+    source = source_of(increments)
+    rows = np.ascontiguousarray(checked_values(increments, MOTION))
+    ends, dt = index_of(increments), rows[:, 0].copy()
+    check_steps(ends, dt, source)
     if increments.empty:
-        raise DataError(
-            "mechanization.no-increment", file=increments.attrs.get("source"), quantity="increments"
-        )
-    _refuse_holes(increments, longest_step)
-    ends = increments.index.to_numpy(dtype=np.float64)
-    begin = float(ends[0] - increments["dt"].iloc[0])
-    _check_start(start, float(ends[-1]) if backward else begin, increments)
+        raise DataError("mechanization.no-increment", file=source, quantity="increments")
+    _refuse_holes(ends, dt, longest_step, source)
+    begin = float(ends[0] - dt[0])
+    _check_start(start, float(ends[-1]) if backward else begin, dt[0], source)
     state = mechanization.begin(start)
-    rows = values_of(increments, MOTION)
     history = np.empty((len(rows) + 1, mechanization.row))
     history[-1 if backward else 0] = state[: mechanization.row]
     others = history[:-1] if backward else history[1:]
@@ -138,11 +139,11 @@ def run_mechanization(
         time=time,
         history=history,
         findings=(
-            *_large_turns(increments),
-            *_wide_steps(increments),
+            *_large_turns(ends, rows, source),
+            *_wide_steps(ends, dt, source),
             *mechanization.remarks(time, history),
         ),
-        source=increments.attrs.get("source"),
+        source=source,
     )
 
 
@@ -190,10 +191,11 @@ def navigate_segments(
             continue
         increments = pd.DataFrame(rows, index=pd.Index(ends, name="time"), columns=MOTION)
         increments.attrs["source"] = segment.attrs.get("source")
+        source = source_of(segment)
         if not begun:
-            _check_start(start, float(ends[0] - rows[0, 0]), increments)
+            _check_start(start, float(ends[0] - rows[0, 0]), rows[0, 0], source)
             begun = True
-        _refuse_holes(increments, longest_step)
+        _refuse_holes(ends, rows[:, 0], longest_step, source)
         state, history = mechanization.advance(state, increments)
         yield mechanization.trajectory(ends, history, segment.attrs.get("source"))
 
@@ -217,23 +219,20 @@ def _check_segment(segment: pd.DataFrame, newest: Array) -> None:
     check_time(np.concatenate([newest, index_of(segment)]), source)
 
 
-def _check_start(start: NavState, begin: float, increments: pd.DataFrame) -> None:
-    slack = 0.5 * float(increments["dt"].iloc[0])
-    if abs(start.time - begin) > slack:
+def _check_start(start: NavState, begin: float, dt: float, source: str | None) -> None:
+    if abs(start.time - begin) > 0.5 * dt:
         raise DataError(
             "mechanization.state-increments-begin",
-            file=increments.attrs.get("source"),
+            file=source,
             quantity="time",
             time=start.time,
             begin=begin,
         )
 
 
-def _refuse_holes(increments: pd.DataFrame, longest: float) -> None:
+def _refuse_holes(ends: Array, dt: Array, longest: float, source: str | None) -> None:
     """Refuse a gap between two steps, and a step that is too long."""
     check_longest_step(longest)
-    dt = increments["dt"].to_numpy(dtype=np.float64)
-    ends = increments.index.to_numpy(dtype=np.float64)
     between = np.diff(ends) - dt[1:]
     if between.size and between.max() > LOST * dt.min():
         holes = np.flatnonzero(between > LOST * dt[1:])
@@ -241,7 +240,7 @@ def _refuse_holes(increments: pd.DataFrame, longest: float) -> None:
             at = int(holes[0])
             raise DataError(
                 "mechanization.no-increment-body-did-then",
-                file=increments.attrs.get("source"),
+                file=source,
                 row=at + 2,
                 quantity="dt",
                 ends=ends[at],
@@ -253,7 +252,7 @@ def _refuse_holes(increments: pd.DataFrame, longest: float) -> None:
         row = int(long[0])
         raise DataError(
             "mechanization.gap-body-did-not-known",
-            file=increments.attrs.get("source"),
+            file=source,
             quantity="dt",
             dt=dt[row],
             end=float(ends[row] - dt[row]),
@@ -263,8 +262,7 @@ def _refuse_holes(increments: pd.DataFrame, longest: float) -> None:
         )
 
 
-def _wide_steps(increments: pd.DataFrame) -> tuple[Finding, ...]:
-    dt = increments["dt"].to_numpy(dtype=np.float64)
+def _wide_steps(ends: Array, dt: Array, source: str | None) -> tuple[Finding, ...]:
     # The usual step is at least the shortest: this test suffices for most logs.
     if dt.max() <= 3.0 * dt.min():
         return ()
@@ -276,28 +274,28 @@ def _wide_steps(increments: pd.DataFrame) -> tuple[Finding, ...]:
     return (
         Finding(
             "mechanization.steps-more-than-three-times",
-            file=increments.attrs.get("source"),
+            file=source,
             quantity="dt",
             size=wide.size,
             usual=usual,
             dt=dt[row],
-            index=float(increments.index[row]),
+            index=float(ends[row]),
         ),
     )
 
 
-def _large_turns(increments: pd.DataFrame) -> tuple[Finding, ...]:
-    phi = increments[PHI].to_numpy(dtype=np.float64)
-    if max(phi.max(), -phi.min()) <= LARGEST_STEP_ROTATION:
+def _large_turns(ends: Array, rows: Array, source: str | None) -> tuple[Finding, ...]:
+    row, axis = largest_turn(rows)
+    phi = rows[row, 1 + axis]
+    if abs(phi) <= LARGEST_STEP_ROTATION:
         return ()
-    row, axis = divmod(int(np.abs(phi).argmax()), 3)
     return (
         Finding(
             "mechanization.step-ending-body-turns-rad",
-            file=increments.attrs.get("source"),
+            file=source,
             quantity=PHI[axis],
-            index=float(increments.index[row]),
-            phi=phi[row, axis],
+            index=float(ends[row]),
+            phi=phi,
         ),
     )
 
@@ -332,7 +330,7 @@ class NavTracker:
         `sampling` is unknown, `longest_step` is not a valid time, or the mechanization differs.
     """
 
-    __slots__ = ("_mechanization", "_record", "_update")
+    __slots__ = ("_mechanization", "_record", "_state", "_update")
 
     def __init__(
         self,
@@ -361,6 +359,7 @@ class NavTracker:
         record[kernel.STATE :] = begin
         self._mechanization = used
         self._record = record
+        self._state = record[kernel.STATE :]
         self._update = update
 
     def update(
@@ -457,5 +456,4 @@ class NavTracker:
     @property
     def state(self) -> NavState:
         """Position, velocity and attitude at the last sample."""
-        record = self._record
-        return self._mechanization.nav_state(record[kernel.STATE :], record.item(kernel.TIME))
+        return self._mechanization.nav_state(self._state, self._record.item(kernel.TIME))

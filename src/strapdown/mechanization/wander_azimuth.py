@@ -133,7 +133,7 @@ class WanderAzimuth(Mechanization):
         """Return the position, velocity and attitude of a state, as `Mechanization.nav_state`."""
         place = np.empty((1, 10))
         level.wander_places(state[None, : kernel.ROW], place)
-        return NavState.of_numbers(time, place[0].tolist())
+        return NavState.of_numbers(time, place[0])
 
     def fill_trajectory(self, history: Array, out: Array) -> None:
         """Fill rows of a Trajectory table from rows of a history."""

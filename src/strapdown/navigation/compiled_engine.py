@@ -428,7 +428,7 @@ class ReferenceEngine(CompiledEngine):
         self.close()
         used = self.navigation.mechanization
         own = used.nav_state(self.mechanization, self.time)
-        true = NavState.of_numbers(self.time, reference.tolist())
+        true = NavState.of_numbers(self.time, reference)
         apart = state_error(own, true, find_ellipsoid(used.ellipsoid)).reshape(3, 3)
         level = apart @ used.level_from_ned(self.row).T
         moved = np.concatenate([level.ravel(), sensors - self.filter.sensors])

@@ -126,8 +126,7 @@ def _joined(values: Array, grid: Grid, factor: int, before: int, steps: int) -> 
 
     dt = np.full(len(values) - 1, grid.step)
     rows, scratch = np.empty((len(dt), 10)), np.empty((kernels.ROWS, kernels.WIDEST))
-    rate, force = (np.ascontiguousarray(values[:, k : k + 3]) for k in (0, 3))
-    kernels.motion_increments_neighbours(dt, rate, force, grid.means, scratch, rows)
+    kernels.motion_increments_neighbours(dt, values, grid.means, scratch, rows)
     out = np.empty((steps, 10))
     own = np.ascontiguousarray(rows[before : before + steps])
     count = kernels.join_blocks(dt[:steps], factor, own, np.empty(steps, np.int64), out)

@@ -110,9 +110,11 @@ def refuse_cell(
 
 def check_latitude(lat: Array, lon: Array, source: str | None) -> None:
     """Check that latitudes are within 90 deg."""
-    exchanged = np.all(np.abs(lon) <= 90.0)
-    code = "tables.latitude-beyond-pole" if exchanged else "tables.latitude-beyond-pole-2"
-    refuse_row(np.abs(lat) > 90.0, code, source, "lat", lat=lat)
+    beyond = np.abs(lat) > 90.0
+    if beyond.any():
+        exchanged = np.all(np.abs(lon) <= 90.0)
+        code = "tables.latitude-beyond-pole" if exchanged else "tables.latitude-beyond-pole-2"
+        refuse_row(beyond, code, source, "lat", lat=lat)
 
 
 def all_finite(values: Array) -> bool:
@@ -236,12 +238,12 @@ def index_of(table: pd.DataFrame) -> Array:
     return np.asarray(table.index.to_numpy(), dtype=np.float64)
 
 
-def check_steps(table: pd.DataFrame, source: str | None) -> None:
-    """Check that steps are positive and do not overlap."""
-    time, dt = index_of(table), view_of(table, ["dt"])[:, 0]
+def check_steps(time: Array, dt: Array, source: str | None) -> None:
+    """Check that steps, which end at `time`, are positive and do not overlap."""
     # Resolution of stamps of epoch size.
     slack = 8.0 * float(np.spacing(np.abs(time).max(initial=1.0)))
-    overlap = (dt <= 0.0) | np.r_[False, time[1:] - dt[1:] < time[:-1] - slack]
+    overlap = dt <= 0.0
+    overlap[1:] |= time[1:] - dt[1:] < time[:-1] - slack
     refuse_row(overlap, "tables.step-ending-not-positive-or", source, "dt", dt=dt, time=time)
 
 

@@ -228,7 +228,7 @@ def _arguments(variant, parts, rows, array):
     """What the kernel of a step is given, by the names of its parameters."""
     chosen = step_parts(variant)[0]
     if parts.harness.name == "navigation":
-        state = chosen.begin(NavState.of_numbers(0.0, (*PLACE, *VELOCITY, *ATTITUDE)))
+        state = chosen.begin(NavState.of_numbers(0.0, np.array([*PLACE, *VELOCITY, *ATTITUDE])))
         held = {
             "state": state,
             "increments": rows[:1, :10],

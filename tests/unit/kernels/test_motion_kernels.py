@@ -164,7 +164,7 @@ def test_one_step_and_the_loop_give_the_same_bits():
     rate, force = rng.normal(size=(301, 3)) * 3.0, rng.normal(size=(301, 3)) * 20.0
     out = np.empty((300, 10))
     for mean in (False, True):
-        kernel.motion_increments_linear(dt, rate, force, mean, out)
+        kernel.motion_increments_linear(dt, np.hstack([rate, force]), mean, out)
         before = dt[0]
         for k in range(300):
             pairs = (*rate[k], *rate[k + 1], *force[k], *force[k + 1])
