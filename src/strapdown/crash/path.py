@@ -248,6 +248,21 @@ class CrashPath:
         systematic = by_time @ by_time.transpose(0, 2, 1)
         return np.asarray(systematic + self.noise_covariance)
 
+    def positions(self, time: Array) -> Array:
+        """North, east, down at instants, (k, 3), m: the cubics that match the velocities."""
+        k = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, len(self.time) - 2)
+        h, since = ((t - self.time[k])[:, None] for t in (self.time[k + 1], time))
+        place, velocity = self.table[NED].to_numpy(), self.table[VELOCITIES].to_numpy()
+        chord = (place[k + 1] - place[k]) / h
+        bend = (velocity[k] + velocity[k + 1] - 2.0 * chord) / h
+        square = since * since
+        return np.asarray(
+            place[k]
+            + velocity[k] * since
+            + ((chord - velocity[k]) / h - bend) * square
+            + bend / h * (square * since)
+        )
+
     @property
     def sd(self) -> pd.DataFrame:
         """Standard deviations: ``north east down`` m, ``VN VE VD`` m/s, ``roll pitch heading`` deg.
@@ -876,9 +891,6 @@ def compare_with_reference(path: CrashPath, reference: pd.DataFrame) -> PathComp
             name=type(reference).__name__,
         )
     time, values, sd = _columns(reference)
-    from scipy.interpolate import CubicHermiteSpline
-
-    own = CubicHermiteSpline(path.time, path.table[NED].to_numpy(), path.table[["VN", "VE", "VD"]])
     inside = (time >= path.time[0] - 1e-9) & (time <= path.time[-1] + 1e-9)
     entry = path.entry.time
     if not (inside.any() and time[0] <= entry + 1e-9 and time[inside][-1] > entry):
@@ -894,8 +906,8 @@ def compare_with_reference(path: CrashPath, reference: pd.DataFrame) -> PathComp
         )
     origin = np.array([np.interp(entry, time, values[:, k]) for k in range(3)])
     at_origin = np.array([np.interp(entry, time, sd[:, k]) for k in range(3)])
-    origin = origin - own(entry)
-    difference = own(time[inside]) - (values[inside] - origin)
+    origin = origin - path.positions(np.array([entry]))[0]
+    difference = path.positions(time[inside]) - (values[inside] - origin)
     place = path.covariance[:, PLACE, PLACE].reshape(len(path.time), 9)
     rows = np.column_stack([np.interp(time[inside], path.time, place[:, k]) for k in range(9)])
     # The reading at the origin is a further independent one.
