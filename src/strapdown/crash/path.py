@@ -23,6 +23,7 @@ from strapdown.crash.acceleration import NOISE, by_contributor, window_weights
 from strapdown.crash.entry import Entry, angles_sd
 from strapdown.crash.measuring_point import SampleEffects
 from strapdown.dsp.chi_square import chi_square_quantile
+from strapdown.dsp.cubics import hermite
 from strapdown.earth import earth_rate
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError, DataError, DivergenceError
@@ -250,18 +251,8 @@ class CrashPath:
 
     def positions(self, time: Array) -> Array:
         """North, east, down at instants, (k, 3), m: the cubics that match the velocities."""
-        k = np.clip(np.searchsorted(self.time, time, side="right") - 1, 0, len(self.time) - 2)
-        h, since = ((t - self.time[k])[:, None] for t in (self.time[k + 1], time))
         place, velocity = self.table[NED].to_numpy(), self.table[VELOCITIES].to_numpy()
-        chord = (place[k + 1] - place[k]) / h
-        bend = (velocity[k] + velocity[k + 1] - 2.0 * chord) / h
-        square = since * since
-        return np.asarray(
-            place[k]
-            + velocity[k] * since
-            + ((chord - velocity[k]) / h - bend) * square
-            + bend / h * (square * since)
-        )
+        return hermite(self.time, place, velocity)(time)
 
     @property
     def sd(self) -> pd.DataFrame:
