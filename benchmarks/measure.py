@@ -128,7 +128,8 @@ def command(
         done = subprocess.run(
             [sys.executable, "-I", "-S", "-c", STARTER, answer.name, *words],
             cwd=folder,
-            env={**os.environ, **(environment or {})},
+            # An installation has its bytecode: without, a third of a short run is compilation.
+            env={**os.environ, "PYTHONDONTWRITEBYTECODE": "", **(environment or {})},
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
             text=True,

@@ -22,6 +22,25 @@ OF_OTHER_RUNS = (
     *("strapdown.export", "strapdown.peers", "strapdown.simulation", "strapdown.live"),
     *("strapdown.report.document_pdf", "strapdown.report.attitude_export"),
 )
+#: Packages of scipy that a run would load for one function: 0.1 to 0.6 s each.
+OF_SCIPY = tuple(
+    f"scipy.{name}"
+    for name in (
+        "fft",
+        "interpolate",
+        "linalg",
+        "ndimage",
+        "optimize",
+        "signal",
+        "special",
+        "stats",
+    )
+)
+#: A doctor of one log knows no stage of a navigation, no second log and no crash record.
+NOT_OF_A_LOG = (
+    *("strapdown.config.alignment", "strapdown.config.navigation", "strapdown.alignment.fine"),
+    *("strapdown.evaluation.second_log", "strapdown.formats.crash_records"),
+)
 DRAWING = tuple(
     f"strapdown.report.{name}"
     for name in (
@@ -98,16 +117,35 @@ def test_attitude_loads_what_it_uses(turn, tmp_path):
     assert (tmp_path / "a" / "report.html").is_file()
 
 
+def test_doctor_and_read_imu_load_what_they_use(turn, tmp_path):
+    unused = (*OF_OTHER_RUNS, *NOT_OF_A_LOG, "scipy")
+    run = ["doctor", str(turn), "--gyro-unit", "rad/s", "--quiet", "--out", str(tmp_path / "a")]
+    assert loaded_by(run, unused) == set()
+    read = f"import strapdown\nstrapdown.read_imu({str(turn)!r}, units={{'gyro': 'rad/s'}})"
+    assert loaded_after(read, (*unused, *DRAWING)) == set()
+
+
+@pytest.mark.slow
+def test_a_crash_of_one_recorder_loads_no_scipy(tmp_path):
+    pole = tmp_path / "pole"
+    simulate = ["simulate", "pole", "--units", "IMU1", "--out", str(pole)]
+    loaded_by(simulate, ())
+    run = ["crash", str(pole / "case.toml"), "--quiet", "--out", str(tmp_path / "a")]
+    unused = ("numba", "jinja2", "matplotlib", "plotly", "numpy.f2py", *OF_SCIPY)
+    assert loaded_by(run, unused) == set()
+
+
 @pytest.mark.slow
 def test_navigate_loads_what_it_uses(tmp_path):
-    # Of scipy the distributions, and the spline by which the delay of a receiver is found.
+    # The receiver states velocities: the delay of these is found by a spline.
     data = files("strapdown") / "demo_data"
     text = (data / "phone.toml").read_text(encoding="utf-8")
     with as_file(data / "comma2k19") as recording:
         file = tmp_path / "phone.toml"
         file.write_text(text.replace("phone-recording", recording.as_posix()))
         run = ["navigate", str(file), "--quiet", "--out"]
-        assert loaded_by([*run, str(tmp_path / "a")], OF_OTHER_RUNS) == set()
+        unused = (*OF_OTHER_RUNS, *OF_SCIPY, "numpy.f2py")
+        assert loaded_by([*run, str(tmp_path / "a")], unused) == set()
         assert loaded_by([*run, str(tmp_path / "b"), "--no-report"], DRAWING) == set()
 
 

@@ -151,7 +151,7 @@ def test_fixes_without_velocity_are_named_with_what_follows(run_cli, ride, tmp_p
 
 def test_fixes_of_another_time_are_refused_as_the_run_refuses_them(run_cli, ride, tmp_path):
     import strapdown as sd
-    from strapdown.config.alignment import FixesTable, LogTable
+    from strapdown.config.logs import FixesTable, LogTable
     from strapdown.errors import DataError
     from strapdown.systems.navigation_draft import draft_navigation
 

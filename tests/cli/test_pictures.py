@@ -15,7 +15,7 @@ import pytest
 
 from strapdown import simulate
 from strapdown.api.attitude import compare_attitude
-from strapdown.config.alignment import LogTable
+from strapdown.config.logs import LogTable
 from strapdown.config.motions import TrajectorySpec
 from strapdown.config.navigation import NavigationSpec
 from strapdown.ellipsoids import find_ellipsoid

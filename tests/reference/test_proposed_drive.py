@@ -12,7 +12,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from strapdown.config.alignment import FixesTable, LogTable
+from strapdown.config.logs import FixesTable, LogTable
 from strapdown.config.navigation import NavigationSpec
 from strapdown.frames import place_difference
 from strapdown.navigation.truth_comparison import smoother_consistency

@@ -1,4 +1,4 @@
-"""Functions that are polynomials between knots, and Legendre series over panels."""
+"""Functions that are polynomials between knots, Legendre series over panels, and splines."""
 
 from __future__ import annotations
 
@@ -109,3 +109,39 @@ def polynomials(knots, coefficients, time, value, first, second):
                 d = d * x + p
                 p = p * x + coefficients[k, n, j]
             value[i, j], first[i, j], second[i, j] = p, d, 2.0 * dd
+
+
+@njit(cache=True, error_model="numpy")
+def solve_tridiagonal(lower, diagonal, upper, rows):
+    """Replace `rows`, (n, m), by the solution; the diagonals, (n - 1, n, n - 1), are used up.
+
+    Gaussian elimination with an exchange of neighboring rows, as LAPACK's gtsv.
+    """
+    n, width = rows.shape
+    for i in range(n - 1):
+        if abs(diagonal[i]) >= abs(lower[i]):
+            share = lower[i] / diagonal[i]
+            diagonal[i + 1] -= share * upper[i]
+            for j in range(width):
+                rows[i + 1, j] -= share * rows[i, j]
+            lower[i] = 0.0
+            continue
+        share = diagonal[i] / lower[i]
+        diagonal[i] = lower[i]
+        kept = diagonal[i + 1]
+        diagonal[i + 1] = upper[i] - share * kept
+        upper[i] = kept
+        if i < n - 2:
+            # Of the column beyond the upper diagonal.
+            lower[i] = upper[i + 1]
+            upper[i + 1] = -share * lower[i]
+        for j in range(width):
+            kept = rows[i, j]
+            rows[i, j] = rows[i + 1, j]
+            rows[i + 1, j] = kept - share * rows[i + 1, j]
+    for j in range(width):
+        rows[n - 1, j] /= diagonal[n - 1]
+        rows[n - 2, j] = (rows[n - 2, j] - upper[n - 2] * rows[n - 1, j]) / diagonal[n - 2]
+        for i in range(n - 3, -1, -1):
+            known = rows[i, j] - upper[i] * rows[i + 1, j] - lower[i] * rows[i + 2, j]
+            rows[i, j] = known / diagonal[i]

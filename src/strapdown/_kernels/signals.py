@@ -34,6 +34,24 @@ def first_order(decay, drive, state, out):
             out[k, j] = x
 
 
+@njit(cache=True)
+def second_order(pass_, start, values, summed, out):
+    """Fill ``y[n] = a0 x[n] + a1 x[n-1] + a2 x[n-2] + b1 y[n-1] + b2 y[n-2]``, (n, c).
+
+    `pass_`: a0, a1, a2, b1, b2. `start`, (2, c): delayed sums before the first sample. `summed`:
+    those of one sample are added first, as by scipy's sosfilt, else to the delayed, as by lfilter.
+    """
+    a0, a1, a2, b1, b2 = pass_[0], pass_[1], pass_[2], pass_[3], pass_[4]
+    for j in range(values.shape[1]):
+        first, second = start[0, j], start[1, j]
+        for k in range(values.shape[0]):
+            x = values[k, j]
+            y = a0 * x + first
+            first = (a1 * x + b1 * y) + second if summed else (second + a1 * x) + b1 * y
+            second = a2 * x + b2 * y
+            out[k, j] = y
+
+
 # Rauch, Tung and Striebel's smoother of a level and its slope, over a fixed lag.
 
 

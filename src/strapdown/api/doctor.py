@@ -10,8 +10,7 @@ from typing import Any
 import pandas as pd
 
 from strapdown.api.reading import ImuFile, imu_input
-from strapdown.config.alignment import FixesTable, LogTable
-from strapdown.config.doctor import DoctorSpec
+from strapdown.config.logs import DoctorSpec, FixesTable, LogTable
 from strapdown.config.spec import specify
 from strapdown.errors import ConfigError
 from strapdown.progress import Progress, silent

@@ -10,7 +10,7 @@ from typing import Any
 import pandas as pd
 
 from strapdown.api.reading import GnssFile, ImuFile, imu_input, keys_in, log_in, table_input
-from strapdown.config.alignment import FixesTable
+from strapdown.config.logs import FixesTable
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.spec import specify
 from strapdown.errors import ConfigError, Finding

@@ -31,7 +31,7 @@ from strapdown.tables import ACCEL, GYRO, QUATERNION, imu_table
 from strapdown.tables.checks import view_of
 
 if TYPE_CHECKING:
-    from strapdown.config.alignment import LogTable
+    from strapdown.config.logs import LogTable
 
 __all__ = [
     "ABSENT",
@@ -68,7 +68,7 @@ class ImuFile:
 
     def read(self) -> Imu:
         """Read the used part of the log into body axes and SI."""
-        from strapdown.config.alignment import AxesTable
+        from strapdown.config.logs import AxesTable
         from strapdown.systems.alignment_source import body_record
 
         recording, table, findings = body_record(self.log, AxesTable(axes=self.axes))
@@ -283,7 +283,7 @@ def read_imu(
     unknown = set(units or {}) - {"gyro", "accel", "time"}
     if unknown:
         raise ConfigError("api.quantity-without-unit", quantity="units", unknown=sorted(unknown)[0])
-    from strapdown.config.alignment import LogTable
+    from strapdown.config.logs import LogTable
 
     log = specify(
         LogTable,
@@ -454,7 +454,7 @@ def imu_input(source: Any) -> ImuFile | pd.DataFrame:
     if isinstance(source, ImuFile):
         return source
     if isinstance(source, str | Path):
-        from strapdown.config.alignment import LogTable
+        from strapdown.config.logs import LogTable
 
         return ImuFile(specify(LogTable, path=str(source)))
     if isinstance(source, pd.DataFrame):
@@ -491,7 +491,7 @@ def log_in(samples: ImuFile | pd.DataFrame, folder: Path) -> ImuFile:
     """Return the file of samples; those in memory are ``imu.npz`` in a folder."""
     if isinstance(samples, ImuFile):
         return samples
-    from strapdown.config.alignment import LogTable
+    from strapdown.config.logs import LogTable
 
     return ImuFile(specify(LogTable, path=str(folder / "imu.npz")))
 

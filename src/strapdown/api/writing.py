@@ -15,7 +15,7 @@ import pandas as pd
 
 from strapdown.api.reading import ImuFile, Streams
 from strapdown.bundle import read_manifest
-from strapdown.config.alignment import FixesTable, LogTable
+from strapdown.config.logs import FixesTable, LogTable
 from strapdown.config.spec import specify
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
 from strapdown.formats import STREAMS, open_stream

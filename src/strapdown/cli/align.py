@@ -159,7 +159,7 @@ def spec_of_flags(log: Path, given: Mapping[str, Any]) -> AlignmentSpec:
     """
     from strapdown.api.alignment import specify_alignment
     from strapdown.api.reading import ImuFile
-    from strapdown.config.alignment import LogTable
+    from strapdown.config.logs import LogTable
     from strapdown.config.spec import specify
 
     site = {"lat_deg": given["lat"], "lon_deg": given["lon"], "alt_m": given["alt"]}

@@ -29,7 +29,7 @@ from strapdown.errors import ConfigError
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from strapdown.config.alignment import LogTable
+    from strapdown.config.logs import LogTable
     from strapdown.config.toml_text import Asked
     from strapdown.progress import Progress
 
@@ -153,7 +153,7 @@ def navigate(
 
     Then: strapdown navigate navigate.toml
     """
-    from strapdown.config.alignment import FixesTable
+    from strapdown.config.logs import FixesTable
     from strapdown.config.spec import specify
     from strapdown.systems.navigation_draft import draft_navigation
 
@@ -179,7 +179,7 @@ def navigate(
 
 
 def _table(log: Path, flags: LogFlags) -> LogTable:
-    from strapdown.config.alignment import LogTable
+    from strapdown.config.logs import LogTable
     from strapdown.config.spec import specify
 
     return specify(LogTable, path=str(log), **log_keys(flags.given()))

@@ -225,7 +225,7 @@ def navigation_of_flags(log: Path, given: Mapping[str, Any]) -> NavigationSpec:
     """
     from strapdown.api.navigation import specify_navigation
     from strapdown.api.reading import ImuFile
-    from strapdown.config.alignment import LogTable
+    from strapdown.config.logs import LogTable
     from strapdown.config.spec import specify
     from strapdown.formats.gnss_files import open_fixes
 

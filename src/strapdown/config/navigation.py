@@ -11,10 +11,7 @@ from pydantic import BeforeValidator, Field, StrictBool, StrictInt, create_model
 
 from strapdown.config.alignment import (
     MOST_SAMPLES,
-    AxesTable,
     EllipsoidName,
-    FixesTable,
-    LogTable,
     PrefilterSpec,
     SensorName,
     SensorsTable,
@@ -25,6 +22,7 @@ from strapdown.config.alignment import (
     source_faults,
 )
 from strapdown.config.choice import NONE, SLOTS, ChoiceSpec, Kinds
+from strapdown.config.logs import AxesTable, FixesTable, LogTable
 from strapdown.config.reading import FileSpec
 from strapdown.config.spec import (
     Angle,

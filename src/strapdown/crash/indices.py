@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown.constants import STANDARD_GRAVITY
+from strapdown.dsp.channel_class import CfcCoefficients, both_ways
 from strapdown.dsp.samples import running_integral
 from strapdown.errors import ConfigError, DataError, Finding, check_choice
 
@@ -125,7 +127,6 @@ def first_reach(time: Array, values: Array, slopes: Array, level: float) -> floa
     k = int(above[0])
     if k == 0:
         return float(time[0])
-    from scipy.optimize import brentq
 
     def short(at: float) -> float:
         return cubic(time, values, slopes, at)[0] - level
@@ -133,7 +134,46 @@ def first_reach(time: Array, values: Array, slopes: Array, level: float) -> floa
     # The value at a knot is that of the sample up to rounding: a root there has no change of sign.
     if short(float(time[k])) <= 0.0:
         return float(time[k])
-    return float(brentq(short, float(time[k - 1]), float(time[k]), xtol=1e-15, rtol=1e-14))
+    return root_between(short, float(time[k - 1]), float(time[k]))
+
+
+def root_between(function: Callable[[float], float], first: float, last: float) -> float:
+    """Root of a function of different signs at two arguments, by Brent's method.
+
+    Brent (1973), Algorithms for Minimization without Derivatives, chapter 4, in the operations of
+    scipy's brentq, which takes 0.3 s to load.
+    """
+    before, x, other = first, last, first
+    f_before, f, f_other = function(first), function(last), 0.0
+    if f_before == 0.0:
+        return first
+    step = previous = 0.0
+    while f != 0.0:
+        if f_before != 0.0 and (f_before < 0.0) != (f < 0.0):
+            other, f_other = before, f_before
+            step = previous = x - before
+        if abs(f_other) < abs(f):
+            before, x, other = x, other, x
+            f_before, f, f_other = f, f_other, f
+        least = 0.5 * (1e-15 + 1e-14 * abs(x))
+        half = 0.5 * (other - x)
+        if abs(half) < least:
+            break
+        tried = math.inf
+        if abs(previous) > least and abs(f) < abs(f_before):
+            if before == other:
+                tried = -f * (x - before) / (f - f_before)
+            else:
+                d, e = (f_before - f) / (before - x), (f_other - f) / (other - x)
+                tried = -f * (f_other * e - f_before * d) / (e * d * (f_other - f_before))
+        if 2.0 * abs(tried) < min(abs(previous), 3.0 * abs(half) - least):
+            previous, step = step, tried
+        else:
+            previous = step = half
+        before, f_before = x, f
+        x += step if abs(step) > least else math.copysign(least, half)
+        f = function(x)
+    return x
 
 
 # Means over a moving window, exact for a record that is linear between its samples.
@@ -215,8 +255,6 @@ def four_pole(time: Array, values: Array, frequency: float, cutoff: str = "whole
     much as there is, so that one that is stationary at its ends starts and stops without a
     transient. `DataError`: steps are not uniform, or the rate is less than ten times the frequency.
     """
-    from scipy.signal import butter, sosfiltfilt
-
     check_choice("crash.no-kind-cut-off", CUTOFFS, quantity="cutoff", cutoff=cutoff)
     step = step_of(time)
     if 1.0 / step < 10.0 * frequency:
@@ -224,9 +262,19 @@ def four_pole(time: Array, values: Array, frequency: float, cutoff: str = "whole
             "crash.rate-hz-less-than-ten", quantity="time", step=1.0 / step, frequency=frequency
         )
     each = frequency / PASS_SHARE if cutoff == "whole" else frequency
-    sections = butter(2, each, fs=1.0 / step, output="sos")
+    # Bilinear transformation of the upper of two poles.
+    tangent = np.tan(np.pi * (each / (1.0 / step)))
+    pole = -tangent * np.exp(-0.25j * np.pi)
+    gain = tangent**2 * (1.0 / _square(1.0 - pole))
+    pole = (1.0 + pole) / (1.0 - pole)
+    one_pass = CfcCoefficients(gain, 2.0 * gain, gain, 2.0 * pole.real, -_square(pole))
     padding = min(round(PADDING / step), time.size - 1)
-    return np.asarray(sosfiltfilt(sections, values, axis=0, padtype="odd", padlen=padding))
+    channels = values.reshape(len(values), -1)
+    return both_ways(one_pass, channels, padding, summed=True).reshape(values.shape)
+
+
+def _square(number: complex) -> float:
+    return float(number.real * number.real + number.imag * number.imag)
 
 
 # Acceleration severity index.

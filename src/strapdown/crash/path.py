@@ -24,6 +24,7 @@ from strapdown.crash.acceleration import NOISE, by_contributor, window_weights
 from strapdown.crash.entry import Entry, angles_sd
 from strapdown.crash.measuring_point import SampleEffects
 from strapdown.dsp.chi_square import chi_square_quantile
+from strapdown.dsp.cubics import hermite
 from strapdown.earth import earth_rate
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError, DataError, DivergenceError
@@ -250,6 +251,11 @@ class CrashPath:
         by_time = np.ascontiguousarray(self.errors.transpose(1, 2, 0))
         systematic = by_time @ by_time.transpose(0, 2, 1)
         return np.asarray(systematic + self.noise_covariance)
+
+    def positions(self, time: Array) -> Array:
+        """North, east, down at instants, (k, 3), m: the cubics that match the velocities."""
+        place, velocity = self.table[NED].to_numpy(), self.table[VELOCITIES].to_numpy()
+        return hermite(self.time, place, velocity)(time)
 
     @property
     def sd(self) -> pd.DataFrame:
@@ -931,9 +937,6 @@ def compare_with_reference(path: CrashPath, reference: pd.DataFrame) -> PathComp
             name=type(reference).__name__,
         )
     time, values, sd = _columns(reference)
-    from scipy.interpolate import CubicHermiteSpline
-
-    own = CubicHermiteSpline(path.time, path.table[NED].to_numpy(), path.table[["VN", "VE", "VD"]])
     inside = (time >= path.time[0] - 1e-9) & (time <= path.time[-1] + 1e-9)
     entry = path.entry.time
     if not (inside.any() and time[0] <= entry + 1e-9 and time[inside][-1] > entry):
@@ -949,8 +952,8 @@ def compare_with_reference(path: CrashPath, reference: pd.DataFrame) -> PathComp
         )
     origin = np.array([np.interp(entry, time, values[:, k]) for k in range(3)])
     at_origin = np.array([np.interp(entry, time, sd[:, k]) for k in range(3)])
-    origin = origin - own(entry)
-    difference = own(time[inside]) - (values[inside] - origin)
+    origin = origin - path.positions(np.array([entry]))[0]
+    difference = path.positions(time[inside]) - (values[inside] - origin)
     place = path.covariance[:, PLACE, PLACE].reshape(len(path.time), 9)
     rows = np.column_stack([np.interp(time[inside], path.time, place[:, k]) for k in range(9)])
     # The reading at the origin is a further independent one.

@@ -50,6 +50,7 @@ from strapdown.mechanization import NorthEastDown
 from strapdown.sensors.crash_unit import CrashUnit
 from strapdown.sensors.synchronise import SynchronisedUnits, synchronise
 from strapdown.sensors.triad_errors import FARTHEST, finite, span, triple
+from strapdown.systems.one_thread import one_thread
 from strapdown.tables import NED
 
 if TYPE_CHECKING:
@@ -736,9 +737,14 @@ def reconstruct_crash(
     for of in there:
         findings += () if of.prepared is None else of.prepared.findings
     # Before each unit estimates its own biases, which absorbs part of the differences.
-    comparison = compare_units(there) if len(there) > 1 else None
+    comparison = None
     hidden: list[Finding] = []
-    if comparison is not None:
+    if len(there) > 1:
+        # Only several units need it, and only what is loaded is limited to one thread.
+        import scipy.linalg  # noqa: F401
+
+        with one_thread():
+            comparison = compare_units(there)
         hidden = undetectable(there, comparison)
         there = [comparison.structure.within(of) for of in there]
     tied = [entry if isinstance(entry, Entry) else None] * len(there)

@@ -11,6 +11,7 @@ from typing import Any, cast
 import numpy as np
 
 from strapdown.config.toml_file import KeyPath, TomlFile, read_toml
+from strapdown.dsp.chi_square import normal_quantile, special
 from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.units import SPEEDS as ALL_SPEEDS
 
@@ -154,11 +155,10 @@ def injury_risk(
     untransformed inputs (no log, no square) and normal errors it is exact. The variance of the
     logit by the coefficients is ``x' V x`` with their covariance V and x = (1, transformed inputs).
     """
-    from scipy.special import expit, ndtri
-
     spread = dict(sd or {})
     _check_options(model, spread, coverage, outside)
-    findings = list(_validity(model, inputs, spread, float(ndtri(0.5 + 0.5 * coverage)), outside))
+    reach = normal_quantile(0.5 + 0.5 * coverage)
+    findings = list(_validity(model, inputs, spread, reach, outside))
     logit, variance = model.intercept, 0.0
     slopes: dict[str, float] = {}
     regressors = [1.0]
@@ -181,12 +181,12 @@ def injury_risk(
         x = np.array(regressors)
         own = float(x @ np.array(model.covariance) @ x)
         variance += own
-    reach = float(ndtri(0.5 + 0.5 * coverage)) * math.sqrt(variance)
+    reach *= math.sqrt(variance)
     return InjuryRisk(
         model,
-        float(expit(logit)),
-        float(expit(logit - reach)),
-        float(expit(logit + reach)),
+        float(special().expit(logit)),
+        float(special().expit(logit - reach)),
+        float(special().expit(logit + reach)),
         coverage,
         logit,
         math.sqrt(variance),

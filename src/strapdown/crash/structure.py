@@ -9,9 +9,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-# At the top, so that it is loaded where a run limits its threads (`systems.one_thread`).
-from scipy.linalg import solve_triangular
-
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.measuring_point import PointKinematics, SampleEffects
 from strapdown.sensors.unmeasured import AXES
@@ -244,6 +241,8 @@ def likeliest(
     the posterior of each size beside the likeliest others, zero where that is; the cost is twice
     the negative logarithm of the posterior.
     """
+    from scipy.linalg import solve_triangular
+
     sizes, means = np.zeros(len(unknowns)), np.zeros(len(unknowns))
     if not difference.size:
         return sizes, means, 0.0

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from strapdown._kernels import signals
 from strapdown.dsp.samples import as_channels, positive_step
 from strapdown.errors import ConfigError, DataError, check_choice
 
@@ -126,8 +127,6 @@ def cfc_filter(values: ArrayLike, step: float, cfc: float, standard: str = "iso"
     DataError
         A sample is not finite, or the record is not longer than the 10 ms that are mirrored.
     """
-    from scipy.signal import lfilter, lfilter_zi
-
     c = cfc_coefficients(cfc, step, standard)
     channels = as_channels(values)
     least = math.ceil(LEAST_PADDING / step - 1e-9)
@@ -144,12 +143,24 @@ def cfc_filter(values: ArrayLike, step: float, cfc: float, standard: str = "iso"
     # The squared modulus of the poles is -b2.
     memory = math.log(FORGOTTEN) / (0.5 * math.log(-c.b2))
     n = min(len(channels) - 1, max(least, LEAST_PADDED, math.ceil(memory)))
+    return both_ways(c, channels, n).reshape(np.shape(values))
+
+
+def both_ways(c: CfcCoefficients, channels: Array, n: int, *, summed: bool = False) -> Array:
+    """Pass channels, (k, c), forward and backward, with `n` samples mirrored at either end.
+
+    Each pass begins in the steady state of its first value. `summed`: order of the sums
+    (`_kernels.signals.second_order`).
+    """
     first, last = channels[:1], channels[-1:]
-    padded = np.concatenate(
+    passed = np.concatenate(
         [2.0 * first - channels[n:0:-1], channels, 2.0 * last - channels[-2 : -n - 2 : -1]]
     )
-    b, a = [c.a0, c.a1, c.a2], [1.0, -c.b1, -c.b2]
-    rest = lfilter_zi(b, a)[:, None]
+    gained = [c.a1 + c.b1 * c.a0, c.a2 + c.b2 * c.a0]
+    rest = np.linalg.solve([[1.0 - c.b1, -1.0], [-c.b2, 1.0]], gained)[:, None]
+    coefficients = np.array([c.a0, c.a1, c.a2, c.b1, c.b2])
     for _ in range(2):
-        padded = lfilter(b, a, padded, axis=0, zi=rest * padded[0])[0][::-1]
-    return np.ascontiguousarray(padded[n : n + len(channels)]).reshape(np.shape(values))
+        out = np.empty_like(passed)
+        signals.second_order(coefficients, rest * passed[0], passed, summed, out)
+        passed = np.ascontiguousarray(out[::-1])
+    return passed[n : n + len(channels)]

@@ -401,12 +401,11 @@ def reference_in_path_axes(path: CrashPath, answer: ReferenceAnswer) -> pd.DataF
         ``north east down``, m, indexed by time, s, as used in the comparison.
     """
     assert answer.path is not None
-    from scipy.interpolate import CubicHermiteSpline
-
     errors = answer.path.errors
-    own = CubicHermiteSpline(path.time, path.table[NED].to_numpy(), path.table[["VN", "VE", "VD"]])
     at = index_of(errors)
-    return pd.DataFrame(own(at) - errors[NED].to_numpy(), index=errors.index, columns=NED)
+    return pd.DataFrame(
+        path.positions(at) - errors[NED].to_numpy(), index=errors.index, columns=NED
+    )
 
 
 def _directions(main: UnitReconstruction, which: int | None) -> list[Direction]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from strapdown import __version__
 from strapdown.bundle import write_json
-from strapdown.config.doctor import DoctorSpec
+from strapdown.config.logs import DoctorSpec
 from strapdown.constants import MICRO_G
 from strapdown.errors import DataError, Finding
 from strapdown.formats.clocks import UNIX, on_clock_of

@@ -7,6 +7,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.constants import TWO_SIDED_95
+from strapdown.dsp.chi_square import chi_square_exceeded, normal_above
 from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.navigation.truth_comparison import bounds
 from strapdown.report.chart import (
@@ -585,9 +586,7 @@ def nis_chart(record: NavigationRecord, found: tuple[Agreement, ...]) -> Chart |
 
 def chi_square_far(freedom: float) -> float:
     """Quantile of chi-square with the two-sided exceedance probability of three sigma."""
-    from scipy.special import chdtri, ndtr
-
-    return float(chdtri(freedom, 2.0 * float(ndtr(-3.0))))
+    return float(chi_square_exceeded(2.0 * normal_above(3.0), freedom))
 
 
 def _mean(one: Agreement) -> list[Line]:

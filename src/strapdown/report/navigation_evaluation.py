@@ -12,7 +12,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.config.navigation import make_aids
-from strapdown.dsp.chi_square import plane_bound
+from strapdown.dsp.chi_square import chi_square_exceeded, plane_bound
 from strapdown.dsp.samples import true_runs
 from strapdown.errors import Finding
 from strapdown.estimation.robust import AdaptiveScale
@@ -256,8 +256,6 @@ def agreements(record: NavigationRecord, lasting: Collection[str] = ()) -> tuple
 
 
 def _agreement(name: str, table: pd.DataFrame, stated: bool) -> Agreement:
-    from scipy.special import chdtri
-
     labels = tuple(innovation_labels(table))
     nu, s, weight = (
         values_of(table, [f"{part} {label}" for label in labels]) for part in ("nu", "s", "weight")
@@ -272,7 +270,7 @@ def _agreement(name: str, table: pd.DataFrame, stated: bool) -> Agreement:
     if count:
         mean = float(nis[used].mean())
         band = band_of_mean(freedom, count)
-        usual = math.sqrt(float(np.median(nis[used])) / float(chdtri(freedom, 0.5)))
+        usual = math.sqrt(float(np.median(nis[used])) / float(chi_square_exceeded(0.5, freedom)))
     ratio = math.sqrt(mean / freedom) if freedom else math.nan
     consistency = consistency_of(name, table)
     long = [one for one in consistency.components if one.autocorrelation.size]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from strapdown import rotation
 from strapdown.alignment.two_vector import triad
-from strapdown.config.alignment import LogTable
+from strapdown.config.logs import LogTable
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.dsp.samples import white_sd
 from strapdown.earth import FIRST_YEAR, LAST_YEAR, THIS_YEAR, magnetic_field

@@ -9,8 +9,9 @@ from typing import Any
 
 import pandas as pd
 
-from strapdown.config.alignment import STAGES, AxesTable, LogTable
+from strapdown.config.alignment import STAGES
 from strapdown.config.choice import SLOTS, Kinds, Slot, options_of
+from strapdown.config.logs import AxesTable, LogTable
 from strapdown.config.toml_text import ASK, Asked, Page, inline, string
 from strapdown.errors import Finding
 from strapdown.formats.assemble import require_accel

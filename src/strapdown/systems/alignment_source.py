@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.bundle import InputFiles, input_files, sensor_file
-from strapdown.config.alignment import AlignmentSpec, AxesTable, LogTable
+from strapdown.config.logs import AxesTable, LogTable
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import Finding
 from strapdown.formats import files_of, read_log
@@ -29,6 +30,9 @@ from strapdown.sensors.triad_errors import (
 from strapdown.systems.inputs import part_of_log, read_options, refuse_long_span
 from strapdown.tables import ACCEL, EULER, GYRO
 from strapdown.tables.checks import values_of
+
+if TYPE_CHECKING:
+    from strapdown.config.alignment import AlignmentSpec
 
 __all__ = ["AlignmentSource", "axes_matrices", "body_record", "read_alignment_source"]
 

@@ -14,13 +14,18 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.bundle import InputFiles, Seal, input_files
-from strapdown.config.alignment import AxesTable, FixesTable, LogTable
-from strapdown.config.doctor import DoctorSpec, flags_of, flags_of_fixes
+from strapdown.config.logs import (
+    AxesTable,
+    DoctorSpec,
+    FixesTable,
+    LogTable,
+    flags_of,
+    flags_of_fixes,
+)
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.dsp.samples import running_integral, white_sd
 from strapdown.errors import DataError, Finding, Severity, StrapdownError
 from strapdown.evaluation.differences import rotation_contradicted
-from strapdown.evaluation.second_log import align_second_log
 from strapdown.formats import (
     READERS,
     STREAMS,
@@ -33,7 +38,6 @@ from strapdown.formats import (
 )
 from strapdown.formats.aid_table import read_stream
 from strapdown.formats.clocks import clock_of, on_clock_of
-from strapdown.formats.crash_records import read_crash_record
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.gnss_fixes import GnssOptions
 from strapdown.formats.recording import ABSENT, PLACEHOLDERS, RawLog, Recording
@@ -458,6 +462,8 @@ def _crash_record(path: str) -> int | None:
 
     None where no channel can be an acceleration, a rate or a velocity, as in a table of attitudes.
     """
+    from strapdown.formats.crash_records import read_crash_record
+
     try:
         channels = read_crash_record(path).channels
     except StrapdownError:
@@ -555,6 +561,8 @@ def _between(logs: Sequence[LogDiagnosis]) -> list[Finding]:
             _, said = _fixes_against({**other.streams, "imu": base.streams["imu"]})
             own = set(other.faults) | set(other.notes)
             found += [f for f in said if f not in own]
+    if len(bases) > 1:
+        from strapdown.evaluation.second_log import align_second_log
     for k, base in enumerate(bases):
         for other in bases[k + 1 :]:
             try:

@@ -21,7 +21,7 @@ from strapdown.formats.recording import ReadOptions
 from strapdown.progress import Progress, silent
 
 if TYPE_CHECKING:
-    from strapdown.config.alignment import LogTable
+    from strapdown.config.logs import LogTable
     from strapdown.config.sources import LogSpec
 
 __all__ = [

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
 
 from strapdown import rotation
-from strapdown.config.navigation import NavigationSpec, StartTable, make_aids
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError, Finding
 from strapdown.estimation.error_model import ERROR_MODELS
@@ -23,6 +23,9 @@ from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, usable
 from strapdown.tables.checks import channels_of, index_of, source_of, values_of
 from strapdown.tables.on_disk import filled, let_go
+
+if TYPE_CHECKING:
+    from strapdown.config.navigation import NavigationSpec, StartTable
 
 __all__ = ["channel_findings", "look_through", "saturated_findings"]
 
@@ -49,6 +52,9 @@ def look_through(
     tables : mapping of str to DataFrame
         By name of the measurement, on the clock of the samples.
     """
+    # `doctor` has the checks of samples without a configuration of navigation.
+    from strapdown.config.navigation import make_aids
+
     found: list[Finding] = []
     for aid in make_aids(spec):
         table = tables.get(aid.name)

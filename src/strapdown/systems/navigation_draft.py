@@ -12,8 +12,8 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.config.alignment import FixesTable, LogTable
 from strapdown.config.choice import SLOTS, Slot, options_of
+from strapdown.config.logs import FixesTable, LogTable
 from strapdown.config.navigation import STAGES
 from strapdown.config.toml_text import ASK, Page, inline, named_from, string
 from strapdown.constants import STANDARD_GRAVITY

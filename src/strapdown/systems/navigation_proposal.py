@@ -18,7 +18,7 @@ from strapdown.alignment.course_sums import Antenna
 from strapdown.alignment.gnss_course import GnssCourse
 from strapdown.alignment.inertial_frame import fit_inertially, heading_rate
 from strapdown.alignment.inertial_sums import sum_inertially
-from strapdown.config.alignment import AxesTable, FixesTable, LogTable
+from strapdown.config.logs import AxesTable, FixesTable, LogTable
 from strapdown.constants import DEG_PER_HOUR, STANDARD_GRAVITY
 from strapdown.errors import DataError, DivergenceError, Finding
 from strapdown.formats.assemble import require_accel

@@ -22,6 +22,7 @@ from strapdown.crash.indices import (
     moving_means,
     nij,
     olc,
+    root_between,
     thiv,
 )
 from strapdown.errors import ConfigError, DataError
@@ -63,6 +64,22 @@ def plane(x, y=None):
 
 # The trapezoid of a sine of 1/T over the step h is short by (2πh/T)²/12 = 3.3e-6 of it.
 TRAPEZOID = 4e-6
+
+
+def test_a_root_is_that_of_brentq():
+    rng = np.random.default_rng(9)
+    for _ in range(500):
+        end, drop = rng.uniform(1e-3, 1.0), rng.uniform(-1.0, 1.0, 3)
+
+        def of(x, a=drop, b=end):
+            return (a[0] * x + a[1]) * x * (x - b) + (x / b - 0.5 + 0.49 * a[2])
+
+        found = root_between(of, 0.0, end)
+        # Each is within 1e-15 + 1e-14 |x| of the change of sign.
+        expected = brentq(of, 0.0, end, xtol=1e-15, rtol=1e-14)
+        assert found == pytest.approx(expected, rel=2e-14, abs=2e-15)
+    assert root_between(lambda x: x, 0.0, 1.0) == 0.0
+    assert root_between(lambda x: x - 1.0, 0.0, 1.0) == 1.0
 
 
 class TestMovingMeans:
@@ -127,6 +144,21 @@ class TestAsi:
             middle = np.abs(time) < 0.5
             # The warping of the bilinear transform, (π 16/10⁴)² / 3 = 8e-6 of the frequency.
             np.testing.assert_allclose(out[middle], gain * wave[middle], atol=2e-5)
+
+    def test_filter_is_that_of_scipy(self):
+        from scipy.signal import butter, sosfiltfilt
+
+        rng = np.random.default_rng(8)
+        for rate, frequency, size in ((1e3, 13.0, 900), (1e4, 10.0, 4000), (2e3, 60.0, 50)):
+            values = np.cumsum(rng.normal(size=(size, 3)), axis=0)
+            sections = butter(2, frequency, fs=rate, output="sos")
+            n = min(round(0.5 * rate), size - 1)
+            expected = sosfiltfilt(sections, values, axis=0, padtype="odd", padlen=n)
+            found = four_pole(np.arange(size) / rate, values, frequency, "pass")
+            # Five roundings of a sample; the recursion adds those of 1 / (1 - |pole|)² samples.
+            lasting = (rate / (math.sqrt(2.0) * math.pi * frequency)) ** 2
+            bound = 5 * np.finfo(np.float64).eps * lasting * np.abs(values).max()
+            np.testing.assert_allclose(found, expected, rtol=0.0, atol=bound)
 
     def test_filter_on_a_long_haversine_is_near_the_mean_of_the_older_edition(self):
         time, a = haversine()

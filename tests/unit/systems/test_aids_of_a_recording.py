@@ -15,8 +15,8 @@ from tests.town_drive import RATE, motion
 
 import strapdown as sd
 from strapdown import rotation
-from strapdown.config.alignment import FixesTable, LogTable
 from strapdown.config.choice import Kinds
+from strapdown.config.logs import FixesTable, LogTable
 from strapdown.config.navigation import AidSpec, NavigationSpec
 from strapdown.errors import DataError
 from strapdown.formats import files_of

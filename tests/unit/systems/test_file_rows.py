@@ -12,7 +12,7 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "cli"))
 
 from bad_navigate import write_drive
 
-from strapdown.config.alignment import AxesTable, LogTable
+from strapdown.config.logs import AxesTable, LogTable
 from strapdown.errors import DataError, DivergenceError, Finding
 from strapdown.formats.gnss_files import read_gnss
 from strapdown.systems.alignment_source import body_record

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from tests.coded import coded
 
-from strapdown.config.alignment import LogTable, sensors_of
+from strapdown.config.alignment import sensors_of
+from strapdown.config.logs import LogTable
 from strapdown.config.navigation import NavigationSpec
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84

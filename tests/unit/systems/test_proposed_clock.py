@@ -13,7 +13,7 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import town_drive as town
-from strapdown.config.alignment import FixesTable, LogTable
+from strapdown.config.logs import FixesTable, LogTable
 from strapdown.navigation.measurements.clock_windows import Offsets
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.sensors.triad_errors import ImuErrors

@@ -7,7 +7,7 @@ import pandas as pd
 import pytest
 from scipy import stats
 
-from strapdown.config.alignment import FixesTable, LogTable
+from strapdown.config.logs import FixesTable, LogTable
 from strapdown.config.navigation import NavigationSpec
 from strapdown.constants import DEG_PER_HOUR, MICRO_G
 from strapdown.frames import place_difference

@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown._kernels import piecewise
+from strapdown.dsp.cubics import spline
 from strapdown.dsp.samples import running_integral
 from strapdown.errors import DataError, Finding
 from strapdown.frames import place_difference
@@ -499,11 +500,9 @@ def velocity_delay(table: pd.DataFrame) -> VelocityDelay | None:
     apart = max(1, round(PIECE / float(np.median(steps))))
     if len(time) <= GNSS_DELAY_LEAST_STEPS + apart:
         return None
-    from scipy.interpolate import CubicSpline
-
     moved = place_difference(place[apart:], place[:-apart])[:, :axes]
-    speed = CubicSpline(time, velocity)
-    way = speed.antiderivative()
+    speed = spline(time, velocity)
+    way = speed.integral()
     # In a gap, or beyond its end, the spline is not valid.
     holes = time[:-1][steps > GNSS_DELAY_LONGEST_STEP], time[1:][steps > GNSS_DELAY_LONGEST_STEP]
     begin, end = time[:-apart] - GNSS_DELAY_LARGEST, time[apart:] + GNSS_DELAY_LARGEST
