@@ -23,7 +23,7 @@ START_SD = (5.0, 0.5, 0.5, 3.0)
 #: Samples of a chunk: 50 s.
 CHUNK = 5000
 #: Forms of the covariance, with the goal and the limit of each beside the plain form in C.
-FORMS = {"joseph": (2.0, 3.1), "ud": (2.0, 3.0), "wd": (2.0, 3.0)}
+FORMS = {"joseph": (2.0, 2.6), "ud": (2.0, 2.4), "wd": (2.0, 2.5)}
 # An epoch is short enough for a turn of the processor.
 EPOCHS = 200
 BLOCKS = {

@@ -569,10 +569,10 @@ class EpochLoop:
             of = codes == code
             innovations = Innovations(*told[of].transpose(1, 0, 2))
             self.seen.append(InnovationColumns(*aid.names(code), times[of, 1], innovations))
-        made = np.isfinite(times)
-        stamps = (times - [JUST_BEFORE, 0.0])[made]
+        rows = [each.reshape(-1, *each.shape[2:]) for each in (times - [JUST_BEFORE, 0.0], *marks)]
+        made = np.flatnonzero(np.isfinite(rows[0]))
         # Without a copy where there is a mark before each fix: of an hour they are many.
-        kept = [each.reshape(-1, *each.shape[2:]) if made.all() else each[made] for each in marks]
+        stamps, *kept = rows if len(made) == times.size else (each[made] for each in rows)
         self.marks.append(CovarianceSnapshots(stamps, *kept))
         self.marked, self.observed = float(stamps[-1]), float(times[-1, 1])
 

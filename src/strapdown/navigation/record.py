@@ -308,7 +308,7 @@ class CovarianceSnapshots(Sequence[CovarianceSnapshot]):
         names = [one.name for one in fields(cls)]
         columns = [[getattr(part, name) for part in parts] for name in names]
         whole = [of[0] if len(of) == 1 else np.concatenate(of) for of in columns]
-        newer = np.diff(whole[0], append=np.inf) > same
+        newer = np.append(np.diff(whole[0]) > same, True)
         return cls(*(whole if newer.all() else (of[newer] for of in whole)))
 
     def __len__(self) -> int:
