@@ -101,14 +101,13 @@ def low_pass_design(
         raise ConfigError(
             "dsp.db-out-reach-double-or", quantity="attenuation", attenuation=attenuation
         )
-    from scipy.signal import kaiser_beta
-
     stop = 0.5 * rate
     depth = attenuation + MARGIN
     order = (depth - 7.95) / (2.285 * 2.0 * math.pi * stop * (1.0 - passband) * step)
-    return LowPassDesign(
-        passband * stop, stop, attenuation, 0.5 * order * step, float(kaiser_beta(depth))
-    )
+    beta = 0.1102 * (depth - 8.7)
+    if depth <= 50.0:
+        beta = 0.5842 * (depth - 21.0) ** 0.4 + 0.07886 * (depth - 21.0)
+    return LowPassDesign(passband * stop, stop, attenuation, 0.5 * order * step, beta)
 
 
 def decimate(

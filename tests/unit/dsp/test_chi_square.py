@@ -33,7 +33,7 @@ def test_the_normal_distribution_is_that_of_scipy_to_the_last_bit():
     np.testing.assert_array_equal(ours.normal_above(VALUE), norm.sf(VALUE))
 
 
-NAMES = "chdtr chdtrc chdtri expit gammaincinv ndtr ndtri stdtr stdtrit"
+NAMES = "chdtr chdtrc chdtri expit gammaincinv j1 jv ndtr ndtri stdtr stdtrit"
 
 
 @pytest.mark.parametrize("alone", [True, False])

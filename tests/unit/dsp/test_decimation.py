@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import kaiser_beta
 from tests.coded import coded
 
 from strapdown.dsp.decimation import decimate, low_pass_design, mean_samples
@@ -13,6 +14,13 @@ RATE = 200.0
 
 def stamps_of(begin, end, rate=RATE):
     return np.arange(round(begin * rate), round(end * rate) + 1) / rate
+
+
+@pytest.mark.parametrize("attenuation", [40.0, 45.0, 45.1, 80.0, 150.0])
+def test_the_window_is_kaisers_to_the_last_bit(attenuation):
+    # Five decibels in reserve; the formula changes at 50 dB.
+    design = low_pass_design(STEP, RATE, attenuation=attenuation)
+    assert design.beta == kaiser_beta(attenuation + 5.0)
 
 
 @pytest.mark.slow
