@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -134,46 +133,11 @@ def first_reach(time: Array, values: Array, slopes: Array, level: float) -> floa
     # The value at a knot is that of the sample up to rounding: a root there has no change of sign.
     if short(float(time[k])) <= 0.0:
         return float(time[k])
-    return root_between(short, float(time[k - 1]), float(time[k]))
-
-
-def root_between(function: Callable[[float], float], first: float, last: float) -> float:
-    """Root of a function of different signs at two arguments, by Brent's method.
-
-    Brent (1973), Algorithms for Minimization without Derivatives, chapter 4, in the operations of
-    scipy's brentq, which takes 0.3 s to load.
-    """
-    before, x, other = first, last, first
-    f_before, f, f_other = function(first), function(last), 0.0
-    if f_before == 0.0:
-        return first
-    step = previous = 0.0
-    while f != 0.0:
-        if f_before != 0.0 and (f_before < 0.0) != (f < 0.0):
-            other, f_other = before, f_before
-            step = previous = x - before
-        if abs(f_other) < abs(f):
-            before, x, other = x, other, x
-            f_before, f, f_other = f, f_other, f
-        least = 0.5 * (1e-15 + 1e-14 * abs(x))
-        half = 0.5 * (other - x)
-        if abs(half) < least:
-            break
-        tried = math.inf
-        if abs(previous) > least and abs(f) < abs(f_before):
-            if before == other:
-                tried = -f * (x - before) / (f - f_before)
-            else:
-                d, e = (f_before - f) / (before - x), (f_other - f) / (other - x)
-                tried = -f * (f_other * e - f_before * d) / (e * d * (f_other - f_before))
-        if 2.0 * abs(tried) < min(abs(previous), 3.0 * abs(half) - least):
-            previous, step = step, tried
-        else:
-            previous = step = half
-        before, f_before = x, f
-        x += step if abs(step) > least else math.copysign(least, half)
-        f = function(x)
-    return x
+    # The bracket is halved until it has no number inside: it is short, and this is done once.
+    low, high = float(time[k - 1]), float(time[k])
+    while low < (middle := 0.5 * (low + high)) < high:
+        low, high = (middle, high) if short(middle) < 0.0 else (low, middle)
+    return high
 
 
 # Means over a moving window, exact for a record that is linear between its samples.

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq, minimize
 from tests.coded import coded
 
@@ -15,6 +16,7 @@ from strapdown.crash.indices import (
     NECK_INTERCEPTS,
     asi,
     exceeded_level,
+    first_reach,
     flail_space,
     four_pole,
     hic,
@@ -22,7 +24,6 @@ from strapdown.crash.indices import (
     moving_means,
     nij,
     olc,
-    root_between,
     thiv,
 )
 from strapdown.errors import ConfigError, DataError
@@ -66,20 +67,22 @@ def plane(x, y=None):
 TRAPEZOID = 4e-6
 
 
-def test_a_root_is_that_of_brentq():
+def test_the_first_reach_is_the_root_of_the_cubic():
     rng = np.random.default_rng(9)
-    for _ in range(500):
-        end, drop = rng.uniform(1e-3, 1.0), rng.uniform(-1.0, 1.0, 3)
-
-        def of(x, a=drop, b=end):
-            return (a[0] * x + a[1]) * x * (x - b) + (x / b - 0.5 + 0.49 * a[2])
-
-        found = root_between(of, 0.0, end)
-        # Each is within 1e-15 + 1e-14 |x| of the change of sign.
-        expected = brentq(of, 0.0, end, xtol=1e-15, rtol=1e-14)
-        assert found == pytest.approx(expected, rel=2e-14, abs=2e-15)
-    assert root_between(lambda x: x, 0.0, 1.0) == 0.0
-    assert root_between(lambda x: x - 1.0, 0.0, 1.0) == 1.0
+    for _ in range(200):
+        time = np.cumsum(rng.uniform(1e-4, 1e-2, 4))
+        values = np.sort(rng.uniform(0.0, 1.0, 4))
+        chords = np.diff(values) / np.diff(time)
+        # Not above the lesser of its chords: the cubics rise.
+        least = np.minimum(np.r_[chords[0], chords], np.r_[chords, chords[-1]])
+        slopes = rng.uniform(0.0, 1.0, 4) * least
+        level = float(rng.uniform(values[0], values[-1]))
+        found = first_reach(time, values, slopes, level)
+        of = CubicHermiteSpline(time, values, slopes)
+        k = int(np.argmax(values >= level))
+        expected = brentq(lambda at, of=of, u=level: of(at) - u, time[k - 1], time[k], xtol=1e-15)
+        # brentq has the root to 4 eps of it; the cubic rounds to eps, and is as steep as that.
+        assert found == pytest.approx(expected, rel=1e-13, abs=1e-15 + 4e-16 / abs(of(found, 1)))
 
 
 class TestMovingMeans:
