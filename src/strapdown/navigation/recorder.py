@@ -283,9 +283,8 @@ class Tape:
                     kept.append(newest)
                 kept.append(k)
                 self._mark_cell, newest = cell, -1
-            elif time == last and kept:
-                kept[-1] = k
             elif time == last:
+                # Of the chunk before: in one there is one of an instant.
                 self._marks.rows[-1] = rows[k]
             elif time <= last + PAIR:
                 kept.append(k)

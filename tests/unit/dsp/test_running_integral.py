@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import cumulative_trapezoid
 from scipy.ndimage import uniform_filter1d
 
-from strapdown.dsp.samples import moving_mean, running_integral
+from strapdown.dsp.samples import AT_ONCE, moving_mean, running_integral
 
 
 @pytest.mark.parametrize("shape", [(), (3,), (3, 2)])
@@ -16,6 +16,15 @@ def test_trapezoids_are_those_of_scipy(shape):
     time = 5.0 + np.cumsum(drawn.uniform(0.001, 0.3, 400))
     values = drawn.normal(size=(400, *shape))
     # Halves are exact: the products and sums of both are the same, in the same order.
+    np.testing.assert_array_equal(
+        running_integral(time, values), cumulative_trapezoid(values, time, axis=0, initial=0)
+    )
+
+
+def test_a_long_record_is_summed_in_parts():
+    drawn = np.random.default_rng(5)
+    time = np.cumsum(drawn.uniform(0.001, 0.3, AT_ONCE + 7))
+    values = drawn.normal(size=(len(time), 2))
     np.testing.assert_array_equal(
         running_integral(time, values), cumulative_trapezoid(values, time, axis=0, initial=0)
     )

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from statistics import NormalDist
+from types import SimpleNamespace
 
 import numpy as np
 import pandas as pd
@@ -163,14 +165,31 @@ def test_what_a_check_finds_piece_by_piece_is_what_it_finds_at_once():
             check.evidence()
 
     with pytest.MonkeyPatch.context() as patched:
-        # What is asked for in between is not judged.
+        # What is asked for in between is not judged. Without a least scatter every epoch counts.
         patched.setattr(heading_checks, "doubts_of", lambda *_: lambda *_: False)
+        patched.setattr(heading_checks, "_scatter", lambda u: np.nanmean(np.abs(u), axis=1))
         undoubted = run_heading_checks(made, record, 0.01)
         patched.setattr(_Check, "over", asked)
         again = run_heading_checks(made, record, 0.01)
     for one, other in zip(undoubted, again, strict=True):
         for name in ("time", "difference", "sd", "covariance", "scale"):
             np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
+
+    begin, doubts = heading_checks._begin, []
+
+    def begun(filter_, run, at, doubt):
+        doubts.append(doubt)
+        return begin(filter_, run, at, doubt)
+
+    # Once doubted, a run stays so: its estimates are not believed again.
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(heading_checks, "_begin", begun)
+        patched.setattr(heading_checks, "doubts_of", lambda *_: lambda _, at: 90.0 < at < 150.0)
+        run_heading_checks(made, record, 0.01)
+    since = [one.since for one in checks]
+    assert doubts == [at > 90.0 for at in since]
+    assert any(doubts)
+    assert not doubts[0]
 
     def diverging(check, time, rows):
         check.lost = check.since > 60.0
@@ -182,6 +201,25 @@ def test_what_a_check_finds_piece_by_piece_is_what_it_finds_at_once():
         patched.setattr(_Check, "over", diverging)
         left = run_heading_checks(made, record, 0.01)
     assert [one.since for one in left] == [one.since for one in checks if one.since <= 60.0]
+
+
+def test_the_scatter_of_innovations_is_that_of_the_latest_and_of_eight_at_least():
+    rng = np.random.default_rng(7)
+    time = np.cumsum(rng.uniform(0.4, 0.6, 200))
+    u = 1.7 * rng.normal(size=(200, 2))
+    u[::9] *= 6.0
+    seconds = np.arange(1.0, 90.0)
+    check = SimpleNamespace(seen=SimpleNamespace(rows=np.column_stack([time, u])))
+    found = _Check._scale(check, seconds)
+    for at, scale in zip(seconds.tolist(), found.tolist(), strict=True):
+        newest = u[time <= at][-60:]
+        if len(newest) < 8:
+            assert scale == 1.0
+            continue
+        whole = np.sqrt(np.minimum(newest**2, 9.0).mean())
+        middle = np.median(np.abs(newest)) / NormalDist().inv_cdf(0.75)
+        assert scale == pytest.approx(max(1.0, whole, middle), rel=1e-12)
+    assert found.max() > 1.5
 
 
 def test_gross_errors_are_left_out_of_the_repeated_run():

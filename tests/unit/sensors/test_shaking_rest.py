@@ -59,6 +59,15 @@ def test_a_hand_a_road_and_a_gyro_alone_are_none():
     assert find_shaking_rests(log([(0, 15)], []).drop(columns=ACCEL)) == ()
 
 
+def test_too_few_samples_and_a_force_beyond_gravity_are_none():
+    imu = log([], [])
+    # Eight parts of half a second with two samples each.
+    assert find_shaking_rests(imu.iloc[::25]) == ()
+    assert len(find_shaking_rests(imu.iloc[::10])) == 1
+    imu[ACCEL] *= 1.5
+    assert find_shaking_rests(imu) == ()
+
+
 def test_a_still_rest_stays_as_it_is():
     imu = log([], [(15.0, 25.0)])
     assert find_rests_of_every_grade(imu) == find_rests(imu)
