@@ -140,15 +140,16 @@ class Smoothing:
         marks = CovarianceSnapshots.joined([self._newest, piece.marks], -math.inf)
         if not len(marks):
             return
-        at, about = marks.time, self._navigator.about
+        at, about, kept = marks.time, self._navigator.about, []
         k = int(piece.time.searchsorted(max(self._due, at[0]) - SAME_INSTANT))
         while k < len(piece.time):
+            kept.append(k)
             time = float(piece.time[k])
-            mark = marks[int(at.searchsorted(time + SAME_INSTANT)) - 1]
-            anchor = np.concatenate([[time, mark.time], piece.history[k], mark.sensors])
-            self._anchors = self._anchors.and_then(anchor[None, :])
             self._due = time + ANCHORS if about is None else about.next_time(time)
             k = int(piece.time.searchsorted(self._due - SAME_INSTANT))
+        of = at.searchsorted(piece.time[kept] + SAME_INSTANT) - 1
+        rows = (piece.time[kept], at[of], piece.history[kept], marks.sensors[of])
+        self._anchors = self._anchors.and_then(np.column_stack(rows))
         self._newest = marks[-1:]
 
     def smoothed(self, marks: Array) -> Smoothed:
