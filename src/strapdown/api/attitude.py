@@ -92,7 +92,8 @@ class Attitude(pd.DataFrame):
     # and of many runs nobody looks at them: they join the manager when it is first asked for.
     @property
     def _mgr(self) -> Any:
-        q_nb = self.__dict__.pop("_quaternions", None)
+        # Another thread may ask at the same time: both make the same.
+        q_nb = self.__dict__.get("_quaternions")
         if q_nb is not None:
             held = self.__dict__["_held"]
             whole = pd.DataFrame(
@@ -102,6 +103,7 @@ class Attitude(pd.DataFrame):
                 copy=False,
             )
             self.__dict__["_held"] = whole._mgr
+            self.__dict__.pop("_quaternions", None)
         return self.__dict__["_held"]
 
     @_mgr.setter
@@ -238,8 +240,7 @@ def attitude(
         history = history_of_samples(chosen, time, view_of(imu, GYRO), mean, q_nb)
     else:
         history = attitude_history(chosen, increments_from_imu(imu, interpolation), q_nb)
-    # The stamps of a table cannot change; an array of the caller can.
-    out = Attitude._of(imu.index if gyro is None else imu.index.copy(deep=True), history)
+    out = Attitude._of(imu.index, history)
     out.attrs = {
         "source": name,
         "algorithm": chosen.label,
@@ -250,10 +251,10 @@ def attitude(
 
 
 def _gyro_alone(t: Any, gyro: ArrayLike, sampling: str) -> pd.DataFrame:
-    """An Imu table of arrays, for this computation alone: it keeps them without a copy."""
+    """An Imu table of arrays, for this computation alone: it keeps the rates without a copy."""
     stamps, rates = as_array(t, None, "time"), as_array(gyro, 3, "gyro")
     check_same_length(None, time=stamps, gyro=rates)
-    return imu_of_columns(stamps, rates, GYRO, sampling=sampling)
+    return imu_of_columns(np.array(stamps), rates, GYRO, sampling=sampling)
 
 
 def _filter_samples(

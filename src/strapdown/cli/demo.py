@@ -58,7 +58,7 @@ def demo(
     for run in there:
         shown = run.shown
         with progress(write.quiet) as show:
-            run.make(out, write.force, _part_of(show, shown.title, done / whole, run.takes / whole))
+            run.make(out, write.force, part_of(show, shown.title, done / whole, run.takes / whole))
         done += run.takes
         if write.quiet:
             continue
@@ -78,7 +78,7 @@ def demo(
     page.print(f"\nOpen  {out / _PAGE}")
 
 
-def _part_of(show: Progress, title: str, begin: float, share: float) -> Progress:
+def part_of(show: Progress, title: str, begin: float, share: float) -> Progress:
     """Progress of one run as a part of the whole."""
     return lambda stage, done: show(f"{title}: {stage}", begin + share * done)
 

@@ -35,7 +35,7 @@ EXIT_CODES = (
     "diverged; 6 verify found a change; 7 verify could compare only a part."
 )
 
-#: Modules of the commands, in the order of the help.
+#: Commands, each of a module, in the order of the help.
 COMMANDS = (
     "doctor",
     "attitude",
@@ -51,6 +51,7 @@ COMMANDS = (
     "export",
     "modules",
     "demo",
+    "warm-up",
 )
 
 
@@ -69,11 +70,12 @@ class Commands(TyperGroup):
 
 
 def _command(name: str) -> Any:
-    module = import_module(f"strapdown.cli.{name}")
+    words = name.replace("-", "_")
+    module = import_module(f"strapdown.cli.{words}")
     own: typer.Typer | None = getattr(module, "app", None)
     one = own or typer.Typer(rich_markup_mode="rich", add_completion=False)
     if own is None:
-        one.command(name, epilog=module.EPILOG)(getattr(module, name))
+        one.command(name, epilog=module.EPILOG)(getattr(module, words))
     for command in one.registered_commands:
         # Line breaks of a docstring would wrap the help twice.
         text = inspect.getdoc(command.callback) or ""

@@ -716,6 +716,18 @@ def reconstruct_crash(
         A path left the range of vehicle motion.
     """
     _check_units(units)
+    if len(units) < 2:
+        return _reconstructed(units, entry, options)
+    # Only several units need it, and only what is loaded is limited to one thread.
+    import scipy.linalg  # noqa: F401
+
+    with one_thread():
+        return _reconstructed(units, entry, options)
+
+
+def _reconstructed(
+    units: Sequence[CrashUnit], entry: Entry | DriveEntry | None, options: CrashOptions
+) -> CrashReconstruction:
     of_fixes: DriveEntry | None = None
     if not (entry is None or isinstance(entry, Entry)):
         # Estimation from fixes is loaded where it is needed.
@@ -740,11 +752,7 @@ def reconstruct_crash(
     comparison = None
     hidden: list[Finding] = []
     if len(there) > 1:
-        # Only several units need it, and only what is loaded is limited to one thread.
-        import scipy.linalg  # noqa: F401
-
-        with one_thread():
-            comparison = compare_units(there)
+        comparison = compare_units(there)
         hidden = undetectable(there, comparison)
         there = [comparison.structure.within(of) for of in there]
     tied = [entry if isinstance(entry, Entry) else None] * len(there)

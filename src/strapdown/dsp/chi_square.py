@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 import math
-import sys
-import threading
 from functools import cache
 from importlib import import_module
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -16,45 +13,10 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-#: Functions of scipy.special that are used here and elsewhere.
-FUNCTIONS = [
-    "chdtr",
-    "chdtrc",
-    "chdtri",
-    "expit",
-    "gammaincinv",
-    "j1",
-    "jv",
-    "ndtr",
-    "ndtri",
-    "stdtr",
-    "stdtrit",
-]
-
-
 @cache
 def special() -> Any:
-    """Return the compiled functions of scipy.special, without the package around them.
-
-    The package wraps them for other array libraries, for which it loads numpy.f2py and takes 0.13 s
-    of a short run. The functions are the same objects. Where they cannot be loaded alone, the
-    package is loaded, or another thread could ask for it meanwhile, it is returned.
-    """
-    import scipy
-
-    name = "scipy.special"
-    if name not in sys.modules and threading.active_count() == 1:
-        package = sys.modules[name] = ModuleType(name)
-        package.__path__ = [f"{folder}/special" for folder in scipy.__path__]
-        try:
-            alone = import_module(f"{name}._ufuncs")
-            if all(hasattr(alone, function) for function in FUNCTIONS):
-                return alone
-        except ImportError:
-            pass
-        finally:
-            del sys.modules[name]
-    return import_module(name)
+    """Return scipy.special, which takes a tenth of a short run to load, where it is used."""
+    return import_module("scipy.special")
 
 
 def chi_square_quantile(share: Any, freedom: Any) -> Any:

@@ -338,7 +338,7 @@ class NavigationChunk:
     history : ndarray, (n, row)
         Rows of the mechanization then, with the estimates subtracted.
     seen : InnovationRecords
-        In the order in which they were taken.
+        In the order of time.
     marks : CovarianceSnapshots
         At every epoch, and at least as often as the navigator's `mark_interval`; where an outage
         ends, before it, too. The newest sample has one by `Navigator.finish`.

@@ -82,13 +82,15 @@ def imu_table(
         unknown.
     """
     stamps = as_array(time, None, "time", source)
-    given = {"gyro": gyro, "accel": accel, "mag": mag}
-    blocks = {name: as_array(x, 3, name, source) for name, x in given.items() if x is not None}
+    given = {"accel": accel, "mag": mag}
+    blocks = {"gyro": as_array(gyro, 3, "gyro", source)}
+    blocks |= {name: as_array(x, 3, name, source) for name, x in given.items() if x is not None}
     check_same_length(source, time=stamps, **blocks)
     room = np.empty((len(stamps), 3 * len(blocks)), order="F") if by_column else None
     values = np.concatenate(list(blocks.values()), axis=1, out=room)
     columns = [f"{name}_{axis}" for name in blocks for axis in "xyz"]
-    return imu_of_columns(stamps, values, columns, sampling=sampling, source=source)
+    # An array of the caller can change.
+    return imu_of_columns(np.array(stamps), values, columns, sampling=sampling, source=source)
 
 
 def imu_of_columns(

@@ -8,6 +8,8 @@ import json
 import pickle
 import subprocess
 import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from io import StringIO
 
@@ -177,6 +179,35 @@ def test_column_is_an_attribute_and_a_rotation_needs_no_angles():
     assert np.array_equal(sd.attitude(t, gyro).rotation.as_quat(), made.rotation.as_quat())
     assert isinstance(made[10:20], type(made))
     assert "heading" in repr(sd.attitude(t, gyro))
+
+
+def test_a_table_of_the_caller_is_not_shared():
+    t = np.arange(0.0, 1.0, 0.01)
+    gyro = np.column_stack([0.1 + 0.0 * t, 0.0 * t, 0.0 * t])
+    columns = {"gyro_x": gyro[:, 0], "gyro_y": gyro[:, 1], "gyro_z": gyro[:, 2]}
+    given = pd.DataFrame({"time": t.copy(), **columns})
+    out = sd.attitude(given)
+    given.loc[:, "time"] += 100.0
+    np.testing.assert_array_equal(out.index, t)
+    stamps = t.copy()
+    imu = imu_table(stamps, gyro)
+    stamps += 100.0
+    np.testing.assert_array_equal(imu.index, t)
+
+
+def test_the_first_use_of_a_result_may_be_in_several_threads():
+    t = np.arange(0.0, 50.0, 0.01)
+    gyro = np.column_stack([0.1 + 0.0 * t, 0.0 * t, 0.0 * t])
+
+    def read(out, together):
+        together.wait()
+        return float(out["heading"].iloc[-1])
+
+    for _ in range(20):
+        out, together = sd.attitude(t, gyro), threading.Barrier(4)
+        with ThreadPoolExecutor(4) as pool:
+            found = list(pool.map(read, [out] * 4, [together] * 4))
+        assert len(set(found)) == 1
 
 
 def test_arrays_of_the_caller_are_not_shared():

@@ -1,6 +1,3 @@
-import subprocess
-import sys
-
 import numpy as np
 import pytest
 from scipy.stats import chi2, norm
@@ -31,40 +28,3 @@ def test_chi_square_is_that_of_scipy_to_the_last_bit(one, same, x):
 def test_the_normal_distribution_is_that_of_scipy_to_the_last_bit():
     np.testing.assert_array_equal(ours.normal_quantile(SHARE), norm.ppf(SHARE))
     np.testing.assert_array_equal(ours.normal_above(VALUE), norm.sf(VALUE))
-
-
-@pytest.mark.parametrize("alone", [True, False])
-def test_the_functions_alone_are_those_of_the_package(alone):
-    code = f"""
-import sys
-from strapdown.dsp import chi_square as ours
-if not {alone}:
-    of = ours.import_module
-    def import_module(name):
-        if "_ufuncs" in name:
-            raise ImportError(name)
-        return of(name)
-    ours.import_module = import_module
-found = ours.special()
-assert ("scipy.special" in sys.modules) != {alone}
-import scipy.special, scipy.stats
-assert ours.special() is found and scipy.special is sys.modules["scipy.special"]
-for name in ours.FUNCTIONS:
-    assert getattr(found, name) is getattr(scipy.special, name), name
-assert scipy.stats.norm.ppf(0.5) == 0.0
-"""
-    subprocess.run([sys.executable, "-c", code], check=True)
-
-
-def test_another_thread_finds_the_whole_package():
-    code = """
-import sys, threading
-from strapdown.dsp.chi_square import special
-waiting = threading.Event()
-other = threading.Thread(target=waiting.wait)
-other.start()
-found = special()
-waiting.set()
-assert found is sys.modules["scipy.special"]
-"""
-    subprocess.run([sys.executable, "-c", code], check=True)

@@ -52,6 +52,8 @@ ARM, ABOUT, CORRELATED = 1.0, 0.1, 2.0
 #: Number of steps needed; fraction of the changes that the sensors must explain; and factor by
 #: which the best offset's residual must be below that of any other more than a second from it.
 LEAST_STEPS, LEAST_SHARE, CLEAR = 20, 0.6, 1.3
+#: Share of a sum of squares that normal equations round to.
+ROUNDED = 1e-14
 #: Of more steps the first are used: two hours of fixes each second know an offset to milliseconds.
 MOST_STEPS = 7200
 LONGEST_STEP = 1.5
@@ -301,20 +303,26 @@ def _best(
         X[:, 4:] = np.diff(rate, axis=0)[used] * weight[:, None]
         return X.T @ X, X.T @ change
 
-    def misfit(normal: Array, product: Array, stiff: float) -> float:
-        """Sum of squares; the normal equations keep enough digits for a comparison."""
-        prior = np.diag([0.0, 0.0, 0.0, 0.0, stiff, stiff, stiff])
-        fit, *_ = np.linalg.lstsq(normal + prior, product, rcond=None)
-        return squares + float(fit @ ((normal + prior) @ fit - 2.0 * product))
+    def fitted(normal: Array, product: Array, stiff: float) -> tuple[Array, float]:
+        """Coefficients, and their sum of squares as far as the normal equations have digits."""
+        normal = normal + np.diag([0.0, 0.0, 0.0, 0.0, stiff, stiff, stiff])
+        fit, *_ = np.linalg.lstsq(normal, product, rcond=None)
+        left = squares + float(fit @ (normal @ fit - 2.0 * product))
+        return np.asarray(fit), max(left, ROUNDED * squares)
+
+    def misfit(offset: float, stiff: float) -> float:
+        """Sum of squares, of the residuals themselves."""
+        fit, _ = fitted(*fit_at(offset), stiff)
+        return float(np.square(change - X @ fit).sum() + stiff * (fit[4:] @ fit[4:]))
 
     squares = float(change @ change)
     whole = float(np.square(change - change.mean()).sum())
     grid = np.arange(-most, most + 0.5 * STEP, STEP)
     fits = [fit_at(float(one)) for one in grid]
-    least = min(misfit(*fit, 0.0) for fit in fits)
+    least = min(fitted(*fit, 0.0)[1] for fit in fits)
     variance = CORRELATED**2 * least / max(len(change) - 8, 1)
     stiff = variance / ARM**2
-    costs = np.array([misfit(*fit, stiff) for fit in fits])
+    costs = np.array([fitted(*fit, stiff)[1] for fit in fits])
     k = int(np.argmin(costs))
     share = 1.0 - float(costs[k]) / whole if whole > 0.0 else 0.0
     away = np.abs(grid - grid[k]) > 1.0
@@ -326,7 +334,7 @@ def _best(
         return None
     # Again near the minimum, with a step that is wide against its noise and narrow against motions.
     fine = grid[k] + np.arange(-AROUND, AROUND + 1) * FINE_STEP
-    near = np.array([misfit(*fit_at(float(one)), stiff) for one in fine])
+    near = np.array([misfit(float(one), stiff) for one in fine])
     best = min(max(int(np.argmin(near)), FITTED), len(fine) - 1 - FITTED)
     part = slice(best - FITTED, best + FITTED + 1)
     second, first, level = np.polyfit(fine[part] - fine[best], near[part], 2)

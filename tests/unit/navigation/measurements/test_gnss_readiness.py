@@ -28,7 +28,7 @@ from strapdown.navigation.measurements.gnss_clock import (
 from strapdown.navigation.measurements.gnss_readiness import gnss_readiness, without_repeats
 from strapdown.sensors.triad_errors import ImuErrors
 from strapdown.simulation import simulate_imu
-from strapdown.tables import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD, gnss_table
+from strapdown.tables import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD, gnss_table, imu_table
 
 
 @cache
@@ -114,6 +114,25 @@ def test_the_offset_of_the_clocks_is_found_to_a_tenth_of_a_second(offset):
     # What the filter is to find is not told again.
     assert not find_time_offset(table, imu(), found.offset)
     assert not find_time_offset(table, imu(), 0.0, 0.0, assumed_sd=abs(offset))
+
+
+@pytest.mark.parametrize("decimals", [16, 12, 9])
+def test_nothing_is_divided_by_where_nothing_is_left_to_explain(decimals):
+    """Integrals of the sensors are course and speed to the last digit, as of a toy simulation.
+
+    Each gives the offset to 1e-4 s and says 1e-6 s: they may disagree, and there is no answer.
+    """
+    time = np.arange(0.0, 120.0, 0.02)
+    course, speed = 0.6 * np.sin(0.2 * time), 12.0 + 3.0 * np.sin(0.13 * time)
+    rate, force = np.zeros((2, len(time), 3))
+    rate[1:, 2], force[1:, 0] = np.diff(course) / 0.02, np.diff(speed) / 0.02
+    flat = imu_table(time, rate, force, sampling="mean")
+    velocity = np.column_stack([speed * np.cos(course), speed * np.sin(course), 0.0 * time])
+    place = np.tile([50.0, 8.0, 100.0], (len(time), 1))
+    sds = (0.05,) * 3
+    table = gnss_table(time, place, velocity.round(decimals), sds, sds).iloc[::50]
+    found = time_offset(table, flat)
+    assert found is None or abs(found.offset) < 1e-3
 
 
 def test_the_first_steps_are_enough_for_the_offset_of_a_long_record(monkeypatch):

@@ -1,0 +1,44 @@
+"""``strapdown warm-up``."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from strapdown.cli.shared_options import Quiet, Verbose
+
+EPILOG = "Example: strapdown warm-up"
+
+
+def warm_up(*, quiet: Quiet = False, verbose: Verbose = False) -> None:
+    """Compile the kernels now instead of in the first runs, where they are not delivered compiled.
+
+    An installation from a wheel has them compiled, and this says so. Elsewhere numba compiles each
+    kernel that is called: here the demonstration is run for that, into a folder that is removed.
+    """
+    from strapdown._kernels.compilation import MODE, NOT_KEPT
+    from strapdown.cli.console import console, progress
+    from strapdown.cli.demo import demo_runs, part_of
+    from strapdown.errors import ConfigError
+
+    if MODE == "compiled":
+        said = "delivered compiled: the first run is as fast as a later one"
+    elif MODE == "python":
+        said = "interpreted, as STRAPDOWN_KERNELS asks: there is nothing to compile"
+    else:
+        begun = time.monotonic()
+        with TemporaryDirectory(prefix="strapdown-") as name:
+            out = Path(name)
+            runs = [run for run in demo_runs(out, out) if run.needs is None]
+            whole, done = sum(run.takes for run in runs), 0.0
+            for run in runs:
+                with progress(quiet) as show:
+                    part = part_of(show, run.shown.title, done / whole, run.takes / whole)
+                    run.make(out, False, part)
+                done += run.takes
+        if NOT_KEPT:
+            raise ConfigError("cli.kernels-not-kept", quantity="NUMBA_CACHE_DIR")
+        said = f"compiled and kept, in {time.monotonic() - begun:.0f} s"
+    if not quiet:
+        console().print(f"Kernels  {said}", highlight=False)
