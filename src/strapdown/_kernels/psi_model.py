@@ -21,8 +21,6 @@ from strapdown._kernels.rotation_vector import cross
 
 # Bits of vertical displacement and velocity, which are constant where the height is held.
 HELD_ROWS = (1 << 2) | (1 << 5)
-# The series of one over the root of 1 + e has an error of 35/128 e^4, 3e-13, down to minus this.
-SMALL = 1e-3
 # Below this cosine of the latitude north is undefined, and so is a slope along it.
 NO_MERIDIAN = 1e-9
 
@@ -151,13 +149,7 @@ def means_of_steps(states, q_at, rows, at, longest, matrix):
         if aw * bw + ax * bx + ay * by + az * bz < 0.0:
             sign = -1.0
         qw, qx, qy, qz = aw + sign * bw, ax + sign * bx, ay + sign * by, az + sign * bz
-        # One over the root of 1 + e by its series for a turn of up to 7 deg: a root and a quotient
-        # would keep all else waiting.
-        e = 0.25 * (qw * qw + qx * qx + qy * qy + qz * qz) - 1.0
-        if e > -SMALL:
-            norm = 0.5 - e * (0.25 - e * (0.1875 - 0.15625 * e))
-        else:
-            norm = 0.5 / math.sqrt(1.0 + e)
+        norm = 1.0 / math.sqrt(qw * qw + qx * qx + qy * qy + qz * qz)
         c = dcm_from_quat(norm * qw, norm * qx, norm * qy, norm * qz)
         # Velocity increments are in the axes of the start of their step: to those of its middle.
         x, y, z = rows[end, 4], rows[end, 5], rows[end, 6]
