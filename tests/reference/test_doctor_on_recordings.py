@@ -60,3 +60,10 @@ def test_a_clean_log_is_the_recording_itself(name, suffix, recordings, tmp_path)
     assert np.array_equal(again.imu.to_numpy(), imu.to_numpy())
     assert np.array_equal(again.imu.index, imu.index)
     assert again.imu.attrs["sampling"] == imu.attrs["sampling"]
+
+
+def test_the_file_of_a_crash_laboratory_is_a_crash_record(recordings):
+    (one,) = sd.doctor(recordings("crash_nhtsa_10146") / "v10146.EV5").logs
+    (told,) = one.fit["crash"]
+    assert told.code == "doctor.crash-record"
+    assert told.data["count"] > 20

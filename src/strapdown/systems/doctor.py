@@ -291,7 +291,7 @@ def _diagnose(log: LogTable, axes: str | None, fixes: FixesTable | None) -> LogD
         "fixes_from": None,
         "fixes_for": None,
         "impact": impact,
-        "crash_record": _crash_record(log.path) if lacks else None,
+        "crash_record": None if inertial.imu is not None else _crash_record(log.path, lacks),
         "temperature": _temperature(streams),
     }
     one = LogDiagnosis(
@@ -457,10 +457,12 @@ def _columns(path: str, form: str) -> RawLog | None:
     return raw if isinstance(raw, RawLog) and raw.columns else None
 
 
-def _crash_record(path: str) -> int | None:
+def _crash_record(path: str, lacks: bool) -> int | None:
     """Return the number of channels that the file has as a crash record.
 
-    None where no channel can be an acceleration, a rate or a velocity, as in a table of attitudes.
+    `lacks`: whether it is a table without the columns of a sensor, of which any may be one of a
+    crash; otherwise its channels must say that they are. None where no channel can be an
+    acceleration, a rate or a velocity, as in a table of attitudes.
     """
     from strapdown.formats.crash_records import read_crash_record
 
@@ -468,8 +470,9 @@ def _crash_record(path: str) -> int | None:
         channels = read_crash_record(path).channels
     except StrapdownError:
         return None
-    useless = all(one.quantity in ("time", "counter", "other") for one in channels)
-    return None if useless else len(channels)
+    quantities = {one.quantity for one in channels}
+    useful = quantities - {"time", "counter", "other"}
+    return len(channels) if (useful if lacks else useful - {""}) else None
 
 
 # Checks across channels and streams.
