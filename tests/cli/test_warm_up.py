@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 
 from strapdown._kernels import compilation
 from strapdown.cli import demo, main
+from strapdown.cli.console import logged
 from strapdown.errors import ConfigError
 
 RUNNER = CliRunner()
@@ -33,7 +34,8 @@ def test_nothing_is_run_where_nothing_is_compiled(monkeypatch, mode, said):
     result = RUNNER.invoke(main.app, ["warm-up"])
     assert result.exit_code == 0
     assert said in result.output
-    assert RUNNER.invoke(main.app, ["warm-up", "--quiet"]).output == ""
+    with logged():
+        assert RUNNER.invoke(main.app, ["warm-up", "--quiet"]).output == ""
 
 
 def test_numba_compiles_by_the_runs_that_need_no_recording(monkeypatch):
