@@ -157,21 +157,25 @@ def test_what_a_check_finds_piece_by_piece_is_what_it_finds_at_once():
     made = heading_checks_of(filter_, chain, source.imu, source.tables, record, consistency)
     checks = run_heading_checks(made, record, 0.01)
     assert max(one.time[-1] - one.since for one in checks) > 120.0
-    over = _Check.over
+    over, evidence, finish = _Check.over, _Check.evidence, _Check.finish
 
-    def asked(check, time, rows):
-        over(check, time, rows)
-        if check.marks.count:
-            check.evidence()
+    def nothing(check):
+        return heading_checks._result(check.since, check.found.rows[:0])
+
+    def finished(check):
+        if check.result is None:
+            evidence(check)
+        return finish(check)
 
     with pytest.MonkeyPatch.context() as patched:
-        # What is asked for in between is not judged. Without a least scatter every epoch counts.
+        # Without doubts, and without a least scatter, so that every epoch counts.
         patched.setattr(heading_checks, "doubts_of", lambda *_: lambda *_: False)
         patched.setattr(heading_checks, "_scatter", lambda u: np.nanmean(np.abs(u), axis=1))
-        undoubted = run_heading_checks(made, record, 0.01)
-        patched.setattr(_Check, "over", asked)
-        again = run_heading_checks(made, record, 0.01)
-    for one, other in zip(undoubted, again, strict=True):
+        by_parts = run_heading_checks(made, record, 0.01)
+        patched.setattr(_Check, "evidence", nothing)
+        patched.setattr(_Check, "finish", finished)
+        at_once = run_heading_checks(made, record, 0.01)
+    for one, other in zip(by_parts, at_once, strict=True):
         for name in ("time", "difference", "sd", "covariance", "scale"):
             np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
 
