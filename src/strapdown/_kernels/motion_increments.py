@@ -189,53 +189,21 @@ def motion_increments_linear(dt, samples, mean, out):
     The interval of the first mean ends where the first step begins; its length is not known,
     and taken for that of the first step.
     """
-    if mean:
-        before = dt[0] if dt.shape[0] > 0 else 0.0
-        for k in range(dt.shape[0]):
-            put_motion(
-                out,
-                k,
-                dt[k],
-                mean_motion(
-                    dt[k],
-                    before,
-                    samples[k, 0],
-                    samples[k, 1],
-                    samples[k, 2],
-                    samples[k + 1, 0],
-                    samples[k + 1, 1],
-                    samples[k + 1, 2],
-                    samples[k, 3],
-                    samples[k, 4],
-                    samples[k, 5],
-                    samples[k + 1, 3],
-                    samples[k + 1, 4],
-                    samples[k + 1, 5],
-                ),
-            )
-            before = dt[k]
-        return
+    before = dt[0] if dt.shape[0] > 0 else 0.0
     for k in range(dt.shape[0]):
-        put_motion(
-            out,
-            k,
-            dt[k],
-            linear_motion(
-                dt[k],
-                samples[k, 0],
-                samples[k, 1],
-                samples[k, 2],
-                samples[k + 1, 0],
-                samples[k + 1, 1],
-                samples[k + 1, 2],
-                samples[k, 3],
-                samples[k, 4],
-                samples[k, 5],
-                samples[k + 1, 3],
-                samples[k + 1, 4],
-                samples[k + 1, 5],
-            ),
-        )
+        h = dt[k]
+        w0x, w0y, w0z = samples[k, 0], samples[k, 1], samples[k, 2]
+        f0x, f0y, f0z = samples[k, 3], samples[k, 4], samples[k, 5]
+        w1x, w1y, w1z = samples[k + 1, 0], samples[k + 1, 1], samples[k + 1, 2]
+        f1x, f1y, f1z = samples[k + 1, 3], samples[k + 1, 4], samples[k + 1, 5]
+        if mean:
+            motion = mean_motion(
+                h, before, w0x, w0y, w0z, w1x, w1y, w1z, f0x, f0y, f0z, f1x, f1y, f1z
+            )
+        else:
+            motion = linear_motion(h, w0x, w0y, w0z, w1x, w1y, w1z, f0x, f0y, f0z, f1x, f1y, f1z)
+        put_motion(out, k, h, motion)
+        before = h
 
 
 @njit(cache=True)
