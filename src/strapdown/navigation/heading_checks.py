@@ -29,7 +29,6 @@ from strapdown.evaluation.trajectory_differences import trajectory_at
 from strapdown.frames import q_ne
 from strapdown.mechanization.ned import NorthEastDown
 from strapdown.mechanization.wander_azimuth import WanderAzimuth
-from strapdown.nav_state import NavState
 from strapdown.navigation.consistency import ObservationConsistency
 from strapdown.navigation.gyrocompass import Compass
 from strapdown.navigation.heading_integrity import (
@@ -52,6 +51,7 @@ from strapdown.navigation.record import (
     InnovationColumns,
     NavigationChunk,
     NavigationRecord,
+    state_of_row,
 )
 from strapdown.rotation import euler_sd
 from strapdown.sensors.uncertainty import ImuUncertainty
@@ -313,11 +313,7 @@ def _scatter(u: Array) -> Array:
 
 def _begin(filter_: ErrorFilter, run: _Run, at: float, doubt: bool) -> FilterState:
     """State at an instant of a run, with a practically unknown heading."""
-    row = run.rows[int(np.searchsorted(run.time, at - NEAR))]
-    lat, lon, alt, _, _, _, roll, pitch, heading = row.tolist()
-    start = NavState.from_degrees(
-        lat, lon, alt, v_n=row[3:6], roll_deg=roll, pitch_deg=pitch, heading_deg=heading
-    )
+    start = state_of_row(run.rows[int(np.searchsorted(run.time, at - NEAR))])
     k = max(int(np.searchsorted(run.marks, at + NEAR, side="right")) - 1, 0)
     # Without what the run does not estimate, as its height.
     P = LOOSER**2 * np.nan_to_num(run.covariance[k])

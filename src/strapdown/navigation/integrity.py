@@ -59,8 +59,8 @@ from strapdown.navigation.record import NavigationRecord, innovation_labels, sta
 from strapdown.navigation.recorder import IntervalRecorder
 from strapdown.navigation.replay import PipelineRun, run_batch
 from strapdown.progress import Progress
-from strapdown.tables import POSITION_SD, VELOCITY_SD
-from strapdown.tables.checks import index_of, values_of
+from strapdown.tables import POSITION_SD, TRAJECTORY, VELOCITY_SD
+from strapdown.tables.checks import index_of, values_of, view_of
 
 __all__ = [
     "Advice",
@@ -308,7 +308,7 @@ def _advised(
     told = [(e, int(np.searchsorted(e.time, time))) for e in evidence]
     told = [(e, k) for e, k in told if k < len(e.time) and e.time[k] == time]
     row = int(np.searchsorted(record.trajectory.index, time - 1e-6))
-    start = state_of_row(record.trajectory.iloc[row])
+    start = state_of_row(view_of(record.trajectory, TRAJECTORY)[row])
     best, at = min(told, key=lambda pair: pair[0].sd[pair[1]])
     filter_ = made.navigator.filter
     mark = max(int(np.searchsorted(index_of(record.sd), time + 1e-6)) - 1, 0)

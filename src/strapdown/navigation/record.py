@@ -16,10 +16,7 @@ from strapdown.estimation.covariance import Innovations, Observation
 from strapdown.nav_state import NavState
 from strapdown.rotation import euler_sd
 from strapdown.tables import (
-    EULER,
-    GEODETIC,
     TRAJECTORY_ERROR,
-    VELOCITY,
     check_trajectory_error,
     on_disk,
 )
@@ -160,13 +157,11 @@ def standard_deviations(
     return table
 
 
-def state_of_row(row: pd.Series) -> NavState:
-    """Position, velocity and attitude of a row of a Trajectory table; without its time."""
-    lat, lon, alt = (float(row[c]) for c in GEODETIC)
-    roll, pitch, heading = (float(row[c]) for c in EULER)
-    v_n = row[VELOCITY].to_numpy(dtype=np.float64)
+def state_of_row(row: Array) -> NavState:
+    """Position, velocity and attitude of the numbers, (9,), of a row of a Trajectory table."""
+    lat, lon, alt, _, _, _, roll, pitch, heading = row.tolist()
     return NavState.from_degrees(
-        lat, lon, alt, v_n=v_n, roll_deg=roll, pitch_deg=pitch, heading_deg=heading
+        lat, lon, alt, v_n=row[3:6], roll_deg=roll, pitch_deg=pitch, heading_deg=heading
     )
 
 

@@ -62,7 +62,7 @@ from strapdown.systems.inputs import Memory, SavedRun, check_part, configuration
 from strapdown.systems.navigation_run import make_chain
 from strapdown.systems.navigation_source import NavigationSource, read_navigation_source
 from strapdown.systems.one_thread import one_thread
-from strapdown.tables import ACCEL, GYRO
+from strapdown.tables import ACCEL, GYRO, TRAJECTORY
 from strapdown.tables.aiding import odometer_table
 from strapdown.tables.checks import index_of, values_of
 
@@ -564,7 +564,8 @@ def forecast_of_sensor(
     time, rows = index_of(made), made.to_numpy(dtype=np.float64)
     driven = begin > 0.0
     before = coast_navigator(spec, sensors, fixes=driven)
-    state = before.begin(state_of_row(motion.trajectory([0.0]).iloc[0]), _aligned(before, sensors))
+    (row,) = values_of(motion.trajectory([0.0]), TRAJECTORY)
+    state = before.begin(state_of_row(row), _aligned(before, sensors))
     for name, table in _tables(spec, motion, begin, driven).items():
         state = before.tell(state, name, table)
     progress("the drive before", 0.2)
