@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -36,7 +36,7 @@ def demo(
     in the folder named by STRAPDOWN_DATA, by default ../shared/data.
     """
     from strapdown.bundle.atomic_folder import replace_file
-    from strapdown.cli.console import console, progress
+    from strapdown.cli.console import console
     from strapdown.report.demo_page import demo_page, shown_answer, shown_truth
 
     data = Path(os.environ.get("STRAPDOWN_DATA", "../shared/data"))
@@ -53,13 +53,8 @@ def demo(
     # It describes the previous results.
     (out / _PAGE).unlink(missing_ok=True)
     page = console()
-    whole = sum(run.takes for run in there)
-    done = 0.0
-    for run in there:
+    for run in made(there, out, force=write.force, quiet=write.quiet):
         shown = run.shown
-        with progress(write.quiet) as show:
-            run.make(out, write.force, part_of(show, shown.title, done / whole, run.takes / whole))
-        done += run.takes
         if write.quiet:
             continue
         page.print(f"{shown.part}  {shown.title}", style="bold")
@@ -78,7 +73,20 @@ def demo(
     page.print(f"\nOpen  {out / _PAGE}")
 
 
-def part_of(show: Progress, title: str, begin: float, share: float) -> Progress:
+def made(runs: Sequence[DemoRun], out: Path, *, force: bool, quiet: bool) -> Iterator[DemoRun]:
+    """Make runs into a folder, with progress over all of them; yield each when it is there."""
+    from strapdown.cli.console import progress
+
+    whole, done = sum(run.takes for run in runs), 0.0
+    for run in runs:
+        with progress(quiet) as show:
+            part = _part_of(show, run.shown.title, done / whole, run.takes / whole)
+            run.make(out, force, part)
+        done += run.takes
+        yield run
+
+
+def _part_of(show: Progress, title: str, begin: float, share: float) -> Progress:
     """Progress of one run as a part of the whole."""
     return lambda stage, done: show(f"{title}: {stage}", begin + share * done)
 

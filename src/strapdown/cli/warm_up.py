@@ -18,8 +18,8 @@ def warm_up(*, quiet: Quiet = False, verbose: Verbose = False) -> None:
     kernel that is called: here the demonstration is run for that, into a folder that is removed.
     """
     from strapdown._kernels.compilation import MODE, NOT_KEPT
-    from strapdown.cli.console import console, progress
-    from strapdown.cli.demo import demo_runs, part_of
+    from strapdown.cli.console import console
+    from strapdown.cli.demo import demo_runs, made
     from strapdown.errors import ConfigError
 
     if MODE == "compiled":
@@ -31,12 +31,8 @@ def warm_up(*, quiet: Quiet = False, verbose: Verbose = False) -> None:
         with TemporaryDirectory(prefix="strapdown-") as name:
             out = Path(name)
             runs = [run for run in demo_runs(out, out) if run.needs is None]
-            whole, done = sum(run.takes for run in runs), 0.0
-            for run in runs:
-                with progress(quiet) as show:
-                    part = part_of(show, run.shown.title, done / whole, run.takes / whole)
-                    run.make(out, False, part)
-                done += run.takes
+            for _ in made(runs, out, force=False, quiet=quiet):
+                pass
         if NOT_KEPT:
             raise ConfigError("cli.kernels-not-kept", quantity="NUMBA_CACHE_DIR")
         said = f"compiled and kept, in {time.monotonic() - begun:.0f} s"
