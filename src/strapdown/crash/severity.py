@@ -11,7 +11,7 @@ from typing import Any, cast
 import numpy as np
 
 from strapdown.config.toml_file import KeyPath, TomlFile, read_toml
-from strapdown.dsp.chi_square import normal_quantile, special
+from strapdown.dsp.chi_square import normal_quantile
 from strapdown.errors import ConfigError, DataError, Finding, check_choice
 from strapdown.units import SPEEDS as ALL_SPEEDS
 
@@ -155,6 +155,8 @@ def injury_risk(
     untransformed inputs (no log, no square) and normal errors it is exact. The variance of the
     logit by the coefficients is ``x' V x`` with their covariance V and x = (1, transformed inputs).
     """
+    from scipy.special import expit
+
     spread = dict(sd or {})
     _check_options(model, spread, coverage, outside)
     reach = normal_quantile(0.5 + 0.5 * coverage)
@@ -184,9 +186,9 @@ def injury_risk(
     reach *= math.sqrt(variance)
     return InjuryRisk(
         model,
-        float(special().expit(logit)),
-        float(special().expit(logit - reach)),
-        float(special().expit(logit + reach)),
+        float(expit(logit)),
+        float(expit(logit - reach)),
+        float(expit(logit + reach)),
         coverage,
         logit,
         math.sqrt(variance),

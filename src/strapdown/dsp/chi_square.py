@@ -3,20 +3,12 @@
 from __future__ import annotations
 
 import math
-from functools import cache
-from importlib import import_module
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-
-
-@cache
-def special() -> Any:
-    """Return scipy.special, which takes a tenth of a short run to load, where it is used."""
-    return import_module("scipy.special")
 
 
 def chi_square_quantile(share: Any, freedom: Any) -> Any:
@@ -26,42 +18,58 @@ def chi_square_quantile(share: Any, freedom: Any) -> Any:
     0. Returns float or ndarray: ``2 P⁻¹(freedom/2, share)``, P the regularized incomplete gamma
     function (DLMF 8.2.4).
     """
-    return _plain(2.0 * special().gammaincinv(0.5 * np.asarray(freedom, dtype=np.float64), share))
+    from scipy.special import gammaincinv
+
+    return _plain(2.0 * gammaincinv(0.5 * np.asarray(freedom, dtype=np.float64), share))
 
 
 def chi_square_exceeded(share: Any, freedom: Any) -> Any:
     """Compute the chi-square value exceeded with a probability; exact for small ones."""
-    return _plain(special().chdtri(freedom, share))
+    from scipy.special import chdtri
+
+    return _plain(chdtri(freedom, share))
 
 
 def chi_square_below(value: Any, freedom: Any) -> Any:
     """Compute the chi-square probability below a value of 0 or more."""
-    return _plain(special().chdtr(freedom, value))
+    from scipy.special import chdtr
+
+    return _plain(chdtr(freedom, value))
 
 
 def chi_square_above(value: Any, freedom: Any) -> Any:
     """Compute the chi-square probability above a value of 0 or more; exact for small ones."""
-    return _plain(special().chdtrc(freedom, value))
+    from scipy.special import chdtrc
+
+    return _plain(chdtrc(freedom, value))
 
 
 def normal_quantile(share: Any) -> Any:
     """Compute the quantile of the standard normal distribution."""
-    return _plain(special().ndtri(share))
+    from scipy.special import ndtri
+
+    return _plain(ndtri(share))
 
 
 def normal_above(value: Any) -> Any:
     """Compute the standard normal probability above a value; exact for small ones."""
-    return _plain(special().ndtr(-np.asarray(value)))
+    from scipy.special import ndtr
+
+    return _plain(ndtr(-np.asarray(value)))
 
 
 def student_quantile(share: float, freedom: float) -> float:
     """Compute the quantile of Student's distribution."""
-    return float(special().stdtrit(freedom, share))
+    from scipy.special import stdtrit
+
+    return float(stdtrit(freedom, share))
 
 
 def student_above(value: float, freedom: float) -> float:
     """Compute the probability of Student's distribution above a value."""
-    return float(special().stdtr(freedom, -value))
+    from scipy.special import stdtr
+
+    return float(stdtr(freedom, -value))
 
 
 def _plain(values: Any) -> Any:

@@ -11,7 +11,6 @@ from numpy.polynomial import polynomial
 from numpy.typing import ArrayLike, NDArray
 
 from strapdown import rotation
-from strapdown.dsp.chi_square import special
 from strapdown.errors import ConfigError
 from strapdown.simulation.motion import (
     STILL,
@@ -192,7 +191,9 @@ class Sculling(FlatMotion):
     @property
     def drift(self) -> float:
         """Steady acceleration along n x e, ``B J1(α) cos ψ``, m/s²."""
-        return float(self.push * special().j1(self._alpha) * np.cos(self._psi))
+        from scipy.special import j1
+
+        return float(self.push * j1(self._alpha) * np.cos(self._psi))
 
     def rate(self, time: ArrayLike) -> Array:
         """Body rate, (n, 3), rad/s, at instants (n,) in s."""
@@ -239,7 +240,8 @@ class Sculling(FlatMotion):
 
     def _harmonics(self, time: ArrayLike) -> tuple[Array, Whole, Complex, Complex]:
         """Times, harmonic numbers, their amplitudes, and ``int exp(im Omega t) dt``."""
-        jv = special().jv
+        from scipy.special import jv
+
         t = np.asarray(time, dtype=np.float64)
         m = np.arange(-HARMONICS, HARMONICS + 1)
         turn = np.exp(1j * self._psi)
