@@ -470,7 +470,7 @@ def alignment_document(result: AlignmentRun, name: str) -> Document:
             ),
             turns,
         ),
-        section("signals", "Signals", signal_chart(result)),
+        section("signals", "Signals", signal_chart(result), folded=True),
         section(
             "findings",
             "Findings",
@@ -499,8 +499,9 @@ def alignment_document(result: AlignmentRun, name: str) -> Document:
                 "0.0014° of tilt, and is not in the bounds.",
             ),
             *run_again(name),
+            folded=True,
         ),
-        section("conventions", "Conventions", Facts(CONVENTIONS)),
+        section("conventions", "Conventions", Facts(CONVENTIONS), folded=True),
     )
     title = result.spec.title or f"Alignment of {result.source.name}"
     return Document(

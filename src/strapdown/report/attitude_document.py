@@ -86,8 +86,9 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
             chart("peers"),
             tables.peer_table(bench),
             tables.filter_table(bench),
+            folded=True,
         ),
-        section("findings", "Findings", findings_list(bench.findings)),
+        section("findings", "Findings", findings_list(bench.findings), folded=not warnings),
         section(
             "inputs",
             "Inputs and assumptions",
@@ -103,8 +104,9 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
             )
             if bench.readings
             else None,
+            folded=True,
         ),
-        section("conventions", "Conventions", Facts(words.CONVENTIONS)),
+        section("conventions", "Conventions", Facts(words.CONVENTIONS), folded=True),
         section(
             "again",
             "Verification",
@@ -113,6 +115,7 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
                 "every input and output."
             ),
             Paragraph("strapdown verify FOLDER", "mono"),
+            folded=True,
         ),
     )
     return Document(

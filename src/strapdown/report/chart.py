@@ -67,6 +67,9 @@ class Line:
         Ends of a horizontal bar through each point.
     inside : float
         Fill opacity of a closed outline; NaN separates outlines.
+    stamps : ndarray, (n,), or None
+        In a plane: time of each point, on the axis that the chart's `x_label` names. The page shows
+        an instant in every chart over that axis at once.
     """
 
     name: str
@@ -86,6 +89,7 @@ class Line:
     high: Array | None = None
     legend: bool = True
     inside: float = 0.0
+    stamps: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -220,7 +224,7 @@ class Chart:
     slug : str
         File name.
     x_label : str
-        With its unit.
+        With its unit; in a chart of planes alone the axis of their `Line.stamps`.
     log_x : bool
         Whether the horizontal axis is logarithmic.
     beside : bool

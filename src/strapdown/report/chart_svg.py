@@ -294,7 +294,8 @@ class Frame:
             if line.inside:
                 drawing.area(at[run], line.colour, line.inside)
             if not line.points:
-                drawing.curve(at[run], line.colour, _PT * line.width, line.dash)
+                stamps = None if line.stamps is None else line.stamps[run]
+                drawing.curve(at[run], line.colour, _PT * line.width, line.dash, stamps)
         if line.low is not None and line.high is not None:
             self._reaches(drawing, line, line.low, line.high)
         if line.points or line.dots:

@@ -286,6 +286,7 @@ def coast_document(result: OutageRun, name: str) -> Document:
             *assumed(*_assumptions(result)),
             Facts(CONVENTIONS),
             *run_again(name),
+            folded=True,
         ),
     )
     title = f"Drift of {result.name} over an outage of {outage_words(result)}"

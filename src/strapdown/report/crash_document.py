@@ -127,10 +127,6 @@ def _document(result: CaseResult, name: str) -> Document:
     limits = limitations(result)
     sections = (
         section(
-            "case", "The case", *described, crash_tables.records_table(result), *_records(result)
-        ),
-        section("signals", "Signals", Paragraph(SIGNALS), *_signals(result)),
-        section(
             "delta-v",
             "Delta-V",
             crash_tables.answers_table(result),
@@ -146,6 +142,7 @@ def _document(result: CaseResult, name: str) -> Document:
             sliding_chart(*units, spec.options.peak_window_s) if happened else None,
             points_picture(outline, points) if points else None,
             None if happened else Paragraph(headline(result)),
+            figures=1,
         ),
         section(
             "direction",
@@ -156,6 +153,7 @@ def _document(result: CaseResult, name: str) -> Document:
             None
             if happened
             else Paragraph("Without an event the direction of force is not defined."),
+            figures=2,
         ),
         section(
             "path",
@@ -166,62 +164,9 @@ def _document(result: CaseResult, name: str) -> Document:
             place_chart(path, names, reference=reference, reference_name=shown, **sampled),
             velocity_chart(path, names, **sampled),
             attitude_chart(path, **sampled),
+            figures=2,
         ),
-        section("agreement", "Consistency of the recorders", *_agreement(result)),
-        section(
-            "closure",
-            "Closure with the other vehicle" if result.partners else "Contact and deformation",
-            *_closure(result),
-        ),
-        section(
-            "budget",
-            "Error budget",
-            Paragraph(
-                "Each unknown was propagated through the whole computation; those of one kind are "
-                "summed here."
-            ),
-            None if which is None else delta_v_budget_chart(main.body[which].event),
-            place_budget_chart(path, names),
-            crash_tables.budget_table(result),
-        ),
-        section("severity", "Severity", *_severity(result, which)),
-        section("indices", "Occupant and barrier indices", crash_tables.indices_table(result)),
-        section(
-            "references",
-            "Reference comparison",
-            *crash_tables.reference_tables(result),
-            *(
-                reference_chart(r.path, r.spec.name, names, k)
-                for k, r in enumerate(paths, start=1)
-                if r.path is not None
-            ),
-            *_sources(result),
-        ),
-        section(
-            "assumptions",
-            "Method and assumptions",
-            Items(tuple(("", step) for step in method(result)), numbered=True),
-            Paragraph("Assumptions:"),
-            Items(assumptions(result)),
-        ),
-        section(
-            "sensors",
-            "Sensors",
-            crash_tables.units_table(result),
-            crash_tables.sensors_table(result),
-            crash_tables.drive_table(result),
-        ),
-        section(
-            "conventions",
-            "Conventions",
-            conventions_picture(
-                outline,
-                [MountingPoint(u.name, u.mounting.position, k) for k, u in enumerate(result.units)],
-                point=point,
-                point_name=spec.point.name,
-            ),
-            Facts(conventions()),
-        ),
+        section("agreement", "Consistency of the recorders", *_agreement(result), figures=1),
         section(
             "limitations",
             "Limitations",
@@ -234,13 +179,87 @@ def _document(result: CaseResult, name: str) -> Document:
             Paragraph("What no evaluation of these records can answer."),
             Items(not_shown(result)),
         ),
-        section("findings", "Notes on the records", *_findings(result)),
+        section("severity", "Severity", *_severity(result, which)),
+        section(
+            "references",
+            "Reference comparison",
+            *crash_tables.reference_tables(result),
+            *(
+                reference_chart(r.path, r.spec.name, names, k)
+                for k, r in enumerate(paths, start=1)
+                if r.path is not None
+            ),
+            *_sources(result),
+        ),
+        section(
+            "case",
+            "The case",
+            *described,
+            crash_tables.records_table(result),
+            *_records(result),
+            folded=True,
+        ),
+        section("signals", "Signals", Paragraph(SIGNALS), *_signals(result), folded=True),
+        section(
+            "closure",
+            "Closure with the other vehicle" if result.partners else "Contact and deformation",
+            *_closure(result),
+            folded=True,
+        ),
+        section(
+            "indices",
+            "Occupant and barrier indices",
+            crash_tables.indices_table(result),
+            folded=True,
+        ),
+        section(
+            "budget",
+            "Error budget",
+            Paragraph(
+                "Each unknown was propagated through the whole computation; those of one kind are "
+                "summed here."
+            ),
+            None if which is None else delta_v_budget_chart(main.body[which].event),
+            place_budget_chart(path, names),
+            crash_tables.budget_table(result),
+            folded=True,
+        ),
+        section(
+            "assumptions",
+            "Method and assumptions",
+            Items(tuple(("", step) for step in method(result)), numbered=True),
+            Paragraph("Assumptions:"),
+            Items(assumptions(result)),
+            folded=True,
+        ),
+        section(
+            "sensors",
+            "Sensors",
+            crash_tables.units_table(result),
+            crash_tables.sensors_table(result),
+            crash_tables.drive_table(result),
+            folded=True,
+        ),
+        section("findings", "Notes on the records", *_findings(result), folded=True),
+        section(
+            "conventions",
+            "Conventions",
+            conventions_picture(
+                outline,
+                [MountingPoint(u.name, u.mounting.position, k) for k, u in enumerate(result.units)],
+                point=point,
+                point_name=spec.point.name,
+            ),
+            Facts(conventions()),
+            folded=True,
+        ),
         section(
             "verify",
             "Verification",
             Items(how_to_verify()),
             Paragraph(f"strapdown verify {name}", "mono"),
             crash_tables.inputs_table(result),
+            folded=True,
         ),
     )
     facts = (

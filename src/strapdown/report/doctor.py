@@ -391,12 +391,14 @@ def _sections(one: LogDiagnosis, slug: str, title: str) -> list[Section]:
             f"{title}Channels and stationary stretches",
             channel_table(one),
             rest_table(one),
+            folded=True,
         ),
         section(
             f"{slug}columns",
             f"{title}Units and axes, with the evidence",
             Items(tuple(read)) if read else None,
             Items(tuple(columns)) if columns else None,
+            folded=True,
         ),
         section(f"{slug}notes", f"{title}Notes", findings_list(one.notes, "cli")),
     ]

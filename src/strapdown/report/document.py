@@ -140,13 +140,31 @@ class KeyFigures:
 Block = Paragraph | Items | Links | Facts | TableBlock | Chart | Picture | Animation | KeyFigures
 
 
+#: Figures of a page that are not behind folds, in all and of one section.
+MOST_OPEN, MOST_OF_SECTION = 8, 3
+
+
 @dataclass(frozen=True)
 class Section:
-    """A part of the report under a heading; `slug` is its anchor. Without blocks it is left out."""
+    """A part of the report under a heading; without blocks it is left out.
+
+    On paper every section is whole.
+
+    Attributes
+    ----------
+    slug : str
+        Its anchor.
+    folded : bool
+        Whether the page shows its heading alone, until a reader opens it.
+    figures : int
+        Of its figures so many are shown at most; the others are behind a fold at its end.
+    """
 
     slug: str
     title: str
     blocks: tuple[Block, ...]
+    folded: bool = False
+    figures: int = MOST_OF_SECTION
 
 
 def blocks(*found: Block | None) -> tuple[Block, ...]:
@@ -154,9 +172,15 @@ def blocks(*found: Block | None) -> tuple[Block, ...]:
     return tuple(block for block in found if block is not None)
 
 
-def section(slug: str, title: str, *found: Block | None) -> Section:
+def section(
+    slug: str,
+    title: str,
+    *found: Block | None,
+    folded: bool = False,
+    figures: int = MOST_OF_SECTION,
+) -> Section:
     """Make a section of the blocks that there are."""
-    return Section(slug, title, blocks(*found))
+    return Section(slug, title, blocks(*found), folded, figures)
 
 
 @dataclass(frozen=True)
@@ -466,23 +490,54 @@ def document_data(
     """
     plain = document.plain
     writer = _Writer(iter(stills), place, alive)
+    front = [writer.block(block) for block in plain.front]
+    left = MOST_OPEN - sum(map(_figures_in, plain.front))
+    sections = []
+    for number, section in enumerate((s for s in plain.sections if s.blocks), start=1):
+        kept, more = [], []
+        shown = 0 if section.folded else max(0, min(section.figures, left))
+        for block in section.blocks:
+            figures = _figures_in(block)
+            beyond = alive and not section.folded and figures > shown
+            (more if beyond else kept).append(writer.block(block))
+            if figures and not beyond and not section.folded:
+                shown, left = shown - figures, left - figures
+        sections.append(
+            {
+                "number": number,
+                "anchor": f"{number}-{section.slug}",
+                "title": section.title,
+                "folded": section.folded,
+                "holds": _holds(section.blocks) if section.folded else "",
+                "blocks": kept,
+                "more": more,
+            }
+        )
     return {
         "title": plain.title,
         "subtitle": plain.subtitle,
         "footer": plain.footer,
         "facts": plain.facts,
         "links": plain.links,
-        "front": [writer.block(block) for block in plain.front],
-        "sections": [
-            {
-                "number": number,
-                "anchor": f"{number}-{section.slug}",
-                "title": section.title,
-                "blocks": [writer.block(block) for block in section.blocks],
-            }
-            for number, section in enumerate((s for s in plain.sections if s.blocks), start=1)
-        ],
+        "front": front,
+        "sections": sections,
     }
+
+
+def _figures_in(block: Block) -> int:
+    """Figures that a block shows."""
+    if isinstance(block, KeyFigures):
+        return len(block.pictures)
+    return int(isinstance(block, Chart | Picture | Animation))
+
+
+def _holds(blocks: Sequence[Block]) -> str:
+    """Figures and tables in words: ``3 figures, 1 table``."""
+    counts = (
+        (sum(map(_figures_in, blocks)), "figure"),
+        (sum(isinstance(block, TableBlock) for block in blocks), "table"),
+    )
+    return ", ".join(f"{n} {name}{'s' * (n > 1)}" for n, name in counts if n)
 
 
 class _Writer:

@@ -26,8 +26,9 @@ _SIGNS = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", "'": "&#39;", '"
 #: Characters from which a cell is wide.
 _LONG = 30
 _HOW_TO = (
-    '<span class="livenote"> In a chart: point for values, drag to zoom, double-click to return, '
-    "click a name in the legend to hide it.</span>"
+    '<span class="livenote"> In a chart: point for values, which every chart over the same time '
+    "and the plan show, too; drag to zoom, double-click to return, click a name in the legend to "
+    "hide it.</span>"
 )
 
 
@@ -64,11 +65,11 @@ def document_page(document: Document, *, stills: Sequence[str] | None = None) ->
     """
     drawn = draw_stills(document) if stills is None else stills
     data = document_data(document, drawn, _image, alive=True)
-    sections = (block for section in data["sections"] for block in section["blocks"])
+    sections = (b for s in data["sections"] for b in (*s["blocks"], *s["more"]))
     kinds = {block["kind"] for block in (*data["front"], *sections)}
     templates = files("strapdown.report").joinpath("templates")
     script = ""
-    if kinds & {"chart", "animation"}:
+    if kinds & {"chart", "animation"} or any(s["folded"] or s["more"] for s in data["sections"]):
         script = templates.joinpath("document.js").read_text("utf-8")
     begin, between, after, end = _PLACE.split(
         templates.joinpath("document.html").read_text("utf-8")
@@ -89,14 +90,6 @@ def _body(data: Mapping[str, Any], script: str) -> str:
         f'<a href="#{_text(one["anchor"])}">{_text(one["title"])}</a></li>'
         for one in sections
     )
-    shown = []
-    for one in sections:
-        anchor = _text(one["anchor"])
-        shown.append(
-            f'<section aria-labelledby="{anchor}">\n<h2 id="{anchor}"><span class="no">'
-            f"{one['number']}</span><span>{_text(one['title'])}</span></h2>\n"
-            f"{''.join(map(_block, one['blocks']))}</section>\n"
-        )
     return "".join(
         [
             '<a class="skip" href="#contents">Skip to the contents</a>' if sections else "",
@@ -110,7 +103,7 @@ def _body(data: Mapping[str, Any], script: str) -> str:
             f'<h2 id="contents-head">Contents</h2>\n<ol>{contents}</ol></nav>\n'
             if sections
             else "",
-            *shown,
+            *map(_section, sections),
             f"<footer>{_text(data['footer'])}{_HOW_TO if script else ''}</footer>"
             if data["footer"] or script
             else "",
@@ -118,6 +111,31 @@ def _body(data: Mapping[str, Any], script: str) -> str:
             f"<script>{script}</script>" if script else "",
         ]
     )
+
+
+def _section(one: Mapping[str, Any]) -> str:
+    """A section under its heading; a folded one opens by its heading."""
+    anchor = _text(one["anchor"])
+    holds = f'<span class="holds">{one["holds"]}</span>' if one["folded"] and one["holds"] else ""
+    heading = (
+        f'<h2 id="{anchor}"><span class="no">{one["number"]}</span>'
+        f"<span>{_text(one['title'])}</span>{holds}</h2>"
+    )
+    body = "".join(map(_block, one["blocks"]))
+    if one["folded"]:
+        body = f"<details><summary>{heading}</summary>\n{body}</details>"
+    else:
+        body = f"{heading}\n{body}{_more(one['more'])}"
+    return f'<section aria-labelledby="{anchor}">\n{body}</section>\n'
+
+
+def _more(figures: Sequence[Mapping[str, Any]]) -> str:
+    """Figures behind a fold, which has their titles."""
+    if not figures:
+        return ""
+    titles = "; ".join(_text(one["title"]) for one in figures)
+    body = "".join(map(_block, figures))
+    return f'<details><summary class="more">{titles}</summary>\n{body}</details>\n'
 
 
 def _block(block: Mapping[str, Any]) -> str:
@@ -187,8 +205,7 @@ def _table(block: Mapping[str, Any]) -> str:
     words = block["words"]
     caption = f"<caption>{_label(block, 'Table')}</caption>" if block["number"] else ""
     names = "".join(
-        ('<th scope="col">' if word else '<th scope="col" class="num">') + f"{_text(name)}</th>"
-        for name, word in zip(block["columns"], words, strict=True)
+        _column_head(_text(name), word) for name, word in zip(block["columns"], words, strict=True)
     )
     rows = "".join(
         ('<tr class="strong">' if strong else "<tr>")
@@ -207,6 +224,12 @@ def _table(block: Mapping[str, Any]) -> str:
     )
 
 
+def _column_head(name: str, word: bool) -> str:
+    look = "" if word else ' class="num"'
+    # A header without a name is none.
+    return f'<th scope="col"{look}>{name}</th>' if name else "<td></td>"
+
+
 def _cell(cell: str, word: bool, passed: bool, *, head: bool) -> str:
     look = "" if word else "num"
     look += " long" if len(cell) >= _LONG else "" if word or head else " short"
@@ -218,10 +241,14 @@ def _cell(cell: str, word: bool, passed: bool, *, head: bool) -> str:
 def _chart(block: Mapping[str, Any]) -> str:
     # The browser would show a title wherever the pointer rests on the chart.
     svg = _TITLE_ELEMENT.sub("", block["svg"], count=1)
+    # Names in its legend can be pressed, so it is a group and no image.
     svg = svg.replace(' xmlns="http://www.w3.org/2000/svg"', "", 1)
+    svg = svg.replace(' role="img"', f' role="group" aria-label="{_text(block["alt"])}"', 1)
+    # On a narrow screen it scrolls, by keys as well.
+    focus = "" if "data-entry" in svg else ' tabindex="0"'
     return (
         f'<figure data-figure="chart" data-x-label="{_text(block["x_label"])}">\n'
-        f'<div class="chart" role="group" aria-label="{_text(block["alt"])}">{svg}</div>\n'
+        f'<div class="chart"{focus}>{svg}</div>\n'
         f'<div class="tip" hidden></div>\n{_caption(block, "Figure")}\n</figure>\n'
     )
 

@@ -53,10 +53,15 @@ WIDE = 3.0
 
 
 def over_time(
-    slug: str, title: str, caption: str, panels: tuple[Panel, ...], record: NavigationRecord
+    slug: str,
+    title: str,
+    caption: str,
+    panels: tuple[Panel, ...],
+    record: NavigationRecord,
+    statuses: tuple[Span, ...] = (),
 ) -> Chart:
-    """Put panels over time below the strip of modes and measurements."""
-    above = strip(record)
+    """Put panels over time below the strip of modes, measurements and heading status."""
+    above = strip(record, statuses)
     bands = outage_bands(record)
     told = f"{caption} {SHADED}" if bands else caption
     return Chart(
@@ -109,6 +114,7 @@ def bound_chart(evaluation: NavigationEvaluation) -> Chart:
         "ellipse.",
         tuple(panels),
         record,
+        evaluation.heading_spans,
     )
 
 
@@ -128,6 +134,7 @@ def height_chart(evaluation: NavigationEvaluation) -> Chart:
         f"Above the ellipsoid ({evaluation.run.ellipsoid.name}).",
         (panel,),
         evaluation.record,
+        evaluation.heading_spans,
     )
 
 
@@ -137,7 +144,14 @@ def velocity_chart(evaluation: NavigationEvaluation) -> Chart:
         _state_panel(evaluation, name, name, f"{words}, m/s")
         for name, words in zip(VELOCITY, NED, strict=True)
     )
-    return over_time("velocity", "Velocity", "Relative to the Earth.", panels, evaluation.record)
+    return over_time(
+        "velocity",
+        "Velocity",
+        "Relative to the Earth.",
+        panels,
+        evaluation.record,
+        evaluation.heading_spans,
+    )
 
 
 def attitude_chart(evaluation: NavigationEvaluation) -> Chart:
@@ -151,6 +165,7 @@ def attitude_chart(evaluation: NavigationEvaluation) -> Chart:
         said,
         tuple(panels),
         evaluation.record,
+        evaluation.heading_spans,
     )
 
 
@@ -240,11 +255,15 @@ def _true(evaluation: NavigationEvaluation, column: str, navigated: Array) -> Li
 
 
 def state_charts(evaluation: NavigationEvaluation) -> tuple[Chart, ...]:
-    """Estimated sensor and measurement errors, with their bounds."""
-    return tuple(_block_chart(evaluation.run.filtered, block) for block in evaluation.states)
+    """Estimated sensor and measurement errors that the run observed, with their bounds."""
+    return tuple(
+        _block_chart(evaluation.run.filtered, block, evaluation.heading_spans)
+        for block in evaluation.states
+        if len(evaluation.unobserved(block)) < len(block.columns)
+    )
 
 
-def _block_chart(record: NavigationRecord, block: ShownStates) -> Chart:
+def _block_chart(record: NavigationRecord, block: ShownStates, statuses: tuple[Span, ...]) -> Chart:
     time = index_of(record.sensors)
     panels = []
     for k, (column, label) in enumerate(zip(block.columns, block.labels, strict=True)):
@@ -263,6 +282,7 @@ def _block_chart(record: NavigationRecord, block: ShownStates) -> Chart:
         "this motion.",
         tuple(panels),
         record,
+        statuses,
     )
 
 
@@ -271,6 +291,12 @@ def _block_chart(record: NavigationRecord, block: ShownStates) -> Chart:
 
 _MODES = {"coarse": GREY, "fine": SKY, "navigation": BLUE}
 _MORE = (PURPLE, ORANGE)
+#: Color of each heading status, and the half height of its bar, which shows it without color.
+STATUS_LOOKS = {
+    "trusted": (GREEN, 0.45),
+    "unverified": (ORANGE, 0.3),
+    "rejected": (VERMILLION, 0.18),
+}
 _ROW, _PAD = 0.115, 0.05  # of a panel
 _LETTER = 0.0085  # of the axis
 _MOST_ROWS, _MOST_MARKS = 7, 200
@@ -294,8 +320,11 @@ def outage_bands(record: NavigationRecord) -> tuple[Band, ...]:
     return tuple(Band(begin, end, "outage") for begin, end in sorted(spans))
 
 
-def strip(record: NavigationRecord) -> Panel | None:
-    """Rows of modes and measurement sources; None if there are neither."""
+def strip(record: NavigationRecord, statuses: tuple[Span, ...] = ()) -> Panel | None:
+    """Rows of modes, measurement sources and heading status; None if there are none.
+
+    `statuses`: stretches of one heading status each.
+    """
     time = index_of(record.trajectory)
     begins = [float(time[0]), *(m.begin for m in record.modes)]
     finishes = [float(time[-1]), *(m.end for m in record.modes)]
@@ -318,7 +347,7 @@ def strip(record: NavigationRecord) -> Panel | None:
     tables: dict[str, list[pd.DataFrame]] = {aid: [] for aid in record.outages}
     for name, table in record.innovations.items():
         tables.setdefault(name.rpartition(".")[0] or name, []).append(table)
-    for aid in [*tables][: _MOST_ROWS - len(rows)]:
+    for aid in [*tables][: _MOST_ROWS - len(rows) - bool(statuses)]:
         at = float(len(rows))
         rows.append(aid)
         out = record.outages.get(aid, ())
@@ -334,6 +363,18 @@ def strip(record: NavigationRecord) -> Panel | None:
         if lost.size:
             y = np.full(lost.size, at)
             lines.append(Line("rejected", lost, y, VERMILLION, points=True, symbol="x", size=6.0))
+    if statuses:
+        for status, (colour, half_height) in STATUS_LOOKS.items():
+            # A status holds for a whole second, the last one beyond the end.
+            those = tuple(
+                Span(status, max(one.begin, whole.begin), min(one.end, whole.end))
+                for one in statuses
+                if one.name == status and one.begin < whole.end and one.end > whole.begin
+            )
+            if those:
+                thick = 0.85 * half_height
+                fills.append(bar(f"heading {status}", those, float(len(rows)), thick, colour))
+        rows.append("heading")
     if not rows:
         return None
     return Panel(
@@ -452,7 +493,8 @@ def error_charts(evaluation: NavigationEvaluation) -> tuple[Chart, ...]:
             fills = (thin_fill(BOUND, errors.time, -half, half, AXIS_COLOURS[k]),)
             panels.append(Panel(label, lines, fills=fills, height=0.8))
         caption = f"Computed − {evaluation.truth_name}, with the run's 95 % bounds."
-        out.append(over_time(slug, title, caption, tuple(panels), evaluation.record))
+        drawn = tuple(panels), evaluation.record, evaluation.heading_spans
+        out.append(over_time(slug, title, caption, *drawn))
     return tuple(out)
 
 
@@ -477,6 +519,7 @@ def nees_chart(evaluation: NavigationEvaluation) -> Chart | None:
         "levels. The errors of one run are correlated in time.",
         (panel,),
         evaluation.record,
+        evaluation.heading_spans,
     )
 
 
@@ -491,7 +534,9 @@ _WINDOW = 20
 _POINTS, _FAR = 500, 3.0
 
 
-def innovation_chart(record: NavigationRecord, agreement: Agreement) -> Chart:
+def innovation_chart(
+    record: NavigationRecord, agreement: Agreement, statuses: tuple[Span, ...] = ()
+) -> Chart:
     """Innovations of one observation with their expected 95 % bounds."""
     panels = []
     beyond = 0
@@ -526,6 +571,7 @@ def innovation_chart(record: NavigationRecord, agreement: Agreement) -> Chart:
         f"Measured − predicted; 95 % are expected in the band.{more}",
         tuple(panels),
         record,
+        statuses,
     )
 
 
@@ -554,7 +600,9 @@ def _points(
     return [Line(name, time[rows], value[rows], colour, points=True, symbol=symbol, size=size)]
 
 
-def nis_chart(record: NavigationRecord, found: tuple[Agreement, ...]) -> Chart | None:
+def nis_chart(
+    record: NavigationRecord, found: tuple[Agreement, ...], statuses: tuple[Span, ...] = ()
+) -> Chart | None:
     """NIS of every observation, with its expected range."""
     panels = []
     thin = any(one.epochs >= 2 * _POINTS for one in found)
@@ -581,6 +629,7 @@ def nis_chart(record: NavigationRecord, found: tuple[Agreement, ...]) -> Chart |
         + (" Points are thinned, except the largest." if thin else ""),
         tuple(panels),
         record,
+        statuses,
     )
 
 

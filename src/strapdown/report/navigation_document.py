@@ -9,9 +9,10 @@ import numpy as np
 from strapdown import __version__
 from strapdown.config.choice import ChoiceSpec
 from strapdown.constants import TWO_SIDED_95
+from strapdown.evaluation.trajectory_differences import trajectory_differences
 from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.navigation.truth_comparison import SmootherConsistency
-from strapdown.report.chart import BLUE, GREY, Array, Chart, Panel, curve
+from strapdown.report.chart import AXIS_COLOURS, BLUE, GREY, Array, Chart, Panel, curve, thin_fill
 from strapdown.report.chart import BUCKETS_OVER_TIME as BUCKETS
 from strapdown.report.document import (
     Block,
@@ -31,6 +32,7 @@ from strapdown.report.document import (
     section,
 )
 from strapdown.report.navigation_evaluation import (
+    FELL,
     NavigationEvaluation,
     distance_over_ground,
     horizontal_bounds,
@@ -56,11 +58,10 @@ from strapdown.report.verdict import integrity_sections, status_words
 from strapdown.rotation import within_half_turn
 from strapdown.systems.navigation_run import NavigationRun, withheld_aid
 from strapdown.tables import EULER, NED, VELOCITY
+from strapdown.tables.checks import index_of
 
 # 95 % bound in deg from which a heading is unknown.
 _NO_HEADING = 180.0
-# A smaller relative reduction of a bound means that the motion made the state not observable.
-_FELL = 0.1
 
 
 def headline(evaluation: NavigationEvaluation) -> str:
@@ -241,24 +242,17 @@ def _refused(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
 
 def _not_told(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
     """States whose bounds hardly decreased."""
-    sd = evaluation.run.filtered.sensors_sd
-    if len(sd) < 2:
-        return []
-    names, first, last = [], sd.iloc[0], sd.iloc[-1]
+    names = []
     for block in evaluation.states:
-        some = [
-            label
-            for label, column in zip(block.labels, block.columns, strict=True)
-            if first[column] > 0.0 and last[column] > (1.0 - _FELL) * first[column]
-        ]
+        some = ", ".join(evaluation.unobserved(block))
         if some:
-            names.append(f"{block.name} {', '.join(some)}" if len(block.labels) > 1 else block.name)
+            names.append(f"{block.name} {some}" if len(block.labels) > 1 else block.name)
     if not names:
         return []
     return [
         (
             "Not observable in this run",
-            f"bound reduced by less than {plain(100.0 * _FELL, 0)}{GAP}%: {'; '.join(names)}.",
+            f"bound reduced by less than {plain(100.0 * FELL, 0)}{GAP}%: {'; '.join(names)}.",
         )
     ]
 
@@ -276,6 +270,8 @@ def _duration(evaluation: NavigationEvaluation) -> float:
 # Effect of the smoother: bounds and errors beside those of the filter alone.
 
 
+# Instants of the chart of separations.
+_SEPARATIONS = 2000
 #: A smaller share of the differences within three standard deviations is not due to chance.
 SHARE = 0.95
 UNITS = dict.fromkeys(NED, "m") | dict.fromkeys(VELOCITY, "m/s") | dict.fromkeys(EULER, "°")
@@ -318,6 +314,42 @@ def smoothing_chart(evaluation: NavigationEvaluation) -> Chart | None:
         "measurements.",
         tuple(panels),
         record,
+        evaluation.heading_spans,
+    )
+
+
+def separation_chart(evaluation: NavigationEvaluation) -> Chart | None:
+    """Filter − smoothed solution in position, with the bound of a consistent smoother."""
+    from strapdown.report.navigation_charts import over_time
+
+    forward, record = evaluation.run.forward, evaluation.record
+    if forward is None:
+        return None
+    marks = index_of(forward.sd)
+    rows = np.searchsorted(index_of(forward.trajectory), marks - 1e-7)
+    # Of several marks before one row the last is that of the row.
+    kept = np.flatnonzero(np.append(rows[1:] > rows[:-1], True) & (rows < len(forward.trajectory)))
+    kept = kept[:: max(1, -(-kept.size // _SEPARATIONS))]
+    both = (one.trajectory.iloc[rows[kept]] for one in (forward, record))
+    apart = trajectory_differences(*both, evaluation.run.ellipsoid)
+    panels = []
+    for column, colour in zip(NED, AXIS_COLOURS, strict=True):
+        if column in record.not_estimated:
+            continue
+        before, after = (one.sd[column].to_numpy()[kept] for one in (forward, record))
+        # Filter less smoother has the difference of both covariances (`smoother_consistency`).
+        reach = TWO_SIDED_95 * np.sqrt(np.maximum(np.square(before) - np.square(after), 0.0))
+        line = curve("separation", marks[kept], apart[column], colour, buckets=BUCKETS)
+        fill = thin_fill("95 % expected", marks[kept], -reach, reach, GREY, opacity=0.25)
+        panels.append(Panel(f"{column}, m", (line,), fills=(fill,), height=0.8))
+    return over_time(
+        "separation",
+        "Separation of filter and smoother",
+        "Filter − smoothed position. The separation exceeds its band where later measurements "
+        "contradict the filter by more than it states.",
+        tuple(panels),
+        record,
+        evaluation.heading_spans,
     )
 
 
@@ -674,47 +706,68 @@ def navigation_document(evaluation: NavigationEvaluation, name: str) -> Document
     aids = dict.fromkeys(
         [*evaluation.record.outages, *(a.name.partition(".")[0] for a in evaluation.agreements)]
     )
+    states = section(
+        "state",
+        "Height, velocity, attitude",
+        charts.height_chart(evaluation),
+        charts.velocity_chart(evaluation),
+        charts.attitude_chart(evaluation),
+    )
+    errors = section(
+        "truth",
+        f"Against {evaluation.truth_name}",
+        error_table(evaluation),
+        *charts.error_charts(evaluation),
+        charts.nees_chart(evaluation),
+    )
+    findings = evaluation.all_findings
     sections = (
         section("answer", "The answer", end_table(evaluation), *verdict.blocks),
         *integrity_sections(evaluation),
-        section(
-            "state",
-            "Height, velocity, attitude",
-            charts.height_chart(evaluation),
-            charts.velocity_chart(evaluation),
-            charts.attitude_chart(evaluation),
-        ),
-        section(
-            "truth",
-            f"Against {evaluation.truth_name}",
-            error_table(evaluation),
-            *charts.error_charts(evaluation),
-            charts.nees_chart(evaluation),
-        ),
+        section("points", "At the control points", point_table(evaluation)),
+        section("outages", "Outages", withheld_table(evaluation), outage_table(evaluation)),
         section(
             "paired",
             "With two corrections of the estimated errors",
             paired_table(evaluation),
             paired_chart(evaluation),
         ),
-        section("points", "At the control points", point_table(evaluation)),
+        # Errors matter more than the state, where they are known.
+        *((errors, states) if errors.blocks else (states,)),
         section(
             "smoothing",
             "Smoothed",
             paragraph(smoothing_words(evaluation)),
             smoothing_table(evaluation),
             smoothing_chart(evaluation),
+            separation_chart(evaluation),
+            figures=1,
+        ),
+        section("observations", "Innovations", *_observations(evaluation)),
+        section(
+            "components",
+            "Innovations of each measurement",
+            *(
+                charts.innovation_chart(evaluation.record, one, evaluation.heading_spans)
+                for one in evaluation.agreements
+            ),
+            folded=True,
         ),
         section(
             "sensors",
             "Sensor and measurement errors",
             state_table(evaluation),
             *charts.state_charts(evaluation),
+            *(Paragraph(f"{head}: {text}") for head, text in _not_told(evaluation)),
+            folded=True,
         ),
-        section("observations", "Innovations", *_observations(evaluation)),
-        section("outages", "Outages", withheld_table(evaluation), outage_table(evaluation)),
-        section("events", "Events", event_table(evaluation)),
-        section("findings", "Findings", findings_list(evaluation.all_findings)),
+        section("events", "Events", event_table(evaluation), folded=True),
+        section(
+            "findings",
+            "Findings",
+            findings_list(findings),
+            folded=all(one.severity == "note" for one in findings),
+        ),
         section(
             "method",
             "Method and assumptions",
@@ -726,8 +779,9 @@ def navigation_document(evaluation: NavigationEvaluation, name: str) -> Document
                 "bounds.",
             ),
             *run_again(name),
+            folded=True,
         ),
-        section("conventions", "Conventions", Facts(CONVENTIONS)),
+        section("conventions", "Conventions", Facts(CONVENTIONS), folded=True),
     )
     title = run.spec.title or f"Navigation of {run.source.name}"
     return Document(
@@ -783,7 +837,7 @@ def _kind(module: ChoiceSpec, slot: str) -> str:
 
 
 def _observations(evaluation: NavigationEvaluation) -> tuple[Block | None, ...]:
-    from strapdown.report.navigation_charts import innovation_chart, nis_chart
+    from strapdown.report.navigation_charts import nis_chart
 
     if not evaluation.agreements:
         return (Paragraph("No measurement was processed: inertial sensors alone."),)
@@ -799,8 +853,7 @@ def _observations(evaluation: NavigationEvaluation) -> tuple[Block | None, ...]:
         observation_table(evaluation),
         Paragraph(against if rows else agree),
         Items(tuple(rows)) if rows else None,
-        nis_chart(evaluation.record, evaluation.agreements),
-        *(innovation_chart(evaluation.record, one) for one in evaluation.agreements),
+        nis_chart(evaluation.record, evaluation.agreements, evaluation.heading_spans),
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -38,6 +38,9 @@ from strapdown.systems.navigation_run import NavigationRun
 from strapdown.tables import EULER, GEODETIC, VELOCITY
 from strapdown.tables.checks import index_of, values_of, view_of
 from strapdown.tables.on_disk import let_go, let_go_of_all, parts_of
+
+#: A smaller relative reduction of a bound means that the motion made the state not observable.
+FELL = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,9 +77,26 @@ class NavigationEvaluation:
         return tuple(found)
 
     @cached_property
+    def heading_spans(self) -> tuple[Span, ...]:
+        """Stretches of one heading status, whatever its reason."""
+        return heading_spans(self.run)
+
+    @cached_property
     def states(self) -> tuple[ShownStates, ...]:
         """Sensor and measurement error states of the filter, for display."""
         return blocks_of(self.run.filtered)
+
+    def unobserved(self, block: ShownStates) -> tuple[str, ...]:
+        """Labels of the states of a block whose bounds hardly decreased in the run."""
+        sd = self.run.filtered.sensors_sd
+        if len(sd) < 2:
+            return ()
+        first, last = sd.iloc[0], sd.iloc[-1]
+        return tuple(
+            label
+            for label, column in zip(block.labels, block.columns, strict=True)
+            if first[column] > 0.0 and last[column] > (1.0 - FELL) * first[column]
+        )
 
     @cached_property
     def agreements(self) -> tuple[Agreement, ...]:
@@ -118,6 +138,17 @@ class NavigationEvaluation:
         return compare_with_truth(
             record.trajectory, record.sd.index, record.covariance, truth, self.run.ellipsoid
         )
+
+
+def heading_spans(run: NavigationRun) -> tuple[Span, ...]:
+    """Stretches of a run with one heading status each, by its name."""
+    spans: list[Span] = []
+    for one in run.trust.heading.spans:
+        if spans and spans[-1].name == one.status:
+            spans[-1] = replace(spans[-1], end=one.end)
+        else:
+            spans.append(Span(one.status, one.begin, one.end))
+    return tuple(spans)
 
 
 def horizontal_bounds(record: NavigationRecord) -> Array:

@@ -15,7 +15,7 @@ from strapdown.formats.trajectory_writers import thin
 from strapdown.frames import ned_from_geodetic
 from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.report.chart import BLACK, BLUE, GREY, PURPLE, VERMILLION, Array, Chart, Line, Panel
-from strapdown.report.navigation_charts import mode_colour
+from strapdown.report.navigation_charts import TIME, mode_colour
 from strapdown.report.navigation_evaluation import NavigationEvaluation, rejected_times
 from strapdown.report.plan import PlanView, ellipse, path_marks, place_labels
 from strapdown.report.svg_drawing import nice_step
@@ -76,7 +76,7 @@ def plan_chart(evaluation: NavigationEvaluation) -> Chart | None:
         "plan",
         "Path",
         " ".join(w for w in words if w),
-        "",
+        TIME,
         (
             Panel(
                 f"north of the start, {plane.unit}",
@@ -137,20 +137,21 @@ def _path(record: NavigationRecord, time: Array, path: tuple[Array, Array]) -> l
             colour = (VERMILLION, PURPLE)[lost.index(name) % 2]
         else:
             colour = mode_colour(name, names) if name in names else BLUE
-        x, y = _pieces(what == name, path)
-        out.append(Line(str(name), x, y, colour, width=3.2 if name in lost else 2.0))
+        x, y, stamps = _pieces(what == name, *path, time)
+        width = 3.2 if name in lost else 2.0
+        out.append(Line(str(name), x, y, colour, width=width, stamps=stamps))
     # Outages are drawn on top.
     return sorted(out, key=lambda line: line.name in lost)
 
 
-def _pieces(of: NDArray[np.bool_], path: tuple[Array, Array]) -> tuple[Array, Array]:
-    """Stretches of a path over some of its steps, with NaN between them."""
-    x: list[Array] = []
-    y: list[Array] = []
-    for run in true_runs(of):
-        x += [path[0][run.start : run.stop + 1], np.array([np.nan])]
-        y += [path[1][run.start : run.stop + 1], np.array([np.nan])]
-    return np.concatenate(x)[:-1], np.concatenate(y)[:-1]
+def _pieces(of: NDArray[np.bool_], *columns: Array) -> tuple[Array, ...]:
+    """Stretches of the columns of a path over some of its steps, with NaN between them."""
+    gap = np.array([np.nan])
+    runs = true_runs(of)
+    return tuple(
+        np.concatenate([part for r in runs for part in (column[r.start : r.stop + 1], gap)])[:-1]
+        for column in columns
+    )
 
 
 def _fixes(plane: Plane, view: PlanView) -> tuple[list[Line], str]:

@@ -179,13 +179,24 @@ class Drawing:
         self._parts.append(f"<circle {at}{_fill(fill, opacity)}{_stroke(colour, width, dash)}/>")
 
     def curve(
-        self, points: Array, colour: str = INK, width: float = 1.0, dash: str = "solid"
+        self,
+        points: Array,
+        colour: str = INK,
+        width: float = 1.0,
+        dash: str = "solid",
+        stamps: Array | None = None,
     ) -> None:
-        """Draw a line of many finite points, (n, 2), to a hundredth of a pixel."""
+        """Draw a line of many finite points, (n, 2), to a hundredth of a pixel.
+
+        `stamps`: time of each point in s, for the page's script.
+        """
         if len(points) < 2:
             return
+        times = ""
+        if stamps is not None:
+            times = f' data-stamps="{" ".join(f"{t:.3f}" for t in stamps.tolist())}"'
         self._parts.append(
-            f'<path d="{_steps(points)}" fill="none"{_stroke(colour, width, dash)}/>'
+            f'<path d="{_steps(points)}" fill="none"{_stroke(colour, width, dash)}{times}/>'
         )
 
     def area(self, points: Array, fill: str, opacity: float = 1.0) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 
@@ -26,9 +25,7 @@ from strapdown.navigation.record import Span
 from strapdown.report.chart import (
     BLACK,
     BLUE,
-    GREEN,
     GREY,
-    ORANGE,
     VERMILLION,
     Array,
     Chart,
@@ -48,7 +45,7 @@ from strapdown.report.document import (
     paragraph,
     section,
 )
-from strapdown.report.navigation_evaluation import NavigationEvaluation
+from strapdown.report.navigation_evaluation import NavigationEvaluation, heading_spans
 from strapdown.report.values import GAP, duration_words, half, length_words, plain, share_words
 from strapdown.report.values import stamp as instant
 from strapdown.systems.navigation_run import NavigationRun
@@ -315,8 +312,18 @@ def integrity_sections(evaluation: NavigationEvaluation) -> tuple[Section, ...]:
     result = evaluation.run
     return (
         section("integrity", "Integrity", Paragraph(answer(evaluation)), *_heading(result)),
-        section("quantities", "Status of position and velocity", *_quantities(result)),
-        section("first", "First inconsistency, and the re-run without it", *_first(result)),
+        section(
+            "quantities",
+            "Status of position and velocity",
+            *_quantities(result),
+            folded=not worst_words(result.trust),
+        ),
+        section(
+            "first",
+            "First inconsistency, and the re-run without it",
+            *_first(result),
+            folded=not result.trust.inconsistencies,
+        ),
     )
 
 
@@ -486,8 +493,6 @@ def _first(result: NavigationRun) -> tuple[Block, ...]:
 # Charts: heading integrity over time, and the run against its re-run.
 
 
-#: Colors of the heading status, and the half height of its bar, which shows it without color.
-COLOURS = {"trusted": (GREEN, 0.45), "unverified": (ORANGE, 0.3), "rejected": (VERMILLION, 0.18)}
 BUCKETS = 500
 
 
@@ -503,27 +508,22 @@ def heading_error(result: NavigationRun, time: Array) -> Array | None:
 
 def heading_chart(result: NavigationRun) -> Chart:
     """Heading integrity of each second, with the bounds that determine it."""
-    from strapdown.report.navigation_charts import bar, span_names
+    from strapdown.report.navigation_charts import STATUS_LOOKS, bar, span_names
 
     heading = result.trust.heading
     table = heading.table
     time = index_of(table)
-    spans: list[Span] = []
-    for one in heading.spans:
-        if spans and spans[-1].name == one.status:
-            spans[-1] = replace(spans[-1], end=one.end)
-        else:
-            spans.append(Span(one.status, one.begin, one.end))
+    spans = heading_spans(result)
     whole = Span("", float(time[0]), max(float(time[-1]) + 1.0, float(time[0]) + 2.0))
     fills = []
-    for name, (colour, half_height) in COLOURS.items():
+    for name, (colour, half_height) in STATUS_LOOKS.items():
         those = tuple(one for one in spans if one.name == name)
         if those:
             fills.append(bar(name, those, 0.0, half_height, colour))
     ends = Line("", np.array([whole.begin, whole.end]), np.full(2, np.nan), GREY, legend=False)
     strip = Panel(
         "",
-        (ends, *span_names(tuple(spans), whole)),
+        (ends, *span_names(spans, whole)),
         categories=("status",),
         height=0.22,
         fills=tuple(fills),

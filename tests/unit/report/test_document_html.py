@@ -9,18 +9,23 @@ import sys
 from html.parser import HTMLParser
 from pathlib import Path
 
+import numpy as np
 import pytest
 from tests.coded import coded
 
 from strapdown.errors import DataError
-from strapdown.report.chart import Chart
+from strapdown.report.chart import BLUE, Chart, Line, Panel
 from strapdown.report.document import (
     Animation,
     Document,
     KeyFigure,
     KeyFigures,
+    Paragraph,
     Picture,
+    TableBlock,
+    document_data,
     draw_stills,
+    section,
 )
 from strapdown.report.document_html import document_page
 
@@ -175,3 +180,98 @@ def test_a_key_figure_breaks_before_its_bound_alone():
     assert '<dd class="value"><span>180.8143</span> <span>±&nbsp;0.0044°</span></dd>' in page
     (style,) = re.findall(r"\.keys \.value \{[^}]*\}", page)[:1]
     assert "nowrap" not in style
+
+
+# Folds: what is open, and what is one click away.
+
+
+def charts_of(count, slug="c"):
+    return tuple(
+        Chart(f"{slug}{k}", f"{slug} {k}", "", "time, s", (Panel("y", (curve_of(k),)),))
+        for k in range(count)
+    )
+
+
+def curve_of(k):
+    return Line(f"line {k}", np.array([0.0, 1.0]), np.array([0.0, k]), BLUE)
+
+
+def paged(front, *sections):
+    return document_page(Document("t", "", (), front, sections))
+
+
+def open_figures(text):
+    """Titles of the figures outside of any fold."""
+    while "<details>" in text:
+        text = re.sub(r"<details>(?:(?!<details>).)*?</details>", "", text, flags=re.S)
+    return re.findall(r"<b>Figure \d+\.</b> <b>([^<]*)\.</b>", text)
+
+
+def test_a_page_has_at_most_eight_open_figures():
+    sections = [section(f"s{k}", f"S{k}", *charts_of(4, f"s{k}c")) for k in range(4)]
+    text = paged(charts_of(2, "front"), *sections)
+    # Two on the front, three of a section at most, eight in all; all of them are in the page.
+    names = ["front 0", "front 1", "s0c 0", "s0c 1", "s0c 2", "s1c 0", "s1c 1", "s1c 2"]
+    assert open_figures(text) == names
+    assert text.count("<figure") == 18
+    assert '<summary class="more">s0c 3</summary>' in text
+    assert '<summary class="more">s2c 0; s2c 1; s2c 2; s2c 3</summary>' in text
+
+
+def test_tables_and_words_of_an_open_section_stay_open():
+    table = TableBlock(("a", "b"), (("x", "1"),), title="T")
+    one = section("s", "S", *charts_of(2), table, Paragraph("Words."), figures=1)
+    text = paged((), one)
+    before = text[: text.index("<details>")]
+    assert "Words." in before and "<table>" in before
+    assert open_figures(text) == ["c 0"]
+
+
+def test_a_folded_section_says_what_it_holds_and_takes_no_room_of_others():
+    table = TableBlock(("a", "b"), (("x", "1"),), title="T")
+    text = paged(
+        (),
+        section("method", "Method", *charts_of(9, "m"), table, folded=True),
+        section("after", "After", *charts_of(3, "after")),
+    )
+    assert '<span class="holds">9 figures, 1 table</span>' in text
+    assert open_figures(text) == ["after 0", "after 1", "after 2"]
+    # The anchor of its heading is where the contents lead.
+    assert re.search(r'<details><summary><h2 id="1-method">', text)
+
+
+def test_paper_has_no_folds():
+    document = Document("t", "", (), (), (section("s", "S", *charts_of(5), folded=False),))
+    data = document_data(document, draw_stills(document), str, alive=False)
+    assert [len(s["blocks"]) for s in data["sections"]] == [5]
+    assert [s["more"] for s in data["sections"]] == [[]]
+
+
+def test_a_page_of_folds_alone_has_its_script():
+    text = paged((), section("s", "S", Paragraph("x"), folded=True))
+    assert "beforeprint" in text
+
+
+# For readers who do not see it.
+
+
+def test_a_chart_is_a_group_and_a_column_without_a_name_has_no_header(text):
+    table = TableBlock(("", "b"), (("x", "1"),), title="T")
+    page = Page(paged(charts_of(1), section("s", "S", table)))
+    # Names in a legend can be pressed: within an image a screen reader would not find them.
+    (drawn,) = [a for a in page.all("svg") if "aria-label" in a]
+    assert drawn["role"] == "group" and drawn["aria-label"] == "c 0."
+    assert [a for a in page.all("svg") if a.get("role") == "img"] == []
+    assert len(page.all("th")) == 2 and page.all("th")[0].get("scope") == "col"
+
+
+def test_the_path_of_a_plan_has_the_time_of_each_of_its_points():
+    stamps = np.array([10.0, 10.5, np.nan, 12.0, 13.25])
+    x = np.array([0.0, 1.0, np.nan, 2.0, 3.0])
+    line = Line("path", x, x, BLUE, stamps=stamps)
+    plan = Chart("plan", "Path", "", "time, s", (Panel("north", (line,), x_label="east"),))
+    text = paged((plan,))
+    assert re.findall(r'data-stamps="([^"]*)"', text) == ["10.000 10.500", "12.000 13.250"]
+    # It is linked with the charts over this axis, and does not write its name.
+    assert 'data-x-label="time, s"' in text
+    assert ">time, s</text>" not in text

@@ -214,6 +214,31 @@ def test_the_strip_shows_modes_aids_and_what_was_rejected():
     assert strip(without_aids(record())) is None
 
 
+def test_the_strip_shows_the_heading_status_within_the_run():
+    statuses = (Span("trusted", -5.0, 40.0), Span("unverified", 40.0, 121.0))
+    panel = strip(record(), statuses)
+    assert panel.categories == ("mode", "rtk", "heading")
+    fills = {fill.name: fill for fill in panel.fills}
+    assert fills["heading trusted"].x.tolist() == [0.1, 40.0]
+    assert fills["heading unverified"].x.tolist() == [40.0, 120.0]
+    assert "heading rejected" not in fills
+    # The lower a status, the thinner its bar: it is seen without color, too.
+    low, high = (
+        np.ptp([fills[f"heading {s}"].low[0], fills[f"heading {s}"].high[0]])
+        for s in ("unverified", "trusted")
+    )
+    assert low < high < 1.0
+
+
+def test_a_state_that_was_not_observed_has_no_chart():
+    made = told(record())
+    sd = made.run.filtered.sensors_sd
+    sd.loc[:, :] = sd.iloc[0].to_numpy()
+    assert charts.state_charts(made) == ()
+    block, _ = made.states
+    assert made.unobserved(block) == block.labels
+
+
 def test_before_navigation_no_aid_is_used():
     made = record(outage=None)
     aligned = (Span("coarse", -60.0, -30.0), Span("fine", -30.0, 0.1))

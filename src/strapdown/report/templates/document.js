@@ -116,6 +116,16 @@
             (Math.min.apply(null, ys) + Math.max.apply(null, ys)) / 2];
   }
 
+  // ---- One instant in every chart over the same time, and on the plan.
+
+  var charts = [];
+
+  function share(source, time) {
+    charts.forEach(function (one) {
+      if (one.figure !== source && one.figure.dataset.xLabel === source.dataset.xLabel) { one.show(time); }
+    });
+  }
+
   function chart(figure) {
     var svg = figure.querySelector(".chart > svg"), tip = figure.querySelector(".tip");
     var hidden = {};
@@ -148,6 +158,7 @@
         var made = shape(node), owner = node.closest("[data-line]");
         made.series = owner ? owner.dataset.series : null;
         made.colour = node.getAttribute("stroke") || node.getAttribute("fill");
+        made.stamps = node.dataset.stamps ? numbers(node.dataset.stamps) : null;
         made.curve = made.curve || node.tagName === "polyline" || made.symbols === true;
         panel.shapes.push(made);
       });
@@ -257,13 +268,78 @@
 
     function clear() { cross.textContent = ""; tip.hidden = true; }
 
+    function upright(panel, x) {
+      var b = panel.box;
+      if (x < b.x || x > b.x + b.w) { return; }
+      element("line", {x1: x, x2: x, y1: b.y, y2: b.y + b.h, stroke: "#59626d", "stroke-width": 0.7}, cross);
+    }
+
+    function dot(panel, at, colour) {
+      var b = panel.box, to = moved(panel, at);
+      if (to[0] < b.x - 1 || to[0] > b.x + b.w + 1 || to[1] < b.y - 1 || to[1] > b.y + b.h + 1) { return; }
+      element("circle", {cx: to[0], cy: to[1], r: panel.kind === "plane" ? 5 : 3, fill: "#fff", stroke: colour, "stroke-width": panel.kind === "plane" ? 2.4 : 1.6}, cross);
+    }
+
+    // The time of the nearest point of a path; null where there is none.
+    function timeOn(panel, x, y) {
+      var least = Infinity, time = null;
+      panel.shapes.forEach(function (s) {
+        if (!s.stamps) { return; }
+        for (var k = 0; k < s.stamps.length; k += 1) {
+          var away = Math.hypot(s.points[2 * k] - x, s.points[2 * k + 1] - y);
+          if (away < least) { least = away; time = s.stamps[k]; }
+        }
+      });
+      return time;
+    }
+
+    // A point of a path at a time, on the straight line between its points.
+    function placeAt(s, time) {
+      for (var k = 0; k + 1 < s.stamps.length; k += 1) {
+        var a = s.stamps[k], c = s.stamps[k + 1];
+        if (a <= time && time <= c) {
+          var u = c > a ? (time - a) / (c - a) : 0;
+          return [s.points[2 * k] + u * (s.points[2 * k + 2] - s.points[2 * k]),
+                  s.points[2 * k + 1] + u * (s.points[2 * k + 3] - s.points[2 * k + 1])];
+        }
+      }
+      return null;
+    }
+
+    charts.push({figure: figure, show: function (time) {
+      clear();
+      if (time === null) { return; }
+      panels.forEach(function (panel) {
+        var b = panel.box;
+        if (panel.kind === "plane") {
+          prepare(panel);
+          panel.shapes.forEach(function (s) {
+            var to = s.stamps ? placeAt(s, time) : null;
+            if (to) { dot(panel, to, s.colour); }
+          });
+          return;
+        }
+        upright(panel, moved(panel, [b.x + panel.x.share(time) * b.w, b.y])[0]);
+        if (panel.kind !== "time") { return; }
+        prepare(panel);
+        var at = b.x + panel.x.share(time) * b.w;
+        panel.shapes.forEach(function (s) {
+          if (!s.curve || s.symbols || !s.series || hidden[s.series]) { return; }
+          var found = nearest(s.points, at, null);
+          if (found.away < 2) { dot(panel, [s.points[found.k], s.points[found.k + 1]], s.colour); }
+        });
+      });
+    }});
+
     function show(event) {
       var p = here(event), panel = panelAt(p);
       clear();
-      if (!panel) { return; }
+      if (!panel) { share(figure, null); return; }
       prepare(panel);
       var b = panel.box, at = shares(panel, p), flat = panel.kind !== "time";
       var ox = b.x + at[0] * b.w, oy = b.y + up(panel, at[1]) * b.h;
+      var time = panel.kind === "plane" ? timeOn(panel, ox, oy) : panel.x.value(at[0]);
+      share(figure, time);
       var rows = {}, order = [];
       panel.shapes.forEach(function (s) {
         if (!s.curve || s.series === null || s.series === "" || hidden[s.series] || !s.points.length) { return; }
@@ -275,9 +351,7 @@
       });
       if (!flat) {
         panels.forEach(function (one) {
-          if (one.group === panel.group && one.box.x === b.x) {
-            element("line", {x1: p[0], x2: p[0], y1: one.box.y, y2: one.box.y + one.box.h, stroke: "#59626d", "stroke-width": 0.7}, cross);
-          }
+          if (one.group === panel.group && one.box.x === b.x) { upright(one, p[0]); }
         });
       }
       if (!order.length) { return; }
@@ -287,17 +361,21 @@
       head.textContent = flat ? "" : title + " " + readable(panel.x, panel.vx, at[0]);
       if (head.textContent) { tip.appendChild(head); }
       order.slice(0, 12).forEach(function (series) {
-        var row = rows[series], to = moved(panel, [row.x, row.y]), line = document.createElement("div");
-        var dot = document.createElement("i"), text = readable(panel.y, panel.vy, up(panel, (row.y - b.y) / b.h));
-        dot.style.background = row.colour;
+        var row = rows[series], line = document.createElement("div");
+        var mark = document.createElement("i"), text = readable(panel.y, panel.vy, up(panel, (row.y - b.y) / b.h));
+        mark.style.background = row.colour;
         if (panel.kind === "categories") { text = ""; }
         if (flat) { text = readable(panel.x, panel.vx, (row.x - b.x) / b.w) + (text ? ", " + text : ""); }
-        line.appendChild(dot);
+        line.appendChild(mark);
         line.appendChild(document.createTextNode(series + " " + text));
         tip.appendChild(line);
-        if (to[0] < b.x - 1 || to[0] > b.x + b.w + 1 || to[1] < b.y - 1 || to[1] > b.y + b.h + 1) { return; }
-        element("circle", {cx: to[0], cy: to[1], r: 3, fill: "#fff", stroke: row.colour, "stroke-width": 1.6}, cross);
+        dot(panel, [row.x, row.y], row.colour);
       });
+      if (panel.kind === "plane" && time !== null && figure.dataset.xLabel) {
+        var stamp = document.createElement("div");
+        stamp.textContent = figure.dataset.xLabel + " " + written(time, 0.01);
+        tip.appendChild(stamp);
+      }
       tip.hidden = false;
       var frame = figure.getBoundingClientRect(), x = event.clientX - frame.left + 14;
       if (x + tip.offsetWidth > frame.width) { x = event.clientX - frame.left - tip.offsetWidth - 14; }
@@ -311,6 +389,7 @@
 
     svg.addEventListener("pointerdown", function (event) {
       var p = here(event), panel = panelAt(p);
+      if (event.pointerType === "touch") { show(event); }
       if (!panel || event.pointerType === "touch" || event.button !== 0) { return; }
       begin = {p: p, panel: panel};
       svg.setPointerCapture(event.pointerId);
@@ -345,7 +424,9 @@
         draw(one);
       });
     });
-    svg.addEventListener("pointerleave", clear);
+    svg.addEventListener("pointerleave", function (event) {
+      if (event.pointerType !== "touch") { clear(); share(figure, null); }
+    });
     svg.addEventListener("dblclick", function () {
       panels.forEach(function (one) { one.vx = [0, 1]; one.vy = [0, 1]; draw(one); });
     });
@@ -504,6 +585,39 @@
     figure.classList.add("live");
     figure.querySelector(".controls").hidden = false;
     go(0);
+  }
+
+  // ---- Folded sections: opened by a link to them, all at once, and on paper.
+
+  var folds = document.querySelectorAll("details");
+
+  function unfold() {
+    var target = document.getElementById(decodeURIComponent(window.location.hash.slice(1)));
+    var fold = target && target.closest("details");
+    if (fold && !fold.open) { fold.open = true; target.scrollIntoView(); }
+  }
+
+  if (folds.length) {
+    window.addEventListener("hashchange", unfold);
+    unfold();
+    var before = [];
+    window.addEventListener("beforeprint", function () {
+      before = Array.prototype.map.call(folds, function (one) { return one.open; });
+      folds.forEach(function (one) { one.open = true; });
+    });
+    window.addEventListener("afterprint", function () {
+      folds.forEach(function (one, k) { one.open = before[k]; });
+    });
+    document.querySelectorAll("nav").forEach(function (nav) {
+      var all = document.createElement("button");
+      all.type = "button"; all.textContent = "Open all sections";
+      all.addEventListener("click", function () {
+        var open = all.textContent.charAt(0) === "O";
+        folds.forEach(function (one) { one.open = open; });
+        all.textContent = (open ? "Close" : "Open") + " all sections";
+      });
+      nav.appendChild(all);
+    });
   }
 
   document.querySelectorAll("figure[data-figure]").forEach(function (figure) {
