@@ -100,6 +100,7 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
         position_sd=_accuracy(raw, found, values) if position_sd is None else position_sd,
         velocity_sd=velocity_sd,
         quality=_quality(raw, found, values),
+        satellites=_satellites(raw),
         heights_from=_LEVELS.get(datum, ""),
         height_source=found[datum].source if datum in found else "",
         findings=raw.findings,
@@ -435,6 +436,20 @@ def _quality(raw: RawLog, found: dict[str, Found], values: Callable[[str], Array
         )
     )
     return np.array([QUALITY[int(q)] for q in codes], dtype=np.float64)
+
+
+#: Names of a column with the satellites of a fix, without case and separators.
+_SATELLITES = ("satellites", "satellitesused", "numsatellites", "numsv", "nsats", "nsat", "sats")
+
+
+def _satellites(raw: RawLog) -> Array | None:
+    """Satellites of each fix for display; None if no column has them as numbers."""
+    names = {re.sub(r"\W|_", "", name.lower()): name for name in raw.columns}
+    for known in _SATELLITES:
+        column = raw.columns.get(names.get(known, ""))
+        if column is not None and column.dtype.kind in "fiu":
+            return np.asarray(column, dtype=np.float64)
+    return None
 
 
 def open_fixes(path: str | Path) -> RawLog | Fixes | None:

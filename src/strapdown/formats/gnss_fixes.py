@@ -107,6 +107,8 @@ class Fixes:
         North, east, down.
     quality : ndarray, (n,), or None
         As field 6 of NMEA 0183 GGA.
+    satellites : ndarray, (n,), or None
+        Used in each fix; for display.
     zero_is_unknown : bool
         A standard deviation of zero means unknown.
     heights_from : {'sea', 'take-off', 'unstated', 'nowhere', ''}
@@ -126,6 +128,7 @@ class Fixes:
     position_sd: Array | None = None
     velocity_sd: Array | None = None
     quality: Array | None = None
+    satellites: Array | None = None
     zero_is_unknown: bool = False
     heights_from: str = ""
     height_source: str = ""
@@ -178,6 +181,8 @@ def table_of_fixes(fixes: Fixes, options: GnssOptions) -> pd.DataFrame:
             quality[at],
             source=fixes.name,
         )
+    if fixes.satellites is not None:
+        table["satellites"] = fixes.satellites[at]
     with_clock(table, fixes.clock)
     table.attrs["findings"] = tuple(fixes.findings)
     table.attrs.update(taken)

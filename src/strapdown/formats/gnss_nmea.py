@@ -59,6 +59,7 @@ class _Epoch:
     sd: tuple[float, float, float] = _NAN3
     velocity: tuple[float, float, float] = _NAN3
     quality: float = np.nan
+    satellites: float = np.nan
     over_sea: bool = False
     day: float | None = None
 
@@ -131,6 +132,7 @@ def read(path: Path) -> Fixes:
         velocity=velocity if np.isfinite(velocity).any() else None,
         position_sd=sd if np.isfinite(sd).any() else None,
         quality=np.array([e.quality for e in fixed]),
+        satellites=np.array([e.satellites for e in fixed]),
         zero_is_unknown=True,
         heights_from="sea" if over_sea else "",
         height_source="GGA, field 9",
@@ -180,6 +182,7 @@ def _take(epochs: list[_Epoch], kind: str, fields: list[str], row: int, file: st
     epoch = epochs[-1]
     if kind == "GGA":
         epoch.row, epoch.quality = row, number(5, "quality")
+        epoch.satellites = float(fields[6]) if fields[6].isdecimal() else np.nan
         if epoch.quality > 0:
             epoch.place = (
                 _angle(number(1, "latitude"), fields[2], "S"),

@@ -107,6 +107,7 @@ def read(path: Path) -> Fixes:
         position_sd=position_sd,
         velocity_sd=velocity_sd,
         quality=np.array([QUALITY[int(q)] for q in quality], dtype=np.float64),
+        satellites=columns.get("ns"),
         zero_is_unknown=True,
         heights_from="sea" if layout.over_sea else "",
         height_source="height(m), geodetic",

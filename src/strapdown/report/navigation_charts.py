@@ -41,7 +41,7 @@ from strapdown.report.navigation_evaluation import (
     rejected_times,
 )
 from strapdown.report.values import NOT_ESTIMATED, plain
-from strapdown.tables import EULER, NED, VELOCITY
+from strapdown.tables import EULER, NED, POSITION_SD, VELOCITY
 from strapdown.tables.checks import index_of
 from strapdown.tables.on_disk import stored
 
@@ -582,6 +582,66 @@ def _some(one: Agreement, k: int, which: NDArray[np.bool_]) -> NDArray[np.bool_]
         far = np.abs(one.nu[:, k]) > _FAR * one.sd[:, k]
     even = np.arange(one.epochs) % step == 0
     return np.asarray(which & (far | even))
+
+
+#: Kinds of fix by the quality of NMEA 0183, from the best.
+_FIXES = {4: "fixed", 5: "float", 3: "precise", 2: "differential", 1: "autonomous", 6: "estimated"}
+
+
+def fix_charts(evaluation: NavigationEvaluation) -> tuple[Chart, ...]:
+    """Kind, satellites and stated accuracy of the fixes of each receiver; none if all constant."""
+    found = []
+    for aid, table in evaluation.run.source.tables.items():
+        if "quality" in table and len(table) > 1:
+            found.append(_fix_chart(evaluation, aid, table))
+    return tuple(chart for chart in found if chart is not None)
+
+
+def _fix_chart(evaluation: NavigationEvaluation, aid: str, table: pd.DataFrame) -> Chart | None:
+    record = evaluation.record
+    time = index_of(table)
+    going = (time >= record.trajectory.index[0]) & (time <= record.trajectory.index[-1])
+    time = time[going]
+
+    def column(name: str) -> Array:
+        return table[name].to_numpy(dtype=np.float64)[going]
+
+    panels = []
+    quality = column("quality")
+    kinds = [k for k in _FIXES if (quality == k).any()]
+    if len(kinds) > 1:
+        at = np.full(quality.size, np.nan)
+        for row, kind in enumerate(kinds):
+            at[quality == kind] = row
+        rows = kept_rows((at,), BUCKETS)
+        dots = Line("fix", time[rows], at[rows], BLUE, points=True, symbol="circle", size=3.2)
+        names = tuple(_FIXES[k] for k in kinds)
+        panels.append(Panel("", (dots,), categories=names, height=0.12 * len(names) + 0.05))
+    if "satellites" in table and np.isfinite(satellites := column("satellites")).any():
+        line = curve("satellites", time, satellites, GREEN, buckets=BUCKETS)
+        panels.append(Panel("satellites", (line,), height=0.6, steady=1.0))
+    lines = []
+    for name, columns, colour, dash in (
+        ("horizontal", POSITION_SD[:2], BLUE, "solid"),
+        ("vertical", POSITION_SD[2:], VERMILLION, "dash"),
+    ):
+        sd = np.sqrt(np.sum([np.square(column(c)) for c in columns], axis=0))
+        sd = np.where(np.isfinite(sd) & (sd > 0.0), sd, np.nan)
+        if np.isfinite(sd).any() and np.nanmax(sd) > np.nanmin(sd):
+            lines.append(curve(name, time, sd, colour, dash, buckets=BUCKETS))
+    if lines:
+        panels.append(Panel("stated sd, m", tuple(lines), log=True, height=0.8))
+    if not panels:
+        return None
+    return over_time(
+        f"fixes-{aid.replace('_', '-')}",
+        f"Fixes of {aid}",
+        "As the receiver states them: kind of fix, satellites used, and one standard deviation of "
+        "position.",
+        tuple(panels),
+        record,
+        evaluation.heading_spans,
+    )
 
 
 def _points(

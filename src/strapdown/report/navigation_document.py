@@ -746,7 +746,8 @@ def navigation_document(evaluation: NavigationEvaluation, name: str) -> Document
         section("observations", "Innovations", *_observations(evaluation)),
         section(
             "components",
-            "Innovations of each measurement",
+            "Fixes, and innovations of each measurement",
+            *charts.fix_charts(evaluation),
             *(
                 charts.innovation_chart(evaluation.record, one, evaluation.heading_spans)
                 for one in evaluation.agreements

@@ -89,6 +89,23 @@ def test_names_and_units(tmp_path, head, factors):
         assert got[name] == number * factors.get(name, 1.0), name
 
 
+@pytest.mark.parametrize(
+    ("head", "values", "read"),
+    [
+        ("num_SV", ("7", "12"), [7.0, 12.0]),
+        ("Satellites", ("7.0", "12.0"), [7.0, 12.0]),
+        # Words, and a name of something else: shown nowhere, refused neither.
+        ("sats", ("many", "few"), None),
+        ("satellite_id", ("7", "12"), None),
+    ],
+)
+def test_satellites_are_kept_where_a_column_counts_them(tmp_path, head, values, read):
+    rows = [f"{k}.0,{ROW},{value}" for k, value in enumerate(values)]
+    table = table_of(tmp_path, f"{HEAD},{head}", rows)
+    assert [*table.columns] == [*GNSS, *(["satellites"] if read else [])]
+    assert read is None or table["satellites"].tolist() == read
+
+
 def test_car_rtk(recordings):
     path = recordings("car_rtk") / "part1_gnss_rtk.csv"
     table = read_gnss(path)

@@ -58,6 +58,7 @@ def test_places_deviations_dates_over_midnight(tmp_path):
     assert table["lat"].iloc[1] == pytest.approx(-lat, abs=1e-13)
     assert table[POSITION_SD].iloc[0].tolist() == [0.011, 0.012, 0.03]
     assert table["quality"].tolist() == [4.0, 1.0]
+    assert table["satellites"].tolist() == [12.0, 12.0]
     assert table.attrs["clock"] == "unix"
 
 

@@ -43,6 +43,7 @@ def test_degrees_and_dates(tmp_path):
     assert table[POSITION_SD].iloc[0].tolist() == [0.0123, 0.0098, 0.0210]
     assert np.isinf(table[VELOCITY_SD].to_numpy()).all()
     assert table["quality"].tolist() == [4, 5]
+    assert table["satellites"].tolist() == [9, 9]
     assert table.attrs["clock"] == "gps-seconds-of-week" and table.attrs["gps_week"] == WEEK
 
 

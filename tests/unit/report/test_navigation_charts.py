@@ -239,6 +239,37 @@ def test_a_state_that_was_not_observed_has_no_chart():
     assert made.unobserved(block) == block.labels
 
 
+def fixes_of(made, **columns):
+    given = told(made).run.source.tables["rtk"].copy()
+    for name, values in columns.items():
+        given[name] = values
+    return told(made, fixes=given)
+
+
+def test_fixes_that_are_all_alike_have_no_chart():
+    assert charts.fix_charts(told(record())) == ()
+
+
+def test_kind_satellites_and_stated_accuracy_of_fixes():
+    count = len(told(record()).run.source.tables["rtk"])
+    quality = np.where(np.arange(count) < 10, 5.0, 4.0)
+    sd = np.linspace(0.5, 2.0, count)
+    made = fixes_of(
+        record(), quality=quality, satellites=np.arange(count) % 3 + 7.0, north_sd=sd, down_sd=sd
+    )
+    (chart,) = charts.fix_charts(made)
+    _, kinds, satellites, stated = chart.panels
+    assert kinds.categories == ("fixed", "float")
+    assert kinds.lines[0].y[:10].tolist() == [1.0] * 10 and kinds.lines[0].y[10:].max() == 0.0
+    assert satellites.y_label == "satellites" and satellites.lines[0].y.max() == 9.0
+    horizontal, vertical = stated.lines
+    assert horizontal.y[-1] == pytest.approx(np.hypot(2.0, 1.0))
+    assert vertical.y[[0, -1]] == pytest.approx([0.5, 2.0])
+    # A deviation that is not stated is not drawn.
+    (chart,) = charts.fix_charts(fixes_of(record(), down_sd=np.inf, north_sd=sd))
+    assert [line.name for line in chart.panels[-1].lines] == ["horizontal"]
+
+
 def test_before_navigation_no_aid_is_used():
     made = record(outage=None)
     aligned = (Span("coarse", -60.0, -30.0), Span("fine", -30.0, 0.1))
