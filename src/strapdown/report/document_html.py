@@ -216,7 +216,8 @@ def _table(block: Mapping[str, Any]) -> str:
         + "</tr>\n"
         for row, passed, strong in zip(block["rows"], block["passed"], block["strong"], strict=True)
     )
-    label = _text(block["title"] or block["caption"] or "Table")
+    columns = ", ".join(filter(None, block["columns"]))
+    label = _text(block["title"] or block["caption"] or f"Table: {columns}")
     return (
         f'<div class="table"><div class="scroll" tabindex="0" role="region" aria-label="{label}">'
         f"<table>\n{caption}<thead><tr>{names}</tr></thead>\n<tbody>{rows}</tbody>\n"
