@@ -5,7 +5,7 @@ from __future__ import annotations
 import datetime
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence, Set
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -206,9 +206,15 @@ def raw_log(
     ``name[1]`` …. `units`: where the file states them. `meta`: may hold ``sampling``, ``axes`` and
     a sampling rate. DataError: no numeric array has two samples or more.
     """
+    squeezed = {name: np.squeeze(array) for name, array in arrays.items()}
+    stamps = {
+        array.size
+        for name, array in squeezed.items()
+        if array.ndim == 1 and read_name(name).quantity == "time"
+    }
     columns: dict[str, NDArray[Any]] = {}
-    for name, array in arrays.items():
-        columns |= _columns(name, np.squeeze(array))
+    for name, array in squeezed.items():
+        columns |= _columns(name, array, stamps)
     if not columns:
         raise DataError(
             "io.no-array-of-numbers",
@@ -256,13 +262,16 @@ def _left_out(columns: dict[str, NDArray[Any]], samples: int, file: str) -> list
     ]
 
 
-def _columns(name: str, array: NDArray[Any]) -> dict[str, NDArray[Any]]:
+def _columns(name: str, array: NDArray[Any], stamps: Set[int]) -> dict[str, NDArray[Any]]:
+    """Columns of an array; `stamps`: lengths of the columns of time."""
     if array.dtype.kind not in "iufbM" or array.ndim not in (1, 2) or array.size < 2:
         return {}
     if array.ndim == 1:
         return {name: array}
-    # One row per sample; MATLAB files often have one column per sample.
-    rows = array.T if array.shape[0] < array.shape[1] else array
+    # One row per sample, as many as there are stamps; MATLAB often has one column per sample.
+    first, second = array.shape
+    across = second in stamps if (first in stamps) != (second in stamps) else first < second
+    rows = array.T if across else array
     if rows.shape[1] > 16:
         return {}
     return {f"{name}[{k}]": np.ascontiguousarray(rows[:, k]) for k in range(rows.shape[1])}

@@ -11,7 +11,7 @@ from tests.coded import coded
 from strapdown import rotation, simulate
 from strapdown.api.attitude import compare_attitude
 from strapdown.errors import ConfigError, DataError
-from strapdown.formats import read_log
+from strapdown.formats import read_log, read_raw
 from strapdown.formats.recording import ReadOptions
 from strapdown.formats.references import read_truth
 from strapdown.tables import ACCEL, GYRO
@@ -118,6 +118,18 @@ def test_three_names_by_prefix_must_be_x_y_and_z(tmp_path):
     assert np.allclose(imu[GYRO].iloc[0], np.radians([1, 3, 4]))
     with pytest.raises(ConfigError, check=coded("io.column-named-twice")):
         read_log(path, ReadOptions(columns={"gyro_x": "GyrY_dps", "gyro_y": "GyrY_dps"}))
+
+
+@pytest.mark.parametrize("count", [2, 3, 4])
+@pytest.mark.parametrize("transposed", [False, True])
+def test_stamps_say_which_way_a_short_array_goes(tmp_path, count, transposed):
+    time = np.arange(count) * 0.01
+    gyro = np.arange(3.0 * count).reshape(count, 3)
+    np.savez(tmp_path / "log.npz", time_s=time, gyro_rad_s=gyro.T if transposed else gyro)
+    raw = read_raw(tmp_path / "log.npz")
+    read = np.column_stack([raw.columns[f"gyro_rad_s[{k}]"] for k in range(3)])
+    # A square is taken as it is.
+    assert np.array_equal(read, gyro.T if transposed and count == 3 else gyro)
 
 
 @pytest.mark.parametrize("transposed", [False, True])
