@@ -60,8 +60,6 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
             "results",
             "Results",
             *tables.result_tables(bench),
-            tables.condition_table(bench),
-            tables.cost_table(bench),
         ),
         section(
             "log", "Signals and attitude", chart("gyro"), chart("attitude"), body_animation(bench)
@@ -74,10 +72,13 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
             chart("difference"),
             tables.difference_table(bench),
             *_named_items("Reference points:", words.reference_lines(bench)),
+            figures=1,
         ),
         section(
             "parts",
-            "Parts of the error, trials and other libraries",
+            "Cost, parts of the error, trials and other libraries",
+            tables.condition_table(bench),
+            tables.cost_table(bench),
             chart("share"),
             tables.budget_table(bench),
             chart("trials"),

@@ -250,7 +250,7 @@ def findings_list(findings: Iterable[Finding], words: Words = "python") -> Items
         parts = (finding.file, finding.quantity, finding.row and f"row {finding.row}")
         text, remedy = finding.sentence(words), finding.advice(words)
         where = ", ".join(str(p) for p in parts if p)
-        rows.append((where, f"{text}. {remedy}." if remedy else text))
+        rows.append((where, f"{text}. {capital(remedy)}." if remedy else text))
     return Items(tuple(rows)) if rows else Paragraph("None.")
 
 

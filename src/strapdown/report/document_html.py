@@ -26,7 +26,7 @@ _SIGNS = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", "'": "&#39;", '"
 #: Characters from which a cell is wide.
 _LONG = 30
 _HOW_TO = (
-    '<span class="livenote"> In a chart: point for values, which every chart over the same time '
+    '<span class="livenote">In a chart: point for values, which every chart over the same time '
     "and the plan show, too; drag to zoom, double-click to return, click a name in the legend to "
     "hide it.</span>"
 )

@@ -20,6 +20,7 @@ from strapdown.report.document import (
     KeyFigures,
     Paragraph,
     TableBlock,
+    capital,
 )
 from strapdown.report.document_html import document_page
 from strapdown.report.navigation_charts import bound_chart, error_charts, height_chart
@@ -417,7 +418,7 @@ def test_findings_stand_with_their_remedies():
     (section,) = [s for s in document.sections if s.slug == "findings"]
     assert section.blocks[0].rows[0] == (
         "rtk.csv",
-        f"{finding.what}. {finding.remedy}.",
+        f"{finding.what}. {capital(finding.remedy)}.",
     )
 
 
