@@ -443,7 +443,7 @@ def grown_factors(ud, growth, room, columns, work):
         d[WITHOUT_SENSORS + taking + s] = weight[p, at]
     for j in range(SENSORS + taking, SENSORS + k):
         core_of_column(turned, ud, j, done)
-        # What is known has no direction, which would grow to no end.
+        # A known quantity has no direction, which would grow to no end.
         by = 1.0 if ud[j, j] != 0.0 else 0.0
         for i in range(CORE):
             ud[i, j] = by * done[i]

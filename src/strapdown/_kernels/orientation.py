@@ -571,7 +571,7 @@ def error_state_sample(r, dt, gx, gy, gz, ax, ay, az, mx, my, mz):
         r[FORCE + 1] += c10 * ax + c11 * ay + c12 * az
         r[FORCE + 2] += c20 * ax + c21 * ay + c22 * az
         r[FORCES] += 1.0
-    # Zeros, as drivers give them before the first conversion, are no field.
+    # Zeros, as drivers give them before the first conversion, are not a field.
     if usable(mx, my, mz) and r[LEVELED] != 0.0 and mx * mx + my * my + mz * mz > 0.0:
         north = c00 * mx + c01 * my + c02 * mz
         east = c10 * mx + c11 * my + c12 * mz
@@ -717,7 +717,7 @@ def complementary_sample(r, dt, gx, gy, gz, ax, ay, az, mx, my, mz):
         ex = gain * (dy * az - dz * ay)
         ey = gain * (dz * ax - dx * az)
         ez = gain * (dx * ay - dy * ax)
-    # Zeros, as drivers give them before the first conversion, are no field.
+    # Zeros, as drivers give them before the first conversion, are not a field.
     if usable(mx, my, mz) and r[LEVELED] != 0.0 and mx * mx + my * my + mz * mz > 0.0:
         north = (1.0 - 2.0 * (y * y + z * z)) * mx + 2.0 * (
             (x * y - w * z) * my + (x * z + w * y) * mz

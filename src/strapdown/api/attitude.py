@@ -214,7 +214,7 @@ def attitude(
         imu = _gyro_alone(t, gyro, sampling)
     else:
         imu = imu_of_arrays(t, gyro, accel, sampling)
-    # Without an accelerometer a rest is no start, and it takes longer to find than the attitude.
+    # Without an accelerometer a rest is not a start, and it takes longer to find than the attitude.
     leveled = set(ACCEL) <= set(imu.columns) or isinstance(gyro_bias, str)
     rests = find_rests(imu) if leveled else ()
     findings: list[Finding] = []

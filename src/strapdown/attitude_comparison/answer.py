@@ -328,7 +328,7 @@ def _of_holding(evidence: Evidence, tolerance: float) -> str | None:
     )
 
 
-#: What a filter uses beside the gyro.
+#: Sensors that a filter uses beside the gyro.
 _AIDS = {
     "gyro+accel": "the accelerometer",
     "gyro+accel+mag": "the accelerometer and the magnetometer",

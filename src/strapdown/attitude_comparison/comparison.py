@@ -620,7 +620,7 @@ def _of_field(
 
 
 def _turn_or_bias(rest: RestStretch, source: AttitudeSource) -> list[Finding]:
-    """Doubt whether a rest is one, where no magnetometer tells it from a steady turn."""
+    """Doubt whether a rest is one, where no magnetometer distinguishes it from a steady turn."""
     if set(MAG) <= set(source.imu.columns) or not could_be_a_turn(rest):
         return []
     return [

@@ -287,7 +287,7 @@ def _removed(
         else:
             rate = values_of(now.imu, GYRO) - (found.bias if part == "bias" else 0.0)
             if part == "scale and axes":
-                # What is left of the bias here is small beside the rates.
+                # The rest of the bias here is small beside the rates.
                 rate = np.asarray(np.linalg.solve(np.eye(3) + found.matrix, rate.T).T)
             imu = now.imu.copy()
             imu[GYRO] = rate
@@ -295,7 +295,7 @@ def _removed(
         q = less.history(MOST_ACCURATE, increments_from_imu(less.imu, less.interpolation))
         row = _row(part, float(unit_rotation_angle(before, q).max()), _errors(less, q))
         if part == "clock":
-            # What the body turns meanwhile.
+            # Rotation of the body meanwhile.
             speed = np.sqrt(np.square(values_of(now.imu, GYRO)).sum(axis=1)).max()
             row["share_deg"] = float(np.degrees(speed)) * found.most_delay_s(index_of(now.imu))
         # A part counts only if less is left without it.

@@ -224,7 +224,7 @@ def _unlock(out: Path, lock: int) -> None:
         os.close(lock)
 
 
-# What a killed run left.
+# Files that a killed run left.
 
 
 def _collect_all(out: Path) -> None:

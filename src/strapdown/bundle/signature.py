@@ -112,7 +112,7 @@ def sign(bundle: str | Path, key: str | Path, password: str | None = None) -> Si
     DataError
         A file differs from the seal.
     ConfigError
-        The key is no Ed25519 key, or its password is wrong or missing.
+        The key is not an Ed25519 key, or its password is wrong or missing.
     """
     root = Path(bundle).absolute()
     changes = unsealed_changes(root, read_manifest(root))
@@ -137,7 +137,7 @@ def sign(bundle: str | Path, key: str | Path, password: str | None = None) -> Si
 def signatures(bundle: Path) -> list[Signature]:
     """Check the signatures in a bundle, in order of their names.
 
-    DataError: a file of this name is no signature. ConfigError: the library is not installed.
+    DataError: a file of this name is not a signature. ConfigError: the library is not installed.
     """
     files = sorted(p for p in bundle.iterdir() if SIGNATURE_FILE.fullmatch(p.name))
     if not files:

@@ -23,7 +23,7 @@ _log = logging.getLogger("strapdown")
 
 #: Terms of messages: options, or the keys of the file that a command runs.
 WORDS: ContextVar[Words] = ContextVar("words", default="cli")
-#: What is held until the command ends.
+#: Lines held until the command ends.
 RESOURCES: ContextVar[ExitStack] = ContextVar("resources")
 # Redirected output has no width; its tables are as wide as needed.
 PIPE_WIDTH = 160

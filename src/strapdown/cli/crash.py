@@ -143,7 +143,7 @@ def crash(
             console().print(printable(run.vehicle_names[run.number - 1]), style="bold")
         with shown_in(run.spec.options.units):
             print_crash(run)
-        # What both say together is told with the first.
+        # Statements of both are printed with the first.
         both = run.closure.findings if run.closure is not None and run.number > 1 else ()
         print_findings([found for found in run.findings if found not in both])
         print_seal(seal, "crash.json", write.no_report)
@@ -179,7 +179,7 @@ def print_crash(result: CaseResult) -> None:
         path_table,
         drive_table,
         comparison_table,
-        # That of two vehicles is told once, below both.
+        # That of two vehicles is printed once, below both.
         *([] if result.partners else [closure_table]),
         deformation_table,
         severity_table,

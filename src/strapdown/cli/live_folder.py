@@ -1,4 +1,4 @@
-"""What a live run received: its journal from the first line to the sealed result, and recovery."""
+"""Input of a live run: its journal from the first line to the sealed result, and recovery."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the cases of a crash say of the contact: deformation, and closure with what was met."""
+"""Statements of the cases of a crash about the contact: deformation, and closure."""
 
 from __future__ import annotations
 

@@ -536,7 +536,7 @@ def _applies(file: TomlFile, given: Any) -> dict[str, tuple[str, ...]]:
 
 def _number(file: TomlFile, value: Any, key: str) -> float:
     number = isinstance(value, int | float) and not isinstance(value, bool)
-    # Nor an integer that is no double, or a number whose square is none.
+    # Nor an integer without a double, or a number whose square overflows.
     if not number or not -LARGEST <= value <= LARGEST:
         raise _bad(file, key, "crash.coefficient-not-a-number", value=value)
     return float(value)

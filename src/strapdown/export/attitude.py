@@ -121,7 +121,7 @@ def _of_filter(
     magnetometer: bool | None,
     imu: pd.DataFrame | None,
 ) -> dict[str, Any]:
-    """What an exported filter takes, from arguments or from samples."""
+    """Inputs of an exported filter, from arguments or from samples."""
     # Of the other sensors a sample may be missing.
     kind = sampling_kind(interpolation, sampling, None if imu is None else imu[GYRO])
     chosen.check_interpolation(interpolation)

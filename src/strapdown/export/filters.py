@@ -39,7 +39,7 @@ HOME = "orientation"
 SENSORS = ("gyro", "accel", "mag")
 #: In a test vector, of a sensor without a new sample: beyond what a filter takes.
 MISSING = 1e30
-#: What is known of the kernels without a magnetometer.
+#: Facts about the kernels without a magnetometer.
 NO_FIELD = {"usable(mx, my, mz)": 0.0, "r[FIELDS]": 0.0, "r[HEADED]": 0.0}
 
 

@@ -317,7 +317,7 @@ ROWS = 64
 
 @dataclass(frozen=True)
 class StepParts:
-    """What a file is made of.
+    """Parts of a file.
 
     `harness`: how a test passes rows of numbers. `gives`: what results of a row are, in words.
     `step`: the kernel of a call, `call` that of the file. `before`: the kernel and the call that

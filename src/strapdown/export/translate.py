@@ -513,7 +513,7 @@ class Body:
         step = 1
         if len(bounds) == 3:
             if not isinstance(bounds[2].constant, int) or bounds[2].constant == 0:
-                raise UntranslatableError("step of a range that is no constant")
+                raise UntranslatableError("step of a range that is not a constant")
             step = bounds[2].constant
         stop_node = call.args[1] if len(bounds) > 1 else call.args[0]
         fixed = not any(

@@ -207,7 +207,7 @@ def along_body(table: pd.DataFrame, axes: str = "") -> pd.DataFrame:
     return out
 
 
-#: What a file that is no table is refused by; a table that is damaged says why.
+#: Refusals of a file that is not a table; a table that is damaged says why.
 _NO_TABLE = ("io.ending-no-known-format", "io.foreign-format", "io.no-stream")
 
 

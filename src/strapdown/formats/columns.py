@@ -1,4 +1,4 @@
-"""What the name of a column says: quantity, axis, unit and sensor, by a vocabulary."""
+"""Meaning of the name of a column: quantity, axis, unit and sensor, by a vocabulary."""
 
 from __future__ import annotations
 

@@ -65,7 +65,7 @@ class _Epoch:
 
 
 def rows_beside(path: Path) -> int:
-    """Count the lines, of the first, that are no sentences and hold the numbers of a sensor."""
+    """Count the lines, of the first, that are not sentences and hold the numbers of a sensor."""
     text, _ = csv.decoded(first_bytes(path, HEAD), path.name)
     others = [line for line in text.splitlines() if line.strip() and "$" not in line]
     rows = [csv.fields_of(line, csv.separator_of(line)) for line in others]

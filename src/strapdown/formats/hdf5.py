@@ -57,7 +57,7 @@ def read_arrays(
 
 
 def outline(path: Path) -> tuple[frozenset[str], frozenset[str]]:
-    """Return the names of all objects and of the attributes of a file; none if it is no HDF5.
+    """Return the names of all objects and of the attributes of a file; none if it is not HDF5.
 
     DataError: it refers to another file.
     """

@@ -227,7 +227,7 @@ ROS = {
     "linear_acceleration": ("accel", "m/s2"),
     "magnetic_field": ("mag", "T"),
 }
-# Words of a sensor's name that do not tell quantities apart.
+# Words of a sensor's name that do not distinguish quantities.
 NOISE = {
     *("raw", "imu", "sensor", "sensors", "data", "body", "device", "phone", "watch", "motion"),
     *("cal", "calib", "calibrated", "corrected", "meas", "measured", "value", "values", "axis"),

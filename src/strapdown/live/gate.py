@@ -21,7 +21,7 @@ __all__ = ["StampGate", "ValueLimits", "value_limits"]
 
 T = TypeVar("T")
 
-#: A longer step is no step of a sensor: held samples further apart do not confirm each other, s.
+#: A longer step is not a step of a sensor: held samples further apart do not confirm each other, s.
 COHERENT = 10.0
 #: Samples that give the usual step, as in `navigation.preprocessing`, and its share of them.
 FIRST, SHARE = 64, 0.95

@@ -40,7 +40,7 @@ __all__ = ["Journal", "SpooledRows", "received_folder"]
 RUN, JOURNAL, LOCK = "run.json", "journal", "lock"
 SCHEMA = "strapdown journal 1"
 MAGIC = f"{SCHEMA}\n".encode()
-#: Interval at which the disk is told to keep what was written, s.
+#: Interval at which written data are flushed to the disk, s.
 SYNCED = 1.0
 #: Length of a payload, its complement, and checksum.
 _FRAME = struct.Struct("<HHI")
@@ -369,7 +369,7 @@ class SpooledRows:
     def __init__(self, columns: int, path: Path | None = None) -> None:
         self.columns, self.count = columns, 0
         self._buffer, self._size = array("d"), 0
-        # What was in a file that cannot be written any more.
+        # Content of a file that cannot be written any more.
         self._kept: NDArray[np.float64] = np.empty(0)
         self._file = None if path is None else path.open("w+b", buffering=0)
 

@@ -134,7 +134,7 @@ def run_heading_checks(
         if youngest >= (RENEWED if heard and heard[-1].sd <= enough else TURN) - TURN / 2.0:
             if len(heard) > 1:
                 heard = [min(heard, key=lambda one: one.sd)]
-            # What came since the last time: a check may last for hours.
+            # Samples since the last time: a check may last for hours.
             said = [one.evidence() for one in told if one.marks.count]
             doubt = doubt or doubted(said, at)
             for ended in told:
@@ -153,7 +153,7 @@ def run_heading_checks(
 
 @dataclass(frozen=True, eq=False)
 class _Run:
-    """What a heading check takes of the run.
+    """Input of a heading check from the run.
 
     Attributes
     ----------
@@ -301,7 +301,7 @@ def _after(time: float, fixes: Epochs) -> Epochs:
 def _scatter(u: Array) -> Array:
     """Scatter of rows of normalized innovations, 1 or more; a few gross errors count little.
 
-    What is not a number is not there.
+    Values that are not numbers are missing.
     """
     sizes = np.sort(np.abs(u), axis=1)
     count = np.maximum(np.isfinite(sizes).sum(axis=1), 1)

@@ -95,7 +95,7 @@ def _solution(m: Any) -> dict[str, Any]:
     return {"values": values if status.status in SOLVED else [np.nan] * 9}
 
 
-#: What is taken of a message, by stream.
+#: Fields taken of a message, by stream.
 _VALUES: dict[str, Callable[[Any], dict[str, Any]]] = {
     "imu": _imu,
     "fix": _fix,

@@ -19,7 +19,7 @@ _PLAIN = "biufSU"
 
 
 def outline(path: Path) -> dict[str, Any]:
-    """List the names of all objects, and of the attributes of the file; none if it is no HDF5.
+    """List the names of all objects, and of the attributes of the file; none if it is not HDF5.
 
     DataError: it refers to another file.
     """
@@ -77,7 +77,7 @@ def _links(file: h5py.File, path: Path) -> list[str]:
     names: list[str] = []
 
     def visit(name: bytes, about: Any) -> str | None:
-        # What is returned ends the walk; the library does not survive an exception in here.
+        # A returned value ends the walk; the library does not survive an exception in here.
         text = name.decode("utf-8", "replace")
         names.append(text)
         if about.type > h5py.h5l.TYPE_SOFT:  # external, or defined by a user

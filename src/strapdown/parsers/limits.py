@@ -1,4 +1,4 @@
-"""What a file may cost: memory, time, and what it may declare, each by its size."""
+"""Limits of the cost of a file: memory, time, and what it may declare, each by its size."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ def contents(path: Path) -> list[list[Any]]:
 
 
 def arrays(path: Path) -> dict[str, Any]:
-    """Read ``arrays`` of numbers, and ``meta``: the rest, as text where it is no number.
+    """Read ``arrays`` of numbers, and ``meta``: the rest, as text where it is not a number.
 
     Fields of a structure are named ``structure.field``. DataError: the file is damaged, or
     declares more data than it holds.

@@ -54,7 +54,7 @@ _process: subprocess.Popen[bytes] | None = None
 #: Files that ended the process: each is asked for by several formats, and once for each stream.
 _refused: dict[tuple[Any, ...], Finding] = {}
 _MOST_REFUSED = 64
-#: What the same file does again.
+#: Behavior of the same file again.
 _LASTING = ("io.parser-crashed", "io.parser-out-of-memory", "io.parser-out-of-time")
 _in_place = False
 

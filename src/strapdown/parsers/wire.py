@@ -73,7 +73,7 @@ def decode(stream: Any, most: int, most_text: int | None = None) -> Any:
     """Read a tree.
 
     `most`: bytes that its arrays may have. `most_text`: that the rest may. EOFError: the stream
-    ended. BrokenAnswerError: it is no tree.
+    ended. BrokenAnswerError: it is not a tree.
     """
     head, size = _LENGTHS.unpack(_exactly(stream, _LENGTHS.size))
     if size > most or head > (most if most_text is None else most_text):

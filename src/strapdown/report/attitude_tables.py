@@ -206,7 +206,7 @@ def difference_table(bench: AttitudeComparison) -> TableBlock | None:
     return TableBlock(("", *names), rows, title=title)
 
 
-#: What each part of the sensor error is.
+#: Description of each part of the sensor error.
 _PARTS = {
     "as stamped": "as stamped",
     "bias": "less a constant bias",

@@ -207,7 +207,7 @@ class Frame:
         """Draw everything within the axes of the panel."""
         panel, (left, top, right, bottom) = self.panel, self.box
         kind = "plane" if panel.x_label else "categories" if panel.categories else "time"
-        # What the page's script needs of the axes.
+        # Data of the axes for the page's script.
         axes = {
             "data_kind": kind,
             "data_group": self.group,

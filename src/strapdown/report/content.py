@@ -1,7 +1,7 @@
 """Compare a file of two runs by its content: numbers within a tolerance, all else exactly.
 
 Another processor or library may round the last digits of a number differently, and other versions
-may draw a page differently. What is compared, by kind of file:
+may draw a page differently. Compared, by kind of file:
 
 * tables and arrays: the numbers of a column within `EQUAL` of its spread; words, units, comments
   and names exactly; JSON: a number within `EQUAL` of itself; places within `PLACE`, times and
@@ -267,7 +267,7 @@ def _apart(name: str, one: NDArray[Any], two: NDArray[Any], scale: float) -> flo
 
 
 class _Text(HTMLParser):
-    """What a page says: its text, the data of its scenes, and where its links lead."""
+    """Content of a page: its text, the data of its scenes, and where its links lead."""
 
     _SAID = ("href", "alt", "title", "aria-label")
 

@@ -342,7 +342,7 @@ def deformation_table(result: CaseResult) -> TableBlock | None:
 
 
 def closure_table(result: CaseResult) -> TableBlock | None:
-    """What a vehicle says with the other, or a barrier: closing speed, restitution, energy."""
+    """Statements of a vehicle with the other, or a barrier: closing speed, restitution, energy."""
     closure = result.closure
     if closure is None:
         return None

@@ -494,7 +494,8 @@ def document_data(
     left = MOST_OPEN - sum(map(_figures_in, plain.front))
     sections = []
     for number, section in enumerate((s for s in plain.sections if s.blocks), start=1):
-        kept, more = [], []
+        kept: list[dict[str, Any]] = []
+        more: list[dict[str, Any]] = []
         shown = 0 if section.folded else max(0, min(section.figures, left))
         for block in section.blocks:
             figures = _figures_in(block)

@@ -604,7 +604,7 @@ def _fix_chart(evaluation: NavigationEvaluation, aid: str, table: pd.DataFrame) 
     time = time[going]
 
     def column(name: str) -> Array:
-        return table[name].to_numpy(dtype=np.float64)[going]
+        return np.asarray(table[name].to_numpy(dtype=np.float64)[going])
 
     panels = []
     quality = column("quality")

@@ -330,15 +330,15 @@ def separation_chart(evaluation: NavigationEvaluation) -> Chart | None:
     # Of several marks before one row the last is that of the row.
     kept = np.flatnonzero(np.append(rows[1:] > rows[:-1], True) & (rows < len(forward.trajectory)))
     kept = kept[:: max(1, -(-kept.size // _SEPARATIONS))]
-    both = (one.trajectory.iloc[rows[kept]] for one in (forward, record))
-    apart = trajectory_differences(*both, evaluation.run.ellipsoid)
+    before, after = (one.trajectory.iloc[rows[kept]] for one in (forward, record))
+    apart = trajectory_differences(before, after, evaluation.run.ellipsoid)
     panels = []
     for column, colour in zip(NED, AXIS_COLOURS, strict=True):
         if column in record.not_estimated:
             continue
-        before, after = (one.sd[column].to_numpy()[kept] for one in (forward, record))
+        less, more = (one.sd[column].to_numpy()[kept] for one in (record, forward))
         # Filter less smoother has the difference of both covariances (`smoother_consistency`).
-        reach = TWO_SIDED_95 * np.sqrt(np.maximum(np.square(before) - np.square(after), 0.0))
+        reach = TWO_SIDED_95 * np.sqrt(np.maximum(np.square(more) - np.square(less), 0.0))
         line = curve("separation", marks[kept], apart[column], colour, buckets=BUCKETS)
         fill = thin_fill("95 % expected", marks[kept], -reach, reach, GREY, opacity=0.25)
         panels.append(Panel(f"{column}, m", (line,), fills=(fill,), height=0.8))

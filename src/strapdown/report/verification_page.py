@@ -86,7 +86,7 @@ def verification_page(
         facts=facts,
         front=front,
         sections=(
-            section("findings", "What was found", _findings(result.findings)),
+            section("findings", "Findings", _findings(result.findings)),
             section(
                 "outputs",
                 "Results",

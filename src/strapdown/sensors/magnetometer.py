@@ -220,7 +220,7 @@ def without_iron(
 def _finding(
     code: str, imu: pd.DataFrame, used: MagnetometerCalibration, raw_scatter: float, scatter: float
 ) -> Finding:
-    """What the sentences about a calibration show."""
+    """Values that the sentences about a calibration show."""
     return Finding(
         code,
         file=imu.attrs.get("source"),

@@ -201,9 +201,9 @@ def _drifts(
     """Whether, within still windows, the mean of some is not that of others up to 8 s later.
 
     `start` ((n,), s) of each window; `slow`: means ((n, 3)), their standard deviations ((n,)), and
-    the change of a stationary sensor. Both means are over half a lag, so that a jolt is no drift.
-    Windows between two that differ are marked, at the shortest lag first: what it marks is not
-    compared over a longer one.
+    the change of a stationary sensor. Both means are over half a lag, so that a jolt is not taken
+    for drift. Windows between two that differ are marked, at the shortest lag first; marked ones
+    are not compared over a longer lag.
     """
     index, left = np.arange(len(start)), still.copy()
     totals = [np.vstack([np.zeros(3), np.cumsum(mean, axis=0)]) for mean, _, _ in slow]
@@ -467,7 +467,7 @@ def _shaking_means(
         & (np.sqrt(scatter[:, :3].sum(axis=1)) <= MAX_GYRO_SCATTER)
         & (np.sqrt(scatter[:, 3:].sum(axis=1)) <= MAX_ACCEL_SCATTER)
     )
-    # From block to block, so that a drift is no noise.
+    # From block to block, so that drift does not count as noise.
     noise = 0.5 * np.square(np.diff(means[good], axis=1)).mean(axis=1)
     shakes[full[good]], mean[full[good]] = True, of[good]
     sd[full[good]] = np.sqrt(noise.reshape(-1, 2, 3).sum(axis=2) / BLOCKS)

@@ -677,7 +677,7 @@ def _velocities_show_arm(fixes: pd.DataFrame, imu: pd.DataFrame) -> bool:
     count = len(rate) // size
     if not len(sd) or count < 2:
         return False
-    # What is constant is mostly a bias.
+    # A constant part is mostly a bias.
     means = rate[: count * size].reshape(count, size, 3).mean(axis=1)
     turn = float(np.sqrt(np.square(means - means.mean(axis=0)).sum(axis=1).mean()))
     scatter = min(float(np.median(sd)), white_velocity_sd(fixes) or math.inf)

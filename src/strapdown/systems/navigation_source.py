@@ -225,7 +225,7 @@ def read_measured(
     names: Mapping[str, str] | None = None,
     repair: bool = False,
 ) -> pd.DataFrame:
-    """Read the table of a measurement that is no receiver, or its stream of a recording.
+    """Read the table of a measurement other than a receiver, or its stream of a recording.
 
     Parameters
     ----------

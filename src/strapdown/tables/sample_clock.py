@@ -31,7 +31,7 @@ MOST_LOST = 0.5
 #: Of the intervals between deliveries, the share that is within this part of the usual one, where
 #: deliveries are even; least share of a size of bursts that counts.
 PACKETS, EVEN, OFTEN = 0.5, 0.1, 0.005
-#: Bursts whose sizes are summed to tell losses from a timer.
+#: Bursts whose sizes are summed to distinguish losses from a timer.
 BURSTS_SUMMED = 25
 #: Steps within this part of a step of whole multiples, and their share, need no tracking.
 MULTIPLE, MULTIPLES = 0.15, 0.98

@@ -10,6 +10,7 @@ import pytest
 from tests.coded import coded
 from tests.unit.report.navigation_records import one_epoch, record, shifted, told, without_aids
 
+from strapdown.constants import TWO_SIDED_95
 from strapdown.dsp.chi_square import PLANE_95
 from strapdown.errors import DataError, Finding
 from strapdown.navigation.outage_test import Withheld, WithheldScore
@@ -34,6 +35,7 @@ from strapdown.report.navigation_document import (
     navigation_document,
     observation_table,
     outage_table,
+    separation_chart,
     smoothing_chart,
     smoothing_table,
     state_table,
@@ -105,6 +107,24 @@ def test_what_is_not_estimated_has_no_bound_of_zero():
     assert [bool(panel.fills) for panel in panels] == [True, True, False]
     for text in words(navigation_document(found, "made")):
         assert not re.search(r"\bnan\b", text), text
+
+
+def test_the_separation_of_filter_and_smoother_has_its_expected_band():
+    smoothed = record()
+    ahead = record(place=tuple(np.add((55.0, 37.0, 150.0), (1.0 / 111_350.0, 0.0, 0.0))))
+    forward = replace(ahead, sd=2.0 * smoothed.sd)
+    chart = separation_chart(told(smoothed, forward=forward))
+    north, east, down = (p for p in chart.panels if not p.categories)
+    # A degree of latitude is 111,350 m at 55 deg north.
+    assert north.lines[0].y == pytest.approx(1.0, abs=2e-3)
+    assert east.lines[0].y == pytest.approx(0.0, abs=2e-3)
+    # Variances 4 and 1: the difference has a standard deviation of the root of 3 of the smoothed.
+    (fill,) = down.fills
+    at = np.isin(smoothed.sd.index, fill.x)
+    expected = TWO_SIDED_95 * np.sqrt(3.0) * smoothed.sd["down"].to_numpy()[at]
+    assert fill.high == pytest.approx(expected)
+    assert fill.low == pytest.approx(-expected)
+    assert separation_chart(told(smoothed)) is None
 
 
 def test_a_smoothed_run_has_no_bound_of_what_is_not_estimated():

@@ -292,7 +292,7 @@ def unsure_steps(gnss: pd.DataFrame) -> list[tuple[float, float]]:
 
 
 def _irregular(steps: Array) -> tuple[float | None, NDArray[np.bool_]]:
-    """Usual interval of regular stamps, s, and the few intervals that are no multiple of it.
+    """Usual interval of regular stamps, s, and the few intervals that are not a multiple of it.
 
     None where stamps are not regular.
     """
