@@ -27,7 +27,6 @@ PAGES = [page for page in RUNNER.pages() if any(map(RUNNER.is_run, RUNNER.exampl
 #: Pages whose examples take more than 8 s; `make examples` runs them.
 SLOW = {
     "align",
-    "alignment",
     "answer",
     "attitude",
     "coast",
@@ -36,13 +35,9 @@ SLOW = {
     "crash",
     "crash_tutorial",
     "doctor",
-    "error_models",
-    "health",
-    "mechanization",
     "navigate",
     "prefilter",
     "references",
-    "results",
     "scenarios",
     "sins1000",
     "smoothing",
