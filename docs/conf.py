@@ -13,6 +13,7 @@ from docutils.parsers.rst import Directive
 from docutils.utils.math.latex2mathml import tex2mathml
 
 from strapdown import __version__
+from strapdown.cli.modules_list import HEADINGS, cell_text, listed_modules
 
 project = "strapdown"
 version = release = __version__
@@ -93,6 +94,26 @@ def _write_messages(app: Any) -> None:
     (Path(app.srcdir) / "messages.md").write_text("\n".join(parts), encoding="utf-8")
 
 
+_MODULES = """# Modules and formats
+
+Every name that a command, a configuration or a function accepts. The page is made of the tables in
+the code when the manual is built; `strapdown modules` prints it with your plug-ins, and `--json`
+as data.
+"""
+
+
+def _write_modules(app: Any) -> None:
+    """Make the page of modules of the lists of `strapdown modules`."""
+    parts = [_MODULES]
+    for listed in listed_modules()[0]:
+        columns = list(listed.rows[0])
+        rows = [[_prose(cell_text(row[c])) for c in columns] for row in listed.rows]
+        parts.append(f"## {_prose(listed.title)}\n")
+        heads = [[HEADINGS.get(c, c) for c in columns], ["---"] * len(columns)]
+        parts += [f"| {' | '.join(cells)} |" for cells in [*heads, *rows]] + [""]
+    (Path(app.srcdir) / "modules.md").write_text("\n".join(parts), encoding="utf-8")
+
+
 def _prose(template: str) -> str:
     """Text of a template as Markdown that is taken as it is."""
     text = re.sub(r"\{(\w+(?:\.\w+)?)(?:![rsa])?:[^{}]*(?:\{\w+\})?[^{}]*\}", r"{\1}", template)
@@ -103,6 +124,7 @@ def _prose(template: str) -> str:
 def setup(app: Any) -> dict[str, bool]:
     """Register the writer of formulas, and cells of notebooks."""
     app.connect("builder-inited", _write_messages)
+    app.connect("builder-inited", _write_modules)
     app.add_directive("code-cell", CodeCell)
     app.add_html_math_renderer("mathml", (_math, None), (_math, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}

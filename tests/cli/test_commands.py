@@ -146,6 +146,10 @@ def test_modules_lists_what_there_is(run_cli):
         "h5",
     ):
         assert word in text
+    sensors = json.loads(run_cli("modules", "--json").out)["sensors"]
+    assert {"name": "mpu-6050", "class": "phone", "sourced": "17 of 21"}.items() <= next(
+        one.items() for one in sensors if one["name"] == "mpu-6050"
+    )
 
 
 def test_a_simulation_takes_a_named_sensor_or_a_file(here, run_cli):

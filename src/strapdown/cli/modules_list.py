@@ -34,6 +34,7 @@ _UNSAID = {"update_rule": "; where none is named, every observation counts in fu
 #: Column headings on a terminal, where they differ from the names for a script.
 HEADINGS = {
     "summary": "what it is",
+    "sourced": "figures with a source",
     "duration_s": "s",
     "semi_major_axis_m": "a, m",
     "inverse_flattening": "1/f",
@@ -210,7 +211,11 @@ def _tables() -> Iterator[tuple[str, str, Mapping[str, Any], Columns]]:
         "sensors",
         "Sensors that can be simulated",
         {s.name: s for s in map(load_sensor, SENSORS)},
-        {"class": lambda _, s: s.grade, "summary": lambda _, s: f"{s.title}: {s.summary}"},
+        {
+            "class": lambda _, s: s.grade,
+            "sourced": lambda _, s: f"{sum(bool(f.source) for f in s.sources)} of {len(s.sources)}",
+            "summary": lambda _, s: f"{s.title}: {s.summary}",
+        },
     )
     written = {w.reader: n for n, w in reversed(WRITERS.items())}
     yield (

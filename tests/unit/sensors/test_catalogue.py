@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tomllib
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +16,6 @@ from strapdown.sensors.catalogue import GRADES, SENSORS, load_sensor
 from strapdown.sensors.triad_errors import TriadErrors
 
 DEG = np.pi / 180.0
-MANUAL = Path(__file__).parents[3] / "docs" / "sensors.md"
 GOOD = """
 title = "Own part"
 class = "phone"
@@ -194,18 +192,6 @@ def test_names_are_listed_without_reading_a_number(monkeypatch):
     monkeypatch.setattr(tomllib, "loads", never)
     assert "mpu-6050" in catalogue.SENSORS
     assert 12 <= len(catalogue.SENSORS) == len(list(catalogue.FOLDER.glob("*.toml")))
-
-
-def test_the_manual_lists_every_sensor_as_its_file_says():
-    text = MANUAL.read_text(encoding="utf-8")
-    rows = [line for line in text.splitlines() if line.startswith("| `")]
-    for sensor in map(load_sensor, SENSORS):
-        assumed = sum(bool(f.assumed) for f in sensor.sources)
-        wanted = (
-            f"| `{sensor.name}` | {sensor.grade} | {sensor.title} | "
-            f"{len(sensor.sources) - assumed} / {assumed} |"
-        )
-        assert wanted in rows
 
 
 @pytest.mark.parametrize("source", ['["ds"]', "{a = 1}", "7"])
