@@ -169,6 +169,25 @@ def test_a_simulation_takes_a_named_sensor_or_a_file(here, run_cli):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (("navigate", "log.csv", "--sensor", "x"), "error: --sensor: unknown sensor 'x'"),
+        (("attitude", "log.csv", "--format=x"), "error: --format: unknown format of a log 'x'"),
+    ],
+)
+def test_an_unknown_choice_is_named_by_its_option(tmp_path, given, said):
+    rows = "\n".join(f"{k / 100},0.1,0.2,0.3,0,0,-9.8" for k in range(200))
+    names = ",".join(
+        f"{t}_{a}_{u}" for t, u in (("gyro", "rad_s"), ("accel", "m_s2")) for a in "xyz"
+    )
+    (tmp_path / "log.csv").write_text(f"time_s,{names}\n{rows}\n")
+    done = shell(*given, "--out", "out", cwd=tmp_path)
+    assert done.stderr.splitlines()[0] == said
+    assert done.returncode == 4
+
+
+@pytest.mark.slow
 def test_python_m_strapdown_and_a_closed_pipe(tmp_path):
     assert shell("--version").stdout.startswith("strapdown 0.")
     done = shell("attitude", "no-such-log.csv", cwd=tmp_path)

@@ -431,7 +431,7 @@ def test_keys_are_refused_by_what_is_wrong_with_them(copy, tmp_path):
     (tmp_path / "text").write_text("no key")
     cases = [
         ("text", None, "bundle.no-secret-key"),
-        ("missing", None, "bundle.no-secret-key"),
+        ("missing", None, "bundle.no-key-file"),
         ("open.pem.pub", None, "bundle.no-secret-key"),
         ("locked.pem", None, "bundle.key-needs-password"),
         ("locked.pem", "wrong", "bundle.wrong-password"),

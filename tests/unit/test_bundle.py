@@ -241,6 +241,9 @@ def test_a_folder_that_is_referred_to_may_have_moved(tmp_path):
 def test_what_is_no_bundle_is_said_to_be_none(tmp_path):
     with pytest.raises(DataError, check=coded("bundle.no-manifest")):
         verify(tmp_path)
+    (tmp_path / "log.csv").write_text("t,x\n")
+    with pytest.raises(DataError, check=coded("bundle.no-folder")):
+        verify(tmp_path / "log.csv")
     (tmp_path / MANIFEST).write_text("{")
     with pytest.raises(DataError, check=coded("bundle.not-json")):
         verify(tmp_path)

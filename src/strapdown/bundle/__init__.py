@@ -444,6 +444,8 @@ def read_manifest(bundle: Path) -> dict[str, Any]:
     path = bundle / MANIFEST
     if not bundle.exists():
         raise DataError("bundle.no-such-folder", file=str(bundle))
+    if not bundle.is_dir():
+        raise DataError("bundle.no-folder", file=str(bundle))
     if not path.is_file():
         raise DataError("bundle.no-manifest", file=str(bundle))
     if path.is_symlink() or path.stat().st_size > LARGEST:

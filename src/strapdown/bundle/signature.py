@@ -206,7 +206,7 @@ def _secret_key(path: Path, password: str | None) -> Ed25519PrivateKey:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
     if not path.is_file():
-        raise ConfigError("bundle.no-secret-key", file=str(path), quantity="--key")
+        raise ConfigError("bundle.no-key-file", file=str(path), quantity="--key")
     data = _small(path)
     load: Any = (
         form.load_ssh_private_key if b"OPENSSH PRIVATE KEY" in data else form.load_pem_private_key

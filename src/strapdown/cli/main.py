@@ -140,7 +140,8 @@ def run() -> None:
             start_for(sys.argv[1:])  # beside the imports of the command
             app()
     except StrapdownError as error:
-        text = "\n  ".join([error.finding.text(WORDS.get()), *_answers(error.finding)])
+        finding = _by_option(error.finding, sys.argv[1:])
+        text = "\n  ".join([finding.text(WORDS.get()), *_answers(finding)])
         _fail(text, error.exit_code)
     except OSError as error:
         if error.errno == errno.EPIPE:
@@ -164,6 +165,15 @@ PLACEHOLDERS = {
     "--axes": "AXES",
     "--columns": "NAME",
 }
+
+
+def _by_option(finding: Finding, given: list[str]) -> Finding:
+    """Return a finding about a choice with the option that made it."""
+    option = f"--{(finding.quantity or '').replace('_', '-')}"
+    if finding.file or not any(word.partition("=")[0] == option for word in given):
+        return finding
+    known = {name for param in _parameters(given[0], given) for name in param.opts}
+    return finding.replace(quantity=option) if option in known else finding
 
 
 def _blanks(flags: list[str]) -> dict[str, str]:

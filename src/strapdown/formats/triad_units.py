@@ -122,6 +122,7 @@ def units_of_triads(
             findings.append(_not_used(raw, triad, "io.left-out-linear-acceleration"))
             continue
         stated = _stated_unit(raw, found, triad, options)
+        findings += _overruled(raw, found, triad, options)
         if stated is None or raw.checked or _asked_unit(triad, options):
             asked.add(triad)
         try:
@@ -193,6 +194,31 @@ def _refuse_open(raw: RawLog, found: dict[str, Column], triad: str) -> None:
 def _asked_unit(triad: str, options: ReadOptions) -> str | None:
     """Return the unit stated by the user."""
     return {"gyro": options.gyro_unit, "accel": options.accel_unit}.get(triad)
+
+
+def _overruled(
+    raw: RawLog, found: dict[str, Column], triad: str, options: ReadOptions
+) -> list[Finding]:
+    """A warning where the user states another unit than the columns."""
+    asked = _asked_unit(triad, options)
+    columns = [found[f"{triad}_{a}"] for a in AXES]
+    stated = {c.unit for c in columns} - {None}
+    if not asked or not stated or not stated <= set(UNITS[triad]):
+        return []
+    unit = parse_unit(asked, triad)
+    if stated == {unit}:
+        return []
+    return [
+        Finding(
+            "io.unit-stated-otherwise",
+            severity="warning",
+            file=raw.name,
+            quantity=triad,
+            unit=unit,
+            file_unit=", ".join(sorted(map(str, stated))),
+            source=columns[0].source,
+        )
+    ]
 
 
 def _stated_unit(

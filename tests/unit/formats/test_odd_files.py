@@ -120,6 +120,18 @@ def test_three_names_by_prefix_must_be_x_y_and_z(tmp_path):
         read_log(path, ReadOptions(columns={"gyro_x": "GyrY_dps", "gyro_y": "GyrY_dps"}))
 
 
+@pytest.mark.parametrize(("stated", "codes"), [("deg/s", ["gyro"]), ("rad/s", []), (None, [])])
+def test_a_unit_against_the_names_of_the_columns_is_used_and_said(tmp_path, stated, codes):
+    time = np.arange(100) * 0.01
+    gyro = {f"gyro_{a}_rad_s": np.sin(time) for a in "xyz"}
+    np.savez(tmp_path / "log.npz", time_s=time, **gyro)
+    log = read_log(tmp_path / "log.npz", ReadOptions(gyro_unit=stated))
+    said = [f.quantity for f in log.findings if f.code == "io.unit-stated-otherwise"]
+    assert said == codes
+    factor = np.pi / 180.0 if stated == "deg/s" else 1.0
+    assert log.imu["gyro_x"].to_numpy() == pytest.approx(factor * np.sin(time))
+
+
 @pytest.mark.parametrize("count", [2, 3, 4])
 @pytest.mark.parametrize("transposed", [False, True])
 def test_stamps_say_which_way_a_short_array_goes(tmp_path, count, transposed):
