@@ -29,7 +29,6 @@ SLOW = {
     "align",
     "alignment",
     "answer",
-    "attitude",
     "coast",
     "consistency",
     "convert",
