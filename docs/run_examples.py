@@ -10,7 +10,7 @@ without it.
 ``console`` blocks are commands and what they print. ``python`` blocks, and the cells of pages that
 are notebooks kept as text (jupytext's form "myst"), run after them in order in one Python process;
 what one prints, and of a cell the value of its last line, is compared with the ``text`` block under
-it.
+it. A line of a cell that begins with ``!`` is a command, as in Jupyter.
 What cannot run has its reason above it, in a comment: ``<!-- not run: REASON -->``.
 """
 
@@ -37,12 +37,18 @@ BLOCK = re.compile(
 # Runs the code that it is given as JSON, each with whether it is a cell, whose last value is shown;
 # tells what each printed, and where one failed.
 RUNNER = """
-import ast, contextlib, io, json, sys, traceback
+import ast, contextlib, io, json, re, subprocess, sys, traceback
 space, printed = {"__name__": "__main__"}, []
+def command(line):
+    done = subprocess.run(["bash", "-c", line], stdout=-1, stderr=-2, text=True)
+    print(done.stdout, end="")
+space["command"] = command
 for code, is_cell in json.load(sys.stdin):
     out = io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(out):
         try:
+            if is_cell:
+                code = re.sub("^!(.*)", lambda line: f"command({line[1]!r})", code, flags=re.M)
             body = ast.parse(code)
             last = body.body[-1] if body.body else None
             value = is_cell and isinstance(last, ast.Expr)
@@ -74,7 +80,7 @@ def commands(block: str) -> list[tuple[str, list[str]]]:
 
 
 def run(command: str, folder: Path) -> list[str]:
-    """Return what a command prints, without what differs from machine to machine."""
+    """Return what a command prints."""
     done = subprocess.run(
         ["bash", "-c", command],
         cwd=folder,
@@ -84,8 +90,12 @@ def run(command: str, folder: Path) -> list[str]:
         text=True,
         check=False,
     )
-    text = done.stdout.replace(str(folder), "…")
-    text = re.sub(r"sha256 [0-9a-f]{64}", "sha256 …", text)
+    return plain(done.stdout, folder)
+
+
+def plain(text: str, folder: Path) -> list[str]:
+    """Return the lines of an output, without what differs from machine to machine."""
+    text = re.sub(r"sha256 [0-9a-f]{64}", "sha256 …", text.replace(str(folder), "…"))
     return "\n".join(line.rstrip() for line in text.splitlines()).strip("\n").splitlines()
 
 
@@ -128,11 +138,7 @@ def run_cells(cells: list[tuple[str, bool]], folder: Path) -> list[list[str]]:
         text=True,
         check=True,
     )
-    found = []
-    for out in json.loads(done.stdout):
-        lines = [line.rstrip() for line in out.replace(str(folder), "…").splitlines()]
-        found.append("\n".join(lines).strip("\n").splitlines())
-    return found
+    return [plain(out, folder) for out in json.loads(done.stdout)]
 
 
 def examples(page: Path) -> list[re.Match[str]]:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.cli.test_manual import RUNNER
 
 from strapdown import simulate
 from strapdown.api.attitude import compare_attitude
@@ -119,6 +120,16 @@ def test_the_rates_of_the_readme_are_what_is_drawn_now(tmp_path):
 
 def test_the_crash_of_the_readme_is_what_is_drawn_now(sealed_crash):
     compare_picture(sealed_crash.folder / "figures" / "path.svg", "crash_path.svg")
+
+
+@pytest.mark.slow
+def test_the_crash_of_the_tutorial_is_what_its_commands_draw_now(recordings, tmp_path, monkeypatch):
+    monkeypatch.setenv("STRAPDOWN_DATA", str(recordings("crash_nhtsa_10146").parent))
+    monkeypatch.setenv("PATH", f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
+    cells = [cell["code"] for cell in RUNNER.examples(ROOT / "docs" / "crash_tutorial.md")]
+    drawing = next(k for k, cell in enumerate(cells) if "--out report" in cell)
+    RUNNER.run_cells([(cell, True) for cell in cells[: drawing + 1]], tmp_path)
+    compare_picture(tmp_path / "report" / "figures" / "delta-v.svg", "crash_wall.svg")
 
 
 @pytest.mark.slow

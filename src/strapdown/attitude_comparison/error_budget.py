@@ -344,6 +344,11 @@ def holding_time(grounds: Grounds, tolerance_deg: float) -> Holding | None:
     if grounds.truth is None:
         return None
     time, reference = index_of(grounds.imu), grounds.truth
+    # In a simulation `own` is the truth.
+    run = grounds.own.q_nb
+    if grounds.exact:
+        increments = increments_from_imu(grounds.imu, grounds.interpolation)
+        run = grounds.history(MOST_ACCURATE, increments)
     times: list[float] = []
     ended: list[bool] = []
     thin = max(1, round(INSTANTS / grounds.clock.step))
@@ -352,7 +357,7 @@ def holding_time(grounds: Grounds, tolerance_deg: float) -> Holding | None:
         if known.size < 2:
             continue
         # Error of the attitude in local-level axes; its change is that of a run from then on.
-        error = rotation.compose(grounds.own.q_nb[known], rotation.conjugate(reference.q_nb[known]))
+        error = rotation.compose(run[known], rotation.conjugate(reference.q_nb[known]))
         at = time[known]
         starts = np.flatnonzero(np.diff(np.floor((at - at[0]) / STARTS), prepend=-1.0))
         for k in starts[:-1]:

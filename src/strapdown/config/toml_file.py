@@ -107,8 +107,8 @@ def _text(path: Path) -> str:
         raise ConfigError("config.not-a-file-name", file=shown(str(path)), reason=error) from None
 
 
-#: File name endings of data tables, which are not configurations.
-RECORDS = (".csv", ".tsv", ".txt", ".dat")
+#: File name endings of data tables and crash records, which are not configurations.
+RECORDS = (".csv", ".tsv", ".txt", ".dat", ".ev5", ".mme")
 
 
 def _no_toml(path: Path, text: str, said: str) -> ConfigError:

@@ -39,8 +39,9 @@ def test_a_slip_is_answered_with_what_was_meant(row, tmp_path):
     assert caught.value.finding.code == SLIPS[row]
 
 
-def test_a_record_in_place_of_a_file_is_answered_with_init(tmp_path):
-    path = tmp_path / "left.csv"
+@pytest.mark.parametrize("name", ["left.csv", "v10146.EV5"])
+def test_a_record_in_place_of_a_file_is_answered_with_init(name, tmp_path):
+    path = tmp_path / name
     path.write_text("time_s,ax\n0,1\n", encoding="utf-8")
     with pytest.raises(ConfigError) as caught:
         read_toml(path)

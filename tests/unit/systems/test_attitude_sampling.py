@@ -214,6 +214,14 @@ def test_integration_holds_a_tolerance_for_as_long_as_a_bias_takes(tmp_path):
     assert not wide.answer.holding.ends
 
 
+def test_integration_with_a_simulated_sensor_does_not_hold_a_tolerance_beyond_its_errors():
+    bench = compare_attitude("gestures", sensor="mpu-6050", rate_hz=50.0, gyro_bias="none", **ONE)
+    held = bench.answer.holding
+    assert held.ends
+    # The bias of this part is up to 20 deg/s on each axis: 1 deg at most by 35 deg/s.
+    assert 1.0 / 35.0 < held.shortest_s < 1.0
+
+
 def still(count, rng, up=-9.81):
     accel = rng.normal(0.0, 0.02, (count, 3))
     accel[:, 2] += up
