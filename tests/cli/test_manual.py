@@ -30,6 +30,7 @@ SLOW = {
     "alignment",
     "answer",
     "attitude",
+    "car",
     "coast",
     "consistency",
     "convert",
