@@ -133,7 +133,7 @@ def spans_to_withhold(begin: float, end: float, length: float, places: int = 5) 
             quantity="withhold",
             places=places,
             length=length,
-            end=end - begin,
+            end=max(end - begin, 0.0),
         )
     starts = begin + room * (np.linspace(0.0, 1.0, places) if places > 1 else np.array([0.5]))
     return tuple(Span(f"{length:g} s", float(at), float(at + length)) for at in starts)

@@ -599,14 +599,16 @@ class NavigationRun(SavedRun):
         return self.trust
 
     def to_pandas(self) -> pd.DataFrame:
-        """The trajectory with its standard deviations, at their common instants.
+        """The trajectory with its standard deviations, linear in time between their instants.
 
         Returns
         -------
         DataFrame
             Columns of `trajectory`, and those of `sd` with the suffix ``_sd``.
         """
-        return self.trajectory.join(self.sd.add_suffix("_sd"), how="inner")
+        at, known = self.trajectory.index, self.sd.index
+        sd = {f"{name}_sd": np.interp(at, known, self.sd[name]) for name in self.sd}
+        return self.trajectory.assign(**sd)
 
     def plot(self, kind: str = "plan") -> ChartFigure:
         """Draw one chart of the report.

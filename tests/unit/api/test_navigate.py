@@ -140,15 +140,26 @@ def test_a_run_shows_itself_and_cannot_be_changed(of_files):
     assert "<table" in of_files._repr_html_()
     table = of_files.to_pandas()
     assert {"lat", "heading", "north_sd", "heading_sd"} <= set(table.columns)
-    # The filter's covariance just before each fix has no sample of the trajectory.
-    before = np.diff(of_files.sd.index) < 1e-5
-    assert 100 < before.sum() <= len(of_files.sd) - len(table) <= before.sum() + 2
+    assert table.index.equals(of_files.trajectory.index)
+    common = table.index.intersection(of_files.sd.index)
+    assert len(common) > 100
+    assert table.loc[common, "north_sd"].equals(of_files.sd.loc[common, "north"].rename("north_sd"))
     with pytest.raises(dataclasses.FrozenInstanceError):
         of_files.record = None
     for kind in ("plan", "bound", "gnss.position"):
         assert of_files.plot(kind).panels
     with pytest.raises(ConfigError, check=coded("report.unknown-chart")):
         of_files.plot("gnss.positoin")
+
+
+def test_a_run_whose_epochs_are_between_its_samples_shows_itself(short):
+    imu, run = short
+    fixes = sd.GnssFixes(run.trajectory.assign(north_sd=1.0, east_sd=1.0, down_sd=1.0))
+    between = fixes.set_axis(fixes.index + 0.0041)
+    off = sd.navigate(imu, [sd.Gnss(between)], sensor=SENSOR, start={"heading_deg": 30.0})
+    assert "<table" in off._repr_html_()
+    assert off.to_pandas().index.equals(off.trajectory.index)
+    assert off.to_pandas()["north_sd"].notna().all()
 
 
 def test_a_lever_arm_reaches_the_filter(folder, short):
