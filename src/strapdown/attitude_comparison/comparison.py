@@ -669,7 +669,7 @@ def initial_attitude(
     how = {"truth": "from the truth", "level": "levelled; heading zero", "zero": "zero"}
     if choice == "auto":
         choice = "truth" if truth is not None else "level" if at_rest else "zero"
-        how["level"] += ", because nothing says what it is"
+        how["level"] += ": it is not stated"
         how["zero"] += (
             ", because none was given and the log does not begin at rest with an accelerometer"
         )

@@ -346,7 +346,7 @@ def print_comparison(bench: AttitudeComparison) -> None:
         page.print(f"and {len(points) - MOST_LINES} more reference points, in the report")
     page.print(bench.answer.sentence, style="bold")
     page.print(words.standing(bench))
-    for title, lines in (("Why", bench.answer.why), ("What would help", bench.answer.helps)):
+    for title, lines in (("Why", bench.answer.why), ("Remedies", bench.answer.helps)):
         if lines:
             page.print(f"{title}:")
         for line in lines:

@@ -162,7 +162,7 @@ def _tables() -> Iterator[tuple[str, str, Mapping[str, Any], Columns]]:
     )
     yield (
         "standstill_thresholds",
-        "What becomes of its threshold (threshold_rule = …)",
+        "Threshold rules of an update rule (threshold_rule = …)",
         STANDSTILL_THRESHOLDS,
         _SUMMARY,
     )
@@ -189,7 +189,7 @@ def _tables() -> Iterator[tuple[str, str, Mapping[str, Any], Columns]]:
     )
     yield (
         "crashes",
-        "Crashes with exact truth, and what is none",
+        "Crashes with exact truth, and records without a crash",
         CRASHES,
         {
             "duration_s": lambda _, c: float(f"{c.motion.duration:.3g}"),

@@ -83,7 +83,7 @@ SLOTS: dict[str, Slot] = {
         Slot("covariance", "Covariance forms", CovarianceForm, COVARIANCES),
         Slot("update_rule", "Update rules", UpdateRule, UPDATE_RULES),
         Slot("influence", "Influence functions", Influence, INFLUENCES),
-        Slot("aiding", "Aids", Measurement, WithPlugins(AIDS, "measurement", Measurement)),
+        Slot("aiding", "Measurements", Measurement, WithPlugins(AIDS, "measurement", Measurement)),
         Slot("damping", "Dampings", Correction, DAMPINGS),
         Slot("smoother", "Smoothers", RauchTungStriebel, SMOOTHERS),
         Slot("recorder", "Recorders", Recorder, RECORDERS),

@@ -127,7 +127,7 @@ def unit_line(unit: UnitReconstruction) -> str:
         size, axis = unit.events.largest_change, unit.events.largest_axis
         lines = [f"{unit.name}: no event, at most {size:.2f} m/s ({axis})"]
         if (cut := unit.events.cut_change) > 0.0:
-            lines = [f"{unit.name}: the record ends within a blow, at least {cut:.2f} m/s"]
+            lines = [f"{unit.name}: the record ends within an impact, at least {cut:.2f} m/s"]
     return "\n".join([*lines, f"{unit.name}, {path_line(unit.path)}"])
 
 

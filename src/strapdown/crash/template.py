@@ -482,7 +482,7 @@ def _told(unit: Unit) -> str:
     ranges = ["low range" if count > 1 else "one range", *["high range"] * (count - 1)]
     if not clock.unit:
         at = impact.trigger * clock.rate
-        what = f"its largest blow begins near sample {at:.0f}; it has no clock"
+        what = f"its largest impact begins near sample {at:.0f}; it has no clock"
     elif impact.found:
         what = (
             f"struck at {instant(impact.trigger)} s of its clock, "
@@ -1142,12 +1142,12 @@ def _like(unit: Unit, goal: float | None, name: str) -> Unit:
         off = {t: abs(float(within_half_turn(np.array([at - goal]))[0])) for t, at in came.items()}
         best = min(off, key=lambda t: off[t])
         if off[best] <= SAME_DIRECTION:
-            why = f"with it the blow comes from where '{name}' has it, within {off[best]:.0f} deg"
+            why = f"with it the impact comes from where '{name}' has it, within {off[best]:.0f} deg"
             return replace(unit, heading_deg=best, heading_why=f"assumed: {why}")
     # Where x is vertical, it points to no side.
     shown = sitting is not None and abs(sitting.pitch_deg) <= MOST_PITCH
     told = [
-        f"{turn:g}{f' (its x points {POINTS[turn]})' if shown else ''} makes it a blow from "
+        f"{turn:g}{f' (its x points {POINTS[turn]})' if shown else ''} makes it an impact from "
         f"{side_of(at)}"
         for turn, at in came.items()
     ]

@@ -129,7 +129,7 @@ def attitude_document(bench: AttitudeComparison, drawn: Sequence[Chart] | None =
             Paragraph(words.standing(bench)),
             *_named_items("To be considered beside it:", warnings),
             *_named_items("Why:", answer.why),
-            *_named_items("What would help:", answer.helps),
+            *_named_items("Remedies:", answer.helps),
             None if bench.scores else Paragraph(words.HOW_TO_REFERENCE),
             *_named_items(
                 "Rests of similar attitude, possible reference points:", words.offer_lines(bench)

@@ -175,8 +175,8 @@ def _document(result: CaseResult, name: str) -> Document:
         ),
         section(
             "not-shown",
-            "What this does not show",
-            Paragraph("What no evaluation of these records can answer."),
+            "Not shown by these records",
+            Paragraph("Questions that no evaluation of these records can answer."),
             Items(not_shown(result)),
         ),
         section("severity", "Severity", *_severity(result, which)),

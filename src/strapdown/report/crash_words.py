@@ -71,7 +71,7 @@ def headline(result: CaseResult) -> str:
     number = main_event(unit)
     if number is None and (cut := unit.events.cut_change) > 0.0:
         return (
-            f"The record ends within a blow: delta-V at least {speed_words(cut)}, as far as it was "
+            f"The record ends within an impact: delta-V at least {speed_words(cut)}, as far as it was "
             "recorded; its direction of force is not determined."
         )
     if number is None:
@@ -737,7 +737,7 @@ def _event(result: CaseResult) -> Iterator[tuple[str, str, str]]:
         if unit.events.cut_change > 0.0:
             yield (
                 "blow-beyond-record",
-                "The record ends within a blow",
+                "The record ends within an impact",
                 f"It ends at {instant(unit.acceleration.end)}, while the velocity changes by more "
                 "than what ends an event by 49 CFR 563, and before it is one. Delta-V is at least "
                 f"{speed_words(unit.events.cut_change)}; severity and direction of force are not "

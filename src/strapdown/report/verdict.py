@@ -163,17 +163,27 @@ def promise(trust: IntegrityReport) -> tuple[tuple[str, str], ...]:
     )
 
 
+#: A maneuver that leaves more of a standard deviation than this share is no help.
+HELPS = 0.8
+
+
 def advice_words(advice: Advice, trust: IntegrityReport) -> str:
     """Return the measures that would have helped at that time."""
     if not advice.options:
         return _without_fixes(trust)
-    best, sd = advice.options[0]
+    helpful = [(one, after) for one, after in advice.options if after < HELPS * advice.sd]
+    if not helpful:
+        return (
+            "no maneuver of some seconds would reduce its standard deviation of "
+            f"{degrees_words(advice.sd)} much: more accurate fixes would, or more maneuvers"
+        )
+    (best, sd), *others = helpful
     text = (
         f"{best.what} with fixes would reduce its standard deviation from "
         f"{degrees_words(advice.sd)} to {degrees_words(sd)}"
     )
-    others = [f"{one.what} to {degrees_words(after)}" for one, after in advice.options[1:]]
-    return text + (f"; {', '.join(others)}" if others else "")
+    more = [f"{one.what} to {degrees_words(after)}" for one, after in others]
+    return text + (f"; {', '.join(more)}" if more else "")
 
 
 def _without_fixes(trust: IntegrityReport) -> str:
@@ -368,7 +378,7 @@ def _advice(trust: IntegrityReport) -> tuple[Block, ...]:
     if not trust.advice:
         return ()
     if not any(a.options for a in trust.advice):
-        return (Paragraph(f"What would help: {advice_words(trust.advice[-1], trust)}."),)
+        return (Paragraph(f"Remedy: {advice_words(trust.advice[-1], trust)}."),)
     rows = tuple(
         (
             f"{a.span.status.capitalize()}, {instant(a.span.begin)} to {instant(a.span.end)} "

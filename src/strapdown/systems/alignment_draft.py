@@ -141,7 +141,7 @@ def _site(page: Page, recording: Recording) -> list[str]:
         page.key("lat_deg", repr(start.lat_deg), "north positive")
         page.key("lon_deg", repr(start.lon_deg), "east positive")
         page.key("alt_m", repr(start.alt), "over the ellipsoid")
-        found = [f"place: {start.lat_deg:.6f}°, {start.lon_deg:.6f}°, {start.alt:g} m"]
+        found = [f"position: {start.lat_deg:.6f}°, {start.lon_deg:.6f}°, {start.alt:g} m"]
     page.key("ellipsoid", '"wgs84"')
     return found
 

@@ -161,7 +161,7 @@ def _where(page: Page, made: Proposal, foot: bool) -> list[str]:
         page.table("[site]", where, "Found: the log states it; check that it is so.")
         for key, value in said.items():
             page.key(key, repr(value))
-        return [f"place: {said['lat_deg']:.6f}°, {said['lon_deg']:.6f}°"]
+        return [f"position: {said['lat_deg']:.6f}°, {said['lon_deg']:.6f}°"]
     if made.gnss is not None:
         page.blank()
         page.say(
@@ -338,7 +338,7 @@ def _aids(
                     key,
                     repr(aid[key]),
                     f"assumed: the fixes do not state it; {usual}",
-                    check=f"how well each fix knows its {what}: {usual}",
+                    check=f"standard deviation of the {what} of each fix: {usual}",
                 )
         options(page, slot.entries[aid["kind"]], aid)
     if made.drives:

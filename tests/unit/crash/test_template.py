@@ -271,7 +271,7 @@ def test_a_heading_that_nothing_tells_is_asked_with_what_each_would_mean(
     assert table["units"][0]["angles_deg"] == [*angles[:2], "?"]
     (asked,) = [a for a in draft.asked if a.key == "angles_deg"]
     said = asked.what.replace("deg: ", ", ")
-    assert re.search(rf", {front}( \(its x [a-z ]+\))? makes it a blow from the front", said)
+    assert re.search(rf", {front}( \(its x [a-z ]+\))? makes it an impact from the front", said)
 
 
 def test_a_gyro_whose_rest_is_as_long_as_gravity_stays_a_gyro(pole, tmp_path):

@@ -68,7 +68,7 @@ def test_a_gyro_with_axes_is_given_to_confirm(crash, tmp_path):
     assert "deg to the right, seen from above" in told["channels"]
     # That x is called x does not tell that it points forward.
     (asked,) = [a for a in draft.asked if a.key == "angles_deg"]
-    assert "0 (its x points forward) makes it a blow from the front" in asked.what
+    assert "0 (its x points forward) makes it an impact from the front" in asked.what
     lines = draft.text.splitlines()
     for check in draft.to_check:
         assert lines[check.line - 1].startswith(f"{check.key} = ")
@@ -136,7 +136,7 @@ def test_the_heading_of_a_zeroed_record_is_asked_and_what_each_would_mean(crash,
     assert found == ["?", "?", "?"]
     # The blow came from the front: the heading with which it does is the one it has.
     assert "gravity is not in it" in asked
-    (front,) = re.findall(r"(-?\d+) makes it a blow from the front", asked)
+    (front,) = re.findall(r"(-?\d+) makes it an impact from the front", asked)
     assert float(front) == heading
 
 
@@ -146,7 +146,7 @@ def test_gravity_tells_roll_and_pitch_and_no_heading(crash, tmp_path, heading):
     path = written(tmp_path, "r.csv", ["t_s", "ax", "ay", "az"], [time, turned(force, heading)])
     found, asked = angles_asked(*drafted(tmp_path, path))
     assert found == [0.0, 0.0, "?"]
-    assert re.search(rf"{heading:g} \(its x points [a-z ]+\) makes it a blow from the front", asked)
+    assert re.search(rf"{heading:g} \(its x points [a-z ]+\) makes it an impact from the front", asked)
 
 
 def test_headings_that_name_directions_define_the_axes(crash, tmp_path):
@@ -158,7 +158,7 @@ def test_headings_that_name_directions_define_the_axes(crash, tmp_path):
         draft.text.split("\n# ")
     )
     told = {c.key: c.what for c in draft.to_check}
-    assert "the blow came from the front" in told["angles_deg"]
+    assert "the impact came from the front" in told["angles_deg"]
 
 
 def of_day(seconds, part=12):

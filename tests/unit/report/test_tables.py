@@ -37,7 +37,7 @@ def test_the_answer_comes_first(full_bench):
     page = page_of(full_bench)
     order = [
         full_bench.answer.sentence,
-        "What would help",
+        "Remedies",
         "Cost against error.</b>",
         "Error against rate.</b>",
         "<span>Results</span></h2>",

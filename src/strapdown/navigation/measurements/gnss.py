@@ -138,7 +138,7 @@ class Gnss(TabulatedMeasurement):
     qualities: tuple[int, ...] = (1, 2, 3, 4, 5, 7, 8)
 
     kind: ClassVar[str] = "gnss"
-    summary: ClassVar[str] = "places and velocities of a satellite receiver"
+    summary: ClassVar[str] = "positions and velocities of a satellite receiver"
     source: ClassVar[str] = (
         "Groves (2013), secs. 14.3.1 and 14.3.2; Chernodarov (2009), Eqs. (19), (20)"
     )

@@ -607,7 +607,7 @@ class ZeroRate(StandstillAid):
     sd_deg_per_s: float = 0.005
 
     kind: ClassVar[str] = "zero_rate"
-    summary: ClassVar[str] = "no turn at a standstill that is detected: bias of the gyros"
+    summary: ClassVar[str] = "zero angular rate (ZARU) at a detected standstill: gyro bias"
     source: ClassVar[str] = "Groves (2013), sec. 15.2"
 
     def __post_init__(self) -> None:
