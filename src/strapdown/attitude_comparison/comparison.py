@@ -388,7 +388,7 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
         source = truth_of_second(source, second, imu, q_nb)
     if spec.gyro_bias.lower() == "auto" and bias["rad_per_s"] is not None:
         findings += _turn_or_bias(rests[0], source)
-    findings = [*source.findings, *findings]
+    findings = [*source.findings, *findings, *_one_axis(imu, source)]
     clock = clock.of(index_of(imu))
     increments = increments_from_imu(imu, spec.interpolation)
     costs = tuple(_cost(algorithm, increments["dt"]) for algorithm in algorithms)
@@ -631,6 +631,30 @@ def _turn_or_bias(rest: RestStretch, source: AttitudeSource) -> list[Finding]:
             severity="warning",
             bias=float(np.degrees(np.linalg.norm(rest.gyro_mean))),
             duration=rest.end - rest.start,
+        )
+    ]
+
+
+#: Rates across the main axis of a motion, as a share of those along it, below which the other two
+#: axes do not matter; rate in rad/s below which a body does not turn.
+ACROSS, TURNING = 0.05, 0.05
+
+
+def _one_axis(imu: pd.DataFrame, source: AttitudeSource) -> list[Finding]:
+    """Warn that a recorded motion is about one axis, which any algorithm integrates exactly."""
+    if source.clean is not None:
+        return []
+    rates = values_of(imu, GYRO)
+    spread = np.sqrt(np.maximum(np.linalg.eigvalsh(rates.T @ rates / len(rates)), 0.0))
+    if spread[2] < TURNING or spread[1] >= ACROSS * spread[2]:
+        return []
+    return [
+        Finding(
+            "attitude.one-axis",
+            file=source.name,
+            quantity="gyro",
+            severity="warning",
+            across=float(spread[1] / spread[2]),
         )
     ]
 

@@ -152,3 +152,15 @@ def test_a_large_bias_may_be_a_turn_and_stated_ones_are_not_doubted(tmp_path, ra
     columns = np.column_stack([time, gyro, force, field])
     pd.DataFrame(columns, columns=names).to_csv(path, index=False)
     assert "attitude.bias-or-turn" not in [f.code for f in compare_attitude(path).findings]
+
+
+@pytest.mark.parametrize(("across", "warned"), [(0.02, True), (0.045, True), (0.1, False)])
+def test_a_motion_about_one_axis_is_said_to_prove_little(across, warned):
+    time = np.arange(2000) * 0.01
+    # About an axis that is none of the body's; `across` is the share of the rate beside it.
+    rates = np.outer(np.sin(time), [0.6, 0.0, 0.8]) + np.outer(across * np.cos(time), [0, 1, 0])
+    imu = pd.DataFrame(rates, columns=list(GYRO), index=pd.Index(time, name="time"))
+    found = compare_attitude(imu, gyro_bias="none").findings
+    (one,) = [f for f in found if f.code == "attitude.one-axis"] or [None]
+    assert (one is not None) == warned
+    assert one is None or one.data["across"] == pytest.approx(across, rel=0.1)
