@@ -269,13 +269,25 @@ def _rows_of_fixes(raw: RawLog, found: dict[str, Found]) -> RawLog:
 
 def _over_ground(
     raw: RawLog, found: dict[str, Found], values: Callable[[str], Array]
-) -> tuple[Array, Array | None]:
+) -> tuple[Array | None, Array | None]:
     """Return velocity by speed and course, and its standard deviation; down is unknown.
 
-    Phones write -1 for a speed or a course that they do not know.
+    Phones write -1 for a speed or a course that they do not know; None where they never do.
     """
     speed, course = values("speed"), values("course")
     known = (speed >= 0.0) & (course >= 0.0)
+    if not known.any():
+        raw.findings.append(
+            Finding(
+                "io.speed-and-course-never-known",
+                severity="note",
+                file=raw.name,
+                quantity=", ".join(VELOCITY),
+                source=found["speed"].source,
+                source_2=found["course"].source,
+            )
+        )
+        return None, None
     speed = np.where(known, speed, np.nan)
     angle, none = np.radians(course), np.full(speed.size, np.nan)
     raw.findings.append(

@@ -71,7 +71,7 @@ def headline(result: CaseResult) -> str:
     number = main_event(unit)
     if number is None and (cut := unit.events.cut_change) > 0.0:
         return (
-            f"The record ends within an impact: delta-V at least {speed_words(cut)}, as far as it was "
+            f"The record ends within an impact: delta-V at least {speed_words(cut)}, as far as "
             "recorded; its direction of force is not determined."
         )
     if number is None:

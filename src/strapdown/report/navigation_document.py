@@ -60,6 +60,8 @@ from strapdown.systems.navigation_run import NavigationRun, withheld_aid
 from strapdown.tables import EULER, NED, VELOCITY
 from strapdown.tables.checks import index_of
 
+# Outages whose largest bound exceeds the median by less do not limit the result.
+_WORSE = 1.5
 # 95 % bound in deg from which a heading is unknown.
 _NO_HEADING = 180.0
 
@@ -174,6 +176,8 @@ def _outages(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
         return []
     total = math.fsum(s.end - s.begin for _, s, _ in outages)
     aid, span, bound = max(outages, key=lambda o: o[2])
+    if bound < _WORSE * float(np.median(evaluation.bounds)):
+        return []
     count = "one outage" if len(outages) == 1 else f"{len(outages)} outages"
     return [
         (

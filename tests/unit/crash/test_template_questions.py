@@ -146,7 +146,9 @@ def test_gravity_tells_roll_and_pitch_and_no_heading(crash, tmp_path, heading):
     path = written(tmp_path, "r.csv", ["t_s", "ax", "ay", "az"], [time, turned(force, heading)])
     found, asked = angles_asked(*drafted(tmp_path, path))
     assert found == [0.0, 0.0, "?"]
-    assert re.search(rf"{heading:g} \(its x points [a-z ]+\) makes it an impact from the front", asked)
+    assert re.search(
+        rf"{heading:g} \(its x points [a-z ]+\) makes it an impact from the front", asked
+    )
 
 
 def test_headings_that_name_directions_define_the_axes(crash, tmp_path):

@@ -106,6 +106,17 @@ def test_satellites_are_kept_where_a_column_counts_them(tmp_path, head, values, 
     assert read is None or table["satellites"].tolist() == read
 
 
+def test_speeds_that_are_never_known_are_no_velocity(tmp_path):
+    head = "time,lat,lon,alt,speed [m/s],course [deg]"
+    rows = [f"{k}.0,45.0,15.0,100.0,-1,-1" for k in range(4)]
+    options = GnssOptions(position_sd=(1.0, 1.0, 1.0))
+    table = read_gnss(written(tmp_path, "\n".join([head, *rows]) + "\n"), options)
+    assert np.isinf(table[VELOCITY_SD].to_numpy()).all()
+    codes = {f.code for f in table.attrs["findings"]}
+    assert "io.speed-and-course-never-known" in codes
+    assert "io.velocity-by-speed-and-course" not in codes
+
+
 def test_car_rtk(recordings):
     path = recordings("car_rtk") / "part1_gnss_rtk.csv"
     table = read_gnss(path)
