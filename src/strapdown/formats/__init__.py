@@ -493,6 +493,7 @@ FOREIGN = (
     Foreign(
         "a Python pickle, which is never opened", "numpy.savez or a CSV", (), (".pkl", ".pickle")
     ),
+    Foreign("a crash test in the format of NHTSA", "strapdown init crash", (), (".ev5",)),
     Foreign(
         "a compressed file",
         "the file in it, unpacked",

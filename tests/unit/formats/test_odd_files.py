@@ -132,12 +132,9 @@ def test_a_unit_against_the_names_of_the_columns_is_used_and_said(tmp_path, stat
     assert log.imu["gyro_x"].to_numpy() == pytest.approx(factor * np.sin(time))
 
 
-def test_a_crash_test_is_no_log_of_columns_without_names(tmp_path):
-    rows = "\n".join(f"{k}|1|AC|2.5|HDCG" for k in range(5))
-    path = tmp_path / "v1.EV5"
-    path.write_text(f"----- EV5 -----\n{rows}\n")
+def test_a_crash_test_is_no_log_of_columns_without_names(recordings):
     with pytest.raises(DataError, check=coded("io.crash-test-file")):
-        read_log(path)
+        read_log(recordings("crash_nhtsa_10146") / "v10146.EV5")
 
 
 @pytest.mark.parametrize("count", [2, 3, 4])
