@@ -232,7 +232,8 @@ def read_dataflash_fixes(path: Path) -> RawLog:
         velocity = (fix["Spd"] * np.cos(course), fix["Spd"] * np.sin(course), down)
         out |= {f"V{a}": (v, "m/s") for a, v in zip("NED", velocity, strict=True)}
         out["quality"] = (np.array([DATAFLASH_QUALITY.get(int(s), 1) for s in fix["Status"]]), None)
-        out["satellites"] = (fix["NSats"].astype(np.float64), None)
+        if "NSats" in fix:
+            out["satellites"] = (fix["NSats"].astype(np.float64), None)
         out |= _accuracy(log.get("GPA"), fix, int(fix["I"][0]) if "I" in fix else None)
     return RawLog.of(path, out, clock=RELATIVE, findings=findings)
 

@@ -143,7 +143,8 @@ def read_fixes(path: Path) -> RawLog:
             velocity = np.where(known, data[f"vel_{axis.lower()}_m_s"], np.nan)
             out |= {f"V{axis}": (velocity, "m/s"), f"V{axis}_sd": (sd, "m/s")}
         out["quality"] = (np.array([QUALITY.get(int(k), 1) for k in data["fix_type"]]), None)
-        out["satellites"] = (data["satellites_used"].astype(np.float64), None)
+        if "satellites_used" in data:
+            out["satellites"] = (data["satellites_used"].astype(np.float64), None)
         delay = log["parameter"]
     if not use.any():
         raise DataError("io.no-usable-fix", file=path.name, quantity="lat, lon")

@@ -145,7 +145,7 @@ def read_ubx_fixes(path: Path) -> RawLog:
             out[f"V{axis}"] = (values(f"vel{axis}"), "mm/s")
             out[f"V{axis}_sd"] = (values("sAcc"), "mm/s")
         out["quality"] = (np.array([_quality(m) for m in fixed]), None)
-        out["satellites"] = (np.array([m.numSV for m in fixed], dtype=np.float64), None)
+        out["satellites"] = (np.array([getattr(m, "numSV", np.nan) for m in fixed]), None)
     return RawLog.of(path, out, clock=GPS, findings=findings)
 
 

@@ -3,7 +3,8 @@
 Messages: sensor_msgs/Imu, NavSatFix, MagneticField and FluidPressure of
 https://github.com/ros2/common_interfaces, by REP 103 and REP 145: rad/s, m/s² of specific force, T,
 Pa, and a covariance that begins with -1 where a sensor does not measure. The axes are those of the
-sensor, which only a tree of transforms relates to the body: they stay open. NavSatFix: deg, m over
+sensor, which only a tree of transforms relates to the body: they stay open, except in the frame
+``base_link``, the body's own (forward, left, up by REP 103 and 105). NavSatFix: deg, m over
 the ellipsoid, covariance in m² east, north, up. A TwistStamped (or TwistWithCovarianceStamped) with
 the frame and the stamps of the fixes is their velocity, east, north, up. Stamps are those of the
 headers, in ns. The reference is INSPVAX or INSPVA of novatel_oem7_msgs.
@@ -153,8 +154,10 @@ def _topic(
     return str(picked[0])
 
 
-def _log(path: Path, out: Quantities, clock: str, findings: list[Finding]) -> RawLog:
-    raw = RawLog.of(path, out, clock=clock, findings=findings)
+def _log(
+    path: Path, out: Quantities, clock: str, findings: list[Finding], axes: str | None = None
+) -> RawLog:
+    raw = RawLog.of(path, out, axes=axes, clock=clock, findings=findings)
     raw.files = files_of(path)
     return raw
 
@@ -179,7 +182,8 @@ def read(path: Path, topic: str | None = None) -> RawLog:
             )
             continue
         out |= part
-    return _log(path, out, clock, findings)
+    of_body = {str(name).lstrip("/") for name in np.unique(columns["frame"])} == {BASE}
+    return _log(path, out, clock, findings, "x,-y,-z" if of_body else None)
 
 
 def read_fixes(path: Path, topic: str | None = None) -> RawLog:
@@ -271,9 +275,6 @@ def write(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
             source = tables[stream].attrs.get("source")
             raise DataError("io.written-stamp-below-zero", file=source, quantity="time", form="ROS")
         findings += [*said, *_lost(stream, tables[stream])]
-        if stream == "imu":
-            source, axes = tables[stream].attrs.get("source"), "forward-left-up"
-            findings.append(Finding("io.written-axes", file=source, severity="note", axes=axes))
         topics += [make(tables[stream], stamps.tolist(), store.types) for make in makers]
     if "reference" in tables:
         findings.append(stream_not_held("MCAP", "reference", tables["reference"]))

@@ -67,6 +67,7 @@ def _vector(prefix: str, v: Any) -> dict[str, Any]:
 
 def _imu(m: Any) -> dict[str, Any]:
     values = _vector("gyro", m.angular_velocity) | _vector("accel", m.linear_acceleration)
+    values["frame"] = m.header.frame_id
     values["gyro_none"] = m.angular_velocity_covariance[0] == -1.0
     return values | {"accel_none": m.linear_acceleration_covariance[0] == -1.0}
 
