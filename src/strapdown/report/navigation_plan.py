@@ -3,25 +3,43 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.dsp.samples import running_integral, true_runs
+from strapdown.ellipsoids import WGS84
 from strapdown.formats.trajectory_writers import thin
-from strapdown.frames import ned_from_geodetic
+from strapdown.frames import geodetic_from_ned, ned_from_geodetic
 from strapdown.navigation.record import NavigationRecord, Span
-from strapdown.report.chart import BLACK, BLUE, GREY, PURPLE, VERMILLION, Array, Chart, Line, Panel
+from strapdown.report.chart import (
+    BLACK,
+    BLUE,
+    GREY,
+    PURPLE,
+    VERMILLION,
+    Array,
+    Backdrop,
+    Chart,
+    Line,
+    Panel,
+    Picture,
+)
+from strapdown.report.chart_svg import plane_view
 from strapdown.report.navigation_charts import TIME, mode_colour
 from strapdown.report.navigation_evaluation import NavigationEvaluation, rejected_times
 from strapdown.report.plan import PlanView, ellipse, path_marks, place_labels
 from strapdown.report.svg_drawing import nice_step
 from strapdown.report.values import GAP, duration_words, length_words, plain
+from strapdown.rotation import within_half_turn
 from strapdown.tables import GEODETIC, places_of
 from strapdown.tables.checks import index_of
+
+if TYPE_CHECKING:
+    from strapdown.formats.map_tiles import MapFile, Tile
 
 MOST_POINTS, MOST_FIXES, MOST_SAMPLES = 1500, 600, 100_000
 # Plans of at least this size, m, are in kilometers.
@@ -42,6 +60,17 @@ def plan_chart(evaluation: NavigationEvaluation) -> Chart | None:
     Chart or None
         None for a run without motion.
     """
+    drawn = _drawn(evaluation)
+    if drawn is None or evaluation.run.spec.map is None:
+        return None if drawn is None else drawn[0]
+    chart, plane = drawn
+    backdrop, said = _backdrop(plane, evaluation.run.spec.map.path, *plane_view(chart))
+    panels = (replace(chart.panels[0], backdrop=backdrop),)
+    return replace(chart, caption=f"{chart.caption} {said}", panels=panels)
+
+
+def _drawn(evaluation: NavigationEvaluation) -> tuple[Chart, Plane] | None:
+    """The chart without a map, and its plane; None without motion."""
     record = evaluation.record
     table = record.trajectory
     rows = _rows(evaluation)
@@ -72,7 +101,7 @@ def plan_chart(evaluation: NavigationEvaluation) -> Chart | None:
         said,
         beyond,
     ]
-    return Chart(
+    chart = Chart(
         "plan",
         "Path",
         " ".join(w for w in words if w),
@@ -86,6 +115,16 @@ def plan_chart(evaluation: NavigationEvaluation) -> Chart | None:
             ),
         ),
     )
+    return chart, plane
+
+
+def plan_tiles(evaluation: NavigationEvaluation, opened: MapFile) -> list[Tile]:
+    """Return the tiles of a map that are under the plan."""
+    drawn = _drawn(evaluation)
+    if drawn is None:
+        return []
+    chart, plane = drawn
+    return [tile for tile, _ in chosen_tiles(opened, map_box(plane, *plane_view(chart))).tiles]
 
 
 def _rows(evaluation: NavigationEvaluation) -> NDArray[np.intp]:
@@ -251,6 +290,137 @@ def _scale(view: PlanView, path: tuple[Array, Array], unit: str) -> list[Line]:
             legend=False,
         ),
     ]
+
+
+# A local map under the plan.
+
+
+#: Most tiles, most of their bytes together, and most pixels from west to east.
+MOST_TILES, MOST_BYTES, MOST_PIXELS = 30, 800_000, 1300.0
+# Of a tile of 2π/2^zoom rad, placed by an affine fit to its corners, the inside is off by up to
+# sin(latitude)/4 of that, as a share of its side, and by a little where it is far from the origin:
+# within a pixel of 256 from these numbers of tiles round the Earth on.
+_ROUND_EARTH, _ROUND_AT_POLE = 128, 512
+_NORTHERNMOST = 85.0  # deg, of Web Mercator
+_LARGEST_ZOOM = 24  # tiles of two meters
+
+
+@dataclass(frozen=True)
+class ChosenTiles:
+    """Tiles of one zoom, each with its column counted on across the date line.
+
+    Attributes
+    ----------
+    count : int
+        How many tiles cover the plan.
+    """
+
+    zoom: int
+    count: int
+    tiles: list[tuple[Tile, int]]
+
+
+@dataclass(frozen=True)
+class MapBox:
+    """A part of Web Mercator: ends from west to east and from north to south, as shares of it.
+
+    Attributes
+    ----------
+    west, east : float
+        Of the whole Earth; may be below 0 or beyond 1 at the date line.
+    lat : float, deg
+        Of the corner nearest to a pole, without a sign.
+    """
+
+    west: float
+    east: float
+    north: float
+    south: float
+    lat: float
+
+
+def map_box(plane: Plane, low: Array, high: Array) -> MapBox:
+    """Return the part of the map between two corners of a plan, (2,) each."""
+    share = np.linspace(0.0, 1.0, 9)
+    east, north = np.meshgrid(*(low + np.outer(share, high - low)).T)
+    ned = np.column_stack([north.ravel(), east.ravel(), np.zeros(east.size)]) / plane.scale
+    lat, lon, _ = geodetic_from_ned(ned, plane.origin, ellipsoid=WGS84).T
+    x = (plane.origin[1] + (lon - plane.origin[1] + 180.0) % 360.0) / 360.0
+    up = np.radians(np.clip(lat, -_NORTHERNMOST, _NORTHERNMOST))
+    y = 0.5 - np.arcsinh(np.tan(up)) / (2.0 * math.pi)
+    ends = [float(v) for v in (x.min(), x.max(), y.min(), y.max())]
+    return MapBox(*ends, lat=float(np.abs(lat).max()))
+
+
+def chosen_tiles(opened: MapFile, box: MapBox) -> ChosenTiles:
+    """Choose the largest zoom within the limits at which most of a plan is covered."""
+    best = ChosenTiles(0, 0, [])
+    least = max(_ROUND_EARTH, _ROUND_AT_POLE * math.sin(math.radians(box.lat)))
+    for zoom in range(_LARGEST_ZOOM, -1, -1):
+        n = 1 << zoom
+        if n < least or box.lat > _NORTHERNMOST:
+            break
+        columns = range(math.floor(n * box.west), math.floor(n * box.east) + 1)
+        rows = range(math.floor(n * box.north), math.floor(n * box.south) + 1)
+        count = len(columns) * len(rows)
+        if count > MOST_TILES:
+            continue
+        found = _tiles(opened, zoom, columns, rows, MOST_PIXELS / (n * (box.east - box.west)))
+        if found and len(found) / count > len(best.tiles) / max(best.count, 1):
+            best = ChosenTiles(zoom, count, found)
+        if len(best.tiles) == best.count > 0:
+            break
+    return best
+
+
+def _tiles(
+    opened: MapFile, zoom: int, columns: range, rows: range, most: float
+) -> list[tuple[Tile, int]]:
+    """Tiles of a zoom; none if they are too large together, or one of more than `most` pixels."""
+    found: list[tuple[Tile, int]] = []
+    size = 0
+    for row in rows:
+        for column in columns:
+            tile = opened.tile(zoom, column % (1 << zoom), row)
+            if tile is None:
+                continue
+            size += len(tile.data)
+            if size > MOST_BYTES or tile.side > most:
+                return []
+            found.append((tile, column))
+    return found
+
+
+def _backdrop(plane: Plane, path: str, low: Array, high: Array) -> tuple[Backdrop | None, str]:
+    """The map under the plan, and a sentence on it."""
+    from strapdown.formats.map_tiles import open_map
+
+    if plane.found.run.ellipsoid != WGS84:
+        name = plane.found.run.ellipsoid.name
+        return None, f"No map: maps are on WGS 84, and positions on {name}."
+    with open_map(path) as opened:
+        chosen = chosen_tiles(opened, map_box(plane, low, high))
+    if not chosen.tiles:
+        return None, f"No map: {opened.name} has no tiles here that suit the plan."
+    pictures = tuple(tile_picture(plane, tile, column) for tile, column in chosen.tiles)
+    part = "" if len(pictures) == chosen.count else f", {len(pictures)} of {chosen.count} tiles"
+    whose = f"; {opened.attribution}" if opened.attribution else ""
+    said = f"Map: {opened.name}, zoom {chosen.zoom}{part}{whose}."
+    return Backdrop(pictures, opened.attribution or opened.name), said
+
+
+def tile_picture(plane: Plane, tile: Tile, column: int) -> Picture:
+    """Place a tile by the affine map of its square that fits its four corners best."""
+    n = 1 << tile.zoom
+    lon = np.array([column, column + 1, column, column + 1]) / n * 360.0 - 180.0
+    y = np.array([tile.row, tile.row, tile.row + 1, tile.row + 1]) / n
+    lat = np.degrees(np.arctan(np.sinh(math.pi * (1.0 - 2.0 * y))))
+    corners = np.column_stack([lat, within_half_turn(lon), np.full(4, plane.origin[2])])
+    ned = ned_from_geodetic(corners, plane.origin, ellipsoid=WGS84)
+    nw, ne, sw, se = plane.scale * ned[:, 1::-1]
+    across, down = 0.5 * (ne + se - nw - sw), 0.5 * (sw + se - nw - ne)
+    corner = 0.25 * (nw + ne + sw + se) - 0.5 * (across + down)
+    return Picture(tile.data, tile.media, corner, across, down)
 
 
 # 95 % ellipses on the plan of a run, and their labels.

@@ -214,6 +214,8 @@ def run_coast(
             (),
         )
     progress("reading", 0.02)
+    # Its plan is not drawn.
+    navigation = navigation.with_map(None)
     source = read_navigation_source(navigation)
     predicted, drifts = coast_of_run(spec, navigation, source, progress)
     return OutageRun(
