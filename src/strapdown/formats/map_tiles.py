@@ -471,7 +471,9 @@ def write_tiles(folder: Path, of: MapFile, tiles: list[Tile]) -> tuple[Path, ...
     """
     folder.mkdir()
     files = [folder / LIST]
-    said = json.dumps({"name": of.name, "attribution": of.attribution}, indent=2)
+    # As HTML, so that the same text is read again.
+    texts = {"name": html.escape(of.name), "attribution": html.escape(of.attribution)}
+    said = json.dumps(texts, indent=2)
     files[0].write_bytes(f"{said}\n".encode())
     for tile in tiles:
         file = folder / f"{tile.zoom}/{tile.column}/{tile.row}.{_PARTS[tile.media]}"

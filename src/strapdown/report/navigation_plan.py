@@ -295,12 +295,17 @@ def _scale(view: PlanView, path: tuple[Array, Array], unit: str) -> list[Line]:
 # A local map under the plan.
 
 
-#: Most tiles, most of their bytes together, and most pixels from west to east.
+#: Most tiles, most of their bytes together, and most pixels from west to east; twice as many pixels
+#: where a lower zoom would be bent too much.
 MOST_TILES, MOST_BYTES, MOST_PIXELS = 30, 800_000, 1300.0
-# Of a tile of 2π/2^zoom rad, placed by an affine fit to its corners, the inside is off by up to
-# sin(latitude)/4 of that, as a share of its side, and by a little where it is far from the origin:
-# within a pixel of 256 from these numbers of tiles round the Earth on.
-_ROUND_EARTH, _ROUND_AT_POLE = 128, 512
+# A tile is placed by an affine fit to the corners of its part on the plan, which is d rad wide. The
+# second derivatives of the plane by Mercator's coordinates are sin(latitude) d of that: the inside
+# is off by up to sin(latitude) d/4 of it. On a page of so many pixels from west to east that is to
+# be below the limit. Half a page from the origin the plane itself adds 60 d² pixels: 0.15 from 128
+# tiles round the Earth on.
+_PAGE, _LIMIT, _ROUND_EARTH = 870.0, 0.8, 128
+# Least part of a tile that is fitted.
+_PART = 1.0 / 16.0
 _NORTHERNMOST = 85.0  # deg, of Web Mercator
 _LARGEST_ZOOM = 24  # tiles of two meters
 
@@ -342,33 +347,37 @@ class MapBox:
 def map_box(plane: Plane, low: Array, high: Array) -> MapBox:
     """Return the part of the map between two corners of a plan, (2,) each."""
     share = np.linspace(0.0, 1.0, 9)
-    east, north = np.meshgrid(*(low + np.outer(share, high - low)).T)
-    ned = np.column_stack([north.ravel(), east.ravel(), np.zeros(east.size)]) / plane.scale
+    across, up = np.meshgrid(*(low + np.outer(share, high - low)).T)
+    ned = np.column_stack([up.ravel(), across.ravel(), np.zeros(up.size)]) / plane.scale
     lat, lon, _ = geodetic_from_ned(ned, plane.origin, ellipsoid=WGS84).T
     x = (plane.origin[1] + (lon - plane.origin[1] + 180.0) % 360.0) / 360.0
-    up = np.radians(np.clip(lat, -_NORTHERNMOST, _NORTHERNMOST))
-    y = 0.5 - np.arcsinh(np.tan(up)) / (2.0 * math.pi)
-    ends = [float(v) for v in (x.min(), x.max(), y.min(), y.max())]
-    return MapBox(*ends, lat=float(np.abs(lat).max()))
+    clipped = np.radians(np.clip(lat, -_NORTHERNMOST, _NORTHERNMOST))
+    y = 0.5 - np.arcsinh(np.tan(clipped)) / (2.0 * math.pi)
+    west, east, north, south = (float(v) for v in (x.min(), x.max(), y.min(), y.max()))
+    return MapBox(west, east, north, south, float(np.abs(lat).max()))
 
 
 def chosen_tiles(opened: MapFile, box: MapBox) -> ChosenTiles:
     """Choose the largest zoom within the limits at which most of a plan is covered."""
-    best = ChosenTiles(0, 0, [])
-    least = max(_ROUND_EARTH, _ROUND_AT_POLE * math.sin(math.radians(box.lat)))
-    for zoom in range(_LARGEST_ZOOM, -1, -1):
-        n = 1 << zoom
-        if n < least or box.lat > _NORTHERNMOST:
-            break
-        columns = range(math.floor(n * box.west), math.floor(n * box.east) + 1)
-        rows = range(math.floor(n * box.north), math.floor(n * box.south) + 1)
-        count = len(columns) * len(rows)
-        if count > MOST_TILES:
-            continue
-        found = _tiles(opened, zoom, columns, rows, MOST_PIXELS / (n * (box.east - box.west)))
-        if found and len(found) / count > len(best.tiles) / max(best.count, 1):
-            best = ChosenTiles(zoom, count, found)
-        if len(best.tiles) == best.count > 0:
+    sine, width = math.sin(math.radians(box.lat)), box.east - box.west
+    for most in (MOST_PIXELS, 2.0 * MOST_PIXELS):
+        best = ChosenTiles(0, 0, [])
+        for zoom in range(_LARGEST_ZOOM, -1, -1):
+            n = 1 << zoom
+            bent = sine * 0.5 * math.pi * _PAGE / width * min(1.0 / n, width) ** 2
+            if n < _ROUND_EARTH or bent > _LIMIT or box.lat > _NORTHERNMOST:
+                break
+            columns = range(math.floor(n * box.west), math.floor(n * box.east) + 1)
+            rows = range(math.floor(n * box.north), math.floor(n * box.south) + 1)
+            count = len(columns) * len(rows)
+            if count > MOST_TILES:
+                continue
+            found = _tiles(opened, zoom, columns, rows, most / (n * width))
+            if found and len(found) / count > len(best.tiles) / max(best.count, 1):
+                best = ChosenTiles(zoom, count, found)
+            if len(best.tiles) == best.count > 0:
+                break
+        if best.tiles:
             break
     return best
 
@@ -376,7 +385,7 @@ def chosen_tiles(opened: MapFile, box: MapBox) -> ChosenTiles:
 def _tiles(
     opened: MapFile, zoom: int, columns: range, rows: range, most: float
 ) -> list[tuple[Tile, int]]:
-    """Tiles of a zoom; none if they are too large together, or one of more than `most` pixels."""
+    """Tiles of a zoom; none if they have too many bytes, or one more than `most` pixels a side."""
     found: list[tuple[Tile, int]] = []
     size = 0
     for row in rows:
@@ -398,29 +407,40 @@ def _backdrop(plane: Plane, path: str, low: Array, high: Array) -> tuple[Backdro
     if plane.found.run.ellipsoid != WGS84:
         name = plane.found.run.ellipsoid.name
         return None, f"No map: maps are on WGS 84, and positions on {name}."
+    box = map_box(plane, low, high)
     with open_map(path) as opened:
-        chosen = chosen_tiles(opened, map_box(plane, low, high))
+        chosen = chosen_tiles(opened, box)
     if not chosen.tiles:
         return None, f"No map: {opened.name} has no tiles here that suit the plan."
-    pictures = tuple(tile_picture(plane, tile, column) for tile, column in chosen.tiles)
+    pictures = tuple(tile_picture(plane, box, tile, column) for tile, column in chosen.tiles)
     part = "" if len(pictures) == chosen.count else f", {len(pictures)} of {chosen.count} tiles"
     whose = f"; {opened.attribution}" if opened.attribution else ""
     said = f"Map: {opened.name}, zoom {chosen.zoom}{part}{whose}."
     return Backdrop(pictures, opened.attribution or opened.name), said
 
 
-def tile_picture(plane: Plane, tile: Tile, column: int) -> Picture:
-    """Place a tile by the affine map of its square that fits its four corners best."""
+def tile_picture(plane: Plane, box: MapBox, tile: Tile, column: int) -> Picture:
+    """Place a tile by the affine map that fits the corners of its part on the plan best."""
     n = 1 << tile.zoom
-    lon = np.array([column, column + 1, column, column + 1]) / n * 360.0 - 180.0
-    y = np.array([tile.row, tile.row, tile.row + 1, tile.row + 1]) / n
+    left, right = _part(n * box.west - column, n * box.east - column)
+    top, bottom = _part(n * box.north - tile.row, n * box.south - tile.row)
+    lon = (column + np.array([left, right, left, right])) / n * 360.0 - 180.0
+    y = (tile.row + np.array([top, top, bottom, bottom])) / n
     lat = np.degrees(np.arctan(np.sinh(math.pi * (1.0 - 2.0 * y))))
     corners = np.column_stack([lat, within_half_turn(lon), np.full(4, plane.origin[2])])
     ned = ned_from_geodetic(corners, plane.origin, ellipsoid=WGS84)
     nw, ne, sw, se = plane.scale * ned[:, 1::-1]
-    across, down = 0.5 * (ne + se - nw - sw), 0.5 * (sw + se - nw - ne)
-    corner = 0.25 * (nw + ne + sw + se) - 0.5 * (across + down)
+    across = 0.5 * (ne + se - nw - sw) / (right - left)
+    down = 0.5 * (sw + se - nw - ne) / (bottom - top)
+    middle = 0.25 * (nw + ne + sw + se)
+    corner = middle - 0.5 * (left + right) * across - 0.5 * (top + bottom) * down
     return Picture(tile.data, tile.media, corner, across, down)
+
+
+def _part(low: float, high: float) -> tuple[float, float]:
+    """Ends of a part of a tile, as shares of its side."""
+    begin = min(max(low, 0.0), 1.0 - _PART)
+    return begin, max(min(high, 1.0), begin + _PART)
 
 
 # 95 % ellipses on the plan of a run, and their labels.
