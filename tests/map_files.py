@@ -82,7 +82,8 @@ def archive(
     outer: int = 1,
     version: int = 3,
 ) -> bytes:
-    """Join the sections of a PMTiles archive."""
+    """Join the sections of a PMTiles archive; the metadata are packed here."""
+    about = gzip.compress(about, mtime=0) if inner == 2 else about
     offsets, at = [], 127
     for part in (root, about, leaves, data):
         offsets += [at, len(part)]
@@ -109,6 +110,6 @@ def pmtiles(path: Path, tiles: Tiles, *, leaf: int = 0, **metadata: str) -> Path
             packed = gzip.compress(directory(part), mtime=0)
             entries.append((part[0][0], len(leaves), len(packed), 0))
             leaves += packed
-    about = gzip.compress(json.dumps(metadata).encode(), mtime=0)
+    about = json.dumps(metadata).encode()
     path.write_bytes(archive(gzip.compress(directory(entries), mtime=0), leaves, data, about))
     return path

@@ -35,8 +35,8 @@ LARGEST_TILE, SIDES = 1 << 20, (64, 1024)
 #: Characters of a name or an attribution that are shown.
 LONGEST = 200
 _METADATA = 1 << 20  # bytes
-# Bytes of all directories of an archive that are read, and how deep they lie.
-_DIRECTORIES, _DEEP = 64 << 20, 4
+# Bytes of a directory, and of all that are read: each may take 20 in memory. How deep they lie.
+_DIRECTORY, _DIRECTORIES, _DEEP = 4 << 20, 16 << 20, 4
 _DATABASE, _PMTILES = b"SQLite format 3\0", b"PMTiles"
 _HEADER = struct.Struct("<7sB 11Q B BBB BB 4i B 2i")
 _NONE, _GZIP, _VECTOR = 1, 2, 1
@@ -356,9 +356,9 @@ class _Pmtiles:
     def _directory(self, offset: int, length: int) -> tuple[Numbers, Numbers, Numbers, Numbers]:
         """Numbers of tiles, how often each is repeated, lengths and offsets."""
         if (offset, length) not in self.kept:
-            left = _DIRECTORIES - self.read
-            data = _unpacked(self._bytes(offset, length, left), self.inner, left)
-            self.read += len(data) + length
+            most = min(_DIRECTORY, _DIRECTORIES - self.read)
+            data = _unpacked(self._bytes(offset, length, most), self.inner, most)
+            self.read += len(data)
             self.kept[offset, length] = _directory(data)
         return self.kept[offset, length]
 

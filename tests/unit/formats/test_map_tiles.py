@@ -9,7 +9,7 @@ import struct
 from itertools import pairwise
 
 import pytest
-from tests.map_files import archive, directory, mbtiles, pmtiles, png
+from tests.map_files import archive, directory, mbtiles, pmtiles, png, varint
 
 from strapdown.errors import DataError
 from strapdown.formats.map_tiles import LARGEST_TILE, Tile, open_map, tile_number, write_tiles
@@ -135,7 +135,7 @@ HOSTILE = {
     "a directory of a billion entries": archive(b"\xff\xff\xff\xff\x0f", inner=1),
     "a directory that unpacks to a gigabyte": archive(gzip.compress(bytes(1 << 27))),
     "metadata that unpack to much": archive(
-        directory([(0, 0, 1, 1)]), data=TILE, about=gzip.compress(b" " * (1 << 24))
+        directory([(0, 0, 1, 1)]), data=TILE, about=b" " * (1 << 24)
     ),
     "an endless number": archive(b"\x01" + b"\xff" * 30, inner=1),
     "numbers beyond what is counted": archive(
@@ -164,6 +164,22 @@ def test_a_directory_that_is_its_own_leaf_ends(tmp_path):
     path = tmp_path / "a.pmtiles"
     path.write_bytes(archive(leaf, leaf, inner=1))
     refused(path, "io.map-damaged")
+
+
+def test_directories_together_are_bounded(tmp_path):
+    # A leaf of 3.6 MB at each of some zooms: four of them are read, the fifth is too much.
+    count = 900_000
+    leaf = gzip.compress(varint(count) + b"\x01" * 3 * count + b"\x01" + bytes(count - 1), mtime=0)
+    entries = [(tile_number(12 + k, 0, 0), k * len(leaf), len(leaf), 0) for k in range(5)]
+    path = tmp_path / "a.pmtiles"
+    path.write_bytes(archive(gzip.compress(directory(entries)), 5 * leaf, TILE))
+    with open_map(path) as opened:
+        for zoom in range(12, 16):
+            # Beyond what the leaf has.
+            assert opened.tile(zoom, (1 << zoom) - 1, 0) is None
+        with pytest.raises(DataError) as caught:
+            opened.tile(16, 0, 0)
+    assert caught.value.finding.code == "io.map-damaged"
 
 
 @pytest.mark.parametrize(
