@@ -298,6 +298,8 @@ def _write_geoparquet(path: Path, tables: Tables, options: FileOptions) -> list[
     """Write every row of a trajectory, else of fixes, as a point with all its columns."""
     options.require_wgs84("GeoParquet")
     stream, track, findings = _track_or_fixes(tables, "GeoParquet")
+    if track.empty:
+        raise DataError("io.trajectory-no-rows")
     points = track[["lon", "lat", "alt"]].to_numpy(dtype=np.float64).copy()
     points[:, 0] = within_half_turn(points[:, 0])
     if stream == "reference":
