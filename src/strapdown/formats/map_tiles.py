@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import html
 import json
+import math
 import re
 import sqlite3
 import struct
@@ -28,7 +29,18 @@ from numpy.typing import NDArray
 
 from strapdown.errors import DataError, printable
 
-__all__ = ["LARGEST_TILE", "MapFile", "Tile", "TileFolder", "open_map", "write_tiles"]
+__all__ = [
+    "LARGEST_TILE",
+    "NORTHERNMOST",
+    "ChosenTiles",
+    "MapBox",
+    "MapFile",
+    "Tile",
+    "TileFolder",
+    "chosen_tiles",
+    "open_map",
+    "write_tiles",
+]
 
 #: Largest tile, bytes; least and largest side, pixels.
 LARGEST_TILE, SIDES = 1 << 20, (64, 1024)
@@ -432,6 +444,100 @@ def tile_number(zoom: int, column: int, row: int) -> int:
             x, y = y, x
         half >>= 1
     return number
+
+
+# The tiles under a plan.
+
+
+#: Most tiles, most of their bytes together, and most pixels from west to east; twice as many pixels
+#: where a lower zoom would be bent too much.
+MOST_TILES, MOST_BYTES, MOST_PIXELS = 30, 800_000, 1300.0
+# A tile is placed by an affine fit to the corners of its part on the plan, which is d rad wide. The
+# second derivatives of the plane by Mercator's coordinates are sin(latitude) d of that: the inside
+# is off by up to sin(latitude) d/4 of it. On a page of so many pixels from west to east that is to
+# be below the limit. Half a page from the origin the plane itself adds 60 d² pixels: 0.15 from 128
+# tiles round the Earth on.
+_PAGE, _LIMIT, _ROUND_EARTH = 870.0, 0.8, 128
+#: Latitude up to which Web Mercator has tiles, deg.
+NORTHERNMOST = 85.0
+_LARGEST_ZOOM = 24  # tiles of two meters
+
+
+@dataclass(frozen=True)
+class ChosenTiles:
+    """Tiles of one zoom, each with its column counted on across the date line.
+
+    Attributes
+    ----------
+    count : int
+        How many tiles cover the plan.
+    """
+
+    zoom: int
+    count: int
+    tiles: list[tuple[Tile, int]]
+
+
+@dataclass(frozen=True)
+class MapBox:
+    """A part of Web Mercator: ends from west to east and from north to south, as shares of it.
+
+    Attributes
+    ----------
+    west, east : float
+        Of the whole Earth; may be below 0 or beyond 1 at the date line.
+    lat : float, deg
+        Of the corner nearest to a pole, without a sign.
+    """
+
+    west: float
+    east: float
+    north: float
+    south: float
+    lat: float
+
+
+def chosen_tiles(opened: MapFile, box: MapBox) -> ChosenTiles:
+    """Choose the largest zoom within the limits at which most of a plan is covered."""
+    sine, width = math.sin(math.radians(box.lat)), box.east - box.west
+    for most in (MOST_PIXELS, 2.0 * MOST_PIXELS):
+        best = ChosenTiles(0, 0, [])
+        for zoom in range(_LARGEST_ZOOM, -1, -1):
+            n = 1 << zoom
+            bent = sine * 0.5 * math.pi * _PAGE / width * min(1.0 / n, width) ** 2
+            if n < _ROUND_EARTH or bent > _LIMIT or box.lat > NORTHERNMOST:
+                break
+            columns = range(math.floor(n * box.west), math.floor(n * box.east) + 1)
+            rows = range(math.floor(n * box.north), math.floor(n * box.south) + 1)
+            count = len(columns) * len(rows)
+            if count > MOST_TILES:
+                continue
+            found = _tiles(opened, zoom, columns, rows, most / (n * width))
+            if found and len(found) / count > len(best.tiles) / max(best.count, 1):
+                best = ChosenTiles(zoom, count, found)
+            if len(best.tiles) == best.count > 0:
+                break
+        if best.tiles:
+            break
+    return best
+
+
+def _tiles(
+    opened: MapFile, zoom: int, columns: range, rows: range, most: float
+) -> list[tuple[Tile, int]]:
+    """Tiles of a zoom; none if they have too many bytes, or one more than `most` pixels a side."""
+    found: list[tuple[Tile, int]] = []
+    size = 0
+    for row in rows:
+        for column in columns:
+            tile = opened.tile(zoom, column % (1 << zoom), row)
+            if tile is None:
+                continue
+            size += len(tile.data)
+            if size > MOST_BYTES or tile.side > most:
+                return []
+            found.append((tile, column))
+    return found
 
 
 # The tiles that a page has used, as files: an input of its bundle.

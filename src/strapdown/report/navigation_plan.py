@@ -39,7 +39,7 @@ from strapdown.tables import GEODETIC, places_of
 from strapdown.tables.checks import index_of
 
 if TYPE_CHECKING:
-    from strapdown.formats.map_tiles import MapFile, Tile
+    from strapdown.formats.map_tiles import MapBox, MapFile, Tile
 
 MOST_POINTS, MOST_FIXES, MOST_SAMPLES = 1500, 600, 100_000
 # Plans of at least this size, m, are in kilometers.
@@ -120,6 +120,8 @@ def _drawn(evaluation: NavigationEvaluation) -> tuple[Chart, Plane] | None:
 
 def plan_tiles(evaluation: NavigationEvaluation, opened: MapFile) -> list[Tile]:
     """Return the tiles of a map that are under the plan."""
+    from strapdown.formats.map_tiles import chosen_tiles
+
     drawn = _drawn(evaluation)
     if drawn is None:
         return []
@@ -295,114 +297,28 @@ def _scale(view: PlanView, path: tuple[Array, Array], unit: str) -> list[Line]:
 # A local map under the plan.
 
 
-#: Most tiles, most of their bytes together, and most pixels from west to east; twice as many pixels
-#: where a lower zoom would be bent too much.
-MOST_TILES, MOST_BYTES, MOST_PIXELS = 30, 800_000, 1300.0
-# A tile is placed by an affine fit to the corners of its part on the plan, which is d rad wide. The
-# second derivatives of the plane by Mercator's coordinates are sin(latitude) d of that: the inside
-# is off by up to sin(latitude) d/4 of it. On a page of so many pixels from west to east that is to
-# be below the limit. Half a page from the origin the plane itself adds 60 d² pixels: 0.15 from 128
-# tiles round the Earth on.
-_PAGE, _LIMIT, _ROUND_EARTH = 870.0, 0.8, 128
 # Least part of a tile that is fitted.
 _PART = 1.0 / 16.0
-_NORTHERNMOST = 85.0  # deg, of Web Mercator
-_LARGEST_ZOOM = 24  # tiles of two meters
-
-
-@dataclass(frozen=True)
-class ChosenTiles:
-    """Tiles of one zoom, each with its column counted on across the date line.
-
-    Attributes
-    ----------
-    count : int
-        How many tiles cover the plan.
-    """
-
-    zoom: int
-    count: int
-    tiles: list[tuple[Tile, int]]
-
-
-@dataclass(frozen=True)
-class MapBox:
-    """A part of Web Mercator: ends from west to east and from north to south, as shares of it.
-
-    Attributes
-    ----------
-    west, east : float
-        Of the whole Earth; may be below 0 or beyond 1 at the date line.
-    lat : float, deg
-        Of the corner nearest to a pole, without a sign.
-    """
-
-    west: float
-    east: float
-    north: float
-    south: float
-    lat: float
 
 
 def map_box(plane: Plane, low: Array, high: Array) -> MapBox:
     """Return the part of the map between two corners of a plan, (2,) each."""
+    from strapdown.formats.map_tiles import NORTHERNMOST, MapBox
+
     share = np.linspace(0.0, 1.0, 9)
     across, up = np.meshgrid(*(low + np.outer(share, high - low)).T)
     ned = np.column_stack([up.ravel(), across.ravel(), np.zeros(up.size)]) / plane.scale
     lat, lon, _ = geodetic_from_ned(ned, plane.origin, ellipsoid=WGS84).T
     x = (plane.origin[1] + (lon - plane.origin[1] + 180.0) % 360.0) / 360.0
-    clipped = np.radians(np.clip(lat, -_NORTHERNMOST, _NORTHERNMOST))
+    clipped = np.radians(np.clip(lat, -NORTHERNMOST, NORTHERNMOST))
     y = 0.5 - np.arcsinh(np.tan(clipped)) / (2.0 * math.pi)
     west, east, north, south = (float(v) for v in (x.min(), x.max(), y.min(), y.max()))
     return MapBox(west, east, north, south, float(np.abs(lat).max()))
 
 
-def chosen_tiles(opened: MapFile, box: MapBox) -> ChosenTiles:
-    """Choose the largest zoom within the limits at which most of a plan is covered."""
-    sine, width = math.sin(math.radians(box.lat)), box.east - box.west
-    for most in (MOST_PIXELS, 2.0 * MOST_PIXELS):
-        best = ChosenTiles(0, 0, [])
-        for zoom in range(_LARGEST_ZOOM, -1, -1):
-            n = 1 << zoom
-            bent = sine * 0.5 * math.pi * _PAGE / width * min(1.0 / n, width) ** 2
-            if n < _ROUND_EARTH or bent > _LIMIT or box.lat > _NORTHERNMOST:
-                break
-            columns = range(math.floor(n * box.west), math.floor(n * box.east) + 1)
-            rows = range(math.floor(n * box.north), math.floor(n * box.south) + 1)
-            count = len(columns) * len(rows)
-            if count > MOST_TILES:
-                continue
-            found = _tiles(opened, zoom, columns, rows, most / (n * width))
-            if found and len(found) / count > len(best.tiles) / max(best.count, 1):
-                best = ChosenTiles(zoom, count, found)
-            if len(best.tiles) == best.count > 0:
-                break
-        if best.tiles:
-            break
-    return best
-
-
-def _tiles(
-    opened: MapFile, zoom: int, columns: range, rows: range, most: float
-) -> list[tuple[Tile, int]]:
-    """Tiles of a zoom; none if they have too many bytes, or one more than `most` pixels a side."""
-    found: list[tuple[Tile, int]] = []
-    size = 0
-    for row in rows:
-        for column in columns:
-            tile = opened.tile(zoom, column % (1 << zoom), row)
-            if tile is None:
-                continue
-            size += len(tile.data)
-            if size > MOST_BYTES or tile.side > most:
-                return []
-            found.append((tile, column))
-    return found
-
-
 def _backdrop(plane: Plane, path: str, low: Array, high: Array) -> tuple[Backdrop | None, str]:
     """The map under the plan, and a sentence on it."""
-    from strapdown.formats.map_tiles import open_map
+    from strapdown.formats.map_tiles import chosen_tiles, open_map
 
     if plane.found.run.ellipsoid != WGS84:
         name = plane.found.run.ellipsoid.name

@@ -17,17 +17,15 @@ sys.path.insert(0, str(Path(__file__).parents[2] / "cli"))
 from bad_navigate import undrawn, write_drive
 
 import strapdown as sd
-from strapdown.formats.map_tiles import Tile
-from strapdown.frames import ned_from_geodetic
-from strapdown.report.navigation_plan import (
+from strapdown.formats.map_tiles import (
     MOST_BYTES,
     MOST_PIXELS,
     MOST_TILES,
-    Plane,
+    Tile,
     chosen_tiles,
-    map_box,
-    tile_picture,
 )
+from strapdown.frames import ned_from_geodetic
+from strapdown.report.navigation_plan import Plane, map_box, tile_picture
 
 #: Where the drive begins.
 LAT, LON = 55.75, 37.62
