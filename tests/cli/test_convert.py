@@ -113,8 +113,10 @@ def test_a_result_gives_its_log_and_its_trajectory(here, run_cli):
     assert run_cli("simulate", "drive-town", "--rate", "10", "--out", "town", "--quiet").code == 0
     for out in ("town.tum", "town.kml", "town.geojson", "town.nav"):
         assert run_cli("convert", "town", out, "--quiet").code == 0, out
-    for out in ("town.gpx", "town.nmea"):
-        assert run_cli("convert", "town", out).code == 3
+    assert run_cli("convert", "town", "town.nmea").code == 3
+    dateless = run_cli("convert", "town", "dateless.gpx")
+    assert dateless.code == 0 and "--epoch" in dateless.out + dateless.err
+    for out in ("town.gpx", "town.nmea", "town.geoparquet"):
         assert run_cli("convert", "town", out, "--epoch", "2026-05-01T12:00:00Z").code == 0, out
     date = ("--epoch", "2026-05-01T12:00:00Z")
     assert run_cli("convert", "town", "k", "--as", "kitti", "--quiet", *date).code == 0

@@ -56,6 +56,7 @@ FLAGS = {
     "aiding, gnss, lever_arm_m": "--lever-arm",
     "truth, path": "--truth",
     "control_points, path": "--points",
+    "map, path": "--map",
     "smoother, kind": "--smooth",
     **LOG_FLAGS,
     **fix_flags("aiding, gnss"),
@@ -86,6 +87,14 @@ class NavigateFlags:
             "FILE",
             "Control points (time, north, east) to score the path by, after the origin and "
             "heading that fit best.",
+        ),
+    ] = None
+    map: Annotated[
+        Path | None,
+        with_what(
+            "FILE",
+            "A local map under the plan of the report: raster tiles, .mbtiles or .pmtiles. "
+            "Nothing is fetched.",
         ),
     ] = None
     smooth: Annotated[
@@ -178,12 +187,14 @@ def navigate(
     assert source is not None
     own = source.suffix.lower() == ".toml"
     if own and live is None:
-        refuse_beside_file(source, {**given, "smooth": None}, FLAGS)
+        refuse_beside_file(source, {**given, "smooth": None, "map": None}, FLAGS)
     if own:
         WORDS.set("file")
     asked = NavigationSpec.read(source) if own else None
     if asked is not None and flags.smooth:
         asked = asked.smoothed()
+    if asked is not None and flags.map is not None:
+        asked = asked.with_map(str(flags.map.absolute()))
     named = None if asked is None else source_name(asked)
     folder = out or default_folder(source, "navigate", named)
     if live is not None:
@@ -247,6 +258,7 @@ def navigation_of_flags(log: Path, given: Mapping[str, Any]) -> NavigationSpec:
         "truth": given["truth"] and {"path": str(given["truth"])},
         "control_points": given["points"] and {"path": str(given["points"])},
         "smoother": given["smooth"] and {"kind": "rts"},
+        "map": given["map"] and {"path": str(given["map"].absolute())},
     }
     try:
         table = specify(LogTable, path=str(log), **log_keys(given))

@@ -203,6 +203,14 @@ class TruthTable(Spec):
     path: FileName = Field(description="the reference trajectory, from the folder of this file")
 
 
+class MapTable(Spec):
+    """Local map under the plan of the report."""
+
+    path: FileName = Field(
+        description="raster tiles, .mbtiles or .pmtiles, from the folder of this file"
+    )
+
+
 class ControlPointsTable(Spec):
     """Known positions of the body at instants, north and east of a local mark."""
 
@@ -366,6 +374,7 @@ class NavigationSpec(FileSpec):
     control_points: ControlPointsTable | None = None
     withhold: WithholdTable | None = None
     trust: TrustTable = TrustTable()
+    map: MapTable | None = None
     output: NavigationOutputTable = NavigationOutputTable()
 
     @model_validator(mode="before")
@@ -399,6 +408,11 @@ class NavigationSpec(FileSpec):
         if self.smoother.kind != NONE:
             return self
         return NavigationSpec.checked({**self.plain(), "smoother": {"kind": "rts"}})
+
+    def with_map(self, path: str | None) -> NavigationSpec:
+        """Return the specification with another map under its plan, or with none."""
+        plain = {key: value for key, value in self.plain().items() if key != "map"}
+        return NavigationSpec.checked(plain if path is None else {**plain, "map": {"path": path}})
 
     @property
     def receivers(self) -> dict[str, ReceiverTable]:

@@ -341,7 +341,7 @@ def _arrays(path: Path) -> list[Path]:
 # Parquet tables: columns, lists of three, structures; units where stated in fields.
 
 
-PARQUET_SUFFIXES = (".parquet", ".pq")
+PARQUET_SUFFIXES = (".parquet", ".pq", ".geoparquet")
 PARQUET_MAGIC = b"PAR1"
 
 
@@ -367,16 +367,111 @@ def read_parquet(path: Path) -> RawLog:
     return raw_log(path, found["arrays"], found["units"], found["meta"])
 
 
-def write_parquet(path: Path, columns: dict[str, NDArray[Any]], meta: dict[str, str]) -> None:
-    """Write columns exactly. `columns` ((n,)): names with their unit. `meta`: of the file."""
+def write_parquet(
+    path: Path,
+    columns: dict[str, NDArray[Any]],
+    meta: dict[str, str],
+    points: NDArray[np.float64] | None = None,
+) -> None:
+    """Write columns exactly. `columns` ((n,)): names with their unit. `meta`: of the file.
+
+    `points` ((n, 3)): longitude and latitude, deg of WGS 84, and height over the ellipsoid, m, as
+    the geometry of a GeoParquet file.
+    """
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     table = pa.table({name: pa.array(values) for name, values in columns.items()})
+    if points is not None:
+        table = table.append_column(GEOMETRY, _wkb(points))
+        meta = {**meta, "geo": json.dumps(_geo(points))}
     pq.write_table(
         table.replace_schema_metadata(meta),
         path,
         compression="zstd",
         use_dictionary=False,
-        use_byte_stream_split=True,
+        use_byte_stream_split=True if points is None else [*columns],
     )
+
+
+# GeoParquet 1.1 (https://geoparquet.org/releases/v1.1.0/): a column of points in WKB, and the
+# metadata ``geo`` of the file. WKB has longitude first, whatever the order of axes of the CRS.
+
+GEOMETRY = "geometry"
+_WKB_POINT = np.dtype([("order", "u1"), ("kind", "<u4"), ("at", "<f8", (3,))])
+_POINT_Z = 1001
+#: EPSG:4979, WGS 84 with heights over the ellipsoid, as PROJJSON; members of the ensemble by their
+#: codes.
+_MEMBERS = {
+    "Transit": 1166,
+    "G730": 1152,
+    "G873": 1153,
+    "G1150": 1154,
+    "G1674": 1155,
+    "G1762": 1156,
+    "G2139": 1309,
+    "G2296": 1383,
+}
+_AXES = (
+    ("Geodetic latitude", "Lat", "north", "degree"),
+    ("Geodetic longitude", "Lon", "east", "degree"),
+    ("Ellipsoidal height", "h", "up", "metre"),
+)
+EPSG_4979: dict[str, Any] = {
+    "$schema": "https://proj.org/schemas/v0.7/projjson.schema.json",
+    "type": "GeographicCRS",
+    "name": "WGS 84",
+    "datum_ensemble": {
+        "name": "World Geodetic System 1984 ensemble",
+        "members": [
+            {
+                "name": f"World Geodetic System 1984 ({name})",
+                "id": {"authority": "EPSG", "code": code},
+            }
+            for name, code in _MEMBERS.items()
+        ],
+        "ellipsoid": {
+            "name": "WGS 84",
+            "semi_major_axis": 6378137,
+            "inverse_flattening": 298.257223563,
+        },
+        "accuracy": "2.0",
+        "id": {"authority": "EPSG", "code": 6326},
+    },
+    "coordinate_system": {
+        "subtype": "ellipsoidal",
+        "axis": [
+            {"name": name, "abbreviation": short, "direction": to, "unit": unit}
+            for name, short, to, unit in _AXES
+        ],
+    },
+    "id": {"authority": "EPSG", "code": 4979},
+}
+
+
+def _wkb(points: NDArray[np.float64]) -> Any:
+    """Return an Arrow array of binary: points with height, of the low byte first."""
+    import pyarrow as pa
+
+    rows = np.empty(len(points), dtype=_WKB_POINT)
+    rows["order"], rows["kind"], rows["at"] = 1, _POINT_Z, points
+    ends = np.arange(len(points) + 1, dtype=np.int64) * _WKB_POINT.itemsize
+    if ends[-1] < 2**31:
+        ends, kind = ends.astype(np.int32), pa.binary()
+    else:
+        kind = pa.large_binary()
+    buffers = [None, pa.py_buffer(ends), pa.py_buffer(rows)]
+    return pa.Array.from_buffers(kind, len(points), buffers)
+
+
+def _geo(points: NDArray[np.float64]) -> dict[str, Any]:
+    column: dict[str, Any] = {
+        "encoding": "WKB",
+        "geometry_types": ["Point Z"],
+        "crs": EPSG_4979,
+    }
+    low, high = points.min(axis=0), points.max(axis=0)
+    # A box across the date line has its west beyond its east (RFC 7946, 5.2): it is left out.
+    if high[0] - low[0] <= 180.0:
+        column["bbox"] = [*low.tolist(), *high.tolist()]
+    return {"version": "1.1.0", "primary_column": GEOMETRY, "columns": {GEOMETRY: column}}

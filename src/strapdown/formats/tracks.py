@@ -22,7 +22,7 @@ from strapdown.formats.signs import Signs, head
 from strapdown.formats.writing import (
     FileOptions,
     Tables,
-    dates,
+    dates_if_known,
     fixes_not_held,
     fixes_of,
     heights_of,
@@ -36,8 +36,9 @@ from strapdown.tables.checks import values_of
 #
 # Every ``trkpt`` of every track and segment, in their order: latitude and longitude in degrees of
 # WGS 84, ``time`` in UTC. ``ele`` is over the sea, and ``geoidheight`` the height of the geoid
-# over the ellipsoid, as in NMEA GGA; ``fix`` is the kind of solution; GPX 1.0 also has ``speed``
-# in m/s and ``course`` in degrees from north.
+# over the ellipsoid, as in NMEA GGA; ``fix`` is the kind of solution. ``speed`` in m/s and
+# ``course`` in degrees from north are elements of a point of GPX 1.0, and in 1.1 of Garmin's
+# extension (https://www8.garmin.com/xmlschemas/TrackPointExtensionv2.xsd).
 
 
 QUALITY = {"none": 0.0, "dgps": 2.0, "pps": 3.0}
@@ -89,13 +90,24 @@ def read_gpx(path: Path) -> RawLog:
     return log
 
 
-# Writing: GPX 1.0 (https://www.topografix.com/GPX/1/0/), which has speed and course; 1.1 has not.
+# Writing: GPX 1.1, speed and course in Garmin's extension.
 
 _FIX = {1: "3d", 2: "dgps", 3: "pps", 4: "dgps", 5: "dgps"}
 _BEGIN = """<?xml version="1.0" encoding="UTF-8"?>
-<gpx version="1.0" creator="strapdown" xmlns="http://www.topografix.com/GPX/1/0">
+<gpx version="1.1" creator="strapdown" xmlns="http://www.topografix.com/GPX/1/1" \
+xmlns:e="http://www.garmin.com/xmlschemas/TrackPointExtension/v2">
+<metadata><name>{name}</name><desc>{heights}</desc></metadata>
 <trk><name>{name}</name><trkseg>
 """
+_HEIGHTS = (
+    "Elevations (ele) are over the WGS 84 ellipsoid, not over mean sea level as GPX has them: the "
+    "height of the geoid is not stated, and geoidheight is 0 so that their sum is the height over "
+    "the ellipsoid."
+)
+_OVER_SEA = (
+    "Elevations (ele) are over the geoid: {geoid:.9g} m (geoidheight), the same everywhere, is "
+    "taken off the heights over the WGS 84 ellipsoid."
+)
 
 
 def write_gpx(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
@@ -103,33 +115,49 @@ def write_gpx(path: Path, tables: Tables, options: FileOptions) -> list[Finding]
 
     Latitude and longitude have the fewest digits that reproduce each; dates microseconds, as far
     as readers go. ``ele`` is over the sea by the stated height of the geoid; without one it is that
-    over the ellipsoid, with ``geoidheight`` 0 and a warning.
+    over the ellipsoid, with ``geoidheight`` 0 and a warning; the description of the file says
+    which. Points of a clock that is not related to UTC are written without a time, with a warning.
 
-    DataError: the clock is not related to UTC, or there are neither fixes nor a trajectory.
+    DataError: there are neither fixes nor a trajectory.
     """
     from strapdown.formats.trajectory_writers import one_line
 
     options.require_wgs84("GPX")
     gnss, findings = fixes_of(tables, "GPX")
-    stamps, said = dates(gnss, options, "GPX")
+    stamps, said = dates_if_known(gnss, options, "GPX")
     over_sea, geoid, warned = heights_of(gnss, options)
     findings += [*said, *warned, *fixes_not_held("GPX", gnss, position_sd=False)]
     speed, course = (v.tolist() for v in over_ground(gnss))
-    lines = [_BEGIN.format(name=escape(one_line(options.name), quote=False))]
+    heights = _HEIGHTS if options.geoid_undulation is None else _OVER_SEA.format(geoid=geoid)
+    name = escape(one_line(options.name), quote=False)
+    lines = [_BEGIN.format(name=name, heights=heights)]
+    times = [""] * len(gnss)
+    if stamps is not None:
+        times = [f"<time>{date}</time>" for date in iso_dates(stamps)]
+    geoid_text = _decimal(geoid)
     quality = values_of(gnss, ["quality"])[:, 0].astype(int).tolist()
     places = zip(*values_of(gnss, ["lat", "lon"]).T.tolist(), over_sea.tolist(), strict=True)
-    for k, ((lat, lon, ele), date) in enumerate(zip(places, iso_dates(stamps), strict=True)):
+    for k, ((lat, lon, ele), time) in enumerate(zip(places, times, strict=True)):
         moves = ""
         if np.isfinite(speed[k]):
-            moves = f"<course>{course[k]!r}</course><speed>{speed[k]!r}</speed>"
+            moves = (
+                f"<extensions><e:TrackPointExtension><e:speed>{_decimal(speed[k])}</e:speed>"
+                f"<e:course>{_decimal(course[k])}</e:course></e:TrackPointExtension></extensions>"
+            )
         fix = f"<fix>{_FIX[quality[k]]}</fix>" if quality[k] in _FIX else ""
         lines.append(
-            f'<trkpt lat="{lat!r}" lon="{lon!r}"><ele>{ele!r}</ele><time>{date}</time>{moves}'
-            f"<geoidheight>{geoid!r}</geoidheight>{fix}</trkpt>\n"
+            f'<trkpt lat="{_decimal(lat)}" lon="{_decimal(lon)}"><ele>{_decimal(ele)}</ele>{time}'
+            f"<geoidheight>{geoid_text}</geoidheight>{fix}{moves}</trkpt>\n"
         )
     lines.append("</trkseg></trk>\n</gpx>\n")
     path.write_bytes("".join(lines).encode())
     return findings
+
+
+def _decimal(value: float) -> str:
+    """The fewest digits that reproduce a number, as a decimal of XML, which has no exponent."""
+    text = repr(value)
+    return np.format_float_positional(value, trim="0") if "e" in text else text
 
 
 # Garmin FIT (``.fit``): activities with fixes, and cameras and watches with a gyro; by fitdecode.

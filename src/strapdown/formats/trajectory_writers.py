@@ -186,12 +186,18 @@ def write_decimals(
                 stream.write(text[:written].data)
 
 
-def write_parquet(path: Path, trajectory: pd.DataFrame, options: FileOptions | None = None) -> None:
+def write_parquet(
+    path: Path,
+    trajectory: pd.DataFrame,
+    options: FileOptions | None = None,
+    points: Array | None = None,
+) -> None:
     """Write a Trajectory table as Parquet.
 
     `trajectory`: further numeric columns, such as standard deviations, are written under their own
     names. `options`: ellipsoid and epoch are written to the file's metadata, like the comments of
-    the CSV. DataError: the table is not valid.
+    the CSV. `points`: geometry of GeoParquet (`table_files.write_parquet`). DataError: the table is
+    not valid.
     """
     chosen = options or FileOptions()
     check_trajectory(trajectory)
@@ -205,7 +211,7 @@ def write_parquet(path: Path, trajectory: pd.DataFrame, options: FileOptions | N
     told: dict[str, Any] = told_of(chosen)
     told |= {"clock": clock.name, "clock_origin_s": repr(clock.origin)}
     told |= {} if clock.week is None else {"gps_week": str(clock.week)}
-    table_files.write_parquet(path, columns, told)
+    table_files.write_parquet(path, columns, told, points)
 
 
 # Trajectories for maps, thinned and split at the date line.

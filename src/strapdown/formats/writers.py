@@ -35,7 +35,13 @@ from strapdown.formats import (
     tum,
 )
 from strapdown.formats.clocks import GPS, RELATIVE, UNIX, clock_of, time_column
-from strapdown.formats.trajectory_writers import write_csv, write_geojson, write_kml, write_parquet
+from strapdown.formats.trajectory_writers import (
+    told_of,
+    write_csv,
+    write_geojson,
+    write_kml,
+    write_parquet,
+)
 from strapdown.formats.writing import (
     FileOptions,
     Tables,
@@ -45,6 +51,7 @@ from strapdown.formats.writing import (
     stream_not_held,
     unix_ns,
 )
+from strapdown.rotation import within_half_turn
 from strapdown.tables import (
     ACCEL,
     EULER,
@@ -287,6 +294,22 @@ def _write_parquet(path: Path, tables: Tables, options: FileOptions) -> None:
         table_files.write_parquet(path, *_columns(tables))
 
 
+def _write_geoparquet(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
+    """Write every row of a trajectory, else of fixes, as a point with all its columns."""
+    options.require_wgs84("GeoParquet")
+    stream, track, findings = _track_or_fixes(tables, "GeoParquet")
+    if track.empty:
+        raise DataError("io.trajectory-no-rows")
+    points = track[["lon", "lat", "alt"]].to_numpy(dtype=np.float64).copy()
+    points[:, 0] = within_half_turn(points[:, 0])
+    if stream == "reference":
+        write_parquet(path, track, options, points)
+        return findings
+    columns, _ = _columns({stream: track})
+    table_files.write_parquet(path, columns, {"place": told_of(options)["place"]}, points)
+    return findings
+
+
 def _write_npz(path: Path, tables: Tables, options: FileOptions) -> None:
     said: dict[str, Array] = {}
     arrays = _three_columns(tables)
@@ -365,11 +388,7 @@ def _write_tum(path: Path, tables: Tables, options: FileOptions) -> list[Finding
 
 def _write_map(path: Path, tables: Tables, options: FileOptions, write: Any) -> list[Finding]:
     """Write a map of a trajectory, else of fixes, with dates if the clock is related to UTC."""
-    places = {k: t for k, t in tables.items() if k == "gnss" or is_trajectory(t)}
-    if not places:
-        raise DataError("io.written-needs-stream", form="a map", needed=["gnss", "a trajectory"])
-    stream, track = next(iter(places.items()))
-    findings = [_of_own_file(k, t) for k, t in tables.items() if k != stream]
+    stream, track, findings = _track_or_fixes(tables, "a map")
     if clock_of(track).name != RELATIVE and options.epoch is None:
         stamps, said = unix_ns(track, options)
         findings += said
@@ -387,6 +406,15 @@ def _write_map(path: Path, tables: Tables, options: FileOptions, write: Any) -> 
     elif POSITION_SD[0] in _known_columns(track):
         findings.append(not_held("a map", stream, "standard deviations", track))
     return findings
+
+
+def _track_or_fixes(tables: Tables, form: str) -> tuple[str, pd.DataFrame, list[Finding]]:
+    """Return the stream of positions, and findings on the others."""
+    places = {k: t for k, t in tables.items() if k == "gnss" or is_trajectory(t)}
+    if not places:
+        raise DataError("io.written-needs-stream", form=form, needed=["gnss", "a trajectory"])
+    stream, track = next(iter(places.items()))
+    return stream, track, [_of_own_file(k, t) for k, t in tables.items() if k != stream]
 
 
 def _write_nav(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
@@ -518,6 +546,13 @@ WRITERS: dict[str, Writer] = {
     "geojson": Writer(
         "GeoJSON", _MAP, partial(_write_map, write=write_geojson), None, (".geojson",)
     ),
+    "geoparquet": Writer(
+        "GeoParquet 1.1",
+        dict.fromkeys(("reference", "gnss"), (*_MAP["gnss"], "all columns")),
+        _write_geoparquet,
+        "parquet",
+        (".geoparquet",),
+    ),
     "nav": Writer(
         "KF-GINS trajectory",
         {"reference": ("deg, m, m/s", "GPS week and seconds of it")},
@@ -530,7 +565,7 @@ WRITERS: dict[str, Writer] = {
 #: What `simulate` writes samples in: exact, with the attitude of each.
 LOG_FORMATS = ("csv", "parquet", "npz", "h5", "mat")
 #: Formats of one file for a trajectory with any clock.
-TRAJECTORY_FORMATS = ("csv", "tum", "kml", "geojson", "nav", "parquet")
+TRAJECTORY_FORMATS = ("csv", "tum", "kml", "geojson", "gpx", "nav", "parquet", "geoparquet")
 
 
 def log_formats(names: tuple[str, ...]) -> tuple[str, ...]:

@@ -36,6 +36,7 @@ __all__ = [
     "Tables",
     "accel_needed",
     "dates",
+    "dates_if_known",
     "fixes_of",
     "gps_ns",
     "not_held",
@@ -196,6 +197,19 @@ def dates(table: pd.DataFrame, options: FileOptions, form: str) -> tuple[Stamps,
             clock=clock_of(table).name,
         )
     return found
+
+
+def dates_if_known(
+    table: pd.DataFrame, options: FileOptions, form: str
+) -> tuple[Stamps | None, list[Finding]]:
+    """Return stamps in ns since 1970, for formats that can do without; None and a warning then."""
+    found = _utc(table, options)
+    if found is not None:
+        return found
+    clock = clock_of(table).name
+    return None, [
+        _note(table, "io.written-without-dates", severity="warning", form=form, clock=clock)
+    ]
 
 
 def gps_ns(

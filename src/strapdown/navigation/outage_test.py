@@ -7,7 +7,7 @@ fixes.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -374,6 +374,7 @@ def withheld_runs(
     time: Array,
     values: Array,
     spans: Sequence[Span],
+    with_fixes: Callable[[Sequence[NavigationChunk]], object] | None = None,
 ) -> Iterator[WithheldRun]:
     """Process samples with every fix up to each test outage, and through it with none.
 
@@ -387,6 +388,9 @@ def withheld_runs(
     values : ndarray, (n, 6)
     spans : sequence of Span
         Within the samples. Each is tested separately: later ones have had its fixes.
+    with_fixes : callable, optional
+        Called with the chunks of the run with every fix, which then goes to the end of the last
+        outage.
 
     Yields
     ------
@@ -397,7 +401,12 @@ def withheld_runs(
     for number in sorted(range(len(spans)), key=lambda k: spans[k].begin):
         span = spans[number]
         first, last = np.searchsorted(time, [span.begin, span.end], side="right").tolist()
-        state, _ = chain.advance(state, time[at:first], values[at:first])
+        state, used = chain.advance(state, time[at:first], values[at:first])
+        if with_fixes is not None:
+            with_fixes(used.navigation)
         at = first
         through, piece = blind.advance(state, time[first:last], values[first:last])
         yield WithheldRun(number, state, through, slice(first, last), piece.navigation)
+    if with_fixes is not None:
+        end = int(np.searchsorted(time, max(span.end for span in spans), side="right"))
+        with_fixes(chain.advance(state, time[at:end], values[at:end])[1].navigation)

@@ -54,6 +54,19 @@ def table(path: Path) -> dict[str, Any]:
     return {"arrays": arrays, "units": units, "meta": meta}
 
 
+def with_bytes(path: Path) -> dict[str, Any]:
+    """Read `table`, and the bytes of the columns of bytes of one length, as a geometry has them."""
+    found = table(path)
+    with pq.ParquetFile(path) as file:
+        names = [f.name for f in file.schema_arrow if pa.types.is_binary(f.type)]
+        for name in names:
+            values = file.read([name], use_threads=False).column(0).to_pylist()
+            if len({None if value is None else len(value) for value in values}) == 1:
+                joined = np.frombuffer(b"".join(values), dtype=np.uint8)
+                found["arrays"][name] = joined.reshape(len(values), -1)
+    return found
+
+
 def _units(held: Any) -> dict[str, str]:
     found = {}
     for field in held.schema:

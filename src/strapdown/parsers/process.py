@@ -30,7 +30,8 @@ __all__ = ["in_place", "parse", "start", "start_for"]
 
 #: Endings of files that are parsed elsewhere.
 ENDINGS = (
-    *(".h5", ".hdf5", ".hdf", ".mat", ".npz", ".parquet", ".pq", ".zip", ".xlsx", ".xlsm"),
+    *(".h5", ".hdf5", ".hdf", ".mat", ".npz", ".zip", ".xlsx", ".xlsm"),
+    *(".parquet", ".pq", ".geoparquet"),
     *(".ulg", ".ulog", ".bag", ".mcap", ".db3", ".ubx", ".tlog", ".fit", ".gpx"),
 )
 

@@ -172,4 +172,17 @@ def gpx(path: Path) -> dict[str, list[Any]]:
         ]
         names = ("latitude", "longitude", "elevation", "geoid_height", "speed", "course")
         fields: dict[str, list[Any]] = {n: [getattr(p, n) for p in points] for n in names}
+        for name in ("speed", "course"):
+            if all(value is None for value in fields[name]):
+                fields[name] = [_of_extension(p, name) for p in points]
         return fields | {"time": times, "fix": [p.type_of_gpx_fix for p in points]}
+
+
+def _of_extension(point: Any, name: str) -> float | None:
+    """Number of a point in Garmin's extension of GPX 1.1, of any version."""
+    for extension in point.extensions:
+        for one in extension.iter():
+            space, _, tag = str(one.tag).rpartition("}")
+            if tag == name and "TrackPointExtension" in space:
+                return float(one.text or "nan")
+    return None

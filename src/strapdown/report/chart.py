@@ -172,6 +172,32 @@ class Band:
 
 
 @dataclass(frozen=True)
+class Picture:
+    """A picture in a plane: a square from one corner along two sides.
+
+    Attributes
+    ----------
+    media : {'png', 'jpeg', 'webp'}
+    corner, across, down : ndarray, (2,)
+        Upper left corner, and the upper and the left side from it, in the unit of the axes.
+    """
+
+    data: bytes
+    media: str
+    corner: Array
+    across: Array
+    down: Array
+
+
+@dataclass(frozen=True)
+class Backdrop:
+    """Pictures below everything else of a plane, and a text on them: whose they are."""
+
+    pictures: tuple[Picture, ...]
+    text: str
+
+
+@dataclass(frozen=True)
 class Panel:
     """One set of axes.
 
@@ -196,6 +222,8 @@ class Panel:
         Between ticks of the vertical axis, such as 30 degrees; 0 for automatic ticks.
     x_step : float
         The same for the horizontal axis, if it is the panel's own or in the last panel.
+    backdrop : Backdrop or None
+        Of a plane.
     """
 
     y_label: str
@@ -211,6 +239,7 @@ class Panel:
     bars: tuple[Bars, ...] = ()
     step: float = 0.0
     x_step: float = 0.0
+    backdrop: Backdrop | None = None
 
 
 @dataclass(frozen=True)

@@ -31,11 +31,13 @@ from strapdown.report.chart import (
 )
 from strapdown.report.svg_drawing import (
     INK,
+    SMALL,
     Box,
     Drawing,
     nice_step,
     number,
     overlap,
+    shortened,
     text_width,
     tick_words,
 )
@@ -217,6 +219,11 @@ class Frame:
             "data_labels": f"{panel.x_label}|{panel.y_label}",
         }
         with drawing.within(self.box, **axes):
+            if panel.backdrop is not None:
+                with drawing.group(class_="map", opacity="0.75", aria_hidden="true"):
+                    for one in panel.backdrop.pictures:
+                        corners = one.corner + np.array([0.0 * one.down, one.across, one.down])
+                        drawing.picture(one.data, one.media, self.at(*corners.T))
             with drawing.group(class_="grid"):
                 self._grid(drawing)
             for band in bands:
@@ -244,6 +251,11 @@ class Frame:
             for line in panel.lines:
                 with drawing.group(data_series=line.name, data_line=""):
                     self._line(drawing, line)
+            if panel.backdrop is not None:
+                # In the middle: a scale and a compass are in a corner.
+                text = shortened(panel.backdrop.text, 0.7 * (right - left), SMALL)
+                at = (0.5 * (left + right), bottom - 0.8 * SMALL)
+                drawing.text(at, text, SMALL, anchor="middle", halo=True)
         drawing.line((left, top), (left, bottom), INK, 0.8)
         drawing.line((left, bottom), (right, bottom), INK, 0.8)
         with drawing.group(class_="ticks"):
@@ -400,10 +412,9 @@ def still(chart: Chart, *, title: bool = False, caption: bool = False) -> str:
     """
     head = _folded(chart.title, _WIDTH - 2.0 * _EDGE, _HEAD, bold=True) if title else []
     foot = _folded(chart.caption, _WIDTH - 2.0 * _EDGE, TICK) if caption else []
-    legend = list(_placed(entries(chart), _EDGE, _WIDTH - _EDGE))
-    below = _LEGEND_ROW * (legend[-1][2] + 1) + 4.0 if legend else 0.0
+    legend, below, room = _legend_of(chart)
     top = 1.35 * _HEAD * len(head) + 4.0 * bool(head)
-    end = top + _INCH * _height(chart) + max(0.0, below - 20.0)
+    end = top + room
     drawing = Drawing(_WIDTH, end + 1.3 * TICK * len(foot) + 4.0 * bool(foot), chart.title)
     for k, line in enumerate(head):
         drawing.text((_EDGE, 1.35 * _HEAD * (k + 0.5)), line, _HEAD, bold=True)
@@ -419,6 +430,20 @@ def still(chart: Chart, *, title: bool = False, caption: bool = False) -> str:
     for k, line in enumerate(foot):
         drawing.text((_EDGE, end + 1.3 * TICK * (k + 0.5)), line, TICK, _SOFT)
     return drawing.svg()
+
+
+def plane_view(chart: Chart) -> tuple[Array, Array]:
+    """Return what the plane of a chart shows: its lower left and upper right corner, (2,) each."""
+    _, below, room = _legend_of(chart)
+    frame = _frames(chart, 0.0, room - below)[0]
+    return np.array([frame.x.low, frame.y.low]), np.array([frame.x.high, frame.y.high])
+
+
+def _legend_of(chart: Chart) -> tuple[list[tuple[Shown, float, int]], float, float]:
+    """Legend entries with their places, their height, and that of the chart with them."""
+    legend = list(_placed(entries(chart), _EDGE, _WIDTH - _EDGE))
+    below = _LEGEND_ROW * (legend[-1][2] + 1) + 4.0 if legend else 0.0
+    return legend, below, _INCH * _height(chart) + max(0.0, below - 20.0)
 
 
 def _height(chart: Chart) -> float:

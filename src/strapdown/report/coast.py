@@ -185,12 +185,22 @@ def coast_json(result: OutageRun) -> dict[str, Any]:
                 q: v[-1] / _positive(predicted.variance(q)[-1]) for q, v in predicted.aids.items()
             },
         },
+        "outages": {
+            "tried": len(result.drifts),
+            "equal_length": len(result.equal),
+            "fixes_to_the_end": sum(d.to_end for d in result.equal),
+            "rejected_fixes": sum(d.rejected for d in result.drifts),
+        },
         "measured": spaced(inside_words(result)),
         "drifts": [
             {
                 "begin_s": d.span.begin,
                 "end_s": d.span.end,
+                "since_fix_s": d.since_fix,
+                "equal_length": d in result.equal,
                 "fixes": len(d.time),
+                "rejected_fixes": d.rejected,
+                "last_fix_s": d.span.begin + float(d.time[-1]),
                 "drift_m": float(d.horizontal[-1]),
                 "along_m": float(d.along[-1]),
                 "across_m": float(d.across[-1]),
@@ -198,7 +208,7 @@ def coast_json(result: OutageRun) -> dict[str, Any]:
                 "predicted_95_m": float(d.bound[-1]),
                 "inside_95": float(d.inside.mean()),
             }
-            for d in drifts_of(result)
+            for d in drifts_of(result.drifts)
         ],
         "findings": [f.plain("file") for f in result.findings],
     }
@@ -231,7 +241,7 @@ def write_coast_tables(result: OutageRun, folder: Path) -> None:
         "outage_from_s": f"{predicted.begin:.9g}",
     }
     csv.write(folder / "budget.csv", {"time_s": predicted.time, **parts}, of)
-    drifts = drifts_of(result)
+    drifts = drifts_of(result.drifts)
     if drifts:
         columns = {
             "outage_from_s": np.concatenate([np.full(len(d.time), d.span.begin) for d in drifts]),

@@ -134,9 +134,32 @@ def at_start(share: Share, result: OutageRun) -> str:
     return f"{three_digits(factor * low)} to {three_digits(factor * high)}{GAP}{unit}"
 
 
-def drifts_of(result: OutageRun) -> list[Drift]:
-    """Return the observed drifts."""
-    return [d for d in result.drifts if d.time.size]
+def drifts_of(outages: Sequence[Drift]) -> list[Drift]:
+    """Return the outages of which fixes show the drift."""
+    return [d for d in outages if d.time.size]
+
+
+def left_out_words(result: OutageRun) -> str:
+    """Outages and fixes that do not count, and why; empty if all do."""
+    late = [d.since_fix for d in result.drifts if not d.whole]
+    rejected = sum(d.rejected for d in result.drifts)
+    said = []
+    if late and len(late) < len(result.drifts):
+        outages = "1 outage that begins" if len(late) == 1 else f"{len(late)} outages that begin"
+        said.append(
+            f"Left out of bounds and drifts: {outages} up to {duration_words(max(late))} after the "
+            "last fix, so that the position is without fixes for longer"
+        )
+    elif late:
+        said.append(
+            f"No outage begins with a fix: the last one is up to {duration_words(max(late))} before"
+        )
+    if rejected:
+        said.append(
+            f"{rejected} withheld {'fix' if rejected == 1 else 'fixes'} that the run with fixes "
+            f"rejects {'is' if rejected == 1 else 'are'} left out"
+        )
+    return "".join(f" {one}." for one in said)
 
 
 def end_bound(result: OutageRun) -> float:
@@ -225,19 +248,23 @@ def remedy(result: OutageRun) -> str:
 
 def inside_words(result: OutageRun) -> str:
     """Number of observed drifts within the predicted bound; empty if none were observed."""
-    drifts = drifts_of(result)
+    drifts = drifts_of(result.equal)
     if not drifts:
-        return ""
+        return left_out_words(result).strip()
     fixes = np.concatenate([d.inside for d in drifts])
-    ends = [bool(d.inside[-1]) for d in drifts]
-    middle = float(np.median([d.horizontal[-1] for d in drifts]))
-    worst = max(float(d.horizontal[-1]) for d in drifts)
-    return (
-        f"Measured in {len(drifts)} {'outages' if len(drifts) > 1 else 'outage'}: the final drift "
-        f"is {length_words(middle)} in the median and {length_words(worst)} at most; {sum(ends)} "
-        f"of {len(ends)} final drifts and {share_words(float(fixes.mean()))} of {len(fixes)} fixes "
-        "are within their 95 % bounds."
-    )
+    of = f"{share_words(float(fixes.mean()))} of {len(fixes)} fixes are within their 95 % bounds."
+    ended = [d for d in drifts if d.to_end]
+    if ended:
+        ends = [bool(d.inside[-1]) for d in ended]
+        middle = float(np.median([d.horizontal[-1] for d in ended]))
+        worst = max(float(d.horizontal[-1]) for d in ended)
+        where = "" if len(ended) == len(drifts) else f" of the {len(ended)} with fixes to the end"
+        of = (
+            f"the final drift{where} is {length_words(middle)} in the median and "
+            f"{length_words(worst)} at most; {sum(ends)} of {len(ends)} final drifts and {of}"
+        )
+    said = f"Measured in {len(drifts)} {'outages' if len(drifts) > 1 else 'outage'}: {of}"
+    return said + left_out_words(result)
 
 
 def key_figures(result: OutageRun) -> tuple[KeyFigure, ...]:
@@ -257,7 +284,7 @@ def key_figures(result: OutageRun) -> tuple[KeyFigure, ...]:
         else KeyFigure("Vertical", f"±{GAP}{length_words(half(sd('vertical')))}", said),
         KeyFigure("Heading", f"±{GAP}{three_digits(math.degrees(half(sd('heading'))))}°", said),
     ]
-    drifts = drifts_of(result)
+    drifts = drifts_of(result.equal)
     if drifts:
         fixes = np.concatenate([d.inside for d in drifts])
         figures.append(
@@ -367,7 +394,8 @@ def time_table(result: OutageRun) -> TableBlock:
                 f"{plain(math.degrees(half(sd('heading', at))), 3)}°",
             )
         )
-    said = "" if len(result.drifts) < 2 else f" Root mean square over {len(result.drifts)} outages."
+    many = len(result.equal)
+    said = "" if many < 2 else f" Root mean square over {many} outages."
     return TableBlock(
         (
             "after",
@@ -432,12 +460,14 @@ def _part(part: float) -> tuple[str, str]:
 
 def drift_table(result: OutageRun) -> TableBlock | None:
     """Table of the outage tests."""
-    drifts = drifts_of(result)
+    drifts = drifts_of(result.drifts)
     if not drifts:
         return None
     rows = [
         (
             f"{plain(d.span.begin, 1)}{GAP}s",
+            duration_words(d.since_fix),
+            f"{plain(float(d.time[-1]), 1)}{GAP}s",
             length_words(float(d.horizontal[-1])),
             length_words(float(d.along[-1])),
             length_words(float(d.across[-1])),
@@ -448,11 +478,15 @@ def drift_table(result: OutageRun) -> TableBlock | None:
         for d in drifts
     ]
     return TableBlock(
-        ("outage from", "drift", "along", "across", "down", "predicted, 95 %", "fixes within"),
+        (
+            *("outage from", "after a fix", "fixes to", "drift", "along", "across", "down"),
+            *("predicted, 95 %", "fixes within"),
+        ),
         tuple(rows),
         text=(),
         caption="Drift at the last fix of each outage, computed − fix, and the share of its fixes "
-        "within their 95 % ellipses, which include the noise of the fixes.",
+        "within their 95 % ellipses, which include the noise of the fixes. After a fix: time from "
+        "the last fix that was used to the begin.",
     )
 
 
@@ -467,6 +501,8 @@ _LEAST_PART = 0.005
 #: Fractions of the outage at which the plan has an ellipse.
 _RINGS = (0.25, 0.5, 0.75, 1.0)
 _CORNERS = 90
+#: Share by which a bound has fallen that is explained.
+_FALL = 0.05
 _INSIDE, _OUTSIDE = "measured drift, within its 95 % bound", "beyond its 95 % bound"
 
 
@@ -493,7 +529,7 @@ def cone_chart(result: OutageRun) -> Chart:
         fills=fills,
         title="Shares of the drift",
     )
-    tried = _tried(result.drifts) if result.drifts else ""
+    tried = _tried(result)
     return Chart(
         "cone",
         "Horizontal drift over the outage",
@@ -504,20 +540,24 @@ def cone_chart(result: OutageRun) -> Chart:
     )
 
 
-def _tried(drifts: Sequence[Drift]) -> str:
-    many = sum(bool(d.time.size) for d in drifts)
-    if many < 2:
-        return ""
-    return (
-        f" The bound is the root mean square of the predictions for {many} outages; each drift is "
-        "compared with its own."
-    )
+def _tried(result: OutageRun) -> str:
+    """What the curve is over, and why it can fall."""
+    many, said = len(result.equal), ""
+    if many > 1:
+        said = (
+            f" The bound is the root mean square of the predictions for {many} outages of one "
+            "length; each drift is compared with its own."
+        )
+    falls = any(float(np.max(d.bound)) > (1.0 + _FALL) * float(d.bound[-1]) for d in result.equal)
+    if falls:
+        said += " A bound falls where a remaining measurement, as at a standstill, corrects it."
+    return said + left_out_words(result)
 
 
 def _came(result: OutageRun, value: object) -> list[Line]:
     """Observed drifts over time."""
     lines = []
-    for d in drifts_of(result):
+    for d in drifts_of(result.equal):
         y = np.asarray(value(d))  # type: ignore[operator]
         lines.append(Line(_INSIDE, d.time, y, GREY, "solid", 1.0))
         if not d.inside.all():
@@ -563,7 +603,7 @@ def _stack(result: OutageRun) -> tuple[tuple[Fill, ...], str]:
         below = above
     cancels = any(float(np.min(v)) < -_LEAST_PART for _, v in signed)
     note = " Negative shares, of errors that cancel, are not drawn." if cancels else ""
-    if len(result.drifts) > 1:
+    if len(result.equal) > 1:
         note += f" Outage from {result.forecast.begin:.1f} s, the median one by its bound."
     return tuple(fills), note
 
@@ -599,9 +639,9 @@ def plane_chart(result: OutageRun) -> Chart:
                 inside=0.06,
             )
         )
-    for d in drifts_of(result):
+    for d in drifts_of(result.equal):
         lines.append(Line(_INSIDE, d.across, d.along, GREY, "solid", 1.0))
-        name, colour = ("final drift", GREY) if d.inside[-1] else (_OUTSIDE, VERMILLION)
+        name, colour = ("drift at the last fix", GREY) if d.inside[-1] else (_OUTSIDE, VERMILLION)
         ends = d.across[-1:], d.along[-1:]
         lines.append(Line(name, *ends, colour, points=True, symbol="circle", size=7.0))
     panel = Panel("along track, m", tuple(lines), x_label="cross track, to the right, m")

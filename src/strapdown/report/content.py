@@ -51,6 +51,7 @@ ARRAYS = {
     ".h5": ("hdf5.arrays", True),
     ".mat": ("matlab.arrays", True),
     ".parquet": ("parquet.table", False),
+    ".geoparquet": ("parquet.with_bytes", False),
 }
 _NUMBER = re.compile(r"-?\d+\.?\d*(?:[eE][+-]?\d+)?")
 _OWN_VERSION = re.compile(r"strapdown \d+\.\d+\.\d+[\w.+]*")

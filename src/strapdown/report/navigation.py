@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import re
-from dataclasses import asdict
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from strapdown.alignment.alignment import Alignment
-from strapdown.bundle import write_json
+from strapdown.bundle import input_files, write_json
 from strapdown.config.navigation import STAGES, NavigationSpec
 from strapdown.errors import ConfigError
 from strapdown.formats import csv
@@ -90,8 +93,31 @@ def _write_all(
         write_report(document, folder, progress, figures=result.spec.output.figures)
 
 
+@contextmanager
+def _with_tiles(result: NavigationRun, report: bool) -> Iterator[NavigationRun]:
+    """The run with the tiles that its plan shows, as files, instead of the map that has them."""
+    if result.spec.map is None:
+        yield result
+        return
+    if not report:
+        yield replace(result, spec=result.spec.with_map(None))
+        return
+    from strapdown.formats.map_tiles import open_map, write_tiles
+    from strapdown.report.navigation_plan import plan_tiles
+
+    with (
+        open_map(result.spec.map.path) as opened,
+        TemporaryDirectory(prefix="strapdown-") as name,
+    ):
+        folder = Path(name).resolve() / "tiles"
+        files = write_tiles(folder, opened, plan_tiles(NavigationEvaluation(result), opened))
+        used = replace(input_files("map", str(folder), files), copied=True)
+        spec = result.spec.with_map(str(folder))
+        yield replace(result, spec=spec, inputs=(*result.inputs, used))
+
+
 #: Pages, JSON, tables and paths for maps of a navigation run.
-NAVIGATION = ReportBundle("navigate", _configuration, _run, _write_all)
+NAVIGATION = ReportBundle("navigate", _configuration, _run, _write_all, prepared=_with_tiles)
 
 
 # Charts of a navigation run as figures for a notebook.

@@ -3,25 +3,43 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.dsp.samples import running_integral, true_runs
+from strapdown.ellipsoids import WGS84
 from strapdown.formats.trajectory_writers import thin
-from strapdown.frames import ned_from_geodetic
+from strapdown.frames import geodetic_from_ned, ned_from_geodetic
 from strapdown.navigation.record import NavigationRecord, Span
-from strapdown.report.chart import BLACK, BLUE, GREY, PURPLE, VERMILLION, Array, Chart, Line, Panel
+from strapdown.report.chart import (
+    BLACK,
+    BLUE,
+    GREY,
+    PURPLE,
+    VERMILLION,
+    Array,
+    Backdrop,
+    Chart,
+    Line,
+    Panel,
+    Picture,
+)
+from strapdown.report.chart_svg import plane_view
 from strapdown.report.navigation_charts import TIME, mode_colour
 from strapdown.report.navigation_evaluation import NavigationEvaluation, rejected_times
 from strapdown.report.plan import PlanView, ellipse, path_marks, place_labels
 from strapdown.report.svg_drawing import nice_step
 from strapdown.report.values import GAP, duration_words, length_words, plain
+from strapdown.rotation import within_half_turn
 from strapdown.tables import GEODETIC, places_of
 from strapdown.tables.checks import index_of
+
+if TYPE_CHECKING:
+    from strapdown.formats.map_tiles import MapBox, MapFile, Tile
 
 MOST_POINTS, MOST_FIXES, MOST_SAMPLES = 1500, 600, 100_000
 # Plans of at least this size, m, are in kilometers.
@@ -42,6 +60,17 @@ def plan_chart(evaluation: NavigationEvaluation) -> Chart | None:
     Chart or None
         None for a run without motion.
     """
+    drawn = _drawn(evaluation)
+    if drawn is None or evaluation.run.spec.map is None:
+        return None if drawn is None else drawn[0]
+    chart, plane = drawn
+    backdrop, said = _backdrop(plane, evaluation.run.spec.map.path, *plane_view(chart))
+    panels = (replace(chart.panels[0], backdrop=backdrop),)
+    return replace(chart, caption=f"{chart.caption} {said}", panels=panels)
+
+
+def _drawn(evaluation: NavigationEvaluation) -> tuple[Chart, Plane] | None:
+    """The chart without a map, and its plane; None without motion."""
     record = evaluation.record
     table = record.trajectory
     rows = _rows(evaluation)
@@ -72,7 +101,7 @@ def plan_chart(evaluation: NavigationEvaluation) -> Chart | None:
         said,
         beyond,
     ]
-    return Chart(
+    chart = Chart(
         "plan",
         "Path",
         " ".join(w for w in words if w),
@@ -86,6 +115,18 @@ def plan_chart(evaluation: NavigationEvaluation) -> Chart | None:
             ),
         ),
     )
+    return chart, plane
+
+
+def plan_tiles(evaluation: NavigationEvaluation, opened: MapFile) -> list[Tile]:
+    """Return the tiles of a map that are under the plan."""
+    from strapdown.formats.map_tiles import chosen_tiles
+
+    drawn = _drawn(evaluation)
+    if drawn is None:
+        return []
+    chart, plane = drawn
+    return [tile for tile, _ in chosen_tiles(opened, map_box(plane, *plane_view(chart))).tiles]
 
 
 def _rows(evaluation: NavigationEvaluation) -> NDArray[np.intp]:
@@ -251,6 +292,71 @@ def _scale(view: PlanView, path: tuple[Array, Array], unit: str) -> list[Line]:
             legend=False,
         ),
     ]
+
+
+# A local map under the plan.
+
+
+# Least part of a tile that is fitted.
+_PART = 1.0 / 16.0
+
+
+def map_box(plane: Plane, low: Array, high: Array) -> MapBox:
+    """Return the part of the map between two corners of a plan, (2,) each."""
+    from strapdown.formats.map_tiles import NORTHERNMOST, MapBox
+
+    share = np.linspace(0.0, 1.0, 9)
+    across, up = np.meshgrid(*(low + np.outer(share, high - low)).T)
+    ned = np.column_stack([up.ravel(), across.ravel(), np.zeros(up.size)]) / plane.scale
+    lat, lon, _ = geodetic_from_ned(ned, plane.origin, ellipsoid=WGS84).T
+    x = (plane.origin[1] + (lon - plane.origin[1] + 180.0) % 360.0) / 360.0
+    clipped = np.radians(np.clip(lat, -NORTHERNMOST, NORTHERNMOST))
+    y = 0.5 - np.arcsinh(np.tan(clipped)) / (2.0 * math.pi)
+    west, east, north, south = (float(v) for v in (x.min(), x.max(), y.min(), y.max()))
+    return MapBox(west, east, north, south, float(np.abs(lat).max()))
+
+
+def _backdrop(plane: Plane, path: str, low: Array, high: Array) -> tuple[Backdrop | None, str]:
+    """The map under the plan, and a sentence on it."""
+    from strapdown.formats.map_tiles import chosen_tiles, open_map
+
+    if plane.found.run.ellipsoid != WGS84:
+        name = plane.found.run.ellipsoid.name
+        return None, f"No map: maps are on WGS 84, and positions on {name}."
+    box = map_box(plane, low, high)
+    with open_map(path) as opened:
+        chosen = chosen_tiles(opened, box)
+    if not chosen.tiles:
+        return None, f"No map: {opened.name} has no tiles here that suit the plan."
+    pictures = tuple(tile_picture(plane, box, tile, column) for tile, column in chosen.tiles)
+    part = "" if len(pictures) == chosen.count else f", {len(pictures)} of {chosen.count} tiles"
+    whose = f"; {opened.attribution}" if opened.attribution else ""
+    said = f"Map: {opened.name}, zoom {chosen.zoom}{part}{whose}."
+    return Backdrop(pictures, opened.attribution or opened.name), said
+
+
+def tile_picture(plane: Plane, box: MapBox, tile: Tile, column: int) -> Picture:
+    """Place a tile by the affine map that fits the corners of its part on the plan best."""
+    n = 1 << tile.zoom
+    left, right = _part(n * box.west - column, n * box.east - column)
+    top, bottom = _part(n * box.north - tile.row, n * box.south - tile.row)
+    lon = (column + np.array([left, right, left, right])) / n * 360.0 - 180.0
+    y = (tile.row + np.array([top, top, bottom, bottom])) / n
+    lat = np.degrees(np.arctan(np.sinh(math.pi * (1.0 - 2.0 * y))))
+    corners = np.column_stack([lat, within_half_turn(lon), np.full(4, plane.origin[2])])
+    ned = ned_from_geodetic(corners, plane.origin, ellipsoid=WGS84)
+    nw, ne, sw, se = plane.scale * ned[:, 1::-1]
+    across = 0.5 * (ne + se - nw - sw) / (right - left)
+    down = 0.5 * (sw + se - nw - ne) / (bottom - top)
+    middle = 0.25 * (nw + ne + sw + se)
+    corner = middle - 0.5 * (left + right) * across - 0.5 * (top + bottom) * down
+    return Picture(tile.data, tile.media, corner, across, down)
+
+
+def _part(low: float, high: float) -> tuple[float, float]:
+    """Ends of a part of a tile, as shares of its side."""
+    begin = min(max(low, 0.0), 1.0 - _PART)
+    return begin, max(min(high, 1.0), begin + _PART)
 
 
 # 95 % ellipses on the plan of a run, and their labels.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Generic, Protocol, TypeVar
@@ -45,6 +46,8 @@ class ReportBundle(Generic[R]):
         report, the forms of the report (``html``, ``pdf``; none for the data alone), and progress.
     pdf : bool
         Whether the report is a PDF, too, where typst is installed.
+    prepared : callable
+        From a run, and whether it has a report, to a context in which the run has further inputs.
     """
 
     command: str
@@ -52,6 +55,7 @@ class ReportBundle(Generic[R]):
     run: Callable[[dict[str, Any]], R]
     write_files: Callable[[R, Path, str, tuple[str, ...], Progress], None]
     pdf: bool = False
+    prepared: Callable[[R, bool], AbstractContextManager[R]] = lambda run, _: nullcontext(run)
 
     @one_thread()
     def write(
@@ -99,20 +103,23 @@ class ReportBundle(Generic[R]):
                 left_out = {"pdf": False}
         name = Path(out).absolute().name if name is None else name
         seals: list[Seal] = []
-        with write_bundle(
-            Path(out),
-            command=self.command,
-            configuration={
-                "name": name,
-                **self.configuration(result),
-                **left_out,
-            },
-            inputs=result.inputs,
-            force=force,
-            seals=seals,
-        ) as folder:
+        with (
+            self.prepared(result, report) as run,
+            write_bundle(
+                Path(out),
+                command=self.command,
+                configuration={
+                    "name": name,
+                    **self.configuration(run),
+                    **left_out,
+                },
+                inputs=run.inputs,
+                force=force,
+                seals=seals,
+            ) as folder,
+        ):
             progress("writing the tables", 0.8)
-            self.write_files(result, folder, name, forms, progress)
+            self.write_files(run, folder, name, forms, progress)
             progress("sealing", 0.97)
         return seals[0]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -26,6 +27,7 @@ _ZERO = re.compile(r"(?<!\d)0\.")
 # Letter widths over the font size, of DejaVu Sans, the widest of the usual fonts.
 _NARROW, _WIDE = frozenset("iIjl.,:;'|!()[] /tfr°′·"), frozenset("mwMWO@%Q—→←")
 _LINE = 1.18
+_UNIT = 256.0  # side of a picture before it is placed
 
 
 def number(value: float) -> str:
@@ -222,6 +224,21 @@ class Drawing:
         path = "".join(f"M{place}{turn}" for place in _hundredths(begin).split(" "))
         look = f'fill="none"{_stroke(colour, 1.2, "")}' if hollow else f'fill="{colour}"'
         self._parts.append(f'<path class="points" d="{path}" {look}/>')
+
+    def picture(self, data: bytes, media: str, corners: Array) -> None:
+        """Draw a square picture by its upper left, upper right and lower left corner, (3, 2).
+
+        `media`: ``png``, ``jpeg`` or ``webp``.
+        """
+        (x, y), across, down = corners[0], corners[1] - corners[0], corners[2] - corners[0]
+        # Half a pixel of 256 larger than it is, so that no gap shows between two.
+        turn = " ".join(f"{v / _UNIT:.6f}" for v in (*across.tolist(), *down.tolist()))
+        side = number(_UNIT * 1.002)
+        source = f"data:image/{media};base64,{base64.b64encode(data).decode('ascii')}"
+        self._parts.append(
+            f'<image width="{side}" height="{side}" preserveAspectRatio="none" '
+            f'transform="matrix({turn} {number(x)} {number(y)})" href="{source}"/>'
+        )
 
     def arrow(
         self,

@@ -433,7 +433,10 @@ def _other(slot: Slot, kinds: Sequence[str]) -> list[str]:
 
 
 def _rest(page: Page, foot: bool) -> None:
-    page.table("[output]", "Forms of the trajectory: csv, parquet, kml, geojson, nav, tum.")
+    page.table(
+        "[output]",
+        "Forms of the trajectory: csv, parquet, kml, geojson, gpx, geoparquet, nav, tum.",
+    )
     page.key("files", '["csv", "kml", "geojson"]')
     page.blank()
     page.say("[truth] and path = …: a reference trajectory, to hold the answer beside")

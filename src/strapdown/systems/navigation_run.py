@@ -144,6 +144,12 @@ def run_navigation(
         The state left the range of the mechanization.
     """
     progress("reading", 0.02)
+    if spec.map is not None:
+        from strapdown.formats.map_tiles import open_map
+
+        # Refused before the run, not after it.
+        with open_map(spec.map.path):
+            pass
     source = read_navigation_source(spec)
     tidy()
     progress("looking through", 0.1)

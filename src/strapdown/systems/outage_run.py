@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
@@ -92,7 +92,7 @@ class OutageRun(SavedRun):
     name, what : str
         Sensor or record, in words.
     forecast : Forecast
-        Of a run, that of the outage with the median bound at its end.
+        Of a run, that of the outage of `equal` with the median bound at its end.
     drifts : tuple of Drift
         Of a run, its outages in order of time; without fixes if it has no receiver.
     stays : tuple of str
@@ -116,9 +116,14 @@ class OutageRun(SavedRun):
     memory: Memory = field(default=Memory({}))
 
     @property
+    def equal(self) -> tuple[Drift, ...]:
+        """Outages that begin with a fix, so that all are of one length; every one if none does."""
+        return _equal(self.drifts)
+
+    @property
     def cone(self) -> tuple[Array, Array, dict[str, Array]]:
-        """Time, s, 95 % bound, m, and variance by quantity; means of squares over the outages."""
-        drifts = self.drifts
+        """Time, s, 95 % bound, m, and variance by quantity; means of squares over `equal`."""
+        drifts = self.equal
         if not drifts:
             found = self.forecast
             return found.time, found.bound, {q: found.variance(q) for q in QUANTITIES}
@@ -209,6 +214,8 @@ def run_coast(
             (),
         )
     progress("reading", 0.02)
+    # Its plan is not drawn.
+    navigation = navigation.with_map(None)
     source = read_navigation_source(navigation)
     predicted, drifts = coast_of_run(spec, navigation, source, progress)
     return OutageRun(
@@ -234,6 +241,8 @@ Array = NDArray[np.float64]
 CHUNK = 2.0
 #: Number of instants of an error cone.
 INSTANTS = 120
+#: Outages whose lengths differ by this share count as of one length.
+_SHARE_LATE = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,11 +256,20 @@ class Drift:
     bound : ndarray, (m,), m
         95 % bound of the horizontal position.
     time : ndarray, (n,), s
-        Time of the withheld fixes since the begin.
+        Time of the withheld fixes since the begin, without those that the run with fixes rejects.
     along, across, down : ndarray, (n,), m
         Computed minus fix; along and across the course.
     inside : ndarray of bool, (n,)
         Whether it is within the 95 % ellipse, including the noise of the fix.
+    rejected : int
+        Withheld fixes that the run with fixes rejects: their errors are not drift.
+    since_fix : float, s
+        From the last fix that was used to the begin; 0 without a receiver.
+    whole : bool
+        Whether that is as short as two intervals of the fixes, or 5 % of the outage: if not, the
+        position has been without fixes for longer than the outage.
+    to_end : bool
+        Whether there are fixes to the end of the outage, by the same limit.
     """
 
     span: Span
@@ -262,6 +280,10 @@ class Drift:
     across: Array
     down: Array
     inside: NDArray[np.bool_]
+    rejected: int = 0
+    since_fix: float = 0.0
+    whole: bool = True
+    to_end: bool = False
 
     @property
     def horizontal(self) -> Array:
@@ -284,9 +306,9 @@ def coast_of_run(
     Returns
     -------
     forecast : Forecast
-        Of the outage with the median bound at its end.
+        Of the outage with the median bound at its end, of those of one length.
     drifts : tuple of Drift
-        In order of time; without fixes if the run has no receiver.
+        In order of time; without fixes if the run has no receiver, or none during the outage.
 
     Raises
     ------
@@ -314,14 +336,22 @@ def coast_of_run(
     blind = chain
     for name in receivers:
         blind = replace(blind, navigator=blinded(blind.navigator, name))
-    runs: list[tuple[WithheldRun, Drift]] = []
+    fixes = _Fixes(
+        receivers,
+        float(begun.time),
+        max(
+            (2.0 * _usual_interval(index_of(source.tables[name])) for name in receivers),
+            default=0.0,
+        ),
+    )
+    runs: list[WithheldRun] = []
+    for run in withheld_runs(chain, blind, begun, time[at:], values[at:], spans, fixes.take):
+        progress(f"outage {len(runs) + 1} of {len(spans)}", 0.1 + 0.4 * len(runs) / len(spans))
+        runs.append(run)
     grid = np.linspace(0.0, spec.outage_s, INSTANTS + 1)
-    scored = receivers[0] if receivers else None
-    for number, run in enumerate(withheld_runs(chain, blind, begun, time[at:], values[at:], spans)):
-        progress(f"outage {number + 1} of {len(spans)}", 0.1 + 0.4 * number / len(spans))
-        runs.append((run, _drift(blind.navigator, run, spans[run.number], scored, grid)))
-    order = sorted(range(len(runs)), key=lambda k: float(runs[k][1].bound[-1]))
-    middle, _ = runs[order[len(order) // 2]]
+    drifts = tuple(_drift(blind.navigator, run, spans[run.number], fixes, grid) for run in runs)
+    order = sorted(_equal(drifts), key=lambda drift: float(drift.bound[-1]))
+    middle = runs[drifts.index(order[len(order) // 2])]
     rows = slice(at + middle.rows.start, at + middle.rows.stop)
     predicted = _predict(
         chain,
@@ -332,7 +362,43 @@ def coast_of_run(
         len(receivers) < len(navigation.aiding),
         lambda stage, share: progress(stage, 0.5 + 0.25 * share),
     )
-    return predicted, tuple(drift for _, drift in runs)
+    return predicted, drifts
+
+
+def _equal(drifts: tuple[Drift, ...]) -> tuple[Drift, ...]:
+    return tuple(drift for drift in drifts if drift.whole) or drifts
+
+
+def _usual_interval(time: Array) -> float:
+    return float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+
+
+@dataclass
+class _Fixes:
+    """Which fixes the run with fixes uses and rejects; the first receiver is scored."""
+
+    receivers: list[str]
+    begun: float
+    late: float
+    used: list[Array] = field(default_factory=list)
+    rejected: list[Array] = field(default_factory=list)
+
+    @property
+    def scored(self) -> str | None:
+        return self.receivers[0] if self.receivers else None
+
+    def take(self, chunks: Sequence[NavigationChunk]) -> None:
+        names = {f"{name}.position" for name in self.receivers}
+        for one in (one for chunk in chunks for one in chunk.seen.by_name() if one.name in names):
+            lost = (one.innovations.weight <= 0.0).any(axis=1)
+            self.used.append(one.time[~lost])
+            if one.name == f"{self.scored}.position":
+                self.rejected.append(one.time[lost])
+
+    def since(self, at: float) -> float:
+        """Time since the last one that was used, s; at most since navigation began."""
+        before = [used[used <= at] for used in self.used]
+        return at - max([self.begun, *(float(used[-1]) for used in before if used.size)])
 
 
 def _spans(
@@ -389,15 +455,14 @@ def _spans(
     return spans_to_withhold(*within, spec.outage_s, places)
 
 
-def _drift(
-    navigator: Navigator, run: WithheldRun, span: Span, scored: str | None, grid: Array
-) -> Drift:
+def _drift(navigator: Navigator, run: WithheldRun, span: Span, fixes: _Fixes, grid: Array) -> Drift:
     """Predicted and measured drift of an outage."""
     if run.state.navigator is None or run.through.navigator is None:
         raise _aligns_anew(span.begin, span.end)
-    record = record_of(navigator, run.pieces)
+    # With the covariance at the end, where no epoch has one.
+    record = record_of(navigator, (*run.pieces, navigator.finish(run.through.navigator)))
     marks = record.sd.index.to_numpy(dtype=np.float64)
-    if not len(marks):
+    if len(marks) < 2:
         # The record has the covariance at intervals; a shorter outage may lie between two.
         raise ConfigError(
             "outage.outage-between-covariances",
@@ -411,22 +476,33 @@ def _drift(
         q: np.interp(on_grid, marks, v) for q, v in variances(record.covariance, course).items()
     }
     bound = np.interp(on_grid, marks, plane_bound(record.covariance))
-    if scored is None:
-        none = np.empty(0)
-        return Drift(span, variance, bound, none, none, none, none, np.empty(0, dtype=np.bool_))
-    score: WithheldScore = score_of(run.pieces, scored, span)
-    way = courses(record.trajectory, score.time)
+    none = np.empty(0)
+    empty = Drift(span, variance, bound, none, none, none, none, np.empty(0, dtype=np.bool_))
+    if fixes.scored is None:
+        return empty
+    late = max(fixes.late, _SHARE_LATE * (span.end - span.begin))
+    since = fixes.since(span.begin)
+    empty = replace(empty, since_fix=since, whole=since <= late)
+    position = f"{fixes.scored}.position"
+    if not any(one.name == position for piece in run.pieces for one in piece.seen.by_name()):
+        return empty
+    score: WithheldScore = score_of(run.pieces, fixes.scored, span)
+    kept = ~np.isin(score.time, np.concatenate([none, *fixes.rejected]))
+    empty = replace(empty, rejected=int((~kept).sum()))
+    if not kept.any():
+        return empty
+    at, error, distance = score.time[kept], score.error[kept], score.distance[kept]
+    way = courses(record.trajectory, at)
     c, s = np.cos(way), np.sin(way)
-    north, east, down = score.error.T
-    return Drift(
-        span,
-        variance,
-        bound,
-        score.time - span.begin,
-        c * north + s * east,
-        -s * north + c * east,
-        down,
-        score.distance <= PLANE_95,
+    north, east, down = error.T
+    return replace(
+        empty,
+        time=at - span.begin,
+        along=c * north + s * east,
+        across=-s * north + c * east,
+        down=down,
+        inside=distance <= PLANE_95,
+        to_end=span.end - float(at[-1]) <= late,
     )
 
 

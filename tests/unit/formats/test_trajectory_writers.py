@@ -61,7 +61,7 @@ def test_the_same_trajectory_gives_the_same_bytes(tmp_path, form):
     a = write(form, tmp_path / f"a.{form}", track, epoch=EPOCH, most_points=50).read_bytes()
     b = write(form, tmp_path / f"b.{form}", track, epoch=EPOCH, most_points=50).read_bytes()
     assert a == b
-    if form != "parquet":
+    if form not in ("parquet", "geoparquet"):
         assert a.endswith(b"\n")
         assert b"-0," not in a and b"-0.0 " not in a
     assert track.equals(before)
@@ -71,7 +71,7 @@ def test_the_same_trajectory_gives_the_same_bytes(tmp_path, form):
 def test_a_hostile_name_stays_a_name(tmp_path, form):
     name = 'a\n<b>&"\x00]]>\ud800 ü,'
     path = write(form, tmp_path / f"a.{form}", made.random_trajectory(1, 5), name=name)
-    if form == "parquet":
+    if form in ("parquet", "geoparquet"):
         assert pq.read_schema(path).metadata[b"trajectory"].decode() == 'a <b>&"]]> ü,'
         return
     text = path.read_text(encoding="utf-8")
@@ -81,6 +81,9 @@ def test_a_hostile_name_stays_a_name(tmp_path, form):
     elif form == "kml":
         root = ElementTree.fromstring(path.read_bytes())
         assert root.find(f"{KML}Document/{KML}name").text == 'a <b>&"]]> ü,'
+    elif form == "gpx":
+        root = ElementTree.fromstring(path.read_bytes())
+        assert root.find("{*}trk/{*}name").text == 'a <b>&"]]> ü,'
     elif form == "geojson":
         assert json.loads(text)["features"][0]["properties"]["name"] == 'a <b>&"]]> ü,'
     else:
@@ -95,7 +98,7 @@ def test_a_table_that_is_none_is_refused(tmp_path, form):
     assert not (tmp_path / "a").exists()
 
 
-@pytest.mark.parametrize("form", ["tum", "kml", "geojson"])
+@pytest.mark.parametrize("form", ["tum", "kml", "geojson", "geoparquet"])
 def test_a_trajectory_without_rows_is_no_file(tmp_path, form):
     with pytest.raises(DataError, check=coded("io.trajectory-no-rows")):
         write(form, tmp_path / "a", made.random_trajectory(1, 5).iloc[:0])

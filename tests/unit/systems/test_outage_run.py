@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from strapdown import rotation
+from strapdown import coast, rotation
 from strapdown.config.coast import CoastSpec
 from strapdown.config.spec import specify
 from strapdown.constants import DEG_PER_HOUR, MICRO_G
@@ -19,6 +19,8 @@ from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown, run_mechanization
 from strapdown.nav_state import NavState
 from strapdown.navigation.outage import QUANTITIES
+from strapdown.report.coast import coast_json
+from strapdown.report.coast_document import cone_chart
 from strapdown.sensors.error_chain import apply
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation import simulate_imu
@@ -268,3 +270,102 @@ def test_the_drive_before_ends_as_the_outage_begins():
     ends = motion.trajectory(np.array([begin, motion.duration]))
     assert ends["heading"].to_numpy() == pytest.approx([70.0, 70.0], abs=1e-6)
     assert np.hypot(ends["VN"], ends["VE"]).to_numpy() == pytest.approx([20.0, 20.0])
+
+
+# Outages of a run whose receiver is silent for a while and has gross errors.
+
+TUNNEL = """
+[simulation]
+rate_hz = 50.0
+seed = 3
+
+[simulation.motion]
+kind = "car"
+lat_deg = 55.75
+lon_deg = 37.62
+alt_m = 150.0
+heading_deg = 30.0
+manoeuvres = [
+  { do = "straight", duration_s = 5.0 },
+  { do = "accelerate", to_km_per_h = 50.0, duration_s = 10.0 },
+  { do = "straight", duration_s = 65.0 },
+]
+
+[simulation.gnss.rtk]
+rate_hz = 2.0
+position_noise_m = 0.02
+velocity_noise_m_per_s = 0.03
+outages_s = [[50.0, 65.0]]
+outlier_share = 0.1
+
+[sensors]
+sensor = "adis16495-1"
+
+[start]
+lat_deg = 55.75
+lon_deg = 37.62
+alt_m = 150.0
+roll_deg = 0.0
+pitch_deg = 0.0
+heading_deg = 30.0
+heading_sd_deg = 1.0
+position_sd_m = 0.1
+
+[aiding.rtk]
+kind = "gnss"
+update_rule = { kind = "adaptive", influence = "igg3", scale = { lowest = 1.0 } }
+"""
+
+
+@pytest.fixture(scope="module")
+def tunnel(tmp_path_factory):
+    """Outages of 8 s in a drive of 80 s without fixes from 50 to 65 s."""
+    file = tmp_path_factory.mktemp("tunnel") / "tunnel.toml"
+    file.write_text(TUNNEL)
+    return coast(file, 8.0, places=8)
+
+
+def test_the_curve_is_over_outages_of_one_length(tunnel):
+    begins = np.array([d.span.begin for d in tunnel.drifts])
+    # The last fix before the silent stretch is at 49.5 s, the first one after it at 65.5 s; two
+    # intervals of the fixes are one second.
+    whole = (begins <= 50.5) | (begins >= 65.5)
+    assert whole.sum() == 6
+    assert [d.whole for d in tunnel.drifts] == whole.tolist()
+    silent = [d.since_fix for d in tunnel.drifts if not d.whole]
+    assert silent == pytest.approx(begins[~whole] - 49.0)  # at 49.5 s is a gross error
+    assert tunnel.equal == tuple(d for d in tunnel.drifts if d.whole)
+    _, bound, variances = tunnel.cone
+    same = [d for d, one in zip(tunnel.drifts, whole, strict=True) if one]
+    assert bound == pytest.approx(np.sqrt(np.mean([d.bound**2 for d in same], axis=0)))
+    along = np.mean([d.variance["along"] for d in same], axis=0)
+    assert variances["along"] == pytest.approx(along)
+    # It goes on to the end: by more than half of what it grows a tenth of the outage earlier.
+    assert bound[-1] - bound[-3] > 0.5 * (bound[-13] - bound[-15])
+    # Nothing but the fixes corrects this run: what is known grows no better with time.
+    assert (np.diff(bound) >= 0.0).all()
+    # On the clock of the samples, 0.02 s apart.
+    assert np.abs(tunnel.forecast.begin - begins[whole]).min() <= 0.02
+
+
+def test_gross_errors_of_withheld_fixes_are_no_drift(tunnel):
+    seen = [len(d.time) + d.rejected for d in tunnel.drifts]
+    at = np.concatenate([np.arange(0.5, 49.9, 0.5), np.arange(65.5, 90.0, 0.5)])
+    assert seen == [int(((at > d.span.begin) & (at <= d.span.end)).sum()) for d in tunnel.drifts]
+    assert min(seen) == 0
+    assert sum(d.rejected for d in tunnel.drifts) > 0
+    for d in tunnel.drifts:
+        # 95 % ellipses end at 2.45 standard deviations: thrice that is none of 90 fixes' noise.
+        assert (d.horizontal <= 3.0 * (np.interp(d.time, tunnel.cone[0], d.bound) + 0.05)).all()
+
+
+def test_outages_that_do_not_count_are_told(tunnel):
+    data = coast_json(tunnel)
+    assert data["outages"] == {
+        "tried": 8,
+        "equal_length": 6,
+        "fixes_to_the_end": 4,  # those from 43 and 49 s end in the silent stretch
+        "rejected_fixes": sum(d.rejected for d in tunnel.drifts),
+    }
+    words = cone_chart(tunnel).caption
+    assert "6 outages" in words and "2 outages that begin" in words

@@ -184,6 +184,10 @@
       var b = panel.box, whole = panel.vx[1] - panel.vx[0] === 1 && panel.vy[1] - panel.vy[0] === 1;
       panel.shapes.forEach(function (s) { s.put(moved(panel, s.points)); });
       panel.node.querySelectorAll("svg").forEach(function (n) { n.style.display = whole ? "" : "none"; });
+      panel.node.querySelectorAll("g.map").forEach(function (n) {
+        var m = moved(panel, [0, 0, 1, 1]);
+        n.setAttribute("transform", "matrix(" + [m[2] - m[0], 0, 0, m[3] - m[1], m[0], m[1]].join(" ") + ")");
+      });
       panel.names.querySelectorAll("[data-at]").forEach(function (node) {
         var at = node.dataset.at.split(" ").map(function (v, k) { return v === "-" ? [b.x, b.y][k] : +v; });
         var free = node.dataset.at.split(" ").map(function (v) { return v === "-"; });
