@@ -26,8 +26,9 @@ extensions = [
     "sphinx.ext.autosummary",
 ]
 exclude_patterns = ["_build"]
+templates_path = ["_templates"]
 
-myst_enable_extensions = ["deflist", "dollarmath"]
+myst_enable_extensions = ["attrs_inline", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 
 # The docstrings give type, shape, unit and frame of every argument; annotations would only
@@ -35,6 +36,8 @@ myst_heading_anchors = 3
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 autosummary_generate = True
+# Two names that differ in case alone would be one file on some systems.
+autosummary_filename_map = {"strapdown.attitude": "strapdown.attitude_function"}
 numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False
 
@@ -68,29 +71,22 @@ class CodeCell(Directive):
         return [nodes.literal_block(text, text, language="python")]
 
 
-_MESSAGES = """# Messages
-
-Every error and every finding has a code, which programs may rely on, and a sentence, which may be
-reworded. `{name}` stands for a number or a name of the case at hand. The page is made of the
-catalogue in `strapdown/messages` when the manual is built.
-"""
-
-
 def _write_messages(app: Any) -> None:
-    """Make the page of messages of the catalogue of sentences."""
-    parts = [_MESSAGES]
+    """Make a page of each room of the catalogue of sentences."""
+    folder = Path(app.srcdir) / "messages"
+    folder.mkdir(exist_ok=True)
     rooms = resources.files("strapdown").joinpath("messages")
-    for room in sorted(rooms.iterdir(), key=lambda one: one.name):
+    for room in rooms.iterdir():
         if not room.name.endswith(".toml"):
             continue
         name = room.name.removesuffix(".toml")
-        parts.append(f"## {name}\n")
+        parts = [f"# Messages: {name}\n", "How to read a code: [messages](../messages.md).\n"]
         for code, entry in sorted(tomllib.loads(room.read_text(encoding="utf-8")).items()):
-            lines = [f"`{name}.{code}`", f": {_prose(entry['what'])}"]
+            lines = [f"`{name}.{code}`{{#{name}.{code}}}", f": {_prose(entry['what'])}"]
             if entry.get("remedy"):
                 lines.append(f"  \n  *{_prose(entry['remedy'])}*")
             parts.append("\n".join(lines) + "\n")
-    (Path(app.srcdir) / "messages.md").write_text("\n".join(parts), encoding="utf-8")
+        (folder / f"{name}.md").write_text("\n".join(parts), encoding="utf-8")
 
 
 def _prose(template: str) -> str:
