@@ -11,7 +11,11 @@ from pathlib import Path
 
 import pytest
 
+import strapdown
+from strapdown.cli.main import COMMANDS
+
 ROOT = Path(__file__).parents[2]
+CATALOGUE = ROOT / "src/strapdown/messages"
 
 
 def runner():
@@ -105,8 +109,33 @@ def test_every_page_is_listed_and_no_link_leads_nowhere():
     # Anchors are the builder's affair, which takes a wrong one for an error.
     for page in DOCUMENTS:
         for target in re.findall(r"\]\(([^)#:\s]+\.\w+)[)#]", page.read_text(encoding="utf-8")):
-            # The page of messages is made of the catalogue when the manual is built.
-            assert target == "messages.md" or (page.parent / target).exists(), (page.name, target)
+            # A page of messages is made of the catalogue when the manual is built.
+            room = re.fullmatch(r"messages/(\w+)\.md", target)
+            source = CATALOGUE / f"{room[1]}.toml" if room else page.parent / target
+            assert source.exists(), (page.name, target)
+
+
+def test_every_room_of_messages_is_listed():
+    page = (ROOT / "docs/messages.md").read_text(encoding="utf-8")
+    rooms = re.findall(r"^\| \[(\w+)\]\(messages/\1\.md\) \|", page, re.M)
+    assert sorted(rooms) == sorted(room.stem for room in CATALOGUE.glob("*.toml"))
+
+
+def test_every_command_is_on_the_page_that_chooses_one():
+    page = (ROOT / "docs/which_command.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\|.*?\|.*?\| `strapdown ([\w-]+)", page, re.M)
+    assert sorted(rows) == sorted(COMMANDS)
+    for name in re.findall(r"\{py:obj\}`\w+ <strapdown\.(\w+)>`", page):
+        assert name in strapdown.__all__, name
+
+
+def test_every_public_name_has_its_page():
+    page = (ROOT / "docs/api.md").read_text(encoding="utf-8")
+    # Sphinx takes a name that does not exist for an error, here and among the building blocks.
+    names = re.findall(r"^   ([\w.]+)$", page, re.M)
+    public = [name for name in names if name in strapdown.__all__]
+    assert sorted(public) == sorted(set(strapdown.__all__) - {"__version__"})
+    assert sorted(set(names) - set(public)) == ["errors", "plugins.plugin", "plugins.plugins"]
 
 
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.md"))
