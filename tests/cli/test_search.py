@@ -27,6 +27,17 @@ import strapdown
 
 DOCS = Path(__file__).parents[2] / "docs"
 BUILT = os.environ.get("STRAPDOWN_SEARCHINDEX")
+#: Words that Sphinx leaves out of an index and of a query.
+LEFT_OUT = """
+a about above after again against all am an and any are as at be because been before being
+below between both but by cannot could did do does doing down during each few for from
+further had has have having he her here hers herself him himself his how i if in into is it
+its itself me more most my myself no nor not of off on once only or other ought our ours
+ourselves out over own same she should so some such than that the their theirs them
+themselves then there these they this those through to too under until up very was we were
+what when where which while who whom why with would you your yours yourself yourselves
+"""
+STOPWORDS = set(LEFT_OUT.split())
 #: What is typed, and the pages that answer it.
 QUERIES = {
     "zupt": "aids walking",
@@ -162,9 +173,11 @@ def of_sources() -> Index:
         for head in heads:
             index.sections.setdefault(head, set()).add(name)
             for word in split(head):
-                index.title_words[stem(word)].add(name)
+                if word.lower() not in STOPWORDS:
+                    index.title_words[stem(word)].add(name)
         for word in split(re.sub(r"\]\([^)]*\)", "]", text)):
-            index.words[stem(word)].add(name)
+            if word.lower() not in STOPWORDS:
+                index.words[stem(word)].add(name)
     index.entries.update((term, {"glossary"}) for term in glossary())
     for name in strapdown.__all__:
         index.objects[f"strapdown.{name}"] = f"api/strapdown.{name}"
@@ -239,7 +252,7 @@ def results(query: str) -> list[str]:
 def of_text(index: Index, typed: str) -> dict[str, int]:
     """Pages that have all words, with the score of the best."""
     cut = stemmer()
-    words = {cut(word) for word in split(typed) if not word.isdigit()}
+    words = {cut(word) for word in split(typed) if not word.isdigit() and word not in STOPWORDS}
     marks: dict[str, dict[str, int]] = defaultdict(dict)
     for word in words:
         for table, whole, part in ((index.words, 5, 2), (index.title_words, 15, 7)):
