@@ -36,6 +36,8 @@ myst_heading_anchors = 3
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 autosummary_generate = True
+# `name` in a docstring is a link where a page has that name.
+default_role = "py:obj"
 # Two names that differ in case alone would be one file on some systems.
 autosummary_filename_map = {"strapdown.attitude": "strapdown.attitude_function"}
 numpydoc_show_class_members = False
