@@ -11,6 +11,7 @@ from typing import Any
 from docutils import nodes
 from docutils.parsers.rst import Directive
 from docutils.utils.math.latex2mathml import tex2mathml
+from sphinx.ext.autosummary import autosummary_toc
 
 from strapdown import __version__
 
@@ -91,6 +92,12 @@ def _write_messages(app: Any) -> None:
         (folder / f"{name}.md").write_text("\n".join(parts), encoding="utf-8")
 
 
+def _without_toctree(app: Any, doctree: Any) -> None:
+    """Keep pages of single objects out of the sidebar: 400 links on each page."""
+    for node in list(doctree.findall(autosummary_toc)):
+        node.parent.remove(node)
+
+
 def _prose(template: str) -> str:
     """Text of a template as Markdown that is taken as it is."""
     text = re.sub(r"\{(\w+(?:\.\w+)?)(?:![rsa])?:[^{}]*(?:\{\w+\})?[^{}]*\}", r"{\1}", template)
@@ -101,6 +108,7 @@ def _prose(template: str) -> str:
 def setup(app: Any) -> dict[str, bool]:
     """Register the writer of formulas, and cells of notebooks."""
     app.connect("builder-inited", _write_messages)
+    app.connect("doctree-read", _without_toctree, priority=100)
     app.add_directive("code-cell", CodeCell)
     app.add_html_math_renderer("mathml", (_math, None), (_math, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}
