@@ -85,7 +85,7 @@ def _write_messages(app: Any) -> None:
         name = room.name.removesuffix(".toml")
         parts = [f"# Messages: {name}\n", "How to read a code: [messages](../messages.md).\n"]
         for code, entry in sorted(tomllib.loads(room.read_text(encoding="utf-8")).items()):
-            lines = [f"`{name}.{code}`{{#{name}.{code}}}", f": {_prose(entry['what'])}"]
+            lines = [f"`{name}.{code}`{{#{name}-{code}}}", f": {_prose(entry['what'])}"]
             if entry.get("remedy"):
                 lines.append(f"  \n  *{_prose(entry['remedy'])}*")
             parts.append("\n".join(lines) + "\n")
