@@ -98,6 +98,12 @@ def _without_toctree(app: Any, doctree: Any) -> None:
         node.parent.remove(node)
 
 
+def _levels(app: Any, page: str, template: str, context: dict[str, Any], _: Any) -> None:
+    """Give the captions of the sidebar, headings, a level, which screen readers need."""
+    role, name = 'role="heading"', "furo_navigation_tree"
+    context[name] = context.get(name, "").replace(role, f'{role} aria-level="2"')
+
+
 def _prose(template: str) -> str:
     """Text of a template as Markdown that is taken as it is."""
     text = re.sub(r"\{(\w+(?:\.\w+)?)(?:![rsa])?:[^{}]*(?:\{\w+\})?[^{}]*\}", r"{\1}", template)
@@ -109,6 +115,7 @@ def setup(app: Any) -> dict[str, bool]:
     """Register the writer of formulas, and cells of notebooks."""
     app.connect("builder-inited", _write_messages)
     app.connect("doctree-read", _without_toctree, priority=100)
+    app.connect("html-page-context", _levels, priority=900)
     app.add_directive("code-cell", CodeCell)
     app.add_html_math_renderer("mathml", (_math, None), (_math, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}
