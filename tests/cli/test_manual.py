@@ -167,3 +167,34 @@ def test_a_cell_that_prints_something_else_is_found_and_mended(tmp_path, capsys)
     assert text.count("words") == 3
     assert "x + 1" in capsys.readouterr().out
     assert RUNNER.check(page, write=False) == 0
+
+
+#: Words of the manual by hand, at most.
+MOST_WORDS = 45_000
+
+
+def words_by_hand() -> dict[str, int]:
+    """Words of each page of docs/ outside of fenced code blocks.
+
+    A word is what blanks part, a link or a cell of a table included. What is in a fence does not
+    count, except a list-table or a note (so the entries of the glossary, a directive, do not). Left
+    out are pages that the build generates (`.gitignore` names them), the decisions, and
+    `performance.md`, which `make bench` writes.
+    """
+    ignored = (ROOT / ".gitignore").read_text(encoding="utf-8")
+    left_out = ("decisions/", "performance.md", *re.findall(r"^docs/(.+)$", ignored, re.M))
+    prose = r"(?!\{(?:list-table|note|warning|tip|admonition|dropdown)\})"
+    fence = rf"^(`{{3,}}|~{{3,}}){prose}.*?^\1\s*$"
+    found = {}
+    for page in sorted((ROOT / "docs").rglob("*.md")):
+        name = str(page.relative_to(ROOT / "docs"))
+        if not name.startswith(left_out):
+            text = re.sub(fence, "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
+            found[name] = len(text.split())
+    return found
+
+
+def test_the_manual_is_short():
+    found = words_by_hand()
+    longest = sorted(found.items(), key=lambda one: -one[1])[:10]
+    assert sum(found.values()) <= MOST_WORDS, (sum(found.values()), longest)
