@@ -11,6 +11,7 @@ from typing import Any
 from docutils import nodes
 from docutils.parsers.rst import Directive
 from docutils.utils.math.latex2mathml import tex2mathml
+from sphinx.ext.autosummary import autosummary_toc
 
 from strapdown import __version__
 from strapdown.cli.modules_list import HEADINGS, cell_text, listed_modules
@@ -27,8 +28,9 @@ extensions = [
     "sphinx.ext.autosummary",
 ]
 exclude_patterns = ["_build"]
+templates_path = ["_templates"]
 
-myst_enable_extensions = ["deflist", "dollarmath"]
+myst_enable_extensions = ["attrs_inline", "deflist", "dollarmath"]
 myst_heading_anchors = 3
 
 # The docstrings give type, shape, unit and frame of every argument; annotations would only
@@ -36,6 +38,10 @@ myst_heading_anchors = 3
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
 autosummary_generate = True
+# `name` in a docstring is a link where a page has that name.
+default_role = "py:obj"
+# Two names that differ in case alone would be one file on some systems.
+autosummary_filename_map = {"strapdown.attitude": "strapdown.attitude_function"}
 numpydoc_show_class_members = False
 numpydoc_class_members_toctree = False
 
@@ -69,29 +75,34 @@ class CodeCell(Directive):
         return [nodes.literal_block(text, text, language="python")]
 
 
-_MESSAGES = """# Messages
-
-Every error and every finding has a code, which programs may rely on, and a sentence, which may be
-reworded. `{name}` stands for a number or a name of the case at hand. The page is made of the
-catalogue in `strapdown/messages` when the manual is built.
-"""
-
-
 def _write_messages(app: Any) -> None:
-    """Make the page of messages of the catalogue of sentences."""
-    parts = [_MESSAGES]
+    """Make a page of each room of the catalogue of sentences."""
+    folder = Path(app.srcdir) / "messages"
+    folder.mkdir(exist_ok=True)
     rooms = resources.files("strapdown").joinpath("messages")
-    for room in sorted(rooms.iterdir(), key=lambda one: one.name):
+    for room in rooms.iterdir():
         if not room.name.endswith(".toml"):
             continue
         name = room.name.removesuffix(".toml")
-        parts.append(f"## {name}\n")
+        parts = [f"# Messages: {name}\n", "How to read a code: [messages](../messages.md).\n"]
         for code, entry in sorted(tomllib.loads(room.read_text(encoding="utf-8")).items()):
-            lines = [f"`{name}.{code}`", f": {_prose(entry['what'])}"]
+            lines = [f"`{name}.{code}`{{#{name}-{code}}}", f": {_prose(entry['what'])}"]
             if entry.get("remedy"):
                 lines.append(f"  \n  *{_prose(entry['remedy'])}*")
             parts.append("\n".join(lines) + "\n")
-    (Path(app.srcdir) / "messages.md").write_text("\n".join(parts), encoding="utf-8")
+        (folder / f"{name}.md").write_text("\n".join(parts), encoding="utf-8")
+
+
+def _without_toctree(app: Any, doctree: Any) -> None:
+    """Keep pages of single objects out of the sidebar: 400 links on each page."""
+    for node in list(doctree.findall(autosummary_toc)):
+        node.parent.remove(node)
+
+
+def _levels(app: Any, page: str, template: str, context: dict[str, Any], _: Any) -> None:
+    """Give the captions of the sidebar, headings, a level, which screen readers need."""
+    role, name = 'role="heading"', "furo_navigation_tree"
+    context[name] = context.get(name, "").replace(role, f'{role} aria-level="2"')
 
 
 _MODULES = """# Modules and formats
@@ -125,6 +136,8 @@ def setup(app: Any) -> dict[str, bool]:
     """Register the writer of formulas, and cells of notebooks."""
     app.connect("builder-inited", _write_messages)
     app.connect("builder-inited", _write_modules)
+    app.connect("doctree-read", _without_toctree, priority=100)
+    app.connect("html-page-context", _levels, priority=900)
     app.add_directive("code-cell", CodeCell)
     app.add_html_math_renderer("mathml", (_math, None), (_math, None))
     return {"parallel_read_safe": True, "parallel_write_safe": True}

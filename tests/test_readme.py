@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import re
 import shlex
+import tomllib
 from pathlib import Path
 
 import pytest
+
+import strapdown
 
 README = (Path(__file__).parent.parent / "README.md").read_text(encoding="utf-8")
 RUNS = re.findall(r"```text\n\$ strapdown (.*?)\n…\n(.*?)```", README, re.S)
@@ -49,3 +52,13 @@ def test_the_python_shown_runs(tmp_path, monkeypatch):
 def test_links_lead_somewhere():
     for target in re.findall(r"\]\(([^)#]+)\)", README):
         assert (Path(__file__).parent.parent / target).exists(), target
+
+
+def test_versions_agree():
+    root = Path(__file__).parent.parent
+    project = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    assert project["version"] == strapdown.__version__
+    # The newest section of the changelog with a date is the newest release.
+    changes = (root / "CHANGELOG.md").read_text(encoding="utf-8")
+    released = re.findall(r"^## \[(\d+\.\d+\.\d+)\] - \d{4}-\d\d-\d\d$", changes, re.M)
+    assert f"\nversion: {released[0]}\n" in (root / "CITATION.cff").read_text(encoding="utf-8")

@@ -42,7 +42,7 @@ class EulerKrylov(AttitudeAlgorithm):
             raise ConfigError("attitude.no-step", quantity="euler:step", step=self.step)
 
     def begin(self, q_nb: Array) -> Array:
-        """Return roll, pitch, heading in rad, least |cos(pitch)|, its step, steps so far."""
+        """Return roll, pitch, heading in rad, least ``|cos(pitch)|``, its step, steps so far."""
         angles = super().begin(q_nb)
         return np.array([*angles, abs(np.cos(angles[1])), 0.0, 0.0])
 
