@@ -31,7 +31,7 @@ from strapdown.lazy_names import load_on_first_use
 if TYPE_CHECKING:
     from strapdown.alignment.alignment import Site
     from strapdown.alignment.fine import FineAlignment
-    from strapdown.api.alignment import AlignmentRun, OutageRun, align, coast
+    from strapdown.api.alignment import AlignmentRun, OutageRun, align, outage
     from strapdown.api.attitude import (
         Attitude,
         AttitudeComparison,
@@ -135,12 +135,12 @@ __all__ = [
     "attitude",
     "calibrate_magnetometer",
     "check_imu_channels",
-    "coast",
     "compare_attitude",
     "doctor",
     "magnetic_field",
     "motion_increments",
     "navigate",
+    "outage",
     "read",
     "read_crash_record",
     "read_gnss",
@@ -168,7 +168,7 @@ load_on_first_use(
     {
         "alignment.alignment": "Site",
         "alignment.fine": "FineAlignment",
-        "api.alignment": "AlignmentRun OutageRun align coast",
+        "api.alignment": "AlignmentRun OutageRun align outage",
         "api.attitude": "Attitude AttitudeComparison AttitudeOptions MagnetometerCalibration "
         "OrientationFilter attitude calibrate_magnetometer compare_attitude",
         "api.crash": "CrashRun reconstruct",

@@ -157,7 +157,7 @@ def test_exit_codes_need_no_sentence(without_words, run_cli, tmp_path):
         ("align", log, "--lat", 55, "--lon", 37, "--alt", 0, "--sensor", "fog-1000"),
         ("align", tmp_path / "none.toml"),
         ("navigate", tmp_path / "none.toml"),
-        ("coast", "no-such-sensor"),
+        ("outage", "no-such-sensor"),
         ("attitude", tmp_path / "none.csv"),
     )
     before = [run_cli(*one).code for one in wrong]

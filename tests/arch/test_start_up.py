@@ -77,7 +77,7 @@ def test_dir_and_an_unknown_name_load_nothing_either():
         ["init", "align", "--help"],
         ["init", "navigate", "--help"],
         ["navigate", "--help"],
-        ["coast", "--help"],
+        ["outage", "--help"],
         ["init", "crash", "--help"],
         ["verify", "--help"],
         ["--version"],

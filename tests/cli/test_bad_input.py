@@ -17,7 +17,6 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from bad_alignment import alignment_section
 from bad_case import CASE_FILES, TEXT
-from bad_coast import coast_section
 from bad_crash import CRASH_CALLS
 from bad_crash_case import CRASH_CASES
 from bad_crash_records import RECORD_CALLS
@@ -25,6 +24,7 @@ from bad_init import init_section
 from bad_inputs import CASES
 from bad_navigate import navigate_section
 from bad_navigation import CALLS
+from bad_outage import outage_section
 
 from strapdown.errors import Finding, StrapdownError
 
@@ -87,7 +87,7 @@ def page(tmp_path_factory, run_cli, crash_said):
         )
     sections.append(alignment_section(tmp_path_factory.mktemp, run_cli))
     sections.append(navigate_section(tmp_path_factory.mktemp, run_cli))
-    sections.append(coast_section(tmp_path_factory.mktemp, run_cli))
+    sections.append(outage_section(tmp_path_factory.mktemp, run_cli))
     sections.append(init_section(tmp_path_factory.mktemp, run_cli))
     return HEAD + "".join(sections) + _crash_cases(crash_said) + _from_python()
 

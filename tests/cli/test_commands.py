@@ -248,7 +248,7 @@ def test_a_job_that_is_stopped_leaves_nothing_behind(tmp_path):
 
 def test_lines_of_the_help_break_where_the_terminal_ends_alone(run_cli):
     """No line of prose is broken while the next word would still have fitted."""
-    for command in (*COMMANDS, "coast", "navigate"):
+    for command in (*COMMANDS, "outage", "navigate"):
         head = run_cli(command, "--help").out.split("╭")[0].rstrip().splitlines()
         width = len(head[0]) or 80
         for line, following in pairwise(head):

@@ -33,7 +33,7 @@ SLOW = {
     "align",
     "answer",
     "car",
-    "coast",
+    "outage",
     "consistency",
     "convert",
     "crash_tutorial",

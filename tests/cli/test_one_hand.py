@@ -22,14 +22,14 @@ COMMANDS = {
 }
 READS_A_LOG = ("attitude", "align", "navigate", "init align", "init navigate")
 TABULAR = {
-    *("attitude", "align", "navigate", "coast", "crash", "simulate", "verify", "modules"),
+    *("attitude", "align", "navigate", "outage", "crash", "simulate", "verify", "modules"),
     *("doctor", "convert", "export"),
 }
 #: What one word says of two things: of a scenario beside a log, of a start beside a place.
 OF_ITS_OWN = {
     *(("simulate", flag) for flag in ("--rate", "--sampling", "--sensor", "--seed", "--format")),
     *(("attitude", flag) for flag in ("--sensor", "--seed")),
-    *(("coast", flag) for flag in ("--lat", "--heading", "--from")),
+    *(("outage", flag) for flag in ("--lat", "--heading", "--from")),
     *(("navigate", flag) for flag in ("--lat",)),
     *(("init navigate", flag) for flag in ("--sensor",)),
     *(("align", flag) for flag in ("--gnss",)),
@@ -56,7 +56,7 @@ def test_a_flag_has_one_meaning_one_form_and_one_group():
             flag = next(o for o in option.opts if o.startswith("--"))
             if (name, flag) in OF_ITS_OWN or flag in ("--out", "--force"):
                 continue
-            panel = None if name == "coast" or flag == "--sensor" else option.rich_help_panel
+            panel = None if name == "outage" or flag == "--sensor" else option.rich_help_panel
             form = (option.help, option.metavar)
             first = said.setdefault(flag, (form, panel, name))
             assert form == first[0], (flag, name, first[2])
@@ -130,7 +130,7 @@ def test_a_draft_keeps_the_part_that_flags_name(
         assert f"\n{flag[2:]}_s = {float(value)}" in text
 
 
-@pytest.mark.parametrize("command", ["attitude", "align", "navigate", "coast"])
+@pytest.mark.parametrize("command", ["attitude", "align", "navigate", "outage"])
 @pytest.mark.parametrize(
     ("flags", "said"),
     [
@@ -141,8 +141,8 @@ def test_a_draft_keeps_the_part_that_flags_name(
     ],
 )
 def test_a_part_that_cannot_be_meant_is_refused_alike(tmp_path, run_cli, command, flags, said):
-    source = "adis16470" if command == "coast" else log(tmp_path / "log.csv")
-    more = () if command in ("attitude", "coast") else ("--lat", "55", "--lon", "37")
+    source = "adis16470" if command == "outage" else log(tmp_path / "log.csv")
+    more = () if command in ("attitude", "outage") else ("--lat", "55", "--lon", "37")
     more = (*more, "--sensor", "fog-1000") if command in ("align", "navigate") else more
     done = run_cli(command, source, *more, *flags, "--out", tmp_path / "out")
     assert (done.code, done.out) == (4, "")
@@ -162,10 +162,10 @@ def test_a_part_that_cannot_be_meant_is_refused_alike(tmp_path, run_cli, command
         ("night.toml", "navigate", "drive.csv", "night-navigate"),
         ("night-navigate.toml", "navigate", "drive.csv", "night-navigate"),
         ("align.toml", "align", "rest.imu", "rest-align"),
-        ("navigate.toml", "coast", "drive.csv", "drive-coast"),
+        ("navigate.toml", "outage", "drive.csv", "drive-outage"),
         ("case.toml", "crash", None, "case-crash"),
         ("crash.toml", "crash", None, "crash-result"),
-        ("adis16470", "coast", None, "adis16470-coast"),
+        ("adis16470", "outage", None, "adis16470-outage"),
         ("alexiev-fig4", "simulated", None, "alexiev-fig4-simulated"),
     ],
 )
@@ -177,7 +177,7 @@ def test_a_folder_keeps_its_whole_name_and_a_result_of_a_result_has_one_ending(t
     for name in ("drive.2018", "drive-navigate"):
         (tmp_path / name).mkdir()
     assert default_folder(tmp_path / "drive.2018", "align") == Path("drive.2018-align")
-    assert default_folder(tmp_path / "drive-navigate", "coast") == Path("drive-coast")
+    assert default_folder(tmp_path / "drive-navigate", "outage") == Path("drive-outage")
 
 
 @pytest.fixture(scope="module")

@@ -73,7 +73,7 @@ QUERIES = {
     "no heading": "trust attitude align",
     "yaw drift": "attitude trust",
     "gyrocompass": "align",
-    "tunnel": "coast",
+    "tunnel": "outage",
     "dead reckoning": "navigate walking",
     "earth rate": "earth",
     "gravity": "earth",

@@ -20,6 +20,7 @@ UNITS = {
 }
 # Names of today and of version 0.1, within the paths that match.
 RENAMED = [
+    (r"/outage\.json/", "outage.json", "coast.json"),
     (r"/heading_integrity\.csv/", "confirmed_99_deg", "borne_out_99_deg"),
     (r"/heading_integrity\.csv/", "check", "witness"),
     (r"/heading_integrity\.csv/", "check_difference_deg", "witness_difference_deg"),
@@ -48,6 +49,7 @@ UNIT_OF = {label: unit for unit, labels in UNITS.items() for label in labels}
 class Names(adapter_0_1.Names):
     """Neutral terms in the words of today, and today's results in neutral terms."""
 
+    COMMANDS: ClassVar[dict[str, str]] = {**adapter_0_1.Names.COMMANDS, "outage": "outage"}
     OPTIONS: ClassVar[dict[str, str]] = {**adapter_0_1.Names.OPTIONS, "export": "--export"}
 
     # The status of a heading is written in neutral words.

@@ -11,22 +11,22 @@ from typing import Any
 from strapdown.api.navigation import NavigationRun
 from strapdown.api.reading import ImuFile, imu_input, keys_in, log_in, table_input
 from strapdown.config.alignment import NOT_BEFORE_FINE, AlignmentSpec
-from strapdown.config.coast import CoastSpec
 from strapdown.config.navigation import NavigationSpec
+from strapdown.config.outage import OutageSpec
 from strapdown.config.spec import specify
 from strapdown.errors import ConfigError
 from strapdown.formats import read_raw
 from strapdown.progress import Progress, silent
-from strapdown.report.coast import read_coasting_run
+from strapdown.report.outage import read_run_of_outage
 from strapdown.systems.alignment_run import AlignmentRun, run_alignment
 from strapdown.systems.inputs import NOWHERE, Memory
-from strapdown.systems.outage_run import OutageRun, run_coast
+from strapdown.systems.outage_run import OutageRun, run_outage
 
 __all__ = [
     "AlignmentRun",
     "OutageRun",
     "align",
-    "coast",
+    "outage",
     "specify_alignment",
 ]
 
@@ -185,7 +185,7 @@ def _site(log: str, known: Mapping[str, float], called: Callable[[str], str]) ->
 # --- predicted drift in a GNSS outage -----------------------------------------------------
 
 
-def coast(
+def outage(
     source: str | Path | NavigationRun,
     outage_s: float = 60.0,
     *,
@@ -220,8 +220,8 @@ def coast(
     """
     with _run_of(source) as (navigation, file, memory, folder):
         sensor = None if navigation is not None else str(source)
-        spec = specify(CoastSpec, outage_s=float(outage_s), sensor=sensor, **options)
-        run = run_coast(spec, navigation, file, progress)
+        spec = specify(OutageSpec, outage_s=float(outage_s), sensor=sensor, **options)
+        run = run_outage(spec, navigation, file, progress)
         return replace(run, memory=memory).in_folder(folder, NOWHERE)
 
 
@@ -231,7 +231,7 @@ def _run_of(
 ) -> Iterator[tuple[NavigationSpec | None, Path | None, Memory, Path]]:
     """The navigation run that a source names, with every input a file."""
     if not isinstance(source, NavigationRun):
-        yield (*read_coasting_run(source), Memory({}), NOWHERE)
+        yield (*read_run_of_outage(source), Memory({}), NOWHERE)
         return
     with source.memory.as_files() as folder:
         yield source.in_folder(NOWHERE, folder).spec, None, source.memory, folder

@@ -200,7 +200,7 @@ def navigate(
     reference : DataFrame, str or Path, optional
         Trajectory table or file to compare with.
     options : mapping, optional
-        Further tables of a configuration: ``{"gaps": {"beyond": "coast"}}``.
+        Further tables of a configuration: ``{"gaps": {"beyond": "bridge"}}``.
     progress : callable, optional
         Called with a stage and the completed fraction.
 

@@ -159,10 +159,10 @@ def demo_runs(out: Path, data: Path) -> list[DemoRun]:
         made = reconstruct(case, progress=progress)
         made.save(folder / "pole", force=force, progress=progress)
 
-    def coasting(folder: Path, force: bool, progress: Progress) -> None:
-        from strapdown.api.alignment import coast
+    def outages(folder: Path, force: bool, progress: Progress) -> None:
+        from strapdown.api.alignment import outage
 
-        made = coast(folder / "tunnel", _OUTAGE, progress=progress)
+        made = outage(folder / "tunnel", _OUTAGE, progress=progress)
         made.save(folder / "cone", force=force, progress=progress)
 
     return [
@@ -203,10 +203,11 @@ def demo_runs(out: Path, data: Path) -> list[DemoRun]:
                 "Drift during a GNSS outage",
                 f"The same drive with a GNSS outage of {_OUTAGE:g} s at each of ten instants: the "
                 "predicted drift, its sources, and the drift that occurred.",
-                f"strapdown coast {out / 'tunnel'} --outage {_OUTAGE:g} \\\n  --out {out / 'cone'}",
+                f"strapdown outage {out / 'tunnel'} --outage {_OUTAGE:g} "
+                f"\\\n  --out {out / 'cone'}",
                 ("cone",),
             ),
-            coasting,
+            outages,
             5.0,
             ("cone",),
         ),

@@ -41,7 +41,7 @@ COMMANDS = (
     "attitude",
     "align",
     "navigate",
-    "coast",
+    "outage",
     "init",
     "convert",
     "crash",

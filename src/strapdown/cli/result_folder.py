@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from strapdown.config.navigation import NavigationSpec
 
 #: Suffixes of the folders of these commands.
-ENDINGS = ("align", "attitude", "coast", "crash", "doctor", "navigate", "simulated")
+ENDINGS = ("align", "attitude", "outage", "crash", "doctor", "navigate", "simulated")
 
 
 def default_folder(source: str | Path, ending: str, named: str | None = None) -> Path:
@@ -82,7 +82,7 @@ def _hints(path: Path, command: str, manifest: Mapping[str, Any]) -> Iterator[Fi
     if (path / "report.html").is_file():
         yield Finding("cli.hint-open", severity="note", report=path / "report.html", folder=path)
     if command == "navigate":
-        yield Finding("cli.hint-coast", severity="note", folder=path)
+        yield Finding("cli.hint-outage", severity="note", folder=path)
     own = next((i for i in manifest["inputs"] if i["role"] in ("log", "case")), None)
     if own is not None:
         at = path / own["name"] if own["kept"] == "copy" else Path(own["name"])

@@ -175,9 +175,9 @@ class GapsTable(Spec):
     #: A step longer than so many usual steps is a gap.
     usual: Annotated[Number, Field(gt=1.0)] = 3.0
     #: Longer gaps are not bridged.
-    coast_s: NotNegative = 1.0
+    bridge_s: NotNegative = 1.0
     #: Action after such a gap: end the run, restart the alignment, or bridge it all the same.
-    beyond: Literal["refuse", "align", "coast"] = "refuse"
+    beyond: Literal["refuse", "align", "bridge"] = "refuse"
 
 
 class AidSpec(FixesTable, ChoiceSpec):

@@ -263,7 +263,7 @@ class Reception:
             self._not_used(bad, None if line is None else line.number)
         if len(items) > 1 and math.isfinite(self._newest):
             begin, end, before = self._newest + self._origin, items[0][0], self.gaps
-            self.gaps += end - begin > self._chain.intake.gaps.coast
+            self.gaps += end - begin > self._chain.intake.gaps.bridge
             if self.gaps == 1 and not before:
                 self._warn(Finding("live.gap", severity="note", begin=begin, end=end))
         for _, (said, line) in items:

@@ -581,11 +581,11 @@ class ModeSequencer:
     def _found(self, hole: Hole) -> None:
         policy = self._chain.intake.gaps
         gap = {"length": hole.length, "begin": hole.begin, "end": hole.end}
-        if hole.length > policy.coast and policy.beyond == "refuse":
+        if hole.length > policy.bridge and policy.beyond == "refuse":
             raise DataError(
                 "navigation.gap", file=self._state.intake.source, quantity="time", data=gap
             )
-        anew = hole.length > policy.coast and policy.beyond == "align"
+        anew = hole.length > policy.bridge and policy.beyond == "align"
         code = "gap-before-alignment" if anew else "gap-bridged"
         self._events.append(Event.of(hole.begin, "gap", code, **gap))
         self._state = replace(self._state, holes=(*self._state.holes, hole))
@@ -643,7 +643,7 @@ class ModeSequencer:
         state, policy = self._state, self._chain.intake.gaps
         hole, *others = state.holes
         state = replace(state, holes=tuple(others))
-        if hole.length > policy.coast and policy.beyond == "align":
+        if hole.length > policy.bridge and policy.beyond == "align":
             mode = self._chain.modes[state.mode]
             self._modes.append(Span(mode.name, state.begun, hole.begin))
             if state.navigator is not None:

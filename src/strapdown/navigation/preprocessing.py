@@ -213,23 +213,25 @@ class GapPolicy:
     ----------
     usual : float
         Ratio to the step that 95 % of the first 64 do not exceed.
-    coast : float, s
+    bridge : float, s
         Longest gap that is bridged.
-    beyond : {'refuse', 'align', 'coast'}
+    beyond : {'refuse', 'align', 'bridge'}
         Action at a longer gap: end the run with an error; begin the first mode anew; or bridge it
         like a short one.
     """
 
     usual: float = field(default=3.0, metadata={"unit": ""})
-    coast: float = field(default=1.0, metadata={"unit": "s"})
-    beyond: Literal["refuse", "align", "coast"] = "refuse"
+    bridge: float = field(default=1.0, metadata={"unit": "s"})
+    beyond: Literal["refuse", "align", "bridge"] = "refuse"
 
     def __post_init__(self) -> None:
         if not is_number(self.usual) or not self.usual > 1.0:
             raise ConfigError("navigation.gap-factor-too-small", quantity="usual", usual=self.usual)
-        if not is_number(self.coast) or not self.coast >= 0.0:
-            raise ConfigError("navigation.gap-length-negative", quantity="coast", coast=self.coast)
-        if self.beyond not in ("refuse", "align", "coast"):
+        if not is_number(self.bridge) or not self.bridge >= 0.0:
+            raise ConfigError(
+                "navigation.gap-length-negative", quantity="bridge", bridge=self.bridge
+            )
+        if self.beyond not in ("refuse", "align", "bridge"):
             raise ConfigError(
                 "navigation.nothing-do-about-gap", quantity="beyond", beyond=self.beyond
             )

@@ -67,14 +67,14 @@ def shown_answer(bundle: Path) -> str:
     Parameters
     ----------
     bundle : Path
-        From `attitude`, `crash`, `navigate` or `coast`.
+        From `attitude`, `crash`, `navigate` or `outage`.
     """
     kind, result = _result_of(bundle)
     if kind == "attitude":
         return str(result["answer"]["sentence"] if result["answer"] else result["headline"])
     if kind == "crash":
         return str(result["headline"])
-    if kind == "coast":
+    if kind == "outage":
         answer = str(result["answer"]).removeprefix(f"{result['name']}: ")
         return f"{answer[:1].upper()}{answer[1:]}."
     return str(_json(bundle / "verdict.json")["answer"])
@@ -98,7 +98,7 @@ def shown_truth(bundle: Path, records: Path | None = None) -> str | None:
         return _attitude_truth(result)
     if kind == "crash":
         return None if records is None else _crash_truth(_json(records / "scenario.json"))
-    if kind == "coast":
+    if kind == "outage":
         return str(result["measured"]) if result["measured"] else None
     return _navigation_truth(result)
 

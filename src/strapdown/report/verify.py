@@ -40,12 +40,12 @@ from strapdown.errors import ConfigError, DataError, Finding, Severity, Strapdow
 from strapdown.report import crash_live
 from strapdown.report.alignment import ALIGNMENT
 from strapdown.report.attitude import write_attitude
-from strapdown.report.coast import COAST
 from strapdown.report.content import EQUAL, Comparison, compare_files, json_of
 from strapdown.report.crash_case import CRASH
 from strapdown.report.crash_simulation import write_crash_simulation
 from strapdown.report.doctor import DOCTOR
 from strapdown.report.navigation import NAVIGATION
+from strapdown.report.outage import OUTAGE
 from strapdown.report.report_bundle import ReportBundle
 from strapdown.report.simulation import write_simulation, write_trajectory_simulation
 
@@ -86,7 +86,7 @@ class Verification:
 
 #: Commands with a `ReportBundle`; ``attitude``, ``simulate`` and ``crash --live`` write theirs.
 BUNDLES: dict[str, ReportBundle[Any]] = {
-    bundle.command: bundle for bundle in (ALIGNMENT, COAST, CRASH, DOCTOR, NAVIGATION)
+    bundle.command: bundle for bundle in (ALIGNMENT, OUTAGE, CRASH, DOCTOR, NAVIGATION)
 }
 
 

@@ -699,7 +699,7 @@ def make_chain(spec: NavigationSpec, sensors: ImuUncertainty) -> NavigationPipel
         navigator=navigator,
         intake=ImuPreprocessor(
             prefilter=prefilter,
-            gaps=GapPolicy(gaps.usual, gaps.coast_s, gaps.beyond),
+            gaps=GapPolicy(gaps.usual, gaps.bridge_s, gaps.beyond),
             ends=ends_of(sensors),
         ),
         modes=_modes(spec),

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from strapdown.bundle import InputFiles, Seal, sensor_file
 from strapdown.config.alignment import sensors_of
-from strapdown.config.coast import CoastSpec, CoastStartTable
 from strapdown.config.navigation import NavigationSpec
+from strapdown.config.outage import OutageSpec, OutageStartTable
 from strapdown.constants import DEG_PER_HOUR, MICRO_G
 from strapdown.dsp.chi_square import PLANE_95, plane_bound
 from strapdown.errors import ConfigError, Finding
@@ -72,10 +72,10 @@ if TYPE_CHECKING:
 __all__ = [
     "Drift",
     "OutageRun",
-    "coast_navigator",
-    "coast_of_run",
     "forecast_of_sensor",
-    "run_coast",
+    "outage_navigator",
+    "outage_of_run",
+    "run_outage",
     "sensor_of",
     "stated_motion",
 ]
@@ -103,7 +103,7 @@ class OutageRun(SavedRun):
 
     configuration: ClassVar[str] = "navigation"
 
-    spec: CoastSpec
+    spec: OutageSpec
     navigation: NavigationSpec | None
     name: str
     what: str
@@ -154,15 +154,15 @@ class OutageRun(SavedRun):
             Displays itself in a notebook; `save` writes it as SVG, PNG or PDF.
         """
         from strapdown.report.chart_svg import ChartFigure
-        from strapdown.report.coast_document import cone_chart
+        from strapdown.report.outage_document import cone_chart
 
         return ChartFigure(cone_chart(self))
 
     @staticmethod
     def _writer() -> Callable[..., Seal]:
-        from strapdown.report.coast import COAST
+        from strapdown.report.outage import OUTAGE
 
-        return COAST.write
+        return OUTAGE.write
 
     def __repr__(self) -> str:
         time, bound = self.forecast.time[-1], self.forecast.bound[-1]
@@ -170,8 +170,8 @@ class OutageRun(SavedRun):
 
 
 @one_thread()
-def run_coast(
-    spec: CoastSpec,
+def run_outage(
+    spec: OutageSpec,
     navigation: NavigationSpec | None = None,
     file: Path | None = None,
     progress: Progress = silent,
@@ -180,7 +180,7 @@ def run_coast(
 
     Parameters
     ----------
-    spec : CoastSpec
+    spec : OutageSpec
         With absolute paths.
     navigation : NavigationSpec, optional
         The run whose receivers are removed; without one, a sensor along a stated motion.
@@ -217,7 +217,7 @@ def run_coast(
     # Its plan is not drawn.
     navigation = navigation.with_map(None)
     source = read_navigation_source(navigation)
-    predicted, drifts = coast_of_run(spec, navigation, source, progress)
+    predicted, drifts = outage_of_run(spec, navigation, source, progress)
     return OutageRun(
         spec,
         navigation,
@@ -291,8 +291,8 @@ class Drift:
         return np.asarray(np.hypot(self.along, self.across))
 
 
-def coast_of_run(
-    spec: CoastSpec,
+def outage_of_run(
+    spec: OutageSpec,
     navigation: NavigationSpec,
     source: NavigationSource,
     progress: Progress = silent,
@@ -402,7 +402,7 @@ class _Fixes:
 
 
 def _spans(
-    spec: CoastSpec, source: NavigationSource, begun: float, end: float, receivers: list[str]
+    spec: OutageSpec, source: NavigationSource, begun: float, end: float, receivers: list[str]
 ) -> tuple[Span, ...]:
     """The outages, on the clock of the samples."""
     first = begun + SETTLED
@@ -591,7 +591,7 @@ def sensor_of(name: str) -> ImuUncertainty:
     return stated_imu(sensor, {}, {})
 
 
-def coast_navigator(spec: CoastSpec, sensors: ImuUncertainty, fixes: bool) -> Navigator:
+def outage_navigator(spec: OutageSpec, sensors: ImuUncertainty, fixes: bool) -> Navigator:
     """Return the navigator of a forecast.
 
     Parameters
@@ -616,7 +616,7 @@ def coast_navigator(spec: CoastSpec, sensors: ImuUncertainty, fixes: bool) -> Na
 
 
 def forecast_of_sensor(
-    spec: CoastSpec, sensors: ImuUncertainty, progress: Progress = silent
+    spec: OutageSpec, sensors: ImuUncertainty, progress: Progress = silent
 ) -> Forecast:
     """Predict the drift of a sensor along a stated motion.
 
@@ -639,7 +639,7 @@ def forecast_of_sensor(
     made = motion_increments(imu)
     time, rows = index_of(made), made.to_numpy(dtype=np.float64)
     driven = begin > 0.0
-    before = coast_navigator(spec, sensors, fixes=driven)
+    before = outage_navigator(spec, sensors, fixes=driven)
     (row,) = values_of(motion.trajectory([0.0]), TRAJECTORY)
     state = before.begin(state_of_row(row), _aligned(before, sensors))
     for name, table in _tables(spec, motion, begin, driven).items():
@@ -675,7 +675,7 @@ def _aligned(navigator: Navigator, sensors: ImuUncertainty) -> Array:
     return np.diag(np.square(sds))
 
 
-def _stated(state: NavigatorState, navigator: Navigator, start: CoastStartTable) -> NavigatorState:
+def _stated(state: NavigatorState, navigator: Navigator, start: OutageStartTable) -> NavigatorState:
     """Replace errors by stated ones, uncorrelated with all others."""
     P = physical(navigator, state).copy()
     for key, (name, factor) in STATED.items():
@@ -689,7 +689,7 @@ def _stated(state: NavigatorState, navigator: Navigator, start: CoastStartTable)
 
 
 def _tables(
-    spec: CoastSpec, motion: EarthMotion, begin: float, driven: bool
+    spec: OutageSpec, motion: EarthMotion, begin: float, driven: bool
 ) -> dict[str, pd.DataFrame]:
     """Error-free tables of receivers and odometers."""
     out: dict[str, pd.DataFrame] = {}
@@ -723,7 +723,7 @@ RAMP = 1.0
 LIMITS = Limits(acceleration=100.0, lateral=100.0, climb_deg=20.0)
 
 
-def stated_motion(spec: CoastSpec) -> tuple[EarthMotion, float]:
+def stated_motion(spec: OutageSpec) -> tuple[EarthMotion, float]:
     """Return the motion of a forecast, and the begin of the outage.
 
     Before it, for `aided_s`, a car drives around blocks to the left and to the right, with changes
@@ -739,7 +739,7 @@ def stated_motion(spec: CoastSpec) -> tuple[EarthMotion, float]:
     before, begin = _drive(spec.start.aided_s, asked.speed_m_per_s)
     motion = car(
         Origin(asked.lat_deg, 10.0, 100.0),
-        [(f"drive {k + 1}", one) for k, one in enumerate([*before, *_coasting(spec)])],
+        [(f"drive {k + 1}", one) for k, one in enumerate([*before, *_of_outage(spec)])],
         heading_deg=asked.heading_deg,
         speed=0.0 if before else asked.speed_m_per_s,
         limits=LIMITS,
@@ -772,7 +772,7 @@ def _drive(length: float, speed: float) -> tuple[list[Manoeuvre], float]:
     return [*(one for one, _ in done), Straight(whole - took)], float(whole)
 
 
-def _coasting(spec: CoastSpec) -> list[Manoeuvre]:
+def _of_outage(spec: OutageSpec) -> list[Manoeuvre]:
     """Maneuvers during the outage."""
     asked, outage = spec.motion, spec.outage_s
     speed, rate = asked.speed_m_per_s, asked.turn_rate_deg_per_s

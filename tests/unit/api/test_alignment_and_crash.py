@@ -1,4 +1,4 @@
-"""`strapdown.align`, `coast`, `reconstruct` and `read`: data out, and sealed as it was."""
+"""`strapdown.align`, `outage`, `reconstruct` and `read`: data out, and sealed as it was."""
 
 from __future__ import annotations
 
@@ -123,7 +123,7 @@ def test_what_an_alignment_lacks_is_named_by_its_argument(rest, ask, words):
 
 
 def test_the_drift_of_an_outage_is_data(tmp_path):
-    run = sd.coast("adis16470", 20.0, motion={"speed_m_per_s": 15.0}, start={"aided_s": 0.0})
+    run = sd.outage("adis16470", 20.0, motion={"speed_m_per_s": 15.0}, start={"aided_s": 0.0})
     assert run.bound_m.index[-1] == 20.0
     assert run.bound_m.is_monotonic_increasing
     assert len(run.to_pandas()) == len(run.bound_m)
@@ -132,7 +132,7 @@ def test_the_drift_of_an_outage_is_data(tmp_path):
     run.save(tmp_path / "out", report=False)
     assert sd.verify(tmp_path / "out").verdict == "identical"
     with pytest.raises(ConfigError):
-        sd.coast("adis16470", 20.0, motion={"speed": 15.0})
+        sd.outage("adis16470", 20.0, motion={"speed": 15.0})
 
 
 @pytest.mark.slow

@@ -36,7 +36,7 @@ def test_verbose_tells_stages_and_readers_and_quiet_nothing(run_cli, tmp_path):
 
 
 def test_every_command_that_is_quiet_is_verbose_too(run_cli):
-    for command in ("attitude", "align", "navigate", "coast", "crash", "simulate", "verify"):
+    for command in ("attitude", "align", "navigate", "outage", "crash", "simulate", "verify"):
         told = run_cli(command, "--help").out
         assert "--quiet" in told and "--verbose" in told, command
 

@@ -150,7 +150,7 @@ def test_a_clock_that_goes_back_is_told():
 
 
 def test_a_gap_that_is_confirmed_is_told():
-    more = {"gaps": {"beyond": "coast"}}
+    more = {"gaps": {"beyond": "bridge"}}
     good = [text for text in lines() if not 2.0 < float(text.split(",")[1]) < 3.5]
     live, _, told = received(good, NavigationSpec.checked(table(**more)))
     assert [one.code for one in told] == ["live.gap"]

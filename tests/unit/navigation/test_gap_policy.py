@@ -107,16 +107,16 @@ def test_a_long_gap_ends_the_run_with_what_can_be_done():
         DataError, check=coded("navigation.gap", file="rock.csv", length=1.5, begin=2.0, end=3.5)
     ) as e:
         run_batch(chain(), log(length=1.5), None)
-    assert "coast" in str(e.value)
+    assert "bridge" in str(e.value)
 
 
 def test_a_long_gap_can_be_bridged_on_request():
-    run = run_batch(chain(beyond="coast"), log(length=1.5), None)
+    run = run_batch(chain(beyond="bridge"), log(length=1.5), None)
     assert len(run.record.trajectory) == len(log(length=1.5)) - 1
 
 
 def test_what_means_nothing_is_refused():
-    for policy in ({"usual": 1.0}, {"coast": -1.0}, {"beyond": "hope"}):
+    for policy in ({"usual": 1.0}, {"bridge": -1.0}, {"beyond": "hope"}):
         with pytest.raises(ConfigError):
             GapPolicy(**policy)
     with pytest.raises(ConfigError, check=coded("navigation.no-alignment-after-gap")):

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from strapdown import coast, rotation
-from strapdown.config.coast import CoastSpec
+from strapdown import outage, rotation
+from strapdown.config.outage import OutageSpec
 from strapdown.config.spec import specify
 from strapdown.constants import DEG_PER_HOUR, MICRO_G
 from strapdown.dsp.chi_square import PLANE_95
@@ -19,8 +19,8 @@ from strapdown.increments import motion_increments
 from strapdown.mechanization import NorthEastDown, run_mechanization
 from strapdown.nav_state import NavState
 from strapdown.navigation.outage import QUANTITIES
-from strapdown.report.coast import coast_json
-from strapdown.report.coast_document import cone_chart
+from strapdown.report.outage import outage_json
+from strapdown.report.outage_document import cone_chart
 from strapdown.sensors.error_chain import apply
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation import simulate_imu
@@ -41,7 +41,7 @@ SMALL = {**START, "gyro_bias_sd_deg_per_h": 30.0, "accel_bias_sd_ug": 500.0}
 
 
 def foretold(sensor, outage=10.0, **tables):
-    spec = specify(CoastSpec, **{"outage_s": outage, "sensor": sensor, **tables})
+    spec = specify(OutageSpec, **{"outage_s": outage, "sensor": sensor, **tables})
     return forecast_of_sensor(spec, sensor_of(sensor))
 
 
@@ -146,7 +146,7 @@ def test_with_aids_the_budget_has_what_their_noise_adds(monkeypatch):
 @pytest.mark.parametrize("sensor", ["mpu-6050", "adis16495-1"])
 def test_drifts_that_are_drawn_are_as_foretold(sensor, motion):
     """Errors are drawn by the simulation of sensors, and navigated by the mechanization alone."""
-    spec = specify(CoastSpec, outage_s=30.0, sensor=sensor, start=SMALL, motion=motion)
+    spec = specify(OutageSpec, outage_s=30.0, sensor=sensor, start=SMALL, motion=motion)
     known = sensor_of(sensor)
     found = forecast_of_sensor(spec, known)
     drifts = drawn(spec, known, 150)
@@ -238,7 +238,7 @@ def wrong_start(truth, spec, draws):
 )
 def test_a_motion_that_cannot_be_is_refused(motion, quantity, says):
     with pytest.raises(ConfigError) as told:
-        stated_motion(specify(CoastSpec, outage_s=10.0, sensor="hg9900", motion=motion))
+        stated_motion(specify(OutageSpec, outage_s=10.0, sensor="hg9900", motion=motion))
     assert told.value.finding.quantity == quantity
     assert says in told.value.finding.what
 
@@ -256,13 +256,13 @@ def test_a_motion_that_cannot_be_is_refused(motion, quantity, says):
 )
 def test_a_number_that_cannot_be_is_refused(table, quantity):
     with pytest.raises(ConfigError) as told:
-        specify(CoastSpec, **table)
+        specify(OutageSpec, **table)
     assert told.value.finding.quantity == quantity
     assert told.value.finding.remedy
 
 
 def test_the_drive_before_ends_as_the_outage_begins():
-    spec = specify(CoastSpec, outage_s=20.0, motion={"speed_m_per_s": 20.0, "heading_deg": 70.0})
+    spec = specify(OutageSpec, outage_s=20.0, motion={"speed_m_per_s": 20.0, "heading_deg": 70.0})
     motion, begin = stated_motion(spec)
     # Rounds are whole: the drive is as long as was asked for but for half of one.
     assert abs(begin - 600.0) < 100.0
@@ -322,7 +322,7 @@ def tunnel(tmp_path_factory):
     """Outages of 8 s in a drive of 80 s without fixes from 50 to 65 s."""
     file = tmp_path_factory.mktemp("tunnel") / "tunnel.toml"
     file.write_text(TUNNEL)
-    return coast(file, 8.0, places=8)
+    return outage(file, 8.0, places=8)
 
 
 def test_the_curve_is_over_outages_of_one_length(tunnel):
@@ -360,7 +360,7 @@ def test_gross_errors_of_withheld_fixes_are_no_drift(tunnel):
 
 
 def test_outages_that_do_not_count_are_told(tunnel):
-    data = coast_json(tunnel)
+    data = outage_json(tunnel)
     assert data["outages"] == {
         "tried": 8,
         "equal_length": 6,

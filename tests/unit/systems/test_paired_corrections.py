@@ -10,22 +10,22 @@ import pandas as pd
 import pytest
 from tests.coded import coded
 
-from strapdown.config.coast import CoastSpec
 from strapdown.config.navigation import NavigationSpec
+from strapdown.config.outage import OutageSpec
 from strapdown.errors import ConfigError
 from strapdown.evaluation.trajectory_differences import trajectory_differences
-from strapdown.report.coast import coast_json
-from strapdown.report.coast_document import key_figures
 from strapdown.report.navigation import NAVIGATION
 from strapdown.report.navigation_evaluation import (
     NavigationEvaluation,
     paired_errors,
     reference_words,
 )
+from strapdown.report.outage import outage_json
+from strapdown.report.outage_document import key_figures
 from strapdown.report.paired_corrections import paired_table
 from strapdown.report.values import NOT_ESTIMATED
 from strapdown.systems.navigation_run import run_navigation
-from strapdown.systems.outage_run import run_coast
+from strapdown.systems.outage_run import run_outage
 
 #: The fixes end here, s.
 LAST_FIX = 70.0
@@ -149,8 +149,8 @@ def test_beside_is_another_kind(beside):
 
 def test_an_outage_has_no_bound_of_a_height_that_is_not_estimated():
     """The same drive, of which 17 states know no height."""
-    made = run_coast(CoastSpec(outage_s=2.0, places=1), spec(kind="feedback"))
-    told = coast_json(made)
+    made = run_outage(OutageSpec(outage_s=2.0, places=1), spec(kind="feedback"))
+    told = outage_json(made)
     assert told["at_the_end"]["vertical_sd_m"] is None
     assert told["at_the_end"]["horizontal_sd_m"] > 0.0
     figures = {one.name: one.value for one in key_figures(made)}

@@ -1,4 +1,4 @@
-"""What `strapdown coast` cannot use, and what it says."""
+"""What `strapdown outage` cannot use, and what it says."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 from bad_navigate import undrawn, write_drive
 
-__all__ = ["COAST_CASES", "coast_said", "coast_section", "navigated_drive"]
+__all__ = ["COAST_CASES", "navigated_drive", "outage_said", "outage_section"]
 
-HEAD = """## strapdown coast
+HEAD = """## strapdown outage
 
 `drive-navigate` is the folder that `strapdown navigate` writes of the drive above, which takes
 80 s.
@@ -112,23 +112,23 @@ def navigated_drive(folder: Path, run_cli) -> None:
     assert done.code == 0, done.err
 
 
-def coast_section(mktemp, run_cli) -> str:
-    """What `strapdown coast` says of each case, as the page has it."""
-    root = mktemp("coast-drive")
+def outage_section(mktemp, run_cli) -> str:
+    """What `strapdown outage` says of each case, as the page has it."""
+    root = mktemp("outage-drive")
     navigated_drive(root, run_cli)
     parts = [HEAD]
     for case in COAST_CASES:
-        said, code = coast_said(case, root, mktemp("coast"), run_cli)
+        said, code = outage_said(case, root, mktemp("outage"), run_cli)
         given = " ".join((case.source, *case.options))
         told = f"{case.what}\n\n" if case.what else ""
         parts.append(
-            f"### {case.title}\n\n{told}`strapdown coast {given}`\n\n"
+            f"### {case.title}\n\n{told}`strapdown outage {given}`\n\n"
             f"```text\n{said}```\n\nExit code {code}.\n\n"
         )
     return "".join(parts)
 
 
-def coast_said(case: CoastCase, root: Path, folder: Path, run_cli) -> tuple[str, int]:
+def outage_said(case: CoastCase, root: Path, folder: Path, run_cli) -> tuple[str, int]:
     """Run a case; whether anything is left behind is looked at here."""
     source: str | Path = case.source
     if case.source.startswith("drive"):
@@ -140,7 +140,7 @@ def coast_said(case: CoastCase, root: Path, folder: Path, run_cli) -> tuple[str,
         if case.change is not None:
             case.change(folder / case.source)
     before = sorted(p.name for p in folder.rglob("*"))
-    done = run_cli("coast", source, "--out", folder / "out", *case.options)
+    done = run_cli("outage", source, "--out", folder / "out", *case.options)
     assert "Traceback" not in done.err, done.err
     assert done.code == case.code, (case.title, done.code, done.err)
     assert sorted(p.name for p in folder.rglob("*")) == before, "something was left behind"

@@ -9,20 +9,20 @@ from typing import Any
 import numpy as np
 
 from strapdown.bundle import read_manifest, resolved, unsealed_changes, write_json
-from strapdown.config.coast import CoastSpec
 from strapdown.config.navigation import NavigationSpec
+from strapdown.config.outage import OutageSpec
 from strapdown.config.spec import specify
 from strapdown.config.toml_file import read_toml
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import csv
 from strapdown.navigation.outage import QUANTITIES
 from strapdown.progress import Progress
-from strapdown.report.coast_document import (
-    coast_document,
+from strapdown.report.outage_document import (
     drifts_of,
     end_bound,
     headline,
     inside_words,
+    outage_document,
     remedy,
     start_words,
 )
@@ -34,10 +34,10 @@ from strapdown.report.report_bundle import (
 )
 from strapdown.report.values import spaced
 from strapdown.sensors.catalogue import SENSORS
-from strapdown.systems.outage_run import OutageRun, run_coast
+from strapdown.systems.outage_run import OutageRun, run_outage
 
 
-def read_coasting_run(source: str | Path) -> tuple[NavigationSpec | None, Path | None]:
+def read_run_of_outage(source: str | Path) -> tuple[NavigationSpec | None, Path | None]:
     """Return the navigation run that a source names; None for a sensor.
 
     Parameters
@@ -102,29 +102,29 @@ def _of_bundle(path: Path) -> tuple[NavigationSpec, Path | None]:
 
 def _configuration(result: OutageRun) -> dict[str, Any]:
     beside = {} if result.navigation is None else {"navigation": result.navigation.plain()}
-    return with_file({"coast": result.spec.plain(), **beside}, result)
+    return with_file({"outage": result.spec.plain(), **beside}, result)
 
 
 def _run(configuration: dict[str, Any]) -> OutageRun:
     table = configuration.get("navigation")
     navigation = None if table is None else NavigationSpec.checked(table)
-    spec = specify(CoastSpec, **configuration["coast"])
-    return run_coast(spec, navigation, file_of(configuration))
+    spec = specify(OutageSpec, **configuration["outage"])
+    return run_outage(spec, navigation, file_of(configuration))
 
 
 def _write(
     result: OutageRun, folder: Path, name: str, forms: tuple[str, ...], progress: Progress
 ) -> None:
-    write_json(folder / "coast.json", coast_json(result))
-    write_coast_tables(result, folder)
+    write_json(folder / "outage.json", outage_json(result))
+    write_outage_tables(result, folder)
     if forms:
         from strapdown.report.document_html import write_report
 
-        write_report(coast_document(result, name), folder, progress)
+        write_report(outage_document(result, name), folder, progress)
 
 
 #: Page, JSON and cone of the drift of an outage prediction.
-COAST = ReportBundle("coast", _configuration, _run, _write)
+OUTAGE = ReportBundle("outage", _configuration, _run, _write)
 
 
 # JSON and tables of an outage prediction.
@@ -141,7 +141,7 @@ SHOWN = {
 }
 
 
-def coast_json(result: OutageRun) -> dict[str, Any]:
+def outage_json(result: OutageRun) -> dict[str, Any]:
     """Return an outage prediction as plain data for programs.
 
     Returns
@@ -215,7 +215,7 @@ def coast_json(result: OutageRun) -> dict[str, Any]:
     return finite(data)
 
 
-def write_coast_tables(result: OutageRun, folder: Path) -> None:
+def write_outage_tables(result: OutageRun, folder: Path) -> None:
     """Write the cone, its error budget over time, and the observed drifts.
 
     Parameters

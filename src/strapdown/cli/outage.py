@@ -1,4 +1,4 @@
-"""``strapdown coast``."""
+"""``strapdown outage``."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ from strapdown.cli.shared_options import (
 from strapdown.errors import ConfigError
 
 if TYPE_CHECKING:
-    from strapdown.config.coast import CoastSpec
+    from strapdown.config.outage import OutageSpec
     from strapdown.progress import Progress
     from strapdown.systems.outage_run import OutageRun
 
 EPILOG = (
-    "Example: strapdown coast adis16470 --outage 60 --speed 15 --with no_slip\n\n"
-    "Example: strapdown coast drive-navigate --outage 30 (a folder of strapdown navigate)"
+    "Example: strapdown outage adis16470 --outage 60 --speed 15 --with no_slip\n\n"
+    "Example: strapdown outage drive-navigate --outage 30 (a folder of strapdown navigate)"
 )
 moving = partial(option, "Motion, for a sensor")
 starting = partial(option, "Initial standard deviations, for a sensor")
@@ -131,7 +131,7 @@ class OutageFlags:
 
 
 @spread
-def coast(
+def outage(
     source: Annotated[
         str,
         typer.Argument(
@@ -157,7 +157,7 @@ def coast(
     ] = None,
     start: StartFlags,
     run: OutageFlags,
-    out: Annotated[Path | None, folder_to_make("SENSOR-coast, or DRIVE-coast")] = None,
+    out: Annotated[Path | None, folder_to_make("SENSOR-outage, or DRIVE-outage")] = None,
     write: ReportFlags,
 ) -> None:
     """Predict the drift during a GNSS outage, and the sources of the drift.
@@ -167,47 +167,47 @@ def coast(
     """
     from strapdown.cli.console import WORDS, print_findings, print_seal
     from strapdown.cli.result_folder import default_folder, run_and_save, source_name
-    from strapdown.report.coast import read_coasting_run
+    from strapdown.report.outage import read_run_of_outage
     from strapdown.systems.inputs import check_part
-    from strapdown.systems.outage_run import run_coast
+    from strapdown.systems.outage_run import run_outage
 
     check_part(run.from_s, run.to_s, run.duration_s)
-    navigation, file = read_coasting_run(source)
+    navigation, file = read_run_of_outage(source)
     named = None if navigation is None or file is None else source_name(navigation)
     tables = {"motion": asdict(motion), "start": asdict(start)}
 
     def compute(report: Progress) -> OutageRun:
-        spec = coast_of_flags(
+        spec = outage_of_flags(
             source, outage, navigation is not None, tables, keep or [], asdict(run)
         )
         if navigation is not None:
             WORDS.set("file")
-        return run_coast(spec, navigation, file, report)
+        return run_outage(spec, navigation, file, report)
 
-    folder = out or default_folder(source, "coast", named)
-    done = run_and_save(compute, folder, write, "coast.json")
+    folder = out or default_folder(source, "outage", named)
+    done = run_and_save(compute, folder, write, "outage.json")
     if done is not None:
         result, seal = done
-        print_coast(result)
+        print_outage(result)
         print_findings(result.findings)
-        print_seal(seal, "coast.json", write.no_report)
+        print_seal(seal, "outage.json", write.no_report)
 
 
-def coast_of_flags(
+def outage_of_flags(
     source: str,
     outage: float,
     of_run: bool,
     tables: Mapping[str, Mapping[str, Any]],
     keep: Sequence[str],
     run: Mapping[str, Any],
-) -> CoastSpec:
+) -> OutageSpec:
     """Return the specification by the flags.
 
     `of_run`: whether `source` is a navigation run, which states motion and start itself. `tables`,
     `run`: by key, None where not given. `keep`: remaining measurements, as given. ConfigError: a
     value is invalid, or belongs to the other kind of source; the message names the flag.
     """
-    from strapdown.config.coast import CoastSpec
+    from strapdown.config.outage import OutageSpec
     from strapdown.config.spec import specify
 
     stated = {
@@ -244,7 +244,7 @@ def coast_of_flags(
         **run,
     }
     try:
-        return specify(CoastSpec, **table)
+        return specify(OutageSpec, **table)
     except ConfigError as error:
         raise as_flag(error, _flag) from None
 
@@ -253,11 +253,11 @@ def _flag(place: str) -> str:
     return FLAGS.get(place, "--with" if place.startswith("aiding") else place)
 
 
-def print_coast(result: OutageRun) -> None:
+def print_outage(result: OutageRun) -> None:
     """Print the predicted drift, its sources, and the measured drifts."""
     from strapdown.cli.console import console, print_block
-    from strapdown.report import coast_document as words
-    from strapdown.report.coast_document import budget_table, drift_table, time_table
+    from strapdown.report import outage_document as words
+    from strapdown.report.outage_document import budget_table, drift_table, time_table
     from strapdown.report.values import spaced
 
     out = console()

@@ -300,7 +300,7 @@ def key_figures(result: OutageRun) -> tuple[KeyFigure, ...]:
 # Report of a GNSS outage prediction: the answer first, then its basis.
 
 
-def coast_document(result: OutageRun, name: str) -> Document:
+def outage_document(result: OutageRun, name: str) -> Document:
     """Return the report of an outage prediction; `name` is that of its folder, to verify it."""
     sections = (
         section("over-time", "Over the outage", time_table(result), parts_chart(result)),

@@ -16,7 +16,7 @@ LONGEST = 86_400.0
 KEPT = ("no_slip", "odometer", "zero_velocity", "zero_rate")
 
 
-class CoastStartTable(Spec):
+class OutageStartTable(Spec):
     """State at the start of the outage: after a drive with fixes, or as stated."""
 
     #: Length of the preceding drive with fixes; 0 starts from the end of an alignment.
@@ -34,7 +34,7 @@ class CoastStartTable(Spec):
     accel_bias_sd_ug: NotNegative | None = None
 
 
-class CoastMotionTable(Spec):
+class OutageMotionTable(Spec):
     """Level motion during the outage, and its position."""
 
     #: Stationary if zero.
@@ -47,14 +47,14 @@ class CoastMotionTable(Spec):
     lat_deg: Annotated[Number, Field(ge=-85.0, le=85.0)] = 45.0
 
 
-class CoastSpec(Spec):
+class OutageSpec(Spec):
     """Predicted outage drift of a sensor along a stated motion, or of a navigation run."""
 
     outage_s: Annotated[Number, Field(gt=0.0, le=LONGEST)]
     #: Catalogue name or file; omitted if a navigation run states it.
     sensor: FileName | None = None
-    start: CoastStartTable = CoastStartTable()
-    motion: CoastMotionTable = CoastMotionTable()
+    start: OutageStartTable = OutageStartTable()
+    motion: OutageMotionTable = OutageMotionTable()
     #: Measurements that remain available, by kind.
     aiding: dict[str, Annotated[ChoiceSpec, BeforeValidator(Kinds("aiding"))]] = Field(
         default_factory=dict
