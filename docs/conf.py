@@ -100,9 +100,13 @@ def _without_toctree(app: Any, doctree: Any) -> None:
 
 
 def _levels(app: Any, page: str, template: str, context: dict[str, Any], _: Any) -> None:
-    """Give the captions of the sidebar, headings, a level, which screen readers need."""
+    """Give captions of the sidebar a level and scrolling boxes a place in the order of keys."""
     role, name = 'role="heading"', "furo_navigation_tree"
     context[name] = context.get(name, "").replace(role, f'{role} aria-level="2"')
+    # What scrolls on a narrow screen is to be reached by keys.
+    for kind in ("table-wrapper", "math-wrapper"):
+        box = f'<div class="{kind}'
+        context["body"] = context.get("body", "").replace(box, f'<div tabindex="0" class="{kind}')
 
 
 _MODULES = """# Modules and formats

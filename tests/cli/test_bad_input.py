@@ -95,8 +95,8 @@ def page(tmp_path_factory, run_cli, crash_said):
 @pytest.fixture(scope="module")
 def crash_said(tmp_path_factory, run_cli):
     """What `strapdown crash` says of each case, and its exit code."""
-    import strapdown.report.crash_case as crash_case
     import strapdown.report.document_html as module
+    import strapdown.report.document_pdf as paper
 
     root = tmp_path_factory.mktemp("crash-cases")
     assert run_cli("simulate", "pole", "-q", "--out", root / "pole").code == 0
@@ -105,7 +105,7 @@ def crash_said(tmp_path_factory, run_cli):
         # The drawing says nothing, and takes most of the time.
         patch.setattr(module, "draw_stills", lambda document: ["<svg/>"] * 99)
         patch.setattr(module, "document_page", lambda document, stills=(): "<html></html>")
-        patch.setattr(crash_case, "write_pdf", lambda document, path, stills: path.write_bytes(b""))
+        patch.setattr(paper, "write_pdf", lambda document, path, stills: path.write_bytes(b""))
         for number, bad in enumerate(CRASH_CASES):
             folder = root / str(number)
             case = bad.make(root / "pole", folder)
