@@ -238,7 +238,7 @@ def test_a_draft_of_foreign_columns_and_of_fixes_without_standard_deviations(run
         "--out", path,
     )  # fmt: skip
     assert done.code == 0, done.err
-    assert "position_sd_m: how well each fix knows its place" in done.out
+    assert "position_sd_m: standard deviation of the position, m of each fix" in done.out
     assert NavigationSpec.read(path).log.columns["gyro_z"] == "c3"
     assert "\nposition_sd_m = 5.0\n" in path.read_text()
     flags = ("navigate", tmp_path / "odd.csv", "--gnss", fixes, "--columns", columns, *units)
