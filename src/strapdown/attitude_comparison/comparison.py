@@ -641,12 +641,22 @@ ACROSS, TURNING = 0.05, 0.05
 
 
 def _one_axis(imu: pd.DataFrame, source: AttitudeSource) -> list[Finding]:
-    """Warn that a recorded motion is about one axis, which any algorithm integrates exactly."""
+    """Warn of a recorded motion that any algorithm integrates: about one axis, or hardly any."""
     if source.clean is not None:
         return []
     rates = values_of(imu, GYRO)
     spread = np.sqrt(np.maximum(np.linalg.eigvalsh(rates.T @ rates / len(rates)), 0.0))
-    if spread[2] < TURNING or spread[1] >= ACROSS * spread[2]:
+    if spread[2] < TURNING:
+        return [
+            Finding(
+                "attitude.hardly-turns",
+                file=source.name,
+                quantity="gyro",
+                severity="warning",
+                rate=float(np.degrees(spread[2])),
+            )
+        ]
+    if spread[1] >= ACROSS * spread[2]:
         return []
     return [
         Finding(
@@ -732,6 +742,17 @@ def initial_attitude(
         q_nb = rotation.quaternion_from_euler([*tilt, 0.0])
     elif choice == "zero":
         q_nb = np.array([1.0, 0.0, 0.0, 0.0])
+        later = next((one for one in rests if one.accel_mean is not None), None)
+        if text.strip().lower() == "auto" and later is not None:
+            findings.append(
+                Finding(
+                    "attitude.rest-after-begin",
+                    file=name,
+                    quantity="initial",
+                    severity="warning",
+                    begin=float(np.ceil(100.0 * later.start) / 100.0),
+                )
+            )
     else:
         try:
             angles = [float(part) for part in text.split(",")]

@@ -154,8 +154,8 @@ class FileFlags:
         Path | None,
         writing(
             "FILE",
-            "Write an algorithm or a filter with the rate, units, axes and biases of this log and "
-            "a test vector from it: C99 (FILE.c) or MicroPython (FILE.py).",
+            "Write an algorithm or a filter for the rate of the answer, with units, axes and "
+            "biases of this log and a test vector from it: C99 (FILE.c) or MicroPython (FILE.py).",
         ),
     ] = None
     export_of: Annotated[

@@ -76,7 +76,12 @@ def verify(
         for found in result.findings:
             for line in found.text(WORDS.get()).split("\n"):
                 out.print(f"  {line}")
-        out.print(f"Seal  sha256 {result.digest}")
+        if result.verdict == "changed":
+            out.print(
+                f"The manifest states the seal sha256 {result.digest}: this folder breaks it."
+            )
+        else:
+            out.print(f"Seal  sha256 {result.digest}")
         if seal is None and signer is None and result.verdict != "changed":
             out.print("Compare it with the seal printed at the time, or give that by --seal.")
         if page is not None:

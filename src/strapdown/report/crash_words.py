@@ -1237,9 +1237,10 @@ def how_to_verify() -> tuple[tuple[str, str], ...]:
     return (
         (
             "Repeat the run",
-            "Install the version of strapdown on page one (pip install strapdown) and run the "
-            "command below. It checks every file against the seal, repeats the case from the "
-            "records, compares each byte, and names every changed file and option.",
+            "Install the version of strapdown on page one, whose source has the digest in "
+            "manifest.json, and run the command below. It checks every file against the seal, "
+            "repeats the case from the records, compares each byte, and names every changed file "
+            "and option.",
         ),
         (
             "The seal",

@@ -183,8 +183,8 @@ def _outages(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
         (
             "In outages the position is less accurate",
             f"{count}, {duration_words(total)} in all; the largest bound of 95{GAP}% is "
-            f"{length_words(bound)}, at the end of {duration_words(span.end - span.begin)} without "
-            f"{aid} from {instant(span.begin)}.",
+            f"{length_words(bound)}, within {duration_words(span.end - span.begin)} without {aid} "
+            f"from {instant(span.begin)}.",
         )
     ]
 
@@ -828,7 +828,7 @@ def _method(run: NavigationRun) -> tuple[tuple[str, str], ...]:
         ("Mechanization", spec.mechanization.kind),
         ("Filter", spec.filter.kind),
         ("Error model", _kind(spec.filter, "error_model")),
-        ("Update rule", filter_rule or "none: every measurement has full weight"),
+        ("Update rule", filter_rule or "none: full weight, but for measurements with their own"),
         ("Smoother", "" if run.forward is None else spec.smoother.kind),
         *aids,
         ("States", ", ".join(state_groups(run.record))),

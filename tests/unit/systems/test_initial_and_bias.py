@@ -10,6 +10,7 @@ import pytest
 from tests.coded import coded
 
 from strapdown.api.attitude import compare_attitude
+from strapdown.attitude_comparison.options import AttitudeOptions
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats.writers import WRITERS
 from strapdown.tables import ACCEL, GYRO, MAG, imu_table
@@ -164,3 +165,24 @@ def test_a_motion_about_one_axis_is_said_to_prove_little(across, warned):
     (one,) = [f for f in found if f.code == "attitude.one-axis"] or [None]
     assert (one is not None) == warned
     assert one is None or one.data["across"] == pytest.approx(across, rel=0.1)
+
+
+def test_a_log_that_hardly_turns_proves_nothing_about_algorithms():
+    time = np.arange(2000) * 0.01
+    rates = 0.04 * np.column_stack([np.sin(time), np.cos(time), np.sin(2 * time)])
+    imu = pd.DataFrame(rates, columns=list(GYRO), index=pd.Index(time, name="time"))
+    codes = [f.code for f in compare_attitude(imu, gyro_bias="none").findings]
+    assert "attitude.hardly-turns" in codes and "attitude.one-axis" not in codes
+
+
+def test_a_rest_after_the_begin_is_named_as_a_start(tmp_path):
+    time = np.arange(2000) * 0.01
+    moving = (time < 3.0) | (time > 12.0)
+    rates = 0.5 * np.column_stack([np.sin(5 * time), np.cos(4 * time), np.sin(3 * time)])
+    force = np.tile([0.0, 0.0, -9.8], (time.size, 1)) + 2.0 * rates * moving[:, None]
+    imu = imu_table(time, rates * moving[:, None], force)
+    said = [f for f in compare_attitude(imu).findings if f.code == "attitude.rest-after-begin"]
+    assert len(said) == 1 and said[0].data["begin"] == pytest.approx(3.0, abs=0.5)
+    assert f"--from {said[0].data['begin']:.2f}" in said[0].advice("cli")
+    later = compare_attitude(imu, options=AttitudeOptions(from_s=said[0].data["begin"]))
+    assert "attitude.rest-after-begin" not in [f.code for f in later.findings]
