@@ -1,0 +1,651 @@
+"""Allan, modified Allan and Hadamard deviations, and the noise terms of a stationary channel."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown.errors import DataError
+
+Array = NDArray[np.float64]
+
+#: Averaging times of a decade.
+PER_DECADE = 8
+#: Parts of a record at the longest averaging time: IEEE Std 952 trusts no estimate from fewer.
+LEAST_PARTS = 9
+#: Samples from which noise terms are estimated.
+LEAST_SAMPLES = 1000
+
+
+def deviations(rate: ArrayLike, dt: float, factors: Iterable[int] | None = None) -> pd.DataFrame:
+    """Overlapping Allan, modified Allan and overlapping Hadamard deviations of a rate.
+
+    With the mean rate over τ = m dt beginning at sample k as y_k, and < > over all k:
+    σ² = <(y_{k+m} - y_k)²>/2; the modified one has the mean of m successive differences in place of
+    one; Hadamard's is <(y_{k+2m} - 2 y_{k+m} + y_k)²>/6 (IEEE Std 952-1997, annex C; Riley and
+    Howe, NIST Special Publication 1065).
+
+    Parameters
+    ----------
+    rate : array_like, (n,), u
+    dt : float, s
+        Sample interval.
+    factors : iterable of int, optional
+        Values of m; by default about eight a decade, up to a ninth of the record.
+
+    Returns
+    -------
+    DataFrame
+        Indexed by ``tau`` in s: ``allan``, ``modified``, ``hadamard`` in u, NaN where the record is
+        too short; ``relative_sd``, standard deviation of the Allan deviation relative to it,
+        1/√(2(n/m - 1)) (IEEE Std 952, C.1).
+    """
+    from strapdown._kernels.allan import integrate, overlapping_variances
+
+    values = np.ascontiguousarray(rate, dtype=np.float64)
+    n = values.size
+    chosen = _factors(n) if factors is None else np.array(sorted(set(factors)), dtype=np.int64)
+    if n < 3 or not chosen.size or chosen[0] < 1 or 2 * chosen[-1] > n:
+        raise DataError("allan.too-short", samples=n, least=LEAST_SAMPLES)
+    phase = np.empty(n + 1)
+    integrate(values, float(values.mean()), phase)
+    sums, scale = np.empty((chosen.size, 6)), chosen.astype(np.float64)
+    for k, m in enumerate(chosen.tolist()):
+        overlapping_variances(phase, m, sums[k])
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = {
+            "allan": np.sqrt(sums[:, 0] / (2.0 * sums[:, 3])) / scale,
+            "modified": np.sqrt(sums[:, 1] / (2.0 * sums[:, 4])) / scale**2,
+            "hadamard": np.sqrt(sums[:, 2] / (6.0 * sums[:, 5])) / scale,
+            "relative_sd": 1.0 / np.sqrt(2.0 * (n / scale - 1.0)),
+        }
+    return pd.DataFrame(found, index=pd.Index(scale * dt, name="tau"))
+
+
+def _factors(n: int) -> NDArray[np.int64]:
+    most = max(n // LEAST_PARTS, 1)
+    count = int(PER_DECADE * math.log10(most)) + 1
+    return np.unique(np.rint(np.geomspace(1, most, max(count, 1))).astype(np.int64))
+
+
+# Noise terms. Each is a process of the rate y with a known shape; x is its integral, and g(t) the
+# generalized covariance of x: the variance of any sum of values of x with weights that annihilate
+# 1, t (and t² within g, a constant rate) is the sum over pairs of weights times g of their distance
+# (Matheron 1973, doi:10.1017/S0001867800039379). Means of y over blocks are differences of x, so
+# their covariance is exact for every block length, without windows, leakage or aliasing.
+
+#: Symbols of the terms with a coefficient, as in IEEE Std 952, and that of a Gauss-Markov process.
+TERMS = ("Q", "N", "B", "K", "GM")
+
+
+def shape(term: str, t: Array, correlation: float = math.inf) -> Array:
+    """Generalized covariance of the integral of a term with coefficient one.
+
+    `t` (s). With S(f) the two-sided spectrum of the rate, and σ²(τ) the Allan variance
+    (IEEE Std 952-1997, annex C):
+
+    - Q, quantization of the integral: S = Q² (2 - 2 cos 2πf dt)/dt, σ² = 3 Q²/τ²;
+    - N, angle or velocity random walk: S = N², σ² = N²/τ (N at 1 s of the slope -1/2);
+    - B, bias instability, flicker: S = B²/(2πf), σ² = (2 ln 2/π) B² (B = flat minimum/0.664);
+    - K, rate random walk: S = K²/(2πf)², σ² = K² τ/3 (K at 3 s of the slope +1/2);
+    - GM, Gauss-Markov process of standard deviation s and correlation time T:
+      S = 2 s² T/(1 + (2πfT)²).
+
+    The rate ramp, σ² = R² τ²/2, is deterministic.
+    """
+    d = np.abs(t)
+    if term == "Q":
+        return np.asarray(d == 0.0, dtype=np.float64)
+    if term == "N":
+        return -0.5 * d
+    if term == "B":
+        return np.asarray(d**2 * np.log(np.where(d > 0.0, d, 1.0)) / (2.0 * math.pi))
+    if term == "K":
+        return d**3 / 12.0
+    h = d / correlation
+    # For a short time the difference of large numbers is a series; h is what t² annihilates.
+    series = h**2 / 2.0 - h**3 / 6.0 + h**4 / 24.0 - h**5 / 120.0
+    return np.asarray(-(correlation**2) * np.where(h < 1e-2, series, np.expm1(-h) + h))
+
+
+def block_covariance(term: str, count: int, block: float, correlation: float = math.inf) -> Array:
+    """Covariance of means of a term over `count` blocks of `block` s, up to a constant."""
+    lags = np.arange(-1, count + 1) * block
+    g = shape(term, lags, correlation)
+    by_lag = (2.0 * g[1:-1] - g[2:] - g[:-2]) / block**2
+    at = np.arange(count)
+    return by_lag[np.abs(at[:, None] - at[None, :])]
+
+
+def allan_model(terms: Mapping[str, float], tau: ArrayLike, correlation: float = math.inf) -> Array:
+    """Allan deviation of a sum of terms, with the ramp as ``R``."""
+    t = np.asarray(tau, dtype=np.float64)
+    variance = np.zeros_like(t)
+    for term, value in terms.items():
+        if term == "R":
+            variance += 0.5 * (value * t) ** 2
+            continue
+        g = [shape(term, k * t, correlation) for k in (0.0, 1.0, 2.0)]
+        variance += value**2 * (6.0 * g[0] - 8.0 * g[1] + 2.0 * g[2]) / (2.0 * t**2)
+    return np.sqrt(np.maximum(variance, 0.0))
+
+
+# The likelihood. The record is cut into runs of blocks; the mean of a run is a block of the next
+# level. Within a run, differences from its mean are Gaussian with a covariance that the terms give
+# exactly, and for white noise independent of every other level. The few runs of the last level are
+# one vector, of which mean and ramp are projected out (restricted maximum likelihood).
+
+#: Blocks in a run and in the last level, at most; and shortest run of shapes kept where a sensor's
+#: own filter colors the highest frequencies.
+RUN, TOP, LEAST_RUN = 64, 96, 7
+#: Twice the gain in log-likelihood that a further parameter must bring: a chance of 0.1 %.
+DEMANDED = 10.8
+#: Twice the log-likelihood by which a model may be worse and yet not be excluded.
+ALIKE = 6.6
+#: Quantiles of chi-square with one degree: 95 % two-sided, and 95 % one-sided.
+TWO_SIDED, ONE_SIDED = 3.841, 2.706
+#: Relative standard deviation of a variance below which its logarithm is as good as Gaussian.
+WELL_KNOWN = 0.1
+#: A level whose shapes exceed the model by this share, beyond 5 standard deviations, is colored.
+COLORED, SURELY = 0.05, 5.0
+ITERATIONS = 40
+#: Correlation times of a Gauss-Markov process in a record, at least: a slower one is a random walk.
+SLOWEST = 10.0
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """Second moments of the runs of one level.
+
+    Attributes
+    ----------
+    block : float, s
+    count : int
+        Blocks in a run.
+    basis : ndarray, (count, k)
+        Orthonormal, without the mean; in the last level without the ramp.
+    moments : ndarray, (k, k), u²
+        Mean product of the coefficients in the basis.
+    runs : int
+    """
+
+    block: float
+    count: int
+    basis: Array
+    moments: Array
+    runs: int
+
+    def covariance(self, term: str, correlation: float) -> Array:
+        """Covariance of the coefficients by a term with coefficient one."""
+        whole = block_covariance(term, self.count, self.block, correlation)
+        return np.asarray(self.basis.T @ whole @ self.basis)
+
+    def lowest(self, kept: int) -> Level:
+        """The level with its `kept` lowest frequencies alone."""
+        return Level(
+            self.block, self.count, self.basis[:, :kept], self.moments[:kept, :kept], self.runs
+        )
+
+
+def levels_of(rate: Array, dt: float) -> tuple[tuple[Level, ...], Array, float]:
+    """Levels of a record, the means of the last one, and the length of their blocks in s."""
+    n = rate.size
+    whole = max(1, math.ceil(n / TOP))
+    count = max(1, math.ceil(math.log(whole) / math.log(RUN) - 1e-9)) if whole > 1 else 0
+    run = max(2, math.ceil(whole ** (1.0 / count) - 1e-9)) if count else 1
+    basis = _cosines(run) if count else np.empty((0, 0))
+    means, block, found = rate, dt, []
+    for _ in range(count):
+        rows = means[: means.size // run * run].reshape(-1, run)
+        second = np.zeros((run, run))
+        for first in range(0, len(rows), 65536):
+            part = rows[first : first + 65536]
+            second += part.T @ part
+        moments = basis.T @ second @ basis / len(rows)
+        found.append(Level(block, run, basis, moments, len(rows)))
+        means, block = rows.mean(axis=1), block * run
+    line = np.vander(np.linspace(-1.0, 1.0, means.size), 2)
+    last = np.linalg.svd(line)[0][:, 2:]
+    z = last.T @ means
+    found.append(Level(block, means.size, last, np.outer(z, z), 1))
+    return tuple(found), means, block
+
+
+def _cosines(count: int) -> Array:
+    """Orthonormal cosines of the second kind without the mean, the slowest first."""
+    at, k = np.arange(count) + 0.5, np.arange(1, count)
+    return np.asarray(np.sqrt(2.0 / count) * np.cos(math.pi / count * np.outer(at, k)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """Maximum of the likelihood over the variances (squared coefficients) of some terms."""
+
+    names: tuple[str, ...]
+    variances: Array
+    value: float  # log-likelihood
+    information: Array  # of the logarithms of the variances
+    correlation: float = math.inf
+
+    @property
+    def penalized(self) -> float:
+        count = len(self.names) + (1 if "GM" in self.names else 0)
+        return 2.0 * self.value - DEMANDED * count
+
+    def variance(self, name: str) -> float:
+        return float(self.variances[self.names.index(name)])
+
+
+class _Record:
+    """Levels of a record with the covariances of the terms on them, each made once."""
+
+    def __init__(self, levels: tuple[Level, ...]) -> None:
+        self.levels = levels
+        self._made: dict[tuple[str, float], list[Array]] = {}
+
+    def covariances(self, term: str, correlation: float) -> list[Array]:
+        key = (term, correlation if term == "GM" else 0.0)
+        if key not in self._made:
+            if term == "GM" and len(self._made) > 60:
+                self._made = {k: v for k, v in self._made.items() if k[0] != "GM"}
+            self._made[key] = [one.covariance(term, correlation) for one in self.levels]
+        return self._made[key]
+
+    def likelihood(
+        self, variances: Array, shapes: list[list[Array]], derivatives: bool = True
+    ) -> tuple[float, Array, Array]:
+        """Log-likelihood, its gradient and the information in the logarithms of the variances."""
+        count = len(variances)
+        value, slope, information = 0.0, np.zeros(count), np.zeros((count, count))
+        for k, level in enumerate(self.levels):
+            sigma = sum(v * s[k] for v, s in zip(variances, shapes, strict=True))
+            try:
+                factor = np.linalg.cholesky(sigma)
+            except np.linalg.LinAlgError:
+                return -math.inf, slope, information
+            inverse = np.linalg.inv(factor)
+            inverse = inverse.T @ inverse
+            fitted = inverse @ level.moments
+            log_det = 2.0 * float(np.log(np.diag(factor)).sum())
+            value -= 0.5 * level.runs * (log_det + float(np.trace(fitted)))
+            if not derivatives:
+                continue
+            parts = [inverse @ (v * s[k]) for v, s in zip(variances, shapes, strict=True)]
+            for i in range(count):
+                slope[i] += 0.5 * level.runs * float(np.sum(parts[i] * fitted.T))
+                slope[i] -= 0.5 * level.runs * float(np.trace(parts[i]))
+                for j in range(i + 1):
+                    both = 0.5 * level.runs * float(np.sum(parts[i] * parts[j].T))
+                    information[i, j] += both
+                    information[j, i] = information[i, j]
+        return value, slope, information
+
+    def fit(
+        self,
+        names: tuple[str, ...],
+        start: Array,
+        correlation: float = math.inf,
+        held: int = -1,
+    ) -> _Fit:
+        """Maximize over the logarithms of the variances by scoring; `held`: one that stays."""
+        shapes = [self.covariances(name, correlation) for name in names]
+        free = [k for k in range(len(names)) if k != held]
+        log = np.log(start)
+        value, slope, information = self.likelihood(np.exp(log), shapes)
+        for _ in range(ITERATIONS):
+            if not free or not math.isfinite(value):
+                break
+            inner = information[np.ix_(free, free)]
+            # A term that the record does not show has no information; it shrinks by steps.
+            inner = inner + 1e-3 * np.eye(len(free))
+            step = np.clip(np.linalg.solve(inner, slope[free]), -3.0, 3.0)
+            size = 1.0
+            while size > 1e-3:
+                trial = log.copy()
+                trial[free] += size * step
+                new, s, i = self.likelihood(np.exp(trial), shapes)
+                if new >= value - 1e-9:
+                    break
+                size *= 0.5
+            else:
+                break
+            gained = new - value
+            log, value, slope, information = trial, new, s, i
+            if gained < 1e-5:
+                break
+        return _Fit(names, np.exp(log), value, information, correlation)
+
+
+@dataclass(frozen=True)
+class NoiseTerm:
+    """One noise term of a channel.
+
+    Attributes
+    ----------
+    name : str
+        ``Q``, ``N``, ``B``, ``K``, ``R``, or ``GM`` (standard deviation) and ``T`` (its correlation
+        time in s).
+    value : float
+        In u s (Q), u √s (N), u (B, GM), u/√s (K), u/s (R), u being rad/s or m/s²; NaN if the record
+        does not show the term.
+    low, high : float
+        95 % interval; of a term that is not observable zero and its 95 % upper bound, or NaN.
+    observable : bool
+        Whether every model that the record does not exclude has the term.
+    """
+
+    name: str
+    value: float
+    low: float
+    high: float
+    observable: bool
+
+
+@dataclass(frozen=True, eq=False)
+class ChannelNoise:
+    """Noise of one channel.
+
+    Attributes
+    ----------
+    terms : tuple of NoiseTerm
+    model : mapping of str to float
+        Coefficients of the model chosen, observable or not; ``R`` if the ramp is.
+    correlation_time : float, s
+        Of its Gauss-Markov process; infinite without one.
+    up_to_hz : float
+        Highest frequency that was used: half the rate, or less where the noise is colored.
+    alike : bool
+        Whether Gauss-Markov and flicker or random walk describe the record equally well.
+    """
+
+    terms: tuple[NoiseTerm, ...]
+    model: Mapping[str, float]
+    correlation_time: float
+    up_to_hz: float
+    alike: bool = field(default=False)
+
+    def term(self, name: str) -> NoiseTerm:
+        """Return the term of a name."""
+        return next(one for one in self.terms if one.name == name)
+
+
+def noise_terms(rate: ArrayLike, dt: float) -> ChannelNoise:
+    """Noise terms of a stationary channel, by maximum likelihood.
+
+    Parameters
+    ----------
+    rate : array_like, (n,), u
+        Angular rate or specific force; its mean does not matter.
+    dt : float, s
+
+    Returns
+    -------
+    ChannelNoise
+        Models of white noise, with and without Q, and with none, B, K, both, a Gauss-Markov
+        process, or that with K, are compared; a parameter must gain 5.4 in log-likelihood. The
+        intervals are those of the likelihood ratio (profile), where the variance of a term is
+        known to worse than 10 %, else Gaussian in its logarithm.
+
+    Raises
+    ------
+    DataError
+        The record has fewer than 1000 samples, or a channel is constant.
+    """
+    values = np.array(rate, dtype=np.float64)
+    if values.size < LEAST_SAMPLES:
+        raise DataError("allan.too-short", samples=values.size, least=LEAST_SAMPLES)
+    values -= values.mean()
+    white = float(values.var()) * dt
+    if not white > 0.0:
+        raise DataError("allan.constant")
+    # In units of its own size, so that no number of the fit depends on the unit.
+    unit = math.sqrt(white)
+    levels, means, block = levels_of(values / unit, dt)
+    while True:
+        record = _Record(levels)
+        fits = _models(record, dt, values.size * dt)
+        best = max(fits, key=lambda one: one.penalized)
+        cut = _without_colored(levels, record, best)
+        if cut is None:
+            break
+        levels = cut
+    terms = _intervals(record, fits, best)
+    ramp = _ramp(record, best, means, block)
+    terms.append(ramp)
+    model = {name: math.sqrt(best.variance(name)) for name in best.names}
+    if ramp.observable:
+        model["R"] = ramp.value
+    families = [("GM" in f.names) for f in _alike(fits, best)]
+    first = levels[0]
+    return ChannelNoise(
+        tuple(_scaled(one, unit) for one in terms),
+        {name: unit * value for name, value in model.items()},
+        best.correlation,
+        first.basis.shape[1] / (2.0 * first.count * first.block),
+        len(set(families)) > 1 and bool(set(best.names) & {"B", "K", "GM"}),
+    )
+
+
+def _scaled(term: NoiseTerm, unit: float) -> NoiseTerm:
+    if term.name == "T":
+        return term
+    return NoiseTerm(
+        term.name, unit * term.value, unit * term.low, unit * term.high, term.observable
+    )
+
+
+def _models(record: _Record, dt: float, span: float) -> list[_Fit]:
+    """Fits of all models; the first level decides about Q."""
+    first = record.levels[0]
+    white = float(np.median(np.diag(first.moments))) * first.block
+    plain = record.fit(("N",), np.array([white]))
+    n = plain.variances[0]
+    # Where white noise crosses the other terms, if they begin within the record.
+    middle = math.sqrt(first.block * span)
+    start = {"B": n / middle, "K": n / middle**2, "GM": n / middle, "Q": n * dt}
+    fits = [plain]
+    for names in (("N", "B"), ("N", "K"), ("N", "B", "K")):
+        known = [f for f in fits if set(f.names) < set(names)]
+        near = max(known, key=lambda f: f.value)
+        begin = [near.variance(x) if x in near.names else 0.1 * start[x] for x in names]
+        fits.append(record.fit(names, np.maximum(begin, 1e-12 * n)))
+    richest = fits[-1]
+    with_q = record.fit(("Q", *richest.names), np.array([0.1 * start["Q"], *richest.variances]))
+    quantized = 2.0 * (with_q.value - richest.value) > DEMANDED
+    own: tuple[str, ...] = ("Q", "N") if quantized else ("N",)
+    if quantized:
+        q = with_q.variances[0]
+        fits = [record.fit(("Q", *f.names), np.array([q, *f.variances])) for f in fits]
+    # Over the correlation time: a coarse grid, then the parabola about the best.
+    low, high = 4.0 * dt * first.count, span / SLOWEST
+    base = min(fits, key=lambda f: f.value)
+    for names in (("GM",), ("K", "GM")):
+        if low >= high:
+            break
+        grid = list(np.geomspace(low, high, 9))
+        begin = [base.variance(x) if x in base.names else 0.3 * start[x] for x in (*own, *names)]
+        tried = [record.fit((*own, *names), np.array(begin), t) for t in grid]
+        fits += _refined(record, tried)
+    return fits
+
+
+def _refined(record: _Record, tried: list[_Fit]) -> list[_Fit]:
+    """Fit at the best correlation time; none if that is at an end of the range."""
+    for _ in range(3):
+        k = int(np.argmax([one.value for one in tried]))
+        if k in (0, len(tried) - 1):
+            return []
+        near = tried[k]
+        sides = [
+            record.fit(near.names, near.variances, math.sqrt(near.correlation * one.correlation))
+            for one in (tried[k - 1], tried[k + 1])
+        ]
+        tried = [tried[k - 1], sides[0], near, sides[1], tried[k + 1]]
+    # The maximum of the parabola through three in the logarithm of the time.
+    k = int(np.argmax([one.value for one in tried]))
+    if k in (0, len(tried) - 1):
+        return [tried[k]]
+    x = np.log([one.correlation for one in tried[k - 1 : k + 2]])
+    a, b, _c = np.polyfit(x - x[1], [one.value for one in tried[k - 1 : k + 2]], 2)
+    at = x[1] - 0.5 * b / a if a < 0.0 else x[1]
+    found = record.fit(tried[k].names, tried[k].variances, float(np.exp(at)))
+    return [max((found, tried[k]), key=lambda f: f.value)]
+
+
+def _without_colored(
+    levels: tuple[Level, ...], record: _Record, best: _Fit
+) -> tuple[Level, ...] | None:
+    """Levels without the highest frequencies, if those do not agree with the model; else None."""
+    if len(levels) < 2:
+        return None
+    first = levels[0]
+    shapes = [record.covariances(name, best.correlation)[0] for name in best.names]
+    model = np.diag(sum(v * s for v, s in zip(best.variances, shapes, strict=True)))
+    ratio = np.diag(first.moments) / model - 1.0
+    count = ratio.size
+    parts = np.array_split(np.arange(count), max(1, count // 4))
+    sd = [math.sqrt(2.0 / (first.runs * part.size)) for part in parts]
+    off = [abs(float(ratio[part].mean())) for part in parts]
+    if all(o < max(COLORED, SURELY * s) for o, s in zip(off, sd, strict=True)):
+        return None
+    kept = count // 2
+    if kept >= LEAST_RUN:
+        return (first.lowest(kept), *levels[1:])
+    return levels[1:] if len(levels) > 2 else None
+
+
+def _alike(fits: list[_Fit], best: _Fit) -> list[_Fit]:
+    """Fits that the likelihood does not exclude, whatever their number of parameters."""
+    return [f for f in fits if 2.0 * f.value > 2.0 * best.value - ALIKE]
+
+
+def _intervals(record: _Record, fits: list[_Fit], best: _Fit) -> list[NoiseTerm]:
+    alike = _alike(fits, best)
+    terms = []
+    for name in TERMS:
+        if name in best.names:
+            low, high = _profile(record, best, name)
+            everywhere = all(name in f.names for f in alike)  # of Q, the first level decided
+            value = math.sqrt(best.variance(name))
+            terms.append(NoiseTerm(name, value, math.sqrt(low), math.sqrt(high), everywhere))
+            if name == "GM":
+                terms.append(_time_interval(record, best, everywhere))
+        elif name in ("Q", "B", "K"):
+            bound = math.sqrt(_upper_bound(record, best, name))
+            terms.append(NoiseTerm(name, math.nan, 0.0, bound, False))
+    return terms
+
+
+def _profile(record: _Record, best: _Fit, name: str) -> tuple[float, float]:
+    """95 % interval of a variance."""
+    k = best.names.index(name)
+    information = best.information + 1e-12 * np.eye(len(best.names))
+    if "GM" in best.names:
+        # The correlation time is estimated as well: a numeric derivative adds its row.
+        information = _with_time(record, best)
+    sd = math.sqrt(max(np.linalg.inv(information)[k, k], 1e-18))
+    if sd < WELL_KNOWN or ("GM" in best.names and name in ("GM", "N", "Q")):
+        return tuple(best.variances[k] * np.exp([-1.96 * sd, 1.96 * sd]))  # type: ignore[return-value]
+    ends = []
+    for sign in (-1.0, 1.0):
+        inside, outside, step = 0.0, sign * 2.0 * sd, 0.0
+        fit = best
+        for _ in range(12):
+            start = fit.variances.copy()
+            start[k] = best.variances[k] * math.exp(outside)
+            fit = record.fit(best.names, start, best.correlation, held=k)
+            lost = 2.0 * (best.value - fit.value)
+            if abs(lost - TWO_SIDED) < 0.05:
+                break
+            if lost > TWO_SIDED:
+                step = outside
+                # The loss is nearly quadratic in the logarithm.
+                outside = inside + (outside - inside) * min(
+                    0.9, max(0.1, math.sqrt(TWO_SIDED / lost))
+                )
+            else:
+                inside = outside
+                if step == 0.0:
+                    outside *= min(2.0, 1.05 * math.sqrt(TWO_SIDED / max(lost, 0.5)))
+                else:
+                    outside = 0.5 * (inside + step)
+            if abs(outside) > 40.0:
+                break
+        ends.append(best.variances[k] * math.exp(outside))
+    return ends[0], ends[1]
+
+
+def _with_time(record: _Record, best: _Fit) -> Array:
+    """Information of the logarithms of the variances and, last, of the correlation time."""
+    count, h = len(best.names), 0.05
+    shapes = [record.covariances(name, best.correlation) for name in best.names]
+    k = best.names.index("GM")
+    up = record.covariances("GM", best.correlation * math.exp(h))
+    down = record.covariances("GM", best.correlation * math.exp(-h))
+    slope = [(u - d) / (2.0 * h) for u, d in zip(up, down, strict=True)]
+    variances = np.append(best.variances, best.variances[k])
+    out = np.zeros((count + 1, count + 1))
+    for j, level in enumerate(record.levels):
+        sigma = sum(v * s[j] for v, s in zip(best.variances, shapes, strict=True))
+        inverse = np.linalg.inv(sigma)
+        parts = [inverse @ (v * s[j]) for v, s in zip(variances, [*shapes, slope], strict=True)]
+        for a in range(count + 1):
+            for b in range(count + 1):
+                out[a, b] += 0.5 * level.runs * float(np.sum(parts[a] * parts[b].T))
+    return out
+
+
+def _time_interval(record: _Record, best: _Fit, observable: bool) -> NoiseTerm:
+    sd = math.sqrt(np.linalg.inv(_with_time(record, best))[-1, -1])
+    t = best.correlation
+    return NoiseTerm("T", t, t * math.exp(-1.96 * sd), t * math.exp(1.96 * sd), observable)
+
+
+def _upper_bound(record: _Record, best: _Fit, name: str) -> float:
+    """One-sided 95 % bound of the variance of a term that the model does not have."""
+    names = (*best.names, name)
+    n = best.variance("N")
+    low = n * {"Q": record.levels[0].block ** 2, "B": 1.0, "K": 1.0}[name]
+    fit = record.fit(names, np.append(best.variances, 1e-6 * low), best.correlation)
+    top, log = max(fit.value, best.value), math.log(fit.variances[-1])
+    start = fit.variances
+    # Where the likelihood has fallen: doubling, then bisection.
+    inside, outside, step = log, math.inf, 1.0
+    for _ in range(60):
+        at = inside + step if math.isinf(outside) else 0.5 * (inside + outside)
+        trial = start.copy()
+        trial[-1] = math.exp(at)
+        found = record.fit(names, trial, best.correlation, held=len(names) - 1)
+        if 2.0 * (top - found.value) < ONE_SIDED:
+            inside, start, step = at, found.variances, 1.5 * step
+        else:
+            outside = at
+        if outside - inside < 0.02:
+            break
+    return math.exp(inside)
+
+
+def _ramp(record: _Record, best: _Fit, means: Array, block: float) -> NoiseTerm:
+    """Ramp by generalized least squares; observable beyond 3.3 standard deviations."""
+    middle = (np.arange(means.size) - 0.5 * (means.size - 1)) * block
+    line = np.column_stack([np.ones(means.size), middle])
+    sigma = sum(
+        v * block_covariance(name, means.size, block, best.correlation)
+        for v, name in zip(best.variances, best.names, strict=True)
+    )
+    # The covariance is known up to a constant, which only the mean would see.
+    sigma = sigma + (1.0 + np.abs(sigma).max())
+    weighted = np.linalg.solve(sigma, line)
+    covariance = np.linalg.inv(line.T @ weighted)
+    slope = float((covariance @ (weighted.T @ means))[1])
+    sd = math.sqrt(covariance[1, 1])
+    observable = abs(slope) > 3.3 * sd
+    if observable:
+        size = abs(slope)
+        return NoiseTerm("R", size, size - 1.96 * sd, size + 1.96 * sd, True)
+    return NoiseTerm("R", math.nan, 0.0, abs(slope) + 1.645 * sd, False)
