@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -154,8 +154,9 @@ WELL_KNOWN = 0.1
 #: A level whose shapes exceed the model by this share, beyond 5 standard deviations, is colored.
 COLORED, SURELY = 0.05, 5.0
 ITERATIONS = 40
-#: Correlation times of a Gauss-Markov process in a record, at least: a slower one is a random walk.
-SLOWEST = 10.0
+#: Correlation times of a Gauss-Markov process in a record, at least: a slower one is a random walk,
+#: if its driving noise has that one's variance within its interval and this factor.
+SLOWEST, SAME = 10.0, 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,9 +232,12 @@ class _Fit:
     value: float  # log-likelihood
     information: Array  # of the logarithms of the variances
     correlation: float = math.inf
+    edge: bool = False  # the best correlation time is that or beyond: never the choice
 
     @property
     def penalized(self) -> float:
+        if self.edge:
+            return -math.inf
         count = len(self.names) + (1 if "GM" in self.names else 0)
         return 2.0 * self.value - DEMANDED * count
 
@@ -360,14 +364,14 @@ class ChannelNoise:
     up_to_hz : float
         Highest frequency that was used: half the rate, or less where the noise is colored.
     alike : bool
-        Whether Gauss-Markov and flicker or random walk describe the record equally well.
+        Whether another model without one of its slow terms describes the record as well.
     """
 
     terms: tuple[NoiseTerm, ...]
     model: Mapping[str, float]
     correlation_time: float
     up_to_hz: float
-    alike: bool = field(default=False)
+    alike: bool = False
 
     def term(self, name: str) -> NoiseTerm:
         """Return the term of a name."""
@@ -415,19 +419,21 @@ def noise_terms(rate: ArrayLike, dt: float) -> ChannelNoise:
             break
         levels = cut
     terms = _intervals(record, fits, best)
-    ramp = _ramp(record, best, means, block)
+    # By the model that allows the largest ramp by chance, of those that are not excluded.
+    ramps = [_ramp(one, means, block) for one in _alike(fits, best)]
+    ramp = min(ramps, key=lambda one: (one.observable, -one.high))
     terms.append(ramp)
     model = {name: math.sqrt(best.variance(name)) for name in best.names}
     if ramp.observable:
         model["R"] = ramp.value
-    families = [("GM" in f.names) for f in _alike(fits, best)]
+    doubtful = [t for t in terms if t.name in ("B", "K", "GM") and t.value > 0.0]
     first = levels[0]
     return ChannelNoise(
         tuple(_scaled(one, unit) for one in terms),
         {name: unit * value for name, value in model.items()},
         best.correlation,
         first.basis.shape[1] / (2.0 * first.count * first.block),
-        len(set(families)) > 1 and bool(set(best.names) & {"B", "K", "GM"}),
+        any(not t.observable for t in doubtful),
     )
 
 
@@ -449,6 +455,7 @@ def _models(record: _Record, dt: float, span: float) -> list[_Fit]:
     middle = math.sqrt(first.block * span)
     start = {"B": n / middle, "K": n / middle**2, "GM": n / middle, "Q": n * dt}
     fits = [plain]
+    names: tuple[str, ...]
     for names in (("N", "B"), ("N", "K"), ("N", "B", "K")):
         known = [f for f in fits if set(f.names) < set(names)]
         near = max(known, key=lambda f: f.value)
@@ -475,11 +482,11 @@ def _models(record: _Record, dt: float, span: float) -> list[_Fit]:
 
 
 def _refined(record: _Record, tried: list[_Fit]) -> list[_Fit]:
-    """Fit at the best correlation time; none if that is at an end of the range."""
+    """Fit at the best correlation time; of an end of the range, that end."""
     for _ in range(3):
         k = int(np.argmax([one.value for one in tried]))
         if k in (0, len(tried) - 1):
-            return []
+            return [replace(tried[k], edge=True)]
         near = tried[k]
         sides = [
             record.fit(near.names, near.variances, math.sqrt(near.correlation * one.correlation))
@@ -526,31 +533,44 @@ def _alike(fits: list[_Fit], best: _Fit) -> list[_Fit]:
 
 def _intervals(record: _Record, fits: list[_Fit], best: _Fit) -> list[NoiseTerm]:
     alike = _alike(fits, best)
+    plain, robust = _covariances(record, best)
     terms = []
     for name in TERMS:
         if name in best.names:
-            low, high = _profile(record, best, name)
-            everywhere = all(name in f.names for f in alike)  # of Q, the first level decided
+            low, high = _profile(record, best, name, plain, robust)
+            everywhere = all(name in f.names or _drives(f, name, low, high) for f in alike)
             value = math.sqrt(best.variance(name))
             terms.append(NoiseTerm(name, value, math.sqrt(low), math.sqrt(high), everywhere))
             if name == "GM":
-                terms.append(_time_interval(record, best, everywhere))
+                time, width = best.correlation, math.exp(1.96 * math.sqrt(robust[-1, -1]))
+                terms.append(NoiseTerm("T", time, time / width, time * width, everywhere))
         elif name in ("Q", "B", "K"):
             bound = math.sqrt(_upper_bound(record, best, name))
             terms.append(NoiseTerm(name, math.nan, 0.0, bound, False))
     return terms
 
 
-def _profile(record: _Record, best: _Fit, name: str) -> tuple[float, float]:
-    """95 % interval of a variance."""
+def _drives(fit: _Fit, name: str, low: float, high: float) -> bool:
+    """Whether a process as slow as can be told from a random walk is driven by the same noise."""
+    if name != "K" or not fit.edge:
+        return False
+    return low / SAME <= 2.0 * fit.variance("GM") / fit.correlation <= SAME * high
+
+
+def _profile(
+    record: _Record, best: _Fit, name: str, plain: Array, robust: Array
+) -> tuple[float, float]:
+    """95 % interval of a variance.
+
+    By the profile of the likelihood, which is as much too narrow as the plain covariance is; of a
+    process, whose correlation time would have to be fitted at each step, Gaussian.
+    """
     k = best.names.index(name)
-    information = best.information + 1e-12 * np.eye(len(best.names))
-    if "GM" in best.names:
-        # The correlation time is estimated as well: a numeric derivative adds its row.
-        information = _with_time(record, best)
-    sd = math.sqrt(max(np.linalg.inv(information)[k, k], 1e-18))
-    if sd < WELL_KNOWN or ("GM" in best.names and name in ("GM", "N", "Q")):
-        return tuple(best.variances[k] * np.exp([-1.96 * sd, 1.96 * sd]))  # type: ignore[return-value]
+    sd, wider = math.sqrt(robust[k, k]), robust[k, k] / plain[k, k]
+    if sd < WELL_KNOWN or "GM" in best.names:
+        size = float(best.variances[k])
+        return size * math.exp(-1.96 * sd), size * math.exp(1.96 * sd)
+    limit = TWO_SIDED * wider
     ends = []
     for sign in (-1.0, 1.0):
         inside, outside, step = 0.0, sign * 2.0 * sd, 0.0
@@ -560,18 +580,16 @@ def _profile(record: _Record, best: _Fit, name: str) -> tuple[float, float]:
             start[k] = best.variances[k] * math.exp(outside)
             fit = record.fit(best.names, start, best.correlation, held=k)
             lost = 2.0 * (best.value - fit.value)
-            if abs(lost - TWO_SIDED) < 0.05:
+            if abs(lost - limit) < 0.05:
                 break
-            if lost > TWO_SIDED:
+            if lost > limit:
                 step = outside
                 # The loss is nearly quadratic in the logarithm.
-                outside = inside + (outside - inside) * min(
-                    0.9, max(0.1, math.sqrt(TWO_SIDED / lost))
-                )
+                outside = inside + (outside - inside) * min(0.9, max(0.1, math.sqrt(limit / lost)))
             else:
                 inside = outside
                 if step == 0.0:
-                    outside *= min(2.0, 1.05 * math.sqrt(TWO_SIDED / max(lost, 0.5)))
+                    outside *= min(2.0, 1.05 * math.sqrt(limit / max(lost, 0.5)))
                 else:
                     outside = 0.5 * (inside + step)
             if abs(outside) > 40.0:
@@ -580,30 +598,62 @@ def _profile(record: _Record, best: _Fit, name: str) -> tuple[float, float]:
     return ends[0], ends[1]
 
 
-def _with_time(record: _Record, best: _Fit) -> Array:
-    """Information of the logarithms of the variances and, last, of the correlation time."""
-    count, h = len(best.names), 0.05
-    shapes = [record.covariances(name, best.correlation) for name in best.names]
-    k = best.names.index("GM")
-    up = record.covariances("GM", best.correlation * math.exp(h))
-    down = record.covariances("GM", best.correlation * math.exp(-h))
-    slope = [(u - d) / (2.0 * h) for u, d in zip(up, down, strict=True)]
-    variances = np.append(best.variances, best.variances[k])
-    out = np.zeros((count + 1, count + 1))
+def _covariances(record: _Record, best: _Fit) -> tuple[Array, Array]:
+    """Covariance of the logarithms of the variances and, of a process, last of its time.
+
+    Returns
+    -------
+    plain, robust : ndarray
+        As if the levels were independent; and with the covariance between each level and the next
+        (sandwich: inverse information, covariance of the scores, inverse information).
+    """
+    names, shapes = best.names, [record.covariances(n, best.correlation) for n in best.names]
+    parts = [[v * m for m in made] for v, made in zip(best.variances, shapes, strict=True)]
+    if "GM" in names:
+        h, size = 0.05, best.variance("GM")
+        up, down = (record.covariances("GM", best.correlation * math.exp(x)) for x in (h, -h))
+        parts.append([size * (u - d) / (2.0 * h) for u, d in zip(up, down, strict=True)])
+    count = len(parts)
+    information, weights = np.zeros((count, count)), []
     for j, level in enumerate(record.levels):
-        sigma = sum(v * s[j] for v, s in zip(best.variances, shapes, strict=True))
-        inverse = np.linalg.inv(sigma)
-        parts = [inverse @ (v * s[j]) for v, s in zip(variances, [*shapes, slope], strict=True)]
-        for a in range(count + 1):
-            for b in range(count + 1):
-                out[a, b] += 0.5 * level.runs * float(np.sum(parts[a] * parts[b].T))
-    return out
+        inverse = np.linalg.inv(sum(part[j] for part in parts[: len(names)]))
+        weighted = [inverse @ part[j] for part in parts]
+        weights.append([w @ inverse for w in weighted])
+        for a in range(count):
+            for b in range(count):
+                share = float(np.sum(weighted[a] * weighted[b].T))
+                information[a, b] += 0.5 * level.runs * share
+    plain = np.linalg.inv(information + 1e-12 * np.eye(count))
+    if not set(names) & {"B", "K", "GM"}:
+        return plain, plain
+    scores = information.copy()
+    for j in range(len(record.levels) - 1):
+        across = _across(record.levels[j], record.levels[j + 1], best)
+        runs = record.levels[j + 1].runs
+        right = [across @ w @ across.transpose(0, 2, 1) for w in weights[j + 1]]
+        summed = [r.sum(axis=0) for r in right]
+        for a in range(count):
+            for b in range(count):
+                shared = 0.5 * runs * float(np.sum(weights[j][a] * summed[b].T))
+                scores[a, b] += shared
+                scores[b, a] += shared
+    return plain, plain @ scores @ plain
 
 
-def _time_interval(record: _Record, best: _Fit, observable: bool) -> NoiseTerm:
-    sd = math.sqrt(np.linalg.inv(_with_time(record, best))[-1, -1])
-    t = best.correlation
-    return NoiseTerm("T", t, t * math.exp(-1.96 * sd), t * math.exp(1.96 * sd), observable)
+def _across(fine: Level, coarse: Level, fit: _Fit) -> Array:
+    """Covariance, (p, k, m), of a run's k coefficients, at each place p in a run of m above it."""
+    h, wide = fine.block, coarse.block
+    steps = np.arange(1 - coarse.count, coarse.count) * wide
+    d = steps[:, None] + np.arange(fine.count) * h
+    total = np.zeros_like(d)
+    for variance, name in zip(fit.variances, fit.names, strict=True):
+        at = [d + h - wide, d + h, d - wide, d]
+        g = [shape(name, x, fit.correlation) for x in at]
+        total += variance * (g[0] - g[1] - g[2] + g[3]) / (h * wide)
+    projected = total @ fine.basis
+    place = np.arange(coarse.count)
+    lag = place[:, None] - place[None, :] + coarse.count - 1
+    return np.asarray(projected[lag].transpose(0, 2, 1) @ coarse.basis)
 
 
 def _upper_bound(record: _Record, best: _Fit, name: str) -> float:
@@ -630,13 +680,13 @@ def _upper_bound(record: _Record, best: _Fit, name: str) -> float:
     return math.exp(inside)
 
 
-def _ramp(record: _Record, best: _Fit, means: Array, block: float) -> NoiseTerm:
+def _ramp(fit: _Fit, means: Array, block: float) -> NoiseTerm:
     """Ramp by generalized least squares; observable beyond 3.3 standard deviations."""
     middle = (np.arange(means.size) - 0.5 * (means.size - 1)) * block
     line = np.column_stack([np.ones(means.size), middle])
     sigma = sum(
-        v * block_covariance(name, means.size, block, best.correlation)
-        for v, name in zip(best.variances, best.names, strict=True)
+        v * block_covariance(name, means.size, block, fit.correlation)
+        for v, name in zip(fit.variances, fit.names, strict=True)
     )
     # The covariance is known up to a constant, which only the mean would see.
     sigma = sigma + (1.0 + np.abs(sigma).max())
