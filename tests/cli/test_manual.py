@@ -28,6 +28,7 @@ PAGES = [page for page in RUNNER.pages() if any(map(RUNNER.is_run, RUNNER.exampl
 SLOW = {
     "align",
     "alignment",
+    "allan",
     "answer",
     "attitude",
     "coast",

@@ -36,10 +36,10 @@ DEG, G = math.pi / 180.0, STANDARD_GRAVITY
 #: Name of a term, then factor and unit for gyros and for accelerometers.
 SHOWN: dict[str, tuple[str, tuple[float, str], tuple[float, str]]] = {
     "Q": ("quantization", (3600.0 / DEG, "arcsec"), (1e3, "mm/s")),
-    "N": ("white noise (random walk of the integral)", (60.0 / DEG, "deg/√h"), (60.0, "m/s/√h")),
-    "B": ("bias instability, flicker", (3600.0 / DEG, "deg/h"), (1e6 / G, "µg")),
-    "GM": ("Gauss-Markov, standard deviation", (3600.0 / DEG, "deg/h"), (1e6 / G, "µg")),
-    "T": ("Gauss-Markov, correlation time", (1.0, "s"), (1.0, "s")),
+    "N": ("white noise", (60.0 / DEG, "deg/√h"), (60.0, "m/s/√h")),
+    "B": ("flicker", (3600.0 / DEG, "deg/h"), (1e6 / G, "µg")),
+    "GM": ("Gauss-Markov, sd", (3600.0 / DEG, "deg/h"), (1e6 / G, "µg")),
+    "T": ("Gauss-Markov, time", (1.0, "s"), (1.0, "s")),
     "K": ("rate random walk", (216000.0 / DEG, "deg/h/√h"), (6e7 / G, "µg/√h")),
     "R": ("ramp", (3600.0**2 / DEG, "deg/h/h"), (3.6e9 / G, "µg/h")),
 }

@@ -410,14 +410,15 @@ def noise_terms(rate: ArrayLike, dt: float) -> ChannelNoise:
     # In units of its own size, so that no number of the fit depends on the unit.
     unit = math.sqrt(white)
     levels, means, block = levels_of(values / unit, dt)
+    whole = True
     while True:
         record = _Record(levels)
-        fits = _models(record, dt, values.size * dt)
+        fits = _models(record, dt, values.size * dt, whole)
         best = max(fits, key=lambda one: one.penalized)
         cut = _without_colored(levels, record, best)
         if cut is None:
             break
-        levels = cut
+        levels, whole = cut, False
     terms = _intervals(record, fits, best)
     # By the model that allows the largest ramp by chance, of those that are not excluded.
     ramps = [_ramp(one, means, block) for one in _alike(fits, best)]
@@ -445,8 +446,8 @@ def _scaled(term: NoiseTerm, unit: float) -> NoiseTerm:
     )
 
 
-def _models(record: _Record, dt: float, span: float) -> list[_Fit]:
-    """Fits of all models; the first level decides about Q."""
+def _models(record: _Record, dt: float, span: float, whole: bool) -> list[_Fit]:
+    """Fits of all models; the first level decides about Q, if it is `whole`."""
     first = record.levels[0]
     white = float(np.median(np.diag(first.moments))) * first.block
     plain = record.fit(("N",), np.array([white]))
@@ -463,7 +464,7 @@ def _models(record: _Record, dt: float, span: float) -> list[_Fit]:
         fits.append(record.fit(names, np.maximum(begin, 1e-12 * n)))
     richest = fits[-1]
     with_q = record.fit(("Q", *richest.names), np.array([0.1 * start["Q"], *richest.variances]))
-    quantized = 2.0 * (with_q.value - richest.value) > DEMANDED
+    quantized = whole and 2.0 * (with_q.value - richest.value) > DEMANDED
     own: tuple[str, ...] = ("Q", "N") if quantized else ("N",)
     if quantized:
         q = with_q.variances[0]
