@@ -41,6 +41,7 @@ SHOWN: dict[str, tuple[str, tuple[float, str], tuple[float, str]]] = {
     "GM": ("Gauss-Markov, sd", (3600.0 / DEG, "deg/h"), (1e6 / G, "µg")),
     "T": ("Gauss-Markov, time", (1.0, "s"), (1.0, "s")),
     "K": ("rate random walk", (216000.0 / DEG, "deg/h/√h"), (6e7 / G, "µg/√h")),
+    "C": ("effect of temperature", (3600.0 / DEG, "deg/h/°C"), (1e6 / G, "µg/°C")),
     "R": ("ramp", (3600.0**2 / DEG, "deg/h/h"), (3.6e9 / G, "µg/h")),
 }
 CAPTION = (
@@ -53,7 +54,8 @@ METHOD = (
     "5.4 in log-likelihood (0.1 % by chance).",
     "Intervals by the profile of the likelihood where the variance of a term is known to worse "
     "than 10 %.",
-    "The sensor's noise is Gaussian and does not change with time; temperature is not regarded.",
+    "The sensor's noise is Gaussian and does not change with time. The effect of temperature is "
+    "estimated beside it where the log has a temperature that changes.",
 )
 
 
@@ -186,6 +188,9 @@ def _cell(term: NoiseTerm, factor: float) -> str:
     if math.isnan(term.value):
         return f"< {_digits(factor * term.high, 2)}" if term.high > 0.0 else "–"
     doubt = "" if term.observable else " ?"
+    if term.name == "C":
+        half = 0.5 * factor * (term.high - term.low)
+        return f"{factor * term.value:.3g} ± {half:.2g}{doubt}".replace("-", "−")
     low, high = factor * term.low, factor * term.high
     # Digits of the interval: two of its width.
     digits = max(2, 2 - math.floor(math.log10((term.high - term.low) / term.value)))

@@ -193,8 +193,13 @@ class Level:
         )
 
 
-def levels_of(rate: Array, dt: float) -> tuple[tuple[Level, ...], Array, float]:
-    """Levels of a record, the means of the last one, and the length of their blocks in s."""
+def levels_of(
+    rate: Array, dt: float, beside: Array | None = None
+) -> tuple[tuple[Level, ...], Array, Array, float]:
+    """Levels of a record, and of the last one the means, what is projected out, and the block in s.
+
+    `beside`: a regressor, such as temperature, that is projected out with mean and ramp.
+    """
     n = rate.size
     whole = max(1, math.ceil(n / TOP))
     count = max(1, math.ceil(math.log(whole) / math.log(RUN) - 1e-9)) if whole > 1 else 0
@@ -210,11 +215,16 @@ def levels_of(rate: Array, dt: float) -> tuple[tuple[Level, ...], Array, float]:
         moments = basis.T @ second @ basis / len(rows)
         found.append(Level(block, run, basis, moments, len(rows)))
         means, block = rows.mean(axis=1), block * run
-    line = np.vander(np.linspace(-1.0, 1.0, means.size), 2)
-    last = np.linalg.svd(line)[0][:, 2:]
+    middle = (np.arange(means.size) - 0.5 * (means.size - 1)) * block
+    line = np.column_stack([np.ones(means.size), middle])
+    if beside is not None:
+        over = run**count
+        warm = beside[: means.size * over].reshape(-1, over).mean(axis=1)
+        line = np.column_stack([line, warm - warm.mean()])
+    last = np.linalg.svd(line / np.abs(line).max(axis=0))[0][:, line.shape[1] :]
     z = last.T @ means
     found.append(Level(block, means.size, last, np.outer(z, z), 1))
-    return tuple(found), means, block
+    return tuple(found), means, line, block
 
 
 def _cosines(count: int) -> Array:
@@ -333,7 +343,7 @@ class NoiseTerm:
     ----------
     name : str
         ``Q``, ``N``, ``B``, ``K``, ``R``, or ``GM`` (standard deviation) and ``T`` (its correlation
-        time in s).
+        time in s); ``C``, the effect of temperature in u/°C, of either sign.
     value : float
         In u s (Q), u √s (N), u (B, GM), u/√s (K), u/s (R), u being rad/s or m/s²; NaN if the record
         does not show the term.
@@ -378,7 +388,7 @@ class ChannelNoise:
         return next(one for one in self.terms if one.name == name)
 
 
-def noise_terms(rate: ArrayLike, dt: float) -> ChannelNoise:
+def noise_terms(rate: ArrayLike, dt: float, temperature: ArrayLike | None = None) -> ChannelNoise:
     """Noise terms of a stationary channel, by maximum likelihood.
 
     Parameters
@@ -386,6 +396,8 @@ def noise_terms(rate: ArrayLike, dt: float) -> ChannelNoise:
     rate : array_like, (n,), u
         Angular rate or specific force; its mean does not matter.
     dt : float, s
+    temperature : array_like, (n,), °C, optional
+        Its effect is estimated with the noise, and is not part of it.
 
     Returns
     -------
@@ -409,7 +421,12 @@ def noise_terms(rate: ArrayLike, dt: float) -> ChannelNoise:
         raise DataError("allan.constant")
     # In units of its own size, so that no number of the fit depends on the unit.
     unit = math.sqrt(white)
-    levels, means, block = levels_of(values / unit, dt)
+    values /= unit
+    beside = None if temperature is None else np.asarray(temperature, dtype=np.float64)
+    levels, means, line, block = levels_of(values, dt, beside)
+    if beside is not None:
+        share = np.linalg.lstsq(line, means, rcond=None)[0][2]
+        levels = levels_of(values - share * (beside - beside.mean()), dt, beside)[0]
     whole = True
     while True:
         record = _Record(levels)
@@ -421,9 +438,10 @@ def noise_terms(rate: ArrayLike, dt: float) -> ChannelNoise:
         levels, whole = cut, False
     terms = _intervals(record, fits, best)
     # By the model that allows the largest ramp by chance, of those that are not excluded.
-    ramps = [_ramp(one, means, block) for one in _alike(fits, best)]
-    ramp = min(ramps, key=lambda one: (one.observable, -one.high))
-    terms.append(ramp)
+    for column, name in enumerate(("R", "C")[: line.shape[1] - 1], 1):
+        found = [_slope(one, means, line, block, column, name) for one in _alike(fits, best)]
+        terms.append(min(found, key=lambda one: (one.observable, one.low - one.high)))
+    ramp = next(one for one in terms if one.name == "R")
     model = {name: math.sqrt(best.variance(name)) for name in best.names}
     if ramp.observable:
         model["R"] = ramp.value
@@ -681,22 +699,25 @@ def _upper_bound(record: _Record, best: _Fit, name: str) -> float:
     return math.exp(inside)
 
 
-def _ramp(fit: _Fit, means: Array, block: float) -> NoiseTerm:
-    """Ramp by generalized least squares; observable beyond 3.3 standard deviations."""
-    middle = (np.arange(means.size) - 0.5 * (means.size - 1)) * block
-    line = np.column_stack([np.ones(means.size), middle])
+def _slope(fit: _Fit, means: Array, line: Array, block: float, column: int, name: str) -> NoiseTerm:
+    """Coefficient of a column of `line` by generalized least squares; of the ramp its size.
+
+    Observable beyond 3.3 standard deviations, a chance of 0.1 %.
+    """
     sigma = sum(
-        v * block_covariance(name, means.size, block, fit.correlation)
-        for v, name in zip(fit.variances, fit.names, strict=True)
+        v * block_covariance(term, means.size, block, fit.correlation)
+        for v, term in zip(fit.variances, fit.names, strict=True)
     )
     # The covariance is known up to a constant, which only the mean would see.
     sigma = sigma + (1.0 + np.abs(sigma).max())
     weighted = np.linalg.solve(sigma, line)
     covariance = np.linalg.inv(line.T @ weighted)
-    slope = float((covariance @ (weighted.T @ means))[1])
-    sd = math.sqrt(covariance[1, 1])
+    slope = float((covariance @ (weighted.T @ means))[column])
+    sd = math.sqrt(covariance[column, column])
     observable = abs(slope) > 3.3 * sd
+    if name == "C":
+        return NoiseTerm(name, slope, slope - 1.96 * sd, slope + 1.96 * sd, observable)
+    size = abs(slope)
     if observable:
-        size = abs(slope)
-        return NoiseTerm("R", size, size - 1.96 * sd, size + 1.96 * sd, True)
-    return NoiseTerm("R", math.nan, 0.0, abs(slope) + 1.645 * sd, False)
+        return NoiseTerm(name, size, size - 1.96 * sd, size + 1.96 * sd, True)
+    return NoiseTerm(name, math.nan, 0.0, size + 1.645 * sd, False)

@@ -14,12 +14,15 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from strapdown.bundle import InputFiles, Seal, input_files
 from strapdown.config.logs import AllanSpec, AxesTable
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84
-from strapdown.errors import DataError, Finding
+from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.formats.aid_table import read_stream
+from strapdown.formats.clocks import on_clock_of
 from strapdown.progress import Progress, silent
 from strapdown.sensors.allan import ChannelNoise, allan_model, deviations, noise_terms
 from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV, KEYS
@@ -36,10 +39,14 @@ if TYPE_CHECKING:
 
 __all__ = ["AllanRun", "run_allan"]
 
+Array = NDArray[np.float64]
+
 #: Shortest stationary stretch that is used, and one below which the result says that it is short.
 LEAST_REST, SHORT = 60.0, 1800.0  # s
 #: Share of a log outside its longest rest from which the result says so.
 MOVED = 0.02
+#: Change of temperature of which an effect is estimated, °C; where it may be missing, s.
+LEAST_WARMING, EDGE = 0.5, 10.0
 #: Flat minimum of the Allan deviation of flicker, √(2 ln 2/π) B.
 FLAT = math.sqrt(2.0 * math.log(2.0) / math.pi)
 #: Correlation times to the maximum of the Allan deviation of a Gauss-Markov process.
@@ -213,6 +220,7 @@ def run_allan(spec: AllanSpec, progress: Progress = silent) -> AllanRun:
     first, past = np.searchsorted(time, [start, end + 1e-9])
     stamps = time[first:past]
     dt = float(stamps[-1] - stamps[0]) / (stamps.size - 1)
+    warm = _temperature(spec, imu, stamps)
     gaps = find_gaps(stamps)
     if gaps:
         longest = max(gap.end - gap.start for gap in gaps)
@@ -225,7 +233,7 @@ def run_allan(spec: AllanSpec, progress: Progress = silent) -> AllanRun:
         progress(f"noise of {channel}", 0.2 + 0.55 * k / len(channels))
         values = np.ascontiguousarray(imu[channel].to_numpy()[first:past], dtype=np.float64)
         try:
-            found = noise_terms(values, dt)
+            found = noise_terms(values, dt, warm)
         except DataError as error:
             raise error.replaced(file=recording.name, quantity=channel) from None
         noise[channel], means[channel] = found, float(values.mean())
@@ -265,6 +273,23 @@ def _rest(imu: pd.DataFrame, name: str, findings: list[Finding]) -> tuple[float,
         at = {"start": longest.start, "end": longest.end}
         findings.append(_said("allan.moved", name, count=len(rests), share=share, **at))
     return longest.start, longest.end
+
+
+def _temperature(spec: AllanSpec, imu: pd.DataFrame, stamps: Array) -> Array | None:
+    """Temperature of the log at the stamps, °C; None without one, or if it hardly changes."""
+    try:
+        stream = read_stream(spec.log.path, "barometer", spec.log.format)
+        stream, _ = on_clock_of(stream, imu)
+    except (DataError, ConfigError):
+        return None
+    if "temperature" not in stream.columns:
+        return None
+    values = stream["temperature"].dropna()
+    time = index_of(values)
+    if len(values) < 2 or time[0] > stamps[0] + EDGE or time[-1] < stamps[-1] - EDGE:
+        return None
+    at = np.interp(stamps, time, values.to_numpy(dtype=np.float64))
+    return at if np.ptp(at) > LEAST_WARMING else None
 
 
 def _said(code: str, name: str, **data: Any) -> Finding:

@@ -113,7 +113,7 @@ def test_covariance_of_blocks_is_that_of_the_process():
 
 def test_levels_keep_all_that_white_noise_has():
     values = np.random.default_rng(3).standard_normal(64_000)
-    levels, means, block = levels_of(values, 0.01)
+    levels, means, _, block = levels_of(values, 0.01)
     used = sum(one.basis.shape[1] * one.runs for one in levels)
     # All but the mean, the ramp, and what is left of the last runs.
     assert values.size - used <= 2 + levels[0].count * (1 + len(levels))
@@ -148,6 +148,15 @@ def test_random_walk_and_ramp_are_found_with_their_intervals():
     found = noise_terms(*simulated(2, noise_density=1e-4, trend=3e-8))
     assert {one.name for one in found.terms if one.observable} == {"N", "R"}
     assert found.term("R").low < 3e-8 < found.term("R").high
+
+
+def test_the_effect_of_temperature_is_not_taken_for_noise():
+    rate, dt = simulated(5, noise_density=1e-4)
+    warm = 20.0 + 10.0 * (1.0 - np.exp(-np.arange(rate.size) * dt / 600.0))
+    found = noise_terms(rate + 2e-5 * warm, dt, warm)
+    assert {one.name for one in found.terms if one.observable} == {"N", "C"}
+    assert found.term("C").low < 2e-5 < found.term("C").high
+    assert {o.name for o in noise_terms(rate + 2e-5 * warm, dt).terms if o.observable} != {"N"}
 
 
 def test_units_do_not_change_what_is_observable():
