@@ -11,6 +11,7 @@ import pytest
 import strapdown as sd
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import csv
+from strapdown.formats.clocks import RELATIVE, Clock, with_clock
 from strapdown.sensors import TriadErrors, apply, load_sensor
 
 NAMES = ["time_s", *(f"gyro_{a}_rad_s" for a in "xyz"), *(f"accel_{a}_m_s2" for a in "xyz")]
@@ -124,6 +125,26 @@ def test_a_result_in_memory(run, tmp_path):
     seal = run.save(tmp_path / "out")
     assert (seal.path / "inputs").is_dir()
     assert sd.verify(seal.path).verdict == "identical"
+
+
+def test_the_temperature_of_a_log_is_regarded(monkeypatch, tmp_path):
+    time, gyro, accel = samples(600.0)
+    warm = 25.0 + 3.0 * np.sin(2.0 * np.pi * time / 400.0)
+    gyro[:, 0] += 1e-3 * warm
+
+    def stream(path, name, form):
+        assert name == "barometer"
+        table = pd.DataFrame({"temperature": warm}, index=pd.Index(time, name="time"))
+        return with_clock(table, Clock(RELATIVE))
+
+    monkeypatch.setattr("strapdown.systems.allan_run.read_stream", stream)
+    run = sd.allan((time, gyro, accel))
+    effect = run.noise["gyro_x"].term("C")
+    assert effect.observable
+    assert effect.low < 1e-3 < effect.high
+    assert not run.noise["gyro_y"].term("C").observable
+    page = (run.save(tmp_path / "out").path / "report.html").read_text(encoding="utf-8")
+    assert "effect of temperature" in page
 
 
 def test_a_log_that_moved_is_cut_or_refused(run):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -124,15 +124,15 @@ def block_covariance(term: str, count: int, block: float, correlation: float = m
 
 def allan_model(terms: Mapping[str, float], tau: ArrayLike, correlation: float = math.inf) -> Array:
     """Allan deviation of a sum of terms, with the ramp as ``R``."""
-    t = np.asarray(tau, dtype=np.float64)
-    variance = np.zeros_like(t)
+    t: Array = np.asarray(tau, dtype=np.float64)
+    variance: Array = np.zeros(t.shape)
     for term, value in terms.items():
         if term == "R":
             variance += 0.5 * (value * t) ** 2
             continue
-        g = [shape(term, k * t, correlation) for k in (0.0, 1.0, 2.0)]
+        g = [shape(term, np.asarray(k * t, np.float64), correlation) for k in (0.0, 1.0, 2.0)]
         variance += value**2 * (6.0 * g[0] - 8.0 * g[1] + 2.0 * g[2]) / (2.0 * t**2)
-    return np.sqrt(np.maximum(variance, 0.0))
+    return np.asarray(np.sqrt(np.maximum(variance, 0.0)), np.float64)
 
 
 # The likelihood. The record is cut into runs of blocks; the mean of a run is a block of the next
@@ -556,13 +556,16 @@ def _intervals(record: _Record, fits: list[_Fit], best: _Fit) -> list[NoiseTerm]
     terms = []
     for name in TERMS:
         if name in best.names:
-            low, high = _profile(record, best, name, plain, robust)
+            ends = _profile(record, best, best.names.index(name), plain, robust)
+            low, high = (best.variance(name) * math.exp(end) for end in ends)
             everywhere = all(name in f.names or _drives(f, name, low, high) for f in alike)
             value = math.sqrt(best.variance(name))
             terms.append(NoiseTerm(name, value, math.sqrt(low), math.sqrt(high), everywhere))
             if name == "GM":
-                time, width = best.correlation, math.exp(1.96 * math.sqrt(robust[-1, -1]))
-                terms.append(NoiseTerm("T", time, time / width, time * width, everywhere))
+                time = best.correlation
+                ends = _profile(record, best, len(best.names), plain, robust)
+                low, high = (time * math.exp(end) for end in ends)
+                terms.append(NoiseTerm("T", time, low, high, everywhere))
         elif name in ("Q", "B", "K"):
             bound = math.sqrt(_upper_bound(record, best, name))
             terms.append(NoiseTerm(name, math.nan, 0.0, bound, False))
@@ -577,44 +580,63 @@ def _drives(fit: _Fit, name: str, low: float, high: float) -> bool:
 
 
 def _profile(
-    record: _Record, best: _Fit, name: str, plain: Array, robust: Array
+    record: _Record, best: _Fit, k: int, plain: Array, robust: Array
 ) -> tuple[float, float]:
-    """95 % interval of a variance.
+    """Ends of the 95 % interval of parameter k, in its logarithm about the maximum.
 
-    By the profile of the likelihood, which is as much too narrow as the plain covariance is; of a
-    process, whose correlation time would have to be fitted at each step, Gaussian.
+    Parameters are the variances and, of a Gauss-Markov process, last its correlation time. By the
+    profile of the likelihood, which is as much too narrow as the plain covariance is.
     """
-    k = best.names.index(name)
-    sd, wider = math.sqrt(robust[k, k]), robust[k, k] / plain[k, k]
-    if sd < WELL_KNOWN or "GM" in best.names:
-        size = float(best.variances[k])
-        return size * math.exp(-1.96 * sd), size * math.exp(1.96 * sd)
-    limit = TWO_SIDED * wider
-    ends = []
-    for sign in (-1.0, 1.0):
-        inside, outside, step = 0.0, sign * 2.0 * sd, 0.0
-        fit = best
-        for _ in range(12):
-            start = fit.variances.copy()
-            start[k] = best.variances[k] * math.exp(outside)
-            fit = record.fit(best.names, start, best.correlation, held=k)
-            lost = 2.0 * (best.value - fit.value)
-            if abs(lost - limit) < 0.05:
-                break
-            if lost > limit:
-                step = outside
-                # The loss is nearly quadratic in the logarithm.
-                outside = inside + (outside - inside) * min(0.9, max(0.1, math.sqrt(limit / lost)))
-            else:
-                inside = outside
-                if step == 0.0:
-                    outside *= min(2.0, 1.05 * math.sqrt(limit / max(lost, 0.5)))
-                else:
-                    outside = 0.5 * (inside + step)
-            if abs(outside) > 40.0:
-                break
-        ends.append(best.variances[k] * math.exp(outside))
-    return ends[0], ends[1]
+    sd, limit = math.sqrt(robust[k, k]), TWO_SIDED * robust[k, k] / plain[k, k]
+    if sd < WELL_KNOWN:
+        return -1.96 * sd, 1.96 * sd
+    starts = {0.0: best}
+
+    def lost(offset: float) -> float:
+        near = starts[min(starts, key=lambda x: abs(x - offset))]
+        if k == len(best.names):
+            fit = record.fit(best.names, near.variances, best.correlation * math.exp(offset))
+            starts[offset] = fit
+            return 2.0 * (best.value - fit.value)
+        begin = near.variances.copy()
+        begin[k] = best.variances[k] * math.exp(offset)
+        if "GM" not in best.names:
+            fit = starts[offset] = record.fit(best.names, begin, held=k)
+            return 2.0 * (best.value - fit.value)
+        # The time that goes with it by the covariance, and the parabola about that.
+        slope, wide = plain[-1, k] / plain[k, k], 0.7 * math.sqrt(plain[-1, -1])
+        times = best.correlation * np.exp(slope * offset + wide * np.array([-1.0, 0.0, 1.0]))
+        fits = [record.fit(best.names, begin, float(t), held=k) for t in times]
+        low, middle, high = (one.value for one in fits)
+        bend = low - 2.0 * middle + high
+        top = max(low, middle, high)
+        if bend < 0.0:
+            top = max(top, middle - 0.125 * (high - low) ** 2 / bend)
+        starts[offset] = fits[1]
+        return 2.0 * (best.value - top)
+
+    low, high = (_crossing(lost, sign * 1.96 * sd, limit) for sign in (-1.0, 1.0))
+    return low, high
+
+
+def _crossing(lost: Callable[[float], float], first: float, limit: float) -> float:
+    """Where a loss that is nearly quadratic reaches a limit, from a first guess."""
+    inside, outside, at = 0.0, math.inf, first
+    for _ in range(12):
+        found = lost(at)
+        if abs(found - limit) < 0.01 * limit:
+            break
+        if found > limit:
+            outside = abs(at)
+        else:
+            inside = abs(at)
+        step = abs(at) * math.sqrt(limit / max(found, 0.1 * limit))
+        if not inside < step < outside:
+            step = 0.5 * (inside + outside) if math.isfinite(outside) else 2.0 * abs(at)
+        at = math.copysign(step, first)
+        if step > 40.0:
+            break
+    return at
 
 
 def _covariances(record: _Record, best: _Fit) -> tuple[Array, Array]:
@@ -642,7 +664,7 @@ def _covariances(record: _Record, best: _Fit) -> tuple[Array, Array]:
             for b in range(count):
                 share = float(np.sum(weighted[a] * weighted[b].T))
                 information[a, b] += 0.5 * level.runs * share
-    plain = np.linalg.inv(information + 1e-12 * np.eye(count))
+    plain: Array = np.asarray(np.linalg.inv(information + 1e-12 * np.eye(count)), np.float64)
     if not set(names) & {"B", "K", "GM"}:
         return plain, plain
     scores = information.copy()
@@ -656,7 +678,7 @@ def _covariances(record: _Record, best: _Fit) -> tuple[Array, Array]:
                 shared = 0.5 * runs * float(np.sum(weights[j][a] * summed[b].T))
                 scores[a, b] += shared
                 scores[b, a] += shared
-    return plain, plain @ scores @ plain
+    return plain, np.asarray(plain @ scores @ plain, np.float64)
 
 
 def _across(fine: Level, coarse: Level, fit: _Fit) -> Array:

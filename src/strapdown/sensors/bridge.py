@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError
@@ -64,8 +65,7 @@ def _both(
     names: tuple[str, str, str, str], units: tuple[str, str, str, str], power: int = 1
 ) -> tuple[Entry, ...]:
     """White noise and driving noise of gyros and accelerometers in SI and continuous time."""
-    kinds = (("gyro", "noise_density"), ("accel", "noise_density"))
-    kinds += (("gyro", "drive"), ("accel", "drive"))
+    kinds = [(triad, q) for q in ("noise_density", "drive") for triad in ("gyro", "accel")]
     rows = zip(names, kinds, units, strict=True)
     return tuple(Entry(name, *kind, 1.0, unit, power) for name, kind, unit in rows)
 
@@ -307,7 +307,8 @@ def from_program(values: Mapping[str, Mapping[str, Triad]], name: str, dt: float
                 made[triad] = replace(made[triad], correlation_time=si[0])
             else:
                 quantity = "random_walk" if entry.quantity == "drive" else entry.quantity
-                made[triad] = replace(made[triad], **{quantity: si})
+                changed: dict[str, Any] = {quantity: si}
+                made[triad] = replace(made[triad], **changed)
     return ImuErrors(made["gyro"], made["accel"])
 
 

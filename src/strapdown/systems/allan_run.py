@@ -284,11 +284,11 @@ def _temperature(spec: AllanSpec, imu: pd.DataFrame, stamps: Array) -> Array | N
         return None
     if "temperature" not in stream.columns:
         return None
-    values = stream["temperature"].dropna()
-    time = index_of(values)
+    stream = stream.dropna(subset=["temperature"])
+    time, values = index_of(stream), stream["temperature"].to_numpy(dtype=np.float64)
     if len(values) < 2 or time[0] > stamps[0] + EDGE or time[-1] < stamps[-1] - EDGE:
         return None
-    at = np.interp(stamps, time, values.to_numpy(dtype=np.float64))
+    at = np.interp(stamps, time, values)
     return at if np.ptp(at) > LEAST_WARMING else None
 
 
