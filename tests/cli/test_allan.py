@@ -156,6 +156,7 @@ def test_a_log_that_moved_is_cut_or_refused(run):
     with pytest.raises(DataError) as refused:
         sd.allan(samples(40.0))
     assert refused.value.finding.code == "allan.not-at-rest"
+    assert sd.allan(samples(40.0), at_rest=True).end == pytest.approx(40.0)
     with pytest.raises(ConfigError):
         sd.allan((time, gyro, accel), rate_hz=100.0)
     only = sd.allan((time[:9000], gyro[:9000]))

@@ -21,6 +21,7 @@ def allan(
     log: Any,
     *,
     axes: str | None = None,
+    at_rest: bool = False,
     target: str | None = None,
     progress: Progress = silent,
     **options: Any,
@@ -34,6 +35,8 @@ def allan(
         stationary stretch is used.
     axes : str, optional
         As of `read_imu`.
+    at_rest : bool
+        Whether the sensor did not move in the whole log, which is then used without a test.
     target : str, optional
         A program whose parameters the saved result has as well: ``KF-GINS``, ``GTSAM``, …
     progress : callable, optional
@@ -67,6 +70,7 @@ def allan(
             axes, name = axes or file.axes, Path(table.path).resolve().stem
         else:
             table, name = file.log, "imu"
-        spec = specify(AllanSpec, name=name, log=table, axes=axes, target=target)
+        stated = {"axes": axes, "at_rest": at_rest, "target": target}
+        spec = specify(AllanSpec, name=name, log=table, **stated)
         run = run_allan(spec, progress)
         return replace(run, memory=memory).in_folder(folder, NOWHERE)

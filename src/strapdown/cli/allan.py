@@ -45,6 +45,12 @@ def allan(
             "--for",
         ),
     ] = None,
+    at_rest: Annotated[
+        bool,
+        running(
+            None, "Use the whole log, or its part, as stationary, without a test.", "--at-rest"
+        ),
+    ] = False,
     sensor_file: Annotated[
         Path | None,
         writing("FILE.toml", "Write the sensor here, for --sensor of navigate and align."),
@@ -72,7 +78,8 @@ def allan(
 
     def compute(report: Progress) -> AllanRun:
         try:
-            run = analyse(str(log), axes=flags.axes, target=program, progress=report, **keys)
+            keys.update(axes=flags.axes, at_rest=at_rest, target=program)
+            run = analyse(str(log), progress=report, **keys)
         except ConfigError as error:
             raise as_flag(error, _flag) from None
         runs.append(run)

@@ -154,6 +154,8 @@ class AllanSpec(FileSpec):
     log: LogTable
     #: Orientation of the sensor's axes, as `AxesTable.axes`.
     axes: Word | None = None
+    #: Whether the whole part is taken as stationary, as stated, without a test.
+    at_rest: StrictBool = False
     #: Program whose parameters the result gives as well, of `sensors.bridge.TARGETS`.
     target: Annotated[Word, accepted_by(target_of)] | None = None
 

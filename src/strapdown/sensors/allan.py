@@ -154,6 +154,8 @@ WELL_KNOWN = 0.1
 #: A level whose shapes exceed the model by this share, beyond 5 standard deviations, is colored.
 COLORED, SURELY = 0.05, 5.0
 ITERATIONS = 40
+#: Least variance, in units of that of the record; and furthest end of an interval, logarithms.
+TINY, FURTHEST = 1e-30, 30.0
 #: Correlation times of a Gauss-Markov process in a record, at least: a slower one is a random walk,
 #: if its driving noise has that one's variance within its interval and this factor.
 SLOWEST, SAME = 10.0, 1.5
@@ -309,7 +311,7 @@ class _Record:
         """Maximize over the logarithms of the variances by scoring; `held`: one that stays."""
         shapes = [self.covariances(name, correlation) for name in names]
         free = [k for k in range(len(names)) if k != held]
-        log = np.log(start)
+        log = np.log(np.maximum(start, TINY))
         value, slope, information = self.likelihood(np.exp(log), shapes)
         for _ in range(ITERATIONS):
             if not free or not math.isfinite(value):
@@ -437,10 +439,10 @@ def noise_terms(rate: ArrayLike, dt: float, temperature: ArrayLike | None = None
             break
         levels, whole = cut, False
     terms = _intervals(record, fits, best)
-    # By the model that allows the largest ramp by chance, of those that are not excluded.
+    walk = next(one.high for one in terms if one.name == "K")
+    models = [*_alike(fits, best), _with_walk(best, walk**2)]
     for column, name in enumerate(("R", "C")[: line.shape[1] - 1], 1):
-        found = [_slope(one, means, line, block, column, name) for one in _alike(fits, best)]
-        terms.append(min(found, key=lambda one: (one.observable, one.low - one.high)))
+        terms.append(_slope_term(name, [_slope(f, means, line, block, column) for f in models]))
     ramp = next(one for one in terms if one.name == "R")
     model = {name: math.sqrt(best.variance(name)) for name in best.names}
     if ramp.observable:
@@ -558,7 +560,9 @@ def _intervals(record: _Record, fits: list[_Fit], best: _Fit) -> list[NoiseTerm]
         if name in best.names:
             ends = _profile(record, best, best.names.index(name), plain, robust)
             low, high = (best.variance(name) * math.exp(end) for end in ends)
-            everywhere = all(name in f.names or _drives(f, name, low, high) for f in alike)
+            everywhere = ends[0] > -FURTHEST and all(
+                name in f.names or _drives(f, name, low, high) for f in alike
+            )
             value = math.sqrt(best.variance(name))
             terms.append(NoiseTerm(name, value, math.sqrt(low), math.sqrt(high), everywhere))
             if name == "GM":
@@ -588,6 +592,7 @@ def _profile(
     profile of the likelihood, which is as much too narrow as the plain covariance is.
     """
     sd, limit = math.sqrt(robust[k, k]), TWO_SIDED * robust[k, k] / plain[k, k]
+    sd = min(sd, FURTHEST / 4.0)
     if sd < WELL_KNOWN:
         return -1.96 * sd, 1.96 * sd
     starts = {0.0: best}
@@ -633,8 +638,8 @@ def _crossing(lost: Callable[[float], float], first: float, limit: float) -> flo
         step = abs(at) * math.sqrt(limit / max(found, 0.1 * limit))
         if not inside < step < outside:
             step = 0.5 * (inside + outside) if math.isfinite(outside) else 2.0 * abs(at)
-        at = math.copysign(step, first)
-        if step > 40.0:
+        at = math.copysign(min(step, FURTHEST), first)
+        if step > FURTHEST:
             break
     return at
 
@@ -721,11 +726,8 @@ def _upper_bound(record: _Record, best: _Fit, name: str) -> float:
     return math.exp(inside)
 
 
-def _slope(fit: _Fit, means: Array, line: Array, block: float, column: int, name: str) -> NoiseTerm:
-    """Coefficient of a column of `line` by generalized least squares; of the ramp its size.
-
-    Observable beyond 3.3 standard deviations, a chance of 0.1 %.
-    """
+def _slope(fit: _Fit, means: Array, line: Array, block: float, column: int) -> tuple[float, float]:
+    """Coefficient of a column of `line` by generalized least squares, and its sd."""
     sigma = sum(
         v * block_covariance(term, means.size, block, fit.correlation)
         for v, term in zip(fit.variances, fit.names, strict=True)
@@ -734,12 +736,28 @@ def _slope(fit: _Fit, means: Array, line: Array, block: float, column: int, name
     sigma = sigma + (1.0 + np.abs(sigma).max())
     weighted = np.linalg.solve(sigma, line)
     covariance = np.linalg.inv(line.T @ weighted)
-    slope = float((covariance @ (weighted.T @ means))[column])
-    sd = math.sqrt(covariance[column, column])
-    observable = abs(slope) > 3.3 * sd
+    return float((covariance @ (weighted.T @ means))[column]), math.sqrt(covariance[column, column])
+
+
+def _slope_term(name: str, found: list[tuple[float, float]]) -> NoiseTerm:
+    """Ramp, of which the size counts, or effect of temperature.
+
+    `found`: by each model that is not excluded, and last by one with a random walk as large as the
+    record allows, which a slope may be. Observable beyond 3.3 standard deviations of each, a chance
+    of 0.1 %; the interval is the widest of the others.
+    """
+    observable = all(abs(slope) > 3.3 * sd for slope, sd in found)
+    slope, sd = max(found[:-1], key=lambda one: one[1])
     if name == "C":
         return NoiseTerm(name, slope, slope - 1.96 * sd, slope + 1.96 * sd, observable)
     size = abs(slope)
     if observable:
         return NoiseTerm(name, size, size - 1.96 * sd, size + 1.96 * sd, True)
-    return NoiseTerm(name, math.nan, 0.0, size + 1.645 * sd, False)
+    return NoiseTerm(name, math.nan, 0.0, max(abs(x) + 1.645 * s for x, s in found), False)
+
+
+def _with_walk(fit: _Fit, variance: float) -> _Fit:
+    """The model with a random walk of a given variance."""
+    kept = [k for k, name in enumerate(fit.names) if name != "K"]
+    names = (*(fit.names[k] for k in kept), "K")
+    return replace(fit, names=names, variances=np.append(fit.variances[kept], variance))

@@ -215,8 +215,10 @@ def run_allan(spec: AllanSpec, progress: Progress = silent) -> AllanRun:
     refuse_long_span(imu, recording.name)
     findings = list(read)
     progress("finding rests", 0.15)
-    start, end = _rest(imu, recording.name, findings)
     time = index_of(imu)
+    start, end = float(time[0]), float(time[-1])
+    if not spec.at_rest:
+        start, end = _rest(imu, recording.name, findings)
     first, past = np.searchsorted(time, [start, end + 1e-9])
     stamps = time[first:past]
     dt = float(stamps[-1] - stamps[0]) / (stamps.size - 1)
