@@ -115,11 +115,11 @@ def shape(term: str, t: Array, correlation: float = math.inf) -> Array:
 
 def block_covariance(term: str, count: int, block: float, correlation: float = math.inf) -> Array:
     """Covariance of means of a term over `count` blocks of `block` s, up to a constant."""
-    lags = np.arange(-1, count + 1) * block
+    lags = np.asarray(np.arange(-1, count + 1) * block, dtype=np.float64)
     g = shape(term, lags, correlation)
     by_lag = (2.0 * g[1:-1] - g[2:] - g[:-2]) / block**2
     at = np.arange(count)
-    return by_lag[np.abs(at[:, None] - at[None, :])]
+    return np.asarray(by_lag[np.abs(at[:, None] - at[None, :])])
 
 
 def allan_model(terms: Mapping[str, float], tau: ArrayLike, correlation: float = math.inf) -> Array:
