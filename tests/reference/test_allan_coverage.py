@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from strapdown.sensors.allan import noise_terms
 from strapdown.sensors.error_chain import apply
+from strapdown.sensors.noise_terms import noise_terms
 from strapdown.sensors.triad_errors import TriadErrors
 
 # Sample interval in s, samples, and the terms in rad and s.

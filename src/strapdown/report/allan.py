@@ -27,8 +27,8 @@ from strapdown.report.document import (
 )
 from strapdown.report.report_bundle import ReportBundle, finite
 from strapdown.report.values import duration_words
-from strapdown.sensors.allan import ChannelNoise, NoiseTerm
 from strapdown.sensors.bridge import target_of
+from strapdown.sensors.noise_terms import ChannelNoise, NoiseTerm
 from strapdown.systems.allan_run import AllanRun, run_allan
 from strapdown.tables import ACCEL, GYRO
 

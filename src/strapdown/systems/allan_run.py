@@ -24,8 +24,9 @@ from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.aid_table import read_stream
 from strapdown.formats.clocks import on_clock_of
 from strapdown.progress import Progress, silent
-from strapdown.sensors.allan import ChannelNoise, allan_model, deviations, noise_terms
+from strapdown.sensors.allan import allan_model, deviations
 from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV, KEYS
+from strapdown.sensors.noise_terms import ChannelNoise, noise_terms
 from strapdown.sensors.rest import find_rests
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors, triad_of
 from strapdown.systems.alignment_source import body_record

@@ -13,10 +13,9 @@ from strapdown.sensors.allan import (
     allan_model,
     block_covariance,
     deviations,
-    levels_of,
-    noise_terms,
 )
 from strapdown.sensors.error_chain import apply
+from strapdown.sensors.noise_terms import levels_of, noise_terms
 from strapdown.sensors.triad_errors import TriadErrors
 
 # allantools 2024.06: oadev, mdev and ohdev of `series()` with rate=100.0, data_type="freq" and
