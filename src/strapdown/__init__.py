@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from strapdown.alignment.alignment import Site
     from strapdown.alignment.fine import FineAlignment
     from strapdown.api.alignment import AlignmentRun, OutageRun, align, outage
+    from strapdown.api.allan import AllanRun, allan
     from strapdown.api.attitude import (
         Attitude,
         AttitudeComparison,
@@ -92,6 +93,7 @@ __version__ = "0.2.0.dev0"
 
 __all__ = [
     "AlignmentRun",
+    "AllanRun",
     "Assumed",
     "Attitude",
     "AttitudeComparison",
@@ -132,6 +134,7 @@ __all__ = [
     "ZeroVelocity",
     "__version__",
     "align",
+    "allan",
     "attitude",
     "calibrate_magnetometer",
     "check_imu_channels",
@@ -169,6 +172,7 @@ load_on_first_use(
         "alignment.alignment": "Site",
         "alignment.fine": "FineAlignment",
         "api.alignment": "AlignmentRun OutageRun align outage",
+        "api.allan": "AllanRun allan",
         "api.attitude": "Attitude AttitudeComparison AttitudeOptions MagnetometerCalibration "
         "OrientationFilter attitude calibrate_magnetometer compare_attitude",
         "api.crash": "CrashRun reconstruct",

@@ -31,6 +31,7 @@ PAGES = [page for page in RUNNER.pages() if any(map(RUNNER.is_run, RUNNER.exampl
 #: Pages whose examples take more than 8 s; `make examples` runs them.
 SLOW = {
     "align",
+    "allan",
     "answer",
     "car",
     "outage",

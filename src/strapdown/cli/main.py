@@ -38,6 +38,7 @@ EXIT_CODES = (
 #: Commands, each of a module, in the order of the help.
 COMMANDS = (
     "doctor",
+    "allan",
     "attitude",
     "align",
     "navigate",

@@ -1,4 +1,4 @@
-"""Logs and how to read them, in any configuration; and that of `strapdown doctor`."""
+"""Logs and how to read them, in any configuration; and those of `doctor` and `allan`."""
 
 from __future__ import annotations
 
@@ -25,6 +25,7 @@ from strapdown.config.spec import (
 from strapdown.formats.columns import parse_axes
 from strapdown.formats.gnss_fixes import GnssOptions
 from strapdown.formats.recording import as_stated
+from strapdown.sensors.bridge import target_of
 from strapdown.sensors.triad_errors import NAMED_AXES, check_axes_matrix
 from strapdown.units import parse_unit
 
@@ -143,6 +144,20 @@ class DoctorSpec(FileSpec):
     fixes: tuple[FixesTable, ...] = ()
     #: Orientation of the sensor's axes, as `AxesTable.axes`; of every log.
     axes: Word | None = None
+
+
+class AllanSpec(FileSpec):
+    """A log at rest, for the noise of its sensor."""
+
+    called = "allan"
+
+    log: LogTable
+    #: Orientation of the sensor's axes, as `AxesTable.axes`.
+    axes: Word | None = None
+    #: Whether the whole part is taken as stationary, as stated, without a test.
+    at_rest: StrictBool = False
+    #: Program whose parameters the result gives as well, of `sensors.bridge.TARGETS`.
+    target: Annotated[Word, accepted_by(target_of)] | None = None
 
 
 def flags_of(log: LogTable, axes: str | None) -> str:

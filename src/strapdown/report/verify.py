@@ -39,6 +39,7 @@ from strapdown.config.sources import CrashSimulationSpec, SimulateSpec
 from strapdown.errors import ConfigError, DataError, Finding, Severity, StrapdownError
 from strapdown.report import crash_live
 from strapdown.report.alignment import ALIGNMENT
+from strapdown.report.allan import ALLAN
 from strapdown.report.attitude import write_attitude
 from strapdown.report.content import EQUAL, Comparison, compare_files, json_of
 from strapdown.report.crash_case import CRASH
@@ -86,7 +87,7 @@ class Verification:
 
 #: Commands with a `ReportBundle`; ``attitude``, ``simulate`` and ``crash --live`` write theirs.
 BUNDLES: dict[str, ReportBundle[Any]] = {
-    bundle.command: bundle for bundle in (ALIGNMENT, OUTAGE, CRASH, DOCTOR, NAVIGATION)
+    bundle.command: bundle for bundle in (ALIGNMENT, ALLAN, OUTAGE, CRASH, DOCTOR, NAVIGATION)
 }
 
 

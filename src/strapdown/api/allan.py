@@ -1,0 +1,76 @@
+"""Noise of a sensor from Python."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from strapdown.api.reading import ImuFile, imu_input, log_in
+from strapdown.config.logs import AllanSpec, LogTable
+from strapdown.config.spec import specify
+from strapdown.errors import ConfigError
+from strapdown.progress import Progress, silent
+from strapdown.systems.allan_run import AllanRun, run_allan
+from strapdown.systems.inputs import NOWHERE, Memory
+
+__all__ = ["AllanRun", "allan"]
+
+
+def allan(
+    log: Any,
+    *,
+    axes: str | None = None,
+    at_rest: bool = False,
+    target: str | None = None,
+    progress: Progress = silent,
+    **options: Any,
+) -> AllanRun:
+    """Find the noise of a sensor from a log at rest: deviations, terms, and a sensor file.
+
+    Parameters
+    ----------
+    log : Imu, DataFrame, (t, gyro, accel), str or Path
+        Samples of an unmoved sensor: s, rad/s (n, 3), m/s² (n, 3); or a file. Its longest
+        stationary stretch is used.
+    axes : str, optional
+        As of `read_imu`.
+    at_rest : bool
+        Whether the sensor did not move in the whole log, which is then used without a test.
+    target : str, optional
+        A program whose parameters the saved result has as well: ``KF-GINS``, ``GTSAM``, …
+    progress : callable, optional
+        Called with a stage and the completed fraction.
+    **options
+        Further keys of a log in a file: ``columns``, ``format``, ``gyro_unit``, ``accel_unit``,
+        ``sampling``, ``rate_hz``, ``from_s``, ``to_s``, ``duration_s``, ``repair``.
+
+    Returns
+    -------
+    AllanRun
+        `deviations`, `terms`, `findings`; `sensor` for ``navigate(sensor=…)``; `parameters` for
+        other programs; `plot`, `save`.
+
+    Raises
+    ------
+    ConfigError
+        The file does not exist, or an option does not fit it.
+    DataError
+        The log cannot be read, or is not at rest for a minute.
+    """
+    samples = imu_input(log)
+    stated = {key: value for key, value in options.items() if value not in (None, {}, False)}
+    memory = Memory.of({"imu.npz": samples})
+    with memory.as_files() as folder:
+        file = log_in(samples, folder)
+        if stated and not isinstance(samples, ImuFile):
+            raise ConfigError("api.table-with-options", quantity=next(iter(stated)))
+        if isinstance(samples, ImuFile):
+            table = specify(LogTable, **{**file.log.model_dump(exclude_none=True), **stated})
+            axes, name = axes or file.axes, Path(table.path).resolve().stem
+        else:
+            table, name = file.log, "imu"
+        stated = {"axes": axes, "at_rest": at_rest, "target": target}
+        spec = specify(AllanSpec, name=name, log=table, **stated)
+        run = run_allan(spec, progress)
+        return replace(run, memory=memory).in_folder(folder, NOWHERE)

@@ -1,0 +1,129 @@
+"""``strapdown allan``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from strapdown.cli.shared_options import (
+    LOG_FLAGS,
+    LogFlags,
+    ReportFlags,
+    as_flag,
+    folder_to_make,
+    log_keys,
+    running,
+    spread,
+    writing,
+)
+from strapdown.errors import ConfigError
+
+if TYPE_CHECKING:
+    from strapdown.progress import Progress
+    from strapdown.systems.allan_run import AllanRun
+
+EPILOG = (
+    "Example: strapdown allan unmoved.csv --sensor-file mine.toml\n\n"
+    "Example: strapdown allan unmoved.csv --for KF-GINS"
+)
+MOST = 4  # findings on the terminal
+
+
+@spread
+def allan(
+    log: Annotated[
+        Path, typer.Argument(metavar="LOG", help="Log of an unmoved sensor, an hour or more.")
+    ],
+    program: Annotated[
+        str | None,
+        running(
+            "PROGRAM",
+            "Print the noise as the parameters of another program, too: KF-GINS, OB_GINS, GTSAM, "
+            "kalibr, ORB-SLAM3, robot_localization, PX4, NaveGo, PSINS, data-sheet.",
+            "--for",
+        ),
+    ] = None,
+    at_rest: Annotated[
+        bool,
+        running(
+            None, "Use the whole log, or its part, as stationary, without a test.", "--at-rest"
+        ),
+    ] = False,
+    sensor_file: Annotated[
+        Path | None,
+        writing("FILE.toml", "Write the sensor here, for --sensor of navigate and align."),
+    ] = None,
+    *,
+    flags: LogFlags,
+    out: Annotated[Path | None, folder_to_make("LOG-allan")] = None,
+    write: ReportFlags,
+) -> None:
+    """Find the noise of a sensor from a log at rest: Allan deviation, noise terms, sensor file.
+
+    White noise (angle and velocity random walk), bias instability or Gauss-Markov process, random
+    walk, quantization and ramp of each channel, by maximum likelihood, with 95 % intervals; a term
+    that the record does not show has an upper bound.
+    """
+    from strapdown.api.allan import allan as analyse
+    from strapdown.cli.console import print_findings, print_seal
+    from strapdown.cli.result_folder import default_folder, refuse_result, run_and_save
+
+    refuse_result(log, "log")
+    if sensor_file is not None:
+        _refuse_sensor_file(sensor_file, write.force)
+    keys = {key: value for key, value in log_keys(flags.given()).items() if value}
+    runs: list[AllanRun] = []
+
+    def compute(report: Progress) -> AllanRun:
+        try:
+            keys.update(axes=flags.axes, at_rest=at_rest, target=program)
+            run = analyse(str(log), progress=report, **keys)
+        except ConfigError as error:
+            raise as_flag(error, _flag) from None
+        runs.append(run)
+        return run
+
+    done = run_and_save(compute, out or default_folder(log, "allan"), write, "allan.json")
+    if sensor_file is not None:
+        from strapdown.bundle.atomic_folder import replace_file
+
+        replace_file(sensor_file, runs[0].sensor_text().encode())
+    if done is not None:
+        result, seal = done
+        print_noise(result, sensor_file)
+        print_findings(result.findings, MOST)
+        print_seal(seal, "allan.json", write.no_report)
+
+
+def _flag(place: str) -> str:
+    return (
+        "--for"
+        if place == "target"
+        else LOG_FLAGS.get(place, LOG_FLAGS.get(f"log, {place}", place))
+    )
+
+
+def _refuse_sensor_file(path: Path, force: bool) -> None:
+    if path.suffix.lower() != ".toml":
+        raise ConfigError("cli.sensor-file-no-toml", quantity="--sensor-file", file=path.name)
+    if path.exists() and not force:
+        raise ConfigError("cli.file-exists", quantity="--sensor-file", file=path.name)
+
+
+def print_noise(result: AllanRun, sensor_file: Path | None) -> None:
+    """Print the terms of each channel, the parameters of another program, and the next command."""
+    from strapdown.cli.console import console, print_block
+    from strapdown.report.allan import headline, parameter_table, term_tables
+    from strapdown.report.values import spaced
+
+    out = console()
+    out.print(spaced(headline(result)), style="bold")
+    for block in (*term_tables(result), parameter_table(result)):
+        if block is not None:
+            print_block(block)
+            if block.caption:
+                out.print(spaced(block.caption), style="dim")
+    if sensor_file is not None:
+        out.print(f"Sensor {sensor_file}: strapdown navigate LOG --sensor {sensor_file}")

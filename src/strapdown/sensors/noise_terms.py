@@ -1,0 +1,642 @@
+"""Noise terms of a stationary channel, with intervals, by maximum likelihood."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from strapdown.errors import DataError
+from strapdown.sensors.allan import LEAST_SAMPLES, TERMS, block_covariance, shape
+
+Array = NDArray[np.float64]
+
+# The likelihood. The record is cut into runs of blocks; the mean of a run is a block of the next
+# level. Within a run, differences from its mean are Gaussian with a covariance that the terms give
+# exactly, and for white noise independent of every other level. The few runs of the last level are
+# one vector, of which mean and ramp are projected out (restricted maximum likelihood).
+
+#: Blocks in a run and in the last level, at most; and shortest run of shapes kept where a sensor's
+#: own filter colors the highest frequencies.
+RUN, TOP, LEAST_RUN = 64, 96, 7
+#: Twice the gain in log-likelihood that a further parameter must bring: a chance of 0.1 %.
+DEMANDED = 10.8
+#: Twice the log-likelihood by which a model may be worse and yet not be excluded.
+ALIKE = 6.6
+#: Quantiles of chi-square with one degree: 95 % two-sided, and 95 % one-sided.
+TWO_SIDED, ONE_SIDED = 3.841, 2.706
+#: Relative standard deviation of a variance below which its logarithm is as good as Gaussian.
+WELL_KNOWN = 0.1
+#: A level whose shapes exceed the model by this share, beyond 5 standard deviations, is colored.
+COLORED, SURELY = 0.05, 5.0
+ITERATIONS = 40
+#: Least variance, in units of that of the record; and furthest end of an interval, logarithms.
+TINY, FURTHEST = 1e-30, 30.0
+#: Correlation times of a Gauss-Markov process in a record, at least: a slower one is a random walk,
+#: if its driving noise has that one's variance within its interval and this factor.
+SLOWEST, SAME = 10.0, 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """Second moments of the runs of one level.
+
+    Attributes
+    ----------
+    block : float, s
+    count : int
+        Blocks in a run.
+    basis : ndarray, (count, k)
+        Orthonormal, without the mean; in the last level without the ramp.
+    moments : ndarray, (k, k), u²
+        Mean product of the coefficients in the basis.
+    runs : int
+    """
+
+    block: float
+    count: int
+    basis: Array
+    moments: Array
+    runs: int
+
+    def covariance(self, term: str, correlation: float) -> Array:
+        """Covariance of the coefficients by a term with coefficient one."""
+        whole = block_covariance(term, self.count, self.block, correlation)
+        return np.asarray(self.basis.T @ whole @ self.basis)
+
+    def lowest(self, kept: int) -> Level:
+        """The level with its `kept` lowest frequencies alone."""
+        return Level(
+            self.block, self.count, self.basis[:, :kept], self.moments[:kept, :kept], self.runs
+        )
+
+
+def levels_of(
+    rate: Array, dt: float, beside: Array | None = None
+) -> tuple[tuple[Level, ...], Array, Array, float]:
+    """Levels of a record, and of the last one the means, what is projected out, and the block in s.
+
+    `beside`: a regressor, such as temperature, that is projected out with mean and ramp.
+    """
+    n = rate.size
+    whole = max(1, math.ceil(n / TOP))
+    count = max(1, math.ceil(math.log(whole) / math.log(RUN) - 1e-9)) if whole > 1 else 0
+    run = max(2, math.ceil(whole ** (1.0 / count) - 1e-9)) if count else 1
+    basis = _cosines(run) if count else np.empty((0, 0))
+    means, block, found = rate, dt, []
+    for _ in range(count):
+        rows = means[: means.size // run * run].reshape(-1, run)
+        second = np.zeros((run, run))
+        for first in range(0, len(rows), 65536):
+            part = rows[first : first + 65536]
+            second += part.T @ part
+        moments = basis.T @ second @ basis / len(rows)
+        found.append(Level(block, run, basis, moments, len(rows)))
+        means, block = rows.mean(axis=1), block * run
+    middle = (np.arange(means.size) - 0.5 * (means.size - 1)) * block
+    line = np.column_stack([np.ones(means.size), middle])
+    if beside is not None:
+        over = run**count
+        warm = beside[: means.size * over].reshape(-1, over).mean(axis=1)
+        line = np.column_stack([line, warm - warm.mean()])
+    last = np.linalg.svd(line / np.abs(line).max(axis=0))[0][:, line.shape[1] :]
+    z = last.T @ means
+    found.append(Level(block, means.size, last, np.outer(z, z), 1))
+    return tuple(found), means, line, block
+
+
+def _cosines(count: int) -> Array:
+    """Orthonormal cosines of the second kind without the mean, the slowest first."""
+    at, k = np.arange(count) + 0.5, np.arange(1, count)
+    return np.asarray(np.sqrt(2.0 / count) * np.cos(math.pi / count * np.outer(at, k)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """Maximum of the likelihood over the variances (squared coefficients) of some terms."""
+
+    names: tuple[str, ...]
+    variances: Array
+    value: float  # log-likelihood
+    information: Array  # of the logarithms of the variances
+    correlation: float = math.inf
+    edge: bool = False  # the best correlation time is that or beyond: never the choice
+
+    @property
+    def penalized(self) -> float:
+        if self.edge:
+            return -math.inf
+        count = len(self.names) + (1 if "GM" in self.names else 0)
+        return 2.0 * self.value - DEMANDED * count
+
+    def variance(self, name: str) -> float:
+        return float(self.variances[self.names.index(name)])
+
+
+class _Record:
+    """Levels of a record with the covariances of the terms on them, each made once."""
+
+    def __init__(self, levels: tuple[Level, ...]) -> None:
+        self.levels = levels
+        self._made: dict[tuple[str, float], list[Array]] = {}
+
+    def covariances(self, term: str, correlation: float) -> list[Array]:
+        key = (term, correlation if term == "GM" else 0.0)
+        if key not in self._made:
+            if term == "GM" and len(self._made) > 60:
+                self._made = {k: v for k, v in self._made.items() if k[0] != "GM"}
+            self._made[key] = [one.covariance(term, correlation) for one in self.levels]
+        return self._made[key]
+
+    def likelihood(
+        self, variances: Array, shapes: list[list[Array]], derivatives: bool = True
+    ) -> tuple[float, Array, Array]:
+        """Log-likelihood, its gradient and the information in the logarithms of the variances."""
+        count = len(variances)
+        value, slope, information = 0.0, np.zeros(count), np.zeros((count, count))
+        for k, level in enumerate(self.levels):
+            sigma = sum(v * s[k] for v, s in zip(variances, shapes, strict=True))
+            try:
+                factor = np.linalg.cholesky(sigma)
+            except np.linalg.LinAlgError:
+                return -math.inf, slope, information
+            inverse = np.linalg.inv(factor)
+            inverse = inverse.T @ inverse
+            fitted = inverse @ level.moments
+            log_det = 2.0 * float(np.log(np.diag(factor)).sum())
+            value -= 0.5 * level.runs * (log_det + float(np.trace(fitted)))
+            if not derivatives:
+                continue
+            parts = [inverse @ (v * s[k]) for v, s in zip(variances, shapes, strict=True)]
+            for i in range(count):
+                slope[i] += 0.5 * level.runs * float(np.sum(parts[i] * fitted.T))
+                slope[i] -= 0.5 * level.runs * float(np.trace(parts[i]))
+                for j in range(i + 1):
+                    both = 0.5 * level.runs * float(np.sum(parts[i] * parts[j].T))
+                    information[i, j] += both
+                    information[j, i] = information[i, j]
+        return value, slope, information
+
+    def fit(
+        self,
+        names: tuple[str, ...],
+        start: Array,
+        correlation: float = math.inf,
+        held: int = -1,
+    ) -> _Fit:
+        """Maximize over the logarithms of the variances by scoring; `held`: one that stays."""
+        shapes = [self.covariances(name, correlation) for name in names]
+        free = [k for k in range(len(names)) if k != held]
+        log = np.log(np.maximum(start, TINY))
+        value, slope, information = self.likelihood(np.exp(log), shapes)
+        for _ in range(ITERATIONS):
+            if not free or not math.isfinite(value):
+                break
+            inner = information[np.ix_(free, free)]
+            # A term that the record does not show has no information; it shrinks by steps.
+            inner = inner + 1e-3 * np.eye(len(free))
+            step = np.clip(np.linalg.solve(inner, slope[free]), -3.0, 3.0)
+            size = 1.0
+            while size > 1e-3:
+                trial = log.copy()
+                trial[free] += size * step
+                new, s, i = self.likelihood(np.exp(trial), shapes)
+                if new >= value - 1e-9:
+                    break
+                size *= 0.5
+            else:
+                break
+            gained = new - value
+            log, value, slope, information = trial, new, s, i
+            if gained < 1e-5:
+                break
+        return _Fit(names, np.exp(log), value, information, correlation)
+
+
+@dataclass(frozen=True)
+class NoiseTerm:
+    """One noise term of a channel.
+
+    Attributes
+    ----------
+    name : str
+        ``Q``, ``N``, ``B``, ``K``, ``R``, or ``GM`` (standard deviation) and ``T`` (its correlation
+        time in s); ``C``, the effect of temperature in u/°C, of either sign.
+    value : float
+        In u s (Q), u √s (N), u (B, GM), u/√s (K), u/s (R), u being rad/s or m/s²; NaN if the record
+        does not show the term.
+    low, high : float
+        95 % interval; of a term that is not observable zero and its 95 % upper bound, or NaN.
+    observable : bool
+        Whether every model that the record does not exclude has the term.
+    """
+
+    name: str
+    value: float
+    low: float
+    high: float
+    observable: bool
+
+
+@dataclass(frozen=True, eq=False)
+class ChannelNoise:
+    """Noise of one channel.
+
+    Attributes
+    ----------
+    terms : tuple of NoiseTerm
+    model : mapping of str to float
+        Coefficients of the model chosen, observable or not; ``R`` if the ramp is.
+    correlation_time : float, s
+        Of its Gauss-Markov process; infinite without one.
+    up_to_hz : float
+        Highest frequency that was used: half the rate, or less where the noise is colored.
+    alike : bool
+        Whether another model without one of its slow terms describes the record as well.
+    """
+
+    terms: tuple[NoiseTerm, ...]
+    model: Mapping[str, float]
+    correlation_time: float
+    up_to_hz: float
+    alike: bool = False
+
+    def term(self, name: str) -> NoiseTerm:
+        """Return the term of a name."""
+        return next(one for one in self.terms if one.name == name)
+
+
+def noise_terms(rate: ArrayLike, dt: float, temperature: ArrayLike | None = None) -> ChannelNoise:
+    """Noise terms of a stationary channel, by maximum likelihood.
+
+    Parameters
+    ----------
+    rate : array_like, (n,), u
+        Angular rate or specific force; its mean does not matter.
+    dt : float, s
+    temperature : array_like, (n,), °C, optional
+        Its effect is estimated with the noise, and is not part of it.
+
+    Returns
+    -------
+    ChannelNoise
+        Models of white noise, with and without Q, and with none, B, K, both, a Gauss-Markov
+        process, or that with K, are compared; a parameter must gain 5.4 in log-likelihood. The
+        intervals are those of the likelihood ratio (profile), where the variance of a term is
+        known to worse than 10 %, else Gaussian in its logarithm.
+
+    Raises
+    ------
+    DataError
+        The record has fewer than 1000 samples, or a channel is constant.
+    """
+    values = np.array(rate, dtype=np.float64)
+    if values.size < LEAST_SAMPLES:
+        raise DataError("allan.too-short", samples=values.size, least=LEAST_SAMPLES)
+    values -= values.mean()
+    white = float(values.var()) * dt
+    if not white > 0.0:
+        raise DataError("allan.constant")
+    # In units of its own size, so that no number of the fit depends on the unit.
+    unit = math.sqrt(white)
+    values /= unit
+    beside = None if temperature is None else np.asarray(temperature, dtype=np.float64)
+    levels, means, line, block = levels_of(values, dt, beside)
+    if beside is not None:
+        share = np.linalg.lstsq(line, means, rcond=None)[0][2]
+        levels = levels_of(values - share * (beside - beside.mean()), dt, beside)[0]
+    whole = True
+    while True:
+        record = _Record(levels)
+        fits = _models(record, dt, values.size * dt, whole)
+        best = max(fits, key=lambda one: one.penalized)
+        cut = _without_colored(levels, record, best)
+        if cut is None:
+            break
+        levels, whole = cut, False
+    terms = _intervals(record, fits, best)
+    walk = next(one.high for one in terms if one.name == "K")
+    models = [*_alike(fits, best), _with_walk(best, walk**2)]
+    for column, name in enumerate(("R", "C")[: line.shape[1] - 1], 1):
+        terms.append(_slope_term(name, [_slope(f, means, line, block, column) for f in models]))
+    ramp = next(one for one in terms if one.name == "R")
+    model = {name: math.sqrt(best.variance(name)) for name in best.names}
+    if ramp.observable:
+        model["R"] = ramp.value
+    doubtful = [t for t in terms if t.name in ("B", "K", "GM") and t.value > 0.0]
+    first = levels[0]
+    return ChannelNoise(
+        tuple(_scaled(one, unit) for one in terms),
+        {name: unit * value for name, value in model.items()},
+        best.correlation,
+        first.basis.shape[1] / (2.0 * first.count * first.block),
+        any(not t.observable for t in doubtful),
+    )
+
+
+def _scaled(term: NoiseTerm, unit: float) -> NoiseTerm:
+    if term.name == "T":
+        return term
+    return NoiseTerm(
+        term.name, unit * term.value, unit * term.low, unit * term.high, term.observable
+    )
+
+
+def _models(record: _Record, dt: float, span: float, whole: bool) -> list[_Fit]:
+    """Fits of all models; the first level decides about Q, if it is `whole`."""
+    first = record.levels[0]
+    white = float(np.median(np.diag(first.moments))) * first.block
+    plain = record.fit(("N",), np.array([white]))
+    n = plain.variances[0]
+    # Where white noise crosses the other terms, if they begin within the record.
+    middle = math.sqrt(first.block * span)
+    start = {"B": n / middle, "K": n / middle**2, "GM": n / middle, "Q": n * dt}
+    fits = [plain]
+    names: tuple[str, ...]
+    for names in (("N", "B"), ("N", "K"), ("N", "B", "K")):
+        known = [f for f in fits if set(f.names) < set(names)]
+        near = max(known, key=lambda f: f.value)
+        begin = [near.variance(x) if x in near.names else 0.1 * start[x] for x in names]
+        fits.append(record.fit(names, np.maximum(begin, 1e-12 * n)))
+    richest = fits[-1]
+    with_q = record.fit(("Q", *richest.names), np.array([0.1 * start["Q"], *richest.variances]))
+    quantized = whole and 2.0 * (with_q.value - richest.value) > DEMANDED
+    own: tuple[str, ...] = ("Q", "N") if quantized else ("N",)
+    if quantized:
+        q = with_q.variances[0]
+        fits = [record.fit(("Q", *f.names), np.array([q, *f.variances])) for f in fits]
+    # Over the correlation time: a coarse grid, then the parabola about the best.
+    low, high = 4.0 * dt * first.count, span / SLOWEST
+    base = min(fits, key=lambda f: f.value)
+    for names in (("GM",), ("K", "GM")):
+        if low >= high:
+            break
+        grid = list(np.geomspace(low, high, 9))
+        begin = [base.variance(x) if x in base.names else 0.3 * start[x] for x in (*own, *names)]
+        tried = [record.fit((*own, *names), np.array(begin), t) for t in grid]
+        fits += _refined(record, tried)
+    return fits
+
+
+def _refined(record: _Record, tried: list[_Fit]) -> list[_Fit]:
+    """Fit at the best correlation time; of an end of the range, that end."""
+    for _ in range(3):
+        k = int(np.argmax([one.value for one in tried]))
+        if k in (0, len(tried) - 1):
+            return [replace(tried[k], edge=True)]
+        near = tried[k]
+        sides = [
+            record.fit(near.names, near.variances, math.sqrt(near.correlation * one.correlation))
+            for one in (tried[k - 1], tried[k + 1])
+        ]
+        tried = [tried[k - 1], sides[0], near, sides[1], tried[k + 1]]
+    # The maximum of the parabola through three in the logarithm of the time.
+    k = int(np.argmax([one.value for one in tried]))
+    if k in (0, len(tried) - 1):
+        return [tried[k]]
+    x = np.log([one.correlation for one in tried[k - 1 : k + 2]])
+    a, b, _c = np.polyfit(x - x[1], [one.value for one in tried[k - 1 : k + 2]], 2)
+    at = x[1] - 0.5 * b / a if a < 0.0 else x[1]
+    found = record.fit(tried[k].names, tried[k].variances, float(np.exp(at)))
+    return [max((found, tried[k]), key=lambda f: f.value)]
+
+
+def _without_colored(
+    levels: tuple[Level, ...], record: _Record, best: _Fit
+) -> tuple[Level, ...] | None:
+    """Levels without the highest frequencies, if those do not agree with the model; else None."""
+    if len(levels) < 2:
+        return None
+    first = levels[0]
+    shapes = [record.covariances(name, best.correlation)[0] for name in best.names]
+    model = np.diag(sum(v * s for v, s in zip(best.variances, shapes, strict=True)))
+    ratio = np.diag(first.moments) / model - 1.0
+    count = ratio.size
+    parts = np.array_split(np.arange(count), max(1, count // 4))
+    sd = [math.sqrt(2.0 / (first.runs * part.size)) for part in parts]
+    off = [abs(float(ratio[part].mean())) for part in parts]
+    if all(o < max(COLORED, SURELY * s) for o, s in zip(off, sd, strict=True)):
+        return None
+    kept = count // 2
+    if kept >= LEAST_RUN:
+        return (first.lowest(kept), *levels[1:])
+    return levels[1:] if len(levels) > 2 else None
+
+
+def _alike(fits: list[_Fit], best: _Fit) -> list[_Fit]:
+    """Fits that the likelihood does not exclude, whatever their number of parameters."""
+    return [f for f in fits if 2.0 * f.value > 2.0 * best.value - ALIKE]
+
+
+def _intervals(record: _Record, fits: list[_Fit], best: _Fit) -> list[NoiseTerm]:
+    alike = _alike(fits, best)
+    plain, robust = _covariances(record, best)
+    terms = []
+    for name in TERMS:
+        if name in best.names:
+            ends = _profile(record, best, best.names.index(name), plain, robust)
+            low, high = (best.variance(name) * math.exp(end) for end in ends)
+            everywhere = ends[0] > -FURTHEST and all(
+                name in f.names or _drives(f, name, low, high) for f in alike
+            )
+            value = math.sqrt(best.variance(name))
+            terms.append(NoiseTerm(name, value, math.sqrt(low), math.sqrt(high), everywhere))
+            if name == "GM":
+                time = best.correlation
+                ends = _profile(record, best, len(best.names), plain, robust)
+                low, high = (time * math.exp(end) for end in ends)
+                terms.append(NoiseTerm("T", time, low, high, everywhere))
+        elif name in ("Q", "B", "K"):
+            bound = math.sqrt(_upper_bound(record, best, name))
+            terms.append(NoiseTerm(name, math.nan, 0.0, bound, False))
+    return terms
+
+
+def _drives(fit: _Fit, name: str, low: float, high: float) -> bool:
+    """Whether a process as slow as can be told from a random walk is driven by the same noise."""
+    if name != "K" or not fit.edge:
+        return False
+    return low / SAME <= 2.0 * fit.variance("GM") / fit.correlation <= SAME * high
+
+
+def _profile(
+    record: _Record, best: _Fit, k: int, plain: Array, robust: Array
+) -> tuple[float, float]:
+    """Ends of the 95 % interval of parameter k, in its logarithm about the maximum.
+
+    Parameters are the variances and, of a Gauss-Markov process, last its correlation time. By the
+    profile of the likelihood, which is as much too narrow as the plain covariance is.
+    """
+    sd, limit = math.sqrt(robust[k, k]), TWO_SIDED * robust[k, k] / plain[k, k]
+    sd = min(sd, FURTHEST / 4.0)
+    if sd < WELL_KNOWN:
+        return -1.96 * sd, 1.96 * sd
+    starts = {0.0: best}
+
+    def lost(offset: float) -> float:
+        near = starts[min(starts, key=lambda x: abs(x - offset))]
+        if k == len(best.names):
+            fit = record.fit(best.names, near.variances, best.correlation * math.exp(offset))
+            starts[offset] = fit
+            return 2.0 * (best.value - fit.value)
+        begin = near.variances.copy()
+        begin[k] = best.variances[k] * math.exp(offset)
+        if "GM" not in best.names:
+            fit = starts[offset] = record.fit(best.names, begin, held=k)
+            return 2.0 * (best.value - fit.value)
+        # The time that goes with it by the covariance, and the parabola about that.
+        slope, wide = plain[-1, k] / plain[k, k], 0.7 * math.sqrt(plain[-1, -1])
+        times = best.correlation * np.exp(slope * offset + wide * np.array([-1.0, 0.0, 1.0]))
+        fits = [record.fit(best.names, begin, float(t), held=k) for t in times]
+        low, middle, high = (one.value for one in fits)
+        bend = low - 2.0 * middle + high
+        top = max(low, middle, high)
+        if bend < 0.0:
+            top = max(top, middle - 0.125 * (high - low) ** 2 / bend)
+        starts[offset] = fits[1]
+        return 2.0 * (best.value - top)
+
+    low, high = (_crossing(lost, sign * 1.96 * sd, limit) for sign in (-1.0, 1.0))
+    return low, high
+
+
+def _crossing(lost: Callable[[float], float], first: float, limit: float) -> float:
+    """Where a loss that is nearly quadratic reaches a limit, from a first guess."""
+    inside, outside, at = 0.0, math.inf, first
+    for _ in range(12):
+        found = lost(at)
+        if abs(found - limit) < 0.01 * limit:
+            break
+        if found > limit:
+            outside = abs(at)
+        else:
+            inside = abs(at)
+        step = abs(at) * math.sqrt(limit / max(found, 0.1 * limit))
+        if not inside < step < outside:
+            step = 0.5 * (inside + outside) if math.isfinite(outside) else 2.0 * abs(at)
+        at = math.copysign(min(step, FURTHEST), first)
+        if step > FURTHEST:
+            break
+    return at
+
+
+def _covariances(record: _Record, best: _Fit) -> tuple[Array, Array]:
+    """Covariance of the logarithms of the variances and, of a process, last of its time.
+
+    Returns
+    -------
+    plain, robust : ndarray
+        As if the levels were independent; and with the covariance between each level and the next
+        (sandwich: inverse information, covariance of the scores, inverse information).
+    """
+    names, shapes = best.names, [record.covariances(n, best.correlation) for n in best.names]
+    parts = [[v * m for m in made] for v, made in zip(best.variances, shapes, strict=True)]
+    if "GM" in names:
+        h, size = 0.05, best.variance("GM")
+        up, down = (record.covariances("GM", best.correlation * math.exp(x)) for x in (h, -h))
+        parts.append([size * (u - d) / (2.0 * h) for u, d in zip(up, down, strict=True)])
+    count = len(parts)
+    information, weights = np.zeros((count, count)), []
+    for j, level in enumerate(record.levels):
+        inverse = np.linalg.inv(sum(part[j] for part in parts[: len(names)]))
+        weighted = [inverse @ part[j] for part in parts]
+        weights.append([w @ inverse for w in weighted])
+        for a in range(count):
+            for b in range(count):
+                share = float(np.sum(weighted[a] * weighted[b].T))
+                information[a, b] += 0.5 * level.runs * share
+    plain: Array = np.asarray(np.linalg.inv(information + 1e-12 * np.eye(count)), np.float64)
+    if not set(names) & {"B", "K", "GM"}:
+        return plain, plain
+    scores = information.copy()
+    for j in range(len(record.levels) - 1):
+        across = _across(record.levels[j], record.levels[j + 1], best)
+        runs = record.levels[j + 1].runs
+        right = [across @ w @ across.transpose(0, 2, 1) for w in weights[j + 1]]
+        summed = [r.sum(axis=0) for r in right]
+        for a in range(count):
+            for b in range(count):
+                shared = 0.5 * runs * float(np.sum(weights[j][a] * summed[b].T))
+                scores[a, b] += shared
+                scores[b, a] += shared
+    return plain, np.asarray(plain @ scores @ plain, np.float64)
+
+
+def _across(fine: Level, coarse: Level, fit: _Fit) -> Array:
+    """Covariance, (p, k, m), of a run's k coefficients, at each place p in a run of m above it."""
+    h, wide = fine.block, coarse.block
+    steps = np.arange(1 - coarse.count, coarse.count) * wide
+    d = steps[:, None] + np.arange(fine.count) * h
+    total = np.zeros_like(d)
+    for variance, name in zip(fit.variances, fit.names, strict=True):
+        at = [d + h - wide, d + h, d - wide, d]
+        g = [shape(name, x, fit.correlation) for x in at]
+        total += variance * (g[0] - g[1] - g[2] + g[3]) / (h * wide)
+    projected = total @ fine.basis
+    place = np.arange(coarse.count)
+    lag = place[:, None] - place[None, :] + coarse.count - 1
+    return np.asarray(projected[lag].transpose(0, 2, 1) @ coarse.basis)
+
+
+def _upper_bound(record: _Record, best: _Fit, name: str) -> float:
+    """One-sided 95 % bound of the variance of a term that the model does not have."""
+    names = (*best.names, name)
+    n = best.variance("N")
+    low = n * {"Q": record.levels[0].block ** 2, "B": 1.0, "K": 1.0}[name]
+    fit = record.fit(names, np.append(best.variances, 1e-6 * low), best.correlation)
+    top, log = max(fit.value, best.value), math.log(fit.variances[-1])
+    start = fit.variances
+    # Where the likelihood has fallen: doubling, then bisection.
+    inside, outside, step = log, math.inf, 1.0
+    for _ in range(60):
+        at = inside + step if math.isinf(outside) else 0.5 * (inside + outside)
+        trial = start.copy()
+        trial[-1] = math.exp(at)
+        found = record.fit(names, trial, best.correlation, held=len(names) - 1)
+        if 2.0 * (top - found.value) < ONE_SIDED:
+            inside, start, step = at, found.variances, 1.5 * step
+        else:
+            outside = at
+        if outside - inside < 0.02:
+            break
+    return math.exp(inside)
+
+
+def _slope(fit: _Fit, means: Array, line: Array, block: float, column: int) -> tuple[float, float]:
+    """Coefficient of a column of `line` by generalized least squares, and its sd."""
+    sigma = sum(
+        v * block_covariance(term, means.size, block, fit.correlation)
+        for v, term in zip(fit.variances, fit.names, strict=True)
+    )
+    # The covariance is known up to a constant, which only the mean would see.
+    sigma = sigma + (1.0 + np.abs(sigma).max())
+    weighted = np.linalg.solve(sigma, line)
+    covariance = np.linalg.inv(line.T @ weighted)
+    return float((covariance @ (weighted.T @ means))[column]), math.sqrt(covariance[column, column])
+
+
+def _slope_term(name: str, found: list[tuple[float, float]]) -> NoiseTerm:
+    """Ramp, of which the size counts, or effect of temperature.
+
+    `found`: by each model that is not excluded, and last by one with a random walk as large as the
+    record allows, which a slope may be. Observable beyond 3.3 standard deviations of each, a chance
+    of 0.1 %; the interval is the widest of the others.
+    """
+    observable = all(abs(slope) > 3.3 * sd for slope, sd in found)
+    slope, sd = max(found[:-1], key=lambda one: one[1])
+    if name == "C":
+        return NoiseTerm(name, slope, slope - 1.96 * sd, slope + 1.96 * sd, observable)
+    size = abs(slope)
+    if observable:
+        return NoiseTerm(name, size, size - 1.96 * sd, size + 1.96 * sd, True)
+    return NoiseTerm(name, math.nan, 0.0, max(abs(x) + 1.645 * s for x, s in found), False)
+
+
+def _with_walk(fit: _Fit, variance: float) -> _Fit:
+    """The model with a random walk of a given variance."""
+    kept = [k for k, name in enumerate(fit.names) if name != "K"]
+    names = (*(fit.names[k] for k in kept), "K")
+    return replace(fit, names=names, variances=np.append(fit.variances[kept], variance))

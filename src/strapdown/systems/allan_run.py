@@ -1,0 +1,407 @@
+"""Noise of a sensor from a log at rest: deviations, terms, and the sensor file for a filter."""
+
+from __future__ import annotations
+
+import math
+import shutil
+import tempfile
+import weakref
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.bundle import InputFiles, Seal, input_files
+from strapdown.config.logs import AllanSpec, AxesTable
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.ellipsoids import WGS84
+from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.formats.aid_table import read_stream
+from strapdown.formats.clocks import on_clock_of
+from strapdown.progress import Progress, silent
+from strapdown.sensors.allan import allan_model, deviations
+from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV, KEYS
+from strapdown.sensors.noise_terms import ChannelNoise, noise_terms
+from strapdown.sensors.rest import find_rests
+from strapdown.sensors.triad_errors import ImuErrors, TriadErrors, triad_of
+from strapdown.systems.alignment_source import body_record
+from strapdown.systems.inputs import Memory, SavedRun, refuse_long_span
+from strapdown.systems.one_thread import one_thread
+from strapdown.tables import ACCEL, GYRO, find_gaps
+from strapdown.tables.checks import index_of
+
+if TYPE_CHECKING:
+    from strapdown.report.chart_svg import ChartFigure
+
+__all__ = ["AllanRun", "run_allan"]
+
+Array = NDArray[np.float64]
+
+#: Shortest stationary stretch that is used, and one below which the result says that it is short.
+LEAST_REST, SHORT = 60.0, 1800.0  # s
+#: Share of a log outside its longest rest from which the result says so.
+MOVED = 0.02
+#: Change of temperature of which an effect is estimated, °C; where it may be missing, s.
+LEAST_WARMING, EDGE = 0.5, 10.0
+#: Flat minimum of the Allan deviation of flicker, √(2 ln 2/π) B.
+FLAT = math.sqrt(2.0 * math.log(2.0) / math.pi)
+#: Correlation times to the maximum of the Allan deviation of a Gauss-Markov process.
+MAXIMUM = 1.893
+#: Angle random walk of a class of the catalogue at most, rad/√s: deg/√h times π/10800.
+CLASSES = (
+    ("navigation", 0.005 * math.pi / 10800.0),
+    ("tactical", 0.15 * math.pi / 10800.0),
+    ("industrial", 0.6 * math.pi / 10800.0),
+    ("phone", math.inf),
+)
+#: Gravity on the ground differs from the standard one by so much, m/s².
+GRAVITY_RANGE = 0.03
+#: Keys of the sensor file, by triad and quantity.
+FILE_KEYS = {
+    "gyro": {
+        "noise_density": "noise_density_deg_per_s_per_sqrt_hz",
+        "bias_instability": "bias_instability_deg_per_h",
+        "random_walk": "random_walk_deg_per_h_per_sqrt_h",
+    },
+    "accel": {
+        "noise_density": "noise_density_ug_per_sqrt_hz",
+        "bias_instability": "bias_instability_ug",
+        "random_walk": "random_walk_ug_per_sqrt_h",
+    },
+}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AllanRun(SavedRun):
+    """Noise of a sensor: in memory until `save` writes its page and its data.
+
+    Attributes
+    ----------
+    deviations : DataFrame
+        A row for each channel and averaging time: ``channel``, ``tau`` s, ``allan``, ``modified``,
+        ``hadamard`` and ``model``, of the fitted terms, in rad/s or m/s², ``relative_sd``.
+    noise : dict of str to ChannelNoise
+        By channel, ``gyro_x`` … ``accel_z``.
+    means : dict of str to float
+        Mean of each channel, rad/s or m/s².
+    errors : ImuErrors
+        The noise as the error model of this package has it: white noise, a Gauss-Markov process and
+        a random walk. A flicker is the process with the same maximum of its Allan deviation.
+    findings : tuple of Finding
+    start, end : float, s
+        The stationary stretch.
+    rate_hz : float
+    """
+
+    configuration: ClassVar[str] = "spec"
+
+    spec: AllanSpec
+    name: str
+    deviations: pd.DataFrame
+    noise: dict[str, ChannelNoise]
+    means: dict[str, float]
+    errors: ImuErrors
+    findings: tuple[Finding, ...]
+    start: float
+    end: float
+    rate_hz: float
+    inputs: tuple[InputFiles, ...]
+    memory: Memory = field(default=Memory({}))
+
+    @property
+    def terms(self) -> pd.DataFrame:
+        """One row per channel and term: value, 95 % interval, whether it is observable; SI."""
+        rows = [
+            {
+                "channel": channel,
+                "term": term.name,
+                "value": term.value,
+                "low": term.low,
+                "high": term.high,
+                "observable": term.observable,
+            }
+            for channel, noise in self.noise.items()
+            for term in noise.terms
+        ]
+        return pd.DataFrame(rows)
+
+    def to_pandas(self) -> pd.DataFrame:
+        """The terms; as `terms`."""
+        return self.terms
+
+    @cached_property
+    def _folder(self) -> Path:
+        name = tempfile.mkdtemp(prefix="strapdown-")
+        weakref.finalize(self, shutil.rmtree, name, ignore_errors=True)
+        return Path(name)
+
+    @property
+    def sensor(self) -> Path:
+        """The sensor as a file, for ``sensor=`` of `navigate` and `align`; gone with this run."""
+        path = self._folder / f"{_stem(self.name)}.toml"
+        if not path.is_file():
+            path.write_text(self.sensor_text(), encoding="utf-8")
+        return path
+
+    def sensor_text(self) -> str:
+        """The sensor file, in the form of the catalogue."""
+        return _sensor_text(self)
+
+    def parameters(self, target: str) -> pd.DataFrame:
+        """The noise as the parameters of another program, `sensors.bridge.TARGETS`.
+
+        Returns
+        -------
+        DataFrame
+            ``parameter``, ``triad``, ``unit``, and the values ``x``, ``y``, ``z``.
+        """
+        from strapdown.sensors.bridge import for_program
+
+        span = self.end - self.start
+        found = for_program(self.errors, target, 1.0 / self.rate_hz, span)
+        return pd.DataFrame(
+            [(e.name, e.triad, e.unit, *values) for e, values in found.items()],
+            columns=["parameter", "triad", "unit", "x", "y", "z"],
+        )
+
+    def plot(self) -> ChartFigure:
+        """Draw the Allan deviations with the fitted terms.
+
+        Returns
+        -------
+        ChartFigure
+            Displays itself in a notebook; `save` writes it as SVG, PNG or PDF.
+        """
+        from strapdown.report.allan import allan_chart
+        from strapdown.report.chart_svg import ChartFigure
+
+        return ChartFigure(allan_chart(self))
+
+    @staticmethod
+    def _writer() -> Callable[..., Seal]:
+        from strapdown.report.allan import ALLAN
+
+        return ALLAN.write
+
+    def __repr__(self) -> str:
+        shown = [
+            f"{channel} {' '.join(t.name for t in noise.terms if t.observable)}"
+            for channel, noise in self.noise.items()
+        ]
+        return f"<AllanRun {self.name}, {self.end - self.start:.4g} s: {'; '.join(shown)}>"
+
+
+@one_thread()
+def run_allan(spec: AllanSpec, progress: Progress = silent) -> AllanRun:
+    """Find the noise of a sensor from a log at rest.
+
+    Parameters
+    ----------
+    spec : AllanSpec
+    progress : callable, optional
+        Called with a stage and the share that is done.
+
+    Raises
+    ------
+    DataError
+        The log cannot be read, is not at rest for a minute, or a channel is constant.
+    """
+    progress("reading", 0.05)
+    recording, imu, read = body_record(spec.log, AxesTable(axes=spec.axes))
+    refuse_long_span(imu, recording.name)
+    findings = list(read)
+    progress("finding rests", 0.15)
+    time = index_of(imu)
+    start, end = float(time[0]), float(time[-1])
+    if not spec.at_rest:
+        start, end = _rest(imu, recording.name, findings)
+    first, past = np.searchsorted(time, [start, end + 1e-9])
+    stamps = time[first:past]
+    dt = float(stamps[-1] - stamps[0]) / (stamps.size - 1)
+    warm = _temperature(spec, imu, stamps)
+    gaps = find_gaps(stamps)
+    if gaps:
+        longest = max(gap.end - gap.start for gap in gaps)
+        findings.append(_said("allan.gaps", recording.name, count=len(gaps), longest=longest))
+    noise: dict[str, ChannelNoise] = {}
+    means: dict[str, float] = {}
+    tables = []
+    channels = [c for c in (*GYRO, *ACCEL) if c in imu.columns]
+    for k, channel in enumerate(channels):
+        progress(f"noise of {channel}", 0.2 + 0.55 * k / len(channels))
+        values = np.ascontiguousarray(imu[channel].to_numpy()[first:past], dtype=np.float64)
+        try:
+            found = noise_terms(values, dt, warm)
+        except DataError as error:
+            raise error.replaced(file=recording.name, quantity=channel) from None
+        noise[channel], means[channel] = found, float(values.mean())
+        table = deviations(values, dt)
+        table["model"] = allan_model(found.model, table.index, found.correlation_time)
+        table.insert(0, "channel", channel)
+        tables.append(table.reset_index())
+    findings += _limits(noise, end - start, 0.5 / dt, recording.name)
+    return AllanRun(
+        spec,
+        recording.name,
+        pd.concat(tables, ignore_index=True),
+        noise,
+        means,
+        _errors(noise, dt, end - start),
+        tuple(findings),
+        start,
+        end,
+        1.0 / dt,
+        (input_files("log", spec.log.path, recording.files),),
+    )
+
+
+def _rest(imu: pd.DataFrame, name: str, findings: list[Finding]) -> tuple[float, float]:
+    """Ends of the longest stationary stretch, s."""
+    time = index_of(imu)
+    whole = float(time[-1] - time[0])
+    rests = find_rests(imu)
+    longest = max(rests, key=lambda r: r.end - r.start, default=None)
+    length = 0.0 if longest is None else longest.end - longest.start
+    if longest is None or length < LEAST_REST:
+        raise DataError(
+            "allan.not-at-rest", file=name, longest=length, whole=whole, least=LEAST_REST
+        )
+    share = length / whole
+    if share < 1.0 - MOVED:
+        at = {"start": longest.start, "end": longest.end}
+        findings.append(_said("allan.moved", name, count=len(rests), share=share, **at))
+    return longest.start, longest.end
+
+
+def _temperature(spec: AllanSpec, imu: pd.DataFrame, stamps: Array) -> Array | None:
+    """Temperature of the log at the stamps, °C; None without one, or if it hardly changes."""
+    try:
+        stream = read_stream(spec.log.path, "barometer", spec.log.format)
+        stream, _ = on_clock_of(stream, imu)
+    except (DataError, ConfigError):
+        return None
+    if "temperature" not in stream.columns:
+        return None
+    stream = stream.dropna(subset=["temperature"])
+    time, values = index_of(stream), stream["temperature"].to_numpy(dtype=np.float64)
+    if len(values) < 2 or time[0] > stamps[0] + EDGE or time[-1] < stamps[-1] - EDGE:
+        return None
+    at = np.interp(stamps, time, values)
+    return at if np.ptp(at) > LEAST_WARMING else None
+
+
+def _said(code: str, name: str, **data: Any) -> Finding:
+    return Finding(code, severity="warning", file=name, data=data)
+
+
+def _limits(
+    noise: dict[str, ChannelNoise], length: float, nyquist: float, name: str
+) -> Iterable[Finding]:
+    if length < SHORT:
+        yield _said("allan.short", name, minutes=length / 60.0)
+    colored = [c for c, one in noise.items() if one.up_to_hz < 0.9 * nyquist]
+    if colored:
+        yield _said(
+            "allan.colored", name, channels=colored, hz=min(noise[c].up_to_hz for c in colored)
+        )
+    alike = [c for c, one in noise.items() if one.alike]
+    if alike:
+        yield _said("allan.models-alike", name, channels=alike)
+
+
+# The error model of this package.
+
+
+def _errors(noise: dict[str, ChannelNoise], dt: float, length: float) -> ImuErrors:
+    """White noise, Gauss-Markov process and random walk of each triad.
+
+    Of a flicker, the Gauss-Markov process has the same maximum of the Allan deviation, where the
+    deviation of all terms is least; of several axes one correlation time, the geometric mean.
+    """
+    made: dict[str, TriadErrors] = {}
+    for triad, channels in (("gyro", GYRO), ("accel", ACCEL)):
+        if channels[0] not in noise:
+            continue
+        axes = [noise[channel] for channel in channels]
+        sizes, times = [], []
+        for one in axes:
+            size = one.model.get("GM", one.model.get("B", 0.0) * FLAT / ALLAN_OF_GAUSS_MARKOV)
+            sizes.append(size)
+            if "GM" in one.model:
+                times.append(one.correlation_time)
+            elif size > 0.0:
+                tau = np.geomspace(dt, length / 4.0, 200)
+                least = tau[int(np.argmin(allan_model(one.model, tau)))]
+                times.append(float(least) / MAXIMUM)
+        made[triad] = TriadErrors(
+            noise_density=triad_of([one.model["N"] for one in axes]),
+            bias_instability=triad_of(sizes),
+            correlation_time=math.exp(float(np.mean(np.log(times)))) if times else math.inf,
+            random_walk=triad_of([one.model.get("K", 0.0) for one in axes]),
+        )
+    return ImuErrors(made["gyro"], made.get("accel"))
+
+
+def _stem(name: str) -> str:
+    kept = "".join(
+        c if c.isascii() and (c.isalnum() or c in "-_") else "-" for c in Path(name).stem
+    )
+    return kept.strip("-") or "sensor"
+
+
+def _sensor_text(run: AllanRun) -> str:
+    """The sensor file: every value with the record as its source."""
+    largest = max(run.errors.gyro.axis("noise_density"))
+    grade = next(name for name, most in CLASSES if largest <= most)
+    spans = f"{run.start:.6g} s to {run.end:.6g} s of the log at {run.rate_hz:.6g} Hz"
+    lines = [
+        f'title = "sensor of {_stem(run.name)}"',
+        f'class = "{grade}"',
+        'summary = "noise by strapdown allan; without scale factor and misalignment"',
+        "",
+        "[sources]",
+        f'log = "{_stem(run.name)}, strapdown allan"',
+    ]
+    for triad, errors in (("gyro", run.errors.gyro), ("accel", run.errors.accel)):
+        if errors is None:
+            continue
+        lines += ["", f"[{triad}]"]
+        for quantity, key in FILE_KEYS[triad].items():
+            values = [v / KEYS[triad][key].factor for v in errors.axis(quantity)]
+            if any(values):
+                numbers = ", ".join(repr(float(f"{v:.6g}")) for v in values)
+                lines.append(
+                    f'{key} = {{ value = [{numbers}], source = "log", place = "{spans}" }}'
+                )
+        if math.isfinite(errors.correlation_time):
+            time = float(f"{errors.correlation_time:.6g}")
+            lines.append(
+                f'correlation_time_s = {{ value = {time!r}, source = "log", place = "{spans}" }}'
+            )
+        lines.append(_bias(run, triad))
+        rate = float(f"{run.rate_hz:.6g}")
+        lines.append(f'output_rate_hz = {{ value = {rate!r}, source = "log", place = "{spans}" }}')
+    return "\n".join(lines) + "\n"
+
+
+def _bias(run: AllanRun, triad: str) -> str:
+    """The bias as the mean of the record leaves it open, without position and attitude.
+
+    The size of the mean rate is the Earth's, that of the mean specific force the local gravity,
+    9.806 m/s² within `GRAVITY_RANGE`, but for the bias along it.
+    """
+    channels, size = (GYRO, WGS84.rotation_rate) if triad == "gyro" else (ACCEL, STANDARD_GRAVITY)
+    off = abs(math.sqrt(math.fsum(run.means[c] ** 2 for c in channels)) - size)
+    if triad == "gyro":
+        why = "mean rate of the log less the rotation rate of the Earth"
+        key, value = "bias_sd_deg_per_h", off / KEYS[triad]["bias_sd_deg_per_h"].factor
+    else:
+        why = "mean specific force of the log less gravity, which is not known to 3 mg"
+        off = math.hypot(off, GRAVITY_RANGE)
+        key, value = "bias_sd_mg", off / KEYS[triad]["bias_sd_mg"].factor
+    return f'{key} = {{ value = {float(f"{value:.3g}")!r}, assumed = "{why}" }}'
