@@ -49,7 +49,7 @@ QUERIES = {
     "gyro bias": "error_models sensors attitude",
     "imu noise": "sensors allan",
     "arw": "sensors allan",
-    "allan": "allan api/strapdown.allan",
+    "allan": "allan",
     "delta-v": "crash crash_tutorial",
     "pdof": "crash conventions",
     "edr": "crash crash_tutorial formats",
