@@ -70,8 +70,8 @@ from strapdown.systems.navigation_source import (
     said_of_file,
 )
 from strapdown.systems.one_thread import one_thread
-from strapdown.tables import EULER, GEODETIC, POSITION_SD, VELOCITY
-from strapdown.tables.checks import source_of, values_of
+from strapdown.tables import EULER, GEODETIC, POSITION_SD, VELOCITY, usable
+from strapdown.tables.checks import index_of, source_of, values_of
 from strapdown.tables.on_disk import tidy
 
 if TYPE_CHECKING:
@@ -228,7 +228,7 @@ def run_navigation(
             source.imu,
             source.tables,
             withheld_aid(spec),
-            _test_outages(spec.withhold, begun, end),
+            _test_outages(spec.withhold, begun, end, source.tables.get(withheld_aid(spec))),
             begun,
             after,
         )
@@ -486,18 +486,29 @@ def _begun(record: NavigationRecord) -> float:
     return max([float(record.trajectory.index[0]), *(one.end for one in aligned)])
 
 
-def _test_outages(asked: WithholdTable, begun: float, end: float) -> Sequence[Span]:
-    """Spans of the GNSS outage test of a run from `begun` to `end`."""
+def _test_outages(
+    asked: WithholdTable, begun: float, end: float, fixes: pd.DataFrame | None
+) -> Sequence[Span]:
+    """Spans of the GNSS outage test of a run from `begun` to `end`.
+
+    Of those that are chosen here, spans without a fix to compare with are left out, unless none
+    has one.
+    """
     from strapdown.navigation.outage_test import SETTLED, spans_to_withhold
 
     if asked.spans_s:
         return [Span(f"{e - b:g} s", b, e) for b, e in asked.spans_s]
     first = begun + SETTLED if asked.from_s is None else asked.from_s
-    return [
+    spans = [
         span
         for length in asked.lengths_s
         for span in spans_to_withhold(first, end, length, asked.places)
     ]
+    if fixes is None or "quality" not in fixes:
+        return spans
+    time = index_of(fixes)[usable(fixes, POSITION_SD[:2])]
+    ends = [np.searchsorted(time, (one.begin, one.end), side="right") for one in spans]
+    return [one for one, (a, b) in zip(spans, ends, strict=True) if b > a] or spans
 
 
 def _against_truth(

@@ -13,9 +13,13 @@ from tests.coded import coded
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import town_drive as town
+from strapdown.config.navigation import WithholdTable
+from strapdown.config.spec import specify
 from strapdown.errors import ConfigError
 from strapdown.navigation.outage_test import spans_to_withhold
 from strapdown.navigation.record import Span
+from strapdown.systems.navigation_run import _test_outages
+from strapdown.tables import gnss_table
 from withheld_fixes import score_withheld, scores_table
 
 LENGTH = 20.0
@@ -45,6 +49,24 @@ def test_spans_are_spread_from_the_begin_to_the_end():
     for length, places in ((12.0, 5), (4.0, 0), (0.0, 5)):
         with pytest.raises(ConfigError, check=coded("evaluation.spans-do-not-fit-within")):
             spans_to_withhold(0.0, 10.0, length, places)
+
+
+def test_places_without_a_fix_to_compare_with_are_left_out():
+    time = np.append(np.arange(0.0, 100.0), np.arange(150.0, 300.0))
+    n = time.size
+    table = gnss_table(time, np.zeros((n, 3)), np.zeros((n, 3)), (1.0,) * 3, (np.inf,) * 3)
+    asked = specify(WithholdTable, lengths_s=[20.0], places=7, from_s=0.0)
+    begins = [one.begin for one in _test_outages(asked, 0.0, 299.0, table)]
+    # Every 46.5 s; from 93.0 to 113.0 s there are fixes up to 99 s, from 139.5 s on from 150 s.
+    assert begins == pytest.approx(np.linspace(0.0, 279.0, 7))
+    asked = specify(WithholdTable, lengths_s=[20.0], places=13, from_s=0.0)
+    begins = [one.begin for one in _test_outages(asked, 0.0, 299.0, table)]
+    assert begins == pytest.approx(np.delete(np.linspace(0.0, 279.0, 13), 5))
+    # What the user names is not changed, and where nothing is left the run says why.
+    asked = specify(WithholdTable, spans_s=[[110.0, 130.0]])
+    assert [one.begin for one in _test_outages(asked, 0.0, 299.0, table)] == [110.0]
+    asked = specify(WithholdTable, lengths_s=[20.0], places=1, from_s=100.0)
+    assert len(_test_outages(asked, 0.0, 149.0, table)) == 1
 
 
 def test_the_score_of_a_span_is_the_error_of_a_run_without_its_fixes():
