@@ -217,7 +217,7 @@ def attitude(
     # Without an accelerometer a rest is not a start, and it takes longer to find than the attitude.
     leveled = set(ACCEL) <= set(imu.columns) or isinstance(gyro_bias, str)
     rests = find_rests(imu) if leveled else ()
-    findings: list[Finding] = []
+    findings = _doubts(imu)
     name = str(imu.attrs.get("source") or "imu")
     if isinstance(initial, str):
         q_nb, start, _ = initial_attitude(initial, imu, rests, findings)
@@ -248,6 +248,30 @@ def attitude(
         "findings": (*imu.attrs.get("findings", ()), *findings),
     }
     return out
+
+
+#: Rates that no person and no vehicle reaches, and those that few reach for a part of a log, rad/s;
+#: turn between samples, in the median, that no algorithm follows, rad.
+IMPOSSIBLE, FAST, FAST_SHARE, TURN = 100.0, 20.0, 0.05, 1.0
+_LOOKED_AT = 2000
+
+
+def _doubts(imu: pd.DataFrame) -> list[Finding]:
+    """Warn of rates and stamps that another unit would explain, by some of the samples."""
+    rows = slice(None, None, max(1, len(imu) // _LOOKED_AT))
+    rates = np.linalg.norm(view_of(imu, GYRO)[rows], axis=1)
+    if len(imu) < 2 or not rates.size:
+        return []
+    time = imu.index.to_numpy(dtype=np.float64)
+    step = float(time[-1] - time[0]) / (len(imu) - 1)
+    if (turn := float(np.median(rates)) * step) > TURN:
+        data = {"turn": math.degrees(turn), "step": step}
+        return [Finding("attitude.turn-between-samples", severity="warning", data=data)]
+    largest, share = float(rates.max()), float(np.mean(rates > FAST))
+    if largest <= IMPOSSIBLE and share <= FAST_SHARE:
+        return []
+    data = {"largest": largest, "share": 100.0 * share, "fast": FAST}
+    return [Finding("attitude.rate-implausible", quantity="gyro", severity="warning", data=data)]
 
 
 def _gyro_alone(t: Any, gyro: ArrayLike, sampling: str) -> pd.DataFrame:
@@ -324,7 +348,7 @@ def _filtered(
             quantity="initial",
             initial=initial.strip().lower(),
         )
-    findings = list(said)
+    findings = [*said, *_doubts(imu)]
     felt = imu.reindex(columns=ACCEL).dropna()  # a filter refuses a log without them
     force = np.linalg.norm(felt.to_numpy(dtype=np.float64), axis=1)
     if force.size and not WEAKEST < (median := float(np.median(force))) < STRONGEST:

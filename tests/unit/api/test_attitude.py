@@ -320,3 +320,22 @@ def test_the_import_stays_free():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("algorithm", ["quaternion", "complementary"])
+@pytest.mark.parametrize(
+    ("clock", "unit", "code"),
+    [
+        (1.0, 1.0, None),
+        (1e3, 1.0, "attitude.turn-between-samples"),
+        (1.0, np.degrees(1.0), "attitude.rate-implausible"),
+    ],
+)
+def test_arrays_in_other_units_are_doubted(algorithm, clock, unit, code):
+    time = np.arange(3000) * 0.01
+    gyro = np.column_stack([np.sin(time), np.cos(0.7 * time), 0.5 * np.sin(2.0 * time)])
+    accel = np.tile([0.0, 0.0, -9.8], (3000, 1))
+    out = sd.attitude(clock * time, unit * gyro, accel, algorithm=algorithm)
+    codes = {f.code for f in out.attrs["findings"]}
+    wrong = {"attitude.turn-between-samples", "attitude.rate-implausible"}
+    assert codes & wrong == ({code} if code else set())
