@@ -273,6 +273,7 @@ def _document(result: CaseResult, name: str) -> Document:
     dial = pdof_dial(outline, directions, **around, small=True)
     against = contradictions(result)
     grave = [head for code, head, _ in limits if code in GRAVE]
+    others = [head for code, head, _ in limits if code not in GRAVE]
     return Document(
         title=spec.title,
         subtitle="Crash reconstruction from inertial records",
@@ -288,6 +289,7 @@ def _document(result: CaseResult, name: str) -> Document:
             else None,
             Paragraph("These contradict the answer:", "warning") if against else None,
             Items(against) if against else None,
+            Paragraph(f"Limitations: {'; '.join(others)}.", "note") if others else None,
         ),
         sections=sections,
         footer=spec.number or spec.title,
