@@ -327,8 +327,8 @@ STATED_STATES: dict[str, tuple[str, str, Callable[..., SensorStates], str]] = {
 }
 
 
-#: Errors in proportion to rate and force: negligible at rest, largest in motion. A sensor whose gyros
-#: turn by 0.1 deg/s for each g, unmodeled, left two thirds of a drive within its 95 % bounds.
+#: Errors in proportion to rate and force: negligible at rest, largest in motion. Unmodeled, 0.1
+#: deg/s of a gyro for each g left two thirds of a drive within its 95 % bounds.
 MOVING = (
     *("gyro_scale", "accel_scale", "gyro_misalignment", "accel_misalignment"),
     "g_sensitivity",
@@ -341,10 +341,10 @@ def stated_states(
     """Return errors of sensors as states.
 
     `sensors`: standard deviation of each. `names`: of `STATED_STATES`; if not given, biases and
-    drifts as `standard_states`, and the scale factors and misalignments with a stated size: without
-    them the covariance of a body that turns and accelerates is too small. A bias that is named
-    without its drift is a random walk that bounds both. ConfigError: a block does not exist, one is
-    named twice, or its size is not stated.
+    drifts as `standard_states`, and the scale factors, misalignments and g-sensitivities with a
+    stated size: without them the covariance of a body that turns and accelerates is too small. A
+    bias that is named without its drift is a random walk that bounds both. ConfigError: a block
+    does not exist, one is named twice, or its size is not stated.
     """
     if names is None:
         known = [n for n in MOVING if any(_size(n, sensors))]

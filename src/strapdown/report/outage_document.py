@@ -351,7 +351,7 @@ def _assumptions(result: OutageRun) -> list[str]:
         "The drift is the filter's own covariance, propagated over the outage. The share of a "
         "source follows from runs in which it is enlarged and reduced.",
         "Errors are small and normal, and sensors as their data sheet or configuration states: "
-        "noise, bias, bias instability, and scale factors and misalignments where stated. "
+        "noise, bias, bias instability, scale factors, misalignments, g-sensitivity where stated. "
         "Vibration beyond the data sheet is not included.",
         "Normal gravity: a deflection of the vertical is not included.",
     ]

@@ -220,7 +220,7 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
         "and [sensors.accel]: bias_sd_deg_per_h, noise_density_deg_per_sqrt_h; bias_sd_ug, "
         "noise_density_ug_per_sqrt_hz, …",
         f"states = [ … ]: which of their errors are estimated, of {', '.join(STATED_STATES)}; "
-        "biases, drifts, and what is stated of scale factors and misalignments, if not given",
+        "biases, drifts, stated scale factors, misalignments and g-sensitivity, if not given",
     )
     chosen = made.table.get("sensors", {}).get("states")
     if chosen is not None:
