@@ -77,7 +77,10 @@ _I2NAV = (
     Entry("abstd", "accel", "bias_instability", 1.0 / MGAL, "mGal"),
     Entry("corrtime", "gyro", "correlation_time", 1.0 / HOUR, "hr"),
 )
-_ONE_TIME = "corrtime is one number for gyros and accelerometers; that of the gyros is given"
+_ONE_TIME = (
+    "corrtime is one number for both triads: that of the gyros, or of the accelerometers where the "
+    "gyros have none; the standard deviation of the other triad keeps its driving noise"
+)
 
 TARGETS: dict[str, Target] = {
     "strapdown": Target(
@@ -276,6 +279,8 @@ def for_program(errors: ImuErrors, name: str, dt: float, span: float) -> dict[En
     name, target = target_of(name)
     dt = PX4_STEP if name == "PX4" else dt
     walks = any(entry.quantity in ("random_walk", "drive") for entry in target.entries)
+    if any(entry.name == "corrtime" for entry in target.entries):
+        errors = _at_one_time(errors, span)
     out: dict[Entry, Triad] = {}
     for entry in target.entries:
         triad = errors.gyro if entry.triad == "gyro" else errors.accel
@@ -319,6 +324,28 @@ def _without_walk(triad: TriadErrors, span: float) -> TriadErrors:
     time = min(triad.correlation_time, span)
     sizes = [math.hypot(s, k * math.sqrt(0.5 * time)) for k, s in zip(walk, sd, strict=True)]
     return replace(triad, random_walk=0.0, bias_instability=sizes, correlation_time=time)
+
+
+def _at_one_time(errors: ImuErrors, span: float) -> ImuErrors:
+    """Slow terms of both triads with one correlation time, each with its driving noise."""
+    both = [t for t in (errors.gyro, errors.accel) if t is not None]
+    slow = [t for t in both if any(t.axis("random_walk")) or any(t.axis("bias_instability"))]
+    if not slow:
+        return errors
+    times = [t.correlation_time for t in slow if math.isfinite(t.correlation_time)]
+    common = times[0] if times else span
+
+    def at_common(triad: TriadErrors | None) -> TriadErrors | None:
+        if triad is None:
+            return None
+        own = triad.correlation_time if math.isfinite(triad.correlation_time) else span
+        sizes = [
+            math.hypot(k * math.sqrt(0.5 * common), s * math.sqrt(common / own))
+            for k, s in zip(triad.axis("random_walk"), triad.axis("bias_instability"), strict=True)
+        ]
+        return replace(triad, random_walk=0.0, bias_instability=sizes, correlation_time=common)
+
+    return ImuErrors(at_common(errors.gyro), at_common(errors.accel))
 
 
 def _quantity(triad: TriadErrors, name: str) -> Triad:

@@ -112,3 +112,24 @@ def test_unknown_programs_are_refused():
     with pytest.raises(ConfigError) as refused:
         target_of("KF-GIN")
     assert "KF-GINS" in str(refused.value)
+
+
+@pytest.mark.parametrize("program", ["kf-gins", "ob-gins"])
+@pytest.mark.parametrize(("gyro", "accel", "common"), [(1800.0, 450.0, 0.5), (None, 900.0, 0.25)])
+def test_one_correlation_time_keeps_the_driving_noise_of_both_triads(program, gyro, accel, common):
+    slow = {} if gyro is None else {"bias_instability": 1e-5, "correlation_time": gyro}
+    errors = ImuErrors(
+        TriadErrors(noise_density=1e-4, **slow),
+        TriadErrors(noise_density=1e-3, bias_instability=2e-4, correlation_time=accel),
+    )
+    told = for_program(
+        errors,
+        target_of(program.replace("-", "_") if "ob" in program else program)[0],
+        0.01,
+        3600.0,
+    )
+    got = {entry.name: values[0] for entry, values in told.items()}
+    assert got["corrtime"] == pytest.approx(common)
+    # The drive of a Gauss-Markov process is s sqrt(2 / T); 1 mGal is 1e-5 m/s².
+    drive = 1e-5 * got["abstd"] * np.sqrt(2.0 / (3600.0 * common))
+    assert drive == pytest.approx(2e-4 * np.sqrt(2.0 / accel))
