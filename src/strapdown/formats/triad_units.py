@@ -122,7 +122,7 @@ def units_of_triads(
             findings.append(_not_used(raw, triad, "io.left-out-linear-acceleration"))
             continue
         stated = _stated_unit(raw, found, triad, options)
-        findings += _overruled(raw, found, triad, options)
+        findings += _overruled(raw, found, triad, options, said.get(f"{triad}_unit"))
         if stated is None or raw.checked or _asked_unit(triad, options):
             asked.add(triad)
         try:
@@ -197,16 +197,22 @@ def _asked_unit(triad: str, options: ReadOptions) -> str | None:
 
 
 def _overruled(
-    raw: RawLog, found: dict[str, Column], triad: str, options: ReadOptions
+    raw: RawLog,
+    found: dict[str, Column],
+    triad: str,
+    options: ReadOptions,
+    likely: Inference | None,
 ) -> list[Finding]:
-    """A warning where the user states another unit than the columns."""
+    """A warning where the user states another unit than the columns, and the numbers do not."""
     asked = _asked_unit(triad, options)
     columns = [found[f"{triad}_{a}"] for a in AXES]
     stated = {c.unit for c in columns} - {None}
     if not asked or not stated or not stated <= set(UNITS[triad]):
         return []
     unit = parse_unit(asked, triad)
-    if stated == {unit}:
+    by_numbers = likely is not None and likely.value == unit and likely.confidence >= LIKELY
+    # A sign is that of the axes, and no other unit.
+    if by_numbers or {str(one).lstrip("-") for one in stated} == {unit.lstrip("-")}:
         return []
     return [
         Finding(

@@ -335,9 +335,7 @@ def _at_one_time(errors: ImuErrors, span: float) -> ImuErrors:
     times = [t.correlation_time for t in slow if math.isfinite(t.correlation_time)]
     common = times[0] if times else span
 
-    def at_common(triad: TriadErrors | None) -> TriadErrors | None:
-        if triad is None:
-            return None
+    def at_common(triad: TriadErrors) -> TriadErrors:
         own = triad.correlation_time if math.isfinite(triad.correlation_time) else span
         sizes = [
             math.hypot(k * math.sqrt(0.5 * common), s * math.sqrt(common / own))
@@ -345,7 +343,8 @@ def _at_one_time(errors: ImuErrors, span: float) -> ImuErrors:
         ]
         return replace(triad, random_walk=0.0, bias_instability=sizes, correlation_time=common)
 
-    return ImuErrors(at_common(errors.gyro), at_common(errors.accel))
+    accel = None if errors.accel is None else at_common(errors.accel)
+    return ImuErrors(at_common(errors.gyro), accel)
 
 
 def _quantity(triad: TriadErrors, name: str) -> Triad:

@@ -325,7 +325,7 @@ def _aids(
                     f"errors that last: {LASTING_ERRORS[aid['kind']]}."
                 )
         for key, what, usual in (
-            ("position_sd_m", "place, m", POSITION_SDS),
+            ("position_sd_m", "position, m", POSITION_SDS),
             ("velocity_sd_m_per_s", "velocity, m/s", VELOCITY_SDS),
         ):
             if key not in aid:
