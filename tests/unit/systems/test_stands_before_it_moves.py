@@ -63,8 +63,8 @@ def test_the_offset_of_a_clock_stays_unknown_while_nothing_moves(result):
 def test_the_rest_that_was_levelled_shows_the_gyro_biases(result):
     """A heading that was stated was lost at the rate of an unknown bias, 5 deg/s as stated."""
     bias_sd = result.record.sensors_sd[[f"gyro_bias_{x}" for x in "xyz"]].iloc[0]
-    # 0.005 deg/s/√Hz over ten seconds, and the drift in the run of the sensor; a rest cannot part the
-    # effect of gravity on a gyro, 0.1 deg/s for each g at most, from its bias.
+    # 0.005 deg/s/√Hz over ten seconds, and the drift in the run of the sensor; a rest cannot part
+    # the effect of gravity on a gyro, 0.1 deg/s for each g at most, from its bias.
     assert np.degrees(bias_sd).max() < np.hypot(0.05, 0.1 / np.sqrt(3.0))
     sd, error = result.record.sd, result.differences
     apart = error["heading"].reindex(sd.index, method="nearest") / sd["heading"]
