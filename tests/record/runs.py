@@ -381,6 +381,8 @@ START = {
 }
 FIXES = {"rate_hz": 2.0, "position_noise_m": 0.5, "outlier_share": 0.05}
 BIASES = ["gyro_bias", "accel_bias"]
+DRIFTS = ["gyro_drift", "accel_drift"]
+MOVING = ["gyro_scale", "accel_scale", "gyro_misalignment", "accel_misalignment"]
 
 
 def car(**more):
@@ -416,7 +418,8 @@ NAVIGATIONS = {
             "quiet": {"kind": "zaru"},
         },
         prefilter={"kind": "robust_fir", "rate_hz": 25.0},
-        sensors={"sensor": "adis16495-1"},
+        # The states that 0.1 took by default: today's have the g-sensitivity, too.
+        sensors={"sensor": "adis16495-1", "states": [*BIASES, *DRIFTS, *MOVING]},
     ),
     "wd-paper-huber-open-loop": car(
         filter={"covariance": "wd"},
