@@ -388,7 +388,7 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
         source = truth_of_second(source, second, imu, q_nb)
     if spec.gyro_bias.lower() == "auto" and bias["rad_per_s"] is not None:
         findings += _turn_or_bias(rests[0], source)
-    findings = [*source.findings, *findings, *_one_axis(imu, source)]
+    findings = [*source.findings, *findings, *_proves_little(imu, source)]
     clock = clock.of(index_of(imu))
     increments = increments_from_imu(imu, spec.interpolation)
     costs = tuple(_cost(algorithm, increments["dt"]) for algorithm in algorithms)
@@ -640,7 +640,7 @@ def _turn_or_bias(rest: RestStretch, source: AttitudeSource) -> list[Finding]:
 ACROSS, TURNING = 0.05, 0.05
 
 
-def _one_axis(imu: pd.DataFrame, source: AttitudeSource) -> list[Finding]:
+def _proves_little(imu: pd.DataFrame, source: AttitudeSource) -> list[Finding]:
     """Warn of a recorded motion that any algorithm integrates: about one axis, or hardly any."""
     if source.clean is not None:
         return []

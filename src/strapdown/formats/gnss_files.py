@@ -276,23 +276,12 @@ def _over_ground(
     """
     speed, course = values("speed"), values("course")
     known = (speed >= 0.0) & (course >= 0.0)
-    if not known.any():
-        raw.findings.append(
-            Finding(
-                "io.speed-and-course-never-known",
-                severity="note",
-                file=raw.name,
-                quantity=", ".join(VELOCITY),
-                source=found["speed"].source,
-                source_2=found["course"].source,
-            )
-        )
-        return None, None
+    never = not known.any()
     speed = np.where(known, speed, np.nan)
     angle, none = np.radians(course), np.full(speed.size, np.nan)
     raw.findings.append(
         Finding(
-            "io.velocity-by-speed-and-course",
+            "io.speed-and-course-never-known" if never else "io.velocity-by-speed-and-course",
             severity="note",
             file=raw.name,
             quantity=", ".join(VELOCITY),
@@ -300,6 +289,8 @@ def _over_ground(
             source_2=found["course"].source,
         )
     )
+    if never:
+        return None, None
     sd = None
     if "speed_sd" in found:
         stated = values("speed_sd")

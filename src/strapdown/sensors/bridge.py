@@ -318,12 +318,10 @@ def from_program(values: Mapping[str, Mapping[str, Triad]], name: str, dt: float
 
 
 def _without_walk(triad: TriadErrors, span: float) -> TriadErrors:
-    walk, sd = triad.axis("random_walk"), triad.axis("bias_instability")
-    if not any(walk):
+    if not any(triad.axis("random_walk")):
         return triad
     time = min(triad.correlation_time, span)
-    sizes = [math.hypot(s, k * math.sqrt(0.5 * time)) for k, s in zip(walk, sd, strict=True)]
-    return replace(triad, random_walk=0.0, bias_instability=sizes, correlation_time=time)
+    return _at_time(triad, time, time)
 
 
 def _at_one_time(errors: ImuErrors, span: float) -> ImuErrors:
@@ -336,15 +334,23 @@ def _at_one_time(errors: ImuErrors, span: float) -> ImuErrors:
     common = times[0] if times else span
 
     def at_common(triad: TriadErrors) -> TriadErrors:
-        own = triad.correlation_time if math.isfinite(triad.correlation_time) else span
-        sizes = [
-            math.hypot(k * math.sqrt(0.5 * common), s * math.sqrt(common / own))
-            for k, s in zip(triad.axis("random_walk"), triad.axis("bias_instability"), strict=True)
-        ]
-        return replace(triad, random_walk=0.0, bias_instability=sizes, correlation_time=common)
+        own = triad.correlation_time
+        return _at_time(triad, common, own if math.isfinite(own) else span)
 
     accel = None if errors.accel is None else at_common(errors.accel)
     return ImuErrors(at_common(errors.gyro), accel)
+
+
+def _at_time(triad: TriadErrors, time: float, own: float) -> TriadErrors:
+    """Random walk and Gauss-Markov process as one process of another correlation time.
+
+    `own`: correlation time of the process so far; the driving noise s √(2/T) is kept.
+    """
+    sizes = [
+        math.hypot(s * math.sqrt(time / own), k * math.sqrt(0.5 * time))
+        for k, s in zip(triad.axis("random_walk"), triad.axis("bias_instability"), strict=True)
+    ]
+    return replace(triad, random_walk=0.0, bias_instability=sizes, correlation_time=time)
 
 
 def _quantity(triad: TriadErrors, name: str) -> Triad:
