@@ -207,24 +207,14 @@ def _held(
 
     `swing`: as of `excursion`. Also the rotation to the last sample (quaternion), and the standard
     deviations of the rates that it is by, (3,), rad/s. The mean rate is that of a bias of known
-    standard deviation B and of a swing, of mean rate m: the part ``B² / (B² + m²)`` is bias. A
-    swing ends as far from its begin as two of its angles, sd √2 of theirs; a slow one further,
-    because `excursion` is about a line: twice.
+    standard deviation B and of a swing, of mean rate m: the part ``B² / (B² + m²)`` is bias.
     """
-    gyro = sensors.gyro
-    bias = np.square(gyro.axis("bias")) + np.square(sensors.gyro_drift.triad)
-    rate = means.whole_rate
-    by_swing = np.square(NET / means.length) * np.diagonal(swing)
-    # Of a swing as slow as the record the halves differ; by how much is known of all axes together.
-    half = len(means.rate) // 2
-    halves = means.rate[:half].mean(axis=0) - means.rate[half:].mean(axis=0)
-    by_swing = np.maximum(by_swing, 0.5 * float(np.mean(np.square(halves))))
-    turns = np.abs(rate) > TURNS * np.sqrt(bias)
-    by_swing = np.where(turns, np.maximum(by_swing, np.square(rate) - bias), by_swing)
+    bias = np.square(sensors.gyro.axis("bias")) + np.square(sensors.gyro_drift.triad)
+    by_swing = turn_variance(sensors, means, swing)
     part = np.divide(bias, bias + by_swing, out=np.zeros(3), where=bias > 0.0)
     table = imu.copy()
     table.attrs = dict(imu.attrs)
-    table[GYRO] = table[GYRO].to_numpy(dtype=np.float64) - part * rate
+    table[GYRO] = table[GYRO].to_numpy(dtype=np.float64) - part * means.whole_rate
     sums = sum_inertially(table)
     ends = np.cumsum(sums.node_length)
     begins = np.searchsorted(ends, sums.length * np.arange(BLOCKS) / BLOCKS, side="right")
@@ -232,6 +222,25 @@ def _held(
     lengths = np.add.reduceat(sums.node_length, begins)
     blocks = np.add.reduceat(sums.node_velocity, begins, axis=0) / lengths[:, None]
     return blocks, sums.turned[-1], np.sqrt(part * by_swing)
+
+
+def turn_variance(sensors: ImuUncertainty, means: BlockMeans, swing: Array) -> Array:
+    """Variances of the mean rate of a swinging body by its own turn, (3,), rad²/s².
+
+    `swing`: as of `excursion`. A swing ends as far from its begin as two of its angles, sd √2 of
+    theirs; a slow one further, because `excursion` is about a line: twice. A mean rate that the
+    stated bias does not explain is a turn.
+    """
+    bias = np.square(sensors.gyro.axis("bias")) + np.square(sensors.gyro_drift.triad)
+    rate = means.whole_rate
+    by_swing: Array = np.square(NET / means.length) * np.diagonal(swing)
+    # Of a swing as slow as the record the halves differ; by how much is known of all axes together.
+    half = len(means.rate) // 2
+    halves = means.rate[:half].mean(axis=0) - means.rate[half:].mean(axis=0)
+    by_swing = np.maximum(by_swing, 0.5 * float(np.mean(np.square(halves))))
+    turns = np.abs(rate) > TURNS * np.sqrt(bias)
+    by_swing[turns] = np.maximum(by_swing, np.square(rate) - bias)[turns]
+    return by_swing
 
 
 # Attitude errors for a force known in both frames and a stated heading.

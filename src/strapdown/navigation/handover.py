@@ -16,6 +16,8 @@ from strapdown.alignment.alignment import Alignment, Site
 from strapdown.alignment.course_sums import Antenna
 from strapdown.alignment.fine import FineResult
 from strapdown.alignment.gnss_course import GnssCourse
+from strapdown.alignment.levelling import BLOCKS, turn_variance
+from strapdown.alignment.mean_errors import block_means, excursion
 from strapdown.constants import MAD_TO_SD
 from strapdown.dsp.samples import running_integral
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
@@ -37,7 +39,17 @@ from strapdown.navigation.modes import Aligned, CoarseMode, FineMode
 from strapdown.prefilter.prefilter import CHANNELS
 from strapdown.rotation import rotate
 from strapdown.sensors.rest import sd_of_mean
-from strapdown.tables import GEODETIC, MOTION, POSITION_SD, VELOCITY_SD, check_gnss, usable
+from strapdown.sensors.uncertainty import ImuUncertainty
+from strapdown.tables import (
+    ACCEL,
+    GEODETIC,
+    GYRO,
+    MOTION,
+    POSITION_SD,
+    VELOCITY_SD,
+    check_gnss,
+    usable,
+)
 from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
 from strapdown.tables.checks import index_of, source_of, values_of
 
@@ -87,11 +99,9 @@ def align(chain: NavigationPipeline, state: PipelineState) -> Aligned:
     """
     mode = chain.modes[state.mode]
     assert chain.sensors is not None
-    kept = _window(chain, state)
-    imu = _table(kept[:, 1:7], kept[:, 0], CHANNELS, state)
-    imu.attrs["sampling"] = chain.intake.sampling(state.intake)
-    imu.attrs["axes"] = "forward-right-down"
+    imu = _steps(chain, state)
     if isinstance(mode, FineMode):
+        kept = _window(chain, state)
         assert state.aligned is not None
         coarse = state.aligned.alignment
         site, _ = _site(chain, state, coarse.q_nb)
@@ -160,18 +170,23 @@ def handed_over(chain: NavigationPipeline, state: PipelineState, found: Aligned)
     P = np.diag(np.square(np.concatenate([sd, chain.velocity_sd])))
     by_others = None if chain.site is not None else _by_antenna(chain, state, q_nb, still, still)
     begun = from_alignment(filter_, found.alignment, start, P, rest, by_others)
-    return (
-        _rested(filter_, begun, _window(chain, state)) if found.alignment.heading_given else begun
-    )
+    if not found.alignment.heading_given:
+        return begun
+    assert chain.sensors is not None
+    return _rested(filter_, begun, _steps(chain, state), chain.sensors)
 
 
-def _rested(filter_: ErrorFilter, begun: FilterState, kept: Array) -> FilterState:
+def _rested(
+    filter_: ErrorFilter, begun: FilterState, imu: pd.DataFrame, sensors: ImuUncertainty
+) -> FilterState:
     """State with the gyro errors that the mean rate of the levelled rest shows.
 
     Without them a heading that was stated is lost at the rate of an unknown bias before the vehicle
-    moves. A rate beyond what the stated errors allow is a turn, and determines no bias.
+    moves. A rate beyond what the stated errors allow is a turn, and determines no bias; that of a
+    body that swings, as in a hand, is known only as well as its own mean turn.
     """
-    mean = kept[:, 1:7].mean(axis=0)
+    kept = imu[[*GYRO, *ACCEL]].to_numpy()
+    mean = kept.mean(axis=0)
     view = View(
         mechanization=filter_.mechanization,
         model=filter_.model,
@@ -182,8 +197,13 @@ def _rested(filter_: ErrorFilter, begun: FilterState, kept: Array) -> FilterStat
         rate=mean[:3],
         force=mean[3:],
     )
-    sway = SWAY / max(float(kept[-1, 0] - kept[0, 0]), INSTANT)
-    variance = np.square(sd_of_mean(kept[:, 0], kept[:, 1:4])) + sway**2
+    time = imu.index.to_numpy(dtype=np.float64)
+    sway = SWAY / max(float(time[-1] - time[0]), INSTANT)
+    variance = np.square(sd_of_mean(time, kept[:, :3])) + sway**2
+    means = block_means(imu, BLOCKS)
+    if means.scatter(sensors)[0] > 1.0:
+        swing = excursion(imu, sensors.gyro.axis("noise_density"))
+        variance = variance + turn_variance(sensors, means, swing)
     one = rate_at_rest("rest.rate", view, mean, variance)
     P = filter_.physical_covariance(begun)
     expected = np.einsum("ij,jk,ik->i", one.H, P, one.H) + variance
@@ -276,6 +296,15 @@ def _window(chain: NavigationPipeline, state: PipelineState) -> Array:
     if not isinstance(mode, CoarseMode):
         return kept
     return kept[np.searchsorted(kept[:, 0], state.time - mode.window - INSTANT) :]
+
+
+def _steps(chain: NavigationPipeline, state: PipelineState) -> pd.DataFrame:
+    """Steps to align with, as an Imu table."""
+    kept = _window(chain, state)
+    imu = _table(kept[:, 1:7], kept[:, 0], CHANNELS, state)
+    imu.attrs["sampling"] = chain.intake.sampling(state.intake)
+    imu.attrs["axes"] = "forward-right-down"
+    return imu
 
 
 def _table(values: Array, time: Array, columns: list[str], state: PipelineState) -> pd.DataFrame:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
+import pandas as pd
 import pytest
 from scipy.stats import chi2
 
 from strapdown.config.navigation import NavigationSpec
 from strapdown.navigation import handover
+from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 from strapdown.systems.navigation_run import run_navigation
+from strapdown.tables import ACCEL, GYRO
 
 TEXT = """
 [simulation]
@@ -83,8 +86,9 @@ def test_each_fix_has_a_bound_before_it_and_one_after(result):
         assert before > after
 
 
-def test_a_turn_is_no_bias():
-    """What the gyros read beyond what is stated of them is a rotation."""
+@pytest.fixture
+def begun():
+    """A filter at its start, with biases of 0.01 rad/s."""
     from strapdown.estimation.covariance import COVARIANCES
     from strapdown.estimation.error_filter import ErrorFilter
     from strapdown.estimation.error_model import ERROR_MODELS
@@ -97,13 +101,44 @@ def test_a_turn_is_no_bias():
     filter_ = ErrorFilter(MECHANIZATIONS["ned"](), model, COVARIANCES["ud"]())
     start = NavState.from_degrees(50.0, 10.0, 100.0)
     P = np.diag(np.repeat([1.0, 0.1, 0.05], 3)) ** 2
-    begun = handover.from_state(filter_, start, P)
-    time = np.arange(500) / 50.0
+    return filter_, handover.from_state(filter_, start, P)
+
+
+STATED = ImuUncertainty(TriadUncertainty(1e-5, bias=1e-2), TriadUncertainty(1e-3, bias=1e-2))
+
+
+def stood(time, rate):
+    """An Imu table of a body at rest, but for its rate about the vertical, rad/s."""
+    noise = 1e-4 * np.random.default_rng(0).normal(size=(len(time), 3))
+    noise[:, 2] += rate
+    rows = np.column_stack([noise, np.tile([0.0, 0.0, -9.81], (len(time), 1))])
+    imu = pd.DataFrame(rows, index=pd.Index(time, name="time"), columns=[*GYRO, *ACCEL])
+    imu.attrs["sampling"] = "instantaneous"
+    return imu
+
+
+def test_a_turn_is_no_bias(begun):
+    """What the gyros read beyond what is stated of them is a rotation."""
+    filter_, state = begun
     for rate, learnt in ((5e-3, True), (0.1, False)):
-        noise = 1e-4 * np.random.default_rng(0).normal(size=(500, 3))
-        force = np.tile([0.0, 0.0, -9.81], (500, 1))
-        kept = np.column_stack([time, noise + np.array([0.0, 0.0, rate]), force])
-        after = handover._rested(filter_, begun, kept)
-        assert (after is not begun) == learnt
+        after = handover._rested(filter_, state, stood(np.arange(500) / 50.0, rate), STATED)
+        assert (after is not state) == learnt
         if learnt:
             assert after.sensors[2] == pytest.approx(rate, abs=2e-4)
+
+
+def test_a_swing_in_a_hand_is_no_bias(begun):
+    """Two seconds of a slow swing: its mean rate, up to 5 deviations of a bias, is its own.
+
+    By the scatter of the rate alone a quarter of these biases were beyond their bounds, by up to
+    7.5 of their standard deviations, and a heading that was stated was lost.
+    """
+    filter_, state = begun
+    time = np.arange(0.0, 2.0, 0.02)
+    inside = []
+    for phase in np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False):
+        rate = 0.05 * np.sin(2.0 * np.pi * time / 6.0 + phase)
+        after = handover._rested(filter_, state, stood(time, rate), STATED)
+        sd = np.sqrt(filter_.physical_covariance(after)[11, 11])
+        inside.append(abs(after.sensors[2]) < 1.96 * sd)
+    assert all(inside)
