@@ -134,6 +134,8 @@ QUARTZ, FEW = 5e-5, 1.5e-5
 #: scatter like those of a code receiver, and of others; the scatter, m, that separates them.
 LASTS, LASTS_MOST = 0.5, 0.9
 LASTS_BY_CODE, LASTS_BY_PHASE, PHASE = 0.9, 0.5, 0.05
+#: Standard deviation, m, of positions of the latter while none is stated: of a float solution.
+FLOATING = 0.3
 #: The least share that is proposed where velocities show what lasts; the factor of the standard
 #: deviations from which a receiver understates its errors, and beyond which it has others.
 SHOWN, UNDERSTATED, MISSTATED = 0.15, 1.5, 10.0
@@ -495,6 +497,9 @@ def first_motion(fixes: pd.DataFrame) -> tuple[int | None, float]:
     time = index_of(fixes)
     lat, lon, _ = np.radians(values_of(fixes, GEODETIC)).T
     sd = values_of(fixes, POSITION_SD)[:, :2].max(axis=1)
+    scatter = white_position_sd(fixes) if "position_sd_taken" in fixes.attrs else None
+    if scatter is not None and scatter[0] < PHASE:
+        sd = np.minimum(sd, FLOATING)
     steps = 1
     while steps < len(time):
         north = (lat[steps:] - lat[:-steps]) * 6.37e6
