@@ -24,6 +24,7 @@ from strapdown.lazy_names import Choices
 from strapdown.navigation.consistency import Inconsistency
 from strapdown.navigation.heading_integrity import REASONS, STATUSES
 from strapdown.navigation.integrity import QUANTITY_REASONS, Repeated
+from strapdown.navigation.outage_test import judge_outages
 from strapdown.navigation.record import NavigationRecord
 from strapdown.progress import Progress
 from strapdown.report.chart import Array
@@ -236,12 +237,17 @@ def navigation_json(evaluation: NavigationEvaluation) -> dict[str, Any]:
                 "to_s": w.result.span.end,
                 "largest_horizontal_error_m": w.result.largest,
                 "bound_95_m": w.result.bound_at_largest,
-                "inside": w.result.inside,
+                "against": w.result.against,
+                "instants": len(w.result.time),
+                "share_inside": float(w.result.inside.mean()),
+                "probability": verdict.probability,
+                "inside": verdict.consistent,
                 "largest_horizontal_error_forward_m": None
                 if w.smoothed is None
                 else w.forward.largest,
             }
             for w in result.withheld
+            for verdict in (judge_outages([w.result]),)
         ],
         "modes": [{"mode": s.name, "from_s": s.begin, "to_s": s.end} for s in record.modes],
         "events": [
