@@ -188,6 +188,16 @@ def test_fixes_are_kept_back_to_score_by(run_cli, tmp_path, undrawn_here):
     assert [w["against"] for w in found] == ["fixes"] * 2
     # The run itself has had all fixes.
     assert not any(e["kind"] == "outage" for e in json.loads(done.out)["events"])
+    # A truth beside the file of the run replaces its own, and scores the outages.
+    file = tmp_path / "other.toml"
+    file.write_text((tmp_path / "navigate.toml").read_text() + '\n[truth]\npath = "drive.csv"\n')
+    truth = tmp_path / "out" / "trajectory.csv"
+    done = run_cli("navigate", file, "--truth", truth, "--out", tmp_path / "true", "--json")
+    assert done.code == 0, done.err
+    told = json.loads(done.out)
+    assert told["against"]["name"] == "trajectory.csv"
+    assert [w["against"] for w in told["gnss_outage_tests"]] == ["truth"] * 2
+    assert run_cli("verify", tmp_path / "true").code == 0
 
 
 def test_a_log_is_navigated_directly_and_as_its_draft_says(run_cli, tmp_path, undrawn_here):

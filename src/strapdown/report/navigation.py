@@ -101,7 +101,7 @@ def _with_tiles(result: NavigationRun, report: bool) -> Iterator[NavigationRun]:
         yield result
         return
     if not report:
-        yield replace(result, spec=result.spec.with_map(None))
+        yield replace(result, spec=result.spec.with_path("map", None))
         return
     from strapdown.formats.map_tiles import open_map, write_tiles
     from strapdown.report.navigation_plan import plan_tiles
@@ -113,7 +113,7 @@ def _with_tiles(result: NavigationRun, report: bool) -> Iterator[NavigationRun]:
         folder = Path(name).resolve() / "tiles"
         files = write_tiles(folder, opened, plan_tiles(NavigationEvaluation(result), opened))
         used = replace(input_files("map", str(folder), files), copied=True)
-        spec = result.spec.with_map(str(folder))
+        spec = result.spec.with_path("map", folder)
         yield replace(result, spec=spec, inputs=(*result.inputs, used))
 
 

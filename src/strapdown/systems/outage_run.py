@@ -223,7 +223,7 @@ def run_outage(
         )
     progress("reading", 0.02)
     # Its plan is not drawn.
-    navigation = navigation.with_map(None)
+    navigation = navigation.with_path("map", None)
     source = read_navigation_source(navigation)
     predicted, drifts = outage_of_run(spec, navigation, source, progress)
     return OutageRun(
