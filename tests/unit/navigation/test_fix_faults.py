@@ -121,12 +121,28 @@ def test_an_error_that_an_outage_can_have_made_is_taken_off_after_few_fixes(gap,
     assert rejected == refused
 
 
-@pytest.mark.parametrize(("taken", "spans"), [(0.9, [(50.0, 56.0, 1.0, None)]), (0.1, [])])
+@pytest.mark.parametrize(("taken", "spans"), [(0.9, [(50.0, 56.0, 1.0, 56.0, None)]), (0.1, [])])
 def test_after_few_rejections_a_receiver_is_a_part_of_the_bound_until_it_has_settled(taken, spans):
     """Ten observations of half a second from the first that was taken; none if it came back."""
     time, nu, rejected = 0.5 * np.arange(400), np.zeros(400), np.zeros(400, bool)
     nu[100:103], rejected[100:103], nu[103] = 1.0, True, taken
     assert list(_contradictions(time, nu, rejected, 10)) == spans
+
+
+@pytest.mark.parametrize("taken", [2, 3])
+def test_fixes_that_are_taken_after_an_outage_confirm_the_solution(taken):
+    """A fault that begins then is the receiver's, for a minute or until it jumps back."""
+    time, nu, rejected = 0.5 * np.arange(400.0), np.zeros(400), np.zeros(400, bool)
+    time[100:] += 10.0
+    wrong = slice(100 + taken, 120 + taken)
+    nu[wrong], rejected[wrong], nu[wrong.stop] = 0.8, True, 0.8
+    ((begin, end, size, _, since),) = _contradictions(time, nu, rejected, 10)
+    assert (begin, size) == (time[wrong.start], 0.8)
+    last = time[wrong.stop - 1]
+    if taken == 2:  # position and velocity; the next shows what they hide
+        assert (end, since) == (last + 0.5 * 10, time[99])
+    else:
+        assert (end, since) == (last + 60.0, None)
 
 
 def test_a_receiver_that_returns_for_a_moment_is_doubted_as_it_was():
@@ -151,7 +167,7 @@ def test_a_jump_after_a_minute_does_not_end_the_contradiction_before_it():
     for first, size in ((100, -1.0), (240, 1.1)):  # 70 s apart, and as if it were the way back
         nu[first : first + 20], rejected[first : first + 20] = size, True
         nu[first + 20] = size
-    (begin, end, size, _), (again, until, later, _) = _contradictions(time, nu, rejected, 10)
+    (begin, end, size, *_), (again, until, later, *_) = _contradictions(time, nu, rejected, 10)
     assert (begin, size) == (50.0, 1.0)
     assert end == pytest.approx(59.5 + 60.0)
     assert (again, later) == (120.0, 1.1)
