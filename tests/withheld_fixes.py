@@ -37,7 +37,10 @@ def score_withheld_smoothed(navigator, state, time, rows, name, spans):
         at = first
         through, piece = blind.advance(state, time[first:last], rows[first:last])
         _, later = navigator.advance(through, time[last:after], rows[last:after])
-        found.append(score_of_smoothed(navigator, [piece], [later], name, span))
+        smoothing = navigator.smoother.begin(navigator)
+        smoothing.take(piece)
+        smoothing.take(later)
+        found.append(score_of_smoothed([piece], smoothing, name, span))
     return tuple(found)
 
 

@@ -69,6 +69,9 @@ kind = "no_slip"
 [recorder]
 kind = "full"
 
+[withhold]
+spans_s = [[20.0, 24.0]]
+
 [output]
 files = ["csv", "parquet", "kml", "geojson"]
 """
@@ -161,6 +164,9 @@ def test_a_simulation_with_outage_outliers_and_full_rate(run_cli, tmp_path, undr
     # The robust rule bears the outliers of 50 standard deviations.
     assert found["against"]["errors"]["horizontal"]["rms_m"] < 2.0
     assert any(e["kind"] == "outage" for e in found["events"])
+    # Not by the fixes, of which there are four, and outliers among them.
+    (test,) = found["gnss_outage_tests"]
+    assert (test["against"], test["inside"]) == ("truth", True)
     csv = read_raw(tmp_path / "out" / "trajectory.csv").columns
     parquet = read_raw(tmp_path / "out" / "trajectory.parquet").columns
     assert np.allclose(np.diff(csv["time_s"]), 0.02)
@@ -178,10 +184,20 @@ def test_fixes_are_kept_back_to_score_by(run_cli, tmp_path, undrawn_here):
         ("rtk", 45.0, 55.0),
         ("rtk", 30.0, 35.0),
     ]
-    # The largest of ten, each of which is within its bound with 95 %: the noise of the fixes.
-    assert all(w["largest_horizontal_error_m"] < 2.0 * w["bound_95_m"] for w in found)
+    assert all(w["inside"] and w["probability"] >= 0.01 for w in found)
+    assert [w["against"] for w in found] == ["fixes"] * 2
     # The run itself has had all fixes.
     assert not any(e["kind"] == "outage" for e in json.loads(done.out)["events"])
+    # A truth beside the file of the run replaces its own, and scores the outages.
+    file = tmp_path / "other.toml"
+    file.write_text((tmp_path / "navigate.toml").read_text() + '\n[truth]\npath = "drive.csv"\n')
+    truth = tmp_path / "out" / "trajectory.csv"
+    done = run_cli("navigate", file, "--truth", truth, "--out", tmp_path / "true", "--json")
+    assert done.code == 0, done.err
+    told = json.loads(done.out)
+    assert told["against"]["name"] == "trajectory.csv"
+    assert [w["against"] for w in told["gnss_outage_tests"]] == ["truth"] * 2
+    assert run_cli("verify", tmp_path / "true").code == 0
 
 
 def test_a_log_is_navigated_directly_and_as_its_draft_says(run_cli, tmp_path, undrawn_here):

@@ -9,7 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from strapdown import read_log, simulate, verify
+from strapdown import read_gnss, read_log, simulate, verify
 from strapdown.config.motions import KINDS, TrajectorySpec
 from strapdown.ellipsoids import ELLIPSOIDS
 from strapdown.simulation import ImuErrors, Origin, StationaryMotion, simulate_imu
@@ -46,6 +46,22 @@ amplitude_m_per_s = [3, 4, 0]
 """
 
 
+DRIVE = """sensor = "adis16470"
+rate_hz = 20
+[motion]
+kind = "car"
+lat_deg = 55.75
+lon_deg = 37.62
+heading_deg = 30
+manoeuvres = [
+  { do = "straight", duration_s = 12 },
+  { do = "accelerate", to_m_per_s = 12, duration_s = 8 },
+  { do = "turn_left", angle_deg = 90, radius_m = 25 },
+  { do = "straight", duration_s = 15 },
+]
+"""
+
+
 @pytest.fixture
 def here(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
@@ -62,7 +78,7 @@ def truth(folder):
 @pytest.mark.parametrize("name", NAMES)
 def test_an_example_is_simulated_and_its_truth_agrees_with_itself(name):
     spec = TrajectorySpec.read(EXAMPLES / f"{name}.toml")
-    motion, _, imu, attitude, trajectory = simulate_trajectory(spec)
+    motion, _, imu, attitude, trajectory, _ = simulate_trajectory(spec)
     assert len(imu) == len(attitude) == len(trajectory)
     assert trajectory.index[-1] == pytest.approx(motion.duration, abs=1.0 / spec.rate_hz)
     assert np.isfinite(imu[[*GYRO, *ACCEL]].to_numpy()).all()
@@ -82,7 +98,9 @@ def test_the_examples_show_the_kinds_that_need_more_than_a_line():
 def test_a_file_becomes_a_sealed_folder(here, run_cli):
     done = run_cli("simulate", "rest.toml")
     assert done.code == 0, done.err
-    assert done.out.startswith("rest: log.csv, manifest.json, scenario.json, trajectory.csv,")
+    assert done.out.startswith(
+        "rest: fixes.csv, log.csv, manifest.json, scenario.json, trajectory.csv,"
+    )
     assert (here / "rest-simulated" / "trajectory.svg").is_file()
     imu = read_log(here / "rest-simulated" / "log.csv").imu
     place = Origin(-33.9, 151.2, 20.0)
@@ -116,6 +134,38 @@ def test_options_replace_what_the_file_says(here, run_cli):
     names = {path.name for path in (here / "other").iterdir()}
     assert {"log.npz", "log.mat"} <= names
     assert "log.csv" not in names
+
+
+def test_the_next_command_navigates_by_the_fixes(here, run_cli):
+    (here / "short.toml").write_text(DRIVE)
+    done = run_cli("simulate", "short.toml", "--out", "town")
+    assert done.code == 0, done.err
+    folder = here / "town"
+    about = json.loads((folder / "scenario.json").read_text())
+    receiver = about["configuration"]["gnss"]
+    assert (receiver["rate_hz"], receiver["position_noise_m"]) == (5.0, 1.0)
+    fixes = read_gnss(folder / "fixes.csv")
+    table = truth(folder)
+    at = fixes.index[fixes.index <= table["time_s"].iloc[-1]]
+    assert len(at) == pytest.approx(5.0 * table["time_s"].iloc[-1], abs=1)
+    north = np.interp(at, table["time_s"], table["lat_deg"])
+    off = (fixes["lat"].to_numpy()[: len(at)] - north) * 111.3e3
+    # A share of 1e-4 of normal errors is beyond four times the rms, whose own sd is 2 %.
+    assert np.sqrt(np.mean(off**2)) == pytest.approx(1.0, abs=0.1)
+    command = done.out.partition("Next  strapdown ")[2]
+    done = run_cli(
+        *command.split(), "--out", "run", "--truth", folder / "trajectory.csv",
+        "--no-report", "-q",
+    )  # fmt: skip
+    assert done.code == 0, done.err
+    found = json.loads((here / "run" / "navigation.json").read_text())
+    assert found["against"]["errors"]["horizontal"]["rms_m"] < 1.0
+    for out, options, written in (("a", ("--fixes", "none"), False), ("b", (), True)):
+        assert run_cli("simulate", "rest.toml", *options, "--out", out, "-q").code == 0
+        assert (here / out / "fixes.csv").is_file() == written
+        assert run_cli("verify", out).out.startswith("identical")
+    for name, given in (("coning", "csv"), ("rest.toml", "gpx")):
+        assert run_cli("simulate", name, "--fixes", given, "--out", "c").code == 4
 
 
 def test_the_same_seed_is_the_same_folder(here):

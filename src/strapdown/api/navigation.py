@@ -188,7 +188,8 @@ def navigate(
     ----------
     imu : Imu, DataFrame, (t, gyro, accel), str or Path
         Samples: s, rad/s (n, 3), m/s² (n, 3), body axes forward-right-down. A path is that of a
-        log, or of a configuration (``.toml``), which then replaces all arguments except `smooth`.
+        log, or of a configuration (``.toml``), which then replaces all arguments except `smooth`
+        and, as a file, `reference`.
     measurements : sequence of Measurement
         `Gnss`, `NonHolonomic`, `ZeroVelocity`, `Odometer` …
     sensor : str or Path
@@ -218,13 +219,16 @@ def navigate(
         The state left the range of the mechanization.
     """
     if isinstance(imu, str | Path) and Path(imu).suffix.lower() == ".toml":
-        if len(measurements) or any(one is not None for one in (sensor, start, reference, options)):
+        table = isinstance(reference, pd.DataFrame)
+        if len(measurements) or table or any(x is not None for x in (sensor, start, options)):
             raise ConfigError(
                 "api.configuration-and-arguments",
                 file=Path(imu).name,
-                quantity="measurements, sensor, start, reference, options",
+                quantity="reference" if table else "measurements, sensor, start, options",
             )
         spec = NavigationSpec.read(imu)
+        if reference is not None:
+            spec = spec.with_path("truth", Path(reference).absolute())
         return run_navigation(spec.smoothed() if smooth else spec, Path(imu), progress)
     samples = imu_input(imu)
     data = _data_of(measurements)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from strapdown.api.reading import GnssFixes, Imu
 from strapdown.attitude_comparison.source import simulate_scenario
 from strapdown.bundle import Seal
-from strapdown.config.motions import TrajectorySpec
+from strapdown.config.motions import FIXES_FORMS, TrajectorySpec
 from strapdown.config.sources import (
     CrashSimulationSpec,
     ScenarioSpec,
@@ -20,7 +20,7 @@ from strapdown.config.sources import (
     is_scenario_file,
 )
 from strapdown.config.spec import specify
-from strapdown.errors import ConfigError
+from strapdown.errors import ConfigError, check_choice
 from strapdown.simulation import SCENARIOS, GnssReceiver, simulate_gnss
 from strapdown.simulation.crash_cases import CASES, RecordedCase, find_case, record_case
 from strapdown.systems.trajectory_source import SimulatedTrajectory, simulate_trajectory
@@ -31,9 +31,6 @@ if TYPE_CHECKING:
     from strapdown.sensors.crash_unit import CrashUnit
 
 __all__ = ["Simulation", "simulate"]
-
-#: Default receiver: a code receiver at 5 Hz, m and m/s.
-RECEIVER = GnssReceiver(rate=5.0, position_noise=1.0, velocity_noise=0.1)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -49,7 +46,7 @@ class Simulation:
         Exact, on the stamps of `imu`: the attitude of a scenario; position, velocity and attitude
         of a trajectory. Of a crash the path of the reference point, by time from the impact.
     gnss : GnssFixes or None
-        Fixes along a trajectory. `save` does not write them.
+        Fixes along a trajectory.
     recorders : mapping of str to CrashUnit
         Recorders of a crash by name, as `reconstruct_crash` takes them.
     """
@@ -67,6 +64,7 @@ class Simulation:
         out: str | Path,
         *,
         formats: str | Sequence[str] | None = None,
+        fixes: str | None = None,
         force: bool = False,
     ) -> Seal:
         """Write log and truth as a sealed bundle, which `verify` runs again.
@@ -78,6 +76,9 @@ class Simulation:
         formats : str or sequence of str
             Of the log: ``csv``, ``npz``, ``h5``, ``mat`` or ``all``; of a crash ``csv``, ``mme``.
             By default those of the trajectory's file, else ``csv``.
+        fixes : {'csv', 'none'}, optional
+            Of the fixes along a trajectory; by default as its file says, else ``csv``. Those of a
+            receiver that is given in Python are not written, because the file does not state it.
         force : bool
             Overwrite an existing bundle.
 
@@ -85,8 +86,8 @@ class Simulation:
         -------
         Seal
             Its folder has ``log.*`` (rad/s, m/s², body forward-right-down, with the true attitude),
-            ``scenario.json``, and ``truth.csv`` or ``trajectory.csv``. Of a crash: the records,
-            ``cameras.csv``, ``truth.csv``, ``scenario.json`` and ``case.toml``.
+            ``scenario.json``, and ``truth.csv`` or ``fixes.csv`` and ``trajectory.csv``. Of a
+            crash: the records, ``cameras.csv``, ``truth.csv``, ``scenario.json`` and ``case.toml``.
 
         Raises
         ------
@@ -99,7 +100,14 @@ class Simulation:
         wanted = [formats] if isinstance(formats, str) else formats
         if wanted is not None and not wanted:
             raise ConfigError("report.none-named", quantity="--format")
-        told = {} if wanted is None else {"formats": tuple(f.lower() for f in wanted)}
+        told: dict[str, Any] = {}
+        if wanted is not None:
+            told["formats"] = tuple(f.lower() for f in wanted)
+        if fixes is not None:
+            check_choice("report.no-writer", FIXES_FORMS, quantity="--fixes", name=fixes)
+            if self.gnss is None:
+                raise ConfigError("report.no-fixes", quantity="--fixes", name=self.name)
+            told["fixes"] = fixes
         source = self._source.model_copy(update=told)
         write = {
             SimulateSpec: write_simulation,
@@ -124,7 +132,7 @@ def simulate(
     sampling: str | None = None,
     seed: int | None = None,
     sensor: str | None = None,
-    receiver: GnssReceiver = RECEIVER,
+    receiver: GnssReceiver | None = None,
     recorders: Sequence[str] = (),
 ) -> Simulation:
     """Simulate a scenario, a trajectory or a crash.
@@ -145,8 +153,9 @@ def simulate(
     sensor : str, optional
         Of the catalogue, or a file in the same form: the errors of one unit, drawn with the seed,
         replace those of the scenario.
-    receiver : GnssReceiver
-        Of the fixes along a trajectory; by default 5 Hz, white noise of 1 m and 0.1 m/s.
+    receiver : GnssReceiver, optional
+        Of the fixes along a trajectory; by default that of its file, else 5 Hz, white noise of 1 m
+        and 0.1 m/s.
     recorders : sequence of str
         For a crash: names of its recorders, or ``all``.
 
@@ -226,10 +235,12 @@ def _imu(table: pd.DataFrame) -> Imu:
     return imu
 
 
-def _trajectory(spec: TrajectorySpec, receiver: GnssReceiver) -> Simulation:
+def _trajectory(spec: TrajectorySpec, receiver: GnssReceiver | None) -> Simulation:
     made: SimulatedTrajectory = simulate_trajectory(spec)
-    motion, _, imu, _, trajectory = made
-    fixes = simulate_gnss(motion, receiver, seed=spec.seed, source=spec.name)
+    motion, _, imu, _, trajectory, fixes = made
+    if receiver is not None:
+        spec = spec.model_copy(update={"fixes": "none"})
+        fixes = simulate_gnss(motion, receiver, seed=spec.seed, source=spec.name)
     gnss = GnssFixes(fixes)
     gnss.attrs = dict(fixes.attrs)
     return Simulation(spec.name, _imu(imu), trajectory, gnss, _source=spec, _made=made)

@@ -80,7 +80,9 @@ class NavigateFlags:
         float | None,
         with_what("DEG", "Initial heading, if neither gyros nor course determine it."),
     ] = None
-    truth: Annotated[Path | None, with_what("FILE", "A trajectory to compare with.")] = None
+    truth: Annotated[
+        Path | None, with_what("FILE", "A trajectory to compare with, before that of a file.")
+    ] = None
     points: Annotated[
         Path | None,
         with_what(
@@ -187,14 +189,15 @@ def navigate(
     assert source is not None
     own = source.suffix.lower() == ".toml"
     if own and live is None:
-        refuse_beside_file(source, {**given, "smooth": None, "map": None}, FLAGS)
+        refuse_beside_file(source, given | dict.fromkeys(("smooth", "map", "truth")), FLAGS)
     if own:
         WORDS.set("file")
     asked = NavigationSpec.read(source) if own else None
     if asked is not None and flags.smooth:
         asked = asked.smoothed()
-    if asked is not None and flags.map is not None:
-        asked = asked.with_map(str(flags.map.absolute()))
+    for table, path in (("map", flags.map), ("truth", flags.truth)):
+        if asked is not None and path is not None:
+            asked = asked.with_path(table, path.absolute())
     named = None if asked is None else source_name(asked)
     folder = out or default_folder(source, "navigate", named)
     if live is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated
 
@@ -42,6 +43,12 @@ def simulate(
             "--format",
         ),
     ] = None,
+    fixes: Annotated[
+        str | None,
+        writing(
+            "FORM", "Fixes along a trajectory, of the receiver of its [gnss]: csv, none (csv)."
+        ),
+    ] = None,
     seed: Annotated[int | None, running("N", "Of the simulated errors (0).")] = None,
     sensor: Annotated[
         str | None,
@@ -80,7 +87,7 @@ def simulate(
         )
         report("writing", 0.6)
         wanted = None if formats is None else formats.replace(",", " ").split()
-        seal = made.save(folder, formats=wanted, force=write.force)
+        seal = made.save(folder, formats=wanted, fixes=fixes, force=write.force)
     if write.json:
         typer.echo((seal.path / "scenario.json").read_text(encoding="utf-8"), nl=False)
     elif not write.quiet:
@@ -90,3 +97,8 @@ def simulate(
         print_seal(seal, "case.toml" if case else "scenario.json")
         if case:
             console().print(f"Next  strapdown crash {seal.path / 'case.toml'}")
+        elif (seal.path / "fixes.csv").is_file() and (seal.path / "log.csv").is_file():
+            stated = json.loads((seal.path / "scenario.json").read_text(encoding="utf-8"))
+            options = f" --sensor {used}" if (used := sensor or stated["sensor"]) else ""
+            told = f"{seal.path / 'log.csv'} --gnss {seal.path / 'fixes.csv'}{options}"
+            console().print(f"Next  strapdown navigate {told}")

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
-from pydantic import Field, StrictInt, model_validator
+from pydantic import BeforeValidator, Field, StrictInt, model_validator
 
 from strapdown.config.reading import FileSpec
 from strapdown.config.spec import (
     AngleWaveSpec,
+    Later,
     NotNegative,
     Number,
     Position,
@@ -253,6 +254,10 @@ KINDS = tuple(
 )
 
 
+FixesForm = Literal["csv", "none"]
+FIXES_FORMS: tuple[str, ...] = get_args(FixesForm)
+
+
 class TrajectorySpec(FileSpec):
     """One run of the simulator over a motion on the Earth."""
 
@@ -267,4 +272,14 @@ class TrajectorySpec(FileSpec):
     sensor: str | None = None
     formats: Annotated[tuple[str, ...], Several] = Field(default=("csv",), min_length=1)
     trajectory_formats: Annotated[tuple[str, ...], Several] = ()
+    #: Form of the receiver's fixes; none leaves them out.
+    fixes: FixesForm = "csv"
     motion: MotionSpec
+    #: Receiver whose fixes are written; 5 Hz, white noise of 1 m and 0.1 m/s.
+    gnss: Annotated[Any, BeforeValidator(Later("strapdown.config.navigation", "ReceiverTable"))] = (
+        Field(
+            default={"rate_hz": 5.0, "velocity_noise_m_per_s": 0.1},
+            validate_default=True,
+            description="the receiver along it",
+        )
+    )

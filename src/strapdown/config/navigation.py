@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -409,10 +410,11 @@ class NavigationSpec(FileSpec):
             return self
         return NavigationSpec.checked({**self.plain(), "smoother": {"kind": "rts"}})
 
-    def with_map(self, path: str | None) -> NavigationSpec:
-        """Return the specification with another map under its plan, or with none."""
-        plain = {key: value for key, value in self.plain().items() if key != "map"}
-        return NavigationSpec.checked(plain if path is None else {**plain, "map": {"path": path}})
+    def with_path(self, table: str, path: str | Path | None) -> NavigationSpec:
+        """Return the specification with another map or truth, or with none."""
+        plain = {key: value for key, value in self.plain().items() if key != table}
+        given = {} if path is None else {table: {"path": str(path)}}
+        return NavigationSpec.checked({**plain, **given})
 
     @property
     def receivers(self) -> dict[str, ReceiverTable]:

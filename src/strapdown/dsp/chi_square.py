@@ -1,4 +1,4 @@
-"""Chi-square, normal and Student distributions without loading scipy.stats; 95 % ellipses."""
+"""Chi-square, normal, Student, binomial distributions without scipy.stats; 95 % ellipses."""
 
 from __future__ import annotations
 
@@ -70,6 +70,16 @@ def student_above(value: float, freedom: float) -> float:
     from scipy.special import stdtr
 
     return float(stdtr(freedom, -value))
+
+
+def binomial_at_least(hits: float, trials: float, probability: float) -> float:
+    """Compute the binomial probability of `hits` or more; neither number need be whole.
+
+    The regularized incomplete beta function ``I_p(k, n - k + 1)`` (DLMF 8.17.5).
+    """
+    from scipy.special import betainc
+
+    return float(betainc(hits, trials - hits + 1.0, probability)) if hits > 0.0 else 1.0
 
 
 def _plain(values: Any) -> Any:

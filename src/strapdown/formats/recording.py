@@ -54,6 +54,8 @@ class NoStreamError(DataError):
         self, file: str, stream: str, title: str, streams: Sequence[str], rows: int = 0
     ) -> None:
         held = next((s for s in ("imu", "gnss", "reference") if s in streams and s != stream), "")
+        if (held, stream) == ("gnss", "reference"):
+            held = "gnss-as-reference"
         way = Finding(f"io.way-of-{held}" if held else "io.way-of-others", stream=stream, file=file)
         if rows:
             way = Finding("io.way-of-rows-beside", name=file, count=rows)

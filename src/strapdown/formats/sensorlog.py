@@ -7,6 +7,8 @@ application. Every row has the latest value of every sensor, and each sensor its
 repeated in several rows. Core Motion reports acceleration and gravity with the sign opposite to
 specific force: a phone on its back has gravity -z (Apple, CMDeviceMotion and CMAccelerometerData).
 
+``motionMagneticFieldX(µT)`` … is the field without that of the phone, zero until it is known.
+
 ``locationLatitude(WGS84)`` … are those of CLLocation: ``locationAltitude(m)`` is over the sea, and
 what is not known is negative. Their stamps count from 1970 and those of the sensors from the start
 of the phone; the time of day of each row, ``loggingTime(txt)``, relates them.
@@ -42,12 +44,15 @@ from strapdown.formats.signs import Signs
 MOTION, GYRO, FORCE = "motionRotationRate", "gyroRotation", "accelerometerAcceleration"
 USER, GRAVITY = "motionUserAcceleration", "motionGravity"
 RADIANS, GS = "(rad/s)", "(G)"
+#: The calibrated magnetic field, with either letter of the micro sign.
+FIELDS = tuple(("motionMagneticField", f"({micro}T)") for micro in "\u00b5\u03bc")
 STAMPS = {
     MOTION: "motionTimestamp_sinceReboot(s)",
     USER: "motionTimestamp_sinceReboot(s)",
     GRAVITY: "motionTimestamp_sinceReboot(s)",
     GYRO: "gyroTimestamp_sinceReboot(s)",
     FORCE: "accelerometerTimestamp_sinceReboot(s)",
+    FIELDS[0][0]: "motionTimestamp_sinceReboot(s)",
 }
 WALL_CLOCK = "loggingTime(txt)"
 TITLE = "table of SensorLog"
@@ -99,7 +104,12 @@ def read(path: Path) -> RawLog:
         logs.append(force_of(*parts))
     elif set(_three(FORCE, GS)) <= have:
         logs.append(_log(raw, FORCE, "accel", "-g", findings))
-    if len(logs) > 1:
+    turned = len(logs) > 1
+    # The calibrated field; zeros where the phone has not calibrated it.
+    field = next((k for k in FIELDS if set(_three(*k)) <= have), None)
+    if field is not None and np.any([column(raw, name) for name in _three(*field)]):
+        logs.append(_log(raw, field[0], "mag", "uT", findings, field[1]))
+    if turned:
         findings.append(
             Finding("io.sign-of-ios-turned", file=path.name, quantity="accel", severity="note")
         )
@@ -133,9 +143,11 @@ def _three(kind: str, unit: str) -> tuple[str, str, str]:
     return (f"{kind}X{unit}", f"{kind}Y{unit}", f"{kind}Z{unit}")
 
 
-def _log(raw: RawLog, kind: str, triad: str, unit: str, findings: list[Finding]) -> RawLog:
+def _log(
+    raw: RawLog, kind: str, triad: str, unit: str, findings: list[Finding], suffix: str = ""
+) -> RawLog:
     """Return the samples of one sensor, without repetitions."""
-    names = _three(kind, RADIANS if triad == "gyro" else GS)
+    names = _three(kind, suffix or (RADIANS if triad == "gyro" else GS))
     time = _clock(raw, kind)
     stamps = raw.columns[time]
     if time == WALL_CLOCK:

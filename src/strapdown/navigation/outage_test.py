@@ -1,12 +1,13 @@
 """GNSS outage test: position error of a navigator at withheld fixes.
 
 A good receiver replaces a reference: some seconds of its fixes are withheld, and the navigator,
-which continues without them, is scored against them. Its stated error is tested on the same
-fixes.
+which continues without them, is scored against them, or against the truth where it is known. Its
+stated error is tested on the same instants.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -14,25 +15,33 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.dsp.chi_square import PLANE_95, plane_reach
+from strapdown.dsp.chi_square import PLANE_95, binomial_at_least, plane_reach
+from strapdown.ellipsoids import Ellipsoid
 from strapdown.errors import ConfigError
 from strapdown.estimation.covariance import Step
 from strapdown.navigation.measurements.measurement import TabulatedMeasurement
 from strapdown.navigation.navigator import Navigator
 from strapdown.navigation.pipeline import NavigationPipeline, PipelineState
 from strapdown.navigation.record import InnovationRecord, NavigationChunk, Span
+from strapdown.navigation.recorder import FullRecorder
+from strapdown.navigation.smoother import Smoothing
+from strapdown.navigation.truth_comparison import compare_with_truth
 from strapdown.progress import Progress
 from strapdown.tables import ACCEL, GYRO
 from strapdown.tables.checks import index_of, source_of, values_of
 
 __all__ = [
+    "IMPROBABLE",
     "SETTLED",
+    "OutageVerdict",
     "Withheld",
     "WithheldRun",
     "WithheldScore",
     "Withholding",
     "blinded",
     "end_of_what_tells",
+    "judge_outages",
+    "score_by_truth",
     "score_of",
     "score_of_smoothed",
     "score_withholding",
@@ -60,20 +69,25 @@ class WithheldScore:
     Attributes
     ----------
     time : ndarray, (n,), s
-        Of the fixes that were withheld, on the clock of the inertial sensors.
+        Of the fixes that were withheld, on the clock of the inertial sensors; of the marks of the
+        covariance, against the truth.
     error : ndarray, (n, 3), m
-        Computed position of the antenna minus the fix, north, east, down.
-    variance : ndarray, (n, 3), m²
-        Predicted variance of the error, including the noise of the fix.
+        Computed position of the antenna minus the fix, north, east, down; computed minus true
+        position.
     covariance : ndarray, (n, 2, 2), m²
-        Of its horizontal part, the noise of the fix with it.
+        Predicted, of its horizontal part, the noise of the fix with it.
+    drift : ndarray, (n,), m²
+        Predicted variance of the horizontal position alone, sum of both components.
+    against : str
+        ``fixes`` or ``truth``.
     """
 
     span: Span
     time: Array
     error: Array
-    variance: Array
     covariance: Array
+    drift: Array
+    against: str = "fixes"
 
     @property
     def horizontal(self) -> Array:
@@ -102,14 +116,114 @@ class WithheldScore:
     @property
     def distance(self) -> Array:
         """Mahalanobis distance of the horizontal error, (n,): 2.45 is the 95 % bound."""
-        e = self.error[:, :2]
-        weighed = np.linalg.solve(self.covariance, e[:, :, None])[..., 0]
-        return np.asarray(np.sqrt((e * weighed).sum(axis=1)))
+        return np.asarray(np.linalg.norm(self._whitened, axis=1))
 
     @property
-    def inside(self) -> bool:
-        """Whether the largest horizontal error is within the 95 % ellipse of its instant."""
-        return bool(self.distance[int(np.argmax(self.horizontal))] <= PLANE_95)
+    def inside(self) -> NDArray[np.bool_]:
+        """Whether each error is within its 95 % ellipse, (n,)."""
+        return np.asarray(self.distance <= PLANE_95)
+
+    @property
+    def _whitened(self) -> Array:
+        L = np.linalg.cholesky(self.covariance)
+        return np.asarray(np.linalg.solve(L, self.error[:, :2, None])[..., 0])
+
+    def without(self, times: Array) -> WithheldScore:
+        """Return the score without the errors at some times."""
+        kept = ~np.isin(self.time, times)
+        arrays = {k: getattr(self, k)[kept] for k in ("time", "error", "covariance", "drift")}
+        return replace(self, **arrays)
+
+    def independent(self) -> tuple[float, float]:
+        """Effective numbers of independent errors: for their share inside, for the largest one.
+
+        Position errors p_i are correlated as those of a random walk, the least correlated of the
+        errors that grow by themselves, and the noise of fixes is not: the correlation of two errors
+        of variance s_i is ``ρ_ij = min(p_i, p_j)/√(s_i s_j)``, and of their squares ρ². A share
+        of n of them has the variance of ``n²/Σρ_ij²`` independent ones; if successive errors are
+        more alike (as those of a receiver are), with the correlation of an autoregressive sequence,
+        ``n (1 - r²)/(1 + r²)``. To the largest one each error contributes the part of its variance
+        that its predecessor does not determine, ``1 - ρ²``.
+        """
+        n, z = len(self.time), self._whitened
+        s = np.einsum("kii->k", self.covariance)
+        ρ = np.minimum.outer(self.drift, self.drift) / np.sqrt(np.multiply.outer(s, s))
+        np.fill_diagonal(ρ, 1.0)
+        pairs = float(np.square(z[1:]).sum() + np.square(z[:-1]).sum())
+        r = max(2.0 * float((z[1:] * z[:-1]).sum()) / pairs, 0.0) if pairs > 0.0 else 0.0
+        share = min(n * n / float(np.square(ρ).sum()), n * (1.0 - r * r) / (1.0 + r * r))
+        return max(share, 1.0), n - float(np.square(np.diagonal(ρ, 1)).sum())
+
+
+#: Probability below which errors contradict the predicted covariance.
+IMPROBABLE = 0.01
+
+
+@dataclass(frozen=True)
+class OutageVerdict:
+    """Agreement of the errors in test outages with their predicted covariance.
+
+    Attributes
+    ----------
+    count : int
+        Of the errors.
+    inside : float
+        Share of them within their 95 % ellipses.
+    worst : int
+        Outage with the largest error relative to its bound.
+    error, bound : float, m
+        That error, and its 95 % bound.
+    probability : float
+        Of as small a share inside, or as large an error, if the covariance is right.
+    """
+
+    count: int
+    inside: float
+    worst: int
+    error: float
+    bound: float
+    probability: float
+
+    @property
+    def consistent(self) -> bool:
+        """Whether the errors agree with their predicted covariance."""
+        return self.probability >= IMPROBABLE
+
+
+def judge_outages(scores: Sequence[WithheldScore]) -> OutageVerdict:
+    """Test the errors of one or several outages against their predicted covariance.
+
+    The share of the errors inside their bounds is tested as binomial, the largest one relative to
+    its bound by the distribution of the maximum, both of effectively independent errors
+    (`WithheldScore.independent`). The smaller probability counts twice, because there are two.
+    """
+    outside, of, largest = 0.0, 0.0, 0.0
+    for one in scores:
+        shares, maxima = one.independent()
+        outside += shares * float(np.mean(~one.inside))
+        of += shares
+        largest += maxima
+    # Outages that overlap have their errors in common.
+    spans = sorted((one.span.begin, one.span.end) for one in scores)
+    whole, until = 0.0, -math.inf
+    for begin, end in spans:
+        whole += max(end - max(begin, until), 0.0)
+        until = max(until, end)
+    apart = whole / sum(end - begin for begin, end in spans)
+    farthest = [float(one.distance.max()) for one in scores]
+    worst = int(np.argmax(farthest))
+    at = int(np.argmax(scores[worst].distance))
+    beyond = math.exp(-0.5 * farthest[worst] ** 2)
+    p_largest = -math.expm1(largest * math.log1p(-beyond)) if beyond < 1.0 else 1.0
+    p_share = binomial_at_least(apart * outside, apart * of, 0.05)
+    return OutageVerdict(
+        count=sum(len(one.time) for one in scores),
+        inside=float(np.concatenate([one.inside for one in scores]).mean()),
+        worst=worst,
+        error=float(scores[worst].horizontal[at]),
+        bound=float(scores[worst].bound[at]),
+        probability=min(2.0 * min(p_share, p_largest), 1.0),
+    )
 
 
 def spans_to_withhold(begin: float, end: float, length: float, places: int = 5) -> tuple[Span, ...]:
@@ -172,10 +286,45 @@ def score_of(pieces: Sequence[NavigationChunk], name: str, span: Span) -> Withhe
     seen = seen_of(pieces, name, span)
     time = np.array([one.time for one in seen])
     nu = np.array([one.innovations.nu for one in seen])
-    s = np.array([one.innovations.s for one in seen])
+    s = np.array([one.innovations.s[:2] for one in seen])
     marks = {mark.time: mark.covariance for piece in pieces for mark in piece.marks}
     P = np.array([marks[at][:2, :2] for at in time.tolist()])
-    return WithheldScore(span, time, nu, s, P + _beyond_place(s, P))
+    # Predicted along north and east are the variances of the position, of the lever arm, and of
+    # the fix: what is beyond the first is independent from axis to axis except for the lever arm.
+    beyond = np.maximum(s - np.diagonal(P, axis1=1, axis2=2), 0.0)
+    covariance = P + np.eye(2) * beyond[:, None, :]
+    return WithheldScore(span, time, nu, covariance, np.einsum("kii->k", P))
+
+
+def score_by_truth(
+    navigator: Navigator,
+    pieces: Sequence[NavigationChunk],
+    span: Span,
+    truth: pd.DataFrame,
+    ellipsoid: Ellipsoid,
+    smoothing: Smoothing | None = None,
+) -> WithheldScore:
+    """Score a navigator over a span by the true path.
+
+    Parameters
+    ----------
+    pieces : sequence of NavigationChunk
+        Of the span; of what follows, too, if they are smoothed.
+    smoothing : Smoothing, optional
+        Of the same chunks.
+    """
+    tape = FullRecorder().begin(navigator)
+    for piece in pieces:
+        tape.take(piece)
+    record = tape.record(smoothing=smoothing)
+    marks = index_of(record.sd)
+    within = marks <= span.end
+    found = compare_with_truth(
+        record.trajectory, marks[within], record.covariance[within], truth, ellipsoid
+    )
+    P = found.covariance[:, :2, :2]
+    drift = np.einsum("kii->k", P)
+    return WithheldScore(span, found.time, found.errors[:, :3], P, drift, "truth")
 
 
 def seen_of(pieces: Sequence[NavigationChunk], name: str, span: Span) -> list[InnovationRecord]:
@@ -196,16 +345,6 @@ def seen_of(pieces: Sequence[NavigationChunk], name: str, span: Span) -> list[In
     return seen
 
 
-def _beyond_place(s: Array, P: Array) -> Array:
-    """Return the predicted variance of a fix beyond that of the position, (n, 2, 2).
-
-    The predicted variance along north and east is P, the part of the lever arm, and the fix's own
-    noise: the part beyond P is independent from axis to axis except for the lever arm.
-    """
-    beyond = np.maximum(s[:, :2] - np.diagonal(P, axis1=1, axis2=2), 0.0)
-    return np.asarray(np.eye(2) * beyond[:, None, :])
-
-
 # GNSS outage test of a smoother: its error at withheld fixes.
 
 
@@ -220,9 +359,8 @@ def end_of_what_tells(span: Span) -> float:
 
 
 def score_of_smoothed(
-    navigator: Navigator,
     pieces: Sequence[NavigationChunk],
-    later: Sequence[NavigationChunk],
+    smoothing: Smoothing,
     name: str,
     span: Span,
 ) -> WithheldScore:
@@ -233,26 +371,21 @@ def score_of_smoothed(
 
     Parameters
     ----------
-    navigator : Navigator
-        With a smoother.
     pieces : sequence of NavigationChunk
         Of the span, in which the aid's innovations were computed but not used.
-    later : sequence of NavigationChunk
-        That follow, with the aid.
+    smoothing : Smoothing
+        Of these, and of those that follow with the aid.
     name : str
         Of the aid, which is a receiver.
     """
-    assert navigator.smoother is not None
     seen = seen_of(pieces, name, span)
-    smoothing = navigator.smoother.begin(navigator)
-    for piece in (*pieces, *later):
-        smoothing.take(piece)
     time = np.array([one.time for one in seen])
     # With a rule of its own it does not take the compiled loop of a single receiver.
     observations = [one.observation for one in seen if one.observation is not None]
     error, covariance = smoothing.seen(time, observations)
-    variance = np.einsum("kii->ki", covariance)
-    return WithheldScore(span, time, error, variance, covariance[:, :2, :2])
+    plane = covariance[:, :2, :2]
+    noise = np.array([one.R[:2] for one in observations])
+    return WithheldScore(span, time, error, plane, np.einsum("kii->k", plane) - noise.sum(axis=1))
 
 
 # GNSS outage test: score a pipeline by fixes withheld from it.
@@ -291,6 +424,9 @@ def score_withholding(
     spans: Sequence[Span],
     begun: float,
     progress: Progress,
+    *,
+    rejected: Array,
+    truth: tuple[pd.DataFrame, Ellipsoid] | None = None,
 ) -> tuple[Withheld, ...]:
     """Run a pipeline with all fixes up to each test outage, and through it with none.
 
@@ -304,6 +440,12 @@ def score_withholding(
         The test outages.
     begun : float, s
         Begin of navigation.
+    rejected : ndarray, (k,), s
+        Times of the fixes that the run with fixes rejects: errors there are not the navigator's,
+        and are left out, unless an outage has no others.
+    truth : (DataFrame, Ellipsoid), optional
+        Trajectory table, and the ellipsoid of its heights: an outage that it covers is scored by
+        it.
 
     Returns
     -------
@@ -329,18 +471,39 @@ def score_withholding(
     found: dict[int, Withheld] = {}
     blind = replace(chain, navigator=blinded(chain.navigator, name))
     runs = withheld_runs(chain, blind, state, time, values, spans)
+
+    def score(
+        pieces: tuple[NavigationChunk, ...],
+        span: Span,
+        smoothing: Smoothing | None = None,
+        later: tuple[NavigationChunk, ...] = (),
+    ) -> WithheldScore:
+        if truth is not None:
+            stamps = index_of(truth[0])
+            if stamps[0] <= span.begin and stamps[-1] >= span.end:
+                whole = (*pieces, *later)
+                return score_by_truth(blind.navigator, whole, span, *truth, smoothing)
+        if smoothing is None:
+            found = score_of(pieces, name, span)
+        else:
+            found = score_of_smoothed(pieces, smoothing, name, span)
+        sound = found.without(rejected)
+        return sound if len(sound.time) else found
+
     for k, withheld in enumerate(runs):
         progress("withholding fixes", k / len(spans))
         span = spans[withheld.number]
-        smoothed = None
+        pieces, smoothed = withheld.pieces, None
         if chain.navigator.smoother is not None:
             until = int(np.searchsorted(time, end_of_what_tells(span), side="right"))
             then = slice(withheld.rows.stop, until)
             _, after = chain.advance(withheld.through, time[then], values[then])
-            smoothed = score_of_smoothed(
-                chain.navigator, withheld.pieces, after.navigation, name, span
-            )
-        found[withheld.number] = Withheld(score_of(withheld.pieces, name, span), smoothed)
+            smoothing = chain.navigator.smoother.begin(chain.navigator)
+            for piece in (*pieces, *after.navigation):
+                smoothing.take(piece)
+            smoothed = score(pieces, span, smoothing, after.navigation)
+        forward = score(pieces, span)
+        found[withheld.number] = Withheld(forward, smoothed)
     return tuple(found[k] for k in range(len(spans)))
 
 

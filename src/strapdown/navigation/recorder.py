@@ -41,8 +41,11 @@ Array = NDArray[np.float64]
 NEAR = 1e-6
 #: Marks before and after an observation are closer than this, s.
 PAIR = 2.0 * JUST_BEFORE
-#: A longer interval, relative to the usual, is an outage; after so many observations it is over.
-GAP, SETTLES = 5.0, 5
+#: A longer interval, relative to the usual, is an outage; after so many observations that are taken
+#: its position, velocity and acceleration are confirmed. An error swings out within so many.
+GAP, CONFIRMED, SETTLES = 5.0, 3, 5
+#: Share of a variance that a smoother takes off, from which on it is compared with its correction.
+LEAST_GAIN = 0.01
 
 
 @dataclass(frozen=True)
@@ -203,6 +206,14 @@ class Tape:
         covariance = on_disk.room((len(kept), 9, 9))
         sensors, sensors_sd = (on_disk.room((len(kept), count)) for _ in range(2))
         contradictions = list(self._contradictions())
+        factor = None
+        if later is not None and contradictions:
+            about = [
+                (begin if since is None else since, until)
+                for _, begin, _, _, until, since in contradictions
+            ]
+            factor = self._excess(later, marks, kept, about)
+            contradictions = [one for one in contradictions if one[5] is None]
         without = ~np.array(model.estimated(used))
         for part in on_disk.parts_of(len(kept), marks.shape[1]):
             rows, at = kept[part], stamps[part]
@@ -214,7 +225,10 @@ class Tape:
             else:
                 P[:], sensors_sd[part] = later.covariance[rows], later.sensors_sd[rows]
                 sensors[part] += later.sensors[rows]
-            for component, begin, end, size in contradictions:
+            if factor is not None:
+                P *= factor[part, None, None]
+                sensors_sd[part] *= np.sqrt(factor[part, None])
+            for component, begin, end, size, *_ in contradictions:
                 within = (at >= begin) & (at <= end)
                 # A correction of one position corrects all else by their covariance with it.
                 own = filtered[within, component, component, None]
@@ -242,8 +256,52 @@ class Tape:
             outages=dict(outages or {}),
         )
 
-    def _contradictions(self) -> Iterator[tuple[int, float, float, float]]:
-        """Components, spans and sizes of contradictions of the receivers' positions."""
+    def _excess(
+        self,
+        later: Smoothed,
+        marks: Array,
+        kept: NDArray[np.intp],
+        spans: Sequence[tuple[float, float]],
+    ) -> Array:
+        """Factors on the smoothed covariance about contradictions, with the outages before them.
+
+        The correction of a filter by its smoother has the variance that the smoother takes off. A
+        correction beyond it, as of rejected fixes that are then believed, was not made by the noise
+        of the model: as the smoother divides it over the time before by that noise, so much as it
+        is larger is the smoothed variance. On both sides to where the correction is within its
+        standard deviation.
+        """
+        stamps = marks[kept, 0]
+        nodes = later.nodes_at(stamps)
+        correction = later.errors[nodes, :6]
+        if len(later.left):
+            correction = correction - later.left[nodes, :6]
+        square = np.square(correction)
+        factor = np.ones(len(kept))
+        for part in on_disk.parts_of(len(kept), 81):
+            rows = kept[part]
+            filtered = marks[rows, 1:82].reshape(-1, 9, 9)
+            for own in (slice(0, 2), slice(2, 3), slice(3, 5), slice(5, 6)):
+                before, after = (
+                    np.einsum("kii->k", P[:, own, own]) for P in (filtered, later.covariance[rows])
+                )
+                less = before - after
+                some = less > LEAST_GAIN * before
+                ratio = square[part, own].sum(axis=1) / np.where(some, less, math.inf)
+                factor[part] = np.fmax(factor[part], ratio)
+            on_disk.let_go_of_all()
+        out = np.ones(len(kept))
+        for since, end in spans:
+            first, stop = np.searchsorted(stamps, [since, end], side="right").tolist()
+            while first > 0 and factor[first - 1] > 1.0:
+                first -= 1
+            while stop < len(stamps) and factor[stop] > 1.0:
+                stop += 1
+            out[first:stop] = factor[first:stop]
+        return out
+
+    def _contradictions(self) -> Iterator[tuple[int, float, float, float, float, float | None]]:
+        """Components of the receivers' positions, with their contradictions."""
         general = self.navigator.filter.rule
         rules = {aid.name: aid.rule or general for aid in self.navigator.aids}
         for name, rows in self._seen.items():
@@ -321,8 +379,11 @@ def _nearest(time: Array, wanted: Array) -> NDArray[np.intp]:
 
 def _contradictions(
     time: Array, nu: Array, rejected: NDArray[np.bool_], patience: int
-) -> Iterator[tuple[float, float, float]]:
+) -> Iterator[tuple[float, float, float, float, float | None]]:
     """Begin and end, s, and size, m, of contradictions of a receiver and the inertial solution.
+
+    Further when the receiver is believed again, and when the outage before began, s, if there was
+    one.
 
     `nu`, `rejected`: innovations of a component, and those that an adaptive rule rejected.
 
@@ -337,20 +398,26 @@ def _contradictions(
         return
     first = [float(nu[span.start]) for span in spans]
     after_gap = np.diff(time, prepend=-math.inf) > GAP * np.median(np.diff(time))
-    back, swings = False, -1
+    back, swings, since = False, -1, None
     for j, span in enumerate(spans):
         # The last estimate needs as many observations to settle.
         settled = min(span.stop + patience, len(time))
         size, end = float(np.abs(nu[span]).max()), float(time[settled - 1])
+        until = float(time[span.stop - 1])
         long = span.stop - span.start >= patience
         if span.stop < len(time) and abs(nu[span.stop]) < 0.5 * abs(nu[span.stop - 1]):
             if long:
-                yield float(time[span.start]), float(time[span.stop]), size
+                yield float(time[span.start]), float(time[span.stop]), size, until, None
             back = False
             continue
-        lately = bool(after_gap[max(span.start - SETTLES, 0) : span.start + 1].any())
-        if lately or not long or back or span.start <= swings:
-            yield float(time[span.start]), end, size
+        near = max(span.start - CONFIRMED + 1, 0)
+        lately = near + np.flatnonzero(after_gap[near : span.start + 1])
+        if lately.size or not long or back or span.start <= swings:
+            if lately.any():
+                since = float(time[lately[0] - 1])
+            elif span.start > swings:
+                since = None
+            yield float(time[span.start]), end, size, end, since
             back, swings = False, settled + patience
             continue
         end = float(time[span.stop - 1]) + DOUBT
@@ -358,7 +425,7 @@ def _contradictions(
         if j + 1 < len(spans) and time[spans[j + 1].start] <= end:
             back = abs(first[j] + first[j + 1]) < 0.5 * abs(first[j])
             end = float(time[spans[j + 1].stop - 1]) if back else end
-        yield float(time[span.start]), end, size
+        yield float(time[span.start]), end, size, until, None
 
 
 def _long_rejections(rejected: NDArray[np.bool_], patience: int) -> list[slice]:

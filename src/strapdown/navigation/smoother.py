@@ -190,6 +190,7 @@ class Smoothing:
             mechanization=self._navigator.filter.mechanization,
             time=time,
             errors=errors[:, :9],
+            left=left,
             covariance=on_disk.stored(covariance, place),
             sensors=sensors,
             sensors_sd=on_disk.stored(sensors_sd, place),
@@ -328,6 +329,8 @@ class Smoothed:
         Of the nodes.
     errors : ndarray, (k, 9)
         Of the state at each, level axes of the mechanization.
+    left : ndarray, (k or 0, 9)
+        Part of these that is the filter's estimate, where its state follows a reference.
     covariance : ndarray, (m, 9, 9)
         At the marks, north-east-down.
     sensors : ndarray, (m, s)
@@ -338,6 +341,7 @@ class Smoothed:
     mechanization: Mechanization
     time: Array
     errors: Array
+    left: Array
     covariance: Array
     sensors: Array
     sensors_sd: Array

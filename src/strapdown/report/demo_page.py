@@ -224,8 +224,8 @@ def _withheld_truth(withheld: list[dict[str, Any]]) -> str:
         else f" (before smoothing by {', '.join(plain(error, 1) for error in forward)} m)"
     )
     return (
-        f"{len(tried)} GNSS outage tests of {length} s: error {errors} m at most{before}, within "
-        f"the 95 % bound in {sum(w['inside'] for w in tried)} of {len(tried)}."
+        f"{len(tried)} GNSS outage tests of {length} s: error {errors} m at most{before}, "
+        f"consistent with the 95 % bounds in {sum(w['inside'] for w in tried)} of {len(tried)}."
     )
 
 

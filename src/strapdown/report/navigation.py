@@ -24,6 +24,7 @@ from strapdown.lazy_names import Choices
 from strapdown.navigation.consistency import Inconsistency
 from strapdown.navigation.heading_integrity import REASONS, STATUSES
 from strapdown.navigation.integrity import QUANTITY_REASONS, Repeated
+from strapdown.navigation.outage_test import judge_outages
 from strapdown.navigation.record import NavigationRecord
 from strapdown.progress import Progress
 from strapdown.report.chart import Array
@@ -100,7 +101,7 @@ def _with_tiles(result: NavigationRun, report: bool) -> Iterator[NavigationRun]:
         yield result
         return
     if not report:
-        yield replace(result, spec=result.spec.with_map(None))
+        yield replace(result, spec=result.spec.with_path("map", None))
         return
     from strapdown.formats.map_tiles import open_map, write_tiles
     from strapdown.report.navigation_plan import plan_tiles
@@ -112,7 +113,7 @@ def _with_tiles(result: NavigationRun, report: bool) -> Iterator[NavigationRun]:
         folder = Path(name).resolve() / "tiles"
         files = write_tiles(folder, opened, plan_tiles(NavigationEvaluation(result), opened))
         used = replace(input_files("map", str(folder), files), copied=True)
-        spec = result.spec.with_map(str(folder))
+        spec = result.spec.with_path("map", folder)
         yield replace(result, spec=spec, inputs=(*result.inputs, used))
 
 
@@ -236,12 +237,17 @@ def navigation_json(evaluation: NavigationEvaluation) -> dict[str, Any]:
                 "to_s": w.result.span.end,
                 "largest_horizontal_error_m": w.result.largest,
                 "bound_95_m": w.result.bound_at_largest,
-                "inside": w.result.inside,
+                "against": w.result.against,
+                "instants": len(w.result.time),
+                "share_inside": float(w.result.inside.mean()),
+                "probability": verdict.probability,
+                "inside": verdict.consistent,
                 "largest_horizontal_error_forward_m": None
                 if w.smoothed is None
                 else w.forward.largest,
             }
             for w in result.withheld
+            for verdict in (judge_outages([w.result]),)
         ],
         "modes": [{"mode": s.name, "from_s": s.begin, "to_s": s.end} for s in record.modes],
         "events": [

@@ -10,6 +10,7 @@ from strapdown import __version__
 from strapdown.config.choice import ChoiceSpec
 from strapdown.constants import TWO_SIDED_95
 from strapdown.evaluation.trajectory_differences import trajectory_differences
+from strapdown.navigation.outage_test import judge_outages
 from strapdown.navigation.record import NavigationRecord, Span
 from strapdown.navigation.truth_comparison import SmootherConsistency
 from strapdown.report.chart import AXIS_COLOURS, BLUE, GREY, Array, Chart, Panel, curve, thin_fill
@@ -593,6 +594,7 @@ def outage_table(evaluation: NavigationEvaluation) -> TableBlock | None:
 
 def withheld_table(evaluation: NavigationEvaluation) -> TableBlock | None:
     """GNSS outage tests with the resulting errors."""
+    verdicts = [judge_outages([w.result]) for w in evaluation.run.withheld]
     rows = [
         (
             withheld_aid(evaluation.run.spec),
@@ -600,25 +602,29 @@ def withheld_table(evaluation: NavigationEvaluation) -> TableBlock | None:
             duration_words(w.result.span.end - w.result.span.begin),
             length_words(w.result.largest),
             length_words(w.result.bound_at_largest),
-            "yes" if w.result.inside else "no",
+            f"{share_words(float(w.result.inside.mean()))} of {len(w.result.time)}",
+            "yes" if verdict.consistent else "no",
             *(() if w.smoothed is None else (length_words(w.forward.largest),)),
         )
-        for w in evaluation.run.withheld
+        for w, verdict in zip(evaluation.run.withheld, verdicts, strict=True)
     ]
     if not rows:
         return None
     smoothed = evaluation.run.forward is not None
     return TableBlock(
         (
-            *("GNSS outage test", "from", "for", "largest error", "95 % bound", "within bound"),
+            *("GNSS outage test", "from", "for", "largest error", "95 % bound", "within bounds"),
+            "consistent",
             *(("filter alone",) if smoothed else ()),
         ),
         tuple(rows),
-        text=(0, 5),
-        caption="Measurements withheld on purpose: the largest horizontal error, and the run's "
-        "95 % bound at that instant"
+        text=(0, 6),
+        caption="Measurements withheld on purpose: the largest horizontal error, the run's "
+        "95 % bound at that instant, and the share of the "
+        + ("true positions" if evaluation.run.withheld[0].result.against == "truth" else "fixes")
+        + " within their bounds; consistent unless such a share or error is less probable than 1 %"
         + ("; smoothed, and by the filter alone." if smoothed else "."),
-        strong=tuple(k for k, w in enumerate(evaluation.run.withheld) if not w.result.inside),
+        strong=tuple(k for k, verdict in enumerate(verdicts) if not verdict.consistent),
     )
 
 

@@ -23,6 +23,7 @@ from strapdown.navigation.consistency import (
     consistency_of,
 )
 from strapdown.navigation.measurements.measurement import lasting
+from strapdown.navigation.outage_test import judge_outages
 from strapdown.navigation.record import NavigationRecord, Span, innovation_labels
 from strapdown.navigation.truth_comparison import (
     SmootherConsistency,
@@ -583,18 +584,21 @@ def _against_known(evaluation: NavigationEvaluation) -> list[Finding]:
         )
     tests = [one.result for one in evaluation.run.withheld]
     if tests:
-        inside = sum(one.inside for one in tests)
-        bounds = [(one, one.bound_at_largest) for one in tests]
-        worst, bound = max(bounds, key=lambda w: w[0].largest / w[1] if w[1] > 0.0 else 0.0)
+        verdict = judge_outages(tests)
+        worst = tests[verdict.worst]
         out.append(
             reason(
-                bool(inside >= _ENOUGH * len(tests)),
-                "navigation.outage-tests",
-                inside=inside,
+                verdict.consistent,
+                "navigation.outage-tests"
+                if worst.against == "fixes"
+                else "navigation.outage-tests-truth",
+                inside=verdict.inside,
+                instants=verdict.count,
                 count=len(tests),
-                error_m=worst.largest,
-                bound_m=bound,
+                error_m=verdict.error,
+                bound_m=verdict.bound,
                 length_s=worst.span.end - worst.span.begin,
+                probability=verdict.probability,
             )
         )
     return out

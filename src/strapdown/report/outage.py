@@ -191,6 +191,7 @@ def outage_json(result: OutageRun) -> dict[str, Any]:
             "fixes_to_the_end": sum(d.to_end for d in result.equal),
             "rejected_fixes": sum(d.rejected for d in result.drifts),
         },
+        "probability": None if result.verdict is None else result.verdict.probability,
         "measured": spaced(inside_words(result)),
         "drifts": [
             {

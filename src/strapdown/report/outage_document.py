@@ -264,6 +264,13 @@ def inside_words(result: OutageRun) -> str:
             f"{length_words(worst)} at most; {sum(ends)} of {len(ends)} final drifts and {of}"
         )
     said = f"Measured in {len(drifts)} {'outages' if len(drifts) > 1 else 'outage'}: {of}"
+    verdict = result.verdict
+    if verdict is not None and not verdict.consistent:
+        said += (
+            " The bounds are too small: as few within them, or an error as large as "
+            f"{length_words(verdict.error)} (bound {length_words(verdict.bound)}), have a "
+            f"probability of {share_words(verdict.probability)}."
+        )
     return said + left_out_words(result)
 
 

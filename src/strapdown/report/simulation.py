@@ -173,8 +173,9 @@ def write_trajectory_simulation(
     -------
     Seal
         The folder holds ``log.*`` (rad/s, m/s², body forward-right-down, with the true attitude in
-        further columns), ``trajectory.csv`` and other formats, ``trajectory.svg``, its picture,
-        and ``scenario.json`` with the resolved configuration.
+        further columns), ``fixes.csv`` of the stated receiver, ``trajectory.csv`` and other
+        formats, ``trajectory.svg``, its picture, and ``scenario.json`` with the resolved
+        configuration.
 
     Raises
     ------
@@ -191,7 +192,7 @@ def write_trajectory_simulation(
             file=f"{spec.name}.toml",
             name=name,
         )
-    motion, errors, imu, attitude, trajectory = made or simulate_trajectory(spec)
+    motion, errors, imu, attitude, trajectory, fixes = made or simulate_trajectory(spec)
     configuration = spec.model_dump(mode="json", exclude_none=True)
     seals: list[Seal] = []
     with write_bundle(
@@ -204,6 +205,8 @@ def write_trajectory_simulation(
     ) as folder:
         for name in formats:
             WRITERS[name].write(folder / f"log.{name}", {"imu": imu, "reference": attitude})
+        if spec.fixes != "none":
+            WRITERS[spec.fixes].write(folder / f"fixes.{spec.fixes}", {"gnss": fixes})
         options = FileOptions(name=spec.name, ellipsoid=motion.ellipsoid)
         for name in dict.fromkeys(("csv", *spec.trajectory_formats)):
             path = folder / f"trajectory.{name}"

@@ -105,7 +105,8 @@ def _rerun(command: str, configuration: dict[str, Any], out: Path, sealed: set[s
     elif command == crash_live.COMMAND:
         crash_live.rerun(configuration, out)
     elif "trajectory" in configuration:
-        trajectory = TrajectorySpec.model_validate(configuration["trajectory"])
+        # Earlier versions wrote no fixes.
+        trajectory = TrajectorySpec.model_validate({"fixes": "none"} | configuration["trajectory"])
         write_trajectory_simulation(trajectory, out)
     elif "crash" in configuration:
         crash = CrashSimulationSpec.model_validate(configuration["crash"])

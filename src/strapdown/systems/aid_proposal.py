@@ -47,6 +47,8 @@ SLIP, TURN = 0.3, 2.0
 #: Differences of the Earth's field, as a share of its strength and in dip, deg, that show iron: of
 #: hard iron that turns a heading by about as much.
 WEAK, DIP = 0.15, 8.0
+#: Least standard deviation of a magnetic heading, deg; least horizontal share of the field.
+LEAST_SD, LEVEL = 5.0, 0.1
 #: Length at the start over which a heading is read, s.
 BEGIN = 2.0
 
@@ -80,6 +82,18 @@ class Magnetic:
         """Whether the field at the start is not that of the Earth."""
         strength, dip = (a - b for a, b in zip(self.measured, self.expected, strict=True))
         return abs(strength) > WEAK * self.expected[0] or abs(dip) > DIP
+
+    @property
+    def heading_sd_deg(self) -> float:
+        """Standard deviation of the heading, deg.
+
+        Strength and dip show two components of an error of the field; the third, across it, is
+        taken to be as large, and turns the heading by itself over the horizontal field.
+        """
+        (size, dip), (expected, steep) = self.measured, self.expected
+        seen = math.hypot(size / expected - 1.0, math.radians(dip - steep)) / math.sqrt(2.0)
+        level = max(math.cos(math.radians(steep)), LEVEL)
+        return max(LEAST_SD, math.degrees(seen / level))
 
 
 def propose_aids(

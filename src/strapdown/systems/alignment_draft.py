@@ -174,14 +174,19 @@ def _sensors(page: Page) -> None:
     )
 
 
-def stage(page: Page, kinds: Kinds, chosen: Mapping[str, Any]) -> None:
-    """Write the table of a module: its chosen options, and the others as comments."""
+def stage(
+    page: Page, kinds: Kinds, chosen: Mapping[str, Any], checks: Mapping[str, str] | None = None
+) -> None:
+    """Write the table of a module: its chosen options, and the others as comments.
+
+    `checks`: by key, the consequence of a chosen value, for the user to confirm.
+    """
     slot = SLOTS[kinds.slot]
     kind = chosen.get("kind", kinds.default)
     page.table(f"[{slot.name}]", f"{slot.title}:", *listed_kinds(slot, kinds.empty))
     page.key("kind", string(kind))
     if kind in slot.entries:
-        options(page, slot.entries[kind], chosen)
+        options(page, slot.entries[kind], chosen, checks)
     keys = [o.key for o in options_of(slot.entries[kind])] if kind in slot.entries else []
     for key, value in chosen.items():
         if key != "kind" and key not in keys:
@@ -198,11 +203,14 @@ _ENDS = {
 }
 
 
-def options(page: Page, module: type, chosen: Mapping[str, Any]) -> None:
+def options(
+    page: Page, module: type, chosen: Mapping[str, Any], checks: Mapping[str, str] | None = None
+) -> None:
     """Write chosen options as keys, the others as comments with their defaults."""
     for option in options_of(module):
         if option.key in chosen:
-            page.key(option.key, _inline(chosen[option.key]), _CHOSEN.get(option.key, ""))
+            remark, check = _CHOSEN.get(option.key, ""), (checks or {}).get(option.key, "")
+            page.key(option.key, _inline(chosen[option.key]), remark, check=check)
             continue
         value = toml_value(option.default)
         if option.slot is not None:

@@ -25,7 +25,7 @@ from strapdown.frames import ways_between
 from strapdown.progress import Progress, silent
 from strapdown.sensors.catalogue import SENSORS, load_sensor
 from strapdown.sensors.uncertainty import ImuUncertainty
-from strapdown.systems.aid_proposal import Magnetic, propose_aids, propose_magnetometer
+from strapdown.systems.aid_proposal import BEGIN, Magnetic, propose_aids, propose_magnetometer
 from strapdown.systems.alignment_draft import (
     ProposedAlignment,
     axes_table,
@@ -49,6 +49,8 @@ LASTING_ERRORS = {
     "barometer": "gusts, and the wind of travel",
     "odometer": "slip, a bus that is late, and lever_arm_m, which is taken as zero",
 }
+#: Consequence of a magnetic heading.
+MAGNETIC = "by the magnetometer at the start, whose field is like the Earth's: is no iron near?"
 #: Other measurements, as comments.
 OTHER_AIDS = ("no_slip", "zero_velocity", "odometer", "barometer")
 
@@ -88,6 +90,8 @@ def draft_navigation(
     made = replace(made, table=table, findings=said)
     if foot:
         made = on_foot(made)
+    elif magnetic is not None:
+        made = _by_magnetometer(made, magnetic)
     parts = {key: made.table["log"].get(key) for key in ("from_s", "to_s", "duration_s")}
     log = log.model_copy(update=parts)
     page = Page()
@@ -114,7 +118,7 @@ def draft_navigation(
     page.blank()
     page.say(f"Alignment: {made.how}.")
     for name in ("coarse", "fine"):
-        stage(page, STAGES[name], made.table[name])
+        stage(page, STAGES[name], made.table[name], {"heading_deg": MAGNETIC})
     for name in ("mechanization", "filter", "damping", "smoother", "recorder"):
         stage(page, STAGES[name], made.table.get(name, {}))
     found += _aids(page, made, magnetic, folder, foot)
@@ -122,6 +126,18 @@ def draft_navigation(
     return ProposedAlignment(
         page.text, tuple(found), tuple(page.asked), made.findings, tuple(page.to_check)
     )
+
+
+def _by_magnetometer(made: Proposal, magnetic: Magnetic) -> Proposal:
+    """Take a heading that would be asked from an undisturbed field, for a body that is at rest."""
+    coarse = made.table["coarse"]
+    asked = coarse["kind"] == "known_heading" and "heading_deg" not in coarse
+    if not asked or magnetic.disturbed or made.rest < BEGIN:
+        return made
+    heading, sd = round(magnetic.heading_deg, 1), round(magnetic.heading_sd_deg, 1)
+    coarse = {**coarse, "heading_deg": heading, "sd_deg": sd}
+    how = f"{made.how.removesuffix(': the heading is asked')}: the heading is the magnetometer's"
+    return replace(made, table={**made.table, "coarse": coarse}, how=how)
 
 
 def _sampling_to_check(made: Proposal) -> str:

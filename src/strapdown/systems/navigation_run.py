@@ -223,14 +223,19 @@ def run_navigation(
         from strapdown.navigation.outage_test import score_withholding
 
         begun, end = _begun(run.record), float(source.imu.index[-1])
+        aid, ellipsoid = withheld_aid(spec), find_ellipsoid(spec.ellipsoid)
+        used = run.record.innovations.get(f"{aid}.position", pd.DataFrame())
+        lost = (used.filter(like="weight ") <= 0.0).any(axis=1)
         withheld = score_withholding(
             begun_with,  # withheld fixes may not tell of the offset, either
             source.imu,
             source.tables,
-            withheld_aid(spec),
-            _test_outages(spec.withhold, begun, end, source.tables.get(withheld_aid(spec))),
+            aid,
+            _test_outages(spec.withhold, begun, end, source.tables.get(aid)),
             begun,
             after,
+            rejected=index_of(used)[lost],
+            truth=None if source.truth is None else (source.truth, ellipsoid),
         )
     tidy()
     trust = assess_integrity(

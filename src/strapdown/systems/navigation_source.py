@@ -7,15 +7,13 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from strapdown.bundle import InputFiles, input_files, sensor_file
 from strapdown.config.choice import SLOTS, options_of
-from strapdown.config.navigation import AidSpec, NavigationSpec, ReceiverTable
+from strapdown.config.navigation import AidSpec, NavigationSpec
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import ConfigError, DataError, DivergenceError, Finding
 from strapdown.evaluation.differences import rotation_contradicted
@@ -29,15 +27,11 @@ from strapdown.formats.trajectory_readers import read_trajectory
 from strapdown.navigation.measurements.gnss_readiness import without_repeats
 from strapdown.navigation.measurements.magnetometer import Magnetometer
 from strapdown.navigation.measurements.measurement import TabulatedMeasurement
-from strapdown.sensors.error_chain import child, normal
+from strapdown.sensors.error_chain import child
 from strapdown.systems.alignment_source import body_record
 from strapdown.systems.inputs import refuse_long_span
-from strapdown.tables import GEODETIC, GNSS, POSITION_SD, VELOCITY_SD, gnss_table
-from strapdown.tables import VELOCITY as VELOCITY_COLUMNS
-from strapdown.tables.checks import index_of, source_of, values_of
-
-if TYPE_CHECKING:
-    from strapdown.simulation.earth_motion import EarthMotion
+from strapdown.tables import GNSS
+from strapdown.tables.checks import source_of
 
 __all__ = [
     "NavigationSource",
@@ -45,7 +39,6 @@ __all__ = [
     "read_aid",
     "read_navigation_source",
     "said_of_file",
-    "simulated_fixes",
 ]
 
 
@@ -161,7 +154,12 @@ def _simulated(
     inputs: list[InputFiles],
     findings: list[Finding],
 ) -> NavigationSource:
-    from strapdown.systems.trajectory_source import make_motion, simulate_samples, with_key
+    from strapdown.systems.trajectory_source import (
+        make_motion,
+        simulate_samples,
+        simulated_fixes,
+        with_key,
+    )
 
     asked = spec.simulation
     assert asked is not None  # one of the two is there
@@ -185,7 +183,7 @@ def _simulated(
         imu=imu,
         tables={**tables, **made},
         truth=exact if truth is None else truth,
-        truth_name="the exact truth",
+        truth_name="the exact truth" if spec.truth is None else Path(spec.truth.path).name,
         points=points,
         start=None,
         readings=(),
@@ -267,67 +265,6 @@ def of_samples(given: AidSpec, imu: pd.DataFrame) -> pd.DataFrame | None:
     table.attrs = {"source": source_of(imu), "findings": ()}
     converted: pd.DataFrame = given.make().converted(table)
     return converted
-
-
-# Fixes of a simulated receiver, with specified outages and outliers.
-
-
-Array = NDArray[np.float64]
-
-# Random streams under the seed; those of the receiver itself count from zero.
-_STRUCK, _WAY = 100, 101
-
-
-def simulated_fixes(
-    motion: EarthMotion, asked: ReceiverTable, seed: np.random.SeedSequence, name: str
-) -> pd.DataFrame:
-    """Simulate a receiver along a motion.
-
-    Parameters
-    ----------
-    seed : SeedSequence
-        Seed of all random numbers.
-    name : str
-        Name of the measurement, for messages.
-
-    Returns
-    -------
-    DataFrame
-        Gnss table without the fixes of outages; outliers state the precision of the others.
-    """
-    from strapdown.simulation.gnss import GnssReceiver, moved_places, simulate_gnss
-
-    receiver = GnssReceiver(
-        rate=asked.rate_hz,
-        position_noise=asked.position_noise_m,
-        position_drift=asked.position_drift_m,
-        correlation_time=asked.correlation_time_s,
-        velocity_noise=asked.velocity_noise_m_per_s,
-        antenna=asked.antenna_m,
-        time_offset=asked.time_offset_s,
-        on_excess="unaffected",
-    )
-    table = simulate_gnss(motion, receiver, seed=seed, source=name)
-    time = index_of(table)
-    place, velocity = values_of(table, GEODETIC), values_of(table, VELOCITY_COLUMNS)
-    place_sd, velocity_sd = values_of(table, POSITION_SD), values_of(table, VELOCITY_SD)
-    if asked.outlier_share > 0.0:
-        chance = np.random.Generator(np.random.PCG64(child(seed, _STRUCK))).random(len(time))
-        struck = chance < asked.outlier_share
-        way = normal(seed, _WAY, len(time), axes=6)
-        for part in (way[:, :3], way[:, 3:]):
-            part /= np.linalg.norm(part, axis=1, keepdims=True)
-        off = asked.outlier_size * struck[:, None] * way
-        place = moved_places(place, off[:, :3] * place_sd, motion.ellipsoid)
-        velocity = velocity + off[:, 3:] * velocity_sd
-    if not asked.velocity:
-        velocity_sd = np.full_like(velocity_sd, np.inf)
-    kept = np.ones(len(time), dtype=np.bool_)
-    for begin, end in asked.outages_s:
-        kept &= (time < begin) | (time > end)
-    return gnss_table(
-        time[kept], place[kept], velocity[kept], place_sd[kept], velocity_sd[kept], source=name
-    )
 
 
 # Findings with table rows converted to file rows.

@@ -17,7 +17,7 @@ from strapdown.config.alignment import sensors_of
 from strapdown.config.navigation import NavigationSpec
 from strapdown.config.outage import OutageSpec, OutageStartTable
 from strapdown.constants import DEG_PER_HOUR, MICRO_G
-from strapdown.dsp.chi_square import PLANE_95, plane_bound
+from strapdown.dsp.chi_square import plane_bound
 from strapdown.errors import ConfigError, Finding
 from strapdown.estimation.covariance import Joseph
 from strapdown.estimation.error_filter import ErrorFilter
@@ -39,9 +39,11 @@ from strapdown.navigation.outage import (
 )
 from strapdown.navigation.outage_test import (
     SETTLED,
+    OutageVerdict,
     WithheldRun,
     WithheldScore,
     blinded,
+    judge_outages,
     score_of,
     spans_to_withhold,
     withheld_runs,
@@ -119,6 +121,12 @@ class OutageRun(SavedRun):
     def equal(self) -> tuple[Drift, ...]:
         """Outages that begin with a fix, so that all are of one length; every one if none does."""
         return _equal(self.drifts)
+
+    @property
+    def verdict(self) -> OutageVerdict | None:
+        """Agreement of the drifts of `equal` with their bounds; None without fixes."""
+        scores = [drift.score for drift in self.equal if drift.score is not None]
+        return judge_outages(scores) if scores else None
 
     @property
     def cone(self) -> tuple[Array, Array, dict[str, Array]]:
@@ -215,7 +223,7 @@ def run_outage(
         )
     progress("reading", 0.02)
     # Its plan is not drawn.
-    navigation = navigation.with_map(None)
+    navigation = navigation.with_path("map", None)
     source = read_navigation_source(navigation)
     predicted, drifts = outage_of_run(spec, navigation, source, progress)
     return OutageRun(
@@ -259,8 +267,8 @@ class Drift:
         Time of the withheld fixes since the begin, without those that the run with fixes rejects.
     along, across, down : ndarray, (n,), m
         Computed minus fix; along and across the course.
-    inside : ndarray of bool, (n,)
-        Whether it is within the 95 % ellipse, including the noise of the fix.
+    score : WithheldScore or None
+        Of these fixes.
     rejected : int
         Withheld fixes that the run with fixes rejects: their errors are not drift.
     since_fix : float, s
@@ -279,7 +287,7 @@ class Drift:
     along: Array
     across: Array
     down: Array
-    inside: NDArray[np.bool_]
+    score: WithheldScore | None = None
     rejected: int = 0
     since_fix: float = 0.0
     whole: bool = True
@@ -289,6 +297,11 @@ class Drift:
     def horizontal(self) -> Array:
         """Length of the horizontal drift, (n,), m."""
         return np.asarray(np.hypot(self.along, self.across))
+
+    @property
+    def inside(self) -> NDArray[np.bool_]:
+        """Whether each is within its 95 % ellipse, including the noise of the fix, (n,)."""
+        return np.empty(0, dtype=np.bool_) if self.score is None else self.score.inside
 
 
 def outage_of_run(
@@ -477,7 +490,7 @@ def _drift(navigator: Navigator, run: WithheldRun, span: Span, fixes: _Fixes, gr
     }
     bound = np.interp(on_grid, marks, plane_bound(record.covariance))
     none = np.empty(0)
-    empty = Drift(span, variance, bound, none, none, none, none, np.empty(0, dtype=np.bool_))
+    empty = Drift(span, variance, bound, none, none, none, none)
     if fixes.scored is None:
         return empty
     late = max(fixes.late, _SHARE_LATE * (span.end - span.begin))
@@ -487,21 +500,21 @@ def _drift(navigator: Navigator, run: WithheldRun, span: Span, fixes: _Fixes, gr
     if not any(one.name == position for piece in run.pieces for one in piece.seen.by_name()):
         return empty
     score: WithheldScore = score_of(run.pieces, fixes.scored, span)
-    kept = ~np.isin(score.time, np.concatenate([none, *fixes.rejected]))
-    empty = replace(empty, rejected=int((~kept).sum()))
-    if not kept.any():
+    sound = score.without(np.concatenate([none, *fixes.rejected]))
+    at = sound.time
+    empty = replace(empty, rejected=len(score.time) - len(at))
+    if not len(at):
         return empty
-    at, error, distance = score.time[kept], score.error[kept], score.distance[kept]
     way = courses(record.trajectory, at)
     c, s = np.cos(way), np.sin(way)
-    north, east, down = error.T
+    north, east, down = sound.error.T
     return replace(
         empty,
         time=at - span.begin,
         along=c * north + s * east,
         across=-s * north + c * east,
         down=down,
-        inside=distance <= PLANE_95,
+        score=sound,
         to_end=span.end - float(at[-1]) <= late,
     )
 

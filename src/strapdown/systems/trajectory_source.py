@@ -14,13 +14,14 @@ from strapdown import rotation
 from strapdown.config import motions
 from strapdown.config.alignment import SimulationTable
 from strapdown.config.motions import TrajectorySpec
-from strapdown.config.navigation import NavigationSimulationTable
+from strapdown.config.navigation import NavigationSimulationTable, ReceiverTable
 from strapdown.config.sources import ScenarioSpec
 from strapdown.config.spec import AngleWaveSpec
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
 from strapdown.errors import ConfigError
 from strapdown.sensors.catalogue import load_sensor
+from strapdown.sensors.error_chain import Seed, child, normal
 from strapdown.simulation import (
     EarthMotion,
     ImuErrors,
@@ -41,10 +42,13 @@ from strapdown.simulation import (
     through_waypoints,
 )
 from strapdown.simulation import vehicles as steps
+from strapdown.simulation.gnss import GnssReceiver, moved_places, simulate_gnss
 from strapdown.simulation.path_motion import Manoeuvre
 from strapdown.simulation.scenarios import repeated_pulse
 from strapdown.simulation.vehicles import LIMITS
 from strapdown.simulation.walking import GAITS, WalkingMotion, walk
+from strapdown.tables import GEODETIC, POSITION_SD, VELOCITY, VELOCITY_SD, gnss_table
+from strapdown.tables.checks import index_of, values_of
 
 # Default onset and end time of a turn or a climb, s.
 TURN_RAMP = {"car": 1.0, "aircraft": 3.0, "ship": 10.0}
@@ -77,9 +81,9 @@ _KEYS = {
 
 #: Rate, sampling and seed of simulated samples.
 Sampling: TypeAlias = TrajectorySpec | SimulationTable | NavigationSimulationTable
-#: Motion, errors, and the tables Imu, Attitude and Trajectory on the same stamps.
+#: Motion, errors, the tables Imu, Attitude and Trajectory on the same stamps, and a Gnss table.
 SimulatedTrajectory: TypeAlias = tuple[
-    EarthMotion, ImuErrors, pd.DataFrame, pd.DataFrame, pd.DataFrame
+    EarthMotion, ImuErrors, pd.DataFrame, pd.DataFrame, pd.DataFrame, pd.DataFrame
 ]
 
 
@@ -92,13 +96,70 @@ def simulate_trajectory(spec: TrajectorySpec) -> SimulatedTrajectory:
     errors : ImuErrors
     imu, attitude, trajectory : DataFrame
         Imu, Attitude and Trajectory tables on the same stamps; the last two are exact.
+    fixes : DataFrame
+        Gnss table of the stated receiver.
     """
     errors = _errors(spec.sensor, spec.seed)
     with with_key(f"{spec.name}.toml"):
         motion = make_motion(spec.motion, find_ellipsoid(spec.ellipsoid))
         imu, attitude = simulate_samples(motion, spec, spec.sensor, spec.name)
         trajectory = motion.trajectory(imu.index.to_numpy(dtype=np.float64), source=spec.name)
-    return motion, errors, imu, attitude, trajectory
+        fixes = simulated_fixes(motion, spec.gnss, spec.seed, spec.name)
+    return motion, errors, imu, attitude, trajectory, fixes
+
+
+# Random streams under the seed; those of the receiver itself count from zero.
+_STRUCK, _WAY = 100, 101
+
+
+def simulated_fixes(
+    motion: EarthMotion, asked: ReceiverTable, seed: Seed, name: str
+) -> pd.DataFrame:
+    """Simulate a receiver along a motion.
+
+    Parameters
+    ----------
+    seed : int or SeedSequence
+        Of all random numbers.
+    name : str
+        Name of the measurement, for messages.
+
+    Returns
+    -------
+    DataFrame
+        Gnss table without the fixes of outages; outliers state the precision of the others.
+    """
+    receiver = GnssReceiver(
+        rate=asked.rate_hz,
+        position_noise=asked.position_noise_m,
+        position_drift=asked.position_drift_m,
+        correlation_time=asked.correlation_time_s,
+        velocity_noise=asked.velocity_noise_m_per_s,
+        antenna=asked.antenna_m,
+        time_offset=asked.time_offset_s,
+        on_excess="unaffected",
+    )
+    table = simulate_gnss(motion, receiver, seed=seed, source=name)
+    time = index_of(table)
+    place, velocity = values_of(table, GEODETIC), values_of(table, VELOCITY)
+    place_sd, velocity_sd = values_of(table, POSITION_SD), values_of(table, VELOCITY_SD)
+    if asked.outlier_share > 0.0:
+        chance = np.random.Generator(np.random.PCG64(child(seed, _STRUCK))).random(len(time))
+        struck = chance < asked.outlier_share
+        way = normal(seed, _WAY, len(time), axes=6)
+        for part in (way[:, :3], way[:, 3:]):
+            part /= np.linalg.norm(part, axis=1, keepdims=True)
+        off = asked.outlier_size * struck[:, None] * way
+        place = moved_places(place, off[:, :3] * place_sd, motion.ellipsoid)
+        velocity = velocity + off[:, 3:] * velocity_sd
+    if not asked.velocity:
+        velocity_sd = np.full_like(velocity_sd, np.inf)
+    kept = np.ones(len(time), dtype=np.bool_)
+    for begin, end in asked.outages_s:
+        kept &= (time < begin) | (time > end)
+    return gnss_table(
+        time[kept], place[kept], velocity[kept], place_sd[kept], velocity_sd[kept], source=name
+    )
 
 
 def scenario_of(spec: ScenarioSpec) -> Scenario:

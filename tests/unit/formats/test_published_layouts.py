@@ -185,11 +185,14 @@ def test_sensorlog_of_ios(tmp_path, split):
     names += three("motionRotationRate", "rad/s")
     names += three("motionUserAcceleration", "G") + three("motionGravity", "G")
     names += ["accelerometerTimestamp_sinceReboot(s)", *three("accelerometerAcceleration", "G")]
+    names += three("motionMagneticField", "\u00b5T")
     rows = []
     for k in range(N):
         parts = (*user[k], *(g[k] - user[k])) if split else ("",) * 6
         when = f"2026-01-01T10:00:{T[k]:06.3f}+02:00"
-        row = line(when, 5000.0 + T[k], *RATE[k], *parts, 5000.0 + T[k], *g[k])
+        # Without a calibration the field is zero.
+        field = FIELD[k] if split else (0.0, 0.0, 0.0)
+        row = line(when, 5000.0 + T[k], *RATE[k], *parts, 5000.0 + T[k], *g[k], *field)
         rows += [row] * (2 if k % 50 == 0 else 1)
     if not split:
         names = [n for n in names if "User" not in n and "Gravity" not in n]
@@ -200,6 +203,9 @@ def test_sensorlog_of_ios(tmp_path, split):
     recording = read_log(path)
     np.testing.assert_allclose(recording.imu[GYRO], phone(RATE), **TIGHT)
     np.testing.assert_allclose(recording.imu[ACCEL], phone(FORCE), atol=1e-12)
+    assert (set(MAG) <= set(recording.imu)) == split
+    if split:
+        np.testing.assert_allclose(recording.imu[MAG], phone(FIELD), **TIGHT)
     assert said(recording, "12 of 612 rows repeat")
 
 

@@ -16,9 +16,11 @@ import pytest
 sys.path.insert(0, str(Path(__file__).parents[2] / "contracts"))
 
 from test_writers import streams
+from tests.coded import coded
 
 from strapdown.ellipsoids import ELLIPSOIDS
-from strapdown.errors import ConfigError
+from strapdown.errors import ConfigError, DataError
+from strapdown.formats.gnss_files import read_gnss
 from strapdown.formats.table_files import EPSG_4979
 from strapdown.formats.trajectory_readers import read_trajectory
 from strapdown.formats.writers import WRITERS, write_trajectory
@@ -61,6 +63,12 @@ def test_gpx_without_utc_has_no_times(tmp_path):
     findings = WRITERS["gpx"].write(tmp_path / "a.gpx", {"reference": made})
     assert "io.written-without-dates" in {f.code for f in findings}
     assert "<time>" not in (tmp_path / "a.gpx").read_text()
+    # Which is neither fixes nor a trajectory, and each refusal says so.
+    with pytest.raises(DataError, check=coded("io.gpx-without-time")):
+        read_gnss(tmp_path / "a.gpx")
+    with pytest.raises(DataError, check=coded("io.no-stream")) as refused:
+        read_trajectory(tmp_path / "a.gpx")
+    assert refused.value.finding.data["way"].code == "io.way-of-gnss-as-reference"
 
 
 def test_small_numbers_of_gpx_are_decimals(tmp_path, track):

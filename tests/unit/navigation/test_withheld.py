@@ -16,7 +16,7 @@ import town_drive as town
 from strapdown.config.navigation import WithholdTable
 from strapdown.config.spec import specify
 from strapdown.errors import ConfigError
-from strapdown.navigation.outage_test import spans_to_withhold
+from strapdown.navigation.outage_test import WithheldScore, judge_outages, spans_to_withhold
 from strapdown.navigation.record import Span
 from strapdown.systems.navigation_run import _test_outages
 from strapdown.tables import gnss_table
@@ -91,6 +91,54 @@ def test_errors_are_within_their_bounds_as_often_as_they_should_be():
     assert table["distance"].max() > 0.1
     assert (table["error"] < table["bound"]).equals(table["distance"] < np.sqrt(-2 * np.log(0.05)))
     assert (table["fixes"] == 2 * LENGTH).all()
+
+
+def made_up(rng, size=1.0, noise=1.0):
+    """Five outages whose errors are a random walk and the white noise of 60 fixes."""
+    steps = np.arange(1.0, 61.0)
+    for begin in range(0, 500, 100):
+        walk = np.cumsum(rng.normal(scale=0.05, size=(60, 2)), axis=0)
+        error = np.zeros((60, 3))
+        error[:, :2] = size * (walk + noise * rng.normal(size=(60, 2)))
+        drift = 2.0 * 0.05**2 * steps
+        covariance = (0.5 * drift + noise**2)[:, None, None] * np.eye(2)
+        yield WithheldScore(
+            Span("60 s", begin, begin + 60.0), begin + steps, error, covariance, drift
+        )
+
+
+def test_many_good_fixes_are_not_condemned_by_the_largest_of_their_errors():
+    rng = np.random.default_rng(61)
+    runs = [list(made_up(rng)) for _ in range(60)]
+    # The largest of sixty is beyond the bound of one in 95 % of the outages.
+    assert sum(one.inside.all() for run in runs for one in run) < 60
+    # One of a hundred good runs is condemned; four of sixty have a probability of 0.3 %.
+    assert sum(not judge_outages(run).consistent for run in runs) < 4
+    # The share inside a bound that is 1.5 times too small, 1 - exp(-3 / 1.5²) = 0.74.
+    assert not any(judge_outages(list(made_up(rng, 1.5))).consistent for _ in range(20))
+
+
+def test_a_drift_counts_once_and_a_single_gross_error_as_what_it_is():
+    rng = np.random.default_rng(62)
+    runs = [list(made_up(rng, noise=1e-3)) for _ in range(60)]
+    assert sum(not judge_outages(run).consistent for run in runs) < 4
+    assert not any(judge_outages(list(made_up(rng, 3.0, 1e-3))).consistent for _ in range(20))
+    # Of one walk from step 1 to 60 the share has the weight of one or two errors.
+    assert 1.0 <= runs[0][0].independent()[0] < 3.0
+    one = next(made_up(rng))
+    one.error[30, :2] = 8.0, 0.0
+    assert not judge_outages([one]).consistent
+    assert judge_outages([one.without(one.time[[30]])]).consistent
+    found = judge_outages([one])
+    assert (found.count, found.worst, found.error) == (60, 0, 8.0)
+
+
+def test_outages_that_overlap_count_once():
+    (one, *_) = made_up(np.random.default_rng(63))
+    one.error[::2, 0] = 3.0  # more often than far
+    assert judge_outages([one] * 5).probability == pytest.approx(
+        judge_outages([one]).probability, rel=1e-9
+    )
 
 
 def test_each_span_is_by_itself():

@@ -15,6 +15,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 
 import town_drive as town
 from strapdown import rotation
+from strapdown.ellipsoids import WGS84
 from strapdown.errors import ConfigError
 from strapdown.frames import place_difference
 from strapdown.navigation.filter_options import DAMPINGS
@@ -23,6 +24,8 @@ from strapdown.navigation.measurements.vehicle import NoSlip
 from strapdown.navigation.outage_test import (
     blinded,
     end_of_what_tells,
+    judge_outages,
+    score_by_truth,
     score_of_smoothed,
 )
 from strapdown.navigation.record import Span
@@ -102,7 +105,10 @@ def test_it_is_the_antenna_of_the_smoothed_run_less_the_fix(damping, least):
     blind = blinded(navigator, "gnss")
     through, piece = blind.advance(state, time[first:last], rows[first:last])
     _, later = navigator.advance(through, time[last:after], rows[last:after])
-    score = score_of_smoothed(navigator, [piece], [later], "gnss", SPAN)
+    smoothing = navigator.smoother.begin(navigator)
+    smoothing.take(piece)
+    smoothing.take(later)
+    score = score_of_smoothed([piece], smoothing, "gnss", SPAN)
     expected = antenna_less_fix(navigator, [piece], [later], score.time)
     assert len(score.time) == 40
     # The derivative by the offset is the velocity of the last epoch at which its change was clear
@@ -124,10 +130,39 @@ def test_a_stretch_is_scored_with_less_than_its_filter_states():
     plain, state = town.begun(town.gnss(**UNKNOWN))
     (forward,) = score_withheld(plain, state, *town.increments(), "gnss", fixes(), [SPAN])
     np.testing.assert_array_equal(smoothed.time, forward.time)
-    assert (smoothed.variance < forward.variance).all()
+    less, more = (np.einsum("kii->ki", one.covariance) for one in (smoothed, forward))
+    assert (less < more).all()
     # The fix has its noise, whatever is known of the place.
-    assert (smoothed.variance > 0.99 * NOISE**2).all()
+    assert (less > 0.99 * NOISE**2).all()
+    # Without that it is the place's own, which grows to the middle of the stretch.
+    assert (smoothed.drift > 0.0).all()
+    np.testing.assert_allclose(less.sum(axis=1) - smoothed.drift, 2.0 * NOISE**2, rtol=0.1)
     assert smoothed.largest < forward.largest
+
+
+def test_the_truth_scores_where_the_sensors_are():
+    navigator, state = begun(town.gnss(**UNKNOWN))
+    time, rows = town.increments()
+    blind = blinded(navigator, "gnss")
+    first, last, after = np.searchsorted(time, [15.0, 35.0, 100.0], side="right").tolist()
+    state, _ = navigator.advance(state, time[:first], rows[:first])
+    through, piece = blind.advance(state, time[first:last], rows[first:last])
+    _, later = navigator.advance(through, time[last:after], rows[last:after])
+    truth = town.motion().trajectory(time)
+    forward = score_by_truth(blind, [piece], SPAN, truth, WGS84)
+    assert forward.against == "truth"
+    # At the marks the true path is one of its rows; the axes are those of the one or the other
+    # place, which turns an error by itself over the radius of the Earth.
+    at = np.searchsorted(piece.time, forward.time - 1e-9)
+    assert np.abs(forward.error - town.off(piece)[at]).max() < forward.largest**2 / 6.3e6
+    smoothing = navigator.smoother.begin(navigator)
+    smoothing.take(piece)
+    smoothing.take(later)
+    smoothed = score_by_truth(blind, [piece, later], SPAN, truth, WGS84, smoothing)
+    assert smoothed.time[-1] <= SPAN.end + 1e-9
+    assert smoothed.largest < forward.largest
+    assert (smoothed.drift < forward.drift).all()
+    assert judge_outages([forward]).consistent and judge_outages([smoothed]).consistent
 
 
 def test_it_does_not_matter_which_aid_comes_first():
@@ -141,7 +176,7 @@ def test_it_does_not_matter_which_aid_comes_first():
     # Observations of an epoch are independent of each other: but for rounding, whose part in the
     # states is some 1e-9 of their deviations, and for what the order of two tilts does.
     assert np.abs(one.error - other.error).max() < 1e-5
-    np.testing.assert_allclose(one.variance, other.variance, rtol=1e-5)
+    np.testing.assert_allclose(one.covariance, other.covariance, rtol=1e-5, atol=1e-5 * NOISE**2)
 
 
 def test_a_stretch_without_fixes_is_refused():

@@ -164,10 +164,10 @@ def test_the_bound_of_a_test_outage_is_that_at_its_largest_error():
         Span("withheld", 10.0, 20.0),
         np.array([12.0, 15.0]),
         np.array([[1.0, 0.0, 0.0], [0.0, 4.0, 0.0]]),
-        np.ones((2, 3)),
         np.array([np.diag([1.0, 9.0])] * 2),
+        np.ones(2),
     )
     assert score.largest == 4.0
     # East the ellipse of 95 % reaches 2.4477 times 3 m.
     assert score.bound_at_largest == pytest.approx(3.0 * math.sqrt(-2.0 * math.log(0.05)))
-    assert score.inside
+    assert score.inside.all()

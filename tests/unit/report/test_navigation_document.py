@@ -338,14 +338,15 @@ def test_what_was_withheld_is_scored():
         one = np.array([[bound, 0.0], [0.0, bound]]) ** 2 / PLANE_95**2
         there = np.array([[error, 0.0, 0.0]])
         span = Span("withheld", begin, end)
-        return Withheld(
-            WithheldScore(span, np.array([end]), there, np.ones((1, 3)), one[None]), None
-        )
+        return Withheld(WithheldScore(span, np.array([end]), there, one[None], np.ones(1)), None)
 
     given = (score(50.0, 80.0, 12.0, 20.0), score(1.0, 2.0, 9.0, 3.0))
     found = told(record(), withheld=given)
     table = withheld_table(found)
-    assert [row[-1] for row in table.rows] == ["yes", "no"]
+    assert [row[-2:] for row in table.rows] == [
+        ("100\u00a0% of 1", "yes"),
+        ("0\u00a0% of 1", "no"),
+    ]
     assert table.strong == (1,)
     assert trust(found).verdict == "distrusted"
 

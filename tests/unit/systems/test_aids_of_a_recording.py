@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from datetime import UTC, datetime
 from functools import cache
 
@@ -183,6 +184,34 @@ def test_a_magnetometer_gives_the_heading_and_the_field_of_the_model(heading, tm
     assert propose_magnetometer(log, near, None, (43.57, 1.39, 150.0)).disturbed
     assert propose_magnetometer(log, imu, None, None) is None
     assert propose_magnetometer(log, imu.drop(columns=MAG), None, (43.57, 1.39, 150.0)) is None
+
+
+@pytest.mark.parametrize("iron", [0.0, 3.0, 20.0])
+def test_a_heading_that_would_be_asked_is_the_magnetometers(iron, tmp_path):
+    imu = phone(59.0, (2.0, -3.0))
+    rng = np.random.default_rng(4)
+    imu[[*GYRO, *ACCEL]] += rng.normal(scale=[*[1e-3] * 3, *[0.01] * 3], size=(300, 6))
+    imu["mag_y"] += iron
+    path = tmp_path / "rest.csv"
+    units = ["rad_s"] * 3 + ["m_s2"] * 3 + ["uT"] * 3
+    imu.columns = [f"{k}_{u}" for k, u in zip([*GYRO, *ACCEL, *MAG], units, strict=True)]
+    imu.to_csv(path, index_label="time_s")
+    fixes = pd.DataFrame({"time_s": np.arange(6.0), "lat": 43.57, "lon": 1.39, "alt": 150.0})
+    fixes.to_csv(tmp_path / "fixes.csv", index=False)
+    draft = draft_navigation(
+        LogTable(path=str(path)), folder=tmp_path, axes="x,y,z",
+        gnss=FixesTable(path=str(tmp_path / "fixes.csv")),
+    )  # fmt: skip
+    asked, check = ({one.key for one in of} for of in (draft.asked, draft.to_check))
+    known = tomllib.loads(draft.text)["coarse"]
+    if iron > 10.0:  # not a field like the Earth's
+        assert "heading_deg" in asked and known["heading_deg"] == "?"
+        return
+    assert "heading_deg" not in asked and "heading_deg" in check
+    # An error of the horizontal field of 24 uT by 3 uT turns it by 7 deg at most.
+    assert abs(known["heading_deg"] - 59.0) < (7.2 if iron else 0.2)
+    assert abs(known["heading_deg"] - 59.0) < 2.0 * known["sd_deg"]
+    assert known["sd_deg"] >= 5.0
 
 
 def test_a_magnetometer_along_the_samples_holds_the_heading(recording, tmp_path):
