@@ -184,7 +184,18 @@ def open_locked(path: Path, *, within: bool = False) -> int:
     """
     lock = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_CLOEXEC", 0), 0o666)
     try:
-        _take(lock, within)
+        if WINDOWS:
+            msvcrt: Any = import_module("msvcrt")
+            # Beyond its content, which others may read.
+            os.lseek(lock, 1 << 20, os.SEEK_SET)
+            msvcrt.locking(lock, msvcrt.LK_NBLCK, 1)
+            os.lseek(lock, 0, os.SEEK_SET)
+        else:
+            fcntl: Any = import_module("fcntl")
+            # A lock of the process is not inherited by its children, and an interrupted call of
+            # this process, which left the file open, does not hold off the next.
+            take = fcntl.flock if within else fcntl.lockf
+            take(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         os.ftruncate(lock, 0)
         os.write(lock, _OWNER + str(os.getpid()).encode() + b"\n")
     except OSError as error:
@@ -196,22 +207,6 @@ def open_locked(path: Path, *, within: bool = False) -> int:
         number = owner.removeprefix(_OWNER).strip()
         raise HeldError(int(number) if number.isdigit() else None) from None
     return lock
-
-
-def _take(lock: int, within: bool) -> None:
-    """Lock an open file, or raise OSError at once."""
-    if WINDOWS:
-        msvcrt: Any = import_module("msvcrt")
-        # Beyond its content, which others may read.
-        os.lseek(lock, 1 << 20, os.SEEK_SET)
-        msvcrt.locking(lock, msvcrt.LK_NBLCK, 1)
-        os.lseek(lock, 0, os.SEEK_SET)
-        return
-    fcntl: Any = import_module("fcntl")
-    # A lock of the process is not inherited by its children, and an interrupted call of this
-    # process, which left the file open, does not hold off the next.
-    take = fcntl.flock if within else fcntl.lockf
-    take(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def _unlock(out: Path, lock: int) -> None:
