@@ -296,32 +296,27 @@ class Recording:
 PLACEHOLDERS = frozenset({"UNIT", "HZ"})
 
 
+@dataclass
 class Questions:
-    """Questions that a file leaves open, asked in one refusal with the inferred answers.
+    """Questions that a file leaves open, asked in one refusal with the inferred answers."""
 
-    Parameters
-    ----------
-    file : str
-    """
-
-    def __init__(self, file: str) -> None:
-        self._file = file
-        self._open: list[Finding] = []
-        self._answers: dict[str, str] = {}
+    file: str
+    questions: list[Finding] = field(default_factory=list)
+    answers: dict[str, str] = field(default_factory=dict)
 
     def ask(self, fault: Finding, **answers: str) -> None:
         """Add a question. `answers`: options of `ReadOptions`, with the likely values."""
-        self._open.append(fault)
-        self._answers |= answers
+        self.questions.append(fault)
+        self.answers |= answers
 
     def refuse(self) -> None:
         """Raise the questions, if there are any: DataError, or the fault itself if it is alone."""
-        if not self._open:
+        if not self.questions:
             return
-        said = as_stated(self._answers)
-        if len(self._open) == 1:
-            raise DataError(self._open[0], **said)
-        raise DataError("io.questions", file=self._file, questions=self._open, **said)
+        said = as_stated(self.answers)
+        if len(self.questions) == 1:
+            raise DataError(self.questions[0], **said)
+        raise DataError("io.questions", file=self.file, questions=self.questions, **said)
 
 
 def as_stated(answers: Mapping[str, str]) -> dict[str, Any]:
