@@ -178,6 +178,9 @@ class RawLog:
         Row of each sample in the file, counted from 1; None if sample k is in row k + 1.
     stated : dict of str to (str, str or None)
         For a known recording: column to (quantity, unit); unit None if not stated.
+    other_units : list of dict of str to (str, str or None)
+        The same for each further sensor unit in the file, which is read where one of its columns
+        is asked for.
     units : dict of str to str
         Column to unit, if stated apart from the name.
     triad_units : dict of str to str
@@ -207,6 +210,7 @@ class RawLog:
     columns: dict[str, NDArray[Any]]
     rows: NDArray[np.int64] | None = None
     stated: Mapping[str, tuple[str, str | None]] = field(default_factory=dict)
+    other_units: list[dict[str, tuple[str, str | None]]] = field(default_factory=list)
     units: dict[str, str] = field(default_factory=dict)
     triad_units: dict[str, str] = field(default_factory=dict)
     rate: float | None = None
