@@ -394,7 +394,7 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
     costs = tuple(_cost(algorithm, increments["dt"]) for algorithm in algorithms)
     span = (float(imu.index[0]), float(imu.index[-1]))
     levelled = initial["method"] == "level"
-    references, places, offers = gather_references(spec, source, span, rests, levelled)
+    references, places, offers = gather_references(spec, source, span, rests, levelled, findings)
     known = None
     if source.truth is not None and source.scored is not None:
         known = known_at(source.truth, source.scored, imu.index.to_numpy(dtype=np.float64))

@@ -112,11 +112,12 @@ def gather_references(
     span: tuple[float, float],
     rests: tuple[RestStretch, ...],
     levelled: bool,
+    findings: list[Finding],
 ) -> tuple[pd.DataFrame, tuple[PlaceReference, ...], tuple[SamePose, ...]]:
     """Reference points of attitude and position, and poses that are offered as such.
 
     `span` is the meaning of the words start and end, s. A rest at which the run is leveled is
-    not a reference.
+    not a reference; where it is the only one, `findings` says that no error can be stated.
     """
     words = list(spec.references)
     whole = spec.from_s is spec.to_s is spec.duration_s is None
@@ -135,13 +136,13 @@ def gather_references(
     points = references_from_words(words, *span)
     usable = [r for r in rests if r.accel_mean is not None and r.start >= span[0]]
     if asked:
-        tilts = tilt_references(usable, levelled_from=usable[0] if levelled and usable else None)
+        where = {"file": source.name, "quantity": "--reference rests"}
+        if not usable:
+            raise ConfigError("attitude.no-rest", **where)
+        tilts = tilt_references(usable, levelled_from=usable[0] if levelled else None)
         if tilts.empty:
-            raise ConfigError(
-                "attitude.no-rest-after-levelling" if levelled else "attitude.no-rest",
-                file=source.name,
-                quantity="--reference rests",
-            )
+            data = {"start": usable[0].start, "end": usable[0].end}
+            findings.append(Finding("attitude.one-rest", **where, **data))
         points = pd.concat([points, tilts], ignore_index=True) if len(points) else tilts
     return points, positions, same_pose_candidates(usable) if points.empty else ()
 
