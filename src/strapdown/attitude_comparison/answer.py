@@ -195,6 +195,8 @@ def _enough(evidence: Evidence, passing: list[Choice], tolerance: float) -> Answ
                 f"{cost.algorithm} is simpler, and {_deg(off)} off at "
                 f"{float(full['rate_hz']):.4g} Hz already."
             )
+    if (enough := _filter_enough(evidence, tolerance)) is not None:
+        why.append(enough)
     helps: tuple[str, ...] = ()
     if not evidence.known:
         why.append(
@@ -354,9 +356,10 @@ def _filter_enough(evidence: Evidence, tolerance: float) -> str | None:
     whole = [run for run in evidence.filters if _largest(run) <= tolerance]
     if whole:
         run = min(whole, key=_thrift)
+        rate = "" if run.lowest_hz is None else f" down to {run.lowest_hz:.4g} Hz"
         return (
-            f"With {_AIDS[run.aiding]} the filter {run.peer} stays within {tolerance:g}°: its "
-            f"largest error is {_deg(_largest(run))}."
+            f"With {_AIDS[run.aiding]} the filter {run.peer} stays within {tolerance:g}°{rate}: "
+            f"at the log's own rate its largest error is {_deg(_largest(run))}."
         )
     level = [
         run
@@ -367,9 +370,11 @@ def _filter_enough(evidence: Evidence, tolerance: float) -> str | None:
         return None
     run = min(level, key=_thrift)
     assert run.errors is not None
+    rate = run.lowest_level_hz
+    lowest = "" if rate is None else f" (within {tolerance:g}° down to {rate:.4g} Hz)"
     return (
         f"With {_AIDS[run.aiding]} the filter {run.peer} keeps roll and pitch within "
-        f"{_deg(run.errors.most_inclination_deg)}{_heading_words(run)}."
+        f"{_deg(run.errors.most_inclination_deg)}{lowest}{_heading_words(run)}."
     )
 
 
@@ -402,7 +407,7 @@ def _of_filters(evidence: Evidence) -> list[str]:
 
 
 def _largest(run: PeerRun) -> float:
-    found = [s.max_deg for s in run.scores if s.max_deg is not None]
+    found = [s.error_deg if s.max_deg is None else s.max_deg for s in run.scores]
     return max(found) if found else np.inf
 
 

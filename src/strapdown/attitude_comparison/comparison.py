@@ -39,6 +39,7 @@ from strapdown.attitude_comparison.references import (
     run_beside,
     truth_of_second,
     truth_score,
+    with_lowest_rates,
 )
 from strapdown.attitude_comparison.source import (
     AttitudeSource,
@@ -429,13 +430,17 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
         sweep = sweep_on(sweep, algorithms, grounds, spec.tolerance_deg)
     of_field, north, iron, field_input = _of_field(spec, source, imu, findings)
     beside = run_beside(spec.peers, source, of_field, q_nb, references, findings, north)
+    tried = sorted(set(sweep["factor"].tolist()))
+    beside = tuple(
+        with_lowest_rates(run, of_field, grounds, tried, spec.tolerance_deg) for run in beside
+    )
     evidence = replace(
         find_evidence(
             grounds, algorithms, costs, sweep, bias, rests, None if between is None else between[1]
         ),
         budget=budget,
         holding=holding_time(grounds, spec.tolerance_deg),
-        filters=tuple(run for run in beside if run.cost is not None and run.errors is not None),
+        filters=tuple(run for run in beside if run.cost is not None and run.scores),
     )
     positions: tuple[PositionScore, ...] = ()
     if places:

@@ -202,6 +202,8 @@ def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
                 "errors": None if peer.errors is None else vars(peer.errors),
                 "cost": None if peer.cost is None else vars(peer.cost),
                 "single_precision_deg": peer.single_deg,
+                "lowest_rate_hz": peer.lowest_hz,
+                "lowest_rate_of_roll_and_pitch_hz": peer.lowest_level_hz,
             }
             for peer in bench.peers
         ],

@@ -316,8 +316,8 @@ def filter_table(bench: AttitudeComparison) -> TableBlock | None:
         return None
     return TableBlock(
         (
-            *("filter", "uses", "RMS", "final", "inclination", "heading", "drift/min", "in 95 %"),
-            *("float32", "ops", "bytes"),
+            *("filter", "uses", "RMS", "final", "tilt", "heading", "drift/min", "in 95 %"),
+            *(f"≤ {bench.answer.tolerance_deg:g}° to", "float32", "ops", "bytes"),
         ),
         tuple(_filter_row(peer) for peer in aided),
         text=(0, 1),
@@ -325,9 +325,11 @@ def filter_table(bench: AttitudeComparison) -> TableBlock | None:
         "and about the vertical; without a magnetometer the heading is that of the truth at the "
         "start. Drift: root mean square change of the heading error over a minute, or over half "
         "of a shorter record, per minute. In 95 %: share of the time in which inclination and "
-        "heading are within their stated 95 % bounds. Float32: largest difference in single "
-        "precision. Ops: operations a sample, as counted on the kernel; bytes: kept between "
-        "samples in single precision.",
+        "heading are within their stated 95 % bounds. ≤: lowest rate, with samples averaged, "
+        "down to which the largest error is within the tolerance; in brackets, that of roll and "
+        "pitch. "
+        "Float32: largest difference in single precision. Ops: operations a sample, as counted on "
+        "the kernel; bytes: kept between samples in single precision.",
         title="Aided filters",
     )
 
@@ -346,9 +348,14 @@ def _filter_row(peer: PeerRun) -> tuple[str, ...]:
     if cost is not None and peer.single_deg is not None:
         operations = cost.add + cost.multiply + cost.divide + cost.sqrt + cost.trig
         of_kernel = (degrees(peer.single_deg), f"{operations:.0f}", f"{4 * cost.memory}")
+    rate = "" if peer.ran is None else _NONE
+    if peer.lowest_hz is not None:
+        rate = f"{peer.lowest_hz:.3g} Hz"
+    elif peer.lowest_level_hz is not None:
+        rate = f"({peer.lowest_level_hz:.3g} Hz)"
     sensors = {"gyro+accel": "6D", "gyro+accel+mag": "9D"}
     name = peer.peer.removeprefix("strapdown ")
-    return (name, sensors[peer.aiding], *parts, *of_kernel)
+    return (name, sensors[peer.aiding], *parts, rate, *of_kernel)
 
 
 # Dead-reckoned positions and the second log.
