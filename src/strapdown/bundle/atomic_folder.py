@@ -305,9 +305,11 @@ def _beside(out: Path, kind: str) -> Path:
 
 def _put_in_place(staging: Path, out: Path) -> None:
     """Rename the finished folder to its destination, then delete an old one."""
+    # In one step where the system and the file system can.
+    exchange = _exchange() if out.exists() else None
     if not out.exists():
         staging.rename(out)
-    elif _exchanged(staging, out):
+    elif exchange is not None and exchange(os.fsencode(staging), os.fsencode(out)) == 0:
         shutil.rmtree(staging, ignore_errors=True)
     else:
         old = _beside(out, "old")
@@ -346,12 +348,6 @@ def _exchange() -> Callable[[bytes, bytes], int] | None:
     except (OSError, AttributeError, TypeError):
         pass  # an older C library, or another system
     return None
-
-
-def _exchanged(one: Path, two: Path) -> bool:
-    """Exchange two folders in one step; False if the system or the file system cannot."""
-    exchange = _exchange()
-    return exchange is not None and exchange(os.fsencode(one), os.fsencode(two)) == 0
 
 
 # To the disk: after a power cut, too, a folder is whole or absent.
