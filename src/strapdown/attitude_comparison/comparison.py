@@ -74,7 +74,6 @@ from strapdown.formats.recording import Reading
 from strapdown.increments import increments_from_imu
 from strapdown.orientation_filters import is_filter
 from strapdown.progress import Progress, silent
-from strapdown.sensors.magnetometer import calibrate_magnetometer, without_iron
 from strapdown.sensors.rest import (
     RestStretch,
     could_be_a_turn,
@@ -601,6 +600,8 @@ def _of_field(
                 )
             )
         return imu, (declination, sd), iron, files
+    from strapdown.sensors.magnetometer import calibrate_magnetometer, without_iron
+
     if spec.place is not None:
         declination, sd, said = magnetic_north(spec.place, source.imu)
         findings += said
