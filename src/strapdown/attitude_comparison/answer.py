@@ -370,8 +370,8 @@ def _filter_enough(evidence: Evidence, tolerance: float) -> str | None:
         return None
     run = min(level, key=_thrift)
     assert run.errors is not None
-    rate = run.lowest_level_hz
-    lowest = "" if rate is None else f" (within {tolerance:g}° down to {rate:.4g} Hz)"
+    level_hz = run.lowest_level_hz
+    lowest = "" if level_hz is None else f" (within {tolerance:g}° down to {level_hz:.4g} Hz)"
     return (
         f"With {_AIDS[run.aiding]} the filter {run.peer} keeps roll and pitch within "
         f"{_deg(run.errors.most_inclination_deg)}{lowest}{_heading_words(run)}."

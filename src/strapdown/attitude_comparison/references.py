@@ -143,13 +143,20 @@ def gather_references(
     points = references_from_words(words, *span)
     usable = [r for r in rests if r.accel_mean is not None and r.start >= span[0]]
     if asked:
-        where = {"file": source.name, "quantity": "--reference rests"}
+        asks = "--reference rests"
         if not usable:
-            raise ConfigError("attitude.no-rest", **where)
+            raise ConfigError("attitude.no-rest", file=source.name, quantity=asks)
         tilts = tilt_references(usable, levelled_from=usable[0] if levelled else None)
         if tilts.empty:
-            data = {"start": usable[0].start, "end": usable[0].end}
-            findings.append(Finding("attitude.one-rest", **where, **data))
+            findings.append(
+                Finding(
+                    "attitude.one-rest",
+                    file=source.name,
+                    quantity=asks,
+                    start=usable[0].start,
+                    end=usable[0].end,
+                )
+            )
         points = pd.concat([points, tilts], ignore_index=True) if len(points) else tilts
     return points, positions, same_pose_candidates(usable) if points.empty else ()
 
@@ -465,7 +472,7 @@ def with_lowest_rates(
                 rates[name] = grounds.clock.rate_hz / factor
         if not passing:
             break
-    return replace(run, **rates)
+    return replace(run, lowest_hz=rates["lowest_hz"], lowest_level_hz=rates["lowest_level_hz"])
 
 
 def motion_finding(chosen: OrientationEstimator, imu: pd.DataFrame) -> Finding:

@@ -77,7 +77,7 @@ def _csv(path: Path) -> RawLog:
     raw.units = {
         n: u for n, said_unit in said.items() if (u := unit_of(said_unit.replace("^", "")))
     }
-    stated = []
+    stated: list[dict[str, tuple[str, str | None]]] = []
     for monitor in monitors:
         of_monitor: dict[str, tuple[str, str | None]] = {"Time": ("time", unit_of(said["Time"]))}
         for kind, triad in APDM_TRIADS.items():

@@ -229,9 +229,9 @@ def _cost(bench: AttitudeComparison) -> Chart:
     lines = []
     # Pareto-optimal points, cheapest first.
     front: list[int] = []
-    for k in sorted(np.flatnonzero(~np.isnan(total)).tolist(), key=lambda j: (cycles[j], total[j])):
-        if not front or total[k] < total[front[-1]]:
-            front.append(k)
+    for j in sorted(np.flatnonzero(~np.isnan(total)).tolist(), key=lambda i: (cycles[i], total[i])):
+        if not front or total[j] < total[front[-1]]:
+            front.append(j)
     if len(front) > 1:
         steps_x = np.repeat(cycles[front], 2)[1:]
         steps_y = np.repeat(total[front], 2)[:-1]
