@@ -13,7 +13,8 @@ from strapdown.formats.writers import WRITERS
 from strapdown.simulation import ImuErrors, simulate_imu
 from strapdown.simulation.attitude_motions import Handling
 
-FEW = ["--algorithms", "naive quaternion", "--rates", "50,25"]
+#: Without the page, which takes as long as the runs and has tests of its own.
+FEW = ["--algorithms", "naive quaternion", "--rates", "50,25", "--no-report"]
 
 
 @pytest.fixture
@@ -58,7 +59,10 @@ def test_what_was_asked_for_is_what_was_run(here, run_cli):
 
 
 def test_all_algorithms(here, run_cli):
-    run_cli("attitude", "alexiev-fig2a", "--algorithms", "all", "--rates", "50", "--out", "out")
+    run_cli(
+        *("attitude", "alexiev-fig2a", "--algorithms", "all", "--rates", "50", "--out", "out"),
+        "--no-report",
+    )
     told = configuration(here / "out")["algorithms"]
     assert told[:5] == ["naive", "euler", "dcm", "quaternion", "rk4"]
     variants = ["1", "1,previous=true", "2", "3", "4"]
@@ -157,6 +161,7 @@ def test_the_chosen_algorithm_as_c(here, run_cli):
 
 def test_a_filter_and_an_algorithm_by_name_for_a_device(here, run_cli, logs):
     asked = ["attitude", logs["a"], "--algorithms", "quaternion", "--rates", "50", "--force"]
+    asked.append("--no-report")
     shown = run_cli(*asked, "--export", "a.py", "--export-of", "complementary:tilt=2")
     assert shown.code == 0
     assert "MicroPython   a.py: complementary:tilt=2" in shown.out

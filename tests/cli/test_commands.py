@@ -77,7 +77,7 @@ def test_exit_codes_are_those_of_the_help(here, run_cli):
 
 
 def test_json_alone_is_json(here, run_cli):
-    found = run_cli("attitude", "alexiev-fig4", "--json")
+    found = run_cli("attitude", "alexiev-fig4", "--json", "--no-report")
     result = json.loads(found.out)
     assert result == json.loads((here / "alexiev-fig4-attitude" / "attitude.json").read_text())
     names = [a["algorithm"] for a in result["algorithms"]]
@@ -88,12 +88,12 @@ def test_json_alone_is_json(here, run_cli):
 
 
 def test_quiet_says_nothing(here, run_cli):
-    found = run_cli("attitude", "alexiev-fig4", "--quiet")
+    found = run_cli("attitude", "alexiev-fig4", "--quiet", "--no-report")
     assert (found.out, found.err) == ("", "")
 
 
 def test_the_table_says_what_the_json_says(here, run_cli):
-    text = run_cli("attitude", "alexiev-fig4").out
+    text = run_cli("attitude", "alexiev-fig4", "--no-report").out
     result = json.loads((here / "alexiev-fig4-attitude" / "attitude.json").read_text())
     for name, error in [
         ("naive", r"5\.12°"),
@@ -110,7 +110,7 @@ def test_the_table_says_what_the_json_says(here, run_cli):
 def test_without_a_reference_it_says_what_it_can_tell_and_how_to_give_one(here, run_cli):
     lines = ["time_s,wx_dps,wy_dps,wz_dps"] + [f"{0.01 * k:.2f},0,{k},9" for k in range(300)]
     (here / "log.csv").write_text("\n".join(lines) + "\n")
-    text = run_cli("attitude", "log.csv").out
+    text = run_cli("attitude", "log.csv", "--no-report").out
     assert "differ by up to" in text
     assert "no stationary stretch" in text
     assert "--reference 'end same as start'" in text
@@ -128,7 +128,7 @@ def test_without_a_reference_it_says_what_it_can_tell_and_how_to_give_one(here, 
     ],
 )
 def test_algorithms_are_named_with_their_options(here, run_cli, text, labels):
-    found = run_cli("attitude", "alexiev-fig4", "--algorithms", text, "--json")
+    found = run_cli("attitude", "alexiev-fig4", "--algorithms", text, "--json", "--no-report")
     assert [a["algorithm"] for a in json.loads(found.out)["algorithms"]] == labels
 
 

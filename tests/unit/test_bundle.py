@@ -172,11 +172,11 @@ def test_a_run_that_fails_leaves_nothing(tmp_path):
 
 
 def test_a_bundle_is_replaced_only_when_asked(bench, tmp_path):
-    first = write_attitude(bench, tmp_path / "out")
+    first = write_attitude(bench, tmp_path / "out", report=False)
     with pytest.raises(ConfigError, check=coded("bundle.folder-exists")) as refused:
-        write_attitude(bench, tmp_path / "out")
+        write_attitude(bench, tmp_path / "out", report=False)
     assert "--force" in refused.value.finding.text("cli")
-    again = write_attitude(bench, tmp_path / "out", force=True)
+    again = write_attitude(bench, tmp_path / "out", force=True, report=False)
     assert again.digest == first.digest
     assert [p.name for p in tmp_path.iterdir()] == ["out"]
 
@@ -193,7 +193,7 @@ def test_a_folder_that_is_no_bundle_is_never_touched(bench, tmp_path, force):
 def test_a_large_input_is_referred_to_and_still_watched(log, tmp_path, monkeypatch):
     monkeypatch.setattr("strapdown.bundle.COPY_LIMIT", 10)
     source = shutil.copy(log, tmp_path / "mine.csv")
-    seal = write_attitude(compare_attitude(source), tmp_path / "out")
+    seal = write_attitude(compare_attitude(source), tmp_path / "out", report=False)
     assert not (seal.path / "inputs").exists()
     assert json.loads((seal.path / MANIFEST).read_text())["inputs"][0]["kept"] == "reference"
     # A manifest may name any file of this machine: only those that the user names are read.
@@ -359,7 +359,7 @@ def test_every_way_of_naming_a_log_gives_one_seal(tmp_path, monkeypatch):
     names = ["logs/log.csv", "./logs/log.csv", "logs//log.csv", "logs/../logs/log.csv"]
     names.append(str(tmp_path / "logs" / "log.csv"))
     seals = [
-        write_attitude(compare_attitude(name, gyro_bias=name), f"out{k}")
+        write_attitude(compare_attitude(name, gyro_bias=name), f"out{k}", report=False)
         for k, name in enumerate(names)
     ]
     assert len({s.digest for s in seals}) == 1
@@ -369,7 +369,7 @@ def test_every_way_of_naming_a_log_gives_one_seal(tmp_path, monkeypatch):
 def test_a_link_keeps_its_own_name(tmp_path, log):
     (tmp_path / "blob1234").write_bytes(log.read_bytes())
     (tmp_path / "mine.csv").symlink_to(tmp_path / "blob1234")
-    seal = write_attitude(compare_attitude(tmp_path / "mine.csv"), tmp_path / "out")
+    seal = write_attitude(compare_attitude(tmp_path / "mine.csv"), tmp_path / "out", report=False)
     assert verify(seal.path).verdict == "identical"
 
 
@@ -379,15 +379,15 @@ def test_a_log_that_changed_since_it_was_read_is_not_sealed(tmp_path, log):
     bench = compare_attitude(mine)
     mine.write_bytes(log.read_bytes() + b"\n")
     with pytest.raises(DataError, check=coded("bundle.input-changed")):
-        write_attitude(bench, tmp_path / "out")
+        write_attitude(bench, tmp_path / "out", report=False)
     mine.unlink()
     with pytest.raises(DataError, check=coded("bundle.input-changed")):
-        write_attitude(bench, tmp_path / "out")
+        write_attitude(bench, tmp_path / "out", report=False)
     assert not (tmp_path / "out").exists()
 
 
 def test_the_old_bundle_stays_where_the_new_one_cannot_be_put(tmp_path, bench, monkeypatch):
-    seal = write_attitude(bench, tmp_path / "out")
+    seal = write_attitude(bench, tmp_path / "out", report=False)
 
     def refuse(self, target):
         raise OSError("no")
@@ -396,7 +396,7 @@ def test_the_old_bundle_stays_where_the_new_one_cannot_be_put(tmp_path, bench, m
     monkeypatch.setattr(atomic_folder, "_exchange", lambda: None)
     monkeypatch.setattr("pathlib.Path.rename", refuse)
     with pytest.raises(OSError, match="no"):
-        write_attitude(bench, tmp_path / "out", force=True)
+        write_attitude(bench, tmp_path / "out", force=True, report=False)
     monkeypatch.undo()
     assert verify(seal.path).verdict == "identical"
 

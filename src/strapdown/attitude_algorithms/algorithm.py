@@ -292,7 +292,8 @@ def run_attitude(
     -------
     AttitudeRun
         Attitude at the start and at the end of each step, and the diagnostics of the
-        algorithm: where the run begins anew, those of its worst piece.
+        algorithm: where the run begins anew, those of the piece nearest to the pole, or with the
+        largest loss.
 
     Raises
     ------
@@ -309,21 +310,18 @@ def run_attitude(
         q.append(piece)
         diagnostics.append(algorithm.diagnostics(state, time[first : first + len(piece)]))
         first += len(piece)
+    key = "closest_to_pole_deg"
+    if key in diagnostics[0]:
+        worst = min(diagnostics, key=lambda d: d[key])
+    else:
+        worst = max(diagnostics, key=lambda d: max((abs(v) for v in d.values()), default=0.0))
     return AttitudeRun(
         algorithm=algorithm.label,
         title=algorithm.title,
         equations=algorithm.equations,
         attitude=attitude_table(time, np.vstack(q)),
-        diagnostics=_worst(diagnostics),
+        diagnostics=worst,
     )
-
-
-def _worst(diagnostics: Sequence[dict[str, float]]) -> dict[str, float]:
-    """Diagnostics of the piece nearest to the pole, or with the largest loss."""
-    key = "closest_to_pole_deg"
-    if key in diagnostics[0]:
-        return min(diagnostics, key=lambda d: d[key])
-    return max(diagnostics, key=lambda d: max((abs(v) for v in d.values()), default=0.0))
 
 
 # Sample by sample, as on a device or live.

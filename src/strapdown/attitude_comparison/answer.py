@@ -131,11 +131,6 @@ class Choice:
     rate_hz: float
     error_deg: float
 
-    @property
-    def cycles_per_second(self) -> float:
-        """Cycles of a Cortex-M4F per second."""
-        return self.cost.cycles * self.rate_hz
-
 
 def find_answer(evidence: Evidence, tolerance_deg: float) -> Answer:
     """Choose the algorithm of fewest cycles, and the lowest rate at which its largest error passes.
@@ -178,20 +173,30 @@ def _enough(evidence: Evidence, passing: list[Choice], tolerance: float) -> Answ
     chosen = passing[0]
     judged = "error" if evidence.known else "own error"
     sentence = (
-        f"{_title(evidence, chosen)} {_at(evidence, chosen)} is the simplest that stays within "
+        f"{_named(evidence, chosen)} is the simplest that stays within "
         f"{tolerance:g}°: its largest {judged} is {_deg(chosen.error_deg)}."
     )
-    why = [_why_not_lower(evidence, chosen, tolerance)]
-    dropped = _dropped(evidence, chosen, "error_deg", tolerance)
-    why += _of_dropped(dropped, chosen)
-    thrifty = min(passing, key=lambda c: c.cycles_per_second)
+    why, dropped_hz = _why_this_rate(evidence, chosen, "error_deg", tolerance)
+    thrifty = min(passing, key=lambda c: c.cost.cycles * c.rate_hz)
     if thrifty.cost.algorithm != chosen.cost.algorithm:
+        few, many = (c.cost.cycles * c.rate_hz / 1e3 for c in (thrifty, chosen))
+        unit = "thousand cycles of a Cortex-M4F a second"
         why.append(
-            f"Fewest operations a second: {thrifty.cost.algorithm} at {_rate(thrifty)}, "
-            f"{_cycles(thrifty)} against {_cycles(chosen)}."
+            f"Fewest operations a second: {thrifty.cost.algorithm} at {thrifty.rate_hz:.4g} Hz, "
+            f"{few:.3g} {unit} against {many:.3g} {unit}."
         )
-    simpler = [c for c in evidence.costs if c.cycles < chosen.cost.cycles]
-    why += [_why_not(evidence, cost) for cost in simpler]
+    sweep = evidence.sweep
+    for cost in evidence.costs:
+        if cost.cycles < chosen.cost.cycles:
+            of_cost = (sweep["algorithm"] == cost.algorithm) & (sweep["meaning"] == "drop")
+            full = sweep[of_cost & (sweep["factor"] == 1)].iloc[0]
+            off = max(float(full["error_deg"]), float(full["own_deg"]))
+            why.append(
+                f"{cost.algorithm} is simpler, and {_deg(off)} off at "
+                f"{float(full['rate_hz']):.4g} Hz already."
+            )
+    if (enough := _filter_enough(evidence, tolerance)) is not None:
+        why.append(enough)
     helps: tuple[str, ...] = ()
     if not evidence.known:
         why.append(
@@ -213,24 +218,37 @@ def _enough(evidence: Evidence, passing: list[Choice], tolerance: float) -> Answ
         chosen.rate_hz,
         tuple(why),
         helps,
-        None if dropped is None else dropped.rate_hz,
+        dropped_hz,
         evidence.holding,
     )
 
 
-def _dropped(evidence: Evidence, chosen: Choice, column: str, limit: float) -> Choice | None:
-    """Return the same algorithm at the lowest rate that passes by leaving samples out."""
+def _why_this_rate(
+    evidence: Evidence, chosen: Choice, column: str, limit: float
+) -> tuple[list[str], float | None]:
+    """Say why no lower rate passes, and which rate does by leaving samples out, also in Hz."""
+    cells = evidence.sweep[
+        (evidence.sweep["algorithm"] == chosen.cost.algorithm)
+        & (evidence.sweep["meaning"] == chosen.meaning)
+        & (evidence.sweep["rate_hz"] < chosen.rate_hz)
+    ].sort_values("rate_hz", ascending=False)
+    if cells.empty:
+        why = [f"{chosen.rate_hz:.4g} Hz is the lowest rate that was tried."]
+    else:
+        lower = cells.iloc[0]
+        error, rate = max(float(lower[column]), float(lower["own_deg"])), float(lower["rate_hz"])
+        off = f"would be {_deg(error)}, beyond {_deg(limit)}" if np.isfinite(error) else "runs away"
+        why = [f"At {rate:.4g} Hz it {off}."]
     passing = choices(evidence, column, limit, "drop")
-    return next((c for c in passing if c.cost.algorithm == chosen.cost.algorithm), None)
-
-
-def _of_dropped(dropped: Choice | None, chosen: Choice) -> list[str]:
-    if dropped is None or dropped.rate_hz <= chosen.rate_hz:
-        return []
-    return [
-        "A program that leaves samples out, instead of a sensor that averages them, needs "
-        f"{_rate(dropped)} ({_deg(dropped.error_deg)})."
-    ]
+    dropped = next((c for c in passing if c.cost.algorithm == chosen.cost.algorithm), None)
+    if dropped is None:
+        return why, None
+    if dropped.rate_hz > chosen.rate_hz:
+        why.append(
+            "A program that leaves samples out, instead of a sensor that averages them, needs "
+            f"{dropped.rate_hz:.4g} Hz ({_deg(dropped.error_deg)})."
+        )
+    return why, dropped.rate_hz
 
 
 def _limited_by_sensor(
@@ -269,15 +287,13 @@ def _limited_by_sensor(
         chosen = good[0]
         algorithm, meaning, rate = chosen.cost.algorithm, chosen.meaning, chosen.rate_hz
         sentence += (
-            f" {_title(evidence, chosen)} {_at(evidence, chosen)} is all that integration needs: "
+            f" {_named(evidence, chosen)} is all that integration needs: "
             f"its own error, {_deg(chosen.error_deg)}, is small beside that."
         )
-        why.append(_why_not_lower(evidence, chosen, limit, "own_deg"))
         if (enough := _filter_enough(evidence, tolerance)) is not None:
             sentence += f" {enough}"
-        dropped = _dropped(evidence, chosen, "own_deg", limit)
-        why += _of_dropped(dropped, chosen)
-        dropped_hz = None if dropped is None else dropped.rate_hz
+        of_rate, dropped_hz = _why_this_rate(evidence, chosen, "own_deg", limit)
+        why += of_rate
     why += _of_budget(evidence)
     helps = []
     if off_at_start:
@@ -340,9 +356,10 @@ def _filter_enough(evidence: Evidence, tolerance: float) -> str | None:
     whole = [run for run in evidence.filters if _largest(run) <= tolerance]
     if whole:
         run = min(whole, key=_thrift)
+        rate = "" if run.lowest_hz is None else f" down to {run.lowest_hz:.4g} Hz"
         return (
-            f"With {_AIDS[run.aiding]} the filter {run.peer} stays within {tolerance:g}°: its "
-            f"largest error is {_deg(_largest(run))}."
+            f"With {_AIDS[run.aiding]} the filter {run.peer} stays within {tolerance:g}°{rate}: "
+            f"at the log's own rate its largest error is {_deg(_largest(run))}."
         )
     level = [
         run
@@ -353,9 +370,11 @@ def _filter_enough(evidence: Evidence, tolerance: float) -> str | None:
         return None
     run = min(level, key=_thrift)
     assert run.errors is not None
+    level_hz = run.lowest_level_hz
+    lowest = "" if level_hz is None else f" (within {tolerance:g}° down to {level_hz:.4g} Hz)"
     return (
         f"With {_AIDS[run.aiding]} the filter {run.peer} keeps roll and pitch within "
-        f"{_deg(run.errors.most_inclination_deg)}{_heading_words(run)}."
+        f"{_deg(run.errors.most_inclination_deg)}{lowest}{_heading_words(run)}."
     )
 
 
@@ -388,7 +407,7 @@ def _of_filters(evidence: Evidence) -> list[str]:
 
 
 def _largest(run: PeerRun) -> float:
-    found = [s.max_deg for s in run.scores if s.max_deg is not None]
+    found = [s.error_deg if s.max_deg is None else s.max_deg for s in run.scores]
     return max(found) if found else np.inf
 
 
@@ -483,59 +502,17 @@ def _sensor_error(evidence: Evidence, best: pd.Series) -> float:
     return max(of_truth, float(np.nan_to_num(judged - best["own_deg"])))
 
 
-def _why_not_lower(
-    evidence: Evidence, chosen: Choice, limit: float, column: str = "error_deg"
-) -> str:
-    cells = evidence.sweep[
-        (evidence.sweep["algorithm"] == chosen.cost.algorithm)
-        & (evidence.sweep["meaning"] == chosen.meaning)
-        & (evidence.sweep["rate_hz"] < chosen.rate_hz)
-    ].sort_values("rate_hz", ascending=False)
-    if cells.empty:
-        return f"{chosen.rate_hz:.4g} Hz is the lowest rate that was tried."
-    lower = cells.iloc[0]
-    error = max(float(lower[column]), float(lower["own_deg"]))
-    if not np.isfinite(error):
-        return f"At {float(lower['rate_hz']):.4g} Hz it runs away."
-    return f"At {float(lower['rate_hz']):.4g} Hz it would be {_deg(error)}, beyond {_deg(limit)}."
-
-
-def _why_not(evidence: Evidence, cost: Cost) -> str:
-    full = evidence.sweep[
-        (evidence.sweep["algorithm"] == cost.algorithm)
-        & (evidence.sweep["meaning"] == "drop")
-        & (evidence.sweep["factor"] == 1)
-    ].iloc[0]
-    off = max(float(full["error_deg"]), float(full["own_deg"]))
-    return (
-        f"{cost.algorithm} is simpler, and {_deg(off)} off at {float(full['rate_hz']):.4g} Hz "
-        "already."
-    )
-
-
-def _title(evidence: Evidence, choice: Choice) -> str:
+def _named(evidence: Evidence, choice: Choice) -> str:
+    """Say which algorithm, at which rate, and how that is made from the log's own."""
     title = next(a.title for a in evidence.algorithms if a.label == choice.cost.algorithm)
-    return f"{title} ({choice.cost.algorithm})"
-
-
-def _at(evidence: Evidence, choice: Choice) -> str:
-    """Say at which rate, and how it is made from the log's own."""
-    if choice.rate_hz >= float(evidence.sweep["rate_hz"].max()):
-        return f"at {_rate(choice)}"
-    return f"with samples averaged to {_rate(choice)}"
-
-
-def _rate(choice: Choice) -> str:
-    return f"{choice.rate_hz:.4g} Hz"
+    full = choice.rate_hz >= float(evidence.sweep["rate_hz"].max())
+    how = "at" if full else "with samples averaged to"
+    return f"{title} ({choice.cost.algorithm}) {how} {choice.rate_hz:.4g} Hz"
 
 
 def _two_digits(value: float) -> str:
     digits = 1 - int(np.floor(np.log10(value)))
     return f"{round(value, digits):.10g}"
-
-
-def _cycles(choice: Choice) -> str:
-    return f"{choice.cycles_per_second / 1e3:.3g} thousand cycles of a Cortex-M4F a second"
 
 
 def _deg(angle: float) -> str:

@@ -39,6 +39,7 @@ from strapdown.attitude_comparison.references import (
     run_beside,
     truth_of_second,
     truth_score,
+    with_lowest_rates,
 )
 from strapdown.attitude_comparison.source import (
     AttitudeSource,
@@ -73,7 +74,6 @@ from strapdown.formats.recording import Reading
 from strapdown.increments import increments_from_imu
 from strapdown.orientation_filters import is_filter
 from strapdown.progress import Progress, silent
-from strapdown.sensors.magnetometer import calibrate_magnetometer, without_iron
 from strapdown.sensors.rest import (
     RestStretch,
     could_be_a_turn,
@@ -394,7 +394,7 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
     costs = tuple(_cost(algorithm, increments["dt"]) for algorithm in algorithms)
     span = (float(imu.index[0]), float(imu.index[-1]))
     levelled = initial["method"] == "level"
-    references, places, offers = gather_references(spec, source, span, rests, levelled)
+    references, places, offers = gather_references(spec, source, span, rests, levelled, findings)
     known = None
     if source.truth is not None and source.scored is not None:
         known = known_at(source.truth, source.scored, imu.index.to_numpy(dtype=np.float64))
@@ -429,13 +429,17 @@ def _bench(spec: AttitudeSpec, progress: Progress) -> tuple[AttitudeComparison, 
         sweep = sweep_on(sweep, algorithms, grounds, spec.tolerance_deg)
     of_field, north, iron, field_input = _of_field(spec, source, imu, findings)
     beside = run_beside(spec.peers, source, of_field, q_nb, references, findings, north)
+    tried = sorted(set(sweep["factor"].tolist()))
+    beside = tuple(
+        with_lowest_rates(run, of_field, grounds, tried, spec.tolerance_deg) for run in beside
+    )
     evidence = replace(
         find_evidence(
             grounds, algorithms, costs, sweep, bias, rests, None if between is None else between[1]
         ),
         budget=budget,
         holding=holding_time(grounds, spec.tolerance_deg),
-        filters=tuple(run for run in beside if run.cost is not None and run.errors is not None),
+        filters=tuple(run for run in beside if run.cost is not None and run.scores),
     )
     positions: tuple[PositionScore, ...] = ()
     if places:
@@ -596,6 +600,8 @@ def _of_field(
                 )
             )
         return imu, (declination, sd), iron, files
+    from strapdown.sensors.magnetometer import calibrate_magnetometer, without_iron
+
     if spec.place is not None:
         declination, sd, said = magnetic_north(spec.place, source.imu)
         findings += said

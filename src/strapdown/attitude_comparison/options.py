@@ -224,53 +224,44 @@ class AttitudeOptions:
         }
         if "columns" in reading:
             reading["columns"] = dict(self.columns)
+        sensor = None if self.sensor is None else str(self.sensor)
         # The name of a scenario has neither a suffix nor a folder.
-        if not Path(name).suffix and len(Path(name).parts) == 1:
+        plain = not Path(name).suffix and len(Path(name).parts) == 1
+        if plain:
             from strapdown.simulation import SCENARIOS, find_scenario
 
-            if name not in SCENARIOS and not _exists(text):
-                self._refuse_of_scenario()
-                find_scenario(name)  # lists the valid names
-            if name in SCENARIOS:
-                if reading:
-                    raise ConfigError(
-                        "attitude.scenario-not-read-file", quantity=name, given=list(reading)
-                    )
-                highest = max((float(r) for r in self.rates_hz), default=100.0)
-                first = specify(
-                    ScenarioSpec,
-                    name=name,
-                    rate_hz=highest if self.rate_hz is None else self.rate_hz,
-                    sampling=(self.sampling or "instantaneous").lower(),
-                    seed=0 if self.seed is None else self.seed,
-                    sensor=None if self.sensor is None else str(self.sensor),
+            plain = name in SCENARIOS or not _exists(text)
+        if plain and name in SCENARIOS:
+            if reading:
+                raise ConfigError(
+                    "attitude.scenario-not-read-file", quantity=name, given=list(reading)
                 )
-                return [
-                    first.model_copy(update={"seed": first.seed + k}) for k in range(self.trials)
-                ]
-        if name.endswith(".toml") and is_scenario_file(Path(text)):
-            first = ScenarioSpec.of_file(
-                Path(text),
-                self.rate_hz,
-                self.sampling and self.sampling.lower(),
-                self.seed,
-                None if self.sensor is None else str(self.sensor),
+            highest = max((float(r) for r in self.rates_hz), default=100.0)
+            first = specify(
+                ScenarioSpec,
+                name=name,
+                rate_hz=highest if self.rate_hz is None else self.rate_hz,
+                sampling=(self.sampling or "instantaneous").lower(),
+                seed=0 if self.seed is None else self.seed,
+                sensor=sensor,
             )
-            return [first.model_copy(update={"seed": first.seed + k}) for k in range(self.trials)]
-        self._refuse_of_scenario()
-        path = str(Path(text))
-        return [
-            specify(LogSpec, path=path, sampling=self.sampling, rate_hz=self.rate_hz, **reading)
-        ]
-
-    def _refuse_of_scenario(self) -> None:
-        """Refuse options of a scenario for a recorded log."""
-        if self.seed is not None:
-            raise ConfigError("attitude.recorded-log-no-noise-drawn", quantity="seed")
-        if self.sensor is not None:
-            raise ConfigError("attitude.recorded-log-sensor", quantity="sensor")
-        if self.trials > 1:
-            raise ConfigError("attitude.recorded-log-not-drawn-again", quantity="--trials")
+        elif name.endswith(".toml") and is_scenario_file(Path(text)):
+            sampling = self.sampling and self.sampling.lower()
+            first = ScenarioSpec.of_file(Path(text), self.rate_hz, sampling, self.seed, sensor)
+        else:
+            if self.seed is not None:
+                raise ConfigError("attitude.recorded-log-no-noise-drawn", quantity="seed")
+            if self.sensor is not None:
+                raise ConfigError("attitude.recorded-log-sensor", quantity="sensor")
+            if self.trials > 1:
+                raise ConfigError("attitude.recorded-log-not-drawn-again", quantity="--trials")
+            if plain:
+                find_scenario(name)  # lists the valid names
+            path = str(Path(text))
+            return [
+                specify(LogSpec, path=path, sampling=self.sampling, rate_hz=self.rate_hz, **reading)
+            ]
+        return [first.model_copy(update={"seed": first.seed + k}) for k in range(self.trials)]
 
 
 def refuse_no_rate(rate: float) -> None:

@@ -18,11 +18,12 @@ from strapdown.attitude_comparison.source import AttitudeSource
 from strapdown.bundle import input_files
 from strapdown.config.sources import ScenarioSpec
 from strapdown.constants import TWO_SIDED_95
-from strapdown.errors import ConfigError, Finding
+from strapdown.errors import ConfigError, DivergenceError, Finding
 from strapdown.evaluation.differences import error_angles, known_at
 from strapdown.evaluation.reference_points import (
     SamePose,
     Score,
+    reference_errors,
     references_from_words,
     same_pose_candidates,
     score_references,
@@ -34,6 +35,7 @@ from strapdown.tables import ACCEL, GYRO, MAG, QUATERNION, THETA, attitude_table
 from strapdown.tables.checks import index_of
 
 if TYPE_CHECKING:
+    from strapdown.attitude_comparison.sweep import Grounds
     from strapdown.evaluation.position_references import PlaceReference
     from strapdown.evaluation.second_log import SecondLog
     from strapdown.orientation_filters import OrientationEstimator
@@ -94,6 +96,9 @@ class PeerRun:
         Largest difference between its results in single and in double precision.
     ran : OrientationEstimator or None
         Filter of the project with all options, those that the log gave included.
+    lowest_hz, lowest_level_hz : float or None
+        Lowest rate of averaged samples at which its largest error is within the tolerance, as at
+        every higher rate; and that of roll and pitch alone. None if there is none.
     """
 
     peer: str
@@ -104,6 +109,8 @@ class PeerRun:
     cost: Cost | None = None
     single_deg: float | None = None
     ran: OrientationEstimator | None = field(default=None, repr=False)
+    lowest_hz: float | None = None
+    lowest_level_hz: float | None = None
 
 
 def gather_references(
@@ -112,11 +119,12 @@ def gather_references(
     span: tuple[float, float],
     rests: tuple[RestStretch, ...],
     levelled: bool,
+    findings: list[Finding],
 ) -> tuple[pd.DataFrame, tuple[PlaceReference, ...], tuple[SamePose, ...]]:
     """Reference points of attitude and position, and poses that are offered as such.
 
     `span` is the meaning of the words start and end, s. A rest at which the run is leveled is
-    not a reference.
+    not a reference; where it is the only one, `findings` says that no error can be stated.
     """
     words = list(spec.references)
     whole = spec.from_s is spec.to_s is spec.duration_s is None
@@ -135,12 +143,19 @@ def gather_references(
     points = references_from_words(words, *span)
     usable = [r for r in rests if r.accel_mean is not None and r.start >= span[0]]
     if asked:
-        tilts = tilt_references(usable, levelled_from=usable[0] if levelled and usable else None)
+        asks = "--reference rests"
+        if not usable:
+            raise ConfigError("attitude.no-rest", file=source.name, quantity=asks)
+        tilts = tilt_references(usable, levelled_from=usable[0] if levelled else None)
         if tilts.empty:
-            raise ConfigError(
-                "attitude.no-rest-after-levelling" if levelled else "attitude.no-rest",
-                file=source.name,
-                quantity="--reference rests",
+            findings.append(
+                Finding(
+                    "attitude.one-rest",
+                    file=source.name,
+                    quantity=asks,
+                    start=usable[0].start,
+                    end=usable[0].end,
+                )
             )
         points = pd.concat([points, tilts], ignore_index=True) if len(points) else tilts
     return points, positions, same_pose_candidates(usable) if points.empty else ()
@@ -406,6 +421,60 @@ def _own_filters(
             )
 
 
+def with_lowest_rates(
+    run: PeerRun, imu: pd.DataFrame, grounds: Grounds, factors: Sequence[int], tolerance: float
+) -> PeerRun:
+    """Find down to which rate a filter of the project suffices, by the rule of the algorithms.
+
+    `imu`: the log's samples. `factors`: ascending divisors of its rate. A lower rate is that of a
+    sensor which averages: a row is the mean over its step.
+    """
+    if run.ran is None or not run.scores:
+        return run
+    from strapdown.orientation_filters import run_filter
+    from strapdown.peers import align_heading
+
+    columns = GYRO + ACCEL + (MAG if run.aiding == "gyro+accel+mag" else [])
+    time, values = index_of(imu), imu[columns].to_numpy(dtype=np.float64)
+    # Missing samples have no weight.
+    weight = np.diff(time)[:, None] * np.isfinite(values[1:])
+    weighted = np.where(weight > 0.0, values[1:], 0.0) * weight
+    rates: dict[str, float | None] = {"lowest_hz": None, "lowest_level_hz": None}
+    passing = set(rates)
+    for factor in factors:
+        samples = grounds.clock.every(factor)
+        sums, weights = (np.add.reduceat(x, samples[:-1], axis=0) for x in (weighted, weight))
+        with np.errstate(invalid="ignore"):
+            rows = np.vstack([values[:1], sums / weights])
+        part = pd.DataFrame(rows, index=imu.index[samples], columns=columns)
+        try:
+            q = run_filter(run.ran, part, sampling="mean").q_nb
+        except DivergenceError:
+            break
+        tilt = np.inf
+        if grounds.truth is None:
+            attitude = pd.DataFrame(q, index=part.index, columns=QUATERNION)
+            whole = max(reference_errors(attitude, grounds.references))
+        else:
+            known = grounds.truth.at(samples)
+            if not known.counts.any():
+                break
+            if run.aiding == "gyro+accel":
+                first = int(known.counts.argmax())
+                q = align_heading(q, known.q_nb[first], first)
+            tilts, _, wholes = _parts(q[known.counts], known.q_nb[known.counts])
+            tilt, whole = float(tilts.max()), float(wholes.max())
+        for name, error in zip(rates, (whole, tilt), strict=True):
+            # A lower rate that passes where a higher one does not is chance.
+            if error > tolerance:
+                passing.discard(name)
+            if name in passing:
+                rates[name] = grounds.clock.rate_hz / factor
+        if not passing:
+            break
+    return replace(run, lowest_hz=rates["lowest_hz"], lowest_level_hz=rates["lowest_level_hz"])
+
+
 def motion_finding(chosen: OrientationEstimator, imu: pd.DataFrame) -> Finding:
     """Say which options a filter took from the motion of a record."""
     return Finding(
@@ -449,12 +518,9 @@ def _judged(
         return scores, None
     counts = known.counts
     q = attitude[QUATERNION].to_numpy(dtype=np.float64)[counts]
-    error = rotation.compose(q, rotation.conjugate(known.q_nb[counts]))
-    level = np.hypot(error[:, 0], error[:, 3])
-    tilt = 2.0 * np.degrees(np.arctan2(np.hypot(error[:, 1], error[:, 2]), level))
+    tilt, error, whole = _parts(q, known.q_nb[counts])
     heading = np.degrees(np.unwrap(2.0 * np.arctan2(error[:, 3], error[:, 0]), period=2.0 * np.pi))
     heading -= 360.0 * np.round(heading[0] / 360.0)
-    whole = np.degrees(2.0 * np.arctan2(np.linalg.norm(error[:, 1:], axis=1), np.abs(error[:, 0])))
     covered = None
     if covariance is not None:
         sd = np.sqrt(np.diagonal(covariance[counts], axis1=1, axis2=2))
@@ -469,6 +535,15 @@ def _judged(
         drift_deg_per_min=_drift(index_of(attitude)[counts], heading),
         covered=covered,
     )
+
+
+def _parts(q: Array, truth: Array) -> tuple[Array, Array, Array]:
+    """Error about level axes, deg, as a quaternion in north-east-down, and as a whole, deg."""
+    error = rotation.compose(q, rotation.conjugate(truth))
+    level = np.hypot(error[:, 0], error[:, 3])
+    tilt = 2.0 * np.degrees(np.arctan2(np.hypot(error[:, 1], error[:, 2]), level))
+    whole = np.degrees(2.0 * np.arctan2(np.linalg.norm(error[:, 1:], axis=1), np.abs(error[:, 0])))
+    return tilt, error, whole
 
 
 def _drift(time: Array, heading: Array) -> float:

@@ -244,9 +244,8 @@ def sweep_rates(
     ends at the end of the log. An algorithm that overflows has an infinite error.
     """
     cells = [(meaning, factor) for meaning in MEANINGS for factor in factors]
-    clean = grounds.clean
-    whole = increments_from_imu(grounds.imu, grounds.interpolation)
-    whole_clean = None if clean is None else increments_from_imu(clean, grounds.interpolation)
+    tables = [grounds.imu] if grounds.clean is None else [grounds.imu, grounds.clean]
+    whole = [(table, increments_from_imu(table, grounds.interpolation)) for table in tables]
     rows: list[dict[str, object]] = []
     for k, (meaning, factor) in enumerate(cells):
         if meaning == "sum" and factor == 1:
@@ -256,10 +255,14 @@ def sweep_rates(
             continue
         progress(f"{meaning} 1:{factor}", k / len(cells))
         samples = grounds.samples(factor)
-        steps = _steps(grounds.imu, whole, samples, meaning, grounds.interpolation)
-        error_free = None
-        if clean is not None and whole_clean is not None:
-            error_free = _steps(clean, whole_clean, samples, meaning, grounds.interpolation)
+        steps, *error_free = [
+            steps_of(
+                increments_from_imu(table.iloc[samples], grounds.interpolation)
+                if meaning == "drop"
+                else sum_increments(increments, samples)
+            )
+            for table, increments in whole
+        ]
         used = grounds.imu.iloc[samples]
         there = replace(
             grounds,
@@ -271,7 +274,7 @@ def sweep_rates(
             rows.append(
                 {"algorithm": algorithm.label, "meaning": meaning, "factor": factor}
                 | {"rate_hz": grounds.clock.rate_hz / factor}
-                | _cell(algorithm, there, steps, error_free, used)
+                | _cell(algorithm, there, steps, *error_free, used=used)
             )
     return pd.DataFrame(rows, columns=COLUMNS)
 
@@ -297,20 +300,7 @@ def sweep_on(
 def error_at_full_rate(algorithm: AttitudeAlgorithm, grounds: Grounds) -> float:
     """Return the error in deg that judges an algorithm at the full rate."""
     steps = steps_of(increments_from_imu(grounds.imu, grounds.interpolation))
-    return _cell(algorithm, grounds, steps, None, grounds.imu)["error_deg"]
-
-
-def _steps(
-    imu: pd.DataFrame,
-    whole: pd.DataFrame,
-    samples: NDArray[np.int64],
-    meaning: str,
-    interpolation: str,
-) -> Steps:
-    """Steps of a lower rate; `whole` are the increments of the full rate."""
-    if meaning == "drop":
-        return steps_of(increments_from_imu(imu.iloc[samples], interpolation))
-    return steps_of(sum_increments(whole, samples))
+    return _cell(algorithm, grounds, steps, used=grounds.imu)["error_deg"]
 
 
 def sum_increments(increments: pd.DataFrame, samples: NDArray[np.int64]) -> pd.DataFrame:
@@ -332,7 +322,8 @@ def _cell(
     algorithm: AttitudeAlgorithm,
     grounds: Grounds,
     steps: Steps,
-    error_free: Steps | None,
+    error_free: Steps | None = None,
+    *,
     used: pd.DataFrame,
 ) -> dict[str, float]:
     infinite: Errors = (np.inf, np.inf, np.inf)

@@ -279,8 +279,17 @@ def _keep(
     names: set[Path] = set()
     for item in inputs:
         copy = small or item.copied
-        place = _place(item, places)
-        if place in places and not item.path.is_dir():
+        # Each path has a folder, under the given name; a link's target may have lost its suffix.
+        own = item.path.name or item.path.resolve().name
+        place, number = Path("inputs") / item.role / own, 2
+        # Several logs may share a name, and a file may have been read for each.
+        while places.get(place, item.path) != item.path:
+            place = Path("inputs") / f"{item.role}-{number}" / own
+            number += 1
+        if item.path.is_dir():
+            # Files of one folder with two roles share a folder.
+            place = next((p for p, path in places.items() if path == item.path), place)
+        elif place in places:
             continue
         places[place] = item.path
         for file, digest in zip(item.files, item.digests, strict=True):
@@ -302,23 +311,6 @@ def _keep(
             )
         moved[str(item.path)] = place.as_posix() if copy else str(item.path.resolve())
     return kept, moved
-
-
-def _place(item: InputFiles, places: dict[Path, Path]) -> Path:
-    """Assign a separate folder to each path, and the same to a repeated path."""
-    # Files of one folder with two roles share a folder: each path has one.
-    first = next((p for p, path in places.items() if path == item.path), None)
-    if first is not None and item.path.is_dir():
-        return first
-    # The given name; a link's target may have lost its suffix.
-    own = item.path.name or item.path.resolve().name
-    place = Path("inputs") / item.role / own
-    # Several logs may share a name, and a file may have been read for each.
-    number = 2
-    while places.get(place, item.path) != item.path:
-        place = Path("inputs") / f"{item.role}-{number}" / own
-        number += 1
-    return place
 
 
 # Dependencies of the results besides the inputs: packages and the platform.

@@ -184,7 +184,18 @@ def open_locked(path: Path, *, within: bool = False) -> int:
     """
     lock = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_CLOEXEC", 0), 0o666)
     try:
-        _take(lock, within)
+        if WINDOWS:
+            msvcrt: Any = import_module("msvcrt")
+            # Beyond its content, which others may read.
+            os.lseek(lock, 1 << 20, os.SEEK_SET)
+            msvcrt.locking(lock, msvcrt.LK_NBLCK, 1)
+            os.lseek(lock, 0, os.SEEK_SET)
+        else:
+            fcntl: Any = import_module("fcntl")
+            # A lock of the process is not inherited by its children, and an interrupted call of
+            # this process, which left the file open, does not hold off the next.
+            take = fcntl.flock if within else fcntl.lockf
+            take(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         os.ftruncate(lock, 0)
         os.write(lock, _OWNER + str(os.getpid()).encode() + b"\n")
     except OSError as error:
@@ -196,22 +207,6 @@ def open_locked(path: Path, *, within: bool = False) -> int:
         number = owner.removeprefix(_OWNER).strip()
         raise HeldError(int(number) if number.isdigit() else None) from None
     return lock
-
-
-def _take(lock: int, within: bool) -> None:
-    """Lock an open file, or raise OSError at once."""
-    if WINDOWS:
-        msvcrt: Any = import_module("msvcrt")
-        # Beyond its content, which others may read.
-        os.lseek(lock, 1 << 20, os.SEEK_SET)
-        msvcrt.locking(lock, msvcrt.LK_NBLCK, 1)
-        os.lseek(lock, 0, os.SEEK_SET)
-        return
-    fcntl: Any = import_module("fcntl")
-    # A lock of the process is not inherited by its children, and an interrupted call of this
-    # process, which left the file open, does not hold off the next.
-    take = fcntl.flock if within else fcntl.lockf
-    take(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
 def _unlock(out: Path, lock: int) -> None:
@@ -310,9 +305,11 @@ def _beside(out: Path, kind: str) -> Path:
 
 def _put_in_place(staging: Path, out: Path) -> None:
     """Rename the finished folder to its destination, then delete an old one."""
+    # In one step where the system and the file system can.
+    exchange = _exchange() if out.exists() else None
     if not out.exists():
         staging.rename(out)
-    elif _exchanged(staging, out):
+    elif exchange is not None and exchange(os.fsencode(staging), os.fsencode(out)) == 0:
         shutil.rmtree(staging, ignore_errors=True)
     else:
         old = _beside(out, "old")
@@ -351,12 +348,6 @@ def _exchange() -> Callable[[bytes, bytes], int] | None:
     except (OSError, AttributeError, TypeError):
         pass  # an older C library, or another system
     return None
-
-
-def _exchanged(one: Path, two: Path) -> bool:
-    """Exchange two folders in one step; False if the system or the file system cannot."""
-    exchange = _exchange()
-    return exchange is not None and exchange(os.fsencode(one), os.fsencode(two)) == 0
 
 
 # To the disk: after a power cut, too, a folder is whole or absent.

@@ -202,7 +202,7 @@ def attitude(
     them with the known attitude, splits their error into the sensor's and their own, counts their
     cost, and writes the answer with tables, JSON, CSV, a report page and its figures.
     """
-    from strapdown.api.attitude import compare_attitude
+    from strapdown.attitude_comparison.comparison import run_comparison
     from strapdown.bundle import to_json, write_timing
     from strapdown.cli.console import Stopwatch, console, print_findings, print_seal, progress
     from strapdown.cli.result_folder import claim, default_folder, refuse_result
@@ -229,7 +229,7 @@ def attitude(
         raise ConfigError("report.export-of-alone", quantity="--export-of")
     with progress(write.quiet or write.json) as show:
         report = Stopwatch(show)
-        bench = compare_attitude(sources, options=_options(compare, log), progress=report)
+        bench = run_comparison(_options(compare, log).specify(sources), report)
         if files.export is not None:
             export.chosen_for_export(bench, files.export_of)
         report("writing", 0.95)

@@ -123,7 +123,9 @@ def _layout(text: str) -> tuple[int, int, int, str | None, dict[str, str]] | Non
     separator = csv.separator_of(lines[1])
     rows = [split(line, separator) for line in lines]
     header = rows[0] if len(rows[0]) >= 5 and not csv.are_data(rows[0][2:]) else []
-    if any(_is_axis_of_sensor(name) for name in header):
+    # An axis of a sensor is in the header of a table of samples.
+    axes = ("gyro_", "accel_", "mag_", "rate_")
+    if any(str(read_name(name).quantity).startswith(axes) for name in header):
         return None
     units = [read_name(name).unit for name in rows[0][:2]]
     unit = next((u for u in units if u in TIME_UNITS), None)
@@ -159,12 +161,6 @@ def _layout(text: str) -> tuple[int, int, int, str | None, dict[str, str]] | Non
             known = bool(kinds & {"gyro", "gyro uncalibrated"})
             return (kind, stamp, first, unit, letters) if known else None
     return None
-
-
-def _is_axis_of_sensor(name: str) -> bool:
-    """Whether a name of a header is an axis of a sensor, as in a table of samples."""
-    quantity = str(read_name(name).quantity)
-    return quantity.startswith(("gyro_", "accel_", "mag_", "rate_"))
 
 
 def _are_of_android(rows: list[tuple[str, ...]]) -> bool:

@@ -106,6 +106,8 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
         )
         found = find_columns(raw, dataclasses.replace(options, columns={}))
     findings = [*raw.findings, *unused]
+    if found["gyro_x"].source not in raw.stated:
+        findings = [f for f in findings if f.code != "io.first-of-monitors"]
     values = values_of_triads(raw, found, findings)
     let_go(values["gyro"])
     ticks, dated = (

@@ -576,7 +576,11 @@ def read_stamps(
                     unit=unit,
                 )
             )
-    since = _since(first, unit, origin)
+    # Exact if both count whole ticks of one unit.
+    if unit == origin.unit:
+        since = (first - origin.stamp) * factor
+    else:
+        since = first * factor - origin.stamp * TIME_UNITS[origin.unit]
     seconds = filled(len(ticks), lambda part: since + ticks[part] * factor)
     let_go(ticks)
     keep = _without_pauses(seconds, keep, repair, file, row, findings)
@@ -675,13 +679,6 @@ def _without_pauses(
     left_out = int(keep.sum() - out.sum())
     findings.append(said.replace(code="io.part-between-pauses-used", count=left_out))
     return out
-
-
-def _since(stamp: float, unit: str, origin: Origin) -> float:
-    """Return seconds from an origin to a stamp; exact if both count whole ticks of one unit."""
-    if unit == origin.unit:
-        return (stamp - origin.stamp) * TIME_UNITS[unit]
-    return stamp * TIME_UNITS[unit] - origin.stamp * TIME_UNITS[origin.unit]
 
 
 def _mean_step(ticks: Array) -> float:

@@ -111,7 +111,14 @@ def _at_once(
 
     None if anything is irregular: the lines then have to be parsed one by one.
     """
-    head, tail, size = _ends(source)
+    if isinstance(source, bytes):
+        head, tail, size = source[:HEAD], source[-HEAD:], len(source)
+    else:
+        with source.open("rb") as stream:
+            head = stream.read(HEAD)
+            size = stream.seek(0, 2)
+            stream.seek(max(0, size - HEAD))
+            tail = stream.read()
     try:
         text = head[: head.rfind(b"\n") + 1].decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -142,17 +149,6 @@ def _at_once(
     if any(c.dtype.kind == "O" for c in columns) and f"{top.separator} " in text:
         return None
     return top.log(name, files, columns, np.arange(first, first + columns[0].size), [])
-
-
-def _ends(source: bytes | Path) -> tuple[bytes, bytes, int]:
-    """Return the beginning and the end of a text, and its size."""
-    if isinstance(source, bytes):
-        return source[:HEAD], source[-HEAD:], len(source)
-    with source.open("rb") as stream:
-        head = stream.read(HEAD)
-        size = stream.seek(0, 2)
-        stream.seek(max(0, size - HEAD))
-        return head, stream.read(), size
 
 
 def _line_by_line(
@@ -361,19 +357,22 @@ class _Top:
             named = _above(self.above[:-1] if below else self.above, width, self.separator)
             if named is not None:
                 del self.above[len(self.above) - 1 - bool(below) :]
-            self.names = _unique(named or [f"column {k + 1}" for k in range(width)])
-            if below and named is not None:
-                self.units = {n: u for n, u in zip(self.names, below, strict=True) if u}
-            return
-        below = _units(near[0], self.separator, width, kinds) if over is not None else None
-        if below and over is not None:
-            names, over = over, lines[2]
-        bare = [_UNIT.sub("", n) for n in names if n]
-        grouped = over is not None and len(set(bare)) < len(bare) and _are_groups(over)
-        if grouped and over is not None:
-            names = [f"{g} {n}".strip() for g, n in zip(_filled(over), names, strict=True)]
-        del self.above[len(self.above) - 1 - bool(below) - grouped - len(marks) :]
-        self.names = _unique(names)
+            names = named or [f"column {k + 1}" for k in range(width)]
+            below = None if named is None else below
+        else:
+            below = _units(near[0], self.separator, width, kinds) if over is not None else None
+            if below and over is not None:
+                names, over = over, lines[2]
+            bare = [_UNIT.sub("", n) for n in names if n]
+            grouped = over is not None and len(set(bare)) < len(bare) and _are_groups(over)
+            if grouped and over is not None:
+                names = [f"{g} {n}".strip() for g, n in zip(_filled(over), names, strict=True)]
+            del self.above[len(self.above) - 1 - bool(below) - grouped - len(marks) :]
+        count: Counter[str] = Counter()
+        self.names = []
+        for name in names:
+            count[name] += 1
+            self.names.append(name if count[name] == 1 else f"{name} ({count[name]})")
         if below:
             self.units = {n: u for n, u in zip(self.names, below, strict=True) if u}
 
@@ -406,7 +405,15 @@ class _Top:
         findings: list[Finding],
     ) -> RawLog:
         """Make the log of these columns, with what the lines above them state."""
-        self._leave_out_shared()
+        # What all names begin with, as that of a device, is left out if it hides the sensors.
+        first, last = min(self.names), max(self.names)
+        same = itertools.takewhile(lambda pair: pair[0] == pair[1], zip(first, last, strict=False))
+        shared = _SHARED.match("".join(letter for letter, _ in same))
+        if shared is not None and not any(map(_is_gyro, self.names)):
+            short = {name: name[shared.end() :] for name in self.names}
+            if all(short.values()) and sum(map(_is_gyro, short.values())) == 3:
+                self.names = list(short.values())
+                self.units = {short[name]: unit for name, unit in self.units.items()}
         held = dict(zip(self.names, columns, strict=True))
         said = [line[:LONGEST] for line in self.above]
         return RawLog(
@@ -421,18 +428,6 @@ class _Top:
             findings=findings,
             **stated_by(stated_by_keys(said)),
         )
-
-    def _leave_out_shared(self) -> None:
-        """Leave out what all names begin with, as that of a device, if it hides the sensors."""
-        first, last = min(self.names), max(self.names)
-        same = itertools.takewhile(lambda pair: pair[0] == pair[1], zip(first, last, strict=False))
-        shared = _SHARED.match("".join(letter for letter, _ in same))
-        if shared is None or any(_is_gyro(name) for name in self.names):
-            return
-        short = {name: name[shared.end() :] for name in self.names}
-        if all(short.values()) and sum(map(_is_gyro, short.values())) == 3:
-            self.names = list(short.values())
-            self.units = {short[name]: unit for name, unit in self.units.items()}
 
 
 #: Beginning of a name, to the last sign in it.
@@ -568,15 +563,6 @@ def _above(comments: list[str], width: int, separator: str | None) -> list[str] 
         # A remark in brackets may hold separators: "# time_s,force_N (sum of cells, zeroed)".
         names = _named(_REMARK.sub("", comments[-1]), separator, width)
     return None if names is None or any(is_data(n) for n in names) else names
-
-
-def _unique(names: list[str]) -> list[str]:
-    seen: dict[str, int] = {}
-    out = []
-    for name in names:
-        seen[name] = seen.get(name, 0) + 1
-        out.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
-    return out
 
 
 #: Ends of names of a stamp's two numbers, as ROS writes them.

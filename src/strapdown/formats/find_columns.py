@@ -92,9 +92,12 @@ def find_columns(
                     name=name,
                 )
             wanted[q] = name
+    # Triads that are not asked for are those of the unit of which one is.
+    of_units = (unit for unit in raw.other_units if not set(wanted.values()).isdisjoint(unit))
+    stated_columns = next(of_units, raw.stated)
     found = {
         quantity: Column(source, unit, "file")
-        for source, (quantity, unit) in raw.stated.items()
+        for source, (quantity, unit) in stated_columns.items()
         if source in raw.columns
     }
     if not raw.stated:
@@ -309,6 +312,12 @@ def _by_name(raw: RawLog, wanted: dict[str, str], questions: Questions) -> dict[
         kept = _best({f: m for (t, f), m in families.items() if t == triad}, said)
         if not kept:
             continue
+        # In a file of several units, those of the unit whose columns are asked for.
+        inside = {n.rpartition("/")[0] for q, n in wanted.items() if q[:-2] in TRIADS} - {""}
+        of_unit = {
+            f: m for f, m in kept.items() if next(iter(m.values())).rpartition("/")[0] in inside
+        }
+        kept = of_unit or kept
         first = next(iter(kept.values()))
         members = {f"{triad}_{axis}": name for axis, name in first.items()}
         found |= {q: name for q, name in members.items() if q not in wanted}

@@ -28,8 +28,8 @@ from strapdown.units import TIME_UNITS, unit_of
 # ``FileFormatVersion``): ``Sensors/<id>/`` with ``Time`` in µs since 1970, ``Accelerometer`` in
 # m/s², ``Gyroscope`` in rad/s and ``Magnetometer`` in µT, each (n, 3); before version 5
 # ``<id>/Calibrated/Accelerometers`` … and ``<id>/Time`` (APDM, Motion Studio user guide, "Working
-# with HDF5"). The first monitor is read; the columns of the others can be named. Axes are those
-# printed on the monitor.
+# with HDF5"). The first monitor is read, or the one of which a column is named; in HDF5 those of
+# the others are ``<id>/gyro_x``. Axes are those printed on the monitor.
 
 
 APDM_TITLE = "APDM Opal"
@@ -73,24 +73,37 @@ def _csv(path: Path) -> RawLog:
     raw = under(path, top, header=header, drop=1)
     said = dict(zip(names, units, strict=False))
     monitors = list(dict.fromkeys(n.split("/")[0] for n in names if "/Angular Velocity/" in n))
-    stated: dict[str, tuple[str, str | None]] = {"Time": ("time", unit_of(said["Time"]))}
-    for kind, triad in APDM_TRIADS.items():
-        for axis in "XYZ":
-            if (name := f"{monitors[0]}/{kind}/{axis}") in raw.columns:
-                column(raw, name)
-                stated[name] = (f"{triad}_{axis.lower()}", unit_of(said[name].replace("^", "")))
     raw.columns = {n: c for n, c in raw.columns.items() if not n.startswith("unnamed ")}
-    raw.stated = stated
     raw.units = {
         n: u for n, said_unit in said.items() if (u := unit_of(said_unit.replace("^", "")))
     }
-    return _told(raw, monitors)
+    stated: list[dict[str, tuple[str, str | None]]] = []
+    for monitor in monitors:
+        of_monitor: dict[str, tuple[str, str | None]] = {"Time": ("time", unit_of(said["Time"]))}
+        for kind, triad in APDM_TRIADS.items():
+            for axis in "XYZ":
+                if (name := f"{monitor}/{kind}/{axis}") in raw.columns:
+                    if not stated:
+                        column(raw, name)
+                    of_monitor[name] = (f"{triad}_{axis.lower()}", raw.units.get(name))
+        stated.append(of_monitor)
+    return _of_monitors(raw, stated, monitors, "/Angular Velocity")
 
 
-def _told(raw: RawLog, monitors: list[str]) -> RawLog:
-    if len(monitors) > 1:
+def _of_monitors(
+    raw: RawLog, stated: list[dict[str, tuple[str, str | None]]], names: list[str], gyro: str
+) -> RawLog:
+    """State the columns of each monitor; `gyro`: behind the name of one, its rates."""
+    raw.stated, *raw.other_units = stated
+    if len(names) > 1:
         raw.findings.append(
-            Finding("io.first-of-monitors", file=raw.name, quantity="gyro", monitors=monitors)
+            Finding(
+                "io.first-of-monitors",
+                file=raw.name,
+                quantity="gyro",
+                monitors=names,
+                other=f"{names[1]}{gyro}",
+            )
         )
     return raw
 
@@ -108,26 +121,42 @@ def _groups(path: Path) -> dict[str, str]:
 
 def _hdf5(path: Path) -> RawLog:
     groups = _groups(path)
-    group = next(iter(groups.values()), "")
-    new = group.startswith("Sensors/")
-    sets = {t: f"{group}/{n}" if new else f"{group}/Calibrated/{n}s" for t, (n, _) in SETS.items()}
-    arrays, _, _ = read_arrays(path, (f"{group}/Time", *sets.values()))
-    if f"{group}/Time" not in arrays or sets["gyro"] not in arrays:
-        raise lacking(path, "imu", APDM_TITLE, [])
-    held: dict[str, tuple[Any, str | None]] = {"time": (np.ravel(arrays[f"{group}/Time"]), "us")}
-    for triad, name in sets.items():
-        if name in arrays:
-            block = arrays[name]
-            if block.shape != (held["time"][0].size, 3):
-                raise DataError(
-                    "io.rows-not-those-of-stamps",
-                    file=path.name,
-                    quantity=triad,
-                    size=len(block),
-                    count=held["time"][0].size,
-                )
-            held |= {f"{triad}_{a}": (block[:, k], SETS[triad][1]) for k, a in enumerate("xyz")}
-    return _told(RawLog.of(path, held, clock=UNIX), list(groups))
+    count = 0
+    columns: dict[str, Any] = {}
+    stated: list[dict[str, tuple[str, str | None]]] = []
+    for monitor, group in groups.items():
+        inside = "{}" if group.startswith("Sensors/") else "Calibrated/{}s"
+        sets = {t: f"{group}/{inside.format(n)}" for t, (n, _) in SETS.items()}
+        arrays, _, _ = read_arrays(path, (f"{group}/Time", *sets.values()))
+        if f"{group}/Time" not in arrays or sets["gyro"] not in arrays:
+            if stated:
+                continue
+            raise lacking(path, "imu", APDM_TITLE, [])
+        time = np.ravel(arrays[f"{group}/Time"])
+        count = count or time.size
+        # Columns of a log have as many rows; a monitor of another number is left out.
+        if stated and any(len(a) != count for a in arrays.values()):
+            continue
+        top = f"{monitor}/" if stated else ""
+        columns[f"{top}time"] = time
+        of_monitor: dict[str, tuple[str, str | None]] = {f"{top}time": ("time", "us")}
+        for triad, name in sets.items():
+            if name in arrays:
+                block = arrays[name]
+                if block.shape != (count, 3):
+                    raise DataError(
+                        "io.rows-not-those-of-stamps",
+                        file=path.name,
+                        quantity=triad,
+                        size=len(block),
+                        count=count,
+                    )
+                for k, axis in enumerate("xyz"):
+                    columns[f"{top}{triad}_{axis}"] = block[:, k]
+                    of_monitor[f"{top}{triad}_{axis}"] = (f"{triad}_{axis}", SETS[triad][1])
+        stated.append(of_monitor)
+    raw = RawLog(path.resolve().name, (path,), columns, clock=UNIX)
+    return _of_monitors(raw, stated, list(groups), "/gyro")
 
 
 # MicroStrain CSV (MIP Monitor, SensorConnect): lines about the session, ``DATA_START``, a table.

@@ -180,6 +180,9 @@ class RawLog:
         Row of each sample in the file, counted from 1; None if sample k is in row k + 1.
     stated : dict of str to (str, str or None)
         For a known recording: column to (quantity, unit); unit None if not stated.
+    other_units : list of dict of str to (str, str or None)
+        The same for each further sensor unit in the file, which is read where one of its columns
+        is asked for.
     units : dict of str to str
         Column to unit, if stated apart from the name.
     triad_units : dict of str to str
@@ -209,6 +212,7 @@ class RawLog:
     columns: dict[str, NDArray[Any]]
     rows: NDArray[np.int64] | None = None
     stated: Mapping[str, tuple[str, str | None]] = field(default_factory=dict)
+    other_units: list[dict[str, tuple[str, str | None]]] = field(default_factory=list)
     units: dict[str, str] = field(default_factory=dict)
     triad_units: dict[str, str] = field(default_factory=dict)
     rate: float | None = None
@@ -298,32 +302,27 @@ class Recording:
 PLACEHOLDERS = frozenset({"UNIT", "HZ"})
 
 
+@dataclass
 class Questions:
-    """Questions that a file leaves open, asked in one refusal with the inferred answers.
+    """Questions that a file leaves open, asked in one refusal with the inferred answers."""
 
-    Parameters
-    ----------
-    file : str
-    """
-
-    def __init__(self, file: str) -> None:
-        self._file = file
-        self._open: list[Finding] = []
-        self._answers: dict[str, str] = {}
+    file: str
+    questions: list[Finding] = field(default_factory=list)
+    answers: dict[str, str] = field(default_factory=dict)
 
     def ask(self, fault: Finding, **answers: str) -> None:
         """Add a question. `answers`: options of `ReadOptions`, with the likely values."""
-        self._open.append(fault)
-        self._answers |= answers
+        self.questions.append(fault)
+        self.answers |= answers
 
     def refuse(self) -> None:
         """Raise the questions, if there are any: DataError, or the fault itself if it is alone."""
-        if not self._open:
+        if not self.questions:
             return
-        said = as_stated(self._answers)
-        if len(self._open) == 1:
-            raise DataError(self._open[0], **said)
-        raise DataError("io.questions", file=self._file, questions=self._open, **said)
+        said = as_stated(self.answers)
+        if len(self.questions) == 1:
+            raise DataError(self.questions[0], **said)
+        raise DataError("io.questions", file=self.file, questions=self.questions, **said)
 
 
 def as_stated(answers: Mapping[str, str]) -> dict[str, Any]:

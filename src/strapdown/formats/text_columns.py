@@ -181,7 +181,9 @@ def _block(
     """Parse one block. `types`: of the blocks before, to which those of this one are added."""
     columns = _typed(block, count, separator or " ", types)
     # A missing value may be two adjacent blanks, or a line without any.
-    if columns is None or not all(_full(c) for c in columns):
+    if columns is None or not all(
+        c.dtype.kind in "iu" or (c.dtype.kind == "f" and np.isfinite(c.sum())) for c in columns
+    ):
         if separator is None:
             columns = _typed(single_blanks(block), count, " ", types)
         if any(empty in b"\n" + block for empty in (b"\n\n", b"\n\r")):
@@ -211,12 +213,6 @@ def _typed(block: bytes, count: int, separator: str, types: dict[str, Any]) -> C
         if dates or max(both, key=_WIDER.index if both <= set(_WIDER) else len) == str(field.type):
             types[field.name] = field.type
     return _arrays(table)
-
-
-def _full(column: NDArray[Any]) -> bool:
-    return column.dtype.kind in "iu" or (
-        column.dtype.kind == "f" and bool(np.isfinite(column.sum()))
-    )
 
 
 def single_blanks(text: bytes) -> bytes:
@@ -304,21 +300,20 @@ def _options(
 
 
 def _arrays(table: Any) -> Columns:
-    """Convert column by column, so that at most one is in memory twice."""
-    held = table.columns[::-1]
-    del table
-    return [_array(held.pop()) for _ in range(len(held))]
-
-
-def _array(column: Any) -> NDArray[Any]:
     """Convert to numbers with NaN for missing values, to dates, or to text."""
-    kind = str(column.type)
-    if kind in ("int64", "double"):
-        values: NDArray[Any] = column.to_numpy()
-        return values
-    if kind == "null":
-        return np.full(len(column), np.nan)
-    if kind.startswith("timestamp") and not column.null_count:
-        dates: NDArray[Any] = column.cast("timestamp[ns]").to_numpy()
-        return dates
-    return np.array([None if v is None else str(v) for v in column.to_pylist()], dtype=object)
+    # Column by column, so that at most one is in memory twice.
+    held, arrays = table.columns[::-1], []
+    del table
+    while held:
+        column = held.pop()
+        kind = str(column.type)
+        if kind in ("int64", "double"):
+            arrays.append(column.to_numpy())
+        elif kind == "null":
+            arrays.append(np.full(len(column), np.nan))
+        elif kind.startswith("timestamp") and not column.null_count:
+            arrays.append(column.cast("timestamp[ns]").to_numpy())
+        else:
+            words = [None if v is None else str(v) for v in column.to_pylist()]
+            arrays.append(np.array(words, dtype=object))
+    return arrays

@@ -123,7 +123,7 @@ def units_of_triads(
             continue
         stated = _stated_unit(raw, found, triad, options)
         findings += _overruled(raw, found, triad, options, said.get(f"{triad}_unit"))
-        if stated is None or raw.checked or _asked_unit(triad, options):
+        if stated is None or raw.checked or getattr(options, f"{triad}_unit", None):
             asked.add(triad)
         try:
             if stated is None:
@@ -191,11 +191,6 @@ def _refuse_open(raw: RawLog, found: dict[str, Column], triad: str) -> None:
         )
 
 
-def _asked_unit(triad: str, options: ReadOptions) -> str | None:
-    """Return the unit stated by the user."""
-    return {"gyro": options.gyro_unit, "accel": options.accel_unit}.get(triad)
-
-
 def _overruled(
     raw: RawLog,
     found: dict[str, Column],
@@ -204,7 +199,7 @@ def _overruled(
     likely: Inference | None,
 ) -> list[Finding]:
     """A warning where the user states another unit than the columns, and the numbers do not."""
-    asked = _asked_unit(triad, options)
+    asked = getattr(options, f"{triad}_unit", None)
     columns = [found[f"{triad}_{a}"] for a in AXES]
     stated = {c.unit for c in columns} - {None}
     if not asked or not stated or not stated <= set(UNITS[triad]):
@@ -230,7 +225,8 @@ def _overruled(
 def _stated_unit(
     raw: RawLog, found: dict[str, Column], triad: str, options: ReadOptions
 ) -> tuple[str, str] | None:
-    asked = _asked_unit(triad, options)
+    # A magnetometer has no such option.
+    asked = getattr(options, f"{triad}_unit", None)
     if asked:
         return parse_unit(asked, triad), f"stated by --{triad}-unit"
     columns = [found[f"{triad}_{a}"] for a in AXES]

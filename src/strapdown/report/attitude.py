@@ -61,7 +61,14 @@ def write_attitude(
         seals=seals,
     ) as folder:
         write_json(folder / "attitude.json", attitude_json(bench))
-        _write_csv(bench, folder / "attitude.csv")
+        # Side by side, to 1e-9 and to 1e-6 deg.
+        columns: dict[str, NDArray[Any]] = {"time_s": index_of(bench.runs[0].attitude)}
+        for run in bench.runs:
+            # Neither a comma nor a semicolon, which a reader may take for a column separator.
+            name, angles = run.algorithm.replace(",", " "), run.attitude
+            columns |= {f"{name} {q}": np.round(angles[q].to_numpy(), 9) for q in QUATERNION}
+            columns |= {f"{name} {e}_deg": np.round(angles[e].to_numpy(), 6) for e in EULER}
+        csv.write(folder / "attitude.csv", columns, as_comments(words.CONVENTIONS))
         if len(bench.sweep):
             _write_sweep(bench, folder / "sweep.csv")
         if report:
@@ -75,17 +82,6 @@ def write_attitude(
             for chart in drawn if png else ():
                 ChartFigure(chart).save(folder / "figures" / f"{chart.slug}.png")
     return seals[0]
-
-
-def _write_csv(bench: AttitudeComparison, path: Path) -> None:
-    """Write the attitude of every algorithm side by side, to 1e-9 and to 1e-6 deg."""
-    columns: dict[str, NDArray[Any]] = {"time_s": index_of(bench.runs[0].attitude)}
-    for run in bench.runs:
-        # Neither a comma nor a semicolon, which a reader may take for a column separator.
-        name = run.algorithm.replace(",", " ")
-        columns |= {f"{name} {q}": np.round(run.attitude[q].to_numpy(), 9) for q in QUATERNION}
-        columns |= {f"{name} {e}_deg": np.round(run.attitude[e].to_numpy(), 6) for e in EULER}
-    csv.write(path, columns, as_comments(words.CONVENTIONS))
 
 
 def _write_sweep(bench: AttitudeComparison, path: Path) -> None:
@@ -206,6 +202,8 @@ def attitude_json(bench: AttitudeComparison) -> dict[str, Any]:
                 "errors": None if peer.errors is None else vars(peer.errors),
                 "cost": None if peer.cost is None else vars(peer.cost),
                 "single_precision_deg": peer.single_deg,
+                "lowest_rate_hz": peer.lowest_hz,
+                "lowest_rate_of_roll_and_pitch_hz": peer.lowest_level_hz,
             }
             for peer in bench.peers
         ],

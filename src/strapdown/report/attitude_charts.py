@@ -79,13 +79,9 @@ def _marks(bench: AttitudeComparison) -> tuple[Mark, ...]:
     return tuple(Mark(at, label) for at, label in sorted(instants.items()))
 
 
-def _bands(bench: AttitudeComparison) -> tuple[Band, ...]:
-    first = float(bench.imu.index[0])
-    return tuple(Band(max(r.start, first), r.end, "at rest") for r in bench.rests if r.end > first)
-
-
 def _gyro(bench: AttitudeComparison) -> Chart:
     time = index_of(bench.imu)
+    first = float(time[0])
     names = ("x, forward", "y, right", "z, down")
     lines = tuple(
         curve(name, time, np.degrees(bench.imu[column].to_numpy()), colour, width=1.1)
@@ -102,7 +98,7 @@ def _gyro(bench: AttitudeComparison) -> Chart:
         _TIME,
         (Panel("rate, deg/s", lines),),
         _marks(bench),
-        _bands(bench),
+        tuple(Band(max(r.start, first), r.end, "at rest") for r in bench.rests if r.end > first),
     )
 
 
@@ -231,7 +227,11 @@ def _cost(bench: AttitudeComparison) -> Chart:
     own = _shown([shares.get(name, np.nan) for name in names])
     tolerance = max(bench.answer.tolerance_deg, LEAST_ERROR)
     lines = []
-    front = _pareto(cycles, total)
+    # Pareto-optimal points, cheapest first.
+    front: list[int] = []
+    for j in sorted(np.flatnonzero(~np.isnan(total)).tolist(), key=lambda i: (cycles[i], total[i])):
+        if not front or total[j] < total[front[-1]]:
+            front.append(j)
     if len(front) > 1:
         steps_x = np.repeat(cycles[front], 2)[1:]
         steps_y = np.repeat(total[front], 2)[:-1]
@@ -287,15 +287,6 @@ def _cost(bench: AttitudeComparison) -> Chart:
         ),
         log_x=True,
     )
-
-
-def _pareto(cost: Array, error: Array) -> list[int]:
-    """Pareto-optimal points in cost and error, cheapest first."""
-    front: list[int] = []
-    for k in sorted(np.flatnonzero(~np.isnan(error)).tolist(), key=lambda j: (cost[j], error[j])):
-        if not front or error[k] < error[front[-1]]:
-            front.append(k)
-    return front
 
 
 def _sweep(bench: AttitudeComparison) -> Chart:

@@ -7,7 +7,6 @@ from itertools import takewhile
 
 from strapdown.attitude_comparison.comparison import AttitudeComparison
 from strapdown.attitude_comparison.references import PeerRun
-from strapdown.evaluation.reference_points import Score
 from strapdown.report.attitude_words import (
     MEANINGS,
     condition,
@@ -51,10 +50,25 @@ def result_tables(bench: AttitudeComparison) -> list[TableBlock]:
     compared, made = [], []
     for run in bench.runs:
         scores = [s for s in bench.scores if s.algorithm == run.algorithm]
-        compared.append(_compared(scores, len(columns)))
+        errors = []
+        for s in scores:
+            errors += [s.error_deg, s.rms_deg, s.max_deg] if s.against == "truth" else []
+        known = [s.error_deg for s in scores if s.reference is not None]
+        errors += [max(known)] if len(known) > _MOST_POINTS else known
+        compared.append([*map(degrees, errors), *[_NONE] * (len(columns) - len(errors))])
         made.append([cells[column].get(run.algorithm, _NONE) for column in parts])
     names = [run.algorithm for run in bench.runs]
-    strong, note = _named(bench), _part_note(bench)
+    note = ""
+    if bench.shares:
+        sensor = "sensor" in cells
+        note = (
+            "alg. error, "
+            + ("sensor, " if sensor else "")
+            + "float32: largest error due to the algorithm at this rate, "
+            + ("to the sensor, " if sensor else "")
+            + f"and to single precision. {share_basis(bench)} cycles: of a Cortex-M4F per sample; "
+            "memory: numbers kept between samples."
+        )
     if len(columns) > _MOST_BESIDE:
         tables = [("Results", columns, compared, ""), ("Parts of the error", parts, made, note)]
     else:
@@ -65,21 +79,11 @@ def result_tables(bench: AttitudeComparison) -> list[TableBlock]:
             ("algorithm", *header),
             tuple((name, *row) for name, row in zip(names, rows, strict=True)),
             caption=caption,
-            strong=strong,
+            strong=_named(bench),
             title=title,
         )
         for title, header, rows, caption in tables
     ]
-
-
-def _compared(scores: list[Score], count: int) -> list[str]:
-    cells = []
-    for s in scores:
-        if s.against == "truth":
-            cells += [degrees(s.error_deg), degrees(s.rms_deg), degrees(s.max_deg)]
-    points = [s.error_deg for s in scores if s.reference is not None]
-    cells += [degrees(max(points))] if len(points) > _MOST_POINTS else map(degrees, points)
-    return cells + [_NONE] * (count - len(cells))
 
 
 def _parts(bench: AttitudeComparison) -> tuple[list[str], dict[str, dict[str, str]]]:
@@ -104,20 +108,6 @@ def _parts(bench: AttitudeComparison) -> tuple[list[str], dict[str, dict[str, st
         cells["cycles"] = {c.algorithm: number(c.cycles) for c in bench.costs}
         cells["memory"] = {c.algorithm: str(c.memory) for c in bench.costs}
     return list(cells), cells
-
-
-def _part_note(bench: AttitudeComparison) -> str:
-    if not bench.shares:
-        return ""
-    sensor = any(share.sensor_deg is not None for share in bench.shares)
-    return (
-        "alg. error, "
-        + ("sensor, " if sensor else "")
-        + "float32: largest error due to the algorithm at this rate, "
-        + ("to the sensor, " if sensor else "")
-        + f"and to single precision. {share_basis(bench)} cycles: of a Cortex-M4F per sample; "
-        "memory: numbers kept between samples."
-    )
 
 
 def condition_table(bench: AttitudeComparison) -> TableBlock:
@@ -326,8 +316,8 @@ def filter_table(bench: AttitudeComparison) -> TableBlock | None:
         return None
     return TableBlock(
         (
-            *("filter", "uses", "RMS", "final", "inclination", "heading", "drift/min", "in 95 %"),
-            *("float32", "ops", "bytes"),
+            *("filter", "uses", "RMS", "final", "tilt", "heading", "drift/min", "in 95 %"),
+            *(f"≤ {bench.answer.tolerance_deg:g}° to", "float32", "ops", "bytes"),
         ),
         tuple(_filter_row(peer) for peer in aided),
         text=(0, 1),
@@ -335,9 +325,11 @@ def filter_table(bench: AttitudeComparison) -> TableBlock | None:
         "and about the vertical; without a magnetometer the heading is that of the truth at the "
         "start. Drift: root mean square change of the heading error over a minute, or over half "
         "of a shorter record, per minute. In 95 %: share of the time in which inclination and "
-        "heading are within their stated 95 % bounds. Float32: largest difference in single "
-        "precision. Ops: operations a sample, as counted on the kernel; bytes: kept between "
-        "samples in single precision.",
+        "heading are within their stated 95 % bounds. ≤: lowest rate, with samples averaged, "
+        "down to which the largest error is within the tolerance; in brackets, that of roll and "
+        "pitch. "
+        "Float32: largest difference in single precision. Ops: operations a sample, as counted on "
+        "the kernel; bytes: kept between samples in single precision.",
         title="Aided filters",
     )
 
@@ -356,9 +348,14 @@ def _filter_row(peer: PeerRun) -> tuple[str, ...]:
     if cost is not None and peer.single_deg is not None:
         operations = cost.add + cost.multiply + cost.divide + cost.sqrt + cost.trig
         of_kernel = (degrees(peer.single_deg), f"{operations:.0f}", f"{4 * cost.memory}")
+    rate = "" if peer.ran is None else _NONE
+    if peer.lowest_hz is not None:
+        rate = f"{peer.lowest_hz:.3g} Hz"
+    elif peer.lowest_level_hz is not None:
+        rate = f"({peer.lowest_level_hz:.3g} Hz)"
     sensors = {"gyro+accel": "6D", "gyro+accel+mag": "9D"}
     name = peer.peer.removeprefix("strapdown ")
-    return (name, sensors[peer.aiding], *parts, *of_kernel)
+    return (name, sensors[peer.aiding], *parts, rate, *of_kernel)
 
 
 # Dead-reckoned positions and the second log.

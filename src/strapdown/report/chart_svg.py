@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -95,7 +95,7 @@ def draw_pattern(drawing: Drawing, pattern: str, box: Box) -> None:
     if right - left < 0.5 or bottom - top < 0.5:
         return
     width, height = right - left, bottom - top
-    with drawing.within(box):
+    with drawing.group(box):
         if pattern == ".":
             columns = np.arange(left + 0.5 * _HATCH, right, _HATCH)
             rows = np.arange(top + 0.5 * _HATCH, bottom, _HATCH)
@@ -127,17 +127,6 @@ def entries(chart: Chart) -> list[Shown]:
             if one.legend and one.name:
                 found.setdefault(one.name, one)
     return list(found.values())
-
-
-def _placed(legend: list[Shown], left: float, right: float) -> Iterator[tuple[Shown, float, int]]:
-    """Legend entries, each with its left end and its row."""
-    x, row = left, 0
-    for one in legend:
-        wide = _SAMPLE + text_width(one.name, _SIZE)
-        if x > left and x + wide > right:
-            x, row = left, row + 1
-        yield one, x, row
-        x += wide + _GAP
 
 
 def _sample(drawing: Drawing, shown: Shown, x: float, y: float) -> None:
@@ -218,16 +207,23 @@ class Frame:
             "data_named": "x" * self.x_named + "y" * (self.y_named and not panel.categories),
             "data_labels": f"{panel.x_label}|{panel.y_label}",
         }
-        with drawing.within(self.box, **axes):
+        with drawing.group(self.box, **axes):
             if panel.backdrop is not None:
                 with drawing.group(class_="map", opacity="0.75", aria_hidden="true"):
                     for one in panel.backdrop.pictures:
                         corners = one.corner + np.array([0.0 * one.down, one.across, one.down])
                         drawing.picture(one.data, one.media, self.at(*corners.T))
             with drawing.group(class_="grid"):
-                self._grid(drawing)
+                for tick in self.x_ticks:
+                    if tick.grid:
+                        x = self.across(tick.at)
+                        drawing.line((x, top), (x, bottom), _GRID, 0.8)
+                for tick in [] if panel.bars and panel.categories else self.y_ticks:
+                    if tick.grid:
+                        y = self.up(tick.at)
+                        drawing.line((left, y), (right, y), _GRID, 0.8)
             for band in bands:
-                (x0, _), (x1, _) = self._edges([band.start, band.end])
+                x0, x1 = self.across(band.start), self.across(band.end)
                 corners = np.array([[x0, top], [x1, top], [x1, bottom], [x0, bottom]])
                 drawing.shape(corners, None, fill=_SHADE, opacity=0.07)
             for fill in panel.fills:
@@ -237,16 +233,16 @@ class Frame:
                 with drawing.group(data_series=bars.name):
                     self._bars(drawing, bars)
             if panel.bars and panel.categories:
-                ((x, _),) = self._edges([0.0])
+                x = self.across(0.0)
                 drawing.line((x, top), (x, bottom), INK, 0.8)
             elif panel.bars:
-                y = float(self.at([self.x.low], [0.0])[0, 1])
+                y = self.up(0.0)
                 drawing.line((left, y), (right, y), INK, 0.8)
             for level in panel.levels:
-                y = float(self.at([self.x.low], [level.y])[0, 1])
+                y = self.up(level.y)
                 drawing.line((left, y), (right, y), RED, 1.2, "dash")
             for mark in marks:
-                ((x, _),) = self._edges([mark.x])
+                x = self.across(mark.x)
                 drawing.line((x, top), (x, bottom), RED, 1.2, "dot")
             for line in panel.lines:
                 with drawing.group(data_series=line.name, data_line=""):
@@ -263,21 +259,13 @@ class Frame:
         with drawing.group(class_="names"):
             self._names(drawing)
 
-    def _edges(self, x: list[float]) -> Array:
-        return self.at(x, [self.y.low] * len(x))
+    def across(self, x: float) -> float:
+        """Return the horizontal position of a value in the picture."""
+        return float(self.at([x], [self.y.low])[0, 0])
 
-    def _grid(self, drawing: Drawing) -> None:
-        left, top, right, bottom = self.box
-        for tick in self.x_ticks:
-            if tick.grid:
-                ((x, _),) = self._edges([tick.at])
-                drawing.line((x, top), (x, bottom), _GRID, 0.8)
-        if self.panel.bars and self.panel.categories:
-            return
-        for tick in self.y_ticks:
-            if tick.grid:
-                y = float(self.at([self.x.low], [tick.at])[0, 1])
-                drawing.line((left, y), (right, y), _GRID, 0.8)
+    def up(self, y: float) -> float:
+        """Return the vertical position of a value in the picture."""
+        return float(self.at([self.x.low], [y])[0, 1])
 
     def _fill(self, drawing: Drawing, fill: Fill) -> None:
         low = np.maximum(fill.low, self.y.low) if self.y.log else fill.low
@@ -324,14 +312,14 @@ class Frame:
     def _ticks(self, drawing: Drawing) -> None:
         left, top, right, bottom = self.box
         for tick in self.x_ticks:
-            ((x, _),) = self._edges([tick.at])
+            x = self.across(tick.at)
             if not left - 0.5 <= x <= right + 0.5:
                 continue
             drawing.line((x, bottom), (x, bottom + LONG * (1.0 if tick.text else 0.6)), INK, 0.8)
             if tick.text and self.x_named:
                 drawing.text((x, bottom + LONG + 8.0), tick.text, TICK, anchor="middle")
         for tick in self.y_ticks:
-            y = float(self.at([self.x.low], [tick.at])[0, 1])
+            y = self.up(tick.at)
             if not top - 0.5 <= y <= bottom + 0.5:
                 continue
             drawing.line((left - LONG * (1.0 if tick.text else 0.6), y), (left, y), INK, 0.8)
@@ -343,7 +331,7 @@ class Frame:
         left, top, right, bottom = self.box
         taken: list[Box] = []
         for level in self.panel.levels:
-            y = float(self.at([self.x.low], [level.y])[0, 1])
+            y = self.up(level.y)
             if not top - 0.5 <= y <= bottom + 0.5:
                 continue
             beside = len(level.label) <= LONGEST_BESIDE
@@ -440,30 +428,32 @@ def plane_view(chart: Chart) -> tuple[Array, Array]:
 
 
 def _legend_of(chart: Chart) -> tuple[list[tuple[Shown, float, int]], float, float]:
-    """Legend entries with their places, their height, and that of the chart with them."""
-    legend = list(_placed(entries(chart), _EDGE, _WIDTH - _EDGE))
-    below = _LEGEND_ROW * (legend[-1][2] + 1) + 4.0 if legend else 0.0
-    return legend, below, _INCH * _height(chart) + max(0.0, below - 20.0)
-
-
-def _height(chart: Chart) -> float:
-    """Height of a chart in a print column, inches; two charts of three panels fill a page."""
+    """Legend entries with left end and row, their height, and that of the chart with them."""
+    legend: list[tuple[Shown, float, int]] = []
+    x, row = _EDGE, 0
+    for one in entries(chart):
+        wide = _SAMPLE + text_width(one.name, _SIZE)
+        if x > _EDGE and x + wide > _WIDTH - _EDGE:
+            x, row = _EDGE, row + 1
+        legend.append((one, x, row))
+        x += wide + _GAP
+    below = _LEGEND_ROW * (row + 1) + 4.0 if legend else 0.0
+    # In inches; two charts of three panels fill a page.
     if min(len(panel.categories) for panel in chart.panels):
-        return 0.8 + 0.19 * max(len(panel.categories) for panel in chart.panels)
-    if chart.beside:
-        return 3.2
-    titles = 0.18 * sum(bool(panel.title) for panel in chart.panels)
-    alone = 0.6 * (len(chart.panels) == 1)
-    return 0.85 + 0.95 * math.fsum(panel.height for panel in chart.panels) + titles + alone
+        height = 0.8 + 0.19 * max(len(panel.categories) for panel in chart.panels)
+    elif chart.beside:
+        height = 3.2
+    else:
+        height = 0.85 + 0.95 * math.fsum(panel.height for panel in chart.panels)
+        height += 0.18 * sum(bool(panel.title) for panel in chart.panels)
+        height += 0.6 * (len(chart.panels) == 1)
+    return legend, below, _INCH * height + max(0.0, below - 20.0)
 
 
 def _frames(chart: Chart, start: float, height: float) -> list[Frame]:
     """Panels between two heights of the picture."""
     count = len(chart.panels)
-    xs, ys = _x_scales(chart), [_y_scale(panel) for panel in chart.panels]
-    if chart.beside and not any(panel.categories for panel in chart.panels):
-        same = Scale(min(y.low for y in ys), max(y.high for y in ys), ys[0].log)
-        ys = [same] * count
+    xs, ys = _scales(chart)
     named = [chart.beside or bool(p.x_label) or k == count - 1 for k, p in enumerate(chart.panels)]
     rooms = [_upright(chart, k, named[k], xs[k], ys[k]) for k in range(count)]
     if chart.beside:
@@ -472,9 +462,9 @@ def _frames(chart: Chart, start: float, height: float) -> list[Frame]:
     else:
         used = math.fsum(a + b for a, b in rooms) + _BETWEEN * (count - 1)
         ratios = np.array([panel.height for panel in chart.panels])
-        free = np.maximum(height - start - used, 20.0 * count) * ratios / ratios.sum()
+        heights = np.maximum(height - start - used, 20.0 * count) * ratios / ratios.sum()
         spans, top = [], start
-        for (above, below), tall in zip(rooms, free.tolist(), strict=True):
+        for (above, below), tall in zip(rooms, heights.tolist(), strict=True):
             spans.append((top + above, top + above + tall))
             top += above + tall + below + _BETWEEN
     y_ticks = [_y_ticks(p, y, b - t) for p, y, (t, b) in zip(chart.panels, ys, spans, strict=True)]
@@ -482,7 +472,14 @@ def _frames(chart: Chart, start: float, height: float) -> list[Frame]:
     sides = [
         _sides(chart.panels[k], y_ticks[k] if y_named[k] else [], spans[k]) for k in range(count)
     ]
-    boxes = _across(chart, sides)
+    if chart.beside:
+        free = (_WIDTH - math.fsum(a + b for a, b in sides)) / count
+        boxes, at = [], 0.0
+        for left, right in sides:
+            boxes.append((at + left, at + left + free))
+            at += left + free + right
+    else:
+        boxes = [(max(a for a, _ in sides), _WIDTH - max(b for _, b in sides))] * count
     found = []
     for k, panel in enumerate(chart.panels):
         (left, right), (top, bottom) = boxes[k], spans[k]
@@ -498,44 +495,43 @@ def _frames(chart: Chart, start: float, height: float) -> list[Frame]:
     return found
 
 
-def _x_scales(chart: Chart) -> list[Scale]:
-    """Horizontal axes: one shared by all panels, and the planes' own."""
-    values: list[Array] = [np.array([b.start, b.end]) for b in chart.bands]
-    values.append(np.array([mark.x for mark in chart.marks]))
+def _scales(chart: Chart) -> tuple[list[Scale], list[Scale]]:
+    """Axes of the panels: horizontally one is shared by all, and planes have their own."""
+    together: list[Array] = [np.array([b.start, b.end]) for b in chart.bands]
+    together.append(np.array([mark.x for mark in chart.marks]))
     margin = 0.05
-    for panel in chart.panels:
-        if not panel.x_label:
-            values += _x_values(panel)
-            margin = max(margin, 0.12 * bool(panel.bars and panel.categories))
-    shared = fitted(values, chart.log_x, margin)
-    if (span := strip_range(chart)) is not None:
-        shared = Scale(*span)
-    return [fitted(_x_values(p)) if p.x_label else shared for p in chart.panels]
-
-
-def _x_values(panel: Panel) -> list[Array]:
-    found = [line.x[np.isfinite(line.y)] for line in panel.lines]
-    found += [v for line in panel.lines for v in (line.low, line.high) if v is not None]
-    found += [f.x[np.isfinite(f.low) & np.isfinite(f.high)] for f in panel.fills]
-    for bars in panel.bars:
-        if panel.categories:
-            found += [bars.values, np.zeros(1) if bars.start is None else bars.start]
+    own: dict[int, Scale] = {}
+    ys = []
+    for k, panel in enumerate(chart.panels):
+        x = [line.x[np.isfinite(line.y)] for line in panel.lines]
+        x += [v for line in panel.lines for v in (line.low, line.high) if v is not None]
+        x += [f.x[np.isfinite(f.low) & np.isfinite(f.high)] for f in panel.fills]
+        y = [line.y[np.isfinite(line.x)] for line in panel.lines]
+        y += [v for fill in panel.fills for v in (fill.low, fill.high)]
+        y.append(np.array([level.y for level in panel.levels]))
+        for bars in panel.bars:
+            ends = [bars.values, np.zeros(1) if bars.start is None else bars.start]
+            y += ends
+            if panel.categories:
+                x += ends
+            else:
+                x += [bars.at - 0.5 * bars.width, bars.at + 0.5 * bars.width]
+        if panel.x_label:
+            own[k] = fitted(x)
         else:
-            found += [bars.at - 0.5 * bars.width, bars.at + 0.5 * bars.width]
-    return found
-
-
-def _y_scale(panel: Panel) -> Scale:
-    if panel.categories:
-        return Scale(-0.5, len(panel.categories) - 0.5)
-    if (ends := steady_range(panel)) is not None:
-        return Scale(*ends)
-    values = [line.y[np.isfinite(line.x)] for line in panel.lines]
-    values += [v for fill in panel.fills for v in (fill.low, fill.high)]
-    values.append(np.array([level.y for level in panel.levels]))
-    for bars in panel.bars:
-        values += [bars.values, np.zeros(1) if bars.start is None else bars.start]
-    return fitted(values, panel.log, 0.12 if panel.bars else 0.05)
+            together += x
+            margin = max(margin, 0.12 * bool(panel.bars and panel.categories))
+        if panel.categories:
+            ys.append(Scale(-0.5, len(panel.categories) - 0.5))
+        elif (steady := steady_range(panel)) is not None:
+            ys.append(Scale(*steady))
+        else:
+            ys.append(fitted(y, panel.log, 0.12 if panel.bars else 0.05))
+    if chart.beside and not any(panel.categories for panel in chart.panels):
+        ys = [Scale(min(y.low for y in ys), max(y.high for y in ys), ys[0].log)] * len(ys)
+    span = strip_range(chart)
+    shared = fitted(together, chart.log_x, margin) if span is None else Scale(*span)
+    return [own.get(k, shared) for k in range(len(ys))], ys
 
 
 def _one_scale(x: Scale, y: Scale, shape: float) -> tuple[Scale, Scale]:
@@ -616,19 +612,6 @@ def _sides(panel: Panel, y_ticks: list[Tick], span: tuple[float, float]) -> tupl
     ends = [label for bars in panel.bars for label in bars.labels] if panel.categories else []
     right = max(right, max((text_width(label, TICK) for label in ends), default=0.0))
     return left, right
-
-
-def _across(chart: Chart, sides: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Left and right end of each panel's axes, between margins to both sides."""
-    if not chart.beside:
-        left, right = max(a for a, _ in sides), max(b for _, b in sides)
-        return [(left, _WIDTH - right)] * len(sides)
-    free = (_WIDTH - math.fsum(a + b for a, b in sides)) / len(sides)
-    found, at = [], 0.0
-    for left, right in sides:
-        found.append((at + left, at + left + free))
-        at += left + free + right
-    return found
 
 
 def _around(drawing: Drawing, chart: Chart, frame: Frame) -> None:
@@ -827,11 +810,12 @@ def ticks(scale: Scale, most: int, *, step: float = 0.0, between: float = 30.0) 
             at = digit * 10.0**power
             if not scale.low <= at <= scale.high * (1.0 + 1e-12):
                 continue
+            text = f"{at:g}".replace("-", "−")
             if digit == 1:
-                found.append(Tick(at, _short(at) if power % stride == 0 else ""))
+                found.append(Tick(at, text if power % stride == 0 else ""))
             elif stride == 1:
                 said = digit in (2, 5) and scale.high < between * scale.low
-                found.append(Tick(at, _short(at) if said else "", grid=False))
+                found.append(Tick(at, text if said else "", grid=False))
     if sum(bool(tick.text) for tick in found) < 2:
         return _even(scale, nice_step((scale.high - scale.low) / max(most, 1)))
     return found
@@ -843,10 +827,6 @@ def _even(scale: Scale, step: float) -> list[Tick]:
     return [
         Tick(k * step, tick_words(k * step / unit, step / unit)) for k in range(first, last + 1)
     ]
-
-
-def _short(value: float) -> str:
-    return f"{value:g}".replace("-", "−")
 
 
 # A chart alone: shown by a notebook, or written as SVG, PNG or PDF.

@@ -213,7 +213,7 @@ def crash_stills(
         _cell(out, (left, top, width, height), f"{plain(1e3 * at, 0)} ms", name)
         shadow = places.copy()
         shadow[:, 2] = ground
-        with out.within((left, top + _HEAD, left + width, top + _HEAD + height)):
+        with out.group((left, top + _HEAD, left + width, top + _HEAD + height)):
             _ground_lines(out, pixels, (places, corners), ground)
             out.shape(pixels(shadow), "#8a939e", 1.0, "dash", closed=False)
             out.shape(pixels(shadow[: row + 1]), BLUE, 2.2, closed=False)

@@ -503,13 +503,18 @@ def document_data(
             (more if beyond else kept).append(writer.block(block))
             if figures and not beyond and not section.folded:
                 shown, left = shown - figures, left - figures
+        held = (
+            (sum(map(_figures_in, section.blocks)), "figure"),
+            (sum(isinstance(block, TableBlock) for block in section.blocks), "table"),
+        )
+        holds = ", ".join(f"{n} {name}{'s' * (n > 1)}" for n, name in held if n)
         sections.append(
             {
                 "number": number,
                 "anchor": f"{number}-{section.slug}",
                 "title": section.title,
                 "folded": section.folded,
-                "holds": _holds(section.blocks) if section.folded else "",
+                "holds": holds if section.folded else "",
                 "blocks": kept,
                 "more": more,
             }
@@ -532,21 +537,15 @@ def _figures_in(block: Block) -> int:
     return int(isinstance(block, Chart | Picture | Animation))
 
 
-def _holds(blocks: Sequence[Block]) -> str:
-    """Figures and tables in words: ``3 figures, 1 table``."""
-    counts = (
-        (sum(map(_figures_in, blocks)), "figure"),
-        (sum(isinstance(block, TableBlock) for block in blocks), "table"),
-    )
-    return ", ".join(f"{n} {name}{'s' * (n > 1)}" for n, name in counts if n)
-
-
+@dataclass
 class _Writer:
     """Blocks as data; figures and tables are numbered in document order."""
 
-    def __init__(self, stills: Iterator[str], place: Place, alive: bool) -> None:
-        self._stills, self._place, self._alive = stills, place, alive
-        self._figures, self._tables = count(1), count(1)
+    stills: Iterator[str]
+    place: Place
+    alive: bool
+    figures: Iterator[int] = field(default_factory=lambda: count(1))
+    tables: Iterator[int] = field(default_factory=lambda: count(1))
 
     def block(self, block: Block) -> dict[str, Any]:
         """Return one block."""
@@ -558,53 +557,57 @@ class _Writer:
             case Links() | Facts():
                 return {"kind": type(block).__name__.lower(), "rows": block.rows}
             case TableBlock():
-                return self._table(block)
+                columns, rows = range(len(block.columns)), range(len(block.rows))
+                if any(len(row) != len(columns) for row in block.rows):
+                    raise ValueError(
+                        f"a row of the table {block.caption!r} has not as many cells as columns"
+                    )
+                return {
+                    "kind": "table",
+                    "title": block.title,
+                    "number": next(self.tables) if block.caption or block.title else 0,
+                    "columns": list(block.columns),
+                    "rows": [list(row) for row in block.rows],
+                    "words": [column in block.text for column in columns],
+                    "caption": block.caption,
+                    "strong": [row in block.strong for row in rows],
+                    "passed": [[(row, c) in block.passed for c in columns] for row in rows],
+                }
             case Chart():
-                return self._chart(block)
+                drawn = next(self.stills)
+                shown = {"svg": drawn, "x_label": block.x_label}
+                return {
+                    "kind": "chart",
+                    "number": next(self.figures),
+                    "title": block.title,
+                    "caption": block.caption,
+                    "alt": f"{block.title}. {block.caption}".strip(),
+                    "width_mm": 170.0,
+                    "still_caption": "",
+                    "live_caption": "",
+                    **(shown if self.alive else {"still": self.place(drawn)}),
+                }
             case Picture():
-                return self._picture(block) | {"kind": "picture", "number": next(self._figures)}
+                return self._picture(block) | {"kind": "picture", "number": next(self.figures)}
             case Animation():
-                return self._animation(block)
+                number = next(self.figures)
+                still: dict[str, Any] = {"still": "", "still_caption": "", "alt": block.title}
+                if block.stills is not None:
+                    still = self._picture(block.stills)
+                    still["still_caption"] = block.stills.caption
+                return {
+                    **still,
+                    "kind": "animation",
+                    "number": number,
+                    "title": block.title,
+                    "caption": block.caption,
+                    "live_caption": block.live_caption,
+                    **({"scene": block.scene} if self.alive else {}),
+                }
             case KeyFigures():
                 pictures = [self._picture(picture) for picture in block.pictures]
                 figures = [vars(one) for one in block.figures]
                 return {"kind": "key_figures", "figures": figures, "pictures": pictures}
-
-    def _table(self, table: TableBlock) -> dict[str, Any]:
-        if any(len(row) != len(table.columns) for row in table.rows):
-            raise ValueError(
-                f"a row of the table {table.caption!r} has not as many cells as columns"
-            )
-        return {
-            "kind": "table",
-            "title": table.title,
-            "number": next(self._tables) if table.caption or table.title else 0,
-            "columns": list(table.columns),
-            "rows": [list(row) for row in table.rows],
-            "words": [index in table.text for index in range(len(table.columns))],
-            "caption": table.caption,
-            "strong": [index in table.strong for index in range(len(table.rows))],
-            "passed": [
-                [(row, column) in table.passed for column in range(len(table.columns))]
-                for row in range(len(table.rows))
-            ],
-        }
-
-    def _chart(self, chart: Chart) -> dict[str, Any]:
-        number = next(self._figures)
-        drawn = next(self._stills)
-        shown = {"svg": drawn, "x_label": chart.x_label}
-        return {
-            "kind": "chart",
-            "number": number,
-            "title": chart.title,
-            "caption": chart.caption,
-            "alt": f"{chart.title}. {chart.caption}".strip(),
-            "width_mm": 170.0,
-            "still_caption": "",
-            "live_caption": "",
-            **(shown if self._alive else {"still": self._place(drawn)}),
-        }
 
     def _picture(self, picture: Picture) -> dict[str, Any]:
         from xml.etree import ElementTree
@@ -625,25 +628,9 @@ class _Writer:
             "title": picture.title,
             "caption": picture.caption,
             "alt": picture.alt or picture.title,
-            "still": self._place(picture.svg),
+            "still": self.place(picture.svg),
             "width_mm": float(picture.width_mm),
         }
-
-    def _animation(self, animation: Animation) -> dict[str, Any]:
-        number = next(self._figures)
-        still: dict[str, Any] = {"still": "", "still_caption": "", "alt": animation.title}
-        if animation.stills is not None:
-            still = self._picture(animation.stills)
-            still["still_caption"] = animation.stills.caption
-        data: dict[str, Any] = {
-            **still,
-            "kind": "animation",
-            "number": number,
-            "title": animation.title,
-            "caption": animation.caption,
-            "live_caption": animation.live_caption,
-        }
-        return data | {"scene": animation.scene} if self._alive else data
 
 
 # Drawings of a document as files beside the page.

@@ -23,6 +23,7 @@ from strapdown.report.document import (
 _TITLE_ELEMENT = re.compile("<title>.*?</title>", re.DOTALL)
 _PLACE = re.compile(r"\{\{ (?:policy|title|body) \}\}")
 _SIGNS = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", "'": "&#39;", '"': "&#34;"})
+_SIGNS_OF_SCRIPT = str.maketrans({sign: f"\\u{ord(sign):04x}" for sign in "<>&"})
 #: Characters from which a cell is wide.
 _LONG = 30
 _HOW_TO = (
@@ -65,52 +66,51 @@ def document_page(document: Document, *, stills: Sequence[str] | None = None) ->
     """
     drawn = draw_stills(document) if stills is None else stills
     data = document_data(document, drawn, _image, alive=True)
-    sections = (b for s in data["sections"] for b in (*s["blocks"], *s["more"]))
-    kinds = {block["kind"] for block in (*data["front"], *sections)}
+    sections, title = data["sections"], _text(data["title"])
+    blocks = [*data["front"], *(b for s in sections for b in (*s["blocks"], *s["more"]))]
     templates = files("strapdown.report").joinpath("templates")
-    script = ""
-    if kinds & {"chart", "animation"} or any(s["folded"] or s["more"] for s in data["sections"]):
+    script, policy = "", "'none'"
+    if any(b["kind"] in ("chart", "animation") for b in blocks) or any(
+        s["folded"] or s["more"] for s in sections
+    ):
         script = templates.joinpath("document.js").read_text("utf-8")
-    begin, between, after, end = _PLACE.split(
-        templates.joinpath("document.html").read_text("utf-8")
-    )
-    policy, title = _text(_digest(script) if script else "'none'"), _text(data["title"])
-    return f"{begin}{policy}{between}{title}{after}{_body(data, script)}{end}".removesuffix("\n")
-
-
-def _text(text: str) -> str:
-    """Escape a text for an element or an attribute."""
-    return str(text).translate(_SIGNS)
-
-
-def _body(data: Mapping[str, Any], script: str) -> str:
-    sections, facts, links = data["sections"], data["facts"], data["links"]
+        # A script that the policy does not list does not run.
+        digest = hashlib.sha256(script.encode()).digest()
+        policy = f"'sha256-{base64.b64encode(digest).decode('ascii')}'"
     contents = "".join(
         f'<li><span class="no" aria-hidden="true">{one["number"]}</span>'
         f'<a href="#{_text(one["anchor"])}">{_text(one["title"])}</a></li>'
         for one in sections
     )
-    return "".join(
-        [
-            '<a class="skip" href="#contents">Skip to the contents</a>' if sections else "",
-            f"\n<main>\n<header>\n<h1>{_text(data['title'])}</h1>\n",
-            f'<p class="subtitle">{_text(data["subtitle"])}</p>' if data["subtitle"] else "",
-            _facts(facts) if facts else "",
-            _links(links) if links else "",
-            "\n</header>\n",
-            *map(_block, data["front"]),
-            '<nav id="contents" aria-labelledby="contents-head">'
-            f'<h2 id="contents-head">Contents</h2>\n<ol>{contents}</ol></nav>\n'
-            if sections
-            else "",
-            *map(_section, sections),
-            f"<footer>{_text(data['footer'])}{_HOW_TO if script else ''}</footer>"
-            if data["footer"] or script
-            else "",
-            "\n</main>\n",
-            f"<script>{script}</script>" if script else "",
-        ]
+    body = [
+        '<a class="skip" href="#contents">Skip to the contents</a>' if sections else "",
+        f"\n<main>\n<header>\n<h1>{title}</h1>\n",
+        f'<p class="subtitle">{_text(data["subtitle"])}</p>' if data["subtitle"] else "",
+        _facts(data["facts"]) if data["facts"] else "",
+        _links(data["links"]) if data["links"] else "",
+        "\n</header>\n",
+        *map(_block, data["front"]),
+        '<nav id="contents" aria-labelledby="contents-head">'
+        f'<h2 id="contents-head">Contents</h2>\n<ol>{contents}</ol></nav>\n'
+        if sections
+        else "",
+        *map(_section, sections),
+        f"<footer>{_text(data['footer'])}{_HOW_TO if script else ''}</footer>"
+        if data["footer"] or script
+        else "",
+        "\n</main>\n",
+        f"<script>{script}</script>" if script else "",
+    ]
+    begin, between, after, end = _PLACE.split(
+        templates.joinpath("document.html").read_text("utf-8")
     )
+    page = [begin, _text(policy), between, title, after, *body, end]
+    return "".join(page).removesuffix("\n")
+
+
+def _text(text: str) -> str:
+    """Escape a text for an element or an attribute."""
+    return str(text).translate(_SIGNS)
 
 
 def _section(one: Mapping[str, Any]) -> str:
@@ -125,26 +125,33 @@ def _section(one: Mapping[str, Any]) -> str:
     if one["folded"]:
         body = f"<details><summary>{heading}</summary>\n{body}</details>"
     else:
-        body = f"{heading}\n{body}{_more(one['more'])}"
+        body = f"{heading}\n{body}"
+        if one["more"]:
+            # Figures behind a fold, which has their titles.
+            titles = "; ".join(_text(figure["title"]) for figure in one["more"])
+            more = "".join(map(_block, one["more"]))
+            body += f'<details><summary class="more">{titles}</summary>\n{more}</details>\n'
     return f'<section aria-labelledby="{anchor}">\n{body}</section>\n'
-
-
-def _more(figures: Sequence[Mapping[str, Any]]) -> str:
-    """Figures behind a fold, which has their titles."""
-    if not figures:
-        return ""
-    titles = "; ".join(_text(one["title"]) for one in figures)
-    body = "".join(map(_block, figures))
-    return f'<details><summary class="more">{titles}</summary>\n{body}</details>\n'
 
 
 def _block(block: Mapping[str, Any]) -> str:
     """One block of any kind, with a line end after it."""
     match block["kind"]:
         case "paragraph":
-            return _paragraph(block["style"], _text(block["text"]))
+            style, text = block["style"], _text(block["text"])
+            if style == "mono":
+                return f"<pre>{text}</pre>\n"
+            look = "" if style == "plain" else f' class="{style}"'
+            role = ' role="note"' if style == "warning" else ""
+            return f"<p{look}{role}>{text}</p>\n"
         case "items":
-            return _items(block)
+            tag = "ol" if block["numbered"] else "ul"
+            rows = "".join(
+                f"<li>{f'<b>{_text(head)}</b>' if head else ''}{' – ' if head and text else ''}"
+                f"{_text(text)}</li>"
+                for head, text in block["rows"]
+            )
+            return f"<{tag}>{rows}</{tag}>\n"
         case "links":
             return f"{_links(block['rows'])}\n"
         case "facts":
@@ -156,28 +163,10 @@ def _block(block: Mapping[str, Any]) -> str:
         case "animation":
             return _animation(block)
         case "picture":
-            return f"<figure>{_picture(block)}{_caption(block, 'Figure')}</figure>\n"
+            caption = _caption(block, "Figure")
+            return f"<figure>{_picture(block)}<figcaption>{caption}</figcaption></figure>\n"
         case _:
             return _key_figures(block)
-
-
-def _paragraph(style: str, text: str) -> str:
-    if style == "mono":
-        return f"<pre>{text}</pre>\n"
-    if style == "plain":
-        return f"<p>{text}</p>\n"
-    role = ' role="note"' if style == "warning" else ""
-    return f'<p class="{style}"{role}>{text}</p>\n'
-
-
-def _items(block: Mapping[str, Any]) -> str:
-    tag = "ol" if block["numbered"] else "ul"
-    rows = "".join(
-        f"<li>{f'<b>{_text(head)}</b>' if head else ''}{' – ' if head and text else ''}"
-        f"{_text(text)}</li>"
-        for head, text in block["rows"]
-    )
-    return f"<{tag}>{rows}</{tag}>\n"
 
 
 def _links(rows: Iterable[tuple[str, str]]) -> str:
@@ -190,32 +179,32 @@ def _facts(rows: Iterable[tuple[str, str]]) -> str:
     return f'<dl class="facts">{shown}</dl>'
 
 
-def _label(block: Mapping[str, Any], kind: str) -> str:
+def _caption(block: Mapping[str, Any], kind: str) -> str:
     """Number, title and caption of a table or a figure."""
     number = f"<b>{kind} {block['number']}.</b> " if block["number"] else ""
     title = f"<b>{_text(block['title'])}.</b> " if block["title"] else ""
     return f"{number}{title}{_text(block['caption'])}"
 
 
-def _caption(block: Mapping[str, Any], kind: str) -> str:
-    return f"<figcaption>{_label(block, kind)}</figcaption>"
-
-
 def _table(block: Mapping[str, Any]) -> str:
     words = block["words"]
-    caption = f"<caption>{_label(block, 'Table')}</caption>" if block["number"] else ""
-    names = "".join(
-        _column_head(_text(name), word) for name, word in zip(block["columns"], words, strict=True)
-    )
-    rows = "".join(
-        ('<tr class="strong">' if strong else "<tr>")
-        + "".join(
-            _cell(cell, word, mark, head=k == 0)
-            for k, (cell, word, mark) in enumerate(zip(row, words, passed, strict=True))
-        )
-        + "</tr>\n"
-        for row, passed, strong in zip(block["rows"], block["passed"], block["strong"], strict=True)
-    )
+    caption = f"<caption>{_caption(block, 'Table')}</caption>" if block["number"] else ""
+    names = ""
+    for name, word in zip(block["columns"], words, strict=True):
+        look = "" if word else ' class="num"'
+        # A header without a name is none.
+        names += f'<th scope="col"{look}>{_text(name)}</th>' if name else "<td></td>"
+    rows = ""
+    for row, passed, strong in zip(block["rows"], block["passed"], block["strong"], strict=True):
+        rows += '<tr class="strong">' if strong else "<tr>"
+        for k, (cell, word, mark) in enumerate(zip(row, words, passed, strict=True)):
+            look = "" if word else "num"
+            look += " long" if len(cell) >= _LONG else "" if word or k == 0 else " short"
+            if k == 0:
+                rows += f'<th scope="row" class="{look}">{_text(cell)}</th>'
+            else:
+                rows += f'<td class="{look}{" passed" if mark else ""}">{_text(cell)}</td>'
+        rows += "</tr>\n"
     columns = ", ".join(filter(None, block["columns"]))
     label = _text(block["title"] or block["caption"] or f"Table: {columns}")
     return (
@@ -223,20 +212,6 @@ def _table(block: Mapping[str, Any]) -> str:
         f"<table>\n{caption}<thead><tr>{names}</tr></thead>\n<tbody>{rows}</tbody>\n"
         "</table></div></div>\n"
     )
-
-
-def _column_head(name: str, word: bool) -> str:
-    look = "" if word else ' class="num"'
-    # A header without a name is none.
-    return f'<th scope="col"{look}>{name}</th>' if name else "<td></td>"
-
-
-def _cell(cell: str, word: bool, passed: bool, *, head: bool) -> str:
-    look = "" if word else "num"
-    look += " long" if len(cell) >= _LONG else "" if word or head else " short"
-    if head:
-        return f'<th scope="row" class="{look}">{_text(cell)}</th>'
-    return f'<td class="{look}{" passed" if passed else ""}">{_text(cell)}</td>'
 
 
 def _chart(block: Mapping[str, Any]) -> str:
@@ -250,7 +225,8 @@ def _chart(block: Mapping[str, Any]) -> str:
     return (
         f'<figure data-figure="chart" data-x-label="{_text(block["x_label"])}">\n'
         f'<div class="chart"{focus}>{svg}</div>\n'
-        f'<div class="tip" hidden></div>\n{_caption(block, "Figure")}\n</figure>\n'
+        f'<div class="tip" hidden></div>\n<figcaption>{_caption(block, "Figure")}</figcaption>\n'
+        "</figure>\n"
     )
 
 
@@ -269,14 +245,18 @@ def _animation(block: Mapping[str, Any]) -> str:
         for name, key in (("livenote", "live_caption"), ("stillnote", "still_caption"))
         if block[key]
     )
+    # No text in the data can end the script element or begin another.
+    scene_data = json.dumps(
+        scene.data(), ensure_ascii=True, allow_nan=False, separators=(",", ":")
+    ).translate(_SIGNS_OF_SCRIPT)
     return (
         f'<figure data-figure="scene">\n{still}\n'
         f'<div class="scene"><canvas role="img" aria-label="{alt}" '
         f'style="height:{_text(scene.height)}px"></canvas>\n<p class="legend">{legend}</p></div>\n'
         '<div class="controls" hidden><button type="button">Play</button><input type="range" '
         f'min="0" value="0" step="1" aria-label="Frame of: {title}"><output></output></div>\n'
-        f"<figcaption>{_label(block, 'Figure')}{notes}</figcaption>\n"
-        f'<script type="application/json">{_embedded(scene.data())}</script>\n</figure>\n'
+        f"<figcaption>{_caption(block, 'Figure')}{notes}</figcaption>\n"
+        f'<script type="application/json">{scene_data}</script>\n</figure>\n'
     )
 
 
@@ -286,42 +266,26 @@ def _picture(block: Mapping[str, Any]) -> str:
 
 
 def _key_figures(block: Mapping[str, Any]) -> str:
-    keys = "".join(map(_key_figure, block["figures"]))
+    keys = ""
+    for key in block["figures"]:
+        # The bound goes to the next line as a whole.
+        value, *bounds = (_text(part) for part in key["value"].split("\u00a0±\u00a0"))
+        parts = f"<span>{value}</span>" + "".join(f" <span>±&nbsp;{one}</span>" for one in bounds)
+        note = f'<dd class="remark">{_text(key["note"])}</dd>' if key["note"] else ""
+        keys += (
+            f'<div><dt>{_text(key["name"])}</dt><dd class="value">{parts}</dd>'
+            f'<dd class="bound">{_text(key["bound"])}</dd>{note}</div>'
+        )
     pictures = "".join(
-        f'<figure style="flex-grow:{one["width_mm"]:.0f}">{_picture(one)}{_caption(one, "")}'
-        "</figure>"
+        f'<figure style="flex-grow:{one["width_mm"]:.0f}">{_picture(one)}'
+        f"<figcaption>{_caption(one, '')}</figcaption></figure>"
         for one in block["pictures"]
     )
     below = f'<div class="keypictures">{pictures}</div>' if pictures else ""
     return f'<dl class="keys">{keys}</dl>\n{below}'
 
 
-def _key_figure(key: Mapping[str, str]) -> str:
-    # The bound goes to the next line as a whole.
-    value, *bounds = (_text(part) for part in key["value"].split("\u00a0±\u00a0"))
-    parts = f"<span>{value}</span>" + "".join(f" <span>±&nbsp;{one}</span>" for one in bounds)
-    note = f'<dd class="remark">{_text(key["note"])}</dd>' if key["note"] else ""
-    return (
-        f'<div><dt>{_text(key["name"])}</dt><dd class="value">{parts}</dd>'
-        f'<dd class="bound">{_text(key["bound"])}</dd>{note}</div>'
-    )
-
-
 def _image(svg: str) -> str:
     # A lone surrogate has no UTF-8.
     whole = base64.b64encode(svg.encode("utf-8", "replace")).decode("ascii")
     return f"data:image/svg+xml;base64,{whole}"
-
-
-def _digest(script: str) -> str:
-    """Digest of a script for the page's content policy; an unlisted script does not run."""
-    whole = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode("ascii")
-    return f"'sha256-{whole}'"
-
-
-def _embedded(figure: Mapping[str, Any]) -> str:
-    """Encode JSON for a script element; no text in it can end the element or begin another."""
-    text = json.dumps(figure, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
-    for char in "<>&":
-        text = text.replace(char, f"\\u{ord(char):04x}")
-    return text

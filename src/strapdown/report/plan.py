@@ -220,40 +220,32 @@ def place_labels(
         return ()
     others = np.asarray(obstacles, dtype=np.float64).reshape(-1, 2)
     points = np.column_stack([np.asarray(x, float), np.asarray(y, float)])
-    unit = _on_axes(np.vstack([points, others]))
+    # As shares of the axes, including their margins.
+    everything = np.vstack([points, others])
+    low, high = everything.min(axis=0), everything.max(axis=0)
+    unit, wide = np.full(everything.shape, 0.5), high > low
+    unit[:, wide] = 0.05 + 0.9 * (everything - low)[:, wide] / (high - low)[wide]
     dots = np.hstack([unit - 0.5 * _POINT, unit + 0.5 * _POINT])
     taken: list[Array] = []
     chosen: dict[int, tuple[int, int]] = {}
     for k in sorted(range(len(labels)), key=lambda j: (-len(labels[j]), j)):
         boxes = [_box(unit[k], place, len(labels[k])) for place in PLACES]
-        covered = [
-            4.0 * math.fsum(overlap(box, other) for other in taken)
-            + math.fsum(overlap(box, dots[j]) for j in _touched(box, dots) if j != k)
-            + _outside(box)
-            # Prefer a near position if none overlaps.
-            + 1e-7 * number
-            for number, box in enumerate(boxes)
-        ]
+        covered = []
+        for number, box in enumerate(boxes):
+            # Of many points few overlap a box.
+            apart = np.minimum(dots[:, 2:], box[2:]) <= np.maximum(dots[:, :2], box[:2])
+            touched = np.flatnonzero(~apart.any(axis=1)).tolist()
+            covered.append(
+                4.0 * math.fsum(overlap(box, other) for other in taken)
+                + math.fsum(overlap(box, dots[j]) for j in touched if j != k)
+                + _outside(box)
+                # Prefer a near position if none overlaps.
+                + 1e-7 * number
+            )
         best = int(np.argmin(np.round(covered, 9)))
         chosen[k] = PLACES[best]
         taken.append(boxes[best])
     return tuple(chosen[k] for k in range(len(labels)))
-
-
-def _on_axes(points: Array) -> Array:
-    """Points as shares of the axes, including their margins."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    unit = np.full(points.shape, 0.5)
-    wide = high > low
-    unit[:, wide] = 0.05 + 0.9 * (points - low)[:, wide] / (high - low)[wide]
-    return unit
-
-
-def _touched(box: Array, others: Array) -> list[int]:
-    """Indices of boxes, (n, 4), that overlap one box."""
-    apart = np.minimum(others[:, 2:], box[2:]) <= np.maximum(others[:, :2], box[:2])
-    touched: list[int] = np.flatnonzero(~apart.any(axis=1)).tolist()
-    return touched
 
 
 def _box(point: Array, place: tuple[int, int], characters: int) -> Array:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from html import escape
 
@@ -112,22 +112,24 @@ class Drawing:
         return "\n".join([head + title, paper, *self._parts, "</svg>\n"])
 
     @contextmanager
-    def group(self, **attributes: str) -> Iterator[None]:
-        """Group everything drawn in this context; `data_x` becomes the attribute ``data-x``."""
-        self._parts.append(f"<g{_attributes(attributes)}>")
-        yield
-        self._parts.append("</g>")
+    def group(self, box: Box | None = None, **attributes: str) -> Iterator[None]:
+        """Group everything drawn in this context; `data_x` becomes the attribute ``data-x``.
 
-    @contextmanager
-    def within(self, box: Box, **attributes: str) -> Iterator[None]:
-        """Clip everything drawn in this context to a box (left, top, right, bottom)."""
-        left, top, right, bottom = box
-        size = f"{number(left)} {number(top)} {number(right - left)} {number(bottom - top)}"
-        x, y, width, height = size.split()
-        place = f'x="{x}" y="{y}" width="{width}" height="{height}" viewBox="{size}"'
-        self._parts.append(f'<svg {place} overflow="hidden"{_attributes(attributes)}>')
+        `box`: to which it is clipped (left, top, right, bottom).
+        """
+        element, place = "g", ""
+        if box is not None:
+            left, top, right, bottom = box
+            size = f"{number(left)} {number(top)} {number(right - left)} {number(bottom - top)}"
+            x, y, width, height = size.split()
+            place = f' x="{x}" y="{y}" width="{width}" height="{height}" viewBox="{size}"'
+            element, place = "svg", f'{place} overflow="hidden"'
+        for name, text in attributes.items():
+            quoted = _escaped(text).replace('"', "&quot;")
+            place += f' {name.rstrip("_").replace("_", "-")}="{quoted}"'
+        self._parts.append(f"<{element}{place}>")
         yield
-        self._parts.append("</svg>")
+        self._parts.append(f"</{element}>")
 
     def line(
         self,
@@ -221,7 +223,7 @@ class Drawing:
         else:
             begin = at - np.array([0.0, radius])
             turn = f"a{size},{size} 0 1 0 .01,0z"
-        path = "".join(f"M{place}{turn}" for place in _hundredths(begin).split(" "))
+        path = "".join(f"M{x:.2f},{y:.2f}{turn}" for x, y in begin.tolist())
         look = f'fill="none"{_stroke(colour, 1.2, "")}' if hollow else f'fill="{colour}"'
         self._parts.append(f'<path class="points" d="{path}" {look}/>')
 
@@ -378,32 +380,18 @@ def _stroke(colour: str | None, width: float, dash: str) -> str:
     return text
 
 
-def _hundredths(points: Array) -> str:
-    """Format many points at once."""
-    return " ".join(["%.2f,%.2f"] * len(points)) % tuple(points.ravel().tolist())
-
-
 def _steps(points: Array) -> str:
     """Format a curve as its start and its steps, which are shorter than its points."""
     rounded = np.rint(100.0 * points).astype(np.int64)
-    start = np.asarray(0.01 * rounded[:1], dtype=np.float64)
+    x, y = (0.01 * rounded[0]).tolist()
     steps = (np.diff(rounded, axis=0) / 100).ravel().tolist()
     pairs = " ".join(["%g,%g"] * (len(steps) // 2)) % tuple(steps)
-    return f"M{_hundredths(start)}l{_ZERO.sub('.', pairs)}"
-
-
-def _attributes(values: Mapping[str, str]) -> str:
-    quoted = ((name, _escaped(text).replace('"', "&quot;")) for name, text in values.items())
-    return "".join(f' {name.rstrip("_").replace("_", "-")}="{text}"' for name, text in quoted)
+    return f"M{x:.2f},{y:.2f}l{_ZERO.sub('.', pairs)}"
 
 
 def _escaped(text: str) -> str:
     """Escape a text for XML, and remove characters that it does not allow."""
     if not (text.isascii() and text.isprintable()):
-        text = _kept(text)
+        text = "".join(c if c >= " " and not "\ud800" <= c <= "\udfff" else " " for c in text)
+        text = "".join(c for c in text if c not in "\ufffe\uffff\x7f")
     return escape(text, quote=False)
-
-
-def _kept(text: str) -> str:
-    kept = "".join(c if c >= " " and not "\ud800" <= c <= "\udfff" else " " for c in text)
-    return "".join(c for c in kept if c not in "\ufffe\uffff\x7f")

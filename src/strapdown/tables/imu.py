@@ -176,22 +176,13 @@ def increments_table(
     Raises
     ------
     DataError
-        Shapes disagree, a value is not finite, or a step is not positive.
+        Shapes disagree, a value is not finite, time does not advance, a step is not positive, or a
+        step begins before the one before it has ended.
     """
     change = np.zeros_like(theta, dtype=np.float64) if dtheta is None else dtheta
     table = joined(time, INCREMENTS, None, dt=(dt, None), theta=(theta, 3), dtheta=(change, 3))
-    check_increments(table)
+    check_steps(index_of(table), checked_values(table, INCREMENTS)[:, 0], None)
     return table
-
-
-def check_increments(table: pd.DataFrame) -> None:
-    """Check an Increments table.
-
-    DataError: a column is missing, a value is not finite, time does not advance, a step is not
-    positive, or a step begins before the one before it has ended.
-    """
-    dt = checked_values(table, INCREMENTS)[:, 0]
-    check_steps(index_of(table), dt, source_of(table))
 
 
 # MotionIncrements tables: rotation and velocity increments per step, ready for navigation.

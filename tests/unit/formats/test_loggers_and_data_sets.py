@@ -20,12 +20,13 @@ from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import DataError
 from strapdown.formats import READERS, NoStreamError, open_stream, read_log
 from strapdown.formats.clocks import unix_from_gps
+from strapdown.formats.find_columns import find_columns
 from strapdown.formats.gnss_files import GnssOptions, fixes_of_columns, read_gnss
 from strapdown.formats.recording import ReadOptions
 from strapdown.formats.trajectory_readers import read_trajectory
 from strapdown.parsers import in_place, matlab
 from strapdown.rotation import dcm_from_euler
-from strapdown.tables import ACCEL, GYRO
+from strapdown.tables import ACCEL, GYRO, MAG
 
 N = 60
 T = np.round(np.arange(N) * 0.01, 2)
@@ -271,13 +272,15 @@ def test_the_first_monitor_of_apdm(recordings):
 
 def test_another_monitor_of_apdm_by_its_columns(recordings):
     path = recordings("zoo/apdm/imuData01.csv")
-    asked = {f"gyro_{a}": f"Upper/Angular Velocity/{a.upper()}" for a in "xyz"}
-    asked |= {f"accel_{a}": f"Upper/Acceleration/{a.upper()}" for a in "xyz"}
-    recording = read_log(path, ReadOptions(columns=asked))
+    # Of one triad: the others are not those of the first monitor.
+    recording = read_log(path, ReadOptions(columns={"gyro": "Upper/Angular Velocity"}))
     table = np.array([ln.split(",")[:60] for ln in path.read_text().splitlines()[4:]], dtype=float)
-    np.testing.assert_allclose(
-        np.sort(np.abs(recording.imu[ACCEL].iloc[0])), np.sort(np.abs(table[0, 16:19]))
-    )
+    for triad, first in ((ACCEL, 16), (GYRO, 19), (MAG, 22)):
+        np.testing.assert_allclose(
+            np.sort(np.abs(recording.imu[triad].iloc[0])),
+            np.sort(np.abs(table[0, first : first + 3])),
+        )
+    assert not any(f.code == "io.first-of-monitors" for f in recording.findings)
 
 
 @pytest.mark.parametrize("new", [True, False])
@@ -287,17 +290,27 @@ def test_hdf5_of_apdm(tmp_path, new):
     names = {"Gyroscope": RATE, "Accelerometer": FORCE, "Magnetometer": RATE}
     with h5py.File(path, "w") as file:
         file.attrs["FileFormatVersion"] = 5 if new else 3
-        for monitor in ("1044", "2011"):
+        for monitor, factor in (("1044", 1.0), ("2011", 2.0)):
             top = f"Sensors/{monitor}" if new else f"SI-{monitor}"
             file[f"{top}/Time"] = stamps.astype(np.uint64)
             for name, values in names.items():
-                file[f"{top}/{name}" if new else f"{top}/Calibrated/{name}s"] = values
+                file[f"{top}/{name}" if new else f"{top}/Calibrated/{name}s"] = factor * values
     assert reader_of(path) == "apdm"
     raw = open_stream(path, "imu")
     np.testing.assert_array_equal(triad(raw, "gyro"), RATE)
     np.testing.assert_array_equal(triad(raw, "accel"), FORCE)
     assert columns(raw)["time"][1] == "us" and raw.clock == "unix"
-    assert any(f.code == "io.first-of-monitors" for f in raw.findings)
+    first = next(f for f in raw.findings if f.code == "io.first-of-monitors")
+    # All triads are those of the monitor whose gyro is asked for.
+    found = find_columns(raw, ReadOptions(columns={"gyro": first.data["other"]}))
+    for triad_name, values in (("gyro", RATE), ("accel", FORCE), ("mag", RATE)):
+        held = [raw.columns[found[f"{triad_name}_{a}"].source] for a in "xyz"]
+        np.testing.assert_array_equal(np.column_stack(held), 2.0 * values)
+    # So they are if the file is read as any other of its kind.
+    gyro = "Sensors/2011/Gyroscope" if new else "SI-2011/Calibrated/Gyroscopes"
+    asked = {"gyro": gyro, "time": "Sensors/2011/Time" if new else "SI-2011/Time"}
+    plain = find_columns(open_stream(path, "imu", "hdf5"), ReadOptions(columns=asked))
+    assert all("2011" in plain[f"{t}_x"].source for t in ("gyro", "accel", "mag"))
     truncations(path, tmp_path, "imu")
 
 

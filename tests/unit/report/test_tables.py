@@ -155,15 +155,16 @@ def test_aided_filters_have_errors_by_parts_and_their_cost(full_bench):
         errors=errors,
         cost=cost,
         single_deg=0.004,
+        lowest_level_hz=12.5,
     )
     table = tables.filter_table(replace(full_bench, peers=(*full_bench.peers, own)))
-    none = ("",) * 9
+    none = ("",) * 10
     assert table.rows == (
         ("vqf 2.1.1", "6D", *none),
         ("imufusion 1.2.5", "9D", *none),
         (
             *("error-state", "9D", "1.23°", "0.5°", "0.321°", "1.19°"),
-            *("0.75°", "99% / 50%", "0.004°", "225", "892"),
+            *("0.75°", "99% / 50%", "(12.5 Hz)", "0.004°", "225", "892"),
         ),
     )
     assert tables.filter_table(replace(full_bench, peers=full_bench.peers[:1])) is None

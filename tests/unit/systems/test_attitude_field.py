@@ -138,10 +138,14 @@ def nine(bench):
     return {p.peer: p.errors for p in bench.peers if p.aiding == "gyro+accel+mag"}
 
 
-def test_a_comparison_takes_the_calibration_of_a_log(logs, tmp_path):
+@pytest.fixture(scope="module")
+def calibrated(logs):
+    return compare(logs, magnetometer=logs / "turned.csv")
+
+
+def test_a_comparison_takes_the_calibration_of_a_log(logs, calibrated, tmp_path):
     raw = nine(compare(logs, magnetometer="raw"))
-    bench = compare(logs, magnetometer=logs / "turned.csv")
-    found = nine(bench)
+    bench, found = calibrated, nine(calibrated)
     assert "attitude.magnetometer-calibrated" in codes(bench)
     for name, errors in found.items():
         assert errors.heading_deg < 0.5 * raw[name].heading_deg
@@ -152,11 +156,11 @@ def test_a_comparison_takes_the_calibration_of_a_log(logs, tmp_path):
         compare(logs, magnetometer=logs / "no-field.csv")
 
 
-def test_a_comparison_turns_headings_to_true_north(logs):
+def test_a_comparison_turns_headings_to_true_north(logs, calibrated):
     bench = compare(logs, magnetometer=logs / "turned.csv", lat=48.2, lon=16.3)
     assert "attitude.true-north-undated" in codes(bench)
     declination = sd.magnetic_field(48.2, 16.3).declination
-    plain = nine(compare(logs, magnetometer=logs / "turned.csv"))
+    plain = nine(calibrated)
     # The truth of the simulation counts from magnetic north: the true heading is off by as much.
     for name, errors in nine(bench).items():
         assert abs(errors.heading_deg - declination) < 1.1 * plain[name].heading_deg

@@ -200,6 +200,19 @@ def test_rests_without_any_are_refused(tmp_path):
         compare_attitude(tmp_path / "log.csv", reference="rests")
 
 
+def test_a_single_rest_levels_and_is_no_reference(tmp_path):
+    time = np.arange(800) * 0.01
+    gyro = np.where(time[:, None] < 4.0, 0.0, np.sin([3.0, 2.0, 4.0] * time[:, None]))
+    force = np.tile([0.0, 0.0, -9.8], (800, 1)) + 0.3 * gyro
+    WRITERS["csv"].write(tmp_path / "log.csv", {"imu": imu_table(time, gyro, force)})
+    bench = compare_attitude(
+        tmp_path / "log.csv", reference="rests", algorithms=["quaternion"], rates_hz=[100]
+    )
+    assert (bench.initial["method"], bench.scores, bench.answer.verdict) == ("level", (), "own")
+    (finding,) = [f for f in bench.findings if f.code == "attitude.one-rest"]
+    assert finding.severity == "warning" and finding.data["end"] < 4.0
+
+
 def test_the_course_of_a_trend_is_taken_off(tmp_path):
     """Noise of 1e-4 rad/s/√Hz, and a bias that runs away by 5e-5 rad/s².
 

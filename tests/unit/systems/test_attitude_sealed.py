@@ -52,7 +52,7 @@ def test_a_sensor_of_ones_own(tmp_path):
     own = tmp_path / "own.toml"
     own.write_text(SENSOR)
     bench = compare_attitude("alexiev-fig2c", sensor=own, **ASKED)
-    seal = write_attitude(bench, tmp_path / "bundle")
+    seal = write_attitude(bench, tmp_path / "bundle", report=False)
     simulated = simulate("alexiev-fig2c", rate_hz=50, sensor=str(tmp_path / "own.toml")).save(
         tmp_path / "s"
     )
@@ -63,7 +63,7 @@ def test_a_sensor_of_ones_own(tmp_path):
 
 def test_several_logs_of_one_name_and_a_bias_of_another(logs, tmp_path):
     bench = compare_attitude(logs[:2], gyro_bias=logs[2], **ASKED)
-    seal = write_attitude(bench, tmp_path / "bundle")
+    seal = write_attitude(bench, tmp_path / "bundle", report=False)
     told = json.loads((seal.path / "manifest.json").read_text(encoding="utf-8"))
     assert [i["name"] for i in told["inputs"]] == [
         "inputs/log/log.csv",
@@ -89,7 +89,7 @@ def test_a_second_log_rests_and_an_interpolation(logs, tmp_path):
         **ASKED,
     )
     assert bench.places
-    seal = write_attitude(bench, tmp_path / "bundle")
+    seal = write_attitude(bench, tmp_path / "bundle", report=False)
     place = moved(seal, [first, second], tmp_path / "elsewhere")
     assert verify(place).verdict == "identical"
 
@@ -98,5 +98,5 @@ def test_a_second_log_rests_and_an_interpolation(logs, tmp_path):
 def test_other_libraries(logs, tmp_path):
     bench = compare_attitude(logs[0], peers=["vqf"], **ASKED)
     assert bench.peers
-    seal = write_attitude(bench, tmp_path / "bundle")
+    seal = write_attitude(bench, tmp_path / "bundle", report=False)
     assert verify(moved(seal, logs, tmp_path / "elsewhere")).verdict == "identical"

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import pairwise, takewhile
 
 import numpy as np
+import pandas as pd
 import pytest
 from tests.coded import coded
 
+from strapdown import rotation
 from strapdown.api.attitude import compare_attitude
 from strapdown.attitude_algorithms import make_algorithm
 from strapdown.attitude_comparison.sweep import (
@@ -19,8 +21,9 @@ from strapdown.attitude_comparison.sweep import (
 from strapdown.errors import ConfigError
 from strapdown.evaluation.differences import Known
 from strapdown.increments import increments_from_imu
+from strapdown.orientation_filters import run_filter
 from strapdown.simulation import ImuErrors, find_scenario, simulate_imu
-from strapdown.tables import DTHETA, QUATERNION, THETA, imu_table, references_table
+from strapdown.tables import ACCEL, DTHETA, GYRO, QUATERNION, THETA, imu_table, references_table
 from strapdown.tables.sample_clock import sample_clock
 
 ALGORITHMS = ["naive", "euler", "dcm", "quaternion", "rk4", "rotvec", "rotvec:samples=4"]
@@ -221,3 +224,33 @@ def test_errors_at_reference_points_are_at_the_same_instants_at_every_rate():
     found = cells(bench, "drop", 1)["reference_deg"].iloc[0]
     assert found == pytest.approx(largest, abs=1e-12)
     assert QUATERNION[0] in bench.runs[0].attitude
+
+
+def test_the_lowest_rate_of_a_filter_is_that_of_averaged_samples():
+    """It passes at that rate and at every higher one, and not at the next lower one."""
+    rates = [100.0, 50.0, 25.0, 12.5, 6.25, 3.125, 1.5625]
+    bench = compare_attitude("gestures", sensor="icm-42688-p", rates_hz=rates, tolerance_deg=3.0)
+    peer = next(p for p in bench.peers if p.peer == "strapdown error-state")
+    truth = bench.truth[QUATERNION].to_numpy()
+    largest = {}
+    for factor in (1, 2, 4, 8, 16, 32, 64):
+        imu = bench.imu.iloc[: 1 + (len(bench.imu) - 1) // factor * factor]
+        blocks = imu.iloc[1:].to_numpy().reshape(-1, factor, imu.shape[1]).mean(axis=1)
+        index = imu.index[::factor]
+        part = pd.DataFrame(np.vstack([imu.iloc[:1], blocks]), index=index, columns=imu.columns)
+        q = run_filter(peer.ran, part[GYRO + ACCEL], sampling="mean").q_nb
+        there = truth[: len(imu) : factor]
+        q = rotation.compose(about_down(q[0], there[0]), q)
+        largest[100.0 / factor] = float(rotation.rotation_angle(q, there).max())
+    passing = list(takewhile(lambda rate: largest[rate] <= 3.0, rates))
+    assert 1 < len(passing) < len(rates), largest
+    assert peer.lowest_hz == pytest.approx(passing[-1])
+    # The answer names the one of fewest operations.
+    few = min((p for p in bench.peers if p.lowest_hz), key=lambda p: p.cost.cycles)
+    assert f"{few.peer} stays within 3° down to {few.lowest_hz:.4g} Hz" in bench.answer.why[-1]
+
+
+def about_down(q, truth):
+    """The turn about the vertical that brings a heading to the true one."""
+    error = rotation.compose(truth[None], rotation.conjugate(q[None]))[0]
+    return rotation.normalise(error * [1.0, 0.0, 0.0, 1.0])[None]

@@ -105,8 +105,18 @@ def infer_signals(signals: Signals) -> tuple[Inference, ...]:
     signals = replace(signals, stamps=_below(signals.stamps, FAR))
     stamps = _finite(signals.stamps)
     steps = None if stamps is None else Steps.of(stamps)
-    times = _times(signals, steps)
-    step = _step(signals, steps, times)
+    # The length of a step, s, where its unit is stated or hardly in doubt.
+    if signals.time_unit is not None:
+        times = {signals.time_unit: 1.0}
+    elif steps is not None:
+        times = time_unit_probabilities(steps)
+    else:
+        times = {"s": 1.0} if signals.rate else {}
+    step = 1.0 / signals.rate if signals.rate else None
+    if steps is not None and times:
+        best = next(iter(times))
+        known = steps.mean * TIME_UNITS[best]
+        step = known if known > 0 and times[best] > 0.9 else None
     # All stamps tell of the clock; of the rest a part is enough.
     signals, starts = _part(signals, step)
     force = None
@@ -114,11 +124,20 @@ def infer_signals(signals: Signals) -> tuple[Inference, ...]:
     heard: list[Inference] = []
     if accel is not None:
         unit, form, gravity, usual = infer_accel(accel, step)
-        arm = _arm(signals, step, starts)
-        heard = [unit, form, gravity]
-        if arm is not None and arm.locks_turn and arm.alone > ARM_ALONE:
-            # The force is explained without gravity.
-            heard = [_doubted(i, arm) for i in heard]
+        heard, arm = [unit, form, gravity], None
+        if step is not None and signals.gyro is not None and signals.accel is not None:
+            kept = np.isfinite(signals.gyro).all(axis=1) & np.isfinite(signals.accel).all(axis=1)
+            before = np.concatenate([[0], np.cumsum(kept)])[starts]
+            arm = fit_arm(step, signals.gyro[kept], signals.accel[kept], before.tolist())
+        # The acceleration of an arm may be indistinguishable from rotating gravity.
+        swings = arm is not None and arm.frequency > LEAST_FREQUENCY and arm.in_step > ARM_IN_STEP
+        if arm is not None and swings and arm.alone > ARM_ALONE:
+            # The force is explained without gravity: the answers become questions.
+            told = evidence("io.evidence-arm-explains-force", percent=100 * arm.alone)
+            heard = [
+                replace(i, confidence=min(i.confidence, 0.5), evidence=(*i.evidence, told))
+                for i in heard
+            ]
             gravity = heard[2]
         if gravity.value == "present" and gravity.confidence > 0.9:
             heard.append(infer_up(accel, step))
@@ -135,7 +154,7 @@ def infer_signals(signals: Signals) -> tuple[Inference, ...]:
             # Gravity in an unknown unit still rotates like gravity.
             assert signals.accel is not None
             force = signals.accel / usual
-        if arm is not None and arm.locks_turn:
+        if swings:
             force = None
     turned: list[Inference] = []
     if signals.gyro is not None and len(signals.gyro) > 1:
@@ -152,12 +171,9 @@ def infer_signals(signals: Signals) -> tuple[Inference, ...]:
                 times = {u: min(p, 0.5) for u, p in times.items()}
     if steps is not None and times and steps.mean > LEAST_ADVANCE:
         best = next(iter(times))
-        told = time_evidence(steps, best)
-        if signals.time_unit is None:
-            out.append(conclude("time_unit", {**times}, told, "--time-unit"))
-        else:
-            stated = time_unit_probabilities(steps)
-            out.append(conclude("time_unit", dict(stated), told, "--time-unit"))
+        shares = times if signals.time_unit is None else time_unit_probabilities(steps)
+        of_time = time_evidence(steps, best)
+        out.append(conclude("time_unit", {**shares}, of_time, "--time-unit"))
         out.append(infer_time_faults(steps))
         out.append(infer_rate(steps, signals.time_unit or best))
     elif steps is not None:
@@ -170,22 +186,6 @@ def infer_signals(signals: Signals) -> tuple[Inference, ...]:
     if mag is not None:
         out.append(infer_mag_unit(mag))
     return tuple(out)
-
-
-def _times(signals: Signals, steps: Steps | None) -> dict[str, float]:
-    if signals.time_unit is not None:
-        return {signals.time_unit: 1.0}
-    if steps is None:
-        return {"s": 1.0} if signals.rate else {}
-    return time_unit_probabilities(steps)
-
-
-def _step(signals: Signals, steps: Steps | None, times: dict[str, float]) -> float | None:
-    if steps is not None and times:
-        best = next(iter(times))
-        step = steps.mean * TIME_UNITS[best]
-        return step if step > 0 and (times[best] > 0.9) else None
-    return 1.0 / signals.rate if signals.rate else None
 
 
 def _part(signals: Signals, step: float | None) -> tuple[Signals, list[int]]:
@@ -216,20 +216,6 @@ def _part(signals: Signals, step: float | None) -> tuple[Signals, list[int]]:
     if signals.stamps is not None:
         part["stamps"] = signals.stamps[rows]
     return replace(signals, **part), list(range(0, count * width, width))
-
-
-def _arm(signals: Signals, step: float | None, starts: list[int]) -> Arm | None:
-    if step is None or signals.gyro is None or signals.accel is None:
-        return None
-    kept = np.isfinite(signals.gyro).all(axis=1) & np.isfinite(signals.accel).all(axis=1)
-    before = np.concatenate([[0], np.cumsum(kept)])[starts]
-    return fit_arm(step, signals.gyro[kept], signals.accel[kept], before.tolist())
-
-
-def _doubted(one: Inference, arm: Arm) -> Inference:
-    """Turn an inference into a question: the force may be an arm's instead of gravity."""
-    told = evidence("io.evidence-arm-explains-force", percent=100 * arm.alone)
-    return replace(one, confidence=min(one.confidence, 0.5), evidence=(*one.evidence, told))
 
 
 def _steady(accel: Array) -> bool:
@@ -322,11 +308,6 @@ class Arm:
     alone: float
     in_step: float
     frequency: float
-
-    @property
-    def locks_turn(self) -> bool:
-        """Whether the acceleration of an arm is indistinguishable from rotating gravity."""
-        return self.frequency > LEAST_FREQUENCY and self.in_step > ARM_IN_STEP
 
 
 def fit_arm(step: float, gyro: Array, accel: Array, starts: Sequence[int] = (0,)) -> Arm | None:

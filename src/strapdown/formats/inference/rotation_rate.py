@@ -90,15 +90,6 @@ _ROLLED = 1e-3
 Hypothesis = tuple[str | None, str, str, str]
 
 
-def _log_magnitude(rate: float) -> float:
-    """Compute the log density of the largest rate of a log, relative to its plateau."""
-    if not rate > 0:
-        return -7.0
-    below = max(0.0, np.log(_QUIET / rate))
-    above = max(0.0, np.log(rate / _FULL_SCALE))
-    return float(-below - 6.0 * above)
-
-
 def infer_gyro(
     ticks: Array,
     gyro: Array,
@@ -143,9 +134,12 @@ def infer_gyro(
             candidates[unit, "rate"] = (scale, prior * (1 - increments))
             candidates[unit, "increment"] = (scale / step, prior * increments)
         for key, (scale, prior) in candidates.items():
-            base[key[0], key[1], tau] = float(
-                np.log(share * prior * (1 - _OTHER)) + _log_magnitude(largest * scale)
-            )
+            # Log density of the largest rate of a log, relative to its plateau.
+            magnitude, rate = -7.0, largest * scale
+            if rate > 0:
+                below = max(0.0, np.log(_QUIET / rate))
+                magnitude = float(-below - 6.0 * max(0.0, np.log(rate / _FULL_SCALE)))
+            base[key[0], key[1], tau] = float(np.log(share * prior * (1 - _OTHER)) + magnitude)
         base[None, "other", tau] = float(np.log(share * _OTHER))
         found = turns(ticks * factor, gyro, force) if force is not None else ()
         for key, (scale, _) in candidates.items():
