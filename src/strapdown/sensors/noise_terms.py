@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from itertools import groupby, islice
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -141,42 +142,51 @@ class _Record:
 
     def __init__(self, levels: tuple[Level, ...]) -> None:
         self.levels = levels
+        # Levels of one size are one stack of matrices.
+        alike = [[*group] for _, group in groupby(levels, key=lambda one: len(one.moments))]
+        self._moments = [np.array([one.moments for one in group]) for group in alike]
+        self._runs = [np.array([float(one.runs) for one in group]) for group in alike]
         self._made: dict[tuple[str, float], list[Array]] = {}
 
     def covariances(self, term: str, correlation: float) -> list[Array]:
+        """Covariances of the coefficients of all levels by a term with coefficient one."""
+        return [one for stack in self._stacks(term, correlation) for one in stack]
+
+    def _stacks(self, term: str, correlation: float) -> list[Array]:
         key = (term, correlation if term == "GM" else 0.0)
         if key not in self._made:
             if term == "GM" and len(self._made) > 60:
                 self._made = {k: v for k, v in self._made.items() if k[0] != "GM"}
-            self._made[key] = [one.covariance(term, correlation) for one in self.levels]
+            every = iter([one.covariance(term, correlation) for one in self.levels])
+            self._made[key] = [np.array([*islice(every, runs.size)]) for runs in self._runs]
         return self._made[key]
 
-    def likelihood(
-        self, variances: Array, shapes: list[list[Array]], derivatives: bool = True
-    ) -> tuple[float, Array, Array]:
+    def likelihood(self, variances: Array, shapes: list[list[Array]]) -> tuple[float, Array, Array]:
         """Log-likelihood, its gradient and the information in the logarithms of the variances."""
         count = len(variances)
         value, slope, information = 0.0, np.zeros(count), np.zeros((count, count))
-        for k, level in enumerate(self.levels):
-            sigma = sum(v * s[k] for v, s in zip(variances, shapes, strict=True))
+        for k, (moments, runs) in enumerate(zip(self._moments, self._runs, strict=True)):
+            parts = [v * s[k] for v, s in zip(variances, shapes, strict=True)]
+            sigma = sum(parts[1:], parts[0])
             try:
                 factor = np.linalg.cholesky(sigma)
             except np.linalg.LinAlgError:
                 return -math.inf, slope, information
-            inverse = np.linalg.inv(factor)
-            inverse = inverse.T @ inverse
-            fitted = inverse @ level.moments
-            log_det = 2.0 * float(np.log(np.diag(factor)).sum())
-            value -= 0.5 * level.runs * (log_det + float(np.trace(fitted)))
-            if not derivatives:
-                continue
-            parts = [inverse @ (v * s[k]) for v, s in zip(variances, shapes, strict=True)]
-            for i in range(count):
-                slope[i] += 0.5 * level.runs * float(np.sum(parts[i] * fitted.T))
-                slope[i] -= 0.5 * level.runs * float(np.trace(parts[i]))
+            inverse = np.linalg.inv(sigma)
+            fitted = inverse @ moments
+            log_det = 2.0 * np.log(np.diagonal(factor, 0, 1, 2)).sum(axis=1)
+            value -= 0.5 * float(runs @ (log_det + np.trace(fitted, 0, 1, 2)))
+            # All together are the unit matrix; the first, of which most is, needs no product.
+            weighted = [inverse @ part for part in parts[1:]]
+            rest = np.zeros_like(inverse) + np.eye(len(inverse[0]))
+            weighted.insert(0, rest - sum(weighted))
+            across = fitted.transpose(0, 2, 1)
+            for i, one in enumerate(weighted):
+                slope[i] += 0.5 * float(runs @ (one * across).sum(axis=(1, 2)))
+                slope[i] -= 0.5 * float(runs @ np.trace(one, 0, 1, 2))
+                turned = one.transpose(0, 2, 1)
                 for j in range(i + 1):
-                    both = 0.5 * level.runs * float(np.sum(parts[i] * parts[j].T))
-                    information[i, j] += both
+                    information[i, j] += 0.5 * float(runs @ (turned * weighted[j]).sum(axis=(1, 2)))
                     information[j, i] = information[i, j]
         return value, slope, information
 
@@ -188,7 +198,7 @@ class _Record:
         held: int = -1,
     ) -> _Fit:
         """Maximize over the logarithms of the variances by scoring; `held`: one that stays."""
-        shapes = [self.covariances(name, correlation) for name in names]
+        shapes = [self._stacks(name, correlation) for name in names]
         free = [k for k in range(len(names)) if k != held]
         log = np.log(np.maximum(start, TINY))
         value, slope, information = self.likelihood(np.exp(log), shapes)

@@ -21,8 +21,10 @@ from strapdown.config.logs import AllanSpec, AxesTable
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84
 from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.formats import holds
 from strapdown.formats.aid_table import read_stream
 from strapdown.formats.clocks import on_clock_of
+from strapdown.formats.recording import Recording
 from strapdown.progress import Progress, silent
 from strapdown.sensors.allan import allan_model, deviations
 from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV, KEYS
@@ -34,6 +36,7 @@ from strapdown.systems.inputs import Memory, SavedRun, refuse_long_span
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GYRO, find_gaps
 from strapdown.tables.checks import index_of
+from strapdown.tables.on_disk import let_go
 
 if TYPE_CHECKING:
     from strapdown.report.chart_svg import ChartFigure
@@ -223,7 +226,9 @@ def run_allan(spec: AllanSpec, progress: Progress = silent) -> AllanRun:
     first, past = np.searchsorted(time, [start, end + 1e-9])
     stamps = time[first:past]
     dt = float(stamps[-1] - stamps[0]) / (stamps.size - 1)
-    warm = _temperature(spec, imu, stamps)
+    warm = _temperature(spec, recording, imu, stamps)
+    if warm is not None and recording.temperature is not None:
+        findings = [*_but_used(findings, str(recording.temperature.name))]
     gaps = find_gaps(stamps)
     if gaps:
         longest = max(gap.end - gap.start for gap in gaps)
@@ -244,6 +249,7 @@ def run_allan(spec: AllanSpec, progress: Progress = silent) -> AllanRun:
         table["model"] = allan_model(found.model, table.index, found.correlation_time)
         table.insert(0, "channel", channel)
         tables.append(table.reset_index())
+        let_go(imu)
     findings += _limits(noise, end - start, 0.5 / dt, recording.name)
     return AllanRun(
         spec,
@@ -278,21 +284,34 @@ def _rest(imu: pd.DataFrame, name: str, findings: list[Finding]) -> tuple[float,
     return longest.start, longest.end
 
 
-def _temperature(spec: AllanSpec, imu: pd.DataFrame, stamps: Array) -> Array | None:
+def _temperature(
+    spec: AllanSpec, recording: Recording, imu: pd.DataFrame, stamps: Array
+) -> Array | None:
     """Temperature of the log at the stamps, °C; None without one, or if it hardly changes."""
-    try:
-        stream = read_stream(spec.log.path, "barometer", spec.log.format)
-        stream, _ = on_clock_of(stream, imu)
-    except (DataError, ConfigError):
+    stream = recording.temperature
+    if stream is None and holds(Path(spec.log.path), "barometer"):
+        try:
+            table, _ = on_clock_of(read_stream(spec.log.path, "barometer", spec.log.format), imu)
+        except (DataError, ConfigError):
+            return None
+        stream = table.get("temperature")
+    if stream is None:
         return None
-    if "temperature" not in stream.columns:
-        return None
-    stream = stream.dropna(subset=["temperature"])
-    time, values = index_of(stream), stream["temperature"].to_numpy(dtype=np.float64)
+    stream = stream.dropna()
+    time, values = (np.asarray(one, np.float64) for one in (stream.index, stream))
     if len(values) < 2 or time[0] > stamps[0] + EDGE or time[-1] < stamps[-1] - EDGE:
         return None
     at = np.interp(stamps, time, values)
     return at if np.ptp(at) > LEAST_WARMING else None
+
+
+def _but_used(findings: Iterable[Finding], column: str) -> Iterable[Finding]:
+    """Findings, of which the one about columns without a use does not list this one."""
+    for one in findings:
+        if one.code != "io.columns-not-used":
+            yield one
+        elif names := [name for name in one.data["names"] if name != column]:
+            yield one.replace(names=names)
 
 
 def _said(code: str, name: str, **data: Any) -> Finding:
