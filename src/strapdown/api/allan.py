@@ -1,10 +1,10 @@
-"""Noise of a sensor from Python."""
+"""Noise of a sensor from Python, and the sensors of the catalogue."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from strapdown.api.reading import ImuFile, imu_input, log_in
 from strapdown.config.logs import AllanSpec, LogTable
@@ -14,7 +14,12 @@ from strapdown.progress import Progress, silent
 from strapdown.systems.allan_run import AllanRun, run_allan
 from strapdown.systems.inputs import NOWHERE, Memory
 
-__all__ = ["AllanRun", "allan"]
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from strapdown.report.sensors import SensorsRun
+
+__all__ = ["AllanRun", "allan", "compare_sensors", "list_sensors"]
 
 
 def allan(
@@ -74,3 +79,56 @@ def allan(
         spec = specify(AllanSpec, name=name, log=table, **stated)
         run = run_allan(spec, progress)
         return replace(run, memory=memory).in_folder(folder, NOWHERE)
+
+
+def list_sensors() -> pd.DataFrame:
+    """List the sensors of the catalogue: class, noise, bias, and how many figures are assumed.
+
+    Returns
+    -------
+    DataFrame
+        A row for each; units in the names of the columns, NaN where a sensor has no such figure.
+        The figures of one with their sources: ``strapdown.sensors.load_sensor(name).sources``.
+    """
+    from strapdown.report.sensors import catalogue_table
+
+    return catalogue_table()
+
+
+def compare_sensors(
+    *names: str | Path,
+    outage_s: float = 60.0,
+    speed_m_per_s: float = 15.0,
+    progress: Progress = silent,
+) -> SensorsRun:
+    """Compare sensors: Allan deviations, and drift over an outage straight on.
+
+    Parameters
+    ----------
+    *names : str or Path
+        Up to nine sensors of the catalogue, or files, such as ``AllanRun.sensor``.
+    outage_s : float, s
+        Time without fixes, after 600 s with them.
+    speed_m_per_s : float, m/s
+    progress : callable, optional
+        Called with a stage and the completed fraction.
+
+    Returns
+    -------
+    SensorsRun
+        `deviations`, `drift` (standard deviations of position and attitude over time), `sensors`;
+        `to_pandas`, `plot`, `save`.
+
+    Raises
+    ------
+    ConfigError
+        A sensor does not exist, or two have one name.
+    """
+    from strapdown.config.outage import SensorsSpec
+    from strapdown.report.sensors import compare
+
+    given = tuple(
+        str(Path(n).absolute()) if str(n).lower().endswith(".toml") else str(n) for n in names
+    )
+    keys = {"outage_s": outage_s, "speed_m_per_s": speed_m_per_s}
+    return compare(specify(SensorsSpec, sensor=given, **keys), progress)

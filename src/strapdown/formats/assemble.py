@@ -262,12 +262,9 @@ def _temperature(raw: RawLog, time: Array, kept: NDArray[np.int64]) -> pd.Series
             continue
         written = f"{source} {raw.units.get(source, '')}"
         factor, zero = (5.0 / 9.0, 32.0) if _FAHRENHEIT.search(written) else (1.0, 0.0)
-        degrees = filled(
-            kept.size,
-            lambda part, values=values, zero=zero, factor=factor: (
-                (values[kept[part]] - zero) * factor
-            ),
-        )
+        degrees = stored(values, kept).astype(np.float64)
+        degrees -= zero
+        degrees *= factor
         return pd.Series(degrees, pd.Index(time, name="time", copy=False), name=source, copy=False)
     return None
 
