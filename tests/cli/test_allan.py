@@ -157,6 +157,22 @@ def test_the_temperature_of_a_log_is_regarded(where, monkeypatch, tmp_path):
         assert "effect of temperature" in page
 
 
+def test_several_logs_of_one_sensor_are_fitted_together(run_cli, log, tmp_path):
+    time, gyro, accel = samples(300.0)
+    short = sd.allan((time, gyro), (time, gyro[::-1]))
+    assert short.length == pytest.approx(2.0 * (time[-1] - time[0]))
+    assert [one.name for one in short.stretches] == ["imu.npz", "imu-2.npz"]
+    seal = short.save(tmp_path / "two")
+    assert sd.verify(seal.path).verdict == "identical"
+    assert "of 2 logs" in (seal.path / "sensor.toml").read_text()
+    with pytest.raises(DataError) as refused:
+        sd.allan((time, gyro, accel), (2.0 * time, gyro, accel))
+    assert refused.value.finding.code == "allan.logs-differ"
+    done = run_cli("allan", log, tmp_path / "none.csv", "--out", tmp_path / "x")
+    assert done.code == 4
+    assert "none.csv" in done.err
+
+
 def test_a_log_that_moved_is_cut_or_refused(run):
     time, gyro, accel = samples(300.0)
     gyro[(time > 200.0) & (time < 210.0)] += 0.5
