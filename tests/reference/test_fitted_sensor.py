@@ -12,6 +12,7 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.stats import chi2
+from tests.reference.test_allan_coverage import flicker
 
 import strapdown as sd
 from strapdown.navigation.truth_comparison import compare_with_truth
@@ -20,7 +21,6 @@ from strapdown.sensors.error_chain import apply
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.simulation import Origin, PathMotion, Track, simulate_imu
 from strapdown.simulation.gnss import GnssReceiver, simulate_gnss
-from tests.reference.test_allan_coverage import flicker
 
 pytestmark = pytest.mark.slow
 RATE, REST, DRIVE = 50.0, 3600.0, 300.0

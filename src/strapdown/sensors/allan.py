@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -50,15 +51,15 @@ def deviations(
     from strapdown._kernels.allan import integrate, overlapping_variances
 
     several = isinstance(rate, list) and np.ndim(rate[0]) == 1
-    records = rate if several else [rate]
-    n = max(np.size(one) for one in records)
+    given: Any = rate if several else [rate]
+    records = [np.ascontiguousarray(one, dtype=np.float64) for one in given]
+    n = max(one.size for one in records)
     chosen = _factors(n) if factors is None else np.array(sorted(set(factors)), dtype=np.int64)
     if n < 3 or not chosen.size or chosen[0] < 1 or 2 * chosen[-1] > n:
         raise DataError("allan.too-short", samples=n, least=LEAST_SAMPLES)
     sums, scale = np.zeros((chosen.size, 6)), chosen.astype(np.float64)
     parts, own = np.zeros(chosen.size), np.empty(6)
-    for record in records:
-        values = np.ascontiguousarray(record, dtype=np.float64)
+    for values in records:
         phase = np.empty(values.size + 1)
         integrate(values, float(values.mean()), phase)
         for k, m in enumerate(chosen.tolist()):

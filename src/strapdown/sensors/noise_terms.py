@@ -322,7 +322,8 @@ def pooled_terms(
     DataError
         A record has fewer than 1000 samples, or a channel is constant.
     """
-    unit, levels, ends = 0.0, [], []
+    unit, every = 0.0, list[Level]()
+    ends: list[tuple[Array, Array, float]] = []
     for k, (rate, dt, temperature) in enumerate(zip(rates, steps, temperatures, strict=True)):
         values = np.array(rate, dtype=np.float64)
         if values.size < LEAST_SAMPLES:
@@ -335,13 +336,13 @@ def pooled_terms(
         unit = unit or math.sqrt(white)
         values /= unit
         beside = None if temperature is None else np.asarray(temperature, dtype=np.float64)
-        own, *end = levels_of(values, dt, beside, k)
+        own, means, line, block = levels_of(values, dt, beside, k)
         if beside is not None:
-            share = np.linalg.lstsq(end[1], end[0], rcond=None)[0][2]
+            share = np.linalg.lstsq(line, means, rcond=None)[0][2]
             own = levels_of(values - share * (beside - beside.mean()), dt, beside, k)[0]
-        levels += own
-        ends.append(end)
-    levels, whole = tuple(levels), True
+        every += own
+        ends.append((means, line, block))
+    levels, whole = tuple(every), True
     span = max(np.size(rate) * dt for rate, dt in zip(rates, steps, strict=True))
     while True:
         record = _Record(levels)
