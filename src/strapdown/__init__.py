@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from strapdown.alignment.alignment import Site
     from strapdown.alignment.fine import FineAlignment
     from strapdown.api.alignment import AlignmentRun, OutageRun, align, outage
-    from strapdown.api.allan import AllanRun, allan
+    from strapdown.api.allan import AllanRun, allan, compare_sensors, list_sensors
     from strapdown.api.attitude import (
         Attitude,
         AttitudeComparison,
@@ -83,6 +83,7 @@ if TYPE_CHECKING:
     from strapdown.increments import motion_increments
     from strapdown.mechanization import NavTracker, NorthEastDown, WanderAzimuth, run_mechanization
     from strapdown.nav_state import NavState
+    from strapdown.report.sensors import SensorsRun
     from strapdown.report.verify import verify
     from strapdown.sensors.crash_unit import Assumed, CrashUnit, Mounting, RecordedTriad
     from strapdown.sensors.imu_health import check_imu_channels
@@ -125,6 +126,7 @@ __all__ = [
     "OrientationFilter",
     "OutageRun",
     "RecordedTriad",
+    "SensorsRun",
     "Simulation",
     "Site",
     "Streams",
@@ -139,7 +141,9 @@ __all__ = [
     "calibrate_magnetometer",
     "check_imu_channels",
     "compare_attitude",
+    "compare_sensors",
     "doctor",
+    "list_sensors",
     "magnetic_field",
     "motion_increments",
     "navigate",
@@ -172,7 +176,8 @@ load_on_first_use(
         "alignment.alignment": "Site",
         "alignment.fine": "FineAlignment",
         "api.alignment": "AlignmentRun OutageRun align outage",
-        "api.allan": "AllanRun allan",
+        "api.allan": "AllanRun allan compare_sensors list_sensors",
+        "report.sensors": "SensorsRun",
         "api.attitude": "Attitude AttitudeComparison AttitudeOptions MagnetometerCalibration "
         "OrientationFilter attitude calibrate_magnetometer compare_attitude",
         "api.crash": "CrashRun reconstruct",

@@ -127,24 +127,50 @@ def test_a_result_in_memory(run, tmp_path):
     assert sd.verify(seal.path).verdict == "identical"
 
 
-def test_the_temperature_of_a_log_is_regarded(monkeypatch, tmp_path):
+@pytest.mark.parametrize("where", ["column", "stream"])
+def test_the_temperature_of_a_log_is_regarded(where, monkeypatch, tmp_path):
     time, gyro, accel = samples(600.0)
     warm = 25.0 + 3.0 * np.sin(2.0 * np.pi * time / 400.0)
     gyro[:, 0] += 1e-3 * warm
+    columns = dict(zip(NAMES, [time, *gyro.T, *accel.T], strict=True))
+    if where == "column":
+        columns |= {"IMU temp [degF]": 1.8 * warm + 32.0, "humidity": warm}
+    csv.write(tmp_path / "log.csv", columns, {"axes": "forward-right-down"})
 
     def stream(path, name, form):
         assert name == "barometer"
         table = pd.DataFrame({"temperature": warm}, index=pd.Index(time, name="time"))
         return with_clock(table, Clock(RELATIVE))
 
-    monkeypatch.setattr("strapdown.systems.allan_run.read_stream", stream)
-    run = sd.allan((time, gyro, accel))
+    if where == "stream":
+        monkeypatch.setattr("strapdown.systems.allan_run.holds", lambda path, stream: True)
+        monkeypatch.setattr("strapdown.systems.allan_run.read_stream", stream)
+    run = sd.allan(tmp_path / "log.csv")
     effect = run.noise["gyro_x"].term("C")
     assert effect.observable
     assert effect.low < 1e-3 < effect.high
     assert not run.noise["gyro_y"].term("C").observable
-    page = (run.save(tmp_path / "out").path / "report.html").read_text(encoding="utf-8")
-    assert "effect of temperature" in page
+    unused = [f.data["names"] for f in run.findings if f.code == "io.columns-not-used"]
+    assert unused == ([("humidity",)] if where == "column" else [])
+    if where == "column":
+        page = (run.save(tmp_path / "out").path / "report.html").read_text(encoding="utf-8")
+        assert "effect of temperature" in page
+
+
+def test_several_logs_of_one_sensor_are_fitted_together(run_cli, log, tmp_path):
+    time, gyro, accel = samples(300.0)
+    short = sd.allan((time, gyro), (time, gyro[::-1]))
+    assert short.length == pytest.approx(2.0 * (time[-1] - time[0]))
+    assert [one.name for one in short.stretches] == ["imu.npz", "imu-2.npz"]
+    seal = short.save(tmp_path / "two")
+    assert sd.verify(seal.path).verdict == "identical"
+    assert "of 2 logs" in (seal.path / "sensor.toml").read_text()
+    with pytest.raises(DataError) as refused:
+        sd.allan((time, gyro, accel), (2.0 * time, gyro, accel))
+    assert refused.value.finding.code == "allan.logs-differ"
+    done = run_cli("allan", log, tmp_path / "none.csv", "--out", tmp_path / "x")
+    assert done.code == 4
+    assert "none.csv" in done.err
 
 
 def test_a_log_that_moved_is_cut_or_refused(run):

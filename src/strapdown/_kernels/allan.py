@@ -50,17 +50,46 @@ def overlapping_variances(phase, m, out):
     out[3] = second
     if third < 1:
         return
-    run = 0.0
+    # Of four parts of the record, each with its own running sum.
+    part = third // 4
+    r0, r1, r2, r3 = 0.0, 0.0, 0.0, 0.0
     for k in range(m):
-        run += phase[k + 2 * m] - 2.0 * phase[k + m] + phase[k]
-    b, c = run * run, 0.0
-    for k in range(third):
+        r0 += phase[k + 2 * m] - 2.0 * phase[k + m] + phase[k]
+        i = k + part
+        r1 += phase[i + 2 * m] - 2.0 * phase[i + m] + phase[i]
+        i += part
+        r2 += phase[i + 2 * m] - 2.0 * phase[i + m] + phase[i]
+        i += part
+        r3 += phase[i + 2 * m] - 2.0 * phase[i + m] + phase[i]
+    b0, b1, b2, b3 = r0 * r0, 0.0, 0.0, 0.0
+    a0, a1, a2, a3 = 0.0, 0.0, 0.0, 0.0
+    for k in range(part):
         d0 = phase[k + 3 * m] - 3.0 * phase[k + 2 * m] + 3.0 * phase[k + m] - phase[k]
-        c += d0 * d0
-        run += d0
+        i = k + part
+        d1 = phase[i + 3 * m] - 3.0 * phase[i + 2 * m] + 3.0 * phase[i + m] - phase[i]
+        i += part
+        d2 = phase[i + 3 * m] - 3.0 * phase[i + 2 * m] + 3.0 * phase[i + m] - phase[i]
+        i += part
+        d3 = phase[i + 3 * m] - 3.0 * phase[i + 2 * m] + 3.0 * phase[i + m] - phase[i]
+        a0 += d0 * d0
+        a1 += d1 * d1
+        a2 += d2 * d2
+        a3 += d3 * d3
         # The sum after the last third difference ends with the last second difference.
-        b += run * run
-    out[1] = b
+        r0 += d0
+        r1 += d1
+        r2 += d2
+        r3 += d3
+        b0 += r0 * r0
+        b1 += r1 * r1
+        b2 += r2 * r2
+        b3 += r3 * r3
+    for k in range(4 * part, third):
+        d3 = phase[k + 3 * m] - 3.0 * phase[k + 2 * m] + 3.0 * phase[k + m] - phase[k]
+        a3 += d3 * d3
+        r3 += d3
+        b3 += r3 * r3
+    out[1] = (b0 + b1) + (b2 + b3)
     out[4] = third + 1
-    out[2] = c
+    out[2] = (a0 + a1) + (a2 + a3)
     out[5] = third

@@ -470,9 +470,8 @@ def rest_rates(
             continue
         assert rest.gyro_mean_sd is not None
         since = float(imu.index[-1]) - 0.5 * (rest.start + rest.end)
-        moved = -2.0 * math.expm1(-since / drift.correlation_time) * np.square(drift.triad)
         white = np.square(sensors.gyro.axis("noise_density")) / (rest.end - rest.start)
-        sd = np.sqrt(np.maximum(np.square(rest.gyro_mean_sd), white) + moved)
+        sd = np.sqrt(np.maximum(np.square(rest.gyro_mean_sd), white) + drift.moved(since))
         middle = 0.5 * (rest.start + rest.end)
         out.append(RestRate(middle, np.array(rest.gyro_mean), sd))
     return tuple(out)

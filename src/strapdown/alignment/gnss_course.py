@@ -539,8 +539,8 @@ class CourseFit:
             white = np.array(triad.axis("noise_density")) / apart
             # A drift changes by so much over the whole, and stays for quarters of it.
             length = float(sums.stretch.sum())
-            walk = -2.0 * math.expm1(-length / drift.correlation_time) * np.square(drift.triad)
-            sd[noise] = np.sqrt(white**2 + WALK * STRETCHES * walk).ravel()
+            walk = WALK * STRETCHES * drift.moved(length)
+            sd[noise] = np.sqrt(white**2 + walk).ravel()
         sd[GYRO_BY_FORCE] = np.repeat(gyro.axis("g_sensitivity"), 3)
         sd[YAW], sd[AXLE] = model.yaw_sd, model.axle_sd
         sd[OFFSET], sd[ARM] = model.antenna.time_offset_sd, model.antenna.lever_arm_sd

@@ -476,7 +476,7 @@ def residual_noise(sums: InertialSums, fit: InertialFit, sensors: ImuUncertainty
     drift = sensors.accel_drift
     known = max(sensors.accel.axis("noise_density")) ** 2 * shapes[2]
     walk = (g * max(sensors.gyro.axis("noise_density"))) ** 2
-    walk += 2.0 * max(drift.triad) ** 2 / drift.correlation_time
+    walk += 2.0 * max(drift.triad) ** 2 / drift.correlation_time + max(drift.steps) ** 2
     known = known + walk * shapes[3]
     energy = np.square(fit.residual[FIRST_FREE:, :2]).sum(axis=1)
     # Rounding error of a second integral of some 1e6 m.

@@ -51,13 +51,14 @@ def gravity_change(force: Array, covariance: Array, gravity: Array) -> tuple[flo
 
 
 def mean_of_drift(drift: BiasDrift, length: float) -> Array:
-    """Variance of the mean of a Gauss-Markov process over a time, (3,), its unit squared.
+    """Variance of the mean of a drift over a time, (3,), its unit squared.
 
-    With x the time over the correlation time: ``2 sd² (x - 1 + exp(-x))/x²``.
+    With x the time over the correlation time: ``2 sd² (x - 1 + exp(-x))/x²`` by the Gauss-Markov
+    process, and a third of the walk's at the end.
     """
     x = length / drift.correlation_time
     part = 1.0 if x < 1e-4 else 2.0 * (x + math.expm1(-x)) / (x * x)
-    return np.asarray(np.square(drift.triad) * part)
+    return np.asarray(np.square(drift.triad) * part + np.square(drift.steps) * length / 3.0)
 
 
 def _own(bias: Triad, density: Triad, drift: BiasDrift, length: float) -> Array:
@@ -127,13 +128,15 @@ def unexplained(means: Array, length: float, density: Triad, drift: BiasDrift) -
     `means` ((m, 3)): of equal parts. `length` (s): of the record. `density`: white noise, unit of
     `means` over √Hz. Returns ratio of standard deviations of the worst axis.
 
-    Within a record a Gauss-Markov process walks by ``q = 2 sd²/correlation_time`` a second, and the
-    means of its parts scatter about that of the whole by ``q length/6`` (variance).
+    Within a record a Gauss-Markov process walks by ``q = 2 sd²/correlation_time`` a second, beside
+    a random walk, and the means of parts scatter about that of the whole by ``q length/6``
+    (variance).
     """
     m = len(means)
     if m < 2:
         return 1.0
     walk = np.square(drift.triad) * min(1.0, length / (3.0 * drift.correlation_time))
+    walk = walk + np.square(drift.steps) * length / 6.0
     expected = np.square(density) * m / length + walk
     measured = means.var(axis=0, ddof=1)
     # An ideal sensor at rest scatters by rounding.
@@ -224,5 +227,10 @@ def _biases(
         t = sums.middles
         like = np.exp(-np.abs(t[:, None] - t[None, :]) / drift.correlation_time)
         changing = by_node * np.array(drift.triad)
+        total += np.einsum("mki,mn,nli->kl", changing, like, changing, optimize=True)
+    if any(drift.steps):
+        since = sums.middles - sums.middles[0]
+        changing = by_node * np.array(drift.steps)
+        like = np.minimum(since[:, None], since[None, :])
         total += np.einsum("mki,mn,nli->kl", changing, like, changing, optimize=True)
     return np.asarray(total)

@@ -1,12 +1,12 @@
-"""Noise of a sensor from Python."""
+"""Noise of a sensor from Python, and the sensors of the catalogue."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from strapdown.api.reading import ImuFile, imu_input, log_in
+from strapdown.api.reading import ImuFile, imu_input
 from strapdown.config.logs import AllanSpec, LogTable
 from strapdown.config.spec import specify
 from strapdown.errors import ConfigError
@@ -14,12 +14,16 @@ from strapdown.progress import Progress, silent
 from strapdown.systems.allan_run import AllanRun, run_allan
 from strapdown.systems.inputs import NOWHERE, Memory
 
-__all__ = ["AllanRun", "allan"]
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from strapdown.report.sensors import SensorsRun
+
+__all__ = ["AllanRun", "allan", "compare_sensors", "list_sensors"]
 
 
 def allan(
-    log: Any,
-    *,
+    *logs: Any,
     axes: str | None = None,
     at_rest: bool = False,
     target: str | None = None,
@@ -30,9 +34,9 @@ def allan(
 
     Parameters
     ----------
-    log : Imu, DataFrame, (t, gyro, accel), str or Path
-        Samples of an unmoved sensor: s, rad/s (n, 3), m/s² (n, 3); or a file. Its longest
-        stationary stretch is used.
+    *logs : Imu, DataFrame, (t, gyro, accel), str or Path
+        Samples of an unmoved sensor: s, rad/s (n, 3), m/s² (n, 3); or a file. The longest
+        stationary stretch is used. Several logs of one sensor are fitted together.
     axes : str, optional
         As of `read_imu`.
     at_rest : bool
@@ -58,19 +62,76 @@ def allan(
     DataError
         The log cannot be read, or is not at rest for a minute.
     """
-    samples = imu_input(log)
+    given = [imu_input(log) for log in logs]
     stated = {key: value for key, value in options.items() if value not in (None, {}, False)}
-    memory = Memory.of({"imu.npz": samples})
+    names = ["imu.npz", *(f"imu-{k}.npz" for k in range(2, len(given) + 1))]
+    memory = Memory.of(dict(zip(names, given, strict=False)))
     with memory.as_files() as folder:
-        file = log_in(samples, folder)
-        if stated and not isinstance(samples, ImuFile):
-            raise ConfigError("api.table-with-options", quantity=next(iter(stated)))
-        if isinstance(samples, ImuFile):
-            table = specify(LogTable, **{**file.log.model_dump(exclude_none=True), **stated})
-            axes, name = axes or file.axes, Path(table.path).resolve().stem
-        else:
-            table, name = file.log, "imu"
-        stated = {"axes": axes, "at_rest": at_rest, "target": target}
-        spec = specify(AllanSpec, name=name, log=table, **stated)
+        tables = []
+        for name, samples in zip(names, given, strict=False):
+            if isinstance(samples, ImuFile):
+                keys = {**samples.log.model_dump(exclude_none=True), **stated}
+                tables.append(specify(LogTable, **keys))
+                axes = axes or samples.axes
+            elif stated:
+                raise ConfigError("api.table-with-options", quantity=next(iter(stated)))
+            else:
+                tables.append(specify(LogTable, path=str(folder / name)))
+        about = {"axes": axes, "at_rest": at_rest, "target": target}
+        stem = Path(tables[0].path).resolve().stem if tables else "imu"
+        spec = specify(AllanSpec, name=stem, logs=tuple(tables), **about)
         run = run_allan(spec, progress)
         return replace(run, memory=memory).in_folder(folder, NOWHERE)
+
+
+def list_sensors() -> pd.DataFrame:
+    """List the sensors of the catalogue: class, noise, bias, and how many figures are assumed.
+
+    Returns
+    -------
+    DataFrame
+        A row for each; units in the names of the columns, NaN where a sensor has no such figure.
+        The figures of one with their sources: ``strapdown.sensors.load_sensor(name).sources``.
+    """
+    from strapdown.report.sensors import catalogue_table
+
+    return catalogue_table()
+
+
+def compare_sensors(
+    *names: str | Path,
+    outage_s: float = 60.0,
+    speed_m_per_s: float = 15.0,
+    progress: Progress = silent,
+) -> SensorsRun:
+    """Compare sensors: Allan deviations, and drift over an outage straight on.
+
+    Parameters
+    ----------
+    *names : str or Path
+        Up to nine sensors of the catalogue, or files, such as ``AllanRun.sensor``.
+    outage_s : float, s
+        Time without fixes, after 600 s with them.
+    speed_m_per_s : float, m/s
+    progress : callable, optional
+        Called with a stage and the completed fraction.
+
+    Returns
+    -------
+    SensorsRun
+        `deviations`, `drift` (standard deviations of position and attitude over time), `sensors`;
+        `to_pandas`, `plot`, `save`.
+
+    Raises
+    ------
+    ConfigError
+        A sensor does not exist, or two have one name.
+    """
+    from strapdown.config.outage import SensorsSpec
+    from strapdown.report.sensors import compare
+
+    given = tuple(
+        str(Path(n).absolute()) if str(n).lower().endswith(".toml") else str(n) for n in names
+    )
+    keys = {"outage_s": outage_s, "speed_m_per_s": speed_m_per_s}
+    return compare(specify(SensorsSpec, sensor=given, **keys), progress)

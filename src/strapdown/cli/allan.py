@@ -33,8 +33,13 @@ MOST = 4  # findings on the terminal
 
 @spread
 def allan(
-    log: Annotated[
-        Path, typer.Argument(metavar="LOG", help="Log of an unmoved sensor, an hour or more.")
+    logs: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="LOG...",
+            help="Log of an unmoved sensor, an hour or more; several logs of one sensor are "
+            "fitted together.",
+        ),
     ],
     program: Annotated[
         str | None,
@@ -70,7 +75,8 @@ def allan(
     from strapdown.cli.console import print_findings, print_seal
     from strapdown.cli.result_folder import default_folder, refuse_result, run_and_save
 
-    refuse_result(log, "log")
+    for log in logs:
+        refuse_result(log, "log")
     if sensor_file is not None:
         _refuse_sensor_file(sensor_file, write.force)
     keys = {key: value for key, value in log_keys(flags.given()).items() if value}
@@ -79,13 +85,13 @@ def allan(
     def compute(report: Progress) -> AllanRun:
         try:
             keys.update(axes=flags.axes, at_rest=at_rest, target=program)
-            run = analyse(str(log), progress=report, **keys)
+            run = analyse(*map(str, logs), progress=report, **keys)
         except ConfigError as error:
             raise as_flag(error, _flag) from None
         runs.append(run)
         return run
 
-    done = run_and_save(compute, out or default_folder(log, "allan"), write, "allan.json")
+    done = run_and_save(compute, out or default_folder(logs[0], "allan"), write, "allan.json")
     if sensor_file is not None:
         from strapdown.bundle.atomic_folder import replace_file
 

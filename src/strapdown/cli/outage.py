@@ -136,7 +136,7 @@ def outage(
         str,
         typer.Argument(
             metavar="SENSOR|BUNDLE",
-            help="A sensor of the catalogue (strapdown modules) or a .toml file of your own; or a "
+            help="A sensor of the catalogue (strapdown sensors) or a .toml file of your own; or a "
             "folder written by strapdown navigate, or the file of such a run, whose GNSS fixes are "
             "then withheld.",
         ),

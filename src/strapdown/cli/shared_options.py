@@ -33,7 +33,7 @@ BEGIN = "Begin at this stamp; {}, if not given."
 END = "End at this stamp; the last, if not given."
 LENGTH = "Length of the part to use, instead of --to."
 SENSOR = (
-    "Sensor error model: a sensor of the catalogue (strapdown modules), or a .toml file of "
+    "Sensor error model: a sensor of the catalogue (strapdown sensors), or a .toml file of "
     "your own."
 )
 

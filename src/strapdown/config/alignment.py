@@ -78,7 +78,7 @@ class SensorsTable(Spec):
 
     sensor: SensorName | None = Field(
         default=None,
-        description="a sensor of the catalogue (strapdown modules), or a .toml file of your own",
+        description="a sensor of the catalogue (strapdown sensors), or a .toml file of your own",
     )
     gyro: dict[Word, OneOrThree] = Field(default_factory=dict)
     accel: dict[Word, OneOrThree] = Field(default_factory=dict)

@@ -147,11 +147,11 @@ class DoctorSpec(FileSpec):
 
 
 class AllanSpec(FileSpec):
-    """A log at rest, for the noise of its sensor."""
+    """Logs at rest, for the noise of their sensor."""
 
     called = "allan"
 
-    log: LogTable
+    logs: tuple[LogTable, ...] = Field(min_length=1)
     #: Orientation of the sensor's axes, as `AxesTable.axes`.
     axes: Word | None = None
     #: Whether the whole part is taken as stationary, as stated, without a test.

@@ -77,3 +77,12 @@ class OutageSpec(Spec):
             if kind not in KEPT:
                 raise refuse("aiding", "config.aid-not-kept", kind=kind, kept=KEPT)
         return {**given, "aiding": {kind: {"kind": kind, **one} for kind, one in aiding.items()}}
+
+
+class SensorsSpec(Spec):
+    """Sensors that are compared: their noise, and their drift in an outage straight on."""
+
+    #: Catalogue names or files.
+    sensor: Annotated[tuple[FileName, ...], Field(min_length=1, max_length=9)]
+    outage_s: Annotated[Number, Field(gt=0.0, le=LONGEST)] = 60.0
+    speed_m_per_s: NotNegative = 15.0

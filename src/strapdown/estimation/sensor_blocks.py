@@ -305,8 +305,7 @@ def _resting(triad: TriadUncertainty, drift: BiasDrift, value: Array) -> Array:
 
 def _walk(drift: BiasDrift) -> tuple[float, float, float]:
     part = 0.0 if math.isinf(drift.correlation_time) else math.sqrt(2.0 / drift.correlation_time)
-    x, y, z = drift.triad
-    return (part * x, part * y, part * z)
+    return _both(triad_of(part * x for x in drift.triad), drift.steps)
 
 
 # Errors of sensors as states by their names, with the sizes that a data sheet states.
@@ -389,6 +388,8 @@ def _block(
             keys=keys,
             triad=triad,
         )
+    if attribute == "bias":
+        return random_walk(make(sd), drift.steps)
     if attribute != "drift":
         return make(sd)
     if math.isinf(drift.correlation_time):
@@ -417,8 +418,8 @@ def _size(name: str, sensors: ImuUncertainty) -> Triad:
 def standard_states(sensors: ImuUncertainty, *, separate: bool = True) -> tuple[SensorStates, ...]:
     """Return the biases of gyros and accelerometers as states.
 
-    A bias is the sum of a constant of the record and a Gauss-Markov process within it. Three states
-    cannot represent it: the sum is not Markov.
+    A bias is the sum of a constant of the record, or a random walk if the sensor has one, and a
+    Gauss-Markov process within it. Three states cannot represent it: the sum is not Markov.
 
     Parameters
     ----------
@@ -458,13 +459,13 @@ def _of_triad(
     sd, time = constant.axis("bias"), drift.correlation_time
     if math.isinf(time) or not any(drift.triad):
         # A drift of infinite correlation time is a constant, too.
-        return [bias_block(_both(sd, drift.triad))]
+        return [random_walk(bias_block(_both(sd, drift.triad)), drift.steps)]
     if separate:
-        return [bias_block(sd), drift_block(drift.triad, time)]
+        return [random_walk(bias_block(sd), drift.steps), drift_block(drift.triad, time)]
     root = math.sqrt(2.0)
     twice = triad_of(root * x for x in drift.triad)
-    bound = random_walk(bias_block(_both(sd, twice)), triad_of(x / math.sqrt(time) for x in twice))
-    return [bound]
+    drive = _both(triad_of(x / math.sqrt(time) for x in twice), drift.steps)
+    return [random_walk(bias_block(_both(sd, twice)), drive)]
 
 
 def _both(a: Triad, b: Triad) -> Triad:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
@@ -66,7 +67,7 @@ from strapdown.formats.triad_units import (
 from strapdown.formats.vocabularies import EULERS, QUATERNIONS
 from strapdown.tables import ACCEL, SAMPLINGS, attitude_table, find_gaps, imu_of_columns
 from strapdown.tables.checks import all_finite
-from strapdown.tables.on_disk import filled, let_go, stored
+from strapdown.tables.on_disk import filled, let_go, room, stored
 from strapdown.units import TIME_UNITS, factor_of, parse_unit
 
 __all__ = [
@@ -109,6 +110,8 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     if found["gyro_x"].source not in raw.stated:
         findings = [f for f in findings if f.code != "io.first-of-monitors"]
     values = values_of_triads(raw, found, findings)
+    if not keep:
+        _take_memory(raw, found, values)
     let_go(values["gyro"])
     ticks, dated = (
         ticks_of(raw, found["time"].source, found["time"].unit)
@@ -201,6 +204,7 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
         used = {triad: values[triad][kept[rows]] for triad in units}
         for triad in units:
             _turn(used[triad], axes, factors[triad], body[triad][rows])
+            let_go(values[triad])
         let_go(block)
         let_go(kept)
     del values
@@ -241,7 +245,39 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
         readings=tuple(readings),
         findings=tuple(findings),
         start=raw.start,
+        temperature=_temperature(raw, time, kept),
     )
+
+
+#: Names of columns with a temperature; those of raw counts or of another part; degrees Fahrenheit.
+_TEMPERATURE = re.compile(r"(?<![a-z])temp(erature)?(?![a-z])", re.I)
+_OTHER_TEMPERATURE = re.compile(r"raw|lsb|adc|count|batt|cpu|ambient|baro", re.I)
+_FAHRENHEIT = re.compile(r"fahrenheit|(deg|°|_) ?f(?![a-z])", re.I)
+
+
+def _temperature(raw: RawLog, time: Array, kept: NDArray[np.int64]) -> pd.Series | None:
+    """Temperature of the sensor at the samples, °C; of several columns the first."""
+    stated = {source for source, (quantity, _) in raw.stated.items() if quantity == "temperature"}
+    for source, values in raw.columns.items():
+        named = _TEMPERATURE.search(source) and not _OTHER_TEMPERATURE.search(source)
+        if values.dtype.kind not in "iuf" or not (source in stated or named):
+            continue
+        written = f"{source} {raw.units.get(source, '')}"
+        factor, zero = (5.0 / 9.0, 32.0) if _FAHRENHEIT.search(written) else (1.0, 0.0)
+        degrees = stored(values, kept).astype(np.float64)
+        degrees -= zero
+        degrees *= factor
+        return pd.Series(degrees, pd.Index(time, name="time", copy=False), name=source, copy=False)
+    return None
+
+
+def _take_memory(raw: RawLog, found: dict[str, Column], values: Mapping[str, Array]) -> None:
+    """Put the columns of triads that were copied in place of those of the log."""
+    for triad, block in values.items():
+        for axis, column in zip(AXES, block.T, strict=True):
+            source = found[f"{triad}_{axis}"].source
+            if raw.columns[source].dtype == column.dtype:
+                raw.columns[source] = column
 
 
 def _written_twice(ticks: NDArray[Any], values: Mapping[str, Array]) -> bool:
@@ -475,7 +511,7 @@ def _block(
     columns = [values[triad].T[k] for triad in names for k in range(3)]
     columns.sort(key=lambda one: int(one.__array_interface__["data"][0]))
     rows = as_rows(columns) if columns[0].size == count and not keep else None
-    block = (np.empty((3 * len(names), count)) if rows is None else rows).T
+    block = (room((3 * len(names), count)) if rows is None else rows).T
     return {triad: block[:, 3 * k : 3 * k + 3] for k, triad in enumerate(names)}, block
 
 

@@ -285,6 +285,8 @@ class Recording:
         Findings for the user.
     start : StatedStart or None
         Position and attitude at the start, if the file states them.
+    temperature : Series or None
+        Temperature at the stamps of `imu`, °C, under the name of its column, if there is one.
     """
 
     name: str
@@ -296,6 +298,7 @@ class Recording:
     readings: tuple[Reading, ...]
     findings: tuple[Finding, ...]
     start: StatedStart | None = None
+    temperature: pd.Series | None = None
 
 
 #: Answers that stand for a value which the numbers do not show: a unit, a rate.

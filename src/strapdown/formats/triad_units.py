@@ -18,6 +18,7 @@ from strapdown.formats.inference.infer import Signals, infer_signals
 from strapdown.formats.recording import Questions, RawLog, ReadOptions
 from strapdown.formats.vocabularies import APPLE
 from strapdown.tables.checks import all_finite
+from strapdown.tables.on_disk import let_go, room
 from strapdown.units import (
     ACCEL_SUMS,
     ACCEL_UNITS,
@@ -286,7 +287,12 @@ def _triad(raw: RawLog, found: dict[str, Column], triad: str) -> Array:
     parts = [numbers(raw, found[f"{triad}_{a}"].source, f"{triad}_{a}") for a in AXES]
     # Column by column, as it came and as the Imu table has it.
     rows = as_rows(parts)
-    return np.stack(parts, dtype=np.float64, casting="unsafe").T if rows is None else rows.T
+    if rows is None:
+        rows = room((3, parts[0].size))
+        for row, part in zip(rows, parts, strict=True):
+            row[:] = part
+            let_go(rows)
+    return rows.T
 
 
 def left_out(raw: RawLog, triad: str, error: DataError) -> Finding:

@@ -54,6 +54,8 @@ METHOD = (
     "5.4 in log-likelihood (0.1 % by chance).",
     "Intervals by the profile of the likelihood where the variance of a term is known to worse "
     "than 10 %.",
+    "Several logs are independent records of one sensor: one likelihood of all, and deviations "
+    "over the differences within each.",
     "The sensor's noise is Gaussian and does not change with time. The effect of temperature is "
     "estimated beside it where the log has a temperature that changes.",
 )
@@ -128,6 +130,9 @@ def allan_json(result: AllanRun) -> dict[str, Any]:
             "name": result.name,
             "from_s": result.start,
             "to_s": result.end,
+            "logs": [
+                {"name": one.name, "from_s": one.start, "to_s": one.end} for one in result.stretches
+            ],
             "rate_hz": result.rate_hz,
         },
         "channels": channels,
@@ -153,7 +158,9 @@ def headline(result: AllanRun) -> str:
             continue
         seen = [t for t in SHOWN if any(_observable(one, t) for one in noise)]
         kinds.append(f"{word} {', '.join(seen)}")
-    length = duration_words(result.end - result.start)
+    length = duration_words(result.length)
+    if len(result.stretches) > 1:
+        length += f" of {len(result.stretches)} logs"
     return (
         f"{result.name}: {length} at rest at {result.rate_hz:.6g} Hz determine {'; '.join(kinds)}."
     )
@@ -263,7 +270,10 @@ def allan_document(result: AllanRun, name: str = "") -> Document:
         section("again", "Check this folder", *run_again(name)),
     ]
     facts = (
-        ("Stationary", f"{result.start:.6g} s to {result.end:.6g} s"),
+        *(
+            ("Stationary", f"{one.name}, {one.start:.6g} s to {one.end:.6g} s")
+            for one in result.stretches
+        ),
         ("Software", f"strapdown {__version__}"),
     )
     good = not result.findings

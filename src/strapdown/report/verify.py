@@ -48,6 +48,7 @@ from strapdown.report.doctor import DOCTOR
 from strapdown.report.navigation import NAVIGATION
 from strapdown.report.outage import OUTAGE
 from strapdown.report.report_bundle import ReportBundle
+from strapdown.report.sensors import SENSORS_BUNDLE
 from strapdown.report.simulation import write_simulation, write_trajectory_simulation
 
 #: Verdicts, from best to worst.
@@ -87,7 +88,8 @@ class Verification:
 
 #: Commands with a `ReportBundle`; ``attitude``, ``simulate`` and ``crash --live`` write theirs.
 BUNDLES: dict[str, ReportBundle[Any]] = {
-    bundle.command: bundle for bundle in (ALIGNMENT, ALLAN, OUTAGE, CRASH, DOCTOR, NAVIGATION)
+    bundle.command: bundle
+    for bundle in (ALIGNMENT, ALLAN, SENSORS_BUNDLE, OUTAGE, CRASH, DOCTOR, NAVIGATION)
 }
 
 

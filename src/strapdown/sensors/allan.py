@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -21,7 +22,9 @@ LEAST_PARTS = 9
 LEAST_SAMPLES = 1000
 
 
-def deviations(rate: ArrayLike, dt: float, factors: Iterable[int] | None = None) -> pd.DataFrame:
+def deviations(
+    rate: ArrayLike | Sequence[ArrayLike], dt: float, factors: Iterable[int] | None = None
+) -> pd.DataFrame:
     """Overlapping Allan, modified Allan and overlapping Hadamard deviations of a rate.
 
     With the mean rate over τ = m dt beginning at sample k as y_k, and < > over all k:
@@ -31,7 +34,8 @@ def deviations(rate: ArrayLike, dt: float, factors: Iterable[int] | None = None)
 
     Parameters
     ----------
-    rate : array_like, (n,), u
+    rate : array_like, (n,), u, or list of them
+        Of several records the means of squares are over the differences within each.
     dt : float, s
         Sample interval.
     factors : iterable of int, optional
@@ -42,26 +46,33 @@ def deviations(rate: ArrayLike, dt: float, factors: Iterable[int] | None = None)
     DataFrame
         Indexed by ``tau`` in s: ``allan``, ``modified``, ``hadamard`` in u, NaN where the record is
         too short; ``relative_sd``, standard deviation of the Allan deviation relative to it,
-        1/√(2(n/m - 1)) (IEEE Std 952, C.1).
+        1/√(2(n/m - 1)) (IEEE Std 952, C.1), n/m - 1 summed over records.
     """
     from strapdown._kernels.allan import integrate, overlapping_variances
 
-    values = np.ascontiguousarray(rate, dtype=np.float64)
-    n = values.size
+    several = isinstance(rate, list) and np.ndim(rate[0]) == 1
+    given: Any = rate if several else [rate]
+    records = [np.ascontiguousarray(one, dtype=np.float64) for one in given]
+    n = max(one.size for one in records)
     chosen = _factors(n) if factors is None else np.array(sorted(set(factors)), dtype=np.int64)
     if n < 3 or not chosen.size or chosen[0] < 1 or 2 * chosen[-1] > n:
         raise DataError("allan.too-short", samples=n, least=LEAST_SAMPLES)
-    phase = np.empty(n + 1)
-    integrate(values, float(values.mean()), phase)
-    sums, scale = np.empty((chosen.size, 6)), chosen.astype(np.float64)
-    for k, m in enumerate(chosen.tolist()):
-        overlapping_variances(phase, m, sums[k])
+    sums, scale = np.zeros((chosen.size, 6)), chosen.astype(np.float64)
+    parts, own = np.zeros(chosen.size), np.empty(6)
+    for values in records:
+        phase = np.empty(values.size + 1)
+        integrate(values, float(values.mean()), phase)
+        for k, m in enumerate(chosen.tolist()):
+            if 2 * m <= values.size:
+                overlapping_variances(phase, m, own)
+                sums[k] += own
+                parts[k] += values.size / m - 1.0
     with np.errstate(divide="ignore", invalid="ignore"):
         found = {
             "allan": np.sqrt(sums[:, 0] / (2.0 * sums[:, 3])) / scale,
             "modified": np.sqrt(sums[:, 1] / (2.0 * sums[:, 4])) / scale**2,
             "hadamard": np.sqrt(sums[:, 2] / (6.0 * sums[:, 5])) / scale,
-            "relative_sd": 1.0 / np.sqrt(2.0 * (n / scale - 1.0)),
+            "relative_sd": 1.0 / np.sqrt(2.0 * parts),
         }
     return pd.DataFrame(found, index=pd.Index(scale * dt, name="tau"))
 

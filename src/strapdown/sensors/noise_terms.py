@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -54,6 +54,8 @@ class Level:
     moments : ndarray, (k, k), u²
         Mean product of the coefficients in the basis.
     runs : int
+    record : int
+        Of several records, which are independent.
     """
 
     block: float
@@ -61,6 +63,7 @@ class Level:
     basis: Array
     moments: Array
     runs: int
+    record: int = 0
 
     def covariance(self, term: str, correlation: float) -> Array:
         """Covariance of the coefficients by a term with coefficient one."""
@@ -69,13 +72,12 @@ class Level:
 
     def lowest(self, kept: int) -> Level:
         """The level with its `kept` lowest frequencies alone."""
-        return Level(
-            self.block, self.count, self.basis[:, :kept], self.moments[:kept, :kept], self.runs
-        )
+        basis, moments = self.basis[:, :kept], self.moments[:kept, :kept]
+        return replace(self, basis=basis, moments=moments)
 
 
 def levels_of(
-    rate: Array, dt: float, beside: Array | None = None
+    rate: Array, dt: float, beside: Array | None = None, record: int = 0
 ) -> tuple[tuple[Level, ...], Array, Array, float]:
     """Levels of a record, and of the last one the means, what is projected out, and the block in s.
 
@@ -94,7 +96,7 @@ def levels_of(
             part = rows[first : first + 65536]
             second += part.T @ part
         moments = basis.T @ second @ basis / len(rows)
-        found.append(Level(block, run, basis, moments, len(rows)))
+        found.append(Level(block, run, basis, moments, len(rows), record))
         means, block = rows.mean(axis=1), block * run
     middle = (np.arange(means.size) - 0.5 * (means.size - 1)) * block
     line = np.column_stack([np.ones(means.size), middle])
@@ -104,7 +106,7 @@ def levels_of(
         line = np.column_stack([line, warm - warm.mean()])
     last = np.linalg.svd(line / np.abs(line).max(axis=0))[0][:, line.shape[1] :]
     z = last.T @ means
-    found.append(Level(block, means.size, last, np.outer(z, z), 1))
+    found.append(Level(block, means.size, last, np.outer(z, z), 1, record))
     return tuple(found), means, line, block
 
 
@@ -141,42 +143,56 @@ class _Record:
 
     def __init__(self, levels: tuple[Level, ...]) -> None:
         self.levels = levels
+        # Levels of one size are one stack of matrices.
+        sizes = [len(one.moments) for one in levels]
+        self._alike = [
+            [k for k, size in enumerate(sizes) if size == own] for own in dict.fromkeys(sizes)
+        ]
+        self._moments = [np.array([levels[k].moments for k in group]) for group in self._alike]
+        self._runs = [np.array([float(levels[k].runs) for k in group]) for group in self._alike]
         self._made: dict[tuple[str, float], list[Array]] = {}
 
     def covariances(self, term: str, correlation: float) -> list[Array]:
+        """Covariances of the coefficients of all levels by a term with coefficient one."""
+        stacks = zip(self._alike, self._stacks(term, correlation), strict=True)
+        found = {k: one for group, stack in stacks for k, one in zip(group, stack, strict=True)}
+        return [found[k] for k in range(len(found))]
+
+    def _stacks(self, term: str, correlation: float) -> list[Array]:
         key = (term, correlation if term == "GM" else 0.0)
         if key not in self._made:
             if term == "GM" and len(self._made) > 60:
                 self._made = {k: v for k, v in self._made.items() if k[0] != "GM"}
-            self._made[key] = [one.covariance(term, correlation) for one in self.levels]
+            every = [one.covariance(term, correlation) for one in self.levels]
+            self._made[key] = [np.array([every[k] for k in group]) for group in self._alike]
         return self._made[key]
 
-    def likelihood(
-        self, variances: Array, shapes: list[list[Array]], derivatives: bool = True
-    ) -> tuple[float, Array, Array]:
+    def likelihood(self, variances: Array, shapes: list[list[Array]]) -> tuple[float, Array, Array]:
         """Log-likelihood, its gradient and the information in the logarithms of the variances."""
         count = len(variances)
         value, slope, information = 0.0, np.zeros(count), np.zeros((count, count))
-        for k, level in enumerate(self.levels):
-            sigma = sum(v * s[k] for v, s in zip(variances, shapes, strict=True))
+        for k, (moments, runs) in enumerate(zip(self._moments, self._runs, strict=True)):
+            parts = [v * s[k] for v, s in zip(variances, shapes, strict=True)]
+            sigma = sum(parts[1:], parts[0])
             try:
                 factor = np.linalg.cholesky(sigma)
             except np.linalg.LinAlgError:
                 return -math.inf, slope, information
-            inverse = np.linalg.inv(factor)
-            inverse = inverse.T @ inverse
-            fitted = inverse @ level.moments
-            log_det = 2.0 * float(np.log(np.diag(factor)).sum())
-            value -= 0.5 * level.runs * (log_det + float(np.trace(fitted)))
-            if not derivatives:
-                continue
-            parts = [inverse @ (v * s[k]) for v, s in zip(variances, shapes, strict=True)]
-            for i in range(count):
-                slope[i] += 0.5 * level.runs * float(np.sum(parts[i] * fitted.T))
-                slope[i] -= 0.5 * level.runs * float(np.trace(parts[i]))
+            inverse = np.linalg.inv(sigma)
+            fitted = inverse @ moments
+            log_det = 2.0 * np.log(np.diagonal(factor, 0, 1, 2)).sum(axis=1)
+            value -= 0.5 * float(runs @ (log_det + np.trace(fitted, 0, 1, 2)))
+            # All together are the unit matrix; the first, of which most is, needs no product.
+            weighted = [inverse @ part for part in parts[1:]]
+            rest = np.zeros_like(inverse) + np.eye(len(inverse[0]))
+            weighted.insert(0, rest - sum(weighted))
+            across = fitted.transpose(0, 2, 1)
+            for i, one in enumerate(weighted):
+                slope[i] += 0.5 * float(runs @ (one * across).sum(axis=(1, 2)))
+                slope[i] -= 0.5 * float(runs @ np.trace(one, 0, 1, 2))
+                turned = one.transpose(0, 2, 1)
                 for j in range(i + 1):
-                    both = 0.5 * level.runs * float(np.sum(parts[i] * parts[j].T))
-                    information[i, j] += both
+                    information[i, j] += 0.5 * float(runs @ (turned * weighted[j]).sum(axis=(1, 2)))
                     information[j, i] = information[i, j]
         return value, slope, information
 
@@ -188,7 +204,7 @@ class _Record:
         held: int = -1,
     ) -> _Fit:
         """Maximize over the logarithms of the variances by scoring; `held`: one that stays."""
-        shapes = [self.covariances(name, correlation) for name in names]
+        shapes = [self._stacks(name, correlation) for name in names]
         free = [k for k in range(len(names)) if k != held]
         log = np.log(np.maximum(start, TINY))
         value, slope, information = self.likelihood(np.exp(log), shapes)
@@ -270,15 +286,26 @@ class ChannelNoise:
 
 
 def noise_terms(rate: ArrayLike, dt: float, temperature: ArrayLike | None = None) -> ChannelNoise:
-    """Noise terms of a stationary channel, by maximum likelihood.
+    """Noise terms of a stationary channel, as `pooled_terms` of one record.
+
+    `rate` ((n,), u): its mean does not matter. `dt` (s). `temperature` ((n,), °C).
+    """
+    return pooled_terms([rate], [dt], [temperature])
+
+
+def pooled_terms(
+    rates: Sequence[ArrayLike], steps: Sequence[float], temperatures: Sequence[ArrayLike | None]
+) -> ChannelNoise:
+    """Noise terms of a stationary channel from one or more records, by maximum likelihood.
 
     Parameters
     ----------
-    rate : array_like, (n,), u
-        Angular rate or specific force; its mean does not matter.
-    dt : float, s
-    temperature : array_like, (n,), °C, optional
-        Its effect is estimated with the noise, and is not part of it.
+    rates : sequence of array_like, (n,), u
+        Angular rate or specific force in each record; its means do not matter.
+    steps : sequence of float, s
+        Sample interval of each.
+    temperatures : sequence of array_like, (n,), °C, or None
+        The effect is estimated with the noise, and is not part of it.
 
     Returns
     -------
@@ -286,32 +313,40 @@ def noise_terms(rate: ArrayLike, dt: float, temperature: ArrayLike | None = None
         Models of white noise, with and without Q, and with none, B, K, both, a Gauss-Markov
         process, or that with K, are compared; a parameter must gain 5.4 in log-likelihood. The
         intervals are those of the likelihood ratio (profile), where the variance of a term is
-        known to worse than 10 %, else Gaussian in its logarithm.
+        known to worse than 10 %, else Gaussian in its logarithm. Records are independent, each
+        with a mean and a ramp of its own in the likelihood of the noise; R and C are what they
+        have in common.
 
     Raises
     ------
     DataError
-        The record has fewer than 1000 samples, or a channel is constant.
+        A record has fewer than 1000 samples, or a channel is constant.
     """
-    values = np.array(rate, dtype=np.float64)
-    if values.size < LEAST_SAMPLES:
-        raise DataError("allan.too-short", samples=values.size, least=LEAST_SAMPLES)
-    values -= values.mean()
-    white = float(values.var()) * dt
-    if not white > 0.0:
-        raise DataError("allan.constant")
-    # In units of its own size, so that no number of the fit depends on the unit.
-    unit = math.sqrt(white)
-    values /= unit
-    beside = None if temperature is None else np.asarray(temperature, dtype=np.float64)
-    levels, means, line, block = levels_of(values, dt, beside)
-    if beside is not None:
-        share = np.linalg.lstsq(line, means, rcond=None)[0][2]
-        levels = levels_of(values - share * (beside - beside.mean()), dt, beside)[0]
-    whole = True
+    unit, every = 0.0, list[Level]()
+    ends: list[tuple[Array, Array, float]] = []
+    for k, (rate, dt, temperature) in enumerate(zip(rates, steps, temperatures, strict=True)):
+        values = np.array(rate, dtype=np.float64)
+        if values.size < LEAST_SAMPLES:
+            raise DataError("allan.too-short", samples=values.size, least=LEAST_SAMPLES)
+        values -= values.mean()
+        white = float(values.var()) * dt
+        if not white > 0.0:
+            raise DataError("allan.constant")
+        # In units of its own size, so that no number of the fit depends on the unit.
+        unit = unit or math.sqrt(white)
+        values /= unit
+        beside = None if temperature is None else np.asarray(temperature, dtype=np.float64)
+        own, means, line, block = levels_of(values, dt, beside, k)
+        if beside is not None:
+            share = np.linalg.lstsq(line, means, rcond=None)[0][2]
+            own = levels_of(values - share * (beside - beside.mean()), dt, beside, k)[0]
+        every += own
+        ends.append((means, line, block))
+    levels, whole = tuple(every), True
+    span = max(np.size(rate) * dt for rate, dt in zip(rates, steps, strict=True))
     while True:
         record = _Record(levels)
-        fits = _models(record, dt, values.size * dt, whole)
+        fits = _models(record, steps[0], span, whole)
         best = max(fits, key=lambda one: one.penalized)
         cut = _without_colored(levels, record, best)
         if cut is None:
@@ -320,8 +355,11 @@ def noise_terms(rate: ArrayLike, dt: float, temperature: ArrayLike | None = None
     terms = _intervals(record, fits, best)
     walk = next(one.high for one in terms if one.name == "K")
     models = [*_alike(fits, best), _with_walk(best, walk**2)]
-    for column, name in enumerate(("R", "C")[: line.shape[1] - 1], 1):
-        terms.append(_slope_term(name, [_slope(f, means, line, block, column) for f in models]))
+    for column, name in enumerate(("R", "C"), 1):
+        held = [end for end in ends if end[1].shape[1] > column]
+        if held:
+            slopes = [_combined([_slope(f, *end, column) for end in held]) for f in models]
+            terms.append(_slope_term(name, slopes))
     ramp = next(one for one in terms if one.name == "R")
     model = {name: math.sqrt(best.variance(name)) for name in best.names}
     if ramp.observable:
@@ -343,6 +381,16 @@ def _scaled(term: NoiseTerm, unit: float) -> NoiseTerm:
     return NoiseTerm(
         term.name, unit * term.value, unit * term.low, unit * term.high, term.observable
     )
+
+
+def _combined(slopes: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """Mean of values with weights by their sd, and its sd."""
+    if len(slopes) == 1:
+        return slopes[0]
+    weights = [1.0 / sd**2 for _, sd in slopes]
+    whole = math.fsum(weights)
+    mean = math.fsum(w * slope for w, (slope, _) in zip(weights, slopes, strict=True)) / whole
+    return mean, math.sqrt(1.0 / whole)
 
 
 def _models(record: _Record, dt: float, span: float, whole: bool) -> list[_Fit]:
@@ -408,22 +456,26 @@ def _without_colored(
     levels: tuple[Level, ...], record: _Record, best: _Fit
 ) -> tuple[Level, ...] | None:
     """Levels without the highest frequencies, if those do not agree with the model; else None."""
-    if len(levels) < 2:
-        return None
-    first = levels[0]
-    shapes = [record.covariances(name, best.correlation)[0] for name in best.names]
-    model = np.diag(sum(v * s for v, s in zip(best.variances, shapes, strict=True)))
-    ratio = np.diag(first.moments) / model - 1.0
-    count = ratio.size
-    parts = np.array_split(np.arange(count), max(1, count // 4))
-    sd = [math.sqrt(2.0 / (first.runs * part.size)) for part in parts]
-    off = [abs(float(ratio[part].mean())) for part in parts]
-    if all(o < max(COLORED, SURELY * s) for o, s in zip(off, sd, strict=True)):
-        return None
-    kept = count // 2
-    if kept >= LEAST_RUN:
-        return (first.lowest(kept), *levels[1:])
-    return levels[1:] if len(levels) > 2 else None
+    shapes = [record.covariances(name, best.correlation) for name in best.names]
+    out: list[Level] = []
+    colored = False
+    for of in dict.fromkeys(one.record for one in levels):
+        own = [k for k, one in enumerate(levels) if one.record == of]
+        first, rest = levels[own[0]], [levels[k] for k in own[1:]]
+        if not rest:
+            return None
+        model = np.diag(sum(v * s[own[0]] for v, s in zip(best.variances, shapes, strict=True)))
+        ratio = np.diag(first.moments) / model - 1.0
+        count = ratio.size
+        parts = np.array_split(np.arange(count), max(1, count // 4))
+        sd = [math.sqrt(2.0 / (first.runs * part.size)) for part in parts]
+        off = [abs(float(ratio[part].mean())) for part in parts]
+        colored |= any(o >= max(COLORED, SURELY * s) for o, s in zip(off, sd, strict=True))
+        kept = count // 2
+        if kept < LEAST_RUN and len(rest) < 2:
+            return None
+        out += [first.lowest(kept), *rest] if kept >= LEAST_RUN else rest
+    return tuple(out) if colored else None
 
 
 def _alike(fits: list[_Fit], best: _Fit) -> list[_Fit]:
@@ -553,6 +605,8 @@ def _covariances(record: _Record, best: _Fit) -> tuple[Array, Array]:
         return plain, plain
     scores = information.copy()
     for j in range(len(record.levels) - 1):
+        if record.levels[j].record != record.levels[j + 1].record:
+            continue
         across = _across(record.levels[j], record.levels[j + 1], best)
         runs = record.levels[j + 1].runs
         right = [across @ w @ across.transpose(0, 2, 1) for w in weights[j + 1]]

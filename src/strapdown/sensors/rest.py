@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +15,8 @@ from strapdown.dsp.samples import occupied_grid
 from strapdown.errors import DataError
 from strapdown.sensors.triad_errors import triad_of
 from strapdown.tables import ACCEL, GYRO, MAG
+from strapdown.tables.checks import view_of
+from strapdown.tables.on_disk import let_go
 
 Array = NDArray[np.float64]
 Triple = tuple[float, float, float]
@@ -139,8 +141,8 @@ def find_rests(imu: pd.DataFrame) -> tuple[RestStretch, ...]:
         `could_be_a_turn`. Neither is a steady acceleration distinguished from a tilt.
     """
     time = imu.index.to_numpy(dtype=np.float64)
-    gyro = imu[GYRO].to_numpy(dtype=np.float64)
-    accel = imu[ACCEL].to_numpy(dtype=np.float64) if set(ACCEL) <= set(imu.columns) else None
+    gyro = _triad(imu, GYRO)
+    accel = _triad(imu, ACCEL) if set(ACCEL) <= set(imu.columns) else None
     starts, ends = _windows(time)
     if not len(starts):
         return ()
@@ -185,11 +187,37 @@ def _windows(time: Array) -> tuple[Indices, Indices]:
     return starts[enough].astype(np.int64), ends[enough].astype(np.int64)
 
 
+def _triad(imu: pd.DataFrame, columns: list[str]) -> Array:
+    """Columns of a triad, (n, 3), without a copy where each is contiguous, as of a log."""
+    view = view_of(imu, columns)
+    return view if _by_column(view) else imu[columns].to_numpy(dtype=np.float64)
+
+
+def _by_column(values: Array) -> bool:
+    return values.strides[0] == values.itemsize
+
+
 def _window_moments(values: Array, starts: Indices, ends: Indices) -> tuple[Array, Array]:
     """Means and variances, (m, k), of columns (n, k) over windows."""
-    mean, variance = (np.empty((len(starts), values.shape[1])) for _ in range(2))
-    window_moments(np.ascontiguousarray(values), *map(np.array, (starts, ends)), mean, variance)
+    windows = np.array(starts), np.array(ends)
+    width = 1 if _by_column(values) else values.shape[1]
+    parts = []
+    for k in range(0, values.shape[1], width):
+        mean, variance = (np.empty((len(starts), width)) for _ in range(2))
+        window_moments(np.ascontiguousarray(values[:, k : k + width]), *windows, mean, variance)
+        let_go(values)
+        parts.append((mean, variance))
+    mean, variance = (np.hstack(both) for both in zip(*parts, strict=True))
     return mean, variance
+
+
+def _of_columns(statistic: Callable[..., Array], values: Array, **options: int) -> Array:
+    """A statistic of each column; of contiguous ones in turn, which needs the memory of one."""
+    if not _by_column(values):
+        return statistic(values, axis=0, **options)
+    found = [statistic(column, **options) for column in values.T]
+    let_go(values)
+    return np.array(found)
 
 
 def _drifts(
@@ -296,8 +324,8 @@ def rest_between(
             end=end,
             least_samples=LEAST_SAMPLES,
         )
-    gyro = imu[GYRO].to_numpy(dtype=np.float64)
-    accel = imu[ACCEL].to_numpy(dtype=np.float64) if set(ACCEL) <= set(imu.columns) else None
+    gyro = _triad(imu, GYRO)
+    accel = _triad(imu, ACCEL) if set(ACCEL) <= set(imu.columns) else None
     return replace(_stretch(time, gyro, accel, a, b), grade=grade)
 
 
@@ -310,11 +338,12 @@ def sd_of_mean(time: Array, values: Array) -> Array:
     doi:10.1287/opre.32.6.1241). A stretch of less than 2 s is too short for that: its n values
     count as ``n (1 - r) / (1 + r)``, with r the autocorrelation from value to value.
     """
-    n, off = len(values), values - values.mean(axis=0)
-    white = values.std(axis=0, ddof=1) / np.sqrt(n)
+    n = len(values)
+    white = _of_columns(np.std, values, ddof=1) / np.sqrt(n)
     parts = min(MOST_PARTS, int((time[-1] - time[0]) / WINDOW))
     edges = np.linspace(0, n, max(parts, 1) + 1).astype(np.int64)
     if parts < LEAST_PARTS or np.diff(edges).min() < 1:
+        off = values - values.mean(axis=0)
         power = np.maximum(np.square(off).sum(axis=0), TINY)
         r = np.clip((off[1:] * off[:-1]).sum(axis=0) / power, 0.0, 1.0 - 2.0 / n)
         return np.asarray(white * np.sqrt((1.0 + r) / (1.0 - r)), dtype=np.float64)
@@ -352,11 +381,11 @@ def _stretch(time: Array, gyro: Array, accel: Array | None, a: int, b: int) -> R
     return RestStretch(
         float(time[a]),
         float(time[b - 1]),
-        triad_of(gyro[a:b].mean(axis=0)),
-        triad_of(gyro[a:b].std(axis=0)),
-        None if force is None else triad_of(force.mean(axis=0)),
+        triad_of(_of_columns(np.mean, gyro[a:b])),
+        triad_of(_of_columns(np.std, gyro[a:b])),
+        None if force is None else triad_of(_of_columns(np.mean, force)),
         triad_of(sd_of_mean(time[a:b], gyro[a:b])),
-        None if force is None else triad_of(force.std(axis=0)),
+        None if force is None else triad_of(_of_columns(np.std, force)),
         None if force is None else triad_of(sd_of_mean(time[a:b], force)),
     )
 

@@ -199,7 +199,7 @@ def uncertainty_of(sensor: Sensor, triad: str, **overrides: TriadLike) -> TriadU
 
 @dataclass(frozen=True)
 class BiasDrift:
-    """Bias drift within a record: a first-order Gauss-Markov process.
+    """Bias drift within a record: a first-order Gauss-Markov process and a random walk.
 
     Attributes
     ----------
@@ -207,29 +207,42 @@ class BiasDrift:
         Steady-state standard deviation of the process.
     correlation_time : float, s
         Infinite for a constant bias.
+    walk : triad, rad/s/√s or m/s²/√s
+        Drive of the random walk.
     """
 
     sd: TriadLike = 0.0
     correlation_time: float = math.inf
+    walk: TriadLike = 0.0
 
     def __post_init__(self) -> None:
-        given: tuple[float, ...] = (
-            (self.sd,) * 3 if isinstance(self.sd, int | float) else tuple(self.sd)
-        )
-        if len(given) != 3 or not all(is_number(x) and 0.0 <= x < math.inf for x in given):
-            raise ConfigError("sensors.no-standard-deviation", quantity="sd", sd=self.sd)
+        for name in ("sd", "walk"):
+            size = getattr(self, name)
+            given = (size,) * 3 if isinstance(size, int | float) else tuple(size)
+            if len(given) != 3 or not all(is_number(x) and 0.0 <= x < math.inf for x in given):
+                raise ConfigError("sensors.no-standard-deviation", quantity=name, sd=size)
+            object.__setattr__(self, name, tuple(float(x) for x in given))
         if not is_number(self.correlation_time) or not self.correlation_time > 0.0:
             raise ConfigError(
                 "sensors.no-time",
                 quantity="correlation_time",
                 correlation_time=self.correlation_time,
             )
-        object.__setattr__(self, "sd", tuple(float(x) for x in given))
 
     @property
     def triad(self) -> Triad:
-        """Standard deviation of each axis."""
+        """Standard deviation of the process of each axis."""
         return self.sd  # type: ignore[return-value]
+
+    @property
+    def steps(self) -> Triad:
+        """Drive of the random walk of each axis."""
+        return self.walk  # type: ignore[return-value]
+
+    def moved(self, length: float) -> Array:
+        """Variance of the change of the bias over a time in s, (3,)."""
+        process = -2.0 * math.expm1(-length / self.correlation_time) * np.square(self.triad)
+        return np.asarray(process + length * np.square(self.steps))
 
 
 @dataclass(frozen=True)
@@ -268,7 +281,8 @@ class ImuUncertainty:
         errors = sensor.imu_errors
         assert errors.accel is not None  # uncertainty_of has found it
         drifts = (
-            BiasDrift(e.bias_instability, e.correlation_time) for e in (errors.gyro, errors.accel)
+            BiasDrift(e.bias_instability, e.correlation_time, e.random_walk)
+            for e in (errors.gyro, errors.accel)
         )
         return cls(gyro, accel, *drifts)
 
@@ -324,7 +338,7 @@ def _scaled(given: Stated, factor: float, quantity: str) -> Stated:
 
 # Uncertainty of gyros and accelerometers together: a data sheet with overrides.
 
-DRIFT = ("bias_instability", "correlation_time")
+DRIFT = ("bias_instability", "correlation_time", "random_walk")
 
 _NEEDED = {"bias": "bias_sd", "noise_density": "noise_density"}
 
@@ -362,16 +376,18 @@ def stated_imu(
 
 def _stated_drift(triad: str, stated: Mapping[str, Stated], base: BiasDrift | None) -> BiasDrift:
     drift = base or BiasDrift()
-    sd, time = drift.sd, drift.correlation_time
+    sd, time, walk = drift.sd, drift.correlation_time, drift.walk
     for name, given in stated.items():
         key = KEYS[triad][name]
         if key.quantity == "bias_instability":
             sd = _scaled(given, key.factor, f"{triad}, {name}")
+        elif key.quantity == "random_walk":
+            walk = _scaled(given, key.factor, f"{triad}, {name}")
         elif isinstance(given, int | float):
             time = float(given) * key.factor
         else:
             raise ConfigError("sensors.time-belongs-all-axes", quantity=f"{triad}, {name}")
-    return BiasDrift(sd, time if time > 0.0 else math.inf)
+    return BiasDrift(sd, time if time > 0.0 else math.inf, walk)
 
 
 def _require(triad: str, known: TriadUncertainty) -> None:

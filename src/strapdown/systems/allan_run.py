@@ -17,16 +17,18 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.bundle import InputFiles, Seal, input_files
-from strapdown.config.logs import AllanSpec, AxesTable
+from strapdown.config.logs import AllanSpec, AxesTable, LogTable
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84
 from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.formats import holds
 from strapdown.formats.aid_table import read_stream
 from strapdown.formats.clocks import on_clock_of
+from strapdown.formats.recording import Recording
 from strapdown.progress import Progress, silent
 from strapdown.sensors.allan import allan_model, deviations
 from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV, KEYS
-from strapdown.sensors.noise_terms import ChannelNoise, noise_terms
+from strapdown.sensors.noise_terms import ChannelNoise, pooled_terms
 from strapdown.sensors.rest import find_rests
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors, triad_of
 from strapdown.systems.alignment_source import body_record
@@ -34,6 +36,7 @@ from strapdown.systems.inputs import Memory, SavedRun, refuse_long_span
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GYRO, find_gaps
 from strapdown.tables.checks import index_of
+from strapdown.tables.on_disk import let_go
 
 if TYPE_CHECKING:
     from strapdown.report.chart_svg import ChartFigure
@@ -44,6 +47,8 @@ Array = NDArray[np.float64]
 
 #: Shortest stationary stretch that is used, and one below which the result says that it is short.
 LEAST_REST, SHORT = 60.0, 1800.0  # s
+#: Share by which the rates of logs of one sensor may differ.
+SAME_RATE = 0.01
 #: Share of a log outside its longest rest from which the result says so.
 MOVED = 0.02
 #: Change of temperature of which an effect is estimated, °C; where it may be missing, s.
@@ -76,6 +81,16 @@ FILE_KEYS = {
 }
 
 
+@dataclass(frozen=True)
+class Stretch:
+    """The stationary stretch of a log, s, and the mean of each channel, rad/s or m/s²."""
+
+    name: str
+    start: float
+    end: float
+    means: dict[str, float]
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class AllanRun(SavedRun):
     """Noise of a sensor: in memory until `save` writes its page and its data.
@@ -87,14 +102,12 @@ class AllanRun(SavedRun):
         ``hadamard`` and ``model``, of the fitted terms, in rad/s or m/s², ``relative_sd``.
     noise : dict of str to ChannelNoise
         By channel, ``gyro_x`` … ``accel_z``.
-    means : dict of str to float
-        Mean of each channel, rad/s or m/s².
     errors : ImuErrors
         The noise as the error model of this package has it: white noise, a Gauss-Markov process and
         a random walk. A flicker is the process with the same maximum of its Allan deviation.
     findings : tuple of Finding
-    start, end : float, s
-        The stationary stretch.
+    stretches : tuple of Stretch
+        The stationary stretch of each log, with the means of its channels.
     rate_hz : float
     """
 
@@ -104,14 +117,27 @@ class AllanRun(SavedRun):
     name: str
     deviations: pd.DataFrame
     noise: dict[str, ChannelNoise]
-    means: dict[str, float]
     errors: ImuErrors
     findings: tuple[Finding, ...]
-    start: float
-    end: float
+    stretches: tuple[Stretch, ...]
     rate_hz: float
     inputs: tuple[InputFiles, ...]
     memory: Memory = field(default=Memory({}))
+
+    @property
+    def start(self) -> float:
+        """Begin of the first stretch, s."""
+        return self.stretches[0].start
+
+    @property
+    def end(self) -> float:
+        """End of the first stretch, s."""
+        return self.stretches[0].end
+
+    @property
+    def length(self) -> float:
+        """Length of all stretches, s."""
+        return math.fsum(one.end - one.start for one in self.stretches)
 
     @property
     def terms(self) -> pd.DataFrame:
@@ -162,7 +188,7 @@ class AllanRun(SavedRun):
         """
         from strapdown.sensors.bridge import for_program
 
-        span = self.end - self.start
+        span = max(one.end - one.start for one in self.stretches)
         found = for_program(self.errors, target, 1.0 / self.rate_hz, span)
         return pd.DataFrame(
             [(e.name, e.triad, e.unit, *values) for e, values in found.items()],
@@ -193,12 +219,12 @@ class AllanRun(SavedRun):
             f"{channel} {' '.join(t.name for t in noise.terms if t.observable)}"
             for channel, noise in self.noise.items()
         ]
-        return f"<AllanRun {self.name}, {self.end - self.start:.4g} s: {'; '.join(shown)}>"
+        return f"<AllanRun {self.name}, {self.length:.4g} s: {'; '.join(shown)}>"
 
 
 @one_thread()
 def run_allan(spec: AllanSpec, progress: Progress = silent) -> AllanRun:
-    """Find the noise of a sensor from a log at rest.
+    """Find the noise of a sensor from a log at rest, or from several of them together.
 
     Parameters
     ----------
@@ -209,55 +235,106 @@ def run_allan(spec: AllanSpec, progress: Progress = silent) -> AllanRun:
     Raises
     ------
     DataError
-        The log cannot be read, is not at rest for a minute, or a channel is constant.
+        A log cannot be read, is not at rest for a minute, has another rate or fewer channels than
+        the first, or a channel is constant.
     """
-    progress("reading", 0.05)
-    recording, imu, read = body_record(spec.log, AxesTable(axes=spec.axes))
-    refuse_long_span(imu, recording.name)
-    findings = list(read)
-    progress("finding rests", 0.15)
-    time = index_of(imu)
-    start, end = float(time[0]), float(time[-1])
-    if not spec.at_rest:
-        start, end = _rest(imu, recording.name, findings)
-    first, past = np.searchsorted(time, [start, end + 1e-9])
-    stamps = time[first:past]
-    dt = float(stamps[-1] - stamps[0]) / (stamps.size - 1)
-    warm = _temperature(spec, imu, stamps)
-    gaps = find_gaps(stamps)
-    if gaps:
-        longest = max(gap.end - gap.start for gap in gaps)
-        findings.append(_said("allan.gaps", recording.name, count=len(gaps), longest=longest))
+    findings: list[Finding] = []
+    rests = []
+    for k, log in enumerate(spec.logs):
+        progress("reading", 0.05 + 0.15 * k / len(spec.logs))
+        rests.append(_rest_of(spec, log, findings))
+    dt, name = rests[0].dt, rests[0].name
+    channels = [c for c in (*GYRO, *ACCEL) if c in rests[0].imu.columns]
+    for rest in rests[1:]:
+        if abs(rest.dt / dt - 1.0) > SAME_RATE or not set(channels) <= set(rest.imu.columns):
+            raise DataError(
+                "allan.logs-differ",
+                file=rest.name,
+                rate=1.0 / rest.dt,
+                first=1.0 / dt,
+                name=name,
+                channels=[c for c in channels if c not in rest.imu.columns],
+            )
     noise: dict[str, ChannelNoise] = {}
-    means: dict[str, float] = {}
+    means: list[dict[str, float]] = [{} for _ in rests]
     tables = []
-    channels = [c for c in (*GYRO, *ACCEL) if c in imu.columns]
     for k, channel in enumerate(channels):
         progress(f"noise of {channel}", 0.2 + 0.55 * k / len(channels))
-        values = np.ascontiguousarray(imu[channel].to_numpy()[first:past], dtype=np.float64)
+        values = [rest.values(channel) for rest in rests]
         try:
-            found = noise_terms(values, dt, warm)
+            found = pooled_terms(values, [one.dt for one in rests], [one.warm for one in rests])
         except DataError as error:
-            raise error.replaced(file=recording.name, quantity=channel) from None
-        noise[channel], means[channel] = found, float(values.mean())
+            raise error.replaced(file=name, quantity=channel) from None
+        noise[channel] = found
+        for one, value in zip(means, values, strict=True):
+            one[channel] = float(value.mean())
         table = deviations(values, dt)
         table["model"] = allan_model(found.model, table.index, found.correlation_time)
         table.insert(0, "channel", channel)
         tables.append(table.reset_index())
-    findings += _limits(noise, end - start, 0.5 / dt, recording.name)
+        for rest in rests:
+            let_go(rest.imu)
+    longest = max(one.end - one.start for one in rests)
+    findings += _limits(noise, longest, 0.5 / dt, name)
     return AllanRun(
         spec,
-        recording.name,
+        name,
         pd.concat(tables, ignore_index=True),
         noise,
-        means,
-        _errors(noise, dt, end - start),
+        _errors(noise, dt, longest),
         tuple(findings),
-        start,
-        end,
+        tuple(
+            Stretch(one.name, one.start, one.end, mean)
+            for one, mean in zip(rests, means, strict=True)
+        ),
         1.0 / dt,
-        (input_files("log", spec.log.path, recording.files),),
+        tuple(
+            input_files("log", log.path, one.files)
+            for log, one in zip(spec.logs, rests, strict=True)
+        ),
     )
+
+
+@dataclass(frozen=True, eq=False)
+class _Rest:
+    """Stationary part of a log: its rows, sample interval in s, and temperature in °C."""
+
+    name: str
+    files: tuple[Path, ...]
+    imu: pd.DataFrame
+    rows: slice
+    start: float
+    end: float
+    dt: float
+    warm: Array | None
+
+    def values(self, channel: str) -> Array:
+        """Values of a channel, without a copy where they are together."""
+        return np.ascontiguousarray(self.imu[channel].to_numpy()[self.rows], dtype=np.float64)
+
+
+def _rest_of(spec: AllanSpec, log: LogTable, findings: list[Finding]) -> _Rest:
+    """Read a log and find its rest; findings are appended."""
+    recording, imu, read = body_record(log, AxesTable(axes=spec.axes))
+    refuse_long_span(imu, recording.name)
+    time = index_of(imu)
+    start, end = float(time[0]), float(time[-1])
+    moved: list[Finding] = []
+    if not spec.at_rest:
+        start, end = _rest(imu, recording.name, moved)
+    first, past = np.searchsorted(time, [start, end + 1e-9])
+    stamps = time[first:past]
+    dt = float(stamps[-1] - stamps[0]) / (stamps.size - 1)
+    warm = _temperature(log, recording, imu, stamps)
+    if warm is not None and recording.temperature is not None:
+        read = tuple(_but_used(read, str(recording.temperature.name)))
+    findings += [*read, *moved]
+    gaps = find_gaps(stamps)
+    if gaps:
+        longest = max(gap.end - gap.start for gap in gaps)
+        findings.append(_said("allan.gaps", recording.name, count=len(gaps), longest=longest))
+    rows = slice(int(first), int(past))
+    return _Rest(recording.name, recording.files, imu, rows, start, end, dt, warm)
 
 
 def _rest(imu: pd.DataFrame, name: str, findings: list[Finding]) -> tuple[float, float]:
@@ -278,21 +355,34 @@ def _rest(imu: pd.DataFrame, name: str, findings: list[Finding]) -> tuple[float,
     return longest.start, longest.end
 
 
-def _temperature(spec: AllanSpec, imu: pd.DataFrame, stamps: Array) -> Array | None:
+def _temperature(
+    log: LogTable, recording: Recording, imu: pd.DataFrame, stamps: Array
+) -> Array | None:
     """Temperature of the log at the stamps, °C; None without one, or if it hardly changes."""
-    try:
-        stream = read_stream(spec.log.path, "barometer", spec.log.format)
-        stream, _ = on_clock_of(stream, imu)
-    except (DataError, ConfigError):
+    stream = recording.temperature
+    if stream is None and holds(Path(log.path), "barometer"):
+        try:
+            table, _ = on_clock_of(read_stream(log.path, "barometer", log.format), imu)
+        except (DataError, ConfigError):
+            return None
+        stream = table.get("temperature")
+    if stream is None:
         return None
-    if "temperature" not in stream.columns:
-        return None
-    stream = stream.dropna(subset=["temperature"])
-    time, values = index_of(stream), stream["temperature"].to_numpy(dtype=np.float64)
+    stream = stream.dropna()
+    time, values = (np.asarray(one, np.float64) for one in (stream.index, stream))
     if len(values) < 2 or time[0] > stamps[0] + EDGE or time[-1] < stamps[-1] - EDGE:
         return None
     at = np.interp(stamps, time, values)
     return at if np.ptp(at) > LEAST_WARMING else None
+
+
+def _but_used(findings: Iterable[Finding], column: str) -> Iterable[Finding]:
+    """Findings, of which the one about columns without a use does not list this one."""
+    for one in findings:
+        if one.code != "io.columns-not-used":
+            yield one
+        elif names := [name for name in one.data["names"] if name != column]:
+            yield one.replace(names=names)
 
 
 def _said(code: str, name: str, **data: Any) -> Finding:
@@ -359,6 +449,8 @@ def _sensor_text(run: AllanRun) -> str:
     largest = max(run.errors.gyro.axis("noise_density"))
     grade = next(name for name, most in CLASSES if largest <= most)
     spans = f"{run.start:.6g} s to {run.end:.6g} s of the log at {run.rate_hz:.6g} Hz"
+    if len(run.stretches) > 1:
+        spans = f"{run.length:.6g} s of {len(run.stretches)} logs at {run.rate_hz:.6g} Hz"
     lines = [
         f'title = "sensor of {_stem(run.name)}"',
         f'class = "{grade}"',
@@ -396,7 +488,10 @@ def _bias(run: AllanRun, triad: str) -> str:
     9.806 m/s² within `GRAVITY_RANGE`, but for the bias along it.
     """
     channels, size = (GYRO, WGS84.rotation_rate) if triad == "gyro" else (ACCEL, STANDARD_GRAVITY)
-    off = abs(math.sqrt(math.fsum(run.means[c] ** 2 for c in channels)) - size)
+    off = max(
+        abs(math.sqrt(math.fsum(one.means[c] ** 2 for c in channels)) - size)
+        for one in run.stretches
+    )
     if triad == "gyro":
         why = "mean rate of the log less the rotation rate of the Earth"
         key, value = "bias_sd_deg_per_h", off / KEYS[triad]["bias_sd_deg_per_h"].factor

@@ -19,6 +19,7 @@ from strapdown.config.reading import FileSpec
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.recording import ReadOptions
 from strapdown.progress import Progress, silent
+from strapdown.tables.on_disk import let_go
 
 if TYPE_CHECKING:
     from strapdown.config.logs import LogTable
@@ -214,6 +215,7 @@ class Memory:
                     WRITERS["npz"].write(folder / file, {"imu": table})
                 else:
                     csv.write(folder / file, table_columns(table), {})
+                let_go(table)
             yield folder
 
 

@@ -231,7 +231,7 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
         remark = "assumed: the grade, by its noise; name yours" if made.guessed else ""
         page.key("sensor", string(named), remark, check=check)
     page.say(
-        f"The catalogue (strapdown modules): {', '.join(s.name for s in _whole())}; or a .toml "
+        f"The catalogue (strapdown sensors): {', '.join(s.name for s in _whole())}; or a .toml "
         "file of your own. Alternatively, or to replace single values: tables [sensors.gyro] "
         "and [sensors.accel]: bias_sd_deg_per_h, noise_density_deg_per_sqrt_h; bias_sd_ug, "
         "noise_density_ug_per_sqrt_hz, …",

@@ -31,6 +31,7 @@ from strapdown.tables.checks import (
     source_of,
     view_of,
 )
+from strapdown.tables.on_disk import let_go, parts_of, room
 
 SAMPLINGS = ("instantaneous", "mean")
 
@@ -86,8 +87,14 @@ def imu_table(
     blocks = {"gyro": as_array(gyro, 3, "gyro", source)}
     blocks |= {name: as_array(x, 3, name, source) for name, x in given.items() if x is not None}
     check_same_length(source, time=stamps, **blocks)
-    room = np.empty((len(stamps), 3 * len(blocks)), order="F") if by_column else None
-    values = np.concatenate(list(blocks.values()), axis=1, out=room)
+    if by_column:
+        values = room((3 * len(blocks), len(stamps))).T
+        for k, block in enumerate(blocks.values()):
+            for part in parts_of(len(stamps), 3):
+                values[part, 3 * k : 3 * k + 3] = block[part]
+                let_go(values)
+    else:
+        values = np.concatenate(list(blocks.values()), axis=1)
     columns = [f"{name}_{axis}" for name in blocks for axis in "xyz"]
     # An array of the caller can change.
     return imu_of_columns(np.array(stamps), values, columns, sampling=sampling, source=source)

@@ -1,0 +1,112 @@
+"""``strapdown sensors``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from strapdown.cli.shared_options import ReportFlags, as_flag, running, spread, writing
+from strapdown.errors import ConfigError
+
+if TYPE_CHECKING:
+    from strapdown.progress import Progress
+    from strapdown.report.sensors import SensorsRun
+
+EPILOG = (
+    "Example: strapdown sensors icm-42688-p\n\n"
+    "Example: strapdown sensors mpu-6050 adis16470 mine.toml --outage 30 --out compared"
+)
+FLAGS = {"outage_s": "--outage", "speed_m_per_s": "--speed", "sensor": "NAME|FILE"}
+
+
+@spread
+def sensors(
+    names: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="[NAME|FILE]...",
+            help="Sensors of the catalogue, or files of your own, as of strapdown allan.",
+        ),
+    ] = None,
+    *,
+    outage: Annotated[
+        float, running("S", "Time without fixes in which drifts are compared (60).", "--outage")
+    ] = 60.0,
+    speed: Annotated[float, running("M/S", "Speed in it, straight on (15).", "--speed")] = 15.0,
+    out: Annotated[
+        Path | None, writing("DIR", "Write a page and the data into this folder.")
+    ] = None,
+    write: ReportFlags,
+) -> None:
+    """List the sensors of the catalogue, show one with its sources, or compare several.
+
+    A comparison has the Allan deviations over one another, and the drift of position and attitude
+    in an outage (standard deviations against time).
+    """
+    from strapdown.bundle import to_json
+    from strapdown.cli.console import print_findings, print_seal
+    from strapdown.cli.result_folder import run_and_save
+    from strapdown.config.outage import SensorsSpec
+    from strapdown.config.spec import specify
+    from strapdown.report import sensors as report
+    from strapdown.sensors.catalogue import load_sensor
+
+    if not names:
+        if out is not None:
+            raise ConfigError("cli.sensors-to-write-missing", quantity="--out")
+        table = report.catalogue_table()
+        if write.json:
+            rows = [report.sensor_json(load_sensor(name)) for name in table["name"]]
+            typer.echo(to_json(rows), nl=False)
+        else:
+            _print(report.list_block(table))
+        return
+    if len(names) == 1 and out is None:
+        sensor = load_sensor(names[0])
+        if write.json:
+            typer.echo(to_json(report.sensor_json(sensor)), nl=False)
+        else:
+            _print(report.figures_block(sensor))
+            _print(report.list_block(report.catalogue_table([sensor])))
+        return
+    given = [str(Path(n).absolute()) if n.lower().endswith(".toml") else n for n in names]
+
+    def compute(progress: Progress) -> SensorsRun:
+        keys: dict[str, Any] = {"outage_s": outage, "speed_m_per_s": speed}
+        try:
+            return report.compare(specify(SensorsSpec, sensor=tuple(given), **keys), progress)
+        except ConfigError as error:
+            raise as_flag(error, lambda place: FLAGS.get(place, place)) from None
+
+    if out is not None:
+        done = run_and_save(compute, out, write, "sensors.json")
+        if done is None:
+            return
+        run, seal = done
+    else:
+        from strapdown.cli.console import progress as bar
+
+        with bar(write.quiet or write.json) as show:
+            run, seal = compute(show), None
+        if write.json:
+            typer.echo(to_json(report.sensors_json(run)), nl=False)
+            return
+    for block in (report.list_block(report.catalogue_table(run.sensors)), report.drift_block(run)):
+        if block is not None:
+            _print(block)
+    print_findings(run.findings)
+    if seal is not None:
+        print_seal(seal, "sensors.json", write.no_report)
+
+
+def _print(block: Any) -> None:
+    from strapdown.cli.console import console, print_block
+    from strapdown.report.values import spaced
+
+    if block.title:
+        console().print(spaced(block.title), style="bold")
+    print_block(block)
+    if block.caption:
+        console().print(spaced(block.caption), style="dim")
