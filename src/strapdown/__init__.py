@@ -140,6 +140,7 @@ __all__ = [
     "check_imu_channels",
     "compare_attitude",
     "doctor",
+    "extrinsics",
     "magnetic_field",
     "motion_increments",
     "navigate",
@@ -177,6 +178,7 @@ load_on_first_use(
         "OrientationFilter attitude calibrate_magnetometer compare_attitude",
         "api.crash": "CrashRun reconstruct",
         "api.doctor": "Diagnosis doctor",
+        "api.extrinsics": "ExtrinsicsRun extrinsics",
         "api.navigation": "Barometer BodyVelocity Gnss Heading Magnetometer Measurement "
         "NavigationRun NonHolonomic Odometer ZeroAngularRate ZeroVelocity navigate",
         "api.reading": "GnssFixes Imu Streams read read_gnss read_imu",
