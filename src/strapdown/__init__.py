@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     )
     from strapdown.api.crash import CrashRun, reconstruct
     from strapdown.api.doctor import Diagnosis, doctor
+    from strapdown.api.extrinsics import ExtrinsicsRun, extrinsics
     from strapdown.api.navigation import (
         Barometer,
         BodyVelocity,
@@ -106,6 +107,7 @@ __all__ = [
     "CrashUnit",
     "Diagnosis",
     "Entry",
+    "ExtrinsicsRun",
     "FineAlignment",
     "Gnss",
     "GnssFixes",

@@ -27,6 +27,9 @@ __all__ = ["ExtrinsicsRun", "extrinsics"]
 #: Before a drive: standard deviations of the antenna's lever arm, m, of the offset, s, and of the
 #: mounting, deg.
 ARM_SD, OFFSET_SD, MOUNTING_SD = 1.0, 0.05, 10.0
+#: The axle is not known: at 1.5 m, a turn faster than this, deg/s, would be a lateral velocity of
+#: more than this, m/s, which would count as lever arm of the antenna.
+STRAIGHT, SIDEWAYS = 2.0, 0.05
 KINDS = ("imu", "magnetometer", "gnss")
 
 
@@ -141,11 +144,20 @@ def _run_of_antenna(
     if offset is not None:
         aids["gnss"]["time_offset_s"] = offset
     if wheels:
-        aids["no_slip"] = {"kind": "no_slip", "mounting_sd_deg": (MOUNTING_SD, MOUNTING_SD)}
+        aids["no_slip"] = {
+            "kind": "no_slip",
+            "mounting_sd_deg": (MOUNTING_SD, MOUNTING_SD),
+            "largest_rate_deg_per_s": STRAIGHT,
+            "lateral_sd_m_per_s": SIDEWAYS,
+        }
     options = {"smoother": {"kind": "rts"}}
     spec = specify_navigation(log, aids, sensor=sensor, options=options).plain()
-    if not spec["aiding"]["gnss"]["time_offset_sd_s"]:
-        spec["aiding"]["gnss"]["time_offset_sd_s"] = OFFSET_SD
+    aid = spec["aiding"]["gnss"]
+    if not aid["time_offset_sd_s"]:
+        aid["time_offset_sd_s"] = OFFSET_SD
+    # In a turn late velocities look like a lever arm along the path of speed times delay, which is
+    # not a state: of 130 ms, 10 ms wrong are 0.1 m at 10 m/s.
+    aid["use_velocity"] = aid["use_velocity"] and not aid["velocity_delay_s"]
     return NavigationSpec.checked(spec)
 
 

@@ -15,7 +15,6 @@ from strapdown.cli.shared_options import (
     as_flag,
     folder_to_make,
     log_keys,
-    reading,
     running,
     spread,
 )
@@ -59,7 +58,7 @@ def extrinsics(
     ] = False,
     sensor: Sensor = None,
     other_axes: Annotated[
-        str | None, reading("X,Y,Z", "Axes of OTHER, as --axes of LOG.", "--other-axes")
+        str | None, running("X,Y,Z", "Axes of OTHER, as --axes of LOG.", "--other-axes")
     ] = None,
     *,
     flags: LogFlags,

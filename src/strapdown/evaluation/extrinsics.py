@@ -199,6 +199,20 @@ def _whitened(rows: Residuals) -> tuple[Array, Array, Array, Rows]:
     return r, z, z, block
 
 
+def _products(tests: Array, slopes: Array) -> Array:
+    """Symmetric part of the sum of products over rows and axes, (k, k)."""
+    count = tests.shape[2]
+    H = tests.reshape(-1, count).T @ slopes.reshape(-1, count)
+    return np.asarray(0.5 * (H + H.T))
+
+
+def _nowhere_negative(H: Array, prior: Array) -> Array:
+    """Information without what noise makes negative, by units of what was assumed."""
+    size = 1.0 / np.sqrt(prior)
+    power, axes = np.linalg.eigh(H * size * size[:, None])
+    return np.asarray((axes * np.maximum(power, 0.0)) @ axes.T / size / size[:, None])
+
+
 def _information(
     white: list[tuple[Array, Array, Array, Rows]], prior: Array
 ) -> tuple[Array, Array]:
@@ -206,11 +220,8 @@ def _information(
     count = len(prior)
     H = np.zeros((count, count))
     for _, z, j, _ in white:
-        H += z.reshape(-1, count).T @ j.reshape(-1, count)
-    size = 1.0 / np.sqrt(prior)
-    # In units of the standard deviations that were assumed.
-    power, axes = np.linalg.eigh(0.5 * (H + H.T) * size * size[:, None])
-    H = (axes * np.maximum(power, 0.0)) @ axes.T / size / size[:, None]
+        H += _products(z, j)
+    H = _nowhere_negative(H, prior)
     scores = np.zeros((max(int(b.max()) for *_, b in white) + 1, count))
     for r, z, _, b in white:
         first = np.flatnonzero(np.diff(b, prepend=-1))
@@ -222,10 +233,13 @@ def solve(problem: _Problem) -> tuple[Array, Array, Array]:
     """Move a problem to its solution: covariance, freedom, and share of what was assumed."""
     prior = problem.prior
     for _ in range(STEPS):
-        H, scores = _information([_whitened(one) for one in problem.rows()], prior)
-        step = np.linalg.solve(H + np.diag(prior), scores.sum(axis=0) - prior * problem.off())
+        white = [_whitened(one) for one in problem.rows()]
+        _, scores = _information(white, prior)
+        # With the noise in it, as that of the scores: a step of signals alone would go too far.
+        whole = sum((_products(z, z) for _, z, _, _ in white), np.diag(prior))
+        step = np.linalg.solve(whole, scores.sum(axis=0) - prior * problem.off())
         problem.move(step)
-        if (np.abs(step) * np.sqrt(np.diag(H) + prior)).max() < SETTLED:
+        if (np.abs(step) * np.sqrt(np.diag(whole))).max() < SETTLED:
             break
     white = [_whitened(one) for one in problem.rows()]
     H, scores = _information(white, prior)
@@ -234,14 +248,11 @@ def solve(problem: _Problem) -> tuple[Array, Array, Array]:
     # A block draws the solution to itself: its score as the others see it (CR3, a jackknife).
     z = np.zeros_like(scores)
     for k in range(len(scores)):
-        own = whole.copy()
+        others = H.copy()
         for _, tests, slopes, block in white:
             low, high = np.searchsorted(block, [k, k + 1])
-            part = tests[low:high].reshape(-1, len(prior)).T @ slopes[low:high].reshape(
-                -1, len(prior)
-            )
-            own -= 0.5 * (part + part.T)
-        z[k] = np.linalg.solve(own, scores[k])
+            others -= _products(tests[low:high], slopes[low:high])
+        z[k] = np.linalg.solve(_nowhere_negative(others, prior) + np.diag(prior), scores[k])
     assumed = (inverse * prior) @ inverse
     spread = z.T @ z
     # Scores of few blocks scatter: not below what white residuals of that size leave.
@@ -450,8 +461,9 @@ class _Imus:
     def rows(self) -> list[Residuals]:
         """Residuals of rates and of specific forces."""
         rate, moved, force = self.modelled()
-        there = [v[:, k : k + 3] @ self.turn.T for k in (0, 3) for v in self._other()]
-        here = [v[:, k : k + 3] for k in (0, 3) for v in (self.own, self.own_slope, self.own_bend)]
+        parts = (0, 3) if self.force else (0,)
+        there = [v[:, k : k + 3] @ self.turn.T for k in parts for v in self._other()]
+        here = [v[:, k : k + 3] for k in parts for v in (self.own, self.own_slope, self.own_bend)]
         here[0] = here[0] - self.x[BIAS_]
         if self.force:
             here[3] = moved - self.x[FORCE_]

@@ -246,9 +246,7 @@ def _coarse_magnetometer(
             "extrinsics.field-does-not-turn", quantity="mag", share=100.0 * max(0.0, 1.0 - best[0])
         )
     Q = best[2]
-    u, size, vt = np.linalg.svd(Q)
-    if np.linalg.det(Q) < 0.0 and size[2] > 0.5 * size[0]:
-        raise DataError("extrinsics.mirrored", quantity="mag")
+    u, _, vt = np.linalg.svd(Q)
     sign = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
     return best[1], np.asarray(((u * sign) @ vt).T)
 
@@ -276,15 +274,15 @@ def imu_to_magnetometer(
     Raises
     ------
     DataError
-        There are too few readings, the gyros do not explain the change of the field, or the axes
-        of the magnetometer are left-handed.
+        There are too few readings, or the gyros do not explain the change of the field.
 
     Notes
     -----
     Within a window of 3 to 10 s the field is constant in the frame that the gyros keep; its
     strength and direction in each window are free, so that a field that changes from place to
     place is allowed. Rotation and soft iron are a polar decomposition: soft iron is symmetric, and
-    what is not symmetric counts as rotation.
+    what is not symmetric counts as rotation. Gyros do not show whether the readings, or one axis of
+    them, have the wrong sign: a left-handed magnetometer looks like one that is turned by 180°.
     """
     check_imu(imu)
     table = magnetometer[MAG].dropna()

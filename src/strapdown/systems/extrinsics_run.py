@@ -220,8 +220,10 @@ def _antenna(spec: ExtrinsicsSpec, progress: Progress) -> ExtrinsicsRun:
     def add(name: str, state: str, unit: str, assumed: float, prior: float) -> None:
         if state not in states:
             return
-        sd = float(sds[state].iloc[middle])
-        value = assumed - float(states[state].iloc[middle])
+        # Constants are the same at all marks; an offset may wander.
+        wander = float(states[state].std(ddof=0))
+        sd = float(np.hypot(np.sqrt((sds[state] ** 2).mean()), wander))
+        value = assumed - float(states[state].mean())
         share = min(1.0, (sd / prior) ** 2) if prior > 0.0 else 1.0
         limit = OBSERVED.get(name.removesuffix(name[-2:]), np.inf)
         seen = share < KEPT and sd <= limit
@@ -254,11 +256,15 @@ def _antenna(spec: ExtrinsicsSpec, progress: Progress) -> ExtrinsicsRun:
         {},
     )
     name = run.source.name
-    closed = [e for e in estimates if not e.observed]
     said = [
         _said("extrinsics.state-open", name, parameter=e.name, share=e.prior_share, bound=e.bound)
-        for e in closed
+        for e in estimates
+        if not e.observed
     ]
+    ends = offset[0] - states["gnss.time_offset_t"].iloc[[0, -1]]
+    if abs(ends.iloc[1] - ends.iloc[0]) > 2.0 * float(sds["gnss.time_offset_t"].iloc[middle]):
+        first, last = (float(x) for x in ends)
+        said.append(_said("extrinsics.offset-wanders", name, "note", first=first, last=last))
     findings = (*run.findings, *said)
     other = Path(str(table["path"])).name
     return ExtrinsicsRun(spec, name, other, result, findings, run.inputs, run)

@@ -15,13 +15,13 @@ from strapdown.tables import MAG, imu_table
 GRAVITY = 9.81
 KINDS = ("hand", "walk", "drive")
 #: White noise of gyros rad/s/√Hz and of accelerometers, standard deviations of biases, of scale and
-#: nonorthogonality, of the misalignment of accelerometers, and noise of a magnetometer in the field.
+#: nonorthogonality, of the misalignment of accelerometers, and noise of a magnetometer.
 GRADES = {
     "phone": (1.2e-4, 2e-3, 0.017, 0.3, 0.01, 0.006, 0.008),
     "industrial": (4e-5, 7e-4, 0.002, 0.03, 0.001, 0.001, 0.003),
 }
 #: Length, s, vibration that the sensors do not share, rad/s and m/s², and disturbance of the field.
-LENGTH = {"hand": 60.0, "walk": 90.0, "drive": 200.0}
+LENGTH = {"hand": 40.0, "walk": 45.0, "drive": 120.0}
 SHAKING = {"hand": (0.002, 0.03), "walk": (0.005, 0.1), "drive": (0.003, 0.1)}
 DISTURBED = {"hand": 0.005, "walk": 0.01, "drive": 0.01}
 
@@ -43,7 +43,9 @@ def sines(rng, t, low, high, sd):
     f = np.exp(rng.uniform(np.log(low), np.log(high), 12))
     a, phase = rng.normal(size=12), rng.uniform(0.0, 2.0 * np.pi, 12)
     a *= sd * np.sqrt(2.0 / (a**2).sum())
-    return sum(size * np.sin(2.0 * np.pi * k * t + p) for size, k, p in zip(a, f, phase, strict=True))
+    return sum(
+        size * np.sin(2.0 * np.pi * k * t + p) for size, k, p in zip(a, f, phase, strict=True)
+    )
 
 
 class Body:
@@ -151,7 +153,7 @@ def unit_and_magnetometer(seed, kind, grade, apart):
     offset = rng.uniform(-2.0, 2.0) if apart else rng.uniform(-0.05, 0.05)
     drift = 6e-5 * rng.uniform(-1.0, 1.0) if apart else 0.0
     A, R = (rotation.dcm_from_rotation_vector(rng.normal(size=3)) for _ in range(2))
-    a, shape = unit(rng, body, *stamps(rng, length, rate, 0.0, 0.0), A, np.zeros(3), grade, kind)
+    a, _ = unit(rng, body, *stamps(rng, length, rate, 0.0, 0.0), A, np.zeros(3), grade, kind)
     t, stamp = stamps(rng, length, other, offset, drift)
     field = np.array([0.4, 0.05, 0.9]) + np.column_stack(
         [sines(rng, t, 0.01, 0.3, DISTURBED[kind]) for _ in range(3)]
