@@ -104,7 +104,7 @@ def extrinsics(
 
 
 def _flag(place: str) -> str:
-    own = {"kind": "--kind", "other": "OTHER", "sensor": "--sensor"}
+    own = {"kind": "--kind", "other": "OTHER", "sensor": "--sensor", "offset_s": "--offset"}
     return own.get(place, LOG_FLAGS.get(place, LOG_FLAGS.get(f"log, {place}", place)))
 
 

@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown import rotation
+from strapdown.errors import DataError
 from strapdown.evaluation.second_log import (
     EvenRates,
     SecondLog,
@@ -350,6 +351,13 @@ class _Imus:
         self.middle = start.middle
         cells = np.arange(0, len(a.rate), THINNED)
         inside = self._covered(a, b, cells)
+        if inside.sum() < 10 * ORDER:
+            raise DataError(
+                "evaluation.offset-logs-share",
+                quantity="time",
+                offset=start.offset,
+                inside=float(inside.sum() * THINNED * step),
+            )
         self.cells = cells[inside]
         self.time = a.time[self.cells]
         spline = CubicSpline(a.time - a.start, a.rate[:, : len(columns)])

@@ -77,6 +77,8 @@ class _Magnetometer:
         begin, end = self.stamps[0] + offset, self.stamps[-1] + offset
         length = np.clip((end - begin) / WINDOWS, SHORTEST_WINDOW, LONGEST_WINDOW)
         inside = (time > begin + 0.5) & (time < end - 0.5)
+        if inside.sum() < LEAST:
+            raise DataError("extrinsics.too-few-readings", quantity="mag", count=int(inside.sum()))
         time, mag = time[inside], mag[inside]
         window = ((time - begin) / length).astype(np.int64)
         step = float(np.median(np.diff(time)))
@@ -297,6 +299,8 @@ def imu_to_magnetometer(
         kept = len(time) // many * many
         time = time[:kept].reshape(-1, many).mean(axis=1)
         mag = mag[:kept].reshape(-1, many, 3).mean(axis=1)
+    if time[-1] - time[0] < 2.0 * SHORTEST_WINDOW:
+        raise DataError("extrinsics.too-few-readings", quantity="mag", count=len(time))
     at, turn = _coarse_magnetometer(imu, time, mag, offset)
     fit = _Magnetometer(imu, time, mag, at, turn, apart)
     covariance, freedom, share = solve(fit)

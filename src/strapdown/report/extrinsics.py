@@ -222,7 +222,7 @@ def headline(result: ExtrinsicsRun) -> str:
     agree = {
         "gyro": ("rates", 1.0 / DEG, "deg/s"),
         "accel": ("specific forces", 1.0, "m/s²"),
-        "mag": ("field", 100.0, "%"),
+        "mag": ("fields", 100.0, "%"),
     }
     parts = [
         f"{agree[k][0]} differ by {agree[k][1] * after:.3g} {agree[k][2]}, before by "

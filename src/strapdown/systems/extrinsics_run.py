@@ -18,7 +18,8 @@ from strapdown.errors import DataError, Finding
 from strapdown.evaluation.extrinsics import OBSERVED, Estimate, Extrinsics, between_imus
 from strapdown.evaluation.magnetometer_extrinsics import imu_to_magnetometer
 from strapdown.evaluation.second_log import coarse_offset
-from strapdown.formats.aid_table import read_aid_table
+from strapdown.formats import holds
+from strapdown.formats.aid_table import read_aid_table, read_stream
 from strapdown.formats.clocks import on_clock_of
 from strapdown.progress import Progress, silent
 from strapdown.systems.alignment_source import body_record
@@ -189,7 +190,9 @@ def _magnetometer(
 
 def read_field(path: str | Path) -> pd.DataFrame:
     """Return the readings of a magnetometer, by time in s: of a stream, or of a table."""
-    return read_aid_table(path, dict.fromkeys(MAG, "uT"), stream="magnetometer")
+    if holds(Path(path), "magnetometer"):
+        return read_stream(path, "magnetometer")
+    return read_aid_table(path, dict.fromkeys(MAG, "uT"))
 
 
 def _open(result: Extrinsics, name: str) -> tuple[Finding, ...]:
