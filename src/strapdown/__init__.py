@@ -45,6 +45,7 @@ if TYPE_CHECKING:
     )
     from strapdown.api.crash import CrashRun, reconstruct
     from strapdown.api.doctor import Diagnosis, doctor
+    from strapdown.api.extrinsics import ExtrinsicsRun, extrinsics
     from strapdown.api.navigation import (
         Barometer,
         BodyVelocity,
@@ -107,6 +108,7 @@ __all__ = [
     "CrashUnit",
     "Diagnosis",
     "Entry",
+    "ExtrinsicsRun",
     "FineAlignment",
     "Gnss",
     "GnssFixes",
@@ -143,6 +145,7 @@ __all__ = [
     "compare_attitude",
     "compare_sensors",
     "doctor",
+    "extrinsics",
     "list_sensors",
     "magnetic_field",
     "motion_increments",
@@ -182,6 +185,7 @@ load_on_first_use(
         "OrientationFilter attitude calibrate_magnetometer compare_attitude",
         "api.crash": "CrashRun reconstruct",
         "api.doctor": "Diagnosis doctor",
+        "api.extrinsics": "ExtrinsicsRun extrinsics",
         "api.navigation": "Barometer BodyVelocity Gnss Heading Magnetometer Measurement "
         "NavigationRun NonHolonomic Odometer ZeroAngularRate ZeroVelocity navigate",
         "api.reading": "GnssFixes Imu Streams read read_gnss read_imu",

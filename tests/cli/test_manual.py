@@ -39,6 +39,7 @@ SLOW = {
     "convert",
     "crash_tutorial",
     "doctor",
+    "extrinsics",
     "navigate",
     "references",
     "scenarios",

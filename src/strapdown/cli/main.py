@@ -40,6 +40,7 @@ COMMANDS = (
     "doctor",
     "allan",
     "sensors",
+    "extrinsics",
     "attitude",
     "align",
     "navigate",

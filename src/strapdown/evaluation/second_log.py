@@ -15,7 +15,7 @@ from strapdown.dsp.delay import lag_correlation, repeats, top_peaks
 from strapdown.errors import DataError
 from strapdown.evaluation.differences import attitude_at
 from strapdown.increments import increments_from_imu
-from strapdown.tables import GYRO, THETA, attitude_table, check_imu, find_gaps, imu_table
+from strapdown.tables import GYRO, attitude_table, check_imu, find_gaps, imu_table
 
 if TYPE_CHECKING:
     from scipy.interpolate import CubicSpline
@@ -26,6 +26,7 @@ __all__ = [
     "align_second_log",
     "coarse_offset",
     "even_rates",
+    "even_values",
     "first_clock",
     "proper_rotation",
     "second_clock",
@@ -452,38 +453,43 @@ class CoarseOffset:
 
 
 def even_rates(imu: pd.DataFrame, step: float) -> EvenRates:
-    """Mean rates over the cells of a grid of `step` s, smoothed by a Gaussian of two cells.
-
-    From the integral of the rates, so that stamps in bursts are weighted by their interval.
-    """
-    from scipy.interpolate import CubicSpline
-    from scipy.ndimage import gaussian_filter1d
-
+    """Mean rates over the cells of a grid of `step` s, smoothed by a Gaussian of two cells."""
     time = imu.index.to_numpy(dtype=np.float64)
-    rate = imu[GYRO].to_numpy(dtype=np.float64)
-    origin, steps = time[0], np.diff(time)
-    n = int((time[-1] - origin) / step)
-    if n < 8:
+    if int((time[-1] - time[0]) / step) < 8:
         raise DataError(
             "evaluation.too-short-compared-another-log",
             file=imu.attrs.get("source"),
             quantity="time",
-            time=time[-1] - origin,
+            time=time[-1] - time[0],
             least_overlap=LEAST_OVERLAP,
         )
+    rate = imu[GYRO].to_numpy(dtype=np.float64)
+    return even_values(time, rate, step, mean=imu.attrs["sampling"] == "mean")
+
+
+def even_values(time: Array, values: Array, step: float, *, mean: bool) -> EvenRates:
+    """As `even_rates` of any values, (n, k), at stamps, (n,).
+
+    From the integral of the values, so that stamps in bursts are weighted by their interval.
+    """
+    from scipy.interpolate import CubicSpline
+    from scipy.ndimage import gaussian_filter1d
+
+    origin, steps = time[0], np.diff(time)
+    n = int((time[-1] - origin) / step)
     edges = step * np.arange(n + 1)
     even = steps.max() < 1.5 * np.median(steps)
-    if imu.attrs["sampling"] == "instantaneous" and even:
-        angle = CubicSpline(time - origin, rate).antiderivative()(edges)
+    if not mean and even:
+        summed = CubicSpline(time - origin, values).antiderivative()(edges)
     else:
         # A spline overshoots at uneven time stamps; the integral is kept in any case.
-        theta = increments_from_imu(imu)[THETA].to_numpy()
-        turned = np.vstack([np.zeros(3), np.cumsum(theta, axis=0)])
+        parts = values[1:] if mean else 0.5 * (values[:-1] + values[1:])
+        whole = np.vstack([np.zeros(values.shape[1]), np.cumsum(parts * steps[:, None], axis=0)])
         if even:
-            angle = CubicSpline(time - origin, turned)(edges)
+            summed = CubicSpline(time - origin, whole)(edges)
         else:
-            angle = np.column_stack([np.interp(edges, time - origin, c) for c in turned.T])
-    smooth = gaussian_filter1d(np.diff(angle, axis=0) / step, SMOOTH_CELLS, axis=0, truncate=5.0)
+            summed = np.column_stack([np.interp(edges, time - origin, c) for c in whole.T])
+    smooth = gaussian_filter1d(np.diff(summed, axis=0) / step, SMOOTH_CELLS, axis=0, truncate=5.0)
     middle = edges[:-1] + 0.5 * step
     known = np.ones(n, dtype=bool)
     reach = 5.0 * SMOOTH_CELLS * step

@@ -45,6 +45,7 @@ from strapdown.report.content import EQUAL, Comparison, compare_files, json_of
 from strapdown.report.crash_case import CRASH
 from strapdown.report.crash_simulation import write_crash_simulation
 from strapdown.report.doctor import DOCTOR
+from strapdown.report.extrinsics import EXTRINSICS
 from strapdown.report.navigation import NAVIGATION
 from strapdown.report.outage import OUTAGE
 from strapdown.report.report_bundle import ReportBundle
@@ -89,7 +90,7 @@ class Verification:
 #: Commands with a `ReportBundle`; ``attitude``, ``simulate`` and ``crash --live`` write theirs.
 BUNDLES: dict[str, ReportBundle[Any]] = {
     bundle.command: bundle
-    for bundle in (ALIGNMENT, ALLAN, SENSORS_BUNDLE, OUTAGE, CRASH, DOCTOR, NAVIGATION)
+    for bundle in (ALIGNMENT, ALLAN, SENSORS_BUNDLE, OUTAGE, CRASH, DOCTOR, EXTRINSICS, NAVIGATION)
 }
 
 

@@ -1,0 +1,123 @@
+"""``strapdown extrinsics``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from strapdown.cli.shared_options import (
+    LOG_FLAGS,
+    LogFlags,
+    ReportFlags,
+    Sensor,
+    as_flag,
+    folder_to_make,
+    log_keys,
+    running,
+    spread,
+)
+from strapdown.errors import ConfigError
+
+if TYPE_CHECKING:
+    from strapdown.progress import Progress
+    from strapdown.systems.extrinsics_run import ExtrinsicsRun
+
+EPILOG = (
+    "Example: strapdown extrinsics phone.csv unit.csv\n\n"
+    "Example: strapdown extrinsics drive.csv fixes.pos --sensor icm-42688-p"
+)
+MOST = 6  # findings on the terminal
+
+
+@spread
+def extrinsics(
+    log: Annotated[Path, typer.Argument(metavar="LOG", help="Log of gyros and accelerometers, a.")],
+    other: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="OTHER",
+            help="The other sensor, b: a second log, a magnetometer, fixes of an antenna; without "
+            "it, the magnetometer in LOG.",
+        ),
+    ] = None,
+    kind: Annotated[
+        str | None,
+        running("imu|magnetometer|gnss", "What OTHER is, if it is not found.", "--kind"),
+    ] = None,
+    offset: Annotated[
+        float | None,
+        running("S", "Clock of OTHER less that of LOG, to 0.3 s; searched, if not given."),
+    ] = None,
+    not_on_wheels: Annotated[
+        bool,
+        running(
+            None, "With fixes: the vehicle does not roll; no mounting angles.", "--not-on-wheels"
+        ),
+    ] = False,
+    sensor: Sensor = None,
+    other_axes: Annotated[
+        str | None, running("X,Y,Z", "Axes of OTHER, as --axes of LOG.", "--other-axes")
+    ] = None,
+    *,
+    flags: LogFlags,
+    out: Annotated[Path | None, folder_to_make("LOG-extrinsics")] = None,
+    write: ReportFlags,
+) -> None:
+    """Find rotation, lever arm and time offset between two sensors on one rigid body.
+
+    Two inertial units, a unit and a magnetometer, or a unit and a GNSS antenna (from a drive), each
+    with 95 % bounds, and with what the motion does not show.
+    """
+    from strapdown.api.extrinsics import extrinsics as find
+    from strapdown.cli.console import print_findings, print_seal
+    from strapdown.cli.result_folder import default_folder, refuse_result, run_and_save
+
+    refuse_result(log, "log")
+    keys: dict[str, Any] = {k: v for k, v in log_keys(flags.given()).items() if v}
+
+    def compute(report: Progress) -> ExtrinsicsRun:
+        try:
+            return find(
+                str(log),
+                None if other is None else str(other),
+                kind=kind,
+                offset=offset,
+                sensor=sensor,
+                wheels=not not_on_wheels,
+                axes=flags.axes,
+                other_axes=other_axes,
+                progress=report,
+                **keys,
+            )
+        except ConfigError as error:
+            raise as_flag(error, _flag) from None
+
+    folder = out or default_folder(log, "extrinsics")
+    done = run_and_save(compute, folder, write, "extrinsics.json")
+    if done is not None:
+        result, seal = done
+        print_extrinsics(result)
+        print_findings(result.findings, MOST)
+        print_seal(seal, "extrinsics.toml", write.no_report)
+
+
+def _flag(place: str) -> str:
+    own = {"kind": "--kind", "other": "OTHER", "sensor": "--sensor", "offset_s": "--offset"}
+    return own.get(place, LOG_FLAGS.get(place, LOG_FLAGS.get(f"log, {place}", place)))
+
+
+def print_extrinsics(result: ExtrinsicsRun) -> None:
+    """Print the parameters, and the lines for a navigation configuration."""
+    from strapdown.cli.console import console, print_block
+    from strapdown.report.extrinsics import headline, navigation_lines, table
+    from strapdown.report.values import spaced
+
+    out = console()
+    out.print(spaced(headline(result)), style="bold")
+    block = table(result)
+    print_block(block)
+    out.print(spaced(block.caption), style="dim")
+    if result.result.kind == "gnss":
+        out.print("\n" + "\n".join(navigation_lines(result)), markup=False, highlight=False)
