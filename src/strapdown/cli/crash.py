@@ -168,6 +168,7 @@ def print_crash(result: CaseResult) -> None:
         drive_table,
         indices_table,
         path_table,
+        reference_tables,
         severity_table,
     )
     from strapdown.report.crash_words import contradictions, headline, limitations
@@ -185,7 +186,8 @@ def print_crash(result: CaseResult) -> None:
         severity_table,
         indices_table,
     )
-    for block in (table(result) for table in tables):
+    blocks = [table(result) for table in tables]
+    for block in (*blocks, *reference_tables(result)):
         if block is not None and block.rows:
             print_block(block)
     out.print(spaced(headline(result)), style="bold")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -28,14 +29,15 @@ from strapdown.report.values import (
     instant,
     length_factor,
     length_unit,
+    mass_words,
     over_ground,
     plain,
     probability_words,
     recorder,
     resultant_words,
-    speed,
     speed_factor,
     speed_unit,
+    speed_words,
 )
 from strapdown.rotation import within_half_turn
 from strapdown.sensors.crash_unit import RecordedTriad
@@ -307,9 +309,9 @@ def _figure_row(
 
 
 def deformation_table(result: CaseResult) -> TableBlock | None:
-    """Crush of a vehicle, its energy of deformation, and the force that was measured on it."""
+    """Crush of a vehicle, and its energy of deformation."""
     found = result.deformation
-    if not found:
+    if not (found.crush or found.energy):
         return None
     row, per, per_unit = _figure_row, speed_factor(), speed_unit()
     rows = [
@@ -326,9 +328,6 @@ def deformation_table(result: CaseResult) -> TableBlock | None:
     ]
     rows.append(row("energy from residual crush and stiffness", found.energy, *energy_shown()))
     rows.append(row("energy-equivalent speed from it", found.equivalent_speed, per, 1, per_unit))
-    rows += [
-        row(f"impulse of {name}", impulse, *impulse_shown()) for name, impulse in found.impulses
-    ]
     return TableBlock(
         _FIGURES,
         tuple(one for one in rows if one is not None),
@@ -490,18 +489,27 @@ def reference_tables(result: CaseResult) -> tuple[TableBlock, ...]:
             (
                 *who,
                 f"{spec.axis}, {instant(answer.span[0])} to {instant(answer.span[1])}",
-                speed(answer.delta_v, TWO_SIDED_95 * answer.sd),
-                speed(spec.delta_v_m_per_s, TWO_SIDED_95 * spec.delta_v_sd_m_per_s),
+                *(plain(speed_factor() * v, 1) for v in (answer.delta_v, spec.delta_v_m_per_s)),
+                about(*(speed_factor() * v for v in answer.difference), ""),
                 verdict,
             )
         )
     names = axis_names(result)
     tables = (
         TableBlock(
-            ("reference", "recorder", "delta-V", "this report", "reference", "consistent"),
+            (
+                *("reference", "recorder", "delta-V"),
+                *(
+                    f"{name}, {speed_unit()}"
+                    for name in ("this report", "reference", "difference (95 %)")
+                ),
+                "consistent",
+            ),
             tuple(changes),
-            text=(0, 1, 2, 5),
-            caption="Delta-V of this report and of references, with 95 % bounds.",
+            text=(0, 1, 2, 6),
+            caption="Delta-V of this report less that of a reference. The 95 % bound of the "
+            "difference holds the bounds of both, and neither alone decides."
+            + "".join(_force_words(result)),
         ),
         TableBlock(
             (
@@ -516,6 +524,28 @@ def reference_tables(result: CaseResult) -> tuple[TableBlock, ...]:
         ),
     )
     return tuple(table for table in tables if table.rows)
+
+
+def _force_words(result: CaseResult) -> Iterator[str]:
+    """What the difference from a measured force holds."""
+    for name, impulse in result.deformation.impulses:
+        for answer in result.references:
+            if answer.spec.name == name and answer.unit == result.reconstruction.main.name:
+                mass = result.spec.vehicle.mass_kg
+                assert mass is not None
+                force = impulse.half_width / mass
+                given = TWO_SIDED_95 * answer.spec.delta_v_sd_m_per_s
+                rest = math.sqrt(max(given**2 - force**2, 0.0))
+                own, *parts = (
+                    f"± {speed_words(v)}" for v in (TWO_SIDED_95 * answer.sd, force, rest)
+                )
+                factor, places, unit = impulse_shown()
+                yield (
+                    f" {name}: an impulse of {plain(factor * impulse.value, places)} {unit} over "
+                    f"{mass_words(mass)}; the bound holds that of this report, {own}, of the "
+                    f"measured force, {parts[0]}, and of the mass and the friction of the tires, "
+                    f"which the force does not show, {parts[1]}."
+                )
 
 
 def _named(unit: str, result: CaseResult) -> str:
