@@ -357,7 +357,13 @@ def closure_table(result: CaseResult) -> TableBlock | None:
         row(f"separation speed {at}", closure.separation_speed, per, 1, per_unit),
         row("restitution", closure.restitution, 1.0, 2, ""),
         row(f"common velocity, along the impulse on {first}", common, per, 1, per_unit),
-        row(f"direction of the impulse on {first}", closure.direction_deg, 1.0, 1, "deg"),
+        row(
+            f"direction of the impulse on {first}",
+            closure.direction_deg,
+            1.0,
+            1,
+            "deg from forward",
+        ),
         row(f"mass of {second} over that of {first}", closure.mass_ratio, 1.0, 3, ""),
         row(f"impulse of {first} less that of {second}", closure.magnitude, *impulse_shown()),
         row("heading of the second less the first", closure.relative_heading_deg, 1.0, 1, "deg"),
@@ -455,6 +461,9 @@ def severity_table(result: CaseResult) -> TableBlock | None:
                 *((answer.model.source,) if len(sources) > 1 else ()),
             )
         )
+    main = result.reconstruction.main
+    kind = main.types[main_event(main) or 0].name
+    any_type = not any("crash_type" in answer.model.applies for answer in result.severity)
     combined = result.reconstruction.combined
     of = {answer.of for answer in result.severity}.pop()
     name = MEAN if combined is not None and of == combined.name else of
@@ -469,6 +478,7 @@ def severity_table(result: CaseResult) -> TableBlock | None:
         f"delta-V by {name} at the {result.spec.point.name}. The bound is due to delta-V and, "
         "where the model states their covariance or standard errors, to its coefficients; else it "
         "leaves the uncertainty of the model out."
+        + any_type * f" The model is of all types of impact together, not of this one ({kind})."
         + (f" Source: {sources[0]}" if len(sources) == 1 else ""),
     )
 
@@ -485,12 +495,13 @@ def reference_tables(result: CaseResult) -> tuple[TableBlock, ...]:
             paths.append((*who, *(plain(float(v), 3) for v in errors), verdict))
             continue
         assert spec.delta_v_m_per_s is not None
+        less, both = answer.difference
         changes.append(
             (
                 *who,
                 f"{spec.axis}, {instant(answer.span[0])} to {instant(answer.span[1])}",
                 *(plain(speed_factor() * v, 1) for v in (answer.delta_v, spec.delta_v_m_per_s)),
-                about(*(speed_factor() * v for v in answer.difference), ""),
+                about(speed_factor() * less, speed_factor() * both, ""),
                 verdict,
             )
         )
@@ -514,13 +525,13 @@ def reference_tables(result: CaseResult) -> tuple[TableBlock, ...]:
         TableBlock(
             (
                 *("reference", "recorder"),
-                *(f"{name}, RMS" for name in names),
-                *(f"{name}, largest" for name in names),
+                *(f"{name}, RMS, {length_unit()}" for name in names),
+                *(f"{name}, largest, {length_unit()}" for name in names),
                 "consistent",
             ),
             tuple(paths),
             text=(0, 1, 8),
-            caption=f"Errors of the path, {length_unit()}: this report − reference.",
+            caption="Errors of the path: this report − reference.",
         ),
     )
     return tuple(table for table in tables if table.rows)

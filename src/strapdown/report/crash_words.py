@@ -997,13 +997,14 @@ def clipping(result: CaseResult) -> Iterator[tuple[str, str, str]]:
 
 def assumed(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     """Return the unmeasured quantities, once for all recorders that share them."""
-    told: dict[str, list[str]] = {}
+    told: dict[tuple[str, str], list[str]] = {}
     for spec in result.spec.units:
-        given, parts = spec.assumed, []
+        given, parts, lacks = spec.assumed, [], []
         if given is None:
             continue
         span = f"between {instant(given.over_s[0])} and {instant(given.over_s[1])}"
         if given.turn_sd_deg is not None:
+            lacks.append("the rotation")
             parts.append(
                 "No gyro: the rotation of the vehicle is assumed to be zero with a standard "
                 f"deviation of {_each(given.turn_sd_deg, '°', 'roll, pitch and heading')} {span}."
@@ -1014,17 +1015,19 @@ def assumed(result: CaseResult) -> Iterator[tuple[str, str, str]]:
                 for name, column in zip(AXES, ("x", "y", "z"), strict=True)
                 if all(column not in t.channels for t in spec.accelerometers)
             ]
+            along = " and ".join(missing) or "an axis"
+            lacks.append(f"delta-V {along}")
             parts.append(
-                f"No accelerometer along {' and '.join(missing) or 'an axis'}: delta-V there is "
+                f"No accelerometer along {along}: delta-V there is "
                 "assumed to be zero with a standard deviation of "
                 f"{_each(given.delta_v_sd_m_per_s, ' m/s', 'x, y and z')} {span}."
             )
         parts.append("The bounds include this; they are wrong if the assumption is.")
         if given.because:
             parts.append(f"Reason stated: {given.because.rstrip('.')}.")
-        told.setdefault(" ".join(parts), []).append(spec.name)
-    for text, names in told.items():
-        yield "assumed", f"{', '.join(names)}: some axes were not measured", text
+        told.setdefault((" and ".join(lacks), " ".join(parts)), []).append(spec.name)
+    for (what, text), names in told.items():
+        yield "assumed", f"{', '.join(names)}: {what}, not measured but assumed", text
 
 
 def _each(sd: float | tuple[float, float, float], unit: str, names: str) -> str:
