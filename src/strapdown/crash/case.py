@@ -274,6 +274,12 @@ def run_case(
         for reference in stated
         for unit in dict.fromkeys((made.main, *made.units))
     )
+    # Indices of the vehicle, and of the occupants of that vehicle in its records.
+    number = main_event(made.main)
+    of_vehicle = () if number is None else vehicle_indices(made.main, number)
+    names = {(t.path, name.lstrip("-")) for t in _triads(spec) for name in t.channels.values()}
+    channels = [c for path, r in records.items() for c in r.channels if (path, c.name) in names]
+    vehicles = {c.vehicle for c in channels}
     return CaseResult(
         spec,
         inputs,
@@ -285,20 +291,8 @@ def run_case(
         references,
         tuple(dict.fromkeys(findings)),
         deformation=deformation,
-        indices=_indices(spec, records, made.main),
+        indices=of_vehicle + occupant_indices(tuple(records.values()), tuple(vehicles)),
     )
-
-
-def _indices(
-    spec: CaseSpec, records: Mapping[str, CrashRecord], main: UnitReconstruction
-) -> tuple[CrashIndex, ...]:
-    """Indices of the vehicle, and of the occupants of that vehicle in its records."""
-    number = main_event(main)
-    of_vehicle = () if number is None else vehicle_indices(main, number)
-    names = {(t.path, name.lstrip("-")) for t in _triads(spec) for name in t.channels.values()}
-    channels = [c for path, r in records.items() for c in r.channels if (path, c.name) in names]
-    vehicles = {c.vehicle for c in channels}
-    return of_vehicle + occupant_indices(tuple(records.values()), tuple(vehicles))
 
 
 def whole_records(spec: CaseSpec) -> tuple[dict[str, CrashRecord], CaseSpec]:

@@ -411,6 +411,8 @@ def rotation_findings(
 
 # Directions with a larger standard deviation count as unobserved.
 MOST_ARM_SD = 0.1  # m
+# So many intervals before and after one in which a body turns alike.
+TURNS_ALIKE = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -455,9 +457,9 @@ def body_turning(increments: Sequence[VelocityIncrements]) -> Turning | None:
     Errors of the angular acceleration times the stated lever arm are in the difference of two
     units, and times the position error in its effect. Where a body hardly turns both are errors,
     and the same: the difference is exactly that of units that are not apart. So the changes of rate
-    δ between the edges count as white of an unknown variance, by their mean square less that of
-    their errors, plus these. The conditional mean of the true δ given the measured one makes the
-    lever, and the difference less its own conditional mean is independent of it.
+    δ between the edges count as white of a variance by their mean square over neighboring intervals
+    less that of their errors, plus these. The conditional mean of the true δ given the measured one
+    makes the lever, and the difference less its own conditional mean is independent of it.
     """
     seen = [v for v in increments if v.lever.any()]
     if not seen:
@@ -477,8 +479,10 @@ def body_turning(increments: Sequence[VelocityIncrements]) -> Turning | None:
     columns = np.concatenate([v.reshape(-1, change.size, 2) for v in shared.values()])
     slope, arm = columns.transpose(2, 1, 0)
     noise = slope @ slope.T
-    power = (np.square(change) - np.diag(noise)).reshape(-1, 3).mean(axis=0)
-    true = np.tile(np.maximum(power, 0.0), len(lever))
+    power = (np.square(change) - np.diag(noise)).reshape(-1, 3)
+    number = np.arange(len(power))
+    near = np.abs(number[:, None] - number) <= TURNS_ALIKE
+    true = np.maximum(near @ power / near.sum(axis=1, keepdims=True), 0.0).ravel()
     weighed = np.linalg.solve(
         floored(np.diag(true) + noise), np.column_stack([change, slope @ arm.T])
     )
@@ -874,7 +878,24 @@ def compare_pair(
         code = "crash.measure-no-axis-common-not"
         findings.append(Finding(code, file=first.name, quantity="delta-V", name=second.name))
     elif not agree:
-        findings.append(_disagreement(first, second, edges, curve, sd, chi, freedom, probability))
+        ratio = np.abs(curve[1:]) / np.where(sd[1:] > 0.0, sd[1:], np.inf) + 0.0 * sd[1:]
+        row, axis = np.unravel_index(int(np.nanargmax(ratio)), ratio.shape)
+        share = f"{probability:.1g}" if probability > 1e-12 else "less than 1e-12"
+        findings.append(
+            Finding(
+                "crash.disagree-their-common-point-chi",
+                file=first.name,
+                quantity="delta-V",
+                name=second.name,
+                chi=chi,
+                freedom=freedom,
+                share=share,
+                axes=AXES[axis],
+                edges=edges[row + 1],
+                curve=curve[row + 1, axis],
+                sd=sd[row + 1, axis],
+            )
+        )
     found = axis_findings(axes, first.name, second.name)
     if whole and not found and first.prepared is not None and second.prepared is not None:
         # A small rotation or a wrong position is not meaningful while axes are swapped.
@@ -1087,7 +1108,10 @@ def _against_all(
                 chi_square_tail(chi, freedom),
             )
         )
-    several = measured_by_any(units)
+    # Orthonormal columns spanning the directions that at least one unit measures, (3, r).
+    measured = np.mean([np.eye(3) - u.unmeasured for u in units], axis=0)
+    values, vectors = np.linalg.eigh(measured)
+    several = np.asarray(vectors[:, values > ROUNDING])
     told = np.where(measured_axes(several), 0.0, np.nan)
     return (
         _curve(combined, kept) + told,
@@ -1111,34 +1135,6 @@ def _curve_sd(covariance: Array, kept: Flags) -> Array:
     total = np.kron(np.tril(np.ones((m, m)))[:, kept], np.eye(3))
     variance = np.maximum(np.einsum("ij,jk,ik->i", total, covariance, total), 0.0)
     return np.vstack([np.zeros(3), np.sqrt(variance).reshape(-1, 3)])
-
-
-def _disagreement(
-    first: PointKinematics,
-    second: PointKinematics,
-    edges: Array,
-    curve: Array,
-    sd: Array,
-    chi: float,
-    freedom: int,
-    probability: float,
-) -> Finding:
-    ratio = np.abs(curve[1:]) / np.where(sd[1:] > 0.0, sd[1:], np.inf) + 0.0 * sd[1:]
-    row, axis = np.unravel_index(int(np.nanargmax(ratio)), ratio.shape)
-    share = f"{probability:.1g}" if probability > 1e-12 else "less than 1e-12"
-    return Finding(
-        "crash.disagree-their-common-point-chi",
-        file=first.name,
-        quantity="delta-V",
-        name=second.name,
-        chi=chi,
-        freedom=freedom,
-        share=share,
-        axes=AXES[axis],
-        edges=edges[row + 1],
-        curve=curve[row + 1, axis],
-        sd=sd[row + 1, axis],
-    )
 
 
 def _left_out(unit: PointKinematics, edges: Array, cut: Flags) -> Finding:
@@ -1339,13 +1335,6 @@ def measured_by_all(units: Sequence[PointKinematics]) -> Array:
         return np.eye(3)
     values, vectors = np.linalg.eigh(total)
     return np.asarray(vectors[:, values < ROUNDING])
-
-
-def measured_by_any(units: Sequence[PointKinematics]) -> Array:
-    """Orthonormal columns spanning the directions that at least one unit measures, (3, r)."""
-    measured = np.mean([np.eye(3) - u.unmeasured for u in units], axis=0)
-    values, vectors = np.linalg.eigh(measured)
-    return np.asarray(vectors[:, values > ROUNDING])
 
 
 def measured_axes(basis: Array) -> NDArray[np.bool_]:
