@@ -763,21 +763,60 @@ GRAVE = frozenset(
 
 def limitations(result: CaseResult) -> tuple[tuple[str, str, str], ...]:
     """Return code, head and text of each limitation that applies to a case."""
-    return (
-        *_event(result),
-        *clipping(result),
-        *_disagreement(result),
-        *_contradicted(result),
-        *_not_closed(result),
-        *assumed(result),
-        *rest(result),
-        *borrowed(result),
-        *_alone(result),
-        *ringing(result),
-        *_levers(result),
-        *_entry(result),
-        *_no_reference(result),
-    )
+    return tuple(_limitations(result))
+
+
+def _limitations(result: CaseResult) -> Iterator[tuple[str, str, str]]:
+    yield from _event(result)
+    yield from clipping(result)
+    yield from _disagreement(result)
+    for answer in result.references:
+        if answer.unit == result.reconstruction.main.name and not answer.consistent:
+            source = (
+                f" Source of the reference: {answer.spec.source}." if answer.spec.source else ""
+            )
+            yield (
+                "reference-contradicts",
+                f"Inconsistent with the reference {answer.spec.name}",
+                f"The difference exceeds the 95 % bound of both; see Reference comparison.{source}",
+            )
+    closure = result.closure
+    if closure is not None and closure.contradicted:
+        yield (
+            "vehicles-do-not-close",
+            f"{' and '.join((*result.vehicle_names, 'the barrier')[:2])} do not close",
+            "Momentum, closing speed or restitution of the two vehicles contradict each other "
+            "beyond their bounds: a record, a mass, a heading or an entry speed is wrong. See "
+            "Closure with the other vehicle."
+            if result.partners
+            else "Closing speed or restitution is not that of a rigid barrier that stands still: "
+            "what it met, the entry speed or a record is wrong. See Contact and deformation.",
+        )
+    yield from assumed(result)
+    yield from rest(result)
+    yield from borrowed(result)
+    if len(result.units) == 1:
+        yield (
+            "one-recorder",
+            "Only one recorder",
+            "An error that is not stated, such as an axis with a wrong sign, a wrong mounting "
+            "position or a loose bracket, cannot be detected.",
+        )
+    yield from ringing(result)
+    yield from _levers(result)
+    if result.spec.entry.kind == "speed":
+        yield (
+            "entry-speed-stated",
+            "The entry speed is not from these records",
+            "It shifts all velocities and the path; delta-V and direction of force do not depend "
+            "on it.",
+        )
+    if not result.references:
+        yield (
+            "no-reference",
+            "No reference",
+            "No film, survey or other measurement of the crash was given.",
+        )
 
 
 def _event(result: CaseResult) -> Iterator[tuple[str, str, str]]:
@@ -861,31 +900,6 @@ def _disagreement(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     )
 
 
-def _not_closed(result: CaseResult) -> Iterator[tuple[str, str, str]]:
-    closure = result.closure
-    if closure is not None and closure.contradicted:
-        yield (
-            "vehicles-do-not-close",
-            f"{' and '.join((*result.vehicle_names, 'the barrier')[:2])} do not close",
-            "Momentum, closing speed or restitution of the two vehicles contradict each other "
-            "beyond their bounds: a record, a mass, a heading or an entry speed is wrong. See "
-            "Closure with the other vehicle."
-            if result.partners
-            else "Closing speed or restitution is not that of a rigid barrier that stands still: "
-            "what it met, the entry speed or a record is wrong. See Contact and deformation.",
-        )
-
-
-def _alone(result: CaseResult) -> Iterator[tuple[str, str, str]]:
-    if len(result.units) == 1:
-        yield (
-            "one-recorder",
-            "Only one recorder",
-            "An error that is not stated, such as an axis with a wrong sign, a wrong mounting "
-            "position or a loose bracket, cannot be detected.",
-        )
-
-
 def _levers(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     point = np.asarray(result.spec.point.position_m)
     longest, name = max(
@@ -910,38 +924,6 @@ def _levers(result: CaseResult) -> Iterator[tuple[str, str, str]]:
             "The vehicle is assumed to be rigid",
             f"This applies between each recorder and the {told}. A floor or pillar that deformed "
             "in between moved differently.",
-        )
-
-
-def _entry(result: CaseResult) -> Iterator[tuple[str, str, str]]:
-    if result.spec.entry.kind == "speed":
-        yield (
-            "entry-speed-stated",
-            "The entry speed is not from these records",
-            "It shifts all velocities and the path; delta-V and direction of force do not depend "
-            "on it.",
-        )
-
-
-def _contradicted(result: CaseResult) -> Iterator[tuple[str, str, str]]:
-    for answer in result.references:
-        if answer.unit == result.reconstruction.main.name and not answer.consistent:
-            source = (
-                f" Source of the reference: {answer.spec.source}." if answer.spec.source else ""
-            )
-            yield (
-                "reference-contradicts",
-                f"Inconsistent with the reference {answer.spec.name}",
-                f"The difference exceeds the 95 % bound of both; see Reference comparison.{source}",
-            )
-
-
-def _no_reference(result: CaseResult) -> Iterator[tuple[str, str, str]]:
-    if not result.references:
-        yield (
-            "no-reference",
-            "No reference",
-            "No film, survey or other measurement of the crash was given.",
         )
 
 
