@@ -14,8 +14,16 @@ from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.acceleration import window_weights
 from strapdown.crash.measuring_point import LEVER_ARM, MOUNTING, NO_TURNING, PointKinematics
-from strapdown.crash.single_error import OFF_MOUNTING, OFF_POSITION, OFF_SCALE, single_error
-from strapdown.crash.structure import LARGEST_SHARE, Structure, learn_share, unlearnt
+from strapdown.crash.structure import (
+    LARGEST_SHARE,
+    OFF_MOUNTING,
+    OFF_POSITION,
+    OFF_SCALE,
+    Structure,
+    learn_share,
+    single_error,
+    unlearnt,
+)
 from strapdown.dsp.chi_square import chi_square_above
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.sensors.unmeasured import NO_GYRO
