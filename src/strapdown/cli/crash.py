@@ -168,25 +168,28 @@ def print_crash(result: CaseResult) -> None:
         drive_table,
         indices_table,
         path_table,
+        reference_tables,
         severity_table,
     )
     from strapdown.report.crash_words import contradictions, headline, limitations
     from strapdown.report.values import spaced
 
     out = console()
-    tables = (
-        answers_table,
-        path_table,
-        drive_table,
-        comparison_table,
+    tables = [
+        ("Delta-V", answers_table(result)),
+        ("Path", path_table(result)),
+        ("Errors by the drive before the crash", drive_table(result)),
+        ("Recorders compared: differences of delta-V", comparison_table(result)),
         # That of two vehicles is printed once, below both.
-        *([] if result.partners else [closure_table]),
-        deformation_table,
-        severity_table,
-        indices_table,
-    )
-    for block in (table(result) for table in tables):
+        ("Contact", None if result.partners else closure_table(result)),
+        ("Deformation", deformation_table(result)),
+        ("Probability of injury", severity_table(result)),
+        ("Indices", indices_table(result)),
+        *(("Reference", block) for block in reference_tables(result)),
+    ]
+    for name, block in tables:
         if block is not None and block.rows:
+            out.print(name, style="bold")
             print_block(block)
     out.print(spaced(headline(result)), style="bold")
     against = contradictions(result)

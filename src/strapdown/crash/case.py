@@ -274,6 +274,12 @@ def run_case(
         for reference in stated
         for unit in dict.fromkeys((made.main, *made.units))
     )
+    # Indices of the vehicle, and of the occupants of that vehicle in its records.
+    number = main_event(made.main)
+    of_vehicle = () if number is None else vehicle_indices(made.main, number)
+    names = {(t.path, name.lstrip("-")) for t in _triads(spec) for name in t.channels.values()}
+    channels = [c for path, r in records.items() for c in r.channels if (path, c.name) in names]
+    vehicles = {c.vehicle for c in channels}
     return CaseResult(
         spec,
         inputs,
@@ -285,20 +291,8 @@ def run_case(
         references,
         tuple(dict.fromkeys(findings)),
         deformation=deformation,
-        indices=_indices(spec, records, made.main),
+        indices=of_vehicle + occupant_indices(tuple(records.values()), tuple(vehicles)),
     )
-
-
-def _indices(
-    spec: CaseSpec, records: Mapping[str, CrashRecord], main: UnitReconstruction
-) -> tuple[CrashIndex, ...]:
-    """Indices of the vehicle, and of the occupants of that vehicle in its records."""
-    number = main_event(main)
-    of_vehicle = () if number is None else vehicle_indices(main, number)
-    names = {(t.path, name.lstrip("-")) for t in _triads(spec) for name in t.channels.values()}
-    channels = [c for path, r in records.items() for c in r.channels if (path, c.name) in names]
-    vehicles = {c.vehicle for c in channels}
-    return of_vehicle + occupant_indices(tuple(records.values()), tuple(vehicles))
 
 
 def whole_records(spec: CaseSpec) -> tuple[dict[str, CrashRecord], CaseSpec]:
@@ -550,7 +544,7 @@ class ReferenceAnswer:
     """Comparison of one unit's answer with a reference: a path, or a delta-V over a span in s.
 
     `delta_v` and `sd`, m/s, are NaN for a path. `consistent`: the difference is within the 95 %
-    bound of both together.
+    bound of both together, or a record of a part of the change leaves it open.
     """
 
     spec: ReferenceSpec
@@ -561,6 +555,13 @@ class ReferenceAnswer:
     delta_v: float
     sd: float
     consistent: bool
+
+    @property
+    def difference(self) -> tuple[float, float]:
+        """Delta-V of the unit less that of the reference, and its 95 % bound, m/s."""
+        assert self.spec.delta_v_m_per_s is not None
+        together = TWO_SIDED_95 * math.hypot(self.sd, self.spec.delta_v_sd_m_per_s)
+        return self.delta_v - self.spec.delta_v_m_per_s, together
 
 
 def _reference_table(spec: ReferenceSpec) -> pd.DataFrame:
@@ -646,14 +647,12 @@ def compare_reference(
         axis = AXES[spec.axis]
         value = float(change.vector @ axis)
         sd = bound.along(axis)
-    together = TWO_SIDED_95 * math.hypot(sd, spec.delta_v_sd_m_per_s)
-    more = spec.delta_v_m_per_s - value
-    near = abs(more) <= together
+    answer = ReferenceAnswer(spec, unit.name, None, None, (start, end), value, sd, False)
+    less, together = answer.difference
     along = (1.0, 1.0, 1.0) if spec.axis == "resultant" else AXES[spec.axis]
-    if any(o and a for o, a in zip(is_open, along, strict=True)):
-        # A part is consistent with every change that continues it.
-        near |= more * value >= 0.0
-    return ReferenceAnswer(spec, unit.name, None, None, (start, end), value, sd, near)
+    # A part is consistent with every change that continues it.
+    continued = any(o and a for o, a in zip(is_open, along, strict=True)) and less * value <= 0.0
+    return replace(answer, consistent=abs(less) <= together or continued)
 
 
 # Severity of a case by published models.

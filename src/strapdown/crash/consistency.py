@@ -14,8 +14,16 @@ from strapdown import rotation
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.crash.acceleration import window_weights
 from strapdown.crash.measuring_point import LEVER_ARM, MOUNTING, NO_TURNING, PointKinematics
-from strapdown.crash.single_error import OFF_MOUNTING, OFF_POSITION, OFF_SCALE, single_error
-from strapdown.crash.structure import LARGEST_SHARE, Structure, learn_share, unlearnt
+from strapdown.crash.structure import (
+    LARGEST_SHARE,
+    OFF_MOUNTING,
+    OFF_POSITION,
+    OFF_SCALE,
+    Structure,
+    learn_share,
+    single_error,
+    unlearnt,
+)
 from strapdown.dsp.chi_square import chi_square_above
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.sensors.unmeasured import NO_GYRO
@@ -35,7 +43,9 @@ class VelocityIncrements:
     of a position error (true minus stated) on the values. `force_noise`, (3 m, 3 m), (m/s)²:
     covariance from accelerometer noise. `arm_noise`, m/s, and `turned_noise`, rad, (3 m, q): effect
     of one standard deviation of each of q independent numbers, the gyro noise, on the values
-    through the lever arm and on the rotation. Units that borrow a `gyro` have the same numbers.
+    through the lever arm and on the rotation; `slopes`, (3 m, p + q), rad/s: effect of the unknowns
+    and of these numbers on the changes of rate of which `lever` consists. Units that borrow a
+    `gyro` have the same numbers.
     """
 
     edges: Array
@@ -49,6 +59,7 @@ class VelocityIncrements:
     force_noise: Array
     arm_noise: Array
     turned_noise: Array
+    slopes: Array
     gyro: str
 
     def of_pieces(self, kept: NDArray[np.bool_]) -> VelocityIncrements:
@@ -66,6 +77,7 @@ class VelocityIncrements:
             force_noise=self.force_noise[np.ix_(rows, rows)],
             arm_noise=self.arm_noise[rows],
             turned_noise=self.turned_noise[rows],
+            slopes=self.slopes[rows],
         )
 
     def bent_by(self, structure: Structure, kept: NDArray[np.bool_]) -> VelocityIncrements:
@@ -218,8 +230,8 @@ def velocity_increments(unit: PointKinematics, edges: Array) -> VelocityIncremen
     )
 
 
-def _noise(unit: PointKinematics, weights: Array) -> tuple[Array, Array, Array]:
-    """Effect of the sample noise on sums with weights, (m, n), s: the three of the increments.
+def _noise(unit: PointKinematics, weights: Array) -> tuple[Array, Array, Array, Array]:
+    """Effect of the sample noise on sums with weights, (m, n), s: the four of the increments.
 
     Gyro noise through the lever arm keeps its correlation from sample to sample: it nearly cancels
     in a change of velocity.
@@ -241,12 +253,20 @@ def _noise(unit: PointKinematics, weights: Array) -> tuple[Array, Array, Array]:
         turning = _root(prepared.gyro_noise_covariance[within])
     blocks = np.einsum("an,nij,bn->aibj", few, own, few, optimize=True)
     turned = np.einsum("an,nik->aink", few, turning).reshape(3 * m, -1)
-    if moved is None or not moved.lever_arm.any():
-        arm = np.zeros_like(turned)
-    else:
-        by_rate = moved.of_rates_in_sums(weights)[:, within]
-        arm = np.einsum("anij,njk->aink", by_rate, turning).reshape(3 * m, -1)
-    return blocks.reshape(3 * m, 3 * m), arm, turned
+    arm = np.zeros_like(turned)
+    slopes = np.zeros((3 * m, len(effects.names) + turned.shape[1]))
+    if moved is not None:
+        by_slope = moved.slope.weighted(weights)[0][:, within]
+        slopes = np.hstack(
+            [
+                np.einsum("an,pni->aip", by_slope, effects.rate[:, within]).reshape(3 * m, -1),
+                np.einsum("an,nik->aink", by_slope, turning).reshape(3 * m, -1),
+            ]
+        )
+        if moved.lever_arm.any():
+            by_rate = moved.of_rates_in_sums(weights)[:, within]
+            arm = np.einsum("anij,njk->aink", by_rate, turning).reshape(3 * m, -1)
+    return blocks.reshape(3 * m, 3 * m), arm, turned, slopes
 
 
 def _diagonal(sd: Array) -> Array:
@@ -399,6 +419,8 @@ def rotation_findings(
 
 # Directions with a larger standard deviation count as unobserved.
 MOST_ARM_SD = 0.1  # m
+# So many intervals before and after one in which a body turns alike.
+TURNS_ALIKE = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -422,21 +444,80 @@ class LeverArmCheck:
         return cls(np.zeros(3), np.eye(3), np.full(3, np.inf), np.zeros(3, dtype=bool), 0.0)
 
 
-def check_lever_arm(first: VelocityIncrements, second: VelocityIncrements) -> LeverArmCheck:
+@dataclass(frozen=True, eq=False)
+class Turning:
+    """What the rates of one body, measured by several units, say of lever arms.
+
+    `lever`, (3 m, 3), 1/s: effect of a position error on the increments, without the errors of the
+    rates. `shift`, (3 m,), m/s, and `known`, (3 m, 3 m), (m/s)²: mean and covariance of the part of
+    the difference of the increments, first unit less second, that these errors make by the stated
+    lever arms, as far as the rates show it: both are to be subtracted.
+    """
+
+    lever: Array
+    shift: Array
+    known: Array
+
+
+def body_turning(increments: Sequence[VelocityIncrements]) -> Turning | None:
+    """Estimate the turning of the body of one or two units; None without rates.
+
+    Errors of the angular acceleration times the stated lever arm are in the difference of two
+    units, and times the position error in its effect. Where a body hardly turns both are errors,
+    and the same: the difference is exactly that of units that are not apart. So the changes of rate
+    δ between the edges count as white of a variance by their mean square over neighboring intervals
+    less that of their errors, plus these. The conditional mean of the true δ given the measured one
+    makes the lever, and the difference less its own conditional mean is independent of it.
+    """
+    seen = [v for v in increments if v.lever.any()]
+    if not seen:
+        return None
+    lever = np.mean([v.lever for v in seen], axis=0).reshape(-1, 3, 3)
+    across = 0.5 * (lever - np.swapaxes(lever, 1, 2))
+    change = across[:, [2, 0, 1], [1, 2, 0]].ravel()
+    shared: dict[object, Array] = {}
+    for v, sign in zip(increments, (1.0, -1.0), strict=False):
+        share = 1.0 / len(seen) if v.lever.any() else 0.0
+        both = np.stack([share * v.slopes, sign * np.hstack([v.effects, v.arm_noise])], axis=2)
+        names = len(v.names)
+        parts = dict(zip(v.names, both[:, :names].transpose(1, 0, 2), strict=True))
+        numbers = both[:, names:].transpose(1, 0, 2)
+        for key, one in (*parts.items(), ((v.gyro, len(numbers)), numbers)):
+            shared[key] = shared[key] + one if key in shared else one
+    columns = np.concatenate([v.reshape(-1, change.size, 2) for v in shared.values()])
+    slope, arm = columns.transpose(2, 1, 0)
+    noise = slope @ slope.T
+    power = (np.square(change) - np.diag(noise)).reshape(-1, 3)
+    number = np.arange(len(power))
+    near = np.abs(number[:, None] - number) <= TURNS_ALIKE
+    true = np.maximum(near @ power / near.sum(axis=1, keepdims=True), 0.0).ravel()
+    weighed = np.linalg.solve(
+        floored(np.diag(true) + noise), np.column_stack([change, slope @ arm.T])
+    )
+    turned = rotation.cross_matrix((true * weighed[:, 0]).reshape(-1, 3))
+    return Turning(
+        (lever - across + turned).reshape(-1, 3),
+        arm @ (slope.T @ weighed[:, 0]),
+        arm @ (slope.T @ weighed[:, 1:]),
+    )
+
+
+def check_lever_arm(
+    first: VelocityIncrements, second: VelocityIncrements, turning: Turning | None
+) -> LeverArmCheck:
     """Estimate the error of the stated relative position of two units, moved to one point.
 
     Position errors e₁ and e₂ (true minus stated) differ by ``([α×] + [ω×]²) (e₁ - e₂)``:
     generalized least squares, with noise and all unknowns but the positions as covariance. The
     component along a fixed axis of rotation is not observable; the normal matrix shows which
-    directions are. Noise of the angular acceleration biases the estimate toward zero by its share
-    of the signal power.
+    directions are. `turning`: of their body.
     """
-    shares = [v.lever for v in (first, second) if v.lever.any()]
-    if not shares:
+    if turning is None:
         return LeverArmCheck.untold()
-    lever = np.mean(shares, axis=0)
-    difference = (first.values - second.values).ravel()
-    covariance = floored(difference_covariance(first, second, without=(LEVER_ARM,)))
+    lever = turning.lever
+    difference = (first.values - second.values).ravel() - turning.shift
+    covariance = difference_covariance(first, second, without=(LEVER_ARM,)) - turning.known
+    covariance = floored(covariance)
     weighed = np.linalg.solve(covariance, np.column_stack([lever, difference]))
     normal = lever.T @ weighed[:, :3]
     values, vectors = np.linalg.eigh(0.5 * (normal + normal.T))
@@ -789,9 +870,10 @@ def compare_pair(
     force[1, kept] = np.sqrt(variance).reshape(-1, 3) / lengths + told
     findings: list[Finding] = []
     whole = not (first.assumed_axes or second.assumed_axes) and bool(kept.any())
+    body = body_turning((a, b)) if whole else None
     if whole:
         # Swapped axes make more of a difference than any structure, which would hide them.
-        turned, lever = mounting_rotation(a, b), check_lever_arm(a, b)
+        turned, lever = mounting_rotation(a, b), check_lever_arm(a, b, body)
         axes = match_axes(*((a, b) if probability >= level else stiff), turned.matrix)
     else:
         # The checks of relative mounting need three measured axes and a gyro on both units.
@@ -804,7 +886,24 @@ def compare_pair(
         code = "crash.measure-no-axis-common-not"
         findings.append(Finding(code, file=first.name, quantity="delta-V", name=second.name))
     elif not agree:
-        findings.append(_disagreement(first, second, edges, curve, sd, chi, freedom, probability))
+        ratio = np.abs(curve[1:]) / np.where(sd[1:] > 0.0, sd[1:], np.inf) + 0.0 * sd[1:]
+        row, axis = np.unravel_index(int(np.nanargmax(ratio)), ratio.shape)
+        share = f"{probability:.1g}" if probability > 1e-12 else "less than 1e-12"
+        findings.append(
+            Finding(
+                "crash.disagree-their-common-point-chi",
+                file=first.name,
+                quantity="delta-V",
+                name=second.name,
+                chi=chi,
+                freedom=freedom,
+                share=share,
+                axes=AXES[axis],
+                edges=edges[row + 1],
+                curve=curve[row + 1, axis],
+                sd=sd[row + 1, axis],
+            )
+        )
     found = axis_findings(axes, first.name, second.name)
     if whole and not found and first.prepared is not None and second.prepared is not None:
         # A small rotation or a wrong position is not meaningful while axes are swapped.
@@ -821,7 +920,9 @@ def compare_pair(
         # Without a gyro a turning makes the same differences.
         error = None
         if turning is None:
-            effects = _single_effects((first, second), stiff, kept)
+            effects = _single_effects((first, second), stiff, kept, body)
+            if body is not None:
+                difference, plain = difference - body.shift, floored(plain - body.known)
             error = single_error(effects, structure, edges, kept, difference, plain, level)
         if error is not None:
             agree = False
@@ -854,6 +955,7 @@ def _single_effects(
     units: tuple[PointKinematics, PointKinematics],
     increments: tuple[VelocityIncrements, VelocityIncrements],
     kept: Flags,
+    turning: Turning | None,
 ) -> dict[str, Array]:
     """Effects, (3 m, r), of errors of one of two units on their difference: `single_error`."""
     felt = np.mean([v.values for v in increments], axis=0)
@@ -865,9 +967,8 @@ def _single_effects(
         OFF_SCALE: np.outer(felt @ along, along).reshape(-1, 1),
         OFF_MOUNTING: -rotation.cross_matrix(felt).reshape(-1, 3),
     }
-    levers = [v.lever for v in increments if v.lever.any()]
-    if levers:
-        effects[OFF_POSITION] = np.mean(levers, axis=0)
+    if turning is not None:
+        effects[OFF_POSITION] = turning.lever
     return effects
 
 
@@ -1015,7 +1116,10 @@ def _against_all(
                 chi_square_tail(chi, freedom),
             )
         )
-    several = measured_by_any(units)
+    # Orthonormal columns spanning the directions that at least one unit measures, (3, r).
+    measured = np.mean([np.eye(3) - u.unmeasured for u in units], axis=0)
+    values, vectors = np.linalg.eigh(measured)
+    several = np.asarray(vectors[:, values > ROUNDING])
     told = np.where(measured_axes(several), 0.0, np.nan)
     return (
         _curve(combined, kept) + told,
@@ -1039,34 +1143,6 @@ def _curve_sd(covariance: Array, kept: Flags) -> Array:
     total = np.kron(np.tril(np.ones((m, m)))[:, kept], np.eye(3))
     variance = np.maximum(np.einsum("ij,jk,ik->i", total, covariance, total), 0.0)
     return np.vstack([np.zeros(3), np.sqrt(variance).reshape(-1, 3)])
-
-
-def _disagreement(
-    first: PointKinematics,
-    second: PointKinematics,
-    edges: Array,
-    curve: Array,
-    sd: Array,
-    chi: float,
-    freedom: int,
-    probability: float,
-) -> Finding:
-    ratio = np.abs(curve[1:]) / np.where(sd[1:] > 0.0, sd[1:], np.inf) + 0.0 * sd[1:]
-    row, axis = np.unravel_index(int(np.nanargmax(ratio)), ratio.shape)
-    share = f"{probability:.1g}" if probability > 1e-12 else "less than 1e-12"
-    return Finding(
-        "crash.disagree-their-common-point-chi",
-        file=first.name,
-        quantity="delta-V",
-        name=second.name,
-        chi=chi,
-        freedom=freedom,
-        share=share,
-        axes=AXES[axis],
-        edges=edges[row + 1],
-        curve=curve[row + 1, axis],
-        sd=sd[row + 1, axis],
-    )
 
 
 def _left_out(unit: PointKinematics, edges: Array, cut: Flags) -> Finding:
@@ -1267,13 +1343,6 @@ def measured_by_all(units: Sequence[PointKinematics]) -> Array:
         return np.eye(3)
     values, vectors = np.linalg.eigh(total)
     return np.asarray(vectors[:, values < ROUNDING])
-
-
-def measured_by_any(units: Sequence[PointKinematics]) -> Array:
-    """Orthonormal columns spanning the directions that at least one unit measures, (3, r)."""
-    measured = np.mean([np.eye(3) - u.unmeasured for u in units], axis=0)
-    values, vectors = np.linalg.eigh(measured)
-    return np.asarray(vectors[:, values > ROUNDING])
 
 
 def measured_axes(basis: Array) -> NDArray[np.bool_]:

@@ -11,6 +11,7 @@ from strapdown import rotation
 from strapdown.crash.consistency import (
     UnitComparison,
     VelocityIncrements,
+    body_turning,
     clipped_pieces,
     compare_pair,
     velocity_increments,
@@ -38,7 +39,10 @@ def _opposite(one: VelocityIncrements) -> VelocityIncrements:
 
 
 def _moved(one: VelocityIncrements) -> VelocityIncrements:
-    off = (one.lever @ (POSITION * np.array([1.0, 1.0, 0.0]))).reshape(-1, 3)
+    turning = body_turning((one,))
+    if turning is None:
+        return one
+    off = (turning.lever @ (POSITION * np.array([1.0, 1.0, 0.0]))).reshape(-1, 3)
     return replace(one, values=one.values + off)
 
 

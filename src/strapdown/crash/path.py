@@ -381,7 +381,14 @@ def reconstruct_path(
     q_nb = begin.state.q_nb
     start = there.carried(start, q_nb, turned=origin.attitude_deg is not None)
     state = replace(begin.state, v_n=begin.state.v_n + there.gained(q_nb))
-    padded = _padded(effects, len(names) - len(effects.names))
+    # Effects extended by unknowns that act on no sample.
+    more = len(names) - len(effects.names)
+    none = np.zeros((more, len(effects.force_noise), 3))
+    padded = replace(
+        effects,
+        force=np.concatenate([effects.force, none]),
+        rate=np.concatenate([effects.rate, none]),
+    )
     back = make_leg(mechanization, state, imu, padded, slice(first, anchor + 1), backward=True)
     ahead = make_leg(mechanization, state, imu, padded, slice(anchor, last + 1), backward=False)
     origin = replace(origin, velocity=triad_of(begin.state.v_n))
@@ -500,16 +507,6 @@ def _turning(imu: pd.DataFrame, rate: Array) -> pd.DataFrame:
     out.attrs = dict(imu.attrs)
     out[GYRO] += rate
     return out
-
-
-def _padded(effects: SampleEffects, more: int) -> SampleEffects:
-    """Effects extended by unknowns that act on no sample."""
-    none = np.zeros((more, len(effects.force_noise), 3))
-    return replace(
-        effects,
-        force=np.concatenate([effects.force, none]),
-        rate=np.concatenate([effects.rate, none]),
-    )
 
 
 def _joined(

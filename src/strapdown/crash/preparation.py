@@ -596,67 +596,42 @@ def saturation_findings(
     unit: CrashUnit, data: UnitArrays, limits: Sequence[RangeLimits], gyro_limits: RangeLimits
 ) -> list[Finding]:
     """Report clipping of the last range or the gyro, and ranges unlike the stated ones."""
-    found = []
-    last = len(limits) - 1
-    for j, (triad, limit) in enumerate(zip(unit.accelerometers, limits, strict=True)):
-        found += _ends(unit, triad, limit, "m/s²", "accel")
-        if j == last:
-            found += _clipped(unit, triad, data.time, limit, "accel")
     assert unit.gyro is not None
-    found += _ends(unit, unit.gyro, gyro_limits, "rad/s", "gyro")
-    found += _clipped(unit, unit.gyro, data.time, gyro_limits, "gyro")
-    return found
-
-
-def _ends(
-    unit: CrashUnit, triad: RecordedTriad, limits: RangeLimits, u: str, quantity: str
-) -> list[Finding]:
+    triads = [*zip(unit.accelerometers, limits, strict=True), (unit.gyro, gyro_limits)]
     found = []
-    stated = triad.uncertainty.axis("full_scale")
-    for k, axis in enumerate("xyz"):
-        source = f"{unit.name}, {triad.name}"
-        if limits.found[k]:
-            found.append(
-                Finding(
-                    "crash.held-between-stated-full-scale",
-                    file=source,
-                    quantity=f"{quantity}_{axis}",
-                    lower=limits.lower[k],
-                    upper=limits.upper[k],
-                    u=u,
-                    stated=stated[k],
+    for j, (triad, limit) in enumerate(triads):
+        kind, u = ("accel", "m/s²") if j < len(limits) else ("gyro", "rad/s")
+        file, stated = f"{unit.name}, {triad.name}", triad.uncertainty.axis("full_scale")
+        for k, axis in enumerate("xyz"):
+            here: dict[str, Any] = {"file": file, "quantity": f"{kind}_{axis}"}
+            if limit.found[k]:
+                found.append(
+                    Finding(
+                        "crash.held-between-stated-full-scale",
+                        **here,
+                        lower=limit.lower[k],
+                        upper=limit.upper[k],
+                        u=u,
+                        stated=stated[k],
+                    )
                 )
-            )
-        if limits.beyond[k]:
-            found.append(
-                Finding(
-                    "crash.reads-more-than-stated-full",
-                    file=source,
-                    quantity=f"{quantity}_{axis}",
-                    stated=stated[k],
-                    u=u,
+            if limit.beyond[k]:
+                code = "crash.reads-more-than-stated-full"
+                found.append(Finding(code, **here, stated=stated[k], u=u))
+        for k, axis in enumerate("xyz"):
+            rows = np.flatnonzero(limit.clipped[:, k])
+            # A wider range holds what ends a lower one.
+            if rows.size and j + 1 >= len(limits):
+                found.append(
+                    Finding(
+                        f"crash.{kind}-clipped",
+                        file=file,
+                        quantity=f"{kind}_{axis}",
+                        count=rows.size,
+                        first=data.time[rows[0]],
+                        last=data.time[rows[-1]],
+                    )
                 )
-            )
-    return found
-
-
-def _clipped(
-    unit: CrashUnit, triad: RecordedTriad, time: Array, limits: RangeLimits, quantity: str
-) -> list[Finding]:
-    found = []
-    for k, axis in enumerate("xyz"):
-        rows = np.flatnonzero(limits.clipped[:, k])
-        if rows.size:
-            found.append(
-                Finding(
-                    f"crash.{quantity}-clipped",
-                    file=f"{unit.name}, {triad.name}",
-                    quantity=f"{quantity}_{axis}",
-                    count=rows.size,
-                    first=time[rows[0]],
-                    last=time[rows[-1]],
-                )
-            )
     return found
 
 

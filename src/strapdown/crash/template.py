@@ -222,6 +222,10 @@ def draft_cases(records: Sequence[CrashRecord], *, folder: str | Path = ".") -> 
         facts = {**(of_test.facts if of_test else {}), **labels.get(vehicle, {})}
         name = facts.get("vehicle", "")
         title = of_test.title if of_test else ""
+        # The database numbers makes and models; its title has their names after the year.
+        named = re.search(rf"\b{name[-4:]} \D.+", title) if name.startswith("make ") else None
+        if named and len(units) == 1:
+            name = facts["vehicle"] = named.group()
         if title and len(units) > 1:
             title = f"{title}, vehicle {vehicle}"
         # What belongs to no vehicle that has a case is stated in each.

@@ -64,7 +64,22 @@ def _run(configuration: dict[str, Any]) -> CaseResult:
 def _write(
     result: CaseResult, folder: Path, name: str, forms: tuple[str, ...], progress: Progress
 ) -> None:
-    _write_numbers(result, folder)
+    system = result.spec.options.units
+    write_json(folder / "crash.json", crash_json(result))
+    with shown_in(system):
+        told = as_comments(crash_words.conventions())
+    main = result.reconstruction.main
+    table = _table_in(system, trajectory_table(main.path))
+    write_table(table, folder / "trajectory.csv", told)
+    answers, formats = result.reconstruction.answers, result.spec.options.formats
+    made: set[str] = set()
+    for unit in answers if "csv" in formats else ():
+        own = file_name(unit.name, made)
+        write_table(_table_in(system, signals_table(unit)), folder / f"signals-{own}.csv", told)
+    if "mme" in formats:
+        spec = result.spec
+        record = signal_record(spec.title, spec.point.name, answers, spec.options.rate_hz)
+        write_mme(folder / "mme", record)
     if forms:
         from strapdown.report.crash_document import crash_document
         from strapdown.report.document_html import write_report
@@ -82,25 +97,6 @@ def _write(
 
 #: Page, PDF, JSON, tables and figures of a crash case.
 CRASH = ReportBundle("crash", _configuration, _run, _write, pdf=True)
-
-
-def _write_numbers(result: CaseResult, folder: Path) -> None:
-    system = result.spec.options.units
-    write_json(folder / "crash.json", crash_json(result))
-    with shown_in(system):
-        told = as_comments(crash_words.conventions())
-    main = result.reconstruction.main
-    table = _table_in(system, trajectory_table(main.path))
-    write_table(table, folder / "trajectory.csv", told)
-    answers, formats = result.reconstruction.answers, result.spec.options.formats
-    made: set[str] = set()
-    for unit in answers if "csv" in formats else ():
-        own = file_name(unit.name, made)
-        write_table(_table_in(system, signals_table(unit)), folder / f"signals-{own}.csv", told)
-    if "mme" in formats:
-        spec = result.spec
-        record = signal_record(spec.title, spec.point.name, answers, spec.options.rate_hz)
-        write_mme(folder / "mme", record)
 
 
 def file_name(name: str, made: set[str]) -> str:

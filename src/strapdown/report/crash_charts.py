@@ -228,20 +228,14 @@ def delta_v_chart(
     return Chart(
         f"delta-v-{event + 1}" if many else "delta-v",
         title,
-        _caption(bool(stated)),
-        SINCE_TRIGGER,
-        tuple(panels),
-        marks=event_marks([found], *span),
-    )
-
-
-def _caption(stated: bool) -> str:
-    return (
         "Change of velocity of the reference point since the onset of the contact, in the axes of "
         "the vehicle, less the specific force at rest; forward, right, down are positive, so "
         "braking is negative. Shaded: 95 % at an exact time; the bar at the end "
         "of the contact includes the uncertainty of that end."
-        + (" Symbols with bars: stated by others, with their 95 % bounds." if stated else "")
+        + (" Symbols with bars: stated by others, with their 95 % bounds." if stated else ""),
+        SINCE_TRIGGER,
+        tuple(panels),
+        marks=event_marks([found], *span),
     )
 
 
@@ -669,7 +663,16 @@ def risk_chart(
         if not x.size:
             continue
         style = look(len(lines) // 3)
-        lines.append(Line(_name(model), x, 100.0 * y, style["colour"], style["dash"], 1.8))
+        lines.append(
+            Line(
+                f"{model.outcome}: {model.author} {model.year}, {model.table}",
+                x,
+                100.0 * y,
+                style["colour"],
+                style["dash"],
+                1.8,
+            )
+        )
         at = np.array([speed_factor() * delta_v])
         bound = 100.0 * np.array([risk.low, risk.high])
         upright = np.repeat(at, 2)
@@ -724,10 +727,6 @@ def _curve(
         x.append(speed_factor() * value)
         y.append(risk.probability)
     return np.array(x), np.array(y)
-
-
-def _name(model: SeverityModel) -> str:
-    return f"{model.outcome}: {model.author} {model.year}, {model.table}"
 
 
 def _percent(share: float) -> str:

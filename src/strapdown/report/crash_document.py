@@ -262,9 +262,15 @@ def _document(result: CaseResult, name: str) -> Document:
             folded=True,
         ),
     )
+    vehicle = result.spec.vehicle
+    size = ""
+    if not vehicle.outline_m:
+        sides = (length_factor() * v for v in (vehicle.length_m, vehicle.width_m))
+        size = " × ".join(f"{v:.4g} {length_unit()}" for v in sides).replace(" ", GAP)
+    mass = "" if vehicle.mass_kg is None else mass_words(vehicle.mass_kg)
     facts = (
         ("Case", spec.number),
-        ("Vehicle", _vehicle(result)),
+        ("Vehicle", ", ".join(part for part in (vehicle.name, mass, size) if part)),
         ("Reference point", spec.point.name + _place(spec.point.position_m)),
         ("Recorders", ", ".join(u.name for u in result.units)),
         ("Author", spec.author),
@@ -309,16 +315,6 @@ def _place(position: tuple[float, float, float]) -> str:
         return ""
     there = ", ".join(plain(length_factor() * v, 2) for v in position)
     return f" ({there} {length_unit()} from the origin)"
-
-
-def _vehicle(result: CaseResult) -> str:
-    vehicle = result.spec.vehicle
-    size = ""
-    if not vehicle.outline_m:
-        sides = (length_factor() * v for v in (vehicle.length_m, vehicle.width_m))
-        size = " × ".join(f"{v:.4g} {length_unit()}" for v in sides).replace(" ", GAP)
-    mass = "" if vehicle.mass_kg is None else mass_words(vehicle.mass_kg)
-    return ", ".join(part for part in (vehicle.name, mass, size) if part)
 
 
 def _records(result: CaseResult) -> Iterator[Block]:

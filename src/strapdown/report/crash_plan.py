@@ -161,18 +161,18 @@ def path_plan(
     _draw_legend(out, legend, bottom + 8.0)
     if small:
         return Picture("path-front", out.svg(), "Path from above", _SMALL_CAPTION, alt, 92.0)
-    return Picture("path", out.svg(), "Path from above", _caption(names, short), alt)
-
-
-def _caption(names: tuple[str, str], short: bool) -> str:
     axes = (
         "north up" if names[0] == "north" else "axes forward and right of the vehicle at the entry"
     )
-    return (
+    return Picture(
+        "path",
+        out.svg(),
+        "Path from above",
         f"Path of the reference point from above, {axes}, in m from its position at the entry; "
         "equal scales. Shaded: 95 % ellipses along the path; they grow from the entry, where the "
         "position is zero by definition. Outlines: the vehicle at the named instants, turned by "
-        "its heading. Dots every 100 ms." + (" Right: the path alone, enlarged." if short else "")
+        "its heading. Dots every 100 ms." + (" Right: the path alone, enlarged." if short else ""),
+        alt,
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -28,14 +29,15 @@ from strapdown.report.values import (
     instant,
     length_factor,
     length_unit,
+    mass_words,
     over_ground,
     plain,
     probability_words,
     recorder,
     resultant_words,
-    speed,
     speed_factor,
     speed_unit,
+    speed_words,
 )
 from strapdown.rotation import within_half_turn
 from strapdown.sensors.crash_unit import RecordedTriad
@@ -307,9 +309,9 @@ def _figure_row(
 
 
 def deformation_table(result: CaseResult) -> TableBlock | None:
-    """Crush of a vehicle, its energy of deformation, and the force that was measured on it."""
+    """Crush of a vehicle, and its energy of deformation."""
     found = result.deformation
-    if not found:
+    if not (found.crush or found.energy):
         return None
     row, per, per_unit = _figure_row, speed_factor(), speed_unit()
     rows = [
@@ -326,9 +328,6 @@ def deformation_table(result: CaseResult) -> TableBlock | None:
     ]
     rows.append(row("energy from residual crush and stiffness", found.energy, *energy_shown()))
     rows.append(row("energy-equivalent speed from it", found.equivalent_speed, per, 1, per_unit))
-    rows += [
-        row(f"impulse of {name}", impulse, *impulse_shown()) for name, impulse in found.impulses
-    ]
     return TableBlock(
         _FIGURES,
         tuple(one for one in rows if one is not None),
@@ -358,7 +357,13 @@ def closure_table(result: CaseResult) -> TableBlock | None:
         row(f"separation speed {at}", closure.separation_speed, per, 1, per_unit),
         row("restitution", closure.restitution, 1.0, 2, ""),
         row(f"common velocity, along the impulse on {first}", common, per, 1, per_unit),
-        row(f"direction of the impulse on {first}", closure.direction_deg, 1.0, 1, "deg"),
+        row(
+            f"direction of the impulse on {first}",
+            closure.direction_deg,
+            1.0,
+            1,
+            "deg from forward",
+        ),
         row(f"mass of {second} over that of {first}", closure.mass_ratio, 1.0, 3, ""),
         row(f"impulse of {first} less that of {second}", closure.magnitude, *impulse_shown()),
         row("heading of the second less the first", closure.relative_heading_deg, 1.0, 1, "deg"),
@@ -456,6 +461,9 @@ def severity_table(result: CaseResult) -> TableBlock | None:
                 *((answer.model.source,) if len(sources) > 1 else ()),
             )
         )
+    main = result.reconstruction.main
+    kind = main.types[main_event(main) or 0].name
+    any_type = not any("crash_type" in answer.model.applies for answer in result.severity)
     combined = result.reconstruction.combined
     of = {answer.of for answer in result.severity}.pop()
     name = MEAN if combined is not None and of == combined.name else of
@@ -470,6 +478,7 @@ def severity_table(result: CaseResult) -> TableBlock | None:
         f"delta-V by {name} at the {result.spec.point.name}. The bound is due to delta-V and, "
         "where the model states their covariance or standard errors, to its coefficients; else it "
         "leaves the uncertainty of the model out."
+        + any_type * f" The model is of all types of impact together, not of this one ({kind})."
         + (f" Source: {sources[0]}" if len(sources) == 1 else ""),
     )
 
@@ -486,36 +495,68 @@ def reference_tables(result: CaseResult) -> tuple[TableBlock, ...]:
             paths.append((*who, *(plain(float(v), 3) for v in errors), verdict))
             continue
         assert spec.delta_v_m_per_s is not None
+        less, both = answer.difference
         changes.append(
             (
                 *who,
                 f"{spec.axis}, {instant(answer.span[0])} to {instant(answer.span[1])}",
-                speed(answer.delta_v, TWO_SIDED_95 * answer.sd),
-                speed(spec.delta_v_m_per_s, TWO_SIDED_95 * spec.delta_v_sd_m_per_s),
+                *(plain(speed_factor() * v, 1) for v in (answer.delta_v, spec.delta_v_m_per_s)),
+                about(speed_factor() * less, speed_factor() * both, ""),
                 verdict,
             )
         )
     names = axis_names(result)
     tables = (
         TableBlock(
-            ("reference", "recorder", "delta-V", "this report", "reference", "consistent"),
+            (
+                *("reference", "recorder", "delta-V"),
+                *(
+                    f"{name}, {speed_unit()}"
+                    for name in ("this report", "reference", "difference (95 %)")
+                ),
+                "consistent",
+            ),
             tuple(changes),
-            text=(0, 1, 2, 5),
-            caption="Delta-V of this report and of references, with 95 % bounds.",
+            text=(0, 1, 2, 6),
+            caption="Delta-V of this report less that of a reference. The 95 % bound of the "
+            "difference holds the bounds of both, and neither alone decides."
+            + "".join(_force_words(result)),
         ),
         TableBlock(
             (
                 *("reference", "recorder"),
-                *(f"{name}, RMS" for name in names),
-                *(f"{name}, largest" for name in names),
+                *(f"{name}, RMS, {length_unit()}" for name in names),
+                *(f"{name}, largest, {length_unit()}" for name in names),
                 "consistent",
             ),
             tuple(paths),
             text=(0, 1, 8),
-            caption=f"Errors of the path, {length_unit()}: this report − reference.",
+            caption="Errors of the path: this report − reference.",
         ),
     )
     return tuple(table for table in tables if table.rows)
+
+
+def _force_words(result: CaseResult) -> Iterator[str]:
+    """What the difference from a measured force holds."""
+    for name, impulse in result.deformation.impulses:
+        for answer in result.references:
+            if answer.spec.name == name and answer.unit == result.reconstruction.main.name:
+                mass = result.spec.vehicle.mass_kg
+                assert mass is not None
+                force = impulse.half_width / mass
+                given = TWO_SIDED_95 * answer.spec.delta_v_sd_m_per_s
+                rest = math.sqrt(max(given**2 - force**2, 0.0))
+                own, *parts = (
+                    f"± {speed_words(v)}" for v in (TWO_SIDED_95 * answer.sd, force, rest)
+                )
+                factor, places, unit = impulse_shown()
+                yield (
+                    f" {name}: an impulse of {plain(factor * impulse.value, places)} {unit} over "
+                    f"{mass_words(mass)}; the bound holds that of this report, {own}, of the "
+                    f"measured force, {parts[0]}, and of the mass and the friction of the tires, "
+                    f"which the force does not show, {parts[1]}."
+                )
 
 
 def _named(unit: str, result: CaseResult) -> str:

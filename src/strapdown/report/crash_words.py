@@ -14,7 +14,8 @@ from strapdown.crash.case import CaseResult
 from strapdown.crash.case_contact import OF_DRIVES, main_event
 from strapdown.crash.closure import Closure
 from strapdown.crash.delta_v_bound import VelocityChange
-from strapdown.crash.pdof import Pdof
+from strapdown.crash.measuring_point import MISSING_AXIS, NO_TURNING
+from strapdown.crash.pdof import AngleInterval, Pdof
 from strapdown.crash.reconstruction import UnitReconstruction
 from strapdown.errors import Finding
 from strapdown.formats.crash_record import CrashRecord
@@ -84,7 +85,7 @@ def headline(result: CaseResult) -> str:
     low = f" ({change_range(whole)})" if whole.at_least else ""
     return (
         f"Delta-V {change_words(whole)}{low}; {direction_name(whole)} "
-        f"{direction(unit, number)}; {TYPES[unit.types[number].name]}."
+        f"{direction(result, number)}; {TYPES[unit.types[number].name]}."
     )
 
 
@@ -93,15 +94,22 @@ def direction_name(change: VelocityChange) -> str:
     return "direction of force" + (" of the recorded part" if change.at_least else "")
 
 
-def direction(unit: UnitReconstruction, number: int) -> str:
+def direction(result: CaseResult, number: int) -> str:
     """Return the direction of force of an event with its bound."""
-    whole = unit.body[number].event
+    whole = result.reconstruction.main.body[number].event
     across = whole.interval.horizontal
     if across.undetermined:
         return angle_range(across)
     angle = whole.pdof
     assert isinstance(angle, Pdof)
-    return f"{plain(angle.horizontal_deg, 1)}° ({angle_range(across)}), {angle.clock} o'clock"
+    found = direction_range(result, across)
+    return f"{plain(angle.horizontal_deg, 1)}° ({found}), {angle.clock} o'clock"
+
+
+def direction_range(result: CaseResult, across: AngleInterval) -> str:
+    """Return the bound of the direction of force, and whether it is an assumption."""
+    assumed = "direction of force" in on_assumption(result)
+    return angle_range(across) + ", by assumption" * assumed
 
 
 def key_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
@@ -139,7 +147,7 @@ def key_figures(result: CaseResult) -> tuple[KeyFigure, ...]:
             KeyFigure(
                 direction_name(whole).capitalize(),
                 value,
-                angle_range(across),
+                direction_range(result, across),
                 "0° the front, clockwise from above",
             )
         )
@@ -179,7 +187,7 @@ def lead(result: CaseResult) -> str:
             f"{result.spec.point.name} changed by {change_words(whole)} ("
             f"{change_words(whole, unit=SHOWN.get().beside)}; all bounds are 95 %), "
             f"{side_words(forward, right)}. {direction_name(whole).capitalize()}: "
-            f"{direction(unit, number)}; {TYPES[unit.types[number].name]}."
+            f"{direction(result, number)}; {TYPES[unit.types[number].name]}."
         )
         if whole.at_least:
             parts.append(f"{incomplete_words(whole)} The change is {change_range(whole)}.")
@@ -196,7 +204,9 @@ def lead(result: CaseResult) -> str:
         entry_words(result),
         path_words(result),
         units_words(result),
+        *references_words(result),
         closure_words(result),
+        assumption_words(result),
     ]
     return " ".join(p for p in parts if p)
 
@@ -254,6 +264,49 @@ def closure_words(result: CaseResult) -> str:
         value, low, high = (plain(x, 2) for x in (figure.value, figure.low, figure.high))
         parts.append(f"the restitution {value} ({low} to {high})")
     return "; ".join(parts) + "."
+
+
+def references_words(result: CaseResult) -> Iterator[str]:
+    """Return what references of delta-V say that do not contradict the result."""
+    main = result.reconstruction.main.name
+    for answer in result.references:
+        if answer.path is None and answer.consistent and answer.unit == main:
+            yield (
+                f"It is consistent with {answer.spec.name}, from which its {answer.spec.axis} "
+                f"delta-V differs by {speed(*answer.difference)}."
+            )
+
+
+#: Contributors of the error budget that a case assumes instead of a measurement.
+ASSUMED = (NO_TURNING, MISSING_AXIS)
+
+
+def on_assumption(result: CaseResult) -> tuple[str, ...]:
+    """Numbers of page one whose bound is by assumptions for the most part of its variance."""
+    unit, names = result.reconstruction.main, axis_names(result)
+    number, out = main_event(unit), []
+    if number is not None:
+        whole = unit.body[number].event
+        forward, right, _ = whole.delta_v.vector
+        across = np.array([-right, forward, 0.0])
+        for name, along in (("delta-V", whole.delta_v.vector), ("direction of force", across)):
+            if along.any():
+                out.append((name, whole.bound.shares(along)))
+    ends = unit.path.variances()[NED]
+    for name, axis in zip(names[:2], NED, strict=False):
+        out.append((f"position {name}", ends[axis] / (ends[axis].sum() or 1.0)))
+    return tuple(name for name, shares in out if shares[shares.index.isin(ASSUMED)].sum() > 0.5)
+
+
+def assumption_words(result: CaseResult) -> str:
+    """Return which numbers of page one rest on assumptions; empty where none does."""
+    found = on_assumption(result)
+    if not found:
+        return ""
+    axes = dict.fromkeys(a for u in result.reconstruction.units for a in u.at_point.assumed_axes)
+    return (
+        f"Not measured but assumed: {', '.join(axes)}. On this assumption rest: {', '.join(found)}."
+    )
 
 
 def _barrier_words(result: CaseResult, closure: Closure) -> str:
@@ -591,9 +644,11 @@ def contradictions(result: CaseResult) -> tuple[tuple[str, str], ...]:
             text = f"Its path differs {at} by {differs} (this report less the reference)."
         else:
             assert spec.delta_v_m_per_s is not None
-            own = speed(answer.delta_v, TWO_SIDED_95 * answer.sd)
-            given = speed(spec.delta_v_m_per_s, TWO_SIDED_95 * spec.delta_v_sd_m_per_s)
-            text = f"Its {spec.axis} delta-V is {given}; this report has {own}."
+            text = (
+                f"Its {spec.axis} delta-V is {speed_words(spec.delta_v_m_per_s)}; that of this "
+                f"report, {speed_words(answer.delta_v)}, differs from it by "
+                f"{speed(*answer.difference)} (95 %)."
+            )
         rows.append((spec.name, text))
     found = [f for f in result.findings if f.code in AGAINST]
     return (*rows, *notes(found, result, remedies=False))
@@ -708,21 +763,60 @@ GRAVE = frozenset(
 
 def limitations(result: CaseResult) -> tuple[tuple[str, str, str], ...]:
     """Return code, head and text of each limitation that applies to a case."""
-    return (
-        *_event(result),
-        *clipping(result),
-        *_disagreement(result),
-        *_contradicted(result),
-        *_not_closed(result),
-        *assumed(result),
-        *rest(result),
-        *borrowed(result),
-        *_alone(result),
-        *ringing(result),
-        *_levers(result),
-        *_entry(result),
-        *_no_reference(result),
-    )
+    return tuple(_limitations(result))
+
+
+def _limitations(result: CaseResult) -> Iterator[tuple[str, str, str]]:
+    yield from _event(result)
+    yield from clipping(result)
+    yield from _disagreement(result)
+    for answer in result.references:
+        if answer.unit == result.reconstruction.main.name and not answer.consistent:
+            source = (
+                f" Source of the reference: {answer.spec.source}." if answer.spec.source else ""
+            )
+            yield (
+                "reference-contradicts",
+                f"Inconsistent with the reference {answer.spec.name}",
+                f"The difference exceeds the 95 % bound of both; see Reference comparison.{source}",
+            )
+    closure = result.closure
+    if closure is not None and closure.contradicted:
+        yield (
+            "vehicles-do-not-close",
+            f"{' and '.join((*result.vehicle_names, 'the barrier')[:2])} do not close",
+            "Momentum, closing speed or restitution of the two vehicles contradict each other "
+            "beyond their bounds: a record, a mass, a heading or an entry speed is wrong. See "
+            "Closure with the other vehicle."
+            if result.partners
+            else "Closing speed or restitution is not that of a rigid barrier that stands still: "
+            "what it met, the entry speed or a record is wrong. See Contact and deformation.",
+        )
+    yield from assumed(result)
+    yield from rest(result)
+    yield from borrowed(result)
+    if len(result.units) == 1:
+        yield (
+            "one-recorder",
+            "Only one recorder",
+            "An error that is not stated, such as an axis with a wrong sign, a wrong mounting "
+            "position or a loose bracket, cannot be detected.",
+        )
+    yield from ringing(result)
+    yield from _levers(result)
+    if result.spec.entry.kind == "speed":
+        yield (
+            "entry-speed-stated",
+            "The entry speed is not from these records",
+            "It shifts all velocities and the path; delta-V and direction of force do not depend "
+            "on it.",
+        )
+    if not result.references:
+        yield (
+            "no-reference",
+            "No reference",
+            "No film, survey or other measurement of the crash was given.",
+        )
 
 
 def _event(result: CaseResult) -> Iterator[tuple[str, str, str]]:
@@ -806,31 +900,6 @@ def _disagreement(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     )
 
 
-def _not_closed(result: CaseResult) -> Iterator[tuple[str, str, str]]:
-    closure = result.closure
-    if closure is not None and closure.contradicted:
-        yield (
-            "vehicles-do-not-close",
-            f"{' and '.join((*result.vehicle_names, 'the barrier')[:2])} do not close",
-            "Momentum, closing speed or restitution of the two vehicles contradict each other "
-            "beyond their bounds: a record, a mass, a heading or an entry speed is wrong. See "
-            "Closure with the other vehicle."
-            if result.partners
-            else "Closing speed or restitution is not that of a rigid barrier that stands still: "
-            "what it met, the entry speed or a record is wrong. See Contact and deformation.",
-        )
-
-
-def _alone(result: CaseResult) -> Iterator[tuple[str, str, str]]:
-    if len(result.units) == 1:
-        yield (
-            "one-recorder",
-            "Only one recorder",
-            "An error that is not stated, such as an axis with a wrong sign, a wrong mounting "
-            "position or a loose bracket, cannot be detected.",
-        )
-
-
 def _levers(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     point = np.asarray(result.spec.point.position_m)
     longest, name = max(
@@ -855,38 +924,6 @@ def _levers(result: CaseResult) -> Iterator[tuple[str, str, str]]:
             "The vehicle is assumed to be rigid",
             f"This applies between each recorder and the {told}. A floor or pillar that deformed "
             "in between moved differently.",
-        )
-
-
-def _entry(result: CaseResult) -> Iterator[tuple[str, str, str]]:
-    if result.spec.entry.kind == "speed":
-        yield (
-            "entry-speed-stated",
-            "The entry speed is not from these records",
-            "It shifts all velocities and the path; delta-V and direction of force do not depend "
-            "on it.",
-        )
-
-
-def _contradicted(result: CaseResult) -> Iterator[tuple[str, str, str]]:
-    for answer in result.references:
-        if answer.unit == result.reconstruction.main.name and not answer.consistent:
-            source = (
-                f" Source of the reference: {answer.spec.source}." if answer.spec.source else ""
-            )
-            yield (
-                "reference-contradicts",
-                f"Inconsistent with the reference {answer.spec.name}",
-                f"The difference exceeds the 95 % bound of both; see Reference comparison.{source}",
-            )
-
-
-def _no_reference(result: CaseResult) -> Iterator[tuple[str, str, str]]:
-    if not result.references:
-        yield (
-            "no-reference",
-            "No reference",
-            "No film, survey or other measurement of the crash was given.",
         )
 
 
@@ -942,13 +979,14 @@ def clipping(result: CaseResult) -> Iterator[tuple[str, str, str]]:
 
 def assumed(result: CaseResult) -> Iterator[tuple[str, str, str]]:
     """Return the unmeasured quantities, once for all recorders that share them."""
-    told: dict[str, list[str]] = {}
+    told: dict[tuple[str, str], list[str]] = {}
     for spec in result.spec.units:
-        given, parts = spec.assumed, []
+        given, parts, lacks = spec.assumed, [], []
         if given is None:
             continue
         span = f"between {instant(given.over_s[0])} and {instant(given.over_s[1])}"
         if given.turn_sd_deg is not None:
+            lacks.append("the rotation")
             parts.append(
                 "No gyro: the rotation of the vehicle is assumed to be zero with a standard "
                 f"deviation of {_each(given.turn_sd_deg, '°', 'roll, pitch and heading')} {span}."
@@ -959,17 +997,19 @@ def assumed(result: CaseResult) -> Iterator[tuple[str, str, str]]:
                 for name, column in zip(AXES, ("x", "y", "z"), strict=True)
                 if all(column not in t.channels for t in spec.accelerometers)
             ]
+            along = " and ".join(missing) or "an axis"
+            lacks.append(f"delta-V {along}")
             parts.append(
-                f"No accelerometer along {' and '.join(missing) or 'an axis'}: delta-V there is "
+                f"No accelerometer along {along}: delta-V there is "
                 "assumed to be zero with a standard deviation of "
                 f"{_each(given.delta_v_sd_m_per_s, ' m/s', 'x, y and z')} {span}."
             )
         parts.append("The bounds include this; they are wrong if the assumption is.")
         if given.because:
             parts.append(f"Reason stated: {given.because.rstrip('.')}.")
-        told.setdefault(" ".join(parts), []).append(spec.name)
-    for text, names in told.items():
-        yield "assumed", f"{', '.join(names)}: some axes were not measured", text
+        told.setdefault((" and ".join(lacks), " ".join(parts)), []).append(spec.name)
+    for (what, text), names in told.items():
+        yield "assumed", f"{', '.join(names)}: {what}, not measured but assumed", text
 
 
 def _each(sd: float | tuple[float, float, float], unit: str, names: str) -> str:

@@ -1,6 +1,6 @@
 """Operating curve of the comparison of two points: share reported against the size of an error.
 
-`python -m tests.unit.crash.test_operating_curve 50` prints the table of the manual, of so many
+`python -m tests.unit.crash.test_operating_curve 6` prints the table of the manual, of so many
 draws of each kind.
 """
 
@@ -35,9 +35,8 @@ def turned(degrees):
 
 
 def moved(meters):
-    """By so much in all, forward and to the right."""
-    off = meters * np.array([1.0, 1.0, 0.0]) / np.sqrt(2.0)
-    return lambda one: replace(one, values=one.values + (one.lever @ off).reshape(-1, 3))
+    """The recorder by so much in all, forward and to the right: what its gyro shows is noisy."""
+    return Fault(moved=(meters / np.sqrt(2.0), meters / np.sqrt(2.0), 0.0))
 
 
 def reversed_axis(one):

@@ -8,6 +8,7 @@ import re
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from tests.coded import coded
 
@@ -16,6 +17,7 @@ from strapdown.bundle import to_json
 from strapdown.config.crash_case import AssumedSpec, CaseSpec, ReferenceSpec
 from strapdown.crash.case import case_severity, compare_reference, run_case
 from strapdown.crash.case_contact import main_event
+from strapdown.crash.measuring_point import MISSING_AXIS
 from strapdown.crash.reconstruction import summary_table
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats import read_raw
@@ -27,9 +29,10 @@ from strapdown.report.crash_case import (
     write_table,
 )
 from strapdown.report.crash_document import crash_document
-from strapdown.report.crash_tables import answers_table, severity_table
+from strapdown.report.crash_tables import answers_table, reference_tables, severity_table
 from strapdown.report.crash_words import (
     GRAVE,
+    assumption_words,
     contradictions,
     headline,
     key_figures,
@@ -232,6 +235,50 @@ def test_what_was_assumed_is_said_with_its_reason(result):
     assert head.startswith("IMU2: ")
     assert "standard deviation of 2° between 0 s and 0.2 s" in spaced(text)
     assert text.endswith("Reason stated: film of IMU1.")
+
+
+def test_page_one_says_which_of_its_numbers_rest_on_an_assumption(result, main):
+    assert assumption_words(result) == ""
+    assert "assumption" not in headline(result)
+
+    def assumed(share):
+        """Of the variance across the force, which comes from the front, this share is assumed."""
+        bound = main.body[0].event.bound
+        parts = pd.DataFrame(0.0, ["timing", MISSING_AXIS], bound.by_contributor.columns)
+        parts.loc["timing", ["xx", "yy"]] = [1.0, 1.0 - share]
+        parts.loc[MISSING_AXIS, "yy"] = share
+        whole = replace(main.body[0].event, bound=replace(bound, by_contributor=parts))
+        body = (replace(main.body[0], event=whole), *main.body[1:])
+        made = replace(result.reconstruction, combined=replace(main, body=body))
+        return replace(result, reconstruction=made)
+
+    known = main.body[0].event.delta_v.vector
+    assert abs(known[1]) < 0.1 * abs(known[0])
+    assert assumption_words(assumed(0.4)) == ""
+    assert assumption_words(assumed(0.6)).endswith(" rest: direction of force.")
+    assert "with 95 %, by assumption)" in spaced(headline(assumed(0.6)))
+
+
+def test_a_reference_of_delta_v_is_one_difference_with_the_bound_of_both(result, main):
+    whole = main.body[0].event
+    spec = ReferenceSpec(
+        kind="delta_v",
+        name="EDR",
+        axis="resultant",
+        delta_v_m_per_s=whole.resultant + 1.0,
+        delta_v_sd_m_per_s=1.0,
+    )
+    answer = compare_reference(spec, main, result.spec.options.gravity_m_per_s2, {})
+    both = replace(result, references=(answer,))
+    (table,) = reference_tables(both)
+    half = 1.959963984540054 * math.hypot(answer.sd, 1.0)
+    assert answer.difference == pytest.approx((-1.0, half))
+    said = f"−3.6 ± {3.6 * half:.1f}"
+    assert spaced(table.rows[0][5]) == said
+    assert sum("±" in cell for cell in table.rows[0]) == 1
+    assert f"differs by {said} km/h" in spaced(lead(both))
+    (against,) = contradictions(replace(both, references=(replace(answer, consistent=False),)))
+    assert said in spaced(against[1])
 
 
 def prepared_of(result, change):
