@@ -43,6 +43,7 @@ if TYPE_CHECKING:
         calibrate_magnetometer,
         compare_attitude,
     )
+    from strapdown.api.calibrate import CalibrateRun, calibrate
     from strapdown.api.crash import CrashRun, reconstruct
     from strapdown.api.doctor import Diagnosis, doctor
     from strapdown.api.navigation import (
@@ -100,6 +101,7 @@ __all__ = [
     "AttitudeOptions",
     "Barometer",
     "BodyVelocity",
+    "CalibrateRun",
     "CrashOptions",
     "CrashReconstruction",
     "CrashRun",
@@ -136,6 +138,7 @@ __all__ = [
     "align",
     "allan",
     "attitude",
+    "calibrate",
     "calibrate_magnetometer",
     "check_imu_channels",
     "compare_attitude",
@@ -173,6 +176,7 @@ load_on_first_use(
         "alignment.fine": "FineAlignment",
         "api.alignment": "AlignmentRun OutageRun align outage",
         "api.allan": "AllanRun allan",
+        "api.calibrate": "CalibrateRun calibrate",
         "api.attitude": "Attitude AttitudeComparison AttitudeOptions MagnetometerCalibration "
         "OrientationFilter attitude calibrate_magnetometer compare_attitude",
         "api.crash": "CrashRun reconstruct",

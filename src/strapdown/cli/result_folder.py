@@ -18,7 +18,10 @@ if TYPE_CHECKING:
     from strapdown.config.navigation import NavigationSpec
 
 #: Suffixes of the folders of these commands.
-ENDINGS = ("align", "allan", "attitude", "outage", "crash", "doctor", "navigate", "simulated")
+ENDINGS = (
+    *("align", "allan", "attitude", "calibrate", "outage", "crash", "doctor", "navigate"),
+    "simulated",
+)
 
 
 def default_folder(source: str | Path, ending: str, named: str | None = None) -> Path:

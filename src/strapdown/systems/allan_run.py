@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.bundle import InputFiles, Seal, input_files
+from strapdown.bundle import InputFiles, Seal, log_files
 from strapdown.config.logs import AllanSpec, AxesTable
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84
@@ -256,7 +256,7 @@ def run_allan(spec: AllanSpec, progress: Progress = silent) -> AllanRun:
         start,
         end,
         1.0 / dt,
-        (input_files("log", spec.log.path, recording.files),),
+        log_files(spec.log.path, recording.files, spec.log.calibration),
     )
 
 
