@@ -63,6 +63,8 @@ HELD = 0.3
 AXIS_SD, CASE_SD, ARM_SD = 4.0 * DEG, 2.0 * DEG, 0.05
 #: Force across the axis of a rate table, beyond what its tilt and arm explain, m/s².
 LEVEL_SD = 0.02
+#: Change of the gyro bias from log to log, by temperature and switching on, rad/s.
+BETWEEN_SD = 0.05 * DEG
 #: Drift of the gyro bias where nothing shows it, rad/s/√s.
 LEAST_DRIFT = 5e-6
 #: Longest path of a rotation between stops that the model follows, rad: two revolutions and a half.
@@ -352,8 +354,9 @@ class CalibrationProblem:
         yield "mean", drifts.mean(axis=0) / 1e-8, mean / 1e-8
         for k in range(n - 1):
             one, two = self.nodes[k], self.nodes[k + 1]
-            pause = two.middle - one.middle if one.log == two.log else BETWEEN_LOGS
-            sd = self.drift * math.sqrt(max(pause, 1e-3))
+            sd = self.drift * math.sqrt(max(two.middle - one.middle, 1e-3))
+            if one.log != two.log:
+                sd = np.hypot(self.drift * math.sqrt(BETWEEN_LOGS), BETWEEN_SD)
             out = self._columns()
             out[:, columns[k] : columns[k] + 3] = -self.drift_scale * np.eye(3)
             out[:, columns[k + 1] : columns[k + 1] + 3] = self.drift_scale * np.eye(3)
