@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -117,9 +118,7 @@ def record(t, w, f, errors, seed):
 
 def between(poses):
     """Rotation vectors from attitude to attitude."""
-    return [
-        rotation.rotation_vector_from_dcm(a.T @ b) for a, b in zip(poses, poses[1:], strict=False)
-    ]
+    return [rotation.rotation_vector_from_dcm(a.T @ b) for a, b in pairwise(poses)]
 
 
 def positions(errors, seed, count=16):

@@ -20,10 +20,10 @@ COMMANDS = {
     **{name: ROOT.get_command(None, name) for name in ROOT.list_commands(None) if name != "init"},
     **{f"init {n}": one for n, one in ROOT.get_command(None, "init").commands.items()},
 }
-READS_A_LOG = ("allan", "attitude", "align", "navigate", "init align", "init navigate")
+READS_A_LOG = ("allan", "calibrate", "attitude", "align", "navigate", "init align", "init navigate")
 TABULAR = {
     *("attitude", "align", "navigate", "outage", "crash", "simulate", "verify", "modules"),
-    *("allan", "doctor", "convert", "export"),
+    *("allan", "calibrate", "doctor", "convert", "export"),
 }
 #: What one word says of two things: of a scenario beside a log, of a start beside a place.
 OF_ITS_OWN = {

@@ -18,6 +18,7 @@ from strapdown.errors import DataError
 from strapdown.sensors.calibration_stops import (
     BETWEEN_LOGS,
     DEG,
+    LEAST_RANGE,
     CalibrationRecord,
     KnownRotation,
     Stop,
@@ -45,8 +46,8 @@ PRIOR = ImuUncertainty(
     TriadUncertainty(bias=10.0 * DEG, scale=0.03, misalignment=0.03, g_sensitivity=2e-4),
     TriadUncertainty(bias=0.8, scale=0.03, misalignment=0.03),
 )
-#: Change of bias with temperature, per °C, before the log is read; least range that shows it, °C.
-TEMPERATURE_PRIOR, LEAST_RANGE = (0.1 * DEG, 0.02), 5.0
+#: Change of bias with temperature, per °C, before the log is read.
+TEMPERATURE_PRIOR = (0.1 * DEG, 0.02)
 #: Gravity of an unknown place: mean over latitudes, and standard deviation, m/s².
 GRAVITY, GRAVITY_SD = 9.806, 0.016
 #: Least excess over noise of the mean force of a rest, m/s², and of turns, rad; residuals that the
@@ -54,6 +55,8 @@ GRAVITY, GRAVITY_SD = 9.806, 0.016
 LEAST_EXCESS, LEAST_TILT, EXCESS_WEIGHT = 2e-4, 1e-4, 3.0
 #: Least share of the noise of means that samples show, where residuals are smaller.
 LEAST_FACTOR = 0.1
+#: Rests of one pose are closer than this, rad.
+ALIKE = 15.0 * DEG
 #: Rests at most; the longest are used.
 MOST_RESTS = 120
 #: By how much a hand shakes the ends of a turn without a rest, m/s².
@@ -134,6 +137,7 @@ class CalibrationProblem:
         variance = mean_variances(nodes)
         self.force_variance, self.rate_variance = variance[:, :3], variance[:, 3:]
         self.second_order = np.zeros(len(nodes))
+        self.shift = np.zeros(len(nodes))
         self.noise = angle_walk(nodes, prior)
         self.force_factor = self.rate_factor = 1.0
         self.accel_excess = LEAST_EXCESS
@@ -318,7 +322,9 @@ class CalibrationProblem:
             out[:, self.gravity] = gain @ node.up * (1.0 - node.wander)
             out[:, at : at + 2] = size * gain @ across
             mean = np.array(node.rest.accel_mean)
-            yield "held" if node.held else "accel", frame @ (model - mean), frame @ out
+            off = frame @ (model - mean)
+            off[0] -= self.shift[k] / sd[0]
+            yield "held" if node.held else "accel", off, frame @ out
             if node.face is not None and self.conditions.pose_sd is not None:
                 turn = z[self.case] * self.sd[self.case]
                 face = node.face + np.cross(turn, node.face)
@@ -418,14 +424,15 @@ class CalibrationProblem:
         start, end = across_of(one.up), across_of(two.up)
         walk = float(np.mean(np.square(self.noise))) * stretch.length
         walk += (WGS84.rotation_rate * stretch.length) ** 2
-        sd = math.sqrt(walk + self.turn_excess**2 + 2.0 * (one.wander + two.wander))
+        spread = self.turn_excess**2 + stretch.second_order**2
+        stretch.sd = sd = math.sqrt(walk + spread + 2.0 * (one.wander + two.wander))
         carried = R.T @ one.up
         out = end.T @ R.T @ rotation.cross_matrix(one.up[None])[0] @ phi
         out[:, at : at + 2] += end.T @ R.T @ start
         out[:, to : to + 2] -= np.eye(2)
         left = end.T @ carried
         self.predicted.append((stretch.last, float(np.linalg.norm(left))))
-        kind = "turns" if not (one.held or two.held) else "held"
+        kind = "turns" if not (one.held or two.held) else "held turns"
         yield kind, left / sd, out / sd
         known = stretch.known
         if known is None or known.angle is None:
@@ -507,6 +514,7 @@ class CalibrationProblem:
         covariance = np.linalg.inv(jacobian.T @ jacobian + np.diag(self.weight))
         before = (self.accel_excess, self.turn_excess, *self.second_order)
         self.second_order = self._second_order(z, covariance)
+        self._second_order_of_turns(jacobian, covariance, kinds)
         squares, free = self._squares("gyro", residual, jacobian, covariance, kinds)
         self.rate_factor = max(_pooled(squares * self.rate_factor, free, 1.0), LEAST_FACTOR)
         quiet = [k for k, n in enumerate(self.nodes) if not n.held]
@@ -571,7 +579,25 @@ class CalibrationProblem:
                 H[:, i, j] = H[:, j, i] = change
         correlation = covariance[:9, :9] / np.outer(sd, sd)
         HP = H @ correlation
-        return np.asarray(np.sqrt(0.5 * np.einsum("nij,nji->n", HP, HP)))
+        # The same in all rests of one pose.
+        ups = np.array([node.up for node in self.nodes])
+        alike = (ups @ ups.T > math.cos(ALIKE)).sum(axis=1)
+        self.shift = 0.5 * np.einsum("nii->n", HP)
+        return np.asarray(np.sqrt(0.5 * alike * np.einsum("nij,nji->n", HP, HP)))
+
+    def _second_order_of_turns(
+        self, jacobian: Array, covariance: Array, kinds: Sequence[tuple[str, int, int]]
+    ) -> None:
+        """Angle by products of angles that are not known: thrice their variances, rad²."""
+        spans = [slice(a, b) for kind, a, b in kinds if kind in ("turns", "held turns")]
+        n = len(self.names)
+        for stretch, span in zip(self.stretches, spans, strict=True):
+            J = stretch.sd * jacobian[span, :n]
+            variance = float(np.einsum("ij,jk,ik->", J, covariance[:n, :n], J))
+            for k in (stretch.first, stretch.last):
+                at = self.first + 5 * k
+                variance += float(np.trace(covariance[at : at + 2, at : at + 2]))
+            stretch.second_order = 3.0 * variance
 
 
 def _pooled(squares: float, free: float, usual: float) -> float:

@@ -25,6 +25,8 @@ DEG = math.pi / 180.0
 HELD_WINDOW = 0.5
 #: Least rotation between stops that counts as a turn, rad.
 LEAST_TURN = 30.0 * DEG
+#: Range of temperature that shows what a bias changes by with it, °C.
+LEAST_RANGE = 5.0
 #: Time between logs, over which the gyro bias drifts, s.
 BETWEEN_LOGS = 600.0
 
@@ -109,6 +111,9 @@ class Stretch:
     accel: Array
     mean: bool
     known: KnownRotation | None = None
+    #: Standard deviation of the vertical that is carried over it, and its part by products, rad.
+    sd: float = 0.0
+    second_order: float = 0.0
 
     @property
     def length(self) -> float:
@@ -290,7 +295,11 @@ def bias_walk(nodes: Sequence[Stop], variance: Array) -> Array:
     if len(quiet) < 6:
         return np.zeros(3)
     mean = np.array([n.rest.gyro_mean for n in quiet])
-    design = np.column_stack([np.ones(len(quiet)), [n.up for n in quiet]])
+    columns = [np.ones(len(quiet)), *np.array([n.up for n in quiet]).T]
+    warmth = np.array([n.warmth for n in quiet])
+    if np.isfinite(warmth).all() and np.ptp(warmth) > LEAST_RANGE:
+        columns.append(warmth)
+    design = np.column_stack(columns)
     solution = np.linalg.lstsq(design, mean, rcond=None)[0]
     left = mean - design @ solution
     pause = np.array(
@@ -298,5 +307,5 @@ def bias_walk(nodes: Sequence[Stop], variance: Array) -> Array:
     )
     level = WGS84.rotation_rate**2
     excess = np.square(np.diff(left, axis=0)) - (noise[1:] + noise[:-1] + level)
-    lost = (len(quiet) - 1) / max(len(quiet) - 4, 1)
+    lost = (len(quiet) - 1) / max(len(quiet) - design.shape[1], 1)
     return np.sqrt(np.maximum(lost * excess.sum(axis=0) / pause.sum(), 0.0))
