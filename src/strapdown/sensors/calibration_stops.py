@@ -295,7 +295,8 @@ def bias_walk(nodes: Sequence[Stop], variance: Array) -> Array:
     if len(quiet) < 6:
         return np.zeros(3)
     mean = np.array([n.rest.gyro_mean for n in quiet])
-    columns = [np.ones(len(quiet)), *np.array([n.up for n in quiet]).T]
+    # Affine in the readings of the accelerometers, whatever their errors.
+    columns = [np.ones(len(quiet)), *np.array([n.rest.accel_mean for n in quiet]).T]
     warmth = np.array([n.warmth for n in quiet])
     if np.isfinite(warmth).all() and np.ptp(warmth) > LEAST_RANGE:
         columns.append(warmth)
