@@ -215,12 +215,12 @@ def _axes_of(calibration: SensorCalibration, axes: AxesTable) -> SensorCalibrati
     """A calibration in the axes of the body; of the worst axis, if only the log knows them."""
     if axes.axes is not None:
         return calibration.turned(axes_matrix(*parse_axes(axes.axes)))
-    triads = {}
-    for triad in ("gyro", "accel"):
-        sd: TriadUncertainty = getattr(calibration, triad)
+
+    def worst(sd: TriadUncertainty) -> TriadUncertainty:
         names = ("bias", "scale", "misalignment", "g_sensitivity")
-        triads[triad] = replace(sd, **{n: max(sd.axis(n)) for n in names})
-    return replace(calibration, **triads)
+        return replace(sd, **{name: max(sd.axis(name)) for name in names})
+
+    return replace(calibration, gyro=worst(calibration.gyro), accel=worst(calibration.accel))
 
 
 def source_faults(spec: Any, others: str) -> Iterator[Fault]:

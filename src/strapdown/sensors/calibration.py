@@ -163,7 +163,7 @@ def calibrate_imu(
         if not problem.update_excess(z):
             break
     _, jacobian, _ = problem.linearize(z)
-    covariance = np.linalg.inv(jacobian.T @ jacobian + np.diag(problem.weight))
+    covariance: Array = np.asarray(np.linalg.inv(jacobian.T @ jacobian + np.diag(problem.weight)))
     n = len(problem.names)
     gyro_skew = z[15:21] * problem.sd[15:21]
     if np.abs(z[:n]).max(initial=0.0) > IMPOSSIBLE or np.abs(gyro_skew).max() > SKEW:
@@ -182,7 +182,8 @@ def _solve(problem: CalibrationProblem, z: Array) -> Array:
         gradient = jacobian.T @ residual + problem.weight * z
         directions = [node.up for node in problem.nodes]
         while True:
-            step = np.linalg.solve(normal + damping * np.diag(np.diag(normal)), gradient)
+            damped = normal + damping * np.diag(np.diag(normal))
+            step: Array = np.asarray(np.linalg.solve(damped, gradient))
             tried = problem.moved(z, -step)
             residual, jacobian, _ = problem.linearize(tried)
             new = float(residual @ residual + problem.weight @ tried**2)
@@ -408,7 +409,9 @@ class SensorCalibration:
                 skew[i, j] = sd[f"{triad}_misalignment_{term}"]
                 if triad == "accel":
                     skew[j, i] = skew[i, j]
-            values = {q: tuple(sd[f"{triad}_{q}_{a}"] for a in XYZ) for q in ("bias", "scale")}
+            values: dict[str, Any] = {
+                q: tuple(sd[f"{triad}_{q}_{a}"] for a in XYZ) for q in ("bias", "scale")
+            }
             values["misalignment"] = triad_of(np.sqrt(np.square(skew).sum(axis=1) / 2.0))
             if triad == "gyro":
                 rows = [[sd[f"g_sensitivity_{i}{j}"] for j in XYZ] for i in XYZ]
@@ -611,15 +614,12 @@ def _sd_of(table: Mapping[str, Any], unit: str) -> TriadUncertainty:
 
 
 def _magnetometer_of(table: Mapping[str, Any]) -> MagnetometerCalibration:
-    arrays = {
-        key: np.array(table[key], dtype=np.float64)
-        for key in ("hard_iron", "hard_iron_sd", "soft_iron")
-    }
-    if arrays["soft_iron"].shape != (3, 3) or arrays["hard_iron"].shape != (3,):
-        raise ValueError
-    return MagnetometerCalibration(
-        **arrays, **{key: float(table[key]) for key in MAG_KEYS}, found=bool(table["found"])
-    )
+    values: dict[str, Any] = {key: float(table[key]) for key in MAG_KEYS}
+    for key, shape in (("hard_iron", (3,)), ("hard_iron_sd", (3,)), ("soft_iron", (3, 3))):
+        values[key] = np.array(table[key], dtype=np.float64)
+        if values[key].shape != shape:
+            raise ValueError
+    return MagnetometerCalibration(**values, found=bool(table["found"]))
 
 
 def correlations(found: ImuCalibration) -> list[tuple[str, str, float]]:

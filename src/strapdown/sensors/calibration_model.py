@@ -374,7 +374,7 @@ class CalibrationProblem:
         f = np.linalg.solve(np.eye(3) + M_a, ((stretch.accel - b_a) / (1.0 + s_a)).T).T
         v = (stretch.gyro - b_g - drift) / (1.0 + s_g)
         w = np.linalg.solve(np.eye(3) + M_g, (v - f @ G.T).T).T
-        return np.ascontiguousarray(w), v, f
+        return np.ascontiguousarray(w), np.asarray(v), np.asarray(f)
 
     def _rotation(self, z: Array, stretch: Stretch) -> tuple[Array, Array, Array, Array]:
         """Rotation from end to start, (3, 3); by unknowns, (3, size); angle; and of the axes."""
@@ -511,7 +511,8 @@ class CalibrationProblem:
     def update_excess(self, z: Array) -> bool:
         """Estimate the excess of rests and turns, and the drift; whether they changed."""
         residual, jacobian, kinds = self.linearize(z)
-        covariance = np.linalg.inv(jacobian.T @ jacobian + np.diag(self.weight))
+        information = jacobian.T @ jacobian + np.diag(self.weight)
+        covariance: Array = np.asarray(np.linalg.inv(information))
         before = (self.accel_excess, self.turn_excess, *self.second_order)
         self.second_order = self._second_order(z, covariance)
         self._second_order_of_turns(jacobian, covariance, kinds)

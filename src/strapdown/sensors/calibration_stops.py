@@ -236,7 +236,7 @@ def assign_turns(
     """Assign the known turns to the stretches with a rotation, in order."""
     bias = [np.array(n.rest.gyro_mean) for n in nodes if not n.held]
     mean = np.mean(bias, axis=0) if bias else np.zeros(3)
-    paths = [np.trapezoid(one.gyro - mean, one.time, axis=0) for one in stretches]
+    paths = [np.asarray(np.trapezoid(s.gyro - mean, s.time, axis=0)) for s in stretches]
     free = [k for k, path in enumerate(paths) if np.linalg.norm(path) > LEAST_TURN]
     for turn in (t for t in turns if t.start is not None):
         inside = [
@@ -309,4 +309,4 @@ def bias_walk(nodes: Sequence[Stop], variance: Array) -> Array:
     level = WGS84.rotation_rate**2
     excess = np.square(np.diff(left, axis=0)) - (noise[1:] + noise[:-1] + level)
     lost = (len(quiet) - 1) / max(len(quiet) - design.shape[1], 1)
-    return np.sqrt(np.maximum(lost * excess.sum(axis=0) / pause.sum(), 0.0))
+    return np.asarray(np.sqrt(np.maximum(lost * excess.sum(axis=0) / pause.sum(), 0.0)))

@@ -126,7 +126,10 @@ class CalibrateRun(SavedRun):
         from strapdown.report.calibrate import bounds_chart
         from strapdown.report.chart_svg import ChartFigure
 
-        return ChartFigure(bounds_chart(self))
+        chart = bounds_chart(self)
+        if chart is None:
+            raise DataError("calibrate.magnetometer-alone", quantity="calibration")
+        return ChartFigure(chart)
 
     @staticmethod
     def _writer() -> Callable[..., Seal]:
