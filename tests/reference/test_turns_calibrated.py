@@ -1,4 +1,4 @@
-"""Turns of a cheap sensor by hand: where the vertical is after them, before and after calibration."""
+"""Turns of a cheap sensor by hand: the vertical after them, before and after calibration."""
 
 from __future__ import annotations
 
