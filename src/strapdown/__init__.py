@@ -43,6 +43,7 @@ if TYPE_CHECKING:
         calibrate_magnetometer,
         compare_attitude,
     )
+    from strapdown.api.calibrate import CalibrateRun, calibrate
     from strapdown.api.crash import CrashRun, reconstruct
     from strapdown.api.doctor import Diagnosis, doctor
     from strapdown.api.extrinsics import ExtrinsicsRun, extrinsics
@@ -102,6 +103,7 @@ __all__ = [
     "AttitudeOptions",
     "Barometer",
     "BodyVelocity",
+    "CalibrateRun",
     "CrashOptions",
     "CrashReconstruction",
     "CrashRun",
@@ -140,6 +142,7 @@ __all__ = [
     "align",
     "allan",
     "attitude",
+    "calibrate",
     "calibrate_magnetometer",
     "check_imu_channels",
     "compare_attitude",
@@ -181,6 +184,7 @@ load_on_first_use(
         "api.alignment": "AlignmentRun OutageRun align outage",
         "api.allan": "AllanRun allan compare_sensors list_sensors",
         "report.sensors": "SensorsRun",
+        "api.calibrate": "CalibrateRun calibrate",
         "api.attitude": "Attitude AttitudeComparison AttitudeOptions MagnetometerCalibration "
         "OrientationFilter attitude calibrate_magnetometer compare_attitude",
         "api.crash": "CrashRun reconstruct",

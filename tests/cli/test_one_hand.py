@@ -22,6 +22,7 @@ COMMANDS = {
 }
 READS_A_LOG = (
     "allan",
+    "calibrate",
     "extrinsics",
     "attitude",
     "align",
@@ -31,7 +32,7 @@ READS_A_LOG = (
 )
 TABULAR = {
     *("attitude", "align", "navigate", "outage", "crash", "simulate", "verify", "modules"),
-    *("allan", "extrinsics", "doctor", "convert", "export"),
+    *("allan", "calibrate", "extrinsics", "doctor", "convert", "export"),
 }
 #: What one word says of two things: of a scenario beside a log, of a start beside a place.
 OF_ITS_OWN = {

@@ -241,6 +241,7 @@ def read_imu(
     rate_hz: float | None = None,
     span_s: tuple[float | None, float | None] = (None, None),
     repair: bool = False,
+    calibration: str | Path | None = None,
 ) -> Imu:
     """Read the log of an inertial sensor into body axes and SI.
 
@@ -267,6 +268,8 @@ def read_imu(
         First and last stamp to use.
     repair : bool
         Leave out unusable rows, and report them, instead of refusing the file.
+    calibration : str or Path, optional
+        File of `calibrate`, ``calibration.toml``: the known errors of this sensor are taken off.
 
     Returns
     -------
@@ -295,6 +298,7 @@ def read_imu(
         from_s=span_s[0],
         to_s=span_s[1],
         repair=repair,
+        calibration=None if calibration is None else str(calibration),
         **{f"{quantity}_unit": unit for quantity, unit in (units or {}).items()},
     )
     return ImuFile(log, axes).read()

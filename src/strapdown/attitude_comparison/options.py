@@ -53,7 +53,16 @@ class AttitudeSpec(Spec):
 
 
 #: Options of how a log is read.
-READING = ("format", "columns", "gyro_unit", "accel_unit", "time_unit", "axes", "repair")
+READING = (
+    "format",
+    "columns",
+    "gyro_unit",
+    "accel_unit",
+    "time_unit",
+    "axes",
+    "repair",
+    "calibration",
+)
 
 
 @dataclass(frozen=True)
@@ -110,7 +119,7 @@ class AttitudeOptions:
         Seed of a scenario's noise; 0 if not given.
     sensor : str or Path, optional
         For a scenario: a sensor of the catalogue, or a file like its entries.
-    format, columns, gyro_unit, accel_unit, time_unit, axes, repair
+    format, columns, gyro_unit, accel_unit, time_unit, axes, repair, calibration
         How to read a log, as in `formats.recording.ReadOptions`.
     """
 
@@ -143,6 +152,7 @@ class AttitudeOptions:
     time_unit: str | None = None
     axes: str | None = None
     repair: bool = False
+    calibration: str | Path | None = None
 
     def specify(self, source: str | Path | Sequence[str | Path]) -> AttitudeSpec:
         """Resolve the options for one source, or for several trials of one question.
@@ -224,6 +234,8 @@ class AttitudeOptions:
         }
         if "columns" in reading:
             reading["columns"] = dict(self.columns)
+        if "calibration" in reading:
+            reading["calibration"] = str(self.calibration)
         sensor = None if self.sensor is None else str(self.sensor)
         # The name of a scenario has neither a suffix nor a folder.
         plain = not Path(name).suffix and len(Path(name).parts) == 1

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from strapdown import rotation
 from strapdown.attitude_algorithms import Quaternion, run_attitude
 from strapdown.attitude_comparison.options import AttitudeSpec
-from strapdown.bundle import InputFiles, input_files, sensor_file
+from strapdown.bundle import InputFiles, input_files, log_files, sensor_file
 from strapdown.config.sources import LogSpec, ScenarioSpec
 from strapdown.earth import magnetic_field
 from strapdown.errors import ConfigError, DataError, Finding
@@ -126,7 +126,7 @@ def read_source(spec: AttitudeSpec) -> AttitudeSource:
             log.scored,
             log.readings,
             findings,
-            (input_files("log", asked.path, log.files),),
+            log_files(asked.path, log.files, asked.calibration),
             axes=axes,
         )
     from strapdown.simulation import ImuErrors, simulate_imu

@@ -100,6 +100,16 @@ def sensor_file(sensor: str | None) -> tuple[InputFiles, ...]:
     return (input_files("sensor", sensor, (Path(sensor),)),)
 
 
+def log_files(
+    path: str, files: tuple[Path, ...], calibration: str | None
+) -> tuple[InputFiles, ...]:
+    """Return the files of a log, and that of the calibration with which it was read."""
+    log = input_files("log", path, files)
+    if calibration is None:
+        return (log,)
+    return log, input_files("calibration", calibration, (Path(calibration),))
+
+
 def files_of(root: Path) -> list[str]:
     """Everything but folders; a link to a folder is not a folder of the bundle."""
     found = (p for p in root.rglob("*") if p.is_symlink() or not p.is_dir())
@@ -157,7 +167,7 @@ def names_file(key: str, value: Any) -> bool:
     if not isinstance(value, str):
         return False
     return key.endswith("path") or (
-        key in ("sensor", "severity") and value.lower().endswith(".toml")
+        key in ("sensor", "severity", "calibration") and value.lower().endswith(".toml")
     )
 
 

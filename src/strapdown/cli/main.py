@@ -39,6 +39,7 @@ EXIT_CODES = (
 COMMANDS = (
     "doctor",
     "allan",
+    "calibrate",
     "sensors",
     "extrinsics",
     "attitude",

@@ -114,6 +114,12 @@ class LogFlags:
             "--repair",
         ),
     ] = False
+    calibration: Annotated[
+        Path | None,
+        reading(
+            "FILE.toml", "Take off the errors that strapdown calibrate found, of the same sensor."
+        ),
+    ] = None
 
     def given(self) -> dict[str, Any]:
         """By name of the flag, None where not given."""
@@ -225,6 +231,7 @@ def log_keys(given: Mapping[str, Any]) -> dict[str, Any]:
         "sampling": given["sampling"],
         "rate_hz": given["rate"],
         "repair": bool(given["repair"]),
+        "calibration": None if given["calibration"] is None else str(given["calibration"]),
         "from_s": given["from_s"],
         "to_s": given["to_s"],
         "duration_s": given["duration"],
@@ -356,6 +363,7 @@ LOG_FLAGS = {
     "log, format": "--format",
     "log, columns": "--columns",
     "log, repair": "--repair",
+    "log, calibration": "--calibration",
     "log, gyro_unit": "--gyro-unit",
     "log, accel_unit": "--accel-unit",
     "log, time_unit": "--time-unit",

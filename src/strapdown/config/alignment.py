@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -31,8 +32,11 @@ from strapdown.config.spec import (
 )
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.estimation.error_filter import ErrorFilter
+from strapdown.formats.columns import parse_axes
+from strapdown.formats.triad_units import axes_matrix
+from strapdown.sensors.calibration import SensorCalibration
 from strapdown.sensors.catalogue import load_sensor
-from strapdown.sensors.uncertainty import ImuUncertainty, stated_imu
+from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty, stated_imu
 
 #: An hour at 4 kHz.
 MOST_SAMPLES = 1.5e7
@@ -200,7 +204,23 @@ def sensors_of(spec: Any) -> ImuUncertainty:
     """
     stated: SensorsTable = spec.sensors
     sensor = None if stated.sensor is None else load_sensor(stated.sensor)
-    return stated_imu(sensor, stated.gyro, stated.accel)
+    log = getattr(spec, "log", None)
+    if log is None or log.calibration is None:
+        return stated_imu(sensor, stated.gyro, stated.accel)
+    known = _axes_of(SensorCalibration.read(log.calibration), spec.axes)
+    return stated_imu(sensor, stated.gyro, stated.accel, known.uncertainty)
+
+
+def _axes_of(calibration: SensorCalibration, axes: AxesTable) -> SensorCalibration:
+    """A calibration in the axes of the body; of the worst axis, if only the log knows them."""
+    if axes.axes is not None:
+        return calibration.turned(axes_matrix(*parse_axes(axes.axes)))
+
+    def worst(sd: TriadUncertainty) -> TriadUncertainty:
+        names = ("bias", "scale", "misalignment", "g_sensitivity")
+        return replace(sd, **{name: max(sd.axis(name)) for name in names})
+
+    return replace(calibration, gyro=worst(calibration.gyro), accel=worst(calibration.accel))
 
 
 def source_faults(spec: Any, others: str) -> Iterator[Fault]:

@@ -1,4 +1,4 @@
-"""Logs and how to read them, in any configuration; and those of `doctor` and `allan`."""
+"""Logs and how to read them, in any configuration; those of `doctor`, `allan`, `calibrate`."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from strapdown.config.reading import FileSpec
 from strapdown.config.spec import (
     Fault,
     FileName,
+    Latitude,
     Number,
     OneOrThree,
     Positive,
@@ -26,6 +27,7 @@ from strapdown.formats.columns import parse_axes
 from strapdown.formats.gnss_fixes import GnssOptions
 from strapdown.formats.recording import as_stated
 from strapdown.sensors.bridge import target_of
+from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.triad_errors import NAMED_AXES, check_axes_matrix
 from strapdown.units import parse_unit
 
@@ -44,6 +46,8 @@ class LogTable(Spec):
     sampling: Literal["instantaneous", "mean"] | None = None
     rate_hz: Positive | None = None
     repair: StrictBool = False
+    #: File of `strapdown calibrate`: known errors of the sensor, which are taken off.
+    calibration: FileName | None = None
     from_s: Number | None = None
     to_s: Number | None = None
     #: From `from_s`, or from the first stamp.
@@ -160,6 +164,52 @@ class AllanSpec(FileSpec):
     target: Annotated[Word, accepted_by(target_of)] | None = None
 
 
+PROCEDURES = ("positions", "six-position", "turns", "rate-table", "magnetometer")
+
+
+class KnownTurn(Spec):
+    """A rotation of a calibration that is known: its angle, or its rate over a stretch."""
+
+    axis: Literal["x", "y", "z"] | None = None
+    angle_deg: Positive | None = None
+    rate_deg_per_s: Number | None = None
+    sd_deg: Positive | None = None
+    #: Which of the logs, from 1; with `from_s` and `to_s`.
+    log: Annotated[int, Field(ge=1)] | None = None
+    from_s: Number | None = None
+    to_s: Number | None = None
+
+    @model_validator(mode="after")
+    def _one(self) -> KnownTurn:
+        if (self.angle_deg is None) == (self.rate_deg_per_s is None):
+            raise refuse("angle_deg, rate_deg_per_s", "config.turn-angle-or-rate")
+        timed = (self.from_s is not None) + (self.to_s is not None)
+        if timed == 1 or (self.rate_deg_per_s is not None and not (timed and self.axis)):
+            raise refuse("from_s, to_s", "config.turn-without-span")
+        if self.from_s is not None and self.to_s is not None and not self.from_s < self.to_s:
+            raise refuse("to_s", "config.end-before-begin", begin=self.from_s)
+        return self
+
+
+class CalibrateSpec(FileSpec):
+    """Logs of one sensor, for the errors of its gyros, accelerometers and magnetometer."""
+
+    called = "calibrate"
+
+    logs: tuple[LogTable, ...] = Field(min_length=1)
+    procedure: Literal["positions", "six-position", "turns", "rate-table"] | None = None
+    turns: tuple[KnownTurn, ...] = ()
+    #: Local gravity; by latitude and height, or the mean of the Earth, if not stated.
+    gravity_m_per_s2: Annotated[Number, Field(ge=9.5, le=10.0)] | None = None
+    lat_deg: Latitude | None = None
+    alt_m: Number = 0.0
+    #: Data sheet, for what is known before the logs are read.
+    sensor: Annotated[FileName, accepted_by(load_sensor)] | None = None
+    #: Of the faces in six positions, and of the angles of turns.
+    pose_sd_deg: Positive = 2.0
+    turn_sd_deg: Positive = 3.0
+
+
 def flags_of(log: LogTable, axes: str | None) -> str:
     """Return the options of the command line that read a log as its table does."""
     answers = {**log.columns}
@@ -171,6 +221,7 @@ def flags_of(log: LogTable, axes: str | None) -> str:
         ("--sampling", log.sampling),
         ("--rate", log.rate_hz),
         ("--axes", axes),
+        ("--calibration", log.calibration),
         ("--from", log.from_s),
         ("--to", log.to_s),
         ("--duration", log.duration_s),

@@ -155,7 +155,7 @@ def _with_absolute_paths(file: TomlFile) -> tuple[dict[str, Any], list[Fault]]:
         if not isinstance(node, str) or not node.isprintable() or not node.strip():
             return node
         key = next((k for k in reversed(path) if isinstance(k, str)), "")
-        own = key in ("sensor", "severity") and node.lower().endswith(".toml")
+        own = key in ("sensor", "severity", "calibration") and node.lower().endswith(".toml")
         if key != "path" and not own:
             return node
         found = _find(file.path, path, node)

@@ -147,6 +147,7 @@ class LogSpec(Spec):
     sampling: str | None = None
     rate_hz: FiniteFloat | None = None
     repair: bool = False
+    calibration: str | None = None
 
 
 class SimulateSpec(Spec):

@@ -11,9 +11,10 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import numpy as np
 import pandas as pd
 
-from strapdown.errors import ConfigError, DataError, StrapdownError, check_choice
+from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
 from strapdown.formats import (
     android_events,
     ardupilot,
@@ -613,7 +614,37 @@ def recording_of(raw: RawLog, asked: ReadOptions, *, keep: bool = True) -> Recor
     known = {*asked.columns, *names_of_quantities(raw)}
     if not any(q.startswith("gyro") for q in known) and not known.issuperset(BODY_RATES):
         _refuse_other_table(raw)
-    return assemble(raw, asked, keep=keep)
+    recording = assemble(raw, asked, keep=keep)
+    return recording if asked.calibration is None else _calibrated(recording, asked)
+
+
+def _calibrated(recording: Recording, asked: ReadOptions) -> Recording:
+    """Take off the known errors of the sensor, in its own axes; and say what is left."""
+    from strapdown.formats.clocks import on_clock_of
+    from strapdown.formats.columns import parse_axes
+    from strapdown.formats.triad_units import axes_matrix
+    from strapdown.sensors.calibration import SensorCalibration
+
+    calibration, imu = SensorCalibration.read(str(asked.calibration)), recording.imu
+    letters = str(imu.attrs.get("sensor_axes") or "x,y,z")
+    known = calibration.turned(axes_matrix(*parse_axes(letters)))
+    warmth = None
+    if calibration.temperature is not None and len(recording.files) == 1:
+        from strapdown.formats.aid_table import read_stream
+
+        try:
+            warm, _ = on_clock_of(read_stream(recording.files[0], "barometer", asked.format), imu)
+            warm = warm.dropna(subset=["temperature"])
+            warmth = np.interp(imu.index, warm.index, warm["temperature"])
+        except (StrapdownError, KeyError, ValueError):
+            warmth = None
+    imu = known.apply(imu, warmth)
+    said = [known.finding(recording.name, Path(str(asked.calibration)).name)]
+    if known.not_observed:
+        data = {"calibration": Path(str(asked.calibration)).name, "names": known.missing}
+        code = "calibrate.applied-in-part"
+        said.append(Finding(code, severity="warning", file=recording.name, data=data))
+    return dataclasses.replace(recording, imu=imu, findings=(*recording.findings, *said))
 
 
 def _refuse_other_table(raw: RawLog) -> None:

@@ -114,6 +114,8 @@ class ReadOptions:
         Drop and count rows that cannot be used, instead of refusing the log.
     format : str, optional
         A key of `formats.READERS`; detected from the file if not given.
+    calibration : str, optional
+        File of `strapdown calibrate`: known errors of the sensor, which are taken off.
     """
 
     columns: dict[str, str] = field(default_factory=dict)
@@ -125,6 +127,7 @@ class ReadOptions:
     rate: float | None = None
     repair: bool = False
     format: str | None = None
+    calibration: str | None = None
 
 
 @dataclass(frozen=True)

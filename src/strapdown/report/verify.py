@@ -41,6 +41,7 @@ from strapdown.report import crash_live
 from strapdown.report.alignment import ALIGNMENT
 from strapdown.report.allan import ALLAN
 from strapdown.report.attitude import write_attitude
+from strapdown.report.calibrate import CALIBRATE
 from strapdown.report.content import EQUAL, Comparison, compare_files, json_of
 from strapdown.report.crash_case import CRASH
 from strapdown.report.crash_simulation import write_crash_simulation
@@ -90,7 +91,10 @@ class Verification:
 #: Commands with a `ReportBundle`; ``attitude``, ``simulate`` and ``crash --live`` write theirs.
 BUNDLES: dict[str, ReportBundle[Any]] = {
     bundle.command: bundle
-    for bundle in (ALIGNMENT, ALLAN, SENSORS_BUNDLE, OUTAGE, CRASH, DOCTOR, EXTRINSICS, NAVIGATION)
+    for bundle in (
+        *(ALIGNMENT, ALLAN, CALIBRATE, SENSORS_BUNDLE, OUTAGE, CRASH),
+        *(DOCTOR, EXTRINSICS, NAVIGATION),
+    )
 }
 
 

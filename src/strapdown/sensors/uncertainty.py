@@ -344,12 +344,16 @@ _NEEDED = {"bias": "bias_sd", "noise_density": "noise_density"}
 
 
 def stated_imu(
-    sensor: Sensor | None, gyro: Mapping[str, Stated], accel: Mapping[str, Stated]
+    sensor: Sensor | None,
+    gyro: Mapping[str, Stated],
+    accel: Mapping[str, Stated],
+    calibrated: Callable[[ImuUncertainty], ImuUncertainty] | None = None,
 ) -> ImuUncertainty:
     """Combine a catalogue sensor and stated values into an uncertainty.
 
     `sensor`: supplies the values that are not stated. `gyro`, `accel`: by catalogue key: one
-    number, or three. ConfigError: a key is unknown, a value is not a number, or bias or noise of a
+    number, or three. `calibrated`: replaces what a calibration knows, unless it is stated.
+    ConfigError: a key is unknown, a value is not a number, or bias or noise of a
     triad is neither stated nor in the data sheet. Zero instead would give the bounds of a perfect
     sensor.
     """
@@ -370,8 +374,16 @@ def stated_imu(
         drifts[triad] = _stated_drift(
             triad, slow, None if base is None else getattr(base, f"{triad}_drift")
         )
-        _require(triad, triads[triad])
-    return ImuUncertainty(triads["gyro"], triads["accel"], drifts["gyro"], drifts["accel"])
+    out = ImuUncertainty(triads["gyro"], triads["accel"], drifts["gyro"], drifts["accel"])
+    if calibrated is not None:
+        known, out = out, calibrated(out)
+        for triad, stated in (("gyro", gyro), ("accel", accel)):
+            names = {SPREADS.get(KEYS[triad][key].quantity) for key in stated}
+            own = {name: getattr(getattr(known, triad), name) for name in names if name}
+            out = replace(out, **{triad: replace(getattr(out, triad), **own)})
+    for triad in triads:
+        _require(triad, getattr(out, triad))
+    return out
 
 
 def _stated_drift(triad: str, stated: Mapping[str, Stated], base: BiasDrift | None) -> BiasDrift:

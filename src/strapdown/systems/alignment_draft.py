@@ -117,7 +117,9 @@ def log_table(
     page.path("path", Path(log.path), folder)
     if log.columns:
         page.key("columns", inline(log.columns))
-    for key, value in log.model_dump(exclude={"path", "columns"}).items():
+    if log.calibration is not None:
+        page.path("calibration", Path(log.calibration), folder)
+    for key, value in log.model_dump(exclude={"path", "columns", "calibration"}).items():
         if value is not None and value is not False:
             page.key(key, toml_value(value) or "")
     if check_sampling:

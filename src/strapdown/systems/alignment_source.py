@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.bundle import InputFiles, input_files, sensor_file
+from strapdown.bundle import InputFiles, input_files, log_files, sensor_file
 from strapdown.config.logs import AxesTable, LogTable
 from strapdown.ellipsoids import find_ellipsoid
 from strapdown.errors import Finding
@@ -73,7 +73,7 @@ def read_alignment_source(spec: AlignmentSpec) -> AlignmentSource:
     recording, imu, findings = body_record(spec.log, spec.axes)
     refuse_long_span(imu, recording.name)
     require_accel(recording)
-    gnss, inputs = None, [input_files("log", spec.log.path, recording.files)]
+    gnss, inputs = None, [*log_files(spec.log.path, recording.files, spec.log.calibration)]
     if spec.gnss is not None:
         inputs.append(input_files("gnss", spec.gnss.path, files_of(spec.gnss.path)))
         fixes = read_gnss(spec.gnss.path, spec.gnss.options())

@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.bundle import InputFiles, Seal, input_files
+from strapdown.bundle import InputFiles, Seal, log_files
 from strapdown.config.logs import AllanSpec, AxesTable, LogTable
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84
@@ -289,7 +289,7 @@ def run_allan(spec: AllanSpec, progress: Progress = silent) -> AllanRun:
         ),
         1.0 / dt,
         tuple(
-            input_files("log", log.path, one.files)
+            log_files(log.path, one.files, log.calibration)
             for log, one in zip(spec.logs, rests, strict=True)
         ),
     )

@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.bundle import InputFiles, Seal, input_files
+from strapdown.bundle import InputFiles, Seal, log_files
 from strapdown.config.logs import (
     AxesTable,
     DoctorSpec,
@@ -226,7 +226,7 @@ def run_doctor(spec: DoctorSpec, progress: Progress = silent) -> Diagnosis:
             logs[alone[0]] = replace(fixes, data={**fixes.data, "fixes_for": one.name})
     between = (*(e.finding for e in unread), *_between(logs))
     findings = tuple(f for one in logs for f in (*one.questions, *one.faults, *one.notes))
-    inputs = tuple(input_files("log", x.log.path, _files(x)) for x in logs)
+    inputs = tuple(f for x in logs for f in log_files(x.log.path, _files(x), x.log.calibration))
     kept = [log for log in spec.logs if log.path in {x.log.path for x in logs}]
     asked = spec.model_copy(update={"logs": tuple(kept)})
     return Diagnosis(asked, tuple(logs), between, inputs, (*findings, *between))

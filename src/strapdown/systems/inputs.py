@@ -75,6 +75,7 @@ def read_options(log: LogSpec | LogTable, axes: str | None) -> ReadOptions:
         sampling=log.sampling,
         rate=log.rate_hz,
         repair=log.repair,
+        calibration=log.calibration,
     )
 
 

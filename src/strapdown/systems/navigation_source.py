@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from strapdown.bundle import InputFiles, input_files, sensor_file
+from strapdown.bundle import InputFiles, input_files, log_files, sensor_file
 from strapdown.config.choice import SLOTS, options_of
 from strapdown.config.navigation import AidSpec, NavigationSpec
 from strapdown.ellipsoids import find_ellipsoid
@@ -141,7 +141,10 @@ def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
         points=points,
         start=recording.start,
         readings=recording.readings,
-        inputs=(input_files("log", spec.log.path, recording.files), *inputs),
+        inputs=(
+            *log_files(spec.log.path, recording.files, spec.log.calibration),
+            *inputs,
+        ),
         findings=(*of_log, *findings),
     )
 

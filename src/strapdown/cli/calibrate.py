@@ -1,0 +1,180 @@
+"""``strapdown calibrate``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from strapdown.cli.shared_options import (
+    LOG_FLAGS,
+    Height,
+    LogFlags,
+    ReportFlags,
+    Sensor,
+    as_flag,
+    folder_to_make,
+    log_keys,
+    running,
+    spread,
+    with_what,
+    writing,
+)
+from strapdown.errors import ConfigError
+
+if TYPE_CHECKING:
+    from strapdown.progress import Progress
+    from strapdown.systems.calibrate_run import CalibrateRun
+
+EPILOG = (
+    "Example: strapdown calibrate poses.csv --lat 48.1 --alt 520\n\n"
+    "Example: strapdown calibrate unmoved.csv turns.csv --turns 360\n\n"
+    "Example: strapdown attitude log.csv --calibration calibration.toml"
+)
+MOST = 4  # findings on the terminal
+FLAGS = {
+    "gravity_m_per_s2": "--gravity",
+    "lat_deg": "--lat",
+    "alt_m": "--alt",
+    "pose_sd_deg": "--pose-sd",
+    "turn_sd_deg": "--turn-sd",
+}
+
+
+@dataclass(frozen=True)
+class ProcedureFlags:
+    """What was done with the sensor, and what is known of it."""
+
+    procedure: Annotated[
+        str | None,
+        running(
+            "KIND",
+            "positions (rests in nine or more poses), six-position (each face up), turns (by known "
+            "angles), rate-table; by the logs if not given.",
+        ),
+    ] = None
+    turns: Annotated[
+        str | None,
+        running(
+            "ANGLES|TABLE.csv",
+            "Known rotations: 360, every turn of about 360 deg between stops; 'x 720, y 720', in "
+            "order; or a table: axis, angle_deg or rate_deg_per_s, sd_deg, log, from_s, to_s.",
+        ),
+    ] = None
+    turn_sd: Annotated[
+        float | None,
+        running("DEG", "Standard deviation of the known angles (3).", show_default=False),
+    ] = None
+    pose_sd: Annotated[
+        float | None,
+        running("DEG", "Standard deviation of the faces in six positions (2).", show_default=False),
+    ] = None
+    gravity: Annotated[
+        float | None,
+        with_what("M/S2", "Local gravity; by --lat and --alt, or the Earth's mean, if not given."),
+    ] = None
+    lat: Annotated[float | None, with_what("DEG", "Latitude, north positive.")] = None
+    alt: Height = None
+    sensor: Sensor = None
+
+
+@spread
+def calibrate(
+    logs: Annotated[
+        list[Path], typer.Argument(metavar="LOG...", help="Logs of one sensor, at rest in poses.")
+    ],
+    *,
+    asked: ProcedureFlags,
+    flags: LogFlags,
+    calibration_file: Annotated[
+        Path | None, writing("FILE.toml", "Write the calibration here, for --calibration.")
+    ] = None,
+    out: Annotated[Path | None, folder_to_make("LOG-calibrate")] = None,
+    write: ReportFlags,
+) -> None:
+    """Find bias, scale, misalignment and g-sensitivity of a sensor from rests and turns.
+
+    Let it rest in nine or more poses for three seconds each, and turn it quickly between them;
+    no equipment is needed. Each error has a 95 % bound; what the logs do not show is said, with the
+    pose or turn that would. A magnetometer is calibrated, too.
+    """
+    from strapdown.api.calibrate import calibrate as find
+    from strapdown.cli.console import print_findings, print_seal
+    from strapdown.cli.result_folder import default_folder, refuse_result, run_and_save
+
+    for log in logs:
+        refuse_result(log, "log")
+    if flags.axes is not None:
+        raise ConfigError("calibrate.axes", quantity="--axes")
+    if calibration_file is not None:
+        if calibration_file.suffix.lower() != ".toml":
+            name = calibration_file.name
+            raise ConfigError("cli.sensor-file-no-toml", quantity="--calibration-file", file=name)
+        if calibration_file.exists() and not write.force:
+            raise ConfigError(
+                "cli.file-exists", quantity="--calibration-file", file=calibration_file.name
+            )
+    keys = {key: value for key, value in log_keys(flags.given()).items() if value}
+    runs: list[CalibrateRun] = []
+
+    def compute(report: Progress) -> CalibrateRun:
+        try:
+            run = find(
+                [str(log) for log in logs],
+                procedure=asked.procedure,
+                turns=asked.turns,
+                gravity_m_per_s2=asked.gravity,
+                lat=asked.lat,
+                alt=asked.alt or 0.0,
+                sensor=asked.sensor,
+                progress=report,
+                pose_sd_deg=asked.pose_sd,
+                turn_sd_deg=asked.turn_sd,
+                **keys,
+            )
+        except ConfigError as error:
+            raise as_flag(error, _flag) from None
+        runs.append(run)
+        return run
+
+    done = run_and_save(
+        compute, out or default_folder(logs[0], "calibrate"), write, "calibrate.json"
+    )
+    if calibration_file is not None:
+        from strapdown.bundle.atomic_folder import replace_file
+
+        replace_file(calibration_file, runs[0].calibration_text().encode())
+    if done is not None:
+        result, seal = done
+        print_calibration(result)
+        print_findings(result.findings, MOST)
+        print_seal(seal, "calibrate.json", write.no_report)
+
+
+def _flag(place: str) -> str:
+    own = FLAGS.get(place)
+    return own or LOG_FLAGS.get(place, LOG_FLAGS.get(f"log, {place}", f"--{place}"))
+
+
+def print_calibration(result: CalibrateRun) -> None:
+    """Print the errors with their bounds, and what the calibration changes."""
+    from strapdown.cli.console import console, print_block
+    from strapdown.report.calibrate import (
+        effect_table,
+        field_table,
+        headline,
+        parameter_table,
+        turn_table,
+    )
+    from strapdown.report.values import spaced
+
+    out = console()
+    out.print(spaced(headline(result)), style="bold")
+    tables = (parameter_table, effect_table, turn_table, field_table)
+    for block in (table(result) for table in tables):
+        if block is not None:
+            print_block(block)
+            if block.caption:
+                out.print(spaced(block.caption), style="dim")

@@ -1,0 +1,384 @@
+"""Write a calibration as a sealed bundle: page, JSON, calibration file, tables."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from strapdown import __version__
+from strapdown.bundle import write_json
+from strapdown.config.logs import CalibrateSpec
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.formats import csv
+from strapdown.progress import Progress
+from strapdown.report.chart import AXIS_COLOURS, Chart, Level, Line, Panel
+from strapdown.report.document import (
+    Document,
+    Items,
+    Paragraph,
+    TableBlock,
+    findings_list,
+    paragraph,
+    run_again,
+    section,
+)
+from strapdown.report.report_bundle import ReportBundle, finite
+from strapdown.sensors.calibration import correlations
+from strapdown.systems.calibrate_run import CalibrateRun, run_calibrate
+
+DEG, G = math.pi / 180.0, STANDARD_GRAVITY
+XYZ = ("x", "y", "z")
+#: Rows of the table: title, unit, factor, names of the parameters.
+ROWS: tuple[tuple[str, str, float, tuple[str, ...]], ...] = (
+    ("gyro bias", "deg/s", 1.0 / DEG, tuple(f"gyro_bias_{a}" for a in XYZ)),
+    ("gyro scale", "%", 100.0, tuple(f"gyro_scale_{a}" for a in XYZ)),
+    (
+        "gyro x by y, y by z, z by x",
+        "deg",
+        1.0 / DEG,
+        tuple(f"gyro_misalignment_{t}" for t in ("xy", "yz", "zx")),
+    ),
+    (
+        "gyro x by z, y by x, z by y",
+        "deg",
+        1.0 / DEG,
+        tuple(f"gyro_misalignment_{t}" for t in ("xz", "yx", "zy")),
+    ),
+    *(
+        (
+            f"gyro by force along {f}",
+            "deg/s/g",
+            G / DEG,
+            tuple(f"g_sensitivity_{a}{f}" for a in XYZ),
+        )
+        for f in XYZ
+    ),
+    (
+        "gyro bias with temperature",
+        "deg/s/°C",
+        1.0 / DEG,
+        tuple(f"gyro_temperature_{a}" for a in XYZ),
+    ),
+    ("accelerometer bias", "mg", 1e3 / G, tuple(f"accel_bias_{a}" for a in XYZ)),
+    ("accelerometer scale", "%", 100.0, tuple(f"accel_scale_{a}" for a in XYZ)),
+    (
+        "accelerometer axes xy, yz, xz",
+        "deg",
+        1.0 / DEG,
+        tuple(f"accel_misalignment_{t}" for t in ("xy", "yz", "xz")),
+    ),
+    (
+        "accelerometer bias with temperature",
+        "mg/°C",
+        1e3 / G,
+        tuple(f"accel_temperature_{a}" for a in XYZ),
+    ),
+)
+CAPTION = (
+    "Reading − truth in the axes of the sensor, ± 95 % bound. ? : not observed, left as before. "
+    "Gyros are aligned to the axes of the accelerometers, whose misalignment is symmetric."
+)
+METHOD = (
+    "Maximum posterior of all errors, of the direction of gravity at each rest and of the drift of "
+    "the gyro bias; a turn carries gravity from rest to rest (Tedaldi, Pretto and Menegatti 2014).",
+    "Noise of means by three parts of a rest; what residuals exceed it widens the bounds, as do "
+    "products of errors that are not observed.",
+    "The Earth's rotation is in the mean rates of rests: its vertical part is estimated, or by the "
+    "latitude; its horizontal part, in an unknown direction, counts as noise.",
+    "The bias is that of these logs: what it changes by from day to day is not in its bound.",
+)
+
+
+def _configuration(result: CalibrateRun) -> dict[str, Any]:
+    return {"calibrate": result.spec.plain()}
+
+
+def _run(configuration: dict[str, Any]) -> CalibrateRun:
+    return run_calibrate(CalibrateSpec.checked(configuration["calibrate"]))
+
+
+def _write(
+    result: CalibrateRun, folder: Path, name: str, forms: tuple[str, ...], progress: Progress
+) -> None:
+    write_json(folder / "calibrate.json", calibrate_json(result))
+    text = result.calibration_text()
+    (folder / "calibration.toml").write_text(text, encoding="utf-8", newline="\n")
+    if result.calibration is not None and len(result.calibration.rests):
+        table = result.calibration.rests
+        csv.write(
+            folder / "rests.csv",
+            {str(c): table[c].to_numpy(dtype=np.float64) for c in table.columns},
+            {"units": "start, end: s; force_: m/s²; turn_: rad; up_: sensor axes"},
+        )
+    if forms:
+        from strapdown.report.document_html import write_report
+
+        write_report(calibrate_document(result, name), folder, progress)
+
+
+#: Page, JSON, calibration file and rests of a calibration.
+CALIBRATE = ReportBundle("calibrate", _configuration, _run, _write)
+
+
+def calibrate_json(result: CalibrateRun) -> dict[str, Any]:
+    """Return the calibration as plain data for programs, in SI.
+
+    Returns
+    -------
+    dict
+        ``parameters`` with ``value``, ``sd``, ``prior_sd``, ``observed``; ``correlations``;
+        ``remedies``; ``excess``; ``turns``; ``magnetometer``; the findings.
+    """
+    found, mag = result.calibration, result.magnetometer
+    out: dict[str, Any] = {"name": result.name, "procedure": result.procedure}
+    if found is not None:
+        rows = result.parameters.to_dict("records")
+        out["parameters"] = {str(row.pop("parameter")): row for row in rows}
+        out["correlations"] = [list(pair) for pair in correlations(found)]
+        out["remedies"] = list(found.remedies)
+        out["excess"] = found.excess
+        out["rests"] = int((~found.rests["held"]).sum()) if len(found.rests) else 0
+        out["turns"] = found.turns.to_dict("records")
+        out["temperature_c"] = found.temperature
+    out["magnetometer"] = (
+        None
+        if mag is None
+        else {
+            "hard_iron": mag.hard_iron.tolist(),
+            "hard_iron_sd": mag.hard_iron_sd.tolist(),
+            "soft_iron": mag.soft_iron.tolist(),
+            "field": mag.field,
+            "direction_sd_deg": mag.direction_sd_deg,
+        }
+    )
+    out["findings"] = [one.plain("cli") for one in result.findings]
+    return finite(out)
+
+
+# The answer, which page and terminal share.
+
+
+def headline(result: CalibrateRun) -> str:
+    """Say what was used, and how much of the sensor it determines."""
+    found = result.calibration
+    if found is None:
+        return f"{result.name}: no rest and no known rotation; the magnetometer is calibrated."
+    count = int((~found.rests["held"]).sum()) if len(found.rests) else 0
+    seen = int(found.observed.sum())
+    return (
+        f"{result.name}: {count} rests and {len(found.turns)} known rotations ({result.procedure}) "
+        f"determine {seen} of {len(found.names)} errors."
+    )
+
+
+def parameter_table(result: CalibrateRun) -> TableBlock | None:
+    """Return the errors with their bounds."""
+    found = result.calibration
+    if found is None:
+        return None
+    by_name = {n: k for k, n in enumerate(found.names)}
+    sd, observed = found.sd, found.observed
+    rows = []
+    for title, unit, factor, names in ROWS:
+        if names[0] not in by_name:
+            continue
+        cells = []
+        for name in names:
+            k = by_name[name]
+            half = 1.96 * factor * float(sd[k])
+            digits = max(0, 1 - math.floor(math.log10(half))) if half > 0.0 else 3
+            text = f"{factor * float(found.values[k]):.{digits}f} ± {half:.{digits}f}"
+            cells.append(text.replace("-", "−") + ("" if observed[k] else " ?"))
+        rows.append((title, unit, *cells))
+    return TableBlock(("Error", "unit", *XYZ), tuple(rows), text=(0, 1), caption=CAPTION)
+
+
+def effect_table(result: CalibrateRun) -> TableBlock | None:
+    """Return what the calibration changes: force at rest, and the vertical after turns."""
+    found = result.calibration
+    if found is None or not len(found.rests):
+        return None
+    still = found.rests[~found.rests["held"]]
+    rows = []
+    for title, unit, factor, names in (
+        ("force at rest − gravity", "mg", 1e3 / G, ("force_error", "force_left")),
+        ("vertical after a turn, by the gyro", "deg", 1.0 / DEG, ("turn_error", "turn_left")),
+    ):
+        before, after = (still[n].dropna().to_numpy(dtype=np.float64) for n in names)
+        if before.size:
+            values = [factor * math.sqrt(float(np.mean(v**2))) for v in (before, after)]
+            rows.append((title, unit, *(f"{v:.3g}" for v in values)))
+    columns = ("Root mean square", "unit", "before", "after")
+    return TableBlock(columns, tuple(rows), text=(0, 1)) if rows else None
+
+
+def turn_table(result: CalibrateRun) -> TableBlock | None:
+    """Return the known rotations beside those that the calibrated gyro measures."""
+    found = result.calibration
+    if found is None or not len(found.turns):
+        return None
+    rows = tuple(
+        (
+            XYZ[int(row["axis"])],
+            f"{row['known'] / DEG:.6g}",
+            f"{row['measured'] / DEG:.6g}",
+            f"{row['left'] / DEG:.3g}",
+        )
+        for row in found.turns.to_dict("records")
+    )
+    caption = (
+        "Angles in deg, rates in deg/s. Left: what the end differs by from the known rotation."
+    )
+    columns = ("Known rotation about", "known", "measured", "left")
+    return TableBlock(columns, rows, text=(0,), caption=caption)
+
+
+def field_table(result: CalibrateRun) -> TableBlock | None:
+    """Return hard iron and what it leaves of the direction of the field."""
+    mag = result.magnetometer
+    if mag is None:
+        return None
+    iron = [
+        f"{100.0 * v / mag.field:.2g} ± {196.0 * s / mag.field:.1g}".replace("-", "−")
+        for v, s in zip(mag.hard_iron, mag.hard_iron_sd, strict=True)
+    ]
+    caption = (
+        f"The direction of the field changes by {mag.change_deg:.2g}° (rms) and is then known to "
+        f"{1.96 * mag.direction_sd_deg:.2g}° (95 %)."
+    )
+    rows = (("hard iron", "% of the field", *iron),)
+    return TableBlock(("Magnetometer", "unit", *XYZ), rows, text=(0, 1), caption=caption)
+
+
+# Page and charts.
+
+
+def calibrate_document(result: CalibrateRun, name: str = "") -> Document:
+    """Return the report of a calibration."""
+    found = result.calibration
+    sections = [
+        section("poses", "Poses: what is missing", poses_chart(result), _missing(result)),
+        section("effect", "Before and after", rests_chart(result), turn_table(result)),
+        section("bounds", "Errors and their bounds", bounds_chart(result), folded=True),
+        section(
+            "file",
+            "Calibration file",
+            Paragraph("calibration.toml, for --calibration of the commands that read a log."),
+            paragraph(result.calibration_text(), "mono"),
+            folded=True,
+        ),
+        section("method", "Method", Items(tuple(("", text) for text in METHOD)), folded=True),
+        section("again", "Check this folder", *run_again(name)),
+    ]
+    good = not any(f.severity == "warning" for f in result.findings)
+    tables = (parameter_table(result), effect_table(result), field_table(result))
+    front = (
+        Paragraph(headline(result), "lead" if good else "warning"),
+        *(t for t in tables if t is not None),
+        *((findings_list(result.findings, "cli"),) if result.findings else ()),
+    )
+    links = [("calibrate.json", "errors with their bounds, SI")]
+    links.append(("calibration.toml", "the calibration, for --calibration"))
+    if found is not None and len(found.rests):
+        links.append(("rests.csv", "rests with their residuals, SI"))
+    facts = (("Procedure", result.procedure), ("Software", f"strapdown {__version__}"))
+    return Document(
+        result.name, "Calibration of the sensor", facts, front, tuple(sections), links=tuple(links)
+    )
+
+
+def _missing(result: CalibrateRun) -> Items | None:
+    found = result.calibration
+    if found is None or not found.remedies:
+        return None
+    rows = []
+    for one in found.remedies:
+        if one.startswith("turn "):
+            rows.append(("Turn", f"by 90° or more about {one[-1]}, from rest to rest"))
+        else:
+            rows.append(("Rest", f"with {one} up"))
+    return Items(tuple(rows))
+
+
+def _map(up: np.ndarray[Any, Any]) -> tuple[float, float]:
+    """Azimuth and elevation of a direction in the axes of the sensor, deg."""
+    return math.degrees(math.atan2(up[1], up[0])), math.degrees(
+        math.asin(max(-1.0, min(1.0, up[2])))
+    )
+
+
+def poses_chart(result: CalibrateRun) -> Chart | None:
+    """Return the directions that were up, and those that are missing."""
+    found = result.calibration
+    if found is None or not len(found.rests):
+        return None
+    still = found.rests[~found.rests["held"]]
+    places = np.array([_map(u) for u in still[["up_x", "up_y", "up_z"]].to_numpy()]).reshape(-1, 2)
+    lines = [Line("rest", places[:, 0], places[:, 1], AXIS_COLOURS[0], points=True, size=6.0)]
+    missing = [r for r in found.remedies if not r.startswith("turn")]
+    if missing:
+        ups = [
+            np.array([float(f"{s}1") if (s := _sign(r, a)) else 0.0 for a in XYZ]) for r in missing
+        ]
+        at = np.array([_map(u / np.linalg.norm(u)) for u in ups])
+        lines.append(
+            Line(
+                "missing",
+                at[:, 0],
+                at[:, 1],
+                AXIS_COLOURS[1],
+                points=True,
+                hollow=True,
+                labels=tuple(f"{r} up" for r in missing),
+            )
+        )
+    panel = Panel("elevation of up above the xy plane, deg", tuple(lines))
+    return Chart("poses", "What was up", "", "azimuth of up from x to y, deg", (panel,))
+
+
+def _sign(text: str, axis: str) -> str:
+    at = text.find(axis)
+    return text[at - 1] if at > 0 else ""
+
+
+def rests_chart(result: CalibrateRun) -> Chart | None:
+    """Return force and vertical at each rest, before and after."""
+    found = result.calibration
+    if found is None or not len(found.rests):
+        return None
+    still = found.rests[~found.rests["held"]]
+    x = np.arange(1, len(still) + 1, dtype=np.float64)
+    panels = []
+    for title, unit, factor, names in (
+        ("Force at rest − gravity", "mg", 1e3 / G, ("force_error", "force_left")),
+        ("Vertical after the turn to it", "deg", 1.0 / DEG, ("turn_error", "turn_left")),
+    ):
+        before, after = (factor * still[n].to_numpy(dtype=np.float64) for n in names)
+        if not np.isfinite(before).any():
+            continue
+        lines = (
+            Line("before", x, before, AXIS_COLOURS[1], points=True, hollow=True, size=6.0),
+            Line("after", x, after, AXIS_COLOURS[0], points=True, size=6.0),
+        )
+        panels.append(Panel(f"error, {unit}", lines, title=title, levels=(Level(0.0, ""),)))
+    return Chart("rests", "Residuals at rests", "", "rest", tuple(panels)) if panels else None
+
+
+def bounds_chart(result: CalibrateRun) -> Chart | None:
+    """Return the standard deviation of each error as a share of the one before the calibration."""
+    found = result.calibration
+    if found is None:
+        return None
+    share = 100.0 * found.sd / found.prior_sd
+    x = np.arange(1, share.size + 1, dtype=np.float64)
+    panel = Panel(
+        "standard deviation, % of that before",
+        (Line("error", x, share, AXIS_COLOURS[0], points=True, size=5.0),),
+        log=True,
+        levels=(Level(50.0, "observed below"),),
+    )
+    caption = ", ".join(f"{k + 1} {n.replace('_', ' ')}" for k, n in enumerate(found.names))
+    return Chart("bounds", "How well each error is known", caption, "error", (panel,))

@@ -1,0 +1,373 @@
+"""Calibration of a sensor from logs in which it rested in many poses and turned between them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.bundle import InputFiles, Seal, input_files, sensor_file
+from strapdown.config.logs import AxesTable, CalibrateSpec, KnownTurn, LogTable
+from strapdown.config.toml_text import string
+from strapdown.earth import gravity
+from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.formats.aid_table import read_stream
+from strapdown.formats.clocks import on_clock_of
+from strapdown.progress import Progress, silent
+from strapdown.sensors.calibration import (
+    CalibrationConditions,
+    CalibrationRecord,
+    ImuCalibration,
+    KnownRotation,
+    SensorCalibration,
+    calibrate_imu,
+    correlations,
+)
+from strapdown.sensors.calibration_model import GRAVITY, GRAVITY_SD, PRIOR
+from strapdown.sensors.catalogue import load_sensor
+from strapdown.sensors.magnetometer import LEAST, MagnetometerCalibration, calibrate_magnetometer
+from strapdown.sensors.rest import RestStretch, find_rests_of_every_grade
+from strapdown.sensors.uncertainty import ImuUncertainty
+from strapdown.systems.alignment_source import body_record
+from strapdown.systems.inputs import Memory, SavedRun, refuse_long_span
+from strapdown.systems.one_thread import one_thread
+from strapdown.tables import MAG
+from strapdown.tables.checks import GYRO, index_of, values_of
+from strapdown.tables.sample_clock import sample_clock
+
+if TYPE_CHECKING:
+    from strapdown.report.chart_svg import ChartFigure
+
+__all__ = ["CalibrateRun", "run_calibrate"]
+
+Array = NDArray[np.float64]
+
+DEG = math.pi / 180.0
+#: Poses that differ by more count as two, rad; a face is up within this, rad.
+POSE_APART, FACE_WITHIN = 15.0 * DEG, 20.0 * DEG
+#: Distinct poses from which all errors of the accelerometers can be told apart.
+ENOUGH = 9
+#: Gravity by latitude and height: anomalies of the field, m/s²; a stated value, m/s².
+ANOMALY, STATED_SD = 5e-4, 2e-4
+#: Excess of the force of rests that is worth a warning, m/s² (5 mg); of turns, rad.
+LARGE_EXCESS, LARGE_TILT = 0.05, 2.0 * DEG
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CalibrateRun(SavedRun):
+    """Errors of a sensor with their bounds: in memory until `save` writes page and file.
+
+    Attributes
+    ----------
+    procedure : str
+        ``positions``, ``six-position``, ``turns``, ``rate-table``, or ``magnetometer`` alone.
+    calibration : ImuCalibration or None
+        Of gyros and accelerometers; None without a rest and a known rotation.
+    magnetometer : MagnetometerCalibration or None
+    findings : tuple of Finding
+    """
+
+    configuration: ClassVar[str] = "spec"
+
+    spec: CalibrateSpec
+    name: str
+    procedure: str
+    calibration: ImuCalibration | None
+    magnetometer: MagnetometerCalibration | None
+    findings: tuple[Finding, ...]
+    inputs: tuple[InputFiles, ...]
+    memory: Memory = field(default=Memory({}))
+
+    @property
+    def parameters(self) -> pd.DataFrame:
+        """One row per parameter: ``value``, ``sd``, ``prior_sd``, ``observed``; SI, sensor axes."""
+        found = self.calibration
+        if found is None:
+            return pd.DataFrame(columns=["parameter", "value", "sd", "prior_sd", "observed"])
+        return pd.DataFrame(
+            {
+                "parameter": found.names,
+                "value": found.values,
+                "sd": found.sd,
+                "prior_sd": found.prior_sd,
+                "observed": found.observed,
+            }
+        )
+
+    def to_pandas(self) -> pd.DataFrame:
+        """The parameters; as `parameters`."""
+        return self.parameters
+
+    @property
+    def sensor(self) -> SensorCalibration:
+        """The calibration as a file has it; ``read_imu(…, calibration=…)`` takes the file."""
+        if self.calibration is None:
+            raise DataError("calibrate.magnetometer-alone", quantity="calibration")
+        return SensorCalibration.of(self.calibration, self.magnetometer)
+
+    def calibration_text(self) -> str:
+        """The file ``calibration.toml``."""
+        return _text(self)
+
+    def plot(self) -> ChartFigure:
+        """Draw the errors with their 95 % bounds.
+
+        Returns
+        -------
+        ChartFigure
+            Displays itself in a notebook; `save` writes it as SVG, PNG or PDF.
+        """
+        from strapdown.report.calibrate import bounds_chart
+        from strapdown.report.chart_svg import ChartFigure
+
+        chart = bounds_chart(self)
+        if chart is None:
+            raise DataError("calibrate.magnetometer-alone", quantity="calibration")
+        return ChartFigure(chart)
+
+    @staticmethod
+    def _writer() -> Callable[..., Seal]:
+        from strapdown.report.calibrate import CALIBRATE
+
+        return CALIBRATE.write
+
+    def __repr__(self) -> str:
+        found = self.calibration
+        shown = "" if found is None else f", {int(found.observed.sum())} of {len(found.names)}"
+        return f"<CalibrateRun {self.name}, {self.procedure}{shown} observed>"
+
+
+@one_thread()
+def run_calibrate(spec: CalibrateSpec, progress: Progress = silent) -> CalibrateRun:
+    """Calibrate a sensor.
+
+    Parameters
+    ----------
+    spec : CalibrateSpec
+    progress : callable, optional
+        Called with a stage and the share that is done.
+
+    Raises
+    ------
+    DataError
+        A log cannot be read, or shows neither rests, nor known rotations, nor a turning field.
+    """
+    records: list[CalibrationRecord] = []
+    fields: list[Array] = []
+    inputs: list[InputFiles] = []
+    findings: list[Finding] = []
+    names = []
+    for k, log in enumerate(spec.logs):
+        progress(f"reading {Path(log.path).name}", 0.05 + 0.4 * k / len(spec.logs))
+        record, mag, said, files = _read(log)
+        records.append(record)
+        fields += [] if mag is None else [mag]
+        findings += said
+        names.append(files.path.name)
+        inputs.append(files)
+    inputs += sensor_file(spec.sensor)
+    progress("finding the errors", 0.5)
+    magnetometer = _magnetometer(fields)
+    procedure = _procedure(spec, records, magnetometer)
+    found = None
+    if procedure != "magnetometer":
+        for record in records:
+            if not {"accel_x"} <= set(record.imu.columns):
+                raise DataError("calibrate.no-accelerometer", file=record.imu.attrs.get("source"))
+        rotations = [_rotation(one, spec, len(records)) for one in spec.turns]
+        prior = _prior(spec)
+        found = calibrate_imu(records, rotations, prior, _conditions(spec, procedure))
+        findings = [*_said(found, spec, names[0]), *findings]
+    name = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
+    return CalibrateRun(spec, name, procedure, found, magnetometer, tuple(findings), tuple(inputs))
+
+
+def _read(
+    log: LogTable,
+) -> tuple[CalibrationRecord, Array | None, list[Finding], InputFiles]:
+    """Samples of a log in the axes of the sensor, its rests, and the readings of its field."""
+    if log.calibration is not None:
+        raise ConfigError("calibrate.calibrated-log", quantity="calibration")
+    recording, imu, said = body_record(log, AxesTable(axes="x,y,z"))
+    refuse_long_span(imu, recording.name)
+    # The axes of a sensor need not be those of a body.
+    findings = [f for f in said if not f.code.startswith("io.axes")]
+    clock = sample_clock(index_of(imu), values_of(imu, GYRO))
+    if clock.repaired:
+        imu = imu.copy()
+        imu.index = pd.Index(clock.time, name="time")
+    rests: tuple[RestStretch, ...] = find_rests_of_every_grade(imu)
+    mag: Array | None = None
+    if set(MAG) <= set(imu.columns):
+        mag = values_of(imu, MAG)
+    else:
+        table = _stream(log, "magnetometer", imu)
+        if table is not None and set(MAG) <= set(table.columns):
+            mag = table[MAG].to_numpy(dtype=np.float64)
+    warm = _stream(log, "barometer", imu)
+    temperature = None
+    if warm is not None and "temperature" in warm.columns:
+        warm = warm.dropna(subset=["temperature"])
+        if len(warm) > 1:
+            temperature = (index_of(warm), warm["temperature"].to_numpy(dtype=np.float64))
+    files = input_files("log", log.path, recording.files)
+    return CalibrationRecord(imu, rests, temperature), mag, findings, files
+
+
+def _stream(log: LogTable, stream: str, imu: pd.DataFrame) -> pd.DataFrame | None:
+    try:
+        table, _ = on_clock_of(read_stream(log.path, stream, log.format), imu)
+    except (DataError, ConfigError):
+        return None
+    return table
+
+
+def _magnetometer(fields: Sequence[Array]) -> MagnetometerCalibration | None:
+    """Hard and soft iron, where the readings show them."""
+    if not fields:
+        return None
+    mag = np.vstack(fields)
+    if int((np.isfinite(mag).all(axis=1) & mag.any(axis=1)).sum()) < LEAST:
+        return None
+    found = calibrate_magnetometer(mag)
+    return found if found.significant else None
+
+
+def _procedure(
+    spec: CalibrateSpec,
+    records: Sequence[CalibrationRecord],
+    magnetometer: MagnetometerCalibration | None,
+) -> str:
+    """What the logs show, if it is not stated."""
+    if spec.procedure is not None:
+        if spec.procedure in ("turns", "rate-table") and not spec.turns:
+            raise ConfigError("calibrate.no-turns", quantity="turns", procedure=spec.procedure)
+        return spec.procedure
+    if any(turn.rate_deg_per_s is not None for turn in spec.turns):
+        return "rate-table"
+    if spec.turns:
+        return "turns"
+    ups = [np.array(r.accel_mean) for one in records for r in one.rests if r.accel_mean is not None]
+    ups = [up / np.linalg.norm(up) for up in ups]
+    poses = _distinct(ups)
+    if not poses:
+        if magnetometer is None:
+            raise DataError("calibrate.no-rest", quantity="log")
+        return "magnetometer"
+    faces = [up for up in poses if np.abs(up).max() > math.cos(FACE_WITHIN)]
+    sides = {(int(np.abs(up).argmax()), bool(up[np.abs(up).argmax()] > 0.0)) for up in faces}
+    return "six-position" if len(sides) == 6 and len(poses) < ENOUGH else "positions"
+
+
+def _distinct(ups: Iterable[Array]) -> list[Array]:
+    kept: list[Array] = []
+    for up in ups:
+        if all(float(up @ other) < math.cos(POSE_APART) for other in kept):
+            kept.append(up)
+    return kept
+
+
+def _rotation(turn: KnownTurn, spec: CalibrateSpec, logs: int) -> KnownRotation:
+    if turn.log is not None and turn.log > logs:
+        raise ConfigError("calibrate.no-such-log", quantity="turns", log=turn.log, logs=logs)
+    rate = turn.rate_deg_per_s
+    # A rate table repeats its rates better than a hand its angles.
+    usual = spec.turn_sd_deg if rate is None else 1e-3 * abs(rate) + 0.01
+    return KnownRotation(
+        angle=None if turn.angle_deg is None else turn.angle_deg * DEG,
+        rate=None if rate is None else rate * DEG,
+        axis=None if turn.axis is None else "xyz".index(turn.axis),
+        sd=(turn.sd_deg or usual) * DEG,
+        log=None if turn.log is None else turn.log - 1,
+        start=turn.from_s,
+        end=turn.to_s,
+    )
+
+
+def _prior(spec: CalibrateSpec) -> ImuUncertainty:
+    return PRIOR if spec.sensor is None else ImuUncertainty.of_sensor(load_sensor(spec.sensor))
+
+
+def _conditions(spec: CalibrateSpec, procedure: str) -> CalibrationConditions:
+    g, sd = GRAVITY, GRAVITY_SD
+    if spec.lat_deg is not None:
+        g, sd = float(np.linalg.norm(gravity(spec.lat_deg, spec.alt_m))), ANOMALY
+    if spec.gravity_m_per_s2 is not None:
+        g, sd = spec.gravity_m_per_s2, STATED_SD
+    six = spec.pose_sd_deg * DEG if procedure == "six-position" else None
+    return CalibrationConditions(g, sd, spec.lat_deg, six)
+
+
+def _said(found: ImuCalibration, spec: CalibrateSpec, name: str) -> Iterable[Finding]:
+    missing = [n for n, o in zip(found.names, found.observed, strict=True) if not o]
+    if missing:
+        data = {"names": SensorCalibration.of(found).missing, "poses": _poses(found.remedies)}
+        data["turns"] = [r.removeprefix("turn ") for r in found.remedies if r.startswith("turn")]
+        code = "calibrate.not-observed"
+        if data["poses"] and data["turns"]:
+            code = "calibrate.not-observed-both"
+        elif data["turns"]:
+            code = "calibrate.not-observed-turns"
+        yield Finding(code, severity="warning", file=name, data=data)
+    if spec.lat_deg is None and spec.gravity_m_per_s2 is None:
+        percent = 100.0 * GRAVITY_SD / GRAVITY
+        yield Finding("calibrate.gravity", severity="note", file=name, data={"percent": percent})
+    if found.excess["accel"] > LARGE_EXCESS:
+        mg = found.excess["accel"] / 9.80665e-3
+        yield Finding("calibrate.rests-disagree", severity="warning", file=name, data={"mg": mg})
+    if found.excess["turns"] > LARGE_TILT:
+        deg = found.excess["turns"] / DEG
+        yield Finding("calibrate.turns-disagree", severity="warning", file=name, data={"deg": deg})
+
+
+def _poses(remedies: Sequence[str]) -> list[str]:
+    return [f"{r} up" for r in remedies if not r.startswith("turn")]
+
+
+def _text(run: CalibrateRun) -> str:
+    """The file: values with their standard deviations, and what they rest on."""
+    found = run.calibration
+    lines = [
+        f"title = {string(f'calibration of {run.name}')}",
+        f"procedure = {string(run.procedure)}",
+        'axes = "of the sensor: the columns x, y, z of the log"',
+    ]
+    if found is None:
+        tables: dict[str, dict[str, Any]] = {}
+    else:
+        missing = [n for n, o in zip(found.names, found.observed, strict=True) if not o]
+        lines.append(f"not_observed = {_plain(missing)}")
+        tables = run.sensor.tables()
+    for one in run.inputs:
+        for file, digest in zip(one.files, one.digests, strict=True):
+            lines += ["", f"[[{one.role}]]", f"name = {string(file.name)}"]
+            lines.append(f"sha256 = {string(digest)}")
+    for name, table in tables.items():
+        lines += ["", f"[{name}]", *(f"{key} = {_plain(value)}" for key, value in table.items())]
+    pairs = [] if found is None else correlations(found)
+    if pairs:
+        lines += [
+            "",
+            "# Pairs of errors whose correlation exceeds 0.3.",
+            "[correlation]",
+            "pairs = [",
+        ]
+        lines += [f"  [{string(a)}, {string(b)}, {r:.2f}]," for a, b, r in pairs] + ["]"]
+    return "\n".join(lines) + "\n"
+
+
+def _plain(value: Any) -> str:
+    """A value of TOML: numbers with nine digits."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return string(value)
+    if isinstance(value, float | int):
+        return repr(float(f"{value:.9g}"))
+    return f"[{', '.join(_plain(v) for v in value)}]"

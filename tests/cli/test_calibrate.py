@@ -1,0 +1,162 @@
+"""`strapdown calibrate`: what it prints and writes, how it ends, and that commands apply it."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+
+import numpy as np
+import pytest
+from tests.calibrated import GRAVITY, POSES, between, by_hand, facing, record, unit
+
+import strapdown as sd
+from strapdown.formats import csv
+from strapdown.sensors.calibration import SensorCalibration
+
+NAMES = ["time_s", *(f"gyro_{a}_rad_s" for a in "xyz"), *(f"accel_{a}_m_s2" for a in "xyz")]
+
+
+def write_log(path, made, axes="forward-right-down"):
+    values = [made.imu.index.to_numpy(), *made.imu.to_numpy().T]
+    header = {"axes": axes, "sampling": "instantaneous"}
+    csv.write(path, dict(zip(NAMES, values, strict=True)), header)
+    return path
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory):
+    """Twelve poses on a table; a further log of the unit at rest, tilted, in other axes."""
+    folder, errors = tmp_path_factory.mktemp("calibrate"), unit(4)
+    draw = np.random.default_rng(4)
+    poses = [facing(up) for up in POSES[:12]]
+    made = record(*by_hand(poses[0], between(poses), draw, rest=2.0), errors, 4)
+    rest = record(*by_hand(facing((0.3, 0.2, -1.0)), [], draw, rest=20.0), errors, 9)
+    return write_log(folder / "poses.csv", made), write_log(folder / "rest.csv", rest)
+
+
+@pytest.fixture(scope="module")
+def result(logs, run_cli, tmp_path_factory):
+    """What the command prints, and its folder."""
+    out = tmp_path_factory.mktemp("result") / "out"
+    done = run_cli("calibrate", logs[0], "--gravity", GRAVITY, "--out", out)
+    assert done.code == 0, done.err
+    return done.out, out
+
+
+def test_the_terminal_and_the_folder(result):
+    printed, out = result
+    assert "12 rests" in printed
+    assert len(printed.splitlines()) <= 45
+    found = json.loads((out / "calibrate.json").read_text())
+    assert found["procedure"] == "positions"
+    assert found["parameters"]["accel_scale_x"]["observed"] is True
+    true = unit(4).accel.axis("bias")[0]
+    bias = found["parameters"]["accel_bias_x"]
+    assert abs(bias["value"] - true) < 4.0 * bias["sd"]
+    file = tomllib.loads((out / "calibration.toml").read_text())
+    assert file["accel"]["bias_m_per_s2"][0] == pytest.approx(bias["value"], rel=1e-8)
+    assert len(file["log"][0]["sha256"]) == 64
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "what is missing" in page
+
+
+@pytest.mark.slow
+def test_its_verification(result, run_cli):
+    assert run_cli("verify", result[1]).code == 0
+
+
+def test_one_flag_applies_it(result, logs, run_cli, tmp_path):
+    calibration = result[1] / "calibration.toml"
+    out = tmp_path / "converted.csv"
+    done = run_cli("convert", logs[1], out, "--calibration", calibration)
+    assert done.code == 0, done.err
+    raw, less = sd.read_imu(logs[1]), sd.read_imu(logs[1], calibration=calibration)
+    force = [np.linalg.norm(one.filter(like="accel").mean()) for one in (raw, less)]
+    # Bounds of scale and bias beside gravity: 1 mg; raw errors are some per cent.
+    assert abs(force[1] - GRAVITY) < 0.02 < abs(force[0] - GRAVITY)
+    written = sd.read_imu(out)
+    assert written.filter(like="accel").mean().to_numpy() == pytest.approx(
+        less.filter(like="accel").mean().to_numpy(), abs=1e-6
+    )
+    assert "calibrate.applied" in [f.code for f in less.findings]
+    # Another mounting of the same sensor: the same vectors in other axes.
+    turned = sd.read_imu(logs[1], axes="y,-x,z", calibration=calibration)
+    assert turned["gyro_x"].to_numpy() == pytest.approx(less["gyro_y"].to_numpy(), abs=1e-12)
+    folder = tmp_path / "attitude"
+    options = ["--calibration", calibration, "--gyro-bias", "none", "--no-report"]
+    done = run_cli("attitude", logs[1], "--algorithms", "quaternion", *options, "--out", folder)
+    assert done.code == 0, done.err
+    roles = [i["role"] for i in json.loads((folder / "manifest.json").read_text())["inputs"]]
+    assert roles == ["log", "calibration"]
+    assert run_cli("verify", folder).code == 0
+
+
+@pytest.mark.slow
+def test_what_is_left_enters_the_filters(result, logs, run_cli, tmp_path):
+    from strapdown.config.alignment import sensors_of
+    from strapdown.config.navigation import NavigationSpec
+
+    calibration = result[1] / "calibration.toml"
+    file = tmp_path / "navigate.toml"
+    options = ["--sensor", "mpu-6050", "--calibration", calibration, "--out", file]
+    done = run_cli("init", "navigate", logs[1], *options)
+    assert done.code == 0, done.err
+    text = file.read_text()
+    assert "calibration = " in text
+    text = text.replace('"?"', "48.0")
+    file.write_text(text)
+    spec = NavigationSpec.read(file)
+    left, made = sensors_of(spec), SensorCalibration.read(calibration)
+    assert max(left.gyro.axis("bias")) == pytest.approx(max(made.gyro.axis("bias")))
+    table = spec.log.model_copy(update={"calibration": None})
+    sheet = sensors_of(spec.model_copy(update={"log": table}))
+    assert max(left.gyro.axis("bias")) < 0.1 * max(sheet.gyro.axis("bias"))
+    stated = spec.sensors.model_copy(update={"gyro": {"bias_sd_deg_per_h": 36.0}})
+    own = sensors_of(spec.model_copy(update={"sensors": stated}))
+    assert own.gyro.axis("bias")[0] == pytest.approx(np.radians(0.01))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("options", "code", "word"),
+    [
+        (["--axes", "x,-y,-z"], 4, "--axes"),
+        (["--turns", "twice"], 4, "twice"),
+        (["--turns", "none.csv"], 4, "none.csv"),
+        (["--turns", "1000"], 3, "1 turns are stated"),
+        (["--procedure", "turns"], 4, "--turns"),
+        (["--procedure", "cube"], 4, "--procedure"),
+        (["--gravity", "5"], 4, "--gravity"),
+        (["--to", "1.5", "--from", "0"], 0, "not observed"),
+        (["--from", "2.2", "--to", "2.8"], 3, "rest"),
+    ],
+)
+def test_what_it_refuses_and_what_it_says(logs, run_cli, tmp_path, options, code, word):
+    done = run_cli("calibrate", logs[0], *options, "--no-report", "--out", tmp_path / "a")
+    assert done.code == code, done.err
+    assert word in done.err + done.out
+
+
+def test_a_table_of_turns_and_files_that_are_no_calibration(result, logs, run_cli, tmp_path):
+    table = tmp_path / "turns.csv"
+    table.write_text("axis,angle_deg,sd_deg\nx,many,1\n")
+    done = run_cli("calibrate", logs[0], "--turns", table, "--out", tmp_path / "a")
+    assert (done.code, "row 2" in done.err) == (3, True)
+    table.write_text("axis,rate_deg_per_s,from_s,to_s\nx,10,,\n")
+    done = run_cli("calibrate", logs[0], "--turns", table, "--out", tmp_path / "b")
+    assert done.code == 4, done.err
+    calibration = result[1] / "calibration.toml"
+    done = run_cli("calibrate", logs[0], "--calibration", calibration, "--out", tmp_path / "c")
+    assert done.code == 4, done.err
+    done = run_cli("convert", logs[1], tmp_path / "d.csv", "--calibration", logs[1])
+    assert done.code == 3, done.err
+    assert "calibration.toml" in done.err
+
+
+def test_from_arrays(logs):
+    samples = sd.read_imu(logs[0]).iloc[:2000]
+    run = sd.calibrate((samples.index, samples.iloc[:, :3], samples.iloc[:, 3:6]), lat=48.0)
+    assert "not_observed" in run.calibration_text()
+    assert list(run.parameters.columns)[:3] == ["parameter", "value", "sd"]
+    assert run.plot() is not None
+    assert run.findings[0].code.startswith("calibrate.not-observed")
