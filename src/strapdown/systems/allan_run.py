@@ -289,8 +289,9 @@ def run_allan(spec: AllanSpec, progress: Progress = silent) -> AllanRun:
         ),
         1.0 / dt,
         tuple(
-            log_files(log.path, one.files, log.calibration)
+            file
             for log, one in zip(spec.logs, rests, strict=True)
+            for file in log_files(log.path, one.files, log.calibration)
         ),
     )
 

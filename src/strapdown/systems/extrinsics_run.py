@@ -11,7 +11,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.bundle import InputFiles, Seal, input_files
+from strapdown.bundle import InputFiles, Seal, input_files, log_files
 from strapdown.config.extrinsics import ExtrinsicsSpec
 from strapdown.config.logs import AxesTable
 from strapdown.errors import DataError, Finding
@@ -133,7 +133,7 @@ def run_extrinsics(spec: ExtrinsicsSpec, progress: Progress = silent) -> Extrins
     recording, imu, said = body_record(spec.log, AxesTable(axes=spec.axes))
     refuse_long_span(imu, recording.name)
     findings = list(said)
-    inputs = [input_files("log", spec.log.path, recording.files)]
+    inputs = [*log_files(spec.log.path, recording.files, spec.log.calibration)]
     other = spec.other or spec.log
     files: tuple[Path, ...]
     if spec.kind == "imu":
