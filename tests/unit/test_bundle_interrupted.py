@@ -359,10 +359,12 @@ def test_files_are_flushed_as_macos_needs_it(tmp_path, given, monkeypatch):
 
 
 def test_a_file_system_without_locks_is_written_all_the_same(tmp_path, given, monkeypatch):
-    def none(lock, within):
+    import fcntl
+
+    def none(lock, how):
         raise OSError(errno.ENOLCK, "No locks available")
 
-    monkeypatch.setattr(atomic_folder, "_take", none)
+    monkeypatch.setattr(fcntl, "lockf", none)
     write(tmp_path / "out", given, "new")
     assert sorted(p.name for p in tmp_path.iterdir()) == ["given.csv", "out"]
     with pytest.raises(ConfigError, check=coded("bundle.folder-exists")):

@@ -32,9 +32,11 @@ def sensors(
     ] = None,
     *,
     outage: Annotated[
-        float, running("S", "Time without fixes in which drifts are compared (60).", "--outage")
+        float, running("S", "Duration of the outage (60).", show_default=False)
     ] = 60.0,
-    speed: Annotated[float, running("M/S", "Speed in it, straight on (15).", "--speed")] = 15.0,
+    speed: Annotated[
+        float, running("M/S", "Speed (0: stationary).", show_default=False)
+    ] = 15.0,
     out: Annotated[
         Path | None, writing("DIR", "Write a page and the data into this folder.")
     ] = None,

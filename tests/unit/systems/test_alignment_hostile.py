@@ -30,7 +30,7 @@ FLAGS = (
     *("lat", "lon", "alt", "sensor", "method", "coarse_only", "gnss", "prefilter", "from_s"),
     "to_s",
     *("duration", "rate", "sampling", "columns", "gyro_unit", "accel_unit", "time_unit", "axes"),
-    "repair",
+    *("repair", "calibration"),
     "format",
     *(f"gnss_{key}" for key in ("format", "columns", "units", "datum_height", "origin")),
     *("gnss_position_sd", "gnss_velocity_sd"),
