@@ -164,7 +164,6 @@ REST_LIMIT = 0.0035  # rad/s: 0.2 deg/s, of a bias since it was known
 REST_FIELD = 0.03  # of the field: its change in a body at rest, noise included
 REST_BIAS = 0.0175  # rad/s: 1 deg/s; a larger bias waits until a turn would have shown
 REST_TURN = 0.1  # rad: shows as that change up to a dip of 72 deg
-ASTRAY = 0.25  # rad²: heading of a bias that was led astray by more than its deviation
 REST_VELOCITY = 1e-2  # m²/s: density of the 0.07 m/s that REST_FORCE may hide, correlated over 1 s
 REST_DRIFT = 9e-4  # rad/s/sqrt(Hz): 0.05 deg/s
 FIELD_SD = 0.02  # of the magnetometer, of the total field, correlated over 1 s
@@ -333,12 +332,6 @@ def field_turned(r):
 
 
 @njit(cache=True, error_model="numpy")
-def bias_bound(r):
-    """Largest rate of a body at rest, by what the gyro bias is known to."""
-    return 3.0 * math.sqrt(r[P + 3 * N + 3] + r[P + 4 * N + 4] + r[P + 5 * N + 5]) + REST_LIMIT
-
-
-@njit(cache=True, error_model="numpy")
 def at_rest(r, span, gx, gy, gz):
     """Whether rate and force have been steady for long enough, and the rate is a bias's.
 
@@ -358,13 +351,9 @@ def at_rest(r, span, gx, gy, gz):
         force += off * off
         off = r[SMOOTH_RATE + i] - r[BIAS + i]
         squared += off * off
-    limit = bias_bound(r)
+    limit = 3.0 * math.sqrt(r[P + 3 * N + 3] + r[P + 4 * N + 4] + r[P + 5 * N + 5]) + REST_LIMIT
     steady = rate < REST_RATE * REST_RATE and force < REST_FORCE * REST_FORCE
-    beyond = squared > limit * limit
-    # Of a bias that a disturbed field has led astray, the deviation is too small.
-    most = 3.0 * math.sqrt(3.0) * r[BIAS_SD] + REST_LIMIT
-    if beyond and (r[FIELDS] == 0.0 or r[HEADED] != 1.0 or squared > most * most):
-        steady = False
+    steady = steady and squared < limit * limit
     if not steady:
         r[REST] = 0.0
     if r[FIELDS] > 0.0 and r[HEADED] == 1.0 and field_turned(r):
@@ -372,7 +361,7 @@ def at_rest(r, span, gx, gy, gz):
     if steady:
         r[REST] += span
     after = REST_AFTER
-    if r[HEADED] == 1.0 and (beyond or squared > REST_BIAS * REST_BIAS):
+    if r[HEADED] == 1.0 and squared > REST_BIAS * REST_BIAS:
         after = max(after, REST_TURN / math.sqrt(squared))
     return r[REST] > after
 
@@ -457,8 +446,6 @@ def end_block(r):
             r[POWER] -= min(1.0, 2.0 * span) * r[POWER]
             for i in range(3):
                 r[FAST + i] = 0.0
-            bound = bias_bound(r)
-            astray = squared > bound * bound
             # A body that came to a constant velocity, as in a train, seems stationary: what was
             # integrated on the way then says nothing of the tilt.
             limit = HUBER * HUBER
@@ -474,9 +461,6 @@ def end_block(r):
             observe(r, 3, 0.0, ox, noise, 0, 0.0, 0.0, 0.0)
             observe(r, 4, 0.0, oy, noise, 0, 0.0, 0.0, 0.0)
             observe(r, 5, 0.0, oz, noise, 0, 0.0, 0.0, 0.0)
-            if astray and r[HEADED] == 1.0:
-                # What led the bias astray has turned the heading, too.
-                forget(r, 2, 3, ASTRAY)
         else:
             own = r[VELOCITY] + UNSEEN * max(r[POWER], now)
             # Soon after the start the velocity is one, not many: its mean is no better known.
