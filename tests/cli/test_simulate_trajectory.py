@@ -204,3 +204,13 @@ def test_a_writer_of_trajectories_is_asked_for_by_name(here, run_cli):
     assert done.code == 4
     assert "sine.toml, trajectory_formats: no writer is named 'dwg'" in done.err
     assert not (here / "sine-simulated").exists()
+
+
+def test_a_sensor_is_questioned_where_units_of_its_type_do_not_differ_by_so_much(tmp_path, run_cli):
+    """A log of the named sensor itself was asked about: 0.17 deg/√h against the sheet's 0.168."""
+    assert run_cli("simulate", "drive-town", "--out", tmp_path / "drive").code == 0
+    log = tmp_path / "drive" / "log.csv"
+    for sensor, asked in (("icm-42688-p", False), ("hg1700", True)):
+        out = tmp_path / f"{sensor}.toml"
+        done = run_cli("init", "navigate", log, "--sensor", sensor, "--out", out)
+        assert ("is it this sensor?" in done.out) == asked, done.out

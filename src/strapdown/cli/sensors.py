@@ -34,9 +34,7 @@ def sensors(
     outage: Annotated[
         float, running("S", "Duration of the outage (60).", show_default=False)
     ] = 60.0,
-    speed: Annotated[
-        float, running("M/S", "Speed (0: stationary).", show_default=False)
-    ] = 15.0,
+    speed: Annotated[float, running("M/S", "Speed (0: stationary).", show_default=False)] = 15.0,
     out: Annotated[
         Path | None, writing("DIR", "Write a page and the data into this folder.")
     ] = None,

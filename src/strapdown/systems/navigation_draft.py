@@ -253,6 +253,8 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
             told.append(f"the {full} shake far beyond their noise while it is quiet")
         elif made.guessed:
             why = "Found: noise while it is quiet, x, y, z; biases of the gyros as a rest allows."
+        elif not _noisier(made, triad, stated):
+            why = "Found: noise while it is quiet, as units of a type differ, x, y, z:"
         else:
             why = (
                 "Found: noise beyond the data sheet while it is quiet: is it this sensor? x, y, z:"
@@ -282,11 +284,21 @@ def _shakes(made: Proposal, triad: str, stated: dict[str, Any]) -> bool:
     return bool(max(stated[key]) * unit > LOUD * made.noise[k])
 
 
+def _noisier(made: Proposal, triad: str, stated: dict[str, Any]) -> bool:
+    """Whether a triad's measured noise is more than units of the named sensor differ by."""
+    key, unit = next((key, unit) for name, key, unit in NOISE_KEYS if name == triad)
+    known = ImuUncertainty.of_sensor(load_sensor(made.table["sensors"]["sensor"]))
+    sheet = np.asarray(getattr(known, triad).axis("noise_density"))
+    return key not in stated or bool((np.asarray(stated[key]) * unit > SPREAD * sheet).any())
+
+
 def _whole() -> list[Any]:
     """Sensors of the catalogue whose gyros and accelerometers measure motion."""
     return [s for s in map(load_sensor, SENSORS) if s.grade != "crash"]
 
 
+#: Noise of a unit over that of its data sheet, which is typical of the type.
+SPREAD = 1.25
 #: Ready-made tables for a vehicle.
 WHEELS = ("[aiding.no_slip]", 'kind = "no_slip"', "mounting_sd_deg = [6.0, 6.0]")
 
