@@ -78,7 +78,16 @@ def test_one_flag_applies_it(result, logs, run_cli, tmp_path):
     assert written.filter(like="accel").mean().to_numpy() == pytest.approx(
         less.filter(like="accel").mean().to_numpy(), abs=1e-6
     )
-    assert "calibrate.applied" in [f.code for f in less.findings]
+    codes = [f.code for f in less.findings]
+    assert "calibrate.applied" in codes and "calibrate.of-another-sensor" not in codes
+    # Of another sensor, as in a folder of several.
+    other = tmp_path / "other.toml"
+    text = calibration.read_text().splitlines()
+    row = next(k for k, line in enumerate(text) if line.startswith("bias_rad_per_s"))
+    text[row] = "bias_rad_per_s = [0.3, -0.2, 0.1]"
+    other.write_text("\n".join(text))
+    codes = [f.code for f in sd.read_imu(logs[1], calibration=other).findings]
+    assert "calibrate.of-another-sensor" in codes
     # Another mounting of the same sensor: the same vectors in other axes.
     turned = sd.read_imu(logs[1], axes="y,-x,z", calibration=calibration)
     assert turned["gyro_x"].to_numpy() == pytest.approx(less["gyro_y"].to_numpy(), abs=1e-12)

@@ -5,15 +5,17 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import logging
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
 
+from strapdown.constants import STANDARD_GRAVITY
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
 from strapdown.formats import (
     android_events,
@@ -54,6 +56,9 @@ from strapdown.formats.recording import NoStreamError, RawLog, ReadOptions, Reco
 from strapdown.formats.signs import HEAD, Signs, first_bytes, state_of
 from strapdown.formats.vocabularies import BODY_RATES
 from strapdown.plugins import plugin, plugins
+
+if TYPE_CHECKING:
+    from strapdown.sensors.calibration import SensorCalibration
 
 _log = logging.getLogger("strapdown")
 
@@ -644,7 +649,43 @@ def _calibrated(recording: Recording, asked: ReadOptions) -> Recording:
         data = {"calibration": Path(str(asked.calibration)).name, "names": known.missing}
         code = "calibrate.applied-in-part"
         said.append(Finding(code, severity="warning", file=recording.name, data=data))
+    said += _of_another_sensor(imu, known, recording.name, Path(str(asked.calibration)).name)
     return dataclasses.replace(recording, imu=imu, findings=(*recording.findings, *said))
+
+
+#: Rate, rad/s, and force beside gravity, m/s², of a calibrated sensor at rest, which it may have
+#: beyond what is left: a bias that changes from one switching on to the next, and local gravity.
+CHANGED = math.radians(1.0), 0.2
+
+
+def _of_another_sensor(
+    imu: pd.DataFrame, known: SensorCalibration, file: str, calibration: str
+) -> list[Finding]:
+    """A finding where the longest rest shows errors that the calibration does not leave."""
+    from strapdown.sensors.rest import find_rests
+
+    rests = [one for one in find_rests(imu) if one.accel_mean is not None]
+    if not rests:
+        return []
+    rest = max(rests, key=lambda one: one.end - one.start)
+    rate = float(np.linalg.norm(rest.gyro_mean))
+    force = abs(float(np.linalg.norm(rest.accel_mean or ())) - STANDARD_GRAVITY)
+    gyro = CHANGED[0] + 3.0 * max(known.gyro.axis("bias"))
+    left = max(known.accel.axis("bias")) + STANDARD_GRAVITY * max(known.accel.axis("scale"))
+    if rate <= gyro and force <= CHANGED[1] + 3.0 * left:
+        return []
+    return [
+        Finding(
+            "calibrate.of-another-sensor",
+            severity="warning",
+            file=file,
+            calibration=calibration,
+            start=rest.start,
+            end=rest.end,
+            rate=math.degrees(rate),
+            force=1e3 * force / STANDARD_GRAVITY,
+        )
+    ]
 
 
 def _refuse_other_table(raw: RawLog) -> None:

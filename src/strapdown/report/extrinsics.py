@@ -31,7 +31,8 @@ from strapdown.tables.checks import index_of
 
 DEG = np.pi / 180.0
 CONVENTION = (
-    "v_a = R v_b: R turns a vector from the axes of b into those of a",
+    "v_a = R v_b: R turns a vector from the axes of b into those of a (of the gyros: those of "
+    "accelerometers differ by their misalignment)",
     "lever arm: from the origin of a to that of b, along the axes of a",
     "t_b = t_a + offset + drift (t_a - middle): stamps of one instant",
 )

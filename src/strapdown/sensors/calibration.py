@@ -435,8 +435,10 @@ class SensorCalibration:
         Raises
         ------
         DataError
-            It is not a file of `strapdown calibrate`.
+            There is none, or it is not of `strapdown calibrate`.
         """
+        if not Path(path).exists():
+            raise DataError("io.no-such-file", file=str(path), quantity="calibration")
         try:
             tables = tomllib.loads(Path(path).read_text(encoding="utf-8"))
             gyro, accel = tables["gyro"], tables["accel"]

@@ -268,7 +268,9 @@ def _antenna(spec: ExtrinsicsSpec, progress: Progress) -> ExtrinsicsRun:
     if abs(ends.iloc[1] - ends.iloc[0]) > 2.0 * float(sds["gnss.time_offset_t"].iloc[middle]):
         first, last = (float(x) for x in ends)
         said.append(_said("extrinsics.offset-wanders", name, "note", first=first, last=last))
-    findings = (*run.findings, *said)
+    # Its remedy is the offset of an earlier pass; the table has that of the last.
+    kept = [f for f in run.findings if not f.code.startswith("navigation.run-again-with-")]
+    findings = (*kept, *said)
     other = Path(str(table["path"])).name
     return ExtrinsicsRun(spec, name, other, result, findings, run.inputs, run)
 
