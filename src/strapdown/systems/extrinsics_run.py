@@ -259,7 +259,9 @@ def _antenna(spec: ExtrinsicsSpec, progress: Progress) -> ExtrinsicsRun:
         {},
     )
     name = run.source.name
-    said = [
+    # Simulated drives say so: docs/extrinsics.md.
+    said = [_said("extrinsics.antenna-indicative", name)]
+    said += [
         _said("extrinsics.state-open", name, parameter=e.name, share=e.prior_share, bound=e.bound)
         for e in estimates
         if not e.observed
