@@ -6,10 +6,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from strapdown.api.reading import ImuFile, imu_input
-from strapdown.config.logs import AllanSpec, LogTable
+from strapdown.api.reading import ImuFile, imu_input, log_table
+from strapdown.config.logs import AllanSpec
 from strapdown.config.spec import specify
-from strapdown.errors import ConfigError
 from strapdown.progress import Progress, silent
 from strapdown.systems.allan_run import AllanRun, run_allan
 from strapdown.systems.inputs import NOWHERE, Memory
@@ -67,16 +66,8 @@ def allan(
     names = ["imu.npz", *(f"imu-{k}.npz" for k in range(2, len(given) + 1))]
     memory = Memory.of(dict(zip(names, given, strict=False)))
     with memory.as_files() as folder:
-        tables = []
-        for name, samples in zip(names, given, strict=False):
-            if isinstance(samples, ImuFile):
-                keys = {**samples.log.model_dump(exclude_none=True), **stated}
-                tables.append(specify(LogTable, **keys))
-                axes = axes or samples.axes
-            elif stated:
-                raise ConfigError("api.table-with-options", quantity=next(iter(stated)))
-            else:
-                tables.append(specify(LogTable, path=str(folder / name)))
+        tables = [log_table(one, folder / n, stated) for n, one in zip(names, given, strict=False)]
+        axes = axes or next((x.axes for x in given if isinstance(x, ImuFile) and x.axes), None)
         about = {"axes": axes, "at_rest": at_rest, "target": target}
         stem = Path(tables[0].path).resolve().stem if tables else "imu"
         spec = specify(AllanSpec, name=stem, logs=tuple(tables), **about)

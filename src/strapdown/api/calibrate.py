@@ -9,8 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from strapdown.api.reading import ImuFile, imu_input
-from strapdown.config.logs import CalibrateSpec, KnownTurn, LogTable
+from strapdown.api.reading import imu_input, log_table
+from strapdown.config.logs import CalibrateSpec, KnownTurn
 from strapdown.config.spec import specify
 from strapdown.errors import ConfigError, DataError
 from strapdown.progress import Progress, silent
@@ -79,15 +79,7 @@ def calibrate(
     names = [f"imu-{k + 1}.npz" if len(given) > 1 else "imu.npz" for k in range(len(given))]
     memory = Memory.of(dict(zip(names, samples, strict=True)))
     with memory.as_files() as folder:
-        tables = []
-        for one, name in zip(samples, names, strict=True):
-            if isinstance(one, ImuFile):
-                keys = {**one.log.model_dump(exclude_none=True), **stated}
-                tables.append(specify(LogTable, **keys))
-            elif stated:
-                raise ConfigError("api.table-with-options", quantity=next(iter(stated)))
-            else:
-                tables.append(specify(LogTable, path=str(folder / name)))
+        tables = [log_table(one, folder / n, stated) for n, one in zip(names, samples, strict=True)]
         spec = specify(
             CalibrateSpec,
             name=Path(tables[0].path).resolve().stem,

@@ -9,10 +9,9 @@ from typing import Any
 
 import pandas as pd
 
-from strapdown.api.reading import ImuFile, imu_input
-from strapdown.config.logs import DoctorSpec, FixesTable, LogTable
+from strapdown.api.reading import ImuFile, imu_input, log_table
+from strapdown.config.logs import DoctorSpec, FixesTable
 from strapdown.config.spec import specify
-from strapdown.errors import ConfigError
 from strapdown.progress import Progress, silent
 from strapdown.systems.clean_log import write_clean_log
 from strapdown.systems.doctor import Diagnosis, run_doctor
@@ -70,8 +69,9 @@ def doctor(
     named = {f"imu-{k + 1}.npz": log for k, log in enumerate(given)}
     memory = Memory.of(named)
     keys = {**options, **{f"{quantity}_unit": unit for quantity, unit in (units or {}).items()}}
+    stated = {key: value for key, value in keys.items() if value}
     with memory.as_files() as folder:
-        tables = [_table(log, folder / name, keys) for name, log in named.items()]
+        tables = [log_table(log, folder / name, stated) for name, log in named.items()]
         name = ", ".join(Path(table.path).resolve().stem for table in tables)
         axes = axes or next((x.axes for x in given if isinstance(x, ImuFile) and x.axes), None)
         fixes = [specify(FixesTable, path=t.path, **gnss) for t in tables] if gnss else []
@@ -80,13 +80,3 @@ def doctor(
         if fix is not None:
             write_clean_log(found, fix, force=force)
         return replace(found, memory=memory).in_folder(folder, NOWHERE)
-
-
-def _table(log: ImuFile | pd.DataFrame, file: Path, keys: Mapping[str, Any]) -> LogTable:
-    """Return how a log is read; what is given replaces what a table was read with."""
-    stated = {key: value for key, value in keys.items() if value}
-    if not isinstance(log, ImuFile):
-        if stated:
-            raise ConfigError("api.table-with-options", quantity=next(iter(stated)))
-        return specify(LogTable, path=str(file))
-    return specify(LogTable, **{**log.log.model_dump(exclude_none=True), **stated})

@@ -10,7 +10,15 @@ from typing import Any
 import pandas as pd
 
 from strapdown.api.navigation import specify_navigation
-from strapdown.api.reading import ImuFile, by_time, imu_input, imu_of, keys_in, table_input
+from strapdown.api.reading import (
+    ImuFile,
+    by_time,
+    imu_input,
+    imu_of,
+    keys_in,
+    log_table,
+    table_input,
+)
 from strapdown.config.extrinsics import ExtrinsicsSpec
 from strapdown.config.logs import LogTable
 from strapdown.config.navigation import NavigationSpec
@@ -105,7 +113,7 @@ def extrinsics(
         if kind == "gnss":
             if second is None:
                 raise ConfigError("extrinsics.other-missing", quantity="other")
-            log_file = ImuFile(specify(LogTable, **table), axes)
+            log_file = ImuFile(table, axes)
             keys = {**given, **keys_in(second, folder / file)}
             spec["navigation"] = _run_of_antenna(log_file, keys, sensor, offset, wheels).plain()
         elif given:
@@ -125,15 +133,13 @@ def _second(other: Any, kind: str) -> Any:
     return table_input(other, "other")
 
 
-def _log(samples: Any, stated: dict[str, Any], path: Path) -> tuple[dict[str, Any], Any, str]:
+def _log(samples: Any, stated: dict[str, Any], path: Path) -> tuple[LogTable, Any, str]:
     """Table of a log, its axes, and a name; `path`: of samples in memory."""
     axes = stated.pop("axes", None)
-    if not isinstance(samples, ImuFile):
-        if stated:
-            raise ConfigError("api.table-with-options", quantity=next(iter(stated)))
-        return {"path": str(path)}, axes, path.stem
-    table = {**samples.log.model_dump(exclude_none=True), **stated}
-    return table, axes or samples.axes, Path(samples.log.path).resolve().stem
+    if isinstance(samples, ImuFile):
+        axes = axes or samples.axes
+    table = log_table(samples, path, stated)
+    return table, axes, Path(table.path).resolve().stem
 
 
 def _run_of_antenna(

@@ -435,6 +435,20 @@ def read(path: str | Path) -> Streams:
     return Streams(tables, Path(path).name, left_out)
 
 
+def log_table(log: ImuFile | pd.DataFrame, file: Path, stated: Mapping[str, Any]) -> LogTable:
+    """Return how a log is read: a file, or samples in memory that are written into `file`.
+
+    `stated` replaces what a file is read with. ConfigError: it is stated of samples in memory.
+    """
+    from strapdown.config.logs import LogTable
+
+    if isinstance(log, ImuFile):
+        return specify(LogTable, **{**log.log.model_dump(exclude_none=True), **stated})
+    if stated:
+        raise ConfigError("api.table-with-options", quantity=next(iter(stated)))
+    return specify(LogTable, path=str(file))
+
+
 def imu_input(source: Any) -> ImuFile | pd.DataFrame:
     """Samples in any form as a file still to be read, or as a checked Imu table.
 

@@ -12,7 +12,6 @@ import pandas as pd
 from strapdown.alignment.alignment import Alignment
 from strapdown.bundle import write_json
 from strapdown.config.alignment import AlignmentSpec
-from strapdown.progress import Progress
 from strapdown.report.alignment_document import (
     CONVENTIONS,
     alignment_document,
@@ -26,6 +25,7 @@ from strapdown.report.report_bundle import (
     file_of,
     finite,
     with_file,
+    with_page,
     write_table,
 )
 from strapdown.systems.alignment_run import AlignmentRun, run_alignment
@@ -42,22 +42,16 @@ def _run(configuration: dict[str, Any]) -> AlignmentRun:
     return run_alignment(spec, file_of(configuration))
 
 
-def _write(
-    result: AlignmentRun, folder: Path, name: str, forms: tuple[str, ...], progress: Progress
-) -> None:
+def _write_data(result: AlignmentRun, folder: Path) -> None:
     write_json(folder / "align.json", alignment_json(result))
     comments = as_comments(CONVENTIONS)
     write_table(_attitude(result), folder / "attitude.csv", comments)
     if result.fine is not None:
         write_table(_history(result.fine.history), folder / "fine.csv", comments)
-    if forms:
-        from strapdown.report.document_html import write_report
-
-        write_report(alignment_document(result, name), folder, progress)
 
 
 #: Page, JSON, tables and figures of an alignment.
-ALIGNMENT = ReportBundle("align", _configuration, _run, _write)
+ALIGNMENT = ReportBundle("align", _configuration, _run, with_page(_write_data, alignment_document))
 
 
 def _attitude(result: AlignmentRun) -> pd.DataFrame:

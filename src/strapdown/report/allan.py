@@ -13,7 +13,6 @@ from strapdown.bundle import write_json
 from strapdown.config.logs import AllanSpec
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.formats import csv
-from strapdown.progress import Progress
 from strapdown.report.chart import AXIS_COLOURS, Chart, Line, Panel
 from strapdown.report.document import (
     Document,
@@ -25,7 +24,7 @@ from strapdown.report.document import (
     run_again,
     section,
 )
-from strapdown.report.report_bundle import ReportBundle, finite
+from strapdown.report.report_bundle import ReportBundle, finite, with_page
 from strapdown.report.values import duration_words
 from strapdown.sensors.bridge import target_of
 from strapdown.sensors.noise_terms import ChannelNoise, NoiseTerm
@@ -69,9 +68,7 @@ def _run(configuration: dict[str, Any]) -> AllanRun:
     return run_allan(AllanSpec.checked(configuration["allan"]))
 
 
-def _write(
-    result: AllanRun, folder: Path, name: str, forms: tuple[str, ...], progress: Progress
-) -> None:
+def _write_data(result: AllanRun, folder: Path) -> None:
     write_json(folder / "allan.json", allan_json(result))
     table = result.deviations
     csv.write(
@@ -80,14 +77,6 @@ def _write(
         {"units": "allan, modified, hadamard, model: rad/s of gyros, m/s² of accelerometers"},
     )
     (folder / "sensor.toml").write_text(result.sensor_text(), encoding="utf-8", newline="\n")
-    if forms:
-        from strapdown.report.document_html import write_report
-
-        write_report(allan_document(result, name), folder, progress)
-
-
-#: Page, JSON, deviations and sensor file of a record at rest.
-ALLAN = ReportBundle("allan", _configuration, _run, _write)
 
 
 def allan_json(result: AllanRun) -> dict[str, Any]:
@@ -317,3 +306,7 @@ def allan_chart(result: AllanRun, kind: str = "allan") -> Chart:
         "hadamard": "Overlapping Hadamard deviation",
     }
     return Chart(kind, words[kind], "", "averaging time, s", tuple(panels), log_x=True)
+
+
+#: Page, JSON, deviations and sensor file of a record at rest.
+ALLAN = ReportBundle("allan", _configuration, _run, with_page(_write_data, allan_document))

@@ -13,7 +13,6 @@ from strapdown.bundle import write_json
 from strapdown.config.logs import CalibrateSpec
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.formats import csv
-from strapdown.progress import Progress
 from strapdown.report.chart import AXIS_COLOURS, Chart, Level, Line, Panel
 from strapdown.report.document import (
     Document,
@@ -25,7 +24,7 @@ from strapdown.report.document import (
     run_again,
     section,
 )
-from strapdown.report.report_bundle import ReportBundle, finite
+from strapdown.report.report_bundle import ReportBundle, finite, with_page
 from strapdown.sensors.calibration import correlations
 from strapdown.systems.calibrate_run import CalibrateRun, run_calibrate
 
@@ -100,9 +99,7 @@ def _run(configuration: dict[str, Any]) -> CalibrateRun:
     return run_calibrate(CalibrateSpec.checked(configuration["calibrate"]))
 
 
-def _write(
-    result: CalibrateRun, folder: Path, name: str, forms: tuple[str, ...], progress: Progress
-) -> None:
+def _write_data(result: CalibrateRun, folder: Path) -> None:
     write_json(folder / "calibrate.json", calibrate_json(result))
     text = result.calibration_text()
     (folder / "calibration.toml").write_text(text, encoding="utf-8", newline="\n")
@@ -113,14 +110,6 @@ def _write(
             {str(c): table[c].to_numpy(dtype=np.float64) for c in table.columns},
             {"units": "start, end: s; force_: m/s²; turn_: rad; up_: sensor axes"},
         )
-    if forms:
-        from strapdown.report.document_html import write_report
-
-        write_report(calibrate_document(result, name), folder, progress)
-
-
-#: Page, JSON, calibration file and rests of a calibration.
-CALIBRATE = ReportBundle("calibrate", _configuration, _run, _write)
 
 
 def calibrate_json(result: CalibrateRun) -> dict[str, Any]:
@@ -382,3 +371,9 @@ def bounds_chart(result: CalibrateRun) -> Chart | None:
     )
     caption = ", ".join(f"{k + 1} {n.replace('_', ' ')}" for k, n in enumerate(found.names))
     return Chart("bounds", "How well each error is known", caption, "error", (panel,))
+
+
+#: Page, JSON, calibration file and rests of a calibration.
+CALIBRATE = ReportBundle(
+    "calibrate", _configuration, _run, with_page(_write_data, calibrate_document)
+)

@@ -18,7 +18,6 @@ from strapdown.constants import MICRO_G
 from strapdown.errors import DataError, Finding
 from strapdown.formats.clocks import UNIX, on_clock_of
 from strapdown.formats.recording import AXES_OF_SENSOR, PLACEHOLDERS
-from strapdown.progress import Progress
 from strapdown.report.chart import (
     AXIS_COLOURS,
     BLACK,
@@ -46,7 +45,7 @@ from strapdown.report.document import (
     run_again,
     section,
 )
-from strapdown.report.report_bundle import ReportBundle, finite
+from strapdown.report.report_bundle import ReportBundle, finite, with_page
 from strapdown.report.values import duration_words, instant, small
 from strapdown.systems.doctor import USES, Diagnosis, LogDiagnosis, refused_fixes, run_doctor
 from strapdown.tables import ACCEL, GEODETIC, GYRO, VELOCITY, VELOCITY_SD, find_gaps
@@ -69,18 +68,8 @@ def _run(configuration: dict[str, Any]) -> Diagnosis:
     return run_doctor(DoctorSpec.checked(configuration["doctor"]))
 
 
-def _write(
-    result: Diagnosis, folder: Path, name: str, forms: tuple[str, ...], progress: Progress
-) -> None:
+def _write_data(result: Diagnosis, folder: Path) -> None:
     write_json(folder / "doctor.json", diagnosis_json(result))
-    if forms:
-        from strapdown.report.document_html import write_report
-
-        write_report(doctor_document(result, name), folder, progress, figures=False)
-
-
-#: Page and JSON of a diagnosis.
-DOCTOR = ReportBundle("doctor", _configuration, _run, _write)
 
 
 def diagnosis_json(result: Diagnosis) -> dict[str, Any]:
@@ -529,3 +518,9 @@ def fix_chart(one: LogDiagnosis, slug: str = "") -> Chart | None:
         Panel("step, s", (steps,), title="Steps of time", height=0.6),
     ]
     return Chart(f"{slug}fixes", "Fixes", "", "time, s", tuple(panels))
+
+
+#: Page and JSON of a diagnosis.
+DOCTOR = ReportBundle(
+    "doctor", _configuration, _run, with_page(_write_data, doctor_document, figures=False)
+)

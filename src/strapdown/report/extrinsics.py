@@ -13,7 +13,6 @@ from strapdown.config.extrinsics import ExtrinsicsSpec
 from strapdown.config.toml_text import array, number, string
 from strapdown.evaluation.extrinsics import Estimate
 from strapdown.navigation.record import innovation_labels
-from strapdown.progress import Progress
 from strapdown.report.chart import AXIS_COLOURS, GREY, Chart, Panel, curve
 from strapdown.report.document import (
     Document,
@@ -25,7 +24,7 @@ from strapdown.report.document import (
     run_again,
     section,
 )
-from strapdown.report.report_bundle import ReportBundle, finite
+from strapdown.report.report_bundle import ReportBundle, finite, with_page
 from strapdown.systems.extrinsics_run import ExtrinsicsRun, run_extrinsics
 from strapdown.tables.checks import index_of
 
@@ -72,20 +71,10 @@ def _run(configuration: dict[str, Any]) -> ExtrinsicsRun:
     return run_extrinsics(ExtrinsicsSpec.checked(configuration["extrinsics"]))
 
 
-def _write(
-    result: ExtrinsicsRun, folder: Path, name: str, forms: tuple[str, ...], progress: Progress
-) -> None:
+def _write_data(result: ExtrinsicsRun, folder: Path) -> None:
     write_json(folder / "extrinsics.json", extrinsics_json(result))
     text = extrinsics_toml(result)
     (folder / "extrinsics.toml").write_text(text, encoding="utf-8", newline="\n")
-    if forms:
-        from strapdown.report.document_html import write_report
-
-        write_report(extrinsics_document(result, name), folder, progress)
-
-
-#: Page, JSON and TOML of two sensors.
-EXTRINSICS = ReportBundle("extrinsics", _configuration, _run, _write)
 
 
 def extrinsics_json(result: ExtrinsicsRun) -> dict[str, Any]:
@@ -328,3 +317,9 @@ def match_chart(result: ExtrinsicsRun) -> Chart:
         panels.append(Panel(f"a less b, {axis}", left))
     what = "Rates" if found.kind == "imu" else "Field"
     return Chart("match", f"{what} of a and b, before and after", "", "time of a, s", tuple(panels))
+
+
+#: Page, JSON and TOML of two sensors.
+EXTRINSICS = ReportBundle(
+    "extrinsics", _configuration, _run, with_page(_write_data, extrinsics_document)
+)

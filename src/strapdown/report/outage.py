@@ -16,7 +16,6 @@ from strapdown.config.toml_file import read_toml
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import csv
 from strapdown.navigation.outage import QUANTITIES
-from strapdown.progress import Progress
 from strapdown.report.outage_document import (
     drifts_of,
     end_bound,
@@ -31,6 +30,7 @@ from strapdown.report.report_bundle import (
     file_of,
     finite,
     with_file,
+    with_page,
 )
 from strapdown.report.values import spaced
 from strapdown.sensors.catalogue import SENSORS
@@ -112,19 +112,13 @@ def _run(configuration: dict[str, Any]) -> OutageRun:
     return run_outage(spec, navigation, file_of(configuration))
 
 
-def _write(
-    result: OutageRun, folder: Path, name: str, forms: tuple[str, ...], progress: Progress
-) -> None:
+def _write_data(result: OutageRun, folder: Path) -> None:
     write_json(folder / "outage.json", outage_json(result))
     write_outage_tables(result, folder)
-    if forms:
-        from strapdown.report.document_html import write_report
-
-        write_report(outage_document(result, name), folder, progress)
 
 
 #: Page, JSON and cone of the drift of an outage prediction.
-OUTAGE = ReportBundle("outage", _configuration, _run, _write)
+OUTAGE = ReportBundle("outage", _configuration, _run, with_page(_write_data, outage_document))
 
 
 # JSON and tables of an outage prediction.

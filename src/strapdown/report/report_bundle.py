@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, Protocol, TypeVar
 
 import numpy as np
 import pandas as pd
@@ -17,6 +17,9 @@ from strapdown.formats import csv
 from strapdown.progress import Progress, silent
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables.checks import index_of
+
+if TYPE_CHECKING:
+    from strapdown.report.document import Document
 
 
 class Ran(Protocol):
@@ -29,6 +32,31 @@ class Ran(Protocol):
 
 R = TypeVar("R", bound=Ran)
 T = TypeVar("T")
+WriteFiles = Callable[[R, Path, str, tuple[str, ...], Progress], None]
+
+
+def with_page(
+    write_data: Callable[[R, Path], None],
+    document: Callable[[R, str], Document],
+    *,
+    figures: bool = True,
+) -> WriteFiles[R]:
+    """Return how the data of a run and its page are written, as `ReportBundle.write_files`.
+
+    `document`: of a run, with the name that it shows. `figures`: whether the drawings of the page
+    are files, too.
+    """
+
+    def write_files(
+        result: R, folder: Path, name: str, forms: tuple[str, ...], progress: Progress
+    ) -> None:
+        write_data(result, folder)
+        if forms:
+            from strapdown.report.document_html import write_report
+
+            write_report(document(result, name), folder, progress, figures=figures)
+
+    return write_files
 
 
 @dataclass(frozen=True)
@@ -53,7 +81,7 @@ class ReportBundle(Generic[R]):
     command: str
     configuration: Callable[[R], dict[str, Any]]
     run: Callable[[dict[str, Any]], R]
-    write_files: Callable[[R, Path, str, tuple[str, ...], Progress], None]
+    write_files: WriteFiles[R]
     pdf: bool = False
     prepared: Callable[[R, bool], AbstractContextManager[R]] = lambda run, _: nullcontext(run)
 

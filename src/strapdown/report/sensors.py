@@ -21,7 +21,7 @@ from strapdown.formats import csv
 from strapdown.progress import Progress, silent
 from strapdown.report.chart import Chart, Line, Panel, look
 from strapdown.report.document import Document, Items, TableBlock, findings_list, run_again, section
-from strapdown.report.report_bundle import ReportBundle, finite
+from strapdown.report.report_bundle import ReportBundle, finite, with_page
 from strapdown.report.values import length_words, three_digits
 from strapdown.sensors.allan import allan_model
 from strapdown.sensors.catalogue import ALLAN_OF_GAUSS_MARKOV, SENSORS, Sensor, load_sensor
@@ -372,9 +372,7 @@ def sensor_json(sensor: Sensor) -> dict[str, Any]:
     return finite({**{str(key): value for key, value in row.items()}, "sources": figures})
 
 
-def _write(
-    run: SensorsRun, folder: Path, name: str, forms: tuple[str, ...], progress: Progress
-) -> None:
+def _write_data(run: SensorsRun, folder: Path) -> None:
     write_json(folder / "sensors.json", sensors_json(run))
     for file, table in (("deviations", run.deviations), ("drift", run.drift)):
         columns = {
@@ -382,10 +380,6 @@ def _write(
             for c in table.columns
         }
         csv.write(folder / f"{file}.csv", columns, {})
-    if forms:
-        from strapdown.report.document_html import write_report
-
-        write_report(sensors_document(run, name), folder, progress)
 
 
 #: Page, JSON, deviations and drift of a comparison of sensors.
@@ -393,5 +387,5 @@ SENSORS_BUNDLE = ReportBundle(
     "sensors",
     lambda run: {"sensors": run.spec.plain()},
     lambda configuration: compare(specify(SensorsSpec, **configuration["sensors"])),
-    _write,
+    with_page(_write_data, sensors_document),
 )
