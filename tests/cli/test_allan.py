@@ -144,7 +144,7 @@ def test_the_temperature_of_a_log_is_regarded(where, monkeypatch, tmp_path):
 
     if where == "stream":
         monkeypatch.setattr("strapdown.systems.allan_run.holds", lambda path, stream: True)
-        monkeypatch.setattr("strapdown.systems.allan_run.read_stream", stream)
+        monkeypatch.setattr("strapdown.formats.aid_table.read_stream", stream)
     run = sd.allan(tmp_path / "log.csv")
     effect = run.noise["gyro_x"].term("C")
     assert effect.observable

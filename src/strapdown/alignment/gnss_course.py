@@ -523,10 +523,10 @@ class CourseFit:
         sd = np.zeros(self.unknowns)
         sd[END_VELOCITY], sd[TURN] = UNKNOWN
         sd[COUNT:] = UNKNOWN_PLACE
-        still = np.square(gyro.axis("bias")) + np.square(self.sensors.gyro_drift.triad)
+        still = self.sensors.gyro_bias_variance()
         still = still + np.square(gyro.axis("g_sensitivity")) * float(force @ force)
         sd[GYRO_BIAS] = np.sqrt(still + gyro.variance_by_input(rate))
-        still = np.square(accel.axis("bias")) + np.square(self.sensors.accel_drift.triad)
+        still = self.sensors.accel_bias_variance()
         sd[ACCEL_BIAS] = np.sqrt(still + accel.variance_by_input(force))
         apart = np.sqrt(np.maximum(sums.stretch, 1e-9))[:, None]
         for triad, drift, matrix, noise in (

@@ -209,7 +209,7 @@ def _held(
     deviations of the rates that it is by, (3,), rad/s. The mean rate is that of a bias of known
     standard deviation B and of a swing, of mean rate m: the part ``B² / (B² + m²)`` is bias.
     """
-    bias = np.square(sensors.gyro.axis("bias")) + np.square(sensors.gyro_drift.triad)
+    bias = sensors.gyro_bias_variance()
     by_swing = turn_variance(sensors, means, swing)
     part = np.divide(bias, bias + by_swing, out=np.zeros(3), where=bias > 0.0)
     table = imu.copy()
@@ -231,7 +231,7 @@ def turn_variance(sensors: ImuUncertainty, means: BlockMeans, swing: Array) -> A
     theirs; a slow one further, because `excursion` is about a line: twice. A mean rate that the
     stated bias does not explain is a turn.
     """
-    bias = np.square(sensors.gyro.axis("bias")) + np.square(sensors.gyro_drift.triad)
+    bias = sensors.gyro_bias_variance()
     rate = means.whole_rate
     by_swing: Array = np.square(NET / means.length) * np.diagonal(swing)
     # Of a swing as slow as the record the halves differ; by how much is known of all axes together.

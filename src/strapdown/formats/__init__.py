@@ -625,7 +625,6 @@ def recording_of(raw: RawLog, asked: ReadOptions, *, keep: bool = True) -> Recor
 
 def _calibrated(recording: Recording, asked: ReadOptions) -> Recording:
     """Take off the known errors of the sensor, in its own axes; and say what is left."""
-    from strapdown.formats.clocks import on_clock_of
     from strapdown.formats.columns import parse_axes
     from strapdown.formats.triad_units import axes_matrix
     from strapdown.sensors.calibration import SensorCalibration
@@ -635,14 +634,10 @@ def _calibrated(recording: Recording, asked: ReadOptions) -> Recording:
     known = calibration.turned(axes_matrix(*parse_axes(letters)))
     warmth = None
     if calibration.temperature is not None and len(recording.files) == 1:
-        from strapdown.formats.aid_table import read_stream
+        from strapdown.formats.aid_table import temperature_beside
 
-        try:
-            warm, _ = on_clock_of(read_stream(recording.files[0], "barometer", asked.format), imu)
-            warm = warm.dropna(subset=["temperature"])
-            warmth = np.interp(imu.index, warm.index, warm["temperature"])
-        except (StrapdownError, KeyError, ValueError):
-            warmth = None
+        warm = temperature_beside(recording.files[0], asked.format, imu)
+        warmth = None if warm is None else np.interp(imu.index, warm.index, warm)
     imu = known.apply(imu, warmth)
     said = [known.finding(recording.name, Path(str(asked.calibration)).name)]
     if known.not_observed:

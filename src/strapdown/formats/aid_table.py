@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats import csv, data_sets, holds, open_stream, read_raw, reader_of, table_files
 from strapdown.formats.arrays import ticks_of
-from strapdown.formats.clocks import GPS, RELATIVE, Clock, unrolled, with_clock
+from strapdown.formats.clocks import GPS, RELATIVE, Clock, on_clock_of, unrolled, with_clock
 from strapdown.formats.columns import parse_axes
 from strapdown.formats.find_columns import find_quantities
 from strapdown.formats.recording import NoStreamError, RawLog
@@ -161,6 +161,31 @@ _STREAM_UNITS = {
     "speed": (SPEEDS, "m/s"),
     "height": (LENGTHS, "m"),
 }
+
+
+def stream_beside(
+    path: str | Path, stream: str, form: str | None, imu: pd.DataFrame
+) -> pd.DataFrame | None:
+    """Read a stream that a log of inertial samples may have, on their clock; None without it.
+
+    `path`, `stream`, `form`: as `open_stream`.
+    """
+    try:
+        return on_clock_of(read_stream(path, stream, form), imu)[0]
+    except (DataError, ConfigError):
+        return None
+
+
+def temperature_beside(path: str | Path, form: str | None, imu: pd.DataFrame) -> pd.Series | None:
+    """Temperature of a log's barometer, °C, by the time of the inertial samples; None without it.
+
+    Arguments as of `stream_beside`.
+    """
+    table = stream_beside(path, "barometer", form, imu)
+    if table is None or "temperature" not in table.columns:
+        return None
+    found = table["temperature"].dropna()
+    return found if len(found) else None
 
 
 def read_stream(path: str | Path, stream: str, form: str | None = None) -> pd.DataFrame:

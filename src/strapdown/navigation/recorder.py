@@ -6,7 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 import pandas as pd
@@ -209,11 +209,11 @@ class Tape:
         factor = None
         if later is not None and contradictions:
             about = [
-                (begin if since is None else since, until)
-                for _, begin, _, _, until, since in contradictions
+                (one.begin if one.since is None else one.since, one.believed)
+                for _, one in contradictions
             ]
             factor = self._excess(later, marks, kept, about)
-            contradictions = [one for one in contradictions if one[5] is None]
+            contradictions = [(k, one) for k, one in contradictions if one.since is None]
         without = ~np.array(model.estimated(used))
         for part in on_disk.parts_of(len(kept), marks.shape[1]):
             rows, at = kept[part], stamps[part]
@@ -228,7 +228,7 @@ class Tape:
             if factor is not None:
                 P *= factor[part, None, None]
                 sensors_sd[part] *= np.sqrt(factor[part, None])
-            for component, begin, end, size, *_ in contradictions:
+            for component, (begin, end, size, *_) in contradictions:
                 within = (at >= begin) & (at <= end)
                 # A correction of one position corrects all else by their covariance with it.
                 own = filtered[within, component, component, None]
@@ -300,7 +300,7 @@ class Tape:
             out[first:stop] = factor[first:stop]
         return out
 
-    def _contradictions(self) -> Iterator[tuple[int, float, float, float, float, float | None]]:
+    def _contradictions(self) -> Iterator[tuple[int, Contradiction]]:
         """Components of the receivers' positions, with their contradictions."""
         general = self.navigator.filter.rule
         rules = {aid.name: aid.rule or general for aid in self.navigator.aids}
@@ -313,7 +313,7 @@ class Tape:
             for k, label in enumerate(labels):
                 rejected = weight[:, k] == 0.0
                 for one in _contradictions(time, nu[:, k], rejected, rule.scale.patience):
-                    yield PLACE.index(label), *one
+                    yield PLACE.index(label), one
 
     def _cells(self, time: Array) -> Array:
         """Number of the interval of each time stamp."""
@@ -377,13 +377,31 @@ def _nearest(time: Array, wanted: Array) -> NDArray[np.intp]:
     return np.asarray(after - (wanted - time[after - 1] < time[after] - wanted))
 
 
+class Contradiction(NamedTuple):
+    """A contradiction of a component of a receiver's position and the inertial solution.
+
+    Attributes
+    ----------
+    begin, end : float, s
+        While what separated the two is a part of the uncertainty.
+    size : float, m
+    believed : float, s
+        When the receiver is believed again.
+    since : float or None, s
+        When the outage before it began, if there was one.
+    """
+
+    begin: float
+    end: float
+    size: float
+    believed: float
+    since: float | None
+
+
 def _contradictions(
     time: Array, nu: Array, rejected: NDArray[np.bool_], patience: int
-) -> Iterator[tuple[float, float, float, float, float | None]]:
-    """Begin and end, s, and size, m, of contradictions of a receiver and the inertial solution.
-
-    Further when the receiver is believed again, and when the outage before began, s, if there was
-    one.
+) -> Iterator[Contradiction]:
+    """Return the contradictions of a receiver and the inertial solution.
 
     `nu`, `rejected`: innovations of a component, and those that an adaptive rule rejected.
 
@@ -403,11 +421,11 @@ def _contradictions(
         # The last estimate needs as many observations to settle.
         settled = min(span.stop + patience, len(time))
         size, end = float(np.abs(nu[span]).max()), float(time[settled - 1])
-        until = float(time[span.stop - 1])
+        begin, until = float(time[span.start]), float(time[span.stop - 1])
         long = span.stop - span.start >= patience
         if span.stop < len(time) and abs(nu[span.stop]) < 0.5 * abs(nu[span.stop - 1]):
             if long:
-                yield float(time[span.start]), float(time[span.stop]), size, until, None
+                yield Contradiction(begin, float(time[span.stop]), size, until, None)
             back = False
             continue
         near = max(span.start - CONFIRMED + 1, 0)
@@ -417,15 +435,15 @@ def _contradictions(
                 since = float(time[lately[0] - 1])
             elif span.start > swings:
                 since = None
-            yield float(time[span.start]), end, size, end, since
+            yield Contradiction(begin, end, size, end, since)
             back, swings = False, settled + patience
             continue
-        end = float(time[span.stop - 1]) + DOUBT
+        end = until + DOUBT
         # One after that time is a fault of its own.
         if j + 1 < len(spans) and time[spans[j + 1].start] <= end:
             back = abs(first[j] + first[j + 1]) < 0.5 * abs(first[j])
             end = float(time[spans[j + 1].stop - 1]) if back else end
-        yield float(time[span.start]), end, size, until, None
+        yield Contradiction(begin, end, size, until, None)
 
 
 def _long_rejections(rejected: NDArray[np.bool_], patience: int) -> list[slice]:

@@ -262,6 +262,14 @@ class ImuUncertainty:
     gyro_drift: BiasDrift = field(default_factory=BiasDrift)
     accel_drift: BiasDrift = field(default_factory=BiasDrift)
 
+    def gyro_bias_variance(self) -> Array:
+        """Variances of the gyro biases with their drift, (3,), rad²/s²."""
+        return np.asarray(np.square(self.gyro.axis("bias")) + np.square(self.gyro_drift.triad))
+
+    def accel_bias_variance(self) -> Array:
+        """Variances of the accelerometer biases with their drift, (3,), m²/s⁴."""
+        return np.asarray(np.square(self.accel.axis("bias")) + np.square(self.accel_drift.triad))
+
     @classmethod
     def of_sensor(cls, sensor: Sensor) -> ImuUncertainty:
         """Make the uncertainty from a data sheet.

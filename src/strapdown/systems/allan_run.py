@@ -20,10 +20,9 @@ from strapdown.bundle import InputFiles, Seal, log_files
 from strapdown.config.logs import AllanSpec, AxesTable, LogTable
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.formats import holds
-from strapdown.formats.aid_table import read_stream
-from strapdown.formats.clocks import on_clock_of
+from strapdown.formats.aid_table import temperature_beside
 from strapdown.formats.recording import Recording
 from strapdown.progress import Progress, silent
 from strapdown.sensors.allan import allan_model, deviations
@@ -362,11 +361,7 @@ def _temperature(
     """Temperature of the log at the stamps, °C; None without one, or if it hardly changes."""
     stream = recording.temperature
     if stream is None and holds(Path(log.path), "barometer"):
-        try:
-            table, _ = on_clock_of(read_stream(log.path, "barometer", log.format), imu)
-        except (DataError, ConfigError):
-            return None
-        stream = table.get("temperature")
+        stream = temperature_beside(log.path, log.format, imu)
     if stream is None:
         return None
     stream = stream.dropna()

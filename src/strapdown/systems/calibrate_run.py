@@ -17,8 +17,7 @@ from strapdown.config.logs import AxesTable, CalibrateSpec, KnownTurn, LogTable
 from strapdown.config.toml_text import string
 from strapdown.earth import gravity
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.formats.aid_table import read_stream
-from strapdown.formats.clocks import on_clock_of
+from strapdown.formats.aid_table import stream_beside, temperature_beside
 from strapdown.progress import Progress, silent
 from strapdown.sensors.calibration import (
     CalibrationConditions,
@@ -207,25 +206,15 @@ def _read(
     if set(MAG) <= set(imu.columns):
         mag = values_of(imu, MAG)
     else:
-        table = _stream(log, "magnetometer", imu)
+        table = stream_beside(log.path, "magnetometer", log.format, imu)
         if table is not None and set(MAG) <= set(table.columns):
             mag = table[MAG].to_numpy(dtype=np.float64)
-    warm = _stream(log, "barometer", imu)
+    warm = temperature_beside(log.path, log.format, imu)
     temperature = None
-    if warm is not None and "temperature" in warm.columns:
-        warm = warm.dropna(subset=["temperature"])
-        if len(warm) > 1:
-            temperature = (index_of(warm), warm["temperature"].to_numpy(dtype=np.float64))
+    if warm is not None and len(warm) > 1:
+        temperature = (warm.index.to_numpy(dtype=np.float64), warm.to_numpy(dtype=np.float64))
     files = input_files("log", log.path, recording.files)
     return CalibrationRecord(imu, rests, temperature), mag, findings, files
-
-
-def _stream(log: LogTable, stream: str, imu: pd.DataFrame) -> pd.DataFrame | None:
-    try:
-        table, _ = on_clock_of(read_stream(log.path, stream, log.format), imu)
-    except (DataError, ConfigError):
-        return None
-    return table
 
 
 def _magnetometer(fields: Sequence[Array]) -> MagnetometerCalibration | None:
