@@ -150,7 +150,12 @@ def _edge(
     velocity between these gives the direction of the force.
     """
     near, quiet, far, peak = places
-    force = _direction(course, over)
+    # Unit vector, horizontal, of the change of velocity between two instants, (3,).
+    start, end = course.velocity(np.array(over))
+    change = end - start
+    change[2] = 0.0
+    size = float(np.sqrt(change @ change))
+    force = np.asarray(change / size) if size > 0.0 else np.array([1.0, 0.0, 0.0])
     stamps = acceleration.time
     mean = acceleration.sampling == "mean"
     step = float(np.median(np.diff(stamps)))
@@ -224,15 +229,6 @@ def _settled(
     k = int(np.argmax(gained / mean >= 1.0))
     part = (mean - gained[k - 1]) / (gained[k] - gained[k - 1])
     return float(at[k - 1] + part * (at[k] - at[k - 1]))
-
-
-def _direction(course: VelocityCourse, over: tuple[float, float]) -> Array:
-    """Unit vector, horizontal, of the change of velocity between two instants, (3,)."""
-    start, end = course.velocity(np.array(over))
-    change = end - start
-    change[2] = 0.0
-    size = float(np.sqrt(change @ change))
-    return np.asarray(change / size) if size > 0.0 else np.array([1.0, 0.0, 0.0])
 
 
 def _missing(

@@ -891,7 +891,18 @@ def truth_of_log(
         # The frames of an attitude are unknown unless the file states those of our own logs.
         q, names = _quaternions(raw, found) if raw.axes == "x,y,z" else (None, [])
         if q is None:
-            _mention(raw, found, findings)
+            # An attitude of unknown frames, as from a phone, is not used as truth.
+            if raw.axes != "x,y,z" and any(
+                set(names) <= set(found) for names in (QUATERNIONS, EULERS)
+            ):
+                findings.append(
+                    Finding(
+                        "io.attitude-not-used",
+                        severity="note",
+                        file=raw.name,
+                        quantity="attitude",
+                    )
+                )
             return None, None
         # Avoid copies of a long log.
         q = q if kept.size == len(q) else q[kept]
@@ -991,19 +1002,6 @@ def _quaternions(raw: RawLog, found: dict[str, Column]) -> tuple[Array | None, l
     q = np.full((len(angles), 4), np.nan)
     q[finite] = rotation.quaternion_from_euler(angles[finite])
     return q, list(EULERS)
-
-
-def _mention(raw: RawLog, found: dict[str, Column], findings: list[Finding]) -> None:
-    """Note that an attitude of unknown frames, as from a phone, is not used as truth."""
-    if raw.axes != "x,y,z" and any(set(names) <= set(found) for names in (QUATERNIONS, EULERS)):
-        findings.append(
-            Finding(
-                "io.attitude-not-used",
-                severity="note",
-                file=raw.name,
-                quantity="attitude",
-            )
-        )
 
 
 def _sensor_from_body(raw: RawLog, axes: Turn) -> Array:

@@ -26,11 +26,10 @@ from strapdown.formats.crash_record import (
     position_of,
 )
 from strapdown.formats.nhtsa import KINDS, Channel, CrashTest, Vehicle, read_nhtsa
-from strapdown.formats.signs import Signs
 from strapdown.tables import imu_table
 from strapdown.units import find_unit, si_of
 
-__all__ = ["accelerations", "code_of_place", "detect", "imu_of", "read"]
+__all__ = ["accelerations", "code_of_place", "imu_of", "read"]
 
 
 Array = NDArray[np.float64]
@@ -56,9 +55,6 @@ _WORDS = {
 _NO_CODE = ("", "NA", "OTHR", "OTHER", "UN")
 _NO_SEAT = ("", "NA", "00", "OT", "AP")
 _STATUS = _CODES["status"]
-
-
-detect = Signs(named=(".ev5",), first=rb"\A.{0,4081}?----- EV5 -----", inside="*.ev5")
 
 
 def read(path: Path) -> CrashRecord:

@@ -227,15 +227,15 @@ def clean(text: str, longest: int = LONGEST_TEXT) -> str:
     """
     # Of a very long text only the part that can be kept is processed.
     kept = "".join(
-        " " if c.isspace() else "\N{REPLACEMENT CHARACTER}" if _steers(c) else c
+        " "
+        if c.isspace()
+        else "\N{REPLACEMENT CHARACTER}"
+        if unicodedata.category(c) in ("Cc", "Cf", "Cs", "Co", "Cn")
+        else c
         for c in text[: 4 * longest]
     )
     kept = " ".join(kept.split())
     return kept if len(kept) <= longest else kept[: longest - 1] + "…"
-
-
-def _steers(character: str) -> bool:
-    return unicodedata.category(character) in ("Cc", "Cf", "Cs", "Co", "Cn")
 
 
 def unique(names: list[str]) -> list[str]:

@@ -5,13 +5,15 @@ from __future__ import annotations
 import difflib
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from itertools import islice
 from pathlib import Path
 
 from strapdown.errors import ConfigError, DataError, check_choice
-from strapdown.formats import crash_edr, crash_json, crash_nhtsa, crash_table, mme_reader
+from strapdown.formats import crash_edr, crash_json
 from strapdown.formats.crash_record import CrashRecord, clean
 from strapdown.formats.crash_table import record_of
+from strapdown.formats.signs import Signs
 
 __all__ = ["CRASH_READERS", "CrashReader", "detect", "read", "read_crash_record"]
 
@@ -85,40 +87,46 @@ OPTION_FAULTS = frozenset({"io.value-not-a-number"})
 
 @dataclass(frozen=True)
 class CrashReader:
-    """How one format is recognized and read."""
+    """How one format is recognized and read.
+
+    `module`: of `strapdown.formats`, whose function ``read`` reads it; loaded by the first record.
+    """
 
     title: str
     detect: Callable[[Path], bool]
-    read: Callable[[Path], CrashRecord]
+    module: str
+
+    def read(self, path: Path) -> CrashRecord:
+        """Read a record of this format."""
+        record: CrashRecord = import_module(f"strapdown.formats.{self.module}").read(path)
+        return record
 
 
 #: In the order of detection: self-describing formats first, tables of columns last.
 CRASH_READERS: dict[str, CrashReader] = {
     "nhtsa": CrashReader(
         "test of the NHTSA vehicle database: .EV5 or its folder",
-        crash_nhtsa.detect,
-        crash_nhtsa.read,
+        Signs(named=(".ev5",), first=rb"\A.{0,4081}?----- EV5 -----", inside="*.ev5"),
+        "crash_nhtsa",
     ),
     "mme": CrashReader(
-        "test in ISO MME (ISO/TS 13499): .mme or its folder", mme_reader.detect, mme_reader.read
+        "test in ISO MME (ISO/TS 13499): .mme or its folder",
+        Signs(named=(".mme",), inside="*.mme"),
+        "mme_reader",
     ),
     "json": CrashReader(
-        "crash record as JSON, as this package writes it", crash_json.detect, crash_json.read
+        "crash record as JSON, as this package writes it", crash_json.detect, "crash_json"
     ),
     "edr": CrashReader(
         "tables of an event data recorder (49 CFR 563) as text: .csv .txt",
         crash_edr.detect,
-        crash_edr.read,
+        "crash_edr",
     ),
     "log": CrashReader(
-        "log with a column a channel: .npz .parquet .h5 .mat, of a phone",
-        detect,
-        read,
+        "log with a column a channel: .npz .parquet .h5 .mat, of a phone", detect, "crash_records"
     ),
     "csv": CrashReader(
-        "text table with a column a channel: .csv .txt",
-        Path.is_file,
-        crash_table.read,
+        "text table with a column a channel: .csv .txt", Path.is_file, "crash_table"
     ),
 }
 

@@ -326,17 +326,13 @@ def _samples(
     def read() -> NDArray[Any]:
         if said.quantity == "time":
             return _ticks(raw, source)[0]
-        values = _numbers(raw, source).astype(np.float64)
+        values = _retold(lambda: numbers(raw, source, f"channel {source}")).astype(np.float64)
         if said.quantity == "velocity" and not said.change and values.size:
             # Velocity of the sensor, not a change: subtract the initial value.
             values = values - values[0]
         return values if factor is None else values * factor
 
     return read
-
-
-def _numbers(raw: RawLog, source: str) -> NDArray[Any]:
-    return _retold(lambda: numbers(raw, source, f"channel {source}"))
 
 
 def _ticks(raw: RawLog, source: str) -> tuple[NDArray[Any], bool]:
@@ -400,16 +396,7 @@ def read_text_table(
         raise DataError("io.crash-table-with-zero-bytes", file=path.name)
     raw = csv.parse(text.encode(), path.name, (path,), OF_CRASHES)
     raw.findings[:0] = findings
-    _read_clocks(raw)
-    notes = notes_of(text.splitlines(), raw)
-    title = next((line[len(_TITLE) :] for line in raw.above[:1] if line.startswith(_TITLE)), "")
-    said = [line for line in raw.above if not line.startswith((NOTE, _TITLE))]
-    remarks = [clean(line.lstrip("#% "), LONGEST_NAME) for line in said]
-    return raw, notes, title, tuple([r for r in remarks if r][:MOST_REMARKS])
-
-
-def _read_clocks(raw: RawLog) -> None:
-    """Convert times of day to nanoseconds since midnight."""
+    # Times of day become nanoseconds since midnight.
     stated = dict(raw.stated)
     for name, values in raw.columns.items():
         if values.dtype.kind != "O":
@@ -419,6 +406,11 @@ def _read_clocks(raw: RawLog) -> None:
             raw.columns[name] = ticks
             stated[name] = ("time", "ns")
     raw.stated = stated
+    notes = notes_of(text.splitlines(), raw)
+    title = next((line[len(_TITLE) :] for line in raw.above[:1] if line.startswith(_TITLE)), "")
+    said = [line for line in raw.above if not line.startswith((NOTE, _TITLE))]
+    remarks = [clean(line.lstrip("#% "), LONGEST_NAME) for line in said]
+    return raw, notes, title, tuple([r for r in remarks if r][:MOST_REMARKS])
 
 
 def notes_of(lines: list[str], raw: RawLog) -> dict[str, dict[str, Any]]:

@@ -505,7 +505,12 @@ def triad_factor(
     are appended. Returns `unit`: as recorded, or stated. ConfigError: the stated unit does not fit
     the quantity, or contradicts the record. DataError: the unit is not known.
     """
-    own = {a: c.unit for a, (c, _) in axes.items() if _known(c)}
+    # Whether the values are in SI units already.
+    own = {
+        a: c.unit
+        for a, (c, _) in axes.items()
+        if FACTORS.get(c.quantity, {}).get(c.unit) is not None
+    }
     velocity = {c.quantity == "velocity" for c, _ in axes.values()}
     kind = "velocity" if velocity == {True} else quantity
     wanted = state_unit(stated, kind) if stated else ""
@@ -555,11 +560,6 @@ def triad_factor(
                 )
             )
     return {a: 1.0 if a in own else FACTORS[kind][wanted] for a in axes}, wanted
-
-
-def _known(channel: CrashChannel) -> bool:
-    """Whether the values are in SI units already."""
-    return FACTORS.get(channel.quantity, {}).get(channel.unit) is not None
 
 
 def _evident(

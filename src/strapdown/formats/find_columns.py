@@ -145,9 +145,9 @@ def _is_nameless(raw: RawLog) -> bool:
 
 def _nameless(raw: RawLog, likely: dict[str, str]) -> Finding:
     """Describe columns without names, by values by which the user can identify them."""
-    from strapdown.formats import crash_nhtsa
+    from strapdown.formats.crash_records import CRASH_READERS
 
-    if raw.files and crash_nhtsa.detect(raw.files[0]):
+    if raw.files and CRASH_READERS["nhtsa"].detect(raw.files[0]):
         return Finding("io.crash-test-file", severity="error", file=raw.name)
     likely = likely or _in_usual_order(raw)
     example = ",".join(f"{quantity}={column}" for quantity, column in likely.items())

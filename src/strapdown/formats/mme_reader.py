@@ -26,7 +26,6 @@ from strapdown.formats.crash_record import (
     unique,
 )
 from strapdown.formats.mme_codes import DIMENSIONS, DUMMIES, NO_CLASS, MmeCode, decode_mme
-from strapdown.formats.signs import Signs
 from strapdown.tables import SAMPLINGS
 from strapdown.units import FACTORS, OF_CRASHES, TIME_UNITS, find_unit
 
@@ -35,7 +34,6 @@ __all__ = [
     "MmeHeader",
     "channel_of",
     "clock_of",
-    "detect",
     "even_stamps",
     "is_bad",
     "read",
@@ -52,9 +50,6 @@ MOST_FILES = 20_000
 _NUMBERED = re.compile(r"\.(\d{3,4})$")
 _LISTED = re.compile(r"name of channel (\d+)")
 _TITLES = ("title", "type of the test", "laboratory test ref. number", "test name")
-
-
-detect = Signs(named=(".mme",), inside="*.mme")
 
 
 def read(path: Path) -> CrashRecord:

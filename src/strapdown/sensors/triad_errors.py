@@ -120,9 +120,45 @@ class TriadErrors:
             except (TypeError, ValueError):
                 raise _refused(f.name, _shape(f.name), given=repr(given)) from None
             object.__setattr__(self, f.name, value)
-            _check_range(f.name, value)
-        _check_matrix(self.misalignment)
-        _check_curve(self)
+            for number in _numbers(value):
+                if math.isnan(number) or (math.isinf(number) and f.name not in POSITIVE):
+                    raise _refused(f.name, "sensors.no-finite-number", number=number)
+                if f.name in POSITIVE and number <= 0.0:
+                    raise _refused(f.name, "sensors.not-positive", number=number)
+                if f.name in NOT_NEGATIVE and number < 0.0:
+                    raise _refused(f.name, "sensors.negative", number=number)
+                if f.name == "scale" and number <= -1.0:
+                    raise _refused(f.name, "sensors.leaves-no-signal", number=number)
+        for i, row in enumerate(self.misalignment):
+            if row[i] != 0.0:
+                raise _refused(
+                    "misalignment", "sensors.misalignment-diagonal-not-zero", i=i + 1, at_row=row[i]
+                )
+            if sum(abs(x) for x in row) >= 1.0:
+                raise _refused(
+                    "misalignment", "sensors.row-sums-rad", i=i + 1, sum=sum(abs(x) for x in row)
+                )
+        # The slope ``1 + s + 2 n2 x + 3 n3 x²`` must stay positive on [-1, 1].
+        axes = zip(
+            self.axis("scale"),
+            self.axis("nonlinearity_2"),
+            self.axis("nonlinearity_3"),
+            self.axis("full_scale"),
+            strict=True,
+        )
+        for s, n2, n3, full in axes:
+            if n2 == 0.0 and n3 == 0.0:
+                continue
+            if math.isinf(full):
+                raise _refused("full_scale", "sensors.nonlinearity-relative-none")
+            places = [-1.0, 1.0]
+            if n3 != 0.0 and abs(n2) < abs(3.0 * n3):
+                places.append(-n2 / (3.0 * n3))
+            least = min(1.0 + s + 2.0 * n2 * x + 3.0 * n3 * x * x for x in places)
+            if least <= 0.0:
+                raise _refused(
+                    "nonlinearity", "sensors.slope-falls-nominal-within-range", least=least
+                )
 
     def axis(self, name: str) -> Triad:
         """Return a per-axis attribute as three numbers."""
@@ -179,52 +215,6 @@ def _numbers(value: Any) -> list[float]:
     if isinstance(value, tuple):
         return [number for part in value for number in _numbers(part)]
     return [float(value)]
-
-
-def _check_range(name: str, value: Any) -> None:
-    for number in _numbers(value):
-        if math.isnan(number) or (math.isinf(number) and name not in POSITIVE):
-            raise _refused(name, "sensors.no-finite-number", number=number)
-        if name in POSITIVE and number <= 0.0:
-            raise _refused(name, "sensors.not-positive", number=number)
-        if name in NOT_NEGATIVE and number < 0.0:
-            raise _refused(name, "sensors.negative", number=number)
-        if name == "scale" and number <= -1.0:
-            raise _refused(name, "sensors.leaves-no-signal", number=number)
-
-
-def _check_matrix(misalignment: Sequence[Sequence[float]]) -> None:
-    for i, row in enumerate(misalignment):
-        if row[i] != 0.0:
-            raise _refused(
-                "misalignment", "sensors.misalignment-diagonal-not-zero", i=i + 1, at_row=row[i]
-            )
-        if sum(abs(x) for x in row) >= 1.0:
-            raise _refused(
-                "misalignment", "sensors.row-sums-rad", i=i + 1, sum=sum(abs(x) for x in row)
-            )
-
-
-def _check_curve(errors: TriadErrors) -> None:
-    """The slope ``1 + s + 2 n2 x + 3 n3 x²`` must stay positive on [-1, 1]."""
-    axes = zip(
-        errors.axis("scale"),
-        errors.axis("nonlinearity_2"),
-        errors.axis("nonlinearity_3"),
-        errors.axis("full_scale"),
-        strict=True,
-    )
-    for s, n2, n3, full in axes:
-        if n2 == 0.0 and n3 == 0.0:
-            continue
-        if math.isinf(full):
-            raise _refused("full_scale", "sensors.nonlinearity-relative-none")
-        places = [-1.0, 1.0]
-        if n3 != 0.0 and abs(n2) < abs(3.0 * n3):
-            places.append(-n2 / (3.0 * n3))
-        least = min(1.0 + s + 2.0 * n2 * x + 3.0 * n3 * x * x for x in places)
-        if least <= 0.0:
-            raise _refused("nonlinearity", "sensors.slope-falls-nominal-within-range", least=least)
 
 
 def _refused(name: str, code: str, **values: Any) -> ConfigError:
