@@ -228,7 +228,12 @@ class Frame:
                 drawing.shape(corners, None, fill=_SHADE, opacity=0.07)
             for fill in panel.fills:
                 with drawing.group(data_series=fill.name):
-                    self._fill(drawing, fill)
+                    low = np.maximum(fill.low, self.y.low) if self.y.log else fill.low
+                    for run in runs(fill.x, low, fill.high):
+                        below = self.at(fill.x[run], low[run])
+                        above = self.at(fill.x[run], fill.high[run])
+                        ring = np.vstack([below, above[::-1]])
+                        drawing.area(ring[np.isfinite(ring).all(axis=1)], fill.colour, fill.opacity)
             for bars in panel.bars:
                 with drawing.group(data_series=bars.name):
                     self._bars(drawing, bars)
@@ -267,13 +272,6 @@ class Frame:
         """Return the vertical position of a value in the picture."""
         return float(self.at([self.x.low], [y])[0, 1])
 
-    def _fill(self, drawing: Drawing, fill: Fill) -> None:
-        low = np.maximum(fill.low, self.y.low) if self.y.log else fill.low
-        for run in runs(fill.x, low, fill.high):
-            below, above = self.at(fill.x[run], low[run]), self.at(fill.x[run], fill.high[run])
-            ring = np.vstack([below, above[::-1]])
-            drawing.area(ring[np.isfinite(ring).all(axis=1)], fill.colour, fill.opacity)
-
     def _bars(self, drawing: Drawing, bars: Bars) -> None:
         start = np.zeros_like(bars.values) if bars.start is None else bars.start
         across = bool(self.panel.categories)
@@ -297,17 +295,16 @@ class Frame:
                 stamps = None if line.stamps is None else line.stamps[run]
                 drawing.curve(at[run], line.colour, _PT * line.width, line.dash, stamps)
         if line.low is not None and line.high is not None:
-            self._reaches(drawing, line, line.low, line.high)
+            cap = np.array([0.0, 4.0])
+            for begin, end in zip(
+                self.at(line.low, line.y), self.at(line.high, line.y), strict=True
+            ):
+                if np.isfinite([begin, end]).all():
+                    drawing.line(begin, end, line.colour, 1.6)
+                    for place in (begin, end):
+                        drawing.line(place - cap, place + cap, line.colour, 1.2)
         if line.points or line.dots:
             draw_points(drawing, line, at)
-
-    def _reaches(self, drawing: Drawing, line: Line, low: Array, high: Array) -> None:
-        cap = np.array([0.0, 4.0])
-        for begin, end in zip(self.at(low, line.y), self.at(high, line.y), strict=True):
-            if np.isfinite([begin, end]).all():
-                drawing.line(begin, end, line.colour, 1.6)
-                for place in (begin, end):
-                    drawing.line(place - cap, place + cap, line.colour, 1.2)
 
     def _ticks(self, drawing: Drawing) -> None:
         left, top, right, bottom = self.box

@@ -129,7 +129,30 @@ def crash_json(result: CaseResult) -> dict[str, Any]:
         ``at_least`` so much.
     """
     with shown_in(result.spec.options.units):
-        found = _json(result)
+        made = result.reconstruction
+        found = {
+            "schema": "strapdown crash 1",
+            "strapdown": __version__,
+            "title": result.spec.title,
+            "number": result.spec.number,
+            "units": result.spec.options.units,
+            "conventions": dict(crash_words.conventions()),
+            "headline": spaced(crash_words.headline(result)),
+            "main": made.main.name,
+            "answers": [_unit(unit) for unit in made.answers],
+            "comparison": None if made.comparison is None else _comparison(made.comparison),
+            "closure": None if result.closure is None else _closure(result, result.closure),
+            "deformation": _deformation(result.deformation) if result.deformation else None,
+            "severity": [_severity(s) for s in result.severity],
+            "indices": [_index(one, result.spec.options.units) for one in result.indices],
+            "references": [_reference(r) for r in result.references],
+            "assumptions": _pairs(crash_words.assumptions(result)),
+            "limitations": _pairs([one[1:] for one in crash_words.limitations(result)]),
+            "contradictions": _pairs(crash_words.contradictions(result)),
+            "not_shown": _pairs(crash_words.not_shown(result)),
+            "findings": [f.plain("file") for f in result.findings],
+            "case": _named(result.spec.model_dump(mode="json", exclude_none=True)),
+        }
     case = found.pop("case")
     return finite({**_labelled(result.spec.options.units, found), "case": case})
 
@@ -177,33 +200,6 @@ def _table_in(system: str, table: pd.DataFrame) -> pd.DataFrame:
     factors = {column: factor for column, (_, factor) in labels.items() if factor != 1.0}
     changed = table.assign(**{column: f * table[column] for column, f in factors.items()})
     return changed.rename(columns={column: name for column, (name, _) in labels.items()})
-
-
-def _json(result: CaseResult) -> dict[str, Any]:
-    made = result.reconstruction
-    return {
-        "schema": "strapdown crash 1",
-        "strapdown": __version__,
-        "title": result.spec.title,
-        "number": result.spec.number,
-        "units": result.spec.options.units,
-        "conventions": dict(crash_words.conventions()),
-        "headline": spaced(crash_words.headline(result)),
-        "main": made.main.name,
-        "answers": [_unit(unit) for unit in made.answers],
-        "comparison": None if made.comparison is None else _comparison(made.comparison),
-        "closure": None if result.closure is None else _closure(result, result.closure),
-        "deformation": _deformation(result.deformation) if result.deformation else None,
-        "severity": [_severity(s) for s in result.severity],
-        "indices": [_index(one, result.spec.options.units) for one in result.indices],
-        "references": [_reference(r) for r in result.references],
-        "assumptions": _pairs(crash_words.assumptions(result)),
-        "limitations": _pairs([one[1:] for one in crash_words.limitations(result)]),
-        "contradictions": _pairs(crash_words.contradictions(result)),
-        "not_shown": _pairs(crash_words.not_shown(result)),
-        "findings": [f.plain("file") for f in result.findings],
-        "case": _named(result.spec.model_dump(mode="json", exclude_none=True)),
-    }
 
 
 def _named(value: Any, key: str = "") -> Any:

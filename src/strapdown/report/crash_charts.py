@@ -483,11 +483,6 @@ def pdof_charts(
     )
 
 
-def _near(angle_deg: Array, middle_deg: float) -> Array:
-    """Angles within half a turn of `middle_deg`, so that a curve at 180 deg is not split."""
-    return middle_deg + np.asarray(within_half_turn(angle_deg - middle_deg))
-
-
 def _lines(
     units: Sequence[UnitReconstruction],
     combined: UnitReconstruction | None,
@@ -503,10 +498,12 @@ def _lines(
         except DataError:
             # The record of this unit covers none of the windows.
             continue
+        angle = found["horizontal_deg"].to_numpy(dtype=np.float64)
         line = Line(
             name,
             1e3 * index_of(found),
-            _near(found["horizontal_deg"].to_numpy(dtype=np.float64), middle),
+            # Within half a turn of the middle, so that a curve at 180 deg is not split.
+            middle + np.asarray(within_half_turn(angle - middle)),
             drawn["colour"],
             drawn["dash"],
             2.2 if unit is main else 1.3,

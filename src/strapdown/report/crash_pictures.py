@@ -110,7 +110,12 @@ def pdof_dial(
     for d in sorted(directions, key=lambda d: d.main):
         _wedge(out, centre, d)
     _clock(out, centre)
-    _vehicle(out, centre, outline, point)
+    scale = _scale(outline, point)
+    origin = np.array(centre)
+    # Forward is up the page: a heading of -90 deg in axes x right, y down.
+    there = outline.placed((0.0, 0.0), -90.0, point)
+    pixels = there.mapped(lambda points: origin + scale * points)
+    draw_outline(out, pixels, _BODY, 1.4, fill="#e9edf2")
     for d in sorted(directions, key=lambda d: d.main):
         _arrow(out, centre, outline, point, d)
     _recorders(out, centre, [(d, d.horizontal_deg, d.interval) for d in recorders])
@@ -422,15 +427,6 @@ def _scale(outline: Outline, point: Sequence[float]) -> float:
     """Pixels per meter about the point."""
     reach = np.abs(outline.body - np.asarray(point, np.float64)[:2])
     return _CAR * _RADIUS / max(float(np.hypot(*reach.T).max()), 1e-3)
-
-
-def _vehicle(out: Drawing, centre: Point, outline: Outline, point: Sequence[float]) -> None:
-    scale = _scale(outline, point)
-    origin = np.array(centre)
-    # Forward is up the page: a heading of -90 deg in axes x right, y down.
-    there = outline.placed((0.0, 0.0), -90.0, point)
-    pixels = there.mapped(lambda points: origin + scale * points)
-    draw_outline(out, pixels, _BODY, 1.4, fill="#e9edf2")
 
 
 def _arrow(

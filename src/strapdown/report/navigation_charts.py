@@ -62,7 +62,9 @@ def over_time(
 ) -> Chart:
     """Put panels over time below the strip of modes, measurements and heading status."""
     above = strip(record, statuses)
-    bands = outage_bands(record)
+    # Shaded bands of the outages.
+    spans = {(s.begin, s.end) for spans in record.outages.values() for s in spans}
+    bands = tuple(Band(begin, end, "outage") for begin, end in sorted(spans))
     told = f"{caption} {SHADED}" if bands else caption
     return Chart(
         slug,
@@ -312,12 +314,6 @@ def mode_colour(name: str, names: tuple[str, ...]) -> str:
             return colour
     others = [n for n in names if not n.startswith(tuple(_MODES))]
     return _MORE[others.index(name) % len(_MORE)]
-
-
-def outage_bands(record: NavigationRecord) -> tuple[Band, ...]:
-    """Shaded bands of the outages."""
-    spans = {(s.begin, s.end) for spans in record.outages.values() for s in spans}
-    return tuple(Band(begin, end, "outage") for begin, end in sorted(spans))
 
 
 def strip(record: NavigationRecord, statuses: tuple[Span, ...] = ()) -> Panel | None:
@@ -673,7 +669,10 @@ def nis_chart(
         nis = np.maximum(one.nis, _LEAST)
         colour = AXIS_COLOURS[(2 + k) % 3]
         step = max(1, one.epochs // _POINTS)
-        drawn = (np.arange(one.epochs) % step == 0) | (one.nis > chi_square_far(len(one.labels)))
+        # Quantile of chi-square with the two-sided exceedance probability of three sigma.
+        drawn = (np.arange(one.epochs) % step == 0) | (
+            one.nis > float(chi_square_exceeded(2.0 * normal_above(3.0), len(one.labels)))
+        )
         lines = _points("epoch", one.time, nis, one.used & drawn, colour, "circle", 3.2)
         lines += _points("rejected", one.time, nis, ~one.used, VERMILLION, "x", 6.0)
         lines += _mean(one)
@@ -691,11 +690,6 @@ def nis_chart(
         record,
         statuses,
     )
-
-
-def chi_square_far(freedom: float) -> float:
-    """Quantile of chi-square with the two-sided exceedance probability of three sigma."""
-    return float(chi_square_exceeded(2.0 * normal_above(3.0), freedom))
 
 
 def _mean(one: Agreement) -> list[Line]:

@@ -162,9 +162,18 @@ def cautions(
 ) -> tuple[tuple[str, str], ...]:
     """Return the cautions, each with its number; brief, without those that the tables show."""
     shown = () if brief else (*_memory(evaluation), *_refused(evaluation), *_not_told(evaluation))
+    end = float(evaluation.record.trajectory.index[-1])
+    late = [(a, s) for a, s, _ in longest_outages(evaluation) if s.end >= end - 1e-6]
     return (
         *_outages(evaluation),
-        *_ended_without(evaluation),
+        *(
+            (
+                f"It ended without {aid}",
+                f"the last {duration_words(span.end - span.begin)} are by the inertial sensors "
+                "alone; a fix would correct them.",
+            )
+            for aid, span in late
+        ),
         *_heading_caution(evaluation),
         *shown,
         *agreement_words(evaluation),
@@ -187,19 +196,6 @@ def _outages(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
             f"{length_words(bound)}, within {duration_words(span.end - span.begin)} without {aid} "
             f"from {instant(span.begin)}.",
         )
-    ]
-
-
-def _ended_without(evaluation: NavigationEvaluation) -> list[tuple[str, str]]:
-    end = float(evaluation.record.trajectory.index[-1])
-    late = [(a, s) for a, s, _ in longest_outages(evaluation) if s.end >= end - 1e-6]
-    return [
-        (
-            f"It ended without {aid}",
-            f"the last {duration_words(span.end - span.begin)} are by the inertial sensors alone; "
-            "a fix would correct them.",
-        )
-        for aid, span in late
     ]
 
 

@@ -235,10 +235,12 @@ def place_labels(
             # Of many points few overlap a box.
             apart = np.minimum(dots[:, 2:], box[2:]) <= np.maximum(dots[:, :2], box[:2])
             touched = np.flatnonzero(~apart.any(axis=1)).tolist()
+            whole = float((box[2] - box[0]) * (box[3] - box[1]))
             covered.append(
                 4.0 * math.fsum(overlap(box, other) for other in taken)
                 + math.fsum(overlap(box, dots[j]) for j in touched if j != k)
-                + _outside(box)
+                # The part outside of the axes weighs most: it would be cut off.
+                + 10.0 * (whole - overlap(box, np.array([0.0, 0.0, 1.0, 1.0])))
                 # Prefer a near position if none overlaps.
                 + 1e-7 * number
             )
@@ -255,12 +257,6 @@ def _box(point: Array, place: tuple[int, int], characters: int) -> Array:
     left = point[0] + {-1: -width - 0.5 * _POINT, 0: -0.5 * width, 1: 0.5 * _POINT}[side]
     bottom = point[1] + (rise - 0.5) * _LINE
     return np.array([left, bottom, left + width, bottom + _LINE])
-
-
-def _outside(box: Array) -> float:
-    """Area outside of the axes, which weighs most because it would be cut off."""
-    whole = float((box[2] - box[0]) * (box[3] - box[1]))
-    return 10.0 * (whole - overlap(box, np.array([0.0, 0.0, 1.0, 1.0])))
 
 
 # Area that contains a point with 95 % probability, along its path.
