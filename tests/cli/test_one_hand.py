@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from typer.main import get_command
 
+from strapdown.cli.main import COMMANDS as SENTENCES
 from strapdown.cli.main import app
 from strapdown.cli.result_folder import default_folder
 from strapdown.cli.shared_options import LogFlags
@@ -48,6 +49,12 @@ OF_ITS_OWN = {
 
 def options(command):
     return [p for p in command.params if p.param_type_name == "option" and p.name != "help"]
+
+
+def test_the_list_of_all_commands_says_of_each_what_its_own_help_begins_with():
+    assert {
+        name: ROOT.get_command(None, name).help.partition("\n\n")[0] for name in SENTENCES
+    } == SENTENCES
 
 
 def test_options_of_reading_a_log_are_the_same_in_the_same_order():

@@ -20,7 +20,7 @@ from importlib import import_module
 from typing import Any, NoReturn
 
 import typer
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from strapdown import __version__
 from strapdown.cli.console import RESOURCES, WORDS, logged
@@ -35,28 +35,46 @@ EXIT_CODES = (
     "diverged; 6 verify found a change; 7 verify could compare only a part."
 )
 
-#: Commands, each of a module, in the order of the help.
-COMMANDS = (
-    "doctor",
-    "allan",
-    "calibrate",
-    "sensors",
-    "extrinsics",
-    "attitude",
-    "align",
-    "navigate",
-    "outage",
-    "init",
-    "convert",
-    "crash",
-    "simulate",
-    "verify",
-    "sign",
-    "export",
-    "modules",
-    "demo",
-    "warm-up",
-)
+#: Commands, each of a module, in the order of the help, with the first sentence of their own help:
+#: the list of all is shown without importing them.
+COMMANDS = {
+    "doctor": "Examine logs: what is in them, what is wrong, the fix, and what they suffice for.",
+    "allan": (
+        "Find the noise of a sensor from a log at rest: Allan deviation, noise terms, sensor file."
+    ),
+    "calibrate": (
+        "Find bias, scale, misalignment and g-sensitivity of a sensor from rests and turns."
+    ),
+    "sensors": "List the sensors of the catalogue, show one with its sources, or compare several.",
+    "extrinsics": "Find rotation, lever arm and time offset between two sensors on one rigid body.",
+    "attitude": (
+        "Find the simplest attitude algorithm, and the lowest rate, of sufficient accuracy."
+    ),
+    "align": "Find roll, pitch and heading of a stationary body from its gyros and accelerometers.",
+    "navigate": (
+        "Find position, velocity and attitude over a record, by inertial sensors and measurements."
+    ),
+    "outage": "Predict the drift during a GNSS outage, and the sources of the drift.",
+    "init": "Propose a configuration from your records, with questions for missing data.",
+    "convert": "Write what a log, a file of fixes or a trajectory holds in another format.",
+    "crash": (
+        "Reconstruct a crash: delta-V, direction of force, severity and path, each with its bound."
+    ),
+    "simulate": (
+        "Write the log of a scenario, a trajectory or a crash together with its exact truth."
+    ),
+    "verify": "Run a result again from its own configuration and compare it bit for bit.",
+    "sign": "Sign the seal of a result with your key, so that others can tell that it is yours.",
+    "export": (
+        "Write a module as one file for a device: C99, with its own test and its most operations."
+    ),
+    "modules": "List the modules of each slot: algorithms, pipeline modules, sensors, formats.",
+    "demo": "Run all systems and show the results on one page: navigation, attitude, crash.",
+    "warm-up": (
+        "Compile the kernels now instead of in the first runs, where they are not delivered "
+        "compiled."
+    ),
+}
 
 
 class Commands(TyperGroup):
@@ -71,6 +89,15 @@ class Commands(TyperGroup):
         for name in [cmd_name] if cmd_name in COMMANDS else COMMANDS:
             self.commands[name] = self.commands.get(name) or _command(name)
         return self.commands.get(cmd_name)
+
+    def format_help(self, ctx: Any, formatter: Any) -> None:
+        """Write the help, with one sentence of each command."""
+        loaded = self.commands
+        self.commands = {name: TyperCommand(name, help=says) for name, says in COMMANDS.items()}
+        try:
+            super().format_help(ctx, formatter)
+        finally:
+            self.commands = loaded
 
 
 def _command(name: str) -> Any:
