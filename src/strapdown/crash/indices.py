@@ -105,14 +105,18 @@ def cubic(time: Array, values: Array, slopes: Array, at: float) -> tuple[float, 
 
     Exact for the double integral of an acceleration that is linear between samples.
     """
-    k = int(np.clip(np.searchsorted(time, at, side="right") - 1, 0, time.size - 2))
+    k = int(np.searchsorted(time[1:-1], at, side="right"))
     h = float(time[k + 1] - time[k])
     u = (at - float(time[k])) / h
+    a, b, c, d = _coefficients(values, slopes, k, h)
+    return ((a * u + b) * u + c) * u + d, ((3.0 * a * u + 2.0 * b) * u + c) / h
+
+
+def _coefficients(values: Array, slopes: Array, k: int, h: float) -> tuple[float, ...]:
+    """Of ``((a u + b) u + c) u + d``, u from 0 to 1 over the step h from sample k."""
     y0, y1 = float(values[k]), float(values[k + 1])
     m0, m1 = h * float(slopes[k]), h * float(slopes[k + 1])
-    a = 2.0 * (y0 - y1) + m0 + m1
-    b = 3.0 * (y1 - y0) - 2.0 * m0 - m1
-    return ((a * u + b) * u + m0) * u + y0, ((3.0 * a * u + 2.0 * b) * u + m0) / h
+    return 2.0 * (y0 - y1) + m0 + m1, 3.0 * (y1 - y0) - 2.0 * m0 - m1, m0, y0
 
 
 def first_reach(time: Array, values: Array, slopes: Array, level: float) -> float | None:
@@ -126,17 +130,17 @@ def first_reach(time: Array, values: Array, slopes: Array, level: float) -> floa
     k = int(above[0])
     if k == 0:
         return float(time[0])
-
-    def short(at: float) -> float:
-        return cubic(time, values, slopes, at)[0] - level
-
-    # The value at a knot is that of the sample up to rounding: a root there has no change of sign.
-    if short(float(time[k])) <= 0.0:
-        return float(time[k])
-    # The bracket is halved until it has no number inside: it is short, and this is done once.
     low, high = float(time[k - 1]), float(time[k])
+    # The value at a knot is that of the sample up to rounding: a root there has no change of sign.
+    if cubic(time, values, slopes, high)[0] - level <= 0.0:
+        return high
+    # The bracket is halved until it has no number inside: it is short, and this is done once.
+    begin, h = low, float(time[k] - time[k - 1])
+    a, b, c, d = _coefficients(values, slopes, k - 1, h)
     while low < (middle := 0.5 * (low + high)) < high:
-        low, high = (middle, high) if short(middle) < 0.0 else (low, middle)
+        u = (middle - begin) / h
+        short = ((a * u + b) * u + c) * u + d - level < 0.0
+        low, high = (middle, high) if short else (low, middle)
     return high
 
 
@@ -193,7 +197,7 @@ def largest_mean(time: Array, values: Array, width: float) -> tuple[float, float
 
 def _integral_at(time: Array, values: Array, total: Array, at: Array) -> Array:
     """Integral from the first sample to any instants, of values linear between samples."""
-    k = np.clip(np.searchsorted(time, at, side="right") - 1, 0, time.size - 2)
+    k = np.searchsorted(time[1:-1], at, side="right")
     h = (time[k + 1] - time[k])[:, None]
     into = (at - time[k])[:, None]
     slope = (values[k + 1] - values[k]) / h
