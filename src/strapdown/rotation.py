@@ -495,7 +495,9 @@ def _rows_of(values: ArrayLike, shape: tuple[int, ...], name: str) -> Rows:
             "geodesy.shape-does-not-end-2", quantity=name, shape=array.shape, shape_2=shape
         )
     # C-contiguous and writable: numba compiles a kernel again for other arrays.
-    rows = np.require(array.reshape(-1, math.prod(shape)), requirements=["C", "W"])
+    rows = array.reshape(-1, math.prod(shape))
+    if not (rows.flags.c_contiguous and rows.flags.writeable):
+        rows = rows.copy()
     # A square that overflows is as useless as infinity.
     if rows.size and not (rows.max() < LARGEST and rows.min() > -LARGEST):
         good = np.abs(rows) < LARGEST

@@ -276,13 +276,11 @@ def _turning(site: Site, q_nb: Array, turn: Array, steps: int) -> tuple[Array, A
     """Motion increments of a turn at constant rate about an axis of the body, and its end."""
     rows = np.empty((steps, 10))
     step = rotation.quaternion_from_rotation_vector(turn / steps)
+    half = rotation.quaternion_from_rotation_vector(0.5 * turn / steps)
     for i in range(steps):
         # Force is constant in level axes: over the step it is rotated halfway.
-        half = rotation.quaternion_from_rotation_vector(0.5 * turn / steps)
         rows[i] = _resting(site, rotation.compose(q_nb, half))
-        rows[i, 4:10] = np.concatenate(
-            [rotation.rotate(half, v) for v in rows[i, 4:10].reshape(2, 3)]
-        )
+        rows[i, 4:10] = rotation.rotate(half, rows[i, 4:10].reshape(2, 3)).ravel()
         rows[i, 1:4] += turn / steps
         q_nb = rotation.compose(q_nb, step)
     return rows, q_nb
