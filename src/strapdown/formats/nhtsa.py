@@ -581,11 +581,10 @@ def _read_pairs(channel: Channel) -> np.ndarray[tuple[int, int], np.dtype[np.flo
             samples=channel.samples,
         )
     lines = path.read_bytes().decode("ascii", "replace").splitlines()
-    out = np.empty((len(lines), 2))
+    pairs: list[tuple[float, float]] = []
     for k, line in enumerate(lines):
-        fields = line.split()
         try:
-            time, value = (float(text) for text in fields)
+            time, value = map(float, line.split())
         except ValueError:
             raise DataError(
                 "io.not-time-value",
@@ -602,7 +601,7 @@ def _read_pairs(channel: Channel) -> np.ndarray[tuple[int, int], np.dtype[np.flo
                 quantity="time" if not math.isfinite(time) else f"channel {channel.number}",
                 strip=line.strip()[:60],
             )
-        out[k] = time, value
+        pairs.append((time, value))
     if len(lines) != channel.samples:
         cut = len(lines) < channel.samples
         raise DataError(
@@ -615,7 +614,7 @@ def _read_pairs(channel: Channel) -> np.ndarray[tuple[int, int], np.dtype[np.flo
             first=channel.first,
             last=channel.last,
         )
-    return out
+    return np.array(pairs)
 
 
 def _check_time(channel: Channel, time: np.ndarray[tuple[int], np.dtype[np.float64]]) -> None:
