@@ -715,15 +715,7 @@ def reconstruct_crash(
     DivergenceError
         A path left the range of vehicle motion.
     """
-    if isinstance(units, CrashUnit):
-        raise ConfigError("crash.unit-list-needed", file=units.name, quantity="units")
-    if units is None or (isinstance(units, Sequence) and not units):
-        raise DataError("crash.no-units-given", quantity="units")
-    if not isinstance(units, Sequence) or isinstance(units, str):
-        raise _wrong_type("units", units)
-    for unit in units:
-        if not isinstance(unit, CrashUnit):
-            raise _wrong_type("units", unit)
+    _check_units(units)
     if len(units) < 2:
         return _reconstructed(units, entry, options)
     # Only several units need it, and only what is loaded is limited to one thread.
@@ -808,6 +800,18 @@ def _check_preparation(preparation: Mapping[str, Any], units: Collection[str]) -
             raise ConfigError(
                 "crash.preparation-of-unknown-unit", quantity="preparation", name=name
             )
+
+
+def _check_units(units: object) -> None:
+    if isinstance(units, CrashUnit):
+        raise ConfigError("crash.unit-list-needed", file=units.name, quantity="units")
+    if units is None or (isinstance(units, Sequence) and not units):
+        raise DataError("crash.no-units-given", quantity="units")
+    if not isinstance(units, Sequence) or isinstance(units, str):
+        raise _wrong_type("units", units)
+    for unit in units:
+        if not isinstance(unit, CrashUnit):
+            raise _wrong_type("units", unit)
 
 
 def _wrong_type(quantity: str, given: object) -> ConfigError:
