@@ -175,13 +175,13 @@ def of_day(seconds, part=12):
 @pytest.mark.parametrize(
     ("head", "stamps", "lasts"),
     [
-        # Whole seconds give a rate over a longer record.
-        ("time", of_day, 3.0),
+        # Each lasts beyond midnight; whole seconds give a rate over a longer record.
+        ("time", of_day, 4.0),
         ("time", lambda t: of_day(t, 8), 6.0),
-        ("time_s", lambda t: [f"{s:.3f}" for s in np.mod(t + 1e-7, 86400.0)], 3.0),
+        ("time_s", lambda t: [f"{s:.3f}" for s in np.mod(t + 1e-7, 86400.0)], 4.0),
         ("time_s", lambda t: [str(int(s)) for s in np.mod(t + 1e-7, 86400.0)], 6.0),
-        ("time_ms", lambda t: [str(round(1e3 * s)) for s in np.mod(t, 86400.0)], 3.0),
-        ("time_us", lambda t: [str(round(1e6 * s)) for s in np.mod(t, 86400.0)], 3.0),
+        ("time_ms", lambda t: [str(round(1e3 * s)) for s in np.mod(t, 86400.0)], 4.0),
+        ("time_us", lambda t: [str(round(1e6 * s)) for s in np.mod(t, 86400.0)], 4.0),
     ],
     ids=["h:m:s.ms", "h:m:s", "seconds", "whole seconds", "ms", "us"],
 )
