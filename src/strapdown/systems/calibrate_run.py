@@ -194,6 +194,9 @@ def _read(
     if log.calibration is not None:
         raise ConfigError("calibrate.calibrated-log", quantity="calibration")
     recording, imu, said = body_record(log, AxesTable(axes="x,y,z"))
+    if "calibrated" in imu.attrs:
+        by = imu.attrs["calibrated"]
+        raise DataError("calibrate.calibrated-log-by", file=recording.name, by=by)
     refuse_long_span(imu, recording.name)
     # The axes of a sensor need not be those of a body.
     findings = [f for f in said if not f.code.startswith("io.axes")]
