@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 
 import numpy as np
@@ -10,7 +11,9 @@ import pytest
 from tests.calibrated import GRAVITY, POSES, between, by_hand, facing, record, unit
 
 import strapdown as sd
+from strapdown.errors import DataError
 from strapdown.formats import csv
+from strapdown.sensors import catalogue as sensors
 from strapdown.sensors.calibration import SensorCalibration
 
 NAMES = ["time_s", *(f"gyro_{a}_rad_s" for a in "xyz"), *(f"accel_{a}_m_s2" for a in "xyz")]
@@ -82,7 +85,7 @@ def test_one_flag_applies_it(result, logs, run_cli, tmp_path):
     assert "calibrate.applied" in codes and "calibrate.of-another-sensor" not in codes
     # Of another sensor, as in a folder of several.
     other = tmp_path / "other.toml"
-    text = calibration.read_text().splitlines()
+    text = [line for line in calibration.read_text().splitlines() if not line.startswith("seal")]
     row = next(k for k, line in enumerate(text) if line.startswith("bias_rad_per_s"))
     text[row] = "bias_rad_per_s = [0.3, -0.2, 0.1]"
     other.write_text("\n".join(text))
@@ -160,6 +163,60 @@ def test_a_table_of_turns_and_files_that_are_no_calibration(result, logs, run_cl
     done = run_cli("convert", logs[1], tmp_path / "d.csv", "--calibration", logs[1])
     assert done.code == 3, done.err
     assert "calibration.toml" in done.err
+
+
+#: What is wrong with a file, what it does to its text, the code, and a word of the message.
+DAMAGE = (
+    ("a digit", lambda t: re.sub(r"\]\nbias_sd", r"1]\nbias_sd", t, count=1), "file-changed"),
+    ("its end", lambda t: t[: t.index("[gyro]")], "file-changed"),
+    ("its middle", lambda t: t[: t.index("scale_sd") + 14], "file-no-toml"),
+    ("a key", lambda t: unsealed(t).replace("scale_sd", "scale_sdd", 1), "file-without-key"),
+    ("a word", lambda t: unsealed(t).replace("scale = [", 'scale = ["a", '), "file-value"),
+    ("all", lambda t: "time,gyro_x\n0.0,1.0\n", "file-no-toml"),
+    ("a sensor", lambda t: (sensors.FOLDER / "mpu-6050.toml").read_text(), "file-of-sensor"),
+    ("another", lambda t: "[log]\npath = 'a.csv'\n", "no-calibration"),
+    ("no accelerometer", lambda t: 'procedure = "magnetometer"\n', "file-of-magnetometer"),
+)
+
+
+def unsealed(text):
+    return "".join(line for line in text.splitlines(keepends=True) if not line.startswith("seal"))
+
+
+@pytest.mark.parametrize(("what", "change", "code"), DAMAGE, ids=[d[0] for d in DAMAGE])
+def test_a_damaged_file_is_said_to_be_damaged_where(result, tmp_path, what, change, code):
+    text = (result[1] / "calibration.toml").read_text()
+    file = tmp_path / "calibration.toml"
+    # Other ends of lines are no change, nor is a file without a seal.
+    for same in (text, text.replace("\n", "\r\n"), unsealed(text)):
+        file.write_text(same, newline="")
+        made = SensorCalibration.read(file)
+    file.write_text(change(text))
+    assert file.read_text() != text
+    with pytest.raises(DataError) as caught:
+        SensorCalibration.read(file)
+    assert caught.value.finding.code == f"calibrate.{code}", what
+    assert made.gyro.axis("bias")[0] > 0.0
+
+
+def test_bytes_that_are_no_text(result, tmp_path):
+    file = tmp_path / "calibration.toml"
+    file.write_bytes((result[1] / "calibration.toml").read_bytes().replace(b"gyro", b"g\xffro"))
+    with pytest.raises(DataError) as caught:
+        SensorCalibration.read(file)
+    assert caught.value.finding.code == "calibrate.file-not-text"
+    assert caught.value.finding.row > 1
+
+
+def test_the_two_options_name_each_other(result, logs, run_cli, tmp_path):
+    calibration, out = result[1] / "calibration.toml", tmp_path / "out"
+    done = run_cli("calibrate", logs[0], "--sensor", calibration, "--out", out)
+    assert done.code == 4, done.err
+    assert "--calibration" in done.err
+    sheet = sensors.FOLDER / "mpu-6050.toml"
+    done = run_cli("convert", logs[1], tmp_path / "c.csv", "--calibration", sheet)
+    assert done.code == 3, done.err
+    assert "--sensor" in done.err
 
 
 def test_from_arrays(logs):

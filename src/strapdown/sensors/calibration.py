@@ -16,6 +16,7 @@ gravity of unknown direction does not show a rotation of all three. Gyros are al
 
 from __future__ import annotations
 
+import hashlib
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -435,28 +436,33 @@ class SensorCalibration:
         Raises
         ------
         DataError
-            There is none, or it is not of `strapdown calibrate`.
+            There is none, it is not of `strapdown calibrate`, or it was damaged or edited.
         """
-        if not Path(path).exists():
-            raise DataError("io.no-such-file", file=str(path), quantity="calibration")
+        where = {"file": Path(path).name, "quantity": "calibration"}
+        tables = _tables_of(Path(path))
+        part = "gyro"
         try:
-            tables = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-            gyro, accel = tables["gyro"], tables["accel"]
-            errors = ImuErrors(_errors_of(gyro, "rad_per_s"), _errors_of(accel, "m_per_s2"))
-            sd = (_sd_of(gyro, "rad_per_s"), _sd_of(accel, "m_per_s2"))
-            warm = tables.get("temperature", {})
+            gyro = _errors_of(tables[part], "rad_per_s"), _sd_of(tables[part], "rad_per_s")
+            part = "accel"
+            accel = _errors_of(tables[part], "m_per_s2"), _sd_of(tables[part], "m_per_s2")
+            part = "temperature"
+            warm = tables.get(part, {})
             slopes = np.array([warm.get(key, [0.0] * 3) for key in SLOPES], dtype=np.float64)
-            field_ = tables.get("magnetometer")
-            mag = None if field_ is None else _magnetometer_of(field_)
-            missing = tuple(str(name) for name in tables.get("not_observed", ()))
             at = warm.get("at_c")
+            at = None if at is None else float(at)
             if slopes.shape != (2, 3) or not np.isfinite(slopes).all():
                 raise ValueError
-        except (OSError, ValueError, TypeError, KeyError, AttributeError, StrapdownError):
-            raise DataError(
-                "calibrate.no-calibration", file=Path(path).name, quantity="calibration"
-            ) from None
-        return cls(errors, *sd, slopes, None if at is None else float(at), mag, missing)
+            part = "magnetometer"
+            mag = None if part not in tables else _magnetometer_of(tables[part])
+            part = "not_observed"
+            missing = tuple(str(name) for name in tables.get(part, ()))
+        except KeyError as error:
+            key = str(error.args[0])
+            key = key if key == part else f"{part}.{key}"
+            raise DataError("calibrate.file-without-key", key=key, **where) from None
+        except (ValueError, TypeError, AttributeError, StrapdownError):
+            raise DataError("calibrate.file-value", key=part, **where) from None
+        return cls(ImuErrors(gyro[0], accel[0]), gyro[1], accel[1], slopes, at, mag, missing)
 
     def tables(self) -> dict[str, dict[str, Any]]:
         """Tables of the file, SI."""
@@ -591,6 +597,50 @@ class SensorCalibration:
         return replace(stated, gyro=triads["gyro"], accel=triads["accel"])
 
 
+def sealed_text(text: str) -> str:
+    """Return the text of a calibration file with the hash of all its other lines."""
+    return f"{SEAL}{seal_of(text)}{text}"
+
+
+def seal_of(text: str) -> str:
+    """Line that seals a text: the hash of its other lines, whatever ends them."""
+    lines = [line.rstrip() for line in text.splitlines() if not line.startswith(SEAL)]
+    digest = hashlib.sha256("\n".join(lines).rstrip().encode()).hexdigest()
+    return f'"sha256 {digest}"\n'
+
+
+def _tables_of(path: Path) -> dict[str, Any]:
+    """Read a calibration file as far as TOML goes.
+
+    DataError: there is none; it is damaged, edited, or a file of another kind.
+    """
+    where = {"file": path.name, "quantity": "calibration"}
+    if not path.exists():
+        raise DataError("io.no-such-file", file=str(path), quantity="calibration")
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+        tables = tomllib.loads(text)
+    except UnicodeDecodeError as error:
+        data = {"row": error.object[: error.start].count(b"\n") + 1}
+        raise DataError("calibrate.file-not-text", **where, **data) from None
+    except OSError as error:
+        raise DataError("calibrate.file-no-toml", error=error.strerror, **where) from None
+    except (ValueError, RecursionError) as error:
+        raise DataError("calibrate.file-no-toml", error=str(error), **where) from None
+    if {"class", "summary"} <= tables.keys():
+        raise DataError("calibrate.file-of-sensor", **where)
+    seals = [line for line in text.splitlines(keepends=True) if line.startswith(SEAL)]
+    if seals and seals[0].removeprefix(SEAL).strip() != seal_of(text).strip():
+        raise DataError("calibrate.file-changed", **where)
+    if "procedure" in tables and not {"gyro", "accel"} & tables.keys():
+        raise DataError("calibrate.file-of-magnetometer", **where)
+    if not {"gyro", "accel"} & tables.keys():
+        raise DataError("calibrate.no-calibration", **where)
+    return tables
+
+
+#: Key of the hash of a calibration file.
+SEAL = "seal = "
 SLOPES = ("gyro_rad_per_s_per_c", "accel_m_per_s2_per_c")
 MAG_KEYS = ("field", "residual", "raw_residual", "direction_sd_deg", "change_deg")
 G_KEY = "g_sensitivity_rad_per_s_per_m_per_s2"

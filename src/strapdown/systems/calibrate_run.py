@@ -27,6 +27,7 @@ from strapdown.sensors.calibration import (
     SensorCalibration,
     calibrate_imu,
     correlations,
+    sealed_text,
 )
 from strapdown.sensors.calibration_model import GRAVITY, GRAVITY_SD, PRIOR
 from strapdown.sensors.catalogue import load_sensor
@@ -351,7 +352,7 @@ def _text(run: CalibrateRun) -> str:
             "pairs = [",
         ]
         lines += [f"  [{string(a)}, {string(b)}, {r:.2f}]," for a, b, r in pairs] + ["]"]
-    return "\n".join(lines) + "\n"
+    return sealed_text("\n".join(lines) + "\n")
 
 
 def _plain(value: Any) -> str:
