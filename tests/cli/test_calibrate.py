@@ -165,6 +165,34 @@ def test_a_table_of_turns_and_files_that_are_no_calibration(result, logs, run_cl
     assert "calibration.toml" in done.err
 
 
+def test_a_column_of_temperature_shows_the_slopes_and_is_used(run_cli, tmp_path):
+    """As `allan` reads it: of the log itself, in calibration and in application."""
+    errors, draw = unit(4), np.random.default_rng(4)
+    poses = [facing(up) for up in POSES[:12]]
+    made = record(*by_hand(poses[0], between(poses), draw, rest=2.0), errors, 4)
+    time = made.imu.index.to_numpy()
+    warmth, slope = 20.0 + 30.0 * time / time[-1], np.array([2e-4, -1e-4, 5e-5])
+    values = made.imu.to_numpy().copy()
+    values[:, :3] += (warmth[:, None] - 35.0) * slope
+    path = tmp_path / "warm.csv"
+    names = [*NAMES, "temperature_degC"]
+    header = {"axes": "forward-right-down", "sampling": "instantaneous"}
+    csv.write(path, dict(zip(names, [time, *values.T, warmth], strict=True)), header)
+    run = sd.calibrate(path, gravity_m_per_s2=GRAVITY)
+    found = run.calibration
+    at = found.names.index("gyro_temperature_x")
+    assert found.temperature_slopes[0] == pytest.approx(
+        slope, abs=4.0 * found.sd[at : at + 3].max()
+    )
+    assert "io.columns-not-used" not in {f.code for f in run.findings}
+    run.save(tmp_path / "out", report=False)
+    imu = sd.read_imu(path, calibration=tmp_path / "out" / "calibration.toml")
+    rate = imu.filter(like="gyro").to_numpy()
+    ends = rate[:150].mean(axis=0), rate[-150:].mean(axis=0)
+    # 30 °C change the bias by 0.006 rad/s; what is left is within the bounds, 0.0035 rad/s.
+    assert np.abs(ends[0] - ends[1]).max() < 4.0 * 30.0 * found.sd[at : at + 3].max()
+
+
 #: What is wrong with a file, what it does to its text, the code, and a word of the message.
 DAMAGE = (
     ("a digit", lambda t: re.sub(r"\]\nbias_sd", r"1]\nbias_sd", t, count=1), "file-changed"),

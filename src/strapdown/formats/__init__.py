@@ -643,10 +643,10 @@ def _calibrated(recording: Recording, asked: ReadOptions) -> Recording:
     letters = str(imu.attrs.get("sensor_axes") or "x,y,z")
     known = calibration.turned(axes_matrix(*parse_axes(letters)))
     warmth = None
-    if calibration.temperature is not None and len(recording.files) == 1:
-        from strapdown.formats.aid_table import temperature_beside
+    if calibration.temperature is not None:
+        from strapdown.formats.aid_table import temperature_of
 
-        warm = temperature_beside(recording.files[0], asked.format, imu)
+        warm = temperature_of(recording, recording.files[0], asked.format)
         warmth = None if warm is None else np.interp(imu.index, warm.index, warm)
     imu = known.apply(imu, warmth)
     imu.attrs["calibrated"] = _mark_of(Path(str(asked.calibration)))

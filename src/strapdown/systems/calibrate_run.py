@@ -17,7 +17,7 @@ from strapdown.config.logs import AxesTable, CalibrateSpec, KnownTurn, LogTable
 from strapdown.config.toml_text import string
 from strapdown.earth import gravity
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.formats.aid_table import stream_beside, temperature_beside
+from strapdown.formats.aid_table import but_temperature, stream_beside, temperature_of
 from strapdown.progress import Progress, silent
 from strapdown.sensors.calibration import (
     CalibrationConditions,
@@ -213,9 +213,10 @@ def _read(
         table = stream_beside(log.path, "magnetometer", log.format, imu)
         if table is not None and set(MAG) <= set(table.columns):
             mag = table[MAG].to_numpy(dtype=np.float64)
-    warm = temperature_beside(log.path, log.format, imu)
+    warm = temperature_of(recording, log.path, log.format)
     temperature = None
-    if warm is not None and len(warm) > 1:
+    if warm is not None:
+        findings = list(but_temperature(findings, recording))
         temperature = (warm.index.to_numpy(dtype=np.float64), warm.to_numpy(dtype=np.float64))
     files = input_files("log", log.path, recording.files)
     return CalibrationRecord(imu, rests, temperature), mag, findings, files
