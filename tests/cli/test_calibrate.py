@@ -11,7 +11,7 @@ import pytest
 from tests.calibrated import GRAVITY, POSES, between, by_hand, facing, record, unit
 
 import strapdown as sd
-from strapdown.errors import DataError
+from strapdown.errors import ConfigError, DataError
 from strapdown.formats import csv
 from strapdown.sensors import catalogue as sensors
 from strapdown.sensors.calibration import SensorCalibration
@@ -139,6 +139,9 @@ def test_what_is_left_enters_the_filters(result, logs, run_cli, tmp_path):
         (["--procedure", "turns"], 4, "--turns"),
         (["--procedure", "cube"], 4, "--procedure"),
         (["--gravity", "5"], 4, "--gravity"),
+        (["--gravity", "981"], 4, "980 Gal"),
+        (["gravity=9.8"], 4, "--gravity 9.8"),
+        (["lat_deg=48"], 4, "--lat 48"),
         (["--to", "1.5", "--from", "0"], 0, "not observed"),
         (["--from", "2.2", "--to", "2.8"], 3, "rest"),
     ],
@@ -248,6 +251,11 @@ def test_the_two_options_name_each_other(result, logs, run_cli, tmp_path):
 
 
 def test_from_arrays(logs):
+    for wrong in ({"gravity": 9.81}, {"g": 9.81}, {"lat_deg": 48.0}):
+        with pytest.raises(ConfigError) as caught:
+            sd.calibrate(logs[0], **wrong)
+        assert caught.value.finding.code == "calibrate.unknown-option"
+        assert "gravity_m_per_s2" in str(caught.value)
     samples = sd.read_imu(logs[0]).iloc[:2000]
     run = sd.calibrate((samples.index, samples.iloc[:, :3], samples.iloc[:, 3:6]), lat=48.0)
     assert "not_observed" in run.calibration_text()
