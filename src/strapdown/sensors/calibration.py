@@ -63,7 +63,9 @@ Array = NDArray[np.float64]
 #: A parameter whose standard deviation the log has not halved is not observed.
 NOT_OBSERVED = 0.5
 #: Rounds of variance components, and steps in each.
-ROUNDS, STEPS = 6, 12
+ROUNDS, STEPS = 6, 60
+#: Damping of a step, beside the information of the prior, which is one.
+LEAST_DAMPING, MOST_DAMPING = 0.05, 1e9
 #: Correlation from which the file states it; parameters beyond so many prior standard deviations,
 #: or such a misalignment, rad, are of no sensor.
 CORRELATED, IMPOSSIBLE, SKEW = 0.3, 8.0, 0.4
@@ -175,7 +177,12 @@ def calibrate_imu(
 
 
 def _solve(problem: CalibrationProblem, z: Array) -> Array:
-    """Damped Gauss-Newton steps to the maximum of the posterior."""
+    """Damped Gauss-Newton steps to the maximum of the posterior.
+
+    Damping is by the prior (Levenberg), not by the information (Marquardt): bias and scale of a
+    face that was up on one side alone lie in a narrow curved valley, whose own direction is known
+    by the prior only, 1e-7 of the information across it.
+    """
     residual, jacobian, _ = problem.linearize(z)
     cost, damping = float(residual @ residual + problem.weight @ z**2), 0.0
     for _ in range(STEPS):
@@ -183,18 +190,19 @@ def _solve(problem: CalibrationProblem, z: Array) -> Array:
         gradient = jacobian.T @ residual + problem.weight * z
         directions = [node.up for node in problem.nodes]
         while True:
-            damped = normal + damping * np.diag(np.diag(normal))
+            damped = normal + damping * np.eye(problem.size)
             step: Array = np.asarray(np.linalg.solve(damped, gradient))
             tried = problem.moved(z, -step)
             residual, jacobian, _ = problem.linearize(tried)
             new = float(residual @ residual + problem.weight @ tried**2)
-            if new <= cost * (1.0 + 1e-9) + 1e-9 or damping > 1e3:
+            if new <= cost * (1.0 + 1e-9) + 1e-9 or damping > MOST_DAMPING:
                 break
             for node, up in zip(problem.nodes, directions, strict=True):
                 node.up = up
-            damping = max(10.0 * damping, 1e-3)
-        z, settled = tried, abs(cost - new) < 1e-6 * (1.0 + new)
-        cost, damping = new, 0.1 * damping if damping > 1e-3 else 0.0
+            damping = max(4.0 * damping, LEAST_DAMPING)
+        # A damped step is short, and says nothing of how far the maximum is.
+        z, settled = tried, damping < 1.0 and abs(cost - new) < 1e-6 * (1.0 + new)
+        cost, damping = new, 0.25 * damping if damping > LEAST_DAMPING else 0.0
         if settled:
             break
     return z
