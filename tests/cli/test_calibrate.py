@@ -5,16 +5,20 @@ from __future__ import annotations
 import json
 import re
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import beta
 from tests.calibrated import GRAVITY, POSES, between, by_hand, facing, record, unit
 
 import strapdown as sd
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats import csv
 from strapdown.sensors import catalogue as sensors
-from strapdown.sensors.calibration import SensorCalibration
+from strapdown.sensors.calibration import CASE, SensorCalibration
+from strapdown.sensors.catalogue import load_sensor
+from strapdown.sensors.uncertainty import ImuUncertainty
 
 NAMES = ["time_s", *(f"gyro_{a}_rad_s" for a in "xyz"), *(f"accel_{a}_m_s2" for a in "xyz")]
 
@@ -262,3 +266,46 @@ def test_from_arrays(logs):
     assert list(run.parameters.columns)[:3] == ["parameter", "value", "sd"]
     assert run.plot() is not None
     assert run.findings[0].code.startswith("calibrate.not-observed")
+
+
+def test_how_the_axes_lie_in_the_case_is_a_line_with_a_number(result, logs, run_cli, tmp_path):
+    """The part of a misalignment that no gravity shows: a rotation of all three axes."""
+    calibration = result[1] / "calibration.toml"
+    made = SensorCalibration.read(calibration)
+    # A misalignment of 0.03 rad of each of two axes, half the difference.
+    assert made.case == pytest.approx([0.03 / np.sqrt(2.0)] * 3)
+    assert tomllib.loads(calibration.read_text())["case"]["rotation_sd_rad"] == pytest.approx(
+        made.case
+    )
+    (said,) = [
+        f
+        for f in sd.read_imu(logs[1], calibration=calibration).findings
+        if f.code == "calibrate.axes-in-case"
+    ]
+    assert said.data["deg"] == pytest.approx(1.96 * np.degrees(0.03 / np.sqrt(2.0)), rel=1e-3)
+    # A data sheet that states less makes it less.
+    sheet = tmp_path / "sheet.toml"
+    text = (sensors.FOLDER / "mpu-6050.toml").read_text()
+    sheet.write_text(text)
+    known = load_sensor(sheet)
+    run = sd.calibrate(logs[0], gravity_m_per_s2=GRAVITY, sensor=sheet)
+    own = ImuUncertainty.of_sensor(known).accel.axis("misalignment")
+    assert run.sensor.case == pytest.approx(0.5 * np.hypot(own, np.roll(own, 1)), rel=1e-6)
+    # In other axes each rotation is about the same line.
+    swap = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+    odd = replace(made, case=(0.01, 0.02, 0.03))
+    assert odd.turned(swap).case == (0.02, 0.01, 0.03)
+    folder = tmp_path / "attitude"
+    options = ["--calibration", calibration, "--gyro-bias", "none", "--no-report"]
+    done = run_cli("attitude", logs[1], "--algorithms", "quaternion", *options, "--out", folder)
+    assert "2.4° about each" in " ".join((done.out + done.err).split())
+
+
+def test_the_rotation_of_simulated_units_is_within_it():
+    """Antisymmetric parts of drawn misalignments, which `in_accel_axes` takes off."""
+    skew = []
+    for seed in range(100):
+        m = np.array(unit(seed).accel.misalignment)
+        skew.append(0.5 * np.array([m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1]]))
+    inside = int((np.abs(skew) < 1.96 * np.array(CASE)).sum())
+    assert beta.ppf(0.995, inside + 1, 300 - inside) >= 0.95 > beta.ppf(0.005, inside, 301 - inside)

@@ -650,7 +650,7 @@ def _calibrated(recording: Recording, asked: ReadOptions) -> Recording:
         warmth = None if warm is None else np.interp(imu.index, warm.index, warm)
     imu = known.apply(imu, warmth)
     imu.attrs["calibrated"] = _mark_of(Path(str(asked.calibration)))
-    said = [known.finding(recording.name, Path(str(asked.calibration)).name)]
+    said = [*known.findings(recording.name, Path(str(asked.calibration)).name)]
     if known.not_observed:
         data = {"calibration": Path(str(asked.calibration)).name, "names": known.missing}
         code = "calibrate.applied-in-part"

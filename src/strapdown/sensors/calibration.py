@@ -43,7 +43,7 @@ from strapdown.sensors.calibration_model import (
 from strapdown.sensors.calibration_stops import CalibrationRecord, KnownRotation
 from strapdown.sensors.error_chain import compensate
 from strapdown.sensors.magnetometer import MagnetometerCalibration
-from strapdown.sensors.triad_errors import ImuErrors, TriadErrors, matrix_of, triad_of
+from strapdown.sensors.triad_errors import ImuErrors, Triad, TriadErrors, matrix_of, triad_of
 from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 from strapdown.tables import ACCEL, GYRO, MAG
 from strapdown.tables.checks import index_of, values_of
@@ -378,6 +378,12 @@ def in_accel_axes(errors: ImuErrors) -> ImuErrors:
 # The file of a calibration.
 
 
+#: Pairs of axes of which a misalignment is a rotation about x, y, z; and its standard deviation
+#: about each where a file does not state it, rad: as of the misalignment that is assumed.
+ABOUT = ("yz", "xz", "xy")
+CASE: Triad = triad_of(PRIOR.accel.axis("misalignment")[k] / math.sqrt(2.0) for k in range(3))
+
+
 @dataclass(frozen=True, eq=False)
 class SensorCalibration:
     """Known errors of a sensor and what is left of them: the file ``calibration.toml``.
@@ -395,6 +401,9 @@ class SensorCalibration:
         In the axes of the sensor.
     not_observed : tuple of str
         Parameters that the logs did not show.
+    case : triad, rad
+        Standard deviation of the rotation of these axes, those of the accelerometers, in the case
+        about each axis: the antisymmetric part of a misalignment before the calibration.
     """
 
     errors: ImuErrors
@@ -404,6 +413,7 @@ class SensorCalibration:
     temperature: float | None
     magnetometer: MagnetometerCalibration | None
     not_observed: tuple[str, ...]
+    case: Triad = CASE
 
     @classmethod
     def of(
@@ -435,6 +445,8 @@ class SensorCalibration:
             found.temperature,
             magnetometer,
             missing,
+            # Symmetric and antisymmetric part, half the sum and the difference, are known alike.
+            triad_of(found.prior_sd[found.names.index(f"accel_misalignment_{p}")] for p in ABOUT),
         )
 
     @classmethod
@@ -462,6 +474,10 @@ class SensorCalibration:
                 raise ValueError
             part = "magnetometer"
             mag = None if part not in tables else _magnetometer_of(tables[part])
+            part = "case"
+            case = triad_of(tables.get(part, {}).get(CASE_KEY, CASE))
+            if not (np.isfinite(case).all() and min(case) >= 0.0):
+                raise ValueError
             part = "not_observed"
             missing = tuple(str(name) for name in tables.get(part, ()))
         except KeyError as error:
@@ -470,7 +486,7 @@ class SensorCalibration:
             raise DataError("calibrate.file-without-key", key=key, **where) from None
         except (ValueError, TypeError, AttributeError, StrapdownError):
             raise DataError("calibrate.file-value", key=part, **where) from None
-        return cls(ImuErrors(gyro[0], accel[0]), gyro[1], accel[1], slopes, at, mag, missing)
+        return cls(ImuErrors(gyro[0], accel[0]), gyro[1], accel[1], slopes, at, mag, missing, case)
 
     def tables(self) -> dict[str, dict[str, Any]]:
         """Tables of the file, SI."""
@@ -488,6 +504,7 @@ class SensorCalibration:
             if triad == "gyro":
                 out[triad][G_KEY] = errors.g_sensitivity
                 out[triad][G_SD_KEY] = sd.axis("g_sensitivity")
+        out["case"] = {CASE_KEY: self.case}
         if self.temperature is not None:
             slopes = dict(zip(SLOPES, self.temperature_slopes.tolist(), strict=True))
             out["temperature"] = {"at_c": self.temperature, **slopes}
@@ -537,6 +554,7 @@ class SensorCalibration:
             accel=self.accel.turned(size),
             temperature_slopes=self.temperature_slopes @ R.T,
             magnetometer=mag,
+            case=triad_of(size @ self.case),
         )
 
     def apply(self, imu: pd.DataFrame, warmth: Array | None = None) -> pd.DataFrame:
@@ -580,14 +598,18 @@ class SensorCalibration:
             groups.setdefault(head.replace("_", " "), []).append(axis)
         return [f"{head} {' '.join(axes)}" for head, axes in groups.items()]
 
-    def finding(self, log: str, name: str) -> Finding:
-        """What is left of a log's errors, as 95 % bounds of the worst axis."""
+    def findings(self, log: str, name: str) -> tuple[Finding, ...]:
+        """What is left, and how the axes may lie in the case: 95 % bounds of the worst axis."""
         data: dict[str, Any] = {"calibration": name}
         for triad, unit in (("gyro", math.pi / 648000.0), ("accel", 1e-3 * STANDARD_GRAVITY)):
             sd = getattr(self, triad)
             for key, size in (("bias", unit), ("scale", 0.01), ("misalignment", math.pi / 180.0)):
                 data[f"{triad}_{key}"] = TWO_SIDED_95 * max(sd.axis(key)) / size
-        return Finding("calibrate.applied", severity="note", file=log, data=data)
+        deg = math.degrees(TWO_SIDED_95 * max(self.case))
+        return (
+            Finding("calibrate.applied", severity="note", file=log, data=data),
+            Finding("calibrate.axes-in-case", severity="note", file=log, deg=deg),
+        )
 
     def uncertainty(self, stated: ImuUncertainty) -> ImuUncertainty:
         """What a sensor's errors are known to after this calibration; noise and drift as stated.
@@ -651,6 +673,7 @@ def _tables_of(path: Path) -> dict[str, Any]:
 SEAL = "seal = "
 SLOPES = ("gyro_rad_per_s_per_c", "accel_m_per_s2_per_c")
 MAG_KEYS = ("field", "residual", "raw_residual", "direction_sd_deg", "change_deg")
+CASE_KEY = "rotation_sd_rad"
 G_KEY = "g_sensitivity_rad_per_s_per_m_per_s2"
 G_SD_KEY = "g_sensitivity_sd_rad_per_s_per_m_per_s2"
 
