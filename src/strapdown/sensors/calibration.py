@@ -117,6 +117,21 @@ class ImuCalibration:
         """Standard deviation of each parameter, (n,)."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
+    def up_covariance(self, up: Array) -> Array:
+        """Covariance of vectors up of rests, (n, 3), by what is left of the accelerometers.
+
+        Returns (3n, 3n): errors are alike in all rests.
+        """
+        J = np.zeros((len(up), 3, 9))
+        J[:, :, 0:3] = np.eye(3) / STANDARD_GRAVITY
+        J[:, :, 3:6] = np.einsum("ni,ij->nij", up, np.eye(3))
+        for k, (i, j) in enumerate(indices_of(PAIRS)):
+            J[:, i, 6 + k], J[:, j, 6 + k] = up[:, j], up[:, i]
+        # What is along the vertical changes the size alone.
+        J -= np.einsum("ni,nj,njk->nik", up, up, J)
+        J = J.reshape(-1, 9)
+        return np.asarray(J @ self.covariance[:9, :9] @ J.T)
+
     @property
     def observed(self) -> NDArray[np.bool_]:
         """Whether the log halved the standard deviation of each parameter, (n,)."""
@@ -161,6 +176,7 @@ def calibrate_imu(
         records, rotations, prior, conditions or CalibrationConditions()
     )
     z = np.zeros(problem.size)
+    problem.begin(z)
     for _ in range(ROUNDS):
         z = _solve(problem, z)
         if not problem.update_excess(z):
@@ -514,6 +530,7 @@ class SensorCalibration:
                 "hard_iron": mag.hard_iron.tolist(),
                 "hard_iron_sd": mag.hard_iron_sd.tolist(),
                 "soft_iron": mag.soft_iron.tolist(),
+                **_rotation_of(mag),
                 **{key: float(getattr(mag, key)) for key in MAG_KEYS},
                 "found": bool(mag.found),
             }
@@ -545,6 +562,8 @@ class SensorCalibration:
                 hard_iron=R @ mag.hard_iron,
                 hard_iron_sd=size @ mag.hard_iron_sd,
                 soft_iron=R @ mag.soft_iron @ R.T,
+                rotation=R @ mag.rotation @ R.T,
+                rotation_sd=size @ np.where(np.isfinite(mag.rotation_sd), mag.rotation_sd, 1e9),
             )
         assert self.errors.accel is not None
         return replace(
@@ -673,6 +692,7 @@ def _tables_of(path: Path) -> dict[str, Any]:
 SEAL = "seal = "
 SLOPES = ("gyro_rad_per_s_per_c", "accel_m_per_s2_per_c")
 MAG_KEYS = ("field", "residual", "raw_residual", "direction_sd_deg", "change_deg")
+ROTATION_KEY, ROTATION_SD_KEY = "rotation", "rotation_sd_rad"
 CASE_KEY = "rotation_sd_rad"
 G_KEY = "g_sensitivity_rad_per_s_per_m_per_s2"
 G_SD_KEY = "g_sensitivity_sd_rad_per_s_per_m_per_s2"
@@ -702,7 +722,21 @@ def _magnetometer_of(table: Mapping[str, Any]) -> MagnetometerCalibration:
         values[key] = np.array(table[key], dtype=np.float64)
         if values[key].shape != shape:
             raise ValueError
+    if ROTATION_KEY in table:
+        values["rotation"] = np.array(table[ROTATION_KEY], dtype=np.float64)
+        values["rotation_sd"] = np.array(table[ROTATION_SD_KEY], dtype=np.float64)
+        R = values["rotation"]
+        if R.shape != (3, 3) or values["rotation_sd"].shape != (3,):
+            raise ValueError
+        if not np.allclose(R @ R.T, np.eye(3), atol=1e-6):
+            raise ValueError
     return MagnetometerCalibration(**values, found=bool(table["found"]))
+
+
+def _rotation_of(mag: MagnetometerCalibration) -> dict[str, Any]:
+    if not np.isfinite(mag.rotation_sd).all():
+        return {}
+    return {ROTATION_KEY: mag.rotation.tolist(), ROTATION_SD_KEY: mag.rotation_sd.tolist()}
 
 
 def correlations(found: ImuCalibration) -> list[tuple[str, str, float]]:

@@ -31,7 +31,12 @@ from strapdown.sensors.calibration import (
 )
 from strapdown.sensors.calibration_model import GRAVITY, GRAVITY_SD, PRIOR
 from strapdown.sensors.catalogue import load_sensor
-from strapdown.sensors.magnetometer import LEAST, MagnetometerCalibration, calibrate_magnetometer
+from strapdown.sensors.magnetometer import (
+    LEAST,
+    MagnetometerCalibration,
+    aligned_to_rests,
+    calibrate_magnetometer,
+)
 from strapdown.sensors.rest import RestStretch, find_rests_of_every_grade
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.alignment_source import body_record
@@ -53,6 +58,8 @@ DEG = math.pi / 180.0
 POSE_APART, FACE_WITHIN = 15.0 * DEG, 20.0 * DEG
 #: Distinct poses from which all errors of the accelerometers can be told apart.
 ENOUGH = 9
+#: Readings of the field in a rest, and what iron may leave of its direction, deg, for its axes.
+LEAST_OF_REST, IRON_KNOWN = 5, 1.0
 #: Gravity by latitude and height: anomalies of the field, m/s²; a stated value, m/s².
 ANOMALY, STATED_SD = 5e-4, 2e-4
 #: Excess of the force of rests that is worth a warning, m/s² (5 mg); of turns, rad.
@@ -159,7 +166,7 @@ def run_calibrate(spec: CalibrateSpec, progress: Progress = silent) -> Calibrate
         A log cannot be read, or shows neither rests, nor known rotations, nor a turning field.
     """
     records: list[CalibrationRecord] = []
-    fields: list[Array] = []
+    fields: list[tuple[Array, Array] | None] = []
     inputs: list[InputFiles] = []
     findings: list[Finding] = []
     names = []
@@ -167,13 +174,14 @@ def run_calibrate(spec: CalibrateSpec, progress: Progress = silent) -> Calibrate
         progress(f"reading {Path(log.path).name}", 0.05 + 0.4 * k / len(spec.logs))
         record, mag, said, files = _read(log)
         records.append(record)
-        fields += [] if mag is None else [mag]
+        fields.append(mag)
         findings += said
         names.append(files.path.name)
         inputs.append(files)
     inputs += sensor_file(spec.sensor)
     progress("finding the errors", 0.5)
-    magnetometer = _magnetometer(fields)
+    iron = _magnetometer(fields)
+    magnetometer = iron if iron is not None and iron.significant else None
     procedure = _procedure(spec, records, magnetometer)
     found = None
     if procedure != "magnetometer":
@@ -184,14 +192,15 @@ def run_calibrate(spec: CalibrateSpec, progress: Progress = silent) -> Calibrate
         prior = _prior(spec)
         found = calibrate_imu(records, rotations, prior, _conditions(spec, procedure))
         findings = [*_said(found, spec, names[0]), *findings]
+        magnetometer = _aligned(found, iron, fields) or magnetometer
     name = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
     return CalibrateRun(spec, name, procedure, found, magnetometer, tuple(findings), tuple(inputs))
 
 
 def _read(
     log: LogTable,
-) -> tuple[CalibrationRecord, Array | None, list[Finding], InputFiles]:
-    """Samples of a log in the axes of the sensor, its rests, and the readings of its field."""
+) -> tuple[CalibrationRecord, tuple[Array, Array] | None, list[Finding], InputFiles]:
+    """Samples of a log in the axes of the sensor, its rests, and its field by time."""
     if log.calibration is not None:
         raise ConfigError("calibrate.calibrated-log", quantity="calibration")
     recording, imu, said = body_record(log, AxesTable(axes="x,y,z"))
@@ -206,13 +215,13 @@ def _read(
         imu = imu.copy()
         imu.index = pd.Index(clock.time, name="time")
     rests: tuple[RestStretch, ...] = find_rests_of_every_grade(imu)
-    mag: Array | None = None
+    mag: tuple[Array, Array] | None = None
     if set(MAG) <= set(imu.columns):
-        mag = values_of(imu, MAG)
+        mag = index_of(imu), values_of(imu, MAG)
     else:
         table = stream_beside(log.path, "magnetometer", log.format, imu)
         if table is not None and set(MAG) <= set(table.columns):
-            mag = table[MAG].to_numpy(dtype=np.float64)
+            mag = index_of(table), table[MAG].to_numpy(dtype=np.float64)
     warm = temperature_of(recording, log.path, log.format)
     temperature = None
     if warm is not None:
@@ -222,15 +231,43 @@ def _read(
     return CalibrationRecord(imu, rests, temperature), mag, findings, files
 
 
-def _magnetometer(fields: Sequence[Array]) -> MagnetometerCalibration | None:
-    """Hard and soft iron, where the readings show them."""
-    if not fields:
+def _magnetometer(
+    fields: Sequence[tuple[Array, Array] | None],
+) -> MagnetometerCalibration | None:
+    """Hard and soft iron."""
+    known = [one[1] for one in fields if one is not None]
+    if not known:
         return None
-    mag = np.vstack(fields)
+    mag = np.vstack(known)
     if int((np.isfinite(mag).all(axis=1) & mag.any(axis=1)).sum()) < LEAST:
         return None
-    found = calibrate_magnetometer(mag)
-    return found if found.significant else None
+    return calibrate_magnetometer(mag)
+
+
+def _aligned(
+    found: ImuCalibration,
+    iron: MagnetometerCalibration | None,
+    fields: Sequence[tuple[Array, Array] | None],
+) -> MagnetometerCalibration | None:
+    """Iron with the rotation against the accelerometers, where iron and rests show it."""
+    if iron is None or not (iron.significant or iron.direction_sd_deg < IRON_KNOWN):
+        return None
+    means, ups = [], []
+    for rest in found.rests.to_dict("records"):
+        of_log = fields[int(rest["log"])]
+        if rest["held"] or of_log is None:
+            continue
+        time, mag = of_log
+        inside = (time >= rest["start"]) & (time <= rest["end"])
+        inside &= np.isfinite(mag).all(axis=1) & mag.any(axis=1)
+        if inside.sum() >= LEAST_OF_REST:
+            means.append(mag[inside].mean(axis=0))
+            ups.append([rest["up_x"], rest["up_y"], rest["up_z"]])
+    if not means:
+        return None
+    up = np.array(ups)
+    aligned = aligned_to_rests(iron, np.array(means), up, found.up_covariance(up))
+    return aligned if np.isfinite(aligned.rotation_sd).all() else None
 
 
 def _procedure(
