@@ -29,6 +29,8 @@ HUBER = 1.5
 FIRST_SCATTER, ROUNDS, STEPS = 0.02, 4, 15
 #: Rotation of a magnetometer in its case before rests show it, rad; fewest rests that do; steps.
 ROTATION_PRIOR, LEAST_RESTS, ROTATION_STEPS = 0.05, 5, 25
+#: Terms of field and iron.
+IRON_TERMS = 9
 #: By how much another order of the axes must fit the dip better, in squares.
 SWAPPED = 10.0
 #: Least scatter, as a share of the field: finer than any magnetometer.
@@ -94,6 +96,8 @@ class MagnetometerCalibration:
         Its standard deviations about the axes of the accelerometers; infinite where not shown.
     covariance : ndarray, (8, 8)
         Of hard iron, and of soft iron along `SHAPES`.
+    independent : float
+        Independent readings as which all count.
     """
 
     hard_iron: Array
@@ -108,6 +112,7 @@ class MagnetometerCalibration:
     rotation: Array = field(default_factory=lambda: np.eye(3), repr=False)
     rotation_sd: Array = field(default_factory=lambda: np.full(3, np.inf), repr=False)
     covariance: Array = field(default_factory=lambda: np.zeros((8, 8)), repr=False)
+    independent: float = field(default=1.0, repr=False)
 
     @property
     def significant(self) -> bool:
@@ -182,6 +187,7 @@ def calibrate_magnetometer(mag: ArrayLike) -> MagnetometerCalibration:
         change_deg=_between(m, (m - best.x[OFFSET]) @ A),
         found=bool(gained > chi_square_exceeded(CHANCE, terms)),
         covariance=_of_iron(by.covariance, size),
+        independent=len(m) / by.correlated,
     )
 
 
@@ -196,7 +202,11 @@ def _of_iron(covariance: Array, size: float) -> Array:
 
 
 def aligned_to_rests(
-    found: MagnetometerCalibration, readings: Array, up: Array, up_covariance: Array
+    found: MagnetometerCalibration,
+    readings: Array,
+    share: Array,
+    up: Array,
+    up_covariance: Array,
 ) -> MagnetometerCalibration:
     """Find the rotation of a magnetometer against the accelerometers from rests in many poses.
 
@@ -206,6 +216,8 @@ def aligned_to_rests(
         Its hard and soft iron.
     readings : ndarray, (n, 3)
         Mean of each rest, as read.
+    share : ndarray, (n,)
+        Of each rest in the readings that showed the iron.
     up : ndarray, (n, 3)
         Unit vector up of each rest, axes of the accelerometers.
     up_covariance : ndarray, (3n, 3n)
@@ -229,6 +241,12 @@ def aligned_to_rests(
     if n < LEAST_RESTS:
         return found
     v = replace(found, rotation=np.eye(3)).apply(readings) / found.field
+    # A place that is disturbed is so over a whole rest: by the strengths of the rests iron is known
+    # less well than by readings whose correlation was seen within them.
+    off = np.square(np.linalg.norm(v, axis=1) - 1.0) / found.residual**2
+    lost = n / max(n - IRON_TERMS * float(share.sum()), 1.0)
+    wider = max(1.0, lost * float(np.mean(off * share)) * found.independent)
+    found = replace(found, covariance=wider * found.covariance)
     fits = [_rotation_fit(found, readings, v, up, up_covariance, R) for R in _swaps()]
     # Another order of the axes than the stated one only where that one does not fit.
     best = min(fits, key=lambda one: one[2])

@@ -252,7 +252,8 @@ def _aligned(
     """Iron with the rotation against the accelerometers, where iron and rests show it."""
     if iron is None or not (iron.significant or iron.direction_sd_deg < IRON_KNOWN):
         return None
-    means, ups = [], []
+    means, shares, ups = [], [], []
+    total = sum(len(one[1]) for one in fields if one is not None)
     for rest in found.rests.to_dict("records"):
         of_log = fields[int(rest["log"])]
         if rest["held"] or of_log is None:
@@ -262,11 +263,13 @@ def _aligned(
         inside &= np.isfinite(mag).all(axis=1) & mag.any(axis=1)
         if inside.sum() >= LEAST_OF_REST:
             means.append(mag[inside].mean(axis=0))
+            shares.append(inside.sum() / total)
             ups.append([rest["up_x"], rest["up_y"], rest["up_z"]])
     if not means:
         return None
     up = np.array(ups)
-    aligned = aligned_to_rests(iron, np.array(means), up, found.up_covariance(up))
+    shared = np.array(shares)
+    aligned = aligned_to_rests(iron, np.array(means), shared, up, found.up_covariance(up))
     return aligned if np.isfinite(aligned.rotation_sd).all() else None
 
 
