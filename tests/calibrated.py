@@ -61,8 +61,13 @@ def about_vertical(C, angle):
     return rotation.dcm_from_rotation_vector(np.array([0.0, 0.0, angle])) @ C
 
 
-def by_hand(first, turns, draw, *, rest=3.0, move=1.5, tremor=1.0):
-    """Stamps, rates of the inertial sensor, forces: rests between turns (rotation vectors).
+def by_hand(first, turns, draw, **options):
+    """Stamps, rates of the inertial sensor, forces; as `moved_by_hand`."""
+    return moved_by_hand(first, turns, draw, **options)[:3]
+
+
+def moved_by_hand(first, turns, draw, *, rest=3.0, move=1.5, tremor=1.0):
+    """Stamps, rates, forces, attitudes: rests between turns (rotation vectors).
 
     `tremor`: of a hand that keeps holding: 0.008 deg at 5 to 11 Hz, slow tilts of 0.05 deg, and
     0.02 m/s², each of several sines; zero for a sensor that lies.
@@ -93,7 +98,7 @@ def by_hand(first, turns, draw, *, rest=3.0, move=1.5, tremor=1.0):
     C_nb = C_nb @ R
     f = GRAVITY * C_nb[:, 2, :] + tremor * sines(t, draw, ((3, 5.0, 11.0, 0.02),))[0]
     earth = np.array([0.6 * math.cos(LATITUDE), 0.8 * math.cos(LATITUDE), math.sin(LATITUDE)])
-    return t, w + WGS84.rotation_rate * np.einsum("nji,j->ni", C_nb, earth), f
+    return t, w + WGS84.rotation_rate * np.einsum("nji,j->ni", C_nb, earth), f, C_nb
 
 
 def sines(t, draw, kinds):

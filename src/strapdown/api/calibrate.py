@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from strapdown.api.reading import imu_input, log_table
-from strapdown.config.logs import CalibrateSpec, KnownTurn
+from strapdown.config.logs import GRAVITY_RANGE, CalibrateSpec, KnownTurn, LogTable
 from strapdown.config.spec import specify
-from strapdown.errors import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError, check_choice
 from strapdown.progress import Progress, silent
 from strapdown.systems.calibrate_run import CalibrateRun, run_calibrate
 from strapdown.systems.inputs import NOWHERE, Memory
@@ -75,6 +75,14 @@ def calibrate(
     given = logs if isinstance(logs, list) else [logs]
     samples = [imu_input(one) for one in given]
     own = {k: options.pop(k) for k in ("pose_sd_deg", "turn_sd_deg") if k in options}
+    known = ["gravity_m_per_s2", "lat", "alt", *LogTable.model_fields]
+    known.remove("path")
+    for key in options:
+        check_choice("calibrate.unknown-option", known, quantity=key, name=key)
+    low, high = GRAVITY_RANGE
+    if gravity_m_per_s2 is not None and not low <= gravity_m_per_s2 <= high:
+        data = {"quantity": "gravity_m_per_s2", "value": gravity_m_per_s2}
+        raise ConfigError("calibrate.gravity-range", **data)
     stated = {key: value for key, value in options.items() if value not in (None, {}, False)}
     names = [f"imu-{k + 1}.npz" if len(given) > 1 else "imu.npz" for k in range(len(given))]
     memory = Memory.of(dict(zip(names, samples, strict=True)))

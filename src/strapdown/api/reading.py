@@ -558,7 +558,10 @@ def _imu_of(source: pd.DataFrame) -> pd.DataFrame:
         raise DataError("api.not-numeric", quantity="imu") from None
     accel = values[:, 3:] if len(triads) > 3 else None
     sampling = given.attrs.get("sampling", "instantaneous")
-    return imu_of_arrays(stamps, values[:, :3], accel, sampling, given.attrs.get("source"))
+    imu = imu_of_arrays(stamps, values[:, :3], accel, sampling, given.attrs.get("source"))
+    if "calibrated" in given.attrs:
+        imu.attrs["calibrated"] = given.attrs["calibrated"]
+    return imu
 
 
 def imu_of_arrays(

@@ -41,6 +41,13 @@ FLAGS = {
     "pose_sd_deg": "--pose-sd",
     "turn_sd_deg": "--turn-sd",
 }
+#: Options, by the keys that other programs and the configuration have for them.
+KEYS = {
+    **dict.fromkeys(("gravity", "g", "gravity_m_per_s2"), "--gravity"),
+    **dict.fromkeys(("lat", "lat_deg", "latitude"), "--lat"),
+    **dict.fromkeys(("alt", "alt_m", "height"), "--alt"),
+    **{key: f"--{key}" for key in ("turns", "procedure", "sensor", "calibration")},
+}
 
 
 @dataclass(frozen=True)
@@ -73,7 +80,9 @@ class ProcedureFlags:
     ] = None
     gravity: Annotated[
         float | None,
-        with_what("M/S2", "Local gravity; by --lat and --alt, or the Earth's mean, if not given."),
+        with_what(
+            "M/S2", "Local gravity, 9.8123; by --lat and --alt, or the Earth's mean, if not given."
+        ),
     ] = None
     lat: Annotated[float | None, with_what("DEG", "Latitude, north positive.")] = None
     alt: Height = None
@@ -105,6 +114,10 @@ def calibrate(
     from strapdown.cli.result_folder import default_folder, refuse_result, run_and_save
 
     for log in logs:
+        key, _, value = log.name.partition("=")
+        if value and key in KEYS and not log.exists():
+            flag = KEYS[key]
+            raise ConfigError("calibrate.key-as-log", text=log.name, flag=flag, value=value)
         refuse_result(log, "log")
     if flags.axes is not None:
         raise ConfigError("calibrate.axes", quantity="--axes")

@@ -191,6 +191,10 @@ class KnownTurn(Spec):
         return self
 
 
+#: Gravity on the Earth with room to either side, m/s².
+GRAVITY_RANGE = 9.5, 10.0
+
+
 class CalibrateSpec(FileSpec):
     """Logs of one sensor, for the errors of its gyros, accelerometers and magnetometer."""
 
@@ -200,7 +204,9 @@ class CalibrateSpec(FileSpec):
     procedure: Literal["positions", "six-position", "turns", "rate-table"] | None = None
     turns: tuple[KnownTurn, ...] = ()
     #: Local gravity; by latitude and height, or the mean of the Earth, if not stated.
-    gravity_m_per_s2: Annotated[Number, Field(ge=9.5, le=10.0)] | None = None
+    gravity_m_per_s2: Annotated[Number, Field(ge=GRAVITY_RANGE[0], le=GRAVITY_RANGE[1])] | None = (
+        None
+    )
     lat_deg: Latitude | None = None
     alt_m: Number = 0.0
     #: Data sheet, for what is known before the logs are read.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import hashlib
 import itertools
 import logging
 import math
@@ -619,6 +620,15 @@ def recording_of(raw: RawLog, asked: ReadOptions, *, keep: bool = True) -> Recor
     known = {*asked.columns, *names_of_quantities(raw)}
     if not any(q.startswith("gyro") for q in known) and not known.issuperset(BODY_RATES):
         _refuse_other_table(raw)
+    if raw.calibrated is not None and asked.calibration is not None:
+        given = Path(str(asked.calibration)).name
+        raise DataError(
+            "calibrate.calibrated-twice",
+            file=raw.name,
+            quantity="calibration",
+            by=raw.calibrated,
+            calibration=given,
+        )
     recording = assemble(raw, asked, keep=keep)
     return recording if asked.calibration is None else _calibrated(recording, asked)
 
@@ -633,19 +643,26 @@ def _calibrated(recording: Recording, asked: ReadOptions) -> Recording:
     letters = str(imu.attrs.get("sensor_axes") or "x,y,z")
     known = calibration.turned(axes_matrix(*parse_axes(letters)))
     warmth = None
-    if calibration.temperature is not None and len(recording.files) == 1:
-        from strapdown.formats.aid_table import temperature_beside
+    if calibration.temperature is not None:
+        from strapdown.formats.aid_table import temperature_of
 
-        warm = temperature_beside(recording.files[0], asked.format, imu)
+        warm = temperature_of(recording, recording.files[0], asked.format)
         warmth = None if warm is None else np.interp(imu.index, warm.index, warm)
     imu = known.apply(imu, warmth)
-    said = [known.finding(recording.name, Path(str(asked.calibration)).name)]
+    imu.attrs["calibrated"] = _mark_of(Path(str(asked.calibration)))
+    said = [*known.findings(recording.name, Path(str(asked.calibration)).name)]
     if known.not_observed:
         data = {"calibration": Path(str(asked.calibration)).name, "names": known.missing}
         code = "calibrate.applied-in-part"
         said.append(Finding(code, severity="warning", file=recording.name, data=data))
     said += _of_another_sensor(imu, known, recording.name, Path(str(asked.calibration)).name)
     return dataclasses.replace(recording, imu=imu, findings=(*recording.findings, *said))
+
+
+def _mark_of(path: Path) -> str:
+    """Name and SHA-256 of a calibration, which identify it in what is written."""
+    name = " ".join(path.name.split())
+    return f"{name}, sha256 {hashlib.sha256(path.read_bytes()).hexdigest()}"
 
 
 #: Rate, rad/s, and force beside gravity, m/s², of a calibrated sensor at rest, which it may have

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,7 @@ from strapdown.formats.arrays import ticks_of
 from strapdown.formats.clocks import GPS, RELATIVE, Clock, on_clock_of, unrolled, with_clock
 from strapdown.formats.columns import parse_axes
 from strapdown.formats.find_columns import find_quantities
-from strapdown.formats.recording import NoStreamError, RawLog
+from strapdown.formats.recording import NoStreamError, RawLog, Recording
 from strapdown.formats.triad_units import axes_matrix
 from strapdown.formats.vocabularies import DATED, Quantity, Vocabulary, spread_of
 from strapdown.tables import MAG, NED, POSITION_SD
@@ -176,16 +176,27 @@ def stream_beside(
         return None
 
 
-def temperature_beside(path: str | Path, form: str | None, imu: pd.DataFrame) -> pd.Series | None:
-    """Temperature of a log's barometer, °C, by the time of the inertial samples; None without it.
+def temperature_of(recording: Recording, path: str | Path, form: str | None) -> pd.Series | None:
+    """Temperature of a log, °C, by the time of its inertial samples; None without two values.
 
-    Arguments as of `stream_beside`.
+    A column of the log, else that of its barometer. `path`, `form`: as of `open_stream`.
     """
-    table = stream_beside(path, "barometer", form, imu)
-    if table is None or "temperature" not in table.columns:
-        return None
-    found = table["temperature"].dropna()
-    return found if len(found) else None
+    found = recording.temperature
+    if found is None and holds(Path(path), "barometer"):
+        table = stream_beside(path, "barometer", form, recording.imu)
+        found = None if table is None else table.get("temperature")
+    found = None if found is None else found.dropna()
+    return found if found is not None and len(found) > 1 else None
+
+
+def but_temperature(findings: Iterable[Finding], recording: Recording) -> Iterator[Finding]:
+    """Findings, of which the one about columns without a use does not list the temperature."""
+    used = None if recording.temperature is None else str(recording.temperature.name)
+    for one in findings:
+        if one.code != "io.columns-not-used":
+            yield one
+        elif names := [name for name in one.data["names"] if name != used]:
+            yield one.replace(names=names)
 
 
 def read_stream(path: str | Path, stream: str, form: str | None = None) -> pd.DataFrame:

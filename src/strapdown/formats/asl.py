@@ -25,9 +25,14 @@ from strapdown.formats import csv
 from strapdown.formats.arrays import numbers
 from strapdown.formats.columns import read_name
 from strapdown.formats.inference.conclusion import differenced
-from strapdown.formats.recording import RawLog, TruthInSensorAxes
+from strapdown.formats.recording import (
+    RawLog,
+    TruthInSensorAxes,
+    calibrated_in,
+    calibrated_mark,
+)
 from strapdown.formats.sensor_folder import file_member, first_line
-from strapdown.formats.signs import Signs
+from strapdown.formats.signs import Signs, first_bytes
 from strapdown.formats.tum import poses
 from strapdown.formats.writing import (
     FileOptions,
@@ -44,6 +49,8 @@ from strapdown.tables.checks import values_of
 Array = NDArray[np.float64]
 
 DATA = "data.csv"
+#: What states frame and noise of a sensor beside its table, and its length at most, bytes.
+SENSOR, LONGEST_SENSOR = "sensor.yaml", 1 << 14
 IMU = "imu0"
 TRUTHS = ("state_groundtruth_estimate0", "mocap0")
 TIME = "timestamp"
@@ -175,6 +182,11 @@ def _folder(path: Path) -> RawLog:
     whole = path.resolve().name
     raw = dataclasses.replace(_imu_table(table, f"{table.parent.name}/{DATA}"), name=whole)
     around = table.parent.parent
+    described = table.parent / SENSOR
+    if described.is_file():
+        by = calibrated_in(first_bytes(described, LONGEST_SENSOR).decode(errors="replace"))
+        if by is not None:
+            raw = dataclasses.replace(raw, calibrated=by, files=(*raw.files, described))
     # A bundle names every file by its path within the given folder.
     if table.parent == path or (truth := _truth_of(around)) is None:
         return raw
@@ -277,7 +289,7 @@ _STAMP = "#timestamp [ns]"
 _NWU = np.array([1.0, -1.0, -1.0])  # of north, east, down
 _YAML = """%YAML:1.0
 sensor_type: {kind}
-comment: {comment}
+comment: "{comment}"
 T_BS:
   cols: 4
   rows: 4
@@ -300,10 +312,11 @@ def write(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
         imu = tables["imu"]
         accel_needed(imu, "EuRoC")
         stamps, said = unix_ns(imu, options)
-        findings += [*said, *imu_not_held("EuRoC", imu)]
+        findings += [*said, *imu_not_held("EuRoC", imu, mark=True)]
         columns = [stamps, *values_of(imu, [*GYRO, *ACCEL]).T]
         step = float(np.median(np.diff(stamps))) * 1e-9
-        _write(path / "mav0" / IMU, "imu", "body axes: forward, right, down", step)
+        said_too = "; ".join(["body axes: forward, right, down", *calibrated_mark(imu).values()])
+        _write(path / "mav0" / IMU, "imu", said_too.replace('"', "'"), step)
         _table(path / "mav0" / IMU, ("gyro", "accel"), columns)
     if "reference" in tables:
         truth = tables["reference"]
@@ -340,7 +353,7 @@ def _write(folder: Path, kind: str, comment: str, step: float) -> None:
     folder.mkdir(parents=True)
     rate = f"rate_hz: {1.0 / step:.6g}\n" if step > 0.0 else ""
     text = _YAML.format(kind=kind, comment=comment) + rate
-    (folder / "sensor.yaml").write_text(text, encoding="utf-8", newline="\n")
+    (folder / SENSOR).write_text(text, encoding="utf-8", newline="\n")
 
 
 def _table(folder: Path, names: tuple[str, ...], columns: list[NDArray[Any]]) -> None:

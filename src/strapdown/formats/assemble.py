@@ -232,6 +232,8 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     with_clock(imu, clock_of_log(raw, found, stamps, dated))
     if raw.epoch == 0.0:
         imu.attrs["clock_origin_stamp"] = (stamps.origin.stamp, stamps.origin.unit)
+    if raw.calibrated is not None:
+        imu.attrs["calibrated"] = raw.calibrated
     first, last = raw.row(int(kept[0])), raw.row(int(kept[-1]))
     imu.attrs["first_row"] = first if last - first == len(kept) - 1 else None
     truth, scored = truth_of_log(raw, found, time, kept, (axes.axis, axes.sign), readings, findings)

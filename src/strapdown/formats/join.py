@@ -113,6 +113,7 @@ def join(
         rate=gyro.rate,
         sampling=gyro.sampling,
         axes=_one_of("axes", logs, name),
+        calibrated=next((log.calibrated for log in logs if log.calibrated), None),
         findings=findings,
     )
 

@@ -29,6 +29,7 @@ from strapdown.formats.writing import (
     accel_needed,
     gps_ns,
     is_trajectory,
+    mark_not_held,
     not_held,
     stream_not_held,
     write_numbers,
@@ -470,6 +471,7 @@ def _write_increments(path: Path, imu: pd.DataFrame, options: FileOptions) -> li
         findings.append(Finding("io.written-increments-of-line", file=source, severity="note"))
     if MAG[0] in imu.columns:
         findings.append(not_held("KF-GINS", "imu", "the magnetic field", imu))
+    findings += mark_not_held("KF-GINS", imu)
     write_numbers(path, [stamps / 1e9, *sums.T], separator=" ")
     return findings
 

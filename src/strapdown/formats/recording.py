@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import shlex
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -208,6 +209,8 @@ class RawLog:
     checked : bool
         Whether `strapdown doctor` wrote it: its statements were checked against the numbers, or
         were decided by a person.
+    calibrated : str or None
+        The calibration whose errors were taken off before it was written: name and SHA-256.
     """
 
     name: str
@@ -228,6 +231,7 @@ class RawLog:
     clock: str | None = None
     epoch: float = 0.0
     checked: bool = False
+    calibrated: str | None = None
 
     @classmethod
     def of(
@@ -359,12 +363,27 @@ def as_stated(answers: Mapping[str, str]) -> dict[str, Any]:
 AXES_OF_SENSOR = "not stated: x, y, z as in the source"
 #: In the metadata of a file that `strapdown doctor` wrote, by the key ``checked``.
 CHECKED = "strapdown doctor"
+#: By the key ``calibration``, of samples that are compensated by a file of `strapdown calibrate`.
+CALIBRATED = re.compile(r"strapdown calibrate: (.+, sha256 [0-9a-f]{64})")
+
+
+def calibrated_in(text: Any) -> str | None:
+    """Return the calibration that a text says was taken off: its name and SHA-256."""
+    found = CALIBRATED.search(str(text))
+    return None if found is None else found[1]
+
+
+def calibrated_mark(imu: pd.DataFrame) -> dict[str, str]:
+    """Return what a file states of an Imu table whose sensor's errors were taken off."""
+    by = imu.attrs.get("calibrated")
+    return {} if by is None else {"calibration": f"strapdown calibrate: {by}"}
 
 
 def stated_by(meta: Mapping[str, Any]) -> dict[str, Any]:
     """Return attributes of a `RawLog` from the metadata or comments of a file.
 
-    `meta`: text by key: ``sampling``, ``axes``, ``clock``, ``clock_origin_s``, ``checked``.
+    `meta`: text by key: ``sampling``, ``axes``, ``clock``, ``clock_origin_s``, ``checked``,
+    ``calibration``.
     """
     sampling, checked = meta.get("sampling"), meta.get("checked") == CHECKED
     stated: dict[str, Any] = {"sampling": sampling if sampling in SAMPLINGS else None, "axes": None}
@@ -374,4 +393,4 @@ def stated_by(meta: Mapping[str, Any]) -> dict[str, Any]:
             stated["axes"] = "x,y,z" if parse_axes(text) == ([0, 1, 2], [1.0, 1.0, 1.0]) else text
     if checked:
         stated |= {"clock": meta.get("clock"), "epoch": float(meta.get("clock_origin_s", 0.0))}
-    return {**stated, "checked": checked}
+    return {**stated, "checked": checked, "calibrated": calibrated_in(meta.get("calibration"))}

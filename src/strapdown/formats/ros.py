@@ -28,7 +28,12 @@ from numpy.typing import NDArray
 from strapdown.errors import DataError, Finding, check_choice
 from strapdown.formats.clocks import RELATIVE, UNIX, Clock
 from strapdown.formats.known_formats import Quantities, solution
-from strapdown.formats.recording import NoStreamError, RawLog
+from strapdown.formats.recording import (
+    NoStreamError,
+    RawLog,
+    calibrated_in,
+    calibrated_mark,
+)
 from strapdown.formats.signs import Signs, first_bytes
 from strapdown.formats.writing import (
     FLU,
@@ -53,6 +58,8 @@ TWISTS = tuple(f"geometry_msgs/msg/Twist{w}Stamped" for w in ("WithCovariance", 
 SOLUTIONS = tuple(f"novatel_oem7_msgs/msg/{m}" for m in ("INSPVAX", "INSPVA"))
 STREAMS = {"imu": IMU, "gnss": FIX, "reference": SOLUTIONS, "magnetometer": FIELD}
 STREAMS |= {"barometer": PRESSURE}
+#: Topic and type of what states that the errors of the inertial sensor were taken off.
+MARK, DIAGNOSTICS = "/imu/calibration", ("diagnostic_msgs/msg/DiagnosticArray",)
 QUALITY = {-1: 0, 0: 1, 1: 2, 2: 2}  # status of NavSatFix to field 6 of NMEA GGA
 LEAST_FORCE = 5.0  # m/s²
 MODERN = 10**18  # ns, 2001: a clock since the start of a device never counts so far
@@ -182,8 +189,14 @@ def read(path: Path, topic: str | None = None) -> RawLog:
             )
             continue
         out |= part
+    calibrated = None
+    if any(name == MARK and kind in DIAGNOSTICS for name, kind, _ in _parsed("bags.topics", path)):
+        said, _, _ = _read(path, "imu", DIAGNOSTICS, "diagnostics", MARK)
+        calibrated = calibrated_in(said["text"][0])
     of_body = {str(name).lstrip("/") for name in np.unique(columns["frame"])} == {BASE}
-    return _log(path, out, clock, findings, "x,-y,-z" if of_body else None)
+    raw = _log(path, out, clock, findings, "x,-y,-z" if of_body else None)
+    raw.calibrated = calibrated
+    return raw
 
 
 def read_fixes(path: Path, topic: str | None = None) -> RawLog:
@@ -292,7 +305,7 @@ def write(path: Path, tables: Tables, options: FileOptions) -> list[Finding]:
 
 def _lost(stream: str, table: pd.DataFrame) -> list[Finding]:
     if stream == "imu":
-        return imu_not_held("MCAP", table, mag=True)
+        return imu_not_held("MCAP", table, mag=True, mark=True)
     if stream == "gnss" and not np.isin(values_of(table, ["quality"]), list(STATUS)).all():
         return [not_held("MCAP", "gnss", "the kind of carrier-phase solution", table)]
     return []
@@ -326,6 +339,16 @@ def _imu_messages(imu: pd.DataFrame, stamps: list[int], types: Any) -> Messages:
             linear_acceleration_covariance=none if has else unknown,
         )
         yield at, "/imu/data_raw", IMU[0], message
+
+
+def _mark_messages(imu: pd.DataFrame, stamps: list[int], types: Any) -> Messages:
+    for text in calibrated_mark(imu).values():
+        name, _, value = text.partition(": ")
+        status = types["diagnostic_msgs/msg/DiagnosticStatus"](
+            level=0, name=name, message=value, hardware_id="", values=[]
+        )
+        header = _header(types, stamps[0], BASE)
+        yield stamps[0], MARK, DIAGNOSTICS[0], types[DIAGNOSTICS[0]](header=header, status=[status])
 
 
 def _mag_messages(table: pd.DataFrame, stamps: list[int], types: Any) -> Messages:
@@ -389,7 +412,7 @@ def _pressure_messages(table: pd.DataFrame, stamps: list[int], types: Any) -> Me
 
 
 _MESSAGES: dict[str, tuple[Callable[[pd.DataFrame, list[int], Any], Messages], ...]] = {
-    "imu": (_imu_messages, _mag_messages),
+    "imu": (_imu_messages, _mag_messages, _mark_messages),
     "gnss": (_fix_messages, _velocity_messages),
     "magnetometer": (_mag_messages,),
     "barometer": (_pressure_messages,),

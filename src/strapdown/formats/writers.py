@@ -35,6 +35,7 @@ from strapdown.formats import (
     tum,
 )
 from strapdown.formats.clocks import GPS, RELATIVE, UNIX, clock_of, time_column
+from strapdown.formats.recording import calibrated_mark
 from strapdown.formats.trajectory_writers import (
     told_of,
     write_csv,
@@ -242,7 +243,8 @@ def imu_columns(
                 columns[f"{name}_{axis}{_SUFFIX[name]}"] = array[:, k]
         else:
             columns[name] = array
-    return columns, {"sampling": imu.attrs["sampling"], "axes": imu.attrs.get("axes", AXES)}
+    said = {"sampling": imu.attrs["sampling"], "axes": imu.attrs.get("axes", AXES)}
+    return columns, said | calibrated_mark(imu)
 
 
 def table_columns(table: pd.DataFrame) -> dict[str, Array]:

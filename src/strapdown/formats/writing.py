@@ -280,12 +280,22 @@ def not_held(form: str, stream: str, what: str, table: pd.DataFrame, **data: Any
     return Finding("io.written-without", file=source, quantity=stream, severity="note", **more)
 
 
-def imu_not_held(form: str, imu: pd.DataFrame, *, mag: bool = False) -> list[Finding]:
+def mark_not_held(form: str, imu: pd.DataFrame) -> list[Finding]:
+    """List that a format loses the mark of samples whose sensor's errors were taken off."""
+    if "calibrated" not in imu.attrs:
+        return []
+    source = imu.attrs.get("source")
+    return [Finding("io.written-without-calibration-mark", file=source, quantity="imu", form=form)]
+
+
+def imu_not_held(
+    form: str, imu: pd.DataFrame, *, mag: bool = False, mark: bool = False
+) -> list[Finding]:
     """List what a format of instantaneous samples loses of an Imu table.
 
-    `mag`: whether it holds the magnetic field.
+    `mag`, `mark`: whether it holds the magnetic field, and the mark of a calibration.
     """
-    lost = []
+    lost = [] if mark else mark_not_held(form, imu)
     if imu.attrs.get("sampling") == "mean":
         source = imu.attrs.get("source")
         lost.append(

@@ -104,4 +104,5 @@ _VALUES: dict[str, Callable[[Any], dict[str, Any]]] = {
     "solution": _solution,
     "magnetometer": lambda m: _vector("mag", m.magnetic_field),
     "barometer": lambda m: {"pressure": m.fluid_pressure},
+    "diagnostics": lambda m: {"text": " ".join(f"{s.name}: {s.message}" for s in m.status)},
 }

@@ -11,7 +11,7 @@ import numpy as np
 from strapdown import __version__
 from strapdown.bundle import write_json
 from strapdown.config.logs import CalibrateSpec
-from strapdown.constants import STANDARD_GRAVITY
+from strapdown.constants import STANDARD_GRAVITY, TWO_SIDED_95
 from strapdown.formats import csv
 from strapdown.report.chart import AXIS_COLOURS, Chart, Level, Line, Panel
 from strapdown.report.document import (
@@ -25,6 +25,7 @@ from strapdown.report.document import (
     section,
 )
 from strapdown.report.report_bundle import ReportBundle, finite, with_page
+from strapdown.rotation import rotation_vector_from_dcm
 from strapdown.sensors.calibration import correlations
 from strapdown.systems.calibrate_run import CalibrateRun, run_calibrate
 
@@ -141,6 +142,8 @@ def calibrate_json(result: CalibrateRun) -> dict[str, Any]:
             "soft_iron": mag.soft_iron.tolist(),
             "field": mag.field,
             "direction_sd_deg": mag.direction_sd_deg,
+            "rotation": mag.rotation.tolist(),
+            "rotation_sd_rad": mag.rotation_sd.tolist(),
         }
     )
     out["findings"] = [one.plain("cli") for one in result.findings]
@@ -238,8 +241,15 @@ def field_table(result: CalibrateRun) -> TableBlock | None:
         f"The direction of the field changes by {mag.change_deg:.2g}° (rms) and is then known to "
         f"{1.96 * mag.direction_sd_deg:.2g}° (95 %)."
     )
-    rows = (("hard iron", "% of the field", *iron),)
-    return TableBlock(("Magnetometer", "unit", *XYZ), rows, text=(0, 1), caption=caption)
+    rows = [("hard iron", "% of the field", *iron)]
+    if np.isfinite(mag.rotation_sd).all():
+        turn = rotation_vector_from_dcm(mag.rotation) / DEG
+        axes = [
+            f"{v:.2f} ± {TWO_SIDED_95 * s / DEG:.2g}".replace("-", "−")
+            for v, s in zip(turn, mag.rotation_sd, strict=True)
+        ]
+        rows.append(("axes against accelerometers", "deg", *axes))
+    return TableBlock(("Magnetometer", "unit", *XYZ), tuple(rows), text=(0, 1), caption=caption)
 
 
 # Page and charts.

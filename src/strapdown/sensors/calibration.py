@@ -16,6 +16,7 @@ gravity of unknown direction does not show a rotation of all three. Gyros are al
 
 from __future__ import annotations
 
+import hashlib
 import math
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -42,7 +43,7 @@ from strapdown.sensors.calibration_model import (
 from strapdown.sensors.calibration_stops import CalibrationRecord, KnownRotation
 from strapdown.sensors.error_chain import compensate
 from strapdown.sensors.magnetometer import MagnetometerCalibration
-from strapdown.sensors.triad_errors import ImuErrors, TriadErrors, matrix_of, triad_of
+from strapdown.sensors.triad_errors import ImuErrors, Triad, TriadErrors, matrix_of, triad_of
 from strapdown.sensors.uncertainty import ImuUncertainty, TriadUncertainty
 from strapdown.tables import ACCEL, GYRO, MAG
 from strapdown.tables.checks import index_of, values_of
@@ -62,7 +63,9 @@ Array = NDArray[np.float64]
 #: A parameter whose standard deviation the log has not halved is not observed.
 NOT_OBSERVED = 0.5
 #: Rounds of variance components, and steps in each.
-ROUNDS, STEPS = 6, 12
+ROUNDS, STEPS = 6, 60
+#: Damping of a step, beside the information of the prior, which is one.
+LEAST_DAMPING, MOST_DAMPING = 0.05, 1e9
 #: Correlation from which the file states it; parameters beyond so many prior standard deviations,
 #: or such a misalignment, rad, are of no sensor.
 CORRELATED, IMPOSSIBLE, SKEW = 0.3, 8.0, 0.4
@@ -114,6 +117,21 @@ class ImuCalibration:
         """Standard deviation of each parameter, (n,)."""
         return np.asarray(np.sqrt(np.diag(self.covariance)))
 
+    def up_covariance(self, up: Array) -> Array:
+        """Covariance of vectors up of rests, (n, 3), by what is left of the accelerometers.
+
+        Returns (3n, 3n): errors are alike in all rests.
+        """
+        J = np.zeros((len(up), 3, 9))
+        J[:, :, 0:3] = np.eye(3) / STANDARD_GRAVITY
+        J[:, :, 3:6] = np.einsum("ni,ij->nij", up, np.eye(3))
+        for k, (i, j) in enumerate(indices_of(PAIRS)):
+            J[:, i, 6 + k], J[:, j, 6 + k] = up[:, j], up[:, i]
+        # What is along the vertical changes the size alone.
+        J -= np.einsum("ni,nj,njk->nik", up, up, J)
+        J = J.reshape(-1, 9)
+        return np.asarray(J @ self.covariance[:9, :9] @ J.T)
+
     @property
     def observed(self) -> NDArray[np.bool_]:
         """Whether the log halved the standard deviation of each parameter, (n,)."""
@@ -158,6 +176,7 @@ def calibrate_imu(
         records, rotations, prior, conditions or CalibrationConditions()
     )
     z = np.zeros(problem.size)
+    problem.begin(z)
     for _ in range(ROUNDS):
         z = _solve(problem, z)
         if not problem.update_excess(z):
@@ -174,7 +193,12 @@ def calibrate_imu(
 
 
 def _solve(problem: CalibrationProblem, z: Array) -> Array:
-    """Damped Gauss-Newton steps to the maximum of the posterior."""
+    """Damped Gauss-Newton steps to the maximum of the posterior.
+
+    Damping is by the prior (Levenberg), not by the information (Marquardt): bias and scale of a
+    face that was up on one side alone lie in a narrow curved valley, whose own direction is known
+    by the prior only, 1e-7 of the information across it.
+    """
     residual, jacobian, _ = problem.linearize(z)
     cost, damping = float(residual @ residual + problem.weight @ z**2), 0.0
     for _ in range(STEPS):
@@ -182,18 +206,19 @@ def _solve(problem: CalibrationProblem, z: Array) -> Array:
         gradient = jacobian.T @ residual + problem.weight * z
         directions = [node.up for node in problem.nodes]
         while True:
-            damped = normal + damping * np.diag(np.diag(normal))
+            damped = normal + damping * np.eye(problem.size)
             step: Array = np.asarray(np.linalg.solve(damped, gradient))
             tried = problem.moved(z, -step)
             residual, jacobian, _ = problem.linearize(tried)
             new = float(residual @ residual + problem.weight @ tried**2)
-            if new <= cost * (1.0 + 1e-9) + 1e-9 or damping > 1e3:
+            if new <= cost * (1.0 + 1e-9) + 1e-9 or damping > MOST_DAMPING:
                 break
             for node, up in zip(problem.nodes, directions, strict=True):
                 node.up = up
-            damping = max(10.0 * damping, 1e-3)
-        z, settled = tried, abs(cost - new) < 1e-6 * (1.0 + new)
-        cost, damping = new, 0.1 * damping if damping > 1e-3 else 0.0
+            damping = max(4.0 * damping, LEAST_DAMPING)
+        # A damped step is short, and says nothing of how far the maximum is.
+        z, settled = tried, damping < 1.0 and abs(cost - new) < 1e-6 * (1.0 + new)
+        cost, damping = new, 0.25 * damping if damping > LEAST_DAMPING else 0.0
         if settled:
             break
     return z
@@ -369,6 +394,12 @@ def in_accel_axes(errors: ImuErrors) -> ImuErrors:
 # The file of a calibration.
 
 
+#: Pairs of axes of which a misalignment is a rotation about x, y, z; and its standard deviation
+#: about each where a file does not state it, rad: as of the misalignment that is assumed.
+ABOUT = ("yz", "xz", "xy")
+CASE: Triad = triad_of(PRIOR.accel.axis("misalignment")[k] / math.sqrt(2.0) for k in range(3))
+
+
 @dataclass(frozen=True, eq=False)
 class SensorCalibration:
     """Known errors of a sensor and what is left of them: the file ``calibration.toml``.
@@ -386,6 +417,9 @@ class SensorCalibration:
         In the axes of the sensor.
     not_observed : tuple of str
         Parameters that the logs did not show.
+    case : triad, rad
+        Standard deviation of the rotation of these axes, those of the accelerometers, in the case
+        about each axis: the antisymmetric part of a misalignment before the calibration.
     """
 
     errors: ImuErrors
@@ -395,6 +429,7 @@ class SensorCalibration:
     temperature: float | None
     magnetometer: MagnetometerCalibration | None
     not_observed: tuple[str, ...]
+    case: Triad = CASE
 
     @classmethod
     def of(
@@ -426,6 +461,8 @@ class SensorCalibration:
             found.temperature,
             magnetometer,
             missing,
+            # Symmetric and antisymmetric part, half the sum and the difference, are known alike.
+            triad_of(found.prior_sd[found.names.index(f"accel_misalignment_{p}")] for p in ABOUT),
         )
 
     @classmethod
@@ -435,28 +472,37 @@ class SensorCalibration:
         Raises
         ------
         DataError
-            There is none, or it is not of `strapdown calibrate`.
+            There is none, it is not of `strapdown calibrate`, or it was damaged or edited.
         """
-        if not Path(path).exists():
-            raise DataError("io.no-such-file", file=str(path), quantity="calibration")
+        where = {"file": Path(path).name, "quantity": "calibration"}
+        tables = _tables_of(Path(path))
+        part = "gyro"
         try:
-            tables = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-            gyro, accel = tables["gyro"], tables["accel"]
-            errors = ImuErrors(_errors_of(gyro, "rad_per_s"), _errors_of(accel, "m_per_s2"))
-            sd = (_sd_of(gyro, "rad_per_s"), _sd_of(accel, "m_per_s2"))
-            warm = tables.get("temperature", {})
+            gyro = _errors_of(tables[part], "rad_per_s"), _sd_of(tables[part], "rad_per_s")
+            part = "accel"
+            accel = _errors_of(tables[part], "m_per_s2"), _sd_of(tables[part], "m_per_s2")
+            part = "temperature"
+            warm = tables.get(part, {})
             slopes = np.array([warm.get(key, [0.0] * 3) for key in SLOPES], dtype=np.float64)
-            field_ = tables.get("magnetometer")
-            mag = None if field_ is None else _magnetometer_of(field_)
-            missing = tuple(str(name) for name in tables.get("not_observed", ()))
             at = warm.get("at_c")
+            at = None if at is None else float(at)
             if slopes.shape != (2, 3) or not np.isfinite(slopes).all():
                 raise ValueError
-        except (OSError, ValueError, TypeError, KeyError, AttributeError, StrapdownError):
-            raise DataError(
-                "calibrate.no-calibration", file=Path(path).name, quantity="calibration"
-            ) from None
-        return cls(errors, *sd, slopes, None if at is None else float(at), mag, missing)
+            part = "magnetometer"
+            mag = None if part not in tables else _magnetometer_of(tables[part])
+            part = "case"
+            case = triad_of(tables.get(part, {}).get(CASE_KEY, CASE))
+            if not (np.isfinite(case).all() and min(case) >= 0.0):
+                raise ValueError
+            part = "not_observed"
+            missing = tuple(str(name) for name in tables.get(part, ()))
+        except KeyError as error:
+            key = str(error.args[0])
+            key = key if key == part else f"{part}.{key}"
+            raise DataError("calibrate.file-without-key", key=key, **where) from None
+        except (ValueError, TypeError, AttributeError, StrapdownError):
+            raise DataError("calibrate.file-value", key=part, **where) from None
+        return cls(ImuErrors(gyro[0], accel[0]), gyro[1], accel[1], slopes, at, mag, missing, case)
 
     def tables(self) -> dict[str, dict[str, Any]]:
         """Tables of the file, SI."""
@@ -474,6 +520,7 @@ class SensorCalibration:
             if triad == "gyro":
                 out[triad][G_KEY] = errors.g_sensitivity
                 out[triad][G_SD_KEY] = sd.axis("g_sensitivity")
+        out["case"] = {CASE_KEY: self.case}
         if self.temperature is not None:
             slopes = dict(zip(SLOPES, self.temperature_slopes.tolist(), strict=True))
             out["temperature"] = {"at_c": self.temperature, **slopes}
@@ -483,6 +530,7 @@ class SensorCalibration:
                 "hard_iron": mag.hard_iron.tolist(),
                 "hard_iron_sd": mag.hard_iron_sd.tolist(),
                 "soft_iron": mag.soft_iron.tolist(),
+                **_rotation_of(mag),
                 **{key: float(getattr(mag, key)) for key in MAG_KEYS},
                 "found": bool(mag.found),
             }
@@ -514,6 +562,8 @@ class SensorCalibration:
                 hard_iron=R @ mag.hard_iron,
                 hard_iron_sd=size @ mag.hard_iron_sd,
                 soft_iron=R @ mag.soft_iron @ R.T,
+                rotation=R @ mag.rotation @ R.T,
+                rotation_sd=size @ np.where(np.isfinite(mag.rotation_sd), mag.rotation_sd, 1e9),
             )
         assert self.errors.accel is not None
         return replace(
@@ -523,6 +573,7 @@ class SensorCalibration:
             accel=self.accel.turned(size),
             temperature_slopes=self.temperature_slopes @ R.T,
             magnetometer=mag,
+            case=triad_of(size @ self.case),
         )
 
     def apply(self, imu: pd.DataFrame, warmth: Array | None = None) -> pd.DataFrame:
@@ -566,14 +617,18 @@ class SensorCalibration:
             groups.setdefault(head.replace("_", " "), []).append(axis)
         return [f"{head} {' '.join(axes)}" for head, axes in groups.items()]
 
-    def finding(self, log: str, name: str) -> Finding:
-        """What is left of a log's errors, as 95 % bounds of the worst axis."""
+    def findings(self, log: str, name: str) -> tuple[Finding, ...]:
+        """What is left, and how the axes may lie in the case: 95 % bounds of the worst axis."""
         data: dict[str, Any] = {"calibration": name}
         for triad, unit in (("gyro", math.pi / 648000.0), ("accel", 1e-3 * STANDARD_GRAVITY)):
             sd = getattr(self, triad)
             for key, size in (("bias", unit), ("scale", 0.01), ("misalignment", math.pi / 180.0)):
                 data[f"{triad}_{key}"] = TWO_SIDED_95 * max(sd.axis(key)) / size
-        return Finding("calibrate.applied", severity="note", file=log, data=data)
+        deg = math.degrees(TWO_SIDED_95 * max(self.case))
+        return (
+            Finding("calibrate.applied", severity="note", file=log, data=data),
+            Finding("calibrate.axes-in-case", severity="note", file=log, deg=deg),
+        )
 
     def uncertainty(self, stated: ImuUncertainty) -> ImuUncertainty:
         """What a sensor's errors are known to after this calibration; noise and drift as stated.
@@ -591,8 +646,54 @@ class SensorCalibration:
         return replace(stated, gyro=triads["gyro"], accel=triads["accel"])
 
 
+def sealed_text(text: str) -> str:
+    """Return the text of a calibration file with the hash of all its other lines."""
+    return f"{SEAL}{seal_of(text)}{text}"
+
+
+def seal_of(text: str) -> str:
+    """Line that seals a text: the hash of its other lines, whatever ends them."""
+    lines = [line.rstrip() for line in text.splitlines() if not line.startswith(SEAL)]
+    digest = hashlib.sha256("\n".join(lines).rstrip().encode()).hexdigest()
+    return f'"sha256 {digest}"\n'
+
+
+def _tables_of(path: Path) -> dict[str, Any]:
+    """Read a calibration file as far as TOML goes.
+
+    DataError: there is none; it is damaged, edited, or a file of another kind.
+    """
+    where = {"file": path.name, "quantity": "calibration"}
+    if not path.exists():
+        raise DataError("io.no-such-file", file=str(path), quantity="calibration")
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+        tables = tomllib.loads(text)
+    except UnicodeDecodeError as error:
+        data = {"row": error.object[: error.start].count(b"\n") + 1}
+        raise DataError("calibrate.file-not-text", **where, **data) from None
+    except OSError as error:
+        raise DataError("calibrate.file-no-toml", error=error.strerror, **where) from None
+    except (ValueError, RecursionError) as error:
+        raise DataError("calibrate.file-no-toml", error=str(error), **where) from None
+    if {"class", "summary"} <= tables.keys():
+        raise DataError("calibrate.file-of-sensor", **where)
+    seals = [line for line in text.splitlines(keepends=True) if line.startswith(SEAL)]
+    if seals and seals[0].removeprefix(SEAL).strip() != seal_of(text).strip():
+        raise DataError("calibrate.file-changed", **where)
+    if "procedure" in tables and not {"gyro", "accel"} & tables.keys():
+        raise DataError("calibrate.file-of-magnetometer", **where)
+    if not {"gyro", "accel"} & tables.keys():
+        raise DataError("calibrate.no-calibration", **where)
+    return tables
+
+
+#: Key of the hash of a calibration file.
+SEAL = "seal = "
 SLOPES = ("gyro_rad_per_s_per_c", "accel_m_per_s2_per_c")
 MAG_KEYS = ("field", "residual", "raw_residual", "direction_sd_deg", "change_deg")
+ROTATION_KEY, ROTATION_SD_KEY = "rotation", "rotation_sd_rad"
+CASE_KEY = "rotation_sd_rad"
 G_KEY = "g_sensitivity_rad_per_s_per_m_per_s2"
 G_SD_KEY = "g_sensitivity_sd_rad_per_s_per_m_per_s2"
 
@@ -621,7 +722,21 @@ def _magnetometer_of(table: Mapping[str, Any]) -> MagnetometerCalibration:
         values[key] = np.array(table[key], dtype=np.float64)
         if values[key].shape != shape:
             raise ValueError
+    if ROTATION_KEY in table:
+        values["rotation"] = np.array(table[ROTATION_KEY], dtype=np.float64)
+        values["rotation_sd"] = np.array(table[ROTATION_SD_KEY], dtype=np.float64)
+        R = values["rotation"]
+        if R.shape != (3, 3) or values["rotation_sd"].shape != (3,):
+            raise ValueError
+        if not np.allclose(R @ R.T, np.eye(3), atol=1e-6):
+            raise ValueError
     return MagnetometerCalibration(**values, found=bool(table["found"]))
+
+
+def _rotation_of(mag: MagnetometerCalibration) -> dict[str, Any]:
+    if not np.isfinite(mag.rotation_sd).all():
+        return {}
+    return {ROTATION_KEY: mag.rotation.tolist(), ROTATION_SD_KEY: mag.rotation_sd.tolist()}
 
 
 def correlations(found: ImuCalibration) -> list[tuple[str, str, float]]:

@@ -508,6 +508,11 @@ class CalibrationProblem:
 
     # Variance components.
 
+    def begin(self, z: Array) -> None:
+        """Begin with the products of errors as they are before the log is read."""
+        self.second_order = self._second_order(z, np.eye(self.size))
+        self.shift = np.zeros(len(self.nodes))
+
     def update_excess(self, z: Array) -> bool:
         """Estimate the excess of rests and turns, and the drift; whether they changed."""
         residual, jacobian, kinds = self.linearize(z)

@@ -139,6 +139,8 @@ def _read(path: Path) -> Sensor:
         raise ConfigError("sensors.no-toml", file=path.name, error=error) from None
     except OSError as error:
         raise ConfigError("sensors.no-toml", file=path.name, error=error.strerror) from None
+    if "procedure" in table and "class" not in table:
+        raise ConfigError("sensors.calibration-as-sensor", file=path.name, quantity="sensor")
     _known(table, TOP, path, "")
     title, summary, grade = (_text(table, key, path) for key in ("title", "summary", "class"))
     if grade not in GRADES:

@@ -21,8 +21,7 @@ from strapdown.config.logs import AllanSpec, AxesTable, LogTable
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import WGS84
 from strapdown.errors import DataError, Finding
-from strapdown.formats import holds
-from strapdown.formats.aid_table import temperature_beside
+from strapdown.formats.aid_table import but_temperature, temperature_of
 from strapdown.formats.recording import Recording
 from strapdown.progress import Progress, silent
 from strapdown.sensors.allan import allan_model, deviations
@@ -325,9 +324,9 @@ def _rest_of(spec: AllanSpec, log: LogTable, findings: list[Finding]) -> _Rest:
     first, past = np.searchsorted(time, [start, end + 1e-9])
     stamps = time[first:past]
     dt = float(stamps[-1] - stamps[0]) / (stamps.size - 1)
-    warm = _temperature(log, recording, imu, stamps)
-    if warm is not None and recording.temperature is not None:
-        read = tuple(_but_used(read, str(recording.temperature.name)))
+    warm = _temperature(log, recording, stamps)
+    if warm is not None:
+        read = tuple(but_temperature(read, recording))
     findings += [*read, *moved]
     gaps = find_gaps(stamps)
     if gaps:
@@ -355,30 +354,16 @@ def _rest(imu: pd.DataFrame, name: str, findings: list[Finding]) -> tuple[float,
     return longest.start, longest.end
 
 
-def _temperature(
-    log: LogTable, recording: Recording, imu: pd.DataFrame, stamps: Array
-) -> Array | None:
+def _temperature(log: LogTable, recording: Recording, stamps: Array) -> Array | None:
     """Temperature of the log at the stamps, °C; None without one, or if it hardly changes."""
-    stream = recording.temperature
-    if stream is None and holds(Path(log.path), "barometer"):
-        stream = temperature_beside(log.path, log.format, imu)
+    stream = temperature_of(recording, log.path, log.format)
     if stream is None:
         return None
-    stream = stream.dropna()
     time, values = (np.asarray(one, np.float64) for one in (stream.index, stream))
-    if len(values) < 2 or time[0] > stamps[0] + EDGE or time[-1] < stamps[-1] - EDGE:
+    if time[0] > stamps[0] + EDGE or time[-1] < stamps[-1] - EDGE:
         return None
     at = np.interp(stamps, time, values)
     return at if np.ptp(at) > LEAST_WARMING else None
-
-
-def _but_used(findings: Iterable[Finding], column: str) -> Iterable[Finding]:
-    """Findings, of which the one about columns without a use does not list this one."""
-    for one in findings:
-        if one.code != "io.columns-not-used":
-            yield one
-        elif names := [name for name in one.data["names"] if name != column]:
-            yield one.replace(names=names)
 
 
 def _said(code: str, name: str, **data: Any) -> Finding:

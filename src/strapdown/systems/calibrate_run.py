@@ -17,7 +17,7 @@ from strapdown.config.logs import AxesTable, CalibrateSpec, KnownTurn, LogTable
 from strapdown.config.toml_text import string
 from strapdown.earth import gravity
 from strapdown.errors import ConfigError, DataError, Finding
-from strapdown.formats.aid_table import stream_beside, temperature_beside
+from strapdown.formats.aid_table import but_temperature, stream_beside, temperature_of
 from strapdown.progress import Progress, silent
 from strapdown.sensors.calibration import (
     CalibrationConditions,
@@ -27,10 +27,16 @@ from strapdown.sensors.calibration import (
     SensorCalibration,
     calibrate_imu,
     correlations,
+    sealed_text,
 )
 from strapdown.sensors.calibration_model import GRAVITY, GRAVITY_SD, PRIOR
 from strapdown.sensors.catalogue import load_sensor
-from strapdown.sensors.magnetometer import LEAST, MagnetometerCalibration, calibrate_magnetometer
+from strapdown.sensors.magnetometer import (
+    LEAST,
+    MagnetometerCalibration,
+    aligned_to_rests,
+    calibrate_magnetometer,
+)
 from strapdown.sensors.rest import RestStretch, find_rests_of_every_grade
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.alignment_source import body_record
@@ -52,6 +58,8 @@ DEG = math.pi / 180.0
 POSE_APART, FACE_WITHIN = 15.0 * DEG, 20.0 * DEG
 #: Distinct poses from which all errors of the accelerometers can be told apart.
 ENOUGH = 9
+#: Readings of the field in a rest, and what iron may leave of its direction, deg, for its axes.
+LEAST_OF_REST, IRON_KNOWN = 5, 1.0
 #: Gravity by latitude and height: anomalies of the field, m/s²; a stated value, m/s².
 ANOMALY, STATED_SD = 5e-4, 2e-4
 #: Excess of the force of rests that is worth a warning, m/s² (5 mg); of turns, rad.
@@ -158,7 +166,7 @@ def run_calibrate(spec: CalibrateSpec, progress: Progress = silent) -> Calibrate
         A log cannot be read, or shows neither rests, nor known rotations, nor a turning field.
     """
     records: list[CalibrationRecord] = []
-    fields: list[Array] = []
+    fields: list[tuple[Array, Array] | None] = []
     inputs: list[InputFiles] = []
     findings: list[Finding] = []
     names = []
@@ -166,13 +174,14 @@ def run_calibrate(spec: CalibrateSpec, progress: Progress = silent) -> Calibrate
         progress(f"reading {Path(log.path).name}", 0.05 + 0.4 * k / len(spec.logs))
         record, mag, said, files = _read(log)
         records.append(record)
-        fields += [] if mag is None else [mag]
+        fields.append(mag)
         findings += said
         names.append(files.path.name)
         inputs.append(files)
     inputs += sensor_file(spec.sensor)
     progress("finding the errors", 0.5)
-    magnetometer = _magnetometer(fields)
+    iron = _magnetometer(fields)
+    magnetometer = iron if iron is not None and iron.significant else None
     procedure = _procedure(spec, records, magnetometer)
     found = None
     if procedure != "magnetometer":
@@ -183,17 +192,21 @@ def run_calibrate(spec: CalibrateSpec, progress: Progress = silent) -> Calibrate
         prior = _prior(spec)
         found = calibrate_imu(records, rotations, prior, _conditions(spec, procedure))
         findings = [*_said(found, spec, names[0]), *findings]
+        magnetometer = _aligned(found, iron, fields) or magnetometer
     name = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
     return CalibrateRun(spec, name, procedure, found, magnetometer, tuple(findings), tuple(inputs))
 
 
 def _read(
     log: LogTable,
-) -> tuple[CalibrationRecord, Array | None, list[Finding], InputFiles]:
-    """Samples of a log in the axes of the sensor, its rests, and the readings of its field."""
+) -> tuple[CalibrationRecord, tuple[Array, Array] | None, list[Finding], InputFiles]:
+    """Samples of a log in the axes of the sensor, its rests, and its field by time."""
     if log.calibration is not None:
         raise ConfigError("calibrate.calibrated-log", quantity="calibration")
     recording, imu, said = body_record(log, AxesTable(axes="x,y,z"))
+    if "calibrated" in imu.attrs:
+        by = imu.attrs["calibrated"]
+        raise DataError("calibrate.calibrated-log-by", file=recording.name, by=by)
     refuse_long_span(imu, recording.name)
     # The axes of a sensor need not be those of a body.
     findings = [f for f in said if not f.code.startswith("io.axes")]
@@ -202,30 +215,62 @@ def _read(
         imu = imu.copy()
         imu.index = pd.Index(clock.time, name="time")
     rests: tuple[RestStretch, ...] = find_rests_of_every_grade(imu)
-    mag: Array | None = None
+    mag: tuple[Array, Array] | None = None
     if set(MAG) <= set(imu.columns):
-        mag = values_of(imu, MAG)
+        mag = index_of(imu), values_of(imu, MAG)
     else:
         table = stream_beside(log.path, "magnetometer", log.format, imu)
         if table is not None and set(MAG) <= set(table.columns):
-            mag = table[MAG].to_numpy(dtype=np.float64)
-    warm = temperature_beside(log.path, log.format, imu)
+            mag = index_of(table), table[MAG].to_numpy(dtype=np.float64)
+    warm = temperature_of(recording, log.path, log.format)
     temperature = None
-    if warm is not None and len(warm) > 1:
+    if warm is not None:
+        findings = list(but_temperature(findings, recording))
         temperature = (warm.index.to_numpy(dtype=np.float64), warm.to_numpy(dtype=np.float64))
     files = input_files("log", log.path, recording.files)
     return CalibrationRecord(imu, rests, temperature), mag, findings, files
 
 
-def _magnetometer(fields: Sequence[Array]) -> MagnetometerCalibration | None:
-    """Hard and soft iron, where the readings show them."""
-    if not fields:
+def _magnetometer(
+    fields: Sequence[tuple[Array, Array] | None],
+) -> MagnetometerCalibration | None:
+    """Hard and soft iron."""
+    known = [one[1] for one in fields if one is not None]
+    if not known:
         return None
-    mag = np.vstack(fields)
+    mag = np.vstack(known)
     if int((np.isfinite(mag).all(axis=1) & mag.any(axis=1)).sum()) < LEAST:
         return None
-    found = calibrate_magnetometer(mag)
-    return found if found.significant else None
+    return calibrate_magnetometer(mag)
+
+
+def _aligned(
+    found: ImuCalibration,
+    iron: MagnetometerCalibration | None,
+    fields: Sequence[tuple[Array, Array] | None],
+) -> MagnetometerCalibration | None:
+    """Iron with the rotation against the accelerometers, where iron and rests show it."""
+    if iron is None or not (iron.significant or iron.direction_sd_deg < IRON_KNOWN):
+        return None
+    means, shares, ups = [], [], []
+    total = sum(len(one[1]) for one in fields if one is not None)
+    for rest in found.rests.to_dict("records"):
+        of_log = fields[int(rest["log"])]
+        if rest["held"] or of_log is None:
+            continue
+        time, mag = of_log
+        inside = (time >= rest["start"]) & (time <= rest["end"])
+        inside &= np.isfinite(mag).all(axis=1) & mag.any(axis=1)
+        if inside.sum() >= LEAST_OF_REST:
+            means.append(mag[inside].mean(axis=0))
+            shares.append(inside.sum() / total)
+            ups.append([rest["up_x"], rest["up_y"], rest["up_z"]])
+    if not means:
+        return None
+    up = np.array(ups)
+    shared = np.array(shares)
+    aligned = aligned_to_rests(iron, np.array(means), shared, up, found.up_covariance(up))
+    return aligned if np.isfinite(aligned.rotation_sd).all() else None
 
 
 def _procedure(
@@ -348,7 +393,7 @@ def _text(run: CalibrateRun) -> str:
             "pairs = [",
         ]
         lines += [f"  [{string(a)}, {string(b)}, {r:.2f}]," for a, b, r in pairs] + ["]"]
-    return "\n".join(lines) + "\n"
+    return sealed_text("\n".join(lines) + "\n")
 
 
 def _plain(value: Any) -> str:

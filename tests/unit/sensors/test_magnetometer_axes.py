@@ -1,0 +1,170 @@
+"""Axes of a magnetometer against accelerometers: simulated truth, and bounds that hold."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import beta
+from tests.calibrated import (
+    DEG,
+    GRAVITY,
+    POSES,
+    about_vertical,
+    between,
+    facing,
+    moved_by_hand,
+    record,
+    turned,
+    unit,
+)
+
+import strapdown as sd
+from strapdown import rotation
+from strapdown.formats import csv
+from strapdown.sensors.calibration import SensorCalibration, in_accel_axes
+from strapdown.sensors.magnetometer import (
+    ROTATION_PRIOR,
+    aligned_to_rests,
+    calibrate_magnetometer,
+)
+
+#: Field, µT: 63° of dip, in a frame with z up; noise of a reading; change from pose to pose.
+FIELD = 48.0 * np.array([math.cos(63.0 * DEG), 0.0, -math.sin(63.0 * DEG)])
+NOISE, ROOM = 0.3, 0.15
+#: What accelerometers leave of the direction of up: bias beside gravity, alike in all poses.
+UP_SD = 1e-3
+
+
+def moved(draw, count):
+    """A motion by hand through poses in any heading: stamps, attitudes, ups and rows of rests."""
+    order = draw.permutation(16)[:count]
+    poses = [turned(facing(POSES[k]), draw, 8.0 * DEG) for k in order]
+    poses = [about_vertical(C, draw.uniform(-math.pi, math.pi)) for C in poses]
+    t, w, f, C_nb = moved_by_hand(poses[0], between(poses), draw, rest=2.0)
+    rate = np.linalg.norm(w, axis=1)
+    rows, begin = [], None
+    for k, still in enumerate(np.r_[rate < 2.0 * DEG, False]):
+        if still and begin is None:
+            begin = k
+        if not still and begin is not None:
+            if k - begin > 150:
+                rows.append(slice(begin, k))
+            begin = None
+    return t, w, f, C_nb, rows
+
+
+def read_by(draw, C_nb, rows, turn):
+    """Readings of a magnetometer that is turned by `turn` against the axes of the attitudes."""
+    field = np.tile(FIELD, (len(C_nb), 1))
+    for k, one in enumerate(rows):
+        past = rows[k + 1].start if k + 1 < len(rows) else len(field)
+        field[one.start : past] += ROOM * draw.standard_normal(3)
+    iron = np.eye(3) + 0.03 * _symmetric(draw)
+    body = np.einsum("nji,nj->ni", C_nb, field)
+    read = body @ turn @ np.linalg.inv(iron) + 15.0 * draw.standard_normal(3)
+    return read + NOISE * draw.standard_normal(read.shape)
+
+
+def _gain(triad):
+    return (1.0 + np.array(triad.scale))[:, None] * (np.eye(3) + np.array(triad.misalignment))
+
+
+def _symmetric(draw):
+    m = draw.standard_normal((3, 3))
+    m = 0.5 * (m + m.T)
+    return m - np.trace(m) / 3.0 * np.eye(3)
+
+
+def aligned(seed, turn=None, count=12):
+    """Error of the estimated rotation, rad, and the calibration."""
+    draw = np.random.default_rng(seed)
+    if turn is None:
+        turn = rotation.dcm_from_rotation_vector(0.7 * ROTATION_PRIOR * draw.standard_normal(3))
+    _, _, _, C_nb, rows = moved(draw, count)
+    read = read_by(draw, C_nb, rows, turn)
+    means = np.array([read[r].mean(axis=0) for r in rows])
+    up = np.array([C_nb[r, 2, :].mean(axis=0) for r in rows])
+    up /= np.linalg.norm(up, axis=1)[:, None]
+    J = (np.eye(3) - up[:, :, None] * up[:, None, :]).reshape(-1, 3)
+    up = up + (J @ (UP_SD * draw.standard_normal(3))).reshape(-1, 3)
+    up /= np.linalg.norm(up, axis=1)[:, None]
+    share = np.array([(r.stop - r.start) / len(read) for r in rows])
+    found = aligned_to_rests(calibrate_magnetometer(read), means, share, up, UP_SD**2 * J @ J.T)
+    return rotation.rotation_vector_from_dcm(found.rotation @ turn.T), found
+
+
+def test_a_rotation_is_found_and_bounded():
+    error, found = aligned(1)
+    assert (found.rotation_sd < 0.3 * ROTATION_PRIOR).all()
+    assert np.abs(error / found.rotation_sd).max() < 3.5
+    # Iron alone leaves it.
+    plain = replace(found, rotation=np.eye(3))
+    turn = rotation.rotation_vector_from_dcm(found.rotation)
+    assert np.linalg.norm(turn) > 2.0 * np.linalg.norm(error)
+    one = np.array([20.0, -10.0, 30.0])
+    assert found.apply(one) == pytest.approx(found.rotation @ plain.apply(one))
+
+
+def test_swapped_axes_are_found():
+    """As of the AK8963 in an MPU-9250: x and y change places, z has the other sign."""
+    swap = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+    error, found = aligned(2, turn=swap)
+    assert np.abs(error / found.rotation_sd).max() < 3.5
+    assert (found.rotation_sd < 0.3 * ROTATION_PRIOR).all()
+
+
+def test_few_rests_leave_it_open():
+    _, found = aligned(3, count=4)
+    assert np.isinf(found.rotation_sd).all()
+    assert found.rotation == pytest.approx(np.eye(3))
+
+
+@pytest.mark.slow
+def test_bounds_of_a_hundred_magnetometers():
+    errors, sds = [], []
+    for seed in range(100, 200):
+        error, found = aligned(seed, count=10 + seed % 7)
+        errors.append(error)
+        sds.append(found.rotation_sd)
+    inside = np.abs(errors) < 1.96 * np.array(sds)
+    assert np.median(sds) < 0.3 * ROTATION_PRIOR
+    # The 99 % interval (Clopper and Pearson) reaches 95 %.
+    count = int(inside.sum())
+    assert beta.ppf(0.995, count + 1, inside.size - count) >= 0.95, count
+    assert inside.sum() < inside.size
+
+
+def test_from_a_log_to_the_flag(tmp_path):
+    """`calibrate` finds it beside gyros and accelerometers; the same flag takes it off."""
+    draw, errors = np.random.default_rng(7), unit(4)
+    turn = rotation.dcm_from_rotation_vector(np.array([0.05, -0.03, 0.06]))
+    t, w, f, C_nb, rows = moved(draw, 14)
+    made = record(t, w, f, errors, 4)
+    read = read_by(draw, C_nb, rows, turn)
+    names = ["time_s", *(f"gyro_{a}_rad_s" for a in "xyz"), *(f"accel_{a}_m_s2" for a in "xyz")]
+    names += [f"mag_{a}_uT" for a in "xyz"]
+    values = [t, *made.imu.to_numpy().T, *read.T]
+    header = {"axes": "forward-right-down", "sampling": "instantaneous"}
+    csv.write(tmp_path / "log.csv", dict(zip(names, values, strict=True)), header)
+    run = sd.calibrate(tmp_path / "log.csv", gravity_m_per_s2=GRAVITY)
+    mag = run.magnetometer
+    # The axes are those of the accelerometers, which lie in the case as their misalignment has it.
+    K, own = (_gain(e.accel) for e in (errors, in_accel_axes(errors)))
+    expected = np.linalg.solve(K, own).T @ turn
+    error = rotation.rotation_vector_from_dcm(mag.rotation @ expected.T)
+    assert np.abs(error / mag.rotation_sd).max() < 4.0
+    run.save(tmp_path / "out", report=False)
+    known = SensorCalibration.read(tmp_path / "out" / "calibration.toml").magnetometer
+    assert known.rotation == pytest.approx(mag.rotation, abs=1e-8)
+    imu = sd.read_imu(tmp_path / "log.csv", calibration=tmp_path / "out" / "calibration.toml")
+    dips = []
+    for one in rows:
+        part = imu.iloc[one].mean()
+        up, h = part[["accel_x", "accel_y", "accel_z"]], part[["mag_x", "mag_y", "mag_z"]]
+        dips.append(up.to_numpy() @ h.to_numpy() / np.linalg.norm(up) / np.linalg.norm(h))
+    # The dip is the same in all poses: 63°, of axes 5° apart within some tenths.
+    assert np.std(np.degrees(np.arcsin(dips))) < 0.5
+    assert np.degrees(np.arcsin(np.mean(dips))) == pytest.approx(-63.0, abs=0.6)
