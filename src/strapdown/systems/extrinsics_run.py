@@ -289,7 +289,8 @@ def _antenna(spec: ExtrinsicsSpec, progress: Progress) -> ExtrinsicsRun:
         said.append(_said("extrinsics.antenna-not-settled", name, moved=moved, passes=PASSES))
     offset = chain.navigator.by_name["gnss"].time_offset - states["gnss.time_offset_t"]
     first, last = (float(x) for x in offset.iloc[[0, -1]])
-    if abs(last - first) > 2.0 * float(record.sensors_sd["gnss.time_offset_t"].median()):
+    ends = record.sensors_sd["gnss.time_offset_t"].iloc[[0, -1]]
+    if abs(last - first) > NORMAL * float(np.hypot(*ends)):
         said.append(_said("extrinsics.offset-wanders", name, "note", first=first, last=last))
     # Its remedy is the offset of an earlier pass; the table has that of the last.
     kept = [f for f in run.findings if not f.code.startswith("navigation.run-again-with-")]
