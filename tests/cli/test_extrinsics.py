@@ -25,6 +25,8 @@ from strapdown.formats import csv
 from strapdown.sensors.calibration import SensorCalibration
 from strapdown.sensors.triad_errors import ImuErrors, TriadErrors
 from strapdown.sensors.uncertainty import TriadUncertainty
+from strapdown.simulation import GnssReceiver
+from strapdown.systems import extrinsics_run
 from strapdown.tables import ACCEL, GYRO, MAG
 
 NAMES = ["time_s", *(f"gyro_{a}_rad_s" for a in "xyz"), *(f"accel_{a}_m_s2" for a in "xyz")]
@@ -106,20 +108,40 @@ def errors_in_sd(run, drive):
     return {e.name: (e.value - known[e.name]) / e.sd for e in run.result.estimates}
 
 
-def test_the_antenna_of_a_drive(tmp_path):
-    drive = drive_with_antenna(1, tmp_path, rate=2.0)
-    run = sd.extrinsics(drive.imu, drive.gnss, sensor=drive.sensor, wheels=False)
+def test_the_antenna_of_a_drive(monkeypatch):
+    arm, offset = (0.8, 0.3, -1.2), 0.15
+    receiver = GnssReceiver(
+        rate=2.0, position_noise=1.0, velocity_noise=0.1, antenna=arm, time_offset=offset
+    )
+    drive = sd.simulate("drive-town", rate_hz=50, sensor="mpu-6050", receiver=receiver)
+    run_batch, chains = extrinsics_run.run_batch, []
+    monkeypatch.setattr(
+        extrinsics_run,
+        "run_batch",
+        lambda chain, *a, **k: (chains.append(chain), run_batch(chain, *a, **k))[1],
+    )
+    run = sd.extrinsics(drive.imu, drive.gnss, sensor="mpu-6050", wheels=False)
     found = run.result
-    assert not [f for f in run.findings if f.code.startswith("extrinsics.")]
-    assert max(abs(x) for x in errors_in_sd(run, drive).values()) < 3.0
-    # 1.4 m and 0.2 s, of which nothing was known, are far from nothing.
-    assert found["lever_arm_x"].sd < 0.1
+    known = {f"lever_arm_{axis}": value for axis, value in zip("xyz", arm, strict=True)}
+    for name, value in (known | {"time_offset": offset}).items():
+        assert abs(found[name].value - value) < 3.0 * found[name].sd
+    # What was known of nothing: an alignment by the same fixes would make the height 0.2 m sure.
+    assert found["lever_arm_x"].sd < 0.15
     assert found["time_offset"].sd < 0.01
+    assert not found["lever_arm_z"].observed
+    assert found["lever_arm_z"].sd > 0.4
+    said = [f for f in run.findings if f.code.startswith("extrinsics.")]
+    assert [(f.code, f.data["parameter"]) for f in said] == [
+        ("extrinsics.state-open", "lever_arm_z")
+    ]
+    # The last pass has the offset that it finds.
+    used = chains[-1].navigator.by_name["gnss"].time_offset
+    assert abs(used - found["time_offset"].value) < 0.1 * found["time_offset"].sd
     sds = [one.sd for one in found.estimates]
     np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), sds)
-    np.testing.assert_array_equal(found.covariance, found.covariance.T)
+    np.testing.assert_allclose(found.covariance, found.covariance.T, rtol=1e-9)
     assert np.linalg.eigvalsh(found.covariance)[0] > 0.0
-    assert np.abs(found.covariance - np.diag(np.diag(found.covariance))).max() > 0.0
+    assert abs(found.covariance[0, 3]) > 0.0
 
 
 @pytest.mark.slow
@@ -137,14 +159,14 @@ def test_a_stated_heading_is_where_the_passes_begin_and_no_more(tmp_path):
 @pytest.mark.slow
 def test_coverage_of_antennas(tmp_path):
     inside: dict[str, list[bool]] = {}
-    for seed in range(100, 108):
-        drive = drive_with_antenna(seed, tmp_path)
-        run = sd.extrinsics(drive.imu, drive.gnss, sensor=drive.sensor)
+    for seed in range(100, 106):
+        drive = drive_with_antenna(seed, tmp_path, rate=1.0)
+        run = sd.extrinsics(drive.imu, drive.gnss, sensor=drive.sensor, wheels=False)
         for name, error in errors_in_sd(run, drive).items():
             if run.result[name].observed:
                 inside.setdefault(name, []).append(abs(error) <= 1.96)
     flags = [flag for each in inside.values() for flag in each]
-    assert len(flags) > 24
+    assert len(flags) >= 18
     for each in (*inside.values(), flags):
         # The 99 % interval of the share contains 95 %.
         assert sum(each) >= binom.ppf(0.005, len(each), 0.95), inside

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -23,6 +24,7 @@ from strapdown.formats import holds
 from strapdown.formats.aid_table import read_aid_table, read_stream
 from strapdown.formats.clocks import on_clock_of
 from strapdown.nav_state import NavState
+from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.modes import KnownStart, Navigation
 from strapdown.navigation.replay import run_batch
 from strapdown.progress import Progress, silent
@@ -263,7 +265,7 @@ def _antenna(spec: ExtrinsicsSpec, progress: Progress) -> ExtrinsicsRun:
         limit = OBSERVED.get(name.removesuffix(name[-2:]), OBSERVED.get(name, np.inf))
         seen = share < KEPT and sd <= limit
         estimates.append(Estimate(name, unit, value, sd, NORMAL * sd, seen, share))
-    columns = [record.sensors.columns.get_loc(state) for _, state, *_ in asked]
+    columns = [list(record.sensors.columns).index(state) for _, state, *_ in asked]
     sds = np.array([one.sd for one in estimates])
     covariance = found.smoothing.correlation()[np.ix_(columns, columns)] * np.outer(sds, sds)
     time, states = record.trajectory.index, record.sensors
@@ -287,10 +289,10 @@ def _antenna(spec: ExtrinsicsSpec, progress: Progress) -> ExtrinsicsRun:
     ]
     if moved > SETTLED:
         said.append(_said("extrinsics.antenna-not-settled", name, moved=moved, passes=PASSES))
-    offset = chain.navigator.by_name["gnss"].time_offset - states["gnss.time_offset_t"]
+    offset = _receiver(chain).time_offset - states["gnss.time_offset_t"]
     first, last = (float(x) for x in offset.iloc[[0, -1]])
     ends = record.sensors_sd["gnss.time_offset_t"].iloc[[0, -1]]
-    if abs(last - first) > NORMAL * float(np.hypot(*ends)):
+    if abs(last - first) > NORMAL * math.hypot(*ends.tolist()):
         said.append(_said("extrinsics.offset-wanders", name, "note", first=first, last=last))
     # Its remedy is the offset of an earlier pass; the table has that of the last.
     kept = [f for f in run.findings if not f.code.startswith("navigation.run-again-with-")]
@@ -305,13 +307,13 @@ def _states_asked(chain: NavigationPipeline, aiding: dict[str, dict[str, Any]]) 
     arm_sd = np.broadcast_to(table["lever_arm_sd_m"], 3).tolist()
     for axis, assumed, prior in zip("xyz", table["lever_arm_m"], arm_sd, strict=True):
         yield f"lever_arm_{axis}", f"gnss.lever_arm_{axis}", "m", assumed, prior
-    assumed = chain.navigator.by_name["gnss"].time_offset
-    yield "time_offset", "gnss.time_offset_t", "s", assumed, table["time_offset_sd_s"]
+    offset_sd = table["time_offset_sd_s"]
+    yield "time_offset", "gnss.time_offset_t", "s", _receiver(chain).time_offset, offset_sd
     for aid, wheels in aiding.items():
         if wheels["kind"] == "no_slip":
             for angle, prior in zip(("pitch", "yaw"), wheels["mounting_sd_deg"], strict=True):
-                state, angles = f"{aid}.mounting_{angle}", (wheels[f"{angle}_deg"], prior)
-                yield f"mounting_{angle}", state, "rad", *np.radians(angles).tolist()
+                state, assumed = f"{aid}.mounting_{angle}", math.radians(wheels[f"{angle}_deg"])
+                yield f"mounting_{angle}", state, "rad", assumed, math.radians(prior)
 
 
 def _settled(
@@ -319,7 +321,7 @@ def _settled(
 ) -> tuple[NavigationPipeline, PipelineRun, float]:
     """Repeat a smoothed run about its states until the antenna stays; the last movement, in sd."""
     recorder = run.spec.recorder.make(ellipsoid=run.spec.ellipsoid)
-    moved, before = np.inf, None
+    moved, before = math.inf, pd.Series(dtype=np.float64)
     for k in range(PASSES):
         progress(f"smoothing, pass {k + 1}", 0.8)
         assert found.smoothing is not None
@@ -331,13 +333,19 @@ def _settled(
         states = found.smoothed.sensors.filter(regex=r"^gnss\.(lever_arm|time_offset)")
         sds = found.smoothed.sensors_sd[states.columns].mean()
         now = states.mean()
-        now["gnss.time_offset_t"] -= chain.navigator.by_name["gnss"].time_offset
-        if before is not None:
+        now["gnss.time_offset_t"] -= _receiver(chain).time_offset
+        if len(before):
             moved = float((abs(now - before) / sds).max())
         if moved < SETTLED:
             break
         before = now
     return chain, found, moved
+
+
+def _receiver(chain: NavigationPipeline) -> Gnss:
+    aid = chain.navigator.by_name["gnss"]
+    assert isinstance(aid, Gnss)  # the API names it
+    return aid
 
 
 def _anew(chain: NavigationPipeline, about: Reference) -> NavigationPipeline:
@@ -346,10 +354,9 @@ def _anew(chain: NavigationPipeline, about: Reference) -> NavigationPipeline:
     error = float(about.sensors[:, at].mean())
     sensors = about.sensors.copy()
     sensors[:, at] -= error
-    aids = tuple(
-        replace(aid, time_offset=aid.time_offset - error) if aid.name == "gnss" else aid
-        for aid in chain.navigator.aids
-    )
+    own = _receiver(chain)
+    centred = replace(own, time_offset=own.time_offset - error)
+    aids = tuple(centred if aid is own else aid for aid in chain.navigator.aids)
     about = replace(about, sensors=sensors)
     return replace(
         chain,
