@@ -25,6 +25,7 @@ from strapdown.config.navigation import NavigationSpec
 from strapdown.config.spec import specify
 from strapdown.errors import ConfigError, StrapdownError
 from strapdown.formats.gnss_files import read_gnss
+from strapdown.formats.gnss_fixes import GnssOptions
 from strapdown.progress import Progress, silent
 from strapdown.systems.extrinsics_run import ExtrinsicsRun, read_field, run_extrinsics
 from strapdown.systems.inputs import NOWHERE, Memory
@@ -34,7 +35,7 @@ __all__ = ["ExtrinsicsRun", "extrinsics"]
 
 #: Before a drive: standard deviations of the antenna's lever arm, m, of the offset, s, and of the
 #: mounting, deg.
-ARM_SD, OFFSET_SD, MOUNTING_SD = 1.0, 0.05, 10.0
+ARM_SD, OFFSET_SD, MOUNTING_SD = 2.0, 0.3, 10.0
 #: The axle is not known: at 1.5 m, a turn faster than this, deg/s, would be a lateral velocity of
 #: more than this, m/s, which would count as lever arm of the antenna.
 STRAIGHT, SIDEWAYS = 2.0, 0.05
@@ -75,9 +76,10 @@ def extrinsics(
     progress : callable, optional
         Called with a stage and the completed fraction.
     **options
-        Further keys of the log in a file, as ``columns``, ``format``, ``from_s``, ``axes``; with
-        the prefix ``other_``, of the other log. For an antenna keys of the measurement ``gnss``,
-        as ``lever_arm_m``, ``lever_arm_sd_m``, ``position_sd_m``.
+        Further keys of the log in a file, as ``columns``, ``format``, ``from_s``, ``axes``,
+        ``calibration``; with the prefix ``other_``, of the other log. For an antenna keys of the
+        measurement ``gnss``, as ``lever_arm_m``, ``lever_arm_sd_m``, ``position_sd_m``; and
+        ``heading_deg`` at the start, for a drive whose course does not show it.
 
     Returns
     -------
@@ -113,6 +115,9 @@ def extrinsics(
         if kind == "gnss":
             if second is None:
                 raise ConfigError("extrinsics.other-missing", quantity="other")
+            if theirs:
+                key = f"other_{next(iter(theirs))}"
+                raise ConfigError("extrinsics.unknown-option", quantity=key, kind=kind)
             log_file = ImuFile(table, axes)
             keys = {**given, **keys_in(second, folder / file)}
             spec["navigation"] = _run_of_antenna(log_file, keys, sensor, offset, wheels).plain()
@@ -145,7 +150,9 @@ def _log(samples: Any, stated: dict[str, Any], path: Path) -> tuple[LogTable, An
 def _run_of_antenna(
     log: ImuFile, keys: dict[str, Any], sensor: Any, offset: float | None, wheels: bool
 ) -> NavigationSpec:
-    """The smoothed run with lever arm, time offset and mounting as states, as proposed."""
+    """The run with lever arm, time offset and mounting as states, with which the passes begin."""
+    start = {key: keys[key] for key in ("heading_deg",) if key in keys}
+    keys = {key: value for key, value in keys.items() if key not in start}
     aids: dict[str, Any] = {"gnss": {"kind": "gnss", "lever_arm_sd_m": ARM_SD, **keys}}
     if offset is not None:
         aids["gnss"]["time_offset_s"] = offset
@@ -156,11 +163,18 @@ def _run_of_antenna(
             "largest_rate_deg_per_s": STRAIGHT,
             "lateral_sd_m_per_s": SIDEWAYS,
         }
-    options = {"smoother": {"kind": "rts"}}
-    spec = specify_navigation(log, aids, sensor=sensor, options=options).plain()
+    options = {"smoother": {"kind": "rts", "passes": 1}, "trust": {"repeat": False}}
+    called = {"heading": "heading_deg", "gnss": "other"}
+    spec = specify_navigation(
+        log,
+        aids,
+        sensor=sensor,
+        start=start,
+        options=options,
+        called=lambda name: called.get(name, name),
+    ).plain()
     aid = spec["aiding"]["gnss"]
-    if not aid["time_offset_sd_s"]:
-        aid["time_offset_sd_s"] = OFFSET_SD
+    aid["time_offset_sd_s"] = max(aid["time_offset_sd_s"], OFFSET_SD)
     # In a turn late velocities look like a lever arm along the path of speed times delay, which is
     # not a state: of 130 ms, 10 ms wrong are 0.1 m at 10 m/s.
     aid["use_velocity"] = aid["use_velocity"] and not aid["velocity_delay_s"]
@@ -180,7 +194,7 @@ def _kind_of(other: Any) -> str:
         return "imu"
     tried: list[tuple[str, Callable[[], Any]]] = [
         ("imu", lambda: imu_of(other)),
-        ("gnss", lambda: read_gnss(other)),
+        ("gnss", lambda: read_gnss(other, GnssOptions(unstated_position_sd=1.0))),
         ("magnetometer", lambda: read_field(other)),
     ]
     refused = []

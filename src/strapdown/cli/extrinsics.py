@@ -9,14 +9,18 @@ import typer
 
 from strapdown.cli.shared_options import (
     LOG_FLAGS,
+    FixFlags,
     LogFlags,
     ReportFlags,
     Sensor,
     as_flag,
+    fix_flags,
+    fix_keys,
     folder_to_make,
     log_keys,
     running,
     spread,
+    with_what,
 )
 from strapdown.errors import ConfigError
 
@@ -60,8 +64,17 @@ def extrinsics(
     other_axes: Annotated[
         str | None, running("X,Y,Z", "Axes of OTHER, as --axes of LOG.", "--other-axes")
     ] = None,
+    other_calibration: Annotated[
+        Path | None,
+        running("FILE.toml", "Of OTHER, as --calibration of LOG.", "--other-calibration"),
+    ] = None,
+    heading: Annotated[
+        float | None,
+        with_what("DEG", "Initial heading, if neither gyros nor course determine it."),
+    ] = None,
     *,
     flags: LogFlags,
+    fixes: FixFlags,
     out: Annotated[Path | None, folder_to_make("LOG-extrinsics")] = None,
     write: ReportFlags,
 ) -> None:
@@ -71,23 +84,28 @@ def extrinsics(
     with 95 % bounds, and with what the motion does not show.
     """
     from strapdown.api.extrinsics import extrinsics as find
+    from strapdown.api.reading import read_gnss
     from strapdown.cli.console import print_findings, print_seal
     from strapdown.cli.result_folder import default_folder, refuse_result, run_and_save
 
     refuse_result(log, "log")
     keys: dict[str, Any] = {k: v for k, v in log_keys(flags.given()).items() if v}
+    keys |= {"other_calibration": None if other_calibration is None else str(other_calibration)}
+    of_fixes = fix_keys(fixes.given(), None)
 
     def compute(report: Progress) -> ExtrinsicsRun:
         try:
+            second: Any = None if other is None else str(other)
             return find(
                 str(log),
-                None if other is None else str(other),
+                read_gnss(second, **of_fixes) if second and of_fixes else second,
                 kind=kind,
                 offset=offset,
                 sensor=sensor,
                 wheels=not not_on_wheels,
                 axes=flags.axes,
                 other_axes=other_axes,
+                heading_deg=heading,
                 progress=report,
                 **keys,
             )
@@ -103,9 +121,23 @@ def extrinsics(
         print_seal(seal, "extrinsics.toml", write.no_report)
 
 
+#: Options by key path of the specification; those of reading LOG also under ``log``.
+FLAGS = {
+    "kind": "--kind",
+    "other": "OTHER",
+    "gnss": "OTHER",
+    "sensor": "--sensor",
+    "offset_s": "--offset",
+    "heading": "--heading",
+    "heading_deg": "--heading",
+    "other_axes": "--other-axes",
+    "other_calibration": "--other-calibration",
+    **fix_flags("navigation, aiding, gnss"),
+}
+
+
 def _flag(place: str) -> str:
-    own = {"kind": "--kind", "other": "OTHER", "sensor": "--sensor", "offset_s": "--offset"}
-    return own.get(place, LOG_FLAGS.get(place, LOG_FLAGS.get(f"log, {place}", place)))
+    return FLAGS.get(place, LOG_FLAGS.get(place, LOG_FLAGS.get(f"log, {place}", place)))
 
 
 def print_extrinsics(result: ExtrinsicsRun) -> None:

@@ -172,7 +172,10 @@ class Smoothing:
         errors = on_disk.room((len(time), n))
         covariance = on_disk.room((len(nodes), 9, 9))
         sensors_sd = on_disk.room((len(nodes), n - 9))
+        joint = None
         for met, P, turn in self._back(nodes, errors):
+            if joint is None and len(P):
+                joint = P[-1, 9:, 9:].copy()
             for a in (0, 3, 6):
                 for b in (0, 3, 6):
                     covariance[met, a : a + 3, b : b + 3] = (
@@ -194,6 +197,7 @@ class Smoothing:
             covariance=on_disk.stored(covariance, place),
             sensors=sensors,
             sensors_sd=on_disk.stored(sensors_sd, place),
+            joint=np.zeros((n - 9, n - 9)) if joint is None else joint,
         )
         self._result = smoothed, errors[:, 9:], marks
         return smoothed
@@ -201,6 +205,13 @@ class Smoothing:
     def release(self) -> None:
         """Drop the history, of which the smoothed states have been made."""
         self._tape = SmoothingTape(self._tape.size, self._memory)
+
+    def correlation(self) -> Array:
+        """Return the correlation of the sensor errors at the last mark, (s, s)."""
+        assert self._result is not None
+        joint = self._result[0].joint
+        sd = np.sqrt(np.maximum(np.diagonal(joint), TINY))
+        return np.asarray(joint / np.outer(sd, sd))
 
     def reference(self) -> Reference | None:
         """Return the smoothed states, about which another pass is linearized.
@@ -336,6 +347,8 @@ class Smoothed:
     sensors : ndarray, (m, s)
         Smoothed correction of the sensor estimates.
     sensors_sd : ndarray, (m, s)
+    joint : ndarray, (s, s)
+        Their covariance at the last mark.
     """
 
     mechanization: Mechanization
@@ -345,6 +358,7 @@ class Smoothed:
     covariance: Array
     sensors: Array
     sensors_sd: Array
+    joint: Array
 
     def nodes_at(self, time: Array) -> NDArray[np.intp]:
         """Return the last node not after each time: with several at an instant, of the output."""

@@ -57,8 +57,11 @@ METHOD = (
     "the gyros by 0.6 deg. A difference of the delays of filters is part of the offset.",
 )
 METHOD_GNSS = (
-    "States of the error-state filter over the whole record, smoothed: lever arm, offset of the "
-    "stamps, mounting of the unit in the vehicle.",
+    "Lever arm, offset of the stamps, and mounting of the unit in the vehicle are states of the "
+    "error-state filter, smoothed over the whole record: about the result of the pass before, with "
+    "its offset, until arm and offset stay where they are (Gauss-Newton).",
+    "Each pass begins with an unknown position, velocity and attitude: an alignment by the same "
+    "fixes would use them twice, with arm and offset as they were assumed.",
     "A state is observable where the record leaves a quarter of its variance at most.",
 )
 

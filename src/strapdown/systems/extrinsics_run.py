@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -15,20 +16,28 @@ from strapdown.bundle import InputFiles, Seal, input_files, log_files
 from strapdown.config.extrinsics import ExtrinsicsSpec
 from strapdown.config.logs import AxesTable
 from strapdown.errors import DataError, Finding
+from strapdown.estimation.error_model import PHYSICAL
 from strapdown.evaluation.extrinsics import OBSERVED, Estimate, Extrinsics, between_imus
 from strapdown.evaluation.magnetometer_extrinsics import imu_to_magnetometer
 from strapdown.evaluation.second_log import coarse_offset
 from strapdown.formats import holds
 from strapdown.formats.aid_table import read_aid_table, read_stream
 from strapdown.formats.clocks import on_clock_of
+from strapdown.nav_state import NavState
+from strapdown.navigation.measurements.gnss import Gnss
+from strapdown.navigation.modes import KnownStart, Navigation
+from strapdown.navigation.replay import run_batch
 from strapdown.progress import Progress, silent
 from strapdown.systems.alignment_source import body_record
 from strapdown.systems.inputs import Memory, SavedRun, refuse_long_span
-from strapdown.systems.navigation_run import NavigationRun, run_navigation
+from strapdown.systems.navigation_run import CHUNK, NavigationRun, run_navigation
 from strapdown.systems.one_thread import one_thread
 from strapdown.tables import ACCEL, GYRO, MAG
 
 if TYPE_CHECKING:
+    from strapdown.navigation.navigator import Reference
+    from strapdown.navigation.pipeline import NavigationPipeline
+    from strapdown.navigation.replay import PipelineRun
     from strapdown.report.chart_svg import ChartFigure
 
 __all__ = ["ExtrinsicsRun", "run_extrinsics"]
@@ -150,6 +159,7 @@ def run_extrinsics(spec: ExtrinsicsSpec, progress: Progress = silent) -> Extrins
         findings += read
     if spec.other is not None:
         inputs.append(input_files("other", other.path, files))
+        inputs += log_files(other.path, files, other.calibration)[1:]
     findings += _open(result, recording.name)
     return ExtrinsicsRun(spec, recording.name, name, result, tuple(findings), tuple(inputs))
 
@@ -174,6 +184,8 @@ def _magnetometer(
             recording, second, read = body_record(other, AxesTable(axes=spec.other_axes))
             name, files = recording.name, recording.files
         except DataError:
+            if other.calibration is not None or spec.other_axes is not None:
+                raise  # of a table of a field alone they would say nothing
             second = None
     if second is not None and set(MAG) <= set(second.columns):
         readings = second[MAG]
@@ -208,44 +220,55 @@ def _open(result: Extrinsics, name: str) -> tuple[Finding, ...]:
     return tuple(found)
 
 
-# The antenna of a satellite receiver, by the states of a smoothed run.
+# The antenna of a satellite receiver: states of a smoothed run.
+
+#: Standard deviations of the state with which a pass begins: position, m, velocity, m/s, tilt and
+#: heading, deg. All that is known of it comes from the fixes, once.
+UNKNOWN_PLACE, UNKNOWN_VELOCITY, UNKNOWN_TILT, UNKNOWN_HEADING = 100.0, 10.0, 10.0, 60.0
+#: Most passes, and the movement of arm and offset by the last one, in standard deviations.
+PASSES, SETTLED = 12, 0.05
+#: An estimate of a pass is ``assumed - state``: name, state, unit, assumed, and sd before the run.
+_State = tuple[str, str, str, float, float]
 
 
 def _antenna(spec: ExtrinsicsSpec, progress: Progress) -> ExtrinsicsRun:
-    assert spec.navigation is not None  # made with it
-    run = run_navigation(spec.navigation, None, progress)
-    states, sds = run.record.sensors, run.record.sensors_sd
-    middle = len(states) // 2
-    aiding: dict[str, dict[str, Any]] = run.spec.plain()["aiding"]
-    table = aiding["gnss"]
-    estimates: list[Estimate] = []
+    """Lever arm, time offset and mounting as states of a smoothed run, by Gauss and Newton.
 
-    def add(name: str, state: str, unit: str, assumed: float, prior: float) -> None:
-        if state not in states:
-            return
+    An alignment makes the first state from the same fixes, as if arm and offset were known: with
+    it they would count twice, for what was assumed. The alignment therefore serves the first run
+    alone, about which the others are linearized. These begin with an unknown state, and with the
+    offset of the one before: the motion is continued over an offset by a mean acceleration, which
+    is late by as much as the offset itself.
+    """
+    assert spec.navigation is not None  # made with it
+    begun: list[tuple[NavigationPipeline, PipelineRun]] = []
+
+    def drive(chain: NavigationPipeline, *record: Any) -> PipelineRun:
+        begun.append((chain, run_batch(chain, *record, chunk=CHUNK)))
+        return begun[-1][1]
+
+    run = run_navigation(spec.navigation, None, progress, drive)
+    progress("smoothing", 0.8)
+    chain, found, moved = _settled(run, *begun[-1], progress)
+    assert found.smoothed is not None
+    assert found.smoothing is not None
+    record = found.smoothed
+    aiding: dict[str, dict[str, Any]] = run.spec.plain()["aiding"]
+    asked = [one for one in _states_asked(chain, aiding) if one[1] in record.sensors]
+    estimates = []
+    for name, state, unit, assumed, prior in asked:
         # Constants are the same at all marks; an offset may wander.
-        wander = float(states[state].std(ddof=0))
-        sd = float(np.hypot(np.sqrt((sds[state] ** 2).mean()), wander))
-        value = assumed - float(states[state].mean())
+        wander = float(record.sensors[state].std(ddof=0))
+        sd = float(np.hypot(np.sqrt((record.sensors_sd[state] ** 2).mean()), wander))
+        value = assumed - float(record.sensors[state].mean())
         share = min(1.0, (sd / prior) ** 2) if prior > 0.0 else 1.0
-        limit = OBSERVED.get(name.removesuffix(name[-2:]), np.inf)
+        limit = OBSERVED.get(name.removesuffix(name[-2:]), OBSERVED.get(name, np.inf))
         seen = share < KEPT and sd <= limit
         estimates.append(Estimate(name, unit, value, sd, NORMAL * sd, seen, share))
-
-    for axis, assumed in zip("xyz", table["lever_arm_m"], strict=True):
-        prior = np.broadcast_to(table["lever_arm_sd_m"], 3)["xyz".index(axis)]
-        add(f"lever_arm_{axis}", f"gnss.lever_arm_{axis}", "m", assumed, float(prior))
-    offset = _offset_of(run, table)
-    add("time_offset", "gnss.time_offset_t", "s", *offset)
-    slip = next((n for n, one in aiding.items() if one["kind"] == "no_slip"), None)
-    if slip is not None:
-        wheels = aiding[slip]
-        for angle, prior in zip(("pitch", "yaw"), wheels["mounting_sd_deg"], strict=True):
-            assumed = np.radians(wheels[f"{angle}_deg"])
-            state = f"{slip}.mounting_{angle}"
-            add(f"mounting_{angle}", state, "rad", float(assumed), float(np.radians(prior)))
-    time = run.record.trajectory.index
-    covariance = np.diag([one.sd**2 for one in estimates])
+    columns = [list(record.sensors.columns).index(state) for _, state, *_ in asked]
+    sds = np.array([one.sd for one in estimates])
+    covariance = found.smoothing.correlation()[np.ix_(columns, columns)] * np.outer(sds, sds)
+    time, states = record.trajectory.index, record.sensors
     result = Extrinsics(
         "gnss",
         None,
@@ -253,41 +276,97 @@ def _antenna(spec: ExtrinsicsSpec, progress: Progress) -> ExtrinsicsRun:
         covariance,
         {},
         float(time[0]),
-        float(states.index[middle]),
+        float(states.index[len(states) // 2]),
         float(time[-1]),
-        _innovations(run),
+        record.innovations["gnss.position"],
         {},
     )
     name = run.source.name
-    # Simulated drives say so: docs/extrinsics.md.
-    said = [_said("extrinsics.antenna-indicative", name)]
-    said += [
+    said = [
         _said("extrinsics.state-open", name, parameter=e.name, share=e.prior_share, bound=e.bound)
         for e in estimates
         if not e.observed
     ]
-    ends = offset[0] - states["gnss.time_offset_t"].iloc[[0, -1]]
-    if abs(ends.iloc[1] - ends.iloc[0]) > 2.0 * float(sds["gnss.time_offset_t"].iloc[middle]):
-        first, last = (float(x) for x in ends)
+    if moved > SETTLED:
+        said.append(_said("extrinsics.antenna-not-settled", name, moved=moved, passes=PASSES))
+    offset = _receiver(chain).time_offset - states["gnss.time_offset_t"]
+    first, last = (float(x) for x in offset.iloc[[0, -1]])
+    ends = record.sensors_sd["gnss.time_offset_t"].iloc[[0, -1]]
+    if abs(last - first) > NORMAL * math.hypot(*ends.tolist()):
         said.append(_said("extrinsics.offset-wanders", name, "note", first=first, last=last))
     # Its remedy is the offset of an earlier pass; the table has that of the last.
     kept = [f for f in run.findings if not f.code.startswith("navigation.run-again-with-")]
-    findings = (*kept, *said)
-    other = Path(str(table["path"])).name
-    return ExtrinsicsRun(spec, name, other, result, findings, run.inputs, run)
+    other = Path(str(aiding["gnss"]["path"])).name
+    run = replace(run, record=record)
+    return ExtrinsicsRun(spec, name, other, result, (*kept, *said), run.inputs, run)
 
 
-def _offset_of(run: NavigationRun, table: dict[str, Any]) -> tuple[float, float]:
-    """Assumed time offset and its standard deviation of the run that counts, s."""
-    again = [
-        f.data
-        for f in run.findings
-        if f.code.startswith("navigation.run-again-with-") and "offset" in f.data
-    ]
-    assumed = float(again[-1]["offset"]) if again else float(table["time_offset_s"])
-    return assumed, float(table["time_offset_sd_s"])
+def _states_asked(chain: NavigationPipeline, aiding: dict[str, dict[str, Any]]) -> Iterator[_State]:
+    """States of the antenna, and of the mounting where the vehicle has wheels."""
+    table = aiding["gnss"]
+    arm_sd = np.broadcast_to(table["lever_arm_sd_m"], 3).tolist()
+    for axis, assumed, prior in zip("xyz", table["lever_arm_m"], arm_sd, strict=True):
+        yield f"lever_arm_{axis}", f"gnss.lever_arm_{axis}", "m", assumed, prior
+    offset_sd = table["time_offset_sd_s"]
+    yield "time_offset", "gnss.time_offset_t", "s", _receiver(chain).time_offset, offset_sd
+    for aid, wheels in aiding.items():
+        if wheels["kind"] == "no_slip":
+            for angle, prior in zip(("pitch", "yaw"), wheels["mounting_sd_deg"], strict=True):
+                state, assumed = f"{aid}.mounting_{angle}", math.radians(wheels[f"{angle}_deg"])
+                yield f"mounting_{angle}", state, "rad", assumed, math.radians(prior)
 
 
-def _innovations(run: NavigationRun) -> pd.DataFrame:
-    """Innovations of position of the smoothed run, by time."""
-    return run.record.innovations["gnss.position"]
+def _settled(
+    run: NavigationRun, chain: NavigationPipeline, found: PipelineRun, progress: Progress
+) -> tuple[NavigationPipeline, PipelineRun, float]:
+    """Repeat a smoothed run about its states until the antenna stays; the last movement, in sd."""
+    recorder = run.spec.recorder.make(ellipsoid=run.spec.ellipsoid)
+    moved, before = math.inf, pd.Series(dtype=np.float64)
+    for k in range(PASSES):
+        progress(f"smoothing, pass {k + 1}", 0.8)
+        assert found.smoothing is not None
+        about = found.smoothing.reference()
+        assert about is not None  # errors are fed back
+        chain = _anew(chain, about)
+        found = run_batch(chain, run.source.imu, run.source.tables, recorder, chunk=CHUNK)
+        assert found.smoothed is not None
+        states = found.smoothed.sensors.filter(regex=r"^gnss\.(lever_arm|time_offset)")
+        sds = found.smoothed.sensors_sd[states.columns].mean()
+        now = states.mean()
+        now["gnss.time_offset_t"] -= _receiver(chain).time_offset
+        if len(before):
+            moved = float((abs(now - before) / sds).max())
+        if moved < SETTLED:
+            break
+        before = now
+    return chain, found, moved
+
+
+def _receiver(chain: NavigationPipeline) -> Gnss:
+    aid = chain.navigator.by_name["gnss"]
+    assert isinstance(aid, Gnss)  # the API names it
+    return aid
+
+
+def _anew(chain: NavigationPipeline, about: Reference) -> NavigationPipeline:
+    """A pipeline about a reference: from an unknown state, and with the offset of the reference."""
+    at = chain.navigator.filter.model.columns_of["gnss.time_offset"].start - PHYSICAL
+    error = float(about.sensors[:, at].mean())
+    sensors = about.sensors.copy()
+    sensors[:, at] -= error
+    own = _receiver(chain)
+    centred = replace(own, time_offset=own.time_offset - error)
+    aids = tuple(centred if aid is own else aid for aid in chain.navigator.aids)
+    about = replace(about, sensors=sensors)
+    return replace(
+        chain,
+        navigator=replace(chain.navigator, aids=aids, about=about),
+        modes=(Navigation(),),
+        start=KnownStart(
+            NavState.of_numbers(float(about.time[0]), about.states[0]),
+            position_sd=(UNKNOWN_PLACE,) * 3,
+            velocity_sd=(UNKNOWN_VELOCITY,) * 3,
+            attitude_sd_deg=(UNKNOWN_TILT, UNKNOWN_TILT, UNKNOWN_HEADING),
+        ),
+        commands=(),
+    )

@@ -1,7 +1,8 @@
-"""Two sensors on one rigid body in a random motion: two units, or a unit and a magnetometer."""
+"""Two sensors on one rigid body in a random motion: units, a magnetometer, an antenna."""
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,8 @@ import pandas as pd
 from scipy.interpolate import CubicSpline
 from scipy.signal import lfilter
 
-from strapdown import rotation
+from strapdown import rotation, simulate
+from strapdown.simulation import GnssReceiver
 from strapdown.tables import MAG, imu_table
 
 GRAVITY = 9.81
@@ -165,3 +167,64 @@ def unit_and_magnetometer(seed, kind, grade, apart):
     readings = along @ soft + hard + GRADES[grade][6] * rng.normal(size=along.shape)
     b = pd.DataFrame(50.0 * readings, index=pd.Index(stamp, name="time"), columns=MAG)
     return a, b, Truth(R, offset, drift, 0.5 * length, np.zeros(3), 50.0 * hard)
+
+
+#: Units with which the made drives are driven, one after the other.
+UNITS = ("mpu-6050", "icm-42688-p", "adis16470", "consumer-grade", "tactical-grade", "bmi270")
+
+
+@dataclass(frozen=True)
+class DriveWithAntenna:
+    """Samples of a unit, fixes of an antenna, and the truth of both."""
+
+    imu: pd.DataFrame
+    gnss: pd.DataFrame
+    sensor: str
+    arm: np.ndarray
+    offset: float
+    heading_deg: float
+
+
+def drive_with_antenna(seed, folder, rate=None):
+    """A car with turns, stops and changes of speed; fixes of 0.02 to 2 m, at 1 or 5 Hz."""
+    rng = np.random.default_rng([50, seed])
+
+    def draw(low, high):
+        return round(float(rng.uniform(low, high)), 2)
+
+    def onward():
+        return {"do": "accelerate", "to_m_per_s": draw(9.0, 16.0), "duration_s": draw(5.0, 8.0)}
+
+    done = [{"do": "straight", "duration_s": draw(3.0, 12.0)}, onward()]
+    for _ in range(4):
+        what = rng.choice(["turn", "stop", "brake"], p=[0.6, 0.2, 0.2])
+        if what == "stop":
+            done.append({"do": "stop", "braking_s": draw(4.0, 7.0), "stay_s": draw(3.0, 12.0)})
+        else:
+            slow = draw(5.0, 9.0)
+            done.append({"do": "brake", "to_m_per_s": slow, "duration_s": draw(3.0, 6.0)})
+        if what == "turn":
+            side = f"turn_{rng.choice(['left', 'right'])}"
+            radius = max(draw(10.0, 28.0), round(slow**2 / 5.0, 2))
+            done.append({"do": side, "angle_deg": draw(50.0, 110.0), "radius_m": radius})
+        done += [onward(), {"do": "straight", "duration_s": draw(3.0, 7.0)}]
+    heading, lean = draw(0.0, 360.0), draw(0.2, 0.6)
+    lines = ["rate_hz = 50", f'sensor = "{UNITS[seed % len(UNITS)]}"', "[motion]", 'kind = "car"']
+    lines += [f"lat_deg = {draw(-60.0, 60.0)}", "lon_deg = 30.0", "alt_m = 100.0"]
+    lines += [f"heading_deg = {heading}", f"roll_deg_per_m_per_s2 = {lean}"]
+    rows = [", ".join(f"{k} = {json.dumps(v)}" for k, v in one.items()) for one in done]
+    lines.append("manoeuvres = [" + ", ".join(f"{{ {row} }}" for row in rows) + "]")
+    path = folder / f"drive{seed}.toml"
+    path.write_text("\n".join(lines))
+    arm = np.array([draw(-1.5, 1.5), draw(-0.8, 0.8), draw(-1.8, 0.3)])
+    offset = draw(-0.3, 0.3)
+    noise = float(np.exp(rng.uniform(np.log(0.02), np.log(2.0))))
+    receiver = GnssReceiver(
+        rate=rate or float(rng.choice([1.0, 5.0])),
+        position_noise=noise,
+        velocity_noise=float(np.clip(0.15 * noise, 0.02, 0.3)),
+        antenna=tuple(arm),
+        time_offset=offset,
+    )
+    made = simulate(path, seed=seed, receiver=receiver)
+    return DriveWithAntenna(made.imu, made.gnss, UNITS[seed % len(UNITS)], arm, offset, heading)
