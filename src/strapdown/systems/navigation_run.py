@@ -193,9 +193,8 @@ def run_navigation(
             )
     if any(finding.code == UNSTATED for finding in source.findings):
         late = 0.5 * float(np.median(np.diff(index_of(source.imu))))
-        records = (run.record, run.smoothed)
-        forward, smoothed = (one and with_late_samples(one, late) for one in records)
-        run = replace(run, record=forward, smoothed=smoothed)
+        smoothed = None if run.smoothed is None else with_late_samples(run.smoothed, late)
+        run = replace(run, record=with_late_samples(run.record, late), smoothed=smoothed)
     beside = None
     if spec.damping.beside is not None:
         with said_of_file(*tables):
