@@ -64,6 +64,7 @@ from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.inputs import Memory, SavedRun, configuration_file
 from strapdown.systems.navigation_checks import channel_findings, look_through, saturated_findings
 from strapdown.systems.navigation_source import (
+    UNSTATED,
     NavigationSource,
     in_file,
     read_navigation_source,
@@ -190,6 +191,10 @@ def run_navigation(
             run = relinearized(
                 chain, source.imu, source.tables, recorder, run, show_pass, chunk=CHUNK
             )
+    if any(finding.code == UNSTATED for finding in source.findings):
+        late = 0.5 * float(np.median(np.diff(index_of(source.imu))))
+        smoothed = None if run.smoothed is None else with_late_samples(run.smoothed, late)
+        run = replace(run, record=with_late_samples(run.record, late), smoothed=smoothed)
     beside = None
     if spec.damping.beside is not None:
         with said_of_file(*tables):
@@ -285,6 +290,37 @@ def run_navigation(
         inputs=(*configuration_file(file), *source.inputs),
         findings=tuple(dict.fromkeys(findings)),
     )
+
+
+def with_late_samples(record: NavigationRecord, late: float) -> NavigationRecord:
+    """Return a record whose velocities may be those of another instant than their stamps.
+
+    Whether a row holds the rate at its stamp, or the mean since the row before, is half a step.
+    Fixes show the difference only as far as they follow the acceleration, a walk's steps not at
+    all: it adds to the velocities as an error of the size of the acceleration over that time.
+
+    Parameters
+    ----------
+    late : float, s
+        Standard deviation of the instant.
+    """
+    time = index_of(record.trajectory)
+    if len(time) < 2:
+        return record
+    # Mean squares over a second: the bound is one of its size, not of its phase.
+    steps = np.diff(time)
+    square = np.square(np.diff(values_of(record.trajectory, VELOCITY), axis=0) / steps[:, None])
+    sums = np.concatenate([np.zeros((1, 3)), np.cumsum(square * steps[:, None], axis=0)])
+    marks = index_of(record.sd)
+    begin, end = (np.clip(marks + side, time[0], time[-1]) for side in (-0.5, 0.5))
+    length = np.maximum(end - begin, 1e-9)
+    covariance = np.array(record.covariance)
+    for k in range(3):
+        grown = np.interp(end, time, sums[:, k]) - np.interp(begin, time, sums[:, k])
+        covariance[:, 3 + k, 3 + k] += late**2 * grown / length
+    sd = record.sd.copy()
+    sd[VELOCITY] = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2)[:, 3:6])
+    return replace(record, sd=sd, covariance=covariance)
 
 
 def _with_offsets(

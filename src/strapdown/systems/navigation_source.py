@@ -30,8 +30,9 @@ from strapdown.navigation.measurements.measurement import TabulatedMeasurement
 from strapdown.sensors.error_chain import child
 from strapdown.systems.alignment_source import body_record
 from strapdown.systems.inputs import refuse_long_span
-from strapdown.tables import GNSS
-from strapdown.tables.checks import source_of
+from strapdown.tables import GNSS, GYRO
+from strapdown.tables.checks import index_of, source_of, values_of
+from strapdown.tables.sample_clock import sample_clock
 
 __all__ = [
     "NavigationSource",
@@ -42,6 +43,8 @@ __all__ = [
 ]
 
 
+#: Finding of a kind of sampling that is not stated.
+UNSTATED = "io.sampling-taken-as-instantaneous"
 #: Random stream of the fixes under a simulation's seed; those of the sensors count from zero.
 _FIXES = 1000
 
@@ -114,6 +117,8 @@ def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
     recording, imu, of_log = body_record(spec.log, spec.axes)
     refuse_long_span(imu, recording.name)
     require_accel(recording)
+    imu, on_clock = on_even_clock(imu)
+    findings += on_clock
     for name, table in tables.items():
         tables[name], shifted = on_clock_of(table, recording.imu)
         findings += [] if shifted is None else [shifted]
@@ -147,6 +152,26 @@ def read_navigation_source(spec: NavigationSpec) -> NavigationSource:
         ),
         findings=(*of_log, *findings),
     )
+
+
+def on_even_clock(imu: pd.DataFrame) -> tuple[pd.DataFrame, tuple[Finding, ...]]:
+    """Return samples on the clock that they were taken by, where their stamps scatter about it.
+
+    Increments are forces times the steps of time: steps that scatter turn every jolt of a walk into
+    an error of the velocity (phone, 5 ms, stamps ±1.4 ms: 12 mm/s, beside bounds of 6 mm/s).
+    """
+    clock = sample_clock(index_of(imu), values_of(imu, GYRO))
+    if not clock.repaired:
+        return imu, ()
+    code = f"attitude.stamps-{'in-bursts' if clock.kind == 'bursts' else 'jitter'}"
+    said = Finding(
+        code,
+        severity="note",
+        file=source_of(imu),
+        quantity="time",
+        data={"rate_hz": clock.rate_hz, "spread": clock.spread},
+    )
+    return imu.set_axis(pd.Index(clock.time, name=imu.index.name)), (said,)
 
 
 def _simulated(

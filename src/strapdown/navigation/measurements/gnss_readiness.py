@@ -265,6 +265,8 @@ JUMP = 8.0
 LEAST_STEPS, LEAST_SPEED = 10, 2.0
 #: A receiver repeats itself if so many consecutive rows are equal while it moves.
 ALIKE = 3
+#: Its speed before and after is that over so many fixes; the least that counts as moving, m/s.
+BESIDE, MOVING = 4, 0.5
 #: Number of rows that a message lists.
 NAMED = 5
 
@@ -462,6 +464,8 @@ def repeated_rows(table: pd.DataFrame) -> tuple[Flags, float]:
     place, time = values_of(table, GEODETIC), index_of(table)
     velocity = np.where(np.isfinite(velocity_sd), values_of(table, VELOCITY), 0.0)
     values = np.column_stack([place, velocity])
+    # Errors from fix to fix are those that a way of some fixes has; others last.
+    usual = np.minimum(sd, _scatter(place[placed])) if placed.sum() > ALIKE else sd
     same = np.zeros(len(values), dtype=np.bool_)
     same[1:] = (values[1:] == values[:-1]).all(axis=1) & placed[1:] & placed[:-1]
     out, first = np.zeros(len(values), dtype=np.bool_), 0.0
@@ -472,19 +476,30 @@ def repeated_rows(table: pd.DataFrame) -> tuple[Flags, float]:
         if fast[a]:
             speed = float(np.linalg.norm(velocity[a]))
             slip = np.where(np.isfinite(velocity_sd[a]), velocity_sd[a], 0.0)
-            moves = speed > max(3.0 * float(np.linalg.norm(slip)), 0.5)
+            moves = speed > max(3.0 * float(np.linalg.norm(slip)), MOVING)
         elif a < 2 or b + 1 >= len(values):
             continue
         else:
-            ways = ways_between(place[[a - 2, a - 1, b, b + 1]])
-            speed = min(ways[0] / (time[a - 1] - time[a - 2]), ways[2] / (time[b + 1] - time[b]))
+            # Over some fixes: from one to the next a walk is hardly more than their scatter.
+            c, d = max(0, a - 1 - BESIDE), min(len(values) - 1, b + BESIDE)
+            ways = ways_between(place[[c, a - 1, b, d]])
+            speed = min(ways[0] / (time[a - 1] - time[c]), ways[2] / (time[d] - time[b]))
             way = speed * (time[b] - time[a - 1])
-            blur = 5.0 * float(np.linalg.norm(sd[[a, b]]))
-            moves = way > blur and ways[1] > max(blur, 0.5 * way)
+            blur = 5.0 * float(np.linalg.norm(usual[[a, b]]))
+            moves = min(way, ways[1]) > blur and ways[1] > 0.5 * way and speed > MOVING
         if moves:
             out[a:b] = True
             first = first or speed
     return out, first
+
+
+def _scatter(place: Array) -> Array:
+    """Standard deviation of the errors of positions from fix to fix, (3,), m.
+
+    By the median of the differences of a position from the middle of its neighbors.
+    """
+    off = place_difference(place[1:-1], 0.5 * (place[:-2] + place[2:]))
+    return np.asarray(MAD_TO_SD * np.median(np.abs(off), axis=0) / math.sqrt(1.5))
 
 
 def without_repeats(table: pd.DataFrame) -> tuple[pd.DataFrame, tuple[Finding, ...]]:

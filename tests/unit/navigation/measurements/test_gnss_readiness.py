@@ -16,6 +16,7 @@ from tests.gnss_faults import Frozen, Outage, Outliers, inject_gnss_faults
 
 import town_drive as town
 from strapdown.errors import DataError
+from strapdown.frames import geodetic_from_ned
 from strapdown.navigation.measurements import gnss_clock
 from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.measurements.gnss_clock import (
@@ -229,6 +230,25 @@ def test_a_frozen_receiver_is_found_by_positions_alone_and_one_that_stands_is_no
     off = np.clip(np.arange(len(place) - 140) / 60.0, 0.0, 1.0)[:, None]
     place[140:] = place[120] + (fresh[140:] - fresh[140]) * off
     assert without_repeats(remade(town.fixes(), place=place, **alone))[1] == ()
+
+
+@pytest.mark.parametrize("walks", [True, False])
+def test_a_walk_is_less_than_what_a_receiver_may_be_off_and_more_than_its_scatter(walks):
+    """18 equal fixes of a phone, whose errors of metres last: 1.3 m/s, or at rest."""
+    time = np.arange(120.0)
+    way = 1.3 * (time if walks else np.where(time < 60.0, time, np.maximum(60.0, time - 18.0)))
+    random = np.random.default_rng(11)
+    off = 0.3 * random.standard_normal((len(time), 3)) + [2.0, -1.0, 1.0]
+    off[:, 0] += way
+    off[60:78] = off[60]
+    here = np.array([50.0, -90.0, 500.0])
+    place = np.array([geodetic_from_ned(one, here) for one in off])
+    nothing = np.full((len(time), 3), np.inf)
+    table = gnss_table(time, place, 0.0 * place, 0.0 * place + 2.5, nothing, source="phone.csv")
+    left, found = without_repeats(table)
+    dropped = np.flatnonzero(left["quality"].to_numpy() == 0.0)
+    assert dropped.tolist() == (list(range(61, 78)) if walks else [])
+    assert [one.code for one in found] == ["navigation.receiver-repeats"] * walks
 
 
 def test_jumps_are_found_in_places_alone():
