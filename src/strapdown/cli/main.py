@@ -50,6 +50,8 @@ COMMANDS = (
     "convert",
     "crash",
     "simulate",
+    "campaign",
+    "worker",
     "verify",
     "sign",
     "export",

@@ -167,6 +167,17 @@ def _with_absolute_paths(file: TomlFile) -> tuple[dict[str, Any], list[Fault]]:
     return {key: resolved(value, (key,)) for key, value in file.table.items()}, faults
 
 
+def absolute_table(file: TomlFile) -> dict[str, Any]:
+    """Return the table of a file with an absolute path for every key that names a file.
+
+    ConfigError: a file that it names is missing; the message names the line.
+    """
+    table, faults = _with_absolute_paths(file)
+    if faults:
+        raise refusal(faults, file.table, file)
+    return table
+
+
 def _find(file: Path, path: KeyPath, given: str) -> str | Fault:
     wanted = file.parent.absolute() / given
     try:
