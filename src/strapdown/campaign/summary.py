@@ -44,7 +44,7 @@ STATUSES = ("done", "refused", "diverged", "failed", "crashed", "hung", "memory"
 #: Quartiles and, in interquartile ranges, how far outliers are beyond them (Tukey 1977: far out).
 FAR_OUT = 3.0
 #: Numbers of cases that are listed with a code; logs of a fleet that are listed with their values.
-EXAMPLES, LOGS = 5, 60
+EXAMPLES, LOGS = 5, 500
 #: Ratio of the 97.5 to the 2.5 % quantile from which a distribution is shown over a logarithm.
 DECADES = 30.0
 
@@ -269,16 +269,16 @@ class _Tally:
             by[name] = block[name].fillna("").astype(object).to_numpy()
         codes = pd.DataFrame(by)
         failed = codes[codes["status"] != "done"]
-        # Keys of a group: pandas has no type for those of several columns.
-        for key, count in codes.groupby(["cell", "status"]).size().items():
-            c, status = key  # type: ignore[misc]
-            self.status[int(c), str(status)] += int(count)
-        for (c, status, code), own in failed.groupby(["cell", "status", "code"])["case"]:
-            entry = self.errors.setdefault((int(c), str(status), str(code)), _Codes())
-            entry.add(own.tolist())
-        noted = codes[codes["findings"] != ""]
-        for (c, text), own in noted.groupby(["cell", "findings"])["case"]:
-            for code in dict.fromkeys(str(text).split()):
+        # Keys of a group of several columns have no type in pandas.
+        sizes: Any = codes.groupby(["cell", "status"]).size().items()
+        for (c, status), count in sizes:
+            self.status[int(c), status] += int(count)
+        groups: Any = failed.groupby(["cell", "status", "code"])["case"]
+        for (c, status, code), own in groups:
+            self.errors.setdefault((int(c), status, code), _Codes()).add(own.tolist())
+        groups = codes[codes["findings"] != ""].groupby(["cell", "findings"])["case"]
+        for (c, text), own in groups:
+            for code in dict.fromkeys(text.split()):
                 self.findings.setdefault((int(c), code), _Codes()).add(own.tolist())
 
     def counts(self, cell: int | None) -> dict[str, Any]:
@@ -368,11 +368,12 @@ def _share(share: Share) -> dict[str, Any]:
 
 def _edges(moments: Moments, found: Array, group: int) -> tuple[Array, bool] | None:
     """Edges of the histogram of a group, and whether they are of equal ratio; None if constant."""
-    low, high, q = moments.low[group], moments.high[group], dict(zip(LEVELS, found, strict=True))
-    if not (moments.count[group] and math.isfinite(low) and math.isfinite(high)):
+    least, most = float(moments.low[group]), float(moments.high[group])
+    if not (moments.count[group] and math.isfinite(least) and math.isfinite(most)):
         return None
-    log = bool(low > 0.0 and q[0.975] > DECADES * q[0.025])
-    values = np.array([low, q[0.25], q[0.75], high])
+    q = dict(zip(LEVELS, found.tolist(), strict=True))
+    log = least > 0.0 and q[0.975] > DECADES * q[0.025]
+    values = np.array([least, q[0.25], q[0.75], most])
     low, first, third, high = (np.log10(values) if log else values).tolist()
     reach = third - first
     start, end = max(low, first - FAR_OUT * reach), min(high, third + FAR_OUT * reach)
@@ -383,6 +384,9 @@ def _edges(moments: Moments, found: Array, group: int) -> tuple[Array, bool] | N
     bins = int(min(40.0, max(8.0, (end - start) / width))) if width > 0.0 else 20
     edges = np.linspace(start, end, bins + 1)
     edges = 10.0**edges if log else edges
+    # The logarithm of an extreme is rounded.
+    edges[0] = least if start == low else edges[0]
+    edges[-1] = most if end == high else edges[-1]
     if not (np.isfinite(edges).all() and (np.diff(edges) > 0.0).all()):
         return None
     return edges, log
