@@ -38,10 +38,9 @@ from strapdown.report.document import (
     Paragraph,
     TableBlock,
     capital,
-    paragraph,
     section,
 )
-from strapdown.report.values import GAP, decimals, plain, share_words
+from strapdown.report.values import GAP, MINUS, decimals, plain, share_words
 from strapdown.units import named_unit
 
 __all__ = ["campaign_document"]
@@ -94,13 +93,14 @@ def campaign_document(frozen: Mapping[str, Any], summary: Mapping[str, Any], nam
         section("tables", "All statistics", *page.tables(), folded=True),
         section("method", "Method", *page.method(), folded=True),
     ]
-    kind = (frozen.get("base_kind") or "") if isinstance(frozen.get("base_kind"), str) else ""
-    facts = [("Cases", page.cases_words)]
-    facts += [("Runs", kind)] if kind else []
     return Document(
         str(frozen.get("title") or name),
         "Campaign",
-        (*facts, ("Software", f"strapdown {__version__}")),
+        (
+            ("Cases", page.cases_words),
+            ("Each case", f"strapdown {(frozen.get('base') or {}).get('kind', '')}"),
+            ("Software", f"strapdown {__version__}"),
+        ),
         tuple(page.front()),
         tuple(sections),
         links=(
@@ -202,7 +202,11 @@ class _Page:
     @cached_property
     def cells(self) -> list[Mapping[str, Any]]:
         """Summaries of the cells with cases."""
-        return [one for one in self.summary["cells"] if one["count"]]
+        return [
+            {**one, "parameters": {k: _word(v) for k, v in one["parameters"].items()}}
+            for one in self.summary["cells"]
+            if one["count"]
+        ]
 
     @cached_property
     def is_fleet(self) -> bool:
@@ -212,7 +216,8 @@ class _Page:
     @cached_property
     def case_noun(self) -> str:
         """Name of a case."""
-        return "log" if self.is_fleet else "case"
+        alone = self.is_fleet and (self.frozen.get("cases") or {}).get("draws", 1) == 1
+        return "log" if alone and len(self.cells) < 2 else "case"
 
     @cached_property
     def scalars(self) -> list[str]:
@@ -232,10 +237,12 @@ class _Page:
 
     def unit(self, parameter: str) -> str:
         """Unit of a parameter."""
-        for one in self.frozen.get("parameters") or ():
-            if one["name"] == parameter and one.get("unit"):
-                return str(one["unit"])
-        return named_unit(parameter)[1]
+        keys = [
+            str(one.get("key", ""))
+            for one in self.frozen.get("parameters") or ()
+            if one["name"] == parameter
+        ]
+        return next(filter(None, (named_unit(one)[1] for one in (parameter, *keys))), "")
 
     def parameter(self, name: str) -> str:
         """Name of a parameter with its unit."""
@@ -247,8 +254,7 @@ class _Page:
         if isinstance(value, str):
             return value
         unit = self.unit(name)
-        shown = str(value).lower() if isinstance(value, bool) else f"{value:g}"
-        return f"{named_unit(name)[0]} {shown}{f'{GAP}{unit}' if unit else ''}"
+        return f"{named_unit(name)[0]} {value:g}{f'{GAP}{unit}' if unit else ''}"
 
     def cell_name(self, cell: Mapping[str, Any], without: Sequence[str] = ()) -> str:
         """Name of a cell by the parameters that vary."""
@@ -285,7 +291,8 @@ class _Page:
         if not self.cells:
             return
         if len(self.cells) == 1:
-            if figures := tuple(self.key_figures(self.cells[0])):
+            figures = tuple(self.key_figures(self.cells[0])) or tuple(self.usual(self.cells[0]))
+            if figures:
                 yield KeyFigures(figures)
             return
         if rows := tuple(self.answers()):
@@ -317,6 +324,28 @@ class _Page:
                 _shown(one["mean"]),
                 f"expected {one['dof']:g}; 95{GAP}% within {ends} if consistent",
                 self.of_words(one, _VARIANCE_WORDS.get(one["verdict"], "")),
+            )
+
+    def usual(self, cell: Mapping[str, Any]) -> Iterator[KeyFigure]:
+        """Medians of the first scalars, where nothing else is asked of the only cell."""
+        for name in self.scalars[:4]:
+            (words, unit), one = _words(name), cell["scalars"][name]
+            low, middle, high = (_quantile(one, p) for p in (0.05, 0.5, 0.95))
+            half = 0.5 * (_number(middle["high"]) - _number(middle["low"]))
+            of = unit and f"{GAP}{unit}"
+            rows = (cell["sensitivity"].get(name) or {}).get("parameters", ())
+            rows = [row for row in rows if row["total"] is not None]
+            note = self.of_words(one, "")
+            if rows:
+                top = max(rows, key=lambda row: _number(row["total"]))
+                share = _between(top["total"], top["total_low"], top["total_high"])
+                note = f"Most sensitive to {named_unit(top['parameter'])[0]}: total index {share}"
+            yield KeyFigure(
+                f"{words}, median",
+                f"{_shown(middle['value'], half)}{of}",
+                f"5 to 95{GAP}% of the {self.case_noun}s: {_shown(low['value'])} to "
+                f"{_shown(high['value'])}{of}",
+                note,
             )
 
     def of_words(self, one: Mapping[str, Any], verdict: str) -> str:
@@ -577,7 +606,7 @@ class _Page:
     @cached_property
     def axis_label(self) -> str:
         """Name of the axis of the curves."""
-        return str((self.frozen.get("keep") or {}).get("axis") or "axis of the curves")
+        return "time from the start, s"
 
     def sensitivity(self) -> Iterator[Block]:
         """Sobol indices of each scalar as bars."""
@@ -709,39 +738,53 @@ class _Page:
         if not self.is_fleet or not self.cells:
             return
         logs = self.summary["logs"]
-        x = np.array([one["case"] for one in logs], dtype=np.float64)
+        x = np.array([one["draw"] for one in logs], dtype=np.float64)
+        cell = np.array([one["cell"] for one in logs])
         for start in range(0, len(self.scalars), 4):
-            panels = []
-            for name in self.scalars[start : start + 4]:
-                y = np.array([_number(one["scalars"][name]) for one in logs])
-                scalar = self.cells[0]["scalars"][name]
-                far = np.zeros(y.size, bool)
-                if "outliers" in scalar:
-                    fences = scalar["outliers"]
-                    far = (y < fences["low_fence"]) | (y > fences["high_fence"])
-                log = _decades([_number(_quantile(scalar, p)["value"]) for p in (0.025, 0.975)])
-                log = log and _number(scalar["minimum"]) > 0.0
-                lines = [
-                    Line(words, x[own], y[own], colour, points=True, symbol=symbol, size=4.0)
-                    for words, own, colour, symbol in (
-                        ("log", ~far, BLUE, "circle"),
-                        ("far out", far, VERMILLION, "diamond"),
-                    )
-                    if np.isfinite(y[own]).any()
-                ]
-                middle = _number(_quantile(scalar, 0.5)["value"])
-                levels = (Level(middle, "median"),) if math.isfinite(middle) else ()
-                panels.append(Panel(_label(name), tuple(lines), log=log, levels=levels))
-            caption = "Each point is a log; logs without a value have none."
-            if len(logs) < self.summary["log_count"]:
-                caption += f" The first {len(logs)} of {self.summary['log_count']:,} logs."
-            yield Chart(
-                f"logs-{start // 4}",
-                "Logs beside each other",
-                caption,
-                "number of the log",
-                tuple(panels),
+            panels = tuple(
+                self.fleet_panel(
+                    name, x, cell, np.array([_number(one["scalars"][name]) for one in logs])
+                )
+                for name in self.scalars[start : start + 4]
             )
+            caption = "Each point is a log; one without a value has none."
+            if len(logs) < self.summary["cases"]["run"]:
+                caption += f" The first {len(logs)} of {self.summary['cases']['run']:,} cases."
+            yield Chart(
+                f"logs-{start // 4}", "Logs beside each other", caption, "number of the log", panels
+            )
+
+    def fleet_panel(self, name: str, x: Array, cell: Array, y: Array) -> Panel:
+        """A scalar over the logs; of several cells each has its color."""
+        scalars = [one["scalars"][name] for one in self.cells]
+        kinds = []
+        if len(self.cells) > 1:
+            for k, one in enumerate(self.cells[: 2 * LINES]):
+                kinds.append((self.cell_name(one), cell == one["cell"], look(k)))
+        else:
+            fences = scalars[0].get("outliers") or {"low_fence": -math.inf, "high_fence": math.inf}
+            far = (y < fences["low_fence"]) | (y > fences["high_fence"])
+            kinds.append(("log", ~far, {"colour": BLUE, "symbol": "circle"}))
+            kinds.append(("far out", far, {"colour": VERMILLION, "symbol": "diamond"}))
+        ends = [_number(_quantile(one, p)["value"]) for one in scalars for p in (0.025, 0.975)]
+        log = _decades(ends) and min(_number(one["minimum"]) for one in scalars) > 0.0
+        lines = tuple(
+            Line(
+                words,
+                x[own],
+                y[own],
+                style["colour"],
+                points=True,
+                symbol=style["symbol"],
+                size=4.0,
+            )
+            for words, own, style in kinds
+            if np.isfinite(y[own]).any()
+        )
+        middle = _number(_quantile(scalars[0], 0.5)["value"])
+        shown = len(self.cells) < 2 and math.isfinite(middle)
+        levels = (Level(middle, "median"),) if shown else ()
+        return Panel(_label(name), lines, log=log, levels=levels)
 
     # Tables.
 
@@ -923,7 +966,7 @@ class _Page:
         """What varied, and how the intervals are made."""
         rows = [
             (one["name"], one.get("key", ""), self.unit(one["name"]) or "–", _distribution(one))
-            for one in self.frozen.get("parameter") or ()
+            for one in self.frozen.get("parameters") or ()
         ]
         if rows:
             yield TableBlock(
@@ -933,9 +976,9 @@ class _Page:
                 title="Parameters",
             )
         given = self.frozen.get("cases") or {}
-        if given and not self.is_fleet:
+        if given:
             words = {
-                "random": "independent",
+                "random": "independent draws",
                 "latin": "Latin hypercube",
                 "sobol": "scrambled Sobol sequence",
                 "sensitivity": "Saltelli's design",
@@ -944,15 +987,25 @@ class _Page:
             method = str(given.get("method", "random"))
             yield Facts(
                 (
-                    ("Draws in each cell", f"{given.get('draws', '–')}"),
+                    ("Draws", self.draws_words(given)),
                     ("Method", words.get(method, method)),
                     ("Seed", f"{given.get('seed', '–')}"),
                 )
             )
         yield Items(tuple(("", text) for text in self.method_words()))
-        yield paragraph(
-            self.frozen.get("base") if isinstance(self.frozen.get("base"), str) else None, "mono"
-        )  # type: ignore[misc]
+
+    def draws_words(self, given: Mapping[str, Any]) -> str:
+        """How many draws were asked."""
+        number = int(given.get("draws", 1))
+        if given.get("method") == "sensitivity":
+            return f"{_count(number, 'base sample')} of {len(self.drawn) + 2} cases"
+        return f"{number:,} in each cell{' and of each log' if self.is_fleet else ''}"
+
+    @cached_property
+    def drawn(self) -> list[str]:
+        """Names of the drawn parameters."""
+        given = self.frozen.get("parameters") or ()
+        return [str(one["name"]) for one in given if one.get("draw")]
 
     def method_words(self) -> Iterator[str]:
         """How the numbers were made."""
@@ -1002,14 +1055,19 @@ class _Page:
             )
 
 
+def _word(value: Any) -> Any:
+    """A value of a parameter as a number or a word."""
+    return value if _is_number(value) or isinstance(value, str) else _listed(value)
+
+
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _distribution(one: Mapping[str, Any]) -> str:
     """Values or distribution of a parameter."""
-    if one.get("values") is not None and not one.get("draw"):
-        return ", ".join(v if isinstance(v, str) else f"{v:g}" for v in one["values"])
+    if not one.get("draw"):
+        return _listed(one["values"]) if one.get("values") else "from the table of cases"
     known = ("name", "key", "draw", "values")
     rest = ", ".join(
         f"{key.replace('_', ' ')} {_listed(value)}"
@@ -1025,4 +1083,6 @@ def _distribution(one: Mapping[str, Any]) -> str:
 def _listed(value: Any) -> str:
     if isinstance(value, list | tuple):
         return ", ".join(map(_listed, value))
-    return f"{value:g}" if _is_number(value) else str(value)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return f"{value:g}".replace("-", MINUS) if _is_number(value) else str(value)
