@@ -1,1 +1,1 @@
-"""Campaigns: many cases of one configuration, or one for each log, and what they say together."""
+"""Many runs of one configuration or over many logs, and the statistics of their results."""

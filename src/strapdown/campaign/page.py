@@ -38,10 +38,9 @@ from strapdown.report.document import (
     Paragraph,
     TableBlock,
     capital,
-    paragraph,
     section,
 )
-from strapdown.report.values import GAP, decimals, plain, share_words
+from strapdown.report.values import GAP, MINUS, decimals, plain, share_words
 from strapdown.units import named_unit
 
 __all__ = ["campaign_document"]
@@ -58,6 +57,7 @@ _VARIANCE_WORDS = {
     "optimistic": "optimistic: errors exceed the stated variances",
     "pessimistic": "pessimistic: errors are below the stated variances",
 }
+_ACRONYMS = ("nees", "nis", "rms", "gnss", "imu")
 _STATUS_WORDS = {
     "refused": "refused (input or configuration)",
     "diverged": "diverged",
@@ -93,13 +93,14 @@ def campaign_document(frozen: Mapping[str, Any], summary: Mapping[str, Any], nam
         section("tables", "All statistics", *page.tables(), folded=True),
         section("method", "Method", *page.method(), folded=True),
     ]
-    kind = (frozen.get("base_kind") or "") if isinstance(frozen.get("base_kind"), str) else ""
-    facts = [("Cases", page.cases_words)]
-    facts += [("Runs", kind)] if kind else []
     return Document(
         str(frozen.get("title") or name),
         "Campaign",
-        (*facts, ("Software", f"strapdown {__version__}")),
+        (
+            ("Cases", page.cases_words),
+            ("Each case", f"strapdown {(frozen.get('base') or {}).get('kind', '')}"),
+            ("Software", f"strapdown {__version__}"),
+        ),
         tuple(page.front()),
         tuple(sections),
         links=(
@@ -114,8 +115,14 @@ def campaign_document(frozen: Mapping[str, Any], summary: Mapping[str, Any], nam
 
 def _label(name: str) -> str:
     """Name of a scalar with its unit: ``end error, m``."""
-    words, unit = named_unit(name)
+    words, unit = _words(name)
     return f"{words}, {unit}" if unit else words
+
+
+def _words(name: str) -> tuple[str, str]:
+    """Name of a scalar in words, and its unit."""
+    words, unit = named_unit(name)
+    return " ".join(w.upper() if w in _ACRONYMS else w for w in words.split()), unit
 
 
 def _number(value: Any) -> float:
@@ -147,7 +154,9 @@ def _between(value: Any, low: Any, high: Any) -> str:
 def _percent(share: Mapping[str, Any]) -> str:
     """The 95 % interval of a share: ``93.1 to 95.8 %``."""
     low, high = 100.0 * _number(share["low"]), 100.0 * _number(share["high"])
-    return f"{plain(low, 1)} to {plain(high, 1)}{GAP}%"
+    # Of many cases a small share has more decimals.
+    places = min(decimals(part, 2, least=1, most=4) for part in (high, 100.0 - low) if part > 0.0)
+    return f"{plain(low, places)} to {plain(high, places)}{GAP}%"
 
 
 def _share(share: Mapping[str, Any]) -> str:
@@ -193,7 +202,11 @@ class _Page:
     @cached_property
     def cells(self) -> list[Mapping[str, Any]]:
         """Summaries of the cells with cases."""
-        return [one for one in self.summary["cells"] if one["count"]]
+        return [
+            {**one, "parameters": {k: _word(v) for k, v in one["parameters"].items()}}
+            for one in self.summary["cells"]
+            if one["count"]
+        ]
 
     @cached_property
     def is_fleet(self) -> bool:
@@ -203,7 +216,8 @@ class _Page:
     @cached_property
     def case_noun(self) -> str:
         """Name of a case."""
-        return "log" if self.is_fleet else "case"
+        alone = self.is_fleet and (self.frozen.get("cases") or {}).get("draws", 1) == 1
+        return "log" if alone and len(self.cells) < 2 else "case"
 
     @cached_property
     def scalars(self) -> list[str]:
@@ -223,10 +237,12 @@ class _Page:
 
     def unit(self, parameter: str) -> str:
         """Unit of a parameter."""
-        for one in self.frozen.get("parameters") or ():
-            if one["name"] == parameter and one.get("unit"):
-                return str(one["unit"])
-        return named_unit(parameter)[1]
+        keys = [
+            str(one.get("key", ""))
+            for one in self.frozen.get("parameters") or ()
+            if one["name"] == parameter
+        ]
+        return next(filter(None, (named_unit(one)[1] for one in (parameter, *keys))), "")
 
     def parameter(self, name: str) -> str:
         """Name of a parameter with its unit."""
@@ -238,8 +254,7 @@ class _Page:
         if isinstance(value, str):
             return value
         unit = self.unit(name)
-        shown = str(value).lower() if isinstance(value, bool) else f"{value:g}"
-        return f"{named_unit(name)[0]} {shown}{f'{GAP}{unit}' if unit else ''}"
+        return f"{named_unit(name)[0]} {value:g}{f'{GAP}{unit}' if unit else ''}"
 
     def cell_name(self, cell: Mapping[str, Any], without: Sequence[str] = ()) -> str:
         """Name of a cell by the parameters that vary."""
@@ -266,7 +281,7 @@ class _Page:
         done = failure["of"] - failure["hits"]
         text = f"{self.cases_words}: {done:,} done"
         if failure["hits"]:
-            text += f", {failure['hits']:,} not ({_share(failure)})"
+            text += f", {failure['hits']:,} not: {_share(failure)}"
         bad = failure["hits"] or any(
             one["verdict"] not in ("consistent", None)
             for cell in self.cells
@@ -276,7 +291,8 @@ class _Page:
         if not self.cells:
             return
         if len(self.cells) == 1:
-            if figures := tuple(self.key_figures(self.cells[0])):
+            figures = tuple(self.key_figures(self.cells[0])) or tuple(self.usual(self.cells[0]))
+            if figures:
                 yield KeyFigures(figures)
             return
         if rows := tuple(self.answers()):
@@ -310,6 +326,28 @@ class _Page:
                 self.of_words(one, _VARIANCE_WORDS.get(one["verdict"], "")),
             )
 
+    def usual(self, cell: Mapping[str, Any]) -> Iterator[KeyFigure]:
+        """Medians of the first scalars, where nothing else is asked of the only cell."""
+        for name in self.scalars[:4]:
+            (words, unit), one = _words(name), cell["scalars"][name]
+            low, middle, high = (_quantile(one, p) for p in (0.05, 0.5, 0.95))
+            half = 0.5 * (_number(middle["high"]) - _number(middle["low"]))
+            of = unit and f"{GAP}{unit}"
+            rows = (cell["sensitivity"].get(name) or {}).get("parameters", ())
+            rows = [row for row in rows if row["total"] is not None]
+            note = self.of_words(one, "")
+            if rows:
+                top = max(rows, key=lambda row: _number(row["total"]))
+                share = _between(top["total"], top["total_low"], top["total_high"])
+                note = f"Most sensitive to {named_unit(top['parameter'])[0]}: total index {share}"
+            yield KeyFigure(
+                f"{words}, median",
+                f"{_shown(middle['value'], half)}{of}",
+                f"5 to 95{GAP}% of the {self.case_noun}s: {_shown(low['value'])} to "
+                f"{_shown(high['value'])}{of}",
+                note,
+            )
+
     def of_words(self, one: Mapping[str, Any], verdict: str) -> str:
         """Verdict, and of how many cases a number is."""
         of = one["of"] if "of" in one else one["count"]
@@ -337,20 +375,18 @@ class _Page:
         """A sentence for each coverage, rate and consistency over the cells of a grid."""
         for kind in ("coverage", "consistency"):
             for k, first in enumerate(self.cells[0][kind]):
-                groups: dict[str, list[str]] = {}
+                groups: dict[str, list[Mapping[str, Any]]] = {}
                 for cell in self.cells:
-                    groups.setdefault(cell[kind][k]["verdict"] or "", []).append(
-                        self.cell_name(cell)
-                    )
+                    groups.setdefault(cell[kind][k]["verdict"] or "", []).append(cell)
                 parts = []
                 for verdict in ("consistent", "optimistic", "pessimistic"):
-                    names = groups.get(verdict, [])
-                    if not names:
+                    cells = groups.get(verdict, [])
+                    if not cells:
                         continue
                     one = {**first, "verdict": verdict}
                     words = self.verdict(one) if kind == "coverage" else _VARIANCE_WORDS[verdict]
-                    listed = "" if verdict == "consistent" else f" ({self.listed(names)})"
-                    parts.append(f"{words} in {len(names)} of {len(self.cells)} cells{listed}")
+                    listed = "" if verdict == "consistent" else f" ({self.listed(cells)})"
+                    parts.append(f"{words} in {len(cells)} of {len(self.cells)} cells{listed}")
                 yield first["name"], f"{capital('; '.join(parts))}."
         for k, first in enumerate(self.cells[0]["rates"]):
             shares = [(_number(c["rates"][k]["share"]), i) for i, c in enumerate(self.cells)]
@@ -363,8 +399,14 @@ class _Page:
             text += f" to {share_words(high)} ({self.cell_name(self.cells[b])})."
             yield first["name"], text
 
-    def listed(self, names: Sequence[str]) -> str:
-        """Names of the first cells."""
+    def listed(self, cells: Sequence[Mapping[str, Any]]) -> str:
+        """Names of the first cells, or the one value that all of them and no others have."""
+        for key, values in self.grid.items():
+            for value in values:
+                own = [cell for cell in self.cells if cell["parameters"][key] == value]
+                if len(own) > 1 and own == list(cells):
+                    return self.value(key, value)
+        names = [self.cell_name(cell) for cell in cells]
         more = f"; and {len(names) - 4} more" if len(names) > 5 else ""
         return "; ".join(names[:4] if more else names) + more
 
@@ -404,7 +446,7 @@ class _Page:
         )
         caption = f"Shares of cases with 95{GAP}% intervals."
         if passed:
-            caption += " ✓: the expected share is in the 99 % interval."
+            caption += f" Marked: the expected share is in the 99{GAP}% interval."
         yield TableBlock(
             (*own, *names, "not done"),
             self.cell_rows(columns),
@@ -477,7 +519,7 @@ class _Page:
                 )
                 style = look(k)
                 label = line or "median"
-                drawn.append(Line(label, x, middle, style["colour"], style["dash"], dots=True))
+                drawn.append(Line(label, x, middle, dots=True, size=7.0, **style))
                 fills.append(Fill(label, x, low, high, style["colour"], 0.14, legend=False))
                 ends += [*low.tolist(), *high.tolist()]
             panels.append((title, tuple(drawn), tuple(fills)))
@@ -564,7 +606,7 @@ class _Page:
     @cached_property
     def axis_label(self) -> str:
         """Name of the axis of the curves."""
-        return str((self.frozen.get("keep") or {}).get("axis") or "axis of the curves")
+        return "time from the start, s"
 
     def sensitivity(self) -> Iterator[Block]:
         """Sobol indices of each scalar as bars."""
@@ -696,58 +738,73 @@ class _Page:
         if not self.is_fleet or not self.cells:
             return
         logs = self.summary["logs"]
-        x = np.array([one["case"] for one in logs], dtype=np.float64)
+        x = np.array([one["draw"] for one in logs], dtype=np.float64)
+        cell = np.array([one["cell"] for one in logs])
         for start in range(0, len(self.scalars), 4):
-            panels = []
-            for name in self.scalars[start : start + 4]:
-                y = np.array([_number(one["scalars"][name]) for one in logs])
-                scalar = self.cells[0]["scalars"][name]
-                far = np.zeros(y.size, bool)
-                if "outliers" in scalar:
-                    fences = scalar["outliers"]
-                    far = (y < fences["low_fence"]) | (y > fences["high_fence"])
-                log = _decades([_number(_quantile(scalar, p)["value"]) for p in (0.025, 0.975)])
-                log = log and _number(scalar["minimum"]) > 0.0
-                lines = [
-                    Line(words, x[own], y[own], colour, points=True, symbol=symbol, size=4.0)
-                    for words, own, colour, symbol in (
-                        ("log", ~far, BLUE, "circle"),
-                        ("far out", far, VERMILLION, "diamond"),
-                    )
-                    if np.isfinite(y[own]).any()
-                ]
-                middle = _number(_quantile(scalar, 0.5)["value"])
-                levels = (Level(middle, "median"),) if math.isfinite(middle) else ()
-                panels.append(Panel(_label(name), tuple(lines), log=log, levels=levels))
-            caption = "Each point is a log; logs without a value have none."
-            if len(logs) < self.summary["log_count"]:
-                caption += f" The first {len(logs)} of {self.summary['log_count']:,} logs."
-            yield Chart(
-                f"logs-{start // 4}",
-                "Logs beside each other",
-                caption,
-                "number of the log",
-                tuple(panels),
+            panels = tuple(
+                self.fleet_panel(
+                    name, x, cell, np.array([_number(one["scalars"][name]) for one in logs])
+                )
+                for name in self.scalars[start : start + 4]
             )
+            caption = "Each point is a log; one without a value has none."
+            if len(logs) < self.summary["cases"]["run"]:
+                caption += f" The first {len(logs)} of {self.summary['cases']['run']:,} cases."
+            yield Chart(
+                f"logs-{start // 4}", "Logs beside each other", caption, "number of the log", panels
+            )
+
+    def fleet_panel(self, name: str, x: Array, cell: Array, y: Array) -> Panel:
+        """A scalar over the logs; of several cells each has its color."""
+        scalars = [one["scalars"][name] for one in self.cells]
+        kinds = []
+        if len(self.cells) > 1:
+            for k, one in enumerate(self.cells[: 2 * LINES]):
+                kinds.append((self.cell_name(one), cell == one["cell"], look(k)))
+        else:
+            fences = scalars[0].get("outliers") or {"low_fence": -math.inf, "high_fence": math.inf}
+            far = (y < fences["low_fence"]) | (y > fences["high_fence"])
+            kinds.append(("log", ~far, {"colour": BLUE, "symbol": "circle"}))
+            kinds.append(("far out", far, {"colour": VERMILLION, "symbol": "diamond"}))
+        ends = [_number(_quantile(one, p)["value"]) for one in scalars for p in (0.025, 0.975)]
+        log = _decades(ends) and min(_number(one["minimum"]) for one in scalars) > 0.0
+        lines = tuple(
+            Line(
+                words,
+                x[own],
+                y[own],
+                style["colour"],
+                points=True,
+                symbol=style["symbol"],
+                size=4.0,
+            )
+            for words, own, style in kinds
+            if np.isfinite(y[own]).any()
+        )
+        middle = _number(_quantile(scalars[0], 0.5)["value"])
+        shown = len(self.cells) < 2 and math.isfinite(middle)
+        levels = (Level(middle, "median"),) if shown else ()
+        return Panel(_label(name), lines, log=log, levels=levels)
 
     # Tables.
 
     def tests(self) -> Iterator[Block]:
         """Coverages and consistencies with their verdicts, one row a cell."""
         for k, first in enumerate(self.cells[0]["coverage"] if self.cells else ()):
-            if len(self.cells) < 2:
-                break
             rows = []
             for cell in self.cells:
                 one = cell["coverage"][k]
-                ends = f"{plain(100.0 * _number(one['low_99']), 1)} to {plain(100.0 * _number(one['high_99']), 1)}"
-                rows.append([str(one["of"]), _share(one), f"{ends}{GAP}%", self.verdict(one)])
+                ends = _percent({"low": one["low_99"], "high": one["high_99"]})
+                rows.append([f"{one['of']:,}", _share(one), ends, self.verdict(one)])
             own, words = self.cell_columns()
             yield TableBlock(
                 (*own, "of", "within the bound", f"99{GAP}% interval", "verdict"),
                 self.cell_rows(rows),
                 text=(*words, len(own) + 3),
-                title=f"{capital(first['name'])}: {_label(first['error'])} within {_label(first['bound'])}",
+                title=(
+                    f"{capital(first['name'])}: {_label(first['error'])}, within "
+                    f"{_label(first['bound'])}"
+                ),
             )
         for k, first in enumerate(self.cells[0]["consistency"] if self.cells else ()):
             rows = []
@@ -776,7 +833,10 @@ class _Page:
                 ),
                 self.cell_rows(rows),
                 text=(*words, len(own) + 4),
-                title=f"{capital(first['name'])}: normalized error squared, {first['dof']:g} degrees of freedom",
+                title=(
+                    f"{capital(first['name'])}: normalized error squared, {first['dof']:g} degrees "
+                    "of freedom"
+                ),
                 caption=(
                     "The mean of a consistent filter is the number of degrees of freedom. The "
                     f"verdict is by its 99{GAP}% interval.{self.rest()}"
@@ -844,7 +904,7 @@ class _Page:
                 if not found:
                     continue
                 total += found["below"] + found["above"]
-                for one in found["worst"]:
+                for one in found["worst"][: 3 if many else None]:
                     what = f"{one['log']} ({one['case']})" if "log" in one else str(one["case"])
                     where = (self.cell_name(cell),) if many else ()
                     usual = (
@@ -857,7 +917,7 @@ class _Page:
         columns = ("scalar", *(("cell",) if many else ()), self.case_noun, "value", "quartiles")
         caption = (
             "Values beyond the quartiles by more than three times the distance between them, the "
-            f"farthest ten of each{' cell' if many else ''}; in all {total:,}."
+            f"farthest {'three of each cell' if many else 'ten of each scalar'}; in all {total:,}."
         )
         if len(rows) > ROWS:
             caption += f" {len(rows) - ROWS} more rows are in summary.json."
@@ -906,7 +966,7 @@ class _Page:
         """What varied, and how the intervals are made."""
         rows = [
             (one["name"], one.get("key", ""), self.unit(one["name"]) or "–", _distribution(one))
-            for one in self.frozen.get("parameter") or ()
+            for one in self.frozen.get("parameters") or ()
         ]
         if rows:
             yield TableBlock(
@@ -916,9 +976,9 @@ class _Page:
                 title="Parameters",
             )
         given = self.frozen.get("cases") or {}
-        if given and not self.is_fleet:
+        if given:
             words = {
-                "random": "independent",
+                "random": "independent draws",
                 "latin": "Latin hypercube",
                 "sobol": "scrambled Sobol sequence",
                 "sensitivity": "Saltelli's design",
@@ -927,22 +987,32 @@ class _Page:
             method = str(given.get("method", "random"))
             yield Facts(
                 (
-                    ("Draws in each cell", f"{given.get('draws', '–')}"),
+                    ("Draws", self.draws_words(given)),
                     ("Method", words.get(method, method)),
                     ("Seed", f"{given.get('seed', '–')}"),
                 )
             )
         yield Items(tuple(("", text) for text in self.method_words()))
-        yield paragraph(
-            self.frozen.get("base") if isinstance(self.frozen.get("base"), str) else None, "mono"
-        )  # type: ignore[misc]
+
+    def draws_words(self, given: Mapping[str, Any]) -> str:
+        """How many draws were asked."""
+        number = int(given.get("draws", 1))
+        if given.get("method") == "sensitivity":
+            return f"{_count(number, 'base sample')} of {len(self.drawn) + 2} cases"
+        return f"{number:,} in each cell{' and of each log' if self.is_fleet else ''}"
+
+    @cached_property
+    def drawn(self) -> list[str]:
+        """Names of the drawn parameters."""
+        given = self.frozen.get("parameters") or ()
+        return [str(one["name"]) for one in given if one.get("draw")]
 
     def method_words(self) -> Iterator[str]:
         """How the numbers were made."""
         noun = self.case_noun
         yield (
-            f"Numbers are over the {noun}s that are done and have the value; the others are counted "
-            "beside them."
+            f"Numbers are over the {noun}s that are done and have the value; the others are "
+            "counted beside them."
         )
         if len(self.cells) > 1:
             yield (
@@ -950,8 +1020,8 @@ class _Page:
                 "cell, so that cells differ by their grid parameters alone."
             )
         yield (
-            "Shares: exact intervals by Clopper and Pearson (1934). A verdict other than consistent "
-            "is by the 99 % interval; one test in a hundred gives it by chance."
+            "Shares: exact intervals by Clopper and Pearson (1934). A verdict other than "
+            "consistent is by the 99 % interval; one test in a hundred gives it by chance."
         )
         yield (
             "Means: Student's interval. Quantiles: exact, interpolated between order statistics; "
@@ -980,9 +1050,14 @@ class _Page:
         if stop:
             yield (
                 f"The number of cases was not fixed: a cell ended when half the width of its "
-                f"interval was {stop.get('half_width')} or less. Such an interval contains the truth "
-                "slightly less often than 95 %."
+                f"interval was {stop.get('half_width')} or less. Such an interval contains the "
+                "truth slightly less often than 95 %."
             )
+
+
+def _word(value: Any) -> Any:
+    """A value of a parameter as a number or a word."""
+    return value if _is_number(value) or isinstance(value, str) else _listed(value)
 
 
 def _is_number(value: Any) -> bool:
@@ -991,8 +1066,8 @@ def _is_number(value: Any) -> bool:
 
 def _distribution(one: Mapping[str, Any]) -> str:
     """Values or distribution of a parameter."""
-    if one.get("values") is not None and not one.get("draw"):
-        return ", ".join(v if isinstance(v, str) else f"{v:g}" for v in one["values"])
+    if not one.get("draw"):
+        return _listed(one["values"]) if one.get("values") else "from the table of cases"
     known = ("name", "key", "draw", "values")
     rest = ", ".join(
         f"{key.replace('_', ' ')} {_listed(value)}"
@@ -1008,4 +1083,6 @@ def _distribution(one: Mapping[str, Any]) -> str:
 def _listed(value: Any) -> str:
     if isinstance(value, list | tuple):
         return ", ".join(map(_listed, value))
-    return f"{value:g}" if _is_number(value) else str(value)
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    return f"{value:g}".replace("-", MINUS) if _is_number(value) else str(value)

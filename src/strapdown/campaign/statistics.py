@@ -402,9 +402,9 @@ class Consistency:
 def consistency(count: int, mean: float, inside: int, dof: float) -> Consistency:
     """Return the test of `count` normalized errors squared, each of `dof` degrees of freedom."""
     if not count:
-        return Consistency(0, *[math.nan] * 5, share_of(0, 0))
-    ends = [chi_square_quantile(p, count * dof) / count for p in (0.025, 0.975, 0.005, 0.995)]
-    return Consistency(count, mean, *ends, share_of(inside, count))
+        return Consistency(0, *(math.nan,) * 5, inside=share_of(0, 0))
+    ends = (chi_square_quantile(p, count * dof) / count for p in (0.025, 0.975, 0.005, 0.995))
+    return Consistency(count, mean, *ends, inside=share_of(inside, count))
 
 
 def count_between(edges: Array, values: Array) -> Whole:

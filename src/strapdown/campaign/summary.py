@@ -188,7 +188,8 @@ class _Plan:
     @cached_property
     def drawn(self) -> tuple[str, ...]:
         """Names of the drawn parameters, in order of the file."""
-        return tuple(one["name"] for one in self.frozen.get("parameter") or () if one.get("draw"))
+        given = self.frozen.get("parameters") or ()
+        return tuple(one["name"] for one in given if one.get("draw"))
 
     @cached_property
     def tests(self) -> tuple[_Test, ...]:
@@ -269,16 +270,16 @@ class _Tally:
             by[name] = block[name].fillna("").astype(object).to_numpy()
         codes = pd.DataFrame(by)
         failed = codes[codes["status"] != "done"]
-        # Keys of a group: pandas has no type for those of several columns.
-        for key, count in codes.groupby(["cell", "status"]).size().items():
-            c, status = key  # type: ignore[misc]
-            self.status[int(c), str(status)] += int(count)
-        for (c, status, code), own in failed.groupby(["cell", "status", "code"])["case"]:
-            entry = self.errors.setdefault((int(c), str(status), str(code)), _Codes())
-            entry.add(own.tolist())
-        noted = codes[codes["findings"] != ""]
-        for (c, text), own in noted.groupby(["cell", "findings"])["case"]:
-            for code in dict.fromkeys(str(text).split()):
+        # Keys of a group of several columns have no type in pandas.
+        sizes: Any = codes.groupby(["cell", "status"]).size().items()
+        for (c, status), count in sizes:
+            self.status[int(c), status] += int(count)
+        groups: Any = failed.groupby(["cell", "status", "code"])["case"]
+        for (c, status, code), own in groups:
+            self.errors.setdefault((int(c), status, code), _Codes()).add(own.tolist())
+        groups = codes[codes["findings"] != ""].groupby(["cell", "findings"])["case"]
+        for (c, text), own in groups:
+            for code in dict.fromkeys(text.split()):
                 self.findings.setdefault((int(c), code), _Codes()).add(own.tolist())
 
     def counts(self, cell: int | None) -> dict[str, Any]:
@@ -426,7 +427,7 @@ class _Shapes:
         if "log" in block and room > 0:
             for row, own in zip(block.head(room).to_dict("records"), values, strict=False):
                 scalars = dict(zip(plan.scalars, own.tolist(), strict=True))
-                kept = {key: row[key] for key in ("case", "log", "status", "code")}
+                kept = {key: row[key] for key in ("case", "cell", "draw", "log", "status", "code")}
                 self.logs.append({**kept, "scalars": scalars})
 
 
@@ -593,14 +594,19 @@ def _axis(curves: Batches) -> Array:
 
 
 def _with_cells(cases: Batches, curves: Batches) -> Iterator[tuple[pd.DataFrame, Whole]]:
-    """Blocks of curves with the cell of each row; both come in order of case."""
+    """Curves of the cases that there are, with the cell of each row; both in order of case."""
     known = iter(blocks(cases()))
     case, cell = np.empty(0, np.int64), np.empty(0, np.int64)
     for block in blocks(curves()):
         own = block["case"].to_numpy(np.int64)
         while not case.size or case[-1] < own[-1]:
-            more = next(known)
+            more = next(known, None)
+            if more is None:
+                break
             kept = case >= own[0]
             case = np.concatenate([case[kept], more["case"].to_numpy(np.int64)])
             cell = np.concatenate([cell[kept], more["cell"].to_numpy(np.int64)])
-        yield block, cell[np.searchsorted(case, own)]
+        # A case beyond the end of its cell may have a curve.
+        at = np.minimum(np.searchsorted(case, own), max(case.size - 1, 0))
+        there = case[at] == own if case.size else np.zeros(own.size, bool)
+        yield block[there], cell[at[there]]

@@ -96,7 +96,7 @@ def binomial_quantile(share: Any, trials: Any, probability: Any) -> NDArray[np.i
         middle = (low + high) // 2
         enough = betainc(trials - middle, middle + 1.0, 1.0 - probability) >= share
         low, high = np.where(enough, low, middle), np.where(enough, middle, high)
-    return high
+    return np.asarray(high, dtype=np.int64)
 
 
 def clopper_pearson(hits: float, trials: float, confidence: float = 0.95) -> tuple[float, float]:
