@@ -11,7 +11,7 @@ import pytest
 from strapdown.campaign import kinds
 
 #: Read by every process that runs cases; `places` says how a case behaves.
-CHEAP = '''
+CHEAP = """
 import dataclasses, math, os, random, time
 import strapdown.campaign.kinds as kinds
 
@@ -40,7 +40,7 @@ def data(result):
     return {"at_the_end": {"horizontal_95_m": result.value, "speed_sd_m_per_s": 1.959964}}
 
 kinds.KINDS["outage"] = dataclasses.replace(kinds.KINDS["outage"], run=run, data=data)
-'''
+"""
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""Whatever happens to a case, a worker or the campaign, nothing is lost, and the bits are the same."""
+"""Whatever happens to a case, a worker or the campaign: nothing is lost, the bits are the same."""
 
 from __future__ import annotations
 
@@ -141,23 +141,24 @@ def test_killed_at_drawn_instants_and_resumed(cheap: Path) -> None:
     campaign(file, workers=2).save(cheap / "whole", report=False)
     command = [sys.executable, "-m", "strapdown", "campaign"]
     rng = random.Random(3)
-    for k in range(3):
-        arguments = [str(file), "--out", str(cheap / "cut"), "--no-report", "--workers", "2", "-q"]
-        process = subprocess.Popen([*command, *arguments], start_new_session=True)
-        time.sleep(2.0 + 4.0 * rng.random())
+    start = [str(file), "--out", str(cheap / "cut"), "--no-report", "--workers", "2", "-q"]
+    kept = [0]
+    # Killed while it starts, runs, or writes; then until its end.
+    for wait in (*(2.0 + 5.0 * rng.random() for _ in range(3)), None):
+        begun = (cheap / "cut-running" / "campaign.json").exists()
+        more = ["resume", str(cheap / "cut"), "--no-report", "-q"] if begun else start
+        process = subprocess.Popen([*command, *more], start_new_session=True)
+        if wait is None:
+            assert process.wait() == 0
+            break
+        time.sleep(wait)
+        if process.poll() is not None:
+            break
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
-        if (cheap / "cut").exists():
-            break
-        rows = 0
         if (cheap / "cut-running" / "campaign.json").exists():
-            rows = int(open_campaign(cheap / "cut").dataset.there().sum())
-        assert rows <= 120, k
-    if not (cheap / "cut").exists():
-        done = subprocess.run(
-            [*command, "resume", str(cheap / "cut"), "--no-report", "-q"], check=False
-        )
-        assert done.returncode == 0
+            kept.append(int(open_campaign(cheap / "cut").dataset.there().sum()))
+    assert kept == sorted(kept)  # what was written stays
     assert content(cheap / "cut") == content(cheap / "whole")
     assert not (cheap / "cut-running").exists()
 
@@ -217,7 +218,7 @@ def test_a_case_by_itself_has_the_same_bits(cheap: Path) -> None:
 
 
 def test_stopping_depends_on_the_order_of_draws_alone(cheap: Path) -> None:
-    stop = '[stop]\ncoverage = "unit"\nhalf_width = 0.06\nevery = 50\n'
+    stop = '[stop]\ncoverage = "unit"\nhalf_width = 0.04\nevery = 20\n'
     grid = '[[parameter]]\nkey = "places"\nvalues = [1, 7]\n'
     file = written(cheap, DRAWN.format(draws=2000) + grid + stop)
     run = campaign(file, workers=2)
@@ -225,7 +226,7 @@ def test_stopping_depends_on_the_order_of_draws_alone(cheap: Path) -> None:
     assert {str(k): v for k, v in counts.items()} == {
         str(k): v for k, v in run.summary["stopped"].items()
     }
-    assert all(v % 50 == 0 and 100 <= v < 800 for v in counts.values())
+    assert all(v % 20 == 0 and 60 <= v < 600 for v in counts.values())
     again = campaign(file, workers=1)
     pd.testing.assert_frame_equal(again.cases, run.cases)
     # The look before was too wide, the last is not.
@@ -236,10 +237,10 @@ def test_stopping_depends_on_the_order_of_draws_alone(cheap: Path) -> None:
         inside = own["horizontal_95_m"].abs() <= own["speed_sd_m_per_s"]
         halves = [
             0.5 * (high - low)
-            for n in (draws - 50, draws)
+            for n in (draws - 20, draws)
             for low, high in [clopper_pearson(int(inside.iloc[:n].sum()), n, 0.95)]
         ]
-        assert halves[0] > 0.06 >= halves[1]
+        assert halves[0] > 0.04 >= halves[1]
 
 
 def test_read_by_duckdb_and_polars(cheap: Path) -> None:
@@ -250,7 +251,7 @@ def test_read_by_duckdb_and_polars(cheap: Path) -> None:
     run.save(cheap / "c", report=False)
     pattern = str(cheap / "c" / "cases" / "*.parquet")
     expected = run.cases["horizontal_95_m"].sum()
-    (total,) = duckdb.sql(f"select sum(horizontal_95_m) from '{pattern}'").fetchone()
+    ((total,),) = duckdb.sql(f"select sum(horizontal_95_m) from '{pattern}'").fetchall()
     assert total == pytest.approx(expected, rel=1e-12)
     table = polars.read_parquet(pattern)
     assert table["horizontal_95_m"].sum() == pytest.approx(expected, rel=1e-12)

@@ -148,7 +148,9 @@ def _limit_memory(megabytes: float) -> None:
         import resource
 
         most = int(megabytes * 1e6)
-        resource.setrlimit(resource.RLIMIT_DATA, (most, resource.getrlimit(resource.RLIMIT_DATA)[1]))
+        resource.setrlimit(
+            resource.RLIMIT_DATA, (most, resource.getrlimit(resource.RLIMIT_DATA)[1])
+        )
 
 
 def main() -> None:
@@ -198,43 +200,64 @@ class CaseProcess:
         self._frozen = frozen
         self._limit = float(frozen["limits"]["time_s"])
         self._process: subprocess.Popen[bytes] | None = None
+        self._closed = False
+        self._busy = threading.Lock()
 
     def run(self, numbers: Sequence[int]) -> Iterator[Row]:
         """Yield the rows of cases, whatever happens to them."""
         left = list(numbers)
+        with self._busy:
+            while left and not self._closed:
+                yield from self._some(left)
+
+    def _some(self, left: list[int]) -> Iterator[Row]:
+        """Yield the rows of cases until none is left, or the process ended; these are taken."""
+        process = self._started()
+        assert process.stdin is not None
+        # A process that ended meanwhile is noticed by its missing answer.
+        with contextlib.suppress(BrokenPipeError):
+            _send(process.stdin, left)
         while left:
-            process = self._started()
-            assert process.stdin is not None
-            # A process that ended meanwhile is noticed by its missing answer.
-            with contextlib.suppress(BrokenPipeError):
-                _send(process.stdin, left)
-            ended = False
-            while left and not ended:
-                number = left.pop(0)
-                try:
-                    row = self._answer(self._limit + GRACE)
-                    ended = row["status"] == "memory"  # what the process still holds is not known
-                except TimeoutError:
-                    row, ended = self._lost(number, "hung"), True
-                except EOFError:
-                    row, ended = self._lost(number, self._ended()), True
-                if ended:
-                    self.stop()
-                yield row
+            number, ended = left.pop(0), True
+            try:
+                row = self._answer(self._limit + GRACE)
+                ended = row["status"] == "memory"  # what the process still holds is not known
+            except TimeoutError:
+                row = self._lost(number, "hung")
+            except EOFError:
+                row = self._lost(number, self._ended())
+            if ended:
+                self.stop()
+                if self._closed:
+                    return
+            yield row
+            if ended:
+                return
 
     def block(self, first: int, last: int) -> Any:
         """Return what one call makes of many cases (`base.bulk`).
 
         RuntimeError: the process ended.
         """
-        process = self._started()
-        assert process.stdin is not None
-        try:
-            _send(process.stdin, [first, last - 1])
-            return self._answer(self._limit + GRACE)
-        except (EOFError, BrokenPipeError, TimeoutError):
+        with self._busy:
+            process = self._started()
+            assert process.stdin is not None
+            try:
+                _send(process.stdin, [first, last - 1])
+                return self._answer(self._limit + GRACE)
+            except (EOFError, BrokenPipeError, TimeoutError):
+                self.stop()
+                raise RuntimeError(f"cases {first} to {last - 1}") from None
+
+    def close(self) -> None:
+        """End the process for good, also while another thread waits for its answer."""
+        self._closed = True
+        process = self._process
+        if process is not None:
+            process.kill()
+        if self._busy.acquire(timeout=10.0):
             self.stop()
-            raise RuntimeError(f"cases {first} to {last - 1}") from None
+            self._busy.release()
 
     def stop(self) -> None:
         """End the process."""

@@ -190,9 +190,11 @@ class Dataset:
             end = begin + BLOCK
             near = [path for first, last, path in files if first < end and last >= begin]
             parts = [
-                pq.read_table(path, columns=wanted, filters=[("case", ">=", begin),
-                              ("case", "<", end)]) for path in near
-            ]  # fmt: skip
+                pq.read_table(
+                    path, columns=wanted, filters=[("case", ">=", begin), ("case", "<", end)]
+                )
+                for path in near
+            ]
             parts = [part for part in parts if part.num_rows]
             if not parts:
                 continue

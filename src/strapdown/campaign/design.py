@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from strapdown.bundle import InputFiles, input_files, named_paths, source_digest
 from strapdown.campaign.kinds import KINDS, Table, at_path, parts_of, with_value
 from strapdown.campaign.specification import CampaignSpec, ParameterTable
-from strapdown.config.reading import absolute_table
-from strapdown.config.toml_file import read_toml
+from strapdown.config.reading import OF_LOG, absolute_table
+from strapdown.config.toml_file import TomlFile, read_toml
 from strapdown.errors import ConfigError, check_choice
 
 __all__ = ["Campaign", "Case"]
@@ -94,8 +94,12 @@ class Campaign:
         """
         base = spec.base
         file = None if base.file is None else folder / base.file
-        written = dict(base.configuration) if file is None else read_toml(file).table
-        table = written if file is None else absolute_table(read_toml(file))
+        if file is None:
+            # Written in the campaign: its files are named from the same folder.
+            source = TomlFile(folder / "campaign.toml", dict(base.configuration), "")
+        else:
+            source = read_toml(file)
+        written, table = source.table, absolute_table(source)
         if base.simulate is not None:
             written = {"simulate": {"name": base.simulate}, **written}
             table = {"simulate": {"name": base.simulate}, **table}
@@ -105,7 +109,9 @@ class Campaign:
         if spec.cases.table is not None:
             rows = _rows(folder / spec.cases.table, spec)
         inputs = [] if file is None else [input_files("base", str(file), (file,))]
-        for path in dict.fromkeys((*named_paths(table), *paths)):
+        tables = [_filled(table, Path(log)) for log in paths] if paths else [table]
+        named = (path for one in tables for path in named_paths(one))
+        for path in dict.fromkeys((*named, *paths)):
             inputs.append(input_files("input", path, _files(Path(path))))
         made = cls(spec, table, written, logs, paths, rows, tuple(inputs))
         made._check()
@@ -294,8 +300,11 @@ class Campaign:
         for name in self.spec.keep.curves:
             check_choice("campaign.no-curve", kind.curve_names, quantity="keep, curves", name=name)
         known = [*self.scalars, *(one.column for one in self.spec.parameter)]
-        wanted = [("coverage", k, n) for k, one in enumerate(self.spec.coverage) for n in
-                  (one.error, one.bound)]  # fmt: skip
+        wanted = [
+            ("coverage", k, name)
+            for k, one in enumerate(self.spec.coverage)
+            for name in (one.error, one.bound)
+        ]
         wanted += [("rate", k, one.scalar) for k, one in enumerate(self.spec.rate)]
         wanted += [("consistency", k, one.scalar) for k, one in enumerate(self.spec.consistency)]
         if self.spec.stop is not None and self.spec.stop.scalar is not None:
@@ -378,11 +387,13 @@ def _rows(path: Path, spec: CampaignSpec) -> tuple[Table, ...]:
         raise ConfigError(
             "campaign.table-columns", file=path.name, lacking=lacking, have=list(table.columns)
         )
-    return tuple(
-        {name: value.item() if isinstance(value, np.generic) else value for name, value in
-         zip(wanted, row, strict=True)}  # fmt: skip
-        for row in table[wanted].itertuples(index=False)
-    )
+    rows = table[wanted].itertuples(index=False)
+    return tuple(dict(zip(wanted, map(_plain, row), strict=True)) for row in rows)
+
+
+def _plain(value: Any) -> Any:
+    """A number of numpy as one of Python."""
+    return value.item() if isinstance(value, np.generic) else value
 
 
 def _filled(node: Any, log: Path) -> Any:
@@ -391,8 +402,9 @@ def _filled(node: Any, log: Path) -> Any:
         return {key: _filled(value, log) for key, value in node.items()}
     if isinstance(node, list | tuple):
         return [_filled(value, log) for value in node]
-    if isinstance(node, str) and "{" in node:
-        return node.replace("{folder}", str(log.parent)).replace("{stem}", log.stem)
+    if isinstance(node, str):
+        for word, own in zip(OF_LOG, (str(log.parent), log.stem), strict=True):
+            node = node.replace(word, own)
     return node
 
 

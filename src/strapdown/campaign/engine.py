@@ -16,8 +16,7 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-
-from strapdown.campaign.case_process import CaseProcess, Row
+from strapdown.campaign.case_process import CaseProcess
 from strapdown.errors import ConfigError
 
 __all__ = ["Workers", "cores", "run_batches"]
@@ -31,8 +30,9 @@ MOST, MOST_BULK, TOGETHER = 1000, 65_536, 64
 #: Share of the latest batch in the estimated cost of a case.
 LATEST = 0.3
 
-#: Processes of this worker that wait for a batch, by campaign.
-_KEPT: dict[str, queue.SimpleQueue[CaseProcess]] = {}
+#: Processes of this worker by campaign: those that wait for a batch, and all of them.
+_IDLE: dict[str, queue.SimpleQueue[CaseProcess]] = {}
+_ALL: dict[str, list[CaseProcess]] = {}
 
 
 def cores() -> int:
@@ -64,28 +64,27 @@ class Workers:
 
 def _batch(frozen: Mapping[str, Any], numbers: list[int]) -> tuple[Any, float]:
     """Run a batch in a process of this worker; returns rows, or an array in bulk, and seconds."""
-    kept = _KEPT.setdefault(frozen["identity"], queue.SimpleQueue())
+    name = frozen["identity"]
+    idle = _IDLE.setdefault(name, queue.SimpleQueue())
     try:
-        keeper = kept.get_nowait()
+        keeper = idle.get_nowait()
     except queue.Empty:
         keeper = CaseProcess(frozen)
+        _ALL.setdefault(name, []).append(keeper)
     begun = time.monotonic()
     try:
         if frozen["base"].get("bulk"):
             return keeper.block(numbers[0], numbers[-1] + 1), time.monotonic() - begun
         return list(keeper.run(numbers)), time.monotonic() - begun
     finally:
-        kept.put(keeper)
+        idle.put(keeper)
 
 
-def _end_kept(identity: str) -> None:
-    """End the processes of a campaign on this worker."""
-    kept = _KEPT.pop(identity, None)
-    while kept is not None:
-        try:
-            kept.get_nowait().stop()
-        except queue.Empty:
-            return
+def _end_kept(name: str) -> None:
+    """End the processes of a campaign on this worker, also those that are in a batch."""
+    _IDLE.pop(name, None)
+    for keeper in _ALL.pop(name, ()):
+        keeper.close()
 
 
 def run_batches(
@@ -139,9 +138,11 @@ def run_batches(
             client = Client(cluster or workers.scheduler, timeout="10s", set_as_default=False)
         except (OSError, ValueError) as error:
             raise ConfigError(
-                "campaign.no-scheduler", quantity="--scheduler", address=workers.scheduler,
+                "campaign.no-scheduler",
+                quantity="--scheduler",
+                address=workers.scheduler,
                 reason=str(error) or type(error).__name__,
-            ) from None  # fmt: skip
+            ) from None
         if workers.dashboard:
             port = client.dashboard_link.rpartition(":")[2]
             shown(client.dashboard_link if cluster is None else f"http://127.0.0.1:{port}")
@@ -181,9 +182,11 @@ def _feed(
         if cost is None:
             return 10 * TOGETHER if bulk else 1
         count = max(1, round(BATCH / max(cost, 1e-9)))
-        return max(TOGETHER, min(count, MOST_BULK) // TOGETHER * TOGETHER) if bulk else min(
-            count, MOST
-        )  # fmt: skip
+        return (
+            max(TOGETHER, min(count, MOST_BULK) // TOGETHER * TOGETHER)
+            if bulk
+            else min(count, MOST)
+        )
 
     def ask() -> bool:
         batch = _next(numbers, size(), held, contiguous=bulk)
@@ -260,5 +263,3 @@ def serve(address: str, count: int | None) -> None:
             address=address,
             reason=str(error) or type(error).__name__,
         ) from None
-
-

@@ -174,9 +174,13 @@ class CampaignRun:
         return self.cases
 
     def save(
-        self, out: str | Path, *, report: bool = True, force: bool = False,
+        self,
+        out: str | Path,
+        *,
+        report: bool = True,
+        force: bool = False,
         progress: Progress = silent,
-    ) -> Seal:  # fmt: skip
+    ) -> Seal:
         """Write the campaign as a sealed bundle, which `verify` runs again.
 
         Parameters
@@ -235,7 +239,7 @@ def campaign(
         The campaign is invalid; the message names the line. Or no worker is to be had.
     """
     path = Path(file)
-    spec = CampaignSpec.read(path)
+    spec = CampaignSpec.read(path, files=False)
     design = Campaign.of(spec, path.parent)
     own = (input_files("campaign", str(path), (path,)),)
     design = replace(design, inputs=(*own, *design.inputs))
@@ -263,9 +267,10 @@ def resume(
     if design.identity != dataset.frozen["identity"]:
         raise ConfigError("campaign.other-version", file=str(folder))
     for one in design.inputs:
-        if not all(f.is_file() for f in one.files) or input_files(
-            one.role, str(one.path), one.files
-        ) != one:  # fmt: skip
+        if (
+            not all(f.is_file() for f in one.files)
+            or input_files(one.role, str(one.path), one.files) != one
+        ):
             raise DataError("bundle.input-changed", file=str(one.path))
     return _finished(design, dataset, workers or Workers(), (1, 1), progress, shown)
 

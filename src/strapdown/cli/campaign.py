@@ -13,7 +13,6 @@ from strapdown.cli.shared_options import ReportFlags, folder_to_make, running, s
 
 if TYPE_CHECKING:
     from strapdown.bundle import Seal
-    from strapdown.campaign.run import CampaignRun
 
 EPILOG = (
     "Example: strapdown campaign tunnel.toml\n\n"
@@ -163,7 +162,7 @@ def _run(folder: Path, write: Any, compute: Any, *, complete: bool = True) -> No
     done = run_and_save(lambda report: compute(report, shown), folder, write, "summary.json", clean)
     if done is not None:
         result, seal = done
-        print_campaign(result.design.plain(), result.summary)
+        print_campaign(result.design.plain(), result.summary, folder.name)
         print_seal(seal, "summary.json", write.no_report)
 
 
@@ -272,16 +271,21 @@ def case(
     )
 
 
-def print_campaign(frozen: dict[str, Any], summary: dict[str, Any]) -> None:
-    """Print coverages, rates, failures and the distributions of each cell."""
-    from strapdown.campaign.page import answer_blocks, headline
+def print_campaign(frozen: dict[str, Any], summary: dict[str, Any], name: str) -> None:
+    """Print the answers that the first page of the report shows."""
+    from strapdown.campaign.page import campaign_document
     from strapdown.cli.console import console, print_block
+    from strapdown.report.document import Paragraph, TableBlock
     from strapdown.report.values import spaced
 
     out = console()
-    out.print(spaced(headline(frozen, summary)), style="bold", markup=False)
-    for block in answer_blocks(frozen, summary):
-        print_block(block)
+    document = campaign_document(frozen, summary, name)
+    out.print(spaced(document.title), style="bold", markup=False)
+    for block in document.front:
+        if isinstance(block, TableBlock):
+            print_block(block)
+        elif isinstance(block, Paragraph):
+            out.print(spaced(block.text), markup=False)
 
 
 def _part(text: str | None) -> tuple[int, int]:

@@ -17,6 +17,8 @@ from strapdown.errors import ConfigError, Finding
 
 #: Value that only the user knows.
 PLACEHOLDER = "?"
+#: Stand for the folder and the name of a log, in the configuration of a campaign over logs.
+OF_LOG = ("{folder}", "{stem}")
 #: Above this number of open values they are counted, not listed.
 MOST_OPEN = 60
 
@@ -153,6 +155,9 @@ def _with_absolute_paths(file: TomlFile) -> tuple[dict[str, Any], list[Fault]]:
             return [resolved(value, (*path, k)) for k, value in enumerate(node)]
         # What cannot name a file is refused by the form.
         if not isinstance(node, str) or not node.isprintable() or not node.strip():
+            return node
+        # Of each log of a fleet: its place is known when the log is.
+        if any(word in node for word in OF_LOG):
             return node
         key = next((k for k in reversed(path) if isinstance(k, str)), "")
         own = key in ("sensor", "severity", "calibration") and node.lower().endswith(".toml")
