@@ -760,25 +760,19 @@ class _Page:
         kinds = []
         if len(self.cells) > 1:
             for k, one in enumerate(self.cells[: 2 * LINES]):
-                kinds.append((self.cell_name(one), cell == one["cell"], look(k)))
+                style = look(k)
+                own = cell == one["cell"]
+                kinds.append((self.cell_name(one), own, style["colour"], style["symbol"]))
         else:
             fences = scalars[0].get("outliers") or {"low_fence": -math.inf, "high_fence": math.inf}
             far = (y < fences["low_fence"]) | (y > fences["high_fence"])
-            kinds.append(("log", ~far, {"colour": BLUE, "symbol": "circle"}))
-            kinds.append(("far out", far, {"colour": VERMILLION, "symbol": "diamond"}))
+            kinds.append(("log", ~far, BLUE, "circle"))
+            kinds.append(("far out", far, VERMILLION, "diamond"))
         ends = [_number(_quantile(one, p)["value"]) for one in scalars for p in (0.025, 0.975)]
         log = _decades(ends) and min(_number(one["minimum"]) for one in scalars) > 0.0
         lines = tuple(
-            Line(
-                words,
-                x[own],
-                y[own],
-                style["colour"],
-                points=True,
-                symbol=style["symbol"],
-                size=4.0,
-            )
-            for words, own, style in kinds
+            Line(words, x[own], y[own], colour, points=True, symbol=symbol, size=4.0)
+            for words, own, colour, symbol in kinds
             if np.isfinite(y[own]).any()
         )
         middle = _number(_quantile(scalars[0], 0.5)["value"])

@@ -110,8 +110,8 @@ class Moments:
     ----------
     count, missing : ndarray of int, (groups,)
         Values, and cases without one.
-    mean, square : ndarray, (groups,)
-        `square` is the sum of squared deviations from the mean.
+    square : ndarray, (groups,)
+        Sum of squared deviations from the mean.
     low, high : ndarray, (groups,)
         Infinite without values.
     low_case, high_case : ndarray of int, (groups,)
@@ -120,7 +120,9 @@ class Moments:
 
     def __init__(self, groups: int) -> None:
         self.count, self.missing = np.zeros(groups, np.int64), np.zeros(groups, np.int64)
-        self.mean, self.square = np.zeros(groups), np.zeros(groups)
+        # Means are kept from the first value, which loses no digits where the spread is small.
+        self._origin, self._off = np.full(groups, np.nan), np.zeros(groups)
+        self.square = np.zeros(groups)
         self.low, self.high = np.full(groups, np.inf), np.full(groups, -np.inf)
         self.low_case, self.high_case = np.full(groups, -1), np.full(groups, -1)
 
@@ -131,14 +133,17 @@ class Moments:
         self.missing += np.bincount(block.group[~there], minlength=groups)
         group, value, case = block.group[there], block.value[there] + 0.0, block.case[there]
         count = np.bincount(group, minlength=groups)
-        # An infinite value has an infinite mean and no variance.
+        fresh = np.isnan(self._origin[group]) & np.isfinite(value)
+        self._origin[group[fresh][::-1]] = value[fresh][::-1]
+        # With an infinite value mean and variance are infinite or NaN.
         with np.errstate(invalid="ignore", over="ignore"):
             some = np.maximum(count, 1)
-            mean = np.bincount(group, value, groups) / some
-            apart = value - mean[group]
-            off = np.bincount(group, apart, groups)
-            square = np.bincount(group, apart**2, groups) - off**2 / some
-            self._merge(count, mean + off / some, square)
+            off_origin = value - np.nan_to_num(self._origin)[group]
+            mean = np.bincount(group, off_origin, groups) / some
+            apart = off_origin - mean[group]
+            rest = np.bincount(group, apart, groups)
+            square = np.bincount(group, apart**2, groups) - rest**2 / some
+            self._merge(count, mean + rest / some, square)
         for extreme, where, better, put in (
             (self.low, self.low_case, np.less, np.minimum),
             (self.high, self.high_case, np.greater, np.maximum),
@@ -152,10 +157,15 @@ class Moments:
     def _merge(self, count: Whole, mean: Array, square: Array) -> None:
         # Chan, Golub and LeVeque (1983), eq. 2.1.
         total = np.maximum(self.count + count, 1)
-        step = np.where(count > 0, mean - self.mean, 0.0)
-        self.mean = self.mean + step * (count / total)
+        step = np.where(count > 0, mean - self._off, 0.0)
+        self._off = self._off + step * (count / total)
         self.square = self.square + square + step**2 * (self.count * count / total)
         self.count = self.count + count
+
+    @property
+    def mean(self) -> Array:
+        """Mean of each group; NaN without values."""
+        return np.where(self.count > 0, np.nan_to_num(self._origin) + self._off, np.nan)
 
     @property
     def sd(self) -> Array:
@@ -333,7 +343,8 @@ def quantiles(
         Quantiles, low and high ends; NaN for what does not exist.
     """
     ranks = quantile_ranks(of.count, levels, confidence)
-    found = order_statistics(stream, of, ranks.reshape(ranks.shape[0], -1)).reshape(ranks.shape)
+    flat = ranks.reshape(len(ranks), 4 * len(levels))
+    found = order_statistics(stream, of, flat).reshape(ranks.shape)
     below, above, low, high = np.moveaxis(found, -1, 0)
     at = np.maximum(of.count - 1, 0)[:, None] * np.asarray(levels)
     with np.errstate(invalid="ignore"):
@@ -401,10 +412,12 @@ class Consistency:
 
 def consistency(count: int, mean: float, inside: int, dof: float) -> Consistency:
     """Return the test of `count` normalized errors squared, each of `dof` degrees of freedom."""
-    if not count:
-        return Consistency(0, *(math.nan,) * 5, inside=share_of(0, 0))
-    ends = (chi_square_quantile(p, count * dof) / count for p in (0.025, 0.975, 0.005, 0.995))
-    return Consistency(count, mean, *ends, inside=share_of(inside, count))
+    shares = (0.025, 0.975, 0.005, 0.995)
+    low, high, low_99, high_99 = (
+        chi_square_quantile(p, count * dof) / count if count else math.nan for p in shares
+    )
+    middle = mean if count else math.nan
+    return Consistency(count, middle, low, high, low_99, high_99, share_of(inside, count))
 
 
 def count_between(edges: Array, values: Array) -> Whole:

@@ -443,7 +443,7 @@ def _scalar(
     out: dict[str, Any] = {
         "count": count,
         "missing": int(moments.missing[group]),
-        "mean": float(mean) if count else math.nan,
+        "mean": float(mean),
         "mean_low": low,
         "mean_high": high,
         "sd": float(sd),
@@ -567,7 +567,7 @@ def _curves(
     shape = (len(plan.cells), len(names), size)
     parts = {
         "count": moments.count,
-        "mean": np.where(moments.count > 0, moments.mean, np.nan),
+        "mean": moments.mean,
         **dict(zip(("low", "median", "high"), found.T, strict=True)),
     }
     bands = [
