@@ -275,7 +275,7 @@ def print_campaign(frozen: dict[str, Any], summary: dict[str, Any], name: str) -
     """Print the answers that the first page of the report shows."""
     from strapdown.campaign.page import campaign_document
     from strapdown.cli.console import console, print_block
-    from strapdown.report.document import Paragraph, TableBlock
+    from strapdown.report.document import Items, KeyFigures, Paragraph, TableBlock
     from strapdown.report.values import spaced
 
     out = console()
@@ -286,6 +286,15 @@ def print_campaign(frozen: dict[str, Any], summary: dict[str, Any], name: str) -
             print_block(block)
         elif isinstance(block, Paragraph):
             out.print(spaced(block.text), markup=False)
+        elif isinstance(block, Items):
+            for head, text in block.rows:
+                out.print(spaced(f"{head}: {text}"), markup=False)
+        elif isinstance(block, KeyFigures):
+            for one in block.figures:
+                out.print(spaced(f"{one.name}: {one.value}"), style="bold", markup=False)
+                for text in (one.bound, one.note):
+                    if text:
+                        out.print(spaced(f"  {text}"), markup=False)
 
 
 def _part(text: str | None) -> tuple[int, int]:
