@@ -98,15 +98,24 @@ class Dataset:
         ConfigError: the folder is of another campaign, or of another version of the program.
         """
         if (folder / CAMPAIGN).exists():
-            there = frozen_of(folder)
-            if there["identity"] != frozen["identity"]:
-                raise ConfigError("campaign.other-campaign", file=str(folder))
-            return cls(folder, there)
+            made = cls(folder, frozen_of(folder))
+            made.check(frozen)
+            return made
         (folder / CASES).mkdir(parents=True, exist_ok=True)
         if frozen["keep"].get("curves"):
             (folder / CURVES).mkdir(exist_ok=True)
         _written(folder / CAMPAIGN, lambda path: path.write_text(to_json(frozen), "utf-8"))
         return cls(folder, frozen)
+
+    def check(self, frozen: Mapping[str, Any]) -> None:
+        """Refuse another campaign, other input files, or another version of the program."""
+        for key, code in (
+            ("identity", "campaign.other-campaign"),
+            ("digests", "campaign.other-inputs"),
+            ("source", "campaign.other-version"),
+        ):
+            if self.frozen[key] != frozen[key]:
+                raise ConfigError(code, file=str(self.folder))
 
     def add(self, rows: Sequence[Mapping[str, Any]]) -> None:
         """Write rows as parts, each whole or not at all.

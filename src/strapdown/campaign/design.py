@@ -16,7 +16,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from strapdown.bundle import InputFiles, input_files, named_paths, source_digest
+from strapdown.bundle import InputFiles, input_files, named_paths
 from strapdown.campaign.kinds import KINDS, Table, at_path, parts_of, with_value
 from strapdown.campaign.specification import CampaignSpec, ParameterTable
 from strapdown.config.reading import OF_LOG, absolute_table
@@ -73,8 +73,8 @@ class Campaign:
         Of a fleet: names from the folder of the campaign, and absolute paths.
     rows : tuple of dict
         Of a table of cases.
-    inputs : tuple of InputFiles
-        Files of the campaign itself, and those that its base and its logs name.
+    files : tuple of (str, str)
+        Roles and paths of the file of the campaign and of its base.
     """
 
     spec: CampaignSpec
@@ -83,7 +83,7 @@ class Campaign:
     logs: tuple[str, ...] = ()
     log_path: tuple[str, ...] = ()
     rows: tuple[Table, ...] = field(default=(), repr=False)
-    inputs: tuple[InputFiles, ...] = field(default=(), repr=False)
+    files: tuple[tuple[str, str], ...] = ()
 
     @classmethod
     def of(cls, spec: CampaignSpec, folder: Path) -> Campaign:
@@ -108,12 +108,8 @@ class Campaign:
         rows: tuple[Table, ...] = ()
         if spec.cases.table is not None:
             rows = _rows(folder / spec.cases.table, spec)
-        inputs = [] if file is None else [input_files("base", str(file), (file,))]
-        tables = [_filled(table, Path(log)) for log in paths] if paths else [table]
-        named = (path for one in tables for path in named_paths(one))
-        for path in dict.fromkeys((*named, *paths)):
-            inputs.append(input_files("input", path, _files(Path(path))))
-        made = cls(spec, table, written, logs, paths, rows, tuple(inputs))
+        files = () if file is None else (("base", str(file.absolute())),)
+        made = cls(spec, table, written, logs, paths, rows, files)
         made._check()
         return made
 
@@ -128,12 +124,19 @@ class Campaign:
             tuple(frozen["logs"]),
             tuple(places["log_path"]),
             tuple(frozen["rows"]),
-            tuple(
-                InputFiles(one["role"], path, _files(path), tuple(one["sha256"]))
-                for one in places.get("inputs", ())
-                for path in (Path(one["path"]),)
-            ),
+            tuple((one["role"], one["file_path"]) for one in places["files"]),
         )
+
+    @cached_property
+    def inputs(self) -> tuple[InputFiles, ...]:
+        """Files of the campaign and its base, and those that they name, with their digests."""
+        found = [input_files(role, path, (Path(path),)) for role, path in self.files]
+        logs = [Path(log) for log in self.log_path]
+        tables = [_filled(self.base, log) for log in logs] if logs else [self.base]
+        named = (path for one in tables for path in named_paths(one))
+        for path in dict.fromkeys((*named, *self.log_path)):
+            found.append(input_files("input", path, _files(Path(path))))
+        return tuple(found)
 
     def plain(self) -> dict[str, Any]:
         """Return what the campaign is, as plain data without the places of its files."""
@@ -157,11 +160,11 @@ class Campaign:
 
     def frozen(self) -> dict[str, Any]:
         """Return plain data from which `thawed` makes the same campaign."""
-        inputs = [
-            {"role": one.role, "path": str(one.path.absolute()), "sha256": list(one.digests)}
-            for one in self.inputs
-        ]
-        places = {"configuration": self.base, "log_path": list(self.log_path), "inputs": inputs}
+        places = {
+            "files": [{"role": role, "file_path": path} for role, path in self.files],
+            "configuration": self.base,
+            "log_path": list(self.log_path),
+        }
         return {**self.plain(), "places": places}
 
     @cached_property
@@ -172,7 +175,7 @@ class Campaign:
             plain.pop(key, None)
         plain["keep"] = {**plain["keep"], "scalars": dict(self.scalars)}
         parts = [plain, list(self.logs), list(self.rows), self.written]
-        text = json.dumps([*parts, source_digest()], sort_keys=True, default=str)
+        text = json.dumps(parts, sort_keys=True, default=str)
         return hashlib.sha256(text.encode()).hexdigest()
 
     @cached_property

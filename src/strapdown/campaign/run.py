@@ -17,9 +17,9 @@ import pandas as pd
 from strapdown.bundle import (
     InputFiles,
     Seal,
-    input_files,
     read_manifest,
     resolved,
+    source_digest,
     write_json,
 )
 from strapdown.campaign.case_process import run_case
@@ -241,14 +241,19 @@ def campaign(
     path = Path(file)
     spec = CampaignSpec.read(path, files=False)
     design = Campaign.of(spec, path.parent)
-    own = (input_files("campaign", str(path), (path,)),)
-    design = replace(design, inputs=(*own, *design.inputs))
+    design = replace(design, files=(("campaign", str(path.absolute())), *design.files))
     if isinstance(workers, int):
         workers = Workers(workers)
     if folder is None:
         folder = Path(tempfile.mkdtemp(prefix="strapdown-campaign-"))
-    dataset = Dataset.begin(Path(folder), design.frozen())
+    dataset = Dataset.begin(Path(folder), _with_digests(design))
     return _finished(design, dataset, workers or Workers(), part, progress, shown)
+
+
+def _with_digests(design: Campaign) -> dict[str, Any]:
+    """The frozen campaign of a working folder, with what its results depend on besides."""
+    digests = [digest for one in design.inputs for digest in one.digests]
+    return {**design.frozen(), "digests": digests, "source": source_digest()}
 
 
 def resume(
@@ -264,14 +269,7 @@ def resume(
     """
     dataset = Dataset(Path(folder), frozen_of(Path(folder)))
     design = Campaign.thawed(dataset.frozen)
-    if design.identity != dataset.frozen["identity"]:
-        raise ConfigError("campaign.other-version", file=str(folder))
-    for one in design.inputs:
-        if (
-            not all(f.is_file() for f in one.files)
-            or input_files(one.role, str(one.path), one.files) != one
-        ):
-            raise DataError("bundle.input-changed", file=str(one.path))
+    dataset.check(_with_digests(design))
     return _finished(design, dataset, workers or Workers(), (1, 1), progress, shown)
 
 
@@ -384,16 +382,14 @@ def _summary(dataset: Dataset, stopped: Mapping[int, int]) -> dict[str, Any]:
 
 
 def _configuration(run: CampaignRun) -> dict[str, Any]:
-    frozen = run.design.frozen()
-    frozen["places"].pop("inputs")  # of the manifest
-    return {"campaign": frozen}
+    return {"campaign": run.design.frozen()}
 
 
 def _run(configuration: dict[str, Any]) -> CampaignRun:
     found = configuration["campaign"]
     design = Campaign.thawed(found)
     folder = Path(tempfile.mkdtemp(prefix="strapdown-campaign-"))
-    dataset = Dataset.begin(folder, design.frozen())
+    dataset = Dataset.begin(folder, _with_digests(design))
     return _finished(design, dataset, Workers(), (1, 1), silent, lambda address: None)
 
 
@@ -542,8 +538,7 @@ def merge_parts(folders: Sequence[str | Path], out: str | Path) -> int:
             raise DataError("campaign.sealed-part", file=str(folder))
         if target is None:
             target = Dataset.begin(Path(out), found.dataset.frozen)
-        if found.dataset.frozen["identity"] != target.frozen["identity"]:
-            raise ConfigError("campaign.other-campaign", file=str(folder))
+        found.dataset.check(target.frozen)
         for name in ("cases", "curves"):
             for path in sorted((found.dataset.folder / name).glob("part-*.parquet")):
                 copy = target.folder / name / path.name
