@@ -519,7 +519,18 @@ class _Page:
                 )
                 style = look(k)
                 label = line or "median"
-                drawn.append(Line(label, x, middle, dots=True, size=7.0, **style))
+                drawn.append(
+                    Line(
+                        label,
+                        x,
+                        middle,
+                        style["colour"],
+                        style["dash"],
+                        dots=True,
+                        symbol=style["symbol"],
+                        size=7.0,
+                    )
+                )
                 fills.append(Fill(label, x, low, high, style["colour"], 0.14, legend=False))
                 ends += [*low.tolist(), *high.tolist()]
             panels.append((title, tuple(drawn), tuple(fills)))
