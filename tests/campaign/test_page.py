@@ -157,3 +157,11 @@ def test_words_of_the_user_are_escaped() -> None:
     spec["title"] = "<script>alert(1)</script>"
     spec["cells"][0]["sensor"] = cases.loc[0, "sensor"] = "<b>"
     assert "<script>alert" not in document_page(document_of(spec, cases))
+
+
+@pytest.mark.parametrize(("logs", "drawn"), [(18, 0), (40, 3)])
+def test_few_values_have_no_histogram(logs: int, drawn: int) -> None:
+    spec, table = fleet(40)
+    document = document_of(spec, table.head(logs))
+    charts = [c for c in blocks_of(document, Chart) if c.slug.startswith("distribution")]
+    assert len(charts) == drawn

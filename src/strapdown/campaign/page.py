@@ -47,6 +47,8 @@ __all__ = ["campaign_document"]
 
 #: Rows of a table, categories of a chart, lines of a panel, and panels of a chart, at most.
 ROWS, CATEGORIES, LINES, PANELS = 100, 40, 6, 6
+#: Values of which a histogram is drawn, at least.
+LEAST = 20
 _BOUND_WORDS = {
     "consistent": "consistent with {}",
     "optimistic": "optimistic: the bound is too small for {}",
@@ -519,7 +521,18 @@ class _Page:
                 )
                 style = look(k)
                 label = line or "median"
-                drawn.append(Line(label, x, middle, dots=True, size=7.0, **style))
+                drawn.append(
+                    Line(
+                        label,
+                        x,
+                        middle,
+                        style["colour"],
+                        style["dash"],
+                        dots=True,
+                        symbol=style["symbol"],
+                        size=7.0,
+                    )
+                )
                 fills.append(Fill(label, x, low, high, style["colour"], 0.14, legend=False))
                 ends += [*low.tolist(), *high.tolist()]
             panels.append((title, tuple(drawn), tuple(fills)))
@@ -681,7 +694,7 @@ class _Page:
             found = [
                 (c, c["scalars"][name]["histogram"])
                 for c in self.cells
-                if "histogram" in c["scalars"][name]
+                if "histogram" in c["scalars"][name] and c["scalars"][name]["count"] >= LEAST
             ]
             if not found:
                 continue
@@ -701,7 +714,8 @@ class _Page:
                     )
                 )
             beyond = sum(one["below"] + one["above"] for _, one in found)
-            caption = f"{capital(self.case_noun)}s by value."
+            steps = "ratio" if all(one["log"] for _, one in found) else "width"
+            caption = f"{capital(self.case_noun)}s by value, in steps of equal {steps}."
             if beyond:
                 caption += f" {_count(beyond, self.case_noun)} beyond the axis, far out."
             marks = []
