@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 
 import numpy as np
 import pandas as pd
@@ -21,7 +20,8 @@ from tests.campaign_cases import (
     ishigami,
 )
 
-from strapdown.campaign.summary import LEVELS, interval_half_width, summarise
+from strapdown.campaign.run import Stopping
+from strapdown.campaign.summary import LEVELS, summarise
 
 
 @pytest.fixture(scope="module")
@@ -199,19 +199,26 @@ def test_a_constant_has_neither_histogram_nor_outliers(value: float) -> None:
 
 def test_half_widths_for_stopping() -> None:
     spec, cases, _ = grid()
-    own = cases[cases["cell"] == 5]
-    done = own[own["status"] == "done"]
-    for rule, hits in (
-        ({"coverage": "north"}, done["north_error_m"].abs() <= done["north_bound_m"]),
-        ({"rate": "beyond 10 m"}, done["horizontal_end_m"] > 10.0),
-    ):
-        ends = stats.binomtest(int(hits.sum()), len(done)).proportion_ci()
-        half = interval_half_width({**spec, "stop": rule}, own)
-        assert half == pytest.approx(0.5 * (ends.high - ends.low))
-    scalar = {**spec, "stop": {"scalar": "north_error_m"}}
-    sem = stats.sem(done["north_error_m"])
-    assert interval_half_width(scalar, own) == pytest.approx(
-        stats.t.ppf(0.975, len(done) - 1) * sem
-    )
-    for rule in ({"coverage": "north"}, {"scalar": "north_error_m"}):
-        assert interval_half_width({**spec, "stop": rule}, own.head(0)) == math.inf
+    own = cases[(cases["cell"] == 5) & (cases["status"] == "done")]
+    names = list(spec["keep"]["scalars"])
+    rows = [
+        {"cell": 0, "draw": k, "scalars": [one[name] for name in names]}
+        for k, one in enumerate(own.to_dict("records"))
+    ]
+    north, sem = own["north_error_m"], stats.sem(own["north_error_m"])
+    hits = {
+        ("coverage", "north"): north.abs() <= own["north_bound_m"],
+        ("rate", "beyond 10 m"): own["horizontal_end_m"] > 10.0,
+    }
+    halves = {("scalar", "north_error_m"): stats.t.ppf(0.975, len(own) - 1) * sem}
+    for rule, hit in hits.items():
+        ends = stats.binomtest(int(hit.sum()), len(own)).proportion_ci()
+        halves[rule] = 0.5 * (ends.high - ends.low)
+    for (key, name), half in halves.items():
+        for factor, stops in ((1.0 + 1e-9, True), (1.0 - 1e-9, False)):
+            stop = {key: name, "half_width": factor * half, "every": len(own)}
+            frozen = {**spec, "stop": stop, "cells": [{}], "total": 10 * len(own)}
+            stopping = Stopping(frozen)
+            for row in reversed(rows):  # as they arrive
+                stopping.add(row)
+            assert (stopping.stopped == {0: len(own)}) is stops

@@ -202,6 +202,8 @@ def _alignment_data(run: Any) -> Table:
 def _attitude(table: Table, name: str) -> Any:
     from strapdown.attitude_comparison.comparison import run_comparison
     from strapdown.attitude_comparison.options import AttitudeOptions
+    from strapdown.config.sources import ScenarioFile, ScenarioSpec
+    from strapdown.simulation import SCENARIOS
 
     keys = {key: value for key, value in table.items() if key != "source"}
     if "source" not in table:
@@ -210,7 +212,22 @@ def _attitude(table: Table, name: str) -> Any:
     if unknown:
         known = ["source", *AttitudeOptions.__dataclass_fields__]
         raise ConfigError("campaign.unknown-key", word=unknown[0], known=known, kind="attitude")
-    return run_comparison(AttitudeOptions(**keys).specify(table["source"]))
+    source = table["source"]
+    if not isinstance(source, dict):
+        return run_comparison(AttitudeOptions(**keys).specify(source))
+    # A scenario written here, whose motion varies.
+    own = ScenarioFile.checked({**source, "name": name})
+    seed = own.seed if keys.pop("seed", None) is None else table["seed"]
+    scenario = ScenarioSpec(
+        name=own.name,
+        own=own,
+        rate_hz=own.rate_hz,
+        sampling=own.sampling,
+        seed=seed,
+        sensor=own.sensor,
+    )
+    asked = AttitudeOptions(**keys).specify(next(iter(SCENARIOS)))
+    return run_comparison(asked.model_copy(update={"source": scenario}))
 
 
 def _attitude_data(run: Any) -> Table:

@@ -28,6 +28,7 @@ from strapdown.campaign.design import Campaign
 from strapdown.campaign.engine import Workers, run_batches
 from strapdown.campaign.kinds import KINDS
 from strapdown.campaign.specification import CampaignSpec
+from strapdown.campaign.statistics import share_of, student_interval
 from strapdown.errors import ConfigError, DataError
 from strapdown.progress import Progress, silent
 from strapdown.report.report_bundle import ReportBundle
@@ -98,18 +99,15 @@ class Stopping:
         return len(self.stopped) == self.cells
 
     def _narrow(self, cell: int) -> bool:
-        from strapdown.dsp.chi_square import clopper_pearson, student_quantile
-
         count, mean, square = self._sums[cell]
         if count < 2:
             return False
         if self.rule.get("scalar") is not None:
-            sd = math.sqrt(square / (count - 1) / count)
-            half = student_quantile(0.975, count - 1) * sd
+            low, high = student_interval(count, mean, math.sqrt(square / (count - 1)))
         else:
-            low, high = clopper_pearson(round(mean * count), count, 0.95)
-            half = 0.5 * (high - low)
-        return bool(half <= float(self.rule["half_width"]))
+            share = share_of(round(mean * count), count)
+            low, high = share.low, share.high
+        return 0.5 * (high - low) <= float(self.rule["half_width"])
 
 
 def _statistic(

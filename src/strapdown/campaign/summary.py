@@ -31,7 +31,7 @@ from strapdown.campaign.statistics import (
 from strapdown.dsp.chi_square import chi_square_quantile
 from strapdown.report.report_bundle import finite
 
-__all__ = ["LEVELS", "STATUSES", "interval_half_width", "summarise"]
+__all__ = ["LEVELS", "STATUSES", "summarise"]
 
 #: A function that returns an iterator over batches of cases, in order of case.
 Batches = Callable[[], Iterator[Any]]
@@ -108,30 +108,6 @@ def summarise(
     if tally.fleet:
         _name_logs(out, cases)
     return finite(out)
-
-
-def interval_half_width(frozen: Mapping[str, Any], cases: pd.DataFrame) -> float:
-    """Return half the 95 % interval that a campaign's ``stop`` looks at.
-
-    `cases`: those of one cell, the first in order. Of a coverage or a rate the interval is that of
-    Clopper and Pearson, of a scalar Student's interval of its mean. Infinite while it has too few.
-    """
-    stop = frozen["stop"]
-    plan = _Plan(frozen)
-    if scalar := stop.get("scalar"):
-        moments = Moments(1)
-        for block in blocks([cases]):
-            (value,) = plan.columns(block, [scalar]).T
-            moments.add(Values(np.zeros(len(value), np.int64), value, plan.number(block)))
-        low, high = student_interval(int(moments.count[0]), moments.mean[0], moments.sd[0])
-    else:
-        kind = "coverage" if stop.get("coverage") else "rate"
-        test = next(one for one in plan.tests if (one.kind, one.name) == (kind, stop[kind]))
-        hit, there = test.of(plan, cases)
-        share = share_of(int(hit.sum()), int(there.sum()))
-        low, high = (share.low, share.high) if share.of else (math.nan, math.nan)
-    half = 0.5 * (high - low)
-    return half if math.isfinite(half) else math.inf
 
 
 # The plan: what there is to summarise.
