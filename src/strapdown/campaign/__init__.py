@@ -1,0 +1,1 @@
+"""Campaigns: many cases of one question, and what they say together."""
