@@ -18,13 +18,13 @@ from strapdown._kernels.rotation import quat_multiply
 FELT, SCALE, SECOND, THIRD, BIAS = 3, 6, 7, 8, 9
 # Of an axis of every unit.
 FULL, QUANTUM = 0, 1
+# Samples that are formed together, in the cache.
+CHUNK = 512
 
 
 @njit(cache=True, error_model="numpy")
-def curve(x, scale, second, third, full):
-    """Output of an axis for an input; linear along the tangent beyond full scale."""
-    if second == 0.0 and third == 0.0:
-        return x * (1.0 + scale)
+def bent(x, scale, second, third, full):
+    """Output of an axis with nonlinearity; linear along the tangent beyond full scale."""
     r = x / full
     inner = min(max(r, -1.0), 1.0)
     gain = 1.0 + scale
@@ -34,19 +34,15 @@ def curve(x, scale, second, third, full):
 
 
 @njit(cache=True, error_model="numpy")
-def curves(x, scale, second, third, full, out):
-    """`curve` of (n,) inputs."""
-    for k in range(x.shape[0]):
-        out[k] = curve(x[k], scale, second, third, full)
-
-
-@njit(cache=True, error_model="numpy")
-def converted(y, full, quantum):
-    """Output of the converter: clipped, then rounded."""
-    y = min(max(y, -full), full)
-    if quantum > 0.0:
-        y = np.rint(y / quantum) * quantum
-    return y
+def curve(x, scale, second, third, full):
+    """Replace inputs of an axis, (n,), by its output."""
+    if second == 0.0 and third == 0.0:
+        gain = 1.0 + scale
+        for k in range(x.shape[0]):
+            x[k] *= gain
+    else:
+        for k in range(x.shape[0]):
+            x[k] = bent(x[k], scale, second, third, full)
 
 
 @njit(cache=True, error_model="numpy")
@@ -69,51 +65,78 @@ def unit_increments(
 ):
     """Fill theta and dtheta, (n - 1, 3), of the steps between n samples of a unit.
 
-    `rate`, (n, 3), rad/s, and `force`, (n, 3), m/s², are the true ones, `felt` whether the force
-    has an effect; `shared`, (n, 3), is the drift of every unit; `slow`, (blocks, 3), that of this
+    `rate`, (3, n), rad/s, and `force`, (3, n), m/s², are the true ones, `felt` whether the force
+    has an effect; `shared`, (3, n), is the drift of every unit; `slow`, (blocks, 3), that of this
     one, each over `each` samples. `unit`, (3, 10): of each axis the row of I + misalignment, the
     row of the g-sensitivity, scale, second and third order, bias; `limits`, (3, 2): full scale and
-    quantum. White noise of `noise_sd`, (n, 3): two bytes of `numbers`, (n, 6), choose among
+    quantum. White noise of `noise_sd`, (3, n): two bytes of `numbers`, (6, n), choose among
     `quantiles`, (65536,).
     """
-    block, left = 0, each
-    before0, before1, before2 = 0.0, 0.0, 0.0
-    for i in range(rate.shape[0]):
-        if left == 0:
-            block += 1
-            left = each
-        left -= 1
-        y0 = _measured(
-            0, i, block, rate, force, felt, shared, slow, unit, limits, noise_sd, numbers, quantiles
-        )
-        y1 = _measured(
-            1, i, block, rate, force, felt, shared, slow, unit, limits, noise_sd, numbers, quantiles
-        )
-        y2 = _measured(
-            2, i, block, rate, force, felt, shared, slow, unit, limits, noise_sd, numbers, quantiles
-        )
-        if i > 0:
-            k = i - 1
-            theta[k, 0], dtheta[k, 0] = increment(before0, y0, dt[k], mean)
-            theta[k, 1], dtheta[k, 1] = increment(before1, y1, dt[k], mean)
-            theta[k, 2], dtheta[k, 2] = increment(before2, y2, dt[k], mean)
-        before0, before1, before2 = y0, y1, y2
+    count = rate.shape[1]
+    # The last sample of a chunk is the first of the next.
+    measured = np.zeros((3, CHUNK + 1))
+    for start in range(0, count, CHUNK):
+        stop = min(start + CHUNK, count)
+        for j in range(3):
+            y = measured[j]
+            y[0] = y[CHUNK]
+            _sense(y, start, stop, rate, force, felt, unit[j], limits[j, FULL])
+            _drift(y, start, stop, j, shared[j], slow, each, unit[j, BIAS])
+            sd, low, high = noise_sd[j], numbers[2 * j], numbers[2 * j + 1]
+            for i in range(start, stop):
+                number = int(low[i]) + 256 * int(high[i])
+                y[1 + i - start] += sd[i] * quantiles[number]
+            _convert(y, stop - start, limits[j, FULL], limits[j, QUANTUM])
+        for i in range(max(start, 1), stop):
+            k, m, step = i - 1, i - start, dt[i - 1]
+            for j in range(3):
+                theta[k, j], dtheta[k, j] = increment(
+                    measured[j, m], measured[j, m + 1], step, mean
+                )
+
+
+# Each a loop of its own, for the compiler to take several samples at once.
 
 
 @njit(cache=True, error_model="numpy")
-def _measured(
-    j, i, block, rate, force, felt, shared, slow, unit, limits, noise_sd, numbers, quantiles
-):
-    """Output of axis j at sample i."""
-    v = unit[j, 0] * rate[i, 0] + unit[j, 1] * rate[i, 1] + unit[j, 2] * rate[i, 2]
+def _sense(y, start, stop, rate, force, felt, own, full):
+    """Output of an axis without drift and noise, from the second element of y on."""
+    a, b, c = own[0], own[1], own[2]
+    x, v, w = rate[0], rate[1], rate[2]
+    for i in range(start, stop):
+        y[1 + i - start] = a * x[i] + b * v[i] + c * w[i]
     if felt:
-        v += unit[j, FELT] * force[i, 0]
-        v += unit[j, FELT + 1] * force[i, 1]
-        v += unit[j, FELT + 2] * force[i, 2]
-    y = curve(v, unit[j, SCALE], unit[j, SECOND], unit[j, THIRD], limits[j, FULL])
-    number = int(numbers[i, 2 * j]) + 256 * int(numbers[i, 2 * j + 1])
-    y += unit[j, BIAS] + shared[i, j] + slow[block, j] + noise_sd[i, j] * quantiles[number]
-    return converted(y, limits[j, FULL], limits[j, QUANTUM])
+        a, b, c = own[FELT], own[FELT + 1], own[FELT + 2]
+        x, v, w = force[0], force[1], force[2]
+        for i in range(start, stop):
+            y[1 + i - start] += a * x[i] + b * v[i] + c * w[i]
+    curve(y[1 : 1 + stop - start], own[SCALE], own[SECOND], own[THIRD], full)
+
+
+@njit(cache=True, error_model="numpy")
+def _drift(y, start, stop, j, shared, slow, each, bias):
+    """Add bias, the drift of every unit and that of this one."""
+    for i in range(start, stop):
+        y[1 + i - start] += bias + shared[i]
+    block = start // each
+    begin = start
+    while begin < stop:
+        end = min((block + 1) * each, stop)
+        wandered = slow[block, j]
+        for i in range(begin, end):
+            y[1 + i - start] += wandered
+        begin = end
+        block += 1
+
+
+@njit(cache=True, error_model="numpy")
+def _convert(y, count, full, quantum):
+    """Clip to the range, then round to the quantum."""
+    for m in range(1, 1 + count):
+        y[m] = min(max(y[m], -full), full)
+    if quantum > 0.0:
+        for m in range(1, 1 + count):
+            y[m] = np.rint(y[m] / quantum) * quantum
 
 
 @njit(cache=True, error_model="numpy")

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import ClassVar, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,7 @@ from strapdown.config.outage import OutageSpec
 from strapdown.config.sources import ScenarioSpec
 from strapdown.crash.case import run_case
 from strapdown.crash.case_contact import main_event
-from strapdown.crash.delta_v_bound import AT_REST, WINDOW_ENDS, body_effects
+from strapdown.crash.delta_v_bound import AT_REST, WINDOW_ENDS, VelocityChange, body_effects
 from strapdown.crash.entry import angles_sd
 from strapdown.crash.path import PLACE, TOGETHER, VELOCITY, PathSampler
 from strapdown.crash.pdof import pdof
@@ -45,7 +45,8 @@ from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.simulation import simulate_imu
 from strapdown.systems.outage_run import ALIGNED, drift_of_sensor, sensor_of
 from strapdown.systems.trajectory_source import make_motion, scenario_of
-from strapdown.tables import ACCEL, EULER, GYRO, NED, QUATERNION
+from strapdown.tables import ACCEL, GYRO, NED, QUATERNION
+from strapdown.tables import VELOCITY as VELOCITIES
 from strapdown.tables.checks import index_of, values_of
 from strapdown.units import SPEEDS
 
@@ -55,26 +56,19 @@ Array = NDArray[np.float64]
 
 
 class BulkCases(Protocol):
-    """Cases that are computed many at a time.
-
-    Attributes
-    ----------
-    scalars : tuple of str
-        Names of the results of a case, each with its unit.
-    nominal : mapping of str to float
-        Results of the unperturbed case.
-    linear_sd : mapping of str to float
-        Standard deviation by linear propagation, of those results that have one.
-    """
+    """Cases that are computed many at a time."""
 
     @property
-    def scalars(self) -> tuple[str, ...]: ...
+    def scalars(self) -> tuple[str, ...]:
+        """Names of the results of a case, each with its unit."""
 
     @property
-    def nominal(self) -> Mapping[str, float]: ...
+    def nominal(self) -> Mapping[str, float]:
+        """Results of the unperturbed case."""
 
     @property
-    def linear_sd(self) -> Mapping[str, float]: ...
+    def linear_sd(self) -> Mapping[str, float]:
+        """Standard deviation by linear propagation, of those results that have one."""
 
     def run(self, first: int, last: int) -> Array:
         """Results of the cases from `first` to before `last`, (last - first, scalars)."""
@@ -84,7 +78,10 @@ class BulkCases(Protocol):
 class _Streams(ABC):
     """Cases in streams of `TOGETHER`."""
 
-    scalars: tuple[str, ...]
+    @property
+    @abstractmethod
+    def scalars(self) -> tuple[str, ...]:
+        """Names of the results of a case, each with its unit."""
 
     @abstractmethod
     def _stream(self, number: int) -> Array:
@@ -105,9 +102,7 @@ class _Streams(ABC):
 
 
 def _generator(seed: int, number: int) -> np.random.Generator:
-    return np.random.Generator(
-        np.random.SFC64(np.random.SeedSequence(seed, spawn_key=(number,)))
-    )
+    return np.random.Generator(np.random.SFC64(np.random.SeedSequence(seed, spawn_key=(number,))))
 
 
 def _root(covariance: Array) -> Array:
@@ -137,9 +132,9 @@ class BulkCrash(_Streams):
     unit: UnitReconstruction
     seed: int = 0
 
-    @cached_property
+    @property
     def scalars(self) -> tuple[str, ...]:
-        """Names of the results."""
+        """Names of the results of a case, each with its unit."""
         return tuple(self.nominal)
 
     @cached_property
@@ -147,7 +142,7 @@ class BulkCrash(_Streams):
         """Results of the reconstruction itself."""
         row = self.unit.path.table.iloc[-1]
         out = {f"end_{axis}_m": float(row[axis]) for axis in NED}
-        out["end_speed_m_per_s"] = math.hypot(float(row["VN"]), float(row["VE"]))
+        out |= {f"end_velocity_{a}_m_per_s": float(row[f"V{a[0].upper()}"]) for a in NED}
         out["end_heading_deg"] = float(row["heading"])
         if self._change is not None:
             vector = self._change.delta_v.vector
@@ -162,14 +157,11 @@ class BulkCrash(_Streams):
 
     @cached_property
     def linear_sd(self) -> Mapping[str, float]:
-        """Standard deviations of the reconstruction; of the speed and the PDOF to first order."""
+        """Standard deviations of the reconstruction; of the PDOF to first order."""
         path = self.unit.path
-        sd, row = path.sd.iloc[-1], path.table.iloc[-1]
+        sd = path.sd.iloc[-1]
         out = {f"end_{axis}_m": float(sd[axis]) for axis in NED}
-        P = path.covariance[-1][VELOCITY, VELOCITY][:2, :2]
-        course = row[["VN", "VE"]].to_numpy(dtype=np.float64)
-        if course.any():
-            out["end_speed_m_per_s"] = float(np.sqrt(course @ P @ course / (course @ course)))
+        out |= {f"end_velocity_{a}_m_per_s": float(sd[f"V{a[0].upper()}"]) for a in NED}
         out["end_heading_deg"] = float(sd["heading"])
         if self._change is not None:
             vector, bound = self._change.delta_v.vector, self._change.bound
@@ -180,9 +172,7 @@ class BulkCrash(_Streams):
                 "delta_v_right_m_per_s": bound.sd[1],
                 "delta_v_total_m_per_s": total,
                 "delta_v_total_km_per_h": total / SPEEDS["km/h"],
-                "pdof_deg": math.degrees(
-                    math.sqrt(across @ bound.covariance[:2, :2] @ across)
-                ),
+                "pdof_deg": math.degrees(math.sqrt(across @ bound.covariance[:2, :2] @ across)),
             }
         return out
 
@@ -191,7 +181,6 @@ class BulkCrash(_Streams):
         drawn = self._sampler.stream(number, errors)
         path, end = self.unit.path, errors[:, 0]
         row = path.table.iloc[-1]
-        velocity = row[["VN", "VE"]].to_numpy(dtype=np.float64) + end[:, VELOCITY][:, :2]
         turned = rotation.compose(
             rotation.quaternion_from_rotation_vector(end[:, :3]),
             np.broadcast_to(path.q_nb[-1], (TOGETHER, 4)),
@@ -199,7 +188,7 @@ class BulkCrash(_Streams):
         away = rotation.euler_from_quaternion(turned)[:, 2] - row["heading"]
         columns = [
             *(row[NED].to_numpy(dtype=np.float64) + end[:, PLACE]).T,
-            np.hypot(*velocity.T),
+            *(row[VELOCITIES].to_numpy(dtype=np.float64) + end[:, VELOCITY]).T,
             row["heading"] + within_half_turn(away),
         ]
         if self._change is not None:
@@ -228,7 +217,7 @@ class BulkCrash(_Streams):
         return PathSampler(self.unit.path, self.seed, [len(self.unit.path.time) - 1])
 
     @cached_property
-    def _change(self) -> object:
+    def _change(self) -> VelocityChange | None:
         number = main_event(self.unit)
         return None if number is None else self.unit.body[number].event
 
@@ -240,6 +229,7 @@ class BulkCrash(_Streams):
         step has the noise of the sample at its end. The rest is the root of a covariance.
         """
         unit, change = self.unit, self._change
+        assert change is not None
         effects, weights = unit.at_point.effects, change.delta_v.weights
         by_sample = (weights[:, None] * effects.force_noise).T
         first = int(np.searchsorted(unit.at_point.time, unit.path.time[0] - 1e-9))
@@ -281,11 +271,18 @@ def bulk_crash(spec: CaseSpec, file: Path | None = None, seed: int = 0) -> BulkC
 # Attitude: units of one gyro triad along one motion, each integrated from the true attitude.
 
 
+ANGLES = (
+    "end_error_deg",
+    "largest_error_deg",
+    "end_roll_error_deg",
+    "end_pitch_error_deg",
+    "end_heading_error_deg",
+)
 #: Quantiles from which white noise is drawn, one of two bytes.
 _QUANTILES = 1 << 16
-#: Blocks of a correlation time, and least number of blocks of a record, over each of which the
-#: slow part of a bias is its mean: of a walk and a Gauss-Markov process the exact one.
-_PER_TIME, _BLOCKS = 64, 256
+#: Blocks of a correlation time, and least number of blocks of a record. Over a block a wandering
+#: bias is its mean, drawn exactly: so is the angle at its end, but for the turn within it.
+_PER_TIME, _BLOCKS = 16, 64
 # Columns of a unit's numbers, as `unit_increments` takes them.
 _FELT, _SCALE, _SECOND, _THIRD, _BIAS = slice(3, 6), 6, 7, 8, 9
 
@@ -313,7 +310,7 @@ class BulkAttitude(_Streams):
     sensor : Sensor
     algorithm : AttitudeAlgorithm
     time : ndarray, (n,), s
-    rate, force : ndarray, (n, 3)
+    rate, force : ndarray, (3, n)
         True, rad/s and m/s², behind the low-pass of the sensor.
     truth : ndarray, (n, 4)
         True attitude ``q_nb``.
@@ -331,21 +328,18 @@ class BulkAttitude(_Streams):
     mean: bool
     seed: int = 0
 
-    scalars: ClassVar[tuple[str, ...]] = (  # type: ignore[misc]
-        "end_error_deg",
-        "largest_error_deg",
-        "end_roll_error_deg",
-        "end_pitch_error_deg",
-        "end_heading_error_deg",
-    )
+    @property
+    def scalars(self) -> tuple[str, ...]:
+        """Names of the results of a case, each with its unit."""
+        return ANGLES
 
     @cached_property
     def nominal(self) -> Mapping[str, float]:
         """Errors of a unit without errors: those of the algorithm, and of the Earth's turning."""
         plain = _units(TriadErrors(), {}, None)
         still = np.zeros((1, 3))
-        nothing = np.zeros((len(self.time), 6), dtype=np.uint8)
-        quiet = np.zeros((len(self.time), 3))
+        nothing = np.zeros((6, len(self.time)), dtype=np.uint8)
+        quiet = np.zeros((3, len(self.time)))
         limits = np.column_stack([np.full(3, np.inf), np.zeros(3)])
         row = self._integrated(plain[0], still, nothing, quiet, quiet, limits)
         return dict(zip(self.scalars, self._scalars(row[None])[0].tolist(), strict=True))
@@ -378,48 +372,62 @@ class BulkAttitude(_Streams):
             each = count
         return each, np.full(-(-count // each), each * step)
 
-    def _slow(self, w1: Array, further: Array, first: Array, more: Array) -> Array:
-        """Wandering bias of each block, (blocks, 3 c), from standard normal numbers."""
+    @cached_property
+    def _numbers(self) -> tuple[int, ...]:
+        """How many rows of standard normal numbers make the wandering bias of an axis."""
+        blocks = len(self._blocks[1])
+        wanders = any(self._errors.axis("bias_instability"))
+        walks = any(self._errors.axis("random_walk"))
+        return (blocks, blocks + 1) * wanders + (blocks, blocks) * walks
+
+    def _slow(self, numbers: list[Array], columns: int) -> Array:
+        """Wandering bias of each block, (blocks, 3 columns), from such numbers."""
         errors, steps = self._errors, self._blocks[1]
-        columns = w1.shape[1] // 3
         out = np.zeros((len(steps), 3 * columns))
         if any(sd := errors.axis("bias_instability")):
-            tau = errors.correlation_time
-            out += gauss_markov_of(w1, further, steps, np.tile(sd, columns), tau)
+            w1, further, *numbers = numbers
+            out += gauss_markov_of(
+                w1, further, steps, np.tile(sd, columns), errors.correlation_time
+            )
         if any(density := errors.axis("random_walk")):
-            out += walk_of(first, more, steps, np.tile(density, columns))
+            out += walk_of(*numbers, steps, np.tile(density, columns))
         return out
 
     @cached_property
     def _shared(self) -> tuple[Array, Array, Array]:
-        """What all units have: drift, (n, 3), sd of the white noise, (n, 3), and limits, (3, 2)."""
+        """What all units have: drift, (3, n), sd of the white noise, (3, n), and limits, (3, 2)."""
         errors = self._errors
         steps = np.diff(self.time, prepend=2.0 * self.time[0] - self.time[1])
         known = known_drift(errors, self.time, steps, self.mean)
-        sd = np.asarray(errors.axis("noise_density")) / np.sqrt(steps)[:, None]
-        return known, sd, np.column_stack([errors.axis("full_scale"), errors.axis("quantization")])
+        sd = np.asarray(errors.axis("noise_density"))[:, None] / np.sqrt(steps)
+        return (
+            np.ascontiguousarray(known.T),
+            sd,
+            np.column_stack([errors.axis("full_scale"), errors.axis("quantization")]),
+        )
 
     def _stream(self, number: int) -> Array:
         generator = _generator(self.seed, number)
         units = _units(self._errors, self._spreads, generator)
         count, blocks = len(self.time), len(self._blocks[1])
-        numbers = [
-            generator.standard_normal((rows, 3 * TOGETHER))
-            for rows in (blocks, blocks + 1, blocks, blocks)
-        ]
-        slow = np.ascontiguousarray(
-            self._slow(*numbers).reshape(blocks, TOGETHER, 3).transpose(1, 0, 2)
-        )
+        numbers = [generator.standard_normal((rows, 3 * TOGETHER)) for rows in self._numbers]
+        slow = self._slow(numbers, TOGETHER).reshape(blocks, TOGETHER, 3).transpose(1, 0, 2).copy()
         known, sd, limits = self._shared
         rows = np.empty((TOGETHER, 6))
         for k in range(TOGETHER):
             raw = generator.bit_generator.random_raw(-(-6 * count // 8)).astype("<u8", copy=False)
-            bytes_ = raw.view(np.uint8)[: 6 * count].reshape(count, 6)
+            bytes_ = raw.view(np.uint8)[: 6 * count].reshape(6, count)
             rows[k] = self._integrated(units[k], slow[k], bytes_, known, sd, limits)
         return self._scalars(rows)
 
     def _integrated(
-        self, unit: Array, slow: Array, numbers: NDArray[np.uint8], known: Array, sd: Array, limits: Array
+        self,
+        unit: Array,
+        slow: Array,
+        numbers: NDArray[np.uint8],
+        known: Array,
+        sd: Array,
+        limits: Array,
     ) -> Array:
         """Largest and last error, rad, and the last attitude of one unit, (6,)."""
         dt, theta, dtheta, history = self._room
@@ -494,27 +502,24 @@ class BulkAttitude(_Streams):
                 continue
             spread = self._spreads[quantity]
             size = np.asarray(spread.size) / (1.0 if spread.kind == "sd" else math.sqrt(3.0))
-            columns += _felt(quantity, weights, self.rate, self.force, size, errors)
+            columns += _felt(quantity, weights, self.rate.T, self.force.T, size, errors)
         each = self._blocks[0]
-        wide = len(self._blocks[1])
-        if wide > 1:
+        if self._numbers:
             # Of every block as of every standard normal number that it is made of.
             ends = np.arange(0, count, each)
             by_block = np.add.reduceat(weights, ends, axis=0)
-            zero, one = np.zeros, np.eye
+            total = sum(self._numbers)
             for axis in range(3):
-                made = [
-                    np.zeros((rows, 3 * (4 * wide + 1))) for rows in (wide, wide + 1, wide, wide)
-                ]
-                at = 0
-                for array in made:
-                    rows = len(array)
-                    array[:, axis + 3 * at : axis + 3 * (at + rows) : 3] = one(rows)
+                made, at = [], 0
+                for rows in self._numbers:
+                    array = np.zeros((rows, 3 * total))
+                    array[:, axis + 3 * at : axis + 3 * (at + rows) : 3] = np.eye(rows)
+                    made.append(array)
                     at += rows
-                slow = self._slow(*made)[:, axis::3]
+                slow = self._slow(made, total)[:, axis::3]
                 columns.append(np.einsum("bi,bm->im", by_block[:, :, axis], slow))
         effects = np.concatenate(columns, axis=1)
-        noise = weights * self._shared[1][:, None, :]
+        noise = weights * self._shared[1].T[:, None, :]
         return np.asarray(effects @ effects.T + np.einsum("nij,nkj->ik", noise, noise))
 
 
@@ -538,7 +543,9 @@ def _units(
             continue
         spread, shape = spreads[quantity], (TOGETHER, 3, 3)
         normal = spread.kind == "sd"
-        numbers = generator.standard_normal(shape) if normal else generator.uniform(-1.0, 1.0, shape)
+        numbers = (
+            generator.standard_normal(shape) if normal else generator.uniform(-1.0, 1.0, shape)
+        )
         rows = np.asarray(spread.size)[:, None] * numbers
         if quantity == "misalignment":
             out[:, :, :3] = np.where(np.eye(3, dtype=bool), 1.0, rows)
@@ -554,7 +561,7 @@ def _units(
 def _felt(
     quantity: str, weights: Array, rate: Array, force: Array, size: Array, errors: TriadErrors
 ) -> list[Array]:
-    """Effects of one standard deviation of each number of a quantity on the last attitude, (3, k)."""
+    """Effects of one standard deviation of each number on the last attitude, (3, k)."""
     if quantity == "misalignment":
         by = np.einsum("nij,nk->ijk", weights, rate) * size[:, None]
         return [by[:, ~np.eye(3, dtype=bool)]]
@@ -608,8 +615,8 @@ def bulk_attitude(
         known,
         chosen,
         np.ascontiguousarray(index_of(imu)),
-        np.ascontiguousarray(values_of(imu, GYRO)),
-        np.ascontiguousarray(values_of(imu, ACCEL)),
+        np.ascontiguousarray(values_of(imu, GYRO).T),
+        np.ascontiguousarray(values_of(imu, ACCEL).T),
         np.ascontiguousarray(values_of(truth, QUATERNION)),
         motion.sampling == "mean",
         seed,
@@ -619,6 +626,7 @@ def bulk_attitude(
 # Predicted drifts: the covariance of an outage for many sensors, starts, lengths and speeds.
 
 
+DRIFTS = ("horizontal_95_m", "speed_sd_m_per_s", "heading_sd_deg")
 #: Keys of a start, and what an alignment leaves where they are not stated.
 _STARTS = {
     "position_sd_m": ALIGNED[0],
@@ -662,11 +670,10 @@ class BulkOutage(_Streams):
     ranges: Mapping[str, tuple[float, float]]
     seed: int = 0
 
-    scalars: ClassVar[tuple[str, ...]] = (  # type: ignore[misc]
-        "horizontal_95_m",
-        "speed_sd_m_per_s",
-        "heading_sd_deg",
-    )
+    @property
+    def scalars(self) -> tuple[str, ...]:
+        """Names of the results of a case, each with its unit."""
+        return DRIFTS
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -704,9 +711,9 @@ class BulkOutage(_Streams):
             if key:
                 squares[:, k] = (given[key] / reference) ** 2
         over = spline(given[OUTAGE]) if OUTAGE in given else spline(spline.x[-1:])
-        by_speed = np.einsum("nk,nskj->nsj", squares, np.broadcast_to(
-            over, (count, *over.shape[1:])
-        ))
+        by_speed = np.einsum(
+            "nk,nskj->nsj", squares, np.broadcast_to(over, (count, *over.shape[1:]))
+        )
         weights = np.ones((count, 1))
         if SPEED in given:
             weights = _lagrange(nodes, given[SPEED])
@@ -746,7 +753,7 @@ class BulkOutage(_Streams):
         return np.array(out)
 
     @cached_property
-    def _growth(self) -> tuple[list[tuple[str, float]], Array, object]:
+    def _growth(self) -> tuple[list[tuple[str, float]], Array, Any]:
         """Sources with their reference size, speeds, and their covariances over time.
 
         A cubic spline of north-north, east-east, north-east, speed and heading, (speeds, sources,
@@ -768,9 +775,7 @@ class BulkOutage(_Streams):
             for key, reference in sources:
                 time, P = drift_of_sensor(*self._alone(key, reference, varied, speed))
                 found = variances(P, np.zeros(len(time)))
-                row.append(
-                    [P[:, 0, 0], P[:, 1, 1], P[:, 0, 1], found["speed"], found["heading"]]
-                )
+                row.append([P[:, 0, 0], P[:, 1, 1], P[:, 0, 1], found["speed"], found["heading"]])
             made.append(row)
         # (speeds, sources, 5, time) to time first.
         return sources, nodes, CubicSpline(time, np.moveaxis(np.array(made), -1, 0))
@@ -786,7 +791,7 @@ class BulkOutage(_Streams):
                 start[name] = reference if name == key else 0.0
             elif name in varied:
                 start[name] = 0.0
-        sensors: dict[str, object] = {}
+        sensors: dict[str, Any] = {}
         for name, (triad, attribute) in _FIGURES.items():
             if (key and name != key) or (not key and name in varied):
                 part = sensors.get(triad, getattr(self.sensors, triad))

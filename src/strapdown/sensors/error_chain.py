@@ -330,10 +330,10 @@ def transfer(x: Array, scale: float, second: float, third: float, full: float) -
     ``y/F = (1 + scale) x/F + second (x/F)² + third (x/F)³`` up to full scale, ``|x| <= F``, and
     linear along the tangent beyond, so that the inverse is unique. `full` (u): F. Returns (n,), u.
     """
-    from strapdown._kernels.unit_rates import curves
+    from strapdown._kernels.unit_rates import curve
 
-    out = np.empty(len(x))
-    curves(np.ascontiguousarray(x), scale, second, third, full, out)
+    out = x.copy()
+    curve(out, scale, second, third, full)
     return out
 
 
