@@ -79,16 +79,24 @@ def bulk() -> Iterator[Row]:
 
 
 def _attitude(name: str, units: Any) -> Row:
-    dt, theta, dtheta, history = units._room
+    from strapdown.attitude_algorithms.algorithm import steps_of
+    from strapdown.increments import increments_from_imu
+    from strapdown.tables import imu_table
+
+    rates = imu_table(units.time, units.rate.T, sampling="instantaneous")
+    steps = steps_of(increments_from_imu(rates))
     algorithm, start = units.algorithm, units.truth[0]
+    history = np.empty((len(steps.dt), algorithm.width))
     options, many = algorithm.kernel_options(), 4 * TOGETHER
 
     def bare() -> None:
         for _ in range(many):
             state = algorithm.begin(start)
-            type(algorithm).advance_kernel(state, dt, theta, dtheta, history, *options)
+            type(algorithm).advance_kernel(
+                state, steps.dt, steps.theta, steps.dtheta, history, *options
+            )
 
-    per = 1e9 / (many * len(dt))
+    per = 1e9 / (many * len(steps.dt))
     ours, theirs = by_turns(lambda: units.run(0, many), bare, rounds=7, per=per)
     return Row(
         f"attitude in bulk, {name}, a unit, a step", ours, "bare algorithm", theirs, "ns", 2.5

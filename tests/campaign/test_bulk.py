@@ -253,7 +253,7 @@ def test_a_unit_is_integrated_as_a_single_run(tmp_path, sampling, algorithm):
         known = truth[QUATERNION].to_numpy()
         made = run_attitude(make_algorithm(algorithm), increments_from_imu(imu), known[0])
         q = made.attitude[QUATERNION].to_numpy()
-        angles = np.degrees(unit_rotation_angle(known, q))
+        angles = unit_rotation_angle(known, q)
         # A quantum may fall to the other side by rounding: half a step of one sample.
         close = {"abs": 1e-6 + np.degrees(0.05 * math.pi / 180 / 100)}
         assert found[k, 0] == pytest.approx(angles[-1], **close)
@@ -307,7 +307,7 @@ def test_the_nominal_unit_has_the_errors_of_the_algorithm_alone():
     )
     known = truth[QUATERNION].to_numpy()
     made = run_attitude(cases.algorithm, increments_from_imu(imu), known[0])
-    angles = np.degrees(unit_rotation_angle(known, made.attitude[QUATERNION].to_numpy()))
+    angles = unit_rotation_angle(known, made.attitude[QUATERNION].to_numpy())
     assert cases.nominal["end_error_deg"] == pytest.approx(angles[-1], rel=1e-6)
     assert cases.nominal["largest_error_deg"] == pytest.approx(angles.max(), rel=1e-6)
 
@@ -355,10 +355,13 @@ def _predicted(parameters, monkeypatch):
 
 @pytest.mark.parametrize("case", [0, 5, 63])
 def test_a_predicted_drift_is_that_of_a_single_run(outage, monkeypatch, case):
-    parameters = dict(zip(outage.parameters, outage.drawn(0)[case], strict=True))
-    found = outage.run(case, case + 1)[0]
+    drawn = outage.drawn(0)
+    assert np.array_equal(outage.of(drawn), outage.run(0, 64))
+    # A single run ends at the last of its samples at 50 Hz.
+    drawn[:, 0] = np.round(drawn[:, 0] / 0.02) * 0.02
+    parameters = dict(zip(outage.parameters, drawn[case], strict=True))
     # Of the polynomial over speed and the spline over time.
-    assert np.allclose(found, _predicted(parameters, monkeypatch), rtol=2e-5)
+    assert np.allclose(outage.of(drawn)[case], _predicted(parameters, monkeypatch), rtol=1e-7)
 
 
 def test_without_length_and_speed_a_drift_is_exact(monkeypatch):

@@ -278,8 +278,8 @@ ANGLES = (
     "end_pitch_error_deg",
     "end_heading_error_deg",
 )
-#: Quantiles from which white noise is drawn, one of two bytes.
-_QUANTILES = 1 << 16
+#: Samples of a piece, and the values of which white noise takes one: both stay in the cache.
+CHUNK, _QUANTILES = 1024, 1 << 12
 #: Blocks of a correlation time, and least number of blocks of a record. Over a block a wandering
 #: bias is its mean, drawn exactly: so is the angle at its end, but for the turn within it.
 _PER_TIME, _BLOCKS = 16, 64
@@ -296,13 +296,22 @@ def _quantiles() -> NDArray[np.float32]:
     return np.asarray(values / np.sqrt((values * values).mean()), dtype=np.float32)
 
 
+def _bytes(generator: np.random.Generator, count: int) -> NDArray[np.uint8]:
+    """Numbers of `unit_increments` for the units of a stream, (TOGETHER, 6, count)."""
+    size = TOGETHER * 6 * count
+    raw = generator.bit_generator.random_raw(size // 8).astype("<u8", copy=False)
+    out = raw.view(np.uint8).reshape(TOGETHER, 6, count)
+    out[:, 1::2] &= (_QUANTILES >> 8) - 1
+    return out
+
+
 @dataclass(frozen=True, eq=False)
 class BulkAttitude(_Streams):
     """Attitude errors of many units of a sensor, integrated from the true attitude.
 
     The errors of a unit are those of `Sensor.draw` and `error_chain`, in the same order: constants
     within the data-sheet limits, a bias that wanders, white noise, range and quantization. White
-    noise takes one of 65,536 equally probable values, of which the largest is 4.3 standard
+    noise takes one of 4,096 equally probable values, of which the largest is 3.7 standard
     deviations; the wandering bias is, over each of some hundred blocks, its exact mean.
 
     Attributes
@@ -336,13 +345,9 @@ class BulkAttitude(_Streams):
     @cached_property
     def nominal(self) -> Mapping[str, float]:
         """Errors of a unit without errors: those of the algorithm, and of the Earth's turning."""
-        plain = _units(TriadErrors(), {}, None)
-        still = np.zeros((1, 3))
-        nothing = np.zeros((6, len(self.time)), dtype=np.uint8)
-        quiet = np.zeros((3, len(self.time)))
-        limits = np.column_stack([np.full(3, np.inf), np.zeros(3)])
-        row = self._integrated(plain[0], still, nothing, quiet, quiet, limits)
-        return dict(zip(self.scalars, self._scalars(row[None])[0].tolist(), strict=True))
+        plain = replace(self.sensor, imu_errors=ImuErrors(), spreads={})
+        row = replace(self, sensor=plain)._stream(0)[0]
+        return dict(zip(self.scalars, row.tolist(), strict=True))
 
     @cached_property
     def linear_sd(self) -> Mapping[str, float]:
@@ -368,8 +373,8 @@ class BulkAttitude(_Streams):
         wanders = any(self._errors.axis("bias_instability"))
         if wanders and math.isfinite(self._errors.correlation_time):
             each = max(1, min(each, int(self._errors.correlation_time / (_PER_TIME * step))))
-        if not wanders and not any(self._errors.axis("random_walk")):
-            each = count
+        if each > CHUNK or not (wanders or any(self._errors.axis("random_walk"))):
+            each = max(1, each // CHUNK) * CHUNK
         return each, np.full(-(-count // each), each * step)
 
     @cached_property
@@ -406,75 +411,76 @@ class BulkAttitude(_Streams):
             np.column_stack([errors.axis("full_scale"), errors.axis("quantization")]),
         )
 
+    @cached_property
+    def _pieces(self) -> list[tuple[Any, ...]]:
+        """What all units have, piece by piece, so that it stays in the cache from unit to unit."""
+        known, sd, _ = self._shared
+        dt, last = np.diff(self.time), len(self.time) - 1
+        each = self._blocks[0]
+        # A piece ends where a block does.
+        length = CHUNK if each > CHUNK else CHUNK // each * each
+        out: list[tuple[Any, ...]] = []
+        for start in range(0, last, length):
+            end = min(start + length, last)
+            columns = [a[:, start : end + 1].copy() for a in (self.rate, self.force, known, sd)]
+            own = slice(start // each, end // each + 1)
+            if each > CHUNK:
+                own = slice(start // each, start // each + 1)
+            out.append(
+                (*columns, own, dt[start:end].copy(), self.truth[start + 1 : end + 1].copy())
+            )
+        return out
+
     def _stream(self, number: int) -> Array:
         generator = _generator(self.seed, number)
         units = _units(self._errors, self._spreads, generator)
-        count, blocks = len(self.time), len(self._blocks[1])
+        blocks, each = len(self._blocks[1]), min(self._blocks[0], CHUNK + 1)
         numbers = [generator.standard_normal((rows, 3 * TOGETHER)) for rows in self._numbers]
         slow = self._slow(numbers, TOGETHER).reshape(blocks, TOGETHER, 3).transpose(1, 0, 2).copy()
-        known, sd, limits = self._shared
-        rows = np.empty((TOGETHER, 6))
-        for k in range(TOGETHER):
-            raw = generator.bit_generator.random_raw(-(-6 * count // 8)).astype("<u8", copy=False)
-            bytes_ = raw.view(np.uint8)[: 6 * count].reshape(6, count)
-            rows[k] = self._integrated(units[k], slow[k], bytes_, known, sd, limits)
-        return self._scalars(rows)
-
-    def _integrated(
-        self,
-        unit: Array,
-        slow: Array,
-        numbers: NDArray[np.uint8],
-        known: Array,
-        sd: Array,
-        limits: Array,
-    ) -> Array:
-        """Largest and last error, rad, and the last attitude of one unit, (6,)."""
-        dt, theta, dtheta, history = self._room
-        felt = bool(unit[:, _FELT].any())
-        each = self._blocks[0] if len(slow) > 1 else len(self.time)
-        unit_increments(
-            self.rate,
-            self.force,
-            felt,
-            known,
-            slow,
-            each,
-            unit,
-            limits,
-            sd,
-            numbers,
-            _quantiles(),
-            dt,
-            self.mean,
-            theta,
-            dtheta,
-        )
-        algorithm = self.algorithm
-        state = algorithm.begin(self.truth[0])
-        type(algorithm).advance_kernel(
-            state, dt, theta, dtheta, history, *algorithm.kernel_options()
-        )
+        limits = self._shared[2]
+        felt = bool(units[:, :, _FELT].any())
+        algorithm, kernel = self.algorithm, type(self.algorithm).advance_kernel
+        options = algorithm.kernel_options()
         plain = (
             type(algorithm).quaternions is AttitudeAlgorithm.quaternions and algorithm.width == 4
         )
-        q = history if plain else algorithm.quaternions(history)
-        largest, last = turns_from(self._later, q)
-        return np.array([largest, last, *q[-1]])
-
-    @cached_property
-    def _later(self) -> Array:
-        return np.ascontiguousarray(self.truth[1:])
-
-    @cached_property
-    def _room(self) -> tuple[Array, Array, Array, Array]:
-        """Lengths of the steps, and room for what is formed of each unit."""
-        dt = np.ascontiguousarray(np.diff(self.time))
-        theta, dtheta = np.empty((2, len(dt), 3))
-        return dt, theta, dtheta, np.empty((len(dt), self.algorithm.width))
+        states = [algorithm.begin(self.truth[0]) for _ in range(TOGETHER)]
+        rows = np.zeros((TOGETHER, 6))
+        before = _bytes(generator, 1)
+        for rate, force, known, sd, own, dt, truth in self._pieces:
+            steps = len(dt)
+            bytes_ = np.concatenate([before, _bytes(generator, steps)], axis=2)
+            before = bytes_[:, :, -1:]
+            theta, dtheta = np.empty((2, steps, 3))
+            history = np.empty((steps, algorithm.width))
+            for k in range(TOGETHER):
+                unit_increments(
+                    rate,
+                    force,
+                    felt,
+                    known,
+                    slow[k, own],
+                    each,
+                    units[k],
+                    limits,
+                    sd,
+                    bytes_[k],
+                    _quantiles(),
+                    dt,
+                    self.mean,
+                    theta,
+                    dtheta,
+                )
+                kernel(states[k], dt, theta, dtheta, history, *options)
+                q = history if plain else algorithm.quaternions(history)
+                largest, end = turns_from(truth, q)
+                rows[k, 0] = max(rows[k, 0], largest)
+                rows[k, 1] = end
+                rows[k, 2:] = q[-1]
+        return self._scalars(rows)
 
     def _scalars(self, rows: Array) -> Array:
-        """Results of units from what `_integrated` returns."""
+        """Results of units from their largest and last error, rad, and last attitude, (r, 6)."""
         q = rotation.normalise(rows[:, 2:])
         away = rotation.euler_from_quaternion(q) - rotation.euler_from_quaternion(self.truth[-1:])
         angles = np.degrees(rows[:, [1, 0]])
@@ -524,7 +530,7 @@ class BulkAttitude(_Streams):
 
 
 def _units(
-    nominal: TriadErrors, spreads: Mapping[str, Spread], generator: np.random.Generator | None
+    nominal: TriadErrors, spreads: Mapping[str, Spread], generator: np.random.Generator
 ) -> Array:
     """Numbers of the units of a stream, (TOGETHER, 3, 10), as `Sensor.draw` places them."""
     out = np.zeros((TOGETHER, 3, 10))
@@ -539,7 +545,7 @@ def _units(
         # The bias of all units is among the drifts that they share.
         out[:, :, column] = 0.0 if name == "bias" else nominal.axis(name)
     for quantity in DRAWN:
-        if quantity not in spreads or generator is None:
+        if quantity not in spreads:
             continue
         spread, shape = spreads[quantity], (TOGETHER, 3, 3)
         normal = spread.kind == "sd"
