@@ -99,7 +99,7 @@ def _attitude(name: str, units: Any) -> Row:
     per = 1e9 / (many * len(steps.dt))
     ours, theirs = by_turns(lambda: units.run(0, many), bare, rounds=7, per=per)
     return Row(
-        f"attitude in bulk, {name}, a unit, a step", ours, "bare algorithm", theirs, "ns", 2.5
+        f"attitude in bulk, {name}, a unit, a step", ours, "bare algorithm", theirs, "ns", 2.5, 3.5
     )
 
 

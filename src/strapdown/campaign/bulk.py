@@ -298,9 +298,8 @@ def _quantiles() -> NDArray[np.float32]:
 
 def _bytes(generator: np.random.Generator, count: int) -> NDArray[np.uint8]:
     """Numbers of `unit_increments` for the units of a stream, (TOGETHER, 6, count)."""
-    size = TOGETHER * 6 * count
-    raw = generator.bit_generator.random_raw(size // 8).astype("<u8", copy=False)
-    out = raw.view(np.uint8).reshape(TOGETHER, 6, count)
+    raw = generator.bit_generator.random_raw(TOGETHER * 6 * count // 8)
+    out = raw.astype("<u8", copy=False).view(np.uint8).reshape(TOGETHER, 6, count)
     out[:, 1::2] &= (_QUANTILES >> 8) - 1
     return out
 
@@ -353,7 +352,7 @@ class BulkAttitude(_Streams):
     def linear_sd(self) -> Mapping[str, float]:
         """Standard deviations of the angles at the end, to first order, without quantization."""
         covariance = self._covariance
-        sds = angles_sd(rotation.euler_from_quaternion(self.truth[-1:]), covariance[None])[0]
+        sds = angles_sd(self._end, covariance[None])[0]
         return dict(zip(self.scalars[2:], sds.tolist(), strict=True))
 
     @cached_property
@@ -445,15 +444,16 @@ class BulkAttitude(_Streams):
             type(algorithm).quaternions is AttitudeAlgorithm.quaternions and algorithm.width == 4
         )
         states = [algorithm.begin(self.truth[0]) for _ in range(TOGETHER)]
-        rows = np.zeros((TOGETHER, 6))
-        before = _bytes(generator, 1)
+        turns: list[list[tuple[float, float]]] = [[] for _ in states]
+        last, quantiles = np.empty((TOGETHER, 4)), _quantiles()
+        bytes_ = _bytes(generator, 1)
         for rate, force, known, sd, own, dt, truth in self._pieces:
             steps = len(dt)
-            bytes_ = np.concatenate([before, _bytes(generator, steps)], axis=2)
-            before = bytes_[:, :, -1:]
+            # The last sample of a piece is the first of the next.
+            bytes_ = np.concatenate([bytes_[:, :, -1:], _bytes(generator, steps)], axis=2)
             theta, dtheta = np.empty((2, steps, 3))
             history = np.empty((steps, algorithm.width))
-            for k in range(TOGETHER):
+            for k, (unit, state) in enumerate(zip(units, states, strict=True)):
                 unit_increments(
                     rate,
                     force,
@@ -461,28 +461,32 @@ class BulkAttitude(_Streams):
                     known,
                     slow[k, own],
                     each,
-                    units[k],
+                    unit,
                     limits,
                     sd,
                     bytes_[k],
-                    _quantiles(),
+                    quantiles,
                     dt,
                     self.mean,
                     theta,
                     dtheta,
                 )
-                kernel(states[k], dt, theta, dtheta, history, *options)
+                kernel(state, dt, theta, dtheta, history, *options)
                 q = history if plain else algorithm.quaternions(history)
-                largest, end = turns_from(truth, q)
-                rows[k, 0] = max(rows[k, 0], largest)
-                rows[k, 1] = end
-                rows[k, 2:] = q[-1]
-        return self._scalars(rows)
+                turns[k].append(turns_from(truth, q))
+                last[k] = q[-1]
+        angles = np.array([[max(pairs)[0], pairs[-1][1]] for pairs in turns])
+        return self._scalars(np.column_stack([angles, last]))
+
+    @cached_property
+    def _end(self) -> Array:
+        """True roll, pitch and heading at the end, (1, 3), deg."""
+        return rotation.euler_from_quaternion(self.truth[-1:])
 
     def _scalars(self, rows: Array) -> Array:
         """Results of units from their largest and last error, rad, and last attitude, (r, 6)."""
         q = rotation.normalise(rows[:, 2:])
-        away = rotation.euler_from_quaternion(q) - rotation.euler_from_quaternion(self.truth[-1:])
+        away = rotation.euler_from_quaternion(q) - self._end
         angles = np.degrees(rows[:, [1, 0]])
         out = np.column_stack([angles, within_half_turn(away)])
         out[~np.isfinite(rows).all(axis=1)] = math.nan
