@@ -31,7 +31,7 @@ from strapdown.crash.case_contact import main_event
 from strapdown.crash.delta_v_bound import AT_REST, WINDOW_ENDS, VelocityChange, body_effects
 from strapdown.crash.entry import angles_sd
 from strapdown.crash.path import PLACE, TOGETHER, VELOCITY, PathSampler
-from strapdown.crash.pdof import pdof
+from strapdown.crash.pdof import horizontal_angles, pdof
 from strapdown.crash.reconstruction import UnitReconstruction
 from strapdown.dsp.chi_square import plane_bound
 from strapdown.ellipsoids import find_ellipsoid
@@ -179,17 +179,14 @@ class BulkCrash(_Streams):
     def _stream(self, number: int) -> Array:
         errors = np.empty((TOGETHER, 1, 9))
         drawn = self._sampler.stream(number, errors)
-        path, end = self.unit.path, errors[:, 0]
-        row = path.table.iloc[-1]
-        turned = rotation.compose(
-            rotation.quaternion_from_rotation_vector(end[:, :3]),
-            np.broadcast_to(path.q_nb[-1], (TOGETHER, 4)),
-        )
-        away = rotation.euler_from_quaternion(turned)[:, 2] - row["heading"]
+        place, velocity, heading, q_nb = self._end
+        end = errors[:, 0]
+        turned = rotation.compose(rotation.quaternion_from_rotation_vector(end[:, :3]), q_nb)
+        away = rotation.euler_from_quaternion(turned)[:, 2] - heading
         columns = [
-            *(row[NED].to_numpy(dtype=np.float64) + end[:, PLACE]).T,
-            *(row[VELOCITIES].to_numpy(dtype=np.float64) + end[:, VELOCITY]).T,
-            row["heading"] + within_half_turn(away),
+            *(place + end[:, PLACE]).T,
+            *(velocity + end[:, VELOCITY]).T,
+            heading + within_half_turn(away),
         ]
         if self._change is not None:
             each, by_sample, root = self._effects
@@ -197,20 +194,31 @@ class BulkCrash(_Streams):
                 "rp,pi->ri", drawn.draws[:, : len(each)], each
             )
             for noise, weights in zip(drawn.noise, by_sample, strict=True):
-                vector = vector + np.einsum("rik,ik->ri", noise[:, 3:], weights)
+                vector = vector + (noise[:, 3:] * weights).sum(axis=2)
             more = drawn.generator.standard_normal((TOGETHER, 3))
             vector = vector + np.einsum("rj,ij->ri", more, root)
             total = np.sqrt((vector * vector).sum(axis=1))
             at = self.nominal["pdof_deg"]
-            angles = np.array([pdof(one).horizontal_deg for one in vector])
             columns += [
                 vector[:, 0],
                 vector[:, 1],
                 total,
                 total / SPEEDS["km/h"],
-                at + within_half_turn(angles - at),
+                at + within_half_turn(horizontal_angles(vector) - at),
             ]
         return np.column_stack(columns)
+
+    @cached_property
+    def _end(self) -> tuple[Array, Array, float, Array]:
+        """End of the path: position, velocity, heading in deg, and attitude of every run."""
+        path = self.unit.path
+        row = path.table.iloc[-1]
+        return (
+            row[NED].to_numpy(dtype=np.float64),
+            row[VELOCITIES].to_numpy(dtype=np.float64),
+            float(row["heading"]),
+            np.tile(path.q_nb[-1], (TOGETHER, 1)),
+        )
 
     @cached_property
     def _sampler(self) -> PathSampler:
