@@ -194,7 +194,11 @@ class BulkCrash(_Streams):
                 "rp,pi->ri", drawn.draws[:, : len(each)], each
             )
             for noise, weights in zip(drawn.noise, by_sample, strict=True):
-                vector = vector + (noise[:, 3:] * weights).sum(axis=2)
+                # The contact is a small part of the path.
+                inside = np.flatnonzero(weights.any(axis=0))
+                if len(inside):
+                    part = slice(inside[0], inside[-1] + 1)
+                    vector = vector + (noise[:, 3:, part] * weights[:, part]).sum(axis=2)
             more = drawn.generator.standard_normal((TOGETHER, 3))
             vector = vector + np.einsum("rj,ij->ri", more, root)
             total = np.sqrt((vector * vector).sum(axis=1))
