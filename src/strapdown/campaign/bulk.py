@@ -22,10 +22,13 @@ from strapdown import rotation
 from strapdown._kernels.unit_rates import turns_from, unit_increments
 from strapdown.attitude_algorithms import make_algorithm
 from strapdown.attitude_algorithms.algorithm import AttitudeAlgorithm
+from strapdown.campaign.kinds import crash_case
+from strapdown.campaign.kinds import scenario_of as written_scenario
 from strapdown.config.crash_case import CaseSpec
 from strapdown.config.motions import TrajectorySpec
 from strapdown.config.outage import OutageSpec
 from strapdown.config.sources import ScenarioSpec
+from strapdown.config.spec import specify
 from strapdown.crash.case import run_case
 from strapdown.crash.case_contact import main_event
 from strapdown.crash.delta_v_bound import AT_REST, WINDOW_ENDS, VelocityChange, body_effects
@@ -50,7 +53,7 @@ from strapdown.tables import VELOCITY as VELOCITIES
 from strapdown.tables.checks import index_of, values_of
 from strapdown.units import SPEEDS
 
-__all__ = ["BulkCases", "bulk_attitude", "bulk_crash", "bulk_outage"]
+__all__ = ["BulkCases", "bulk_attitude", "bulk_cases", "bulk_crash", "bulk_outage"]
 
 Array = NDArray[np.float64]
 
@@ -877,3 +880,46 @@ def bulk_outage(
     if spec.motion.to_speed_m_per_s is not None and {OUTAGE, SPEED} & set(ranges):
         raise ConfigError("campaign.bulk-outage-changes-speed", quantity="motion, to_speed_m_per_s")
     return BulkOutage(spec, sensor_of(spec.sensor), dict(ranges), seed)
+
+
+# The many cases of a campaign.
+
+
+def bulk_cases(
+    kind: str, table: Mapping[str, Any], seed: int, ranges: Mapping[str, tuple[float, float]]
+) -> BulkCases:
+    """Prepare the cases of a campaign that are computed many at a time.
+
+    Parameters
+    ----------
+    kind : {'crash', 'attitude', 'outage'}
+    table : mapping
+        Configuration of the campaign's base.
+    seed : int
+    ranges : mapping of str to (float, float)
+        Of an outage, what varies (`bulk_outage`).
+
+    Raises
+    ------
+    ConfigError
+        The configuration is invalid, or says nothing that can be drawn.
+    """
+    if kind == "crash":
+        own = dict(table)
+        if "simulate" in own:
+            own["simulate"] = {"seed": seed, **own["simulate"]}
+        with crash_case(own, "case") as (case, _):
+            return bulk_crash(case, seed=seed)
+    if kind == "outage":
+        return bulk_outage(specify(OutageSpec, **table), ranges, seed)
+    source, sensor = table.get("source"), table.get("sensor")
+    if isinstance(source, dict):
+        sensor = sensor or source.get("sensor")
+        motion = written_scenario(source, None, "case")
+    else:
+        keys = {k: table[k] for k in ("rate_hz", "sampling") if k in table}
+        motion = specify(ScenarioSpec, name=source or "", **keys)
+    if sensor is None:
+        raise ConfigError("campaign.bulk-without-sensor", quantity="base, configuration, sensor")
+    algorithms = table.get("algorithms") or ["quaternion"]
+    return bulk_attitude(motion, str(sensor), str(algorithms[0]), seed)

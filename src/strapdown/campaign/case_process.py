@@ -164,11 +164,7 @@ def main() -> None:
 
     frozen = _receive(asked)
     campaign = Campaign.thawed(frozen)
-    bulk = None
-    if campaign.spec.base.bulk:
-        from strapdown.campaign.bulk import bulk_cases
-
-        bulk = bulk_cases(campaign)
+    bulk = campaign.bulk() if campaign.spec.base.bulk else None
     _limit_memory(campaign.spec.limits.memory_mb)
     _send(answers, "ready")
     while True:

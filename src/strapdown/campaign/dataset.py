@@ -52,7 +52,9 @@ def schema_of(frozen: Mapping[str, Any]) -> pa.Schema:
     """Columns of the cases of a campaign."""
     fields = [("case", pa.int64()), ("cell", pa.int32()), ("draw", pa.int64())]
     fields += [("seed", pa.int64())]
-    fields += [(one["name"], _type_of(one, frozen)) for one in frozen["parameters"]]
+    # In bulk they are drawn where they are used.
+    varied = [] if frozen["base"].get("bulk") else frozen["parameters"]
+    fields += [(one["name"], _type_of(one, frozen)) for one in varied]
     if frozen["logs"]:
         fields += [("log", pa.string())]
     fields += [(name, pa.string()) for name in ("status", "code", "findings")]

@@ -7,10 +7,10 @@ import itertools
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pandas as pd
@@ -22,6 +22,9 @@ from strapdown.campaign.specification import CampaignSpec, ParameterTable
 from strapdown.config.reading import OF_LOG, absolute_table
 from strapdown.config.toml_file import TomlFile, read_toml
 from strapdown.errors import ConfigError, check_choice
+
+if TYPE_CHECKING:
+    from strapdown.campaign.bulk import BulkCases
 
 __all__ = ["Campaign", "Case"]
 
@@ -75,6 +78,9 @@ class Campaign:
         Of a table of cases.
     files : tuple of (str, str)
         Roles and paths of the file of the campaign and of its base.
+    linear : dict
+        In bulk, of each scalar the value of the unperturbed case and the standard deviation by
+        linear propagation: ``nominal``, ``linear_sd``.
     """
 
     spec: CampaignSpec
@@ -84,6 +90,7 @@ class Campaign:
     log_path: tuple[str, ...] = ()
     rows: tuple[Table, ...] = field(default=(), repr=False)
     files: tuple[tuple[str, str], ...] = ()
+    linear: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(cls, spec: CampaignSpec, folder: Path) -> Campaign:
@@ -110,6 +117,11 @@ class Campaign:
             rows = _rows(folder / spec.cases.table, spec)
         files = () if file is None else (("base", str(file.absolute())),)
         made = cls(spec, table, written, logs, paths, rows, files)
+        if base.bulk:
+            cases = made.bulk()
+            spec = spec.with_scalars({name: name for name in cases.scalars})
+            linear = {"nominal": dict(cases.nominal), "linear_sd": dict(cases.linear_sd)}
+            made = replace(made, spec=spec, linear=linear)
         made._check()
         return made
 
@@ -125,7 +137,21 @@ class Campaign:
             tuple(places["log_path"]),
             tuple(frozen["rows"]),
             tuple((one["role"], one["file_path"]) for one in places["files"]),
+            dict(frozen["linear"]),
         )
+
+    def bulk(self) -> BulkCases:
+        """Return the cases that are computed many at a time."""
+        from strapdown.campaign.bulk import bulk_cases
+
+        ranges = {
+            str(one.path[-1]) if one.path[0] in ("start", "motion") else one.key: (
+                float(one.low or 0.0),
+                float(one.high or 0.0),
+            )
+            for one in self.drawn
+        }
+        return bulk_cases(self.spec.base.kind, self.base, self.spec.cases.seed, ranges)
 
     @cached_property
     def inputs(self) -> tuple[InputFiles, ...]:
@@ -155,6 +181,7 @@ class Campaign:
                 for one in self.spec.parameter
             ],
             "total": self.total,
+            "linear": self.linear,
             "identity": self.identity,
         }
 
@@ -313,11 +340,11 @@ class Campaign:
         if self.spec.stop is not None and self.spec.stop.scalar is not None:
             wanted += [("stop", 0, self.spec.stop.scalar)]
         for table, k, name in wanted:
-            if not self.spec.base.bulk:
-                place = f"{table} {k + 1}"
-                check_choice("campaign.no-scalar", known, quantity=place, name=name)
-        for cell in range(len(self.cells)):
-            self.table(self.case(cell))
+            place = f"{table} {k + 1}"
+            check_choice("campaign.no-scalar", known, quantity=place, name=name)
+        if not self.spec.base.bulk:
+            for cell in range(len(self.cells)):
+                self.table(self.case(cell))
 
 
 # --- parts of a design --------------------------------------------------------------------

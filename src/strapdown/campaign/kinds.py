@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import copy
+import json
 import math
 import tempfile
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -202,7 +204,6 @@ def _alignment_data(run: Any) -> Table:
 def _attitude(table: Table, name: str) -> Any:
     from strapdown.attitude_comparison.comparison import run_comparison
     from strapdown.attitude_comparison.options import AttitudeOptions
-    from strapdown.config.sources import ScenarioFile, ScenarioSpec
     from strapdown.simulation import SCENARIOS
 
     keys = {key: value for key, value in table.items() if key != "source"}
@@ -215,19 +216,24 @@ def _attitude(table: Table, name: str) -> Any:
     source = table["source"]
     if not isinstance(source, dict):
         return run_comparison(AttitudeOptions(**keys).specify(source))
-    # A scenario written here, whose motion varies.
+    scenario = scenario_of(source, keys.pop("seed", None), name)
+    asked = AttitudeOptions(**keys).specify(next(iter(SCENARIOS)))
+    return run_comparison(asked.model_copy(update={"source": scenario}))
+
+
+def scenario_of(source: Table, seed: int | None, name: str) -> Any:
+    """Return the scenario that is written as a table, whose motion can vary."""
+    from strapdown.config.sources import ScenarioFile, ScenarioSpec
+
     own = ScenarioFile.checked({**source, "name": name})
-    seed = own.seed if keys.pop("seed", None) is None else table["seed"]
-    scenario = ScenarioSpec(
+    return ScenarioSpec(
         name=own.name,
         own=own,
         rate_hz=own.rate_hz,
         sampling=own.sampling,
-        seed=seed,
+        seed=own.seed if seed is None else seed,
         sensor=own.sensor,
     )
-    asked = AttitudeOptions(**keys).specify(next(iter(SCENARIOS)))
-    return run_comparison(asked.model_copy(update={"source": scenario}))
 
 
 def _attitude_data(run: Any) -> Table:
@@ -319,42 +325,40 @@ class _SimulatedCrash:
 
 
 def _crash(table: Table, name: str) -> Any:
-    from strapdown.config.crash_case import CaseSpec
-
-    if "simulate" not in table:
-        return _reconstructed(CaseSpec.checked({**table, "name": name}))
-    return _simulated_crash(table, None)
-
-
-def _reconstructed(spec: Any) -> Any:
     from strapdown.api.crash import CrashRun
     from strapdown.crash.case import run_cases
 
-    return CrashRun(**vars(run_cases([(spec, None)])[0]))
+    with crash_case(table, name) as (spec, truth):
+        run = CrashRun(**vars(run_cases([(spec, None)])[0]))
+    return run if truth is None else _SimulatedCrash(run, truth)
 
 
-def _simulated_crash(table: Table, kept: Path | None) -> _SimulatedCrash:
-    """Write the records of a crash as its user has them, and reconstruct it from its case."""
-    import json
+@contextmanager
+def crash_case(table: Table, name: str) -> Iterator[tuple[Any, Table | None]]:
+    """Yield the specification of a crash, and what really happened if it is a simulated one.
 
+    The records of a simulated crash are written as its user has them, and read from their case;
+    other keys of the table replace those of the case.
+    """
     from strapdown.config.crash_case import CaseSpec
     from strapdown.config.sources import CrashSimulationSpec
     from strapdown.report.crash_simulation import write_crash_simulation
 
-    asked = dict(table["simulate"])
-    spec = specify(CrashSimulationSpec, **asked)
+    if "simulate" not in table:
+        yield CaseSpec.checked({**table, "name": name}), None
+        return
+    spec = specify(CrashSimulationSpec, **table["simulate"])
     with tempfile.TemporaryDirectory(prefix="strapdown-") as folder:
-        place = Path(folder).resolve() / "records" if kept is None else kept
+        place = Path(folder).resolve() / "records"
         write_crash_simulation(spec, place)
-        case = absolute_table(read_toml(place / "case.toml"))
+        case: Table = absolute_table(read_toml(place / "case.toml"))
         for key, value in table.items():
+            own = case.get(key)
             if key != "simulate":
-                own = case.get(key)
                 both = isinstance(own, dict) and isinstance(value, dict)
                 case[key] = {**own, **value} if both else value  # type: ignore[dict-item]
         truth = json.loads((place / "scenario.json").read_text(encoding="utf-8"))
-        run = _reconstructed(CaseSpec.checked({**case, "name": "case"}))
-    return _SimulatedCrash(run, truth)
+        yield CaseSpec.checked({**case, "name": "case"}), truth
 
 
 def _crash_data(run: Any) -> Table:

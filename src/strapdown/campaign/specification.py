@@ -259,6 +259,11 @@ class CampaignSpec(FileSpec):
     stop: StopTable | None = None
     limits: LimitsTable = LimitsTable()
 
+    def with_scalars(self, scalars: dict[str, str]) -> CampaignSpec:
+        """Return it with other kept scalars."""
+        keep = self.keep.model_copy(update={"scalars": scalars})
+        return self.model_copy(update={"keep": keep})
+
     def faults(self) -> Iterator[Fault]:
         """Yield what contradicts: names used twice, a stop rule without its statistic."""
         taken: set[str] = {"case", "cell", "draw", "seed", "status", "code", "findings", "log"}
@@ -277,7 +282,8 @@ class CampaignSpec(FileSpec):
             yield Fault(("cases", "method"), "campaign.sensitivity-of-draws")
         if self.cases.table is not None and (drawn or grid or self.base.logs):
             yield Fault(("cases", "table"), "campaign.table-alone")
-        if self.base.bulk and (drawn or grid or self.base.logs or self.cases.table):
+        varied = drawn if self.base.kind != "outage" else [d for d in drawn if d.draw != "uniform"]
+        if self.base.bulk and (varied or grid or self.base.logs or self.cases.table):
             yield Fault(("base", "bulk"), "campaign.bulk-alone")
         if self.stop is not None and self.cases.method == "sensitivity":
             yield Fault(("stop",), "campaign.sensitivity-whole")
