@@ -30,6 +30,7 @@ GROUPS: dict[str, Callable[[], Iterator[Row]]] = {
     "epochs": filters.epochs,
     "hour-drive": commands.hour_drive,
     "crash": crash.monte_carlo,
+    "bulk": crash.bulk,
     "reading": commands.text_table,
     "long-runs": commands.long_runs,
 }

@@ -18,6 +18,7 @@ __all__ = [
     "ACCEL_SUMS",
     "ACCEL_UNITS",
     "ANGLES",
+    "ENDINGS",
     "FACTORS",
     "FORCES",
     "GYRO_SUMS",
@@ -37,6 +38,7 @@ __all__ = [
     "ShownUnits",
     "factor_of",
     "find_unit",
+    "named_unit",
     "parse_unit",
     "si_of",
     "unit_of",
@@ -298,6 +300,52 @@ def unit_words(words: Sequence[str], among: Sequence[str] = OF_LOGS) -> tuple[li
                 if unit := _UNIT_OF[quantity].get(spelled):
                     return list(words[:-take]), unit
     return list(words), ""
+
+
+#: Endings of names, in configurations and results, and how their units are shown.
+ENDINGS = {
+    "_m_per_s2": "m/s²",
+    "_m_per_s": "m/s",
+    "_km_per_h": "km/h",
+    "_mm_per_s": "mm/s",
+    "_rad_per_s": "rad/s",
+    "_deg_per_s": "deg/s",
+    "_deg_per_h": "deg/h",
+    "_deg_per_sqrt_h": "deg/√h",
+    "_m": "m",
+    "_km": "km",
+    "_mm": "mm",
+    "_cm": "cm",
+    "_s": "s",
+    "_ms": "ms",
+    "_h": "h",
+    "_hz": "Hz",
+    "_deg": "deg",
+    "_rad": "rad",
+    "_kg": "kg",
+    "_n": "N",
+    "_kn": "kN",
+    "_kj": "kJ",
+    "_ug": "µg",
+    "_mg": "mg",
+    "_g": "g",
+    "_ut": "µT",
+    "_pa": "Pa",
+    "_ppm": "ppm",
+    "_percent": "%",
+}
+
+
+def named_unit(name: str) -> tuple[str, str]:
+    """Split a name into words and the unit of its ending: ``end_error_m``, end error and m.
+
+    The unit is empty where the ending is none of `ENDINGS`, or the name is nothing but a unit.
+    """
+    ending = max((e for e in ENDINGS if name.endswith(e)), key=len, default="")
+    words = name.removesuffix(ending)
+    if not words or words.endswith(("_per", "_sqrt")):
+        return name.replace("_", " "), ""
+    return words.replace("_", " "), ENDINGS.get(ending, "")
 
 
 # Units of raw counts, and units stated by the user.

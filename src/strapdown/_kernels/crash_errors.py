@@ -115,7 +115,7 @@ def _turned(c, x, y, z):
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def perturbed_runs(
-    state, rows, nominal, start, effects, used, noise_sd, draws, noise, earth, options, out
+    state, rows, nominal, start, effects, used, noise_sd, draws, noise, earth, options, kept, out
 ):
     """Navigate once for each row of `draws`; returns the number of complete runs.
 
@@ -123,8 +123,8 @@ def perturbed_runs(
     states, beginning with the first (k + 1, 10). One standard deviation of unknown p adds
     `start[p]` (rotation vector in level, velocity, meters north, east, down) to the start and
     `effects[p]` (6, k) to angle and velocity of each step, where `used[p]` (6) is set. `noise_sd`
-    (6, k) times `noise` (n, 6, k) is added. `out` (n, k + 1, 9) takes the difference of a run from
-    the nominal one, as in `grow_errors`.
+    (6, k) times `noise` (n, 6, k) is added. `out` (n, m, 9) takes the difference of a run from the
+    nominal one, as in `grow_errors`, after `kept` (m) steps: 0 is the start.
     """
     steps, unknowns = rows.shape[0], start.shape[0]
     added = np.empty((6, steps))
@@ -133,6 +133,7 @@ def perturbed_runs(
     own = np.empty(state.shape[0])
     first = np.empty(9)
     nothing = np.empty(0)
+    order = np.empty(unknowns, dtype=np.int64)
     meridian, transverse = radii(math.sin(state[LAT]), earth[0], earth[1])
     north, east = meridian + state[ALT], (transverse + state[ALT]) * math.cos(state[LAT])
     whole = 0
@@ -145,22 +146,29 @@ def perturbed_runs(
             for j in range(9):
                 first[j] += draws[n, p] * start[p, j]
         for j in range(6):
-            waiting = -1
+            count = 0
             for p in range(unknowns):
-                if not used[p, j]:
-                    continue
-                if waiting < 0:
-                    waiting = p
-                    continue
-                # Two at a time: half of the loads and stores of what they are added to.
-                x, y = draws[n, waiting], draws[n, p]
+                if used[p, j]:
+                    order[count] = p
+                    count += 1
+            # Four at a time: a quarter of the loads and stores of what they are added to.
+            whole_fours = count - count % 4
+            for k in range(0, whole_fours, 4):
+                a, b, c, d = order[k], order[k + 1], order[k + 2], order[k + 3]
+                w, x, y, z = draws[n, a], draws[n, b], draws[n, c], draws[n, d]
                 for i in range(steps):
-                    added[j, i] = added[j, i] + x * effects[waiting, j, i] + y * effects[p, j, i]
-                waiting = -1
-            if waiting >= 0:
-                x = draws[n, waiting]
+                    added[j, i] = (
+                        added[j, i]
+                        + w * effects[a, j, i]
+                        + x * effects[b, j, i]
+                        + y * effects[c, j, i]
+                        + z * effects[d, j, i]
+                    )
+            for k in range(whole_fours, count):
+                p = order[k]
+                x = draws[n, p]
                 for i in range(steps):
-                    added[j, i] += x * effects[waiting, j, i]
+                    added[j, i] += x * effects[p, j, i]
         for i in range(steps):
             half = 0.5 * rows[i, 0]
             mine[i, 0] = rows[i, 0]
@@ -181,12 +189,18 @@ def perturbed_runs(
         )
         own[SINE], own[COSINE] = math.sin(own[LAT]), math.cos(own[LAT])
         own[PRIME] = 1.0 / math.sqrt(1.0 - earth[1] * own[SINE] * own[SINE])
-        for j in range(9):
-            out[n, 0, j] = first[j]
         made, why = ned_advance(own, mine, nothing, earth, options, history)
         if why == DONE:
             whole += 1
-        for i in range(made):
+        for m in range(kept.shape[0]):
+            i = kept[m] - 1
+            if i < 0:
+                for j in range(9):
+                    out[n, m, j] = first[j]
+                continue
+            if i >= made:
+                out[n, m, :] = math.nan
+                continue
             w, x, y, z = quat_multiply(
                 history[i, Q],
                 history[i, Q + 1],
@@ -200,12 +214,10 @@ def perturbed_runs(
             # Errors of attitude are far below a radian: the rotation vector is twice the vector
             # part to within a part in 24 of its square.
             twice = 2.0 if w > 0.0 else -2.0
-            out[n, i + 1, 0], out[n, i + 1, 1], out[n, i + 1, 2] = twice * x, twice * y, twice * z
+            out[n, m, 0], out[n, m, 1], out[n, m, 2] = twice * x, twice * y, twice * z
             for j in range(3):
-                out[n, i + 1, 3 + j] = history[i, V + j] - nominal[i + 1, V + j]
-            out[n, i + 1, 6] = (history[i, LAT] - nominal[i + 1, LAT]) * north
-            out[n, i + 1, 7] = (history[i, LON] - nominal[i + 1, LON]) * east
-            out[n, i + 1, 8] = nominal[i + 1, ALT] - history[i, ALT]
-        for i in range(made, steps):
-            out[n, i + 1, :] = math.nan
+                out[n, m, 3 + j] = history[i, V + j] - nominal[i + 1, V + j]
+            out[n, m, 6] = (history[i, LAT] - nominal[i + 1, LAT]) * north
+            out[n, m, 7] = (history[i, LON] - nominal[i + 1, LON]) * east
+            out[n, m, 8] = nominal[i + 1, ALT] - history[i, ALT]
     return whole

@@ -26,8 +26,8 @@ def fir_decimate(values, weights, first, factor, out):
 
 @njit(cache=True)
 def first_order(decay, drive, state, out):
-    """Fill ``out[k] = decay[k] out[k-1] + drive[k]``, (n, 3), from ``out[-1] = state``, (3,)."""
-    for j in range(3):
+    """Fill ``out[k] = decay[k] out[k-1] + drive[k]``, (n, c), from ``out[-1] = state``, (c,)."""
+    for j in range(drive.shape[1]):
         x = state[j]
         for k in range(drive.shape[0]):
             x = decay[k] * x + drive[k, j]

@@ -63,6 +63,8 @@ COMMANDS = {
     "simulate": (
         "Write the log of a scenario, a trajectory or a crash together with its exact truth."
     ),
+    "campaign": "Run many cases of one configuration, or one for each log, and say how often.",
+    "worker": "Run cases of campaigns for a scheduler of dask, until it ends.",
     "verify": "Run a result again from its own configuration and compare it bit for bit.",
     "sign": "Sign the seal of a result with your key, so that others can tell that it is yours.",
     "export": (

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 #: Suffixes of the folders of these commands.
 ENDINGS = (
-    *("align", "allan", "attitude", "calibrate", "outage", "crash"),
+    *("align", "allan", "attitude", "calibrate", "campaign", "outage", "crash"),
     *("doctor", "extrinsics", "navigate", "simulated"),
 )
 

@@ -17,6 +17,8 @@ from strapdown.errors import ConfigError, Finding
 
 #: Value that only the user knows.
 PLACEHOLDER = "?"
+#: Stand for the folder and the name of a log, in the configuration of a campaign over logs.
+OF_LOG = ("{folder}", "{stem}")
 #: Above this number of open values they are counted, not listed.
 MOST_OPEN = 60
 
@@ -154,6 +156,9 @@ def _with_absolute_paths(file: TomlFile) -> tuple[dict[str, Any], list[Fault]]:
         # What cannot name a file is refused by the form.
         if not isinstance(node, str) or not node.isprintable() or not node.strip():
             return node
+        # Of each log of a fleet: its place is known when the log is.
+        if any(word in node for word in OF_LOG):
+            return node
         key = next((k for k in reversed(path) if isinstance(k, str)), "")
         own = key in ("sensor", "severity", "calibration") and node.lower().endswith(".toml")
         if key != "path" and not own:
@@ -165,6 +170,17 @@ def _with_absolute_paths(file: TomlFile) -> tuple[dict[str, Any], list[Fault]]:
         return node
 
     return {key: resolved(value, (key,)) for key, value in file.table.items()}, faults
+
+
+def absolute_table(file: TomlFile) -> dict[str, Any]:
+    """Return the table of a file with an absolute path for every key that names a file.
+
+    ConfigError: a file that it names is missing; the message names the line.
+    """
+    table, faults = _with_absolute_paths(file)
+    if faults:
+        raise refusal(faults, file.table, file)
+    return table
 
 
 def _find(file: Path, path: KeyPath, given: str) -> str | Fault:

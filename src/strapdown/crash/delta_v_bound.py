@@ -25,6 +25,8 @@ Triple = tuple[float, float, float]
 
 #: Line of the error budget: of the mean force before the crash, which is subtracted.
 AT_REST = "level before the crash"
+#: Line of the error budget: of the instants that bound the window.
+WINDOW_ENDS = "time of the window"
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,11 +92,16 @@ def body_delta_v_bound(
     that bounds the window.
     """
     w = np.asarray(weights, dtype=np.float64)
-    length = float(w.sum())
-    each = np.einsum("n,pni->pi", w, effects.force) - length * effects.rest_force
     noise = (w[:, None] ** 2 * effects.force_noise**2).sum(axis=0)
-    at_rest = (length * np.asarray(rest_sd, dtype=np.float64)) ** 2
+    at_rest = (float(w.sum()) * np.asarray(rest_sd, dtype=np.float64)) ** 2
+    each = body_effects(effects, w)
     return _bound(each, effects.contributors, np.diag(noise), at_ends, at_rest)
+
+
+def body_effects(effects: SampleEffects, weights: Array) -> Array:
+    """Effect of one standard deviation of each unknown on such a change, (p, 3), m/s."""
+    felt = np.einsum("n,pni->pi", weights, effects.force)
+    return np.asarray(felt - float(weights.sum()) * effects.rest_force)
 
 
 def resolved_delta_v_bound(
@@ -161,7 +168,7 @@ def _bound(
         more[AT_REST] = np.diag(np.asarray(at_rest, dtype=np.float64)).ravel()
     if at_ends is not None:
         ends = np.asarray(at_ends, dtype=np.float64)
-        more["time of the window"] = (ends.T @ ends).ravel()
+        more[WINDOW_ENDS] = (ends.T @ ends).ravel()
     columns = [a + b for a in "xyz" for b in "xyz"]
     table = by_contributor(products, columns, contributors, more)
     return DeltaVBound(table.to_numpy().sum(axis=0).reshape(3, 3), table)

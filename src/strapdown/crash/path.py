@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -735,6 +736,107 @@ class PathSamples:
         return out[0], out[1]
 
 
+@dataclass(frozen=True, eq=False)
+class PathStream:
+    """Numbers of one stream of runs.
+
+    Attributes
+    ----------
+    draws : ndarray, (r, p)
+        Standard normal numbers, one for each unknown of the path.
+    noise : tuple of ndarray, (TOGETHER, 6, k)
+        Of each segment of the path: standard normal numbers for angle and velocity of each step.
+    generator : Generator
+        Gives what follows them in the stream.
+    """
+
+    draws: Array
+    noise: tuple[NDArray[np.float32], ...]
+    generator: np.random.Generator
+
+
+@dataclass(frozen=True, eq=False)
+class PathSampler:
+    """Monte Carlo runs of a path, stream by stream: a stream depends on seed and number alone.
+
+    Attributes
+    ----------
+    path : CrashPath
+    seed : int
+    rows : sequence of int, optional
+        Samples of the path at which the runs are wanted, increasing; by default all.
+    """
+
+    path: CrashPath
+    seed: int
+    rows: Sequence[int] | None = None
+
+    def stream(self, number: int, out: Array) -> PathStream:
+        """Draw the first runs of a stream and navigate them.
+
+        `out`, (r, m, 9), takes their errors, as `PathSamples.errors`, at the `rows`; r is at most
+        `TOGETHER`.
+        """
+        generator = np.random.Generator(
+            np.random.SFC64(np.random.SeedSequence(self.seed, spawn_key=(number,)))
+        )
+        draws = generator.standard_normal((TOGETHER, len(self.path.names)))[: len(out)]
+        noises = []
+        for leg, part, kept, active, start, effects, used in self._legs:
+            # Single precision suffices for noise and halves the memory.
+            noise = generator.standard_normal((TOGETHER, 6, len(leg.rows)), dtype=np.float32)
+            noises.append(noise)
+            if not len(kept):
+                continue
+            view = out[:, part]
+            perturbed_runs(
+                leg.state,
+                leg.rows,
+                leg.nominal,
+                start,
+                effects,
+                used,
+                leg.noise_sd,
+                np.ascontiguousarray(draws[:, active]),
+                noise,
+                leg.earth,
+                leg.options,
+                kept,
+                view,
+            )
+            if leg.backward:
+                view[..., VELOCITY] *= -1.0
+        return PathStream(draws, tuple(noises), generator)
+
+    @cached_property
+    def _legs(self) -> list[tuple[Any, ...]]:
+        """Each segment, which of the `rows` it has and after how many steps, and its unknowns."""
+        path = self.path
+        rows = np.arange(len(path.time)) if self.rows is None else np.asarray(self.rows)
+        out: list[tuple[Any, ...]] = []
+        for leg in path.legs:
+            start = path.start.copy()
+            if leg.backward:
+                start[:, VELOCITY] *= -1.0
+                part = slice(0, int(np.searchsorted(rows, path.anchor, side="right")))
+            else:
+                part = slice(int(np.searchsorted(rows, path.anchor)), len(rows))
+            used = np.abs(leg.effects).max(axis=2, initial=0.0) > 0.0
+            active = (np.abs(start).max(axis=1) > 0.0) | (used.sum(axis=1) > 0)
+            out.append(
+                (
+                    leg,
+                    part,
+                    np.abs(rows[part] - path.anchor).astype(np.int64),
+                    active,
+                    start[active],
+                    np.ascontiguousarray(leg.effects[active]),
+                    np.ascontiguousarray(used[active]),
+                )
+            )
+        return out
+
+
 def sample_paths(
     path: CrashPath,
     *,
@@ -773,52 +875,11 @@ def sample_paths(
     kept = _room(runs, numbers + unknowns)
     errors = kept[:numbers, :runs].T.reshape(runs, -1, 9)
     draws = kept[numbers:, :runs].T
-    prepared = []
-    for leg in path.legs:
-        start = path.start.copy()
-        if leg.backward:
-            start[:, VELOCITY] *= -1.0
-        used = np.abs(leg.effects).max(axis=2, initial=0.0) > 0.0
-        active = (np.abs(start).max(axis=1) > 0.0) | (used.sum(axis=1) > 0)
-        prepared.append(
-            (
-                leg,
-                active,
-                start[active],
-                np.ascontiguousarray(leg.effects[active]),
-                np.ascontiguousarray(used[active]),
-            )
-        )
+    sampler = PathSampler(path, seed)
 
     def chunk(number: int) -> None:
         rows = slice(number * TOGETHER, min((number + 1) * TOGETHER, runs))
-        generator = np.random.Generator(
-            np.random.SFC64(np.random.SeedSequence(seed, spawn_key=(number,)))
-        )
-        mine = generator.standard_normal((TOGETHER, unknowns))[: rows.stop - rows.start]
-        draws[rows] = mine
-        own = errors[rows]
-        for leg, active, start, effects, used in prepared:
-            view = own[:, path.anchor :: -1] if leg.backward else own[:, path.anchor :]
-            steps = len(leg.rows)
-            # Single precision suffices for noise and halves the memory.
-            noise = generator.standard_normal((TOGETHER, 6, steps), dtype=np.float32)
-            perturbed_runs(
-                leg.state,
-                leg.rows,
-                leg.nominal,
-                start,
-                effects,
-                used,
-                leg.noise_sd,
-                np.ascontiguousarray(mine[:, active]),
-                noise,
-                leg.earth,
-                leg.options,
-                view,
-            )
-            if leg.backward:
-                view[..., VELOCITY] *= -1.0
+        draws[rows] = sampler.stream(number, errors[rows]).draws
         if (number + 1) % STREAMS == 0:
             let_go(kept)
 

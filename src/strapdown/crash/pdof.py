@@ -84,6 +84,11 @@ def _angles(vector: Array) -> tuple[float, float]:
     return horizontal, math.degrees(math.atan2(z, math.hypot(x, y)))
 
 
+def horizontal_angles(vectors: Array) -> Array:
+    """Horizontal directions, (n,), deg, that the forces of many changes, (n, 3), came from."""
+    return np.asarray(np.degrees(np.arctan2(0.0 - vectors[:, 1], 0.0 - vectors[:, 0])))
+
+
 def pdof(change: DeltaV | ArrayLike) -> Pdof:
     """Direction of force from a change of velocity along vehicle axes.
 

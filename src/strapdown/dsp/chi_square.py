@@ -82,6 +82,37 @@ def binomial_at_least(hits: float, trials: float, probability: float) -> float:
     return float(betainc(hits, trials - hits + 1.0, probability)) if hits > 0.0 else 1.0
 
 
+def binomial_quantile(share: Any, trials: Any, probability: Any) -> NDArray[np.int64]:
+    """Compute the smallest count of hits that is not exceeded with a probability of `share`.
+
+    Bisection over the binomial distribution ``I_q(n - k, k + 1)``, q = 1 - `probability`
+    (DLMF 8.17.5), so that the count is the exact one. The arguments are broadcast.
+    """
+    from scipy.special import betainc
+
+    share, trials, probability = np.broadcast_arrays(share, trials, probability)
+    low, high = np.full(share.shape, -1, np.int64), trials.astype(np.int64)
+    while (high - low > 1).any():
+        middle = (low + high) // 2
+        enough = betainc(trials - middle, middle + 1.0, 1.0 - probability) >= share
+        low, high = np.where(enough, low, middle), np.where(enough, middle, high)
+    return np.asarray(high, dtype=np.int64)
+
+
+def clopper_pearson(hits: float, trials: float, confidence: float = 0.95) -> tuple[float, float]:
+    """Compute the exact interval of a probability of which `hits` of `trials` were seen.
+
+    Clopper and Pearson (1934): it contains the probability with `confidence` or more, whatever the
+    probability is. Without trials it is 0 to 1.
+    """
+    from scipy.special import betaincinv
+
+    tail, misses = 0.5 * (1.0 - confidence), trials - hits
+    low = float(betaincinv(hits, misses + 1.0, tail)) if hits > 0.0 else 0.0
+    high = 1.0 - float(betaincinv(misses, hits + 1.0, tail)) if misses > 0.0 else 1.0
+    return low, high
+
+
 def _plain(values: Any) -> Any:
     return float(values) if np.ndim(values) == 0 else values
 

@@ -26,6 +26,7 @@ __all__ = [
     "Share",
     "Source",
     "courses",
+    "covariance_over",
     "forecast",
     "scaled",
     "sources_of",
@@ -177,15 +178,9 @@ def forecast(
         Whether measurements remain.
     progress : callable, optional
     """
-    interval = max(outage / INSTANTS, navigator.filter.step)
-    navigator = replace(navigator, mark_interval=interval)
+    navigator = _marked(navigator, outage)
+    time, P, trajectory = covariance_over(navigator, state, go, outage)
     begin = state.time
-    start = _start(navigator, state)
-    record = record_of(navigator, go(navigator, state), "outage")
-    time = np.concatenate([[0.0], record.sd.index.to_numpy(dtype=np.float64) - begin])
-    P = np.concatenate([start[None], record.covariance])
-    P = np.where(np.isnan(P).any(axis=0), np.nan, P)
-    trajectory = record.trajectory
     course = courses(trajectory, time + begin)
     part = AIDED_PART if aided else LINEAR_PART
     whole = variances(P, course)
@@ -207,6 +202,33 @@ def forecast(
     left = {q: v - np.sum([one.variance[q] for one in shares], axis=0) for q, v in whole.items()}
     trajectory.index = trajectory.index - begin
     return Forecast(begin, time, trajectory, P, course, tuple(shares), left if aided else {})
+
+
+def covariance_over(
+    navigator: Navigator, state: NavigatorState, go: Go, outage: float
+) -> tuple[Array, Array, pd.DataFrame]:
+    """Run the filter over an outage.
+
+    Returns
+    -------
+    time : ndarray, (n,), s
+        Since the begin of the outage.
+    covariance : ndarray, (n, 9, 9)
+        As `Forecast.covariance`.
+    trajectory : DataFrame
+        On the clock of the samples.
+    """
+    navigator, begin = _marked(navigator, outage), state.time
+    start = _start(navigator, state)
+    record = record_of(navigator, go(navigator, state), "outage")
+    time = np.concatenate([[0.0], record.sd.index.to_numpy(dtype=np.float64) - begin])
+    P = np.concatenate([start[None], record.covariance])
+    return time, np.where(np.isnan(P).any(axis=0), np.nan, P), record.trajectory
+
+
+def _marked(navigator: Navigator, outage: float) -> Navigator:
+    """With the covariance at so many instants of an outage."""
+    return replace(navigator, mark_interval=max(outage / INSTANTS, navigator.filter.step))
 
 
 def _as_it_would_be(

@@ -37,6 +37,7 @@ from strapdown.config.motions import TrajectorySpec
 from strapdown.config.reading import changed_options
 from strapdown.config.sources import CrashSimulationSpec, SimulateSpec
 from strapdown.errors import ConfigError, DataError, Finding, Severity, StrapdownError
+from strapdown.lazy_names import Choices
 from strapdown.report import crash_live
 from strapdown.report.alignment import ALIGNMENT
 from strapdown.report.allan import ALLAN
@@ -98,10 +99,14 @@ BUNDLES: dict[str, ReportBundle[Any]] = {
 }
 
 
+#: Of commands on a floor above this one: ``module:attribute``.
+ABOVE: Choices = Choices({"campaign": "strapdown.campaign.run:CAMPAIGN_BUNDLE"})
+
+
 def _rerun(command: str, configuration: dict[str, Any], out: Path, sealed: set[str]) -> None:
     """Repeat a run from its configuration; `sealed`: names of the sealed files."""
-    if command in BUNDLES:
-        BUNDLES[command].rerun(configuration, out)
+    if command in BUNDLES or command in ABOVE:
+        (BUNDLES.get(command) or ABOVE[command]).rerun(configuration, out)
     elif command == "attitude":
         keys = {key: value for key, value in configuration.items() if key != "report"}
         report = bool(configuration.get("report", True))
@@ -178,7 +183,7 @@ def verify(
         return Verification("changed", math.inf, digest, (*changes, *notes))
     if manifest["command"] == "reproduce":
         raise DataError("report.reproduced-paper", file=MANIFEST)
-    if manifest["command"] not in (*BUNDLES, "attitude", "simulate", crash_live.COMMAND):
+    if manifest["command"] not in (*BUNDLES, *ABOVE, "attitude", "simulate", crash_live.COMMAND):
         raise DataError("report.command-not-known", file=MANIFEST, manifest=manifest["command"])
     with tempfile.TemporaryDirectory(prefix="strapdown-verify-") as folder:
         repeated = Path(folder) / "again" if again is None else Path(again).absolute()

@@ -89,7 +89,7 @@ def apply(
         u = _through_filter(errors, t, u, steps, mean)
     v = u + u @ np.asarray(errors.misalignment).T + _g_effect(errors, u, specific_force)
     y = np.column_stack([transfer(v[:, k], *_curve(errors, k)) for k in range(3)])
-    y += _known_drift(errors, t, steps, mean) + _rectified(errors, y, vibration)
+    y += known_drift(errors, t, steps, mean) + _rectified(errors, y, vibration)
     if any(errors.axis("bias_instability")):
         y += gauss_markov(
             seed, steps, errors.axis("bias_instability"), errors.correlation_time, mean
@@ -141,7 +141,7 @@ def compensate(
     """
     t, y = _rows(time, measured, "measured")
     mean = _is_mean(sampling)
-    y = y - _known_drift(errors, t, intervals(t), mean) - _rectified(errors, y, vibration)
+    y = y - known_drift(errors, t, intervals(t), mean) - _rectified(errors, y, vibration)
     v = np.column_stack([input_of(y[:, k], *_curve(errors, k)) for k in range(3)])
     v -= _g_effect(errors, v, specific_force)
     directions = np.eye(3) + np.asarray(errors.misalignment)
@@ -257,7 +257,7 @@ def _curve(errors: TriadErrors, axis: int) -> tuple[float, float, float, float]:
     )
 
 
-def _known_drift(errors: TriadErrors, t: Array, steps: Array, mean: bool) -> Array:
+def known_drift(errors: TriadErrors, t: Array, steps: Array, mean: bool) -> Array:
     """Bias, trend and warm-up; the mean of a trend over an interval is its midpoint value."""
     middle = t - 0.5 * steps if mean else t
     drift = np.asarray(errors.bias) + np.outer(middle, np.asarray(errors.trend))
@@ -330,14 +330,11 @@ def transfer(x: Array, scale: float, second: float, third: float, full: float) -
     ``y/F = (1 + scale) x/F + second (x/F)² + third (x/F)³`` up to full scale, ``|x| <= F``, and
     linear along the tangent beyond, so that the inverse is unique. `full` (u): F. Returns (n,), u.
     """
-    if second == 0.0 and third == 0.0:
-        return x * (1.0 + scale)
-    r = x / full
-    inner = np.clip(r, -1.0, 1.0)
-    gain = 1.0 + scale
-    value = inner * (gain + inner * (second + inner * third))
-    slope = gain + inner * (2.0 * second + inner * 3.0 * third)
-    return np.asarray(full * (value + slope * (r - inner)), dtype=np.float64)
+    from strapdown._kernels.unit_rates import curve
+
+    out = x.copy()
+    curve(out, scale, second, third, full)
+    return out
 
 
 def input_of(y: Array, scale: float, second: float, third: float, full: float) -> Array:
@@ -418,13 +415,19 @@ def random_walk(seed: Seed, steps: Array, density: Triad, mean: bool) -> Array:
     Instantaneous: zero at the first sample. Mean: zero at the start of the first step. With
     ``x1 - x0 = K √dt w1``, the mean over the step is ``x0 + K √dt (w1/2 + w2/√12)``.
     """
+    more = normal(seed, WALK_MEAN, steps.size) if mean else None
+    return walk_of(normal(seed, WALK, steps.size), more, steps, density)
+
+
+def walk_of(first: Array, more: Array | None, steps: Array, density: ArrayLike) -> Array:
+    """`random_walk` from its standard normal numbers, (n, c) each; `more`: for means only."""
     root = np.sqrt(steps)[:, None]
-    moves = root * normal(seed, WALK, steps.size)
-    if not mean:
+    moves = root * first
+    if more is None:
         moves[0] = 0.0
         return np.asarray(np.cumsum(moves, axis=0) * np.asarray(density), dtype=np.float64)
     before = np.cumsum(moves, axis=0) - moves
-    inside = 0.5 * moves + root * normal(seed, WALK_MEAN, steps.size) / np.sqrt(12.0)
+    inside = 0.5 * moves + root * more / np.sqrt(12.0)
     return np.asarray((before + inside) * np.asarray(density), dtype=np.float64)
 
 
@@ -436,25 +439,31 @@ def gauss_markov(seed: Seed, steps: Array, sd: Triad, correlation: float, mean: 
     mean ``(1 - a) x0/sd``, the variance ``2h - 3 + 4a - a²`` and the covariance ``(1 - a)²`` with
     x1 (Gillespie 1996, Physical Review E 54, 2084).
     """
+    further = normal(seed, INSTABILITY_MEAN, steps.size + 1) if mean else None
+    return gauss_markov_of(normal(seed, INSTABILITY, steps.size), further, steps, sd, correlation)
+
+
+def gauss_markov_of(
+    w1: Array, further: Array | None, steps: Array, sd: ArrayLike, correlation: float
+) -> Array:
+    """`gauss_markov` from its standard normal numbers: (n, c), and for means alone (n + 1, c)."""
     from strapdown._kernels.signals import first_order
 
     h = steps / correlation
     a = np.exp(-h)
     spread = np.sqrt(-np.expm1(-2.0 * h))
-    w1 = normal(seed, INSTABILITY, steps.size)
     drive = spread[:, None] * w1
-    first = np.zeros(3)
-    if mean:
+    first = np.zeros(w1.shape[1])
+    if further is not None:
         # The process starts, stationary, at the start of the first step, with the first number of
         # the second stream.
-        further = normal(seed, INSTABILITY_MEAN, steps.size + 1)
         first = further[0].copy()
     else:
         # The first sample itself is drawn from the stationary distribution.
         a[0], drive[0] = 0.0, w1[0]
     x = np.empty_like(drive)
     first_order(a, drive, first, x)
-    if not mean:
+    if further is None:
         return np.asarray(x * np.asarray(sd), dtype=np.float64)
     before = np.vstack([first, x[:-1]])
     given_start = -np.expm1(-h)

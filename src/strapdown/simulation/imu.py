@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 
 import numpy as np
 import pandas as pd
@@ -26,6 +27,8 @@ Array = NDArray[np.float64]
 
 # Samples that fit in a few gigabytes of memory with all derived arrays.
 MOST_SAMPLES = 5_000_000
+# Samples of one motion that are kept for other units, and how many of such arrays.
+MOST_KEPT, KEPT = 500_000, 4
 # Keys of the triads in the seed tree.
 GYRO_SEED, ACCEL_SEED = 0, 1
 
@@ -205,6 +208,53 @@ def _sampled(
     of_force: bool,
 ) -> Array:
     """Rate or specific force at the jittered instants, or its means, after the low-pass."""
+    if errors.jitter == 0.0 and time.size <= MOST_KEPT:
+        return _exact(motion, errors.bandwidth, _Stamps(time), sampling, straight, of_force)
+    return _measured(motion, errors, time, sampling, seed, straight, of_force=of_force)
+
+
+class _Stamps:
+    """Stamps that compare by value."""
+
+    def __init__(self, time: Array) -> None:
+        self.time = time
+
+    def __hash__(self) -> int:
+        return hash((self.time.size, float(self.time[0]), float(self.time[-1])))
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Stamps) and np.array_equal(self.time, other.time)
+
+
+@lru_cache(maxsize=KEPT)
+def _exact(
+    motion: Motion,
+    bandwidth: float,
+    stamps: _Stamps,
+    sampling: str,
+    straight: float,
+    of_force: bool,
+) -> Array:
+    """Return what a triad without errors but for its low-pass reads, and keep it.
+
+    Many units along one motion differ in their errors alone, and the motion costs the most.
+    """
+    ideal = TriadErrors(bandwidth=bandwidth)
+    values = _measured(motion, ideal, stamps.time, sampling, 0, straight, of_force=of_force)
+    values.setflags(write=False)
+    return values
+
+
+def _measured(
+    motion: Motion,
+    errors: TriadErrors,
+    time: Array,
+    sampling: str,
+    seed: Seed,
+    straight: float,
+    *,
+    of_force: bool,
+) -> Array:
     step, at = float(time[1] - time[0]), time
     if errors.jitter > 0.0:
         # The motion is known from zero to its end.

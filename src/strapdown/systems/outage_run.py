@@ -31,7 +31,9 @@ from strapdown.navigation.navigator import Navigator, NavigatorState, with_state
 from strapdown.navigation.outage import (
     QUANTITIES,
     Forecast,
+    Go,
     courses,
+    covariance_over,
     forecast,
     physical,
     variances,
@@ -74,6 +76,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Drift",
     "OutageRun",
+    "drift_of_sensor",
     "forecast_of_sensor",
     "outage_navigator",
     "outage_of_run",
@@ -645,6 +648,30 @@ def forecast_of_sensor(
     ConfigError
         The motion is not possible.
     """
+    navigator, state, go = _begun(spec, sensors, progress)
+    return forecast(
+        navigator,
+        state,
+        go,
+        spec.outage_s,
+        aided=bool(navigator.aids),
+        progress=lambda stage, share: progress(stage, 0.3 + 0.45 * share),
+    )
+
+
+def drift_of_sensor(spec: OutageSpec, sensors: ImuUncertainty) -> tuple[Array, Array]:
+    """Time since the begin of the outage, (n,), s, and covariance, (n, 9, 9), of the prediction.
+
+    The covariance of `forecast_of_sensor`, without the shares of the sources.
+    """
+    time, covariance, _ = covariance_over(*_begun(spec, sensors, silent), spec.outage_s)
+    return time, covariance
+
+
+def _begun(
+    spec: OutageSpec, sensors: ImuUncertainty, progress: Progress
+) -> tuple[Navigator, NavigatorState, Go]:
+    """Navigator and state at the begin of an outage, and what runs over it."""
     motion, begin = stated_motion(spec)
     progress("the motion", 0.1)
     perfect = ImuErrors()
@@ -669,14 +696,7 @@ def forecast_of_sensor(
         end, piece = one.advance(start, time[first:], rows[first:])
         return piece, one.finish(end)
 
-    return forecast(
-        navigator,
-        state,
-        go,
-        spec.outage_s,
-        aided=bool(navigator.aids),
-        progress=lambda stage, share: progress(stage, 0.3 + 0.45 * share),
-    )
+    return navigator, state, go
 
 
 def _aligned(navigator: Navigator, sensors: ImuUncertainty) -> Array:

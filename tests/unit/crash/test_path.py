@@ -184,6 +184,7 @@ def test_every_unknown_grows_as_navigation_does(case):
             np.zeros((unknowns, 6, steps)),
             leg.earth,
             leg.options,
+            np.arange(steps + 1),
             out,
         )
         assert whole == unknowns
@@ -414,7 +415,8 @@ def test_effects_are_added_in_the_order_of_the_unknowns(case):
     def navigated(start, effects, used, noise_sd, draws, noise):
         out = np.empty((len(draws), steps + 1, 9))
         state, rows, nominal = leg.state, leg.rows, leg.nominal
-        about = (start, effects, used, noise_sd, draws, noise, leg.earth, leg.options, out)
+        known = (leg.earth, leg.options, np.arange(steps + 1))
+        about = (start, effects, used, noise_sd, draws, noise, *known, out)
         assert perturbed_runs(state, rows, nominal, *about) == len(draws)
         return out
 

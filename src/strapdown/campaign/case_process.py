@@ -1,0 +1,339 @@
+"""A process that runs cases, and its keeper, who notices when it dies, hangs or takes too much.
+
+A case may crash its process, hang in compiled code, or need all of the memory. It runs in a process
+of its own making, which answers each case by itself: the keeper knows which one it was, records it,
+and starts another process for the next. Messages are pickles with their length before them.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import os
+import pickle
+import select
+import signal
+import struct
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, BinaryIO
+
+from strapdown.errors import ConfigError
+
+__all__ = ["CaseProcess", "Row", "run_case"]
+
+#: Outcome of a case: status, code, findings, scalars in order, curves in order.
+Row = dict[str, Any]
+_LENGTH = struct.Struct("<Q")
+#: Grace beyond the limit before a process that answers nothing is ended, s.
+GRACE = 1.0
+#: Least time of a process to start and to load what it runs, s.
+START = 120.0
+
+
+# --- within the process -------------------------------------------------------------------
+
+
+def run_case(campaign: Any, number: int) -> tuple[Row, Any]:
+    """Run a case; returns its row and its result, None where it has none."""
+    from strapdown.campaign.kinds import KINDS, at_path, parts_of
+    from strapdown.errors import DivergenceError, StrapdownError
+
+    case = campaign.case(number)
+    kind = KINDS[campaign.spec.base.kind]
+    row: Row = {
+        "case": case.number,
+        "cell": case.cell,
+        "draw": case.draw,
+        "seed": case.seed,
+        "values": case.values,
+        "log": case.log,
+        "status": "done",
+        "code": "",
+        "findings": "",
+        "scalars": [math.nan] * len(campaign.scalars),
+        "curves": None,
+    }
+    try:
+        result = kind.run(campaign.table(case), f"case-{number}")
+        data = kind.data(result)
+        row["scalars"] = [
+            _number(at_path(data, parts_of(place))) for place in campaign.scalars.values()
+        ]
+        row["findings"] = " ".join(sorted({one.code for one in _findings(result)}))
+        if campaign.spec.keep.curves:
+            row["curves"] = _curves(campaign, kind, result)
+    except MemoryError:
+        return {**row, "status": "memory"}, None
+    except StrapdownError as error:
+        status = "diverged" if isinstance(error, DivergenceError) else "refused"
+        return {**row, "status": status, "code": error.finding.code}, None
+    except Exception as error:  # a fault of ours, or of a plug-in, is a result of this case
+        return {**row, "status": "failed", "code": type(error).__name__}, None
+    return row, result
+
+
+def _findings(result: Any) -> Iterator[Any]:
+    found = getattr(result, "findings", None)
+    if found is not None:
+        yield from found
+        return
+    for log in getattr(result, "logs", ()):
+        yield from (*log.questions, *log.faults, *log.notes)
+
+
+def _number(value: Any) -> float:
+    """A scalar as a number; what is none is NaN."""
+    if isinstance(value, bool | int | float):
+        return float(value)
+    return math.nan
+
+
+def _curves(campaign: Any, kind: Any, result: Any) -> list[list[float]]:
+    import numpy as np
+
+    axis = campaign.spec.keep.axis
+    x = np.linspace(axis.from_s, axis.to_s, axis.points)
+    table = kind.curves(result)
+    time = table.index.to_numpy(dtype=np.float64)
+    out = []
+    for name in campaign.spec.keep.curves:
+        if name not in table.columns:
+            out.append([math.nan] * len(x))
+            continue
+        values = np.interp(x, time, table[name].to_numpy(dtype=np.float64))
+        values[(x < time[0] - 1e-9) | (x > time[-1] + 1e-9)] = np.nan
+        out.append(values.tolist())
+    return out
+
+
+def _send(stream: BinaryIO, message: Any) -> None:
+    data = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
+    stream.write(_LENGTH.pack(len(data)) + data)
+    stream.flush()
+
+
+def _receive(stream: BinaryIO) -> Any:
+    """Read one message, and nothing of the next; EOFError where the stream ends before its end."""
+    return pickle.loads(_exactly(stream, _LENGTH.unpack(_exactly(stream, _LENGTH.size))[0]))
+
+
+def _exactly(stream: BinaryIO, count: int) -> bytes:
+    parts = bytearray()
+    while len(parts) < count:
+        part = stream.read(count - len(parts))
+        if not part:
+            raise EOFError
+        parts += part
+    return bytes(parts)
+
+
+def _end_with(parent: int) -> None:
+    """End this process when its keeper ends, however that happens."""
+
+    def watch() -> None:
+        while os.getppid() == parent:
+            time.sleep(1.0)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+def _limit_memory(megabytes: float) -> None:
+    """Refuse allocations beyond the limit, so that a case meets a MemoryError."""
+    with contextlib.suppress(ImportError, ValueError, OSError):
+        import resource
+
+        most = int(megabytes * 1e6)
+        resource.setrlimit(
+            resource.RLIMIT_DATA, (most, resource.getrlimit(resource.RLIMIT_DATA)[1])
+        )
+
+
+def main() -> None:
+    """Serve cases on the standard streams until the input ends."""
+    # What a case prints must not be among the answers.
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    asked = sys.stdin.buffer.raw
+    _end_with(os.getppid())
+    from strapdown.campaign.design import Campaign
+
+    frozen = _receive(asked)
+    campaign = Campaign.thawed(frozen)
+    bulk = campaign.bulk() if campaign.spec.base.bulk else None
+    _limit_memory(campaign.spec.limits.memory_mb)
+    _send(answers, "ready")
+    while True:
+        try:
+            numbers = _receive(asked)
+        except EOFError:
+            return
+        if bulk is not None:
+            _send(answers, bulk.run(numbers[0], numbers[-1] + 1))
+            continue
+        for number in numbers:
+            row, _ = run_case(campaign, number)
+            _send(answers, row)
+
+
+# --- its keeper ---------------------------------------------------------------------------
+
+
+class CaseProcess:
+    """Keeps a process that runs cases of a campaign, and starts another where it ends.
+
+    Parameters
+    ----------
+    frozen : mapping
+        `design.Campaign.frozen`.
+    """
+
+    def __init__(self, frozen: Mapping[str, Any]) -> None:
+        self._frozen = frozen
+        self._limit = float(frozen["limits"]["time_s"])
+        self._process: subprocess.Popen[bytes] | None = None
+        self._closed = False
+        self._busy = threading.Lock()
+
+    def run(self, numbers: Sequence[int]) -> Iterator[Row]:
+        """Yield the rows of cases, whatever happens to them."""
+        left = list(numbers)
+        with self._busy:
+            while left and not self._closed:
+                yield from self._some(left)
+
+    def _some(self, left: list[int]) -> Iterator[Row]:
+        """Yield the rows of cases until none is left, or the process ended; these are taken."""
+        process = self._started()
+        assert process.stdin is not None
+        # A process that ended meanwhile is noticed by its missing answer.
+        with contextlib.suppress(BrokenPipeError):
+            _send(process.stdin, left)
+        while left:
+            number, ended = left.pop(0), True
+            try:
+                row = self._answer(self._limit + GRACE)
+                ended = row["status"] == "memory"  # what the process still holds is not known
+            except TimeoutError:
+                row = self._lost(number, "hung")
+            except EOFError:
+                row = self._lost(number, self._ended())
+            if ended:
+                self.stop()
+                if self._closed:
+                    return
+            yield row
+            if ended:
+                return
+
+    def block(self, first: int, last: int) -> Any:
+        """Return what one call makes of many cases (`base.bulk`).
+
+        RuntimeError: the process ended.
+        """
+        with self._busy:
+            process = self._started()
+            assert process.stdin is not None
+            try:
+                _send(process.stdin, [first, last - 1])
+                return self._answer(self._limit + GRACE)
+            except (EOFError, BrokenPipeError, TimeoutError):
+                self.stop()
+                raise RuntimeError(f"cases {first} to {last - 1}") from None
+
+    def close(self) -> None:
+        """End the process for good, also while another thread waits for its answer."""
+        self._closed = True
+        process = self._process
+        if process is not None:
+            process.kill()
+        if self._busy.acquire(timeout=10.0):
+            self.stop()
+            self._busy.release()
+
+    def stop(self) -> None:
+        """End the process."""
+        process, self._process = self._process, None
+        if process is not None:
+            process.kill()
+            process.wait()
+            for stream in (process.stdin, process.stdout):
+                if stream is not None:
+                    with contextlib.suppress(OSError):
+                        stream.close()
+
+    def _started(self) -> subprocess.Popen[bytes]:
+        if self._process is None or self._process.poll() is not None:
+            self.stop()
+            environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+            command = [sys.executable, "-m", "strapdown.campaign.case_process"]
+            self._process = subprocess.Popen(
+                command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL,
+                env=environment,
+                bufsize=0,
+                # An interrupt of the keeper is none of a case.
+                start_new_session=True,
+            )
+            assert self._process.stdin is not None
+            try:
+                _send(self._process.stdin, dict(self._frozen))
+                self._answer(max(START, self._limit))
+            except (EOFError, BrokenPipeError, TimeoutError):
+                self.stop()
+                raise ConfigError("campaign.no-process", python=sys.executable) from None
+        return self._process
+
+    def _answer(self, limit: float) -> Any:
+        """Next message; TimeoutError after `limit`, s, EOFError where the process ended."""
+        assert self._process is not None
+        assert self._process.stdout is not None
+        stream = self._process.stdout
+        if not select.select([stream], [], [], limit)[0]:
+            raise TimeoutError
+        return _receive(stream)
+
+    def _ended(self) -> str:
+        """Code of how the process ended."""
+        if self._process is None:
+            return "exit"
+        try:
+            code = self._process.wait(timeout=10.0)
+        except subprocess.TimeoutExpired:
+            code = None
+        self.stop()
+        if code is None:
+            return "exit"
+        if code < 0:
+            with contextlib.suppress(ValueError):
+                return signal.Signals(-code).name
+        return f"exit {code}"
+
+    def _lost(self, number: int, how: str) -> Row:
+        from strapdown.campaign.design import Campaign
+
+        campaign = Campaign.thawed(self._frozen)
+        case = campaign.case(number)
+        return {
+            "case": case.number,
+            "cell": case.cell,
+            "draw": case.draw,
+            "seed": case.seed,
+            "values": case.values,
+            "log": case.log,
+            "status": "hung" if how == "hung" else "crashed",
+            "code": "" if how == "hung" else how,
+            "findings": "",
+            "scalars": [math.nan] * len(campaign.scalars),
+            "curves": None,
+        }
+
+
+if __name__ == "__main__":
+    main()
