@@ -65,6 +65,8 @@ if TYPE_CHECKING:
     from strapdown.api.simulation import Simulation, simulate
     from strapdown.api.writing import write
     from strapdown.bundle.signature import sign
+    from strapdown.campaign.engine import Workers
+    from strapdown.campaign.run import CampaignRun, run_campaign
     from strapdown.crash.entry import Entry
     from strapdown.crash.path import sample_paths
     from strapdown.crash.reconstruction import (
@@ -104,6 +106,7 @@ __all__ = [
     "Barometer",
     "BodyVelocity",
     "CalibrateRun",
+    "CampaignRun",
     "CrashOptions",
     "CrashReconstruction",
     "CrashRun",
@@ -136,6 +139,7 @@ __all__ = [
     "Streams",
     "TriadUncertainty",
     "WanderAzimuth",
+    "Workers",
     "ZeroAngularRate",
     "ZeroVelocity",
     "__version__",
@@ -163,6 +167,7 @@ __all__ = [
     "read_trajectory",
     "reconstruct",
     "reconstruct_crash",
+    "run_campaign",
     "run_mechanization",
     "sample_paths",
     "sign",
@@ -195,6 +200,8 @@ load_on_first_use(
         "api.reading": "GnssFixes Imu Streams read read_gnss read_imu",
         "api.simulation": "Simulation simulate",
         "api.writing": "write",
+        "campaign.engine": "Workers",
+        "campaign.run": "CampaignRun run_campaign",
         "crash.entry": "Entry",
         "bundle.signature": "sign",
         "crash.path": "sample_paths",

@@ -19,7 +19,14 @@ import pytest
 
 from strapdown.campaign import dataset
 from strapdown.campaign.engine import Workers
-from strapdown.campaign.run import campaign, case_of, differing, merge_parts, open_campaign, resume
+from strapdown.campaign.run import (
+    case_of,
+    differing,
+    merge_parts,
+    open_campaign,
+    resume,
+    run_campaign,
+)
 from strapdown.errors import ConfigError
 
 HEAD = """
@@ -67,7 +74,7 @@ def test_a_case_that_dies_hangs_or_needs_all_memory_is_recorded(cheap: Path) -> 
         memory_mb = 600.0
         """,
     )
-    run = campaign(file, workers=2)
+    run = run_campaign(file, workers=2)
     found = run.cases.groupby("places")[["status", "code"]].first()
     assert found["status"].to_dict() == {
         1: "done",
@@ -119,13 +126,13 @@ def scheduler(workers: int, python_path: str) -> Iterator[str]:
 
 def test_one_and_two_workers_and_a_scheduler_give_the_same_bytes(cheap: Path) -> None:
     file = written(cheap, DRAWN.format(draws=300))
-    campaign(file, workers=1).save(cheap / "one", report=False)
-    campaign(file, workers=2).save(cheap / "two", report=False)
+    run_campaign(file, workers=1).save(cheap / "one", report=False)
+    run_campaign(file, workers=2).save(cheap / "two", report=False)
     with scheduler(2, os.environ["PYTHONPATH"]) as address:
         deadline = time.monotonic() + 120.0
         while True:
             try:
-                run = campaign(file, workers=Workers(scheduler=address))
+                run = run_campaign(file, workers=Workers(scheduler=address))
                 break
             except ConfigError:  # it has not begun to listen
                 assert time.monotonic() < deadline
@@ -138,7 +145,7 @@ def test_killed_at_drawn_instants_and_resumed(cheap: Path) -> None:
     file = written(cheap, DRAWN.format(draws=120).replace("[cases]", "[cases]\nseed = 5"))
     text = file.read_text().replace("at_s = 0.0", "at_s = 0.05")
     file.write_text(text)
-    campaign(file, workers=2).save(cheap / "whole", report=False)
+    run_campaign(file, workers=2).save(cheap / "whole", report=False)
     command = [sys.executable, "-m", "strapdown", "campaign"]
     rng = random.Random(3)
     start = [str(file), "--out", str(cheap / "cut"), "--no-report", "--workers", "2", "-q"]
@@ -167,7 +174,7 @@ def test_a_full_disk_loses_nothing_that_was_written(
     cheap: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = written(cheap, DRAWN.format(draws=200))
-    campaign(file, workers=1).save(cheap / "whole", report=False)
+    run_campaign(file, workers=1).save(cheap / "whole", report=False)
     plain = dataset.Dataset.add
     calls = []
 
@@ -181,7 +188,7 @@ def test_a_full_disk_loses_nothing_that_was_written(
     monkeypatch.setattr("strapdown.campaign.run.SECONDS", 0.0)
     monkeypatch.setattr("strapdown.campaign.engine.MOST", 20)
     with pytest.raises(OSError, match="no space"):
-        campaign(file, workers=1, folder=cheap / "c-running")
+        run_campaign(file, workers=1, folder=cheap / "c-running")
     monkeypatch.setattr(dataset.Dataset, "add", plain)
     found = open_campaign(cheap / "c").dataset.there().sum()
     assert 0 < found < 200
@@ -191,22 +198,22 @@ def test_a_full_disk_loses_nothing_that_was_written(
 
 def test_parts_of_two_machines_merge(cheap: Path) -> None:
     file = written(cheap, DRAWN.format(draws=100))
-    campaign(file, workers=1).save(cheap / "whole", report=False)
+    run_campaign(file, workers=1).save(cheap / "whole", report=False)
     for k in (1, 2):
-        campaign(file, workers=1, folder=cheap / f"p{k}-running", part=(k, 2))
+        run_campaign(file, workers=1, folder=cheap / f"p{k}-running", part=(k, 2))
     assert merge_parts([cheap / "p1"], cheap / "m-running") == 50
     assert merge_parts([cheap / "p1", cheap / "p2"], cheap / "m-running") == 0
     resume(cheap / "m-running").save(cheap / "m", report=False)
     assert content(cheap / "m") == content(cheap / "whole")
     other = written(cheap, DRAWN.format(draws=100).replace("1.0", "1.1"), "d.toml")
-    campaign(other, workers=1, folder=cheap / "o-running", part=(1, 50))
+    run_campaign(other, workers=1, folder=cheap / "o-running", part=(1, 50))
     with pytest.raises(ConfigError, match="another campaign"):
         merge_parts([cheap / "p1", cheap / "o"], cheap / "n-running")
 
 
 def test_a_case_by_itself_has_the_same_bits(cheap: Path) -> None:
     file = written(cheap, DRAWN.format(draws=20))
-    run = campaign(file, workers=1)
+    run = run_campaign(file, workers=1)
     run.save(cheap / "c", report=False)
     _, row, recorded = case_of(cheap / "c", 13)
     assert recorded is not None
@@ -221,13 +228,13 @@ def test_stopping_depends_on_the_order_of_draws_alone(cheap: Path) -> None:
     stop = '[stop]\ncoverage = "unit"\nhalf_width = 0.04\nevery = 20\n'
     grid = '[[parameter]]\nkey = "places"\nvalues = [1, 7]\n'
     file = written(cheap, DRAWN.format(draws=2000) + grid + stop)
-    run = campaign(file, workers=2)
+    run = run_campaign(file, workers=2)
     counts = run.cases["cell"].value_counts().to_dict()
     assert {str(k): v for k, v in counts.items()} == {
         str(k): v for k, v in run.summary["stopped"].items()
     }
     assert all(v % 20 == 0 and 60 <= v < 600 for v in counts.values())
-    again = campaign(file, workers=1)
+    again = run_campaign(file, workers=1)
     pd.testing.assert_frame_equal(again.cases, run.cases)
     # The look before was too wide, the last is not.
     from strapdown.dsp.chi_square import clopper_pearson
@@ -247,7 +254,7 @@ def test_read_by_duckdb_and_polars(cheap: Path) -> None:
     duckdb = pytest.importorskip("duckdb")
     polars = pytest.importorskip("polars")
     file = written(cheap, DRAWN.format(draws=30))
-    run = campaign(file, workers=1)
+    run = run_campaign(file, workers=1)
     run.save(cheap / "c", report=False)
     pattern = str(cheap / "c" / "cases" / "*.parquet")
     expected = run.cases["horizontal_95_m"].sum()

@@ -409,7 +409,8 @@ class BulkAttitude(_Streams):
                 w1, further, steps, np.tile(sd, columns), errors.correlation_time
             )
         if any(density := errors.axis("random_walk")):
-            out += walk_of(*numbers, steps, np.tile(density, columns))
+            first, more = numbers
+            out += walk_of(first, more, steps, np.tile(density, columns))
         return out
 
     @cached_property

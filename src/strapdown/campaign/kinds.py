@@ -88,12 +88,12 @@ def with_value(table: Table, path: KeyPath, value: Any) -> Table:
                 raise KeyError(part)
         elif not isinstance(node, dict):
             raise KeyError(part)
-        key = part if isinstance(node, list) else str(part)
+        key: Any = part if isinstance(node, list) else str(part)
         if last:
             node[key] = value
         else:
-            inner = node[key] if isinstance(node, list) else node.get(key, {})
-            node[key] = inner = copy.copy(inner)
+            inner = copy.copy(node[key] if isinstance(node, list) else node.get(key, {}))
+            node[key] = inner
             node = inner
     return out
 
@@ -293,7 +293,7 @@ def _doctor_data(run: Any) -> Table:
 
     data = diagnosis_json(run)
     first = data["logs"][0]
-    imu = next((one for one in first["streams"] if one.get("name") == "imu"), {})
+    imu: Table = next((one for one in first["streams"] if one.get("name") == "imu"), {})
     data["log"] = {
         "samples": imu.get("rows"),
         "rate_hz": imu.get("rate_hz"),

@@ -33,7 +33,7 @@ from strapdown.errors import ConfigError, DataError
 from strapdown.progress import Progress, silent
 from strapdown.report.report_bundle import ReportBundle
 
-__all__ = ["CampaignRun", "campaign", "case_of", "merge_parts", "open_campaign", "resume"]
+__all__ = ["CampaignRun", "case_of", "merge_parts", "open_campaign", "resume", "run_campaign"]
 
 #: Rows, and time, s, after which parts are written.
 ROWS, SECONDS = 5000, 5.0
@@ -203,7 +203,7 @@ class CampaignRun:
         return f"<CampaignRun {self.design.spec.name}: {self.summary['cases']} cases>"
 
 
-def campaign(
+def run_campaign(
     file: str | Path,
     *,
     workers: Workers | int | None = None,

@@ -82,7 +82,7 @@ def run(
 ) -> None:
     """Run a campaign from its file."""
     from strapdown.campaign.engine import Workers
-    from strapdown.campaign.run import WORKING, campaign
+    from strapdown.campaign.run import WORKING, run_campaign
     from strapdown.cli.result_folder import default_folder
 
     folder = out or default_folder(file, "campaign")
@@ -90,7 +90,7 @@ def run(
     _run(
         folder,
         write,
-        lambda report, shown: campaign(
+        lambda report, shown: run_campaign(
             file,
             workers=Workers(workers, scheduler, dashboard),
             folder=folder.with_name(folder.name + WORKING),

@@ -129,8 +129,8 @@ class ImuCalibration:
             J[:, i, 6 + k], J[:, j, 6 + k] = up[:, j], up[:, i]
         # What is along the vertical changes the size alone.
         J -= np.einsum("ni,nj,njk->nik", up, up, J)
-        J = J.reshape(-1, 9)
-        return np.asarray(J @ self.covariance[:9, :9] @ J.T)
+        rows = J.reshape(-1, 9)
+        return np.asarray(rows @ self.covariance[:9, :9] @ rows.T)
 
     @property
     def observed(self) -> NDArray[np.bool_]:

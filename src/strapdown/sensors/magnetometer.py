@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from dataclasses import field as attribute
 
 import numpy as np
 import pandas as pd
@@ -101,7 +102,7 @@ class MagnetometerCalibration:
     """
 
     hard_iron: Array
-    soft_iron: Array = field(repr=False)
+    soft_iron: Array = attribute(repr=False)
     field: float
     hard_iron_sd: Array
     residual: float
@@ -109,10 +110,10 @@ class MagnetometerCalibration:
     direction_sd_deg: float
     change_deg: float
     found: bool
-    rotation: Array = field(default_factory=lambda: np.eye(3), repr=False)
-    rotation_sd: Array = field(default_factory=lambda: np.full(3, np.inf), repr=False)
-    covariance: Array = field(default_factory=lambda: np.zeros((8, 8)), repr=False)
-    independent: float = field(default=1.0, repr=False)
+    rotation: Array = attribute(default_factory=lambda: np.eye(3), repr=False)
+    rotation_sd: Array = attribute(default_factory=lambda: np.full(3, np.inf), repr=False)
+    covariance: Array = attribute(default_factory=lambda: np.zeros((8, 8)), repr=False)
+    independent: float = attribute(default=1.0, repr=False)
 
     @property
     def significant(self) -> bool:

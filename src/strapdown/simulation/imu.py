@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -209,6 +210,7 @@ def _sampled(
 ) -> Array:
     """Rate or specific force at the jittered instants, or its means, after the low-pass."""
     if errors.jitter == 0.0 and time.size <= MOST_KEPT:
+        assert isinstance(motion, Hashable)
         return _exact(motion, errors.bandwidth, _Stamps(time), sampling, straight, of_force)
     return _measured(motion, errors, time, sampling, seed, straight, of_force=of_force)
 
@@ -228,7 +230,7 @@ class _Stamps:
 
 @lru_cache(maxsize=KEPT)
 def _exact(
-    motion: Motion,
+    motion: Any,
     bandwidth: float,
     stamps: _Stamps,
     sampling: str,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -37,6 +37,7 @@ from strapdown.tables import ACCEL, GYRO, MAG
 if TYPE_CHECKING:
     from strapdown.navigation.navigator import Reference
     from strapdown.navigation.pipeline import NavigationPipeline
+    from strapdown.navigation.recorder import Recorder
     from strapdown.navigation.replay import PipelineRun
     from strapdown.report.chart_svg import ChartFigure
 
@@ -243,8 +244,14 @@ def _antenna(spec: ExtrinsicsSpec, progress: Progress) -> ExtrinsicsRun:
     assert spec.navigation is not None  # made with it
     begun: list[tuple[NavigationPipeline, PipelineRun]] = []
 
-    def drive(chain: NavigationPipeline, *record: Any) -> PipelineRun:
-        begun.append((chain, run_batch(chain, *record, chunk=CHUNK)))
+    def drive(
+        chain: NavigationPipeline,
+        imu: pd.DataFrame,
+        tables: Mapping[str, pd.DataFrame],
+        recorder: Recorder,
+        shown: Progress,
+    ) -> PipelineRun:
+        begun.append((chain, run_batch(chain, imu, tables, recorder, shown, chunk=CHUNK)))
         return begun[-1][1]
 
     run = run_navigation(spec.navigation, None, progress, drive)
