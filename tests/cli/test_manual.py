@@ -30,6 +30,7 @@ RUNNER = runner()
 PAGES = [page for page in RUNNER.pages() if any(map(RUNNER.is_run, RUNNER.examples(page)))]
 #: Pages whose examples take more than 8 s; `make examples` runs them.
 SLOW = {
+    "campaign",
     "align",
     "allan",
     "answer",

@@ -19,7 +19,7 @@ import sys
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, BinaryIO
+from typing import IO, Any
 
 from strapdown.errors import ConfigError
 
@@ -110,18 +110,18 @@ def _curves(campaign: Any, kind: Any, result: Any) -> list[list[float]]:
     return out
 
 
-def _send(stream: BinaryIO, message: Any) -> None:
+def _send(stream: IO[bytes], message: Any) -> None:
     data = pickle.dumps(message, protocol=pickle.HIGHEST_PROTOCOL)
     stream.write(_LENGTH.pack(len(data)) + data)
     stream.flush()
 
 
-def _receive(stream: BinaryIO) -> Any:
+def _receive(stream: IO[bytes]) -> Any:
     """Read one message, and nothing of the next; EOFError where the stream ends before its end."""
     return pickle.loads(_exactly(stream, _LENGTH.unpack(_exactly(stream, _LENGTH.size))[0]))
 
 
-def _exactly(stream: BinaryIO, count: int) -> bytes:
+def _exactly(stream: IO[bytes], count: int) -> bytes:
     parts = bytearray()
     while len(parts) < count:
         part = stream.read(count - len(parts))
@@ -158,7 +158,8 @@ def main() -> None:
     # What a case prints must not be among the answers.
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    asked = sys.stdin.buffer.raw
+    # Unbuffered: nothing of the next message is read with one.
+    asked = os.fdopen(os.dup(0), "rb", buffering=0)
     _end_with(os.getppid())
     from strapdown.campaign.design import Campaign
 

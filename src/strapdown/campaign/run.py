@@ -287,7 +287,8 @@ def _finished(
         names = list(dataset.frozen["keep"]["scalars"])
         for block in dataset.cases():
             for row in block.to_dict("records"):
-                stopping.add({**row, "scalars": [row[name] for name in names]})
+                named = {str(key): value for key, value in row.items()}
+                stopping.add({**named, "scalars": [named[name] for name in names]})
     k, of = part
     edges = [round(design.total * i / of) for i in (k - 1, k)]
     todo = np.flatnonzero(~there[edges[0] : edges[1]]) + edges[0]
