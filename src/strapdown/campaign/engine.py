@@ -13,6 +13,7 @@ import os
 import queue
 import time
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -121,7 +122,8 @@ def run_batches(
         raise ConfigError("campaign.no-dask") from None
     for name in ("distributed", "tornado", "asyncio"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
-    cluster = client = None
+    cluster: Any = None
+    client: Any = None
     try:
         try:
             if workers.scheduler is None:
@@ -149,15 +151,13 @@ def run_batches(
         _feed(frozen, numbers, client, arriving, take, workers.scheduler)
     finally:
         # A lost scheduler answers none of this.
-        for end in (
-            lambda: client and client.run(_end_kept, frozen["identity"]),
-            lambda: client and client.close(timeout=2.0),
-            lambda: cluster and cluster.close(timeout=5.0),
-        ):
-            try:
-                end()
-            except Exception:
-                logging.getLogger(__name__).debug("closing", exc_info=True)
+        with suppress(Exception):
+            if client is not None:
+                client.run(_end_kept, frozen["identity"])
+                client.close(timeout=2.0)
+        with suppress(Exception):
+            if cluster is not None:
+                cluster.close(timeout=5.0)
         _end_kept(frozen["identity"])
 
 
