@@ -651,12 +651,10 @@ class AdaptiveScale:
 
     def rule(self, state: ScaleState, influence: Influence) -> RobustUpdate:
         """Return the rule of the next observation."""
-        return RobustUpdate(HUBER if self.gives_in(state) else influence, state.factor)
-
-    def gives_in(self, state: ScaleState) -> bool:
-        """Return whether the next observation is taken after so many that were rejected."""
         grown = state.time > -math.inf and state.held == -math.inf
-        return state.rejected >= (min(FEW, self.patience) if grown else self.patience)
+        patience = min(FEW, self.patience) if grown else self.patience
+        given = HUBER if state.rejected >= patience else influence
+        return RobustUpdate(given, state.factor)
 
     def after(
         self, state: ScaleState, nu: float, s: float, r: float, weight: float = 1.0

@@ -21,7 +21,6 @@ from strapdown.estimation.error_filter import (
     FilterState,
     Rules,
     is_large,
-    symmetric,
     turned_force,
     unlearnt_force,
 )
@@ -33,7 +32,6 @@ from strapdown.estimation.robust import (
     ScaleState,
     linear_range,
 )
-from strapdown.frames import place_difference
 from strapdown.nav_state import NavState
 from strapdown.navigation.compiled_engine import (
     NO_REFERENCES,
@@ -359,14 +357,6 @@ AGED = 0.15
 JUST_BEFORE = 1e-6
 #: Relative size up to which a negative variance is rounding.
 ROUNDING = 1e-12
-#: Standard deviations of an innovation beyond which a covariance does not hold.
-BEYOND = 3.0
-#: Largest factor of the standard deviations of a solution that is contradicted; those of its
-#: attitude, north, east, down, rad, up to which a linear filter follows.
-MOST_WIDENED, WIDEST = 10.0, np.radians([5.0, 5.0, 15.0])
-#: Share of the solution's way since a contradiction began that a receiver must report to be one
-#: that moves, and not one that repeats itself.
-ALIVE = 1.0 / 3.0
 #: Acceleration by which an inertial solution of any grade may be wrong, m/s².
 WRONG = 3.0
 PHYSICAL_LABELS = ("place", "velocity", "attitude")
@@ -690,8 +680,6 @@ class EpochLoop:
             if isinstance(rule, AdaptiveRule):
                 scales = self._scales(rule, one.name, one.z.size)
                 away = _is_away(scales, one, view)
-                if set(one.labels) <= set(PLACE) and self._moves(scales, one, view) and not away:
-                    self._doubt_itself(rule, scales, one, view)
                 asked.append(away or rule.rules(scales))
             else:
                 asked.append(rule)
@@ -708,60 +696,6 @@ class EpochLoop:
                 others = self.scales.get(one.name, ())[len(after) :]
                 self.scales[one.name] = (*after, *others)
         return innovations
-
-    def _moves(self, scales: Scales, one: Observation, view: View) -> bool:
-        """Whether a receiver that contradicts the solution reports that it moves as that does.
-
-        Since the contradiction began: a receiver that repeats its position does not, however long
-        it contradicts, and nor does a vehicle at rest, where the two are not told apart.
-        """
-        name = f"{one.name}.contradicted"
-        agrees = all(of.rejected == 0 and of.settled > 0 for of in scales)
-        at = view.here
-        here = np.array([*np.degrees([at.lat, at.lon]), at.alt, *one.z])
-        begun = self.kept.get(name)
-        if agrees or begun is None or len(begun) != len(here):
-            self.kept[name] = here
-            return False
-        way = place_difference(here[:3], begun[:3], ellipsoid=view.ellipsoid)
-        # The innovation is computed less measured.
-        reported = way[: one.z.size] - (here[3:] - begun[3:])
-        size, blur = float(np.linalg.norm(reported)), float(np.sqrt(2.0 * one.R.sum()))
-        return size > max(ALIVE * float(np.linalg.norm(way)), BEYOND * blur)
-
-    def _doubt_itself(
-        self, rule: AdaptiveRule, scales: Scales, one: Observation, view: View
-    ) -> None:
-        """Widen the covariance as an observation shows that the rule takes after rejections.
-
-        Rejected that often in a row by a receiver that moves, and no fault of the observation: it
-        is the solution that is wrong, by more than its covariance P. In it a bounded influence goes
-        by steps that are smaller than the error grows. The innovation is as large as it is if the
-        variance of its prediction, ``s = h P h'``, is c times as large; so is that of the errors
-        which it shows, ``(c - 1) P h' h P / s``, while a linear filter follows the attitude. The
-        rest is position and velocity. (Yang, He and Xu 2001, Journal of Geodesy 75, 109-116,
-        multiply all of P.)
-        """
-        P = view.covariance
-        more = np.zeros_like(P)
-        for k, scale in enumerate(scales):
-            shown = P @ one.H[k]
-            s, excess = float(one.H[k] @ shown), float(one.z[k] ** 2 - one.R[k])
-            if not rule.scale.gives_in(scale) or one.z[k] ** 2 <= BEYOND**2 * (s + one.R[k]):
-                continue
-            room = (np.square(WIDEST) - np.diagonal(P)[6:9]) * s
-            most = max(float((room / np.square(shown[6:9])).min()), 0.0)
-            factor = min(excess / s - 1.0, MOST_WIDENED**2, most)
-            more += factor / s * np.outer(shown, shown)
-            left = excess - (1.0 + factor) * s
-            if left > 0.0:
-                h = np.outer(one.H[k, :3], one.H[k, :3])
-                more[:3, :3] += left * h
-                more[3:6, 3:6] += left / (scale.rejected * (view.time - scale.time)) ** 2 * h
-        if more.any():
-            filter_, at = self.navigator.filter, self.engine.filter
-            E = filter_.model.from_physical(filter_.mechanization, at.time, at.row)
-            self.engine.carry(np.eye(len(P)), symmetric(E @ more @ E.T))
 
     def _unlearn(self, met: FilterState) -> None:
         """Carry the covariance over the correction of a large tilt (second-order tilt)."""

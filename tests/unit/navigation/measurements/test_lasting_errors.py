@@ -184,9 +184,9 @@ def test_a_receiver_that_is_believed_again_makes_the_bound_cover_both():
     during = (at > 60.0) & (at < 80.0)
     assert np.abs(off[during][:, [0, 2]]).max() > 0.5
     assert (np.abs(off[during])[:, [0, 2]] < bound[during][:, [0, 2]]).mean() > 0.99
-    # East is not contradicted, and moves with the others by their correlation alone. Back again,
-    # the receiver is believed after some seconds.
-    assert bound[:, 1][at > 2.0].max() < 0.5 * 0.8
+    # East is not contradicted, and moves little with the others. Back again, the receiver is
+    # believed after some seconds.
+    assert bound[:, 1][at > 2.0].max() < 0.25 * 0.8
     assert 0.5 < bound[(at > 80.0) & (at < 85.0)].max() < 3.0
     assert bound[at > 120.0].max() < 0.1
 
@@ -207,9 +207,8 @@ def test_after_an_outage_the_solution_was_wrong():
     at, north = piece.time, found.sd["north"]
     far = np.abs(town.off(piece)[:, 0] - 3.0)
     bound = 1.96 * np.interp(at, north.index, north)
-    # Two fixes are rejected; with the third the solution goes there: its covariance is widened by
-    # what they show, and does not hold it back (before: for eight seconds, as the error grew).
-    assert far[at > 61.0].max() < 0.3
-    assert (far < bound)[at > 60.5].mean() > 0.95
+    during = (at > 60.5) & (far > 0.3)
+    assert during.sum() > 300
+    assert (far < bound)[during].mean() > 0.95
     # Not for the minute of a doubtful receiver.
     assert bound[at > 95.0].max() < 0.1
