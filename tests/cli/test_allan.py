@@ -157,7 +157,7 @@ def test_the_temperature_of_a_log_is_regarded(where, monkeypatch, tmp_path):
         return with_clock(table, Clock(RELATIVE))
 
     if where == "stream":
-        monkeypatch.setattr("strapdown.systems.allan_run.holds", lambda path, stream: True)
+        monkeypatch.setattr("strapdown.formats.aid_table.holds", lambda path, stream: True)
         monkeypatch.setattr("strapdown.formats.aid_table.read_stream", stream)
     run = sd.allan(tmp_path / "log.csv")
     effect = run.noise["gyro_x"].term("C")

@@ -189,6 +189,11 @@ def calibrate_imu(
         worst = int(np.argmax(np.abs(z[:n])))
         data = {"name": problem.names[worst], "value": float(z[worst] * problem.sd[worst])}
         raise DataError("calibrate.contradiction", quantity="log", **data)
+    # What no error explains, m/s², is not larger than the errors themselves may be.
+    left = problem.accel_excess
+    if left > math.hypot(problem.sd[0], STANDARD_GRAVITY * problem.sd[3]):
+        data = {"name": "accel_residual", "value": float(left)}
+        raise DataError("calibrate.contradiction", quantity="log", **data)
     return _result(problem, z, covariance)
 
 
