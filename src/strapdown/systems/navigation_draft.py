@@ -35,23 +35,15 @@ from strapdown.systems.alignment_draft import (
     stage,
     toml_value,
 )
-from strapdown.systems.navigation_proposal import (
-    LOUD,
-    NOISE_KEYS,
-    TAKEN,
-    WALK,
-    Proposal,
-    propose,
-)
-from strapdown.systems.navigation_source import UNSTATED
+from strapdown.systems.navigation_proposal import LOUD, NOISE_KEYS, TAKEN, Proposal, propose
 from strapdown.tables import ACCEL, GEODETIC, GYRO, POSITION_SD, VELOCITY_SD
 from strapdown.tables.checks import index_of, source_of, values_of
 
 __all__ = ["STANCE", "STANDING", "draft_navigation", "first_stand", "on_foot", "second_order"]
 
 
-#: Turns are means over so many seconds.
-STEADY = 0.5
+#: Finding of a kind of sampling that is not stated; turns are means over so many seconds.
+UNSTATED, STEADY = "io.sampling-taken-as-instantaneous", 0.5
 #: Errors of other sensors in the recording, as comments of their tables.
 LASTING_ERRORS = {
     "barometer": "gusts, and the wind of travel",
@@ -259,8 +251,6 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
                 "Found: it shakes far beyond its noise at rest; half of the time so much, x, y, z:"
             )
             told.append(f"the {full} shake far beyond their noise while it is quiet")
-        elif not set(stated) - {WALK}:
-            why = ""
         elif made.guessed:
             why = "Found: noise while it is quiet, x, y, z; biases of the gyros as a rest allows."
         elif not _noisier(made, triad, stated):
@@ -272,8 +262,7 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
             told.append(f"the noise of the {full} exceeds that of {named}: is it this sensor?")
         page.table(f"[sensors.{triad}]", why)
         for key, value in stated.items():
-            remark = "" if key != WALK else "assumed: the unit warms up; leave it out if it is warm"
-            page.key(key, toml_value(value) or "", remark)
+            page.key(key, toml_value(value) or "")
     for block, stated in made.table.get("states", {}).items():
         why = (
             "As a start whose tilt is hardly known wants it: once the tilt is found, gravity along "

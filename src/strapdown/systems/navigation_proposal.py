@@ -92,12 +92,6 @@ NOISE_OF_GRADES = (
 #: that of its surroundings: as constants an hour of good fixes makes them surer than they stay.
 SCALES = {"correlation_time_s": 3600.0}
 NO_ERRORS = ImuUncertainty(TriadUncertainty(), TriadUncertainty())
-#: By how much the gyros of a grade drift while the unit warms up, deg/s: data sheets of MEMS parts
-#: have 0.01 to 0.05 deg/s/K, of industrial ones 0.005, and a unit becomes some 3 to 5 K warmer; and
-#: the time in which most of that happens, s.
-WARMING, WARM = {"phone": 0.1, "industrial": 0.015}, 400.0
-WALK = "random_walk_deg_per_h_per_sqrt_h"
-HOUR = 3600.0
 #: Longest rest used for a coarse alignment, s.
 COARSE = 100.0
 #: Levelling for a heading that is asked: the longest, s, and that of a body in motion, which may
@@ -263,9 +257,7 @@ def propose(
     sensors: ImuUncertainty | None = None
     if sensor is not None or scatter is not None:
         rocking = _rest(quiet, until, rocks=True)
-        length = float(imu.index[-1] - imu.index[0])
-        bias = _rest_bias(imu, rocking, place, fixes)
-        table["sensors"] = _sensors(sensor, scatter, bias, length)
+        table["sensors"] = _sensors(sensor, scatter, _rest_bias(imu, rocking, place, fixes))
         sensors = _stated(table)
         if table["sensors"]["sensor"] == "tactical-grade":
             table["states"] = {name: dict(SCALES) for name in ("gyro_scale", "accel_scale")}
@@ -373,17 +365,12 @@ def _scatter(imu: pd.DataFrame) -> tuple[Array, Array] | None:
 
 
 def _sensors(
-    named: str | None,
-    scatter: tuple[Array, Array] | None,
-    bias: float | None,
-    length: float = WARM,
+    named: str | None, scatter: tuple[Array, Array] | None, bias: float | None
 ) -> dict[str, Any]:
     """Sensor to state: the one that is named, or the grade that the noise allows.
 
-    `scatter`: as of `_scatter`. `bias`: of the gyros by a rest, as of `_rest_bias`. `length`: of
-    the log, s. The noise is measured where it exceeds the data sheet's; of a grade it always is.
-    Nothing says that the unit is warm: its gyros drift by `WARMING` as a random walk, which is
-    that large after `WARM`, or at the end of a longer log.
+    `scatter`: as of `_scatter`. `bias`: of the gyros by a rest, as of `_rest_bias`. The noise is
+    measured where it exceeds the data sheet's; of a grade it always is.
     """
     out: dict[str, Any] = {"sensor": named}
     if named is None:
@@ -393,7 +380,7 @@ def _sensors(
     # For gyrocompassing gyros the rocking of a vehicle is motion, not noise.
     north = _finds_north(known) or (named is None and bias is not None and bias <= NORTH)
     if scatter is None:
-        return out | _warming(out["sensor"], known, length)
+        return out
     for (triad, key, unit), quiet, usual in zip(NOISE_KEYS, *scatter, strict=True):
         sheet = np.asarray(getattr(known, triad).axis("noise_density"))
         stated = quiet if named is None else np.maximum(quiet, sheet)
@@ -408,18 +395,7 @@ def _sensors(
             "bias_sd_deg_per_h": float(f"{bias * DEG_PER_HOUR:.2g}"),
             "bias_instability_deg_per_h": float(f"{slow * DEG_PER_HOUR:.2g}"),
         }
-    if not north and (warming := _warming(out["sensor"], known, length)):
-        out["gyro"] = out.get("gyro", {}) | warming["gyro"]
     return out
-
-
-def _warming(named: str, known: ImuUncertainty, length: float) -> dict[str, Any]:
-    """Random walk of gyros that warm up, of a sensor that states none."""
-    largest = WARMING.get(load_sensor(named).grade, 0.0)
-    if not largest or any(known.gyro_drift.steps):
-        return {}
-    walk = largest * HOUR * math.sqrt(HOUR / max(WARM, length))
-    return {"gyro": {WALK: float(f"{walk:.2g}")}}
 
 
 def _rest_bias(

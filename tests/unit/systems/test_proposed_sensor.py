@@ -59,27 +59,6 @@ def test_noise_beyond_the_data_sheet_is_stated_for_a_named_sensor_too():
     assert found["accel"]["noise_density_ug_per_sqrt_hz"] == (48.0, 48.0, 48.0)
 
 
-def test_gyros_of_a_cheap_unit_are_taken_to_warm_up():
-    key, quiet = "random_walk_deg_per_h_per_sqrt_h", scatter(1e-6, 1e-4)
-
-    def drifts(named, length):
-        """Standard deviation of the walk over a log, deg/s."""
-        walk = _sensors(named, quiet, None, length).get("gyro", {}).get(key, 0.0)
-        return walk / 3600.0 * np.sqrt(length / 3600.0)
-
-    # Over the first minutes as fast as it can, over a longer log no more in all.
-    assert drifts("bmi160", 400.0) == pytest.approx(0.1, rel=0.05)
-    assert drifts("bmi160", 100.0) == pytest.approx(0.05, rel=0.05)
-    assert drifts("bmi160", 7200.0) == pytest.approx(0.1, rel=0.05)
-    assert drifts("adis16470", 400.0) == pytest.approx(0.015, rel=0.05)
-    assert drifts("stim300", 400.0) == drifts("hg9900", 400.0) == 0.0
-    assert _sensors("bmi160", None, None, 400.0)["gyro"][key] == pytest.approx(1080.0, rel=0.05)
-    # Gyros whose rest shows that they find north are warm.
-    loud = scatter(np.radians(0.1) / 60.0, 1e-4)
-    assert key not in _sensors(None, loud, 1.0 / DEG_PER_HOUR)["gyro"]
-    assert key in _sensors(None, loud, None)["gyro"]
-
-
 def test_shaking_is_stated_but_for_gyros_that_find_north():
     gyro, accel, shaken = 0.5 * TACTICAL_NOISE, 60.0 / MICRO_G, 2.0 * LOUD
     key = "noise_density_ug_per_sqrt_hz"
