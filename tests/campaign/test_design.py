@@ -220,6 +220,28 @@ def test_what_no_case_could_run_is_refused_with_its_place(tmp_path: Path) -> Non
     assert "distribution" in refused(tmp_path, text)
 
 
+def test_in_bulk_what_cannot_be_kept_is_refused(tmp_path: Path) -> None:
+    base = """
+    [base]
+    kind = "outage"
+    bulk = true
+    configuration = { outage_s = 10.0, sensor = "mpu-6050", start = { aided_s = 0.0 } }
+    """
+    varied = '[[parameter]]\nkey = "start.tilt_sd_deg"\ndraw = "uniform"\nlow = 0.1\nhigh = 1.0\n'
+    made = design(tmp_path, "[cases]\ndraws = 70\n" + varied, base)
+    assert made.total == 70
+    again = Campaign.thawed(made.frozen())
+    assert list(again.scalars) == list(made.linear["nominal"])
+    np.testing.assert_array_equal(again.bulk().run(60, 70), made.bulk().run(0, 70)[60:])
+    for text in (
+        '[stop]\nscalar = "horizontal_95_m"\nhalf_width = 1.0\n',
+        '[keep]\nscalars = { a = "b" }\n',
+        '[keep]\ncurves = ["horizontal_95_m"]\naxis = { to_s = 1.0 }\n',
+    ):
+        assert "in bulk" in refused(tmp_path, varied + text, base)
+    assert "in bulk" in refused(tmp_path, varied.replace("uniform", "log-uniform"), base)
+
+
 def test_keys_and_places() -> None:
     assert key_path('observations."gnss.position".mean_nis') == (
         "observations",

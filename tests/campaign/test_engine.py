@@ -141,6 +141,24 @@ def test_one_and_two_workers_and_a_scheduler_give_the_same_bytes(cheap: Path) ->
     assert content(cheap / "one") == content(cheap / "two") == content(cheap / "many")
 
 
+def test_a_scheduler_without_workers_and_none_at_all(
+    cheap: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = written(cheap, DRAWN.format(draws=10))
+    monkeypatch.setattr("strapdown.campaign.engine.WORKERS", 2.0)
+    with pytest.raises(ConfigError) as none:
+        run_campaign(file, workers=Workers(scheduler="tcp://127.0.0.1:9"))
+    assert none.value.finding.code == "campaign.no-scheduler"
+    with scheduler(0, os.environ["PYTHONPATH"]) as address:
+        code = ""
+        deadline = time.monotonic() + 60.0
+        while code != "campaign.no-workers" and time.monotonic() < deadline:
+            with pytest.raises(ConfigError) as caught:
+                run_campaign(file, workers=Workers(scheduler=address))
+            code = caught.value.finding.code
+    assert code == "campaign.no-workers"
+
+
 def test_killed_at_drawn_instants_and_resumed(cheap: Path) -> None:
     file = written(cheap, DRAWN.format(draws=120).replace("[cases]", "[cases]\nseed = 5"))
     text = file.read_text().replace("at_s = 0.0", "at_s = 0.05")

@@ -118,6 +118,8 @@ class Campaign:
         files = () if file is None else (("base", str(file.absolute())),)
         made = cls(spec, table, written, logs, paths, rows, files)
         if base.bulk:
+            if spec.keep.scalars:
+                raise ConfigError("campaign.not-in-bulk", quantity="keep, scalars")
             cases = made.bulk()
             spec = spec.with_scalars({name: name for name in cases.scalars})
             linear = {"nominal": dict(cases.nominal), "linear_sd": dict(cases.linear_sd)}

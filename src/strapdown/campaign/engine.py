@@ -28,6 +28,8 @@ BATCH = 2.0
 AHEAD = 2
 #: Most cases of a batch; in bulk, in multiples of `TOGETHER`.
 MOST, MOST_BULK, TOGETHER = 1000, 65_536, 64
+#: How long a scheduler may be without a worker, s.
+WORKERS = 60.0
 #: Share of the latest batch in the estimated cost of a case.
 LATEST = 0.3
 
@@ -171,6 +173,10 @@ def _feed(
 ) -> None:
     """Keep the workers busy, and hand over what they made."""
     bulk = bool(frozen["base"].get("bulk"))
+    try:
+        client.wait_for_workers(1, timeout=WORKERS)
+    except TimeoutError:
+        raise ConfigError("campaign.no-workers", address=address) from None
     shared = client.scatter(dict(frozen), broadcast=True, hash=False)
     width = max(1, sum(client.nthreads().values()))
     cost: float | None = None

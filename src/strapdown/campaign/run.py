@@ -6,6 +6,7 @@ import math
 import shutil
 import tempfile
 import time
+import weakref
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -242,10 +243,17 @@ def run_campaign(
     design = replace(design, files=(("campaign", str(path.absolute())), *design.files))
     if isinstance(workers, int):
         workers = Workers(workers)
+    place = _temporary() if folder is None else Path(folder)
+    dataset = Dataset.begin(place, _with_digests(design))
+    run = _finished(design, dataset, workers or Workers(), part, progress, shown)
     if folder is None:
-        folder = Path(tempfile.mkdtemp(prefix="strapdown-campaign-"))
-    dataset = Dataset.begin(Path(folder), _with_digests(design))
-    return _finished(design, dataset, workers or Workers(), part, progress, shown)
+        weakref.finalize(run, shutil.rmtree, place, ignore_errors=True)
+    return run
+
+
+def _temporary() -> Path:
+    """A working folder that goes with its run."""
+    return Path(tempfile.mkdtemp(prefix="strapdown-campaign-"))
 
 
 def _with_digests(design: Campaign) -> dict[str, Any]:
@@ -387,9 +395,11 @@ def _configuration(run: CampaignRun) -> dict[str, Any]:
 def _run(configuration: dict[str, Any]) -> CampaignRun:
     found = configuration["campaign"]
     design = Campaign.thawed(found)
-    folder = Path(tempfile.mkdtemp(prefix="strapdown-campaign-"))
+    folder = _temporary()
     dataset = Dataset.begin(folder, _with_digests(design))
-    return _finished(design, dataset, Workers(), (1, 1), silent, lambda address: None)
+    run = _finished(design, dataset, Workers(), (1, 1), silent, lambda address: None)
+    weakref.finalize(run, shutil.rmtree, folder, ignore_errors=True)
+    return run
 
 
 def _write_files(

@@ -285,6 +285,13 @@ class CampaignSpec(FileSpec):
         varied = drawn if self.base.kind != "outage" else [d for d in drawn if d.draw != "uniform"]
         if self.base.bulk and (varied or grid or self.base.logs or self.cases.table):
             yield Fault(("base", "bulk"), "campaign.bulk-alone")
+        if self.base.bulk:
+            for place, stated in (
+                (("stop",), self.stop is not None),
+                (("keep", "curves"), bool(self.keep.curves)),
+            ):
+                if stated:
+                    yield Fault(place, "campaign.not-in-bulk")
         if self.stop is not None and self.cases.method == "sensitivity":
             yield Fault(("stop",), "campaign.sensitivity-whole")
         if self.stop is not None:
