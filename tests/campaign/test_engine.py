@@ -97,7 +97,9 @@ def test_a_case_that_dies_hangs_or_needs_all_memory_is_recorded(cheap: Path) -> 
 
 
 @contextmanager
-def scheduler(workers: int, python_path: str) -> Iterator[str]:
+def scheduler(
+    workers: int, python_path: str
+) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
     """A scheduler and workers in processes of their own, on the loopback interface."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -117,7 +119,7 @@ def scheduler(workers: int, python_path: str) -> Iterator[str]:
     worker = [sys.executable, "-m", "strapdown", "worker", address, "--workers", "1"]
     made += [subprocess.Popen(worker, **quiet) for _ in range(workers)]
     try:
-        yield address
+        yield address, made
     finally:
         for one in made:
             one.kill()
@@ -128,7 +130,7 @@ def test_one_and_two_workers_and_a_scheduler_give_the_same_bytes(cheap: Path) ->
     file = written(cheap, DRAWN.format(draws=300))
     run_campaign(file, workers=1).save(cheap / "one", report=False)
     run_campaign(file, workers=2).save(cheap / "two", report=False)
-    with scheduler(2, os.environ["PYTHONPATH"]) as address:
+    with scheduler(2, os.environ["PYTHONPATH"]) as (address, _):
         deadline = time.monotonic() + 120.0
         while True:
             try:
@@ -141,6 +143,46 @@ def test_one_and_two_workers_and_a_scheduler_give_the_same_bytes(cheap: Path) ->
     assert content(cheap / "one") == content(cheap / "two") == content(cheap / "many")
 
 
+def test_a_worker_that_is_killed_and_a_scheduler_that_is_lost(cheap: Path) -> None:
+    file = written(cheap, DRAWN.format(draws=60))
+    file.write_text(file.read_text().replace("at_s = 0.0", "at_s = 0.1"))
+    run_campaign(file, workers=2).save(cheap / "whole", report=False)
+
+    def killed(which: int, folder: Path) -> None:
+        with scheduler(2, os.environ["PYTHONPATH"]) as (address, made):
+            ended = False
+
+            def progress(stage: str, share: float) -> None:
+                nonlocal ended
+                if share > 0.2 and not ended:
+                    made[which].kill()
+                    ended = True
+
+            deadline = time.monotonic() + 60.0
+            while True:
+                try:
+                    workers = Workers(scheduler=address)
+                    run = run_campaign(file, workers=workers, folder=folder, progress=progress)
+                except ConfigError as error:
+                    if error.finding.code != "campaign.no-scheduler" or ended:
+                        raise
+                    assert time.monotonic() < deadline
+                    time.sleep(0.5)
+                else:
+                    run.save(cheap / "one", report=False)
+                    assert ended
+                    return
+
+    killed(1, cheap / "one-running")
+    assert content(cheap / "one") == content(cheap / "whole")
+    with pytest.raises(ConfigError) as lost:
+        killed(0, cheap / "two-running")
+    assert lost.value.finding.code == "campaign.scheduler-lost"
+    assert 0 < open_campaign(cheap / "two").dataset.there().sum() < 60
+    resume(cheap / "two-running").save(cheap / "two", report=False)
+    assert content(cheap / "two") == content(cheap / "whole")
+
+
 def test_a_scheduler_without_workers_and_none_at_all(
     cheap: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -149,7 +191,7 @@ def test_a_scheduler_without_workers_and_none_at_all(
     with pytest.raises(ConfigError) as none:
         run_campaign(file, workers=Workers(scheduler="tcp://127.0.0.1:9"))
     assert none.value.finding.code == "campaign.no-scheduler"
-    with scheduler(0, os.environ["PYTHONPATH"]) as address:
+    with scheduler(0, os.environ["PYTHONPATH"]) as (address, _):
         code = ""
         deadline = time.monotonic() + 60.0
         while code != "campaign.no-workers" and time.monotonic() < deadline:
