@@ -318,6 +318,7 @@ class _SimulatedCrash:
 
     result: Any
     truth: Table
+    table: Table
 
     @property
     def findings(self) -> Any:
@@ -325,12 +326,16 @@ class _SimulatedCrash:
 
 
 def _crash(table: Table, name: str) -> Any:
+    with crash_case(table, name) as (spec, truth):
+        run = _reconstructed(spec)
+    return run if truth is None else _SimulatedCrash(run, truth, table)
+
+
+def _reconstructed(spec: Any) -> Any:
     from strapdown.api.crash import CrashRun
     from strapdown.crash.case import run_cases
 
-    with crash_case(table, name) as (spec, truth):
-        run = CrashRun(**vars(run_cases([(spec, None)])[0]))
-    return run if truth is None else _SimulatedCrash(run, truth)
+    return CrashRun(**vars(run_cases([(spec, None)])[0]))
 
 
 @contextmanager
@@ -430,8 +435,11 @@ def _save_run(run: Any, out: Path, force: bool) -> Any:
 
 
 def _save_crash(run: Any, out: Path, force: bool) -> Any:
-    result = run.result if isinstance(run, _SimulatedCrash) else run
-    return result.save(out, force=force)
+    if not isinstance(run, _SimulatedCrash):
+        return run.save(out, force=force)
+    # Its records went with the run: they are the same again.
+    with crash_case(run.table, "case") as (spec, _):
+        return _reconstructed(spec).save(out, force=force)
 
 
 def _ends(names: Iterable[str], unit: str) -> dict[str, str]:

@@ -1,0 +1,123 @@
+"""Each kind of case as its users run it, and a case by itself with its report."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from strapdown.campaign.run import case_of, differing, run_campaign, save_case
+from strapdown.report.verify import verify
+
+FLEET = """
+[base]
+kind = "doctor"
+logs = "logs/*.csv"
+[[base.configuration.logs]]
+gyro_unit = "rad/s"
+accel_unit = "m/s2"
+"""
+DRIVE = Path(__file__).parents[2] / "docs" / "examples" / "navigate_drive.toml"
+
+
+def run_of(folder: Path, text: str):
+    (folder / "c.toml").write_text(text)
+    return run_campaign(folder / "c.toml", workers=1)
+
+
+@pytest.mark.slow
+def test_a_simulated_crash_with_its_truth(tmp_path: Path) -> None:
+    run = run_of(
+        tmp_path,
+        """
+        [base]
+        kind = "crash"
+        simulate = "frontal"
+        configuration = { options = { monte_carlo_runs = 0 } }
+        [cases]
+        draws = 2
+        """,
+    )
+    run.save(tmp_path / "c")
+    assert set(run.cases["status"]) == {"done"}
+    # The bound is one of the truth, which is 17.5 m/s.
+    assert (
+        run.cases["delta_v_error_m_per_s"].abs() < 3.0 * run.cases["delta_v_bound_m_per_s"]
+    ).all()
+    assert run.cases["delta_v_m_per_s"].between(16.0, 19.0).all()
+    result, row, recorded = case_of(tmp_path / "c", 1)
+    assert recorded is not None
+    assert differing(run.dataset.frozen, row, recorded) == []
+    save_case(run.design, result, tmp_path / "one", False)
+    found = json.loads((tmp_path / "one" / "crash.json").read_text())
+    value = found["answers"][-1]["events"][0]["body"]["event"]["resultant_m_per_s"]["value"]
+    assert value == recorded["delta_v_m_per_s"]
+    assert (tmp_path / "one" / "report.html").exists()
+
+
+@pytest.mark.slow
+def test_drives_with_curves_and_their_seal(tmp_path: Path) -> None:
+    run = run_of(
+        tmp_path,
+        f"""
+        [base]
+        kind = "navigate"
+        file = "{DRIVE}"
+        [cases]
+        draws = 2
+        [[parameter]]
+        key = "simulation.gnss.rtk.position_noise_m"
+        name = "noise_m"
+        values = [0.02, 2.0]
+        [keep]
+        curves = ["horizontal_error_m"]
+        axis = {{ to_s = 150.0, points = 4 }}
+        """,
+    )
+    assert set(run.cases["status"]) == {"done"}
+    by_noise = run.cases.groupby("noise_m")["horizontal_rms_m"].median()
+    assert by_noise[2.0] > by_noise[0.02]
+    run.save(tmp_path / "c")
+    curves = next(run.dataset.curves())
+    assert curves["x"].unique().tolist() == [0.0, 50.0, 100.0, 150.0]
+    assert verify(tmp_path / "c").verdict == "identical"
+
+
+def test_a_fleet_and_a_gesture(tmp_path: Path) -> None:
+    (tmp_path / "logs").mkdir()
+    for k in range(2):
+        values = np.random.default_rng(k).normal(0.0, 0.01, (300, 6)) - [0, 0, 0, 0, 0, 9.8]
+        rows = "".join(
+            f"{0.01 * i:.2f},{','.join(f'{v:.6f}' for v in row)}\n" for i, row in enumerate(values)
+        )
+        text = "time_s,gyro_x,gyro_y,gyro_z,accel_x,accel_y,accel_z\n" + rows
+        (tmp_path / "logs" / f"{k}.csv").write_text(text)
+    (tmp_path / "logs" / "none.csv").write_text("a,b\n1,2\n")
+    run = run_of(tmp_path, FLEET)
+    assert run.cases["log"].tolist() == ["logs/0.csv", "logs/1.csv", "logs/none.csv"]
+    assert run.cases["samples"].tolist()[:2] == [300.0, 300.0]
+    assert run.cases["status"].tolist()[:2] == ["done", "done"]
+    gesture = run_of(
+        tmp_path,
+        """
+        [base]
+        kind = "attitude"
+        [base.configuration]
+        algorithms = ["quaternion"]
+        initial = "truth"
+        [base.configuration.source]
+        rate_hz = 50.0
+        [base.configuration.source.motion]
+        kind = "pulses"
+        duration_s = 2.0
+        x = [{ start_s = 0.5, duration_s = 0.6, turn_deg = 150.0, edge_s = 0.2 }]
+        y = [{ start_s = 0.3, duration_s = 0.8, turn_deg = 60.0, edge_s = 0.4 }]
+        [[parameter]]
+        key = "source.rate_hz"
+        values = [10.0, 100.0]
+        """,
+    )
+    slow, fast = gesture.cases["largest_deg"]
+    assert slow > 10.0 * fast  # of second order in the step
