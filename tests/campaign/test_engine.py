@@ -143,6 +143,7 @@ def test_one_and_two_workers_and_a_scheduler_give_the_same_bytes(cheap: Path) ->
     assert content(cheap / "one") == content(cheap / "two") == content(cheap / "many")
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_killed_and_a_scheduler_that_is_lost(cheap: Path) -> None:
     file = written(cheap, DRAWN.format(draws=60))
     file.write_text(file.read_text().replace("at_s = 0.0", "at_s = 0.1"))
@@ -183,6 +184,7 @@ def test_a_worker_that_is_killed_and_a_scheduler_that_is_lost(cheap: Path) -> No
     assert content(cheap / "two") == content(cheap / "whole")
 
 
+@pytest.mark.slow
 def test_a_scheduler_without_workers_and_none_at_all(
     cheap: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -201,6 +203,7 @@ def test_a_scheduler_without_workers_and_none_at_all(
     assert code == "campaign.no-workers"
 
 
+@pytest.mark.slow
 def test_killed_at_drawn_instants_and_resumed(cheap: Path) -> None:
     file = written(cheap, DRAWN.format(draws=120).replace("[cases]", "[cases]\nseed = 5"))
     text = file.read_text().replace("at_s = 0.0", "at_s = 0.05")
