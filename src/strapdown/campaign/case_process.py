@@ -39,29 +39,18 @@ START = 120.0
 
 def run_case(campaign: Any, number: int) -> tuple[Row, Any]:
     """Run a case; returns its row and its result, None where it has none."""
-    from strapdown.campaign.kinds import KINDS, at_path, parts_of
+    from strapdown.campaign.kinds import KINDS, at_path
+    from strapdown.campaign.specification import key_path
     from strapdown.errors import DivergenceError, StrapdownError
 
     case = campaign.case(number)
     kind = KINDS[campaign.spec.base.kind]
-    row: Row = {
-        "case": case.number,
-        "cell": case.cell,
-        "draw": case.draw,
-        "seed": case.seed,
-        "values": case.values,
-        "log": case.log,
-        "status": "done",
-        "code": "",
-        "findings": "",
-        "scalars": [math.nan] * len(campaign.scalars),
-        "curves": None,
-    }
+    row = _row(campaign, case, "done")
     try:
         result = kind.run(campaign.table(case), f"case-{number}")
         data = kind.data(result)
         row["scalars"] = [
-            _number(at_path(data, parts_of(place))) for place in campaign.scalars.values()
+            _number(at_path(data, key_path(place))) for place in campaign.scalars.values()
         ]
         row["findings"] = " ".join(sorted({one.code for one in _findings(result)}))
         if campaign.spec.keep.curves:
@@ -74,6 +63,19 @@ def run_case(campaign: Any, number: int) -> tuple[Row, Any]:
     except Exception as error:  # a fault of ours, or of a plug-in, is a result of this case
         return {**row, "status": "failed", "code": type(error).__name__}, None
     return row, result
+
+
+def _row(campaign: Any, case: Any, status: str, code: str = "") -> Row:
+    """Row of a case without results."""
+    return {
+        **vars(case),
+        "case": case.number,
+        "status": status,
+        "code": code,
+        "findings": "",
+        "scalars": [math.nan] * len(campaign.scalars),
+        "curves": None,
+    }
 
 
 def _findings(result: Any) -> Iterator[Any]:
@@ -320,20 +322,8 @@ class CaseProcess:
         from strapdown.campaign.design import Campaign
 
         campaign = Campaign.thawed(self._frozen)
-        case = campaign.case(number)
-        return {
-            "case": case.number,
-            "cell": case.cell,
-            "draw": case.draw,
-            "seed": case.seed,
-            "values": case.values,
-            "log": case.log,
-            "status": "hung" if how == "hung" else "crashed",
-            "code": "" if how == "hung" else how,
-            "findings": "",
-            "scalars": [math.nan] * len(campaign.scalars),
-            "curves": None,
-        }
+        case, hung = campaign.case(number), how == "hung"
+        return _row(campaign, case, "hung" if hung else "crashed", "" if hung else how)
 
 
 if __name__ == "__main__":

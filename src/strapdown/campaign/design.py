@@ -17,7 +17,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.bundle import InputFiles, input_files, named_paths
-from strapdown.campaign.kinds import KINDS, Table, at_path, parts_of, with_value
+from strapdown.campaign.kinds import KINDS, Table, at_path, with_value
 from strapdown.campaign.specification import CampaignSpec, ParameterTable
 from strapdown.config.reading import OF_LOG, absolute_table
 from strapdown.config.toml_file import TomlFile, read_toml
@@ -279,7 +279,7 @@ class Campaign:
         if kind.seed and (len(kind.seed) == 1 or at_path(table, kind.seed[:-1]) is not None):
             table = with_value(table, kind.seed, case.seed)
         if case.log:
-            path = Path(self.log_path[self.logs.index(case.log)])
+            path = Path(self.log_path[case.draw // self.spec.cases.draws])
             if not table.get(str(kind.log[0])) and len(kind.log) == 3:
                 table = with_value(table, kind.log[:1], [{}])
             table = _filled(with_value(table, kind.log, str(path)), path)
@@ -287,7 +287,7 @@ class Campaign:
             if one.column not in case.values:
                 continue
             try:
-                table = with_value(table, parts_of(one.key), case.values[one.column])
+                table = with_value(table, one.path, case.values[one.column])
             except KeyError as error:
                 raise ConfigError(
                     "campaign.no-place", quantity=one.key, part=str(error.args[0])

@@ -9,7 +9,6 @@ import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,7 @@ from strapdown.config.toml_file import KeyPath, read_toml
 from strapdown.constants import TWO_SIDED_95
 from strapdown.errors import ConfigError
 
-__all__ = ["KINDS", "Kind", "at_path", "parts_of", "with_value"]
+__all__ = ["KINDS", "Kind", "at_path", "with_value"]
 
 Table = dict[str, Any]
 
@@ -553,11 +552,3 @@ KINDS: dict[str, Kind] = {
         log=("logs", 0, "path"),
     ),
 }
-
-
-@cache
-def parts_of(text: str) -> KeyPath:
-    """The parts of a dotted place, parsed once."""
-    from strapdown.campaign.specification import key_path
-
-    return key_path(text)

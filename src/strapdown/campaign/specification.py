@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Iterator
+from functools import cache
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, StrictBool, StrictInt, model_validator
@@ -28,6 +29,7 @@ DRAWS = {
 }
 
 
+@cache
 def key_path(text: str) -> KeyPath:
     """Split a dotted key as TOML does; a part that is a whole number is the place in a list.
 
