@@ -290,6 +290,11 @@ FILTER_NODES = 6
 ROUGH_NODES = 3
 # exp(-40) is below the rounding error of the sum.
 MEMORY = 40.0  # time constants
+# Stretches longer than a time constant where the memory fades, from the instant back: their ends
+# in time constants, and nodes. The error for a rotation of ρ rad per time constant, on a stretch
+# that begins at a and has the length L and n nodes, is L^(2n+1) n!⁴ / ((2n+1) (2n)!³)
+# |1 + iρ|^(2n) e^-a: at ρ = 2 3e-12 as in the newest time constant, which has 6 nodes.
+FADING = ((1.0, 6), (2.0, 6), (6.0, 10), (14.0, 14), (30.0, 18), (MEMORY, 8))
 # Probe positions within a step, irregular so that a vibration is not zero at all three.
 PROBES = (0.23, 0.57, 0.81)
 # Instants evaluated per batch, to bound memory.
@@ -349,8 +354,8 @@ def low_passed(
     quantity within this of a straight line between two instants is treated as linear, and the
     quadrature elsewhere has 3 nodes; zero disables both. This saves evaluations where the quantity
     changes little. Returns (n, 3), ``y1 = exp(-dt/τ) y0 + ∫ exp(-(t1 - s)/τ) u(s) ds/τ`` from
-    instant to instant, with the integral by 6-node Gauss-Legendre quadrature in stretches no longer
-    than τ, so that the motion is evaluated at 6 or more instants per sample and time constant.
+    instant to instant, with the integral by Gauss-Legendre quadrature, with 6 nodes in stretches no
+    longer than τ, and with longer ones where the memory has faded (`FADING`).
     Smooth motion is exact to rounding; a jump of u is spread over its stretch.
     """
     if math.isinf(bandwidth):
@@ -383,11 +388,7 @@ def low_passed(
 def _weighted(quantity: Quantity, ends: Array, steps: Array, tau: float, count: int) -> Array:
     """``∫ exp(-(t1 - s)/τ) u(s) ds/τ`` over the step that ends at each instant, (n, 3)."""
     window = np.minimum(steps, MEMORY * tau)
-    stretches = max(1, math.ceil(float(window.max()) / tau))
-    nodes, weights = np.polynomial.legendre.leggauss(count)
-    # Nodes within the window from 0 to 1, and their weights.
-    place = ((np.arange(stretches)[:, None] + 0.5 * (1.0 + nodes)) / stretches).ravel()
-    weight = np.tile(0.5 * weights, stretches) / stretches
+    place, weight = _nodes(float(window.max()) / tau, count)
     parts = []
     for chunk in _chunks(steps.size, place.size):
         back = window[chunk, None] * (1.0 - place)
@@ -395,6 +396,25 @@ def _weighted(quantity: Quantity, ends: Array, steps: Array, tau: float, count: 
         share = weight * np.exp(-back / tau) * window[chunk, None] / tau
         parts.append(np.einsum("nm,nmk->nk", share, values))
     return np.concatenate(parts)
+
+
+def _nodes(window: float, count: int) -> tuple[Array, Array]:
+    """Nodes within a window of so many time constants, from 0 to 1 at the instant, and weights."""
+    if count == FILTER_NODES and window > FADING[2][0]:
+        ends = [end for end, _ in FADING if end < window] + [window]
+        counts = [count for _, count in FADING[: len(ends)]]
+        edges = 1.0 - np.array([0.0, *ends])[::-1] / window
+        counts.reverse()
+    else:
+        stretches = max(1, math.ceil(window))
+        edges, counts = np.arange(stretches + 1) / stretches, [count] * stretches
+    place, weight = [], []
+    for k, number in enumerate(counts):
+        nodes, weights = np.polynomial.legendre.leggauss(number)
+        length = edges[k + 1] - edges[k]
+        place.append(edges[k] + 0.5 * length * (1.0 + nodes))
+        weight.append(0.5 * length * weights)
+    return np.concatenate(place), np.concatenate(weight)
 
 
 def _curved(

@@ -61,6 +61,26 @@ def test_true_means_of_ringing_are_changes_of_its_velocity():
     assert np.abs(exact).max() > 1.0
 
 
+@pytest.mark.parametrize("step", [0.0125, 2.9, 5.9, 6.1, 13.0, 39.0, 41.0, 400.0])
+@pytest.mark.parametrize("turn", [0.01, 0.3, 1.0, 2.0])
+def test_a_turning_vector_behind_a_pole_is_its_closed_form_for_any_step(step, turn):
+    """`step` in time constants; `turn` in rad per time constant: rounding is of the phase."""
+    tau = time_constant(300.0)
+    stamps = np.arange(50) * (step * tau)
+    phase = turn * stamps / tau
+    found = low_passed(
+        lambda s: np.column_stack([np.cos(turn * s / tau), np.sin(turn * s / tau), 1.0 + 0.0 * s]),
+        stamps,
+        300.0,
+    )
+    gain = 1.0 / (1.0 + 1j * turn)
+    exact = gain * np.exp(1j * phase) + (1.0 - gain) * np.exp(-stamps / tau)
+    within = 8e-12 * (turn / 2.0) ** 12 + 4e-16 * (4.0 + phase.max())
+    np.testing.assert_allclose(found[:, 0], exact.real, rtol=0.0, atol=within)
+    np.testing.assert_allclose(found[:, 1], exact.imag, rtol=0.0, atol=within)
+    np.testing.assert_allclose(found[:, 2], 1.0, rtol=0.0, atol=2e-15)
+
+
 @pytest.mark.parametrize("bandwidth", [20.0, 80.0, 500.0])
 def test_ringing_behind_a_pole_is_its_closed_form(bandwidth):
     found = low_passed_at(RINGING.acceleration, STAMPS, bandwidth, RINGING.quarters())
