@@ -2,23 +2,13 @@
 
 from __future__ import annotations
 
-import tempfile
-from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol
 
 from strapdown.errors import ConfigError
 from strapdown.progress import Progress, silent
-from strapdown.report.compare import RunComparison, compare_folders
+from strapdown.report.compare import RunComparison, Saved, compare_results
 
 __all__ = ["RunComparison", "compare_runs"]
-
-
-class Saved(Protocol):
-    """A run in memory, of any command."""
-
-    def save(self, out: str | Path, *, report: bool = True) -> Any:
-        """Write it as a sealed folder."""
 
 
 def compare_runs(*runs: str | Path | Saved, progress: Progress = silent) -> RunComparison:
@@ -52,19 +42,7 @@ def compare_runs(*runs: str | Path | Saved, progress: Progress = silent) -> RunC
     >>> both = sd.compare_runs("drive-a", "drive-b")  # doctest: +SKIP
     >>> both.options, both.to_pandas(), both.differences[0].scores  # doctest: +SKIP
     """
-    folder = tempfile.TemporaryDirectory(prefix="strapdown-")
-    given: list[Path | tuple[str, Path]] = []
-    made: list[str] = []
-    for k, run in enumerate(runs, start=1):
-        if isinstance(run, str | Path):
-            given.append(Path(run))
-        elif hasattr(run, "save"):
-            place = Path(folder.name).resolve() / f"run-{k}"
-            run.save(place, report=False)
-            made.append(f"run {k}")
-            given.append((f"run {k}", place))
-        else:
+    for run in runs:
+        if not isinstance(run, str | Path) and not hasattr(run, "save"):
             raise ConfigError("compare.no-run", quantity="runs", shown=type(run).__name__)
-    found = compare_folders(given, progress)
-    kept = tuple(replace(run, ran=run.ran or run.name in made) for run in found.runs)
-    return replace(found, runs=kept, kept=(found.kept, folder))
+    return compare_results(runs, progress)

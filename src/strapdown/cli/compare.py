@@ -45,10 +45,10 @@ def compare(
     """
     from strapdown.bundle import to_json
     from strapdown.cli.result_folder import run_and_save
-    from strapdown.report.compare import compare_folders, comparison_json
+    from strapdown.report.compare import compare_results, comparison_json
 
     def compute(progress: Progress) -> RunComparison:
-        return compare_folders(runs, progress)
+        return compare_results(runs, progress)
 
     if out is not None:
         kept: list[RunComparison] = []

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+import shutil
 import tempfile
+import weakref
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from html import escape
 from pathlib import Path
 from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import pandas as pd
 
@@ -26,6 +28,7 @@ from strapdown.bundle import (
 from strapdown.config.alignment import AlignmentSpec
 from strapdown.config.crash_case import CaseSpec
 from strapdown.config.navigation import NavigationSpec
+from strapdown.config.reading import FileSpec
 from strapdown.config.toml_file import read_toml
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.formats import csv
@@ -46,7 +49,7 @@ from strapdown.report.compare_folders import (
     seconds,
     shown_names,
 )
-from strapdown.report.compare_numbers import Value, values_of
+from strapdown.report.compare_numbers import OF_THE_UNIT, Value, values_of
 from strapdown.report.compare_tracks import (
     Curve,
     Difference,
@@ -62,7 +65,7 @@ from strapdown.units import SHOWN_UNITS
 if TYPE_CHECKING:
     from strapdown.report.chart_svg import ChartFigure
 
-__all__ = ["COMPARE", "NumberRow", "RunComparison", "compare_folders", "comparison_json"]
+__all__ = ["COMPARE", "NumberRow", "RunComparison", "compare_results", "comparison_json"]
 
 #: Instants that differ by less are the same, s.
 SAME_INSTANT = 1e-6
@@ -169,8 +172,6 @@ class RunComparison:
     curves: tuple[tuple[Curve, ...], ...] = field(repr=False)
     seconds: tuple[dict[str, float], ...]
     findings: tuple[Finding, ...]
-    #: Folder of the runs that were made for the comparison; removed with the last reference.
-    kept: Any = field(default=None, repr=False)
 
     @property
     def same_command(self) -> bool:
@@ -318,22 +319,29 @@ def _ends(value: Value | None) -> tuple[float | None, float | None]:
 # Compare.
 
 
-def compare_folders(
-    given: Sequence[str | Path | tuple[str, Path]], progress: Progress = silent
+class Saved(Protocol):
+    """A run in memory, of any command."""
+
+    def save(self, out: Path, *, report: bool) -> Any:
+        """Write it as a sealed folder."""
+
+
+def compare_results(
+    given: Sequence[str | Path | Saved], progress: Progress = silent
 ) -> RunComparison:
-    """Compare result folders, and configurations, which are run first.
+    """Compare result folders, runs in memory, and configurations, which are run first.
 
     Parameters
     ----------
-    given : sequence of (str, Path, or (str, Path))
-        Folders of results, or TOML files of `navigate`, `align` or `crash`; with a name to show,
-        or without.
+    given : sequence of (str, Path or run)
+        Folders of results; TOML files of `navigate`, `align` or `crash`; runs in memory, named by
+        their place.
     progress : callable, optional
 
     Returns
     -------
     RunComparison
-        Runs that were made for it are in a temporary folder, which is removed with it.
+        What is run or saved for it is in a temporary folder, which is removed with it.
 
     Raises
     ------
@@ -343,44 +351,55 @@ def compare_folders(
     DataError
         A folder is no result, or its files are damaged.
     """
-    named = [one if isinstance(one, tuple) else (None, Path(one)) for one in given]
-    if len(named) < 2:
-        raise ConfigError("compare.one-run", quantity="RUN", count=len(named))
-    paths = [path for _, path in named]
-    if len({path.resolve() for path in paths}) < len(paths):
-        twice = next(
-            p for k, p in enumerate(paths) if p.resolve() in [q.resolve() for q in paths[:k]]
-        )
-        raise ConfigError("compare.same-run", file=str(twice), quantity="RUN")
-    for path in paths:
+    if len(given) < 2:
+        raise ConfigError("compare.one-run", quantity="RUN", count=len(given))
+    paths = {k: Path(one) for k, one in enumerate(given) if isinstance(one, str | Path)}
+    _refuse_twice(list(paths.values()))
+    for path in paths.values():
         _check(path)
-    files = [path for path in paths if path.is_file()]
-    names = [own or name for (own, _), name in zip(named, shown_names(paths), strict=True)]
-    names = [f"{n} ({k + 1})" if n in names[:k] else n for k, n in enumerate(names)]
-    folder = tempfile.TemporaryDirectory(prefix="strapdown-") if files else None
-    runs = []
-    for k, (path, name) in enumerate(zip(paths, names, strict=True)):
-        begin, share = 0.8 * k / len(paths), 0.8 / len(paths)
-        if folder is not None and path.is_file():
-            place = Path(folder.name).resolve() / str(k + 1) / path.stem
-            place.parent.mkdir()
-            _run_file(
-                path,
-                place,
-                lambda stage, done, b=begin, s=share, n=name: progress(
-                    f"{n}: {stage}", b + s * done
-                ),
-            )  # type: ignore[misc]
-            runs.append(open_run(place, name, ran=True))
-        else:
-            progress(f"reading {name}", begin)
-            runs.append(open_run(path.absolute(), name))
-    progress("comparing", 0.8)
-    return replace(compared(runs), kept=folder)
+    names = {k: f"run {k + 1}" for k in range(len(given))}
+    names |= dict(zip(paths, shown_names(list(paths.values())), strict=True))
+    made = Path(tempfile.mkdtemp(prefix="strapdown-")).resolve()
+    try:
+        runs = []
+        for k, one in enumerate(given):
+            share = 0.8 / len(given)
+
+            def told(stage: str, done: float, k: int = k, share: float = share) -> None:
+                progress(f"{names[k]}: {stage}", share * (k + done))
+
+            told("reading", 0.0)
+            if k not in paths:
+                assert not isinstance(one, str | Path)
+                one.save(made / f"run-{k + 1}", report=False)
+                runs.append(open_run(made / f"run-{k + 1}", names[k], ran=True))
+            elif paths[k].is_file():
+                place = made / str(k + 1) / paths[k].stem
+                place.parent.mkdir()
+                _run_file(paths[k], place, told)
+                runs.append(open_run(place, names[k], ran=True))
+            else:
+                runs.append(open_run(paths[k].absolute(), names[k]))
+        progress("comparing", 0.8)
+        result = compared(runs)
+    except BaseException:
+        shutil.rmtree(made, ignore_errors=True)
+        raise
+    weakref.finalize(result, shutil.rmtree, made, ignore_errors=True)
+    return result
+
+
+def _refuse_twice(paths: Sequence[Path]) -> None:
+    """Refuse a run that is given twice: ConfigError."""
+    seen = set()
+    for path in paths:
+        if path.resolve() in seen:
+            raise ConfigError("compare.same-run", file=str(path), quantity="RUN")
+        seen.add(path.resolve())
 
 
 def compared(runs: Sequence[SealedRun]) -> RunComparison:
-    """Compare opened runs; errors as `compare_folders`."""
+    """Compare opened runs; errors as `compare_results`."""
     options, equal = option_rows(runs)
     inputs = input_rows(runs)
     commands = tuple(dict.fromkeys(run.command for run in runs))
@@ -399,7 +418,8 @@ def compared(runs: Sequence[SealedRun]) -> RunComparison:
         numbers: tuple[NumberRow, ...] = ()
         codes: tuple[FoundCode, ...] = ()
     else:
-        numbers, codes = number_rows(runs), found_codes(runs)
+        one_unit = _same_record(options, inputs)
+        numbers, codes = number_rows(runs, one_unit=one_unit), found_codes(runs)
         read = [tracks_of(run) for run in runs]
         tracks, curves = tuple(own for own, _ in read), tuple(map(curves_of, runs))
         findings += [one for _, own in read for one in own]
@@ -434,8 +454,20 @@ def _is_record(row: InputRow) -> bool:
     return row.role.rpartition(": ")[2] == "log"
 
 
-def number_rows(runs: Sequence[SealedRun]) -> tuple[NumberRow, ...]:
-    """Return the numbers of runs of one command, by their keys, in the order of the first."""
+def _same_record(options: Sequence[OptionRow], inputs: Sequence[InputRow]) -> bool:
+    """Whether all runs are of the same samples: of one log, or of one simulation."""
+    logs = [row for row in inputs if _is_record(row)]
+    if logs:
+        return all(row.same for row in logs)
+    return not any(row.key.startswith(("simulation.", "sensors.")) for row in options)
+
+
+def number_rows(runs: Sequence[SealedRun], *, one_unit: bool = True) -> tuple[NumberRow, ...]:
+    """Return the numbers of runs of one command, by their keys, in the order of the first.
+
+    `one_unit`: whether all runs are of one sensor in one record; otherwise its errors differ as
+    units do, and their differences have no bound.
+    """
     several = any(len(run.parts) > 1 for run in runs)
     every: list[dict[str, Value]] = []
     for run in runs:
@@ -453,6 +485,8 @@ def number_rows(runs: Sequence[SealedRun]) -> tuple[NumberRow, ...]:
         values = tuple(own.get(key) for own in every)
         first = values[0]
         pairs = [(None, None), *(_difference(first, other) for other in values[1:])]
+        if not one_unit and any(v is not None and OF_THE_UNIT in v.group for v in values):
+            pairs = [(apart, None) for apart, _ in pairs]
         rows.append(NumberRow(key, values, *map(tuple, zip(*pairs, strict=True))))
     return tuple(sorted(rows, key=lambda row: groups.index(row.any.group)))
 
@@ -476,7 +510,7 @@ def _apart(first: Value, other: Value) -> float | None:
         return None
     if first.place is not None and other.place is not None:
         try:
-            north, east, _ = place_difference(other.place, first.place).tolist()
+            north, east, _ = map(float, place_difference(other.place, first.place))
         except StrapdownError:
             return None
         return {"lat": north, "lon": east}.get(first.kind, math.hypot(north, east))
@@ -508,6 +542,7 @@ def _check(path: Path) -> None:
 def _kind_of(path: Path) -> str:
     """Command of a configuration: by the keys that only one of them has, else navigation."""
     keys = set(read_toml(path).table)
+    forms: dict[str, type[FileSpec]]
     forms = {"navigate": NavigationSpec, "align": AlignmentSpec, "crash": CaseSpec}
     fit = [name for name, form in forms.items() if keys <= set(form.model_fields) - {"name"}]
     if not fit:

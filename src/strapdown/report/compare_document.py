@@ -84,7 +84,8 @@ METHOD = (
     "A difference is a run minus the first one. Its 95 % bound is the root of the sum of the "
     "squares of both bounds, as of independent errors. Runs of one log share measurements, and "
     "differ by less if both bounds hold: a difference outside says that one of them does not, one "
-    "within proves neither.",
+    "within proves neither. Sensor errors of different records or units differ as these do: their "
+    "differences have no bound.",
     "Over time: at the instants of the covariance of the run (the first is interpolated), rms and "
     "shares weighted by time. Horizontally within means within the ellipse of both standard "
     "deviations north and east, without their correlation.",
@@ -744,7 +745,7 @@ def _plan_chart(result: RunComparison, label: str, end: str) -> Chart | None:
     if len(found) < 2 or len({one.frame for _, one in found}) > 1:
         return None
     origin = None
-    paths = []
+    paths: list[tuple[int, Array, Array, Array]] = []
     for k, one in found:
         rows = kept_rows(_plane(one, None)[:2], 700)
         if one.kind == "geodetic" and origin is None:
@@ -760,7 +761,7 @@ def _plan_chart(result: RunComparison, label: str, end: str) -> Chart | None:
     tight = PlanView.of(drawn, most=0.9)
     margin = 0.04 * (tight.high - tight.low)
     view = PlanView(tight.low - margin, tight.high + margin)
-    lines = []
+    lines: list[Line] = []
     for (k, time, _, _), (east, north) in zip(paths, drawn, strict=True):
         colour, dash = _style(k)
         width = 2.6 if not lines else 1.6
@@ -817,9 +818,9 @@ def _attitude_chart(result: RunComparison) -> Chart | None:
 
 def _sweep_chart(result: RunComparison) -> Chart | None:
     """Errors of the algorithms over the rate, of averaged samples."""
+    lines: list[Line] = []
     own = [(k, one) for k, some in enumerate(result.curves) for one in some if one.kind == "sweep"]
     names = list(dict.fromkeys(one.label for _, one in own))
-    lines = []
     for k, one in own:
         style, dash = look(names.index(one.label)), ("solid", "dash", "dot", "dashdot")[k % 4]
         text = f"{one.label}, {result.runs[k].name}"
@@ -834,7 +835,7 @@ def _sweep_chart(result: RunComparison) -> Chart | None:
 
 def _cone_chart(result: RunComparison) -> Chart | None:
     """95 % bounds of the drift in an outage."""
-    lines = []
+    lines: list[Line] = []
     for k, some in enumerate(result.curves):
         for one in some:
             if one.kind == "cone":

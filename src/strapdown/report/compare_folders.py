@@ -18,7 +18,7 @@ from strapdown.bundle import (
     sha256,
     unsealed_changes,
 )
-from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.errors import DataError, Finding
 from strapdown.report.content import json_of
 
 __all__ = [
@@ -198,12 +198,12 @@ def open_part(root: Path, label: str = "") -> RunPart:
 def shown_names(paths: Sequence[Path]) -> list[str]:
     """Return a name for each path: its last part, and as many parts above it as tell them apart."""
     parts = [path.absolute().parts for path in paths]
-    longest = max(map(len, parts))
-    for count in range(1, longest + 1):
+    longest = max(map(len, parts), default=0)
+    for count in range(1, longest):
         names = ["/".join(one[-count:]) for one in parts]
         if len(set(names)) == len(names):
             return names
-    raise ConfigError("compare.same-run", file=str(paths[0]), quantity="RUN")
+    return [str(path) for path in paths]
 
 
 # Options: the resolved configurations, side by side.

@@ -18,8 +18,10 @@ from strapdown.report.values import AXES
 from strapdown.tables import EULER, NED, VELOCITY
 from strapdown.units import SPEEDS
 
-__all__ = ["Value", "is_over_ground", "values_of"]
+__all__ = ["OF_THE_UNIT", "Value", "is_over_ground", "values_of"]
 
+#: Group of what is a property of the unit that recorded, and no error of the result.
+OF_THE_UNIT = "Estimated sensor errors"
 Place = tuple[float, float, float]
 
 
@@ -191,11 +193,12 @@ def _navigate(part: RunPart) -> Iterator[Value]:
         label = name.replace("_", " ")
         yield from _row(
             f"sensors.{name}",
-            "Estimated sensor errors",
+            OF_THE_UNIT,
             label,
             _number(one, "estimate"),
             _word(one, "unit") or "",
             half=_half(_number(one, "sd")),
+            detail="bias" not in name,
         )
     for name, one in _table(data, "observations").items():
         for key, label, unit, kind in (
@@ -331,7 +334,7 @@ def _align(part: RunPart) -> Iterator[Value]:
             label = f"{name.replace('_', ' ')} {axis}"
             yield from _row(
                 f"fine.{name}_{axis}",
-                "Estimated sensor errors",
+                OF_THE_UNIT,
                 label,
                 _number(fine, key, k),
                 unit,
@@ -442,12 +445,12 @@ def _crash(part: RunPart) -> Iterator[Value]:
             yield from _crash_path(answer, is_over_ground(data))
     recorders = {_word(one, "name") for one in _tables(data, "case", "units")}
     for answer in answers if len(recorders) > 1 else ():
-        name, number = _word(answer, "recorder"), _number(answer, "main_event")
-        if name not in recorders:
+        own, main_event = _word(answer, "recorder"), _number(answer, "main_event")
+        if own not in recorders:
             continue  # their mean
-        events = [one for one in _tables(answer, "events") if _number(one, "event") == number]
-        for event in events:
-            yield from _force(event, f"recorders.{name}", "Each recorder", f"{name}, ")
+        for event in _tables(answer, "events"):
+            if _number(event, "event") == main_event:
+                yield from _force(event, f"recorders.{own}", "Each recorder", f"{own}, ")
     for one in _tables(data, "severity"):
         model, outcome = _word(one, "model") or "?", _word(one, "outcome") or ""
         label, key = _of_main(one, f"{outcome}, {model}", f"severity.{model}", main)

@@ -165,9 +165,8 @@ def tracks_of(run: SealedRun) -> tuple[tuple[Track, ...], tuple[Finding, ...]]:
         try:
             tracks += read(part)
         except StrapdownError as error:
-            findings.append(
-                Finding("compare.track-not-read", file=str(part.root), reason=error.finding)
-            )
+            name = f"{run.name}, {part.label}" if part.label else run.name
+            findings.append(Finding("compare.track-not-read", file=name, reason=error.finding))
     return tuple(tracks), tuple(findings)
 
 
@@ -416,14 +415,14 @@ def _attitude_at(track: Track, time: Array) -> Array:
         rotation.compose(rotation.conjugate(q[after - 1]), q[after])
     )
     steps = rotation.quaternion_from_rotation_vector(share[:, None] * turn)
-    return np.asarray(rotation.compose(q[after - 1], steps))
+    return rotation.compose(q[after - 1], steps)
 
 
 def _common(first: Track, other: Track) -> Array:
     """Instants of the other within the span of the first."""
     a, b = first.time, other.time
     slack = 1e-6 * float(np.median(np.diff(a)))
-    time = b[(b >= a[0] - slack) & (b <= a[-1] + slack)]
+    time: Array = b[(b >= a[0] - slack) & (b <= a[-1] + slack)]
     if not time.size:
         spans = [f"{t[0]:.9g} to {t[-1]:.9g} s" for t in (a, b)]
         raise DataError("compare.no-common-time", spans=spans)
