@@ -253,7 +253,7 @@ class RunComparison:
             These runs have no such chart.
         """
         from strapdown.report.chart_svg import ChartFigure
-        from strapdown.report.compare_document import charts
+        from strapdown.report.compare_charts import charts
 
         drawn = {chart.slug: chart for chart in charts(self)}
         if kind not in drawn:

@@ -408,9 +408,9 @@ def _attitude(part: RunPart) -> Iterator[Value]:
                 detail=True,
             )
     for one in _tables(data, "sweep"):
-        name, rate = _word(one, "algorithm"), _number(one, "rate_hz")
+        name, rate = _word(one, "algorithm") or "?", _number(one, "rate_hz")
         meaning = MEANINGS.get(_word(one, "meaning") or "")
-        if name is None or rate is None or meaning is None:
+        if rate is None or meaning is None:
             continue
         yield from _row(
             f"sweep.{meaning}.{name}.{rate:.6g}",
