@@ -6,9 +6,6 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from strapdown import __version__
 from strapdown.config.toml_file import shown
 from strapdown.constants import STANDARD_GRAVITY
@@ -43,8 +40,6 @@ from strapdown.report.values import (
 
 if TYPE_CHECKING:
     from strapdown.report.compare import NumberRow, RunComparison
-
-Array = NDArray[np.float64]
 
 SAME, NONE = "same", "–"
 #: Distance of two positions that is rounding alone, m.

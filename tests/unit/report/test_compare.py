@@ -17,6 +17,7 @@ from strapdown.errors import ConfigError, DataError
 from strapdown.formats import csv
 from strapdown.formats.writers import write_trajectory
 from strapdown.report.compare_document import compare_document, numbers_block, options_block
+from strapdown.report.compare_tracks import Track, differences
 from strapdown.report.document_html import document_page
 from strapdown.tables import trajectory_table
 
@@ -358,6 +359,54 @@ def test_no_common_time_and_other_ellipsoids_are_said(tmp_path):
     assert [f.code for f in result.findings] == ["compare.track-not-read"]
 
 
+def local(rate, **columns):
+    """A track in the axes of a plane over a second; each quantity a number or a function of t."""
+    t = np.arange(0.0, 1.0 + 0.5 / rate, 1.0 / rate)
+    names = ("north", "east", "down", "VN", "VE", "VD", "roll", "pitch", "heading")
+
+    def table(given, other):
+        found = {n: given.get(n, other) for n in names}
+        made = {n: v(t) if callable(v) else np.full_like(t, v) for n, v in found.items()}
+        return pd.DataFrame(made, index=t)
+
+    sds = {name.removesuffix("_sd"): v for name, v in columns.items() if name.endswith("_sd")}
+    return Track("", "local", "over ground", table(columns, 0.0), table(sds, 1.0))
+
+
+def test_the_horizontal_bound_is_that_of_the_ellipse():
+    """3 m north, 4 m east; standard deviations of the difference 2 m and 1 m."""
+    first = local(10.0, north_sd=1.2, east_sd=0.6)
+    other = local(10.0, north=3.0, east=4.0, north_sd=1.6, east_sd=0.8)
+    ((one,), _) = differences((first,), (other,), 1, "b")
+    assert one.table["horizontal"].to_numpy() == pytest.approx(5.0)
+    # At a distance of 2.4477 the ellipse is met, which these are beyond.
+    distance = math.sqrt((3.0 / 2.0) ** 2 + (4.0 / 1.0) ** 2)
+    assert one.table["horizontal_combined"].to_numpy() == pytest.approx(2.447747 / distance * 5.0)
+    assert one.score("horizontal").share == 0.0
+    assert one.table["horizontal_other"].to_numpy() == pytest.approx(2.447747 * 1.6)
+
+
+def test_a_heading_through_north_is_interpolated_through_north():
+    def heading(t):
+        return (359.9 + 10.0 * t) % 360.0
+
+    ((one,), _) = differences(
+        (local(4.0, heading=heading),), (local(50.0, heading=heading),), 1, ""
+    )
+    assert np.abs(one.table["heading"]).max() < 1e-9
+
+
+def test_a_covariance_holds_from_its_mark_on(tmp_path):
+    """The first has a mark each second, of which the value says the second."""
+    first = straight(tmp_path, "a", rate=1.0, sd=lambda t: 1.0 + t)
+    other = straight(tmp_path, "b", rate=4.0)
+    (one,) = sd.compare_runs(first, other).differences
+    time = one.table.index.to_numpy()
+    expected = 1.959964 * (1.0 + np.floor(time + 1e-9))
+    assert one.table["VN_first"].to_numpy() == pytest.approx(expected, rel=1e-6)
+    assert one.table["VN_other"].to_numpy() == pytest.approx(1.959964, rel=1e-6)
+
+
 def turning(folder, name, rate, ahead=0.0):
     """A sealed comparison of algorithms: 20 deg/s about down, some degrees ahead."""
     t = np.arange(0.0, 5.0 + 0.5 / rate, 1.0 / rate)
@@ -424,9 +473,9 @@ def crashed(folder, name, *, north, rate, system="metric", heading=None, speed=1
                     for k, v in zip(("value", "low", "high"), (10.0, 9.0, 12.0), strict=True)
                 },
                 "direction_of_force": {
-                    "horizontal_deg": 359.0,
-                    "low_deg": 350.0,
-                    "high_deg": 8.0,
+                    "horizontal_deg": 2.0,
+                    "low_deg": 353.0,
+                    "high_deg": 11.0,
                     "clock": 12,
                 },
             }
