@@ -15,7 +15,9 @@ from strapdown.report.chart import (
     BLACK,
     BLUE,
     BUCKETS_OVER_TIME,
+    GREEN,
     GREY,
+    PURPLE,
     SERIES_COLOURS,
     VERMILLION,
     Chart,
@@ -46,7 +48,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 #: Colors of the runs, the same in plan and charts.
-COLOURS = (BLUE, VERMILLION, *(c for c in SERIES_COLOURS if c not in (BLUE, VERMILLION)))
+FIRST_COLOURS = (BLUE, VERMILLION, GREEN, PURPLE)
+COLOURS = (*FIRST_COLOURS, *(c for c in SERIES_COLOURS if c not in FIRST_COLOURS))
 
 
 def in_units(system: str | None, unit: str) -> tuple[float, str]:
@@ -139,9 +142,13 @@ def _panel(result: RunComparison, own: Sequence[Difference], name: str, two: boo
             factor * one.table[f"{name}_{key}"].to_numpy(dtype=np.float64)
             for key in ("combined", "first", "other")
         )
+        # Of a distance there is no lower bound.
+        signs = (1.0,) if name == "horizontal" else (1.0, -1.0)
         if not two:
-            line = curve(f"{other}, bound", time, combined, colour, "dash", 1.0, BUCKETS_OVER_TIME)
-            lines.append(replace(line, legend=False))
+            for sign in signs:
+                bound = sign * combined
+                line = curve(other, time, bound, colour, "dash", 1.0, BUCKETS_OVER_TIME)
+                lines.append(replace(line, legend=False))
             continue
         low = np.zeros(len(time)) if name == "horizontal" else -combined
         fills.append(
@@ -149,7 +156,7 @@ def _panel(result: RunComparison, own: Sequence[Difference], name: str, two: boo
         )
         for k, bound, dash in ((0, first, "dash"), (1, last, "dot")):
             text = f"95 % bound of {result.runs[k].name}"
-            for sign in (1.0,) if name == "horizontal" else (1.0, -1.0):
+            for sign in signs:
                 line = curve(text, time, sign * bound, _style(k)[0], dash, 1.1, BUCKETS_OVER_TIME)
                 lines.append(line if sign > 0.0 else replace(line, legend=False))
     return Panel(

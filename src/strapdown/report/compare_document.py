@@ -342,7 +342,8 @@ def _cells(row: NumberRow, result: RunComparison, two: bool) -> Iterator[str]:
 
 
 def _in_brackets(row: NumberRow, k: int, factor: float) -> str:
-    if row.values[k] is None or row.values[0] is None:
+    own = row.values[k]
+    if own is None or row.values[0] is None or isinstance(own.value, str):
         return ""
     said = _difference(row, k, factor)
     mark = " !" if row.within[k] is False else ""
