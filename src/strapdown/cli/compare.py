@@ -40,8 +40,8 @@ def compare(
     """Show what differs between results: options, inputs, numbers, and positions over time.
 
     Differences are against the first run, each with its 95 % bound where both have one. A run that
-    was changed after it was sealed is named, with exit code 6. What a configuration is run for
-    stays in a temporary folder, and is kept only by --out.
+    was changed after it was sealed is named, with exit code 6. The result of a configuration is in
+    a temporary folder, and kept only by --out.
     """
     from strapdown.bundle import to_json
     from strapdown.cli.result_folder import run_and_save
