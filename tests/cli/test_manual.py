@@ -166,7 +166,8 @@ def test_a_cell_that_prints_something_else_is_found_and_mended(tmp_path, capsys)
     assert RUNNER.check(page, write=False) == 0
 
 
-#: Words of the manual by hand, at most: of the commands up to `extrinsics`, of campaigns, and of comparisons.
+#: Words of the manual by hand, at most: of the commands up to `extrinsics`, of campaigns, and of
+#: comparisons.
 MOST_WORDS = 45_000 + 1_000 + 700
 
 

@@ -86,7 +86,7 @@ def headline(result: RunComparison) -> str:
         words = (
             "No number differs."
             if not other
-            else f"{other} of {len(result.numbers)} numbers differ"
+            else f"{other} of {len(result.numbers)} numbers {'differs' if other == 1 else 'differ'}"
         )
         if other:
             words += f", {outside} by more than their 95 % bound." if outside else "."
@@ -300,9 +300,10 @@ def numbers_block(
     rows: list[tuple[str, ...]] = []
     strong = []
     two = len(result.runs) == 2
+    bounded = any(row.combined[-1] is not None for row in result.numbers)
     columns = ["", *_names(result)]
     if two:
-        columns += ["difference", "95 % bound of it"]
+        columns += ["difference", "95 % bound of it"][: 2 if bounded else 1]
     group = None
     for row in result.numbers:
         if (row.same and not every) or (short and row.any.detail):
@@ -311,7 +312,7 @@ def numbers_block(
             group = row.any.group
             strong.append(len(rows))
             rows.append((group or "Result", *("" for _ in columns[1:])))
-        rows.append(tuple(_cells(row, result, two)))
+        rows.append(tuple(_cells(row, result, two))[: len(columns)])
     if not rows:
         return None
     caption = "Difference: a run minus the first."

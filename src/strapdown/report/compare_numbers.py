@@ -750,9 +750,18 @@ def _every(node: Any, place: str, depth: int) -> Iterator[Value]:
             if depth or key not in ABOUT:
                 yield from _every(item, f"{place}.{key}" if place else key, depth + 1)
     elif isinstance(node, list):
-        for k, item in enumerate(node[:MOST], start=1):
-            yield from _every(item, f"{place}[{k}]", depth + 1)
+        for name, item in zip(_names(node), node[:MOST], strict=False):
+            yield from _every(item, f"{place}[{name}]", depth + 1)
     elif (value := _number(node)) is not None:
         unit = next((u for ending, u in ENDINGS.items() if place.endswith(ending)), "")
         group, _, label = place.partition(".")
         yield Value(place, group if label else "", label or place, value, unit)
+
+
+def _names(items: list[Any]) -> list[str]:
+    """Names of the tables of a list, by which they are paired; without names their numbers."""
+    for key in ("name", "key"):
+        names = [_word(one, key) for one in items]
+        if all(names) and len(set(names)) == len(names):
+            return [str(name) for name in names]
+    return [str(k + 1) for k in range(len(items))]

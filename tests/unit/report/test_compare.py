@@ -238,12 +238,18 @@ def test_errors_of_other_units_have_no_bound(tmp_path, logs):
 
 def test_any_other_result_has_every_number_of_its_json(tmp_path):
     for name, depth in (("a", 1.0), ("b", 2.5)):
-        data = {"scenario.json": {"truth": {"depth_m": depth, "words": "x"}, "list": [1, 2]}}
+        named = [{"name": "x", "n": 1}, {"name": "y", "n": 2}]
+        truth = {"depth_m": depth, "words": "x"}
+        own = {"truth": truth, "list": [1, 2], "named": named if name == "a" else named[::-1]}
+        data = {"scenario.json": own}
         sealed(tmp_path / name, "simulate", {"scenario": {"seed": 1}}, files=data)
     result = sd.compare_runs(tmp_path / "a", tmp_path / "b")
     depth = row(result, "truth.depth_m")
     assert (depth.any.unit, depth.differences[1]) == ("m", 1.5)
-    assert [r.key for r in result.numbers if r.same] == ["list[1]", "list[2]"]
+    same = [r.key for r in result.numbers if r.same]
+    assert same == ["list[1]", "list[2]", "named[x].n", "named[y].n"]
+    # Without a bound of any number there is no column for it.
+    assert numbers_block(result).columns == ("", "a", "b", "difference")
 
 
 def test_findings_that_one_run_has(tmp_path):
