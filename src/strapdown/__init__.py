@@ -44,6 +44,7 @@ if TYPE_CHECKING:
         compare_attitude,
     )
     from strapdown.api.calibrate import CalibrateRun, calibrate
+    from strapdown.api.compare import RunComparison, compare_runs
     from strapdown.api.crash import CrashRun, reconstruct
     from strapdown.api.doctor import Diagnosis, doctor
     from strapdown.api.extrinsics import ExtrinsicsRun, extrinsics
@@ -133,6 +134,7 @@ __all__ = [
     "OrientationFilter",
     "OutageRun",
     "RecordedTriad",
+    "RunComparison",
     "SensorsRun",
     "Simulation",
     "Site",
@@ -150,6 +152,7 @@ __all__ = [
     "calibrate_magnetometer",
     "check_imu_channels",
     "compare_attitude",
+    "compare_runs",
     "compare_sensors",
     "doctor",
     "extrinsics",
@@ -192,6 +195,7 @@ load_on_first_use(
         "api.calibrate": "CalibrateRun calibrate",
         "api.attitude": "Attitude AttitudeComparison AttitudeOptions MagnetometerCalibration "
         "OrientationFilter attitude calibrate_magnetometer compare_attitude",
+        "api.compare": "RunComparison compare_runs",
         "api.crash": "CrashRun reconstruct",
         "api.doctor": "Diagnosis doctor",
         "api.extrinsics": "ExtrinsicsRun extrinsics",

@@ -34,6 +34,7 @@ READS_A_LOG = (
 TABULAR = {
     *("attitude", "align", "navigate", "outage", "crash", "simulate", "verify", "modules"),
     *("allan", "calibrate", "extrinsics", "sensors", "doctor", "convert", "export"),
+    "compare",
 }
 #: What one word says of two things: of a scenario beside a log, of a start beside a place.
 OF_ITS_OWN = {

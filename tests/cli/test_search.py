@@ -50,6 +50,7 @@ QUERIES = {
     "imu noise": "sensors allan",
     "arw": "sensors allan",
     "allan": "allan",
+    "compare two runs": "compare",
     "delta-v": "crash crash_tutorial",
     "pdof": "crash conventions",
     "edr": "crash crash_tutorial formats",

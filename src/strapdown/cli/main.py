@@ -32,7 +32,7 @@ _RESEND_S = 0.005
 EXIT_CODES = (
     "Exit codes: 0 done; 1 an error of strapdown itself; 2 the command line was not understood; "
     "3 the data cannot be used; 4 what was asked for is unknown or cannot be done; 5 a computation "
-    "diverged; 6 verify found a change; 7 verify could compare only a part."
+    "diverged; 6 a result was changed after it was sealed; 7 verify could compare only a part."
 )
 
 #: Commands, each of a module, in the order of the help, with the first sentence of their own help:
@@ -65,6 +65,9 @@ COMMANDS = {
     ),
     "campaign": "Run many cases of one configuration, or one for each log, and say how often.",
     "worker": "Run cases of campaigns for a scheduler of dask, until it ends.",
+    "compare": (
+        "Show what differs between results: options, inputs, numbers, and positions over time."
+    ),
     "verify": "Run a result again from its own configuration and compare it bit for bit.",
     "sign": "Sign the seal of a result with your key, so that others can tell that it is yours.",
     "export": (

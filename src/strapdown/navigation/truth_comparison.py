@@ -59,8 +59,10 @@ __all__ = [
     "compare_with_places",
     "compare_with_truth",
     "normalised_squares",
+    "rows_of_marks",
     "smoother_consistency",
     "state_errors",
+    "time_shares",
 ]
 
 
@@ -196,14 +198,7 @@ class TruthComparison:
 
     @cached_property
     def _weight(self) -> Array:
-        """Share of the time that each instant represents, (n,)."""
-        steps = np.diff(self.time)
-        if not steps.size:
-            return np.ones(len(self.time)) / len(self.time)
-        # A long gap of the truth counts only up to this limit.
-        steps = np.minimum(steps, max(LONGEST, 3.0 * float(np.median(steps))))
-        about = 0.5 * (np.append(steps, 0.0) + np.insert(steps, 0, 0.0))
-        return np.asarray(about / about.sum())
+        return time_shares(self.time)
 
     def _score(self, name: str, unit: str, error: Array, bound: Array) -> SolutionScore:
         worst = int(np.argmax(np.abs(error)))
@@ -216,6 +211,17 @@ class TruthComparison:
             float(np.sqrt(self._weight @ np.square(bound))),
             float(min(1.0, self._weight[np.abs(error) <= bound].sum())),
         )
+
+
+def time_shares(time: Array) -> Array:
+    """Share of the time that each of increasing instants represents, (n,)."""
+    steps = np.diff(time)
+    if not steps.size:
+        return np.ones(len(time)) / len(time)
+    # A long gap counts only up to this limit.
+    steps = np.minimum(steps, max(LONGEST, 3.0 * float(np.median(steps))))
+    about = 0.5 * (np.append(steps, 0.0) + np.insert(steps, 0, 0.0))
+    return np.asarray(about / about.sum())
 
 
 def compare_with_truth(
@@ -247,7 +253,7 @@ def compare_with_truth(
         No mark is within the truth, a table is not valid, or a covariance is not positive.
     """
     stamps = trajectory.index.to_numpy(dtype=np.float64)
-    row, mark = _rows_of_marks(stamps, np.asarray(marks, dtype=np.float64))
+    row, mark = rows_of_marks(stamps, np.asarray(marks, dtype=np.float64))
     if not isinstance(truth, pd.DataFrame):
         inside = stamps[row] <= truth.duration
         span = (0.0, truth.duration)
@@ -375,7 +381,7 @@ def _displacements(computed: Array, true: Array, ellipsoid: Ellipsoid) -> Array:
     )
 
 
-def _rows_of_marks(stamps: Array, marks: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def rows_of_marks(stamps: Array, marks: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Rows of a trajectory that belong to marks, and these marks: of several, the last."""
     step = float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
     nearest, same = same_stamps(stamps, marks, SAME_BEAT)

@@ -194,6 +194,30 @@ def _labelled(system: str, value: Any, factor: float = 1.0) -> Any:
     return value
 
 
+def in_si(data: dict[str, Any]) -> dict[str, Any]:
+    """Return the plain data of a case, as `crash_json`, with SI keys and numbers."""
+    system = data.get("units")
+    if not isinstance(system, str) or system not in _LABELS:
+        return data
+    back = {other: (key, 1.0 / f) for key, (other, f) in _LABELS[system].items()}
+    return {key: value if key == "case" else _si(value, back, key) for key, value in data.items()}
+
+
+def _si(value: Any, back: dict[str, tuple[str, float]], key: str = "", factor: float = 1.0) -> Any:
+    if isinstance(value, dict):
+        found = {}
+        for name, item in value.items():
+            ending = max((e for e in back if name.endswith(e)), key=len, default="")
+            own, by = back.get(ending, ("", 1.0))
+            found[name.removesuffix(ending) + own] = _si(item, back, name, factor * by)
+        return found
+    if isinstance(value, list):
+        return [_si(item, back, key, factor) for item in value]
+    if isinstance(value, float) and factor != 1.0:
+        return factor * value
+    return value
+
+
 def _table_in(system: str, table: pd.DataFrame) -> pd.DataFrame:
     """Table with the columns of a system of units."""
     labels = {str(column): _label(system, str(column)) for column in table.columns}
@@ -211,6 +235,18 @@ def _named(value: Any, key: str = "") -> Any:
     if names_file(key, value):
         return str(value).replace("\\", "/").rstrip("/").rsplit("/", 1)[-1]
     return value
+
+
+def table_in_si(system: str, table: pd.DataFrame) -> pd.DataFrame:
+    """Return a table that was written in a system of units, with SI columns."""
+    back = {other: (key, 1.0 / f) for key, (other, f) in _LABELS.get(system, {}).items()}
+    columns = {}
+    for name in map(str, table.columns):
+        ending = max((e for e in back if name.endswith(e)), key=len, default="")
+        own, factor = back.get(ending, ("", 1.0))
+        values = table[name]
+        columns[name.removesuffix(ending) + own] = values if factor == 1.0 else factor * values
+    return pd.DataFrame(columns, index=table.index)
 
 
 def _pairs(rows: Sequence[tuple[str, str]]) -> list[dict[str, str]]:

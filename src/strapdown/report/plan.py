@@ -98,7 +98,7 @@ def path_marks(time: Array, paths: list[Path], view: PlanView, colour: str) -> l
         # Skip positions near the start, the end or another mark, as of a stationary vehicle.
         if all(np.hypot(place[0] - x, place[1] - y) > _APART * view.width for x, y in ends + dots):
             dots.append(place)
-            labels.append(f"{at:.12g} s")
+            labels.append(f"{at + 0.0:.12g} s")  # without the sign of -0
             lengths.append(float(np.interp(at, time, way)))
     points = np.array(ends + dots)
     places = place_labels(

@@ -43,6 +43,7 @@ from strapdown.report.alignment import ALIGNMENT
 from strapdown.report.allan import ALLAN
 from strapdown.report.attitude import write_attitude
 from strapdown.report.calibrate import CALIBRATE
+from strapdown.report.compare import COMPARE
 from strapdown.report.content import EQUAL, Comparison, compare_files, json_of
 from strapdown.report.crash_case import CRASH
 from strapdown.report.crash_simulation import write_crash_simulation
@@ -94,7 +95,7 @@ BUNDLES: dict[str, ReportBundle[Any]] = {
     bundle.command: bundle
     for bundle in (
         *(ALIGNMENT, ALLAN, CALIBRATE, SENSORS_BUNDLE, OUTAGE, CRASH),
-        *(DOCTOR, EXTRINSICS, NAVIGATION),
+        *(COMPARE, DOCTOR, EXTRINSICS, NAVIGATION),
     )
 }
 
