@@ -82,8 +82,6 @@ def studio(
             # A browser in the terminal would hold the server.
             threading.Thread(target=webbrowser.open, args=[address.url], daemon=True).start()
 
-    left = serve(
-        folder, host=host, port=port, listen=listen, map_file=map_file, started=started
-    )
+    left = serve(folder, host=host, port=port, listen=listen, map_file=map_file, started=started)
     if left:
         out.print(f"\n{left} jobs go on; a studio that is started again shows them")

@@ -11,6 +11,7 @@ import hashlib
 import json
 import logging
 import math
+import os
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
@@ -38,7 +39,8 @@ from strapdown.studio.reading_process import ReadingProcess, Refused, told
 __all__ = ["Studio", "make_app"]
 
 _log = logging.getLogger("strapdown")
-STATIC = Path(__file__).parent / "static"
+#: The built front end; a developer may name another.
+STATIC = Path(os.environ.get("STRAPDOWN_STUDIO_STATIC") or Path(__file__).parent / "static")
 #: Kinds of files of the page and of results; others are sent as bytes.
 MEDIA = {
     ".html": "text/html; charset=utf-8",
@@ -182,7 +184,9 @@ async def series(studio: Studio, request: Request) -> Response:
     """Extremes of a stream of a log."""
     query = request.query_params
     path = studio.folder.file(query.get("file", ""))
-    log, axes = reading_of({"log": parsed(query.get("log", "{}"), "log"), "axes": query.get("axes")})
+    log, axes = reading_of(
+        {"log": parsed(query.get("log", "{}"), "log"), "axes": query.get("axes")}
+    )
     name = query.get("stream", "imu")
     at = await studio.ask("stream", path, file=path.name, name=name, log=log, axes=axes)
     return await extremes(Path(at), request)
@@ -277,6 +281,9 @@ async def submit(studio: Studio, request: Request) -> Response:
         digest = ""
         if made["file"]:
             digest = write_configuration(studio, made["file"], asked["toml"], made["words"])
+        else:
+            kept = studio.folder.state / "configurations"
+            replace_file(kept / f"{name}.toml", asked["toml"].encode())
         return studio.jobs.submit(asked["kind"], name, made["words"], digest)
 
     return JSONResponse(await run_in_threadpool(queued), status_code=201)
@@ -318,7 +325,13 @@ async def cancel(studio: Studio, request: Request) -> Response:
 async def run(studio: Studio, request: Request) -> Response:
     """Numbers, findings and inputs of a result."""
     name = run_name(studio, request)
-    return JSONResponse(await studio.ask("run", studio.folder.path / name, name=name))
+    found = await studio.ask("run", studio.folder.path / name, name=name)
+    made = next((j for j in studio.jobs.listed() if j["run"] == name), None)
+    return JSONResponse(
+        {**found, "job": made and made["id"], "command_line": made["command"]}
+        if made
+        else {**found, "job": None}
+    )
 
 
 async def run_series(studio: Studio, request: Request) -> Response:
@@ -353,7 +366,10 @@ async def export(studio: Studio, request: Request) -> Response:
     """Download a result: the folder, its report as PDF, its track, its configuration."""
     name = run_name(studio, request)
     kind = request.query_params.get("as", "zip")
-    made = await studio.ask("export", studio.folder.path / name, name=name, kind=kind)
+    geoid = number(request.query_params.get("geoid"), "geoid")
+    epoch = request.query_params.get("epoch")
+    place = studio.folder.path / name
+    made = await studio.ask("export", place, name=name, kind=kind, epoch=epoch, geoid=geoid)
     path = Path(made["path"])
     response = FileResponse(path, media_type=media_of(path), filename=made["name"])
     response.headers["content-security-policy"] = SANDBOX
@@ -366,6 +382,19 @@ async def compare(studio: Studio, request: Request) -> Response:
     names = [studio.folder.file(name).name for name in asked.get("runs", [])]
     paths = [studio.folder.path / name for name in names]
     return JSONResponse(await studio.ask("compare", *paths, runs=names))
+
+
+async def comparison_file(studio: Studio, request: Request) -> Response:
+    """One file of a comparison, without rights where it is a page."""
+    from strapdown.studio.runs import file_of_comparison
+
+    asked = request.path_params
+    path = await run_in_threadpool(
+        file_of_comparison, studio.folder.path, asked["key"], asked["path"]
+    )
+    response = FileResponse(path, media_type=media_of(path))
+    response.headers["content-security-policy"] = SANDBOX
+    return response
 
 
 async def quick(studio: Studio, request: Request) -> Response:
@@ -543,6 +572,7 @@ def make_app(studio: Studio) -> Starlette:
         ("GET", "/api/runs/{name}/export", export),
         ("GET", "/runs/{name}/{path:path}", run_file),
         ("POST", "/api/compare", compare),
+        ("GET", "/comparisons/{key}/{path:path}", comparison_file),
         ("POST", "/api/crash/quick", quick),
         ("GET", "/api/map", map_info),
         ("GET", "/tiles/{z:int}/{x:int}/{y:int}", tile),
@@ -555,6 +585,8 @@ def make_app(studio: Studio) -> Starlette:
     async def nothing(*_: Any) -> Response:
         return refusal(told(Finding("studio.no-such-page", severity="error")), "ConfigError")
 
-    app = Starlette(routes=routes, lifespan=lifespan, exception_handlers={404: nothing, 405: nothing})
+    app = Starlette(
+        routes=routes, lifespan=lifespan, exception_handlers={404: nothing, 405: nothing}
+    )
     app.router.redirect_slashes = False
     return app

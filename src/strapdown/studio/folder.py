@@ -102,7 +102,7 @@ class Folder:
     limits: Limits = Limits()
 
     @classmethod
-    def open(cls, path: str | Path, limits: Limits = Limits()) -> Folder:
+    def open(cls, path: str | Path, limits: Limits | None = None) -> Folder:
         """Open a folder, and make what the studio keeps in it. ConfigError: it cannot be used."""
         root = Path(path)
         if root.exists() and not root.is_dir():
@@ -112,14 +112,22 @@ class Folder:
             state = root / STATE
             if state.is_symlink():
                 raise ConfigError("studio.state-is-link", file=str(state))
-            for part in ("", "cache", "jobs", "uploads"):
+            for part in (
+                "",
+                "cache",
+                "comparisons",
+                "configurations",
+                "exports",
+                "jobs",
+                "uploads",
+            ):
                 (state / part).mkdir(mode=0o700, exist_ok=True)
             for left in (state / "uploads").iterdir():
                 left.unlink()  # of an upload that ended with the server
         except OSError as error:
             reason = error.strerror or str(error)
             raise ConfigError("studio.folder-unusable", file=str(path), reason=reason) from None
-        return cls(root, limits)
+        return cls(root, limits or Limits())
 
     @property
     def state(self) -> Path:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import types
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
@@ -21,6 +21,16 @@ __all__ = ["form_of", "kinds", "unit_of"]
 
 #: Units as a person writes them, by the ending of a key.
 SHOWN = {
+    "_km_per_h": "km/h",
+    "_mph": "mph",
+    "_ft_per_s": "ft/s",
+    "_mm": "mm",
+    "_cm": "cm",
+    "_in": "in",
+    "_ft": "ft",
+    "_ms": "ms",
+    "_lb": "lb",
+    "_g": "g",
     "_m_per_s2": "m/s²",
     "_m_per_s": "m/s",
     "_m": "m",
@@ -41,9 +51,13 @@ HIDDEN = {"name", "simulation", "live", "states"}
 
 def unit_of(key: str) -> str:
     """Return the unit in the name of a key, as a person writes it; empty if there is none."""
-    ending = max((end for end in (*UNITS, "_percent") if key.endswith(end)), key=len, default="")
+    ending = _ending(key, SHOWN)
     base = key.removesuffix(ending)
     return "" if base.endswith(("_per", "_sqrt")) else SHOWN.get(ending, "")
+
+
+def _ending(key: str, among: Iterable[str]) -> str:
+    return max((end for end in among if key.endswith(end)), key=len, default="")
 
 
 def kinds(_: Path) -> list[dict[str, Any]]:
@@ -185,6 +199,5 @@ def _kind(hint: Any) -> tuple[str, list[Any]]:
 
 def _label(name: str) -> str:
     """Name of a key in words, without its unit."""
-    ending = max((end for end in (*UNITS, "_percent") if name.endswith(end)), key=len, default="")
-    words = name.removesuffix(ending) if unit_of(name) else name
+    words = name.removesuffix(_ending(name, (*UNITS, "_percent"))) if unit_of(name) else name
     return words.replace("_", " ").capitalize().replace("gnss", "GNSS").replace("Gnss", "GNSS")

@@ -1,8 +1,8 @@
 """Jobs of a studio: commands of strapdown in processes of their own, whose state is on disk.
 
-A job is ``python -m strapdown COMMAND …`` with the studio's folder as its working directory, so that
-its result is the command line's. It goes on when the page is reloaded, and when the server ends: one
-that is started again finds it by its process and the instant at which that began.
+A job is ``python -m strapdown COMMAND …`` with the studio's folder as its working directory, so
+that its result is the command line's. It goes on when the page is reloaded, and when the server
+ends: one that is started again finds it by its process and the instant at which that began.
 """
 
 from __future__ import annotations
@@ -252,16 +252,15 @@ class Jobs:
             return
         self._children[job.id] = process
         born = process_began(process.pid)
-        self._keep(
-            replace(job, state="running", begun=time.time(), process=process.pid, born=born)
-        )
+        self._keep(replace(job, state="running", begun=time.time(), process=process.pid, born=born))
 
     def _seen(self, job: Job) -> Job:
         """Return a running job as it is now."""
         said = self._progress(job)
         error = said.get("error")
         if job.stopping is None and "stage" in said:
-            job = replace(job, stage=str(said["stage"])[:200], share=_share(said.get("share")))
+            share = max(job.share, _share(said.get("share")))
+            job = replace(job, stage=str(said["stage"])[:200], share=share)
         code = self._end(job)
         if code is None and self._lives(job):
             if job.stopping is not None and time.time() > job.stopping + GRACE:

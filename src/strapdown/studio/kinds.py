@@ -1,7 +1,7 @@
 """What a studio runs: the configuration of each kind, how it is proposed, and its command.
 
-``navigate``, ``align`` and ``crash`` have configuration files of their own. The others take options;
-their file here has the same keys under ``[log]``, and becomes these options word by word.
+``navigate``, ``align`` and ``crash`` have configuration files of their own. The others take
+options; their file here has the same keys under ``[log]``, and becomes these options word by word.
 """
 
 from __future__ import annotations
@@ -113,7 +113,9 @@ def _draft_navigation(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]
 
     log, fixes = _sorted_files(paths, keys, axes)
     gnss = None if fixes is None else specify(FixesTable, path=str(fixes))
-    return [Draft(**vars(draft_navigation(_log_table(log, keys), folder=Path(), axes=axes, gnss=gnss)))]
+    return [
+        Draft(**vars(draft_navigation(_log_table(log, keys), folder=Path(), axes=axes, gnss=gnss)))
+    ]
 
 
 def _draft_alignment(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]:
@@ -171,9 +173,7 @@ class AttitudeTable(Spec):
     initial: Word = Field(
         default="auto", description="auto, truth, level, zero, or roll,pitch,heading in deg"
     )
-    gyro_bias: Word = Field(
-        default="auto", description="auto, none, rest, rests, or 'x,y,z deg/s'"
-    )
+    gyro_bias: Word = Field(default="auto", description="auto, none, rest, rests, or 'x,y,z deg/s'")
     magnetometer: Word = Field(
         default="auto", description="auto, raw, or a log turned through all directions"
     )
@@ -226,9 +226,7 @@ class CalibrateTable(Spec):
     turns: Word | None = Field(
         default=None, description="known turns: 360, or 'x 720, y 720' in order"
     )
-    turn_sd_deg: Positive = Field(
-        default=3.0, description="standard deviation of the known angles"
-    )
+    turn_sd_deg: Positive = Field(default=3.0, description="standard deviation of the known angles")
     pose_sd_deg: Positive = Field(
         default=2.0, description="standard deviation of the faces in six positions"
     )

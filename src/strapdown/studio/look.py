@@ -11,7 +11,7 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -143,12 +143,20 @@ def stream(
     return str(at)
 
 
-def kept_stream(folder: Path, key: str, name: str, table: pd.DataFrame) -> str:
-    """Keep a table under a key, and return its folder."""
+def kept_stream(
+    folder: Path,
+    key: str,
+    name: str,
+    table: Callable[[], pd.DataFrame],
+    unit: Callable[[str], str],
+) -> str:
+    """Return the folder of a table under a key; it is made if it is not there."""
     at = _cache(Folder(folder)) / key
     if not (at / name / LIST).is_file():
-        _keep(at, name, table)
+        made = table()
+        _keep(at, name, made, {str(column): unit(str(column)) for column in made.columns})
         _forget(_cache(Folder(folder)))
+    os.utime(at)
     return str(at / name)
 
 
@@ -198,7 +206,9 @@ def _known_digest(path: Path, size: int, changed: int) -> str:
     return _DIGESTS[at]
 
 
-def _keep(folder: Path, name: str, table: pd.DataFrame) -> dict[str, Any]:
+def _keep(
+    folder: Path, name: str, table: pd.DataFrame, units: Mapping[str, str] = UNITS
+) -> dict[str, Any]:
     """Write the numbers of a table as a stream, whole or not at all; return its list."""
     target = folder / name
     with suppress(OSError, ValueError):
@@ -208,7 +218,7 @@ def _keep(folder: Path, name: str, table: pd.DataFrame) -> dict[str, Any]:
     folder.mkdir(parents=True, exist_ok=True)
     staged = Path(tempfile.mkdtemp(dir=folder, prefix=".partial-"))
     try:
-        listed = write_stream(staged / "stream", index_of(table), columns, UNITS)
+        listed = write_stream(staged / "stream", index_of(table), columns, units)
         with suppress(OSError):  # another process was first
             (staged / "stream").rename(target)
     finally:

@@ -1,4 +1,4 @@
-"""The map of a studio: tiles of a local file, MBTiles or PMTiles, each checked before it is sent."""
+"""The map of a studio: tiles of a local MBTiles or PMTiles file, each checked before it is sent."""
 
 from __future__ import annotations
 
@@ -61,9 +61,7 @@ def map_of(studio: Studio) -> Map | None:
     """Return the map that was named at the start, or the first of the folder; None without any."""
     paths = [studio.map_file] if studio.map_file is not None else []
     if not paths:
-        paths = [
-            Path(e.path) for e in studio.folder.entries() if e.name.lower().endswith(ENDINGS)
-        ]
+        paths = [Path(e.path) for e in studio.folder.entries() if e.name.lower().endswith(ENDINGS)]
     for path in sorted(paths):
         with suppress(OSError):
             about = path.stat()

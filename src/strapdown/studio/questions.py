@@ -86,16 +86,20 @@ def axes_question(finding: Finding, file: str) -> dict[str, Any] | None:
     return {**_question(finding, file, "axes", choices, "text"), "optional": True}
 
 
-def open_question(asked: Asked, key: str, unit: str, number: bool) -> dict[str, Any]:
-    """Return the question for a value of a proposed configuration that only a person knows."""
+def open_question(asked: Asked, key: str, unit: str, count: int) -> dict[str, Any]:
+    """Return the question for a value of a proposed configuration that only a person knows.
+
+    `count`: numbers that it has, where it is a list.
+    """
     return {
         "code": "config.open-value",
         "text": asked.what,
         "key": key,
         "line": asked.line,
         "choices": [],
-        "free": "number" if number else "text",
+        "free": "number" if unit else "text",
         "unit": unit,
+        "count": count,
     }
 
 

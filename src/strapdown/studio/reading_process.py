@@ -1,8 +1,8 @@
 """A process in which everything is read that a user drops into the studio, and its keeper.
 
 A hostile file may crash a reader, hang it, or fill the memory: the server has no part in it. A
-question has a limit of time and of memory; a process that passes one, or dies, is ended and replaced,
-and the question is answered by an error. Messages are lines of JSON.
+question has a limit of time and of memory; a process that passes one, or dies, is ended and
+replaced, and the question is answered by an error. Messages are lines of JSON.
 """
 
 from __future__ import annotations
@@ -251,5 +251,3 @@ def _signal_name(code: int | None) -> str:
     if code is not None and -code in set(signal.Signals):
         return signal.Signals(-code).name
     return f"exit code {code}"
-
-

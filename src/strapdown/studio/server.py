@@ -16,6 +16,7 @@ from strapdown.studio.folder import Folder, Limits
 __all__ = ["Address", "serve"]
 
 #: Loopback addresses, which other machines cannot reach.
+LIMITS = Limits()
 LOOPBACK = ("127.0.0.1", "::1", "localhost")
 
 
@@ -44,7 +45,7 @@ def serve(
     port: int = 0,
     listen: bool = False,
     map_file: str | Path | None = None,
-    limits: Limits = Limits(),
+    limits: Limits = LIMITS,
     started: Callable[[Address], None] = lambda _: None,
 ) -> int:
     """Serve the studio of a folder until it is interrupted.
@@ -110,7 +111,7 @@ def serve(
         timeout_graceful_shutdown=3,
     )
     shown = f"[{host}]" if ":" in host else host
-    if host in ("0.0.0.0", "::"):  # noqa: S104
+    if host in ("0.0.0.0", "::"):
         shown = socket.gethostname()
     address = Address(f"http://{shown}:{port}/{token}/", opened.path, studio.jobs.running())
 
