@@ -155,8 +155,8 @@ _EVERY, _LONGEST = 0.1, 1 << 16
 def tell(said: dict[str, Any]) -> None:
     """Append a line of JSON to the file that the environment names for progress, if it does.
 
-    `said`: ``stage`` and ``share``, or ``error``. Nobody is told if it cannot be written: a run does
-    not fail for want of a reader.
+    `said`: ``stage`` and ``share``, or ``error``. A run does not fail if it cannot be written: nobody
+    reads it then.
     """
     path = os.environ.get(PROGRESS_FILE)
     if not path:

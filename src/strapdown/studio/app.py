@@ -445,8 +445,12 @@ async def static(_: Studio, request: Request) -> Response:
 
 def page_file(name: str) -> Response:
     """A file of the built front end."""
-    path = (STATIC / name).resolve()
-    if not path.is_relative_to(STATIC.resolve()) or not path.is_file():
+    try:
+        path = (STATIC / name).resolve()
+        there = path.is_relative_to(STATIC.resolve()) and path.is_file()
+    except (OSError, ValueError, RuntimeError):  # a name that cannot be one
+        there = False
+    if not there:
         raise ConfigError("studio.no-such-page")
     response = FileResponse(path, media_type=media_of(path))
     response.headers["cache-control"] = "no-cache"

@@ -231,6 +231,12 @@ class PatientProtocol(H11Protocol):
         if self.cycle is None and not self.transport.is_closing():
             self.transport.abort()
 
+    def handle_websocket_upgrade(self, event: Any) -> None:
+        """Hand the connection to the protocol of WebSockets, which has its own waits."""
+        if self._late is not None:
+            self._late.cancel()
+        super().handle_websocket_upgrade(event)
+
     def connection_lost(self, exc: Exception | None) -> None:
         """End the timers of a connection."""
         for timer in (self._late, self._stuck):

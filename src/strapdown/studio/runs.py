@@ -40,6 +40,8 @@ TABLES, SD = ("trajectory.csv", "attitude.csv", "error_growth.csv", "allan.csv")
 ANSWERS = {"navigate": "navigation.json"}
 #: Largest file that is read as JSON or as a table, bytes; findings and fixes that are listed.
 LARGEST, MOST = 256 << 20, 500
+#: Bytes of the JSON of which the list of results shows the verdict.
+SMALL = 2 << 20
 #: Units by the ending of a column, the longest first.
 ENDINGS = {
     "_m_per_s2": "m/s²",
@@ -84,13 +86,10 @@ def _title(manifest: Mapping[str, Any], name: str) -> str:
 
 
 def _verdict(place: Path, manifest: Mapping[str, Any]) -> str | None:
-    """The verdict of a navigation, from the small file that has it alone."""
-    found = None
-    with suppress(OSError, ValueError, StrapdownError):
-        path = file_in(place, "verdict.json", manifest)
-        if path.stat().st_size < 1 << 20:
-            found = json.loads(path.read_text(encoding="utf-8")).get("verdict")
-    return found[:40] if isinstance(found, str) else None
+    """The verdict of a navigation or of an attitude, where its JSON is not large."""
+    found = _answer(place, manifest, SMALL)
+    said = [_word(found.get(key), "verdict") for key in ("trust", "answer")]
+    return next((one[:40] for one in said if one is not None), None)
 
 
 def file_of_run(folder: Path, name: str, path: str) -> Path:
@@ -156,12 +155,14 @@ def _opened(folder: Path, name: str) -> tuple[Path, dict[str, Any]]:
     return place, read_manifest(place)
 
 
-def _answer(place: Path, manifest: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the JSON of a result; empty if it has none."""
+def _answer(
+    place: Path, manifest: Mapping[str, Any], most: int | None = None
+) -> dict[str, Any]:
+    """Return the JSON of a result; empty if it has none, or of more bytes than so many."""
     command = str(manifest["command"])
-    with suppress(ConfigError, ValueError, RecursionError):
+    with suppress(ConfigError, OSError, ValueError, RecursionError):
         path = file_in(place, ANSWERS.get(command, f"{command}.json"), manifest)
-        if path.stat().st_size <= LARGEST:
+        if path.stat().st_size <= (most or LARGEST):
             found = json.loads(path.read_text(encoding="utf-8"))
             return found if isinstance(found, dict) else {}
     return {}
