@@ -27,7 +27,7 @@ from strapdown.bundle import MANIFEST
 from strapdown.bundle.atomic_folder import replace_file
 from strapdown.errors import ConfigError, Finding
 from strapdown.studio import job_keeper
-from strapdown.studio.folder import Folder
+from strapdown.studio.folder import Folder, plain_name
 from strapdown.studio.reading_process import told
 
 __all__ = ["Job", "Jobs", "process_began"]
@@ -99,11 +99,9 @@ class Jobs:
 
     def __post_init__(self) -> None:
         for path in sorted(self._place.glob("*.json")):
-            with suppress(OSError, ValueError, TypeError):
-                said = json.loads(path.read_text(encoding="utf-8"))
-                job = Job(**{**said, "words": tuple(said["words"])})
-                if job.id == path.stem:
-                    self._jobs[job.id] = job
+            job = _read(path)
+            if job is not None:
+                self._jobs[job.id] = job
         self.advance()
 
     @property
@@ -162,6 +160,10 @@ class Jobs:
         """See how the jobs stand, begin what waits; return those that changed."""
         changed = []
         with self._lock:
+            for number, child in list(self._children.items()):
+                # Waited for, as soon as it is gone, whatever its job has said before.
+                if child.poll() is not None and self._jobs[number].state in ENDED:
+                    del self._children[number]
             for job in list(self._jobs.values()):
                 if job.state == "running" and (now := self._seen(job)) != job:
                     ends = now.state != job.state or now.stopping != job.stopping
@@ -268,7 +270,6 @@ class Jobs:
                 return replace(job, stopping=time.time())
             return job
         code = self._end(job) if code is None else code  # it may have ended between the two
-        self._children.pop(job.id, None)
         ended = replace(job, ended=time.time(), process=None)
         if job.stopping is not None and code != 0:
             return replace(ended, state="cancelled")
@@ -322,9 +323,22 @@ class Jobs:
         """Remove the oldest of the jobs that ended."""
         ended = [job for job in self._jobs.values() if job.state in ENDED]
         for job in sorted(ended, key=lambda one: one.made)[: max(0, len(ended) - REMEMBERED)]:
+            if job.id in self._children:
+                continue  # its keeper is about to end
             del self._jobs[job.id]
             for path in self._place.glob(f"{job.id}.*"):
                 path.unlink(missing_ok=True)
+
+
+def _read(path: Path) -> Job | None:
+    """Return the job of a file; None if it is damaged."""
+    with suppress(OSError, ValueError, TypeError, KeyError, RecursionError):
+        said = json.loads(path.read_text(encoding="utf-8"))
+        job = Job(**{**said, "words": tuple(map(str, said["words"]))})
+        numbers = all(isinstance(one, int | float) for one in (job.made, job.share))
+        if job.id == path.stem and numbers and plain_name(job.name) == job.name:
+            return job
+    return None
 
 
 def process_began(number: int) -> str:
