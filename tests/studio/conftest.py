@@ -1,4 +1,4 @@
-"""A studio in a process of its own, and clients that speak to it as a browser and as an attacker."""
+"""A studio in a process of its own, and clients that are a browser or an attacker."""
 
 from __future__ import annotations
 

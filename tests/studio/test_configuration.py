@@ -97,7 +97,9 @@ def test_a_place_that_is_none(changes, code):
     assert caught.value.finding.code == code
 
 
-@pytest.mark.parametrize("text", ["a = ", "[" * 5000, "a" + ".a" * 100_000 + " = 1", "x = [[[[" * 900])
+@pytest.mark.parametrize(
+    "text", ["a = ", "[" * 5000, "a" + ".a" * 100_000 + " = 1", "x = [[[[" * 900]
+)
 def test_text_that_is_no_toml_is_refused_in_time(folder, text):
     found = check(folder, "navigate", text, {})
     assert found["errors"] and found["errors"][0]["code"].startswith("config.")
@@ -155,7 +157,9 @@ def test_options_of_a_comparison(folder):
 def test_no_text_of_a_configuration_becomes_an_option(folder):
     shutil.copy(folder / "log.csv", folder / "--force")
     for value in ("--force", "-q", "--export=x.c"):
-        text = f'[log]\npath = "--force"\n[attitude]\ninitial = "{value}"\nreference = ["{value}"]\n'
+        text = (
+            f'[log]\npath = "--force"\n[attitude]\ninitial = "{value}"\nreference = ["{value}"]\n'
+        )
         words = command(folder, "attitude", "new", text, [])["words"]
         assert words[:2] == ["attitude", "./--force"]
         assert [w for w in words if w.startswith("-")] == [
@@ -177,7 +181,7 @@ def test_every_kind_has_a_form_whose_keys_its_configuration_takes(tmp_path):
     assert list(found) == list(KINDS)
     for kind, one in found.items():
         paths = [f["path"] for section in one["schema"] for f in section["fields"]]
-        assert len(paths) == len(set(paths)) and "log.path" in paths or kind == "crash"
+        assert (len(paths) == len(set(paths)) and "log.path" in paths) or kind == "crash"
         for section in one["schema"]:
             for field in section["fields"]:
                 assert field["type"] in ("number", "text", "choice", "flag", "list"), field

@@ -81,7 +81,11 @@ def test_hosts_of_a_server_that_others_reach():
 
 
 def test_what_changes_something_needs_the_header(studio):
-    for method, path in (("POST", "api/look"), ("PUT", "api/files/a.csv"), ("DELETE", "api/jobs/x")):
+    for method, path in (
+        ("POST", "api/look"),
+        ("PUT", "api/files/a.csv"),
+        ("DELETE", "api/jobs/x"),
+    ):
         found = studio.ask(method, path, {}, headers={"X-Strapdown": ""})
         assert (found.status, found.code) == (403, "studio.header-missing")
 
@@ -123,7 +127,17 @@ def test_a_body_that_grows_without_end_is_ended(studio):
 
 @pytest.mark.parametrize(
     "text",
-    ["{", "[]", "1", '{"files": 1}', '{"files": [1]}', '{"kind": {}}', "{" * 3000, '{"x": 1}', "\xff"],
+    [
+        "{",
+        "[]",
+        "1",
+        '{"files": 1}',
+        '{"files": [1]}',
+        '{"kind": {}}',
+        "{" * 3000,
+        '{"x": 1}',
+        "\xff",
+    ],
 )
 def test_what_is_no_request_is_refused_with_a_code(studio, text):
     found = studio.ask("POST", "api/look", raw=text.encode("latin-1"))
@@ -186,6 +200,27 @@ def test_connections_that_say_nothing_are_ended(studio):
             continue
         gone += 1
     assert gone == len(held)
+
+
+def test_a_second_request_that_is_begun_and_not_ended_is_ended(studio):
+    with studio.socket() as one:
+        text = f"GET /{studio.token}/api/jobs/x HTTP/1.1\r\nHost: 127.0.0.1:{studio.port}\r\n"
+        one.sendall(f"{text}\r\n".encode())
+        assert one.recv(4096).startswith(b"HTTP/1.1 404")
+        begun, ended = time.monotonic(), None
+        while ended is None and time.monotonic() < begun + 10.0:
+            try:
+                one.sendall(text[:1].encode() if text else b"x")
+                text = text[1:]
+                time.sleep(0.2)
+                one.settimeout(0.05)
+                if one.recv(1) == b"":
+                    ended = time.monotonic()
+            except TimeoutError:
+                continue
+            except OSError:
+                ended = time.monotonic()
+        assert ended is not None and ended - begun < studio.limits["patience"] + 2.0
 
 
 def test_a_client_that_takes_nothing_is_ended(studio):

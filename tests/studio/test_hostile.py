@@ -1,4 +1,4 @@
-"""Hostile contents: what ends a reader ends no studio, and no text of a file reaches the page as it is."""
+"""Hostile contents: what ends a reader ends no studio, and texts of files are shown escaped."""
 
 from __future__ import annotations
 
@@ -197,7 +197,14 @@ def test_a_forged_result_ends_nothing(studio, changes):
     try:
         state = studio.ask("GET", "api/state")
         assert state.status == 200
-        for path in ("", "/series", "/track", "/export?as=zip", "/export?as=toml", "/export?as=gpx"):
+        for path in (
+            "",
+            "/series",
+            "/track",
+            "/export?as=zip",
+            "/export?as=toml",
+            "/export?as=gpx",
+        ):
             found = studio.ask("GET", f"api/runs/forged{path}")
             assert found.status in (200, 400, 404, 422), (path, found)
             if found.status != 200:

@@ -33,7 +33,7 @@ PATHS = (
 
 @pytest.fixture(scope="module")
 def places(studio):
-    """A folder with links that lead out, beside a secret; and a result that lies about its files."""
+    """A folder with links that lead out, beside a secret; and a result whose list lies."""
     (studio.folder.parent / "secret.txt").write_text(SECRET, encoding="utf-8")
     outside = studio.folder.parent / "outside"
     outside.mkdir()
@@ -141,7 +141,23 @@ def test_the_list_has_no_hidden_names_and_nothing_outside(places):
 @pytest.mark.parametrize(
     "name",
     [
-        *("", ".", "..", "...", "a/b", "a\\b", "/a", ".a", "-a", " a", "a ", "a.", "a:b", "a*", "a?"),
+        *(
+            "",
+            ".",
+            "..",
+            "...",
+            "a/b",
+            "a\\b",
+            "/a",
+            ".a",
+            "-a",
+            " a",
+            "a ",
+            "a.",
+            "a:b",
+            "a*",
+            "a?",
+        ),
         *('a"', "a<", "a>", "a|", "a\0b", "a\nb", "a\x1b[2J", "a‮b", "a\udcffb", "con", "NUL.txt"),
         *("com1", "x" * 201, "é" * 101, None, 3),
     ],
@@ -152,7 +168,9 @@ def test_names_that_are_none(name):
     assert caught.value.finding.code == "studio.name-not-plain"
 
 
-@pytest.mark.parametrize("name", ["a", "a b.csv", "Å.csv", "測定 1.csv", "a.b.c", "x" * 200, "$a;b&c'd"])
+@pytest.mark.parametrize(
+    "name", ["a", "a b.csv", "Å.csv", "測定 1.csv", "a.b.c", "x" * 200, "$a;b&c'd"]
+)
 def test_names_that_are(name):
     assert plain_name(unicodedata.normalize("NFD", name)) == unicodedata.normalize("NFC", name)
 

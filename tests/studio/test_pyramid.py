@@ -129,7 +129,9 @@ def test_infinite_and_missing_values_are_none_in_json(tmp_path):
 
 def test_an_empty_stream_and_one_of_one_sample(tmp_path):
     for count in (0, 1):
-        write_stream(tmp_path / str(count), np.arange(count, dtype=float), {"a": np.ones(count)}, {})
+        write_stream(
+            tmp_path / str(count), np.arange(count, dtype=float), {"a": np.ones(count)}, {}
+        )
         found = StoredStream(tmp_path / str(count)).series([], None, None, 10)
         assert found["t"] == [0.0] * count
 

@@ -98,8 +98,14 @@ def test_a_navigation_is_that_of_the_command(fresh, tmp_path):
     result = same_by_both(fresh, tmp_path, "navigate", "drive", short_drive())
     track = fresh.ask("GET", "api/runs/drive/track?points=50").json
     assert len(track["lat"]) == 50 and len(track["q"][0]) == 4
-    assert fresh.ask("GET", "api/runs/drive").json["verdict"] in ("trusted", "reserve", "distrusted")
-    gpx = fresh.ask("GET", "api/runs/drive/export?as=gpx&epoch=2026-05-01T12:00:00%2B00:00&geoid=46")
+    assert fresh.ask("GET", "api/runs/drive").json["verdict"] in (
+        "trusted",
+        "reserve",
+        "distrusted",
+    )
+    gpx = fresh.ask(
+        "GET", "api/runs/drive/export?as=gpx&epoch=2026-05-01T12:00:00%2B00:00&geoid=46"
+    )
     assert gpx.status == 200 and gpx.body.count(b"<trkpt") > 100
     assert fresh.ask("GET", "api/runs/drive/export?as=zip").body[:2] == b"PK"
     page = fresh.ask("GET", "runs/drive/report.html").body
@@ -126,7 +132,9 @@ def test_a_crash_is_that_of_the_command_and_the_quick_answer_is_its_own(fresh, t
     size = own["events"][0]["body"]["event"]["resultant_m_per_s"]
     # By all recorders together, each has a part of the others' ringing in its bound.
     assert quick["delta_v"]["value"] == pytest.approx(size["value"], rel=1e-9)
-    assert quick["pdof"]["clock"] == 12 and len(quick["path"]["north"]) == len(quick["path"]["bound"])
+    assert quick["pdof"]["clock"] == 12 and len(quick["path"]["north"]) == len(
+        quick["path"]["bound"]
+    )
     end = own["path"]["end"]["north_m"]
     assert quick["path"]["north"][-1] == pytest.approx(end["value"], rel=1e-9)
     # The half axis of an ellipse in the plane is longer than the bound along one axis.

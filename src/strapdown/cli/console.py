@@ -155,8 +155,8 @@ _EVERY, _LONGEST = 0.1, 1 << 16
 def tell(said: dict[str, Any]) -> None:
     """Append a line of JSON to the file that the environment names for progress, if it does.
 
-    `said`: ``stage`` and ``share``, or ``error``. A run does not fail if it cannot be written: nobody
-    reads it then.
+    `said`: ``stage`` and ``share``, ``error``, or ``live``. A run does not fail if it cannot be
+    written.
     """
     path = os.environ.get(PROGRESS_FILE)
     if not path:

@@ -17,7 +17,12 @@ EPILOG = "Example: strapdown studio records"
 
 def studio(
     folder: Annotated[
-        Path, typer.Argument(metavar="[FOLDER]", help="Folder of the logs and the results.")
+        Path,
+        typer.Argument(
+            metavar="[FOLDER]",
+            help="Folder of the logs and the results; this one, if not given.",
+            show_default=False,
+        ),
     ] = Path(),
     map_file: Annotated[
         Path | None,

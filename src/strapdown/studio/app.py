@@ -32,9 +32,11 @@ from strapdown.studio.events import Events
 from strapdown.studio.folder import Folder, plain_name
 from strapdown.studio.guard import SANDBOX
 from strapdown.studio.jobs import Jobs
+from strapdown.studio.live_jobs import live_command, live_info
 from strapdown.studio.maps import Map, map_of
 from strapdown.studio.pyramid import StoredStream
 from strapdown.studio.reading_process import ReadingProcess, Refused, told
+from strapdown.studio.samples import listed_samples
 
 __all__ = ["Studio", "make_app"]
 
@@ -135,6 +137,7 @@ async def state(studio: Studio, _: Request) -> Response:
             "files": studio.folder.files(),
             "runs": list_runs(studio),
             "jobs": studio.jobs.listed(),
+            "samples": listed_samples(),
         }
 
     return JSONResponse(await run_in_threadpool(seen))
@@ -211,6 +214,11 @@ def reading_of(asked: Mapping[str, Any]) -> tuple[dict[str, Any], str | None]:
     return log, axes if isinstance(axes, str) else None
 
 
+async def copy_sample(studio: Studio, request: Request) -> Response:
+    """Copy records to begin with into the folder."""
+    return JSONResponse(await studio.ask("sample", name=request.path_params["name"]))
+
+
 # --- configurations and jobs --------------------------------------------------------------
 
 
@@ -264,20 +272,23 @@ async def check(studio: Studio, request: Request) -> Response:
 
 async def submit(studio: Studio, request: Request) -> Response:
     """Write a configuration beside the logs, and queue the command that runs it."""
-    asked = await body(request, kind=str, name=str, toml=str, options=list)
+    asked = await body(request, kind=str, name=str, toml=str, protocol=str, options=(list, dict))
     name = plain_name(asked.get("name", ""))
+    options = asked.get("options") or []
+    if asked.get("kind") == "live":
+        return await submit_live(studio, name, asked.get("protocol") or "", options)
+    if not isinstance(options, list):
+        raise ConfigError("studio.wrong-type", quantity="options", wanted="list")
     made = await studio.ask(
         "command",
         kind=asked.get("kind", ""),
         name=name,
         toml=asked.get("toml", ""),
-        options=asked.get("options") or [],
+        options=options,
     )
 
     def queued() -> dict[str, Any]:
-        target = studio.folder.path / name
-        if (target.exists() or target.is_symlink()) and "--force" not in made["words"]:
-            raise ConfigError("studio.run-exists", name=name)
+        refuse_taken(studio, name, made["words"])
         digest = ""
         if made["file"]:
             digest = write_configuration(studio, made["file"], asked["toml"], made["words"])
@@ -287,6 +298,31 @@ async def submit(studio: Studio, request: Request) -> Response:
         return studio.jobs.submit(asked["kind"], name, made["words"], digest)
 
     return JSONResponse(await run_in_threadpool(queued), status_code=201)
+
+
+async def submit_live(
+    studio: Studio, name: str, protocol: str, options: Mapping[str, Any] | list[Any]
+) -> Response:
+    """Queue a run that receives samples as they come."""
+    words = live_command(name, protocol, options if isinstance(options, dict) else {})
+
+    def queued() -> dict[str, Any]:
+        refuse_taken(studio, name, words)
+        return studio.jobs.submit("live", name, words)
+
+    return JSONResponse(await run_in_threadpool(queued), status_code=201)
+
+
+def refuse_taken(studio: Studio, name: str, words: list[str]) -> None:
+    """Refuse a run whose folder is there, unless it is to be replaced: ConfigError."""
+    target = studio.folder.path / name
+    if (target.exists() or target.is_symlink()) and "--force" not in words:
+        raise ConfigError("studio.run-exists", name=name)
+
+
+async def live(_: Studio, __: Request) -> Response:
+    """Who may send samples."""
+    return JSONResponse(live_info())
 
 
 def write_configuration(studio: Studio, name: str, text: str, words: list[str]) -> str:
@@ -476,11 +512,12 @@ def parsed(text: str, what: str) -> Any:
     return found
 
 
-async def body(request: Request, **kinds: type) -> dict[str, Any]:
+async def body(request: Request, **kinds: type | tuple[type, ...]) -> dict[str, Any]:
     """Return the body of a request: an object with keys of some types. ConfigError: another."""
     data = bytearray()
     async for part in request.stream():
         data += part
+    found: dict[str, Any]
     try:
         found = parsed(data.decode() or "{}", "body")
     except UnicodeDecodeError:
@@ -491,8 +528,9 @@ async def body(request: Request, **kinds: type) -> dict[str, Any]:
             raise ConfigError("studio.unknown-key", word=str(key)[:80], known=list(kinds))
         fits = isinstance(value, kind) or (kind is float and isinstance(value, int))
         if value is not None and not fits:
-            raise ConfigError("studio.wrong-type", quantity=key, wanted=kind.__name__)
-        if kind is list and not all(isinstance(one, str) for one in value or ()):
+            names = [k.__name__ for k in (kind if isinstance(kind, tuple) else (kind,))]
+            raise ConfigError("studio.wrong-type", quantity=key, wanted=" or ".join(names))
+        if isinstance(value, list) and not all(isinstance(one, str) for one in value):
             raise ConfigError("studio.wrong-type", quantity=key, wanted="texts")
         if kind is float and value is not None and not math.isfinite(value):
             raise ConfigError("studio.wrong-type", quantity=key, wanted="number")
@@ -566,6 +604,8 @@ def make_app(studio: Studio) -> Starlette:
         ("GET", "/api/series", series),
         ("GET", "/api/kinds", kinds),
         ("POST", "/api/propose", propose),
+        ("POST", "/api/samples/{name}", copy_sample),
+        ("GET", "/api/live", live),
         ("POST", "/api/check", check),
         ("POST", "/api/jobs", submit),
         ("GET", "/api/jobs/{id}", job),

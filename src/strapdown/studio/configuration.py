@@ -18,7 +18,14 @@ from tomlkit.exceptions import TOMLKitError
 
 from strapdown.bundle import named_paths
 from strapdown.config.reading import FileSpec
-from strapdown.config.toml_file import DEEPEST, KeyPath, TomlFile, key_lines, parse_toml
+from strapdown.config.toml_file import (
+    DEEPEST,
+    KeyPath,
+    TomlFile,
+    key_lines,
+    parse_toml,
+    place_of,
+)
 from strapdown.config.toml_text import Asked
 from strapdown.errors import ConfigError, Finding, check_choice
 from strapdown.studio.folder import Folder
@@ -93,7 +100,8 @@ def check(
     Returns
     -------
     dict
-        ``toml``; ``values`` by key path, as they are written; ``errors``: line, key, text, remedy.
+        ``toml``; ``values`` by key path, as they are written; ``errors``: line, key, path, text and
+        remedy.
     """
     one = _kind(kind)
     os.chdir(folder)
@@ -102,13 +110,18 @@ def check(
     try:
         table = parse_toml(_path(folder, name), text).table
     except ConfigError as error:
-        return {"toml": text, "values": {}, "errors": list(_faults(error.finding))}
+        return {"toml": text, "values": {}, "errors": list(_faults(error.finding, {}))}
     try:
         checked(folder, one, text, name)
     except ConfigError as error:
-        errors = list(_faults(error.finding))
-    values = {".".join(map(str, path)): value for path, value in _flat(table, ())}
+        errors = list(_faults(error.finding, key_lines(text)))
+    values = {dotted(path): value for path, value in _flat(table, ())}
     return {"toml": text, "values": values, "errors": errors}
+
+
+def dotted(path: KeyPath) -> str:
+    """Return a key path as the front end writes it: ``units.0.position_m``."""
+    return ".".join(map(str, path))
 
 
 def command(
@@ -145,13 +158,13 @@ def checked(
 
 def refuse_outside(place: Folder, file: TomlFile) -> None:
     """Refuse a configuration that names a file outside of the folder: ConfigError."""
-    for path in named_paths(file.table):
-        place.refuse_outside(path, "path")
+    for name in named_paths(file.table):
+        place.refuse_outside(name, "path")
     # Any other text may be the name of a file, too, for a key that takes words or a file.
     for path, value in _flat(file.table, ()):
         for text in value if isinstance(value, list) else [value]:
             if isinstance(text, str) and _exists(place.path, text):
-                place.refuse_outside(text, ".".join(map(str, path)))
+                place.refuse_outside(text, dotted(path))
 
 
 def _exists(folder: Path, text: str) -> bool:
@@ -197,7 +210,7 @@ def _change(document: Any, place: str, value: Any, new: Callable[[], Any]) -> No
     *tables, key = [_part(part) for part in place.split(".")]
     if len(tables) >= DEEPEST or key == "":
         raise ConfigError("studio.no-such-key", quantity=place[:100])
-    node = document
+    node: Any = document
     for part in tables:
         if isinstance(part, int) or part in node:
             node = _at(node, part, place)
@@ -208,16 +221,15 @@ def _change(document: Any, place: str, value: Any, new: Callable[[], Any]) -> No
             node = node[part]
     if not isinstance(node, dict | list) or isinstance(node, list) != isinstance(key, int):
         raise ConfigError("studio.no-such-key", quantity=place[:100])
-    if isinstance(key, int):
+    if isinstance(node, list):
         _at(node, key, place)
-        if value is None:
-            del node[key]
-        else:
-            node[key] = value
-    elif value is None:
-        node.pop(key, None)
+    elif value is None and key not in node:
+        return
+    table: Any = node
+    if value is None:
+        del table[key]
     else:
-        node[key] = value
+        table[key] = value
 
 
 def _part(part: str) -> str | int:
@@ -260,8 +272,9 @@ def _flat(node: Any, path: KeyPath) -> Iterator[tuple[KeyPath, Any]]:
         yield path, json.loads(json.dumps(node, default=str))
 
 
-def _faults(finding: Finding) -> Iterator[dict[str, Any]]:
-    """Yield each fault of a configuration with its line and key."""
+def _faults(finding: Finding, lines: Mapping[KeyPath, Sequence[int]]) -> Iterator[dict[str, Any]]:
+    """Yield each fault of a configuration with its line and key; `lines`: as `key_lines`."""
+    paths = {place_of(path): path for path in lines}
     several = finding.data.get("faults") or finding.data.get("values") or ()
     found = [one for one in several if isinstance(one, Finding)] or [finding]
     for one in found:
@@ -269,6 +282,7 @@ def _faults(finding: Finding) -> Iterator[dict[str, Any]]:
         yield {
             "line": one.line,
             "key": one.quantity,
+            "path": dotted(paths[one.quantity]) if one.quantity in paths else None,
             "code": one.code,
             "text": said["text"],
             "remedy": said["remedy"],
@@ -278,15 +292,16 @@ def _faults(finding: Finding) -> Iterator[dict[str, Any]]:
 def _questions(text: str, asked: Sequence[Asked]) -> list[dict[str, Any]]:
     """Return open values of a text as questions, each with its key path."""
     by_line: dict[int, list[KeyPath]] = {}
-    for path, lines in key_lines(text).items():
-        for line in lines:
-            by_line.setdefault(line, []).append(path)
-    lines = text.split("\n")
+    for path, numbers in key_lines(text).items():
+        for number in numbers:
+            by_line.setdefault(number, []).append(path)
+    written = text.split("\n")
     found = []
     for one in asked:
         paths = [p for p in by_line.get(one.line, []) if p and p[-1] == one.key]
-        key = ".".join(map(str, paths[0])) if paths else one.key
-        count = lines[one.line - 1].partition("#")[0].count("?") if one.line <= len(lines) else 1
+        key = dotted(paths[0]) if paths else one.key
+        line = written[one.line - 1] if one.line <= len(written) else ""
+        count = line.partition("#")[0].count("?") or 1
         found.append(open_question(one, key, unit_of_key(one.key), count))
     return found
 

@@ -95,20 +95,19 @@ def _sections(form: type[BaseModel], path: tuple[str, ...], deep: int) -> Iterat
     for name, info in form.model_fields.items():
         if name in getattr(form, "unwritten", ()) or (not path and name in HIDDEN):
             continue
-        table, many = _table(info.annotation, info)
+        table, form_of_table = _table(info.annotation, info)
         if table is None:
             fields.append(_field(name, info, (*path, name)))
         elif deep < DEEPEST:
-            own = {"one": (name,), "list": (f"{name}[]",), "named": (name, "*")}[many]
+            own = {"one": (name,), "list": (f"{name}[]",), "named": (name, "*")}[form_of_table]
             below += list(_sections(table, (*path, *own), deep + 1))
     if fields:
-        help_ = (form.__doc__ or "").strip().partition("\n")[0]
         title = path[-1].removesuffix("[]") if path else ""
         many = bool(path) and (path[-1].endswith("[]") or path[-1] == "*")
         yield {
             "key": ".".join(path),
             "title": _label(path[-2] if title == "*" else title),
-            "help": "" if help_.startswith("Usage docs") else help_,
+            "help": (form.__doc__ or "").strip().partition("\n")[0],
             "many": many,
             "fields": fields,
         }
@@ -146,13 +145,13 @@ def _choices(of: Kinds) -> type[BaseModel]:
     from pydantic import create_model
 
     names = [form.model_fields["kind"].default for form in of.forms()]
-    known: dict[str, Any] = {"kind": (Literal[tuple(names)], of.default or names[0])}  # type: ignore[valid-type]
+    known: dict[str, Any] = {"kind": (Literal[tuple(names)], of.default or names[0])}
     for form in of.forms():
         for name, info in form.model_fields.items():
             if name != "kind":
                 known.setdefault(name, (info.annotation, info))
-    base: Any = of.base if of.base is not ChoiceSpec else BaseModel
-    return create_model(of.slot, __base__=BaseModel, __doc__=base.__doc__, **known)
+    doc = "" if of.base is ChoiceSpec else of.base.__doc__
+    return create_model(of.slot, __base__=BaseModel, __doc__=doc, **known)
 
 
 def _field(name: str, info: FieldInfo, path: tuple[str, ...]) -> dict[str, Any]:

@@ -26,10 +26,10 @@ Receive = Callable[[], Awaitable[Message]]
 Send = Callable[[Message], Awaitable[None]]
 App = Callable[[MutableMapping[str, Any], Receive, Send], Awaitable[None]]
 
-#: Of pages of the studio. MapLibre and uPlot set styles of elements, hence the style.
+#: Of the page of the studio: what comes from it alone, and nothing written into the page.
 POLICY = (
-    "default-src 'none'; script-src 'self'; style-src 'self' 'unsafe-inline'; "
-    "img-src 'self' data: blob:; font-src 'self'; connect-src 'self'; worker-src 'self' blob:; "
+    "default-src 'none'; script-src 'self'; style-src 'self'; "
+    "img-src 'self' data: blob:; font-src 'self'; connect-src 'self'; worker-src 'self'; "
     "frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
 )
 #: Of a file of a result, which anyone may have made: without rights, network and origin.
@@ -225,10 +225,22 @@ class PatientProtocol(H11Protocol):
         if len(self.connections) > self.limits.connections:
             transport.abort()
             return
+        self._wait_for_request()
+
+    def on_response_complete(self) -> None:
+        """End a request, and wait so long for the whole of the next."""
+        super().on_response_complete()
+        if not self.transport.is_closing():
+            self._wait_for_request()
+
+    def _wait_for_request(self) -> None:
+        if self._late is not None:
+            self._late.cancel()
         self._late = self.loop.call_later(self.limits.patience, self._end_if_silent)
 
     def _end_if_silent(self) -> None:
-        if self.cycle is None and not self.transport.is_closing():
+        cycle: Any = self.cycle
+        if (cycle is None or cycle.response_complete) and not self.transport.is_closing():
             self.transport.abort()
 
     def handle_websocket_upgrade(self, event: Any) -> None:

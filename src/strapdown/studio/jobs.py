@@ -205,6 +205,7 @@ class Jobs:
             "run": job.name if job.state == "done" and done else None,
             "error": job.error,
             "tail": self._tail(job),
+            "live": self._live(job),
         }
 
     def output(self, number: str) -> Path:
@@ -292,6 +293,17 @@ class Jobs:
                 said = json.loads(line)
                 found |= said if isinstance(said, dict) else {}
         return found
+
+    def _live(self, job: Job) -> dict[str, Any] | None:
+        """Return where a live run listens, once it does, and a warning where it is open."""
+        said = self._progress(job).get("live") if job.kind == "live" else None
+        if not isinstance(said, dict) or not isinstance(said.get("address"), str):
+            return None
+        address = said["address"][:300]
+        open_ = None
+        if said.get("loopback") is not True:
+            open_ = Finding("studio.live-open").sentence("file")
+        return {"address": address, "qr": address, "token": None, "warning": open_}
 
     def _tail(self, job: Job) -> list[str]:
         text = _last(self._file(job, "log"), TAIL).decode("utf-8", "replace")

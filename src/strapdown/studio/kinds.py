@@ -126,11 +126,18 @@ def _draft_alignment(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]:
 
 
 def _draft_crash(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]:
-    from strapdown.crash.template import draft_cases, read_records
+    from strapdown.crash.template import draft_cases
+    from strapdown.formats.crash_records import read_crash_record
 
+    records, seen = [], set()
+    for path in paths:
+        # A record of several files is one, whichever of them are chosen.
+        if path.resolve() not in seen:
+            records.append(read_crash_record(path))
+            seen |= {file.resolve() for file in (*records[-1].files, path)}
     return [
         Draft(one.text, one.found, one.asked, one.to_check, one.findings, one.vehicle)
-        for one in draft_cases(read_records(paths), folder=Path())
+        for one in draft_cases(records, folder=Path())
     ]
 
 

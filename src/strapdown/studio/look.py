@@ -92,9 +92,11 @@ def look(
         own = _key([path], keys, axes)
         lent = one.data["fixes_from"]
         tables = {n: t for n, t in one.streams.items() if not (n == "gnss" and lent)}
+        rates = {str(s["name"]): s["rate_hz"] for s in one.data["streams"]}
         for name, table in tables.items():
             listed = _keep(_cache(place) / own, name, table)
-            streams.append({"file": path.name, "key": own, "name": name, **listed})
+            about = {"file": path.name, "key": own, "name": name, "rate_hz": rates.get(name)}
+            streams.append({**about, **listed})
     first = next((one for one in made.logs if "imu" in one.streams), made.logs[0])
     gaps = []
     if "imu" in first.streams:

@@ -69,6 +69,6 @@ def map_of(studio: Studio) -> Map | None:
             if studio.known_map[0] == key:
                 return studio.known_map[1]
             with suppress(DataError), open_map(path) as opened:
-                studio.known_map = (key, Map(path, opened.attribution, opened.zooms()))
+                studio.known_map = (key, Map(path, opened.attribution, opened.zooms))
                 return studio.known_map[1]
     return None

@@ -16,7 +16,7 @@ from strapdown.units import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS
 __all__ = ["axes_question", "open_question", "question_of"]
 
 #: Usual units of each key, the ones that are offered.
-OFFERED = {
+OFFERED: dict[str, list[str]] = {
     "gyro_unit": [unit for unit in ("rad/s", "deg/s", "mdeg/s", "deg/h") if unit in GYRO_UNITS],
     "accel_unit": [unit for unit in ("m/s2", "g", "mg", "-g", "-m/s2") if unit in ACCEL_UNITS],
     "time_unit": list(TIME_UNITS),
@@ -104,10 +104,11 @@ def open_question(asked: Asked, key: str, unit: str, count: int) -> dict[str, An
 
 
 def _units(key: str, inferred: str, finding: Finding) -> Iterator[dict[str, Any]]:
-    shares = finding.data.get("choices", ())
+    shares: Any = finding.data.get("choices", ())
     said = [str(f.data["value"]) for f in shares if isinstance(f, Finding) and "value" in f.data]
     likely = [] if inferred in PLACEHOLDERS else [inferred]
-    for unit in dict.fromkeys([*likely, *said, *OFFERED.get(key, ())]):
+    usual = OFFERED.get(key, [])
+    for unit in dict.fromkeys(likely + said + usual):
         if unit != "None":
             yield {**_choice(unit, {key: unit}), **({"likely": True} if unit in likely else {})}
 

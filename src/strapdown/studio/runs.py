@@ -29,6 +29,7 @@ from strapdown.bundle import MANIFEST, SIGNATURE_FILE, UNSEALED, read_manifest, 
 from strapdown.errors import ConfigError, DataError, StrapdownError, check_choice
 from strapdown.studio.folder import Folder
 from strapdown.studio.look import kept_stream
+from strapdown.studio.pyramid import LIST
 from strapdown.tables.checks import index_of
 
 __all__ = ["compare", "export", "file_of_run", "run", "run_stream", "summary", "track"]
@@ -126,9 +127,14 @@ def run(folder: Path, name: str) -> dict[str, Any]:
     """Return the numbers, options, inputs and findings of a result."""
     place, manifest = _opened(folder, name)
     answer = _answer(place, manifest)
+    span: dict[str, Any] = {"from_s": None, "to_s": None}
+    with suppress(StrapdownError):
+        listed = json.loads((Path(run_stream(folder, name)) / LIST).read_text(encoding="utf-8"))
+        span = {key: listed[key] for key in span}
     has = {str(one["name"]) for one in manifest["outputs"]}
     return {
         **summary(folder, name),
+        **span,
         "answer": _word(answer, "answer") or _word(answer, "headline"),
         "numbers": _numbers(place),
         "options": manifest["configuration"],
@@ -155,9 +161,7 @@ def _opened(folder: Path, name: str) -> tuple[Path, dict[str, Any]]:
     return place, read_manifest(place)
 
 
-def _answer(
-    place: Path, manifest: Mapping[str, Any], most: int | None = None
-) -> dict[str, Any]:
+def _answer(place: Path, manifest: Mapping[str, Any], most: int | None = None) -> dict[str, Any]:
     """Return the JSON of a result; empty if it has none, or of more bytes than so many."""
     command = str(manifest["command"])
     with suppress(ConfigError, OSError, ValueError, RecursionError):
@@ -280,11 +284,12 @@ def _read(path: Path) -> pd.DataFrame:
     except (ValueError, StopIteration, TypeError) as error:
         reason = type(error).__name__
         raise DataError("studio.table-not-read", file=path.name, reason=reason) from None
-    numbers.index = pd.Index(stamps, name="time")
-    kept = np.isfinite(stamps)
-    if kept.sum() < 2:
+    kept = np.flatnonzero(np.isfinite(stamps))
+    if kept.size < 2:
         raise DataError("studio.table-not-read", file=path.name, reason="no rows")
-    return numbers[kept].sort_index(kind="stable")
+    kept = kept[np.argsort(stamps[kept], kind="stable")]
+    values = numbers.to_numpy(dtype=np.float64)[kept]
+    return pd.DataFrame(values, pd.Index(stamps[kept], name="time"), list(numbers.columns))
 
 
 def track(folder: Path, name: str, points: int) -> dict[str, Any]:
@@ -293,13 +298,13 @@ def track(folder: Path, name: str, points: int) -> dict[str, Any]:
     table = _read(file_in(place, "trajectory.csv", manifest))
     if not {"lat_deg", "lon_deg", "alt_m"} <= set(table.columns):
         raise ConfigError("studio.no-track", file=name)
-    table = table[np.isfinite(table[["lat_deg", "lon_deg", "alt_m"]]).all(axis=1)]
-    rows = np.unique(np.linspace(0, len(table) - 1, min(points, len(table))).round().astype(int))
-    some = table.iloc[rows]
+    some = _thinned(table, ["lat_deg", "lon_deg", "alt_m"], points)
     euler = ["roll_deg", "pitch_deg", "heading_deg"]
     quaternions = None
-    if set(euler) <= set(table.columns) and np.isfinite(some[euler]).all(axis=None):
-        quaternions = rotation.quaternion_from_euler(some[euler].to_numpy()).tolist()
+    if set(euler) <= set(table.columns):
+        angles = some[euler].to_numpy(dtype=np.float64)
+        if np.isfinite(angles).all():
+            quaternions = rotation.quaternion_from_euler(angles).tolist()
     return {
         "t": index_of(some).tolist(),
         "lat": some["lat_deg"].tolist(),
@@ -342,10 +347,17 @@ def _reference(place: Path, manifest: Mapping[str, Any], points: int) -> dict[st
     return None
 
 
+def _thinned(table: pd.DataFrame, columns: list[str], points: int) -> pd.DataFrame:
+    """Return at most so many rows whose columns are finite, the first and the last among them."""
+    whole = np.flatnonzero(np.isfinite(table[columns].to_numpy(dtype=np.float64)).all(axis=1))
+    if not whole.size:
+        raise ConfigError("studio.no-track")
+    at = np.linspace(0, whole.size - 1, min(points, whole.size)).round().astype(int)
+    return table.take(whole[np.unique(at)])
+
+
 def _places(table: pd.DataFrame, points: int) -> dict[str, Any]:
-    kept = table[np.isfinite(table[["lat", "lon"]]).all(axis=1)]
-    rows = np.unique(np.linspace(0, max(len(kept) - 1, 0), min(points, len(kept))).astype(int))
-    some = kept.iloc[rows]
+    some = _thinned(table, ["lat", "lon"], points)
     return {
         "t": index_of(some).tolist(),
         "lat": some["lat"].tolist(),

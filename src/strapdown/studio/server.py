@@ -5,6 +5,7 @@ from __future__ import annotations
 import secrets
 import socket
 from collections.abc import Callable
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -75,27 +76,38 @@ def serve(
         the extra ``studio`` is not installed.
     """
     _libraries()
-    import uvicorn
-
     from strapdown.studio.app import STATIC, Studio, make_app
-    from strapdown.studio.guard import Guard, PatientProtocol, allowed_hosts
+    from strapdown.studio.guard import Guard, allowed_hosts
 
     if host not in LOOPBACK and not listen:
         raise ConfigError("studio.host-needs-listen", quantity="--host", host=host)
-    opened = Folder.open(folder, limits)
-    lock = _locked(opened)
-    map_path = None if map_file is None else _map(Path(map_file))
     if not (STATIC / "index.html").is_file():
         raise ConfigError("studio.no-page")
-    bound = _bound(host, port)
-    port = bound.getsockname()[1]
-    studio = Studio.of(opened, map_path)
-    token = secrets.token_urlsafe(24)
-    guard = Guard(make_app(studio), token, allowed_hosts(host, port, listen), limits)
-    protocol = type("Protocol", (PatientProtocol,), {"limits": limits})
+    with ExitStack() as kept:
+        opened = Folder.open(folder, limits)
+        kept.enter_context(_locked(opened))
+        map_path = None if map_file is None else _map(Path(map_file))
+        bound = kept.enter_context(_bound(host, port))
+        port = bound.getsockname()[1]
+        studio = Studio.of(opened, map_path)
+        kept.callback(studio.end)
+        token = secrets.token_urlsafe(24)
+        guard = Guard(make_app(studio), token, allowed_hosts(host, port, listen), limits)
+        url = f"http://{_shown(host)}:{port}/{token}/"
+        address = Address(url, opened.path, studio.jobs.running())
+        _run(guard, bound, limits, lambda: started(address))
+        return studio.jobs.running()
+
+
+def _run(app: Any, bound: socket.socket, limits: Limits, started: Callable[[], None]) -> None:
+    """Answer requests until the process is interrupted."""
+    import uvicorn
+
+    from strapdown.studio.guard import PatientProtocol
+
     config = uvicorn.Config(
-        guard,
-        http=protocol,
+        app,
+        http=type("Protocol", (PatientProtocol,), {"limits": limits}),
         ws="websockets-sansio",
         ws_max_size=1 << 16,
         ws_max_queue=4,
@@ -110,25 +122,22 @@ def serve(
         timeout_keep_alive=10,
         timeout_graceful_shutdown=3,
     )
-    shown = f"[{host}]" if ":" in host else host
-    if host in ("0.0.0.0", "::"):
-        shown = socket.gethostname()
-    address = Address(f"http://{shown}:{port}/{token}/", opened.path, studio.jobs.running())
 
     class Server(uvicorn.Server):
         async def startup(self, sockets: list[socket.socket] | None = None) -> None:
             await super().startup(sockets)
-            started(address)
+            started()
 
-    try:
+    # The server ends in order, and raises the interrupt again.
+    with suppress(KeyboardInterrupt):
         Server(config).run([bound])
-    except KeyboardInterrupt:
-        pass  # uvicorn raises it again after its end in order
-    finally:
-        bound.close()
-        studio.end()
-        lock.close()
-    return studio.jobs.running()
+
+
+def _shown(host: str) -> str:
+    """Host as a person types it into a browser."""
+    if host in ("0.0.0.0", "::"):
+        return socket.gethostname()
+    return f"[{host}]" if ":" in host else host
 
 
 def _libraries() -> None:
@@ -147,14 +156,20 @@ def _bound(host: str, port: int) -> socket.socket:
             host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
         )[0]
         bound = socket.socket(family, kind, protocol)
+    except (OSError, OverflowError) as error:
+        raise _no_port(host, port, error) from None
+    try:
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         bound.bind(place)
+        return bound
     except (OSError, OverflowError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise ConfigError(
-            "studio.port-taken", quantity="--port", host=host, port=port, reason=reason
-        ) from None
-    return bound
+        bound.close()
+        raise _no_port(host, port, error) from None
+
+
+def _no_port(host: str, port: int, error: Exception) -> ConfigError:
+    reason = getattr(error, "strerror", None) or str(error)
+    return ConfigError("studio.port-taken", quantity="--port", host=host, port=port, reason=reason)
 
 
 def _locked(folder: Folder) -> Any:
