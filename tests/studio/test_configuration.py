@@ -38,8 +38,8 @@ def comments(text):
 
 
 @pytest.fixture
-def folder(tmp_path):
-    """A folder with a log of 100 Hz that turns and rests."""
+def folder(tmp_path, monkeypatch):
+    """A folder with a log of 100 Hz that turns and rests, in which the process is."""
     from strapdown.studio.folder import Folder
 
     rng = np.random.default_rng(0)
@@ -50,6 +50,7 @@ def folder(tmp_path):
     rows[:, 1:] += 1e-3 * rng.standard_normal((time.size, 6))
     head = "time_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,accel_x_m_s2,accel_y_m_s2,accel_z_m_s2"
     np.savetxt(tmp_path / "log.csv", rows, "%.9g", ",", header=head, comments="")
+    monkeypatch.chdir(tmp_path)
     return Folder.open(tmp_path).path
 
 

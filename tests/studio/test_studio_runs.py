@@ -82,6 +82,26 @@ def test_an_attitude_is_that_of_the_command(fresh, tmp_path):
     assert fresh.ask("POST", "api/jobs", again).code == "studio.run-exists"
 
 
+def test_a_session_of_a_live_run_is_a_log(fresh):
+    session = fresh.folder / "walk" / "phone-1"
+    session.mkdir(parents=True)
+    (fresh.folder / "walk" / "other").mkdir()
+    turning_log(session / "journal.csv", 4.0)
+    (session / "journal").write_bytes(b"x")
+    (session / "run.json").write_text("{}", encoding="utf-8")
+    (session / "link").symlink_to(fresh.folder.parent)
+    (fresh.folder / "plain").mkdir()
+    names = [one["name"] for one in fresh.ask("GET", "api/state").json["files"]]
+    assert names == ["plain", "walk/phone-1"]
+    for name in ("walk/phone-1/journal.csv", "walk/../plain", "walk//phone-1", "walk/", "/walk"):
+        found = fresh.ask("POST", "api/look", {"files": [name], "log": {}})
+        assert found.status in (400, 404) and found.code.startswith("studio.")
+    # A log that is no journal, under such a name: what is read is the file itself.
+    turning_log(fresh.folder / "walk" / "other" / "log.csv")
+    look = fresh.ask("POST", "api/look", {"files": ["walk/other"], "log": {}})
+    assert look.status == 422 and look.code.startswith("io.")
+
+
 DRIVE = Path("docs/examples/navigate_drive.toml")
 
 

@@ -179,7 +179,7 @@ async def look(studio: Studio, request: Request) -> Response:
     asked = await body(request, files=list, log=dict, axes=str)
     paths = [studio.folder.file(name) for name in asked.get("files", [])]
     log, axes = reading_of(asked)
-    names = [path.name for path in paths]
+    names = [studio.folder.name_of(path) for path in paths]
     return JSONResponse(await studio.ask("look", *paths, names=names, log=log, axes=axes))
 
 
@@ -191,7 +191,9 @@ async def series(studio: Studio, request: Request) -> Response:
         {"log": parsed(query.get("log", "{}"), "log"), "axes": query.get("axes")}
     )
     name = query.get("stream", "imu")
-    at = await studio.ask("stream", path, file=path.name, name=name, log=log, axes=axes)
+    at = await studio.ask(
+        "stream", path, file=studio.folder.name_of(path), name=name, log=log, axes=axes
+    )
     return await extremes(Path(at), request)
 
 
@@ -249,7 +251,7 @@ async def propose(studio: Studio, request: Request) -> Response:
         "propose",
         *paths,
         kind=asked.get("kind", ""),
-        names=[path.name for path in paths],
+        names=[studio.folder.name_of(path) for path in paths],
         log=log,
         axes=axes,
         answers=answers,

@@ -8,7 +8,6 @@ which `command_of` makes the options.
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -74,8 +73,7 @@ def propose(
     paths = [place.file(name) for name in names]
     if not paths:
         raise ConfigError("studio.nothing-named")
-    os.chdir(folder)
-    drafts = one.draft([Path(path.name) for path in paths], dict(log), axes)
+    drafts = one.draft([path.relative_to(place.path) for path in paths], dict(log), axes)
     first, *others = drafts
     text = edited(first.text, answers)
     asked = [a for a in first.asked if not _set(a, answers)]
@@ -104,7 +102,6 @@ def check(
         remedy.
     """
     one = _kind(kind)
-    os.chdir(folder)
     text = edited(toml, changes)
     errors: list[dict[str, Any]] = []
     try:
@@ -133,7 +130,6 @@ def command(
     ConfigError: the configuration is wrong, or an option is not of this command.
     """
     one = _kind(kind)
-    os.chdir(folder)
     for option in options:
         check_choice("studio.unknown-option", one.options, quantity=kind, option=option)
     spec = checked(folder, one, toml, name)

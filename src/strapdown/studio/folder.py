@@ -29,6 +29,8 @@ STATE = ".strapdown-studio"
 LONGEST, MOST_ENTRIES = 200, 5000
 #: Characters that some system gives a meaning in a name.
 _MARKS = frozenset('/\\:*?"<>|')
+#: Files by which a folder is a session of a live run.
+_OF_SESSION = ("journal", "run.json")
 #: Names that Windows gives to devices.
 _DEVICES = frozenset(
     ("con", "prn", "aux", "nul", *(f"com{k}" for k in range(10)), *(f"lpt{k}" for k in range(10)))
@@ -155,17 +157,22 @@ class Folder:
         return asked
 
     def file(self, name: object) -> Path:
-        """Return the path of a file or folder that stands directly in the folder.
+        """Return the path of a file or folder of the folder, or of a session of a live run in it.
 
         The path is as named: where the name is a link within the folder, it keeps the link's name.
         """
-        plain = plain_name(name)
+        parts = name.split("/") if isinstance(name, str) else [""]
+        plain = "/".join(plain_name(part) for part in parts)
         for form in ("NFC", "NFD"):
             named = unicodedata.normalize(form, plain)
-            if (self.path / named).exists():
+            if len(parts) <= 2 and (self.path / named).exists():
                 self.within(named)
                 return self.path / named
         raise ConfigError("studio.no-such-file", file=plain)
+
+    def name_of(self, path: Path) -> str:
+        """Return the name of a path of `file`, from the folder."""
+        return path.relative_to(self.path).as_posix()
 
     def refuse_outside(self, path: str, quantity: str) -> None:
         """Refuse a path of a configuration that leads out of the folder: ConfigError."""
@@ -196,11 +203,26 @@ class Folder:
                 folder = entry.is_dir()
                 if folder and (Path(entry.path) / MANIFEST).is_file():
                     continue
+                if folder and (sessions := self._sessions(Path(entry.path))):
+                    found += sessions
+                    continue
                 about = entry.stat()
                 size = _size(Path(entry.path)) if folder else about.st_size
                 one = {"name": entry.name, "bytes": size, "modified": about.st_mtime}
                 found.append({**one, "folder": True} if folder else one)
         return sorted(found, key=lambda one: str(one["name"]).lower())
+
+    def _sessions(self, folder: Path) -> list[dict[str, Any]]:
+        """List the sessions in the folder of a live run, each of which is a log."""
+        found = []
+        for path in islice(folder.iterdir(), MOST_ENTRIES):
+            with suppress(OSError, ConfigError):
+                inside = self.file(self.name_of(path))
+                if all((inside / name).is_file() for name in _OF_SESSION):
+                    changed = (inside / _OF_SESSION[0]).stat().st_mtime
+                    about = {"name": self.name_of(path), "bytes": _size(inside), "folder": True}
+                    found.append({**about, "modified": changed})
+        return found
 
     def results(self) -> list[str]:
         """Names of the folders with a manifest."""

@@ -82,20 +82,24 @@ def look(
         if all((_cache(place) / s["key"] / s["name"] / LIST).is_file() for s in found["streams"]):
             os.utime(kept)
             return found
-    # Names, not paths: nothing that is shown tells where the folder is.
-    os.chdir(folder)
-    made = doctor([path.name for path in paths], axes=axes, **keys)
+    # Names, not paths: nothing that is shown tells where the folder is, in which this process is.
+    by_name = {place.name_of(path): path for path in paths}
+    made = doctor(list(by_name), axes=axes, **keys)
     streams: list[dict[str, Any]] = []
-    by_name = {path.name: path for path in paths}
     for one in made.logs:
-        path = by_name[Path(one.log.path).name]
+        path = by_name[Path(one.log.path).as_posix()]
         own = _key([path], keys, axes)
         lent = one.data["fixes_from"]
         tables = {n: t for n, t in one.streams.items() if not (n == "gnss" and lent)}
         rates = {str(s["name"]): s["rate_hz"] for s in one.data["streams"]}
         for name, table in tables.items():
             listed = _keep(_cache(place) / own, name, table)
-            about = {"file": path.name, "key": own, "name": name, "rate_hz": rates.get(name)}
+            about = {
+                "file": place.name_of(path),
+                "key": own,
+                "name": name,
+                "rate_hz": rates.get(name),
+            }
             streams.append({**about, **listed})
     first = next((one for one in made.logs if "imu" in one.streams), made.logs[0])
     gaps = []
@@ -122,7 +126,7 @@ def _questions(logs: Sequence[Any], columns: Mapping[str, str]) -> list[dict[str
     """List what the logs leave open, and how the sensor of each is mounted where none says it."""
     found = []
     for one in logs:
-        name = Path(one.log.path).name
+        name = Path(one.log.path).as_posix()
         found += [question_of(f, one.answers, name, columns) for f in one.questions]
         mounted = [axes_question(f, name) for f in (*one.faults, *one.notes)]
         found += [q for q in mounted if q is not None][:1]

@@ -8,7 +8,6 @@ two questions.
 from __future__ import annotations
 
 import math
-import os
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -58,7 +57,6 @@ def quick(folder: Path, toml: str, changes: Mapping[str, Any], unit: int = 0) ->
         ``vehicle``, ``recorder``, and ``ms`` that it took.
     """
     begun = time.perf_counter()
-    os.chdir(folder)
     spec = checked(folder, KINDS["crash"], toml, changes=changes)
     assert isinstance(spec, CaseSpec)
     records, spec = whole_records(spec, _record)

@@ -32,7 +32,8 @@ SECONDS, SECONDS_PER_MIB = 60.0, 5.0
 #: Longest answer, bytes.
 LONGEST = 64 << 20
 
-#: Questions, each a function of `studio` with a folder and arguments of JSON.
+#: Questions, each a function of `studio` with a folder, in which the process is, and arguments of
+#: JSON.
 QUESTIONS = {
     "look": "strapdown.studio.look:look",
     "stream": "strapdown.studio.look:stream",

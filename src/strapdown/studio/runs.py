@@ -8,7 +8,6 @@ stand beside the seal, are given away.
 from __future__ import annotations
 
 import json
-import os
 import re
 import shlex
 import shutil
@@ -188,6 +187,8 @@ def _numbers(place: Path) -> list[dict[str, Any]]:
                     "label": one.label,
                     "value": _finite(one.value),
                     "unit": one.unit,
+                    # A bound of a latitude or a longitude is along the ground.
+                    "bound_unit": "m" if one.kind in ("lat", "lon") else one.unit,
                     "below": _finite(one.below),
                     "above": _finite(one.above),
                 }
@@ -443,7 +444,6 @@ def compare(folder: Path, runs: Sequence[str]) -> dict[str, Any]:
         report = import_module("strapdown.report.compare")
     except ImportError:
         raise ConfigError("studio.no-comparison") from None
-    os.chdir(folder)
     place = Folder(folder)
     digests = [sha256(place.file(name) / MANIFEST) for name in runs]
     found = api.compare_runs(*(place.file(name).name for name in runs))
