@@ -68,7 +68,7 @@ def test_commands_of_live_runs():
         ("udp", {"out": "/"}, "studio.unknown-key"),
         ("udp", {"udp": "a\x1bb"}, "studio.wrong-type"),
         ("udp", {"udp": 3}, "studio.wrong-type"),
-        ("udp", {"for": "soon"}, "studio.wrong-type"),
+        ("udp", {"stop-after": "soon"}, "studio.wrong-type"),
         ("phyphox", {}, "studio.wrong-type"),
         ("sensor-logger", {"platform": "--force"}, "studio.unknown-choice"),
     ):

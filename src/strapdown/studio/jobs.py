@@ -34,8 +34,8 @@ __all__ = ["Job", "Jobs", "process_began"]
 
 #: Jobs at once; jobs that are remembered; jobs that may wait.
 AT_ONCE, REMEMBERED, WAITING = 2, 100, 50
-#: Time from an interrupt to the end by force, s.
-GRACE = 8.0
+#: Time from an interrupt to the end by force, s; of a live run, which then writes what it received.
+GRACE, GRACE_LIVE = 8.0, 120.0
 #: Bytes and lines of output that a job shows.
 TAIL, LINES = 16 << 10, 40
 #: States that a job does not leave.
@@ -266,7 +266,8 @@ class Jobs:
             job = replace(job, stage=str(said["stage"])[:200], share=share)
         code = self._end(job)
         if code is None and self._lives(job):
-            if job.stopping is not None and time.time() > job.stopping + GRACE:
+            grace = GRACE_LIVE if job.kind == "live" else GRACE
+            if job.stopping is not None and time.time() > job.stopping + grace:
                 self._signal(job, signal.SIGKILL)
                 return replace(job, stopping=time.time())
             return job

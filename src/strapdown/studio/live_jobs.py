@@ -45,8 +45,8 @@ _AT = LiveField(
 _EVERY = LiveField(
     "--every", "Interval of states", "least time between two", "0.1", "number", (), "s"
 )
-_FOR = LiveField(
-    "--for", "End after", "otherwise it ends when it is stopped", "", "number", (), "s"
+_END = LiveField(
+    "--stop-after", "End after", "otherwise it ends when it is stopped", "", "number", (), "s"
 )
 
 PROTOCOLS = {
@@ -64,13 +64,13 @@ PROTOCOLS = {
                 ("auto", "android", "ios"),
             ),
             _EVERY,
-            _FOR,
+            _END,
         ),
     ),
     "phyphox": Protocol(
         "phyphox",
         "A phone with remote access is asked.",
-        (LiveField("--phyphox", "Address", "HOST:PORT that the phone shows"), _EVERY, _FOR),
+        (LiveField("--phyphox", "Address", "HOST:PORT that the phone shows"), _EVERY, _END),
     ),
     "udp": Protocol(
         "Lines in datagrams",
@@ -78,18 +78,18 @@ PROTOCOLS = {
         (
             LiveField("--udp", "Address", "HOST:PORT of this machine", "127.0.0.1:5555"),
             _EVERY,
-            _FOR,
+            _END,
         ),
     ),
     "serial": Protocol(
         "Serial port",
         "Lines or rows of a board.",
-        (LiveField("--serial", "Port", "PORT@BAUD, such as /dev/ttyUSB0@115200"), _EVERY, _FOR),
+        (LiveField("--serial", "Port", "PORT@BAUD, such as /dev/ttyUSB0@115200"), _EVERY, _END),
     ),
     "mqtt": Protocol(
         "MQTT",
         "Sensor Logger by a broker.",
-        (LiveField("--mqtt", "Broker", "mqtt://HOST/TOPIC"), _EVERY, _FOR),
+        (LiveField("--mqtt", "Broker", "mqtt://HOST/TOPIC"), _EVERY, _END),
     ),
 }
 
@@ -139,7 +139,7 @@ def live_command(name: str, protocol: str, options: Mapping[str, Any]) -> list[s
         if value in (None, ""):
             value = field.default
         if value in (None, ""):
-            if key in ("for", "every"):
+            if key in ("stop-after", "every"):
                 continue
             raise ConfigError("studio.wrong-type", quantity=key, wanted=field.label)
         words.append(f"{field.flag}={_text(key, value, field)}")
