@@ -89,7 +89,6 @@ def least_and_largest(
             _join(low, below, first, last, np.fmin)
             _join(high, above, first, last, np.fmax)
         begin, end = up // FACTOR, down // FACTOR
-        end = np.where(up < down, end, begin)
         size = -(-size // FACTOR)
         below, above = least[at : at + size], largest[at : at + size]
         at += size
