@@ -141,8 +141,8 @@ def test_what_a_sentence_shows_is_given_where_it_is_raised(raised):
     assert lacking == []
 
 
-#: Where findings are shown to people: a terminal, a report, the comments of a proposed case file.
-SHOWN = ("cli", "report", "api", "crash/template", "crash/record_parts")
+#: Where findings are shown to people: a terminal, a page, the comments of a proposed case file.
+SHOWN = ("cli", "studio", "report", "api", "crash/template", "crash/record_parts")
 ON_REQUEST = ("__str__", "__repr__")
 
 

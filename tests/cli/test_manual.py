@@ -166,9 +166,9 @@ def test_a_cell_that_prints_something_else_is_found_and_mended(tmp_path, capsys)
     assert RUNNER.check(page, write=False) == 0
 
 
-#: Words of the manual by hand, at most: of the commands up to `extrinsics`, of campaigns, and of
-#: comparisons.
-MOST_WORDS = 45_000 + 1_000 + 700
+#: Words of the manual by hand, at most: of the commands up to `extrinsics`, of campaigns, of
+#: comparisons, and of the studio with what stops its attackers.
+MOST_WORDS = 45_000 + 1_000 + 700 + 600 + 250
 
 
 def words_by_hand() -> dict[str, int]:

@@ -44,6 +44,7 @@ OF_ITS_OWN = {
     *(("navigate", flag) for flag in ("--lat",)),
     *(("init navigate", flag) for flag in ("--sensor",)),
     *(("align", flag) for flag in ("--gnss",)),
+    *(("studio", flag) for flag in ("--map", "--listen", "--port", "--host")),
     *(("crash", flag) for flag in ("--live", "--every", "--calibration", "--export")),
 }
 

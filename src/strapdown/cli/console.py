@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import json
 import logging
+import os
 import sys
 from collections.abc import Callable, Container, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from contextvars import ContextVar
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
@@ -144,9 +146,53 @@ class Compilations:
         return event
 
 
+#: Environment variable with the file to which progress is written, for the program that reads it.
+PROGRESS_FILE = "STRAPDOWN_PROGRESS"
+#: Time between two lines of it, s, and its length, bytes, beyond which it begins again.
+_EVERY, _LONGEST = 0.1, 1 << 16
+
+
+def tell(said: dict[str, Any]) -> None:
+    """Append a line of JSON to the file that the environment names for progress, if it does.
+
+    `said`: ``stage`` and ``share``, ``error``, or ``live``. A run does not fail if it cannot be
+    written.
+    """
+    path = os.environ.get(PROGRESS_FILE)
+    if not path:
+        return
+    with suppress(OSError), open(path, "a", encoding="utf-8") as stream:  # noqa: PTH123
+        if stream.tell() > _LONGEST:
+            stream.truncate(0)
+        stream.write(json.dumps(said) + "\n")
+
+
 @contextmanager
 def progress(quiet: bool) -> Iterator[Callable[[str, float], None]]:
-    """Show the stage and the share done on the terminal, and erase them at the end."""
+    """Show the stage and the share done on the terminal, and erase them at the end.
+
+    Both are also written to the file that `PROGRESS_FILE` names.
+    """
+    with _on_terminal(quiet) as show:
+        if not os.environ.get(PROGRESS_FILE):
+            yield show
+            return
+        last: tuple[str, float] = ("", 0.0)
+
+        def report(stage: str, share: float) -> None:
+            nonlocal last
+            show(stage, share)
+            now = perf_counter()
+            if stage != last[0] or now - last[1] >= _EVERY:
+                last = (stage, now)
+                tell({"stage": stage, "share": round(share, 4)})
+
+        yield report
+
+
+@contextmanager
+def _on_terminal(quiet: bool) -> Iterator[Callable[[str, float], None]]:
+    """Show stage and share on the terminal, if there is one."""
     if quiet or not (out := console(err=True)).is_terminal:
         yield lambda stage, share: None
         return

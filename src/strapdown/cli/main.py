@@ -23,7 +23,7 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from strapdown import __version__
-from strapdown.cli.console import RESOURCES, WORDS, logged
+from strapdown.cli.console import RESOURCES, WORDS, logged, tell
 from strapdown.errors import ConfigError, Finding, StrapdownError, printable
 from strapdown.parsers import start_for
 
@@ -67,6 +67,9 @@ COMMANDS = {
     "worker": "Run cases of campaigns for a scheduler of dask, until it ends.",
     "compare": (
         "Show what differs between results: options, inputs, numbers, and positions over time."
+    ),
+    "studio": (
+        "Look at logs, run the commands on them and compare results, in a browser on this machine."
     ),
     "verify": "Run a result again from its own configuration and compare it bit for bit.",
     "sign": "Sign the seal of a result with your key, so that others can tell that it is yours.",
@@ -177,6 +180,7 @@ def run() -> None:
             app()
     except StrapdownError as error:
         finding = _by_option(error.finding, sys.argv[1:])
+        _tell(finding)
         text = "\n  ".join([finding.text(WORDS.get()), *_answers(finding)])
         _fail(text, error.exit_code)
     except OSError as error:
@@ -188,7 +192,16 @@ def run() -> None:
             file=str(error.filename) if error.filename else None,
             reason=error.strerror or str(error),
         )
+        _tell(what)
         _fail(what.text(WORDS.get()), 4)
+
+
+def _tell(finding: Finding) -> None:
+    """Tell an error to the program that follows this run."""
+    words, places = WORDS.get(), ("file", "row", "line", "quantity")
+    where = {key: value for key in places if (value := getattr(finding, key)) is not None}
+    said = {"text": finding.sentence(words), "remedy": finding.advice(words)}
+    tell({"error": {"code": finding.code, "severity": "error", **where, **said}})
 
 
 #: Placeholders of proposed options whose value cannot be inferred, for the user to fill in.

@@ -66,7 +66,11 @@ class FileSpec(Spec):
             The file is missing or not TOML, a value is still ``"?"``, or as `checked`; the message
             names the lines.
         """
-        file = read_toml(Path(path))
+        return cls.of_file(read_toml(Path(path)), files=files, **instead)
+
+    @classmethod
+    def of_file(cls, file: TomlFile, *, files: bool = True, **instead: Any) -> Self:
+        """Return the specification of a file that was read, or is not written yet, as `read`."""
         if "name" in file.table:
             raise file.refuse(("name",), "config.named-after-file", kind=cls.called)
         _refuse_placeholders(file, cls)

@@ -63,7 +63,11 @@ def read_toml(path: Path) -> TomlFile:
 
     ConfigError: the file is missing, cannot be read, or is not TOML; the message names the line.
     """
-    text = _text(path)
+    return parse_toml(path, _text(path))
+
+
+def parse_toml(path: Path, text: str) -> TomlFile:
+    """Parse the text of a file, which need not be written. ConfigError: as `read_toml`."""
     try:
         if any(line.count(".") > DEEPEST for line in text.split("\n")):
             key_lines(text)  # refuses a key of many parts, which tomllib parses slowly

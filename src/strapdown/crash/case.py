@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -248,22 +248,7 @@ def run_case(
     inputs = _inputs(spec, case_file, records)
     progress("reconstructing", 0.15)
     options = spec.options
-    made = reconstruct_crash(
-        units,
-        entry,
-        CrashOptions(
-            point=spec.point.position_m,
-            window=options.window_s,
-            rate=options.rate_hz,
-            sampling=options.sampling,
-            clock=options.clock,
-            combine=options.combine,
-            preparation=_preparation(spec),
-            peak_window=options.peak_window_s,
-            rule=EventRule(zero_at=options.zero_at),
-            gravity=options.gravity_m_per_s2,
-        ),
-    )
+    made = reconstruct_crash(units, entry, _options(spec))
     findings += made.findings
     progress("drawing possible paths", 0.4)
     samples, said = _samples(made.main.path, options.monte_carlo_runs, options.seed, progress)
@@ -295,9 +280,51 @@ def run_case(
     )
 
 
-def whole_records(spec: CaseSpec) -> tuple[dict[str, CrashRecord], CaseSpec]:
+def _options(spec: CaseSpec) -> CrashOptions:
+    options = spec.options
+    return CrashOptions(
+        point=spec.point.position_m,
+        window=options.window_s,
+        rate=options.rate_hz,
+        sampling=options.sampling,
+        clock=options.clock,
+        combine=options.combine,
+        preparation=_preparation(spec),
+        peak_window=options.peak_window_s,
+        rule=EventRule(zero_at=options.zero_at),
+        gravity=options.gravity_m_per_s2,
+    )
+
+
+def reconstruct_recorder(
+    spec: CaseSpec, records: Mapping[str, CrashRecord], number: int = 0
+) -> UnitReconstruction:
+    """Reconstruct a crash by one of its recorders alone, with linear bounds: a part of `run_case`.
+
+    Parameters
+    ----------
+    spec : CaseSpec
+    records : mapping of str to CrashRecord
+        Both as of `whole_records`.
+    number : int
+        Of the recorder, from 0.
+
+    Raises
+    ------
+    ConfigError, DataError, DivergenceError
+        As `run_case`.
+    """
+    unit = case_unit(spec.units[number], records)
+    options = _options(spec)
+    own = {k: v for k, v in (options.preparation or {}).items() if k == unit.name}
+    return reconstruct_crash((unit,), _entry(spec), replace(options, preparation=own)).main
+
+
+def whole_records(
+    spec: CaseSpec, read_record: Callable[[str], CrashRecord] = read_crash_record
+) -> tuple[dict[str, CrashRecord], CaseSpec]:
     """Read the records of a case, and name each of several files by its folder."""
-    read = {t.path: read_crash_record(t.path) for t in _triads(spec)}
+    read = {t.path: read_record(t.path) for t in _triads(spec)}
     several = {path for path, r in read.items() if len(r.files) > 1 and Path(path).is_file()}
     moved = {path: str(Path(path).parent if path in several else Path(path)) for path in read}
     units = tuple(

@@ -870,7 +870,9 @@ def error_model(part: Part, ends: RangeEnds, unit: Unit) -> tuple[Mapping[str, f
 
 
 def _next(value: float, usual: tuple[float, ...]) -> float:
-    return next((u for u in usual if u >= value * (1.0 - 1e-6)), float(math.ceil(value)))
+    # Of a record that is beyond all numbers, no whole one is next.
+    beyond = float(math.ceil(value)) if math.isfinite(value) else value
+    return next((u for u in usual if u >= value * (1.0 - 1e-6)), beyond)
 
 
 # Impact of a unit on its own clock, and its state of rest before.

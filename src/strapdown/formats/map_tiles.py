@@ -98,12 +98,15 @@ class MapFile:
     path : Path
     name, attribution : str
         Plain text in one line, as the file states it; empty if it states none.
+    zooms : (int, int)
+        Least and largest zoom, as the file states them.
     """
 
     path: Path
     archive: _Archive
     name: str
     attribution: str
+    zooms: tuple[int, int] = (0, 24)
 
     def tile(self, zoom: int, column: int, row: int) -> Tile | None:
         """Return a tile; None if there is none.
@@ -162,7 +165,9 @@ def open_map(path: str | Path) -> Iterator[MapFile]:
             archive = _opened(path, kept)
             said = archive.metadata()
         name = _plain(said.get("name")) or _plain(path.stem)
-        yield MapFile(path, archive, name, _plain(said.get("attribution")))
+        least, most = _zoom(said.get("minzoom"), 0), _zoom(said.get("maxzoom"), _LARGEST_ZOOM)
+        zooms = (min(least, most), max(least, most))
+        yield MapFile(path, archive, name, _plain(said.get("attribution")), zooms)
 
 
 def _opened(path: Path, kept: ExitStack) -> _Archive:
@@ -183,6 +188,15 @@ def _plain(value: Any) -> str:
         return ""
     text = html.unescape(re.sub(r"<[^<>]*>", "", value[: 20 * LONGEST]))
     return printable(" ".join(text.split()))[:LONGEST]
+
+
+def _zoom(value: Any, usual: int) -> int:
+    """Zoom that a file states, as a number or as text; the usual one if it states none."""
+    try:
+        found = int(str(value)[:4])
+    except ValueError:
+        return usual
+    return min(max(found, 0), _LARGEST_ZOOM)
 
 
 @contextmanager
@@ -280,7 +294,7 @@ class _Mbtiles:
         return self.connection.execute(query, values).fetchone()
 
     def metadata(self) -> dict[str, Any]:
-        names = ("name", "attribution", "format")
+        names = ("name", "attribution", "format", "minzoom", "maxzoom")
         if self._row("SELECT 1 FROM sqlite_master WHERE name = 'tiles'") is None:
             raise DataError("io.map-unknown", file=self.name)
         found = {
@@ -329,6 +343,7 @@ class _Pmtiles:
             fields[2:10:2], fields[3:10:2], strict=True
         )
         self.inner, self.outer, kind = fields[14:17]
+        self.zooms = {"minzoom": fields[17], "maxzoom": fields[18]}
         if kind == _VECTOR:
             raise DataError("io.map-vector", file=self.name)
 
@@ -340,9 +355,9 @@ class _Pmtiles:
 
     def metadata(self) -> dict[str, Any]:
         if not self.about[1]:
-            return {}
+            return self.zooms
         said = json.loads(_unpacked(self._bytes(*self.about, _METADATA), self.inner, _METADATA))
-        return said if isinstance(said, dict) else {}
+        return {**said, **self.zooms} if isinstance(said, dict) else self.zooms
 
     def tile(self, zoom: int, column: int, row: int) -> bytes | None:
         wanted = tile_number(zoom, column, row)

@@ -1,0 +1,313 @@
+"""Configurations in the studio: proposed from files, checked, changed key by key, and run.
+
+A configuration is the text of a TOML file, as ``strapdown init`` writes it; a change of a key keeps
+every comment. Commands that are configured by options alone have a file of the same kind here, of
+which `command_of` makes the options.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import tomlkit
+from tomlkit.exceptions import TOMLKitError
+
+from strapdown.bundle import named_paths
+from strapdown.config.reading import FileSpec
+from strapdown.config.toml_file import (
+    DEEPEST,
+    KeyPath,
+    TomlFile,
+    key_lines,
+    parse_toml,
+    place_of,
+)
+from strapdown.config.toml_text import Asked
+from strapdown.errors import ConfigError, Finding, check_choice
+from strapdown.studio.folder import Folder
+from strapdown.studio.kinds import KINDS, Kind
+from strapdown.studio.questions import open_question
+from strapdown.studio.reading_process import told
+
+__all__ = ["check", "checked", "command", "edited", "propose"]
+
+#: Longest text of a configuration, characters; keys that are changed at once.
+LONGEST, MOST = 1 << 20, 200
+
+
+def propose(
+    folder: Path,
+    kind: str,
+    names: Sequence[str],
+    log: Mapping[str, Any],
+    axes: str | None,
+    answers: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Propose a configuration from files of the folder.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the studio.
+    kind : str
+        Of `KINDS`.
+    names : sequence of str
+        Of files in the folder.
+    log : mapping
+        Keys of ``[log]``: how the files are read, and the part to use.
+    axes : str, optional
+    answers : mapping
+        Values by key path, which are set in what is proposed.
+
+    Returns
+    -------
+    dict
+        ``toml``, ``questions``, ``findings``; ``found``: what it rests on; ``others``: of further
+        vehicles.
+    """
+    one = _kind(kind)
+    place = Folder(folder)
+    paths = [place.file(name) for name in names]
+    if not paths:
+        raise ConfigError("studio.nothing-named")
+    drafts = one.draft([path.relative_to(place.path) for path in paths], dict(log), axes)
+    first, *others = drafts
+    text = edited(first.text, answers)
+    asked = [a for a in first.asked if not _set(a, answers)]
+    return {
+        "toml": text,
+        "questions": _questions(text, asked),
+        "to_check": _questions(text, first.to_check),
+        "findings": [told(finding) for finding in first.findings],
+        "found": list(first.found),
+        "others": [
+            {"toml": other.text, "name": str(other.name or k)}
+            for k, other in enumerate(others, start=2)
+        ],
+    }
+
+
+def check(
+    folder: Path, kind: str, toml: str, changes: Mapping[str, Any], name: str = ""
+) -> dict[str, Any]:
+    """Change keys of a configuration, and say what is wrong with it.
+
+    Returns
+    -------
+    dict
+        ``toml``; ``values`` by key path, as they are written; ``errors``: line, key, path, text and
+        remedy.
+    """
+    one = _kind(kind)
+    text = edited(toml, changes)
+    errors: list[dict[str, Any]] = []
+    try:
+        table = parse_toml(_path(folder, name), text).table
+    except ConfigError as error:
+        return {"toml": text, "values": {}, "errors": list(_faults(error.finding, {}))}
+    try:
+        checked(folder, one, text, name)
+    except ConfigError as error:
+        errors = list(_faults(error.finding, key_lines(text)))
+    values = {dotted(path): value for path, value in _flat(table, ())}
+    return {"toml": text, "values": values, "errors": errors}
+
+
+def dotted(path: KeyPath) -> str:
+    """Return a key path as the front end writes it: ``units.0.position_m``."""
+    return ".".join(map(str, path))
+
+
+def command(
+    folder: Path, kind: str, name: str, toml: str, options: Sequence[str]
+) -> dict[str, Any]:
+    """Return the command that runs a configuration, as words after ``strapdown``.
+
+    ``file`` is the name of the configuration file that it reads; empty if it reads none.
+    ConfigError: the configuration is wrong, or an option is not of this command.
+    """
+    one = _kind(kind)
+    for option in options:
+        check_choice("studio.unknown-option", one.options, quantity=kind, option=option)
+    spec = checked(folder, one, toml, name)
+    words, file = one.command(spec, name)
+    return {"words": [*words, "--out", name, *dict.fromkeys(options)], "file": file}
+
+
+def checked(
+    folder: Path, kind: Kind, toml: str, name: str = "", changes: Mapping[str, Any] | None = None
+) -> FileSpec:
+    """Return the specification of a configuration whose files are in the folder.
+
+    `changes`: values that replace those of the text, as `edited`, in less time. ConfigError: it is
+    wrong, or names a file outside of the folder.
+    """
+    file = parse_toml(_path(folder, name), _short(toml))
+    for place, value in (changes or {}).items():
+        _change(file.table, place, value, dict)
+    refuse_outside(Folder(folder), file)
+    return kind.form.of_file(file)
+
+
+def refuse_outside(place: Folder, file: TomlFile) -> None:
+    """Refuse a configuration that names a file outside of the folder: ConfigError."""
+    for name in named_paths(file.table):
+        place.refuse_outside(name, "path")
+    # Any other text may be the name of a file, too, for a key that takes words or a file.
+    for path, value in _flat(file.table, ()):
+        for text in value if isinstance(value, list) else [value]:
+            if isinstance(text, str) and _exists(place.path, text):
+                place.refuse_outside(text, dotted(path))
+
+
+def _exists(folder: Path, text: str) -> bool:
+    try:
+        return len(text) < 1000 and (folder / text).exists()
+    except (OSError, ValueError):
+        return False
+
+
+def edited(text: str, changes: Mapping[str, Any]) -> str:
+    """Return the text of a TOML file with values changed; comments and order are kept.
+
+    Parameters
+    ----------
+    text : str
+    changes : mapping of str to object
+        By key path, ``aiding.gnss.lever_arm_m`` or ``units.0.position_m``; None removes the key.
+
+    Raises
+    ------
+    ConfigError
+        The text is not TOML, or a path leads through what is no table.
+    """
+    _short(text)
+    if not changes:
+        return text
+    if len(changes) > MOST:
+        raise ConfigError("studio.request-too-large")
+    # It refuses what is nested too deep for the other parser.
+    parse_toml(Path("configuration.toml"), text)
+    try:
+        document = tomlkit.parse(text)
+        for place, value in changes.items():
+            _change(document, place, value, tomlkit.table)
+        return tomlkit.dumps(document)
+    except (TOMLKitError, RecursionError, ValueError, TypeError) as error:
+        reason = str(error)[:200] or type(error).__name__
+        raise ConfigError("studio.not-changed", reason=reason) from None
+
+
+def _change(document: Any, place: str, value: Any, new: Callable[[], Any]) -> None:
+    """Set or remove one value; `new` makes a table that is missing."""
+    *tables, key = [_part(part) for part in place.split(".")]
+    if len(tables) >= DEEPEST or key == "":
+        raise ConfigError("studio.no-such-key", quantity=place[:100])
+    node: Any = document
+    for part in tables:
+        if isinstance(part, int) or part in node:
+            node = _at(node, part, place)
+        elif value is None:
+            return
+        else:
+            node[part] = new()
+            node = node[part]
+    if not isinstance(node, dict | list) or isinstance(node, list) != isinstance(key, int):
+        raise ConfigError("studio.no-such-key", quantity=place[:100])
+    if isinstance(node, list):
+        _at(node, key, place)
+    elif value is None and key not in node:
+        return
+    table: Any = node
+    if value is None:
+        del table[key]
+    else:
+        table[key] = value
+
+
+def _part(part: str) -> str | int:
+    return int(part) if part.isdecimal() and len(part) < 6 else part
+
+
+def _at(node: Any, part: str | int, place: str) -> Any:
+    if isinstance(node, list) and isinstance(part, int) and part < len(node):
+        return node[part]
+    if isinstance(node, dict) and isinstance(part, str) and part in node:
+        return node[part]
+    raise ConfigError("studio.no-such-key", quantity=place[:100])
+
+
+def _kind(kind: str) -> Kind:
+    check_choice("studio.unknown-kind", KINDS, quantity="kind", kind=kind)
+    return KINDS[kind]
+
+
+def _path(folder: Path, name: str) -> Path:
+    """Path of a file that is not written: its name is that of the run, its folder the studio's."""
+    return folder / f"{name or 'configuration'}.toml"
+
+
+def _short(text: str) -> str:
+    if len(text) > LONGEST:
+        raise ConfigError("studio.request-too-large")
+    return text
+
+
+def _flat(node: Any, path: KeyPath) -> Iterator[tuple[KeyPath, Any]]:
+    """Yield every value by its path; lists of values are values."""
+    if isinstance(node, dict):
+        for key, value in node.items():
+            yield from _flat(value, (*path, key))
+    elif isinstance(node, list) and any(isinstance(part, dict) for part in node):
+        for k, value in enumerate(node):
+            yield from _flat(value, (*path, k))
+    else:
+        yield path, json.loads(json.dumps(node, default=str))
+
+
+def _faults(finding: Finding, lines: Mapping[KeyPath, Sequence[int]]) -> Iterator[dict[str, Any]]:
+    """Yield each fault of a configuration with its line and key; `lines`: as `key_lines`."""
+    paths = {place_of(path): path for path in lines}
+    several = finding.data.get("faults") or finding.data.get("values") or ()
+    found = [one for one in several if isinstance(one, Finding)] or [finding]
+    for one in found:
+        said = told(one)
+        yield {
+            "line": one.line,
+            "key": one.quantity,
+            "path": dotted(paths[one.quantity]) if one.quantity in paths else None,
+            "code": one.code,
+            "text": said["text"],
+            "remedy": said["remedy"],
+        }
+
+
+def _questions(text: str, asked: Sequence[Asked]) -> list[dict[str, Any]]:
+    """Return open values of a text as questions, each with its key path."""
+    by_line: dict[int, list[KeyPath]] = {}
+    for path, numbers in key_lines(text).items():
+        for number in numbers:
+            by_line.setdefault(number, []).append(path)
+    written = text.split("\n")
+    found = []
+    for one in asked:
+        paths = [p for p in by_line.get(one.line, []) if p and p[-1] == one.key]
+        key = dotted(paths[0]) if paths else one.key
+        line = written[one.line - 1] if one.line <= len(written) else ""
+        count = line.partition("#")[0].count("?") or 1
+        found.append(open_question(one, key, unit_of_key(one.key), count))
+    return found
+
+
+def unit_of_key(key: str) -> str:
+    """Return the unit in the name of a key, as a person writes it; empty if there is none."""
+    from strapdown.studio.forms import unit_of
+
+    return unit_of(key)
+
+
+def _set(asked: Asked, answers: Mapping[str, Any]) -> bool:
+    return any(str(key).rpartition(".")[2] == asked.key for key in answers)

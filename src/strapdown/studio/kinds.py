@@ -1,0 +1,439 @@
+"""What a studio runs: the configuration of each kind, how it is proposed, and its command.
+
+``navigate``, ``align`` and ``crash`` have configuration files of their own. The others take
+options; their file here has the same keys under ``[log]``, and becomes these options word by word.
+"""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, StrictBool
+
+from strapdown.config.alignment import AlignmentSpec
+from strapdown.config.crash_case import CaseSpec
+from strapdown.config.logs import AxesTable, FixesTable, LogTable, flags_of
+from strapdown.config.navigation import NavigationSpec
+from strapdown.config.reading import FileSpec
+from strapdown.config.spec import (
+    FileName,
+    Latitude,
+    Number,
+    Positive,
+    Spec,
+    Word,
+    accepted_by,
+    specify,
+)
+from strapdown.config.toml_text import Asked, Page, inline, string
+from strapdown.errors import DataError, Finding
+from strapdown.sensors.bridge import target_of
+
+__all__ = ["KINDS", "Draft", "Kind"]
+
+
+@dataclass(frozen=True)
+class Draft:
+    """A proposed configuration: its text, what it rests on, and what is open."""
+
+    text: str
+    found: tuple[str, ...] = ()
+    asked: tuple[Asked, ...] = ()
+    to_check: tuple[Asked, ...] = ()
+    findings: tuple[Finding, ...] = ()
+    name: str = ""
+
+
+Paths = Sequence[Path]
+Keys = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of run.
+
+    Attributes
+    ----------
+    title, what, needs : str
+        For people: name, what is found, and what is needed.
+    form : type of FileSpec
+    draft : callable
+        Paths, keys of ``[log]`` and axes to drafts.
+    command : callable
+        Specification and name of the run to the words of the command, and the name of the file that
+        it reads, empty if none.
+    options : tuple of str
+        Flags that may be added.
+    """
+
+    title: str
+    what: str
+    needs: str
+    form: type[FileSpec]
+    draft: Callable[[Paths, Keys, str | None], list[Draft]]
+    command: Callable[[Any, str], tuple[list[str], str]]
+    options: tuple[str, ...] = ("--no-report", "--force", "--verbose")
+
+
+# --- kinds with a configuration file ------------------------------------------------------
+
+
+def _log_table(path: Path, keys: Keys) -> LogTable:
+    return specify(LogTable, path=str(path), **keys)
+
+
+def _sorted_files(paths: Paths, keys: Keys, axes: str | None) -> tuple[Path, Path | None]:
+    """Return the log of inertial samples, and the file of fixes among the others."""
+    from strapdown.api.doctor import doctor
+
+    if len(paths) == 1:
+        return paths[0], None
+    reading = {k: v for k, v in keys.items() if k not in ("from_s", "to_s", "duration_s")}
+    logs = {str(path): path for path in paths}
+    inertial, fixes = [], []
+    for path in logs.values():
+        try:
+            one = doctor(str(path), axes=axes, **reading).logs[0]
+        except DataError:
+            continue
+        if "imu" in one.streams or one.questions:
+            inertial.append(path)
+        elif "gnss" in one.streams:
+            fixes.append(path)
+    log = (inertial or list(paths))[0]
+    return log, next((path for path in fixes if path != log), None)
+
+
+def _draft_navigation(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]:
+    from strapdown.systems.navigation_draft import draft_navigation
+
+    log, fixes = _sorted_files(paths, keys, axes)
+    gnss = None if fixes is None else specify(FixesTable, path=str(fixes))
+    return [
+        Draft(**vars(draft_navigation(_log_table(log, keys), folder=Path(), axes=axes, gnss=gnss)))
+    ]
+
+
+def _draft_alignment(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]:
+    from strapdown.systems.alignment_draft import draft_alignment
+
+    log, _ = _sorted_files(paths, keys, axes)
+    return [Draft(**vars(draft_alignment(_log_table(log, keys), folder=Path(), axes=axes)))]
+
+
+def _draft_crash(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]:
+    from strapdown.crash.template import draft_cases
+    from strapdown.formats.crash_records import read_crash_record
+
+    records, seen = [], set()
+    for path in paths:
+        # A record of several files is one, whichever of them are chosen.
+        if path.resolve() not in seen:
+            records.append(read_crash_record(path))
+            seen |= {file.resolve() for file in (*records[-1].files, path)}
+    return [
+        Draft(one.text, one.found, one.asked, one.to_check, one.findings, one.vehicle)
+        for one in draft_cases(records, folder=Path())
+    ]
+
+
+def _by_file(command: str) -> Callable[[Any, str], tuple[list[str], str]]:
+    """The command that runs a configuration file, which is named after the run."""
+
+    def words(_: Any, name: str) -> tuple[list[str], str]:
+        return [command, f"{name}.toml"], f"{name}.toml"
+
+    return words
+
+
+# --- kinds with options -------------------------------------------------------------------
+
+
+class LogsTable(LogTable):
+    """Logs that are read in the same way."""
+
+    also: tuple[FileName, ...] = Field(default=(), description="further logs of the same sensor")
+
+
+class AttitudeTable(Spec):
+    """What is compared, and how."""
+
+    tolerance_deg: Positive = Field(default=1.0, description="the largest acceptable error")
+    rates_hz: tuple[Positive, ...] = Field(
+        default=(), description="lower rates to try; the full rate and its halves, if empty"
+    )
+    algorithms: tuple[Word, ...] = Field(
+        default=(), description="names with options, or all; one of each, if empty"
+    )
+    interpolation: Literal["linear", "cubic"] = Field(
+        default="linear", description="how rates run between their stamps"
+    )
+    reference: tuple[Word, ...] = Field(
+        default=(),
+        description="what is known of the motion: 'end same as start', 'rests', "
+        "'12.5 roll 0 pitch 0 heading 90', or a file of such lines or of an attitude truth",
+    )
+    initial: Word = Field(
+        default="auto", description="auto, truth, level, zero, or roll,pitch,heading in deg"
+    )
+    gyro_bias: Word = Field(default="auto", description="auto, none, rest, rests, or 'x,y,z deg/s'")
+    magnetometer: Word = Field(
+        default="auto", description="auto, raw, or a log turned through all directions"
+    )
+    lat_deg: Latitude | None = Field(default=None, description="latitude, for true headings")
+    lon_deg: Annotated[Number, Field(ge=-180.0, le=360.0)] | None = Field(
+        default=None, description="longitude, for true headings"
+    )
+    peers: tuple[Word, ...] = Field(
+        default=(), description="other libraries to lay beside: vqf, imufusion, ahrs, or all"
+    )
+
+
+class AttitudeFile(FileSpec):
+    """A comparison of attitude algorithms over a log."""
+
+    called = "attitude"
+
+    log: LogTable
+    axes: AxesTable = AxesTable()
+    attitude: AttitudeTable = AttitudeTable()
+
+
+class AllanTable(Spec):
+    """How the logs are taken."""
+
+    at_rest: StrictBool = Field(
+        default=False, description="take the whole part as at rest, without a test"
+    )
+    program: Annotated[Word, accepted_by(target_of)] | None = Field(
+        default=None, description="program whose noise parameters are given, too, such as KF-GINS"
+    )
+
+
+class AllanFile(FileSpec):
+    """Logs at rest, for the noise of their sensor."""
+
+    called = "allan"
+
+    log: LogsTable
+    axes: AxesTable = AxesTable()
+    allan: AllanTable = AllanTable()
+
+
+class CalibrateTable(Spec):
+    """What was done with the sensor, and what is known of it."""
+
+    procedure: Literal["positions", "six-position", "turns", "rate-table"] | None = Field(
+        default=None, description="what was done; by the logs, if not stated"
+    )
+    turns: Word | None = Field(
+        default=None, description="known turns: 360, or 'x 720, y 720' in order"
+    )
+    turn_sd_deg: Positive = Field(default=3.0, description="standard deviation of the known angles")
+    pose_sd_deg: Positive = Field(
+        default=2.0, description="standard deviation of the faces in six positions"
+    )
+    gravity_m_per_s2: Annotated[Number, Field(ge=9.5, le=10.0)] | None = Field(
+        default=None, description="local gravity; by latitude and height, if not stated"
+    )
+    lat_deg: Latitude | None = Field(default=None, description="latitude, for gravity")
+    alt_m: Number | None = Field(default=None, description="height, for gravity")
+    sensor: FileName | None = Field(
+        default=None, description="a sensor of the catalogue, or a .toml file of your own"
+    )
+
+
+class CalibrateFile(FileSpec):
+    """Logs of one sensor at rest in poses, and turned."""
+
+    called = "calibrate"
+
+    log: LogsTable
+    calibrate: CalibrateTable = CalibrateTable()
+
+
+def _draft_of_options(table: str, what: str, example: Iterable[tuple[str, str, str]]) -> Any:
+    """Return the draft of a kind with options: the log as it was read, and keys with defaults."""
+
+    def draft(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]:
+        first, *others = paths
+        spec = specify(LogTable, path=str(first), **keys)
+        page = Page()
+        page.say(what.format(name=first.name))
+        page.table("[log]")
+        page.key("path", string(first.as_posix()))
+        if others and table != "attitude":
+            listed = ", ".join(string(one.as_posix()) for one in others)
+            page.key("also", f"[{listed}]", "further logs of the same sensor")
+        for key, value in spec.plain().items():
+            if key not in ("path", "columns") and value is not False:
+                page.key(key, string(value) if isinstance(value, str) else _toml(value))
+        if spec.columns:
+            page.key("columns", inline(spec.columns))
+        if axes is not None:
+            page.table("[axes]")
+            page.key("axes", string(axes))
+        page.table(f"[{table}]")
+        for key, value, remark in example:
+            page.key(key, value, remark)
+        return [Draft(page.text)]
+
+    return draft
+
+
+def _toml(value: Any) -> str:
+    return str(value).lower() if isinstance(value, bool) else repr(value)
+
+
+def _logs(spec: Any) -> list[str]:
+    return [_as_argument(path) for path in (spec.log.path, *getattr(spec.log, "also", ()))]
+
+
+def _as_argument(path: str) -> str:
+    """Path as a word of a command, from the folder of the studio; never an option."""
+    there = Path(path)
+    own = there.relative_to(Path.cwd()) if there.is_relative_to(Path.cwd()) else there
+    return f"./{own.as_posix()}" if str(own).startswith("-") else own.as_posix()
+
+
+def _reading(spec: Any) -> list[str]:
+    log, axes = spec.log, getattr(spec, "axes", None)
+    if log.calibration is not None:
+        log = log.model_copy(update={"calibration": _as_argument(log.calibration)})
+    return shlex.split(flags_of(log, None if axes is None else axes.axes))
+
+
+def _flags(values: Mapping[str, Any]) -> list[str]:
+    """Options with values; those that are None, False or empty are left out.
+
+    One that begins with a minus sign is joined to its option, and is none itself.
+    """
+    words: list[str] = []
+    for flag, value in values.items():
+        if value is None or value is False or value == "":
+            continue
+        words.append(flag if value is True else f"{flag}={value}")
+    return words
+
+
+def _attitude_words(spec: Any, _: str) -> tuple[list[str], str]:
+    own, usual = spec.attitude, AttitudeTable()
+    stated = {
+        "--tolerance-deg": own.tolerance_deg,
+        "--interpolation": own.interpolation,
+        "--initial": own.initial,
+        "--gyro-bias": own.gyro_bias,
+        "--magnetometer": own.magnetometer,
+    }
+    defaults = {
+        "--tolerance-deg": usual.tolerance_deg,
+        "--interpolation": usual.interpolation,
+        "--initial": usual.initial,
+        "--gyro-bias": usual.gyro_bias,
+        "--magnetometer": usual.magnetometer,
+    }
+    flags = {flag: value for flag, value in stated.items() if value != defaults[flag]}
+    flags |= {
+        "--algorithms": " ".join(own.algorithms),
+        "--rates": " ".join(f"{rate:g}" for rate in own.rates_hz),
+        "--lat": own.lat_deg,
+        "--lon": own.lon_deg,
+        "--peers": " ".join(own.peers),
+    }
+    words = ["attitude", *_logs(spec), *_reading(spec), *_flags(flags)]
+    words += [f"--reference={one}" for one in own.reference]
+    return words, ""
+
+
+def _allan_words(spec: Any, _: str) -> tuple[list[str], str]:
+    flags = {"--for": spec.allan.program, "--at-rest": spec.allan.at_rest}
+    return ["allan", *_logs(spec), *_reading(spec), *_flags(flags)], ""
+
+
+def _calibrate_words(spec: Any, _: str) -> tuple[list[str], str]:
+    own = spec.calibrate
+    flags = {
+        "--procedure": own.procedure,
+        "--turns": own.turns,
+        "--turn-sd": None if own.turn_sd_deg == 3.0 else own.turn_sd_deg,
+        "--pose-sd": None if own.pose_sd_deg == 2.0 else own.pose_sd_deg,
+        "--gravity": own.gravity_m_per_s2,
+        "--lat": own.lat_deg,
+        "--alt": own.alt_m,
+        "--sensor": own.sensor and _as_argument(own.sensor),
+    }
+    return ["calibrate", *_logs(spec), *_reading(spec), *_flags(flags)], ""
+
+
+USUAL = Kind.options
+KINDS: dict[str, Kind] = {
+    "navigate": Kind(
+        "Navigation",
+        "Position, velocity and attitude over a record, with their uncertainty.",
+        "A log of gyros and accelerometers, and satellite fixes in it or in a file of their own.",
+        NavigationSpec,
+        _draft_navigation,
+        _by_file("navigate"),
+        (*USUAL, "--smooth"),
+    ),
+    "attitude": Kind(
+        "Attitude",
+        "The simplest attitude algorithm, and the lowest sample rate, that are accurate enough.",
+        "A log of gyros; what is known of the motion, such as that it ends as it began.",
+        AttitudeFile,
+        _draft_of_options(
+            "attitude",
+            "Attitude algorithms compared over {name}.",
+            (("tolerance_deg", "1.0", "the largest acceptable error"),),
+        ),
+        _attitude_words,
+        (*USUAL, "--png", "--timing"),
+    ),
+    "align": Kind(
+        "Alignment",
+        "Roll, pitch and heading of a body that does not move.",
+        "A log of gyros and accelerometers at rest, and the place.",
+        AlignmentSpec,
+        _draft_alignment,
+        _by_file("align"),
+    ),
+    "crash": Kind(
+        "Crash",
+        "Delta-V, direction of force, severity and path of a crash, each with its bound.",
+        "Records of accelerometers on the vehicle, and how it moved before the crash.",
+        CaseSpec,
+        _draft_crash,
+        _by_file("crash"),
+    ),
+    "allan": Kind(
+        "Sensor noise",
+        "Allan deviation and noise terms of a sensor, and its file for the other commands.",
+        "A log of the unmoved sensor, an hour or more.",
+        AllanFile,
+        _draft_of_options(
+            "allan",
+            "Noise of the sensor in {name}, which lay still.",
+            (("at_rest", "false", "true: take the whole part as at rest, without a test"),),
+        ),
+        _allan_words,
+    ),
+    "calibrate": Kind(
+        "Calibration",
+        "Bias, scale, misalignment and g-sensitivity of a sensor, each with its bound.",
+        "A log of the sensor at rest in nine or more poses, turned quickly between them.",
+        CalibrateFile,
+        _draft_of_options(
+            "calibrate",
+            "Calibration of the sensor in {name}: rests in poses, and turns between them.",
+            (
+                ("turn_sd_deg", "3.0", "standard deviation of known angles"),
+                ("pose_sd_deg", "2.0", "standard deviation of the faces in six positions"),
+            ),
+        ),
+        _calibrate_words,
+    ),
+}

@@ -1,0 +1,164 @@
+"""Live runs in the studio: who may send, and the command that receives it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.util import find_spec
+from typing import Any
+
+from strapdown.errors import ConfigError, Finding, check_choice, printable
+
+__all__ = ["PROTOCOLS", "live_command", "live_info"]
+
+
+@dataclass(frozen=True)
+class LiveField:
+    """One option of a protocol: the flag that it becomes, and what a page shows of it."""
+
+    flag: str
+    label: str
+    help: str
+    default: str = ""
+    kind: str = "text"
+    choices: tuple[str, ...] = ()
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class Protocol:
+    """One way in which samples come."""
+
+    title: str
+    help: str
+    fields: tuple[LiveField, ...]
+
+
+_AT = LiveField(
+    "--listen",
+    "Address",
+    "HOST:PORT of this machine; 127.0.0.1 is for this machine alone, 0.0.0.0 for phones in your "
+    "network",
+    "127.0.0.1:8437",
+)
+_EVERY = LiveField(
+    "--every", "Interval of states", "least time between two", "0.1", "number", (), "s"
+)
+_END = LiveField(
+    "--stop-after", "End after", "otherwise it ends when it is stopped", "", "number", (), "s"
+)
+
+PROTOCOLS = {
+    "sensor-logger": Protocol(
+        "Sensor Logger",
+        "The app of a phone sends by HTTP or WebSocket.",
+        (
+            _AT,
+            LiveField(
+                "--platform",
+                "Phone",
+                "sign of its accelerations",
+                "auto",
+                "choice",
+                ("auto", "android", "ios"),
+            ),
+            _EVERY,
+            _END,
+        ),
+    ),
+    "phyphox": Protocol(
+        "phyphox",
+        "A phone with remote access is asked.",
+        (LiveField("--phyphox", "Address", "HOST:PORT that the phone shows"), _EVERY, _END),
+    ),
+    "udp": Protocol(
+        "Lines in datagrams",
+        "Sensorstream, or lines of your own.",
+        (
+            LiveField("--udp", "Address", "HOST:PORT of this machine", "127.0.0.1:5555"),
+            _EVERY,
+            _END,
+        ),
+    ),
+    "serial": Protocol(
+        "Serial port",
+        "Lines or rows of a board.",
+        (LiveField("--serial", "Port", "PORT@BAUD, such as /dev/ttyUSB0@115200"), _EVERY, _END),
+    ),
+    "mqtt": Protocol(
+        "MQTT",
+        "Sensor Logger by a broker.",
+        (LiveField("--mqtt", "Broker", "mqtt://HOST/TOPIC"), _EVERY, _END),
+    ),
+}
+
+
+def live_info() -> dict[str, Any]:
+    """Return the protocols with their fields; none where this version has no ``strapdown live``."""
+    there = find_spec("strapdown.live.hub") is not None
+    return {
+        "protocols": [
+            {
+                "name": name,
+                "title": one.title,
+                "help": one.help,
+                "fields": [
+                    {
+                        "key": field.flag.removeprefix("--"),
+                        "label": field.label,
+                        "unit": field.unit,
+                        "type": field.kind,
+                        "choices": list(field.choices),
+                        "default": field.default,
+                        "help": field.help,
+                    }
+                    for field in one.fields
+                ],
+            }
+            for name, one in PROTOCOLS.items()
+            if there
+        ],
+        "warning": Finding("studio.live-open").sentence("file"),
+    }
+
+
+def live_command(name: str, protocol: str, options: Mapping[str, Any]) -> list[str]:
+    """Return the command of a live run, as words after ``strapdown``.
+
+    ConfigError: the protocol or an option of it is not known, or its value is none.
+    """
+    check_choice("studio.unknown-protocol", PROTOCOLS, quantity="protocol", word=protocol)
+    fields = {one.flag.removeprefix("--"): one for one in PROTOCOLS[protocol].fields}
+    words = ["live"]
+    for key in options:
+        if key not in fields:
+            raise ConfigError("studio.unknown-key", word=str(key)[:80], known=list(fields))
+    for key, field in fields.items():
+        value = options.get(key)
+        if value in (None, ""):
+            value = field.default
+        if value in (None, ""):
+            if key in ("stop-after", "every"):
+                continue
+            raise ConfigError("studio.wrong-type", quantity=key, wanted=field.label)
+        words.append(f"{field.flag}={_text(key, value, field)}")
+    return [*words, "--lines=json", "--out", name]
+
+
+def _text(key: str, value: Any, field: LiveField) -> str:
+    """Value of an option as a word; ConfigError: it is none."""
+    if field.kind == "number":
+        try:
+            found = float(value)
+        except (TypeError, ValueError):
+            found = math.nan
+        if not math.isfinite(found):
+            raise ConfigError("studio.wrong-type", quantity=key, wanted="number")
+        return f"{found:g}"
+    text = value if isinstance(value, str) else ""
+    if not text or len(text) > 300 or printable(text) != text:
+        raise ConfigError("studio.wrong-type", quantity=key, wanted="text")
+    if field.choices:
+        check_choice("studio.unknown-choice", field.choices, quantity=key, word=text)
+    return text

@@ -1,0 +1,141 @@
+"""What a log leaves open, as questions with answers to choose from.
+
+An answer sets keys of the table ``[log]``, or ``axes``; what the file itself suggests comes first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from strapdown.config.toml_text import Asked
+from strapdown.errors import Finding
+from strapdown.formats.recording import PLACEHOLDERS
+from strapdown.units import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS
+
+__all__ = ["axes_question", "open_question", "question_of"]
+
+#: Usual units of each key, the ones that are offered.
+OFFERED: dict[str, list[str]] = {
+    "gyro_unit": [unit for unit in ("rad/s", "deg/s", "mdeg/s", "deg/h") if unit in GYRO_UNITS],
+    "accel_unit": [unit for unit in ("m/s2", "g", "mg", "-g", "-m/s2") if unit in ACCEL_UNITS],
+    "time_unit": list(TIME_UNITS),
+}
+#: Usual orientations of a sensor: where its x, y and z point.
+ORIENTATIONS = {
+    "forward-right-down": "x forward, y right, z down",
+    "forward-left-up": "x forward, y left, z up",
+    "right-forward-up": "x right, y forward, z up (a phone flat on the dashboard)",
+    "right-up-back": "x right, y up, z back (a phone upright in a holder)",
+    "back-right-up": "x back, y right, z up",
+    "left-back-up": "x left, y back, z up",
+}
+#: Codes of findings about axes that a log does not state.
+AXES_OPEN = (
+    "io.axes-not-stated",
+    "io.axes-not-stated-z-up",
+    "io.axes-not-stated-y-up",
+    "io.axes-not-stated-other-up",
+    "io.axes-upside-down",
+)
+
+
+def question_of(
+    finding: Finding, answers: Mapping[str, str], file: str, columns: Mapping[str, str]
+) -> dict[str, Any]:
+    """Return an open question of a log.
+
+    Parameters
+    ----------
+    answers : mapping
+        Of all questions of the log, as inferred (`LogDiagnosis.answers`).
+    columns : mapping
+        Stated already; an answer about one column keeps the others.
+    """
+    triad = (finding.quantity or "").partition("_")[0]
+    named = {q: a for q, a in answers.items() if q not in PLAIN and not q.endswith("_unit")}
+    if f"{triad}_unit" in answers and finding.code not in COLUMNS_OPEN:
+        key = f"{triad}_unit"
+        choices = list(_units(key, answers[key], finding))
+        return _question(finding, file, key, choices, "text")
+    if "repair" in answers and not (triad in named or finding.quantity in named):
+        choices = [_choice("Leave out what cannot be used, and report it", {"repair": True})]
+        return _question(finding, file, "repair", choices, None)
+    if "rate" in answers and finding.code == "io.time-column-missing":
+        return _question(finding, file, "rate_hz", [], "number", unit="Hz")
+    own = {q: a for q, a in named.items() if q.partition("_")[0] == triad} or named
+    choices = [_choice(_listed(own), {"columns": {**columns, **own}})] if own else []
+    for name in finding.data.get("names", ()):
+        label = {str(finding.quantity): str(name)}
+        if finding.quantity and name not in own.values() and len(own) == 1:
+            choices.append(_choice(_listed(label), {"columns": {**columns, **label}}))
+    return _question(finding, file, "columns", choices, None)
+
+
+#: Answers that are keys of their own.
+PLAIN = ("repair", "rate")
+#: Questions about which column is meant.
+COLUMNS_OPEN = ("io.columns-ambiguous", "io.letter-g-open")
+
+
+def axes_question(finding: Finding, file: str) -> dict[str, Any] | None:
+    """Return the question how the sensor is mounted; None if the finding is about another thing."""
+    if finding.code not in AXES_OPEN:
+        return None
+    choices = [_choice(text, {"axes": axes}) for axes, text in ORIENTATIONS.items()]
+    return {**_question(finding, file, "axes", choices, "text"), "optional": True}
+
+
+def open_question(asked: Asked, key: str, unit: str, count: int) -> dict[str, Any]:
+    """Return the question for a value of a proposed configuration that only a person knows.
+
+    `count`: numbers that it has, where it is a list.
+    """
+    return {
+        "code": "config.open-value",
+        "text": asked.what,
+        "key": key,
+        "line": asked.line,
+        "choices": [],
+        "free": "number" if unit else "text",
+        "unit": unit,
+        "count": count,
+    }
+
+
+def _units(key: str, inferred: str, finding: Finding) -> Iterator[dict[str, Any]]:
+    shares: Any = finding.data.get("choices", ())
+    said = [str(f.data["value"]) for f in shares if isinstance(f, Finding) and "value" in f.data]
+    likely = [] if inferred in PLACEHOLDERS else [inferred]
+    usual = OFFERED.get(key, [])
+    for unit in dict.fromkeys(likely + said + usual):
+        if unit != "None":
+            yield {**_choice(unit, {key: unit}), **({"likely": True} if unit in likely else {})}
+
+
+def _choice(label: str, values: Mapping[str, Any]) -> dict[str, Any]:
+    return {"label": label, "set": dict(values)}
+
+
+def _listed(columns: Mapping[str, str]) -> str:
+    return ", ".join(f"{quantity}: {name}" for quantity, name in columns.items())
+
+
+def _question(
+    finding: Finding,
+    file: str,
+    key: str,
+    choices: list[dict[str, Any]],
+    free: str | None,
+    unit: str | None = None,
+) -> dict[str, Any]:
+    return {
+        "code": finding.code,
+        "text": finding.sentence("file"),
+        "remedy": finding.advice("file"),
+        "file": file,
+        "key": key,
+        "choices": choices,
+        "free": free,
+        "unit": unit,
+    }

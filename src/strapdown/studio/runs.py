@@ -1,0 +1,470 @@
+"""Results in the studio: what a sealed folder holds, as numbers, series, track and downloads.
+
+A result may come from anyone: its manifest and its files are data, which are read in the process
+for reading and checked before they are shown. Only files that the manifest lists, and those that
+stand beside the seal, are given away.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import shlex
+import shutil
+import tempfile
+import zipfile
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from datetime import datetime
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from strapdown import rotation
+from strapdown.bundle import MANIFEST, SIGNATURE_FILE, UNSEALED, read_manifest, sha256
+from strapdown.errors import ConfigError, DataError, StrapdownError, check_choice
+from strapdown.studio.folder import Folder
+from strapdown.studio.look import kept_stream
+from strapdown.studio.pyramid import LIST
+from strapdown.tables.checks import index_of
+
+__all__ = ["compare", "export", "file_of_run", "run", "run_stream", "summary", "track"]
+
+#: Tables of a result with its values over time, the first that it has; and that of the standard
+#: deviations, whose stamps may be others.
+TABLES, SD = ("trajectory.csv", "attitude.csv", "error_growth.csv", "allan.csv"), "sd.csv"
+#: JSON of each command, with the answer.
+ANSWERS = {"navigate": "navigation.json"}
+#: Largest file that is read as JSON or as a table, bytes; findings and fixes that are listed.
+LARGEST, MOST = 256 << 20, 500
+#: Bytes of the JSON of which the list of results shows the verdict.
+SMALL = 2 << 20
+#: Units by the ending of a column, the longest first.
+ENDINGS = {
+    "_m_per_s2": "m/s²",
+    "_deg_per_s": "deg/s",
+    "_m_per_s": "m/s",
+    "_m_s": "m/s",
+    "_deg": "deg",
+    "_m": "m",
+    "_s": "s",
+}
+#: Downloads that are kept until the next ones.
+KEPT = 4
+EXPORTS = ("zip", "pdf", "gpx", "toml")
+
+
+# --- what is read by the server -----------------------------------------------------------
+
+
+def summary(folder: Path, name: str) -> dict[str, Any]:
+    """Return what the list of results shows of one: command, title, digest, instant, verdict."""
+    place = folder / name
+    manifest = read_manifest(place)
+    about = (place / MANIFEST).stat()
+    return {
+        "name": name,
+        "command": str(manifest["command"])[:40],
+        "title": _title(manifest, name),
+        "made": about.st_mtime,
+        "digest": sha256(place / MANIFEST),
+        "verdict": _verdict(place, manifest),
+    }
+
+
+def _title(manifest: Mapping[str, Any], name: str) -> str:
+    """Title that the configuration states, or the name of the folder."""
+    configuration = manifest.get("configuration")
+    for table in configuration.values() if isinstance(configuration, dict) else ():
+        title = table.get("title") if isinstance(table, dict) else None
+        if isinstance(title, str) and title.strip():
+            return title[:200]
+    return name
+
+
+def _verdict(place: Path, manifest: Mapping[str, Any]) -> str | None:
+    """The verdict of a navigation or of an attitude, where its JSON is not large."""
+    found = _answer(place, manifest, SMALL)
+    said = [_word(found.get(key), "verdict") for key in ("trust", "answer")]
+    return next((one[:40] for one in said if one is not None), None)
+
+
+def file_of_run(folder: Path, name: str, path: str) -> Path:
+    """Return a file of a result that its manifest lists, or that stands beside the seal.
+
+    ConfigError: there is none, or the path leads elsewhere.
+    """
+    place = Folder(folder).file(name)
+    return file_in(place, path, read_manifest(place))
+
+
+def file_in(place: Path, path: str, manifest: Mapping[str, Any]) -> Path:
+    """Return a file of a result: ConfigError if it is none."""
+    listed = {str(one["name"]) for one in manifest["outputs"]}
+    listed |= {str(one["name"]) for one in manifest["inputs"] if one.get("kept") == "copy"}
+    own = path in UNSEALED or path == MANIFEST or SIGNATURE_FILE.fullmatch(path) is not None
+    missing = ConfigError("studio.no-such-file", file=path[:80])
+    if path not in listed and not own:
+        raise missing
+    # A manifest is data: what it lists must be in the folder, too.
+    try:
+        found = (place / path).resolve(strict=True)
+    except (OSError, ValueError, RuntimeError):
+        raise missing from None
+    if not found.is_relative_to(place.resolve()) or not found.is_file():
+        raise missing
+    return found
+
+
+# --- one result ---------------------------------------------------------------------------
+
+
+def run(folder: Path, name: str) -> dict[str, Any]:
+    """Return the numbers, options, inputs and findings of a result."""
+    place, manifest = _opened(folder, name)
+    answer = _answer(place, manifest)
+    span: dict[str, Any] = {"from_s": None, "to_s": None}
+    with suppress(StrapdownError):
+        listed = json.loads((Path(run_stream(folder, name)) / LIST).read_text(encoding="utf-8"))
+        span = {key: listed[key] for key in span}
+    has = {str(one["name"]) for one in manifest["outputs"]}
+    return {
+        **summary(folder, name),
+        **span,
+        "answer": _word(answer, "answer") or _word(answer, "headline"),
+        "numbers": _numbers(place),
+        "options": manifest["configuration"],
+        "inputs": [
+            {key: one.get(key) for key in ("role", "name", "kept", "sha256", "bytes")}
+            for one in manifest["inputs"]
+        ],
+        "findings": [_finding(one) for one in _list(answer, "findings")[:MOST]],
+        "versions": manifest["versions"],
+        "command_line": _repeating(manifest, name),
+        "report": f"runs/{name}/report.html" if "report.html" in has else None,
+        "has": {
+            "track": "trajectory.csv" in has and manifest["command"] == "navigate",
+            "attitude": bool({"trajectory.csv", "attitude.csv"} & has),
+            "series": bool(set(TABLES) & has),
+            "pdf": "report.pdf" in has,
+            "toml": _configuration(manifest) is not None,
+        },
+    }
+
+
+def _opened(folder: Path, name: str) -> tuple[Path, dict[str, Any]]:
+    place = Folder(folder).file(name)
+    return place, read_manifest(place)
+
+
+def _answer(place: Path, manifest: Mapping[str, Any], most: int | None = None) -> dict[str, Any]:
+    """Return the JSON of a result; empty if it has none, or of more bytes than so many."""
+    command = str(manifest["command"])
+    with suppress(ConfigError, OSError, ValueError, RecursionError):
+        path = file_in(place, ANSWERS.get(command, f"{command}.json"), manifest)
+        if path.stat().st_size <= (most or LARGEST):
+            found = json.loads(path.read_text(encoding="utf-8"))
+            return found if isinstance(found, dict) else {}
+    return {}
+
+
+def _numbers(place: Path) -> list[dict[str, Any]]:
+    """Return the numbers of a result with their 95 % bounds: those that `compare` compares."""
+    try:
+        folders = import_module("strapdown.report.compare_folders")
+        numbers = import_module("strapdown.report.compare_numbers")
+    except ImportError:
+        return []
+    found = []
+    for part in folders.open_run(place, place.name).parts:
+        for one in numbers.values_of(part):
+            found.append(
+                {
+                    "group": one.group,
+                    "label": one.label,
+                    "value": _finite(one.value),
+                    "unit": one.unit,
+                    # A bound of a latitude or a longitude is along the ground.
+                    "bound_unit": "m" if one.kind in ("lat", "lon") else one.unit,
+                    "below": _finite(one.below),
+                    "above": _finite(one.above),
+                }
+            )
+    return found[:MOST]
+
+
+def _finite(value: Any) -> Any:
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def _finding(one: Any) -> dict[str, Any]:
+    """Return a finding of a result as the front end shows findings."""
+    return {
+        "code": _word(one, "code"),
+        "severity": _word(one, "severity") or "note",
+        "file": _word(one, "file"),
+        "quantity": _word(one, "quantity"),
+        "text": _word(one, "sentence") or "",
+        "remedy": _word(one, "remedy"),
+    }
+
+
+def _list(node: Any, key: str) -> list[Any]:
+    found = node.get(key) if isinstance(node, dict) else None
+    return found if isinstance(found, list) else []
+
+
+def _word(node: Any, key: str) -> str | None:
+    found = node.get(key) if isinstance(node, dict) else None
+    return found if isinstance(found, str) else None
+
+
+def _configuration(manifest: Mapping[str, Any]) -> str | None:
+    """Return the configuration file in a result; None if it was made with options."""
+    for one in manifest["inputs"]:
+        if one.get("role") in ("configuration", "case") and one.get("kept") == "copy":
+            return str(one["name"])
+    return None
+
+
+def _repeating(manifest: Mapping[str, Any], name: str) -> str:
+    """Return the command that repeats a result."""
+    file = _configuration(manifest)
+    command = str(manifest["command"])
+    if file is None or command not in ("navigate", "align", "crash"):
+        return shlex.join(("strapdown", "verify", name))
+    return shlex.join(("strapdown", command, f"{name}/{file}", "--out", f"{name}-again"))
+
+
+# --- series and track ---------------------------------------------------------------------
+
+
+def run_stream(folder: Path, name: str) -> str:
+    """Return the folder of the kept series of a result."""
+    place, manifest = _opened(folder, name)
+    key = sha256(place / MANIFEST)[:40]
+    return kept_stream(folder, key, "run", lambda: _table(place, manifest), column_unit)
+
+
+def column_unit(name: str) -> str:
+    """Return the unit in the name of a column; empty if it names none."""
+    return next((unit for ending, unit in ENDINGS.items() if name.endswith(ending)), "")
+
+
+def _table(place: Path, manifest: Mapping[str, Any]) -> pd.DataFrame:
+    """Return the values of a result over time, with their standard deviations."""
+    for name in TABLES:
+        with suppress(ConfigError):
+            table = _read(file_in(place, name, manifest))
+            break
+    else:
+        raise ConfigError("studio.no-series")
+    with suppress(ConfigError):
+        sd = _read(file_in(place, SD, manifest))
+        # At the nearest stamp: the filter has them at its own steps.
+        at = np.searchsorted(index_of(sd), index_of(table)).clip(1, len(sd) - 1)
+        time, stamps = index_of(sd), index_of(table)
+        at = np.where(stamps - time[at - 1] < time[at] - stamps, at - 1, at)
+        for column in sd.columns:
+            table[column] = sd[column].to_numpy()[at]
+    return table
+
+
+def _read(path: Path) -> pd.DataFrame:
+    """Read a table of a result: numbers by time. DataError: it is none."""
+    if path.stat().st_size > LARGEST:
+        raise DataError("studio.table-too-large", file=path.name, most=LARGEST / 2**20)
+    try:
+        table = pd.read_csv(path, comment="#")
+        time = table.pop(next(c for c in table.columns if str(c).startswith("time")))
+        stamps = pd.to_numeric(time, errors="coerce").to_numpy(dtype=np.float64)
+        numbers = table.apply(pd.to_numeric, errors="coerce")
+    except (ValueError, StopIteration, TypeError) as error:
+        reason = type(error).__name__
+        raise DataError("studio.table-not-read", file=path.name, reason=reason) from None
+    kept = np.flatnonzero(np.isfinite(stamps))
+    if kept.size < 2:
+        raise DataError("studio.table-not-read", file=path.name, reason="no rows")
+    kept = kept[np.argsort(stamps[kept], kind="stable")]
+    values = numbers.to_numpy(dtype=np.float64)[kept]
+    return pd.DataFrame(values, pd.Index(stamps[kept], name="time"), list(numbers.columns))
+
+
+def track(folder: Path, name: str, points: int) -> dict[str, Any]:
+    """Return places and attitudes along a navigation, at most so many, the ends among them."""
+    place, manifest = _opened(folder, name)
+    table = _read(file_in(place, "trajectory.csv", manifest))
+    if not {"lat_deg", "lon_deg", "alt_m"} <= set(table.columns):
+        raise ConfigError("studio.no-track", file=name)
+    some = _thinned(table, ["lat_deg", "lon_deg", "alt_m"], points)
+    euler = ["roll_deg", "pitch_deg", "heading_deg"]
+    quaternions = None
+    if set(euler) <= set(table.columns):
+        angles = some[euler].to_numpy(dtype=np.float64)
+        if np.isfinite(angles).all():
+            quaternions = rotation.quaternion_from_euler(angles).tolist()
+    return {
+        "t": index_of(some).tolist(),
+        "lat": some["lat_deg"].tolist(),
+        "lon": some["lon_deg"].tolist(),
+        "alt": some["alt_m"].tolist(),
+        "q": quaternions,
+        "fixes": _fixes(place, manifest, points),
+        "reference": _reference(place, manifest, points),
+    }
+
+
+def _fixes(place: Path, manifest: Mapping[str, Any], points: int) -> dict[str, Any] | None:
+    """Return the fixes that the run used, if it has a copy of them."""
+    from strapdown.config.logs import FixesTable
+    from strapdown.config.spec import specify
+    from strapdown.formats.gnss_files import read_gnss
+
+    aids = manifest["configuration"].get("navigation", {}).get("aiding", {})
+    for aid in aids.values() if isinstance(aids, dict) else ():
+        if not isinstance(aid, dict) or aid.get("kind") != "gnss" or not aid.get("path"):
+            continue
+        with suppress(StrapdownError, OSError):
+            path = file_in(place, str(aid["path"]), manifest)
+            keys = {key: aid[key] for key in FixesTable.model_fields if key in aid}
+            options = specify(FixesTable, **{**keys, "path": str(path)}).options()
+            return _places(read_gnss(path, options), points)
+    return None
+
+
+def _reference(place: Path, manifest: Mapping[str, Any], points: int) -> dict[str, Any] | None:
+    """Return the reference trajectory of the run, if it has a copy of it."""
+    from strapdown.formats.trajectory_readers import read_trajectory
+
+    truth = manifest["configuration"].get("navigation", {}).get("truth")
+    if not isinstance(truth, dict) or not truth.get("path"):
+        return None
+    with suppress(StrapdownError, OSError):
+        path = file_in(place, str(truth["path"]), manifest)
+        return _places(read_trajectory(path), points)
+    return None
+
+
+def _thinned(table: pd.DataFrame, columns: list[str], points: int) -> pd.DataFrame:
+    """Return at most so many rows whose columns are finite, the first and the last among them."""
+    whole = np.flatnonzero(np.isfinite(table[columns].to_numpy(dtype=np.float64)).all(axis=1))
+    if not whole.size:
+        raise ConfigError("studio.no-track")
+    at = np.linspace(0, whole.size - 1, min(points, whole.size)).round().astype(int)
+    return table.take(whole[np.unique(at)])
+
+
+def _places(table: pd.DataFrame, points: int) -> dict[str, Any]:
+    some = _thinned(table, ["lat", "lon"], points)
+    return {
+        "t": index_of(some).tolist(),
+        "lat": some["lat"].tolist(),
+        "lon": some["lon"].tolist(),
+    }
+
+
+# --- downloads ----------------------------------------------------------------------------
+
+
+def export(
+    folder: Path, name: str, kind: str, epoch: str | None = None, geoid: float | None = None
+) -> dict[str, str]:
+    """Return a file to download: path and name.
+
+    Parameters
+    ----------
+    kind : {'zip', 'pdf', 'gpx', 'toml'}
+    epoch : str, optional
+        Instant of stamp zero, for a clock that is not related to UTC; of a GPX.
+    geoid : float, optional, m
+        Height of the geoid over the ellipsoid, of a GPX.
+    """
+    check_choice("studio.no-such-export", EXPORTS, quantity="as", word=kind)
+    place, manifest = _opened(folder, name)
+    if kind == "pdf":
+        try:
+            return {"path": str(file_in(place, "report.pdf", manifest)), "name": f"{name}.pdf"}
+        except ConfigError:
+            raise ConfigError("studio.no-pdf", name=name) from None
+    if kind == "toml":
+        own = _configuration(manifest)
+        written = Folder(folder).state / "configurations" / f"{name}.toml"
+        path = written if own is None else file_in(place, own, manifest)
+        if not path.is_file():
+            raise ConfigError("studio.no-configuration", name=name)
+        return {"path": str(path), "name": f"{name}.toml"}
+    exports = Folder(folder).state / "exports"
+    exports.mkdir(exist_ok=True)
+    for old in sorted(exports.iterdir(), key=lambda one: one.stat().st_mtime)[:-KEPT]:
+        shutil.rmtree(old, ignore_errors=True)
+    made = Path(tempfile.mkdtemp(dir=exports)) / f"{name}.{kind}"
+    if kind == "zip":
+        _zip(place, name, manifest, made)
+    else:
+        _gpx(place, made, epoch, geoid)
+    return {"path": str(made), "name": made.name}
+
+
+def _zip(place: Path, name: str, manifest: Mapping[str, Any], out: Path) -> None:
+    """Write the files of a result, and nothing else that lies in its folder."""
+    names = [MANIFEST, *UNSEALED]
+    names += [p.name for p in place.iterdir() if SIGNATURE_FILE.fullmatch(p.name)]
+    names += [str(one["name"]) for one in manifest["outputs"]]
+    names += [str(one["name"]) for one in manifest["inputs"] if one.get("kept") == "copy"]
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED, compresslevel=6) as archive:
+        for one in dict.fromkeys(names):
+            with suppress(ConfigError):
+                archive.write(file_in(place, one, manifest), f"{name}/{one}")
+
+
+def _gpx(place: Path, out: Path, epoch: str | None, geoid: float | None) -> None:
+    """Write the track of a result as ``strapdown convert`` does."""
+    from strapdown.api.writing import read_streams, write
+
+    instant = None
+    if epoch:
+        try:
+            instant = datetime.fromisoformat(epoch)
+        except ValueError:
+            raise ConfigError("studio.wrong-type", quantity="epoch", wanted="date") from None
+    found, _ = read_streams([place], {}, None, {}, ["reference"])
+    write(found, out, epoch=instant, geoid_undulation_m=geoid)
+
+
+# --- several results ----------------------------------------------------------------------
+
+
+def compare(folder: Path, runs: Sequence[str]) -> dict[str, Any]:
+    """Compare results: the JSON of ``strapdown compare``, and the address of its page."""
+    try:
+        api = import_module("strapdown.api.compare")
+        report = import_module("strapdown.report.compare")
+    except ImportError:
+        raise ConfigError("studio.no-comparison") from None
+    place = Folder(folder)
+    digests = [sha256(place.file(name) / MANIFEST) for name in runs]
+    found = api.compare_runs(*(place.file(name).name for name in runs))
+    key = re.sub(r"[^0-9a-f]", "", "".join(one[:12] for one in digests))[:120]
+    kept = place.state / "comparisons" / key
+    if not (kept / MANIFEST).is_file():
+        kept.parent.mkdir(exist_ok=True)
+        found.save(kept, force=True)
+        for old in sorted(kept.parent.iterdir(), key=lambda p: p.stat().st_mtime)[: -10 * KEPT]:
+            shutil.rmtree(old, ignore_errors=True)
+    command = shlex.join(("strapdown", "compare", *runs))
+    return {
+        **report.comparison_json(found),
+        "page": f"comparisons/{key}/report.html",
+        "command_line": command,
+    }
+
+
+def file_of_comparison(folder: Path, key: str, path: str) -> Path:
+    """Return a file of a comparison that was made; ConfigError: there is none."""
+    place = Folder(folder).state / "comparisons" / key
+    if re.fullmatch(r"[0-9a-f]{12,120}", key) is None or not (place / MANIFEST).is_file():
+        raise ConfigError("studio.no-such-file", file=path[:80])
+    return file_in(place, path, read_manifest(place))

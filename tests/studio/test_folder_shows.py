@@ -1,0 +1,128 @@
+"""What else the folder of a studio has: samples, a map, live runs; and its start from the shell."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import os
+import subprocess
+import sys
+
+import pytest
+from tests.map_files import mbtiles, pmtiles, png
+
+from strapdown.errors import ConfigError
+from strapdown.studio import app as studio_app
+from strapdown.studio import server
+from strapdown.studio.live_jobs import PROTOCOLS, live_command
+from strapdown.studio.samples import SAMPLES
+
+
+@pytest.mark.parametrize("name", sorted(SAMPLES))
+def test_a_sample_is_copied_and_can_be_looked_at(fresh, name):
+    listed = fresh.ask("GET", "api/state").json["samples"]
+    assert name in {one["name"] for one in listed}
+    made = fresh.ask("POST", f"api/samples/{name}")
+    assert made.status == 200
+    files = made.json["files"]
+    assert all((fresh.folder / file).is_file() for file in files)
+    assert fresh.ask("POST", f"api/samples/{name}").json == made.json
+    kind = "crash" if name == "crash" else "navigate"
+    chosen = [file for file in files if "reference" not in file]
+    proposed = fresh.ask("POST", "api/propose", {"kind": kind, "files": chosen})
+    assert proposed.status == 200 and f'"{chosen[0]}"' in proposed.json["toml"]
+    (fresh.folder / files[0]).write_text("mine", encoding="utf-8")
+    assert fresh.ask("POST", f"api/samples/{name}").code == "studio.name-taken"
+    assert (fresh.folder / files[0]).read_text(encoding="utf-8") == "mine"
+
+
+def test_a_sample_that_is_none(studio):
+    assert studio.ask("POST", "api/samples/nothing").code == "studio.no-such-sample"
+
+
+def test_tiles_of_a_map_in_the_folder(fresh):
+    assert fresh.ask("GET", "api/map").json["tiles"] is None
+    (fresh.folder / "broken.mbtiles").write_bytes(b"SQLite format 3\0" + b"x" * 5000)
+    assert fresh.ask("GET", "api/map").json["tiles"] is None
+    picture = png()
+    for write, file in ((mbtiles, "town.mbtiles"), (pmtiles, "a.pmtiles")):
+        write(fresh.folder / file, {(3, 4, 2): picture}, attribution="<b>those</b> who drew it")
+        told = fresh.ask("GET", "api/map").json
+        assert told["tiles"] == "tiles/{z}/{x}/{y}" and told["min"] <= told["max"] <= 24
+        assert told["attribution"] == "those who drew it"
+        found = fresh.ask("GET", "tiles/3/4/2")
+        assert (found.status, found.body) == (200, picture)
+        assert found.headers["content-type"] == "image/png"
+        for place in ("3/4/3", "3/8/2", "30/0/0", "0/0/0"):
+            assert fresh.ask("GET", f"tiles/{place}").status == 204
+
+
+def test_commands_of_live_runs():
+    words = live_command("walk", "sensor-logger", {"listen": "0.0.0.0:8437", "every": 0.5})
+    assert words == [
+        *("live", "--listen=0.0.0.0:8437", "--platform=auto", "--every=0.5"),
+        *("--lines=json", "--out", "walk"),
+    ]
+    for protocol, options, code in (
+        ("nothing", {}, "studio.unknown-protocol"),
+        ("udp", {"out": "/"}, "studio.unknown-key"),
+        ("udp", {"udp": "a\x1bb"}, "studio.wrong-type"),
+        ("udp", {"udp": 3}, "studio.wrong-type"),
+        ("udp", {"stop-after": "soon"}, "studio.wrong-type"),
+        ("phyphox", {}, "studio.wrong-type"),
+        ("sensor-logger", {"platform": "--force"}, "studio.unknown-choice"),
+    ):
+        with pytest.raises(ConfigError) as caught:
+            live_command("walk", protocol, options)
+        assert caught.value.finding.code == code, (protocol, options)
+    for name, one in PROTOCOLS.items():
+        own = {f.flag.removeprefix("--"): f.choices[0] if f.choices else "1" for f in one.fields}
+        made = live_command("walk", name, own)
+        assert all(word.startswith(("--", "live", "walk")) for word in made)
+
+
+def test_without_the_extra_it_says_what_to_install(tmp_path, monkeypatch):
+    there = importlib.util.find_spec
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name: None if name == "uvicorn" else there(name)
+    )
+    with pytest.raises(ConfigError) as caught:
+        server.serve(tmp_path)
+    assert caught.value.finding.code == "studio.library-missing"
+    assert "strapdown[studio]" in caught.value.finding.advice()
+
+
+@pytest.mark.parametrize(
+    ("words", "code"),
+    [
+        (["--host", "0.0.0.0"], "reached from other machines"),
+        (["--host", "192.0.2.1", "--listen"], "cannot be used"),
+        (["--map", "missing.pmtiles"], "the map cannot be used"),
+        (["nowhere/at/all"], "the folder cannot be used"),
+    ],
+)
+def test_a_start_that_cannot_be(tmp_path, words, code, run_cli, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "page").mkdir()
+    (tmp_path / "page" / "index.html").write_text("", encoding="utf-8")
+    monkeypatch.setattr(studio_app, "STATIC", tmp_path / "page")
+    done = run_cli("studio", "--no-browser", *words)
+    assert done.code == 4 and code in done.err
+
+
+def test_the_progress_of_any_command_is_told_to_a_file(tmp_path):
+    told = tmp_path / "progress"
+    command = [sys.executable, "-m", "strapdown", "attitude", "alexiev-fig4", "--rate", "20"]
+    command += ["--algorithms", "naive", "--no-report", "--quiet", "--out", tmp_path / "out"]
+    environment = {**os.environ, "STRAPDOWN_PROGRESS": str(told)}
+    assert subprocess.run(command, env=environment, check=False).returncode == 0
+    lines = [json.loads(line) for line in told.read_text(encoding="utf-8").splitlines()]
+    assert lines and all(0.0 <= line["share"] <= 1.0 and line["stage"] for line in lines)
+    told.unlink()
+    again = subprocess.run(command, env=environment, capture_output=True, check=False)
+    assert again.returncode == 4
+    (error,) = [json.loads(x)["error"] for x in told.read_text(encoding="utf-8").splitlines()]
+    assert error["code"] == "bundle.folder-exists" and error["remedy"]
+    # A file that cannot be written is nobody's matter.
+    environment["STRAPDOWN_PROGRESS"] = str(tmp_path / "no" / "folder")
+    assert subprocess.run([*command, "--force"], env=environment, check=False).returncode == 0

@@ -1,0 +1,243 @@
+"""Commands by the studio: their results are those of the command line, and nothing is lost."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from urllib.parse import quote
+
+import numpy as np
+import pytest
+
+from strapdown.bundle import MANIFEST, sha256
+
+
+def by_command_line(folder: Path, command: str) -> None:
+    """Run a command in a folder, as a person would."""
+    program, *words = shlex.split(command)
+    assert program == "strapdown"
+    done = subprocess.run(
+        [sys.executable, "-m", "strapdown", *words],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def same_by_both(studio, tmp_path, kind, name, toml, options=()):
+    """Run by the studio and by the command that it shows, elsewhere; return the result's folder."""
+    other = tmp_path / "elsewhere"
+    shutil.copytree(studio.folder, other, ignore=shutil.ignore_patterns(".*"))
+    asked = {"kind": kind, "name": name, "toml": toml, "options": list(options)}
+    made = studio.ask("POST", "api/jobs", asked)
+    assert made.status == 201, made.body
+    job = studio.finished(made.json)
+    assert job["state"] == "done" and job["run"] == name, job
+    if (studio.folder / f"{name}.toml").is_file():
+        shutil.copy(studio.folder / f"{name}.toml", other)
+    by_command_line(other, job["command"])
+    digest = sha256(studio.folder / name / MANIFEST)
+    assert digest == sha256(other / name / MANIFEST)
+    (listed,) = [r for r in studio.ask("GET", "api/state").json["runs"] if r["name"] == name]
+    assert listed["digest"] == digest and listed["command"] == kind
+    found = studio.ask("GET", f"api/runs/{quote(name)}").json
+    assert found["command_line"] == job["command"] and found["job"] == job["id"]
+    return studio.folder / name
+
+
+def turning_log(path: Path, seconds: float = 20.0) -> None:
+    time_s = np.arange(0.0, seconds, 0.02)
+    rate = 20.0 * np.sin(time_s) * (time_s > 5.0)
+    rows = np.column_stack([time_s, 0 * rate, 0 * rate, rate, 0 * rate, 0 * rate, 0 * rate - 9.8])
+    head = "time_s,gyro_x_deg_s,gyro_y_deg_s,gyro_z_deg_s,accel_x_m_s2,accel_y_m_s2,accel_z_m_s2"
+    np.savetxt(path, rows, "%.9g", ",", header=head, comments="")
+
+
+def test_an_attitude_is_that_of_the_command(fresh, tmp_path):
+    turning_log(fresh.folder / "log.csv")
+    look = fresh.ask("POST", "api/look", {"files": ["log.csv"], "log": {}})
+    assert look.status == 200 and look.json["streams"][0]["rows"] == 1000
+    assert look.json["rests"][0][0] == pytest.approx(0.0, abs=0.2)
+    series = fresh.ask("GET", "api/series?file=log.csv&columns=gyro_z&width=50").json
+    assert max(series["columns"]["gyro_z"]["high"]) == pytest.approx(np.radians(20.0), rel=1e-3)
+    proposed = fresh.ask("POST", "api/propose", {"kind": "attitude", "files": ["log.csv"]}).json
+    text = proposed["toml"] + 'algorithms = ["quaternion"]\nrates_hz = [25.0]\n'
+    result = same_by_both(fresh, tmp_path, "attitude", "turns 1", text, ["--no-report"])
+    told = json.loads((result / "attitude.json").read_text(encoding="utf-8"))
+    assert [a["algorithm"] for a in told["algorithms"]] == ["quaternion"]
+    kept = fresh.ask("GET", "api/runs/turns%201/export?as=toml")
+    assert kept.body.decode() == text
+    values = fresh.ask("GET", "api/runs/turns%201/series?width=10").json
+    assert values["columns"]["quaternion heading_deg"]["unit"] == "deg"
+    again = {"kind": "attitude", "name": "turns 1", "toml": text, "options": []}
+    assert fresh.ask("POST", "api/jobs", again).code == "studio.run-exists"
+
+
+def test_a_session_of_a_live_run_is_a_log(fresh):
+    session = fresh.folder / "walk" / "phone-1"
+    session.mkdir(parents=True)
+    (fresh.folder / "walk" / "other").mkdir()
+    turning_log(session / "journal.csv", 4.0)
+    (session / "journal").write_bytes(b"x")
+    (session / "run.json").write_text("{}", encoding="utf-8")
+    (session / "link").symlink_to(fresh.folder.parent)
+    (fresh.folder / "plain").mkdir()
+    names = [one["name"] for one in fresh.ask("GET", "api/state").json["files"]]
+    assert names == ["plain", "walk/phone-1"]
+    for name in ("walk/phone-1/journal.csv", "walk/../plain", "walk//phone-1", "walk/", "/walk"):
+        found = fresh.ask("POST", "api/look", {"files": [name], "log": {}})
+        assert found.status in (400, 404) and found.code.startswith("studio.")
+    # A log that is no journal, under such a name: what is read is the file itself.
+    turning_log(fresh.folder / "walk" / "other" / "log.csv")
+    look = fresh.ask("POST", "api/look", {"files": ["walk/other"], "log": {}})
+    assert look.status == 422 and look.code.startswith("io.")
+
+
+DRIVE = Path("docs/examples/navigate_drive.toml")
+
+
+def short_drive() -> str:
+    text = DRIVE.read_text(encoding="utf-8")
+    for long, short in (("duration_s = 40.0", "duration_s = 12.0"), ("80.0, 110.0", "52.0, 60.0")):
+        assert long in text
+        text = text.replace(long, short)
+    return text
+
+
+@pytest.mark.slow
+def test_a_navigation_is_that_of_the_command(fresh, tmp_path):
+    result = same_by_both(fresh, tmp_path, "navigate", "drive", short_drive())
+    track = fresh.ask("GET", "api/runs/drive/track?points=50").json
+    assert len(track["lat"]) == 50 and len(track["q"][0]) == 4
+    assert fresh.ask("GET", "api/runs/drive").json["verdict"] in (
+        "trusted",
+        "reserve",
+        "distrusted",
+    )
+    gpx = fresh.ask(
+        "GET", "api/runs/drive/export?as=gpx&epoch=2026-05-01T12:00:00%2B00:00&geoid=46"
+    )
+    assert gpx.status == 200 and gpx.body.count(b"<trkpt") > 100
+    assert fresh.ask("GET", "api/runs/drive/export?as=zip").body[:2] == b"PK"
+    page = fresh.ask("GET", "runs/drive/report.html").body
+    assert page == (result / "report.html").read_bytes()
+
+
+@pytest.mark.slow
+def test_a_crash_is_that_of_the_command_and_the_quick_answer_is_its_own(fresh, tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-m", "strapdown", "simulate", "pole", "--out", tmp_path / "pole"],
+        capture_output=True,
+        check=False,
+    )
+    assert done.returncode == 0
+    for path in (tmp_path / "pole").glob("*.csv"):
+        assert fresh.put(path.name, path.read_bytes()).status == 201
+    text = (tmp_path / "pole" / "case.toml").read_text(encoding="utf-8")
+    quick = fresh.ask("POST", "api/crash/quick", {"toml": text, "set": {}}).json
+    text = text.replace("monte_carlo_runs = 2000", "monte_carlo_runs = 0")
+    assert "monte_carlo_runs = 0" in text
+    result = same_by_both(fresh, tmp_path, "crash", "pole", text)
+    told = json.loads((result / "crash.json").read_text(encoding="utf-8"))
+    (own,) = [a for a in told["answers"] if a["recorder"] == quick["recorder"]]
+    size = own["events"][0]["body"]["event"]["resultant_m_per_s"]
+    # By all recorders together, each has a part of the others' ringing in its bound.
+    assert quick["delta_v"]["value"] == pytest.approx(size["value"], rel=1e-9)
+    assert quick["pdof"]["clock"] == 12 and len(quick["path"]["north"]) == len(
+        quick["path"]["bound"]
+    )
+    end = own["path"]["end"]["north_m"]
+    assert quick["path"]["north"][-1] == pytest.approx(end["value"], rel=1e-9)
+    # The half axis of an ellipse in the plane is longer than the bound along one axis.
+    assert quick["path"]["bound"][-1] > end["high"] - end["value"]
+    faster = {"toml": text, "set": {"entry.speed_m_per_s": 9.0}}
+    moved = fresh.ask("POST", "api/crash/quick", faster).json
+    assert moved["path"]["north"][-1] > quick["path"]["north"][-1] + 1.0
+
+
+@pytest.mark.slow
+def test_a_server_that_is_killed_loses_no_job(fresh):
+    made = fresh.ask(
+        "POST", "api/jobs", {"kind": "navigate", "name": "drive", "toml": short_drive()}
+    ).json
+    fresh.until(made)
+    fresh.kill()
+    time.sleep(0.5)
+    fresh.start()
+    assert fresh.left == 1
+    seen = fresh.ask("GET", f"api/jobs/{made['id']}").json
+    assert seen["state"] in ("running", "done") and seen["command"] == made["command"]
+    done = fresh.finished(seen)
+    assert done["state"] == "done" and (fresh.folder / "drive" / MANIFEST).is_file()
+
+
+@pytest.mark.slow
+def test_a_server_that_is_ended_in_order_says_what_goes_on(fresh):
+    made = fresh.ask(
+        "POST", "api/jobs", {"kind": "navigate", "name": "drive", "toml": short_drive()}
+    ).json
+    fresh.until(made)
+    assert fresh.interrupt() == 0
+    fresh.process.stdout.close()
+    fresh.start()
+    assert fresh.finished(fresh.ask("GET", f"api/jobs/{made['id']}").json)["state"] == "done"
+
+
+@pytest.mark.slow
+def test_a_run_that_is_cancelled_or_killed_leaves_no_result(fresh):
+    asked = {"kind": "navigate", "name": "drive", "toml": short_drive()}
+    made = fresh.until(fresh.ask("POST", "api/jobs", asked).json)
+    assert fresh.ask("DELETE", f"api/jobs/{made['id']}").status == 200
+    assert fresh.finished(made)["state"] == "cancelled"
+    assert not (fresh.folder / "drive").exists()
+    # The same name again: its configuration was the studio's own.
+    again = {**asked, "toml": asked["toml"] + "# changed\n"}
+    made = fresh.until(fresh.ask("POST", "api/jobs", again).json)
+    said = json.loads(
+        (fresh.folder / ".strapdown-studio" / "jobs" / f"{made['id']}.json").read_text("utf-8")
+    )
+    os.killpg(said["process"], signal.SIGKILL)
+    lost = fresh.finished(made)
+    assert lost["state"] == "lost" and lost["error"]["code"] == "studio.job-lost"
+    assert not (fresh.folder / "drive").exists()
+    left = [p.name for p in fresh.folder.iterdir() if p.name.startswith(".")]
+    assert fresh.ask("GET", "api/state").json["runs"] == [], left
+
+
+def test_a_configuration_of_the_users_is_not_written_over(fresh):
+    (fresh.folder / "drive.toml").write_text("# mine\n", encoding="utf-8")
+    asked = {"kind": "navigate", "name": "drive", "toml": short_drive()}
+    assert fresh.ask("POST", "api/jobs", asked).code == "studio.file-exists"
+    assert (fresh.folder / "drive.toml").read_text(encoding="utf-8") == "# mine\n"
+    (fresh.folder / "other").mkdir()
+    asked["name"] = "other"
+    assert fresh.ask("POST", "api/jobs", asked).code == "studio.run-exists"
+
+
+def test_a_wrong_configuration_begins_no_job(fresh):
+    asked = {"kind": "navigate", "name": "drive", "toml": "[log]\npath = 3\n"}
+    assert fresh.ask("POST", "api/jobs", asked).status == 400
+    asked = {"kind": "nothing", "name": "drive", "toml": ""}
+    assert fresh.ask("POST", "api/jobs", asked).code == "studio.unknown-kind"
+    assert fresh.ask("GET", "api/state").json["jobs"] == []
+
+
+def test_one_studio_in_a_folder(fresh):
+    done = subprocess.run(
+        [sys.executable, "-m", "strapdown", "studio", fresh.folder, "--no-browser"],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        env={**os.environ, "STRAPDOWN_STUDIO_STATIC": str(fresh.folder.parent / "page")},
+    )
+    assert done.returncode == 4 and "a studio runs in this folder" in done.stderr
