@@ -1,0 +1,63 @@
+// Build the front end into src/strapdown/studio/static: no names of this machine, no dates, the
+// same bytes for the same sources and versions. `--out FOLDER` builds elsewhere, to compare.
+
+import { createHash } from "node:crypto";
+import { copyFileSync, mkdirSync, readdirSync, readFileSync, rmSync, writeFileSync } from "node:fs";
+import { dirname, join } from "node:path";
+import { fileURLToPath } from "node:url";
+import { build } from "esbuild";
+
+const here = dirname(fileURLToPath(import.meta.url));
+const given = process.argv.indexOf("--out");
+const out = given > 0 ? process.argv[given + 1] : join(here, "../src/strapdown/studio/static");
+
+const sources = [...readdirSync(join(here, "src")).map((name) => `src/${name}`), "build.mjs", "package.json", "package-lock.json", "tsconfig.json"].sort();
+const digest = createHash("sha256");
+for (const name of sources) {
+  digest.update(name + "\n");
+  digest.update(readFileSync(join(here, name)));
+  digest.update("\n");
+}
+
+rmSync(out, { recursive: true, force: true });
+mkdirSync(out, { recursive: true });
+await build({
+  absWorkingDir: here,
+  entryPoints: { app: "src/main.tsx", map: "src/map.ts", "map-worker": "node_modules/maplibre-gl/dist/maplibre-gl-worker.mjs" },
+  outdir: out, bundle: true, minify: true, format: "esm", target: "es2022", charset: "utf8", legalComments: "none",
+  logLevel: "warning",
+});
+for (const name of ["index.html", "icon.svg"]) copyFileSync(join(here, "src", name), join(out, name));
+
+// Two packages state their license in their sources alone.
+const PLAIN = {
+  "qrcode-generator": mit("Copyright (c) 2009 Kazuhiko Arase, http://www.d-project.com/"),
+  "murmurhash-js": mit("Copyright (c) 2011 Gary Court"),
+};
+
+const bundled = ["preact", "uplot", "qrcode-generator", "maplibre-gl", ...insideMap()];
+writeFileSync(join(out, "LICENSES.txt"), bundled.map(licenseOf).join(`\n${"-".repeat(78)}\n\n`));
+writeFileSync(join(out, "build.json"), JSON.stringify({ sources: digest.digest("hex"), files: sources }, null, 1) + "\n");
+
+/** What MapLibre brings with it: its own dependencies, in the file that it publishes. */
+function insideMap() {
+  const listed = JSON.parse(readFileSync(join(here, "node_modules/maplibre-gl/package.json"), "utf8")).dependencies ?? {};
+  return Object.keys(listed).filter((name) => !name.startsWith("@types/")).sort();
+}
+
+function licenseOf(name) {
+  const folder = join(here, "node_modules", name);
+  const about = JSON.parse(readFileSync(join(folder, "package.json"), "utf8"));
+  const file = readdirSync(folder).find((one) => /^licen[cs]e/i.test(one));
+  const text = file ? readFileSync(join(folder, file), "utf8") : PLAIN[name] ?? missing(name);
+  return `${name} ${about.version} (${typeof about.license === "string" ? about.license : JSON.stringify(about.license)})\n\n${text.trim()}\n`;
+}
+
+function mit(copyright) {
+  const text = readFileSync(join(here, "node_modules/preact/LICENSE"), "utf8");
+  return text.replace(/^Copyright.*$/m, copyright);
+}
+
+function missing(name) {
+  throw new Error(`${name} has no license file: write its text into build.mjs`);
+}

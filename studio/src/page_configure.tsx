@@ -1,0 +1,285 @@
+// Set up: the configuration as a form and as TOML side by side, kept in step by the server; open
+// questions first; for a crash, what follows from it while its parameters move.
+
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import { aborted, api, problemOf } from "./api";
+import { CrashPreview } from "./crash";
+import { number, plural } from "./format";
+import { putJob, setWork, useShared, type Point, type Work } from "./store";
+import type { Checked, Fault, Field, Finding, Problem, Question, Section } from "./types";
+import { Ask, Busy, Control, Copy, Empty, Findings, More, Page, Part, Trouble, useRequest } from "./ui";
+import { Vehicle } from "./vehicle";
+
+/** What a proposal depends on: another one is offered when it changes. */
+const basis = (work: Work) => JSON.stringify([work.kind, work.files, work.log, work.axes, work.trim, work.places]);
+
+export function ConfigurePage() {
+  const { work, state } = useShared();
+  const kinds = useRequest(() => api.kinds(), []);
+  const kind = kinds.value?.find((one) => one.kind === work.kind);
+  const [proposing, setProposing] = useState(false);
+  const [problem, setProblem] = useState<Problem | null>(null);
+  const [found, setFound] = useState<{ questions: Question[]; findings: Finding[] }>({ questions: [], findings: [] });
+
+  const propose = async () => {
+    if (!work.kind) return;
+    setProposing(true);
+    setProblem(null);
+    try {
+      const made = await api.propose({
+        kind: work.kind, files: work.files, log: { ...work.log, ...(work.axes ? { axes: work.axes } : {}) },
+        ...(work.trim ? { from_s: work.trim[0], to_s: work.trim[1] } : {}), answers: {},
+      });
+      let toml = made.toml;
+      if (work.places) toml = await withPlaces(work.kind, toml, work.places);
+      setFound({ questions: made.questions, findings: made.findings });
+      setWork({ toml, proposedFor: basis(work), name: work.name || freeName(work, state?.runs.map((r) => r.name) ?? []) });
+    } catch (error) {
+      setProblem(problemOf(error));
+    }
+    setProposing(false);
+  };
+  useEffect(() => { if (work.kind && work.files.length && !work.toml) void propose(); }, [work.kind]);
+
+  if (!work.kind || !work.files.length) {
+    return <Page title="Nothing to set up yet"><Empty><a href={work.files.length ? "#/choose" : "#/files"}>{work.files.length ? "Choose what to find out" : "Choose a file"}</a> first.</Empty></Page>;
+  }
+  return <Page title={kind?.title ?? "Set up"} lead="This was proposed from your log. Answer what is open, correct what is wrong, and run it.">
+    {proposing && <Busy>Proposing a configuration from the log…</Busy>}
+    <Trouble problem={problem} retry={() => void propose()} />
+    <Trouble problem={kinds.problem} retry={kinds.again} />
+    {work.toml && work.proposedFor !== basis(work) && !proposing && <div class="notice warn" role="status">
+      <p>How the log is read, or the part to use, was changed after this configuration was proposed.</p>
+      <p class="row"><button type="button" onClick={() => void propose()}>Propose it anew</button> <span class="soft">What you wrote here is replaced.</span></p>
+    </div>}
+    {work.toml && !proposing && <Editor schema={kind?.schema ?? []} proposed={found} />}
+  </Page>;
+}
+
+async function withPlaces(kind: string, toml: string, places: NonNullable<Work["places"]>): Promise<string> {
+  const { values } = await api.check({ kind, toml });
+  const set: Record<string, unknown> = {};
+  const round = (point: number[]) => point.map((v) => Math.round(v * 1000) / 1000);
+  for (const key of Object.keys(values)) {
+    if (/^aiding\.[^.]+\.kind$/.test(key) && values[key] === "gnss") {
+      set[key.replace(/kind$/, "lever_arm_m")] = round(places.antenna.map((v, i) => v - places.sensor[i]!));
+    }
+    if (key === "units.0.position_m") set[key] = round(places.sensor);
+  }
+  return Object.keys(set).length ? (await api.check({ kind, toml, set })).toml : toml;
+}
+
+function freeName(work: Work, taken: string[]): string {
+  const base = `${(work.files[0] ?? "run").replace(/\.[^.]*$/, "").replace(/[^A-Za-z0-9_-]+/g, "_").slice(0, 40)}-${work.kind}`;
+  let name = base;
+  for (let i = 2; taken.includes(name); i++) name = `${base}-${i}`;
+  return name;
+}
+
+function Editor({ schema, proposed }: { schema: Section[]; proposed: { questions: Question[]; findings: Finding[] } }) {
+  const { work, state } = useShared();
+  const [checked, setChecked] = useState<Checked | null>(null);
+  const [checking, setChecking] = useState(true);
+  const [problem, setProblem] = useState<Problem | null>(null);
+  const [starting, setStarting] = useState(false);
+  const [force, setForce] = useState("");
+  const serial = useRef(0);
+  const kind = work.kind!;
+
+  const check = async (toml: string, set?: Record<string, unknown>) => {
+    const own = ++serial.current;
+    setChecking(true);
+    try {
+      const answer = await api.check({ kind, toml, ...(set ? { set } : {}) });
+      // An answer to what was written since replaced is old.
+      if (own !== serial.current) return;
+      setChecked(answer);
+      setProblem(null);
+      if (set) setWork({ toml: answer.toml });
+    } catch (error) {
+      if (own === serial.current && !aborted(error)) setProblem(problemOf(error));
+    }
+    if (own === serial.current) setChecking(false);
+  };
+  useEffect(() => {
+    if (checked?.toml === work.toml) return;
+    const timer = setTimeout(() => void check(work.toml), checked ? 350 : 0);
+    return () => clearTimeout(timer);
+  }, [work.toml]);
+  const set = (change: Record<string, unknown>) => void check(work.toml, change);
+
+  const run = async () => {
+    setStarting(true);
+    setProblem(null);
+    try {
+      const job = await api.begin({ kind, name: work.name, toml: work.toml, options: force === work.name ? ["--force"] : [] });
+      putJob(job);
+      location.hash = `#/job/${encodeURIComponent(job.id)}`;
+    } catch (error) {
+      setProblem(problemOf(error));
+    }
+    setStarting(false);
+  };
+  const values = checked?.values ?? {};
+  const errors = checked?.errors ?? [];
+  const questions = checked?.questions ?? proposed.questions.filter((q) => q.key && isOpen(values[q.key]));
+  const taken = state?.runs.some((one) => one.name === work.name) ?? false;
+  const reason = errors.length ? `${plural(errors.length, "error")} to correct first` : questions.length ? `${plural(questions.length, "question")} to answer first` : !work.name.trim() ? "The result needs a name" : "";
+  return <>
+    <Questions questions={questions} schema={schema} values={values} onAnswer={set} />
+    {proposed.findings.length > 0 && <More title={`What was noticed while proposing it (${proposed.findings.length})`}><Findings findings={proposed.findings} /></More>}
+    <Trouble problem={problem} />
+    <div class="sidebyside">
+      <section aria-label="The configuration as a form" class="formside">
+        <h2>As a form</h2>
+        <Form schema={schema} values={values} errors={errors} onSet={set} />
+      </section>
+      <section aria-label="The configuration as text" class="textside">
+        <div class="parthead"><h2>As text</h2><span class="soft" role="status">{checking ? "checking…" : errors.length ? plural(errors.length, "error") : "in step with the form"}</span><Copy text={work.toml} /></div>
+        <TomlText toml={work.toml} errors={errors} onChange={(toml) => setWork({ toml })} />
+      </section>
+    </div>
+    <Positions values={values} onSet={set} />
+    {kind === "crash" && <CrashPreview toml={work.toml} ready={!checking && errors.length === 0 && questions.length === 0} onKeep={set} />}
+    <div class="next startrun">
+      <label class="inline">Name of the result <input type="text" value={work.name} onInput={(e) => setWork({ name: e.currentTarget.value })} aria-describedby="taken" /></label>
+      {taken && <label class="inline" id="taken"><input type="checkbox" checked={force === work.name} onChange={(e) => setForce(e.currentTarget.checked ? work.name : "")} /> Overwrite the result of this name</label>}
+      <button type="button" class="main" disabled={starting || reason !== "" || (taken && force !== work.name)} aria-describedby="reason" onClick={() => void run()}>Run it</button>
+      <span id="reason" class="soft">{reason}</span>
+    </div>
+  </>;
+}
+
+const isOpen = (value: unknown) => value === "?" || (Array.isArray(value) && value.includes("?"));
+
+function Questions({ questions, schema, values, onAnswer }: { questions: Question[]; schema: Section[]; values: Record<string, unknown>; onAnswer: (set: Record<string, unknown>) => void }) {
+  if (!questions.length) return null;
+  const kindOf = (key: string | null) => key === null ? undefined : schema.flatMap((s) => s.fields).find((f) => pattern(f.key).test(key))?.type;
+  return <Part title={`${plural(questions.length, "question")} only you can answer`}>
+    {questions.map((q) => <Ask key={q.code + (q.key ?? "") + q.text} question={q} list={kindOf(q.key) === "list" || Array.isArray(q.key ? values[q.key] : null)} onAnswer={onAnswer} />)}
+  </Part>;
+}
+
+const escape = (text: string) => text.replace(/[.+?^${}()|[\]\\]/g, "\\$&");
+const pattern = (key: string) => new RegExp(`^${escape(key).replaceAll("*", "([^.]+)")}$`);
+
+interface Shown { title: string; help: string | null; set: Field[]; others: Field[] }
+
+/** The sections of the form, one for each table that the configuration has. */
+export function sectionsOf(schema: Section[], values: Record<string, unknown>): Shown[] {
+  const keys = Object.keys(values);
+  const seen = new Set<string>();
+  const shown: Shown[] = [];
+  for (const section of schema) {
+    const stars = Math.max(0, ...section.fields.map((f) => (f.key.match(/\*/g) ?? []).length));
+    const instances = stars === 0 ? [[]] : instancesOf(section, keys, stars);
+    for (const names of instances) {
+      const fill = (text: string) => names.reduce((rest, name) => rest.replace("*", name), text);
+      const fields = section.fields.map((f) => ({ ...f, key: fill(f.key) })).filter((f) => !f.key.includes("*"));
+      fields.forEach((f) => seen.add(f.key));
+      const label = names.map((name) => /^\d+$/.test(name) ? String(Number(name) + 1) : name).join(", ");
+      shown.push({
+        title: [section.title ?? section.key ?? "Settings", label].filter(Boolean).join(" "), help: section.help ?? null,
+        set: fields.filter((f) => f.key in values), others: fields.filter((f) => !(f.key in values)),
+      });
+    }
+  }
+  const rest = keys.filter((key) => !seen.has(key));
+  if (rest.length) {
+    shown.push({ title: "Others", help: null, others: [], set: rest.map((key) => ({ key, label: key, unit: null, type: typeof values[key] === "number" ? "number" : typeof values[key] === "boolean" ? "flag" : Array.isArray(values[key]) ? "list" : "text" })) });
+  }
+  return shown.filter((s) => s.set.length || s.others.length);
+}
+
+function instancesOf(section: Section, keys: string[], stars: number): string[][] {
+  const found = new Map<string, string[]>();
+  for (const field of section.fields) {
+    if ((field.key.match(/\*/g) ?? []).length !== stars) continue;
+    const matching = pattern(field.key);
+    for (const key of keys) {
+      const match = matching.exec(key);
+      if (match) found.set(match.slice(1).join("\n"), match.slice(1));
+    }
+  }
+  return [...found.values()];
+}
+
+function Form({ schema, values, errors, onSet }: { schema: Section[]; values: Record<string, unknown>; errors: Fault[]; onSet: (set: Record<string, unknown>) => void }) {
+  const [wanted, setWanted] = useState("");
+  const shown = useMemo(() => sectionsOf(schema, values), [schema, values]);
+  const fits = (f: Field) => !wanted || `${f.key} ${f.label} ${f.help ?? ""}`.toLowerCase().includes(wanted.toLowerCase());
+  const fault = (key: string) => errors.find((e) => e.key === key || (e.key !== null && e.key.startsWith(`${key}.`)))?.text;
+  const control = (f: Field) => <Control key={f.key} field={f} value={values[f.key]} fault={fault(f.key)} onChange={(value) => onSet({ [f.key]: value })} />;
+  return <>
+    <input type="search" class="wide" aria-label="Find a setting" placeholder="Find a setting" value={wanted} onInput={(e) => setWanted(e.currentTarget.value)} />
+    {shown.map((section) => {
+      const set = section.set.filter(fits), others = section.others.filter(fits);
+      if (!set.length && !(wanted ? others.length : section.others.length)) return null;
+      const wrong = section.set.some((f) => fault(f.key) || isOpen(values[f.key]));
+      return <More key={section.title} open={wanted !== "" || wrong} title={<>{section.title} <span class="soft">{set.length ? `${set.length} set` : "as by default"}</span></>}>
+        {section.help && <p class="help">{section.help}</p>}
+        <div class="fields">{set.map(control)}</div>
+        {others.length > 0 && (wanted ? <div class="fields">{others.map(control)}</div>
+          : <More title={plural(others.length, "setting that is not set", "settings that are not set")}><div class="fields">{others.map(control)}</div></More>)}
+      </More>;
+    })}
+    {!shown.length && <Empty>The form appears as soon as the text can be read.</Empty>}
+  </>;
+}
+
+function TomlText({ toml, errors, onChange }: { toml: string; errors: Fault[]; onChange: (toml: string) => void }) {
+  const area = useRef<HTMLTextAreaElement>(null);
+  const gutter = useRef<HTMLDivElement>(null);
+  const lines = useMemo(() => toml.split("\n"), [toml]);
+  const wrong = new Set(errors.map((e) => e.line));
+  const show = (line: number) => {
+    const own = area.current;
+    if (!own) return;
+    const from = lines.slice(0, line - 1).reduce((sum, text) => sum + text.length + 1, 0);
+    own.focus();
+    own.setSelectionRange(from, from + (lines[line - 1]?.length ?? 0));
+    own.scrollTop = Math.max(0, (line - 6) * 20);
+  };
+  return <div class="toml">
+    <div class="tomlbox">
+      <div class="gutter" ref={gutter} aria-hidden="true">{lines.map((_, i) => <span class={wrong.has(i + 1) ? "wrong" : ""} key={i}>{i + 1}</span>)}</div>
+      <textarea ref={area} aria-label="The configuration in TOML" spellcheck={false} autocomplete="off" autocapitalize="off" wrap="off" value={toml} aria-invalid={errors.length > 0} aria-describedby="tomlerrors"
+        onInput={(e) => onChange(e.currentTarget.value)} onScroll={(e) => { if (gutter.current) gutter.current.scrollTop = e.currentTarget.scrollTop; }} />
+    </div>
+    <ul class="findings" id="tomlerrors" aria-live="polite">
+      {errors.map((e) => <li class="bad" key={`${e.line} ${e.key} ${e.text}`}>
+        {e.line ? <button type="button" onClick={() => show(e.line!)}>Line {e.line}</button> : <span class="tag">Error</span>}
+        <p>{e.key && <code>{e.key}</code>} {e.text}</p>
+      </li>)}
+    </ul>
+  </div>;
+}
+
+const PLACE = /(^|\.)(position_m|lever_arm_m|antenna_m)$/;
+
+/** Every position of the configuration, on a drawing of the vehicle. */
+function Positions({ values, onSet }: { values: Record<string, unknown>; onSet: (set: Record<string, unknown>) => void }) {
+  const dots = Object.entries(values).filter(([key, value]) => PLACE.test(key) && Array.isArray(value) && value.length === 3 && !key.startsWith("site"))
+    .map(([key, value]) => ({ key, label: placeName(key, values), value: (value as unknown[]).every((v) => typeof v === "number") ? value as Point : null }));
+  const [moved, setMoved] = useState<{ key: string; value: Point } | null>(null);
+  useEffect(() => {
+    if (!moved) return;
+    // A drag is written when the hand rests.
+    const timer = setTimeout(() => { onSet({ [moved.key]: moved.value }); setMoved(null); }, 400);
+    return () => clearTimeout(timer);
+  }, [moved]);
+  if (!dots.length) return null;
+  const size = (key: string) => typeof values[key] === "number" ? values[key] as number : undefined;
+  return <Part title="Positions on the vehicle">
+    <p class="soft">{dots.map((d) => `${d.label}: ${d.value ? d.value.map((v) => number(v, 3)).join(", ") + " m" : "not yet stated"}`).join(" · ")}</p>
+    <Vehicle dots={dots.map((d) => d.key === moved?.key ? { ...d, value: moved.value } : d)} length={size("vehicle.length_m")} width={size("vehicle.width_m")}
+      onMove={(key, value) => setMoved({ key, value })} />
+  </Part>;
+}
+
+function placeName(key: string, values: Record<string, unknown>): string {
+  const parent = key.replace(/\.[^.]+$/, "");
+  if (key.endsWith("antenna_m") || values[`${parent}.kind`] === "gnss") return "Antenna";
+  const name = values[`${parent}.name`];
+  return typeof name === "string" && name ? name : parent.replace(/\.\d+/g, (n) => ` ${Number(n.slice(1)) + 1}`).replace(/^aiding\./, "");
+}

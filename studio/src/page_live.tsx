@@ -1,0 +1,148 @@
+// Live: listen to a phone or a sensor, show its address as a code to scan, and draw attitude and
+// position as they come. Every byte is kept; the session becomes a log like any other.
+
+import { useMemo, useState } from "preact/hooks";
+import qrcode from "qrcode-generator";
+import { api, problemOf } from "./api";
+import { Attitude, fromEuler, type Quaternion } from "./attitude";
+import { number, stamp } from "./format";
+import { Plan, type Line } from "./plan";
+import { putJob, useShared } from "./store";
+import type { Job, Problem } from "./types";
+import { Busy, Command, Control, Copy, Empty, More, Page, Part, Table, Trouble, useRequest } from "./ui";
+import { STATES } from "./page_run";
+
+export function LivePage({ id }: { id: string }) {
+  const { state } = useShared();
+  const jobs = state?.jobs.filter((job) => job.kind === "live") ?? [];
+  const job = jobs.find((one) => one.id === id) ?? jobs.find((one) => one.state === "running" || one.state === "waiting");
+  return <Page title="Live" lead="A phone or a sensor sends, this computer listens and keeps every byte. Attitude and position appear as they come.">
+    {job && <Session job={job} key={job.id} />}
+    {(!job || (job.state !== "running" && job.state !== "waiting")) && <Begin />}
+    {jobs.filter((one) => one !== job).length > 0 && <Part title="Earlier sessions">
+      <ul class="list">{jobs.filter((one) => one !== job).map((one) => <li class="item" key={one.id}><a class="name" href={`#/live/${encodeURIComponent(one.id)}`}>{one.name}</a><span class="soft">{STATES[one.state]}</span></li>)}</ul>
+    </Part>}
+  </Page>;
+}
+
+function Begin() {
+  const { state } = useShared();
+  const info = useRequest(() => api.live(), []);
+  const [protocol, setProtocol] = useState("");
+  const [name, setName] = useState("live-1");
+  const [options, setOptions] = useState<Record<string, unknown>>({});
+  const [problem, setProblem] = useState<Problem | null>(null);
+  const chosen = info.value?.protocols.find((one) => one.name === protocol) ?? info.value?.protocols[0];
+  const taken = state?.runs.some((run) => run.name === name) || state?.files.some((file) => file.name === name) || state?.jobs.some((job) => job.name === name && (job.state === "running" || job.state === "waiting"));
+  const begin = async () => {
+    if (!chosen) return;
+    setProblem(null);
+    try {
+      const job = await api.begin({ kind: "live", name, protocol: chosen.name, options });
+      putJob(job);
+      location.hash = `#/live/${encodeURIComponent(job.id)}`;
+    } catch (error) {
+      setProblem(problemOf(error));
+    }
+  };
+  return <Part title="Start listening">
+    {info.busy && <Busy>One moment…</Busy>}
+    <Trouble problem={info.problem} retry={info.again} />
+    <Trouble problem={problem} />
+    {info.value && !info.value.protocols.length && <Empty>This installation has nothing that can listen.</Empty>}
+    {chosen && <>
+      <fieldset class="list"><legend>What sends</legend>
+        {info.value!.protocols.map((one) => <label class="item" key={one.name}>
+          <input type="radio" name="protocol" checked={one === chosen} onChange={() => { setProtocol(one.name); setOptions({}); }} />
+          <span class="name">{one.title}</span><span class="soft">{one.help}</span></label>)}
+      </fieldset>
+      <div class="fields">{chosen.fields.map((field) => <Control key={`${chosen.name}.${field.key}`} field={field} value={options[field.key]}
+        onChange={(value) => { const rest = { ...options }; if (value === null) delete rest[field.key]; else rest[field.key] = value; setOptions(rest); }} />)}</div>
+      {info.value!.warning && <p class="notice warn">{info.value!.warning}</p>}
+      <div class="next startrun">
+        <label class="inline">Name of the session <input type="text" value={name} onInput={(e) => setName(e.currentTarget.value)} /></label>
+        <button type="button" class="main" disabled={!name.trim() || taken} onClick={() => void begin()}>Listen</button>
+        {taken && <span class="soft">There is one of this name.</span>}
+      </div>
+    </>}
+  </Part>;
+}
+
+const num = (line: Record<string, unknown>, ...keys: string[]): number | null => {
+  for (const key of keys) if (typeof line[key] === "number") return line[key] as number;
+  return null;
+};
+
+function attitudeOf(line: Record<string, unknown>): Quaternion | null {
+  if (Array.isArray(line["q"]) && line["q"].length === 4) return line["q"] as Quaternion;
+  const [roll, pitch, heading] = [num(line, "roll"), num(line, "pitch"), num(line, "heading")];
+  return roll === null || pitch === null ? null : fromEuler(roll, pitch, heading ?? 0);
+}
+
+function Session({ job }: { job: Job }) {
+  const { lines: all } = useShared();
+  const [problem, setProblem] = useState<Problem | null>(null);
+  const lines = all[job.id] ?? [];
+  const last = lines[lines.length - 1];
+  const going = job.state === "running" || job.state === "waiting";
+  const track = useMemo<Line | null>(() => {
+    const seen = lines.filter((line) => num(line, "lat") !== null && num(line, "lon") !== null);
+    return seen.length ? { t: seen.map((line) => num(line, "time") ?? 0), lat: seen.map((line) => num(line, "lat")!), lon: seen.map((line) => num(line, "lon")!) } : null;
+  }, [lines]);
+  const end = async () => {
+    try {
+      putJob(await api.cancel(job.id));
+    } catch (error) {
+      setProblem(problemOf(error));
+    }
+  };
+  return <Part title={job.name} aside={<span class="soft" role="status">{going ? job.live ? last ? "Receiving" : "Waiting for the first sample" : "Starting" : STATES[job.state]}</span>}>
+    <Trouble problem={problem} />
+    {job.state === "failed" && <Trouble problem={job.error} />}
+    {going && job.live && <div class="pairing">
+      {job.live.qr && <Qr text={job.live.qr} />}
+      <div>
+        <p>Let the phone send to this address, or scan the code:</p>
+        <div class="command"><code tabIndex={0}>{job.live.address}</code><Copy text={job.live.address} /></div>
+        {job.live.token && <p>Word to pair with: <code>{job.live.token}</code></p>}
+        {job.live.warning && <p class="notice warn">{job.live.warning}</p>}
+      </div>
+    </div>}
+    {last && <LiveState last={last} track={track} />}
+    <div class="row">
+      {going && <button type="button" onClick={() => void end()}>Stop listening</button>}
+      {!going && job.run && <a class="button main" href={`#/result/${encodeURIComponent(job.run)}`}>See the result</a>}
+    </div>
+    <More title="What it prints"><pre class="tail" tabIndex={0}>{job.tail.join("\n") || "Nothing yet."}</pre></More>
+    <More title="The same from a terminal"><Command text={job.command} /></More>
+  </Part>;
+}
+
+function LiveState({ last, track }: { last: Record<string, unknown>; track: Line | null }) {
+  const time = num(last, "time");
+  const rows = Object.entries(last).filter(([key, value]) => typeof value === "number" && key !== "time");
+  return <>
+    <div class="motion">
+      <Attitude q={attitudeOf(last)} at={time === null ? undefined : `${stamp(time, 10)} s:`} />
+      {track && <Plan track={track} fixes={null} cursor={time} onCursor={() => undefined} />}
+    </div>
+    {rows.length > 0 && <More title="Numbers"><Table head={["", "Value"]} numeric={[1]} rows={rows.map(([key, value]) => [`${key}${UNITS[key] ? `, ${UNITS[key]}` : ""}`, number(value as number, 7)])} /></More>}
+  </>;
+}
+
+const UNITS: Record<string, string> = { lat: "deg", lon: "deg", alt: "m", VN: "m/s", VE: "m/s", VD: "m/s", roll: "deg", pitch: "deg", heading: "deg" };
+
+function Qr({ text }: { text: string }) {
+  const path = useMemo(() => {
+    const code = qrcode(0, "M");
+    code.addData(text);
+    code.make();
+    const size = code.getModuleCount();
+    let d = "";
+    for (let row = 0; row < size; row++) for (let col = 0; col < size; col++) if (code.isDark(row, col)) d += `M${col} ${row}h1v1h-1z`;
+    return { d, size };
+  }, [text]);
+  // Dark on light in the dark, too: cameras expect it, with four modules of margin.
+  return <svg class="qr" viewBox={`-4 -4 ${path.size + 8} ${path.size + 8}`} role="img" aria-label={`Code to scan with the address ${text}`} shape-rendering="crispEdges">
+    <rect x={-4} y={-4} width={path.size + 8} height={path.size + 8} fill="#fff" /><path d={path.d} fill="#000" /></svg>;
+}

@@ -1,0 +1,105 @@
+// The result: key numbers with their bounds, what was noticed, plan and series under one cursor,
+// the attitude, the sealed report, exports, and the command that repeats it.
+
+import { useEffect, useMemo, useState } from "preact/hooks";
+import { api, part } from "./api";
+import { Attitude } from "./attitude";
+import { date, shown, stamp } from "./format";
+import { indexOf, Plan } from "./plan";
+import { Traces } from "./traces";
+import type { RunDetail, Span, Track } from "./types";
+import { Busy, Command, Empty, Findings, More, Page, Part, Trouble, useRequest } from "./ui";
+
+export function ResultPage({ name }: { name: string }) {
+  const run = useRequest(() => api.run(name), [name]);
+  if (!name) return <Page title="No result chosen"><Empty><a href="#/files">Choose one</a> of the folder.</Empty></Page>;
+  const found = run.value;
+  return <Page title={found?.title || name} lead={found?.verdict ?? undefined}>
+    {run.busy && <Busy>Opening the result…</Busy>}
+    <Trouble problem={run.problem} retry={run.again} />
+    {found && <Result run={found} />}
+  </Page>;
+}
+
+function Result({ run }: { run: RunDetail }) {
+  const [cursor, setCursor] = useState<number | null>(null);
+  const track = useRequest(run.has.track || run.has.attitude ? () => api.track(run.name) : null, [run.name]);
+  const exports: [string, string, boolean][] = [
+    ["zip", "The whole result (.zip)", true], ["pdf", "Report (.pdf)", Boolean(run.has.pdf)], ["gpx", "Track (.gpx)", Boolean(run.has.track)], ["toml", "Configuration (.toml)", true],
+  ];
+  return <>
+    {run.numbers.length > 0 && <dl class="keys">
+      {run.numbers.map((one) => <div key={one.label}><dt>{one.label}</dt>
+        <dd class="value">{shown(one.value)} <small>{one.bound !== undefined && one.bound !== null ? `± ${shown(one.bound)} ` : ""}{one.unit ?? ""}</small></dd></div>)}
+    </dl>}
+    <div class="row exports" role="group" aria-label="Take it with you">
+      {exports.filter(([, , has]) => has).map(([as, words]) => <a class="button" key={as} href={api.exportOf(run.name, as)} download>{words}</a>)}
+      <a class="button" href={`#/compare?run=${part(run.name)}`}>Compare with another</a>
+    </div>
+    {run.findings.length > 0 && <Part title="What was noticed"><Findings findings={run.findings} /></Part>}
+    <Trouble problem={track.problem} retry={track.again} />
+    {track.busy && <Busy>Reading the track…</Busy>}
+    {track.value && <Motion run={run} track={track.value} cursor={cursor} onCursor={setCursor} />}
+    {!track.value && run.panels && run.panels.length > 0 && <Series run={run} whole={[run.from_s ?? 0, run.to_s ?? 1]} cursor={cursor} onCursor={setCursor} />}
+    {run.report && <Part title="The report" aside={<a href={run.report} target="_blank" rel="noopener noreferrer">Open in a tab of its own</a>}>
+      <iframe class="report" src={run.report} title="The report" sandbox="allow-scripts" referrerpolicy="no-referrer" loading="lazy" />
+    </Part>}
+    <Part title="Repeat it">
+      <p>This command gives the same result to the last bit:</p>
+      <Command text={run.command} />
+      <p class="soft">Made {date(run.made)}. Seal <code class="digest">{run.digest}</code></p>
+      <More title="Options and inputs"><pre tabIndex={0}>{JSON.stringify({ options: run.options, inputs: run.inputs }, null, 2)}</pre></More>
+    </Part>
+  </>;
+}
+
+function Motion({ run, track, cursor, onCursor }: { run: RunDetail; track: Track; cursor: number | null; onCursor: (t: number | null) => void }) {
+  const [playing, setPlaying] = useState(false);
+  const last = track.t[track.t.length - 1] ?? 0;
+  const whole = useMemo<Span>(() => [run.from_s ?? track.t[0] ?? 0, run.to_s ?? last], [run, track]);
+  const at = cursor ?? whole[0];
+  useEffect(() => {
+    if (!playing) return;
+    // The whole record in half a minute, or in its own time if it is shorter.
+    const speed = Math.max(1, (whole[1] - whole[0]) / 30);
+    let t = at >= whole[1] ? whole[0] : at, before = performance.now(), frame = 0;
+    const draw = (now: number) => {
+      t += ((now - before) / 1000) * speed;
+      before = now;
+      if (t >= whole[1]) { onCursor(whole[1]); setPlaying(false); return; }
+      onCursor(t);
+      frame = requestAnimationFrame(draw);
+    };
+    frame = requestAnimationFrame(draw);
+    return () => cancelAnimationFrame(frame);
+  }, [playing]);
+  const i = track.t.length ? indexOf(track.t, at) : -1;
+  const q = i >= 0 ? track.q?.[i] ?? null : null;
+  const hasPlace = track.lat.some(Number.isFinite);
+  return <Part title="The motion">
+    <div class="row scrub">
+      <button type="button" onClick={() => setPlaying(!playing)}>{playing ? "Pause" : "Play"}</button>
+      <input type="range" class="wide" aria-label="Instant" min={whole[0]} max={whole[1]} step={(whole[1] - whole[0]) / 1000 || 1} value={at} aria-valuetext={`${stamp(at, 10)} s`} onInput={(e) => { setPlaying(false); onCursor(e.currentTarget.valueAsNumber); }} />
+      <output>{stamp(at, 10)} s</output>
+    </div>
+    <div class="motion">
+      {hasPlace && <Plan track={track} fixes={track.fixes} reference={track.reference} cursor={at} onCursor={onCursor} />}
+      {track.q && <Attitude q={q} at={`${stamp(at, 10)} s:`} />}
+    </div>
+    <Series run={run} whole={whole} cursor={cursor} onCursor={onCursor} />
+  </Part>;
+}
+
+function Series({ run, whole, cursor, onCursor }: { run: RunDetail; whole: Span; cursor: number | null; onCursor: (t: number | null) => void }) {
+  const all = run.panels ?? [];
+  const [chosen, setChosen] = useState<string[]>(all.slice(0, 3).map((p) => p.title));
+  const panels = useMemo(() => all.filter((p) => chosen.includes(p.title)), [run, chosen]);
+  if (!all.length) return null;
+  return <>
+    <fieldset class="row pick"><legend>Show</legend>
+      {all.map((p) => <label class="inline" key={p.title}><input type="checkbox" checked={chosen.includes(p.title)} onChange={(e) => setChosen(e.currentTarget.checked ? [...chosen, p.title] : chosen.filter((t) => t !== p.title))} />{p.title}</label>)}
+    </fieldset>
+    {panels.length > 0 && <Traces panels={panels} whole={whole} askKey={run.name} cursor={cursor} onCursor={onCursor}
+      ask={(columns, view, width, signal) => api.runSeries(run.name, { columns, from: view[0], to: view[1], width }, signal)} />}
+  </>;
+}
