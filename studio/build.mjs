@@ -35,14 +35,13 @@ const PLAIN = {
   "murmurhash-js": mit("Copyright (c) 2011 Gary Court"),
 };
 
-const bundled = ["preact", "uplot", "qrcode-generator", "maplibre-gl", ...insideMap()];
-writeFileSync(join(out, "LICENSES.txt"), bundled.map(licenseOf).join(`\n${"-".repeat(78)}\n\n`));
+writeFileSync(join(out, "LICENSES.txt"), shipped().map(licenseOf).join(`\n${"-".repeat(78)}\n\n`));
 writeFileSync(join(out, "build.json"), JSON.stringify({ sources: digest.digest("hex"), files: sources }, null, 1) + "\n");
 
-/** What MapLibre brings with it: its own dependencies, in the file that it publishes. */
-function insideMap() {
-  const listed = JSON.parse(readFileSync(join(here, "node_modules/maplibre-gl/package.json"), "utf8")).dependencies ?? {};
-  return Object.keys(listed).filter((name) => !name.startsWith("@types/")).sort();
+/** All that is installed but for the tools and for types: MapLibre brings its own in its file. */
+function shipped() {
+  const { packages } = JSON.parse(readFileSync(join(here, "package-lock.json"), "utf8"));
+  return Object.keys(packages).filter((path) => path && !packages[path].dev).map((path) => path.replace("node_modules/", "")).filter((name) => !name.startsWith("@types/")).sort();
 }
 
 function licenseOf(name) {

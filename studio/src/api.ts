@@ -2,7 +2,7 @@
 // page stays there, and no request leaves this machine.
 
 import type {
-  Checked, CrashQuick, Job, Kind, LiveInfo, Look, MapInfo, Problem, Proposal, RunDetail, Sample, Series,
+  Checked, Comparison, CrashQuick, Job, Kind, LiveInfo, Look, MapInfo, Problem, Proposal, RunDetail, Sample, Series,
   State, StoredFile, Track,
 } from "./types";
 
@@ -72,19 +72,19 @@ export interface SeriesRequest { columns: string[]; from?: number; to?: number; 
 export const api = {
   state: () => get<State>("api/state"),
   look: (reading: Reading, signal?: AbortSignal) => post<Look>("api/look", reading, signal),
-  kinds: () => get<Kind[]>("api/kinds"),
+  kinds: async () => (await get<Kind[]>("api/kinds")).map(withDottedNames),
   propose: (body: { kind: string; files: string[]; log: Record<string, unknown>; from_s?: number; to_s?: number; answers: Record<string, unknown> }) =>
     post<Proposal>("api/propose", body),
-  check: (body: { kind: string; toml: string; set?: Record<string, unknown> }, signal?: AbortSignal) =>
+  check: (body: { kind: string; toml: string; name?: string; set?: Record<string, unknown> }, signal?: AbortSignal) =>
     post<Checked>("api/check", body, signal),
   begin: (body: Record<string, unknown>) => post<Job>("api/jobs", body),
   job: (id: string) => get<Job>(`api/jobs/${part(id)}`),
   cancel: (id: string) => send<Job>(`api/jobs/${part(id)}`, { method: "DELETE", headers: CHANGES }),
   run: (name: string) => get<RunDetail>(`api/runs/${part(name)}`),
   track: (name: string) => get<Track>(`api/runs/${part(name)}/track?points=2000`),
-  compare: (runs: string[]) => post<Record<string, unknown>>("api/compare", { runs }),
-  quick: (toml: string, set: Record<string, number>, signal?: AbortSignal) =>
-    post<CrashQuick>("api/crash/quick", { toml, set }, signal),
+  compare: (runs: string[]) => post<Comparison>("api/compare", { runs }),
+  quick: (toml: string, set: Record<string, unknown>, unit: number, signal?: AbortSignal) =>
+    post<CrashQuick>("api/crash/quick", { toml, set, ...(unit ? { unit } : {}) }, signal),
   map: () => get<MapInfo>("api/map"),
   live: () => get<LiveInfo>("api/live"),
   sample: (sample: Sample) => post<{ files: string[] }>(`api/samples/${part(sample.name)}`, {}),
@@ -125,6 +125,18 @@ export const api = {
     });
   },
 };
+
+const dotted = (path: string) => path.replaceAll("[]", ".*");
+
+/** Names of fields as those of values, `units.*.name`: the server writes `units[].name`. */
+function withDottedNames(kind: Kind): Kind {
+  return {
+    ...kind,
+    schema: kind.schema.map((section) => ({
+      ...section, key: dotted(section.key ?? ""), fields: section.fields.map((field) => ({ ...field, key: dotted(field.path ?? field.key) })),
+    })),
+  };
+}
 
 /** The reason and the remedy of anything that was thrown. */
 export function problemOf(error: unknown): Problem {

@@ -1,18 +1,17 @@
 // Compare: two or more results of the folder, and what differs between them.
 
-import type { ComponentChildren } from "preact";
 import { useState } from "preact/hooks";
 import { api, problemOf } from "./api";
-import { date, shown } from "./format";
+import { date, number, plural, shown } from "./format";
 import { useShared } from "./store";
-import type { Problem } from "./types";
-import { Busy, Empty, Findings, More, Page, Part, Table, Trouble } from "./ui";
+import type { Comparison, Problem } from "./types";
+import { Busy, Empty, Findings, Page, Part, Table, Trouble } from "./ui";
 
 export function ComparePage({ chosen: first }: { chosen: string[] }) {
   const { state } = useShared();
   const runs = state?.runs ?? [];
   const [chosen, setChosen] = useState<string[]>(first.filter((name) => runs.some((run) => run.name === name)));
-  const [found, setFound] = useState<Record<string, unknown> | null>(null);
+  const [found, setFound] = useState<Comparison | null>(null);
   const [problem, setProblem] = useState<Problem | null>(null);
   const [busy, setBusy] = useState(false);
   const compare = async () => {
@@ -42,42 +41,39 @@ export function ComparePage({ chosen: first }: { chosen: string[] }) {
   </Page>;
 }
 
-const PARTS: [string, string][] = [
-  ["numbers", "Numbers"], ["options", "Options"], ["inputs", "Inputs"], ["tracks", "Tracks"], ["findings", "Findings"], ["times", "Computing times"],
-];
-
-/** The parts of the comparison that people ask for, in order; the rest below. */
-function Found({ found }: { found: Record<string, unknown> }) {
-  const known = new Set([...PARTS.map(([key]) => key), "page", "runs"]);
-  const rest = Object.entries(found).filter(([key]) => !known.has(key));
+/** Values in a row, marked where they differ; the first run is what the others are held against. */
+function Found({ found }: { found: Comparison }) {
+  const names = found.runs.map((run) => run.name);
+  const [all, setAll] = useState(false);
+  const numbers = found.numbers.filter((row) => all || !row.same);
+  const findings = found.findings_of_runs.filter((one) => one.differs);
+  const inputs = found.inputs.filter((row) => !row.same);
+  const others = names.slice(1);
   return <>
-    {Array.isArray(found["runs"]) && <Part title="The results"><Anything value={found["runs"]} /></Part>}
-    {PARTS.filter(([key]) => key in found).map(([key, title]) => <Part title={title} key={key}>
-      <Anything value={found[key]} />
-    </Part>)}
-    {rest.length > 0 && <More title="More">{rest.map(([key, value]) => <div key={key}><h3>{words(key)}</h3><Anything value={value} /></div>)}</More>}
-    {typeof found["page"] === "string" && <Part title="The page"><iframe class="report" title="The comparison as a page" sandbox="allow-scripts" referrerpolicy="no-referrer" src={found["page"]} /></Part>}
+    <p class="lead" role="status">{found.summary}</p>
+    <Findings findings={found.findings} />
+    <Part title="Options">
+      {found.options.length ? <Table head={["Option", ...names]} rows={found.options.map((row) => [<code>{row.key}</code>, ...row.values.map(shown)])} /> : <Empty>No option differs.</Empty>}
+      <p class="soft">{plural(found.equal_options, "option is", "options are")} the same.</p>
+    </Part>
+    <Part title="Inputs">
+      {inputs.length ? <Table head={["Role", ...names]} rows={inputs.map((row) => [row.role, ...row.files.map((file, i) => file ? `${file.name} (${row.status[i] ?? ""})` : "none")])} /> : <Empty>All inputs are the same, to the byte.</Empty>}
+      {found.conditions.some((c) => new Set(c.values).size > 1) && <Table head={["Software", ...names]} rows={found.conditions.filter((c) => new Set(c.values).size > 1).map((c) => [c.name, ...c.values.map(shown)])} />}
+    </Part>
+    <Part title="Numbers" aside={<label class="inline"><input type="checkbox" checked={all} onChange={(e) => setAll(e.currentTarget.checked)} />Those that are the same, too</label>}>
+      {numbers.length ? <Table head={["Quantity", ...names, ...others.map((name) => `Difference of ${name}`), "Unit"]} numeric={[...names, ...others].map((_, i) => i + 1)}
+        rows={numbers.map((row) => [`${row.group}: ${row.quantity}`, ...row.values.map((value, i) => `${shown(value)}${bound(row.below_95[i], row.above_95[i])}`),
+          ...others.map((_, i) => row.differences[i + 1] === null || row.differences[i + 1] === undefined ? "–" : `${shown(row.differences[i + 1])}${row.within[i + 1] === false ? " (beyond both bounds)" : ""}`), row.unit ?? ""])} /> : <Empty>No number differs.</Empty>}
+    </Part>
+    {findings.length > 0 && <Part title="Findings that differ">
+      <Table head={["Finding", ...names.map((name) => `In ${name}`)]} numeric={names.map((_, i) => i + 1)} rows={findings.map((one) => [one.sentence, ...one.counts.map(String)])} />
+    </Part>}
+    {found.page && <Part title="The page" aside={<a href={found.page} target="_blank" rel="noopener noreferrer">Open in a tab of its own</a>}>
+      <iframe class="report" title="The comparison as a page" sandbox="allow-scripts" referrerpolicy="no-referrer" src={found.page} /></Part>}
   </>;
 }
 
-const words = (key: string) => (key.charAt(0).toUpperCase() + key.slice(1)).replaceAll("_", " ");
-
-/** A value of the comparison as a table where it is rows, as facts where it is an object. */
-function Anything({ value }: { value: unknown }): ComponentChildren {
-  if (Array.isArray(value)) {
-    if (!value.length) return <Empty>No difference.</Empty>;
-    if (value.every((one) => one && typeof one === "object" && "severity" in one && "code" in one)) return <Findings findings={value} />;
-    if (value.every((one) => one && typeof one === "object" && !Array.isArray(one))) {
-      const head = [...new Set(value.flatMap((one) => Object.keys(one as object)))];
-      return <Table head={head.map(words)} numeric={head.map((_, i) => i).filter((i) => value.every((one) => typeof (one as Record<string, unknown>)[head[i]!] === "number"))}
-        rows={value.map((one) => head.map((key) => shown((one as Record<string, unknown>)[key])))} />;
-    }
-    return <p>{shown(value)}</p>;
-  }
-  if (value && typeof value === "object") {
-    const entries = Object.entries(value);
-    if (!entries.length) return <Empty>No difference.</Empty>;
-    return <dl class="facts">{entries.map(([key, one]) => <><dt key={key}>{words(key)}</dt><dd>{one && typeof one === "object" && !(Array.isArray(one) && one.every((v) => typeof v !== "object")) ? <Anything value={one} /> : shown(one)}</dd></>)}</dl>;
-  }
-  return <p>{shown(value)}</p>;
+function bound(below: number | null | undefined, above: number | null | undefined): string {
+  if (below === null || below === undefined || above === null || above === undefined) return "";
+  return below === above ? ` ± ${number(below, 2)}` : ` −${number(below, 2)}/+${number(above, 2)}`;
 }

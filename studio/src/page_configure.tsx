@@ -6,8 +6,8 @@ import { aborted, api, problemOf } from "./api";
 import { CrashPreview } from "./crash";
 import { number, plural } from "./format";
 import { putJob, setWork, useShared, type Point, type Work } from "./store";
-import type { Checked, Fault, Field, Finding, Problem, Question, Section } from "./types";
-import { Ask, Busy, Control, Copy, Empty, Findings, More, Page, Part, Trouble, useRequest } from "./ui";
+import type { Checked, Fault, Field, Problem, Question, Section } from "./types";
+import { Ask, Busy, Control, Copy, Empty, Findings, More, Page, Part, sentence, Trouble, useRequest } from "./ui";
 import { Vehicle } from "./vehicle";
 
 /** What a proposal depends on: another one is offered when it changes. */
@@ -19,7 +19,6 @@ export function ConfigurePage() {
   const kind = kinds.value?.find((one) => one.kind === work.kind);
   const [proposing, setProposing] = useState(false);
   const [problem, setProblem] = useState<Problem | null>(null);
-  const [found, setFound] = useState<{ questions: Question[]; findings: Finding[] }>({ questions: [], findings: [] });
 
   const propose = async () => {
     if (!work.kind) return;
@@ -32,8 +31,8 @@ export function ConfigurePage() {
       });
       let toml = made.toml;
       if (work.places) toml = await withPlaces(work.kind, toml, work.places);
-      setFound({ questions: made.questions, findings: made.findings });
-      setWork({ toml, proposedFor: basis(work), name: work.name || freeName(work, state?.runs.map((r) => r.name) ?? []) });
+      const { toml: _, ...proposal } = made;
+      setWork({ toml, proposal, proposedFor: basis(work), name: work.name || freeName(work, state?.runs.map((r) => r.name) ?? []) });
     } catch (error) {
       setProblem(problemOf(error));
     }
@@ -52,7 +51,7 @@ export function ConfigurePage() {
       <p>How the log is read, or the part to use, was changed after this configuration was proposed.</p>
       <p class="row"><button type="button" onClick={() => void propose()}>Propose it anew</button> <span class="soft">What you wrote here is replaced.</span></p>
     </div>}
-    {work.toml && !proposing && <Editor schema={kind?.schema ?? []} proposed={found} />}
+    {work.toml && !proposing && <Editor schema={kind?.schema ?? []} flags={kind?.options ?? []} />}
   </Page>;
 }
 
@@ -76,7 +75,13 @@ function freeName(work: Work, taken: string[]): string {
   return name;
 }
 
-function Editor({ schema, proposed }: { schema: Section[]; proposed: { questions: Question[]; findings: Finding[] } }) {
+/** Flags that a person may want, of those that the command takes. */
+const FLAGS: Record<string, string> = {
+  "--smooth": "Smooth: every instant by all measurements, the later ones too", "--no-report": "Without the report: numbers only",
+  "--png": "Figures as PNG, too", "--timing": "Measure the times of the algorithms, too",
+};
+
+function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
   const { work, state } = useShared();
   const [checked, setChecked] = useState<Checked | null>(null);
   const [checking, setChecking] = useState(true);
@@ -90,7 +95,7 @@ function Editor({ schema, proposed }: { schema: Section[]; proposed: { questions
     const own = ++serial.current;
     setChecking(true);
     try {
-      const answer = await api.check({ kind, toml, ...(set ? { set } : {}) });
+      const answer = await api.check({ kind, toml, name: work.name, ...(set ? { set } : {}) });
       // An answer to what was written since replaced is old.
       if (own !== serial.current) return;
       setChecked(answer);
@@ -112,7 +117,7 @@ function Editor({ schema, proposed }: { schema: Section[]; proposed: { questions
     setStarting(true);
     setProblem(null);
     try {
-      const job = await api.begin({ kind, name: work.name, toml: work.toml, options: force === work.name ? ["--force"] : [] });
+      const job = await api.begin({ kind, name: work.name, toml: work.toml, options: [...work.options, ...(taken && force === work.name ? ["--force"] : [])] });
       putJob(job);
       location.hash = `#/job/${encodeURIComponent(job.id)}`;
     } catch (error) {
@@ -121,13 +126,28 @@ function Editor({ schema, proposed }: { schema: Section[]; proposed: { questions
     setStarting(false);
   };
   const values = checked?.values ?? {};
-  const errors = checked?.errors ?? [];
-  const questions = checked?.questions ?? proposed.questions.filter((q) => q.key && isOpen(values[q.key]));
+  const proposal = work.proposal;
+  // An open value is a question, not a mistake.
+  const errors = checked?.errors.filter((e) => e.code !== OPEN) ?? [];
+  const questions = openQuestions(checked, proposal?.questions ?? []);
+  const assumed = (proposal?.to_check ?? []).filter((q) => q.key && q.key in values);
   const taken = state?.runs.some((one) => one.name === work.name) ?? false;
   const reason = errors.length ? `${plural(errors.length, "error")} to correct first` : questions.length ? `${plural(questions.length, "question")} to answer first` : !work.name.trim() ? "The result needs a name" : "";
   return <>
-    <Questions questions={questions} schema={schema} values={values} onAnswer={set} />
-    {proposed.findings.length > 0 && <More title={`What was noticed while proposing it (${proposed.findings.length})`}><Findings findings={proposed.findings} /></More>}
+    <Questions questions={questions} values={values} onAnswer={set} />
+    {assumed.length > 0 && <Part title="Assumed: correct it if it is wrong">
+      <div class="fields wide">{assumed.map((q) => {
+        const field = fieldOf(schema, q.key!);
+        return <Control key={q.key} field={{ ...field, key: q.key!, label: field?.label ?? q.key!, unit: field?.unit ?? q.unit, type: field?.type ?? (Array.isArray(values[q.key!]) ? "list" : q.free ?? "text"), help: q.text }}
+          value={values[q.key!]} fault={faultOf(errors, q.key!)} onChange={(value) => set({ [q.key!]: value })} />;
+      })}</div>
+    </Part>}
+    {proposal && (proposal.found?.length ?? 0) + proposal.findings.length > 0 && <More title="What was found while proposing it">
+      <ul class="plain">{proposal.found?.map((text) => <li key={text}>{sentence(text)}</li>)}</ul>
+      <Findings findings={proposal.findings} />
+    </More>}
+    {proposal?.others?.map((other) => <div class="notice" key={other.name}><p>The record holds another vehicle: {other.name}.</p>
+      <button type="button" onClick={() => setWork({ toml: other.toml, name: `${work.name}-${other.name}`.replace(/[^A-Za-z0-9_-]+/g, "_") })}>Use its case instead</button></div>)}
     <Trouble problem={problem} />
     <div class="sidebyside">
       <section aria-label="The configuration as a form" class="formside">
@@ -140,7 +160,11 @@ function Editor({ schema, proposed }: { schema: Section[]; proposed: { questions
       </section>
     </div>
     <Positions values={values} onSet={set} />
-    {kind === "crash" && <CrashPreview toml={work.toml} ready={!checking && errors.length === 0 && questions.length === 0} onKeep={set} />}
+    {kind === "crash" && <CrashPreview toml={work.toml} values={values} ready={!checking && errors.length === 0 && questions.length === 0} onKeep={set} />}
+    {flags.some((flag) => flag in FLAGS) && <fieldset class="row flags"><legend>Options</legend>
+      {flags.filter((flag) => flag in FLAGS).map((flag) => <label class="inline" key={flag}><input type="checkbox" checked={work.options.includes(flag)}
+        onChange={(e) => setWork({ options: e.currentTarget.checked ? [...work.options, flag] : work.options.filter((o) => o !== flag) })} />{FLAGS[flag]}</label>)}
+    </fieldset>}
     <div class="next startrun">
       <label class="inline">Name of the result <input type="text" value={work.name} onInput={(e) => setWork({ name: e.currentTarget.value })} aria-describedby="taken" /></label>
       {taken && <label class="inline" id="taken"><input type="checkbox" checked={force === work.name} onChange={(e) => setForce(e.currentTarget.checked ? work.name : "")} /> Overwrite the result of this name</label>}
@@ -152,18 +176,40 @@ function Editor({ schema, proposed }: { schema: Section[]; proposed: { questions
 
 const isOpen = (value: unknown) => value === "?" || (Array.isArray(value) && value.includes("?"));
 
-function Questions({ questions, schema, values, onAnswer }: { questions: Question[]; schema: Section[]; values: Record<string, unknown>; onAnswer: (set: Record<string, unknown>) => void }) {
+const OPEN = "config.open-value";
+
+/** What still has a "?": asked in the words of the proposal, and what it is for in those of the check. */
+function openQuestions(checked: Checked | null, asked: Question[]): Question[] {
+  if (!checked) return asked;
+  const faults = checked.errors.filter((e) => e.code === OPEN);
+  return Object.keys(checked.values).filter((key) => isOpen(checked.values[key])).map((key, i) => {
+    const said = asked.find((q) => q.key === key), fault = faults.find((e) => e.path === key) ?? faults[i];
+    return {
+      code: OPEN, choices: [], free: "number", unit: null, ...said, key, text: said?.text ?? fault?.text ?? key,
+      line: fault?.line ?? undefined, remedy: said && fault ? fault.text : null,
+    };
+  });
+}
+
+function Questions({ questions, values, onAnswer }: { questions: Question[]; values: Record<string, unknown>; onAnswer: (set: Record<string, unknown>) => void }) {
   if (!questions.length) return null;
-  const kindOf = (key: string | null) => key === null ? undefined : schema.flatMap((s) => s.fields).find((f) => pattern(f.key).test(key))?.type;
   return <Part title={`${plural(questions.length, "question")} only you can answer`}>
-    {questions.map((q) => <Ask key={q.code + (q.key ?? "") + q.text} question={q} list={kindOf(q.key) === "list" || Array.isArray(q.key ? values[q.key] : null)} onAnswer={onAnswer} />)}
+    {questions.map((q) => <Ask key={q.key} question={q} list={q.key !== null && Array.isArray(values[q.key])} onAnswer={onAnswer} />)}
   </Part>;
 }
+
+/** The field of the form that a full name belongs to. */
+const fieldOf = (schema: Section[], key: string) => schema.flatMap((s) => s.fields).find((f) => pattern(f.key).test(key));
+
+const faultOf = (errors: Fault[], key: string) => errors.find((e) => {
+  const at = e.path ?? e.key?.replaceAll(", ", ".") ?? "";
+  return at === key || at.startsWith(`${key}.`);
+})?.text;
 
 const escape = (text: string) => text.replace(/[.+?^${}()|[\]\\]/g, "\\$&");
 const pattern = (key: string) => new RegExp(`^${escape(key).replaceAll("*", "([^.]+)")}$`);
 
-interface Shown { title: string; help: string | null; set: Field[]; others: Field[] }
+interface Shown { at: string; title: string; help: string | null; set: Field[]; others: Field[] }
 
 /** The sections of the form, one for each table that the configuration has. */
 export function sectionsOf(schema: Section[], values: Record<string, unknown>): Shown[] {
@@ -171,35 +217,45 @@ export function sectionsOf(schema: Section[], values: Record<string, unknown>): 
   const seen = new Set<string>();
   const shown: Shown[] = [];
   for (const section of schema) {
-    const stars = Math.max(0, ...section.fields.map((f) => (f.key.match(/\*/g) ?? []).length));
-    const instances = stars === 0 ? [[]] : instancesOf(section, keys, stars);
-    for (const names of instances) {
+    const stars = (section.key?.match(/\*/g) ?? []).length;
+    for (const names of stars === 0 ? [[]] : instancesOf(section, keys, stars)) {
       const fill = (text: string) => names.reduce((rest, name) => rest.replace("*", name), text);
       const fields = section.fields.map((f) => ({ ...f, key: fill(f.key) })).filter((f) => !f.key.includes("*"));
       fields.forEach((f) => seen.add(f.key));
-      const label = names.map((name) => /^\d+$/.test(name) ? String(Number(name) + 1) : name).join(", ");
-      shown.push({
-        title: [section.title ?? section.key ?? "Settings", label].filter(Boolean).join(" "), help: section.help ?? null,
-        set: fields.filter((f) => f.key in values), others: fields.filter((f) => !(f.key in values)),
-      });
+      const at = fill(section.key ?? "");
+      shown.push({ at, title: titleOf(section, names, values), help: section.help ?? null, set: fields.filter((f) => f.key in values), others: fields.filter((f) => !(f.key in values)) });
     }
   }
-  const rest = keys.filter((key) => !seen.has(key));
-  if (rest.length) {
-    shown.push({ title: "Others", help: null, others: [], set: rest.map((key) => ({ key, label: key, unit: null, type: typeof values[key] === "number" ? "number" : typeof values[key] === "boolean" ? "flag" : Array.isArray(values[key]) ? "list" : "text" })) });
+  // A key without a field of its own, such as a speed in another unit: with the table that it is in.
+  for (const key of keys.filter((one) => !seen.has(one))) {
+    const home = shown.filter((s) => s.at !== "" && key.startsWith(`${s.at}.`)).sort((a, b) => b.at.length - a.at.length)[0] ?? shown.find((s) => s.at === "");
+    const value = values[key];
+    const field: Field = { key, label: words(home?.at ? key.slice(home.at.length + 1) : key), unit: null, type: typeof value === "number" ? "number" : typeof value === "boolean" ? "flag" : Array.isArray(value) ? "list" : "text" };
+    if (home) home.set.push(field); else shown.push({ at: "", title: "General", help: null, set: [field], others: [] });
   }
-  return shown.filter((s) => s.set.length || s.others.length);
+  return shown.filter((s) => s.set.length || s.others.length).sort((a, b) => Number(b.set.length > 0) - Number(a.set.length > 0));
 }
 
+const words = (key: string) => key.replaceAll(".", ": ").replaceAll("_", " ").replace(/^./, (c) => c.toUpperCase());
+
+/** "Units 1 (LEFT REAR SEAT)", "Aiding gnss: Update rule": the table, which one, and what of it. */
+function titleOf(section: Section, names: string[], values: Record<string, unknown>): string {
+  const own = section.title || section.key || "General";
+  if (!names.length) return section.key?.includes(".") ? `${words(section.key.split(".")[0]!)}: ${own}` : own;
+  const table = section.key!.split(".")[0]!;
+  const name = values[`${table}.${names[0]}.name`];
+  const which = /^\d+$/.test(names[0]!) ? `${Number(names[0]) + 1}${typeof name === "string" && name ? ` (${name})` : ""}` : names[0]!;
+  const inner = section.key!.split(".").length > 2 ? `: ${own}${names.length > 1 ? ` ${Number(names[1]) + 1}` : ""}` : "";
+  return `${words(table)} ${which}${inner}`;
+}
+
+/** Names and numbers that the values put in place of the stars of a section. */
 function instancesOf(section: Section, keys: string[], stars: number): string[][] {
+  const table = new RegExp(`^${escape(section.key!).replaceAll("*", "([^.]+)")}\\.`);
   const found = new Map<string, string[]>();
-  for (const field of section.fields) {
-    if ((field.key.match(/\*/g) ?? []).length !== stars) continue;
-    const matching = pattern(field.key);
-    for (const key of keys) {
-      const match = matching.exec(key);
-      if (match) found.set(match.slice(1).join("\n"), match.slice(1));
-    }
+  for (const key of keys) {
+    const match = table.exec(key);
+    if (match) found.set(match.slice(1, stars + 1).join("\n"), match.slice(1, stars + 1));
   }
   return [...found.values()];
 }
@@ -208,11 +264,12 @@ function Form({ schema, values, errors, onSet }: { schema: Section[]; values: Re
   const [wanted, setWanted] = useState("");
   const shown = useMemo(() => sectionsOf(schema, values), [schema, values]);
   const fits = (f: Field) => !wanted || `${f.key} ${f.label} ${f.help ?? ""}`.toLowerCase().includes(wanted.toLowerCase());
-  const fault = (key: string) => errors.find((e) => e.key === key || (e.key !== null && e.key.startsWith(`${key}.`)))?.text;
+  const fault = (key: string) => faultOf(errors, key);
   const control = (f: Field) => <Control key={f.key} field={f} value={values[f.key]} fault={fault(f.key)} onChange={(value) => onSet({ [f.key]: value })} />;
+  const used = shown.filter((s) => wanted || s.set.length), unused = shown.filter((s) => !wanted && !s.set.length);
   return <>
     <input type="search" class="wide" aria-label="Find a setting" placeholder="Find a setting" value={wanted} onInput={(e) => setWanted(e.currentTarget.value)} />
-    {shown.map((section) => {
+    {used.map((section) => {
       const set = section.set.filter(fits), others = section.others.filter(fits);
       if (!set.length && !(wanted ? others.length : section.others.length)) return null;
       const wrong = section.set.some((f) => fault(f.key) || isOpen(values[f.key]));
@@ -223,6 +280,11 @@ function Form({ schema, values, errors, onSet }: { schema: Section[]; values: Re
           : <More title={plural(others.length, "setting that is not set", "settings that are not set")}><div class="fields">{others.map(control)}</div></More>)}
       </More>;
     })}
+    {unused.length > 0 && <More title={<>Tables that are not there <span class="soft">{plural(unused.length, "table")}, as by default</span></>}>
+      {unused.map((section) => <More key={section.title} title={section.title}>
+        {section.help && <p class="help">{section.help}</p>}<div class="fields">{section.others.map(control)}</div>
+      </More>)}
+    </More>}
     {!shown.length && <Empty>The form appears as soon as the text can be read.</Empty>}
   </>;
 }
@@ -249,7 +311,7 @@ function TomlText({ toml, errors, onChange }: { toml: string; errors: Fault[]; o
     <ul class="findings" id="tomlerrors" aria-live="polite">
       {errors.map((e) => <li class="bad" key={`${e.line} ${e.key} ${e.text}`}>
         {e.line ? <button type="button" onClick={() => show(e.line!)}>Line {e.line}</button> : <span class="tag">Error</span>}
-        <p>{e.key && <code>{e.key}</code>} {e.text}</p>
+        <div><p>{e.key && <code>{e.key}</code>} {sentence(e.text)}</p>{e.remedy && <p class="remedy">What to do: {e.remedy}</p>}</div>
       </li>)}
     </ul>
   </div>;
@@ -279,6 +341,7 @@ function Positions({ values, onSet }: { values: Record<string, unknown>; onSet: 
 
 function placeName(key: string, values: Record<string, unknown>): string {
   const parent = key.replace(/\.[^.]+$/, "");
+  if (key === "point.position_m") return String(values["point.name"] || "Reference point");
   if (key.endsWith("antenna_m") || values[`${parent}.kind`] === "gnss") return "Antenna";
   const name = values[`${parent}.name`];
   return typeof name === "string" && name ? name : parent.replace(/\.\d+/g, (n) => ` ${Number(n.slice(1)) + 1}`).replace(/^aiding\./, "");

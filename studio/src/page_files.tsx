@@ -85,7 +85,7 @@ export function FilesPage() {
         <fieldset class="list"><legend>Choose those of one recording</legend>
           {files.map((file) => <label key={file.name} class="item">
             <input type="checkbox" checked={here.includes(file.name)} onChange={() => toggle(file.name)} />
-            <span class="name">{file.name}</span><span class="soft">{bytes(file.bytes)}</span><span class="soft when">{date(file.modified)}</span>
+            <span class="name">{file.name}</span><span class="soft">{file.folder ? "folder, " : ""}{bytes(file.bytes)}</span><span class="soft when">{date(file.modified)}</span>
           </label>)}
         </fieldset>
         <div class="next"><button type="button" class="main" disabled={!here.length} onClick={go}>Look into {here.length ? plural(here.length, "file") : "them"}</button></div>

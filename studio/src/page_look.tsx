@@ -6,7 +6,7 @@ import { duration, number, plural, stamp } from "./format";
 import { Plan, type Line } from "./plan";
 import { setWork, useShared, type Point } from "./store";
 import { Traces, TrimBar, type Panel } from "./traces";
-import type { Finding, Kind, LogFound, Look, Span, Stream } from "./types";
+import type { Finding, Kind, LogFound, Look, Question, Span, Stream } from "./types";
 import { Ask, Busy, Control, Empty, Findings, More, Page, Part, Table, Trouble, useRequest } from "./ui";
 import { Vehicle } from "./vehicle";
 
@@ -54,8 +54,10 @@ function inOneSentence(look: Look): string {
   const imu = look.streams.find((s) => s.name === "imu") ?? look.streams[0];
   if (!imu) return "No stream of samples was found in these files.";
   const others = look.streams.filter((s) => s !== imu).map((s) => WORDS[s.name] ?? s.name);
-  return `${duration(imu.to_s - imu.from_s)} of inertial samples${imu.rate_hz ? ` at ${number(imu.rate_hz, 3)} Hz` : ""}${others.length ? `, with ${[...new Set(others)].join(", ")}` : ""}.`;
+  return `${duration(imu.to_s - imu.from_s)} of inertial samples${rateOf(look, imu) ? ` at ${number(rateOf(look, imu)!, 3)} Hz` : ""}${others.length ? `, with ${[...new Set(others)].join(", ")}` : ""}.`;
 }
+
+const rateOf = (look: Look, s: Stream) => s.rate_hz ?? look.logs.find((log) => log.name === s.file)?.streams.find((one) => one.name === s.name)?.rate_hz ?? null;
 
 const WORDS: Record<string, string> = {
   imu: "inertial sensors", gnss: "satellite fixes", magnetometer: "magnetometer", barometer: "barometer",
@@ -68,11 +70,14 @@ function Found({ look, reading }: { look: Look; reading: Reading }) {
   const notes = look.logs.flatMap((log) => log.notes.map((f) => ({ ...f, file: f.file ?? log.name })));
   const streams = look.streams.filter((s) => s.rows > 1 && s.columns.length > 0);
   const imu = streams.find((s) => s.name === "imu") ?? streams[0];
+  const ask = (q: Question) => <Ask key={q.code + q.text} question={{ ...q, text: look.logs.length > 1 && q.file ? `${q.file}: ${q.text}` : q.text, remedy: q.choices.length ? null : q.remedy }} onAnswer={(set) => answerLog(set, work.log)} />;
+  const needed = look.questions.filter((q) => !q.optional), optional = look.questions.filter((q) => q.optional);
   return <>
-    {look.questions.length > 0 && <Part title={`${plural(look.questions.length, "question")} about the log`}>
+    {needed.length > 0 && <Part title={`${plural(needed.length, "question")} about the log`}>
       <p>Nothing is guessed. One click each; you can change it later.</p>
-      {look.questions.map((q) => <Ask key={q.code + q.text} question={q} onAnswer={(set) => answerLog(set, work.log)} />)}
+      {needed.map(ask)}
     </Part>}
+    {optional.length > 0 && <Part title="Is this right?">{optional.map(ask)}</Part>}
     <Part title="What is in it"><Contents look={look} /></Part>
     {imu && <Signals look={look} streams={streams} imu={imu} reading={reading} />}
     {(faults.length > 0 || notes.length > 0) && <Part title="What was noticed">
@@ -95,7 +100,7 @@ function Contents({ look }: { look: Look }) {
     <Table head={["Stream", "File", "Samples", "Rate", "From", "To", "Gaps"]} numeric={[2, 3, 4, 5, 6]}
       rows={look.streams.map((s) => {
         const told = look.logs.find((log) => log.name === s.file)?.streams.find((one) => one.name === s.name);
-        return [WORDS[s.name] ?? s.name, s.file ?? "", s.rows.toLocaleString("en"), s.rate_hz ? `${number(s.rate_hz, 4)} Hz` : "–",
+        return [WORDS[s.name] ?? s.name, s.file ?? "", s.rows.toLocaleString("en"), rateOf(look, s) ? `${number(rateOf(look, s)!, 4)} Hz` : "–",
           `${stamp(s.from_s, 1)} s`, `${stamp(s.to_s, 1)} s`, told?.gaps ? `${told.gaps}, ${duration(told.lost_s)} lost` : "none"];
       })} />
     <dl class="facts">
@@ -255,7 +260,7 @@ export function ChoosePage() {
   const look = useLook();
   const kinds = useRequest(() => api.kinds(), []);
   const choose = (kind: string) => {
-    setWork(kind === work.kind ? {} : { kind, toml: "", proposedFor: "", name: "" });
+    setWork(kind === work.kind ? {} : { kind, toml: "", proposal: null, proposedFor: "", name: "", options: [] });
     location.hash = "#/configure";
   };
   if (!work.files.length) {

@@ -4,17 +4,17 @@
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { api, part } from "./api";
 import { Attitude } from "./attitude";
-import { date, shown, stamp } from "./format";
+import { date, plural, shown, stamp } from "./format";
 import { indexOf, Plan } from "./plan";
-import { Traces } from "./traces";
-import type { RunDetail, Span, Track } from "./types";
-import { Busy, Command, Empty, Findings, More, Page, Part, Trouble, useRequest } from "./ui";
+import { Traces, type Panel } from "./traces";
+import type { KeyNumber, RunDetail, Series as SeriesData, Span, Track } from "./types";
+import { Busy, Command, Empty, Findings, More, Page, Part, sentence, Table, Trouble, useRequest } from "./ui";
 
 export function ResultPage({ name }: { name: string }) {
   const run = useRequest(() => api.run(name), [name]);
   if (!name) return <Page title="No result chosen"><Empty><a href="#/files">Choose one</a> of the folder.</Empty></Page>;
   const found = run.value;
-  return <Page title={found?.title || name} lead={found?.verdict ?? undefined}>
+  return <Page title={found?.title || name} lead={found?.verdict ?? found?.answer ?? undefined}>
     {run.busy && <Busy>Opening the result…</Busy>}
     <Trouble problem={run.problem} retry={run.again} />
     {found && <Result run={found} />}
@@ -25,13 +25,10 @@ function Result({ run }: { run: RunDetail }) {
   const [cursor, setCursor] = useState<number | null>(null);
   const track = useRequest(run.has.track || run.has.attitude ? () => api.track(run.name) : null, [run.name]);
   const exports: [string, string, boolean][] = [
-    ["zip", "The whole result (.zip)", true], ["pdf", "Report (.pdf)", Boolean(run.has.pdf)], ["gpx", "Track (.gpx)", Boolean(run.has.track)], ["toml", "Configuration (.toml)", true],
+    ["zip", "The whole result (.zip)", true], ["pdf", "Report (.pdf)", Boolean(run.has.pdf)], ["gpx", "Track (.gpx)", Boolean(run.has.track)], ["toml", "Configuration (.toml)", run.has.toml !== false],
   ];
   return <>
-    {run.numbers.length > 0 && <dl class="keys">
-      {run.numbers.map((one) => <div key={one.label}><dt>{one.label}</dt>
-        <dd class="value">{shown(one.value)} <small>{one.bound !== undefined && one.bound !== null ? `± ${shown(one.bound)} ` : ""}{one.unit ?? ""}</small></dd></div>)}
-    </dl>}
+    <Numbers numbers={run.numbers} />
     <div class="row exports" role="group" aria-label="Take it with you">
       {exports.filter(([, , has]) => has).map(([as, words]) => <a class="button" key={as} href={api.exportOf(run.name, as)} download>{words}</a>)}
       <a class="button" href={`#/compare?run=${part(run.name)}`}>Compare with another</a>
@@ -40,17 +37,55 @@ function Result({ run }: { run: RunDetail }) {
     <Trouble problem={track.problem} retry={track.again} />
     {track.busy && <Busy>Reading the track…</Busy>}
     {track.value && <Motion run={run} track={track.value} cursor={cursor} onCursor={setCursor} />}
-    {!track.value && run.panels && run.panels.length > 0 && <Series run={run} whole={[run.from_s ?? 0, run.to_s ?? 1]} cursor={cursor} onCursor={setCursor} />}
     {run.report && <Part title="The report" aside={<a href={run.report} target="_blank" rel="noopener noreferrer">Open in a tab of its own</a>}>
       <iframe class="report" src={run.report} title="The report" sandbox="allow-scripts" referrerpolicy="no-referrer" loading="lazy" />
     </Part>}
     <Part title="Repeat it">
       <p>This command gives the same result to the last bit:</p>
-      <Command text={run.command} />
+      <Command text={run.command_line} />
       <p class="soft">Made {date(run.made)}. Seal <code class="digest">{run.digest}</code></p>
       <More title="Options and inputs"><pre tabIndex={0}>{JSON.stringify({ options: run.options, inputs: run.inputs }, null, 2)}</pre></More>
     </Part>
   </>;
+}
+
+/** The numbers that matter first, large; the others in a table. */
+function Numbers({ numbers }: { numbers: KeyNumber[] }) {
+  const large = numbers.filter((one) => one.value !== null).slice(0, 6), rest = numbers.slice(large.length);
+  const bound = ({ below, above }: KeyNumber) => below === undefined || above === undefined || (below === null && above === null) ? ""
+    : below === above ? `± ${shown(below)}` : `− ${below === null ? "∞" : shown(below)}, + ${above === null ? "∞" : shown(above)}`;
+  if (!numbers.length) return null;
+  return <>
+    <dl class="keys">
+      {large.map((one) => <div key={`${one.group} ${one.label}`}><dt>{sentence(`${one.group ? `${one.group}: ` : ""}${one.label}`).replace(/\.$/, "")}</dt>
+        <dd>{shown(one.value)} <small>{bound(one)} {one.unit}</small></dd></div>)}
+    </dl>
+    {rest.length > 0 && <More title={plural(rest.length, "more number")}>
+      <Table head={["", "Quantity", "Value", "95 % bound", "Unit"]} numeric={[2, 3]} rows={rest.map((one) => [one.group ?? "", one.label, shown(one.value), bound(one), one.unit ?? ""])} />
+    </More>}
+  </>;
+}
+
+const GROUPS: [RegExp, string, string?][] = [
+  [/^VN_m/, "Velocity", "north"], [/^VE_m/, "Velocity", "east"], [/^VD_m/, "Velocity", "down"],
+  [/^roll_deg/, "Roll and pitch", "roll"], [/^pitch_deg/, "Roll and pitch", "pitch"], [/^heading_deg/, "Heading", "heading"], [/^alt_m/, "Height", "height"],
+  [/^(north|east|down)_sd/, "Position, standard deviation"], [/^V[NED]_sd/, "Velocity, standard deviation"], [/^(roll|pitch|heading)_sd/, "Attitude, standard deviation"],
+  [/^(lat|lon)_/, ""],
+];
+
+/** Panels for the columns of a result: of one quantity in one panel. */
+export function panelsOfRun(series: SeriesData): Panel[] {
+  const panels = new Map<string, Panel>();
+  for (const [, title] of GROUPS) if (title) panels.set(title, { title, unit: "", columns: [] });
+  for (const [name, { unit }] of Object.entries(series.columns)) {
+    const [, title, label] = GROUPS.find(([pattern]) => pattern.test(name)) ?? [null, name];
+    if (!title) continue;
+    const panel = panels.get(title) ?? { title, unit: unit ?? "", columns: [] };
+    panel.unit = unit ?? "";
+    panel.columns.push({ name, label: label ?? name.replace(/_sd.*$/, "") });
+    panels.set(title, panel);
+  }
+  return [...panels.values()].filter((panel) => panel.columns.length);
 }
 
 function Motion({ run, track, cursor, onCursor }: { run: RunDetail; track: Track; cursor: number | null; onCursor: (t: number | null) => void }) {
@@ -91,13 +126,17 @@ function Motion({ run, track, cursor, onCursor }: { run: RunDetail; track: Track
 }
 
 function Series({ run, whole, cursor, onCursor }: { run: RunDetail; whole: Span; cursor: number | null; onCursor: (t: number | null) => void }) {
-  const all = run.panels ?? [];
-  const [chosen, setChosen] = useState<string[]>(all.slice(0, 3).map((p) => p.title));
-  const panels = useMemo(() => all.filter((p) => chosen.includes(p.title)), [run, chosen]);
+  // One bucket: which columns there are.
+  const columns = useRequest(run.panels || !run.has.series ? null : (signal) => api.runSeries(run.name, { columns: [], width: 1 }, signal), [run.name]);
+  const all = useMemo(() => run.panels ?? (columns.value ? panelsOfRun(columns.value) : []), [run, columns.value]);
+  const [picked, setPicked] = useState<string[] | null>(null);
+  const chosen = picked ?? all.slice(0, 3).map((p) => p.title);
+  const panels = useMemo(() => all.filter((p) => chosen.includes(p.title)), [all, chosen.join("|")]);
+  if (columns.problem) return <Trouble problem={columns.problem} retry={columns.again} />;
   if (!all.length) return null;
   return <>
     <fieldset class="row pick"><legend>Show</legend>
-      {all.map((p) => <label class="inline" key={p.title}><input type="checkbox" checked={chosen.includes(p.title)} onChange={(e) => setChosen(e.currentTarget.checked ? [...chosen, p.title] : chosen.filter((t) => t !== p.title))} />{p.title}</label>)}
+      {all.map((p) => <label class="inline" key={p.title}><input type="checkbox" checked={chosen.includes(p.title)} onChange={(e) => setPicked(e.currentTarget.checked ? [...chosen, p.title] : chosen.filter((t) => t !== p.title))} />{p.title}</label>)}
     </fieldset>
     {panels.length > 0 && <Traces panels={panels} whole={whole} askKey={run.name} cursor={cursor} onCursor={onCursor}
       ask={(columns, view, width, signal) => api.runSeries(run.name, { columns, from: view[0], to: view[1], width }, signal)} />}

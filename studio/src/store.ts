@@ -3,7 +3,7 @@
 
 import { useEffect, useState } from "preact/hooks";
 import { api, problemOf } from "./api";
-import type { Job, Problem, Span, State } from "./types";
+import type { Job, Problem, Proposal, Span, State } from "./types";
 
 /** Point on the vehicle: forward, right, down, in m. */
 export type Point = [number, number, number];
@@ -21,13 +21,17 @@ export interface Work {
   kind: string | null;
   toml: string;
   name: string;
+  /** What was found and asked when the configuration was proposed. */
+  proposal: Omit<Proposal, "toml"> | null;
+  /** Flags of the command. */
+  options: string[];
   /** What the configuration was proposed for: another one is proposed when it changes. */
   proposedFor: string;
 }
 
 const NOTHING: Work = {
   files: [], log: {}, axes: null, trim: null, marks: [], places: null, kind: null, toml: "", name: "",
-  proposedFor: "",
+  proposal: null, options: [], proposedFor: "",
 };
 const KEY = "strapdown.studio.work";
 

@@ -13,7 +13,7 @@ export interface Panel { title: string; unit: string; columns: { name: string; l
 export type Ask = (columns: string[], view: Span, width: number, signal: AbortSignal) => Promise<Series>;
 
 const COLORS = ["--trace1", "--trace2", "--trace3", "--trace4"];
-const HEIGHT = 150;
+const HEIGHT = 180;
 
 interface Props {
   panels: Panel[]; ask: Ask; whole: Span; askKey: string;
@@ -159,7 +159,7 @@ function OnePanel(props: Props & {
       width, height: HEIGHT, series: lines, bands, legend: { show: false },
       scales: { x: { time: false, range: () => latest.current.view as [number, number] } },
       axes: [
-        { ...axis, size: 30, values: (_, ticks) => ticks.map((t) => stamp(t, Math.max(...ticks) - Math.min(...ticks) || 1)) },
+        { ...axis, size: 30, space: 90, values: (_, ticks, __, ___, step) => ticks.map((t) => t.toFixed(Math.max(0, -Math.floor(Math.log10(step) + 1e-9)))) },
         { ...axis, size: 58, values: (_, ticks) => ticks.map((v) => number(v, 6)) },
       ],
       cursor: {

@@ -1,6 +1,6 @@
 // What the server of the studio answers: one interface for each table of its address book.
 
-export interface StoredFile { name: string; bytes: number; modified: number | string }
+export interface StoredFile { name: string; bytes: number; modified: number | string; folder?: boolean }
 
 export interface Run {
   name: string; command: string; title: string; made: number | string; digest: string;
@@ -24,11 +24,12 @@ export interface State {
   version: string; folder: string; files: StoredFile[]; runs: Run[]; jobs: Job[]; samples?: Sample[];
 }
 
-export interface Choice { label: string; set: Record<string, unknown> }
+export interface Choice { label: string; set: Record<string, unknown>; likely?: boolean }
 
 export interface Question {
   code: string; text: string; key: string | null; choices: Choice[];
-  free: "number" | "text" | null; unit: string | null; line?: number;
+  free: "number" | "text" | null; unit: string | null; line?: number; optional?: boolean; file?: string;
+  remedy?: string | null;
 }
 
 export interface Finding {
@@ -69,30 +70,43 @@ export interface Series {
 }
 
 export interface Field {
-  key: string; label: string; unit: string | null; type: "number" | "text" | "choice" | "flag" | "list";
+  /** Full dotted name; `*` stands for a number or a name of one's own. */
+  key: string; path?: string; label: string; unit: string | null; type: "number" | "text" | "choice" | "flag" | "list";
   choices?: (string | number)[] | null; default?: unknown; help?: string | null;
 }
 
 export interface Section { key?: string; title?: string; help?: string | null; fields: Field[] }
 
-export interface Kind { kind: string; title: string; what: string; needs: string; schema: Section[] }
+export interface Kind {
+  kind: string; title: string; what: string; needs: string; schema: Section[]; options?: string[];
+}
 
-export interface Proposal { toml: string; questions: Question[]; findings: Finding[] }
+export interface Proposal {
+  toml: string; questions: Question[]; findings: Finding[]; to_check?: Question[]; found?: string[];
+  others?: { toml: string; name: string }[];
+}
 
-export interface Fault { line: number | null; key: string | null; text: string }
+export interface Fault {
+  line: number | null; key: string | null; path?: string | null; code?: string; text: string; remedy?: string | null;
+}
 
 export interface Checked {
   toml: string; values: Record<string, unknown>; errors: Fault[]; questions?: Question[];
   findings?: Finding[];
 }
 
-export interface KeyNumber { label: string; value: number | string; unit: string | null; bound?: string | number | null }
+export interface KeyNumber {
+  group?: string; label: string; value: number | string | null; unit: string | null;
+  /** Distance of the lower and of the upper bound; null without an end. */
+  below?: number | null; above?: number | null;
+}
 
 export interface RunDetail extends Run {
+  command_line: string; answer?: string | null; job?: string | null;
   numbers: KeyNumber[]; options: unknown; inputs: unknown; findings: Finding[];
   from_s?: number; to_s?: number;
   panels?: { title: string; unit: string; columns: { name: string; label: string }[] }[];
-  report: string | null; has: { track?: boolean; attitude?: boolean; pdf?: boolean };
+  report: string | null; has: { track?: boolean; attitude?: boolean; series?: boolean; pdf?: boolean; toml?: boolean };
 }
 
 export interface Track {
@@ -105,15 +119,29 @@ export interface Track {
 export interface MapInfo { tiles: string | null; min: number; max: number; attribution: string | null }
 
 export interface CrashQuick {
-  delta_v: { value: number; bound: number; unit: string };
-  pdof: { deg: number; bound_deg: number; clock: string | number };
-  path: { north: number[]; east: number[]; bound: number[] };
-  vehicle: { length: number; width: number };
-  ms: number;
-  parameters?: { key: string; label: string; unit: string | null; value: number; low: number; high: number; step: number }[];
+  delta_v: { value: number; bound: number | null; at_least?: boolean; unit: string; forward: number; right: number } | null;
+  pdof: { deg: number; low: number | null; high: number | null; clock: number } | null;
+  path: { t: number[]; north: number[]; east: number[]; heading: number[]; bound: number[] };
+  /** The outline: corners forward, right of the origin of positions. */
+  vehicle: { length: number; width: number; outline: [number, number][] };
+  recorder: string; recorders: string[]; findings: Finding[]; ms: number;
 }
 
 export interface LiveInfo {
   protocols: { name: string; title: string; help: string; fields: Field[] }[];
   warning: string | null;
+}
+
+/** What `strapdown compare` gives as JSON; lists of values are in the order of the runs. */
+export interface Comparison {
+  summary: string; runs: { name: string; command: string }[];
+  options: { key: string; values: unknown[] }[]; equal_options: number;
+  inputs: { role: string; same: boolean; status: string[]; files: ({ name: string } | null)[] }[];
+  conditions: { name: string; values: (string | null)[] }[];
+  numbers: {
+    group: string; quantity: string; unit: string | null; same: boolean; values: (number | string | null)[];
+    below_95: (number | null)[]; above_95: (number | null)[]; differences: (number | null)[]; within: (boolean | null)[];
+  }[];
+  findings_of_runs: { code: string; sentence: string; differs: boolean; counts: number[] }[];
+  findings: Finding[]; page?: string | null;
 }

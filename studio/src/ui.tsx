@@ -96,7 +96,7 @@ export function Findings({ findings, none }: { findings: Finding[]; none?: strin
   </ul>;
 }
 
-const sentence = (text: string) => text.charAt(0).toUpperCase() + text.slice(1) + (/[.?!]$/.test(text) ? "" : ".");
+export const sentence = (text: string) => text.charAt(0).toUpperCase() + text.slice(1) + (/[.?!]$/.test(text) ? "" : ".");
 
 /** An open question: answered by one click, or by a value with its unit. */
 export function Ask({ question, onAnswer, list }: { question: Question; onAnswer: (set: Record<string, unknown>) => void; list?: boolean }) {
@@ -113,8 +113,9 @@ export function Ask({ question, onAnswer, list }: { question: Question; onAnswer
   };
   return <div class="ask" role="group" aria-labelledby={id}>
     <p id={id}>{sentence(question.text)}{question.line ? <span class="soft"> (line {question.line})</span> : null}</p>
+    {question.remedy && <p class="help">{sentence(question.remedy)}</p>}
     {question.choices.length > 0 && <div class="row">
-      {question.choices.map((choice: Choice) => <button type="button" key={choice.label} onClick={() => onAnswer(choice.set)}>{choice.label}</button>)}
+      {question.choices.map((choice: Choice) => <button type="button" key={choice.label} onClick={() => onAnswer(choice.set)}>{choice.label}{choice.likely ? " (likely)" : ""}</button>)}
     </div>}
     {question.free && <form class="row" onSubmit={submit}>
       <span class="withunit">
@@ -169,7 +170,7 @@ export function Control({ field, value, fault, onChange }: {
   let control: JSX.Element;
   if (field.type === "flag") {
     control = <input {...common} type="checkbox" checked={Boolean(value ?? field.default)} onChange={(e) => onChange(e.currentTarget.checked)} />;
-  } else if (field.type === "choice" && field.choices) {
+  } else if (field.type === "choice" && field.choices?.length) {
     control = <select {...common} value={written} onChange={(e) => {
       const chosen = field.choices!.find((c) => String(c) === e.currentTarget.value);
       onChange(chosen === undefined ? null : chosen);

@@ -95,7 +95,7 @@ function View({ title, dots, axes, box, onMove, chosen, onChoose, children }: {
           onPointerDown={drag(dot)} onKeyDown={keys(dot)} onFocus={() => onChoose(dot.key)}>
           <circle cx={at[axes[0]]} cy={at[axes[1]]} r={0.28} class="touch" />
           <circle cx={at[axes[0]]} cy={at[axes[1]]} r={0.1} />
-          <text x={at[axes[0]]! + 0.14} y={at[axes[1]]! - 0.14} class="words">{dot.label}</text>
+          {(dots.length < 3 || dot.key === chosen) && <text x={at[axes[0]]! + 0.14} y={at[axes[1]]! - 0.14} class="words">{dot.label}</text>}
         </g>;
       })}
     </svg>

@@ -1,0 +1,68 @@
+"""The studio driven in a browser as a person would: `studio/test/flow.mjs`, with its pictures."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+STUDIO = ROOT / "studio"
+LOGS = ROOT / "src" / "strapdown" / "demo_data" / "comma2k19"
+CHROMIUM = os.environ.get("CHROMIUM", "/usr/bin/chromium")
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(shutil.which("node") is None, reason="no node"),
+    pytest.mark.skipif(not Path(CHROMIUM).is_file(), reason="no chromium: set CHROMIUM"),
+    pytest.mark.skipif(
+        not (STUDIO / "node_modules" / "playwright-core").is_dir(),
+        reason="nothing installed: cd studio && npm ci",
+    ),
+]
+
+
+@pytest.fixture
+def address(tmp_path: Path) -> Iterator[str]:
+    """Address of a studio of an empty folder."""
+    folder = tmp_path / "records"
+    folder.mkdir()
+    command = [sys.executable, "-m", "strapdown", "studio", str(folder), "--no-browser"]
+    with (
+        (tmp_path / "errors").open("wb") as errors,
+        subprocess.Popen(command, stdout=subprocess.PIPE, stderr=errors) as server,
+    ):
+        assert server.stdout is not None
+        try:
+            for line in server.stdout:
+                if found := re.search(rb"http://\S+", line):
+                    yield found[0].decode()
+                    break
+            else:
+                pytest.fail((tmp_path / "errors").read_text(errors="replace"))
+        finally:
+            server.terminate()
+
+
+def test_the_whole_flow(address: str, tmp_path: Path) -> None:
+    shots = Path(os.environ.get("STRAPDOWN_SHOTS", tmp_path / "shots"))
+    command = ["node", "test/flow.mjs", address, str(shots), "imu.csv", "gnss.csv"]
+    command[-2:] = [str(LOGS / name) for name in command[-2:]]
+    ran = subprocess.run(
+        command,
+        cwd=STUDIO,
+        env={**os.environ, "CHROMIUM": CHROMIUM},
+        capture_output=True,
+        text=True,
+        timeout=1200,
+        check=False,
+    )
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    assert "no error in the console" in ran.stdout
+    assert len(list(shots.glob("*.png"))) >= 40
