@@ -118,7 +118,7 @@ export function Attitude({ q, at }: { q: Quaternion | null; at?: string }) {
     for (const [tip, name, stroke] of axes) {
       const end = rotate(q, tip);
       line([0, 0, 0], end, color(stroke), 2.5);
-      label(end, name, color(stroke));
+      label(rotate(q, tip.map((v) => v * 1.15) as Vector), name, color(stroke));
     }
   }, [q, turn, width, dark]);
 

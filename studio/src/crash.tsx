@@ -73,7 +73,7 @@ export function CrashPreview({ toml, values, ready, onKeep }: {
       <div>
         <dl class="keys" aria-live="polite">
           <div><dt>Change of velocity (delta-V)</dt>{quick.delta_v ? <dd>{quick.delta_v.at_least ? "at least " : ""}{number(quick.delta_v.value * 3.6, 3)} <small>± {bounded(quick.delta_v.bound, 3.6)} km/h</small></dd> : <dd><small>no impact in this record</small></dd>}</div>
-          <div><dt>Direction of force</dt>{quick.pdof ? <dd>{quick.pdof.clock} o'clock <small>{number(quick.pdof.deg, 3)}°{quick.pdof.low !== null && quick.pdof.high !== null ? `, ${number(quick.pdof.low, 3)}° to ${number(quick.pdof.high, 3)}°` : ", without a bound"}</small></dd> : <dd><small>–</small></dd>}</div>
+          <div><dt>Direction of force</dt>{quick.pdof ? <dd>{quick.pdof.clock} o'clock <small>{number(quick.pdof.deg, 3)}°{quick.pdof.low !== null && quick.pdof.high !== null ? ` (${number(quick.pdof.low, 3)}° to ${number(quick.pdof.high, 3)}°)` : ", without a bound"}</small></dd> : <dd><small>–</small></dd>}</div>
         </dl>
         <p class="help">95 % bounds of one recorder, linear and fast. The run computes them in full.</p>
         {quick.pdof && <ClockFace deg={quick.pdof.deg} low={quick.pdof.low} high={quick.pdof.high} before={before?.pdof?.deg ?? null} />}

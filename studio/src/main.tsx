@@ -62,7 +62,7 @@ function App() {
       </nav>
     </header>
     {connected === false && <p class="offline" role="status">The connection to the studio's server is lost. Trying again; running jobs go on by themselves.</p>}
-    {running.length > 0 && at.page !== "job" && <p class="running" role="status">
+    {running.length > 0 && at.page !== "job" && <p class="atwork" role="status">
       {running.map((job) => <a key={job.id} href={`#/${job.kind === "live" ? "live" : "job"}/${encodeURIComponent(job.id)}`}>{job.name}: {job.state === "waiting" ? "waits for its turn" : job.kind === "live" ? "listening" : `running${job.share !== null ? `, ${Math.round(job.share * 100)} %` : ""}`}</a>)}
     </p>}
     <main id="main" tabIndex={-1}>

@@ -46,6 +46,7 @@ export function ConfigurePage() {
   return <Page title={kind?.title ?? "Set up"} lead="This was proposed from your log. Answer what is open, correct what is wrong, and run it.">
     {proposing && <Busy>Proposing a configuration from the log…</Busy>}
     <Trouble problem={problem} retry={() => void propose()} />
+    {problem && <p><a href="#/files">Choose other files</a>, <a href="#/look">look at how they are read</a>, or <a href="#/choose">find out something else</a>.</p>}
     <Trouble problem={kinds.problem} retry={kinds.again} />
     {work.toml && work.proposedFor !== basis(work) && !proposing && <div class="notice warn" role="status">
       <p>How the log is read, or the part to use, was changed after this configuration was proposed.</p>
@@ -184,9 +185,12 @@ function openQuestions(checked: Checked | null, asked: Question[]): Question[] {
   const faults = checked.errors.filter((e) => e.code === OPEN);
   return Object.keys(checked.values).filter((key) => isOpen(checked.values[key])).map((key, i) => {
     const said = asked.find((q) => q.key === key), fault = faults.find((e) => e.path === key) ?? faults[i];
+    // Two recorders are asked the same: by whose name.
+    const name = checked.values[`${key.split(".").slice(0, 2).join(".")}.name`];
+    const text = said?.text ?? fault?.text ?? key;
     return {
-      code: OPEN, choices: [], free: "number", unit: null, ...said, key, text: said?.text ?? fault?.text ?? key,
-      line: fault?.line ?? undefined, remedy: said && fault ? fault.text : null,
+      code: OPEN, choices: [], free: "number", unit: null, ...said, key, text: typeof name === "string" && name && !text.includes(name) ? `${name}: ${text}` : text,
+      line: fault?.line ?? undefined, remedy: [said && fault ? sentence(fault.text) : "", PLACE.test(key) ? "Or drag its dot on the drawing of the vehicle below." : ""].filter(Boolean).join(" ") || null,
     };
   });
 }
@@ -272,7 +276,7 @@ function Form({ schema, values, errors, onSet }: { schema: Section[]; values: Re
     {used.map((section) => {
       const set = section.set.filter(fits), others = section.others.filter(fits);
       if (!set.length && !(wanted ? others.length : section.others.length)) return null;
-      const wrong = section.set.some((f) => fault(f.key) || isOpen(values[f.key]));
+      const wrong = section.set.some((f) => fault(f.key));
       return <More key={section.title} open={wanted !== "" || wrong} title={<>{section.title} <span class="soft">{set.length ? `${set.length} set` : "as by default"}</span></>}>
         {section.help && <p class="help">{section.help}</p>}
         <div class="fields">{set.map(control)}</div>

@@ -82,7 +82,7 @@ function Found({ look, reading }: { look: Look; reading: Reading }) {
     {imu && <Signals look={look} streams={streams} imu={imu} reading={reading} />}
     {(faults.length > 0 || notes.length > 0) && <Part title="What was noticed">
       <Findings findings={faults} none="Nothing is wrong with it." />
-      {notes.length > 0 && <More title={plural(notes.length, "note")}><Findings findings={notes} /></More>}
+      {notes.length > 0 && <More title={plural(notes.length, "note")}>{notes.map((note, i) => <Findings key={i} findings={[note]} />)}</More>}
     </Part>}
     <Part title="How it was read">
       <p>Units and axes, with the reason for each. Correct what is wrong: the log is looked at again.</p>

@@ -3,9 +3,9 @@
 
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { api, part } from "./api";
-import { Attitude } from "./attitude";
+import { Attitude, fromEuler } from "./attitude";
 import { date, plural, shown, stamp } from "./format";
-import { indexOf, Plan } from "./plan";
+import { indexOf, METERS_PER_DEG, Plan } from "./plan";
 import { Traces, type Panel } from "./traces";
 import type { KeyNumber, RunDetail, Series as SeriesData, Span, Track } from "./types";
 import { Busy, Command, Empty, Findings, More, Page, Part, sentence, Table, Trouble, useRequest } from "./ui";
@@ -14,7 +14,7 @@ export function ResultPage({ name }: { name: string }) {
   const run = useRequest(() => api.run(name), [name]);
   if (!name) return <Page title="No result chosen"><Empty><a href="#/files">Choose one</a> of the folder.</Empty></Page>;
   const found = run.value;
-  return <Page title={found?.title || name} lead={found?.verdict ?? found?.answer ?? undefined}>
+  return <Page title={found?.title || name} lead={found?.answer ?? undefined}>
     {run.busy && <Busy>Opening the result…</Busy>}
     <Trouble problem={run.problem} retry={run.again} />
     {found && <Result run={found} />}
@@ -23,11 +23,12 @@ export function ResultPage({ name }: { name: string }) {
 
 function Result({ run }: { run: RunDetail }) {
   const [cursor, setCursor] = useState<number | null>(null);
-  const track = useRequest(run.has.track || run.has.attitude ? () => api.track(run.name) : null, [run.name]);
+  const track = useRequest(run.has.track ? () => api.track(run.name) : run.has.series ? (signal) => trackOfSeries(run.name, signal) : null, [run.name]);
   const exports: [string, string, boolean][] = [
     ["zip", "The whole result (.zip)", true], ["pdf", "Report (.pdf)", Boolean(run.has.pdf)], ["gpx", "Track (.gpx)", Boolean(run.has.track)], ["toml", "Configuration (.toml)", run.has.toml !== false],
   ];
   return <>
+    {run.verdict && VERDICTS[run.verdict] && <p class={`verdict ${VERDICTS[run.verdict]!.look}`}>{VERDICTS[run.verdict]!.words}</p>}
     <Numbers numbers={run.numbers} />
     <div class="row exports" role="group" aria-label="Take it with you">
       {exports.filter(([, , has]) => has).map(([as, words]) => <a class="button" key={as} href={api.exportOf(run.name, as)} download>{words}</a>)}
@@ -49,6 +50,11 @@ function Result({ run }: { run: RunDetail }) {
   </>;
 }
 
+/** As the reports put it. */
+const VERDICTS: Record<string, { words: string; look: string }> = {
+  trusted: { words: "The result can be trusted", look: "good" }, reserve: { words: "Use with caution", look: "warn" }, distrusted: { words: "Do not trust the result", look: "bad" },
+};
+
 /** The numbers that matter first, large; the others in a table. */
 function Numbers({ numbers }: { numbers: KeyNumber[] }) {
   const large = numbers.filter((one) => one.value !== null).slice(0, 6), rest = numbers.slice(large.length);
@@ -67,6 +73,7 @@ function Numbers({ numbers }: { numbers: KeyNumber[] }) {
 }
 
 const GROUPS: [RegExp, string, string?][] = [
+  [/^north_m/, "Path", "north"], [/^east_m/, "Path", "east"], [/^down_m/, "Path", "down"],
   [/^VN_m/, "Velocity", "north"], [/^VE_m/, "Velocity", "east"], [/^VD_m/, "Velocity", "down"],
   [/^roll_deg/, "Roll and pitch", "roll"], [/^pitch_deg/, "Roll and pitch", "pitch"], [/^heading_deg/, "Heading", "heading"], [/^alt_m/, "Height", "height"],
   [/^(north|east|down)_sd/, "Position, standard deviation"], [/^V[NED]_sd/, "Velocity, standard deviation"], [/^(roll|pitch|heading)_sd/, "Attitude, standard deviation"],
@@ -86,6 +93,20 @@ export function panelsOfRun(series: SeriesData): Panel[] {
     panels.set(title, panel);
   }
   return [...panels.values()].filter((panel) => panel.columns.length);
+}
+
+/** The motion of a result without positions on the Earth, such as that of a crash, by its series. */
+async function trackOfSeries(name: string, signal: AbortSignal): Promise<Track | null> {
+  const wanted = ["north_m", "east_m", "roll_deg", "pitch_deg", "heading_deg"];
+  const { t, columns } = await api.runSeries(name, { columns: wanted, width: 2000 }, signal);
+  if (t.length < 2) return null;
+  const [north, east, roll, pitch, heading] = wanted.map((one) => columns[one]?.low.map((low, i) => (Number(low) + Number(columns[one]!.high[i])) / 2));
+  // On a grid a meter is a meter: degrees about the equator stand for it.
+  const flat = (meters: number[] | undefined) => meters ? meters.map((m) => m / METERS_PER_DEG) : t.map(() => NaN);
+  return {
+    t, lat: flat(north), lon: flat(east), alt: [], fixes: null, reference: null,
+    q: roll && pitch && heading ? t.map((_, i) => fromEuler(roll[i]!, pitch[i]!, heading[i]!)) : null,
+  };
 }
 
 function Motion({ run, track, cursor, onCursor }: { run: RunDetail; track: Track; cursor: number | null; onCursor: (t: number | null) => void }) {
@@ -118,7 +139,7 @@ function Motion({ run, track, cursor, onCursor }: { run: RunDetail; track: Track
       <output>{stamp(at, 10)} s</output>
     </div>
     <div class="motion">
-      {hasPlace && <Plan track={track} fixes={track.fixes} reference={track.reference} cursor={at} onCursor={onCursor} />}
+      {hasPlace && <Plan track={track} onMap={Boolean(run.has.track)} fixes={track.fixes} reference={track.reference} cursor={at} onCursor={onCursor} />}
       {track.q && <Attitude q={q} at={`${stamp(at, 10)} s:`} />}
     </div>
     <Series run={run} whole={whole} cursor={cursor} onCursor={onCursor} />

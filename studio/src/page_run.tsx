@@ -47,7 +47,7 @@ export function JobPage({ id }: { id: string }) {
   return <Page title={job.name}>
     <Trouble problem={problem} />
     <div class={`progress ${job.state}`}>
-      <p class="state" role="status"><b>{STATES[job.state]}</b>{job.state === "running" && job.stage ? `: ${job.stage}` : ""}{lasted !== null && lasted >= 0 ? <span class="soft"> {duration(Math.max(lasted, 0.1))}</span> : null}</p>
+      <p class="state" role="status"><b>{STATES[job.state]}</b>{job.state === "running" && job.stage ? `: ${job.stage}` : ""}{lasted !== null && lasted >= 0 ? <span class="soft"> {lasted < 120 ? `${Math.round(lasted)} s` : duration(lasted)}</span> : null}</p>
       {going && <progress {...(job.share === null ? {} : { value: job.share })} max={1} aria-label="Share of the run that is done" />}
       {job.state === "failed" && job.error && <Trouble problem={job.error} />}
       {job.state === "lost" && <p>The studio was stopped while this ran, and the run ended unseen. Run it again.</p>}

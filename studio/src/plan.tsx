@@ -11,6 +11,8 @@ export interface Line { t: number[]; lat: number[]; lon: number[] }
 export interface PlanProps {
   track: Line | null; fixes: Line | null; reference?: Line | null;
   cursor: number | null; onCursor: (t: number | null) => void;
+  /** False where the positions are of no place on the Earth. */
+  onMap?: boolean;
 }
 
 /** What `map.js`, loaded only where a map is shown, offers. */
@@ -20,7 +22,8 @@ export interface MapHandle { cursor: (t: number | null) => void; remove: () => v
 const HEIGHT = 360;
 
 export function Plan(props: PlanProps) {
-  const map = useRequest(() => api.map(), []);
+  const onMap = props.onMap !== false;
+  const map = useRequest(onMap ? () => api.map() : null, [onMap]);
   const [wanted, setWanted] = useState(true);
   const [failed, setFailed] = useState("");
   const tiles = map.value?.tiles ? map.value : null;
@@ -36,7 +39,7 @@ export function Plan(props: PlanProps) {
       {props.track && <span><i class="line t1" />track</span>}
       {props.fixes && <span><i class="dot t2" />satellite fixes</span>}
       {props.reference && <span><i class="line t3" />reference</span>}
-      {!tiles && <span class="soft">No map in the folder: put a .mbtiles or .pmtiles file there to see one. Nothing is fetched from the network.</span>}
+      {onMap && map.value && !tiles && <span class="soft">No map in the folder: put a .mbtiles or .pmtiles file there to see one. Nothing is fetched from the network.</span>}
     </p>
   </div>;
 }
@@ -70,7 +73,7 @@ function MapPlan(props: PlanProps & { info: MapInfo; onFail: (why: string) => vo
 
 interface Flat { t: number[]; north: Float64Array; east: Float64Array }
 
-const METERS_PER_DEG = 111_320;
+export const METERS_PER_DEG = 111_320;
 
 function flatten(line: Line | null | undefined, origin: [number, number]): Flat | null {
   if (!line || !line.t.length) return null;

@@ -63,8 +63,8 @@ export function More({ title, open, children }: { title: ComponentChildren; open
 export function Trouble({ problem, retry }: { problem: Problem | null; retry?: () => void }) {
   if (!problem) return null;
   return <div class="notice bad" role="alert">
-    <p><strong>{problem.text}</strong></p>
-    {problem.remedy && <p>{problem.remedy}</p>}
+    <p><strong>{sentence(problem.text)}</strong></p>
+    {problem.remedy && <p>{sentence(problem.remedy)}</p>}
     {retry && <p><button type="button" onClick={retry}>Try again</button></p>}
   </div>;
 }
@@ -79,21 +79,27 @@ const SEVERITY: Record<string, { word: string; look: string }> = {
   error: { word: "Error", look: "bad" }, warning: { word: "Warning", look: "warn" }, note: { word: "Note", look: "note" },
 };
 
+/** Errors and warnings as a list; notes behind one line, where they are many. */
 export function Findings({ findings, none }: { findings: Finding[]; none?: string }) {
   if (!findings.length) return none ? <Empty>{none}</Empty> : null;
-  const rank = (one: Finding) => ["error", "warning"].indexOf(one.severity) === -1 ? 2 : ["error", "warning"].indexOf(one.severity);
-  return <ul class="findings">
-    {[...findings].sort((a, b) => rank(a) - rank(b)).map((one) => {
-      const { word, look } = SEVERITY[one.severity] ?? SEVERITY["note"]!;
-      return <li class={look} key={`${one.code}${one.file ?? ""}${one.text ?? one.sentence ?? ""}`}>
-        <span class="tag">{word}</span>
-        <div>
-          <p>{one.file && <span class="soft">{one.file}: </span>}{sentence(one.text ?? one.sentence ?? one.code)}</p>
-          {one.remedy && <p class="remedy">What to do: {one.remedy}</p>}
-        </div>
-      </li>;
-    })}
-  </ul>;
+  const of = (...severities: string[]) => findings.filter((one) => severities.includes(one.severity));
+  const notes = findings.filter((one) => !["error", "warning"].includes(one.severity));
+  const list = (some: Finding[]) => some.length > 0 && <ul class="findings">{some.map((one, i) => <OneFinding finding={one} key={i} />)}</ul>;
+  return <>
+    {list([...of("error"), ...of("warning"), ...(notes.length <= 3 ? notes : [])])}
+    {notes.length > 3 && <More title={`${notes.length} notes`}>{list(notes)}</More>}
+  </>;
+}
+
+function OneFinding({ finding: one }: { finding: Finding }) {
+  const { word, look } = SEVERITY[one.severity] ?? SEVERITY["note"]!;
+  return <li class={look}>
+    <span class="tag">{word}</span>
+    <div>
+      <p>{one.file && <span class="soft">{one.file}: </span>}{sentence(one.text ?? one.sentence ?? one.code)}</p>
+      {one.remedy && <p class="remedy">What to do: {one.remedy}</p>}
+    </div>
+  </li>;
 }
 
 export const sentence = (text: string) => text.charAt(0).toUpperCase() + text.slice(1) + (/[.?!]$/.test(text) ? "" : ".");

@@ -2,87 +2,16 @@
 //
 //   node test/flow.mjs ADDRESS SHOTS LOG FIXES
 //
-// ADDRESS is what `strapdown studio` prints; SHOTS a folder for pictures of every step at 1300 and
-// 390 pixels, light and dark. Fails at an error in the console, a request to elsewhere, a page that
-// scrolls sideways, a control without a name, text of too little contrast, and a step that does
-// not do what it should.
+// ADDRESS is what `strapdown studio` prints, of an empty folder; SHOTS a folder for pictures.
 
 import assert from "node:assert/strict";
-import { mkdirSync } from "node:fs";
 import { basename } from "node:path";
-import { chromium } from "playwright-core";
+import { open } from "./drive.mjs";
 
 const [address, shots, ...files] = process.argv.slice(2);
-mkdirSync(shots, { recursive: true });
-const browser = await chromium.launch({
-  executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
-  args: ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"],
-});
-const page = await (await browser.newContext({ viewport: { width: 1300, height: 900 }, permissions: ["clipboard-read", "clipboard-write"] })).newPage();
-page.setDefaultTimeout(60_000);
-const faults = [];
-let expected = 0;
-page.on("console", (message) => { if (["error", "warning"].includes(message.type())) faults.push(`${message.text()} (${message.location().url})`); });
-page.on("pageerror", (error) => faults.push(`uncaught: ${error.message}`));
-page.on("request", (request) => {
-  const at = new URL(request.url());
-  if (!["blob:", "data:"].includes(at.protocol) && at.host !== new URL(address).host) faults.push(`asked another host: ${request.url()}`);
-});
+const { page, look, click, see, done, expect, run } = await open(address, shots);
 
-const click = (name, options = {}) => page.getByRole("button", { name, ...options }).first().click();
-const see = (text) => page.getByText(text).first().waitFor();
-const done = (what) => console.log(`${((Date.now() - begun) / 1000).toFixed(1).padStart(6)} s  ${what}`);
-const begun = Date.now();
-
-/** Pictures of a step, and what has to hold on every page. */
-async function look(name) {
-  for (const [width, dark] of [[1300, false], [1300, true], [390, false], [390, true]]) {
-    await page.setViewportSize({ width, height: 900 });
-    await page.emulateMedia({ colorScheme: dark ? "dark" : "light" });
-    await page.waitForTimeout(350);
-    const wide = await page.evaluate(() => document.documentElement.scrollWidth);
-    assert.ok(wide <= width, `${name}: ${wide} pixels wide at ${width}`);
-    assert.deepEqual(await page.evaluate(faintText), [], `${name}: contrast, ${dark ? "dark" : "light"}`);
-    await page.screenshot({ path: `${shots}/${name}-${width}-${dark ? "dark" : "light"}.png`, fullPage: true });
-  }
-  assert.deepEqual(await nameless(), [], `${name}: controls without a name`);
-  await page.setViewportSize({ width: 1300, height: 900 });
-  await page.emulateMedia({ colorScheme: "light" });
-}
-
-/** Controls that a screen reader could not name. */
-async function nameless() {
-  const session = await page.context().newCDPSession(page);
-  const { nodes } = await session.send("Accessibility.getFullAXTree");
-  await session.detach();
-  const controls = new Set(["button", "link", "textbox", "searchbox", "checkbox", "radio", "combobox", "slider", "spinbutton", "img", "progressbar"]);
-  return nodes.filter((n) => !n.ignored && controls.has(n.role?.value) && !n.name?.value).map((n) => `${n.role.value} ${n.nodeId}`);
-}
-
-/** Text below the contrast of WCAG AA, 4.5 or 3 where it is large; runs in the page. */
-function faintText() {
-  const parse = (text) => { const [r, g, b, a = 1] = (text.match(/[\d.]+/g) ?? []).map(Number); return [r, g, b, a]; };
-  const over = (top, under) => top.slice(0, 3).map((v, i) => v * top[3] + under[i] * (1 - top[3]));
-  const light = (rgb) => rgb.map((v) => v / 255).map((v) => (v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)).reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
-  const ground = (element) => {
-    const layers = [];
-    for (let e = element; e; e = e.parentElement) layers.push(parse(getComputedStyle(e).backgroundColor));
-    return layers.reverse().reduce((under, top) => over(top, under), [255, 255, 255]);
-  };
-  const found = new Set();
-  const walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
-  while (walk.nextNode()) {
-    const element = walk.currentNode.parentElement;
-    if (!walk.currentNode.data.trim() || element.closest("svg, noscript, :disabled, .u-wrap") || !element.checkVisibility()) continue;
-    const style = getComputedStyle(element), back = ground(element);
-    const [a, b] = [light(over(parse(style.color), back)), light(back)].sort((x, y) => y - x);
-    const ratio = (a + 0.05) / (b + 0.05), size = parseFloat(style.fontSize);
-    if (ratio < (size >= 24 || (size >= 18.6 && style.fontWeight >= 600) ? 3 : 4.5)) found.add(`${walk.currentNode.data.trim().slice(0, 40)}: ${ratio.toFixed(2)}`);
-  }
-  return [...found];
-}
-
-try {
+await run(async () => {
   await page.goto(address);
   await see("What did you record?");
   await look("1-empty");
@@ -91,7 +20,7 @@ try {
   // A second time: it asks before it replaces.
   await page.locator("input[type=file]").setInputFiles(files[0]);
   await click("Replace it");
-  expected += 1;
+  expect();
   await page.getByRole("button", { name: "Replace it" }).waitFor({ state: "detached" });
   for (const box of await page.getByRole("checkbox").all()) await box.check();
   await look("2-files");
@@ -209,17 +138,5 @@ try {
   await look("9-live");
   await page.goto(`${address}#/result/none`);
   await page.getByRole("alert").waitFor();
-  expected += 1;
-
-  // What the steps above were refused on purpose is said by the browser, too.
-  const refused = faults.filter((fault) => /status of (404|409)/.test(fault));
-  assert.equal(refused.length, expected, `refusals: ${refused.join("\n")}`);
-  assert.deepEqual(faults.filter((fault) => !refused.includes(fault)), [], "console");
-  done("no error in the console, no request to elsewhere");
-} catch (error) {
-  await page.screenshot({ path: `${shots}/failed.png`, fullPage: true });
-  console.log(faults.join("\n"));
-  throw error;
-} finally {
-  await browser.close();
-}
+  expect();
+});
