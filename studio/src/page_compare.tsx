@@ -5,7 +5,7 @@ import { api, problemOf } from "./api";
 import { date, number, plural, shown } from "./format";
 import { useShared } from "./store";
 import type { Comparison, Problem } from "./types";
-import { Busy, Empty, Findings, Page, Part, Table, Trouble } from "./ui";
+import { Busy, Empty, Findings, More, Page, Part, Table, Trouble } from "./ui";
 
 export function ComparePage({ chosen: first }: { chosen: string[] }) {
   const { state } = useShared();
@@ -61,9 +61,13 @@ function Found({ found }: { found: Comparison }) {
       {found.conditions.some((c) => new Set(c.values).size > 1) && <Table head={["Software", ...names]} rows={found.conditions.filter((c) => new Set(c.values).size > 1).map((c) => [c.name, ...c.values.map(shown)])} />}
     </Part>
     <Part title="Numbers" aside={<label class="inline"><input type="checkbox" checked={all} onChange={(e) => setAll(e.currentTarget.checked)} />Those that are the same, too</label>}>
-      {numbers.length ? <Table head={["Quantity", ...names, ...others.map((name) => `Difference of ${name}`), "Unit"]} numeric={[...names, ...others].map((_, i) => i + 1)}
-        rows={numbers.map((row) => [`${row.group}: ${row.quantity}`, ...row.values.map((value, i) => `${shown(value)}${bound(row.below_95[i], row.above_95[i])}`),
-          ...others.map((_, i) => row.differences[i + 1] === null || row.differences[i + 1] === undefined ? "–" : `${shown(row.differences[i + 1])}${row.within[i + 1] === false ? " (beyond both bounds)" : ""}`), row.unit ?? ""])} /> : <Empty>No number differs.</Empty>}
+      {!numbers.length && <Empty>No number differs.</Empty>}
+      {[...new Set(numbers.map((row) => row.group))].map((group) => <More key={group} title={group} open={!DETAILS.test(group)}>
+        <Table head={["Quantity", ...names, ...others.map((name) => `Difference of ${name}`), "Unit"]} numeric={[...names, ...others].map((_, i) => i + 1)}
+          rows={numbers.filter((row) => row.group === group).map((row) => [row.quantity,
+            ...row.values.map((value, i) => `${value === null ? "" : shown(value)}${bound(row.below_95[i], row.above_95[i], row.difference_unit === row.unit ? "" : row.difference_unit)}` || "–"),
+            ...others.map((_, i) => difference(row, i + 1)), row.unit ?? ""])} />
+      </More>)}
     </Part>
     {findings.length > 0 && <Part title="Findings that differ">
       <Table head={["Finding", ...names.map((name) => `In ${name}`)]} numeric={names.map((_, i) => i + 1)} rows={findings.map((one) => [one.sentence, ...one.counts.map(String)])} />
@@ -73,7 +77,16 @@ function Found({ found }: { found: Comparison }) {
   </>;
 }
 
-function bound(below: number | null | undefined, above: number | null | undefined): string {
+/** What few people ask for: folded at first. */
+const DETAILS = /^(Estimated|Measurements|Shares|Errors by|Coarse)/;
+
+function difference(row: Comparison["numbers"][number], i: number): string {
+  const value = row.differences[i];
+  if (value === null || value === undefined) return "–";
+  return `${shown(value)}${row.difference_unit !== row.unit ? ` ${row.difference_unit}` : ""}${row.within[i] === false ? " (beyond both bounds)" : ""}`;
+}
+
+function bound(below: number | null | undefined, above: number | null | undefined, unit: string | null): string {
   if (below === null || below === undefined || above === null || above === undefined) return "";
-  return below === above ? ` ± ${number(below, 2)}` : ` −${number(below, 2)}/+${number(above, 2)}`;
+  return (below === above ? ` ± ${number(below, 2)}` : ` −${number(below, 2)}/+${number(above, 2)}`) + (unit ? ` ${unit}` : "");
 }

@@ -47,7 +47,8 @@ function Begin() {
   };
   return <Part title="Start listening">
     {info.busy && <Busy>One moment…</Busy>}
-    <Trouble problem={info.problem} retry={info.again} />
+    {info.problem?.code === "studio.no-such-page" ? <><Empty>This studio does not listen itself. From a terminal it goes so, and the session is a log that the studio opens:</Empty><Command text="strapdown live --listen 0.0.0.0:8437 --out session" /></>
+      : <Trouble problem={info.problem} retry={info.again} />}
     <Trouble problem={problem} />
     {info.value && !info.value.protocols.length && <Empty>This installation has nothing that can listen.</Empty>}
     {chosen && <>

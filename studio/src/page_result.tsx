@@ -4,11 +4,11 @@
 import { useEffect, useMemo, useState } from "preact/hooks";
 import { api, part } from "./api";
 import { Attitude, fromEuler } from "./attitude";
-import { date, plural, shown, stamp } from "./format";
+import { date, number, plural, shown, stamp, withBound } from "./format";
 import { indexOf, METERS_PER_DEG, Plan } from "./plan";
 import { Traces, type Panel } from "./traces";
 import type { KeyNumber, RunDetail, Series as SeriesData, Span, Track } from "./types";
-import { Busy, Command, Empty, Findings, More, Page, Part, sentence, Table, Trouble, useRequest } from "./ui";
+import { Busy, Command, Empty, Findings, More, Page, Part, Table, Trouble, useRequest } from "./ui";
 
 export function ResultPage({ name }: { name: string }) {
   const run = useRequest(() => api.run(name), [name]);
@@ -55,20 +55,44 @@ const VERDICTS: Record<string, { words: string; look: string }> = {
   trusted: { words: "The result can be trusted", look: "good" }, reserve: { words: "Use with caution", look: "warn" }, distrusted: { words: "Do not trust the result", look: "bad" },
 };
 
-/** The numbers that matter first, large; the others in a table. */
+/** What people ask for first, by the names of `strapdown compare`. */
+const MAIN = [
+  /^delta-V$/, /^direction of force$/, /^position, horizontal$/, /^heading$/, /^way over ground$/, /^largest 95 % bound, horizontal$/, /^height$/, /^roll$/, /^pitch$/,
+  /^algorithm$/, /^lowest rate$/, /^shortest time/,
+];
+
+function bound({ below, above }: KeyNumber): string {
+  if ((below ?? null) === null && (above ?? null) === null) return "";
+  return below === above ? `± ${number(below!, 2)}` : `− ${below === null ? "∞" : number(below!, 2)}, + ${above === null ? "∞" : number(above!, 2)}`;
+}
+
+const valueOf = (one: KeyNumber) => typeof one.value === "number" && unitOfBound(one) === one.unit && (one.below ?? one.above) ? withBound(one.value, Math.min(one.below ?? Infinity, one.above ?? Infinity)) : shown(one.value);
+
+/** Latitude and longitude are in degrees, their bounds in meters. */
+const unitOfBound = (one: KeyNumber) => one.bound_unit ?? (/^(latitude|longitude)$/.test(one.label) ? "m" : one.unit);
+
+/** Speeds of vehicles, as people say them. */
+function spoken(one: KeyNumber): KeyNumber {
+  if (!/delta-V/i.test(one.label) || one.unit !== "m/s" || typeof one.value !== "number") return one;
+  const times = (v: number | null | undefined) => v === null || v === undefined ? null : v * 3.6;
+  return { ...one, value: one.value * 3.6, below: times(one.below), above: times(one.above), unit: "km/h" };
+}
+
+/** The numbers that matter first, large; all in a table. */
 function Numbers({ numbers }: { numbers: KeyNumber[] }) {
-  const large = numbers.filter((one) => one.value !== null).slice(0, 6), rest = numbers.slice(large.length);
-  const bound = ({ below, above }: KeyNumber) => below === undefined || above === undefined || (below === null && above === null) ? ""
-    : below === above ? `± ${shown(below)}` : `− ${below === null ? "∞" : shown(below)}, + ${above === null ? "∞" : shown(above)}`;
   if (!numbers.length) return null;
+  const all = numbers.map(spoken);
+  const main = MAIN.flatMap((pattern) => all.filter((one) => pattern.test(one.label)).slice(0, 1)).slice(0, 6);
+  const large = main.length ? main : all.filter((one) => one.value !== null && bound(one)).slice(0, 4);
   return <>
-    <dl class="keys">
-      {large.map((one) => <div key={`${one.group} ${one.label}`}><dt>{sentence(`${one.group ? `${one.group}: ` : ""}${one.label}`).replace(/\.$/, "")}</dt>
-        <dd>{shown(one.value)} <small>{bound(one)} {one.unit}</small></dd></div>)}
-    </dl>
-    {rest.length > 0 && <More title={plural(rest.length, "more number")}>
-      <Table head={["", "Quantity", "Value", "95 % bound", "Unit"]} numeric={[2, 3]} rows={rest.map((one) => [one.group ?? "", one.label, shown(one.value), bound(one), one.unit ?? ""])} />
-    </More>}
+    {large.length > 0 && <dl class="keys">
+      {large.map((one) => <div key={`${one.group} ${one.label}`}><dt>{[one.label.replace(/^./, (c) => c.toUpperCase()), one.group?.toLowerCase() === "at the end" ? "at the end" : ""].filter(Boolean).join(" ")}</dt>
+        <dd>{one.value === null ? `${bound(one)} ${one.unit}` : valueOf(one)} {one.value !== null && <small>{bound(one)} {one.unit}</small>}</dd></div>)}
+    </dl>}
+    {large.some(bound) && <p class="help">Bounds hold 95 % of the time.</p>}
+    <More title={`All ${plural(all.length, "number")}`}>
+      <Table head={["", "Quantity", "Value", "Unit", "95 % bound"]} numeric={[2, 4]} rows={all.map((one) => [one.group ?? "", one.label, valueOf(one), one.unit ?? "", bound(one) && `${bound(one)} ${unitOfBound(one) ?? ""}`])} />
+    </More>
   </>;
 }
 

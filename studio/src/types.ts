@@ -98,7 +98,7 @@ export interface Checked {
 export interface KeyNumber {
   group?: string; label: string; value: number | string | null; unit: string | null;
   /** Distance of the lower and of the upper bound; null without an end. */
-  below?: number | null; above?: number | null;
+  below?: number | null; above?: number | null; bound_unit?: string | null;
 }
 
 export interface RunDetail extends Run {
@@ -139,7 +139,7 @@ export interface Comparison {
   inputs: { role: string; same: boolean; status: string[]; files: ({ name: string } | null)[] }[];
   conditions: { name: string; values: (string | null)[] }[];
   numbers: {
-    group: string; quantity: string; unit: string | null; same: boolean; values: (number | string | null)[];
+    group: string; quantity: string; unit: string | null; difference_unit: string | null; same: boolean; values: (number | string | null)[];
     below_95: (number | null)[]; above_95: (number | null)[]; differences: (number | null)[]; within: (boolean | null)[];
   }[];
   findings_of_runs: { code: string; sentence: string; differs: boolean; counts: number[] }[];

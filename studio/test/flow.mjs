@@ -35,6 +35,10 @@ await run(async () => {
     await page.locator(".plot canvas").first().waitFor();
   }
   await page.getByText("Looking again…").waitFor({ state: "detached" });
+  if (await page.getByRole("button", { name: "Map", exact: true }).count()) {
+    await page.locator(".maplibregl-canvas").waitFor();
+    done("map");
+  }
   const viewed = () => page.locator(".viewed").innerText();
   const whole = await viewed();
   const over = page.locator(".u-over").first();
@@ -135,6 +139,7 @@ await run(async () => {
   await page.goto(`${address}#/live`);
   await see("Start listening");
   await page.waitForTimeout(500);
+  if (await page.getByText("does not listen itself").count()) expect();
   await look("9-live");
   await page.goto(`${address}#/result/none`);
   await page.getByRole("alert").waitFor();

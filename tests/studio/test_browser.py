@@ -12,6 +12,9 @@ from pathlib import Path
 
 import pytest
 
+from strapdown.formats.map_tiles import tile_number
+from tests.map_files import mbtiles, png
+
 ROOT = Path(__file__).parents[2]
 STUDIO = ROOT / "studio"
 LOGS = ROOT / "src" / "strapdown" / "demo_data" / "comma2k19"
@@ -33,6 +36,16 @@ def address(tmp_path: Path) -> Iterator[str]:
     """Address of a studio of an empty folder."""
     folder = tmp_path / "records"
     folder.mkdir()
+    # The drive of the demo, on a map of greys.
+    town = [(z, *tile_number(37.7255, -122.4721, z)) for z in range(10, 17)]
+    tiles = {
+        (z, x + i, y + j): png(grey=235 if (i + j) % 2 else 205)
+        for z, x, y in town
+        for i in range(-4, 5)
+        for j in range(-4, 5)
+    }
+    about = {"format": "png", "minzoom": "10", "maxzoom": "16", "attribution": "© Town"}
+    mbtiles(folder / "town.mbtiles", tiles, **about)
     command = [sys.executable, "-m", "strapdown", "studio", str(folder), "--no-browser"]
     with (
         (tmp_path / "errors").open("wb") as errors,
