@@ -12,7 +12,9 @@ const [address, shots, ...files] = process.argv.slice(2);
 const { page, look, click, see, done, expect, run } = await open(address, shots);
 
 await run(async () => {
-  await page.goto(address);
+  const policy = (await page.goto(address)).headers()["content-security-policy"];
+  assert.match(policy, /default-src 'none'/);
+  assert.doesNotMatch(policy, /unsafe|\*|http/, "nothing inline, nothing from elsewhere");
   await see("What did you record?");
   await look("1-empty");
   await page.locator("input[type=file]").setInputFiles(files);

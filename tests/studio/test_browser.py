@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import shutil
@@ -12,7 +13,6 @@ from pathlib import Path
 
 import pytest
 
-from strapdown.formats.map_tiles import tile_number
 from tests.map_files import mbtiles, png
 
 ROOT = Path(__file__).parents[2]
@@ -31,13 +31,19 @@ pytestmark = [
 ]
 
 
+def tile_of(lat: float, lon: float, zoom: int) -> tuple[int, int]:
+    """Column and row, from the north, of the tile of web Mercator that holds a place."""
+    north = math.asinh(math.tan(math.radians(lat))) / math.pi
+    return int((lon + 180.0) / 360.0 * 2**zoom), int((1.0 - north) / 2.0 * 2**zoom)
+
+
 @pytest.fixture
 def address(tmp_path: Path) -> Iterator[str]:
     """Address of a studio of an empty folder."""
     folder = tmp_path / "records"
     folder.mkdir()
     # The drive of the demo, on a map of greys.
-    town = [(z, *tile_number(37.7255, -122.4721, z)) for z in range(10, 17)]
+    town = [(z, *tile_of(37.7255, -122.4721, z)) for z in range(10, 17)]
     tiles = {
         (z, x + i, y + j): png(grey=235 if (i + j) % 2 else 205)
         for z, x, y in town
