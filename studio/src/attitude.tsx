@@ -57,14 +57,14 @@ export function Attitude({ q, at }: { q: Quaternion | null; at?: string }) {
     const ctx = own.getContext("2d")!;
     ctx.scale(dense, dense);
     ctx.clearRect(0, 0, width, HEIGHT);
-    const scale = Math.min(width / 3.6, HEIGHT / 2.5);
+    const scale = Math.min(width / 3.8, HEIGHT / 2.9);
     // A camera that looks north, turned to the side and down by what was dragged.
     const [side, tilt] = turn;
     const see = ([n, e, d]: Vector): Vector => {
       const across = e * Math.cos(side) - n * Math.sin(side), ahead = n * Math.cos(side) + e * Math.sin(side);
       const up = -d * Math.cos(tilt) + ahead * Math.sin(tilt), depth = ahead * Math.cos(tilt) + d * Math.sin(tilt);
       const near = 6 / (6 + depth);
-      return [width / 2 + across * scale * near, HEIGHT / 2 - up * scale * near, depth];
+      return [width / 2 + across * scale * near, HEIGHT * 0.46 - up * scale * near, depth];
     };
     const line = (from: Vector, to: Vector, stroke: string, thick: number) => {
       const a = see(from), b = see(to);

@@ -7,9 +7,10 @@ import { api, problemOf } from "./api";
 import { Attitude, fromEuler, type Quaternion } from "./attitude";
 import { number, stamp } from "./format";
 import { Plan, type Line } from "./plan";
-import { putJob, useShared } from "./store";
-import type { Job, Problem } from "./types";
-import { Busy, Command, Control, Copy, Empty, More, Page, Part, Table, Trouble, useRequest } from "./ui";
+import { newWork, putJob, useShared } from "./store";
+import { Traces, type Panel } from "./traces";
+import type { Job, Problem, Series, Span } from "./types";
+import { Busy, Command, Control, Empty, More, Page, Part, sentence, Table, Trouble, useRequest } from "./ui";
 import { STATES } from "./page_run";
 
 export function LivePage({ id }: { id: string }) {
@@ -29,7 +30,11 @@ function Begin() {
   const { state } = useShared();
   const info = useRequest(() => api.live(), []);
   const [protocol, setProtocol] = useState("");
-  const [name, setName] = useState("live-1");
+  const [name, setName] = useState(() => {
+    let i = 1;
+    while (state?.files.some((file) => file.name === `live-${i}`) || state?.jobs.some((job) => job.name === `live-${i}`)) i++;
+    return `live-${i}`;
+  });
   const [options, setOptions] = useState<Record<string, unknown>>({});
   const [problem, setProblem] = useState<Problem | null>(null);
   const chosen = info.value?.protocols.find((one) => one.name === protocol) ?? info.value?.protocols[0];
@@ -59,7 +64,7 @@ function Begin() {
       </fieldset>
       <div class="fields">{chosen.fields.map((field) => <Control key={`${chosen.name}.${field.key}`} field={field} value={options[field.key]}
         onChange={(value) => { const rest = { ...options }; if (value === null) delete rest[field.key]; else rest[field.key] = value; setOptions(rest); }} />)}</div>
-      {info.value!.warning && <p class="notice warn">{info.value!.warning}</p>}
+      {info.value!.warning && <p class="notice warn">{sentence(info.value!.warning)}</p>}
       <div class="next startrun">
         <label class="inline">Name of the session <input type="text" value={name} onInput={(e) => setName(e.currentTarget.value)} /></label>
         <button type="button" class="main" disabled={!name.trim() || taken} onClick={() => void begin()}>Listen</button>
@@ -81,15 +86,14 @@ function attitudeOf(line: Record<string, unknown>): Quaternion | null {
 }
 
 function Session({ job }: { job: Job }) {
-  const { lines: all } = useShared();
+  const { lines: all, state } = useShared();
   const [problem, setProblem] = useState<Problem | null>(null);
-  const lines = all[job.id] ?? [];
-  const last = lines[lines.length - 1];
+  const [device, setDevice] = useState<string | null>(null);
+  const states = (all[job.id] ?? []).filter((line) => num(line, "time") !== null);
+  const devices = [...new Set(states.map((line) => String(line["session"] ?? "")))];
+  const shown = device ?? devices[0] ?? "";
+  const lines = states.filter((line) => String(line["session"] ?? "") === shown);
   const going = job.state === "running" || job.state === "waiting";
-  const track = useMemo<Line | null>(() => {
-    const seen = lines.filter((line) => num(line, "lat") !== null && num(line, "lon") !== null);
-    return seen.length ? { t: seen.map((line) => num(line, "time") ?? 0), lat: seen.map((line) => num(line, "lat")!), lon: seen.map((line) => num(line, "lon")!) } : null;
-  }, [lines]);
   const end = async () => {
     try {
       putJob(await api.cancel(job.id));
@@ -97,37 +101,61 @@ function Session({ job }: { job: Job }) {
       setProblem(problemOf(error));
     }
   };
-  return <Part title={job.name} aside={<span class="soft" role="status">{going ? job.live ? last ? "Receiving" : "Waiting for the first sample" : "Starting" : STATES[job.state]}</span>}>
+  // Each session is a log of the folder like any other.
+  const logs = going ? [] : (state?.files ?? []).filter((file) => file.name.startsWith(`${job.name}/`));
+  const open = (name: string) => { newWork([name]); location.hash = "#/look"; };
+  return <Part title={job.name} aside={<span class="soft" role="status">{going ? job.live ? lines.length ? "Receiving" : "Waiting for the first sample" : "Starting" : STATES[job.state]}</span>}>
     <Trouble problem={problem} />
     {job.state === "failed" && <Trouble problem={job.error} />}
     {going && job.live && <div class="pairing">
       {job.live.qr && <Qr text={job.live.qr} />}
       <div>
         <p>Let the phone send to this address, or scan the code:</p>
-        <div class="command"><code tabIndex={0}>{job.live.address}</code><Copy text={job.live.address} /></div>
+        <Command text={job.live.address} />
         {job.live.token && <p>Word to pair with: <code>{job.live.token}</code></p>}
-        {job.live.warning && <p class="notice warn">{job.live.warning}</p>}
+        {job.live.warning && <p class="notice warn">{sentence(job.live.warning)}</p>}
       </div>
     </div>}
-    {last && <LiveState last={last} track={track} />}
-    <div class="row">
+    {devices.length > 1 && <label class="inline">Device <select value={shown} onChange={(e) => setDevice(e.currentTarget.value)}>{devices.map((one) => <option key={one} value={one}>{one}</option>)}</select></label>}
+    {lines.length > 0 && <LiveState lines={lines} session={shown} />}
+    <div class="next">
       {going && <button type="button" onClick={() => void end()}>Stop listening</button>}
       {!going && job.run && <a class="button main" href={`#/result/${encodeURIComponent(job.run)}`}>See the result</a>}
+      {logs.map(({ name }) => <button type="button" class="main" key={name} onClick={() => open(name)}>Look into {name.slice(job.name.length + 1)}</button>)}
     </div>
-    <More title="What it prints"><pre class="tail" tabIndex={0}>{job.tail.join("\n") || "Nothing yet."}</pre></More>
+    <More title="What it prints"><pre class="tail" tabIndex={0}>{job.tail.filter((line) => !line.startsWith("{")).join("\n") || "Nothing yet."}</pre></More>
     <More title="The same from a terminal"><Command text={job.command} /></More>
   </Part>;
 }
 
-function LiveState({ last, track }: { last: Record<string, unknown>; track: Line | null }) {
-  const time = num(last, "time");
-  const rows = Object.entries(last).filter(([key, value]) => typeof value === "number" && key !== "time");
+const CURVES: [string, string, string[]][] = [["Roll and pitch", "deg", ["roll", "pitch"]], ["Heading", "deg", ["heading"]], ["Velocity", "m/s", ["VN", "VE", "VD"]]];
+
+function LiveState({ lines, session }: { lines: Record<string, unknown>[]; session: string }) {
+  const last = lines[lines.length - 1]!, time = num(last, "time")!;
+  const [cursor, setCursor] = useState<number | null>(null);
+  const track = useMemo<Line | null>(() => {
+    const seen = lines.filter((line) => num(line, "lat") !== null && num(line, "lon") !== null);
+    return seen.length ? { t: seen.map((line) => num(line, "time")!), lat: seen.map((line) => num(line, "lat")!), lon: seen.map((line) => num(line, "lon")!) } : null;
+  }, [lines.length, time]);
+  const panels = useMemo<Panel[]>(() => CURVES.filter(([, , names]) => names.some((name) => num(last, name) !== null))
+    .map(([title, unit, names]) => ({ title, unit, columns: names.map((name) => ({ name, label: name })) })), [session, Object.keys(last).join()]);
+  // The curves are drawn twice a second, the attitude with every state.
+  const beat = Math.floor(Date.now() / 500);
+  const whole = useMemo<Span>(() => [num(lines[0]!, "time")!, Math.max(time, num(lines[0]!, "time")! + 1)], [beat, session]);
+  const held = lines.filter((line) => { const t = num(line, "time")!; return t <= whole[1]; });
+  const ask = async (columns: string[], view: Span): Promise<Series> => {
+    const seen = held.filter((line) => { const t = num(line, "time")!; return t >= view[0] && t <= view[1]; });
+    const of = (name: string) => seen.map((line) => num(line, name));
+    return { t: seen.map((line) => num(line, "time")!), columns: Object.fromEntries(columns.map((name) => [name, { unit: null, low: of(name), high: of(name) }])) };
+  };
+  const rows = Object.entries(last).filter(([key, value]) => typeof value === "number" && key !== "time" && key !== "unix");
   return <>
     <div class="motion">
-      <Attitude q={attitudeOf(last)} at={time === null ? undefined : `${stamp(time, 10)} s:`} />
-      {track && <Plan track={track} fixes={null} cursor={time} onCursor={() => undefined} />}
+      <Attitude q={attitudeOf(last)} at={`${stamp(time, 10)} s:`} />
+      {track && <Plan track={track} fixes={null} cursor={cursor ?? time} onCursor={setCursor} />}
     </div>
-    {rows.length > 0 && <More title="Numbers"><Table head={["", "Value"]} numeric={[1]} rows={rows.map(([key, value]) => [`${key}${UNITS[key] ? `, ${UNITS[key]}` : ""}`, number(value as number, 7)])} /></More>}
+    {panels.length > 0 && <Traces panels={panels} whole={whole} askKey={session} ask={ask} cursor={cursor} onCursor={setCursor} />}
+    {rows.length > 0 && <More title="Numbers"><Table head={["", "Value", "Unit"]} numeric={[1]} rows={rows.map(([key, value]) => [key.replaceAll("_", " "), number(value as number, 7), UNITS[key.replace(/_sd$/, "")] ?? ""])} /></More>}
   </>;
 }
 

@@ -1,8 +1,8 @@
 // Drive a crash: its records, each question of the case, what follows while a value moves, the run.
 //
-//   node test/crash.mjs ADDRESS SHOTS RECORD OTHERS…
+//   node test/crash.mjs ADDRESS SHOTS [RECORD OTHERS…]
 //
-// RECORD is chosen; OTHERS are files that it refers to.
+// RECORD is chosen; OTHERS are files that it refers to. Without them: the studio's own sample.
 
 import assert from "node:assert/strict";
 import { basename } from "node:path";
@@ -21,10 +21,15 @@ function answer(text) {
 
 await run(async () => {
   await page.goto(address);
-  await page.locator("input[type=file]").setInputFiles(files);
-  await page.locator(".sending").waitFor({ state: "detached" });
-  for (const box of await page.getByRole("checkbox").all()) await box.uncheck();
-  await page.getByRole("checkbox", { name: new RegExp(basename(files[0]).replaceAll(".", "\\.")) }).check();
+  if (files.length) {
+    await page.locator("input[type=file]").setInputFiles(files);
+    await page.locator(".sending").waitFor({ state: "detached" });
+    for (const box of await page.getByRole("checkbox").all()) await box.uncheck();
+    await page.getByRole("checkbox", { name: new RegExp(basename(files[0]).replaceAll(".", "\\.")) }).check();
+  } else {
+    await click("A simulated crash");
+    await page.getByRole("checkbox", { checked: true }).first().waitFor();
+  }
   await click(/^Look into/);
   await page.getByRole("link", { name: "Choose what to find out" }).click();
   await page.getByRole("button", { name: "Crash", exact: true }).click();

@@ -69,12 +69,11 @@ def address(tmp_path: Path) -> Iterator[str]:
             server.terminate()
 
 
-def test_the_whole_flow(address: str, tmp_path: Path) -> None:
+def drive(script: str, address: str, tmp_path: Path, *words: Path) -> str:
+    """Run a script of studio/test; its output. STRAPDOWN_SHOTS: a folder that keeps the pictures."""
     shots = Path(os.environ.get("STRAPDOWN_SHOTS", tmp_path / "shots"))
-    command = ["node", "test/flow.mjs", address, str(shots), "imu.csv", "gnss.csv"]
-    command[-2:] = [str(LOGS / name) for name in command[-2:]]
     ran = subprocess.run(
-        command,
+        ["node", f"test/{script}", address, str(shots), *map(str, words)],
         cwd=STUDIO,
         env={**os.environ, "CHROMIUM": CHROMIUM},
         capture_output=True,
@@ -84,4 +83,18 @@ def test_the_whole_flow(address: str, tmp_path: Path) -> None:
     )
     assert ran.returncode == 0, ran.stdout + ran.stderr
     assert "no error in the console" in ran.stdout
-    assert len(list(shots.glob("*.png"))) >= 40
+    assert len(list(shots.glob("*.png"))) >= 8
+    return ran.stdout
+
+
+def test_from_files_to_a_comparison(address: str, tmp_path: Path) -> None:
+    said = drive("flow.mjs", address, tmp_path, LOGS / "imu.csv", LOGS / "gnss.csv")
+    assert "map" in said
+
+
+def test_a_crash(address: str, tmp_path: Path) -> None:
+    assert "questions answered" in drive("crash.mjs", address, tmp_path)
+
+
+def test_a_phone_sends(address: str, tmp_path: Path) -> None:
+    assert "seen: " in drive("live.mjs", address, tmp_path)
