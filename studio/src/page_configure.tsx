@@ -198,7 +198,14 @@ function openQuestions(checked: Checked | null, asked: Question[]): Question[] {
 function Questions({ questions, values, onAnswer }: { questions: Question[]; values: Record<string, unknown>; onAnswer: (set: Record<string, unknown>) => void }) {
   if (!questions.length) return null;
   return <Part title={`${plural(questions.length, "question")} only you can answer`}>
-    {questions.map((q) => <Ask key={q.key} question={q} list={q.key !== null && Array.isArray(values[q.key])} onAnswer={onAnswer} />)}
+    {questions.map((q) => {
+      const value = q.key === null ? null : values[q.key];
+      // Of a list, such as [0, 0, "?"], what is open is asked alone.
+      const open = Array.isArray(value) ? value.filter((one) => one === "?").length : 1;
+      const fill = (set: Record<string, unknown>) => open === 1 && Array.isArray(value)
+        ? Object.fromEntries(Object.entries(set).map(([key, answer]) => [key, key === q.key ? value.map((one) => one === "?" ? answer : one) : answer])) : set;
+      return <Ask key={q.key} question={{ ...q, count: open }} list={open > 1} onAnswer={(set) => onAnswer(fill(set))} />;
+    })}
   </Part>;
 }
 

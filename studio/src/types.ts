@@ -30,6 +30,8 @@ export interface Question {
   code: string; text: string; key: string | null; choices: Choice[];
   free: "number" | "text" | null; unit: string | null; line?: number; optional?: boolean; file?: string;
   remedy?: string | null;
+  /** Numbers of a list: 3 of a position. */
+  count?: number;
 }
 
 export interface Finding {

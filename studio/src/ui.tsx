@@ -113,7 +113,9 @@ export function Ask({ question, onAnswer, list }: { question: Question; onAnswer
     event.preventDefault();
     if (!question.key || text.trim() === "") return setFault("Write an answer first.");
     const value = question.free === "text" ? text : parseNumbers(text);
-    if (value === null || (Array.isArray(value) && !list)) return setFault(list ? "Three numbers with commas between them, such as 0.3, 0, -1.2." : "This has to be a number, such as 0.25.");
+    const count = question.count ?? 3;
+    if (list && question.free !== "text" && (!Array.isArray(value) || value.length !== count)) return setFault(`${count} numbers with commas between them, such as ${[0.3, 0, -1.2, 0, 0, 0].slice(0, count).join(", ")}.`);
+    if (value === null || (Array.isArray(value) && !list)) return setFault("This has to be a number, such as 0.25.");
     setFault("");
     onAnswer({ [question.key]: value });
   };

@@ -15,6 +15,9 @@ const { page, look, click, see, done, run } = await open(address, shots);
 function answer(text) {
   if (/sits|position/i.test(text)) return "-1.0, 0.4, 0.2";
   if (/speed|fast/i.test(text)) return "50";
+  if (/^heading/i.test(text)) return "0";
+  if (/title|called/i.test(text)) return "A frontal impact";
+  if (/weigh|mass/i.test(text)) return "1500";
   if (/why/i.test(text)) return "centric impact, no turn in the film";
   return "2";
 }
