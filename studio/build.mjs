@@ -29,9 +29,8 @@ await build({
 });
 for (const name of ["index.html", "icon.svg"]) copyFileSync(join(here, "src", name), join(out, name));
 
-// Two packages state their license in their sources alone.
+// One package states its license in its README alone.
 const PLAIN = {
-  "qrcode-generator": mit("Copyright (c) 2009 Kazuhiko Arase, http://www.d-project.com/"),
   "murmurhash-js": mit("Copyright (c) 2011 Gary Court"),
 };
 

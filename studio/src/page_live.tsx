@@ -2,7 +2,7 @@
 // position as they come. Every byte is kept; the session becomes a log like any other.
 
 import { useMemo, useState } from "preact/hooks";
-import qrcode from "qrcode-generator";
+import { encode } from "uqr";
 import { api, problemOf } from "./api";
 import { Attitude, fromEuler, type Quaternion } from "./attitude";
 import { number, stamp } from "./format";
@@ -163,15 +163,10 @@ const UNITS: Record<string, string> = { lat: "deg", lon: "deg", alt: "m", VN: "m
 
 function Qr({ text }: { text: string }) {
   const path = useMemo(() => {
-    const code = qrcode(0, "M");
-    code.addData(text);
-    code.make();
-    const size = code.getModuleCount();
-    let d = "";
-    for (let row = 0; row < size; row++) for (let col = 0; col < size; col++) if (code.isDark(row, col)) d += `M${col} ${row}h1v1h-1z`;
-    return { d, size };
+    const { data, size } = encode(text, { ecc: "M", border: 4 });
+    return { size, d: data.flatMap((row, y) => row.map((dark, x) => dark ? `M${x} ${y}h1v1h-1z` : "")).join("") };
   }, [text]);
   // Dark on light in the dark, too: cameras expect it, with four modules of margin.
-  return <svg class="qr" viewBox={`-4 -4 ${path.size + 8} ${path.size + 8}`} role="img" aria-label={`Code to scan with the address ${text}`} shape-rendering="crispEdges">
-    <rect x={-4} y={-4} width={path.size + 8} height={path.size + 8} fill="#fff" /><path d={path.d} fill="#000" /></svg>;
+  return <svg class="qr" viewBox={`0 0 ${path.size} ${path.size}`} role="img" aria-label={`Code to scan with the address ${text}`} shape-rendering="crispEdges">
+    <rect width={path.size} height={path.size} fill="#fff" /><path d={path.d} fill="#000" /></svg>;
 }

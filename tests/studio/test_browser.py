@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-
 from tests.map_files import mbtiles, png
 
 ROOT = Path(__file__).parents[2]
@@ -70,7 +69,7 @@ def address(tmp_path: Path) -> Iterator[str]:
 
 
 def drive(script: str, address: str, tmp_path: Path, *words: Path) -> str:
-    """Run a script of studio/test; its output. STRAPDOWN_SHOTS: a folder that keeps the pictures."""
+    """Run a script of studio/test; its output. Pictures stay in the folder STRAPDOWN_SHOTS."""
     shots = Path(os.environ.get("STRAPDOWN_SHOTS", tmp_path / "shots"))
     ran = subprocess.run(
         ["node", f"test/{script}", address, str(shots), *map(str, words)],

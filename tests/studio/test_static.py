@@ -64,7 +64,9 @@ def test_nothing_is_inline_and_nothing_is_from_elsewhere() -> None:
 def test_no_text_becomes_markup() -> None:
     for path in (STUDIO / "src").glob("*.ts*"):
         source = path.read_text(encoding="utf-8")
-        assert not re.search(r"innerHTML|insertAdjacentHTML|outerHTML|DOMParser", source, re.I), path
+        assert not re.search(r"innerHTML|insertAdjacentHTML|outerHTML|DOMParser", source, re.I), (
+            path
+        )
 
 
 def test_every_bundled_package_has_its_license() -> None:
@@ -78,7 +80,9 @@ def test_every_bundled_package_has_its_license() -> None:
     # Of types alone nothing is bundled.
     for name, version in shipped.items():
         if not name.startswith("@types/"):
-            assert re.search(rf"^{re.escape(name)} {re.escape(version)} \(", text, re.MULTILINE), name
+            assert re.search(rf"^{re.escape(name)} {re.escape(version)} \(", text, re.MULTILINE), (
+                name
+            )
     assert not re.search(r"\bA?GPL", text)
 
 
