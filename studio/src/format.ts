@@ -38,8 +38,8 @@ export function bytes(count: number): string {
 export function duration(seconds: number): string {
   if (seconds < 0.1) return `${number(seconds * 1000, 3)} ms`;
   if (seconds < 120) return `${number(seconds, 3)} s`;
-  const minutes = Math.floor(seconds / 60);
-  if (minutes < 60) return `${minutes} min ${Math.round(seconds % 60)} s`;
+  const whole = Math.round(seconds), minutes = Math.round(seconds / 60);
+  if (whole < 3600) return `${Math.floor(whole / 60)} min ${whole % 60} s`;
   return `${Math.floor(minutes / 60)} h ${minutes % 60} min`;
 }
 

@@ -57,8 +57,8 @@ const VERDICTS: Record<string, { words: string; look: string }> = {
 
 /** What people ask for first, by the names of `strapdown compare`. */
 const MAIN = [
-  /^delta-V$/, /^direction of force$/, /^position, horizontal$/, /^heading$/, /^way over ground$/, /^largest 95 % bound, horizontal$/, /^height$/, /^roll$/, /^pitch$/,
-  /^algorithm$/, /^lowest rate$/, /^shortest time/,
+  /: delta-V$/, /: direction of force/, /: clock direction$/, /^At the end: position, horizontal$/, /^At the end: heading$/, /: way over ground$/, /: largest 95 % bound, horizontal$/, /^At the end: height$/,
+  /^At the end: roll$/, /^At the end: pitch$/, /: algorithm$/, /: lowest rate$/, /: shortest time/,
 ];
 
 function bound({ below, above }: KeyNumber): string {
@@ -82,7 +82,7 @@ function spoken(one: KeyNumber): KeyNumber {
 function Numbers({ numbers }: { numbers: KeyNumber[] }) {
   if (!numbers.length) return null;
   const all = numbers.map(spoken);
-  const main = MAIN.flatMap((pattern) => all.filter((one) => pattern.test(one.label)).slice(0, 1)).slice(0, 6);
+  const main = MAIN.flatMap((pattern) => all.filter((one) => pattern.test(`${one.group ?? ""}: ${one.label}`)).slice(0, 1)).slice(0, 6);
   const large = main.length ? main : all.filter((one) => one.value !== null && bound(one)).slice(0, 4);
   return <>
     {large.length > 0 && <dl class="keys">
