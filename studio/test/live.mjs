@@ -45,5 +45,10 @@ await run(async () => {
   await click("Stop listening");
   await page.getByText("Stop listening").waitFor({ state: "detached" });
   await look("live-3-ended");
+  // What was received is a log like any other.
+  await click("Look into phone-1");
+  await see("The traces");
+  await page.locator(".plot canvas").first().waitFor();
+  await look("live-4-log");
   done("live");
 });
