@@ -11,7 +11,7 @@ FRESH = cache=$$(mktemp -d); trap 'rm -rf "$$cache"' EXIT; NUMBA_CACHE_DIR="$$ca
 # What an installation is made of, but for modules that it finds in place.
 INSTALLED = pyproject.toml constraints.txt hatch_build.py $(wildcard src/strapdown/_kernels/*.py tools/kernels_to_c/*.*)
 
-.PHONY: kernels demo test fuzz test-slow test-bounds examples papers record mutation check format bench docs audit codes strangers pictures wheels clean
+.PHONY: kernels demo test fuzz test-slow test-bounds examples papers record mutation check format bench docs audit codes strangers pictures studio wheels clean
 .DEFAULT_GOAL := help
 
 help:
@@ -27,6 +27,7 @@ help:
 	@echo "make kernels    compile the kernels anew, after a change of their sources"
 	@echo "make wheels     one wheel under several Pythons, compared to the byte; PYTHONS='python3.11 python3.12'"
 	@echo "make audit      known vulnerabilities of the versions in constraints.txt"
+	@echo "make studio     the front end of strapdown studio, from studio/ into the package; needs npm"
 	@echo "make docs       the manual, into docs/_build"
 
 $(VENV)/bin/python:
@@ -115,6 +116,14 @@ statements: $(VENV)/.test
 
 pictures: $(VENV)/.test
 	STRAPDOWN_WRITE_PICTURES=1 $(PYTEST) -m '' tests/cli/test_pictures.py papers -k picture
+
+# The front end of strapdown studio. What it builds is committed: a bare machine has no node.
+studio: studio/node_modules
+	cd studio && npm run --silent check && npm run --silent build
+
+studio/node_modules: studio/package-lock.json
+	cd studio && npm ci
+	@touch $@
 
 audit: $(VENV)/.dev
 	$(PIP) pip-audit

@@ -1,0 +1,359 @@
+// Set up: the configuration as a form and as TOML side by side, kept in step by the server; open
+// questions first; for a crash, what follows from it while its parameters move.
+
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import { aborted, api, problemOf } from "./api";
+import { CrashPreview } from "./crash";
+import { number, plural } from "./format";
+import { putJob, setWork, useShared, type Point, type Work } from "./store";
+import type { Checked, Fault, Field, Problem, Question, Section } from "./types";
+import { Ask, Busy, Control, Copy, Empty, Findings, More, Page, Part, sentence, Trouble, useRequest } from "./ui";
+import { Vehicle } from "./vehicle";
+
+/** What a proposal depends on: another one is offered when it changes. */
+const basis = (work: Work) => JSON.stringify([work.kind, work.files, work.log, work.axes, work.trim, work.places]);
+
+export function ConfigurePage() {
+  const { work, state } = useShared();
+  const kinds = useRequest(() => api.kinds(), []);
+  const kind = kinds.value?.find((one) => one.kind === work.kind);
+  const [proposing, setProposing] = useState(false);
+  const [problem, setProblem] = useState<Problem | null>(null);
+
+  const propose = async () => {
+    if (!work.kind) return;
+    setProposing(true);
+    setProblem(null);
+    try {
+      const made = await api.propose({
+        kind: work.kind, files: work.files, log: { ...work.log, ...(work.axes ? { axes: work.axes } : {}) },
+        ...(work.trim ? { from_s: work.trim[0], to_s: work.trim[1] } : {}), answers: {},
+      });
+      let toml = made.toml;
+      if (work.places) toml = await withPlaces(work.kind, toml, work.places);
+      const { toml: _, ...proposal } = made;
+      setWork({ toml, proposal, proposedFor: basis(work), name: work.name || freeName(work, state?.runs.map((r) => r.name) ?? []) });
+    } catch (error) {
+      setProblem(problemOf(error));
+    }
+    setProposing(false);
+  };
+  useEffect(() => { if (work.kind && work.files.length && !work.toml) void propose(); }, [work.kind]);
+
+  if (!work.kind || !work.files.length) {
+    return <Page title="Nothing to set up yet"><Empty><a href={work.files.length ? "#/choose" : "#/files"}>{work.files.length ? "Choose what to find out" : "Choose a file"}</a> first.</Empty></Page>;
+  }
+  return <Page title={kind?.title ?? "Set up"} lead="This was proposed from your log. Answer what is open, correct what is wrong, and run it.">
+    {proposing && <Busy>Proposing a configuration from the log…</Busy>}
+    <Trouble problem={problem} retry={() => void propose()} />
+    {problem && <p><a href="#/files">Choose other files</a>, <a href="#/look">look at how they are read</a>, or <a href="#/choose">find out something else</a>.</p>}
+    <Trouble problem={kinds.problem} retry={kinds.again} />
+    {work.toml && work.proposedFor !== basis(work) && !proposing && <div class="notice warn" role="status">
+      <p>How the log is read, or the part to use, was changed after this configuration was proposed.</p>
+      <p class="row"><button type="button" onClick={() => void propose()}>Propose it anew</button> <span class="soft">What you wrote here is replaced.</span></p>
+    </div>}
+    {work.toml && !proposing && <Editor schema={kind?.schema ?? []} flags={kind?.options ?? []} />}
+  </Page>;
+}
+
+async function withPlaces(kind: string, toml: string, places: NonNullable<Work["places"]>): Promise<string> {
+  const { values } = await api.check({ kind, toml });
+  const set: Record<string, unknown> = {};
+  const round = (point: number[]) => point.map((v) => Math.round(v * 1000) / 1000);
+  for (const key of Object.keys(values)) {
+    if (/^aiding\.[^.]+\.kind$/.test(key) && values[key] === "gnss") {
+      set[key.replace(/kind$/, "lever_arm_m")] = round(places.antenna.map((v, i) => v - places.sensor[i]!));
+    }
+    if (key === "units.0.position_m") set[key] = round(places.sensor);
+  }
+  return Object.keys(set).length ? (await api.check({ kind, toml, set })).toml : toml;
+}
+
+function freeName(work: Work, taken: string[]): string {
+  const base = `${(work.files[0] ?? "run").replace(/\.[^.]*$/, "").replace(/[^A-Za-z0-9_-]+/g, "_").slice(0, 40)}-${work.kind}`;
+  let name = base;
+  for (let i = 2; taken.includes(name); i++) name = `${base}-${i}`;
+  return name;
+}
+
+/** Flags that a person may want, of those that the command takes. */
+const FLAGS: Record<string, string> = {
+  "--smooth": "Smooth: every instant by all measurements, the later ones too", "--no-report": "Without the report: numbers only",
+  "--png": "Figures as PNG, too", "--timing": "Measure the times of the algorithms, too",
+};
+
+function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
+  const { work, state } = useShared();
+  const [checked, setChecked] = useState<Checked | null>(null);
+  const [checking, setChecking] = useState(true);
+  const [problem, setProblem] = useState<Problem | null>(null);
+  const [starting, setStarting] = useState(false);
+  const [force, setForce] = useState("");
+  const serial = useRef(0);
+  const kind = work.kind!;
+
+  const check = async (toml: string, set?: Record<string, unknown>) => {
+    const own = ++serial.current;
+    setChecking(true);
+    try {
+      const answer = await api.check({ kind, toml, name: work.name, ...(set ? { set } : {}) });
+      // An answer to what was written since replaced is old.
+      if (own !== serial.current) return;
+      setChecked(answer);
+      setProblem(null);
+      if (set) setWork({ toml: answer.toml });
+    } catch (error) {
+      if (own === serial.current && !aborted(error)) setProblem(problemOf(error));
+    }
+    if (own === serial.current) setChecking(false);
+  };
+  useEffect(() => {
+    if (checked?.toml === work.toml) return;
+    const timer = setTimeout(() => void check(work.toml), checked ? 350 : 0);
+    return () => clearTimeout(timer);
+  }, [work.toml]);
+  const set = (change: Record<string, unknown>) => void check(work.toml, change);
+
+  const run = async () => {
+    setStarting(true);
+    setProblem(null);
+    try {
+      const job = await api.begin({ kind, name: work.name, toml: work.toml, options: [...work.options, ...(taken && force === work.name ? ["--force"] : [])] });
+      putJob(job);
+      location.hash = `#/job/${encodeURIComponent(job.id)}`;
+    } catch (error) {
+      setProblem(problemOf(error));
+    }
+    setStarting(false);
+  };
+  const values = checked?.values ?? {};
+  const proposal = work.proposal;
+  // An open value is a question, not a mistake.
+  const errors = checked?.errors.filter((e) => e.code !== OPEN) ?? [];
+  const questions = openQuestions(checked, proposal?.questions ?? []);
+  const assumed = (proposal?.to_check ?? []).filter((q) => q.key && q.key in values);
+  const taken = state?.runs.some((one) => one.name === work.name) ?? false;
+  const reason = errors.length ? `${plural(errors.length, "error")} to correct first` : questions.length ? `${plural(questions.length, "question")} to answer first` : !work.name.trim() ? "The result needs a name" : "";
+  return <>
+    <Questions questions={questions} values={values} onAnswer={set} />
+    {assumed.length > 0 && <Part title="Assumed: correct it if it is wrong">
+      <div class="fields wide">{assumed.map((q) => {
+        const field = fieldOf(schema, q.key!);
+        return <Control key={q.key} field={{ ...field, key: q.key!, label: field?.label ?? q.key!, unit: field?.unit ?? q.unit, type: field?.type ?? (Array.isArray(values[q.key!]) ? "list" : q.free ?? "text"), help: q.text }}
+          value={values[q.key!]} fault={faultOf(errors, q.key!)} onChange={(value) => set({ [q.key!]: value })} />;
+      })}</div>
+    </Part>}
+    {proposal && (proposal.found?.length ?? 0) + proposal.findings.length > 0 && <More title="What was found while proposing it">
+      <ul class="plain">{proposal.found?.map((text) => <li key={text}>{sentence(text)}</li>)}</ul>
+      <Findings findings={proposal.findings} />
+    </More>}
+    {proposal?.others?.map((other) => <div class="notice" key={other.name}><p>The record holds another vehicle: {other.name}.</p>
+      <button type="button" onClick={() => setWork({ toml: other.toml, name: `${work.name}-${other.name}`.replace(/[^A-Za-z0-9_-]+/g, "_") })}>Use its case instead</button></div>)}
+    <Trouble problem={problem} />
+    <div class="sidebyside">
+      <section aria-label="The configuration as a form" class="formside">
+        <h2>As a form</h2>
+        <Form schema={schema} values={values} errors={errors} onSet={set} />
+      </section>
+      <section aria-label="The configuration as text" class="textside">
+        <div class="parthead"><h2>As text</h2><span class="soft" role="status">{checking ? "checking…" : errors.length ? plural(errors.length, "error") : "in step with the form"}</span><Copy text={work.toml} /></div>
+        <TomlText toml={work.toml} errors={errors} onChange={(toml) => setWork({ toml })} />
+      </section>
+    </div>
+    <Positions values={values} onSet={set} />
+    {kind === "crash" && <CrashPreview toml={work.toml} values={values} ready={!checking && errors.length === 0 && questions.length === 0} onKeep={set} />}
+    {flags.some((flag) => flag in FLAGS) && <fieldset class="row flags"><legend>Options</legend>
+      {flags.filter((flag) => flag in FLAGS).map((flag) => <label class="inline" key={flag}><input type="checkbox" checked={work.options.includes(flag)}
+        onChange={(e) => setWork({ options: e.currentTarget.checked ? [...work.options, flag] : work.options.filter((o) => o !== flag) })} />{FLAGS[flag]}</label>)}
+    </fieldset>}
+    <div class="next startrun">
+      <label class="inline">Name of the result <input type="text" value={work.name} onInput={(e) => setWork({ name: e.currentTarget.value })} aria-describedby="taken" /></label>
+      {taken && <label class="inline" id="taken"><input type="checkbox" checked={force === work.name} onChange={(e) => setForce(e.currentTarget.checked ? work.name : "")} /> Overwrite the result of this name</label>}
+      <button type="button" class="main" disabled={starting || reason !== "" || (taken && force !== work.name)} aria-describedby="reason" onClick={() => void run()}>Run it</button>
+      <span id="reason" class="soft">{reason}</span>
+    </div>
+  </>;
+}
+
+const isOpen = (value: unknown) => value === "?" || (Array.isArray(value) && value.includes("?"));
+
+const OPEN = "config.open-value";
+
+/** What still has a "?": asked in the words of the proposal, and what it is for in those of the check. */
+function openQuestions(checked: Checked | null, asked: Question[]): Question[] {
+  if (!checked) return asked;
+  const faults = checked.errors.filter((e) => e.code === OPEN);
+  return Object.keys(checked.values).filter((key) => isOpen(checked.values[key])).map((key, i) => {
+    const said = asked.find((q) => q.key === key), fault = faults.find((e) => e.path === key) ?? faults[i];
+    // Two recorders are asked the same: by whose name.
+    const name = checked.values[`${key.split(".").slice(0, 2).join(".")}.name`];
+    const text = said?.text ?? fault?.text ?? key;
+    return {
+      code: OPEN, choices: [], free: "number", unit: null, ...said, key, text: typeof name === "string" && name && !text.includes(name) ? `${name}: ${text}` : text,
+      line: fault?.line ?? undefined, remedy: [said && fault ? sentence(fault.text) : "", PLACE.test(key) ? "Or drag its dot on the drawing of the vehicle below." : ""].filter(Boolean).join(" ") || null,
+    };
+  });
+}
+
+function Questions({ questions, values, onAnswer }: { questions: Question[]; values: Record<string, unknown>; onAnswer: (set: Record<string, unknown>) => void }) {
+  if (!questions.length) return null;
+  return <Part title={`${plural(questions.length, "question")} only you can answer`}>
+    {questions.map((q) => {
+      const value = q.key === null ? null : values[q.key];
+      // Of a list, such as [0, 0, "?"], what is open is asked alone.
+      const open = Array.isArray(value) ? value.filter((one) => one === "?").length : 1;
+      const fill = (set: Record<string, unknown>) => open === 1 && Array.isArray(value)
+        ? Object.fromEntries(Object.entries(set).map(([key, answer]) => [key, key === q.key ? value.map((one) => one === "?" ? answer : one) : answer])) : set;
+      return <Ask key={q.key} question={{ ...q, count: open }} list={open > 1} onAnswer={(set) => onAnswer(fill(set))} />;
+    })}
+  </Part>;
+}
+
+/** The field of the form that a full name belongs to. */
+const fieldOf = (schema: Section[], key: string) => schema.flatMap((s) => s.fields).find((f) => pattern(f.key).test(key));
+
+const faultOf = (errors: Fault[], key: string) => errors.find((e) => {
+  const at = e.path ?? e.key?.replaceAll(", ", ".") ?? "";
+  return at === key || at.startsWith(`${key}.`);
+})?.text;
+
+const escape = (text: string) => text.replace(/[.+?^${}()|[\]\\]/g, "\\$&");
+const pattern = (key: string) => new RegExp(`^${escape(key).replaceAll("*", "([^.]+)")}$`);
+
+interface Shown { at: string; title: string; help: string | null; set: Field[]; others: Field[] }
+
+/** The sections of the form, one for each table that the configuration has. */
+export function sectionsOf(schema: Section[], values: Record<string, unknown>): Shown[] {
+  const keys = Object.keys(values);
+  const seen = new Set<string>();
+  const shown: Shown[] = [];
+  for (const section of schema) {
+    const stars = (section.key?.match(/\*/g) ?? []).length;
+    for (const names of stars === 0 ? [[]] : instancesOf(section, keys, stars)) {
+      const fill = (text: string) => names.reduce((rest, name) => rest.replace("*", name), text);
+      const fields = section.fields.map((f) => ({ ...f, key: fill(f.key) })).filter((f) => !f.key.includes("*"));
+      fields.forEach((f) => seen.add(f.key));
+      const at = fill(section.key ?? "");
+      shown.push({ at, title: titleOf(section, names, values), help: section.help ?? null, set: fields.filter((f) => f.key in values), others: fields.filter((f) => !(f.key in values)) });
+    }
+  }
+  // A key without a field of its own, such as a speed in another unit: with the table that it is in.
+  for (const key of keys.filter((one) => !seen.has(one))) {
+    const home = shown.filter((s) => s.at !== "" && key.startsWith(`${s.at}.`)).sort((a, b) => b.at.length - a.at.length)[0] ?? shown.find((s) => s.at === "");
+    const value = values[key];
+    const field: Field = { key, label: words(home?.at ? key.slice(home.at.length + 1) : key), unit: null, type: typeof value === "number" ? "number" : typeof value === "boolean" ? "flag" : Array.isArray(value) ? "list" : "text" };
+    if (home) home.set.push(field); else shown.push({ at: "", title: "General", help: null, set: [field], others: [] });
+  }
+  return shown.filter((s) => s.set.length || s.others.length).sort((a, b) => Number(b.set.length > 0) - Number(a.set.length > 0));
+}
+
+const words = (key: string) => key.replaceAll(".", ": ").replaceAll("_", " ").replace(/^./, (c) => c.toUpperCase());
+
+/** "Units 1 (LEFT REAR SEAT)", "Aiding gnss: Update rule": the table, which one, and what of it. */
+function titleOf(section: Section, names: string[], values: Record<string, unknown>): string {
+  const own = section.title || section.key || "General";
+  if (!names.length) return section.key?.includes(".") ? `${words(section.key.split(".")[0]!)}: ${own}` : own;
+  const table = section.key!.split(".")[0]!;
+  const name = values[`${table}.${names[0]}.name`];
+  const which = /^\d+$/.test(names[0]!) ? `${Number(names[0]) + 1}${typeof name === "string" && name ? ` (${name})` : ""}` : names[0]!;
+  const inner = section.key!.split(".").length > 2 ? `: ${own}${names.length > 1 ? ` ${Number(names[1]) + 1}` : ""}` : "";
+  return `${words(table)} ${which}${inner}`;
+}
+
+/** Names and numbers that the values put in place of the stars of a section. */
+function instancesOf(section: Section, keys: string[], stars: number): string[][] {
+  const table = new RegExp(`^${escape(section.key!).replaceAll("*", "([^.]+)")}\\.`);
+  const found = new Map<string, string[]>();
+  for (const key of keys) {
+    const match = table.exec(key);
+    if (match) found.set(match.slice(1, stars + 1).join("\n"), match.slice(1, stars + 1));
+  }
+  return [...found.values()];
+}
+
+function Form({ schema, values, errors, onSet }: { schema: Section[]; values: Record<string, unknown>; errors: Fault[]; onSet: (set: Record<string, unknown>) => void }) {
+  const [wanted, setWanted] = useState("");
+  const shown = useMemo(() => sectionsOf(schema, values), [schema, values]);
+  const fits = (f: Field) => !wanted || `${f.key} ${f.label} ${f.help ?? ""}`.toLowerCase().includes(wanted.toLowerCase());
+  const fault = (key: string) => faultOf(errors, key);
+  const control = (f: Field) => <Control key={f.key} field={f} value={values[f.key]} fault={fault(f.key)} onChange={(value) => onSet({ [f.key]: value })} />;
+  const used = shown.filter((s) => wanted || s.set.length), unused = shown.filter((s) => !wanted && !s.set.length);
+  return <>
+    <input type="search" class="wide" aria-label="Find a setting" placeholder="Find a setting" value={wanted} onInput={(e) => setWanted(e.currentTarget.value)} />
+    {used.map((section) => {
+      const set = section.set.filter(fits), others = section.others.filter(fits);
+      if (!set.length && !(wanted ? others.length : section.others.length)) return null;
+      const wrong = section.set.some((f) => fault(f.key));
+      return <More key={section.title} open={wanted !== "" || wrong} title={<>{section.title} <span class="soft">{set.length ? `${set.length} set` : "as by default"}</span></>}>
+        {section.help && <p class="help">{section.help}</p>}
+        <div class="fields">{set.map(control)}</div>
+        {others.length > 0 && (wanted ? <div class="fields">{others.map(control)}</div>
+          : <More title={plural(others.length, "setting that is not set", "settings that are not set")}><div class="fields">{others.map(control)}</div></More>)}
+      </More>;
+    })}
+    {unused.length > 0 && <More title={<>Tables that are not there <span class="soft">{plural(unused.length, "table")}, as by default</span></>}>
+      {unused.map((section) => <More key={section.title} title={section.title}>
+        {section.help && <p class="help">{section.help}</p>}<div class="fields">{section.others.map(control)}</div>
+      </More>)}
+    </More>}
+    {!shown.length && <Empty>The form appears as soon as the text can be read.</Empty>}
+  </>;
+}
+
+function TomlText({ toml, errors, onChange }: { toml: string; errors: Fault[]; onChange: (toml: string) => void }) {
+  const area = useRef<HTMLTextAreaElement>(null);
+  const gutter = useRef<HTMLDivElement>(null);
+  const lines = useMemo(() => toml.split("\n"), [toml]);
+  const wrong = new Set(errors.map((e) => e.line));
+  const show = (line: number) => {
+    const own = area.current;
+    if (!own) return;
+    const from = lines.slice(0, line - 1).reduce((sum, text) => sum + text.length + 1, 0);
+    own.focus();
+    own.setSelectionRange(from, from + (lines[line - 1]?.length ?? 0));
+    own.scrollTop = Math.max(0, (line - 6) * 20);
+  };
+  return <div class="toml">
+    <div class="tomlbox">
+      <div class="gutter" ref={gutter} aria-hidden="true">{lines.map((_, i) => <span class={wrong.has(i + 1) ? "wrong" : ""} key={i}>{i + 1}</span>)}</div>
+      <textarea ref={area} aria-label="The configuration in TOML" spellcheck={false} autocomplete="off" autocapitalize="off" wrap="off" value={toml} aria-invalid={errors.length > 0} aria-describedby="tomlerrors"
+        onInput={(e) => onChange(e.currentTarget.value)} onScroll={(e) => { if (gutter.current) gutter.current.scrollTop = e.currentTarget.scrollTop; }} />
+    </div>
+    <ul class="findings" id="tomlerrors" aria-live="polite">
+      {errors.map((e) => <li class="bad" key={`${e.line} ${e.key} ${e.text}`}>
+        {e.line ? <button type="button" onClick={() => show(e.line!)}>Line {e.line}</button> : <span class="tag">Error</span>}
+        <div><p>{e.key && <code>{e.key}</code>} {sentence(e.text)}</p>{e.remedy && <p class="remedy">What to do: {e.remedy}</p>}</div>
+      </li>)}
+    </ul>
+  </div>;
+}
+
+const PLACE = /(^|\.)(position_m|lever_arm_m|antenna_m)$/;
+
+/** Every position of the configuration, on a drawing of the vehicle. */
+function Positions({ values, onSet }: { values: Record<string, unknown>; onSet: (set: Record<string, unknown>) => void }) {
+  const dots = Object.entries(values).filter(([key, value]) => PLACE.test(key) && Array.isArray(value) && value.length === 3 && !key.startsWith("site"))
+    .map(([key, value]) => ({ key, label: placeName(key, values), value: (value as unknown[]).every((v) => typeof v === "number") ? value as Point : null }));
+  const [moved, setMoved] = useState<{ key: string; value: Point } | null>(null);
+  useEffect(() => {
+    if (!moved) return;
+    // A drag is written when the hand rests.
+    const timer = setTimeout(() => { onSet({ [moved.key]: moved.value }); setMoved(null); }, 400);
+    return () => clearTimeout(timer);
+  }, [moved]);
+  if (!dots.length) return null;
+  const size = (key: string) => typeof values[key] === "number" ? values[key] as number : undefined;
+  return <Part title="Positions on the vehicle">
+    <p class="soft">{dots.map((d) => `${d.label}: ${d.value ? d.value.map((v) => number(v, 3)).join(", ") + " m" : "not yet stated"}`).join(" · ")}</p>
+    <Vehicle dots={dots.map((d) => d.key === moved?.key ? { ...d, value: moved.value } : d)} length={size("vehicle.length_m")} width={size("vehicle.width_m")}
+      onMove={(key, value) => setMoved({ key, value })} />
+  </Part>;
+}
+
+function placeName(key: string, values: Record<string, unknown>): string {
+  const parent = key.replace(/\.[^.]+$/, "");
+  if (key === "point.position_m") return String(values["point.name"] || "Reference point");
+  if (key.endsWith("antenna_m") || values[`${parent}.kind`] === "gnss") return "Antenna";
+  const name = values[`${parent}.name`];
+  return typeof name === "string" && name ? name : parent.replace(/\.\d+/g, (n) => ` ${Number(n.slice(1)) + 1}`).replace(/^aiding\./, "");
+}

@@ -1,0 +1,288 @@
+// Look: what is in the log, the evidence, the questions, the traces; then choose what to find out.
+
+import { useMemo, useState } from "preact/hooks";
+import { api, type Reading } from "./api";
+import { duration, number, plural, stamp } from "./format";
+import { Plan, type Line } from "./plan";
+import { setWork, useShared, type Point } from "./store";
+import { Traces, TrimBar, type Panel } from "./traces";
+import type { Finding, Kind, LogFound, Look, Question, Span, Stream } from "./types";
+import { Ask, Busy, Control, Empty, Findings, More, Page, Part, Table, Trouble, useRequest } from "./ui";
+import { Vehicle } from "./vehicle";
+
+/** How the chosen files are read, as every request names it. */
+export function useReading(): Reading {
+  const { work } = useShared();
+  return { files: work.files, log: work.log, axes: work.axes };
+}
+
+/** What doctor found in the chosen files; the server remembers it. */
+export function useLook() {
+  const reading = useReading();
+  return useRequest(reading.files.length ? (signal) => api.look(reading, signal) : null, [JSON.stringify(reading)]);
+}
+
+/** A click's answer: keys of [log], or the axes. */
+export function answerLog(set: Record<string, unknown>, log: Record<string, unknown>) {
+  const { axes, ...rest } = set;
+  const merged: Record<string, unknown> = { ...log };
+  for (const [key, value] of Object.entries(rest)) {
+    const own = key.replace(/^log\./, "");
+    if (value === null) delete merged[own]; else merged[own] = value;
+  }
+  setWork({ log: merged, ...(axes !== undefined ? { axes: axes === null ? null : String(axes) } : {}) });
+}
+
+export function LookPage() {
+  const { work } = useShared();
+  const look = useLook();
+  const reading = useReading();
+  if (!work.files.length) {
+    return <Page title="No file chosen"><Empty><a href="#/files">Choose a file</a> first.</Empty></Page>;
+  }
+  const found = look.value;
+  return <Page title={work.files.length === 1 ? work.files[0]! : `${work.files[0]} and ${plural(work.files.length - 1, "more file")}`}
+    lead={found ? inOneSentence(found) : undefined}>
+    {look.busy && <Busy>{found ? "Looking again…" : "Looking into the log: streams, clock, units, axes, rests…"}</Busy>}
+    <Trouble problem={look.problem} retry={look.again} />
+    {look.problem && <ReadingForm />}
+    {found && <Found look={found} reading={reading} />}
+  </Page>;
+}
+
+function inOneSentence(look: Look): string {
+  const imu = look.streams.find((s) => s.name === "imu") ?? look.streams[0];
+  if (!imu) return "No stream of samples was found in these files.";
+  const others = look.streams.filter((s) => s !== imu).map((s) => WORDS[s.name] ?? s.name);
+  return `${duration(imu.to_s - imu.from_s)} of inertial samples${rateOf(look, imu) ? ` at ${number(rateOf(look, imu)!, 3)} Hz` : ""}${others.length ? `, with ${[...new Set(others)].join(", ")}` : ""}.`;
+}
+
+const rateOf = (look: Look, s: Stream) => s.rate_hz ?? look.logs.find((log) => log.name === s.file)?.streams.find((one) => one.name === s.name)?.rate_hz ?? null;
+
+const WORDS: Record<string, string> = {
+  imu: "inertial sensors", gnss: "satellite fixes", magnetometer: "magnetometer", barometer: "barometer",
+  wheel: "wheel speeds", reference: "a reference", pressure: "air pressure",
+};
+
+function Found({ look, reading }: { look: Look; reading: Reading }) {
+  const { work } = useShared();
+  const faults = [...look.logs.flatMap((log) => log.faults.map((f) => ({ ...f, file: f.file ?? log.name }))), ...(look.between ?? [])];
+  const notes = look.logs.flatMap((log) => log.notes.map((f) => ({ ...f, file: f.file ?? log.name })));
+  const streams = look.streams.filter((s) => s.rows > 1 && s.columns.length > 0);
+  const imu = streams.find((s) => s.name === "imu") ?? streams[0];
+  const ask = (q: Question) => <Ask key={q.code + q.text} question={{ ...q, text: look.logs.length > 1 && q.file ? `${q.file}: ${q.text}` : q.text, remedy: q.choices.length ? null : q.remedy }} onAnswer={(set) => answerLog(set, work.log)} />;
+  const needed = look.questions.filter((q) => !q.optional), optional = look.questions.filter((q) => q.optional);
+  return <>
+    {needed.length > 0 && <Part title={`${plural(needed.length, "question")} about the log`}>
+      <p>Nothing is guessed. One click each; you can change it later.</p>
+      {needed.map(ask)}
+    </Part>}
+    {optional.length > 0 && <Part title="Is this right?">{optional.map(ask)}</Part>}
+    <Part title="What is in it"><Contents look={look} /></Part>
+    {imu && <Signals look={look} streams={streams} imu={imu} reading={reading} />}
+    {(faults.length > 0 || notes.length > 0) && <Part title="What was noticed">
+      <Findings findings={faults} none="Nothing is wrong with it." />
+      {notes.length > 0 && <More title={plural(notes.length, "note")}>{notes.map((note, i) => <Findings key={i} findings={[note]} />)}</More>}
+    </Part>}
+    <Part title="How it was read">
+      <p>Units and axes, with the reason for each. Correct what is wrong: the log is looked at again.</p>
+      {look.logs.filter((log) => log.read_as.length > 0).map((log) => <Table key={log.name} caption={log.name} head={["Quantity", "Column", "Unit", "Why"]}
+        rows={log.read_as.map((r) => [r.quantity, r.source, r.unit ?? "–", r.why])} />)}
+      <ReadingForm />
+    </Part>
+    <Places look={look} reading={reading} streams={streams} />
+    <div class="next"><a class="button main" href="#/choose">Choose what to find out</a></div>
+  </>;
+}
+
+function Contents({ look }: { look: Look }) {
+  return <>
+    <Table head={["Stream", "File", "Samples", "Rate", "From", "To", "Gaps"]} numeric={[2, 3, 4, 5, 6]}
+      rows={look.streams.map((s) => {
+        const told = look.logs.find((log) => log.name === s.file)?.streams.find((one) => one.name === s.name);
+        return [WORDS[s.name] ?? s.name, s.file ?? "", s.rows.toLocaleString("en"), rateOf(look, s) ? `${number(rateOf(look, s)!, 4)} Hz` : "–",
+          `${stamp(s.from_s, 1)} s`, `${stamp(s.to_s, 1)} s`, told?.gaps ? `${told.gaps}, ${duration(told.lost_s)} lost` : "none"];
+      })} />
+    <dl class="facts">
+      {look.logs.map((log) => <Facts key={log.name} log={log} alone={look.logs.length === 1} />)}
+      <dt>Rests</dt><dd>{look.rests.length ? `${plural(look.rests.length, "stretch", "stretches")}, the longest ${duration(Math.max(...look.rests.map(([a, b]) => b - a)))}` : "none found: it moved all the time"}</dd>
+    </dl>
+  </>;
+}
+
+function Facts({ log, alone }: { log: LogFound; alone: boolean }) {
+  const name = alone ? "" : ` of ${log.name}`;
+  return <>
+    {log.format && <><dt>Format{name}</dt><dd>{log.format.title}</dd></>}
+    {log.gravity && <><dt>Gravity{name}</dt><dd>{log.gravity.included ? `included: ${number(log.gravity.median_m_per_s2)} m/s² in the median` : "not included: the log has linear acceleration"}</dd></>}
+    {log.impact && log.impact.delta_v_m_per_s > 1 && <><dt>Largest impact{name}</dt><dd>{number(log.impact.delta_v_m_per_s * 3.6, 3)} km/h within 150 ms, at {stamp(log.impact.at_s, 1)} s</dd></>}
+  </>;
+}
+
+const QUANTITIES: [RegExp, string][] = [
+  [/^gyro_/, "Angular rate"], [/^accel_/, "Specific force"], [/^mag_/, "Magnetic field"], [/^(lat|lon)$/, ""],
+  [/^(alt|height)/, "Height"], [/^(VN|VE|VD)$/, "Velocity"], [/^q_/, "Quaternion"], [/^(roll|pitch|heading)$/, "Attitude"],
+];
+
+/** Columns of one quantity share a panel, as far as their units are one. */
+export function panelsOf(stream: Stream): Panel[] {
+  const panels = new Map<string, Panel>();
+  for (const { name, unit } of stream.columns) {
+    const title = QUANTITIES.find(([pattern]) => pattern.test(name))?.[1] ?? name;
+    if (title === "") continue;
+    const key = `${title}|${unit ?? ""}`;
+    const panel = panels.get(key) ?? { title, unit: unit ?? "", columns: [] };
+    panel.columns.push({ name, label: name.replace(/^(gyro|accel|mag)_/, "") });
+    panels.set(key, panel);
+  }
+  return [...panels.values()];
+}
+
+function Signals({ look, streams, imu, reading }: { look: Look; streams: Stream[]; imu: Stream; reading: Reading }) {
+  const { work } = useShared();
+  const [name, setName] = useState(`${imu.file ?? ""}|${imu.name}`);
+  const [cursor, setCursor] = useState<number | null>(null);
+  const [label, setLabel] = useState("");
+  const stream = streams.find((s) => `${s.file ?? ""}|${s.name}` === name) ?? imu;
+  const whole = useMemo<Span>(() => [stream.from_s, stream.to_s], [stream.from_s, stream.to_s]);
+  const panels = useMemo(() => panelsOf(stream), [stream]);
+  const trim: Span = work.trim ?? [imu.from_s, imu.to_s];
+  const setTrim = (t: Span) => setWork({ trim: t[0] <= imu.from_s && t[1] >= imu.to_s ? null : t });
+  const addMark = (t: number, words?: string) => {
+    setWork({ marks: [...work.marks.filter((m) => m.t !== t), { t, label: words || String(work.marks.length + 1) }].sort((a, b) => a.t - b.t) });
+    setLabel("");
+  };
+  const plan = useFixes(streams, reading);
+  const file = stream.file ?? reading.files[0]!;
+  return <Part title="The traces" aside={streams.length > 1 ? <label class="inline">Show <select value={`${stream.file ?? ""}|${stream.name}`} onChange={(e) => setName(e.currentTarget.value)}>
+    {streams.map((s) => <option key={`${s.file ?? ""}|${s.name}`} value={`${s.file ?? ""}|${s.name}`}>{WORDS[s.name] ?? s.name}{look.logs.length > 1 && s.file ? ` (${s.file})` : ""}</option>)}
+  </select></label> : undefined}>
+    <Traces panels={panels} whole={whole} askKey={JSON.stringify([reading, name])} cursor={cursor} onCursor={setCursor}
+      ask={(columns, view, width, signal) => api.series(reading, file, stream.name, { columns, from: view[0], to: view[1], width }, signal)}
+      trim={work.trim} marks={work.marks} rests={look.rests} gaps={look.gaps} onTrim={setTrim} onMark={(t) => addMark(t)} />
+    <p class="legend"><span><i class="area rest" />at rest</span><span><i class="area gap" />gap</span><span><i class="area away" />not used</span></p>
+    <h3>The part to use</h3>
+    <TrimBar whole={[imu.from_s, imu.to_s]} trim={trim} onTrim={setTrim} rests={look.rests} gaps={look.gaps} marks={work.marks} />
+    <div class="row">
+      <TrimInput label="From" value={trim[0]} length={imu.to_s - imu.from_s} onChange={(v) => { if (v < trim[1]) setTrim([Math.max(v, imu.from_s), trim[1]]); }} />
+      <TrimInput label="To" value={trim[1]} length={imu.to_s - imu.from_s} onChange={(v) => { if (v > trim[0]) setTrim([trim[0], Math.min(v, imu.to_s)]); }} />
+      <span class="soft">{duration(trim[1] - trim[0])} of {duration(imu.to_s - imu.from_s)}</span>
+      <button type="button" disabled={!work.trim} onClick={() => setWork({ trim: null })}>Use all</button>
+    </div>
+    <h3>Reference points</h3>
+    <p class="help">Instants to find again: the impact, a stop, a turn. Put the cursor there first.</p>
+    <form class="row" onSubmit={(e) => { e.preventDefault(); if (cursor !== null) addMark(cursor, label.trim()); }}>
+      <label class="inline">What it is <input type="text" value={label} onInput={(e) => setLabel(e.currentTarget.value)} placeholder="impact" /></label>
+      <button type="submit" disabled={cursor === null}>{cursor === null ? "Mark the cursor" : `Mark ${stamp(cursor, 10)} s`}</button>
+    </form>
+    {work.marks.length > 0 && <ul class="list">{work.marks.map((mark) => <li class="item" key={mark.t}>
+      <span class="name">{mark.label}</span><span>{stamp(mark.t, 1)} s</span>
+      <span class="row"><button type="button" onClick={() => setCursor(mark.t)}>Show</button>
+        <button type="button" disabled={mark.t >= trim[1]} onClick={() => setTrim([mark.t, trim[1]])}>Begin here</button>
+        <button type="button" disabled={mark.t <= trim[0]} onClick={() => setTrim([trim[0], mark.t])}>End here</button>
+        <button type="button" aria-label={`Remove the mark ${mark.label}`} onClick={() => setWork({ marks: work.marks.filter((m) => m !== mark) })}>Remove</button></span>
+    </li>)}</ul>}
+    {plan && <><h3>From above</h3><Plan track={null} fixes={plan} cursor={cursor} onCursor={setCursor} /></>}
+  </Part>;
+}
+
+function TrimInput({ label, value, length, onChange }: { label: string; value: number; length: number; onChange: (value: number) => void }) {
+  return <label class="inline">{label} <span class="withunit"><input type="text" inputMode="decimal" size={12} value={stamp(value, Math.min(length, 10))}
+    onChange={(e) => { const v = Number(e.currentTarget.value); if (Number.isFinite(v)) onChange(v); }} /><span class="unit">s</span></span></label>;
+}
+
+/** The fixes of the log, as a line for the plan. */
+function useFixes(streams: Stream[], reading: Reading): Line | null {
+  const stream = streams.find((s) => s.columns.some((c) => c.name === "lat") && s.columns.some((c) => c.name === "lon"));
+  const series = useRequest(stream ? (signal) => api.series(reading, stream.file ?? reading.files[0]!, stream.name, { columns: ["lat", "lon"], width: 1500 }, signal) : null,
+    [JSON.stringify(reading), stream?.name, stream?.file]);
+  return useMemo(() => {
+    const { lat, lon } = series.value?.columns ?? {};
+    if (!series.value || !lat || !lon) return null;
+    // Within a bucket of the pyramid: the middle of its extremes.
+    const middle = (one: typeof lat) => one.low.map((v, i) => v === null || one.high[i] === null ? NaN : (v + one.high[i]!) / 2);
+    return { t: series.value.t, lat: middle(lat), lon: middle(lon) };
+  }, [series.value]);
+}
+
+const AXES = ["forward-right-down", "forward-left-up", "right-forward-up", "left-back-up", "back-right-up", "up-right-forward"];
+
+function ReadingForm() {
+  const { work } = useShared();
+  const set = (key: string) => (value: unknown) => answerLog({ [key]: value }, work.log);
+  const field = (key: string, label: string, help: string, type: "text" | "number" | "choice" | "flag" = "text", choices?: string[], unit: string | null = null) =>
+    <Control field={{ key, label, unit, type, choices: choices ?? null, help }} value={key === "axes" ? work.axes : work.log[key]} onChange={set(key)} />;
+  return <More title="Correct how it is read">
+    <div class="fields">
+      {field("axes", "Axes", "Where x, y, z of the sensor point on the vehicle", "choice", AXES)}
+      {field("gyro_unit", "Unit of angular rates", "rad/s, deg/s, or of raw counts deg/s/131")}
+      {field("accel_unit", "Unit of accelerations", "m/s2, g, mg; -g for the other sign (iOS)")}
+      {field("time_unit", "Unit of the time", "", "choice", ["s", "ms", "us", "ns"])}
+      {field("sampling", "Each row is", "the rate at its stamp, or the mean over the interval that ends there", "choice", ["instantaneous", "mean"])}
+      {field("rate_hz", "Sample rate", "for a log without a column of times", "number", undefined, "Hz")}
+      {field("repair", "Repair", "drop rows that cannot be used, and unwrap the clock; both are reported", "flag")}
+    </div>
+  </More>;
+}
+
+function Places({ streams }: { look: Look; reading: Reading; streams: Stream[] }) {
+  const { work } = useShared();
+  const places = work.places ?? { sensor: [0, 0, 0] as Point, antenna: [0, 0, 0] as Point };
+  const fixes = streams.some((s) => s.columns.some((c) => c.name === "lat"));
+  const arm = places.antenna.map((v, i) => v - places.sensor[i]!);
+  return <Part title="Where the sensor sits">
+    <p>{fixes ? "The distance between the antenna and the sensor matters: a meter too much shows as a meter in every turn." : "A crash and a wheeled vehicle need it; for an attitude alone it does not matter."}</p>
+    <Vehicle dots={[{ key: "sensor", label: "Sensor", value: places.sensor }, ...(fixes ? [{ key: "antenna", label: "Antenna", value: places.antenna }] : [])]}
+      onMove={(key, value) => setWork({ places: { ...places, [key]: value } })} />
+    {fixes && work.places && <p>The antenna is <b>{arm.map((v) => number(v, 3)).join(", ")} m</b> forward, right, down of the sensor. This goes into the configuration as <code>lever_arm_m = [{arm.map((v) => number(v, 3)).join(", ")}]</code>.</p>}
+  </Part>;
+}
+
+/** Whether the log suffices for a kind, as doctor says or as its rests show. */
+export function suffices(kind: Kind, look: Look): { answer: string; reasons: Finding[] } | null {
+  const log = look.logs.find((l) => l.read_as.length > 0) ?? look.logs[0];
+  const of = { navigate: "navigation", attitude: "attitude", crash: "crash" }[kind.kind];
+  if (of && log?.fit[of]) return log.fit[of]!;
+  const longest = look.rests.length ? Math.max(...look.rests.map(([a, b]) => b - a)) : 0;
+  const say = (answer: string, text: string) => ({ answer, reasons: [{ code: "studio.rests", severity: "note", text }] });
+  const rest = longest ? `the longest rest is ${duration(longest)}` : "no rest was found";
+  if (kind.kind === "align") return say(longest >= 60 ? "yes" : longest > 0 ? "with limits" : "no", rest);
+  if (kind.kind === "allan") return say(longest >= 3600 ? "yes" : longest >= 300 ? "with limits" : "no", `${rest}; an hour is better than a minute`);
+  return null;
+}
+
+const ANSWERS: Record<string, { words: string; look: string }> = {
+  yes: { words: "This log has it", look: "good" }, "with limits": { words: "Possible, with limits", look: "warn" }, no: { words: "This log does not suffice", look: "bad" },
+};
+
+export function ChoosePage() {
+  const { work } = useShared();
+  const look = useLook();
+  const kinds = useRequest(() => api.kinds(), []);
+  const choose = (kind: string) => {
+    setWork(kind === work.kind ? {} : { kind, toml: "", proposal: null, proposedFor: "", name: "", options: [] });
+    location.hash = "#/configure";
+  };
+  if (!work.files.length) {
+    return <Page title="No file chosen"><Empty><a href="#/files">Choose a file</a> first.</Empty></Page>;
+  }
+  return <Page title="What do you want to find out?">
+    <Trouble problem={kinds.problem} retry={kinds.again} />
+    <Trouble problem={look.problem} retry={look.again} />
+    {(kinds.busy || look.busy) && <Busy>One moment…</Busy>}
+    <ul class="kinds">
+      {kinds.value?.map((kind) => {
+        const fit = look.value ? suffices(kind, look.value) : null;
+        const answer = fit ? ANSWERS[fit.answer] : null;
+        return <li key={kind.kind}>
+          <h2>{kind.title}</h2>
+          <p>{kind.what}</p>
+          <p class="soft">It needs: {kind.needs}</p>
+          {answer && <p class={`verdict ${answer.look}`}>{answer.words}</p>}
+          {fit && fit.reasons.length > 0 && <More title="Why"><Findings findings={fit.reasons} /></More>}
+          <button type="button" class={fit?.answer === "no" ? "" : "main"} onClick={() => choose(kind.kind)}>{kind.title}</button>
+        </li>;
+      })}
+    </ul>
+  </Page>;
+}

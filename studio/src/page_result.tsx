@@ -1,0 +1,189 @@
+// The result: key numbers with their bounds, what was noticed, plan and series under one cursor,
+// the attitude, the sealed report, exports, and the command that repeats it.
+
+import { useEffect, useMemo, useState } from "preact/hooks";
+import { api, part } from "./api";
+import { Attitude, fromEuler } from "./attitude";
+import { date, number, plural, shown, stamp, withBound } from "./format";
+import { indexOf, METERS_PER_DEG, Plan } from "./plan";
+import { Traces, type Panel } from "./traces";
+import type { KeyNumber, RunDetail, Series as SeriesData, Span, Track } from "./types";
+import { Busy, Command, Empty, Findings, More, Page, Part, Table, Trouble, useRequest } from "./ui";
+
+export function ResultPage({ name }: { name: string }) {
+  const run = useRequest(() => api.run(name), [name]);
+  if (!name) return <Page title="No result chosen"><Empty><a href="#/files">Choose one</a> of the folder.</Empty></Page>;
+  const found = run.value;
+  return <Page title={found?.title || name} lead={found?.answer ?? undefined}>
+    {run.busy && <Busy>Opening the result…</Busy>}
+    <Trouble problem={run.problem} retry={run.again} />
+    {found && <Result run={found} />}
+  </Page>;
+}
+
+function Result({ run }: { run: RunDetail }) {
+  const [cursor, setCursor] = useState<number | null>(null);
+  const track = useRequest(run.has.track ? () => api.track(run.name) : run.has.series ? (signal) => trackOfSeries(run.name, signal) : null, [run.name]);
+  const exports: [string, string, boolean][] = [
+    ["zip", "The whole result (.zip)", true], ["pdf", "Report (.pdf)", Boolean(run.has.pdf)], ["gpx", "Track (.gpx)", Boolean(run.has.track)], ["toml", "Configuration (.toml)", run.has.toml !== false],
+  ];
+  return <>
+    {run.verdict && VERDICTS[run.verdict] && <p class={`verdict ${VERDICTS[run.verdict]!.look}`}>{VERDICTS[run.verdict]!.words}</p>}
+    <Numbers numbers={run.numbers} />
+    <div class="row exports" role="group" aria-label="Take it with you">
+      {exports.filter(([, , has]) => has).map(([as, words]) => <a class="button" key={as} href={api.exportOf(run.name, as)} download>{words}</a>)}
+      <a class="button" href={`#/compare?run=${part(run.name)}`}>Compare with another</a>
+    </div>
+    {run.findings.length > 0 && <Part title="What was noticed"><Findings findings={run.findings} /></Part>}
+    <Trouble problem={track.problem} retry={track.again} />
+    {track.busy && <Busy>Reading the track…</Busy>}
+    {track.value && <Motion run={run} track={track.value} cursor={cursor} onCursor={setCursor} />}
+    {run.report && <Part title="The report" aside={<a href={run.report} target="_blank" rel="noopener noreferrer">Open in a tab of its own</a>}>
+      <iframe class="report" src={run.report} title="The report" sandbox="allow-scripts" referrerpolicy="no-referrer" loading="lazy" />
+    </Part>}
+    <Part title="Repeat it">
+      <p>This command gives the same result to the last bit:</p>
+      <Command text={run.command_line} />
+      <p class="soft">Made {date(run.made)}. Seal <code class="digest">{run.digest}</code></p>
+      <More title="Options and inputs"><pre tabIndex={0}>{JSON.stringify({ options: run.options, inputs: run.inputs }, null, 2)}</pre></More>
+    </Part>
+  </>;
+}
+
+/** As the reports put it. */
+const VERDICTS: Record<string, { words: string; look: string }> = {
+  trusted: { words: "The result can be trusted", look: "good" }, reserve: { words: "Use with caution", look: "warn" }, distrusted: { words: "Do not trust the result", look: "bad" },
+};
+
+/** What people ask for first, by the names of `strapdown compare`. */
+const MAIN = [
+  /: delta-V$/, /: direction of force/, /: clock direction$/, /^At the end: position, horizontal$/, /^At the end: heading$/, /: way over ground$/, /: largest 95 % bound, horizontal$/, /^At the end: height$/,
+  /^At the end: roll$/, /^At the end: pitch$/, /: algorithm$/, /: lowest rate$/, /: shortest time/,
+];
+
+function bound({ below, above }: KeyNumber): string {
+  if ((below ?? null) === null && (above ?? null) === null) return "";
+  return below === above ? `± ${number(below!, 2)}` : `− ${below === null ? "∞" : number(below!, 2)}, + ${above === null ? "∞" : number(above!, 2)}`;
+}
+
+const valueOf = (one: KeyNumber) => typeof one.value === "number" && unitOfBound(one) === one.unit && (one.below ?? one.above) ? withBound(one.value, Math.min(one.below ?? Infinity, one.above ?? Infinity)) : shown(one.value);
+
+/** Latitude and longitude are in degrees, their bounds in meters. */
+const unitOfBound = (one: KeyNumber) => one.bound_unit ?? (/^(latitude|longitude)$/.test(one.label) ? "m" : one.unit);
+
+/** Speeds of vehicles, as people say them. */
+function spoken(one: KeyNumber): KeyNumber {
+  if (!/delta-V/i.test(one.label) || one.unit !== "m/s" || typeof one.value !== "number") return one;
+  const times = (v: number | null | undefined) => v === null || v === undefined ? null : v * 3.6;
+  return { ...one, value: one.value * 3.6, below: times(one.below), above: times(one.above), unit: "km/h" };
+}
+
+/** The numbers that matter first, large; all in a table. */
+function Numbers({ numbers }: { numbers: KeyNumber[] }) {
+  if (!numbers.length) return null;
+  const all = numbers.map(spoken);
+  const main = MAIN.flatMap((pattern) => all.filter((one) => pattern.test(`${one.group ?? ""}: ${one.label}`)).slice(0, 1)).slice(0, 6);
+  const large = main.length ? main : all.filter((one) => one.value !== null && bound(one)).slice(0, 4);
+  return <>
+    {large.length > 0 && <dl class="keys">
+      {large.map((one) => <div key={`${one.group} ${one.label}`}><dt>{[one.label.replace(/^./, (c) => c.toUpperCase()), one.group?.toLowerCase() === "at the end" ? "at the end" : ""].filter(Boolean).join(" ")}</dt>
+        <dd>{one.value === null ? `${bound(one)} ${one.unit}` : valueOf(one)} {one.value !== null && <small>{bound(one)} {one.unit}</small>}</dd></div>)}
+    </dl>}
+    {large.some(bound) && <p class="help">Bounds hold 95 % of the time.</p>}
+    <More title={`All ${plural(all.length, "number")}`}>
+      <Table head={["", "Quantity", "Value", "Unit", "95 % bound"]} numeric={[2, 4]} rows={all.map((one) => [one.group ?? "", one.label, valueOf(one), one.unit ?? "", bound(one) && `${bound(one)} ${unitOfBound(one) ?? ""}`])} />
+    </More>
+  </>;
+}
+
+const GROUPS: [RegExp, string, string?][] = [
+  [/^north_m/, "Path", "north"], [/^east_m/, "Path", "east"], [/^down_m/, "Path", "down"],
+  [/^VN_m/, "Velocity", "north"], [/^VE_m/, "Velocity", "east"], [/^VD_m/, "Velocity", "down"],
+  [/^roll_deg/, "Roll and pitch", "roll"], [/^pitch_deg/, "Roll and pitch", "pitch"], [/^heading_deg/, "Heading", "heading"], [/^alt_m/, "Height", "height"],
+  [/^(north|east|down)_sd/, "Position, standard deviation"], [/^V[NED]_sd/, "Velocity, standard deviation"], [/^(roll|pitch|heading)_sd/, "Attitude, standard deviation"],
+  [/^(lat|lon)_/, ""],
+];
+
+/** Panels for the columns of a result: of one quantity in one panel. */
+export function panelsOfRun(series: SeriesData): Panel[] {
+  const panels = new Map<string, Panel>();
+  for (const [, title] of GROUPS) if (title) panels.set(title, { title, unit: "", columns: [] });
+  for (const [name, { unit }] of Object.entries(series.columns)) {
+    const [, title, label] = GROUPS.find(([pattern]) => pattern.test(name)) ?? [null, name];
+    if (!title) continue;
+    const panel = panels.get(title) ?? { title, unit: unit ?? "", columns: [] };
+    panel.unit = unit ?? "";
+    panel.columns.push({ name, label: label ?? name.replace(/_sd.*$/, "") });
+    panels.set(title, panel);
+  }
+  return [...panels.values()].filter((panel) => panel.columns.length);
+}
+
+/** The motion of a result without positions on the Earth, such as that of a crash, by its series. */
+async function trackOfSeries(name: string, signal: AbortSignal): Promise<Track | null> {
+  const wanted = ["north_m", "east_m", "roll_deg", "pitch_deg", "heading_deg"];
+  const { t, columns } = await api.runSeries(name, { columns: wanted, width: 2000 }, signal);
+  if (t.length < 2) return null;
+  const [north, east, roll, pitch, heading] = wanted.map((one) => columns[one]?.low.map((low, i) => (Number(low) + Number(columns[one]!.high[i])) / 2));
+  // On a grid a meter is a meter: degrees about the equator stand for it.
+  const flat = (meters: number[] | undefined) => meters ? meters.map((m) => m / METERS_PER_DEG) : t.map(() => NaN);
+  return {
+    t, lat: flat(north), lon: flat(east), alt: [], fixes: null, reference: null,
+    q: roll && pitch && heading ? t.map((_, i) => fromEuler(roll[i]!, pitch[i]!, heading[i]!)) : null,
+  };
+}
+
+function Motion({ run, track, cursor, onCursor }: { run: RunDetail; track: Track; cursor: number | null; onCursor: (t: number | null) => void }) {
+  const [playing, setPlaying] = useState(false);
+  const last = track.t[track.t.length - 1] ?? 0;
+  const whole = useMemo<Span>(() => [run.from_s ?? track.t[0] ?? 0, run.to_s ?? last], [run, track]);
+  const at = cursor ?? whole[0];
+  useEffect(() => {
+    if (!playing) return;
+    // The whole record in half a minute, or in its own time if it is shorter.
+    const speed = Math.max(1, (whole[1] - whole[0]) / 30);
+    let t = at >= whole[1] ? whole[0] : at, before = performance.now(), frame = 0;
+    const draw = (now: number) => {
+      t += ((now - before) / 1000) * speed;
+      before = now;
+      if (t >= whole[1]) { onCursor(whole[1]); setPlaying(false); return; }
+      onCursor(t);
+      frame = requestAnimationFrame(draw);
+    };
+    frame = requestAnimationFrame(draw);
+    return () => cancelAnimationFrame(frame);
+  }, [playing]);
+  const i = track.t.length ? indexOf(track.t, at) : -1;
+  const q = i >= 0 ? track.q?.[i] ?? null : null;
+  const hasPlace = track.lat.some(Number.isFinite);
+  return <Part title="The motion">
+    <div class="row scrub">
+      <button type="button" onClick={() => setPlaying(!playing)}>{playing ? "Pause" : "Play"}</button>
+      <input type="range" class="wide" aria-label="Instant" min={whole[0]} max={whole[1]} step={(whole[1] - whole[0]) / 1000 || 1} value={at} aria-valuetext={`${stamp(at, 10)} s`} onInput={(e) => { setPlaying(false); onCursor(e.currentTarget.valueAsNumber); }} />
+      <output>{stamp(at, 10)} s</output>
+    </div>
+    <div class="motion">
+      {hasPlace && <Plan track={track} onMap={Boolean(run.has.track)} fixes={track.fixes} reference={track.reference} cursor={at} onCursor={onCursor} />}
+      {track.q && <Attitude q={q} at={`${stamp(at, 10)} s:`} />}
+    </div>
+    <Series run={run} whole={whole} cursor={cursor} onCursor={onCursor} />
+  </Part>;
+}
+
+function Series({ run, whole, cursor, onCursor }: { run: RunDetail; whole: Span; cursor: number | null; onCursor: (t: number | null) => void }) {
+  // One bucket: which columns there are.
+  const columns = useRequest(run.panels || !run.has.series ? null : (signal) => api.runSeries(run.name, { columns: [], width: 1 }, signal), [run.name]);
+  const all = useMemo(() => run.panels ?? (columns.value ? panelsOfRun(columns.value) : []), [run, columns.value]);
+  const [picked, setPicked] = useState<string[] | null>(null);
+  const chosen = picked ?? all.slice(0, 3).map((p) => p.title);
+  const panels = useMemo(() => all.filter((p) => chosen.includes(p.title)), [all, chosen.join("|")]);
+  if (columns.problem) return <Trouble problem={columns.problem} retry={columns.again} />;
+  if (!all.length) return null;
+  return <>
+    <fieldset class="row pick"><legend>Show</legend>
+      {all.map((p) => <label class="inline" key={p.title}><input type="checkbox" checked={chosen.includes(p.title)} onChange={(e) => setPicked(e.currentTarget.checked ? [...chosen, p.title] : chosen.filter((t) => t !== p.title))} />{p.title}</label>)}
+    </fieldset>
+    {panels.length > 0 && <Traces panels={panels} whole={whole} askKey={run.name} cursor={cursor} onCursor={onCursor}
+      ask={(columns, view, width, signal) => api.runSeries(run.name, { columns, from: view[0], to: view[1], width }, signal)} />}
+  </>;
+}

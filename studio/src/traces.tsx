@@ -1,0 +1,291 @@
+// Traces over time: panels with one time axis and one cursor, of which the server sends at most a
+// few hundred points for any view. Zoom by drag, wheel, buttons and keys.
+
+import { useEffect, useMemo, useRef, useState } from "preact/hooks";
+import uPlot from "uplot";
+import { aborted, problemOf } from "./api";
+import { number, stamp } from "./format";
+import type { Problem, Series, Span } from "./types";
+import { color, useDark, useWidth } from "./ui";
+
+export interface Panel { title: string; unit: string; columns: { name: string; label: string }[] }
+
+export type Ask = (columns: string[], view: Span, width: number, signal: AbortSignal) => Promise<Series>;
+
+const COLORS = ["--trace1", "--trace2", "--trace3", "--trace4"];
+const HEIGHT = 180;
+
+interface Props {
+  panels: Panel[]; ask: Ask; whole: Span; askKey: string;
+  cursor: number | null; onCursor: (t: number | null) => void;
+  trim?: Span | null; marks?: { label: string; t: number }[]; rests?: Span[]; gaps?: Span[];
+  onMark?: (t: number) => void; onTrim?: (trim: Span) => void;
+}
+
+/** Panels of traces; `askKey` names what is asked for, so that another log is fetched anew. */
+export function Traces(props: Props) {
+  const { panels, ask, whole, askKey, cursor, onCursor, trim } = props;
+  const [view, setView] = useState<Span>(whole);
+  const [series, setSeries] = useState<Series | null>(null);
+  const [problem, setProblem] = useState<Problem | null>(null);
+  const [element, width] = useWidth<HTMLDivElement>();
+  const columns = useMemo(() => panels.flatMap((p) => p.columns.map((c) => c.name)), [panels]);
+  const span = whole[1] - whole[0];
+
+  useEffect(() => setView(whole), [askKey, whole[0], whole[1]]);
+  useEffect(() => {
+    if (!width || !columns.length) return;
+    const control = new AbortController();
+    const points = Math.max(200, Math.min(1200, width));
+    // A drag of the wheel asks once, when it rests for a moment.
+    const timer = setTimeout(() => {
+      ask(columns, view, points, control.signal).then(
+        (answer) => { setSeries(answer); setProblem(null); },
+        (error: unknown) => { if (!aborted(error)) setProblem(problemOf(error)); });
+    }, series ? 60 : 0);
+    return () => { clearTimeout(timer); control.abort(); };
+  }, [askKey, view[0], view[1], width, columns.join()]);
+
+  const show = (from: number, to: number) => {
+    const length = Math.min(span, Math.max(to - from, span * 1e-6, 1e-4));
+    const begin = Math.min(Math.max(from, whole[0]), whole[1] - length);
+    setView([begin, begin + length]);
+  };
+  const zoom = (factor: number, about?: number) => {
+    const centre = about ?? (cursor !== null && cursor >= view[0] && cursor <= view[1] ? cursor : (view[0] + view[1]) / 2);
+    show(centre - (centre - view[0]) * factor, centre + (view[1] - centre) * factor);
+  };
+  const pan = (share: number) => show(view[0] + share * (view[1] - view[0]), view[1] + share * (view[1] - view[0]));
+  const step = (share: number) => {
+    const from = cursor ?? (view[0] + view[1]) / 2;
+    const t = Math.min(whole[1], Math.max(whole[0], from + share * (view[1] - view[0])));
+    if (t < view[0] || t > view[1]) pan(share);
+    onCursor(t);
+  };
+  const keys = (event: KeyboardEvent) => {
+    if (event.ctrlKey || event.metaKey || event.altKey) return;
+    const large = event.shiftKey ? 0.1 : 0.01;
+    const act: Record<string, () => void> = {
+      ArrowLeft: () => step(-large), ArrowRight: () => step(large), "+": () => zoom(0.5), "=": () => zoom(0.5),
+      "-": () => zoom(2), PageUp: () => pan(-0.8), PageDown: () => pan(0.8), "0": () => setView(whole),
+      Home: () => onCursor(view[0]), End: () => onCursor(view[1]), Escape: () => setView(whole),
+    };
+    if (props.onMark && cursor !== null) act["m"] = () => props.onMark!(cursor);
+    if (props.onTrim && cursor !== null) {
+      act["["] = () => { if (cursor < (trim?.[1] ?? whole[1])) props.onTrim!([cursor, trim?.[1] ?? whole[1]]); };
+      act["]"] = () => { if (cursor > (trim?.[0] ?? whole[0])) props.onTrim!([trim?.[0] ?? whole[0], cursor]); };
+    }
+    const chosen = act[event.key];
+    if (!chosen) return;
+    event.preventDefault();
+    chosen();
+  };
+  const zoomed = view[0] > whole[0] || view[1] < whole[1];
+  return <div class="traces" ref={element}>
+    <div class="row tools" role="toolbar" aria-label="View of the traces">
+      <button type="button" onClick={() => zoom(0.5)} aria-label="Zoom in">+</button>
+      <button type="button" onClick={() => zoom(2)} disabled={!zoomed} aria-label="Zoom out">−</button>
+      <button type="button" onClick={() => pan(-0.5)} disabled={view[0] <= whole[0]} aria-label="Earlier">←</button>
+      <button type="button" onClick={() => pan(0.5)} disabled={view[1] >= whole[1]} aria-label="Later">→</button>
+      <button type="button" onClick={() => setView(whole)} disabled={!zoomed}>Whole log</button>
+      {trim && <button type="button" onClick={() => show(trim[0], trim[1])}>Part to use</button>}
+      <span class="soft viewed">{stamp(view[0], view[1] - view[0])} to {stamp(view[1], view[1] - view[0])} s</span>
+    </div>
+    {problem && <div class="notice bad" role="alert"><p>{problem.text}</p>{problem.remedy && <p>{problem.remedy}</p>}</div>}
+    <div class="panels" tabIndex={0} role="group" onKeyDown={keys}
+      aria-label="Traces over time. Arrow keys move the cursor, plus and minus zoom, page keys move the view, 0 shows all.">
+      {width > 0 && series && panels.map((panel) =>
+        <OnePanel key={panel.title} panel={panel} series={series} view={view} width={width} {...props}
+          onZoom={show} onWheel={zoom} onPan={pan} />)}
+      {!series && !problem && <p class="busy" role="status"><span class="spin" aria-hidden="true" />Reading the traces…</p>}
+    </div>
+    <Readout panels={panels} series={series} cursor={cursor} whole={whole} />
+    <p class="help">Drag to zoom; double-click for all. After a click on the traces the wheel zooms too, and the keys ← → + − 0 work.{props.onTrim && " [ and ] put the beginning and the end of the part to use at the cursor, m sets a mark."}</p>
+  </div>;
+}
+
+function indexAt(t: number[], at: number): number {
+  let low = 0, high = t.length - 1;
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (t[middle]! < at) low = middle + 1; else high = middle;
+  }
+  return low > 0 && at - t[low - 1]! < t[low]! - at ? low - 1 : low;
+}
+
+function Readout({ panels, series, cursor, whole }: { panels: Panel[]; series: Series | null; cursor: number | null; whole: Span }) {
+  if (!series || cursor === null || !series.t.length) return <p class="readout soft">Point at a trace to read its values.</p>;
+  const i = indexAt(series.t, cursor);
+  return <p class="readout" aria-live="polite">
+    <b>{stamp(cursor, 1)} s</b> <span class="soft">({stamp(cursor - whole[0], 1)} s from the beginning)</span>
+    {panels.map((panel) => <span class="values" key={panel.title}>
+      {panel.columns.map((column, j) => {
+        const one = series.columns[column.name];
+        const low = one?.low[i], high = one?.high[i];
+        if (low === null || low === undefined || high === null || high === undefined) return null;
+        return <span key={column.name}><i class={`dot t${j + 1}`} />{column.label} {low === high ? number(low) : `${number(low, 3)} to ${number(high, 3)}`} {panel.unit}</span>;
+      })}
+    </span>)}
+  </p>;
+}
+
+function OnePanel(props: Props & {
+  panel: Panel; series: Series; view: Span; width: number;
+  onZoom: (from: number, to: number) => void; onWheel: (factor: number, about: number) => void; onPan: (share: number) => void;
+}) {
+  const { panel, series, view, width } = props;
+  const place = useRef<HTMLDivElement>(null);
+  const chart = useRef<uPlot | null>(null);
+  const latest = useRef(props);
+  latest.current = props;
+  const dark = useDark();
+
+  const data = useMemo(() => {
+    const of = (name: string) => series.columns[name];
+    return [series.t, ...panel.columns.flatMap(({ name }) => [of(name)?.high ?? [], of(name)?.low ?? []])] as uPlot.AlignedData;
+  }, [series, panel]);
+
+  useEffect(() => {
+    if (!place.current) return;
+    const lines: uPlot.Series[] = [{}];
+    const bands: uPlot.Band[] = [];
+    panel.columns.forEach(({ label }, j) => {
+      const stroke = () => color(COLORS[j % COLORS.length]!);
+      lines.push({ label, stroke, width: 1, points: { show: false } }, { label: `${label} (least)`, stroke, width: 1, points: { show: false } });
+      bands.push({ series: [2 * j + 1, 2 * j + 2], fill: () => color(COLORS[j % COLORS.length]!) + "55" });
+    });
+    const axis = { stroke: () => color("--soft"), grid: { stroke: () => color("--faint"), width: 1 }, ticks: { stroke: () => color("--line"), width: 1 }, font: "12px system-ui, sans-serif" };
+    const made = new uPlot({
+      width, height: HEIGHT, series: lines, bands, legend: { show: false },
+      scales: { x: { time: false, range: () => latest.current.view as [number, number] } },
+      axes: [
+        { ...axis, size: 30, space: 90, values: (_, ticks, __, ___, step) => ticks.map((t) => t.toFixed(Math.max(0, -Math.floor(Math.log10(step) + 1e-9)))) },
+        { ...axis, size: 58, values: (_, ticks) => ticks.map((v) => number(v, 6)) },
+      ],
+      cursor: {
+        drag: { x: true, y: false, setScale: false }, points: { show: false },
+        sync: { key: "traces", setSeries: false, scales: ["x", null] },
+        bind: { dblclick: () => () => { latest.current.onZoom(latest.current.whole[0], latest.current.whole[1]); return null; } },
+      },
+      hooks: {
+        setSelect: [(u) => {
+          if (u.select.width > 4) latest.current.onZoom(u.posToVal(u.select.left, "x"), u.posToVal(u.select.left + u.select.width, "x"));
+          if (u.select.width > 0) u.setSelect({ left: 0, width: 0, top: 0, height: 0 }, false);
+        }],
+        setCursor: [(u) => {
+          // Only the panel under the pointer speaks; the others follow it.
+          if (u.cursor.event && u.cursor.left !== undefined && u.cursor.left >= 0) latest.current.onCursor(u.posToVal(u.cursor.left, "x"));
+        }],
+        drawClear: [(u) => shade(u, latest.current)],
+        draw: [(u) => mark(u, latest.current)],
+      },
+    }, data, place.current);
+    chart.current = made;
+    const wheel = (event: WheelEvent) => {
+      const inside = place.current?.closest(".panels");
+      // The page scrolls on, unless someone has turned to the traces.
+      if (!event.ctrlKey && !inside?.contains(document.activeElement)) return;
+      event.preventDefault();
+      if (Math.abs(event.deltaX) > Math.abs(event.deltaY)) return latest.current.onPan(Math.sign(event.deltaX) * 0.1);
+      const left = event.clientX - made.over.getBoundingClientRect().left;
+      latest.current.onWheel(event.deltaY > 0 ? 1.25 : 0.8, made.posToVal(left, "x"));
+    };
+    made.over.addEventListener("wheel", wheel, { passive: false });
+    return () => { made.destroy(); chart.current = null; };
+  }, [panel, dark]);
+
+  useEffect(() => { chart.current?.setSize({ width, height: HEIGHT }); }, [width]);
+  useEffect(() => { chart.current?.setData(data, true); }, [data]);
+  useEffect(() => { chart.current?.redraw(false, false); }, [view, props.trim, props.marks, props.rests]);
+  useEffect(() => {
+    const u = chart.current;
+    if (!u) return;
+    const left = props.cursor === null ? -10 : u.valToPos(props.cursor, "x");
+    u.setCursor({ left, top: -10 }, false);
+  }, [props.cursor, view, width, data]);
+
+  return <div class="panel">
+    <div class="paneltitle"><b>{panel.title}</b> <span class="soft">{panel.unit}</span>
+      {panel.columns.map(({ label }, j) => <span class="key" key={label}><i class={`dot t${j + 1}`} />{label}</span>)}</div>
+    <div ref={place} class="plot" aria-hidden="true" />
+  </div>;
+}
+
+function shade(u: uPlot, props: Props) {
+  const { ctx, bbox } = u;
+  const area = (from: number, to: number, fill: string) => {
+    const left = Math.max(bbox.left, u.valToPos(from, "x", true));
+    const right = Math.min(bbox.left + bbox.width, u.valToPos(to, "x", true));
+    if (right <= left) return;
+    ctx.fillStyle = fill;
+    ctx.fillRect(left, bbox.top, Math.max(1, right - left), bbox.height);
+  };
+  ctx.save();
+  for (const [from, to] of props.rests ?? []) area(from, to, color("--rest"));
+  for (const [from, to] of props.gaps ?? []) area(from, to, color("--gap"));
+  if (props.trim) {
+    area(props.whole[0], props.trim[0], color("--away"));
+    area(props.trim[1], props.whole[1], color("--away"));
+  }
+  ctx.restore();
+}
+
+function mark(u: uPlot, props: Props) {
+  const { ctx, bbox } = u;
+  ctx.save();
+  ctx.font = `${12 * devicePixelRatio}px system-ui, sans-serif`;
+  for (const { label, t } of props.marks ?? []) {
+    const x = u.valToPos(t, "x", true);
+    if (x < bbox.left || x > bbox.left + bbox.width) continue;
+    ctx.strokeStyle = ctx.fillStyle = color("--mark");
+    ctx.lineWidth = devicePixelRatio;
+    ctx.beginPath();
+    ctx.moveTo(x, bbox.top);
+    ctx.lineTo(x, bbox.top + bbox.height);
+    ctx.stroke();
+    ctx.fillText(label, x + 4 * devicePixelRatio, bbox.top + 12 * devicePixelRatio);
+  }
+  ctx.restore();
+}
+
+/** The whole log as one bar: rests, gaps, marks, and the part to use between two handles. */
+export function TrimBar({ whole, trim, onTrim, rests, gaps, marks }: {
+  whole: Span; trim: Span; onTrim: (trim: Span) => void; rests: Span[]; gaps: Span[]; marks: { label: string; t: number }[];
+}) {
+  const bar = useRef<HTMLDivElement>(null);
+  const length = whole[1] - whole[0] || 1;
+  const share = (t: number) => `${(100 * (t - whole[0])) / length}%`;
+  const least = length / 1000;
+  const put = (which: 0 | 1, t: number) => onTrim(which === 0
+    ? [Math.min(Math.max(t, whole[0]), trim[1] - least), trim[1]]
+    : [trim[0], Math.max(Math.min(t, whole[1]), trim[0] + least)]);
+  const drag = (which: 0 | 1) => (event: PointerEvent) => {
+    const box = bar.current!.getBoundingClientRect();
+    const handle = event.currentTarget as HTMLElement;
+    handle.setPointerCapture(event.pointerId);
+    const move = (e: PointerEvent) => put(which, whole[0] + (length * (e.clientX - box.left)) / box.width);
+    const end = () => { handle.removeEventListener("pointermove", move); handle.removeEventListener("pointerup", end); };
+    handle.addEventListener("pointermove", move);
+    handle.addEventListener("pointerup", end);
+  };
+  const keys = (which: 0 | 1) => (event: KeyboardEvent) => {
+    const step = length * (event.shiftKey ? 0.05 : 0.005);
+    const by: Record<string, number> = { ArrowLeft: -step, ArrowDown: -step, ArrowRight: step, ArrowUp: step, Home: -Infinity, End: Infinity };
+    const change = by[event.key];
+    if (change === undefined) return;
+    event.preventDefault();
+    put(which, trim[which] + change);
+  };
+  const handle = (which: 0 | 1, name: string) => <div class="handle" style={{ left: share(trim[which]) }} role="slider" tabIndex={0}
+    aria-label={name} aria-valuemin={whole[0]} aria-valuemax={whole[1]} aria-valuenow={trim[which]} aria-valuetext={`${stamp(trim[which], length)} s`}
+    onPointerDown={drag(which)} onKeyDown={keys(which)} />;
+  return <div class="trimbar" ref={bar}>
+    {rests.map(([from, to]) => <span class="rest" key={from} style={{ left: share(from), width: `${(100 * (to - from)) / length}%` }} />)}
+    {gaps.map(([from, to]) => <span class="gap" key={from} style={{ left: share(from), width: `max(2px, ${(100 * (to - from)) / length}%)` }} />)}
+    {marks.map(({ t, label }) => <span class="markline" key={label + t} title={label} style={{ left: share(t) }} />)}
+    <span class="away" style={{ left: 0, width: share(trim[0]) }} />
+    <span class="away" style={{ left: share(trim[1]), right: 0 }} />
+    {handle(0, "Beginning of the part to use")}
+    {handle(1, "End of the part to use")}
+  </div>;
+}

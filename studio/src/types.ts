@@ -1,0 +1,149 @@
+// What the server of the studio answers: one interface for each table of its address book.
+
+export interface StoredFile { name: string; bytes: number; modified: number | string; folder?: boolean }
+
+export interface Run {
+  name: string; command: string; title: string; made: number | string; digest: string;
+  verdict: string | null;
+}
+
+export type JobState = "waiting" | "running" | "done" | "failed" | "cancelled" | "lost";
+
+export interface Problem { code: string; text: string; remedy?: string | null }
+
+export interface Job {
+  id: string; kind: string; name: string; state: JobState; stage: string | null; share: number | null;
+  begun: number | string | null; ended: number | string | null; command: string; run: string | null;
+  error: Problem | null; tail: string[];
+  live?: { address: string; qr?: string; token?: string | null; warning?: string | null } | null;
+}
+
+export interface Sample { name: string; title: string; text: string }
+
+export interface State {
+  version: string; folder: string; files: StoredFile[]; runs: Run[]; jobs: Job[]; samples?: Sample[];
+}
+
+export interface Choice { label: string; set: Record<string, unknown>; likely?: boolean }
+
+export interface Question {
+  code: string; text: string; key: string | null; choices: Choice[];
+  free: "number" | "text" | null; unit: string | null; line?: number; optional?: boolean; file?: string;
+  remedy?: string | null;
+  /** Numbers of a list: 3 of a position. */
+  count?: number;
+}
+
+export interface Finding {
+  code: string; severity: string; text?: string; sentence?: string; remedy?: string | null;
+  file?: string;
+}
+
+export interface Column { name: string; unit: string | null }
+
+export interface Stream {
+  file?: string; name: string; rows: number; rate_hz?: number | null; from_s: number; to_s: number;
+  columns: Column[];
+}
+
+export type Span = [number, number];
+
+export interface Fit { answer: string; reasons: Finding[] }
+
+export interface LogFound {
+  name: string; format: { name: string; title: string } | null;
+  streams: { name: string; rows: number; rate_hz: number | null; from_s: number; to_s: number; gaps: number; lost_s: number; columns: string[]; clock?: string }[];
+  read_as: { source: string; quantity: string; unit: string | null; why: string }[];
+  stationary: { from_s: number; to_s: number; grade: string }[];
+  gravity: { included: boolean; median_m_per_s2: number; at_rest_m_per_s2: number | null } | null;
+  impact: { delta_v_m_per_s: number; at_s: number; largest_m_per_s2: number } | null;
+  fit: Record<string, Fit>;
+  faults: Finding[]; notes: Finding[];
+}
+
+export interface Look {
+  logs: LogFound[]; between: Finding[]; questions: Question[]; streams: Stream[];
+  rests: Span[]; gaps: Span[];
+}
+
+export interface Series {
+  t: number[];
+  columns: Record<string, { unit: string | null; low: (number | null)[]; high: (number | null)[] }>;
+}
+
+export interface Field {
+  /** Full dotted name; `*` stands for a number or a name of one's own. */
+  key: string; path?: string; label: string; unit: string | null; type: "number" | "text" | "choice" | "flag" | "list";
+  choices?: (string | number)[] | null; default?: unknown; help?: string | null;
+}
+
+export interface Section { key?: string; title?: string; help?: string | null; fields: Field[] }
+
+export interface Kind {
+  kind: string; title: string; what: string; needs: string; schema: Section[]; options?: string[];
+}
+
+export interface Proposal {
+  toml: string; questions: Question[]; findings: Finding[]; to_check?: Question[]; found?: string[];
+  others?: { toml: string; name: string }[];
+}
+
+export interface Fault {
+  line: number | null; key: string | null; path?: string | null; code?: string; text: string; remedy?: string | null;
+}
+
+export interface Checked {
+  toml: string; values: Record<string, unknown>; errors: Fault[]; questions?: Question[];
+  findings?: Finding[];
+}
+
+export interface KeyNumber {
+  group?: string; label: string; value: number | string | null; unit: string | null;
+  /** Distance of the lower and of the upper bound; null without an end. */
+  below?: number | null; above?: number | null; bound_unit?: string | null;
+}
+
+export interface RunDetail extends Run {
+  command_line: string; answer?: string | null; job?: string | null;
+  numbers: KeyNumber[]; options: unknown; inputs: unknown; findings: Finding[];
+  from_s?: number; to_s?: number;
+  panels?: { title: string; unit: string; columns: { name: string; label: string }[] }[];
+  report: string | null; has: { track?: boolean; attitude?: boolean; series?: boolean; pdf?: boolean; toml?: boolean };
+}
+
+export interface Track {
+  t: number[]; lat: number[]; lon: number[]; alt: number[];
+  q: [number, number, number, number][] | null;
+  fixes: { t: number[]; lat: number[]; lon: number[] } | null;
+  reference: { t: number[]; lat: number[]; lon: number[] } | null;
+}
+
+export interface MapInfo { tiles: string | null; min: number; max: number; attribution: string | null }
+
+export interface CrashQuick {
+  delta_v: { value: number; bound: number | null; at_least?: boolean; unit: string; forward: number; right: number } | null;
+  pdof: { deg: number; low: number | null; high: number | null; clock: number } | null;
+  path: { t: number[]; north: number[]; east: number[]; heading: number[]; bound: number[] };
+  /** The outline: corners forward, right of the origin of positions. */
+  vehicle: { length: number; width: number; outline: [number, number][] };
+  recorder: string; recorders: string[]; findings: Finding[]; ms: number;
+}
+
+export interface LiveInfo {
+  protocols: { name: string; title: string; help: string; fields: Field[] }[];
+  warning: string | null;
+}
+
+/** What `strapdown compare` gives as JSON; lists of values are in the order of the runs. */
+export interface Comparison {
+  summary: string; runs: { name: string; command: string }[];
+  options: { key: string; values: unknown[] }[]; equal_options: number;
+  inputs: { role: string; same: boolean; status: string[]; files: ({ name: string } | null)[] }[];
+  conditions: { name: string; values: (string | null)[] }[];
+  numbers: {
+    group: string; quantity: string; unit: string | null; difference_unit: string | null; same: boolean; values: (number | string | null)[];
+    below_95: (number | null)[]; above_95: (number | null)[]; differences: (number | null)[]; within: (boolean | null)[];
+  }[];
+  findings_of_runs: { code: string; sentence: string; differs: boolean; counts: number[] }[];
+  findings: Finding[]; page?: string | null;
+}

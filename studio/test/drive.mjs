@@ -1,0 +1,100 @@
+// What the flows share: a browser, and what has to hold on every page.
+
+import assert from "node:assert/strict";
+import { mkdirSync } from "node:fs";
+import { chromium } from "playwright-core";
+
+/**
+ * Open a browser at ADDRESS. `look(name)` takes pictures at two widths, light and dark, and fails at
+ * a page that scrolls sideways, text of too little contrast and a control without a name; `end`
+ * fails at an error in the console that was not `expect`ed, and at a request to elsewhere.
+ */
+export async function open(address, shots) {
+  mkdirSync(shots, { recursive: true });
+  const browser = await chromium.launch({
+    executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium",
+    args: ["--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"],
+  });
+  const page = await (await browser.newContext({ viewport: { width: 1300, height: 900 }, permissions: ["clipboard-read", "clipboard-write"] })).newPage();
+  page.setDefaultTimeout(90_000);
+  const faults = [];
+  const begun = Date.now();
+  let expected = 0;
+  page.on("console", (message) => { if (["error", "warning"].includes(message.type()) && !message.text().includes("GPU stall")) faults.push(`${message.text()} (${message.location().url})`); });
+  page.on("pageerror", (error) => faults.push(`uncaught: ${error.message}`));
+  page.on("request", (request) => {
+    const at = new URL(request.url());
+    if (!["blob:", "data:"].includes(at.protocol) && at.host !== new URL(address).host) faults.push(`asked another host: ${request.url()}`);
+  });
+
+  async function look(name) {
+    for (const [width, dark] of [[1300, false], [1300, true], [390, false], [390, true]]) {
+      await page.setViewportSize({ width, height: 900 });
+      await page.emulateMedia({ colorScheme: dark ? "dark" : "light" });
+      await page.waitForTimeout(350);
+      const wide = await page.evaluate(() => document.documentElement.scrollWidth);
+      assert.ok(wide <= width, `${name}: ${wide} pixels wide at ${width}`);
+      assert.deepEqual(await page.evaluate(faintText), [], `${name}: contrast, ${dark ? "dark" : "light"}`);
+      await page.screenshot({ path: `${shots}/${name}-${width}-${dark ? "dark" : "light"}.png`, fullPage: true });
+    }
+    assert.deepEqual(await nameless(page), [], `${name}: controls without a name`);
+    await page.setViewportSize({ width: 1300, height: 900 });
+    await page.emulateMedia({ colorScheme: "light" });
+  }
+
+  return {
+    page, look,
+    click: (name, options = {}) => page.getByRole("button", { name, ...options }).first().click(),
+    see: (text) => page.getByText(text).first().waitFor(),
+    done: (what) => console.log(`${((Date.now() - begun) / 1000).toFixed(1).padStart(6)} s  ${what}`),
+    /** A refusal by the server, which the browser writes into the console. */
+    expect: () => { expected += 1; },
+    async run(steps) {
+      try {
+        await steps();
+        const refused = faults.filter((fault) => /status of (404|409)/.test(fault));
+        assert.equal(refused.length, expected, `refusals: ${refused.join("\n")}`);
+        assert.deepEqual(faults.filter((fault) => !refused.includes(fault)), [], "console");
+        console.log("no error in the console, no request to elsewhere");
+      } catch (error) {
+        await page.screenshot({ path: `${shots}/failed.png`, fullPage: true });
+        console.log(faults.join("\n"));
+        throw error;
+      } finally {
+        await browser.close();
+      }
+    },
+  };
+}
+
+/** Controls that a screen reader could not name. */
+async function nameless(page) {
+  const session = await page.context().newCDPSession(page);
+  const { nodes } = await session.send("Accessibility.getFullAXTree");
+  await session.detach();
+  const controls = new Set(["button", "link", "textbox", "searchbox", "checkbox", "radio", "combobox", "slider", "spinbutton", "img", "progressbar"]);
+  return nodes.filter((n) => !n.ignored && controls.has(n.role?.value) && !n.name?.value).map((n) => `${n.role.value} ${n.nodeId}`);
+}
+
+/** Text below the contrast of WCAG AA, 4.5 or 3 where it is large; runs in the page. */
+function faintText() {
+  const parse = (text) => { const [r, g, b, a = 1] = (text.match(/[\d.]+/g) ?? []).map(Number); return [r, g, b, a]; };
+  const over = (top, under) => top.slice(0, 3).map((v, i) => v * top[3] + under[i] * (1 - top[3]));
+  const light = (rgb) => rgb.map((v) => v / 255).map((v) => (v <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)).reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
+  const ground = (element) => {
+    const layers = [];
+    for (let e = element; e; e = e.parentElement) layers.push(parse(getComputedStyle(e).backgroundColor));
+    return layers.reverse().reduce((under, top) => over(top, under), [255, 255, 255]);
+  };
+  const found = new Set();
+  const walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (walk.nextNode()) {
+    const element = walk.currentNode.parentElement;
+    if (!walk.currentNode.data.trim() || element.closest("svg, noscript, :disabled, .u-wrap") || !element.checkVisibility()) continue;
+    const style = getComputedStyle(element), back = ground(element);
+    const [a, b] = [light(over(parse(style.color), back)), light(back)].sort((x, y) => y - x);
+    const ratio = (a + 0.05) / (b + 0.05), size = parseFloat(style.fontSize);
+    if (ratio < (size >= 24 || (size >= 18.6 && style.fontWeight >= 600) ? 3 : 4.5)) found.add(`${walk.currentNode.data.trim().slice(0, 40)}: ${ratio.toFixed(2)}`);
+  }
+  return [...found];
+}

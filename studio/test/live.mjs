@@ -1,0 +1,54 @@
+// Drive a live session: listen, let a synthetic phone send as Sensor Logger does, see its attitude.
+//
+//   node test/live.mjs ADDRESS SHOTS
+
+import assert from "node:assert/strict";
+import { open } from "./drive.mjs";
+
+const [address, shots] = process.argv.slice(2);
+const { page, look, click, see, done, run } = await open(address, shots);
+
+/** Half a second of a phone that lies flat and turns about its z by 20 deg a second. */
+function message(number) {
+  const payload = [];
+  for (let i = 0; i < 50; i++) {
+    const time = 1.7e18 + (number * 0.5 + i * 0.01) * 1e9;
+    payload.push({ name: "gyroscope", time, accuracy: 3, values: { x: 0, y: 0, z: (20 * Math.PI) / 180 } });
+    payload.push({ name: "totalacceleration", time, accuracy: 3, values: { x: 0, y: 0, z: 9.80665 } });
+  }
+  return JSON.stringify({ messageId: number, sessionId: "walk", deviceId: "phone-1", payload });
+}
+
+await run(async () => {
+  await page.goto(`${address}#/live`);
+  await see("Start listening");
+  await page.getByRole("textbox", { name: "Address" }).fill("127.0.0.1:0");
+  await page.getByRole("textbox", { name: "Address" }).press("Enter");
+  await page.getByRole("combobox", { name: "Phone" }).selectOption("android");
+  await look("live-1-begin");
+  await click("Listen");
+  const shown = page.locator(".pairing code").first();
+  await shown.waitFor();
+  await page.getByRole("img", { name: /^Code to scan/ }).waitFor();
+  const target = await shown.innerText();
+  for (let i = 0; i < 24; i++) {
+    const answer = await fetch(target, { method: "POST", body: message(i), headers: { "Content-Type": "application/json" } });
+    assert.equal(answer.status, 200);
+    await new Promise((resolve) => setTimeout(resolve, 500));
+  }
+  const words = page.locator(".attitude figcaption");
+  await words.getByText(/nose level, level across|Heading/).waitFor();
+  const first = await words.innerText();
+  done(`seen: ${first}`);
+  await look("live-2-receiving");
+  await page.reload();
+  await click("Stop listening");
+  await page.getByText("Stop listening").waitFor({ state: "detached" });
+  await look("live-3-ended");
+  // What was received is a log like any other.
+  await click("Look into phone-1");
+  await see("The traces");
+  await page.locator(".plot canvas").first().waitFor();
+  await look("live-4-log");
+  done("live");
+});
