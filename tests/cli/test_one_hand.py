@@ -43,6 +43,7 @@ OF_ITS_OWN = {
     *(("navigate", flag) for flag in ("--lat",)),
     *(("init navigate", flag) for flag in ("--sensor",)),
     *(("align", flag) for flag in ("--gnss",)),
+    *(("live", flag) for flag in ("--every", "--lines", "--token")),
     *(("crash", flag) for flag in ("--live", "--every", "--calibration", "--export")),
 }
 
