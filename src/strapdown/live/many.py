@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import re
 import secrets
+import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -13,14 +14,14 @@ from typing import Any, Protocol
 
 from strapdown.config.alignment import sensors_of
 from strapdown.errors import ConfigError, Finding
+from strapdown.formats.sensor_streams import ACCEL, GYRO, MAG, Event
 from strapdown.live.feeds import MqttFeed, PhyphoxFeed, SerialFeed, UdpFeed
 from strapdown.live.hub import Hub, StateWriter
-from strapdown.live.replay import RunClock
+from strapdown.live.replay import MachineClock, RunClock
 from strapdown.live.run import until_a_signal
-from strapdown.live.session import SessionOptions
+from strapdown.live.session import Session, SessionOptions
 from strapdown.live.web import WebReceiver, listening_socket
 from strapdown.navigation.measurements.measurement import TabulatedMeasurement
-from strapdown.orientation_filters import OrientationTracker, make_filter
 from strapdown.systems.navigation_run import make_chain
 from strapdown.systems.one_thread import one_thread
 
@@ -123,10 +124,23 @@ def address_token(token: str | None) -> str:
 def _warmed(options: SessionOptions) -> list[str]:
     """Load and compile what sessions need; return the names of measurements that lines may hold."""
     if options.spec is None:
-        tracker = OrientationTracker(make_filter(options.algorithm))
-        for k in range(3):
-            tracker.update(0.01 * k, (0.0, 0.0, 0.0), (0.0, 0.0, -9.8), (20.0, 0.0, 40.0))
-        _ = tracker.quaternion, tracker.roll_pitch_heading, tracker.roll_pitch_heading_sd
+        # A session of a second, so that the first real one does not wait for what it needs.
+        values = (0.0, 0.0, 9.8)
+        with tempfile.TemporaryDirectory() as folder:
+            session = Session(
+                Path(folder) / "warm-up",
+                "",
+                "",
+                None,
+                options,
+                lambda state: None,
+                lambda finding: None,
+                MachineClock(),
+            )
+            for k in range(100):
+                rows = [Event(kind, k * 10**7, values) for kind in (GYRO, ACCEL, MAG)]
+                session.take(rows, 0.0)
+            session.finish()
         return []
     chain = make_chain(options.spec, sensors_of(options.spec))
     return [aid.name for aid in chain.navigator.aids if isinstance(aid, TabulatedMeasurement)]

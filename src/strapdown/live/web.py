@@ -71,7 +71,8 @@ def listening_socket(where: str) -> socket.socket:
     host, port = split_address(where, "--listen")
     try:
         family, kind, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        made = socket.socket(family, kind)
+        # Named as TCP, so that asyncio lets no answer wait for an acknowledgment (40 ms).
+        made = socket.socket(family, kind, socket.IPPROTO_TCP)
         try:
             made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             made.bind(address)
