@@ -45,6 +45,7 @@ OF_ITS_OWN = {
     *(("init navigate", flag) for flag in ("--sensor",)),
     *(("align", flag) for flag in ("--gnss",)),
     *(("studio", flag) for flag in ("--map", "--listen", "--port", "--host")),
+    *(("live", flag) for flag in ("--every", "--lines", "--token")),
     *(("crash", flag) for flag in ("--live", "--every", "--calibration", "--export")),
 }
 

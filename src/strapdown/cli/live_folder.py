@@ -22,6 +22,8 @@ from strapdown.live.sources import LineSource, open_source
 
 __all__ = [
     "begin_journal",
+    "configured_session",
+    "let_go_of_received",
     "open_lines",
     "output_of",
     "recovered",
@@ -96,6 +98,22 @@ def remove_received(journal: Journal, bundle: Path) -> None:
         shutil.rmtree(journal.folder)
     else:
         journal.remove()
+
+
+def configured_session(path: Path) -> Path | None:
+    """Return the folder of a session that navigated, by itself or its journal; None of others."""
+    from strapdown.formats.live_journal import run_of, session_folder
+
+    folder = session_folder(path) if path.exists() else None
+    if folder is None or (run := run_of(folder))["command"] != "live":
+        return None
+    return folder if isinstance(run.get("configuration"), dict) else None
+
+
+def let_go_of_received(bundle: Path) -> None:
+    """Remove the input that was written for a bundle, unless the bundle refers to it."""
+    if all(item["kept"] == "copy" for item in read_manifest(bundle)["inputs"]):
+        shutil.rmtree(received_folder(bundle), ignore_errors=True)
 
 
 def remove_empty(journal: Journal, live: bool) -> NoReturn:

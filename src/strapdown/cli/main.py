@@ -54,6 +54,7 @@ COMMANDS = {
     "navigate": (
         "Find position, velocity and attitude over a record, by inertial sensors and measurements."
     ),
+    "live": "Receive phones and sensors as they send, and show their attitude or navigation.",
     "outage": "Predict the drift during a GNSS outage, and the sources of the drift.",
     "init": "Propose a configuration from your records, with questions for missing data.",
     "convert": "Write what a log, a file of fixes or a trajectory holds in another format.",

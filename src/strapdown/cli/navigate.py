@@ -140,7 +140,8 @@ def navigate(
         Path | None,
         typer.Argument(
             metavar="LOG|CONFIG.toml",
-            help="A log of gyros and accelerometers, or the file of a run of navigation.",
+            help="A log of gyros and accelerometers, a session of strapdown live, or the file of "
+            "a run of navigation.",
             show_default=False,
         ),
     ] = None,
@@ -154,6 +155,7 @@ def navigate(
     """Find position, velocity and attitude over a record, by inertial sensors and measurements."""
     from strapdown.bundle import write_latency
     from strapdown.cli.console import WORDS, print_seal
+    from strapdown.cli.live_folder import configured_session, let_go_of_received, warner
     from strapdown.cli.result_folder import (
         claim,
         default_folder,
@@ -207,8 +209,14 @@ def navigate(
         navigate_live(source, folder, write, flags, refused)
         return
     refuse_without_live(own_of_live)
+    session = None if own or any(value is not None for value in given.values()) else source
+    received = None if session is None else configured_session(session)
 
     def compute(report: Progress) -> NavigationRun:
+        if received is not None:
+            from strapdown.cli.navigate_live import navigate_session
+
+            return navigate_session(received, folder, report, played, warner(write.quiet))
         report("looking through", 0.01)
         spec = navigation_of_flags(source, given) if asked is None else asked
         drive: dict[str, Any] = {} if played is None else {"drive": played}
@@ -220,6 +228,8 @@ def navigate(
             write_latency(seal, {"pace": pace, **found.told()})
 
     done = run_and_save(compute, folder, write, "navigation.json", latency)
+    if received is not None:
+        let_go_of_received(folder)
     if done is not None:
         from strapdown.cli.navigate_tables import print_latency, print_navigation
 

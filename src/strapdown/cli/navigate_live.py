@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,14 +25,16 @@ from strapdown.cli.live_folder import (
 from strapdown.cli.navigate_tables import print_latency, print_navigation
 from strapdown.cli.shared_options import ReportFlags
 from strapdown.config.navigation import NavigationSpec
-from strapdown.errors import ConfigError
-from strapdown.live.journal import Journal
-from strapdown.live.replay import MachineClock
-from strapdown.live.run import LiveRun, live_spec, receive, result_of
+from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.live.journal import Journal, received_folder
+from strapdown.live.replay import MachineClock, Replay
+from strapdown.live.run import LiveRun, live_spec, receive, replay_session, result_of
+from strapdown.progress import Progress
 from strapdown.report.navigation import NAVIGATION
 
 if TYPE_CHECKING:
     from strapdown.cli.navigate import NavigateFlags
+    from strapdown.systems.navigation_run import NavigationRun
 
 COMMAND = "navigate --live"
 EVERY, LINES = 1.0, "json"
@@ -82,6 +84,27 @@ def recover_navigation(
         spec = NavigationSpec.checked(journal.run["configuration"])
         file = _file(journal)
     _run(journal, spec, file, folder, write, flags)
+
+
+def navigate_session(
+    session: Path,
+    folder: Path,
+    report: Progress,
+    played: Replay | None,
+    warn: Callable[[Finding], None],
+) -> NavigationRun:
+    """Navigate a session of ``strapdown live`` again, with its configuration; or replay it.
+
+    `session`: its folder. `folder`: the bundle, beside which the received input is written.
+    StrapdownError: the error that ended the session, if it has no result.
+    """
+    report("reading", 0.01)
+    live = replay_session(session, warn)
+    if not live.got.count or (live.run is None and live.error is not None):
+        raise live.error or DataError("cli.no-sample", file=str(session))
+    received = received_folder(folder)
+    received.mkdir(parents=True, exist_ok=True)
+    return result_of(live, received, None, report, played)
 
 
 def _file(journal: Journal) -> Path:

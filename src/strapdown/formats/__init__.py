@@ -34,6 +34,7 @@ from strapdown.formats import (
     join,
     kf_gins,
     kitti,
+    live_journal,
     novatel,
     phone_apps,
     phyphox,
@@ -142,6 +143,7 @@ class Reader:
 
 #: In the order of detection: formats of known recordings first, general formats last.
 READERS: dict[str, Reader] = {
+    "live": Reader.of(live_journal),
     "px4": Reader.of(px4),
     "dataflash": Reader.of(ardupilot, name="dataflash"),
     "mavlink": Reader.of(ardupilot, name="mavlink"),

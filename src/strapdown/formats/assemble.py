@@ -222,7 +222,8 @@ def assemble(raw: RawLog, options: ReadOptions, *, keep: bool = False) -> Record
     let_go(block)
     report_weightless(raw.name, body.get("accel"), findings)
     columns = [f"{triad}_{a}" for triad in units for a in AXES]
-    imu = imu_of_columns(time, block, columns, sampling=sampling, source=raw.name)
+    sparse = any(not all_finite(body[triad]) for triad in raw.sparse if triad in body)
+    imu = imu_of_columns(time, block, columns, sampling=sampling, source=raw.name, sparse=sparse)
     if not axes.stated:
         imu.attrs["axes"] = AXES_OF_SENSOR
     imu.attrs["sensor_axes"] = ",".join(
@@ -425,7 +426,7 @@ def _by_sensor(raw: RawLog, found: dict[str, Column]) -> list[RawLog]:
 
     Empty if every triad has a value in most rows, or the table has no time.
     """
-    if "time" not in found:
+    if "time" not in found or raw.sparse:
         return []
     there: dict[str, NDArray[np.bool_]] = {}
     for triad in ("gyro", "accel", "mag"):
@@ -829,7 +830,7 @@ def finite_rows(
         blocks = {"time": ticks[:, None].astype(np.float64, copy=False)} | blocks
     keep = np.ones(len(values["gyro"]), dtype=bool)
     for name, block in blocks.items():
-        if all_finite(block):
+        if name in raw.sparse or all_finite(block):
             continue
         bad = ~np.isfinite(block)
         row, column = (int(i) for i in np.argwhere(bad)[0])

@@ -211,6 +211,8 @@ class RawLog:
         were decided by a person.
     calibrated : str or None
         The calibration whose errors were taken off before it was written: name and SHA-256.
+    sparse : frozenset of str
+        Triads of which some samples may be missing, NaN: of a magnetometer that began later.
     """
 
     name: str
@@ -232,6 +234,7 @@ class RawLog:
     epoch: float = 0.0
     checked: bool = False
     calibrated: str | None = None
+    sparse: frozenset[str] = frozenset()
 
     @classmethod
     def of(

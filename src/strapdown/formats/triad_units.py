@@ -271,7 +271,7 @@ def values_of_triads(
         bad = np.zeros(1, dtype=bool) if all_finite(block) else ~np.isfinite(block)
         if bad.all():
             findings.append(_not_used(raw, triad, "io.left-out-without-number"))
-        elif triad == "mag" and bad.any():
+        elif triad == "mag" and bad.any() and triad not in raw.sparse:
             empty = int(bad.any(axis=1).sum())
             findings.append(_not_used(raw, triad, "io.left-out-rows-without-number", count=empty))
         else:

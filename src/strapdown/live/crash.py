@@ -18,7 +18,8 @@ from strapdown.config.crash_case import CaseSpec, TriadSpec, UnitSpec
 from strapdown.constants import TWO_SIDED_95
 from strapdown.crash.watch import CrashLog, CrashWatch, WatchOptions, watch_options
 from strapdown.errors import DataError, Finding
-from strapdown.live.gate import FAMILY, STRONGEST, StampGate, ValueLimits
+from strapdown.formats.stamp_gate import StampGate
+from strapdown.live.gate import FAMILY, STRONGEST, ValueLimits
 from strapdown.live.journal import Journal, SpooledRows
 from strapdown.live.lines import (
     END,

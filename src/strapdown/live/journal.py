@@ -18,11 +18,10 @@ from __future__ import annotations
 import errno
 import json
 import os
-import struct
 import threading
 import zlib
 from array import array
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Self
@@ -33,22 +32,35 @@ from numpy.typing import NDArray
 from strapdown.bundle import sha256, to_json
 from strapdown.bundle.atomic_folder import HeldError, flush_entry, open_locked
 from strapdown.errors import ConfigError, DataError, Finding
+from strapdown.formats.live_journal import (
+    FRAME,
+    JOURNAL,
+    MAGIC,
+    MEASURED,
+    ROWS,
+    RUN,
+    SAMPLE,
+    SCHEMA,
+    WORD,
+    event_payload,
+    events_in,
+    records,
+    run_of,
+)
+from strapdown.formats.sensor_streams import Event
 from strapdown.live.lines import Measured, Sample, Word
 
-__all__ = ["Journal", "SpooledRows", "received_folder"]
+__all__ = ["Journal", "Said", "SpooledRows", "received_folder", "said_of"]
 
-RUN, JOURNAL, LOCK = "run.json", "journal", "lock"
-SCHEMA = "strapdown journal 1"
-MAGIC = f"{SCHEMA}\n".encode()
+#: What a journal holds: what lines said, and events of phones.
+Said = Sample | Measured | Word | Event
+
+LOCK = "lock"
 #: Interval at which written data are flushed to the disk, s.
 SYNCED = 1.0
-#: Length of a payload, its complement, and checksum.
-_FRAME = struct.Struct("<HHI")
-_SAMPLE, _MEASURED, _WORD, _RUN, _SEALED = b"S", b"M", b"W", b"R", b"E"
+_RUN, _SEALED = b"R", b"E"
 #: Size of a journal in which nothing is.
-HEAD = len(MAGIC) + _FRAME.size + 65
-#: A row of seven numbers, rates and forces, and one of four, forces alone.
-_ROWS = {n: struct.Struct(f"<{n}d") for n in (4, 7)}
+HEAD = len(MAGIC) + FRAME.size + 65
 #: Bytes of rows that are kept in memory before they are written.
 ROOM = 1 << 16
 
@@ -144,7 +156,7 @@ class Journal:
             raise ConfigError("live.no-journal", file=str(folder), quantity="--recover")
         lock = _locked(folder)
         try:
-            run = _read_run(folder)
+            run = run_of(folder)
             if run["command"] != command:
                 raise ConfigError(
                     "live.journal-of-other-command",
@@ -165,28 +177,13 @@ class Journal:
         made._syncing.start()
         return made
 
-    def append(self, said: Sample | Measured | Word) -> None:
-        """Write what a line said, before it is used."""
-        if isinstance(said, Sample):
-            row = _ROWS[1 + len(said.values)].pack(said.time, *said.values)
-            self._append(_SAMPLE + row)
-        elif isinstance(said, Measured):
-            whole = [said.name, said.time, dict(said.values)]
-            self._append(_MEASURED + json.dumps(whole, separators=(",", ":")).encode())
-        else:
-            self._append(_WORD + said.word.encode())
+    def append(self, *received: Said) -> None:
+        """Write what came together, a line or a message, before it is used."""
+        self._append(*map(_payload, received))
 
-    def said(self) -> Iterator[Sample | Measured | Word]:
+    def said(self) -> Iterator[Said]:
         """Yield what is in it, exact to the bit."""
-        for _, payload in self._payloads():
-            kind, rest = payload[:1], payload[1:]
-            if kind == _SAMPLE:
-                time, *values = _ROWS[len(rest) // 8].unpack(rest)
-                yield Sample(time, tuple(values))
-            elif kind == _MEASURED:
-                yield Measured(*json.loads(rest))
-            elif kind == _WORD:
-                yield Word(rest.decode())
+        return said_of(payload for _, payload in self._payloads())
 
     @property
     def empty(self) -> bool:
@@ -220,11 +217,14 @@ class Journal:
         with suppress(OSError):
             self.folder.rmdir()
 
-    def _append(self, payload: bytes) -> None:
-        if self._stopped:
+    def _append(self, *payloads: bytes) -> None:
+        if self._stopped or not payloads:
             return
-        crc, count = zlib.crc32(payload, self._crc), len(payload)
-        data = _FRAME.pack(count, count ^ 0xFFFF, crc) + payload
+        crc, parts = self._crc, []
+        for payload in payloads:
+            crc, count = zlib.crc32(payload, crc), len(payload)
+            parts += [FRAME.pack(count, count ^ 0xFFFF, crc), payload]
+        data = b"".join(parts)
         try:
             if os.write(self._file, data) < len(data):
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
@@ -254,38 +254,9 @@ class Journal:
 
     def _payloads(self) -> Iterator[tuple[int, bytes]]:
         """Yield the ends and the payloads of the complete records; DataError: it is damaged."""
-        path, crc = self.folder / JOURNAL, 0
-        with path.open("rb") as stream:
-            magic = stream.read(len(MAGIC))
-            if not MAGIC.startswith(magic):
-                raise self._damaged(0)
-            at, number = len(magic), 0
-            while len(frame := stream.read(_FRAME.size)) == _FRAME.size:
-                count, complement, wanted = _FRAME.unpack(frame)
-                if count ^ 0xFFFF != complement:
-                    raise self._damaged(at, number)
-                payload = stream.read(count)
-                if len(payload) < count:
-                    return
-                crc = zlib.crc32(payload, crc)
-                if crc != wanted:
-                    raise self._damaged(at, number)
-                at, number = at + _FRAME.size + count, number + 1
-                self._crc = crc
-                yield at, payload
-
-    def _damaged(self, at: int, number: int = 0) -> DataError:
-        path = self.folder / JOURNAL
-        if not number:
-            return DataError("live.not-a-journal", file=str(path), quantity="--recover")
-        return DataError(
-            "live.journal-damaged",
-            file=str(path),
-            quantity="--recover",
-            path=path,
-            at=at,
-            number=number,
-        )
+        for at, crc, payload in records(self.folder / JOURNAL):
+            self._crc = crc
+            yield at, payload
 
     def _check(self) -> None:
         """Find the end of the last complete record, and cut what is after it."""
@@ -308,22 +279,30 @@ class Journal:
         os.ftruncate(self._file, self._size)
 
 
-def _read_run(folder: Path) -> dict[str, Any]:
-    try:
-        run = json.loads((folder / RUN).read_bytes())
-    except (ValueError, RecursionError):
-        run = None
-    if not isinstance(run, dict) or not isinstance(run.get("command"), str):
-        raise DataError("live.not-a-journal", file=str(folder / RUN), quantity="--recover")
-    if run.get("schema") != SCHEMA:
-        raise DataError(
-            "live.journal-of-other-version",
-            file=str(folder),
-            quantity="--recover",
-            schema=str(run.get("schema")),
-            own=SCHEMA,
-        )
-    return run
+def said_of(payloads: Iterable[bytes]) -> Iterator[Said]:
+    """Yield what the payloads of a journal hold."""
+    for payload in payloads:
+        kind, rest = payload[:1], payload[1:]
+        if (event := events_in(payload)) is not None:
+            yield event
+        elif kind == SAMPLE:
+            time, *values = ROWS[len(rest) // 8].unpack(rest)
+            yield Sample(time, tuple(values))
+        elif kind == MEASURED:
+            yield Measured(*json.loads(rest))
+        elif kind == WORD:
+            yield Word(rest.decode())
+
+
+def _payload(said: Said) -> bytes:
+    if isinstance(said, Event):
+        return event_payload(said)
+    if isinstance(said, Sample):
+        return SAMPLE + ROWS[1 + len(said.values)].pack(said.time, *said.values)
+    if isinstance(said, Measured):
+        whole = [said.name, said.time, dict(said.values)]
+        return MEASURED + json.dumps(whole, separators=(",", ":")).encode()
+    return WORD + said.word.encode()
 
 
 def _refuse_data(folder: Path) -> None:
@@ -335,7 +314,7 @@ def _refuse_data(folder: Path) -> None:
             file=str(folder),
             quantity="--out",
             folder=folder,
-            command=_read_run(folder)["command"].split()[0],
+            command=run_of(folder)["command"].split()[0],
         )
     if {p.name for p in folder.iterdir()} - {JOURNAL, LOCK, RUN, f"{RUN}.part"}:
         raise ConfigError("live.received-before", file=str(folder), quantity="--out")

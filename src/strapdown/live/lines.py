@@ -388,7 +388,10 @@ class StateLines:
         if not math.isfinite(piece.time) or piece.time < self._next - 1e-9:
             return
         self._next = piece.time + self._every
-        told = {"time": round(piece.time, _FINE), "mode": piece.mode, **self._state(piece)}
+        self.tell({"time": round(piece.time, _FINE), "mode": piece.mode, **self._state(piece)})
+
+    def tell(self, told: Mapping[str, Any]) -> None:
+        """Write a state."""
         if self._form == "json":
             self._write(json.dumps(told) + "\n")
             return

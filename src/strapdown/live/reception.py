@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import partial
 
@@ -16,7 +16,8 @@ from strapdown.config.navigation import CommandTable, LiveTable, NavigationSpec
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.formats.clocks import EPOCH
 from strapdown.formats.columns import parse_axes
-from strapdown.live.gate import LATEST, StampGate, value_limits
+from strapdown.formats.stamp_gate import StampGate
+from strapdown.live.gate import LATEST, value_limits
 from strapdown.live.journal import Journal, SpooledRows
 from strapdown.live.lines import (
     END,
@@ -188,15 +189,19 @@ class Reception:
             self._not_used(bad, line.number)
         return self.error is None
 
-    def replay(self, journal: Journal) -> None:
-        """Process what the journal of a killed run has."""
-        for said in journal.said():
+    def accept(self, said: Sample | Measured | Word, line: ReceivedLine | None = None) -> bool:
+        """Process what was said, and is in a journal already; return whether the run continues."""
+        try:
+            self._use(said, line)
+        except BadLineError as bad:
+            self._not_used(bad, None if line is None else line.number)
+        return self.error is None
+
+    def replay(self, said: Iterable[Sample | Measured | Word]) -> None:
+        """Process what a journal has."""
+        for one in said:
             self.replayed += 1
-            try:
-                self._use(said, None)
-            except BadLineError as bad:
-                self._not_used(bad)
-            if self.error is not None:
+            if not self.accept(one):
                 return
 
     def finish(self) -> None:

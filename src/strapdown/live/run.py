@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import closing, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,23 +15,37 @@ import pandas as pd
 from strapdown.config.alignment import sensors_of
 from strapdown.config.navigation import NavigationSpec
 from strapdown.errors import DataError, Finding, StrapdownError
+from strapdown.formats.clocks import RELATIVE, Clock
+from strapdown.formats.gnss_fixes import GnssOptions, table_of_fixes
+from strapdown.formats.live_journal import JOURNAL, event_streams, fixes_of, records, run_of
+from strapdown.formats.sensor_streams import Event, Joined, Located
 from strapdown.formats.writers import WRITERS
 from strapdown.formats.writing import FileOptions
-from strapdown.live.journal import Journal
-from strapdown.live.lines import StateLines
+from strapdown.live.journal import Journal, Said, said_of
+from strapdown.live.lines import Measured, Sample, StateLines, Word
 from strapdown.live.reception import Reception
-from strapdown.live.replay import Latency, RunClock, warm_up
+from strapdown.live.replay import Latency, MachineClock, RunClock, warm_up
 from strapdown.live.sources import LineSource, ReceivedLine
+from strapdown.navigation.measurements.gnss import Gnss
 from strapdown.navigation.pipeline import NavigationPipeline
 from strapdown.navigation.recorder import Recorder
 from strapdown.navigation.replay import PipelineRun, Recording, run_batch
 from strapdown.progress import Progress, silent
-from strapdown.systems.navigation_run import NavigationRun, make_chain, run_navigation
+from strapdown.systems.navigation_run import Drive, NavigationRun, make_chain, run_navigation
 from strapdown.systems.one_thread import one_thread
-from strapdown.tables import ACCEL, GYRO
+from strapdown.tables import ACCEL, GNSS, GYRO
 from strapdown.tables.checks import values_of
 
-__all__ = ["LiveRun", "live_spec", "receive", "result_of", "write_received"]
+__all__ = [
+    "LiveRun",
+    "as_said",
+    "live_spec",
+    "phone_aid",
+    "receive",
+    "replay_session",
+    "result_of",
+    "write_received",
+]
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +122,7 @@ def receive(
             journal.warn = warn
         if journal is not None:
             reader.muted = True
-            got.replay(journal)
+            got.replay(said_by_phone(journal.run, journal.said(), phone_aid(chain)))
             reader.muted = False
             lines.begin()
         with until_a_signal() as wanted:
@@ -127,6 +141,73 @@ def receive(
         return LiveRun(spec, got, None, got.error or error)
 
 
+def phone_aid(chain: NavigationPipeline) -> str | None:
+    """Return the name of the receiver that the fixes of a phone are measurements of."""
+    return next((aid.name for aid in chain.navigator.aids if isinstance(aid, Gnss)), None)
+
+
+def said_by_phone(
+    run: Mapping[str, Any], held: Iterable[Said], aid: str | None
+) -> Iterator[Sample | Measured | Word]:
+    """Yield what a journal holds, the events of a phone joined as when they arrived."""
+    streams = event_streams(dict(run))
+    for said in held:
+        if not isinstance(said, Event):
+            yield said
+            continue
+        for row in streams.take(said):
+            if (one := as_said(row, aid)) is not None:
+                yield one
+    for row in streams.finish():
+        if (one := as_said(row, aid)) is not None:
+            yield one
+
+
+@one_thread()
+def replay_session(folder: Path, warn: Callable[[Finding], None]) -> LiveRun:
+    """Navigate again what a session of `strapdown live` received, with its configuration.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the session.
+    warn : callable
+        Called with each finding.
+
+    Returns
+    -------
+    LiveRun
+        With the states that were shown, to the bit.
+    """
+    run = run_of(folder)
+    spec = NavigationSpec.checked(run["configuration"])
+    chain = make_chain(spec, sensors_of(spec))
+    recorder: Recorder = spec.recorder.make(ellipsoid=spec.ellipsoid)
+    recording = Recording(chain, recorder)
+    got = Reception(chain, spec, recording, MachineClock(), lambda piece: None, warn)
+    payloads = (payload for _, _, payload in records(folder / JOURNAL))
+    got.replay(said_by_phone(run, said_of(payloads), phone_aid(chain)))
+    try:
+        got.finish()
+        return LiveRun(spec, got, recording.run("received.csv"), got.error)
+    except DataError as error:
+        return LiveRun(spec, got, None, got.error or error)
+
+
+def as_said(row: Joined | Located, aid: str | None) -> Sample | Measured | None:
+    """Return a sample or a fix of a phone as a line would say it; None of a fix without use."""
+    if isinstance(row, Joined):
+        return Sample(row.time, (*row.gyro, *row.accel))
+    if aid is None:
+        return None
+    try:
+        table = table_of_fixes(fixes_of([row], aid, Clock(RELATIVE)), GnssOptions())
+    except DataError:  # without a usable position
+        return None
+    values = {str(name): float(table[name].iloc[0]) for name in GNSS}
+    return Measured(aid, row.time, values)
+
+
 def received_lines(source: LineSource, wanted: Callable[[], bool]) -> Iterator[ReceivedLine]:
     """Yield the lines of a source to its end, or as long as they are wanted."""
     while wanted():
@@ -140,7 +221,11 @@ def received_lines(source: LineSource, wanted: Callable[[], bool]) -> Iterator[R
 
 
 def result_of(
-    live: LiveRun, folder: Path, file: Path | None = None, progress: Progress = silent
+    live: LiveRun,
+    folder: Path,
+    file: Path | None = None,
+    progress: Progress = silent,
+    drive: Drive | None = None,
 ) -> NavigationRun:
     """Write the received input, and return the result of the run over it.
 
@@ -153,6 +238,8 @@ def result_of(
     file : Path, optional
         The configuration.
     progress : callable, optional
+    drive : callable, optional
+        Runs the pipeline over the received input once more, as `run_batch`; to replay it.
 
     Returns
     -------
@@ -174,7 +261,7 @@ def result_of(
             return live.run
         return run_batch(chain, imu, tables, recorder, told)
 
-    return run_navigation(spec, file, progress, same)
+    return run_navigation(spec, file, progress, same if drive is None else drive)
 
 
 class _Reader:
@@ -230,15 +317,19 @@ def _plain(spec: NavigationSpec) -> dict[str, Any]:
     return whole
 
 
-def live_spec(spec: NavigationSpec) -> NavigationSpec:
+def live_spec(spec: NavigationSpec, axes: str | None = None) -> NavigationSpec:
     """Return a specification that reads from lines instead of files.
 
     Parameters
     ----------
     spec : NavigationSpec
         With ``[live]``, or of a record, whose files are then ignored.
+    axes : str, optional
+        Axes of the device, where the specification states none.
     """
     whole = _plain(spec)
+    if axes is not None and not whole.get("axes"):
+        whole["axes"] = {"axes": axes}
     whole.pop("simulation", None)
     log = whole.pop("log", {})
     sampling = log.get("sampling")

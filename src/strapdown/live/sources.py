@@ -16,7 +16,7 @@ from urllib.parse import urlsplit
 from strapdown.errors import ConfigError
 from strapdown.live.replay import RunClock
 
-__all__ = ["LineSource", "ReceivedLine", "open_source"]
+__all__ = ["LineSource", "ReceivedLine", "open_source", "token_or_drawn"]
 
 #: Most waiting lines; beyond them a pipe blocks, and the system drops datagrams.
 WAITING = 20_000
@@ -33,13 +33,13 @@ class ReceivedLine:
 
     Attributes
     ----------
-    number : int
-        Counted from 1.
+    number : int or None
+        Counted from 1; None of a message that is no line.
     arrived : float, s
         By the clock of the run.
     """
 
-    number: int
+    number: int | None
     text: str
     arrived: float
 
@@ -147,8 +147,7 @@ def open_source(
     token : str, optional
         That commands in datagrams need; drawn, if not given. Standard input needs none.
     """
-    if token is not None and not re.fullmatch(r"[\w.~+/=-]{8,128}", token, re.ASCII):
-        raise ConfigError("live.bad-token", quantity="--token")
+    drawn = token_or_drawn(token)
     if where == "-":
         if token is not None:
             raise ConfigError("live.only-with", option="--token", beside="--live udp://HOST:PORT")
@@ -170,8 +169,15 @@ def open_source(
         lambda: bound.recv(65_536) or b"\n",
         clock,
         bound.close,
-        token=token or secrets.token_urlsafe(12),
+        token=drawn,
     )
+
+
+def token_or_drawn(token: str | None) -> str:
+    """Return a token, or draw one; ConfigError: it has another form."""
+    if token is not None and not re.fullmatch(r"[\w.~+/=-]{8,128}", token, re.ASCII):
+        raise ConfigError("live.bad-token", quantity="--token")
+    return token or secrets.token_urlsafe(12)
 
 
 def _bound(host: str, port: int) -> socket.socket:

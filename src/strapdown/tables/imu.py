@@ -107,14 +107,18 @@ def imu_of_columns(
     *,
     sampling: str = "instantaneous",
     source: str | None = None,
+    sparse: bool = False,
 ) -> pd.DataFrame:
     """Make an Imu table of arrays, which it keeps without a copy; otherwise as `imu_table`.
 
-    `time` ((n,), s). `values` ((n, m)): by `columns`, of `GYRO`, `ACCEL`, `MAG`.
+    `time` ((n,), s). `values` ((n, m)): by `columns`, of `GYRO`, `ACCEL`, `MAG`. `sparse`: whether
+    samples of the magnetometer may be missing, NaN.
     """
     index = pd.Index(time, name="time", copy=False)
     table: pd.DataFrame = pd.DataFrame(values, index=index, columns=list(columns), copy=False)
     table.attrs = {"sampling": sampling, "source": source, "axes": "forward-right-down"}
+    if sparse:
+        table.attrs["sparse"] = True
     check_imu(table)
     return table
 
@@ -142,7 +146,8 @@ def check_imu(table: pd.DataFrame) -> None:
         there = [c for c in triad if c in table.columns]
         if there:
             check_columns(table, triad, source)
-        columns += there
+        # Of a live session, in which a magnetometer may begin later.
+        columns += [] if triad == MAG and table.attrs.get("sparse") else there
     if len(table) < 2:
         raise DataError(
             "tables.sample-attitude-integral-rate-needs",

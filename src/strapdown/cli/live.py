@@ -1,0 +1,239 @@
+"""``strapdown live``."""
+
+from __future__ import annotations
+
+import os
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from strapdown.cli.shared_options import (
+    Quiet,
+    folder_to_make,
+    running,
+    spread,
+    with_what,
+)
+
+if TYPE_CHECKING:
+    from strapdown.live.hub import Hub
+
+EPILOG = (
+    "Example: strapdown live --listen 0.0.0.0:8437 --out walk\n\n"
+    "Example: strapdown live --phyphox 192.168.0.42 | head"
+)
+#: The password of a broker, which is not to be seen in the list of processes.
+PASSWORD = "STRAPDOWN_MQTT_PASSWORD"
+#: Default interval of states, s.
+EVERY = 0.1
+
+
+@dataclass(frozen=True)
+class SourceFlags:
+    """Where samples come from."""
+
+    listen: Annotated[
+        str | None,
+        with_what(
+            "HOST:PORT",
+            "Let phones send by HTTP or WebSocket: Sensor Logger. 127.0.0.1, any port, if no "
+            "source is given; 0.0.0.0:8437 for phones in your network.",
+        ),
+    ] = None
+    phyphox: Annotated[
+        list[str] | None,
+        with_what("HOST:PORT", "Ask a phone with phyphox and remote access, repeatable."),
+    ] = None
+    udp: Annotated[
+        list[str] | None,
+        with_what("HOST:PORT", "Lines in datagrams: ours, or of Sensorstream; repeatable."),
+    ] = None
+    serial: Annotated[
+        list[str] | None,
+        with_what(
+            "PORT@BAUD", "Lines of a serial port, or rows under a header; repeatable (115200)."
+        ),
+    ] = None
+    mqtt: Annotated[
+        list[str] | None,
+        with_what(
+            "URL", "Sensor Logger by a broker: mqtt://HOST/TOPIC, mqtts, ws, wss; repeatable."
+        ),
+    ] = None
+    mqtt_user: Annotated[
+        str | None,
+        with_what("NAME", f"User of the broker; the password is in {PASSWORD}."),
+    ] = None
+    token: Annotated[
+        str | None,
+        with_what(
+            "WORD",
+            "Last part of the address for phones, at least 16 letters and digits; and of commands "
+            "in datagrams. By default one is drawn.",
+        ),
+    ] = None
+    platform: Annotated[
+        str,
+        with_what(
+            "auto|android|ios",
+            "Sign of the accelerations of Sensor Logger: ios without its setting Standardise "
+            "Units & Frames (auto).",
+            show_default=False,
+        ),
+    ] = "auto"
+
+
+@spread
+def live(
+    config: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="CONFIG.toml",
+            help="The file of a run of navigation; without it the attitude by a filter.",
+            show_default=False,
+        ),
+    ] = None,
+    *,
+    sources: SourceFlags,
+    algorithm: Annotated[
+        str,
+        running(
+            "NAME", "Filter of the attitude, with its options (error-state).", show_default=False
+        ),
+    ] = "error-state",
+    every: Annotated[
+        float,
+        running("S", "Least interval between states; 0: each sample (0.1).", show_default=False),
+    ] = EVERY,
+    lines: Annotated[
+        str, running("json|csv", "States as lines of this form (json).", show_default=False)
+    ] = "json",
+    reorder: Annotated[
+        float,
+        running("S", "Wait so long for samples that others overtook (0).", show_default=False),
+    ] = 0.0,
+    stop_after: Annotated[
+        float | None, running("S", "End after so long; otherwise at Ctrl-C.")
+    ] = None,
+    qr: Annotated[
+        bool | None,
+        running(
+            None,
+            "Show the address as a QR code; by default on a terminal, if phones can reach it.",
+            "--qr/--no-qr",
+            show_default=False,
+        ),
+    ] = None,
+    out: Annotated[Path | None, folder_to_make("live, a folder in it for each device")] = None,
+    quiet: Quiet = False,
+) -> None:
+    """Receive phones and sensors as they send, and show their attitude or navigation.
+
+    Each device has a session of its own: a folder with all that it sent, on the disk before it is
+    used, which every other command reads as a log. States are written to standard output, one a
+    line, all else to standard error.
+    """
+    from strapdown.cli.live_folder import warner
+    from strapdown.cli.navigate_live import line_writer
+    from strapdown.config.navigation import NavigationSpec
+    from strapdown.errors import ConfigError, Finding
+    from strapdown.live.hub import StateWriter
+    from strapdown.live.many import LiveSources, receive_many
+    from strapdown.live.replay import MachineClock
+    from strapdown.live.session import SessionOptions
+
+    for option, value in (("--every", every), ("--reorder", reorder), ("--stop-after", stop_after)):
+        if value is not None and not 0.0 <= value < 1e9:
+            raise ConfigError("live.bad-interval", quantity=option, every=value)
+    spec = None if config is None else NavigationSpec.read(config)
+    options = SessionOptions(spec, algorithm, every, reorder)
+    warn = warner(quiet)
+    user = sources.mqtt_user
+
+    def listening(address: str, loopback: bool) -> None:
+        if not loopback:
+            warn(Finding("live.open-to-network", address=address))
+        if qr or (qr is None and not loopback and sys.stderr.isatty() and not quiet):
+            show_qr(address)
+
+    hub = receive_many(
+        out or Path("live"),
+        LiveSources(
+            sources.listen,
+            sources.udp or (),
+            sources.phyphox or (),
+            sources.serial or (),
+            sources.mqtt or (),
+            sources.token,
+            None if user is None else (user, os.environ.get(PASSWORD)),
+        ),
+        options,
+        MachineClock(),
+        StateWriter(line_writer, lines),
+        warn,
+        sources.platform,
+        listening,
+        stop_after,
+    )
+    if not quiet:
+        _print_sessions(hub)
+
+
+def show_qr(address: str) -> None:
+    """Show an address as a QR code on standard error."""
+    from strapdown.errors import ConfigError
+
+    try:
+        import segno
+    except ImportError:
+        raise ConfigError(
+            "live.library-missing", quantity="--qr", library="segno", extra="live"
+        ) from None
+    made: Any = segno.make(address, micro=False)
+    made.terminal(out=sys.stderr, compact=True)
+    typer.echo(address, err=True)
+
+
+def _print_sessions(hub: Hub) -> None:
+    """Print the latencies and counts of all sessions to standard error."""
+    from contextlib import redirect_stdout
+
+    from strapdown.cli.console import print_table
+
+    rows = []
+    for told in hub.ended:
+        stages = told["stages"]
+        whole = stages.get("arrival_to_state")
+        times = (
+            ["-"] * 3
+            if whole is None
+            else [f"{whole[key]:.3f}" for key in ("median_ms", "p99_ms", "largest_ms")]
+        )
+        unused = ", ".join(f"{n} {reason}" for reason, n in told["not_used"].items())
+        rows.append(
+            [
+                told["session"],
+                str(told["events"]),
+                *times,
+                str(told["messages_lost"]),
+                unused or "-",
+            ]
+        )
+    with redirect_stdout(sys.stderr):
+        if rows:
+            print_table(
+                [
+                    "session",
+                    "samples",
+                    "median, ms",
+                    "99 %",
+                    "largest",
+                    "lost messages",
+                    "not used",
+                ],
+                rows,
+            )
+            print(f"sessions: {hub.folder}")
