@@ -134,7 +134,9 @@ def read_name(name: str, of: Vocabulary = LOGS, unit: str = "") -> ColumnName:
 
 def _read_name(name: str, of: Vocabulary, unit: str) -> ColumnName:
     text, index = unicodedata.normalize("NFC", name).strip(), ""
-    if of.sensors and (match := INDEXED.fullmatch(text)):
+    if match := INDEXED.fullmatch(text):
+        if not of.sensors:
+            return ColumnName(None)  # q[0] is a part of an array, not a column q in units of 0
         text, index = match.groups()
     said = _of_format(text, index) if of.sensors else None
     if said is None:
@@ -196,7 +198,7 @@ def _read(bare: str, written: str, of: Vocabulary) -> ColumnName:
     if unit and bare.lower().strip("_ ") == "sampletimefine":
         return ColumnName("time", unit)  # without a unit it counts 0.1 ms
     # In group/sub/name the last part decides, unless the whole is a known name.
-    parts = re.split(r"[/.]", bare) if of.sensors else [bare]
+    parts = re.split(r"[/.:]", bare) if of.sensors else [bare]
     if unit is None and len(parts) > 1 and parts[-1].lower() in tuple(_AXES):
         # The unit of a sensor whose axes are members: gyro_dps.x.
         parts[-2], unit = _without_unit(parts[-2], of)
@@ -216,7 +218,8 @@ def _read(bare: str, written: str, of: Vocabulary) -> ColumnName:
         (written and unit is None and written.lower() not in OF_TIME)
         or (kind and kind[0] != "time")
     ):
-        said = replace(said, quantity=None if of.sensors else quantity)
+        # A temperature or an angle is no clock; a text in brackets may be anything: time (of day).
+        said = replace(said, quantity=None if of.sensors or kind else quantity)
     elif of.sensors and quantity in QUANTITIES[1:] and kind and kind[0] == "time":
         return ColumnName(None, said.unit)  # gyro_x_min
     if written and unit is None and not of.sensors and written.lower() not in OF_TIME:

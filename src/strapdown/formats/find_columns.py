@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
-from strapdown.formats.arrays import numbers, ticks_of
+from strapdown.formats.arrays import is_stamp, numbers, ticks_of
 from strapdown.formats.clocks import clock_of_name
 from strapdown.formats.columns import INDEXED, ColumnName, clocks_with_unit, read_name
 from strapdown.formats.recording import Questions, RawLog, ReadOptions
@@ -24,7 +24,7 @@ from strapdown.formats.vocabularies import (
     Quantity,
     Vocabulary,
 )
-from strapdown.units import ACCEL_UNITS, GYRO_UNITS, unit_of
+from strapdown.units import ACCEL_UNITS, GYRO_UNITS, OF_TABLES, unit_of
 
 AXES = "xyz"
 
@@ -331,7 +331,10 @@ def _by_name(raw: RawLog, wanted: dict[str, str], questions: Questions) -> dict[
         if quantity in wanted:
             continue
         if len(names) > 1 and quantity == "time":
-            names = _one_clock(raw, [n for n in names if n != "T"])
+            names = [n for n in names if n != "T" and not _stands(raw.columns[n])]
+            names = _one_clock(raw, names) if names else []
+        if not names:
+            continue
         # Names read without their order are a last resort.
         names = [n for n in names if not said[n].loose] or names
         found[quantity] = names[0]
@@ -472,6 +475,7 @@ def _one_clock(raw: RawLog, names: list[str]) -> list[str]:
     arrival. Clocks that advance alike are one clock.
     """
     names = [n for n in names if n.lower().endswith("header.stamp")] or names
+    names = [n for n in names if is_clock(raw, n)] or names
     # A stamp that a spreadsheet rounded is the same in every row.
     names = [n for n in names if len(set(raw.columns[n][:2].tolist())) > 1] or names
     names = clocks_with_unit(names, lambda n: _unit_of(raw, n) is not None)
@@ -484,6 +488,21 @@ def _one_clock(raw: RawLog, names: list[str]) -> list[str]:
         ):
             return names[:1]
     return names
+
+
+def _stands(values: NDArray[Any]) -> bool:
+    """Whether every row has the same stamp, as a date beside a clock that starts at zero."""
+    return values.size > FEW and bool((values == values[0]).all())
+
+
+#: Rows that a clock may stand still for: a burst of samples.
+FEW = 50
+
+
+def is_clock(raw: RawLog, name: str) -> bool:
+    """Whether a column holds numbers, dates or times of day: not a date with a local zone's name."""
+    values = raw.columns[name]
+    return values.dtype.kind != "O" or bool(values.size and is_stamp(str(values[0])))
 
 
 def _unit_of(raw: RawLog, column: str) -> str | None:
@@ -663,6 +682,8 @@ def find_quantities(
                 continue
             sign = said.sign if said.quantity == meant else 1.0
             factor = sign * _factor(meant, known[meant], said.unit, name, file)
+            if meant in found and _in_other_unit(found[meant].source, name):
+                continue
             if meant in found:
                 raise DataError(
                     "io.column-names-ambiguous",
@@ -674,6 +695,19 @@ def find_quantities(
                 )
             found[meant] = Found(name, factor, bool(said.unit))
     return found
+
+
+#: A name and its last word, in brackets or behind a sign.
+_END = re.compile(r"(.*?)[\s_(\[]+([^\s_(\[\])]+)[\])]?$")
+
+
+def _in_other_unit(one: str, other: str) -> bool:
+    """Whether two names are one quantity in two units: SPEED_KPH and SPEED_MPH."""
+    ends = [_END.match(name.strip().lower()) for name in (one, other)]
+    if None in ends or ends[0][1] != ends[1][1]:  # type: ignore[index]
+        return False
+    units = {unit_of(end[2], OF_TABLES) for end in ends if end}
+    return len(units) == 2 and None not in units
 
 
 def _is_plain(name: str, read: Mapping[str, ColumnName], known: Mapping[str, Quantity]) -> bool:
@@ -707,7 +741,13 @@ def fix_columns(raw: RawLog, asked: Mapping[str, str]) -> dict[str, Found]:
     `find_quantities`.
     """
     if not raw.stated:
-        return find_quantities(raw.columns, FIXES, asked, raw.name, raw.units)
+        names = list(raw.columns)
+        clocks = [n for n in names if read_name(n, FIXES).quantity == "time"]
+        if len(clocks) > 1:
+            # A lone T is as often a temperature; a text that is no stamp is no clock.
+            other = {n for n in clocks if n == "T" or not is_clock(raw, n)} - set(asked.values())
+            names = [n for n in names if n not in other or other >= set(clocks)]
+        return find_quantities(names, FIXES, asked, raw.name, raw.units)
     known = FIXES.quantities
     found = {
         quantity: Found(column, 1.0 if unit is None else known[quantity].units[unit], True)
