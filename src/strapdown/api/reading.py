@@ -371,12 +371,14 @@ def _gnss(path: str | Path, options: GnssOptions) -> GnssFixes:
     return fixes
 
 
-def read(path: str | Path) -> Streams:
+def read(path: str | Path, **options: Any) -> Streams:
     """Read all streams of a recording in a known format.
 
     Parameters
     ----------
     path : str or Path
+    **options
+        Those of `read_imu`, for the log of the inertial sensor: ``units``, ``axes`` ….
 
     Returns
     -------
@@ -401,7 +403,7 @@ def read(path: str | Path) -> Streams:
     refused: dict[str, StrapdownError] = {}
     others = [s for s in ("magnetometer", "barometer", "wheel") if holds(Path(path), s)]
     readers: dict[str, Callable[[str | Path], pd.DataFrame]] = {
-        "imu": read_imu,
+        "imu": partial(read_imu, **options),
         "gnss": fixes,
         "reference": read_trajectory,
         **{stream: partial(read_stream, stream=stream) for stream in others},

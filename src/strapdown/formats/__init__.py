@@ -53,6 +53,7 @@ from strapdown.formats import (
 from strapdown.formats.assemble import assemble
 from strapdown.formats.find_columns import names_of_fixes, names_of_quantities
 from strapdown.formats.gnss_fixes import Fixes
+from strapdown.formats.instances import of_one_sensor
 from strapdown.formats.known_formats import or_sentences
 from strapdown.formats.recording import NoStreamError, RawLog, ReadOptions, Recording
 from strapdown.formats.signs import HEAD, Signs, first_bytes, state_of
@@ -400,6 +401,8 @@ def open_stream(path: str | Path, stream: str, form: str | None = None) -> Raw:
                 raw = reader.streams[key](path, *([part or None] if reader.parts else []))
                 if isinstance(raw, RawLog) and reader.files is not None:
                     raw.files = reader.files(path) or raw.files
+                if isinstance(raw, RawLog) and key == TABLE and stream == "imu":
+                    raw = of_one_sensor(raw)
                 return raw
             except _BROKEN as error:
                 _log.debug("%s", path.name, exc_info=True)

@@ -39,7 +39,7 @@ from strapdown.formats.vocabularies import (
     WITHOUT_GRAVITY,
     Vocabulary,
 )
-from strapdown.units import FACTORS, OF_LOGS, find_unit, unit_of, unit_words
+from strapdown.units import FACTORS, GYRO_UNITS, OF_LOGS, find_unit, unit_of, unit_words
 
 __all__ = [
     "ColumnName",
@@ -210,6 +210,8 @@ def _read(bare: str, written: str, of: Vocabulary) -> ColumnName:
                 family = f"{' '.join(parts[:start]).lower()} {said.family}".strip()
                 said = replace(said, family=family if said.family else "")
                 break
+    if said.quantity is None and of.sensors and said.unit in GYRO_UNITS:
+        said = _turn(bare, said)
     quantity = said.quantity
     kind = find_unit(said.unit) if said.unit else None
     if str(quantity).startswith("mag") and said.unit in MAGNETIC:
@@ -225,6 +227,14 @@ def _read(bare: str, written: str, of: Vocabulary) -> ColumnName:
     if written and unit is None and not of.sensors and written.lower() not in OF_TIME:
         said = replace(said, unit=re.sub(r"\s+", "", written.strip("[]() ").lower()))
     return said
+
+
+def _turn(bare: str, said: ColumnName) -> ColumnName:
+    """Read a rotation about an axis as a rate, where its unit is one of rates."""
+    words = re.split(_SIGNS, bare.lower().strip())
+    if len(words) != 2 or words[0] not in ("rotation", "turn") or words[1] not in tuple(_AXES):
+        return said
+    return replace(said, quantity=f"gyro_{words[1]}", loose=2, family=words[0])
 
 
 def _without_unit(text: str, of: Vocabulary) -> tuple[str, str | None]:

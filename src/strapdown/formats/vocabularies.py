@@ -129,7 +129,7 @@ TIMES = _words(
     "gpstow gpstime unixtime epoch epoc stamp elapsedtime timeelapsed timesincestart sampletime "
     "sensortime systemtime unixtimestamp datetime localtime utc utctime timeutc "
     "gpssecondsofweek secondsofweek gpst timeintervalsince1970 zeit zeitstempel temps tiempo tempo "
-    "rtctime chiptime utime"
+    "rtctime chiptime utime offsettime"
 )
 # Names of clocks that state their unit.
 CLOCKS = {
