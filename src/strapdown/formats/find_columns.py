@@ -14,6 +14,7 @@ from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, ch
 from strapdown.formats.arrays import is_stamp, numbers, ticks_of
 from strapdown.formats.clocks import clock_of_name
 from strapdown.formats.columns import INDEXED, ColumnName, clocks_with_unit, read_name
+from strapdown.formats.nameless import rates_and_force
 from strapdown.formats.recording import Questions, RawLog, ReadOptions
 from strapdown.formats.vocabularies import (
     BODY_RATES,
@@ -102,7 +103,8 @@ def find_columns(
     }
     if not raw.stated:
         found |= _by_name(raw, wanted, asked_here)
-        if not wanted and _is_nameless(raw) and (likely := _likely_columns(raw)):
+        likely = _likely_columns(raw) if not wanted and _is_nameless(raw) else {}
+        if likely or (not wanted and _is_nameless(raw) and (likely := _by_motion(raw))):
             asked_here.ask(_nameless(raw, likely), **likely)
             names = list(raw.columns)
             found |= {q: Column(names[int(k) - 1], None, "numbers") for q, k in likely.items()}
@@ -149,11 +151,12 @@ def _nameless(raw: RawLog, likely: dict[str, str]) -> Finding:
 
     if raw.files and CRASH_READERS["nhtsa"].detect(raw.files[0]):
         return Finding("io.crash-test-file", severity="error", file=raw.name)
+    code = "io.nameless-columns" if likely else "io.nameless-columns-open"
     likely = likely or _in_usual_order(raw)
     example = ",".join(f"{quantity}={column}" for quantity, column in likely.items())
     # Seven columns are usually increments of KF-GINS.
     return Finding(
-        "io.nameless-seven-columns" if len(raw.columns) == 7 else "io.nameless-columns",
+        "io.nameless-seven-columns" if len(raw.columns) == 7 else code,
         severity="error",
         file=raw.name,
         row=raw.row(0),
@@ -248,7 +251,8 @@ def _likely_columns(raw: RawLog) -> dict[str, str]:
         three = columns[k : k + 3]
         if any(c.dtype.kind not in "iuf" for c in three):
             break
-        triads[k] = norm_and_spread(three)
+        if not any((c == c[0]).all() for c in three):  # a flag is no axis
+            triads[k] = norm_and_spread(three)
     forces = [k for k, (usual, spread) in triads.items() if spread < LOOSEST and _is_gravity(usual)]
     if len(forces) != 1 and len(triads) == 2:
         # Of two, the norm of rates varies about that of their noise; a force is in any unit.
@@ -267,6 +271,19 @@ def _likely_columns(raw: RawLog) -> dict[str, str]:
         return {}
     out = {} if clock is None else {"time": str(clock + 1)}
     for triad, at in (("gyro", turns[0]), ("accel", force)):
+        out |= {f"{triad}_{axis}": str(at + k + 1) for k, axis in enumerate(AXES)}
+    return out
+
+
+def _by_motion(raw: RawLog) -> dict[str, str]:
+    """Guess the numbers of nameless columns by the motion; empty where it shows no pair."""
+    columns = list(raw.columns.values())
+    found = rates_and_force(columns)
+    if found is None:
+        return {}
+    clock = next((k for k, c in enumerate(columns) if c.dtype.kind in "iufM" and advances(c)), None)
+    out = {} if clock is None or clock >= min(found) else {"time": str(clock + 1)}
+    for triad, at in zip(("gyro", "accel"), found, strict=True):
         out |= {f"{triad}_{axis}": str(at + k + 1) for k, axis in enumerate(AXES)}
     return out
 

@@ -9,9 +9,10 @@ from __future__ import annotations
 import re
 
 import numpy as np
+from numpy.typing import NDArray
 
 from strapdown.errors import Finding
-from strapdown.formats.find_columns import names_of_quantities
+from strapdown.formats.columns import read_name
 from strapdown.formats.known_formats import selected
 from strapdown.formats.recording import RawLog
 
@@ -27,9 +28,18 @@ _NAMES = {
 MOST, FEWEST, CHANGES = 16, 10, 0.1
 
 
+def _all_have_rates(raw: RawLog, sensors: NDArray[np.str_]) -> bool:
+    """Whether most rows of each sensor have a rate: kinds of sensors fill columns of their own."""
+    rate = next(c for n, c in raw.columns.items() if read_name(n).quantity == "gyro_x")
+    if rate.dtype.kind not in "iuf":
+        return False
+    known = np.isfinite(rate)
+    return all(known[sensors == one].mean() > 0.5 for one in np.unique(sensors))
+
+
 def of_one_sensor(raw: RawLog) -> RawLog:
     """Keep the rows of the first of several sensors, with a warning; the same log if it has one."""
-    if "gyro_x" not in names_of_quantities(raw):
+    if all(read_name(name).quantity != "gyro_x" for name in raw.columns):
         return raw
     for name, values in raw.columns.items():
         if re.sub(r"[^a-z0-9]", "", name.lower()) not in _NAMES or values.dtype.kind not in "iuO":
@@ -39,7 +49,7 @@ def of_one_sensor(raw: RawLog) -> RawLog:
         changes = np.count_nonzero(texts[1:] != texts[:-1])
         if not 1 < sensors.size <= MOST or counts.min() < FEWEST:
             continue
-        if changes < CHANGES * texts.size:
+        if changes < CHANGES * texts.size or not _all_have_rates(raw, texts):
             continue
         first = str(texts[0])
         finding = Finding(
