@@ -234,8 +234,11 @@ EXPLORER_UNITS |= {"longitude": EXPLORER_UNITS["latitude"], **dict.fromkeys(ANGL
 EXPLORER_UNITS |= dict.fromkeys((*LEVEL, *BODY), ("m/s",))
 
 
-# The line that names the program.
-detect_explorer = Signs(first=rb"(?m)^[ \t]*Program:[ \t]+Inertial Explorer")
+# The line that names the program, or names and units of angles in three numbers without it.
+detect_explorer = Signs(
+    first=rb"(?m)^[ \t]*Program:[ \t]+Inertial Explorer"
+    rb"|\A[^\r\n]*Latitude[ \t]+Longitude[ \t]+H-Ell\b[^\r\n]*\r?\n[^\r\n]*\(\+/-D M S\)"
+)
 
 
 def read_explorer(path: Path) -> pd.DataFrame:
@@ -269,11 +272,13 @@ def read_explorer(path: Path) -> pd.DataFrame:
 def _values(path: Path, lines: list[str]) -> dict[str, Any]:
     """Return the columns of numbers by name in lower case; angles in deg."""
     at = next(
-        (k for k, n in enumerate(lines) if {"latitude", "h-ell"} <= set(n.lower().split())), 0
+        (k for k, n in enumerate(lines) if {"latitude", "h-ell"} <= set(n.lower().split())), -1
     )
-    names = lines[at].lower().split()
-    below = lines[at + 1] if 0 < at < len(lines) - 1 else ""
+    names = lines[at].lower().split() if at >= 0 else []
+    below = lines[at + 1] if 0 <= at < len(lines) - 1 else ""
     units = [u.strip("()").lower() for u in _UNIT.findall(below)]
+    if len(names) == len(units) + 1 and names[-1] == "q":
+        units.append("")  # the quality, the last, has none
     if len(names) != len(units):
         raise DataError("io.inertial-explorer-header", file=path.name)
     for name, unit in zip(names, units, strict=True):
