@@ -158,8 +158,10 @@ def _are_milliseconds(whole: Sequence[int], parts: Sequence[str]) -> bool:
         return False
     decimals = np.array([w + int(p.ljust(9, "0")) for w, p in zip(whole, parts, strict=True)])
     counts = np.array([w + int(p) * _MILLI for w, p in zip(whole, parts, strict=True)])
-    back = [np.count_nonzero((d := np.diff(t)) < 0) - np.count_nonzero(d < -_HALF_DAY)
-            for t in (decimals, counts)]
+    back = [
+        np.count_nonzero((d := np.diff(t)) < 0) - np.count_nonzero(d < -_HALF_DAY)
+        for t in (decimals, counts)
+    ]
     return bool(back[0] > 0 and back[1] == 0)
 
 

@@ -301,9 +301,7 @@ def _over_ground(
     return np.column_stack([speed * np.cos(angle), speed * np.sin(angle), none]), sd
 
 
-def _sd_of_speed(
-    raw: RawLog, found: dict[str, Found], values: Callable[[str], Array]
-) -> Array:
+def _sd_of_speed(raw: RawLog, found: dict[str, Found], values: Callable[[str], Array]) -> Array:
     """Return the accuracy of the speed as the standard deviation of each part of the velocity."""
     stated = values("speed_sd")
     raw.findings.append(

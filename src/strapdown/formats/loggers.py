@@ -55,7 +55,9 @@ _DAY = 86_400.0
 _MINUTES, _DIFFERENTIAL, _SATELLITES = 1.0 / 60.0, 64, 63
 
 
-detect_vbo = Signs(text=r"^\[column names\][ \t]*\r?$", also=lambda p: "[data]" in " ".join(_lines(p)))
+detect_vbo = Signs(
+    text=r"^\[column names\][ \t]*\r?$", also=lambda p: "[data]" in " ".join(_lines(p))
+)
 
 
 def read_vbo_fixes(path: Path) -> RawLog:
@@ -136,7 +138,9 @@ def _of_kind(path: Path, kind: str, stream: str) -> RawLog:
     lines = _lines(path)
     declared = {tuple(f[:2]): f[2:] for f in (line.split(",") for line in lines) if f[0] != "$DATA"}
     names, mark = declared.get(("$COL", kind)), f"${kind},"
-    rows = [(k, line.removeprefix(mark)) for k, line in enumerate(lines, 1) if line.startswith(mark)]
+    rows = [
+        (k, line.removeprefix(mark)) for k, line in enumerate(lines, 1) if line.startswith(mark)
+    ]
     if names is None or not rows:
         has = [s for s, k in (("imu", "IMU"), ("gnss", "GNSS")) if ("$COL", k) in declared]
         raise lacking(path, stream, FLYSIGHT_TITLE, has)

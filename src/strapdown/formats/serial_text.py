@@ -38,8 +38,10 @@ def _labelled(line: str) -> tuple[tuple[str, ...], list[str]]:
         return (re.sub(r"[^A-Za-z]", "", line[:LONGEST]),), []
     # "Accel X: 1, Y: 2, Z: 3": the name is said once.
     first, _, axis = values[0][0].rpartition(" ")
-    names = [n if len(n) > 1 or not first or axis not in ("X", "x") else f"{first} {n}"
-             for n, _ in values]
+    names = [
+        n if len(n) > 1 or not first or axis not in ("X", "x") else f"{first} {n}"
+        for n, _ in values
+    ]
     return tuple(f"{n} [{unit}]" if unit else n for n in names), [v for _, v in values]
 
 
@@ -51,7 +53,9 @@ def one_line_a_sample(numbered: Lines) -> Lines:
     """
     said = [_labelled(line) for _, line in numbered[:SEARCHED]]
     keys = [names for names, _ in said]
-    period = next((k for k in range(1, min(MOST_TURNS, len(keys) - 1) + 1) if keys[k] == keys[0]), 0)
+    period = next(
+        (k for k in range(1, min(MOST_TURNS, len(keys) - 1) + 1) if keys[k] == keys[0]), 0
+    )
     if period < SENSORS or len(keys) < 3 * period:
         return numbered
     turns = keys[:period]
