@@ -517,7 +517,7 @@ FEW = 50
 
 
 def is_clock(raw: RawLog, name: str) -> bool:
-    """Whether a column holds numbers, dates or times of day: not a date with a local zone's name."""
+    """Whether a column holds numbers, dates or times of day; letters of a local zone are none."""
     values = raw.columns[name]
     return values.dtype.kind != "O" or bool(values.size and is_stamp(str(values[0])))
 

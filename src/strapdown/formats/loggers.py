@@ -171,8 +171,8 @@ def read_flysight_fixes(path: Path) -> RawLog:
 
 # GCSV of Gyroflow, an open format for loggers beside a camera: lines ``key,value``, then
 # ``t,gx,gy,gz`` with ``ax,ay,az`` and ``mx,my,mz`` or without, in counts; ``tscale`` are s,
-# ``gscale`` rad/s and ``ascale`` g of one (docs.gyroflow.xyz, GCSV format). Its ``orientation`` turns
-# the sensor's axes to those of a picture, not to those of a body.
+# ``gscale`` rad/s and ``ascale`` g of one (docs.gyroflow.xyz, GCSV format). Its ``orientation``
+# turns the sensor's axes to those of a picture, not to those of a body.
 
 
 GYROFLOW_TITLE = "GCSV of Gyroflow"
