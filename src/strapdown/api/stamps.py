@@ -43,17 +43,17 @@ def seconds_of(stamps: Any) -> tuple[Any, dict[str, Any]]:
         stamps = pd.DatetimeIndex(pd.to_datetime(stamps, utc=True))
     kind = getattr(stamps, "dtype", None)
     if isinstance(kind, pd.DatetimeTZDtype):
-        index = pd.DatetimeIndex(stamps).tz_convert("UTC").tz_localize(None)
-    elif getattr(kind, "kind", "") in ("M", "m"):
-        index = pd.Index(np.asarray(stamps))
-    else:
+        stamps = pd.DatetimeIndex(stamps).tz_convert("UTC").tz_localize(None)
+    elif getattr(kind, "kind", "") not in ("M", "m"):
         return stamps, {}
-    if index.isna().any():
-        row = int(np.argmax(index.isna())) + 1
+    values: NDArray[Any] = np.asarray(stamps)
+    missing = np.isnat(values)
+    if missing.any():
+        row = int(np.argmax(missing)) + 1
         raise DataError("api.stamp-missing", quantity="time", row=row)
-    if isinstance(index, pd.TimedeltaIndex):
-        return index.to_numpy().astype("timedelta64[ns]").astype(np.int64) * 1e-9, {}
-    ns: NDArray[np.int64] = index.to_numpy().astype("datetime64[ns]").astype(np.int64)
+    if values.dtype.kind == "m":
+        return values.astype("timedelta64[ns]").astype(np.int64) * 1e-9, {}
+    ns: NDArray[np.int64] = values.astype("datetime64[ns]").astype(np.int64)
     origin = int(ns[0] // 10**9) if ns.size else 0
     return (ns - origin * 10**9) * 1e-9, {"clock": UNIX, "clock_origin": float(origin)}
 

@@ -415,8 +415,8 @@ def _time(raw: RawLog, found: Found) -> tuple[Array, Clock]:
             if 0.005 <= step * TIME_UNITS[u] <= 120.0
             and (first * (k := TIME_UNITS[u]) < _SINCE_START or _DATES[0] < first * k < _DATES[1])
         ]
-        dated = [u for u in ("ms", "us", "ns") if _DATES[0] < first * TIME_UNITS[u] < _DATES[1]]
-        unit = (fits or dated or ["ms"])[0]
+        by_date = [u for u in ("ms", "us", "ns") if _DATES[0] < first * TIME_UNITS[u] < _DATES[1]]
+        unit = (fits or by_date or ["ms"])[0]
         if len(fits) == 1 and _DATES[0] < first * TIME_UNITS[unit] < _DATES[1]:
             raw.findings.append(
                 Finding(
