@@ -12,13 +12,13 @@ import pandas as pd
 from strapdown.api.navigation import specify_navigation
 from strapdown.api.reading import (
     ImuFile,
-    by_time,
     imu_input,
     imu_of,
     keys_in,
     log_table,
     table_input,
 )
+from strapdown.api.stamps import by_time
 from strapdown.config.extrinsics import ExtrinsicsSpec
 from strapdown.config.logs import LogTable
 from strapdown.config.navigation import NavigationSpec

@@ -20,6 +20,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike
 
+from strapdown.api.stamps import as_frame, by_time, flat, seconds_of
 from strapdown.config.spec import specify
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.formats import holds
@@ -371,12 +372,14 @@ def _gnss(path: str | Path, options: GnssOptions) -> GnssFixes:
     return fixes
 
 
-def read(path: str | Path) -> Streams:
+def read(path: str | Path, **options: Any) -> Streams:
     """Read all streams of a recording in a known format.
 
     Parameters
     ----------
     path : str or Path
+    **options
+        Those of `read_imu`, for the log of the inertial sensor: ``units``, ``axes`` ….
 
     Returns
     -------
@@ -401,7 +404,7 @@ def read(path: str | Path) -> Streams:
     refused: dict[str, StrapdownError] = {}
     others = [s for s in ("magnetometer", "barometer", "wheel") if holds(Path(path), s)]
     readers: dict[str, Callable[[str | Path], pd.DataFrame]] = {
-        "imu": read_imu,
+        "imu": partial(read_imu, **options),
         "gnss": fixes,
         "reference": read_trajectory,
         **{stream: partial(read_stream, stream=stream) for stream in others},
@@ -475,6 +478,7 @@ def imu_input(source: Any) -> ImuFile | pd.DataFrame:
         from strapdown.config.logs import LogTable
 
         return ImuFile(specify(LogTable, path=str(source)))
+    source = as_frame(source)
     if isinstance(source, pd.DataFrame):
         file = _unchanged(source)
         return file if isinstance(file, ImuFile) else _imu_of(source)
@@ -499,9 +503,10 @@ def table_input(data: Any, quantity: str) -> str | GnssFile | pd.DataFrame:
     """
     if isinstance(data, str | Path):
         return str(data)
+    data = as_frame(data)
     if isinstance(data, pd.DataFrame):
         file = _unchanged(data)
-        return file if isinstance(file, GnssFile) else by_time(data)
+        return file if isinstance(file, GnssFile) else by_time(data, quantity)
     raise ConfigError("api.not-a-table-or-file", quantity=quantity, name=type(data).__name__)
 
 
@@ -533,18 +538,9 @@ def imu_of(source: Any) -> pd.DataFrame:
     return given.read() if isinstance(given, ImuFile) else given
 
 
-def by_time(table: pd.DataFrame) -> pd.DataFrame:
-    """A table indexed by time in s, from its index or its column ``time``."""
-    if "time" not in table.columns:
-        return table
-    out = table.set_index("time")
-    out.attrs = dict(table.attrs)
-    return out
-
-
 def _imu_of(source: pd.DataFrame) -> pd.DataFrame:
     """A checked copy with only the columns of an Imu table."""
-    given = by_time(source)
+    given = by_time(flat(source, [*GYRO, *ACCEL, "time"]))
     triads = [*GYRO, *(ACCEL if ACCEL[0] in given.columns else [])]
     missing = [c for c in triads if c not in given.columns]
     if missing:
@@ -559,8 +555,8 @@ def _imu_of(source: pd.DataFrame) -> pd.DataFrame:
     accel = values[:, 3:] if len(triads) > 3 else None
     sampling = given.attrs.get("sampling", "instantaneous")
     imu = imu_of_arrays(stamps, values[:, :3], accel, sampling, given.attrs.get("source"))
-    if "calibrated" in given.attrs:
-        imu.attrs["calibrated"] = given.attrs["calibrated"]
+    kept = ("calibrated", "clock", "clock_origin", "clock_origin_stamp", "gps_week")
+    imu.attrs |= {key: given.attrs[key] for key in kept if key in given.attrs}
     return imu
 
 
@@ -572,7 +568,10 @@ def imu_of_arrays(
     source: str | None = None,
 ) -> pd.DataFrame:
     """An Imu table from arrays, stored column by column like one that is read."""
-    return imu_table(t, gyro, accel, sampling=sampling, source=source, by_column=True)
+    stamps, clock = seconds_of(t)
+    imu = imu_table(stamps, gyro, accel, sampling=sampling, source=source, by_column=True)
+    imu.attrs |= clock
+    return imu
 
 
 def _digest(table: pd.DataFrame) -> str:

@@ -35,6 +35,7 @@ from strapdown.formats import (
     kf_gins,
     kitti,
     live_journal,
+    loggers,
     novatel,
     phone_apps,
     phyphox,
@@ -53,6 +54,7 @@ from strapdown.formats import (
 from strapdown.formats.assemble import assemble
 from strapdown.formats.find_columns import names_of_fixes, names_of_quantities
 from strapdown.formats.gnss_fixes import Fixes
+from strapdown.formats.instances import of_one_sensor
 from strapdown.formats.known_formats import or_sentences
 from strapdown.formats.recording import NoStreamError, RawLog, ReadOptions, Recording
 from strapdown.formats.signs import HEAD, Signs, first_bytes, state_of
@@ -213,6 +215,9 @@ READERS: dict[str, Reader] = {
         {"gnss": data_sets.read_smartloc},
     ),
     "racechrono": Reader.of(phone_apps, name="racechrono"),
+    "vbo": Reader.of(loggers, name="vbo"),
+    "flysight": Reader.of(loggers, name="flysight"),
+    "gyroflow": Reader.of(loggers, name="gyroflow"),
     "microstrain": Reader.of(imu_makers, name="microstrain"),
     "apdm": Reader.of(imu_makers, name="apdm"),
     "x-imu3": Reader.of(imu_makers, "x-IMU3: CSV, folder", name="xio"),
@@ -398,6 +403,8 @@ def open_stream(path: str | Path, stream: str, form: str | None = None) -> Raw:
                 raw = reader.streams[key](path, *([part or None] if reader.parts else []))
                 if isinstance(raw, RawLog) and reader.files is not None:
                     raw.files = reader.files(path) or raw.files
+                if isinstance(raw, RawLog) and key == TABLE and stream == "imu":
+                    raw = of_one_sensor(raw)
                 return raw
             except _BROKEN as error:
                 _log.debug("%s", path.name, exc_info=True)

@@ -31,7 +31,7 @@ __all__ = [
 _DATE = r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}"
 _STAMP = re.compile(
     rf"(?:(?P<date>{_DATE})(?:[T,]|[ T,] ?))?"
-    r"(?P<h>\d{1,2}):(?P<m>[0-5]\d):(?P<s>[0-5]\d)(?:[.,:](?P<part>\d{1,9}))?"
+    r"(?P<h>\d{1,2}):(?P<m>[0-5]?\d):(?P<s>[0-5]?\d)(?:[.,:](?P<part>\d{1,9}))?"
     r" ?(?:(?P<half>[AP])M|Z|UTC|GMT|(?P<zone>[+-]\d\d:?\d\d))?",
     re.I,
 )
@@ -39,8 +39,12 @@ _STAMP = re.compile(
 _MONTHS = ["jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec"]
 _CTIME = re.compile(
     rf"(?:mon|tue|wed|thu|fri|sat|sun) ({'|'.join(_MONTHS)}) +(\d{{1,2}}) "
-    r"(\d\d:\d\d:\d\d(?:\.\d+)?) (\d{4})",
+    r"(\d\d:\d\d:\d\d(?:\.\d+)?) (?:UTC |GMT )?(\d{4})",
     re.I,
+)
+# A month in letters: 22-May-2015 07:00:25.730.
+_NAMED_MONTH = re.compile(
+    rf"(\d{{1,2}})[-/ ]({'|'.join(_MONTHS)})[a-z]*[-/ ](\d{{4}}|\d\d)(?!\d)", re.I
 )
 _ONLY_DATE = re.compile(_DATE)
 _DAY = 86_400 * 10**9
@@ -59,7 +63,7 @@ def is_day_time(field: object) -> bool:
 
 def is_date(field: object) -> bool:
     """Whether a field is a date alone."""
-    return _ONLY_DATE.fullmatch(str(field)) is not None
+    return _ONLY_DATE.fullmatch(_plain(str(field))) is not None
 
 
 def is_stamp(field: str) -> bool:
@@ -68,9 +72,17 @@ def is_stamp(field: str) -> bool:
 
 
 def _plain(field: str) -> str:
-    """Write a date of C in numbers; any other text as it is."""
-    m = _CTIME.fullmatch(field)
-    return field if m is None else f"{m[4]}-{_MONTHS.index(m[1].lower()) + 1}-{m[2]} {m[3]}"
+    """Write a date with its month in letters in numbers; any other text as it is.
+
+    The letters of another zone than UTC may be of several (EST, CST): such a text is no stamp.
+    """
+    if (m := _CTIME.fullmatch(field)) is not None:
+        return f"{m[4]}-{_MONTHS.index(m[1].lower()) + 1}-{m[2]} {m[3]}"
+    m = _NAMED_MONTH.match(field)
+    if m is None:
+        return field
+    year = int(m[3]) + 2000 * (len(m[3]) == 2)
+    return f"{year}-{_MONTHS.index(m[2].lower()) + 1}-{m[1]}{field[m.end() :]}"
 
 
 def day_nanoseconds(texts: Iterable[object]) -> NDArray[np.int64] | None:
@@ -120,14 +132,37 @@ def _of_day(found: Sequence[re.Match[str]]) -> NDArray[np.int64]:
     def hour(m: re.Match[str]) -> int:
         return int(m["h"]) if not m["half"] else int(m["h"]) % 12 + 12 * (m["half"] in "pP")
 
+    whole = [(hour(m) * 3600 + int(m["m"]) * 60 + int(m["s"])) * 10**9 for m in found]
+    parts = [m["part"] or "0" for m in found]
+    scale = _MILLI if _are_milliseconds(whole, parts) else None
     return np.array(
         [
-            (hour(m) * 3600 + int(m["m"]) * 60 + int(m["s"])) * 10**9
-            + int((m["part"] or "0").ljust(9, "0"))
-            for m in found
+            w + (int(p) * scale if scale else int(p.ljust(9, "0")))
+            for w, p in zip(whole, parts, strict=True)
         ],
         dtype=np.int64,
     )
+
+
+_MILLI = 10**6
+
+
+def _are_milliseconds(whole: Sequence[int], parts: Sequence[str]) -> bool:
+    """Whether the digits behind seconds count milliseconds, without leading zeros: 1.5 is 1.005 s.
+
+    As decimals they go back where they pass 100 ms, and as counts they do not.
+    """
+    if max(map(len, parts), default=0) > 3 or len({*map(len, parts)}) < 2:
+        return False
+    if any(p[0] == "0" and p != "0" for p in parts):
+        return False
+    decimals = np.array([w + int(p.ljust(9, "0")) for w, p in zip(whole, parts, strict=True)])
+    counts = np.array([w + int(p) * _MILLI for w, p in zip(whole, parts, strict=True)])
+    back = [
+        np.count_nonzero((d := np.diff(t)) < 0) - np.count_nonzero(d < -_HALF_DAY)
+        for t in (decimals, counts)
+    ]
+    return bool(back[0] > 0 and back[1] == 0)
 
 
 def _past_midnight(whole: NDArray[np.int64]) -> NDArray[np.int64]:
@@ -369,7 +404,8 @@ def ticks_of(raw: RawLog, source: str, unit: str | None = None) -> tuple[NDArray
     if re.match(r"\d{4}-\d\d-\d\d[T ]", str(values[0])):  # a hundred times faster
         texts = pd.Series(values).str.replace(",", ".")
         dates = pd.to_datetime(texts, format="ISO8601", utc=True, errors="coerce")
-        if not dates.isna().any():
+        parts = texts.str.extract(r":\d\d\.(\d+)", expand=False).fillna("0")
+        if not dates.isna().any() and parts.str.len().nunique() == 1:
             stamps = dates.dt.tz_localize(None).to_numpy().astype("datetime64[ns]")
             return stamps.astype(np.int64), True
     found = nanoseconds_of(values)

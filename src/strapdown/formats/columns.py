@@ -39,7 +39,7 @@ from strapdown.formats.vocabularies import (
     WITHOUT_GRAVITY,
     Vocabulary,
 )
-from strapdown.units import FACTORS, OF_LOGS, find_unit, unit_of, unit_words
+from strapdown.units import FACTORS, GYRO_UNITS, OF_LOGS, find_unit, unit_of, unit_words
 
 __all__ = [
     "ColumnName",
@@ -134,7 +134,9 @@ def read_name(name: str, of: Vocabulary = LOGS, unit: str = "") -> ColumnName:
 
 def _read_name(name: str, of: Vocabulary, unit: str) -> ColumnName:
     text, index = unicodedata.normalize("NFC", name).strip(), ""
-    if of.sensors and (match := INDEXED.fullmatch(text)):
+    if match := INDEXED.fullmatch(text):
+        if not of.sensors:
+            return ColumnName(None)  # q[0] is a part of an array, not a column q in units of 0
         text, index = match.groups()
     said = _of_format(text, index) if of.sensors else None
     if said is None:
@@ -196,7 +198,7 @@ def _read(bare: str, written: str, of: Vocabulary) -> ColumnName:
     if unit and bare.lower().strip("_ ") == "sampletimefine":
         return ColumnName("time", unit)  # without a unit it counts 0.1 ms
     # In group/sub/name the last part decides, unless the whole is a known name.
-    parts = re.split(r"[/.]", bare) if of.sensors else [bare]
+    parts = re.split(r"[/.:]", bare) if of.sensors else [bare]
     if unit is None and len(parts) > 1 and parts[-1].lower() in tuple(_AXES):
         # The unit of a sensor whose axes are members: gyro_dps.x.
         parts[-2], unit = _without_unit(parts[-2], of)
@@ -208,6 +210,8 @@ def _read(bare: str, written: str, of: Vocabulary) -> ColumnName:
                 family = f"{' '.join(parts[:start]).lower()} {said.family}".strip()
                 said = replace(said, family=family if said.family else "")
                 break
+    if said.quantity is None and of.sensors and said.unit in GYRO_UNITS:
+        said = _turn(bare, said)
     quantity = said.quantity
     kind = find_unit(said.unit) if said.unit else None
     if str(quantity).startswith("mag") and said.unit in MAGNETIC:
@@ -216,12 +220,21 @@ def _read(bare: str, written: str, of: Vocabulary) -> ColumnName:
         (written and unit is None and written.lower() not in OF_TIME)
         or (kind and kind[0] != "time")
     ):
-        said = replace(said, quantity=None if of.sensors else quantity)
+        # A temperature or an angle is no clock; a text in brackets may be anything: time (of day).
+        said = replace(said, quantity=None if of.sensors or kind else quantity)
     elif of.sensors and quantity in QUANTITIES[1:] and kind and kind[0] == "time":
         return ColumnName(None, said.unit)  # gyro_x_min
     if written and unit is None and not of.sensors and written.lower() not in OF_TIME:
         said = replace(said, unit=re.sub(r"\s+", "", written.strip("[]() ").lower()))
     return said
+
+
+def _turn(bare: str, said: ColumnName) -> ColumnName:
+    """Read a rotation about an axis as a rate, where its unit is one of rates."""
+    words = re.split(_SIGNS, bare.lower().strip())
+    if len(words) != 2 or words[0] not in ("rotation", "turn") or words[1] not in tuple(_AXES):
+        return said
+    return replace(said, quantity=f"gyro_{words[1]}", loose=2, family=words[0])
 
 
 def _without_unit(text: str, of: Vocabulary) -> tuple[str, str | None]:

@@ -25,6 +25,7 @@ from strapdown.formats.arrays import is_date, is_day_time, is_stamp
 from strapdown.formats.columns import read_name, split_brackets
 from strapdown.formats.preamble import stated_by_keys, stated_rate, stated_units
 from strapdown.formats.recording import RawLog, stated_by
+from strapdown.formats.serial_text import one_line_a_sample, with_names
 from strapdown.formats.signs import HEAD, Signs, first_bytes
 from strapdown.formats.text_columns import NULLS, Columns, columns_at_once, parsed
 from strapdown.tables.on_disk import let_go
@@ -164,6 +165,8 @@ def _line_by_line(
         raise DataError("io.csv-without-rows", file=name, row=numbered[0][0])
     ended = text.endswith(("\n", "\r"))
     rows, lines = _whole_lines(top, ended, name, findings)
+    if (several := _in_blocks(rows, top, name)) is not None:
+        findings.append(several)
     columns = _parse(lines, len(top.names), top.separator, name)
     return top.log(name, files, columns, np.array(rows), findings)
 
@@ -236,6 +239,7 @@ def _rewritten(numbered: Lines) -> Lines:
     sentences = {m[1] if m else "" for m in (_SENTENCE.fullmatch(line) for _, line in top)}
     if len(sentences) == 1 and "" not in sentences:
         numbered = [(row, _SENTENCE.sub(r"\1\2", line)) for row, line in numbered]
+        numbered = with_names(numbered, [str(s) for s in sentences])
         top = numbered[:SEARCHED]
     tags = {m[1] if m else "" for m in (_TAGGED.match(line) for _, line in top)}
     if len(tags) == 1 and "" not in tags:
@@ -254,7 +258,8 @@ def _rewritten(numbered: Lines) -> Lines:
         rows = _unlabelled(bare)
         by_row = {row: m[1] for m, (row, _) in zip(stamps, numbered, strict=True) if m}
         return [(row, _with_arrival(line, by_row.get(row))) for row, line in rows if line.strip()]
-    return _unlabelled(numbered)
+    joined = one_line_a_sample(numbered)
+    return _unlabelled(numbered) if joined is numbered else joined
 
 
 def _with_arrival(line: str, stamp: str | None) -> str:
@@ -727,6 +732,27 @@ def _whole_lines(
             )
         )
     return rows, lines
+
+
+#: Fewest rows of a block, on average, that blank lines set apart from the next.
+BLOCK = 10
+
+
+def _in_blocks(rows: list[int], top: _Top, name: str) -> Finding | None:
+    """A warning of rows without stamps in blocks between blank lines: recordings of their own."""
+    breaks = [k for k, (a, b) in enumerate(itertools.pairwise(rows), 1) if b > a + 1]
+    if not breaks or len(rows) < BLOCK * (len(breaks) + 1):
+        return None
+    if any(read_name(n).quantity == "time" for n in top.names):
+        return None
+    return Finding(
+        "io.rows-in-blocks",
+        severity="warning",
+        file=name,
+        row=rows[breaks[0]],
+        count=len(breaks) + 1,
+        size=breaks[0],
+    )
 
 
 #: Most kinds of rows that a message lists.

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.errors import ConfigError, DataError, Finding, StrapdownError, check_choice
-from strapdown.formats.arrays import numbers, ticks_of
+from strapdown.formats.arrays import is_stamp, numbers, ticks_of
 from strapdown.formats.clocks import clock_of_name
 from strapdown.formats.columns import INDEXED, ColumnName, clocks_with_unit, read_name
+from strapdown.formats.nameless import rates_and_force
 from strapdown.formats.recording import Questions, RawLog, ReadOptions
 from strapdown.formats.vocabularies import (
     BODY_RATES,
@@ -24,7 +25,7 @@ from strapdown.formats.vocabularies import (
     Quantity,
     Vocabulary,
 )
-from strapdown.units import ACCEL_UNITS, GYRO_UNITS, unit_of
+from strapdown.units import ACCEL_UNITS, GYRO_UNITS, OF_TABLES, unit_of
 
 AXES = "xyz"
 
@@ -102,7 +103,8 @@ def find_columns(
     }
     if not raw.stated:
         found |= _by_name(raw, wanted, asked_here)
-        if not wanted and _is_nameless(raw) and (likely := _likely_columns(raw)):
+        likely = _likely_columns(raw) if not wanted and _is_nameless(raw) else {}
+        if likely or (not wanted and _is_nameless(raw) and (likely := _by_motion(raw))):
             asked_here.ask(_nameless(raw, likely), **likely)
             names = list(raw.columns)
             found |= {q: Column(names[int(k) - 1], None, "numbers") for q, k in likely.items()}
@@ -149,11 +151,12 @@ def _nameless(raw: RawLog, likely: dict[str, str]) -> Finding:
 
     if raw.files and CRASH_READERS["nhtsa"].detect(raw.files[0]):
         return Finding("io.crash-test-file", severity="error", file=raw.name)
+    code = "io.nameless-columns" if likely else "io.nameless-columns-open"
     likely = likely or _in_usual_order(raw)
     example = ",".join(f"{quantity}={column}" for quantity, column in likely.items())
     # Seven columns are usually increments of KF-GINS.
     return Finding(
-        "io.nameless-seven-columns" if len(raw.columns) == 7 else "io.nameless-columns",
+        "io.nameless-seven-columns" if len(raw.columns) == 7 else code,
         severity="error",
         file=raw.name,
         row=raw.row(0),
@@ -248,7 +251,8 @@ def _likely_columns(raw: RawLog) -> dict[str, str]:
         three = columns[k : k + 3]
         if any(c.dtype.kind not in "iuf" for c in three):
             break
-        triads[k] = norm_and_spread(three)
+        if not any((c == c[0]).all() for c in three):  # a flag is no axis
+            triads[k] = norm_and_spread(three)
     forces = [k for k, (usual, spread) in triads.items() if spread < LOOSEST and _is_gravity(usual)]
     if len(forces) != 1 and len(triads) == 2:
         # Of two, the norm of rates varies about that of their noise; a force is in any unit.
@@ -267,6 +271,19 @@ def _likely_columns(raw: RawLog) -> dict[str, str]:
         return {}
     out = {} if clock is None else {"time": str(clock + 1)}
     for triad, at in (("gyro", turns[0]), ("accel", force)):
+        out |= {f"{triad}_{axis}": str(at + k + 1) for k, axis in enumerate(AXES)}
+    return out
+
+
+def _by_motion(raw: RawLog) -> dict[str, str]:
+    """Guess the numbers of nameless columns by the motion; empty where it shows no pair."""
+    columns = list(raw.columns.values())
+    found = rates_and_force(columns)
+    if found is None:
+        return {}
+    clock = next((k for k, c in enumerate(columns) if c.dtype.kind in "iufM" and advances(c)), None)
+    out = {} if clock is None or clock >= min(found) else {"time": str(clock + 1)}
+    for triad, at in zip(("gyro", "accel"), found, strict=True):
         out |= {f"{triad}_{axis}": str(at + k + 1) for k, axis in enumerate(AXES)}
     return out
 
@@ -331,7 +348,10 @@ def _by_name(raw: RawLog, wanted: dict[str, str], questions: Questions) -> dict[
         if quantity in wanted:
             continue
         if len(names) > 1 and quantity == "time":
-            names = _one_clock(raw, [n for n in names if n != "T"])
+            names = [n for n in names if n != "T" and not _stands(raw.columns[n])]
+            names = _one_clock(raw, names) if names else []
+        if not names:
+            continue
         # Names read without their order are a last resort.
         names = [n for n in names if not said[n].loose] or names
         found[quantity] = names[0]
@@ -472,6 +492,7 @@ def _one_clock(raw: RawLog, names: list[str]) -> list[str]:
     arrival. Clocks that advance alike are one clock.
     """
     names = [n for n in names if n.lower().endswith("header.stamp")] or names
+    names = [n for n in names if is_clock(raw, n)] or names
     # A stamp that a spreadsheet rounded is the same in every row.
     names = [n for n in names if len(set(raw.columns[n][:2].tolist())) > 1] or names
     names = clocks_with_unit(names, lambda n: _unit_of(raw, n) is not None)
@@ -484,6 +505,21 @@ def _one_clock(raw: RawLog, names: list[str]) -> list[str]:
         ):
             return names[:1]
     return names
+
+
+def _stands(values: NDArray[Any]) -> bool:
+    """Whether every row has the same stamp, as a date beside a clock that starts at zero."""
+    return values.size > FEW and bool((values == values[0]).all())
+
+
+#: Rows that a clock may stand still for: a burst of samples.
+FEW = 50
+
+
+def is_clock(raw: RawLog, name: str) -> bool:
+    """Whether a column holds numbers, dates or times of day; letters of a local zone are none."""
+    values = raw.columns[name]
+    return values.dtype.kind != "O" or bool(values.size and is_stamp(str(values[0])))
 
 
 def _unit_of(raw: RawLog, column: str) -> str | None:
@@ -663,6 +699,8 @@ def find_quantities(
                 continue
             sign = said.sign if said.quantity == meant else 1.0
             factor = sign * _factor(meant, known[meant], said.unit, name, file)
+            if meant in found and _in_other_unit(found[meant].source, name):
+                continue
             if meant in found:
                 raise DataError(
                     "io.column-names-ambiguous",
@@ -674,6 +712,19 @@ def find_quantities(
                 )
             found[meant] = Found(name, factor, bool(said.unit))
     return found
+
+
+#: A name and its last word, in brackets or behind a sign.
+_END = re.compile(r"(.*?)[\s_(\[]+([^\s_(\[\])]+)[\])]?$")
+
+
+def _in_other_unit(one: str, other: str) -> bool:
+    """Whether two names are one quantity in two units: SPEED_KPH and SPEED_MPH."""
+    ends = [_END.match(name.strip().lower()) for name in (one, other)]
+    if None in ends or ends[0][1] != ends[1][1]:  # type: ignore[index]
+        return False
+    units = {unit_of(end[2], OF_TABLES) for end in ends if end}
+    return len(units) == 2 and None not in units
 
 
 def _is_plain(name: str, read: Mapping[str, ColumnName], known: Mapping[str, Quantity]) -> bool:
@@ -707,7 +758,13 @@ def fix_columns(raw: RawLog, asked: Mapping[str, str]) -> dict[str, Found]:
     `find_quantities`.
     """
     if not raw.stated:
-        return find_quantities(raw.columns, FIXES, asked, raw.name, raw.units)
+        names = list(raw.columns)
+        clocks = [n for n in names if read_name(n, FIXES).quantity == "time"]
+        if len(clocks) > 1:
+            # A lone T is as often a temperature; a text that is no stamp is no clock.
+            other = {n for n in clocks if n == "T" or not is_clock(raw, n)} - set(asked.values())
+            names = [n for n in names if n not in other or other >= set(clocks)]
+        return find_quantities(names, FIXES, asked, raw.name, raw.units)
     known = FIXES.quantities
     found = {
         quantity: Found(column, 1.0 if unit is None else known[quantity].units[unit], True)

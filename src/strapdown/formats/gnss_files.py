@@ -86,6 +86,8 @@ def fixes_of_columns(raw: RawLog, options: GnssOptions) -> Fixes:
         clock = Clock(GPS, 0.0, int(week[0]))
     velocity, velocity_sd = block(VELOCITY), block(VELOCITY_SD)
     position_sd = block(POSITION_SD)
+    if velocity is not None and velocity_sd is None and "speed_sd" in found:
+        velocity_sd = _sd_of_speed(raw, found, values)
     if velocity is None and {"speed", "course"} <= found.keys():
         velocity, velocity_sd = _over_ground(raw, found, values)
     if velocity is not None:
@@ -299,6 +301,21 @@ def _over_ground(
     return np.column_stack([speed * np.cos(angle), speed * np.sin(angle), none]), sd
 
 
+def _sd_of_speed(raw: RawLog, found: dict[str, Found], values: Callable[[str], Array]) -> Array:
+    """Return the accuracy of the speed as the standard deviation of each part of the velocity."""
+    stated = values("speed_sd")
+    raw.findings.append(
+        Finding(
+            "io.velocity-sd-by-speed",
+            severity="note",
+            file=raw.name,
+            quantity=", ".join(VELOCITY_SD),
+            source=found["speed_sd"].source,
+        )
+    )
+    return np.column_stack([np.where(stated > 0.0, stated, np.nan)] * 3)
+
+
 #: Steps between fixes from which a speed is computed, s, and the least distance in them, m.
 _STEPS, _WAY = (0.05, 10.0), 50.0
 #: Units that a speed without one may have, and how near the ratio to that of the positions is.
@@ -380,6 +397,8 @@ def _accuracy(raw: RawLog, found: dict[str, Found], values: Callable[[str], Arra
 
 #: Seconds since 1970 of 2000 and 2045: dates of a receiver's fixes.
 _DATES = (9.467e8, 2.367e9)
+#: Most seconds that a device may have counted since its start, three years.
+_SINCE_START = 1e8
 
 
 def _time(raw: RawLog, found: Found) -> tuple[Array, Clock]:
@@ -389,8 +408,15 @@ def _time(raw: RawLog, found: Found) -> tuple[Array, Clock]:
         step = float(np.median(np.abs(np.diff(time)))) if time.size > 1 else np.nan
         # A receiver gives 100 fixes a second to one in two minutes: this, not the stamp, separates
         # a clock of 1970 in ms from one in ns that counts from the start of a phone.
-        fits = [u for u in ("ms", "us", "ns") if 0.005 <= step * TIME_UNITS[u] <= 120.0]
-        unit = fits[0] if fits else "ms"
+        # Of neither clock is a stamp between them, or beyond: 46,000 years of 1.4e15 ms.
+        fits = [
+            u
+            for u in ("ms", "us", "ns")
+            if 0.005 <= step * TIME_UNITS[u] <= 120.0
+            and (first * (k := TIME_UNITS[u]) < _SINCE_START or _DATES[0] < first * k < _DATES[1])
+        ]
+        by_date = [u for u in ("ms", "us", "ns") if _DATES[0] < first * TIME_UNITS[u] < _DATES[1]]
+        unit = (fits or by_date or ["ms"])[0]
         if len(fits) == 1 and _DATES[0] < first * TIME_UNITS[unit] < _DATES[1]:
             raw.findings.append(
                 Finding(

@@ -28,7 +28,8 @@ from strapdown.frames import geodetic_from_ecef, q_ne
 __all__ = ["QUALITY", "detect", "read"]
 
 Array = NDArray[np.float64]
-SUFFIX = ".pos"
+#: Receivers of Emlid write it with the second ending, and without a line of names.
+SUFFIXES = (".pos", ".llh")
 #: RTKLIB's Q (1 fix, 2 float, 3 SBAS, 4 DGPS, 5 single, 6 PPP, 7 dead reckoning) to field 6 of
 #: NMEA 0183 GGA, as RTKLIB writes it; SBAS is differential.
 QUALITY = {0: 0, 1: 4, 2: 5, 3: 2, 4: 2, 5: 1, 6: 3, 7: 6}
@@ -41,7 +42,7 @@ _XYZ = ["x-ecef(m)", "y-ecef(m)", "z-ecef(m)"]
 
 # The line that names the columns.
 detect = Signs(
-    named=(SUFFIX,),
+    named=SUFFIXES,
     text=r"^%[ \t]*(?i:GPST|UTC|JST)\b.*(?:latitude\(|x-ecef\(|e-baseline\(|longitude\()",
 )
 

@@ -1,4 +1,4 @@
-"""Binary logs of NovAtel OEM7 and OEM6 receivers (``.gps .bin``), with SPAN.
+"""Logs of NovAtel OEM7 and OEM6 receivers (``.gps .bin``, or as text), with SPAN.
 
 Frames: https://docs.novatel.com/OEM7/Content/Messages/Binary.htm and
 Description_of_Short_Headers.htm: AA 44 12 with a header of 28 bytes or AA 44 13 with one of 12, the
@@ -7,7 +7,9 @@ SPAN_Logs: BESTPOS (height over the sea and undulation), BESTVEL (speed, course,
 latency), INSPVA (height over the ellipsoid; roll, pitch, azimuth of the vehicle in deg), RAWIMU and
 RAWIMUX: counts of velocity and angle in each interval, z, -y, x of the sensor, scaled by the type
 of the unit (table Raw IMU Scale Factors). CORRIMU is without gravity and the Earth's rate: it is
-not a sensor's output, and is not read. Stamps are GPS seconds of week.
+not a sensor's output, and is not read. Stamps are GPS seconds of week. As text (Content/Messages/
+ASCII.htm, Abbreviated headers aside) a line is ``#BESTPOSA,…,week,seconds,…;fields*CRC``, or with a
+short header ``%RAWIMUSA,week,seconds;fields*CRC``.
 
 Text exports of Inertial Explorer (NovAtel Waypoint), as a reference.
 
@@ -40,7 +42,7 @@ from strapdown.formats.recording import NoStreamError, RawLog
 from strapdown.formats.signs import Signs, first_bytes
 from strapdown.units import LENGTHS
 
-TITLE = "NovAtel OEM binary log"
+TITLE = "NovAtel OEM log, binary or text"
 SYNCS = (b"\xaa\x44\x12", b"\xaa\x44\x13")
 BESTPOS, BESTVEL, INSPVA, INSPVAS, INSPVAX = 42, 99, 507, 508, 1465
 RAWIMU, RAWIMUS, RAWIMUX, RAWIMUSX, INSCONFIG = 268, 325, 1461, 1462, 1945
@@ -80,11 +82,89 @@ def _has_messages(path: Path) -> bool:
     return sum(map(len, _frames(first_bytes(path, 8192))[0].values())) >= 2
 
 
-detect = Signs(first=rb"\xaa\x44[\x12\x13]", also=_has_messages)
+#: Messages as text: number, layout of the binary message, and which of the fields of a line are
+#: its values. Fields that are words or hexadecimal are in `_WORDS` and `_HEX`.
+TEXTS: dict[str, tuple[int, str]] = {
+    "BESTPOS": (BESTPOS, "<IIdddfI3f"),
+    "BESTVEL": (BESTVEL, "<II2f3d"),
+    "INSPVA": (INSPVA, "<Id9dI"),
+    "INSPVAS": (INSPVAS, "<Id9dI"),
+    "INSPVAX": (INSPVAX, "<II3df6d"),
+    "RAWIMU": (RAWIMU, "<IdI6i"),
+    "RAWIMUS": (RAWIMUS, "<IdI6i"),
+    "RAWIMUX": (RAWIMUX, "<BBHdI6i"),
+    "RAWIMUSX": (RAWIMUSX, "<BBHdI6i"),
+}
+#: States of a solution and of the inertial solution, types of a position, and the datum, by name
+#: (tables Solution Status, Position or Velocity Type, Inertial Solution Status, Datum).
+_WORDS = {"SOL_COMPUTED": 0, "NONE": 0, "WGS84": 61, "INS_INACTIVE": 0, "INS_ALIGNING": 1}
+_WORDS |= {"INS_HIGH_VARIANCE": 2, "INS_SOLUTION_GOOD": 3, "INS_SOLUTION_FREE": 6}
+_WORDS |= {"INS_ALIGNMENT_COMPLETE": 7, "FIXEDPOS": 1, "FIXEDHEIGHT": 2, "DOPPLER_VELOCITY": 8}
+_WORDS |= {"SINGLE": 16, "PSRDIFF": 17, "WAAS": 18, "PROPAGATED": 19, "L1_FLOAT": 32}
+_WORDS |= {"IONOFREE_FLOAT": 33, "NARROW_FLOAT": 34, "L1_INT": 48, "WIDE_INT": 49}
+_WORDS |= {"NARROW_INT": 50, "RTK_DIRECT_INS": 51, "INS_SBAS": 52, "INS_PSRSP": 53}
+_WORDS |= {"INS_PSRDIFF": 54, "INS_RTKFLOAT": 55, "INS_RTKFIXED": 56, "PPP_CONVERGING": 68}
+_WORDS |= {"PPP": 69, "OPERATIONAL": 70, "INS_PPP_CONVERGING": 73, "INS_PPP": 74}
+_WORDS |= {"PPP_BASIC_CONVERGING": 77, "PPP_BASIC": 78, "INS_PPP_BASIC": 80}
+#: Another state than a computed solution.
+_OTHER_STATE = 99
+#: Field with the status of the unit, in hexadecimal, of the messages with its counts.
+_STATUS = {RAWIMU: 2, RAWIMUS: 2, RAWIMUX: 4, RAWIMUSX: 4}
+_LINE = re.compile(
+    rb"^(?:#(\w+)A,(?:[^,;\r\n]*,){4}(\d+),(\d+\.\d+),[^;\r\n]*"
+    rb"|%(\w+)A,(\d+),(\d+\.\d+));([^*\r\n]*)\*([0-9a-fA-F]{8})[ \t]*\r?$",
+    re.M,
+)
+
+
+detect = Signs(
+    first=rb"\xaa\x44[\x12\x13]|(?m:^[#%](?:BESTPOS|BESTVEL|INSPVA|RAWIMU)S?X?A,)",
+    also=_has_messages,
+)
+
+
+def _lines(data: bytes) -> tuple[Frames, int]:
+    """Return the messages of a text as their binary form, and the count of damaged lines."""
+    found: Frames = {}
+    lost = 0
+    for m in _LINE.finditer(data):
+        name, week, second = (m[1], m[2], m[3]) if m[1] else (m[4], m[5], m[6])
+        kind, form = TEXTS.get(name.decode(), (0, ""))
+        if not kind:
+            continue
+        line = m[0]
+        if _crc(line[1 : line.rindex(b"*")]) != int(m[8], 16):
+            lost += 1
+            continue
+        try:
+            letters = re.sub(r"(\d+)(\w)", lambda n: n[2] * int(n[1]), form[1:])
+            fields = m[7].decode().split(",")[: len(letters)]
+            values = [
+                int(field, 16) if k == _STATUS.get(kind) else _value(field, letters[k])
+                for k, field in enumerate(fields)
+            ]
+            message = struct.pack(form, *values)
+        except (ValueError, struct.error):
+            lost += 1
+            continue
+        ms = round(float(second) * 1000.0)
+        found.setdefault(kind, []).append((int(week) * WEEK_MS + ms, message))
+    return found, lost
+
+
+def _value(field: str, letter: str) -> float:
+    if field[:1].isalpha():
+        return _WORDS.get(field, _OTHER_STATE)
+    return float(field) if letter in "df" else int(field)
 
 
 def _frames(data: bytes) -> tuple[Frames, int]:
-    """Return messages by their number, with GPS ms since 1980, and the count of other bytes."""
+    """Return messages by their number, with GPS ms since 1980, and the count of other bytes.
+
+    Of a text: and the count of damaged lines.
+    """
+    if not any(sync in data for sync in SYNCS):
+        return _lines(data)
     found: Frames = {}
     k, lost = 0, 0
     while (at := data.find(b"\xaa\x44", k)) >= 0:
@@ -234,8 +314,11 @@ EXPLORER_UNITS |= {"longitude": EXPLORER_UNITS["latitude"], **dict.fromkeys(ANGL
 EXPLORER_UNITS |= dict.fromkeys((*LEVEL, *BODY), ("m/s",))
 
 
-# The line that names the program.
-detect_explorer = Signs(first=rb"(?m)^[ \t]*Program:[ \t]+Inertial Explorer")
+# The line that names the program, or names and units of angles in three numbers without it.
+detect_explorer = Signs(
+    first=rb"(?m)^[ \t]*Program:[ \t]+Inertial Explorer"
+    rb"|\A[^\r\n]*Latitude[ \t]+Longitude[ \t]+H-Ell\b[^\r\n]*\r?\n[^\r\n]*\(\+/-D M S\)"
+)
 
 
 def read_explorer(path: Path) -> pd.DataFrame:
@@ -269,12 +352,14 @@ def read_explorer(path: Path) -> pd.DataFrame:
 def _values(path: Path, lines: list[str]) -> dict[str, Any]:
     """Return the columns of numbers by name in lower case; angles in deg."""
     at = next(
-        (k for k, n in enumerate(lines) if {"latitude", "h-ell"} <= set(n.lower().split())), 0
+        (k for k, n in enumerate(lines) if {"latitude", "h-ell"} <= set(n.lower().split())), -1
     )
-    names = lines[at].lower().split()
-    below = lines[at + 1] if 0 < at < len(lines) - 1 else ""
+    names = lines[at].lower().split() if at >= 0 else []
+    below = lines[at + 1] if 0 <= at < len(lines) - 1 else ""
     units = [u.strip("()").lower() for u in _UNIT.findall(below)]
-    if len(names) != len(units):
+    if len(names) == len(units) + 1 and names[-1] == "q":
+        units.append("")  # the quality, the last, has none
+    if not names or len(names) != len(units):
         raise DataError("io.inertial-explorer-header", file=path.name)
     for name, unit in zip(names, units, strict=True):
         if name in EXPLORER_UNITS and unit not in EXPLORER_UNITS[name]:

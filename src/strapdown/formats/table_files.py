@@ -88,6 +88,11 @@ KINDS = ("sensor", "type", "name", "kind", "sensorType", "sensor_type")
 DEEP = 6
 
 
+#: A list of sensors before the list of their values, as Edge Impulse has them (data acquisition
+#: format): ``"sensors": [{"name": "accX", "units": "m/s2"}, …], "values": [[…], …]``.
+_APART = re.compile(r'"sensors"\s*:\s*\[\s*\{[^\[\]]*\}\s*\]\s*,\s*"values"\s*:\s*\[')
+
+
 def _is_object(line: str) -> bool:
     try:
         return isinstance(json.loads(line), dict)
@@ -100,6 +105,8 @@ def _begins(path: Path) -> bool:
     text = head(path).lstrip()
     if path.suffix.lower() in JSON_SUFFIXES[:1] and text.startswith("["):
         return text[1:].lstrip().startswith("{")
+    if _APART.search(text):
+        return True
     return _is_object(text.partition("\n")[0])
 
 
@@ -114,6 +121,8 @@ def read_json(path: Path) -> RawLog:
     DataError
         A line is not JSON, a value is neither a number nor a text, or the file has no object.
     """
+    if _APART.search(head(path)):
+        return _names_apart(path)
     objects, rows, findings = _objects(path)
     kind = next(
         (k for k in KINDS if len({kind_of(str(o.get(k))) for o in objects} - {None}) > 1), None
@@ -134,6 +143,30 @@ def read_json(path: Path) -> RawLog:
                 [np.nan if v is None else v for v in values], dtype=None if whole else np.float64
             )
     return RawLog(path.name, (path,), columns, rows=np.array(rows), findings=findings)
+
+
+def _names_apart(path: Path) -> RawLog:
+    """Read rows of values under a list of names and units, at a constant interval."""
+    content = from_json(path)
+    held = content if isinstance(content, dict) else {}
+    held = held.get("payload", held)
+    sensors, values = held.get("sensors"), held.get("values")
+    try:
+        names = [str(one["name"]) for one in sensors]
+        units = {str(one["name"]): str(one.get("units", "")) for one in sensors}
+        table = np.array(values, dtype=np.float64)
+        step = float(held.get("interval_ms") or 0.0)
+    except (TypeError, KeyError, ValueError, AttributeError):
+        raise DataError("io.not-list-records", file=path.name) from None
+    if table.ndim != 2 or table.shape[1] != len(names):
+        raise DataError("io.not-list-records", file=path.name)
+    return RawLog(
+        path.name,
+        (path,),
+        {name: np.ascontiguousarray(table[:, k]) for k, name in enumerate(names)},
+        units={name: unit for name, unit in units.items() if unit and unit != "N/A"},
+        rate=1000.0 / step if 0.0 < step < np.inf else None,
+    )
 
 
 def _objects(path: Path) -> tuple[list[dict[str, Any]], list[int], list[Finding]]:

@@ -120,7 +120,7 @@ ABROAD = {
 TURNS = {"roll": "x", "pitch": "y", "yaw": "z"}
 #: Words for the axes of a vehicle.
 DIRECTIONS = {
-    "x": ("longitudinal", "longit", "langs", "laengs", "longitudinale"),
+    "x": ("longitudinal", "longit", "langs", "laengs", "longitudinale", "inline"),
     "y": ("lateral", "quer", "laterale", "transversal"),
     "z": ("vertical", "vertikal", "hoch", "verticale"),
 }
@@ -128,7 +128,8 @@ TIMES = _words(
     "time t ts timestamp timestamps timesec elapsed secondselapsed seconds sec tow sow gpssow "
     "gpstow gpstime unixtime epoch epoc stamp elapsedtime timeelapsed timesincestart sampletime "
     "sensortime systemtime unixtimestamp datetime localtime utc utctime timeutc "
-    "gpssecondsofweek secondsofweek gpst timeintervalsince1970 zeit zeitstempel temps tiempo tempo"
+    "gpssecondsofweek secondsofweek gpst timeintervalsince1970 zeit zeitstempel temps tiempo tempo "
+    "rtctime chiptime utime offsettime"
 )
 # Names of clocks that state their unit.
 CLOCKS = {
@@ -146,6 +147,7 @@ CLOCKS = {
     "nanoseconds": "ns",
     "ms": "ms",
     "msec": "ms",
+    "utime": "us",  # of LCM, and logs made from it
     "us": "us",
     "usec": "us",
     "ns": "ns",
@@ -157,7 +159,7 @@ APPLE = ("timeintervalsince1970",)
 #: Words of the name of a clock, beside ``time``, and words behind it in brackets.
 OF_TIME = {
     *_words("time timestamp timestamps stamp unix epoch utc gps system gmt sample logging elapsed"),
-    *_words("since start boot reboot local ros rosbag bag header"),
+    *_words("since start boot reboot local ros rosbag bag header rtc chip device"),
 }
 TIME = Quantity((*TIMES, *CLOCKS), TIME_UNITS)
 #: Of tables of measurements, where a date stands for a clock.
@@ -232,6 +234,8 @@ NOISE = {
     *("raw", "imu", "sensor", "sensors", "data", "body", "device", "phone", "watch", "motion"),
     *("cal", "calib", "calibrated", "corrected", "meas", "measured", "value", "values", "axis"),
     *("ins", "the", "of", "in", "de", "del", "di", "reading", "readings", "uncal", "uncalibrated"),
+    # Of flight controllers: converted, smoothed (gyroADC, accSmooth).
+    *("adc", "smooth"),
 }
 #: Where a sensor is worn or mounted, and its range: they tell sensors apart, not quantities.
 PLACES = {

@@ -270,6 +270,10 @@ def _diagnose(log: LogTable, axes: str | None, fixes: FixesTable | None) -> LogD
         elif missing.code not in ABSENT:
             findings.append(missing.replace(severity="warning"))
     lacks = raw is not None and missing is not None and missing.code in ABSENT
+    # A table of positions is none of a crash, whatever words its columns have.
+    of_another = inertial.imu is not None or (
+        missing is not None and missing.code == "io.table-of-positions"
+    )
     impact = None if inertial.imu is None else _impact(inertial.imu)
     order = {"error": 0, "warning": 1}
     faults = sorted((f for f in findings if f.severity in order), key=lambda f: order[f.severity])
@@ -291,7 +295,7 @@ def _diagnose(log: LogTable, axes: str | None, fixes: FixesTable | None) -> LogD
         "fixes_from": None,
         "fixes_for": None,
         "impact": impact,
-        "crash_record": None if inertial.imu is not None else _crash_record(log.path, lacks),
+        "crash_record": None if of_another else _crash_record(log.path, lacks),
         "temperature": _temperature(streams),
     }
     one = LogDiagnosis(
@@ -909,6 +913,9 @@ def _navigation(one: LogDiagnosis) -> list[Finding]:
     stamps, time = index_of(imu), index_of(fixes)
     inside = time[(time >= stamps[0]) & (time <= stamps[-1])]
     if inside.size < 2:
+        if not found:
+            data = {"count": int(inside.size), "of": len(time)}
+            found = [Finding("doctor.too-few-fixes", severity="error", file=one.name, data=data)]
         return found
     sd = values_of(gnss, POSITION_SD)[:, 0]
     finite = sd[np.isfinite(sd)]

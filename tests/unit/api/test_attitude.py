@@ -288,7 +288,9 @@ def test_algorithms_are_compared_on_a_table_as_on_its_file(tmp_path):
         (lambda: sd.attitude(*samples(), initial=(1.0, 2.0)), ConfigError, "initial"),
         (lambda: sd.compare_attitude("x", sed=1), ConfigError, "seed"),
         (
-            lambda: sd.attitude(pd.DataFrame({f"gyro_{axis}": ["a", "b"] for axis in "xyz"})),
+            lambda: sd.attitude(
+                pd.DataFrame({"time": [0, 1], **{f"gyro_{axis}": ["a", "b"] for axis in "xyz"}})
+            ),
             DataError,
             "numbers",
         ),

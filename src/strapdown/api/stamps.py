@@ -1,0 +1,105 @@
+"""Time, units and names of tables in memory: dates become seconds, other units are refused.
+
+A table of this package has its time in s and its columns in SI. pandas has clocks of dates and
+durations, a default index that counts rows, and names in levels; taken as numbers they would be
+nanoseconds or rows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from strapdown.errors import DataError
+from strapdown.formats.clocks import UNIX
+from strapdown.formats.columns import read_name
+from strapdown.units import unit_of
+
+__all__ = ["as_frame", "by_time", "flat", "seconds_of"]
+
+#: Units of the columns of a table.
+SI = ("rad/s", "m/s2", "uT")
+
+
+def as_frame(table: Any) -> Any:
+    """Return a table of another library (polars, pyarrow) as one of pandas; anything else as is."""
+    if isinstance(table, pd.DataFrame) or not callable(getattr(table, "to_pandas", None)):
+        return table
+    return table.to_pandas()
+
+
+def seconds_of(stamps: Any) -> tuple[Any, dict[str, Any]]:
+    """Return stamps in s, and the `attrs` of their clock.
+
+    Dates, UTC without a zone, count from the whole second of the first, which is ``clock_origin``;
+    durations are seconds. Other stamps are returned as they are, without `attrs`.
+    """
+    if isinstance(stamps, list | tuple) and stamps and isinstance(stamps[0], datetime):
+        stamps = pd.DatetimeIndex(pd.to_datetime(stamps, utc=True))
+    kind = getattr(stamps, "dtype", None)
+    if isinstance(kind, pd.DatetimeTZDtype):
+        stamps = pd.DatetimeIndex(stamps).tz_convert("UTC").tz_localize(None)
+    elif getattr(kind, "kind", "") not in ("M", "m"):
+        return stamps, {}
+    values: NDArray[Any] = np.asarray(stamps)
+    missing = np.isnat(values)
+    if missing.any():
+        row = int(np.argmax(missing)) + 1
+        raise DataError("api.stamp-missing", quantity="time", row=row)
+    if values.dtype.kind == "m":
+        return values.astype("timedelta64[ns]").astype(np.int64) * 1e-9, {}
+    ns: NDArray[np.int64] = values.astype("datetime64[ns]").astype(np.int64)
+    origin = int(ns[0] // 10**9) if ns.size else 0
+    return (ns - origin * 10**9) * 1e-9, {"clock": UNIX, "clock_origin": float(origin)}
+
+
+def by_time(table: pd.DataFrame, quantity: str = "imu") -> pd.DataFrame:
+    """Return a table indexed by time in s, from its index or its column ``time``.
+
+    DataError: the index only counts rows, or states another unit than s.
+    """
+    out = table
+    if "time" in table.columns:
+        out = table.set_index("time")
+        out.attrs = dict(table.attrs)
+    elif isinstance(table.index, pd.RangeIndex) and table.index.name is None and len(table) > 1:
+        clocks = [str(c) for c in table.columns if read_name(str(c)).quantity == "time"]
+        code = "api.time-in-other-column" if clocks else "api.index-counts-rows"
+        raise DataError(code, quantity=quantity, name=clocks[0] if clocks else "time")
+    stamps, clock = seconds_of(out.index)
+    if clock or stamps is not out.index:
+        attrs = dict(out.attrs)
+        out = out.set_axis(pd.Index(stamps, name="time"), axis=0)
+        out.attrs = attrs | clock
+        return out
+    unit = read_name(str(out.index.name)).unit if out.index.name is not None else None
+    if unit not in (None, "s"):
+        raise DataError("api.time-unit", quantity=quantity, name=out.index.name, unit=unit)
+    return out
+
+
+def flat(table: pd.DataFrame, needed: Sequence[str]) -> pd.DataFrame:
+    """Return a table whose names in levels are joined: ``("gyro", "x")``, ``("gyro_x", "rad/s")``.
+
+    `needed`: names of columns whose units are checked. DataError: a level states a unit that is not
+    the table's.
+    """
+    if table.columns.nlevels == 1:
+        return table
+    names = []
+    for column in table.columns:
+        parts = [str(part) for part in column if str(part)]
+        units = {part: unit_of(part) for part in parts if part not in needed}
+        name = "_".join(part for part in parts if units.get(part) is None)
+        stated = next((u for u in units.values() if u is not None), None)
+        if name in needed and stated is not None and stated not in SI:
+            raise DataError("api.unit-of-level", quantity=name, unit=stated)
+        names.append(name)
+    out = table.set_axis(names, axis=1)
+    out.attrs = dict(table.attrs)
+    return out

@@ -1,0 +1,489 @@
+"""Layouts that loggers and data sets publish, met for the first time; every log here is synthetic.
+
+A body turns about three axes under gravity and stays in its place; its samples are written as each
+layout has them, and what is read is compared with what was written.
+"""
+
+from __future__ import annotations
+
+import json
+import zlib
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.spatial.transform import Rotation
+from tests.coded import coded
+
+import strapdown as sd
+from strapdown.constants import STANDARD_GRAVITY
+from strapdown.errors import DataError
+from strapdown.formats import reader_of
+from strapdown.formats.arrays import nanoseconds_of
+from strapdown.formats.columns import read_name
+from strapdown.formats.nameless import rates_and_force
+from strapdown.formats.novatel import SCALES
+from strapdown.formats.vocabularies import FIXES, TRAJECTORIES
+from strapdown.tables import ACCEL, GYRO
+
+N, STEP = 1500, 0.01
+T = STEP * np.arange(N)
+TURN = Rotation.from_euler(
+    "zyx", np.column_stack([0.7 * T, 0.5 * np.sin(0.8 * T), 0.6 * np.sin(1.3 * T)])
+)
+RATE = np.vstack([(TURN[:-1].inv() * TURN[1:]).as_rotvec() / STEP, np.zeros(3)])
+FORCE = TURN.inv().apply([0.0, 0.0, STANDARD_GRAVITY])
+DEG = np.degrees(1.0)
+DAY = datetime(2024, 3, 5, 12, tzinfo=UTC)
+LAT, LON = 55.75 + 1e-6 * np.arange(60), 37.62 - 2e-6 * np.arange(60)
+
+
+def written(tmp_path, name, lines, end="\n"):
+    path = tmp_path / name
+    path.write_text(end.join(lines) + end, encoding="utf-8")
+    return path
+
+
+def line(*values, separator=","):
+    return separator.join(str(v) for v in values)
+
+
+def many(values, digits=6):
+    return [f"{v:.{digits}f}" for v in values]
+
+
+def check(imu, rate=RATE, force=FORCE, *, digits=1e-4, start=None):
+    np.testing.assert_allclose(imu[GYRO], rate, atol=digits)
+    np.testing.assert_allclose(imu[ACCEL], force, atol=50 * digits)
+    np.testing.assert_allclose(np.diff(imu.index), STEP, atol=1e-6)
+    if start is not None:
+        assert imu.attrs["clock"] == "unix"
+        assert imu.index[0] + imu.attrs["clock_origin"] == pytest.approx(start, abs=1e-3)
+
+
+# Clocks and names.
+
+
+def test_a_clock_of_a_logger_in_two_columns_with_milli_g(tmp_path):
+    """OpenLog Artemis: rtcDate, rtcTime; accelerometer in mg; a comma ends each row."""
+    rows = ["rtcDate,rtcTime,aX,aY,aZ,gX,gY,gZ,imu_degC,output_Hz,"]
+    for k in range(N):
+        at = DAY + timedelta(seconds=float(T[k]))
+        stamp = f"{at:%m/%d/%Y},{at:%H:%M:%S}.{at.microsecond // 10000:02d}"
+        values = many(1000 * FORCE[k] / STANDARD_GRAVITY, 2) + many(RATE[k] * DEG, 2)
+        rows.append(line(stamp, *values, "25.10", "100.000", ""))
+    imu = sd.read_imu(written(tmp_path, "dataLog00001.csv", rows))
+    check(imu, digits=2e-4)
+
+
+def test_milliseconds_without_leading_zeros(tmp_path):
+    """WitMotion's Python SDK joins numbers: 12:0:1.5 is 5 ms after the second; T(°) is no clock."""
+    rows = ["Chiptime\tax(g)\tay(g)\taz(g)\twx(deg/s)\twy(deg/s)\twz(deg/s)\tT(°)"]
+    for k in range(N):
+        at = DAY + timedelta(seconds=float(T[k]), milliseconds=5)
+        stamp = f"{at.year}-{at.month}-{at.day} {at.hour}:{at.minute}:{at.second}"
+        stamp += f".{at.microsecond // 1000}"
+        values = many(FORCE[k] / STANDARD_GRAVITY) + many(RATE[k] * DEG)
+        rows.append(line(stamp, *values, "25.3", separator="\t"))
+    imu = sd.read_imu(written(tmp_path, "20240305.txt", rows, "\r\n"))
+    check(imu, start=DAY.timestamp() + 0.005)
+
+
+@pytest.mark.parametrize(
+    ("texts", "steps"),
+    [
+        # Eighths of a second without trailing zeros are decimals: they never go back.
+        (["10:00:01", "10:00:01.125", "10:00:01.25", "10:00:01.375", "10:00:01.5"], [0.125] * 4),
+        (["10:00:01.9", "10:00:01.95", "10:00:02.0"], [0.05, 0.05]),
+        (["10:00:01.90", "10:00:01.100", "10:00:01.110"], [0.010, 0.010]),
+        (["10:00:01.090", "10:00:01.100", "10:00:01.110"], [0.010, 0.010]),
+    ],
+)
+def test_digits_behind_seconds(texts, steps):
+    found = nanoseconds_of(texts)
+    assert found is not None
+    np.testing.assert_allclose(np.diff(found) * 1e-9, steps, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "date"),
+    [
+        ("22-May-2015 07:00:25.730", datetime(2015, 5, 22, 7, 0, 25, 730000, tzinfo=UTC)),
+        ("05-Mar-24 12:00:00.20", datetime(2024, 3, 5, 12, 0, 0, 200000, tzinfo=UTC)),
+        ("Fri May 22 07:00:26 UTC 2015", datetime(2015, 5, 22, 7, 0, 26, tzinfo=UTC)),
+    ],
+)
+def test_months_in_letters(text, date):
+    found = nanoseconds_of([text])
+    assert found is not None and found[0] == int(date.timestamp() * 1000) * 10**6
+
+
+def test_letters_of_a_local_zone_are_no_stamp():
+    assert nanoseconds_of(["Fri May 22 07:00:26 EDT 2015"]) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "quantity", "unit"),
+    [
+        ("utime", "time", "us"),
+        ("Clock:offsetTime", "time", None),
+        ("IMU_ATTI(0):gyroX", "gyro_x", None),
+        ("IMU_ATTI(0):accelZ", "accel_z", None),
+        ("gyroADC[1]", "gyro_y", None),
+        ("accSmooth[2]", "accel_z", None),
+        ("InlineAcc", "accel_x", None),
+        ("Rotation X [rad/s]", "gyro_x", "rad/s"),
+        ("Rotation X [deg]", None, "deg"),
+        ("T(°)", None, "deg"),
+    ],
+)
+def test_names_of_columns(name, quantity, unit):
+    said = read_name(name)
+    assert (said.quantity, said.unit) == (quantity, unit)
+
+
+def test_a_part_of_an_array_is_no_quantity_of_fixes():
+    """It was a column q in the unit 0, and refused the whole table."""
+    assert read_name("q[0]", FIXES).quantity is None
+    assert read_name("theta[0]", TRAJECTORIES).quantity is None
+    assert read_name("T(°)", FIXES).quantity is None
+
+
+# Rows of several sensors, samples of several lines, rows in blocks.
+
+
+def test_rows_of_two_sensors_are_not_one_log(tmp_path):
+    """mavlogdump writes the rows of all inertial sensors under one header; they were mixed."""
+    rows = ["timestamp,TimeUS,I,GyrX,GyrY,GyrZ,AccX,AccY,AccZ,T"]
+    for k in range(N):
+        for which in (0, 1):
+            stamp = f"{1.7e9 + T[k]:.6f},{int(1e6 * T[k]) + 55_000_000 + 40 * which},{which}"
+            rows.append(line(stamp, *many(RATE[k] + which, 8), *many(FORCE[k] - which), "41.2"))
+    imu = sd.read_imu(written(tmp_path, "imu.csv", rows))
+    check(imu)
+    finding = next(f for f in imu.findings if f.code == "io.rows-of-several-sensors")
+    assert (finding.severity, finding.data["name"], finding.data["first"]) == ("warning", "I", "0")
+
+
+@pytest.mark.parametrize("numbers", [np.zeros(N, int), np.arange(N), np.arange(N) // 500])
+def test_a_number_that_rarely_changes_tells_no_sensors_apart(tmp_path, numbers):
+    rows = ["time_s,id,gx_dps,gy_dps,gz_dps,ax_g,ay_g,az_g"]
+    for k in range(N):
+        values = many(RATE[k] * DEG) + many(FORCE[k] / STANDARD_GRAVITY)
+        rows.append(line(f"{T[k]:.2f}", int(numbers[k]), *values))
+    imu = sd.read_imu(written(tmp_path, "log.csv", rows))
+    check(imu)
+    assert "io.rows-of-several-sensors" not in {f.code for f in imu.findings}
+
+
+def three(name, values, unit):
+    return f"{name} X: {values[0]:.4f}, Y: {values[1]:.4f}, Z: {values[2]:.4f} {unit}"
+
+
+def test_a_sample_in_several_lines(tmp_path):
+    """The serial output of Adafruit's examples: a line a sensor, and a blank line."""
+    rows = []
+    for k in range(N):
+        rows += [three("Acceleration", FORCE[k], "m/s^2"), three("Rotation", RATE[k], "rad/s")]
+        rows += ["Temperature: 25.31 degC", ""]
+    path = written(tmp_path, "monitor.txt", rows, "\r\n")
+    check(sd.read_imu(path, rate_hz=100.0))
+    # Without a line a sample is not whole: it is left out, and no other is mixed with it.
+    del rows[4 * 700 + 1]
+    imu = sd.read_imu(written(tmp_path, "monitor.txt", rows, "\r\n"), rate_hz=100.0)
+    check(imu, np.delete(RATE, 700, axis=0), np.delete(FORCE, 700, axis=0))
+
+
+def test_sentences_whose_fields_are_known(tmp_path):
+    rows = []
+    for k in range(N):
+        values = [*many((0.2, -0.03, 0.4), 4), *many(FORCE[k], 3), *many(RATE[k], 6)]
+        text = line("VNIMU", *values, "+20.7", "+084.322")
+        check_sum = 0
+        for letter in text:
+            check_sum ^= ord(letter)
+        rows.append(f"${text}*{check_sum:02X}")
+    imu = sd.read_imu(written(tmp_path, "vn.txt", rows, "\r\n"), rate_hz=100.0)
+    check(imu)
+    np.testing.assert_allclose(imu["mag_x"], 20.0)  # gauss
+
+
+def test_blank_lines_between_recordings_are_warned_of(tmp_path):
+    rows = ["aX,aY,aZ,gX,gY,gZ"]
+    for k in range(N):
+        rows += [""] if k and k % 119 == 0 else []
+        rows.append(line(*many(FORCE[k] / STANDARD_GRAVITY, 4), *many(RATE[k] * DEG, 3)))
+    units = {"gyro": "deg/s", "accel": "g"}
+    path = written(tmp_path, "punch.csv", rows)
+    findings = {f.code: f for f in sd.read_imu(path, rate_hz=100.0, units=units).findings}
+    assert findings["io.rows-in-blocks"].data["count"] == 13
+    assert findings["io.rows-in-blocks"].severity == "warning"
+    path = written(tmp_path, "punch.csv", [row for row in rows if row])
+    codes = {f.code for f in sd.read_imu(path, rate_hz=100.0, units=units).findings}
+    assert "io.rows-in-blocks" not in codes
+
+
+# Columns without names.
+
+
+def test_columns_without_names_by_the_motion():
+    """A quaternion and Euler angles before the rates, as in xsens_imu.csv of KAIST and MulRan."""
+    noise = np.random.default_rng(5).standard_normal((N, 3))
+    others = [np.full(N, 0.5), *TURN.as_quat().T, *TURN.as_euler("xyz").T]
+    table = [1.56e18 + 1e7 * np.arange(N), *others[1:], *RATE.T, *FORCE.T, *noise.T]
+    assert rates_and_force([np.asarray(c) for c in table]) == (8, 11)
+    # Rates of another body explain nothing.
+    table[8:11] = list(np.roll(RATE, 500, axis=0).T)
+    assert rates_and_force([np.asarray(c) for c in table]) is None
+
+
+def test_an_order_that_nothing_shows_is_not_proposed_as_known(tmp_path):
+    noise = np.random.default_rng(6).standard_normal((200, 8))
+    rows = [line(f"{0.1 * k:.1f}", *many(noise[k])) for k in range(200)]
+    with pytest.raises(DataError, check=coded("io.nameless-columns-open")):
+        sd.read_imu(written(tmp_path, "bare.csv", rows))
+
+
+# Formats with a head of their own.
+
+
+def test_vbo_of_racelogic(tmp_path):
+    """Minutes of an arc, longitude to the west, km/h, UTC of the day, on the date of the head."""
+    top = "File created on 05/03/2024 at 14:00:00\n\n[header]\nsatellites\ntime\nvelocity kmh\n\n"
+    top += "[channel units]\n\n[comments]\n(c) Racelogic\n\n[column names]\n"
+    top += "sats time lat long velocity heading height\n\n[data]"
+    rows = top.split("\n")
+    for k in range(60):
+        at = DAY.replace(hour=23, minute=59, second=50) + timedelta(seconds=k / 2)
+        sats = 0 if k == 3 else 73  # 9, and 64 for a differential fix
+        place = f"{60 * LAT[k]:+012.6f} {-60 * LON[k]:+012.6f}"
+        stamp = f"{at:%H%M%S}.{at.microsecond // 10000:02d}"
+        rows.append(f"{sats:03d} {stamp} {place} 036.000 090.00 +00160.00")
+    path = written(tmp_path, "lap.vbo", rows, "\r\n")
+    assert reader_of(path)[0] == "vbo"
+    with pytest.raises(DataError, check=coded("io.height-level-not-stated")):
+        sd.read_gnss(path, position_sd_m=1.0)
+    fixes = sd.read_gnss(path, position_sd_m=1.0, velocity_sd_m_per_s=0.1, datum_height_m=0.0)
+    keep = np.arange(60) != 3
+    np.testing.assert_allclose(fixes["lat"], LAT[keep], atol=2e-8)
+    np.testing.assert_allclose(fixes["lon"], LON[keep], atol=2e-8)
+    np.testing.assert_allclose(fixes[["VN", "VE"]], np.tile([0.0, 10.0], (59, 1)), atol=1e-9)
+    assert set(fixes["quality"]) == {2.0}
+    # The last row of the day is followed by the next day.
+    since = fixes.index + fixes.attrs["clock_origin"] - DAY.timestamp()
+    np.testing.assert_allclose(since, 12 * 3600 - 10 + np.arange(60)[keep] / 2, atol=1e-6)
+
+
+FLYS = ["$FLYS,1", "$VAR,FIRMWARE_VER,v2023.09.22"]
+
+
+def test_sensors_of_flysight(tmp_path):
+    rows = [*FLYS, "$COL,BARO,time,pressure,temperature", "$UNIT,BARO,s,Pa,deg C"]
+    rows += ["$COL,IMU,time,wx,wy,wz,ax,ay,az,temperature"]
+    rows += ["$UNIT,IMU,s,deg/s,deg/s,deg/s,g,g,g,deg C"]
+    rows += ["$COL,TIME,time,tow,week", "$UNIT,TIME,s,s,", "$DATA"]
+    for k in range(N):
+        rows += [f"$BARO,{150 + T[k]:.3f},76997.26,31.04"] if k % 10 == 0 else []
+        rows += [f"$TIME,{150 + T[k]:.3f},{1000 + T[k]:.3f},2304"] if k % 100 == 0 else []
+        values = many(RATE[k] * DEG, 4) + many(FORCE[k] / STANDARD_GRAVITY)
+        rows.append(line("$IMU", f"{150 + T[k]:.3f}", *values, "30.64"))
+    path = written(tmp_path, "SENSOR.CSV", rows)
+    assert reader_of(path)[0] == "flysight"
+    # Week 2304 began on 2024-03-03; GPS is 18 s ahead of UTC.
+    begin = datetime(2024, 3, 3, tzinfo=UTC).timestamp() + 1000 - 18
+    check(sd.read_imu(path), start=begin)
+
+
+def test_fixes_of_flysight(tmp_path):
+    rows = [*FLYS, "$COL,GNSS,time,lat,lon,hMSL,velN,velE,velD,hAcc,vAcc,sAcc,numSV"]
+    rows += ["$UNIT,GNSS,,deg,deg,m,m/s,m/s,m/s,m,m,m/s,", "$DATA"]
+    for k in range(60):
+        at = DAY + timedelta(seconds=k / 5)
+        stamp = f"{at:%Y-%m-%dT%H:%M:%S}.{at.microsecond // 1000:03d}Z"
+        place = [f"{LAT[k]:.7f}", f"{LON[k]:.7f}", "160.0"]
+        rows.append(line("$GNSS", stamp, *place, "0.1", "0.2", "0.3", "1.5", "2.0", "0.4", "9"))
+    path = written(tmp_path, "TRACK.CSV", rows)
+    with pytest.raises(DataError, check=coded("io.height-over-sea-column")):
+        sd.read_gnss(path)
+    fixes = sd.read_gnss(path, datum_height_m=0.0)
+    np.testing.assert_allclose(fixes["lat"], LAT, atol=1e-7)
+    np.testing.assert_allclose(fixes[["VN", "VE", "VD"]], np.tile([0.1, 0.2, 0.3], (60, 1)))
+    # The accuracy of the speed is that of each part; it was not used, and the velocity neither.
+    np.testing.assert_allclose(fixes[["VN_sd", "VE_sd", "VD_sd"]], 0.4)
+    assert fixes.index[0] + fixes.attrs["clock_origin"] == DAY.timestamp()
+
+
+@pytest.mark.parametrize("ending", ["gcsv", "csv"])
+def test_counts_of_gyroflow(tmp_path, ending):
+    rows = ["GYROFLOW IMU LOG", "version,1.3", "orientation,YxZ", "tscale,0.001"]
+    gyro, accel = 0.00122173047, 0.00048828125
+    rows += [f"gscale,{gyro}", f"ascale,{accel}", "t,gx,gy,gz,ax,ay,az"]
+    rates = np.round(RATE / gyro).astype(int)
+    forces = np.round(FORCE / STANDARD_GRAVITY / accel).astype(int)
+    rows += [line(10 * k, *rates[k], *forces[k]) for k in range(N)]
+    path = written(tmp_path, f"clip.{ending}", rows)
+    assert reader_of(path)[0] == "gyroflow"
+    check(sd.read_imu(path), rates * gyro, forces * accel * STANDARD_GRAVITY, digits=1e-9)
+
+
+def test_json_with_names_apart_from_values(tmp_path):
+    names = [{"name": f"acc{a}", "units": "m/s2"} for a in "XYZ"]
+    names += [{"name": f"gyr{a}", "units": "dps"} for a in "XYZ"]
+    values = np.column_stack([FORCE, RATE * DEG]).tolist()
+    payload = {"device_type": "NANO33BLE", "interval_ms": 10, "sensors": names, "values": values}
+    path = tmp_path / "wave.json"
+    path.write_text(json.dumps({"protected": {"ver": "v1"}, "signature": "0", "payload": payload}))
+    check(sd.read_imu(path), digits=1e-9)
+    payload["values"] = [row[:5] for row in values]
+    path.write_text(json.dumps({"payload": payload}))
+    with pytest.raises(DataError, check=coded("io.not-list-records")):
+        sd.read_imu(path)
+
+
+def crc(text):
+    """CRC of 32 bits of NovAtel, by its printed example: c3194e35."""
+    return f"{zlib.crc32(text.encode(), 0xFFFFFFFF) ^ 0xFFFFFFFF:08x}"
+
+
+BESTPOSA = (
+    "BESTPOSA,COM1,0,83.5,FINESTEERING,2163,329760.000,02400000,b1f6,65535;SOL_COMPUTED,SINGLE,"
+    '51.15043874397,-114.03066788586,1097.6822,-17.0000,WGS84,1.3648,1.1806,3.1112,"",0.000,0.000,'
+    "18,18,18,0,00,02,11,01"
+)
+
+
+def test_fixes_of_novatel_as_text(tmp_path):
+    assert crc(BESTPOSA) == "c3194e35"
+    lines = []
+    for k in range(10):
+        text = BESTPOSA.replace("329760.000", f"{329760 + k}.000")
+        lines.append(f"#{text}*{crc(text)}")
+        text = f"BESTVELA,COM1,0,0,FINE,2163,{329760 + k}.000,0,0,0;SOL_COMPUTED,"
+        text += "DOPPLER_VELOCITY,0.000,0.000,2.0,90.0,0.5,0.0"
+        lines.append(f"#{text}*{crc(text)}")
+    lines[4] = lines[4].replace("51.15", "61.15")  # a damaged line
+    path = written(tmp_path, "rover.gps", lines, "\r\n")
+    assert reader_of(path)[0] == "novatel"
+    fixes = sd.read_gnss(path, velocity_sd_m_per_s=0.1)
+    assert len(fixes) == 9
+    first = fixes.iloc[0]
+    assert (first["lat"], first["lon"]) == (51.15043874397, -114.03066788586)
+    assert first["alt"] == pytest.approx(1080.6822, abs=1e-4)  # undulation is added
+    np.testing.assert_allclose(first[["VN", "VE", "VD"]].to_numpy(float), [0, 2, -0.5], atol=1e-9)
+    assert (first["north_sd"], fixes.attrs["gps_week"]) == (pytest.approx(1.3648, abs=1e-6), 2163)
+
+
+def test_counts_of_novatel_as_text(tmp_path):
+    angle, speed = SCALES[11]
+    lines = []
+    for k in range(N):
+        f, w = FORCE[k] * STEP / speed, RATE[k] * STEP / angle
+        counts = np.round([f[2], -f[1], f[0], w[2], -w[1], w[0]]).astype(int)
+        text = f"RAWIMUSXA,2163,{329760 + T[k]:.3f};00,11,2163,{329760 + T[k]:.9f},00801503,"
+        text += line(*counts)
+        lines.append(f"%{text}*{crc(text)}")
+    check(sd.read_imu(written(tmp_path, "rover.asc", lines, "\r\n")))
+
+
+def test_an_export_of_inertial_explorer_without_its_preamble(tmp_path):
+    """UrbanNav: names, units of degrees, minutes and seconds; the quality has no unit."""
+    names = "UTCTime Week GPSTime Latitude Longitude H-Ell VelBdyX VelBdyY VelBdyZ Roll Pitch"
+    units = "(sec) (weeks) (sec) (+/-D M S) (+/-D M S) (m) (m/s) (m/s) (m/s) (deg) (deg) (deg)"
+    rows = [f"{names} Heading Q", units]
+    rows += [f"{k}.0 2158 {95575 + k}.0 22 18 04.5 114 10 44.1 3.0 0 5 0 0 0 90 1" for k in (0, 1)]
+    table = sd.read_trajectory(written(tmp_path, "truth.txt", rows))
+    np.testing.assert_allclose(table["lat"], 22 + 18 / 60 + 4.5 / 3600, atol=1e-12)
+    np.testing.assert_allclose(table[["VN", "VE"]], [[0.0, 5.0]] * 2, atol=1e-9)
+
+
+def test_solutions_of_emlid_have_another_ending(tmp_path):
+    rows = [
+        f"2024/03/05 12:00:{k:02d}.000   {LAT[k]:.9f}   {LON[k]:.9f}   160.0000   1  12   0.0100"
+        "   0.0100   0.0200   0.0000   0.0000   0.0000   0.00    0.0"
+        for k in range(30)
+    ]
+    fixes = sd.read_gnss(written(tmp_path, "solution.LLH", rows))
+    np.testing.assert_allclose(fixes["lat"], LAT[:30], atol=1e-9)
+    assert set(fixes["quality"]) == {4.0}
+
+
+# Fixes by names.
+
+
+def test_one_quantity_in_two_units(tmp_path):
+    """Harry's LapTimer: SPEED_KPH and SPEED_MPH, HEIGHT_M and HEIGHT_FT, a date in letters."""
+    head = "INDEX,DATE,TIME,LATITUDE,LONGITUDE,SPEED_KPH,SPEED_MPH,HEIGHT_M,HEIGHT_FT,BEARING"
+    rows = [head]
+    for k in range(30):
+        stamp = f"05-Mar-24,12:00:{k // 5:02d}.{20 * (k % 5):02d}"
+        place = f"{LAT[k]:.7f},{LON[k]:.7f}"
+        rows.append(line(k, stamp, place, "36.00", "22.37", "160.0", "524.9", "90.0"))
+    path = written(tmp_path, "laps.csv", rows)
+    fixes = sd.read_gnss(path, position_sd_m=1.0, velocity_sd_m_per_s=0.1)
+    assert fixes["alt"].iloc[0] == 160.0
+    np.testing.assert_allclose(fixes["VE"], 10.0)
+    assert fixes.index[0] + fixes.attrs["clock_origin"] == DAY.timestamp()
+
+
+def test_two_columns_of_one_quantity_in_one_unit_are_asked(tmp_path):
+    rows = ["time_s,lat,lon,alt,height"]
+    rows += [line(k, LAT[k], LON[k], 160.0, 175.0) for k in range(30)]
+    with pytest.raises(DataError, check=coded("io.column-names-ambiguous")):
+        sd.read_gnss(written(tmp_path, "track.csv", rows), position_sd_m=1.0)
+
+
+def test_of_two_clocks_the_one_that_is_a_stamp(tmp_path):
+    """Torque: a GPS time with the letters of a local zone, and the time of the device."""
+    rows = ["GPS Time, Device Time, Longitude, Latitude, Altitude"]
+    for k in range(30):
+        at = DAY + timedelta(seconds=k)
+        zone = f"{at:%a %b %d %H:%M:%S} EDT {at.year}"
+        rows.append(line(zone, f"{at:%d-%b-%Y %H:%M:%S}.000", LON[k], LAT[k], "160.0"))
+    fixes = sd.read_gnss(written(tmp_path, "trackLog.csv", rows), position_sd_m=5.0)
+    assert fixes.index[0] + fixes.attrs["clock_origin"] == DAY.timestamp()
+
+
+def test_microseconds_since_1970_of_fast_fixes(tmp_path):
+    """ins.csv of Oxford RobotCar: steps of 20 ms, whose ticks would be 20 s as milliseconds."""
+    rows = ["timestamp,latitude,longitude,altitude"]
+    begin = int(DAY.timestamp() * 1e6)
+    rows += [line(begin + 20_000 * k, LAT[k], LON[k], "160.0") for k in range(60)]
+    fixes = sd.read_gnss(written(tmp_path, "ins.csv", rows), position_sd_m=1.0)
+    np.testing.assert_allclose(np.diff(fixes.index), 0.02, atol=1e-6)
+
+
+# What is said.
+
+
+def test_one_fix_does_not_suffice(tmp_path, run_cli):
+    rows = ["time_s,gx_dps,gy_dps,gz_dps,ax_g,ay_g,az_g,lat,lon,alt"]
+    for k in range(N):
+        values = many(RATE[k] * DEG) + many(FORCE[k] / STANDARD_GRAVITY)
+        rows.append(line(f"{T[k]:.2f}", *values, "55.75", "37.62", "160.0"))
+    path = written(tmp_path, "log.csv", rows)
+    diagnosis = sd.doctor(path)
+    fit = diagnosis.logs[0].fit["navigation"]
+    assert [(f.code, f.severity, f.data["count"]) for f in fit] == [
+        ("doctor.too-few-fixes", "error", 1)
+    ]
+
+
+def test_a_track_is_no_crash_record(tmp_path):
+    rows = ["time_s,lat,lon,alt,velN,velE,velD"]
+    rows += [line(k, LAT[k], LON[k], 160.0, 0.1, 0.2, 0.0) for k in range(60)]
+    diagnosis = sd.doctor(written(tmp_path, "track.csv", rows))
+    assert diagnosis.logs[0].answer("crash") == "no"
+
+
+def test_what_a_refusal_names_is_an_argument_of_read(tmp_path):
+    rows = ["t,ax,ay,az,gx,gy,gz"]
+    rows += [
+        line(f"{T[k]:.2f}", 0.01, 0.02, 1.0, *many(RATE[0] * DEG + 0.1 * (k % 3), 2))
+        for k in range(N)
+    ]
+    path = written(tmp_path, "log.csv", rows)
+    with pytest.raises(DataError):
+        sd.read(path)
+    imu = sd.read(path, units={"gyro": "deg/s", "accel": "g"})["imu"]
+    assert isinstance(imu, pd.DataFrame) and len(imu) == N
