@@ -75,11 +75,13 @@ def calibrate_by_poses(
     Gustafsson and Luinge, FUSION 2012; Li, Li, IEEE Trans. Instrum. Meas. 61, 2012). The field of a
     pose differs from that of all by a random vector (people, cars and the place of the sensor
     change it), which both numbers share; more samples of a rest do not reduce it. Its standard
-    deviation has a uniform prior (Gelman, Bayesian Analysis 1, 2006) and is summed over: few poses
-    make the bounds wider, as Student's distribution does. Of a motion between rests counts what
-    differs from a straight line in the strength, as its ends have the errors of their places, too;
-    beyond that its field walks at random, by as much as its readings show. Maximum posterior about
-    the nearest of the 24 ways in which axes are swapped, by Gauss-Newton steps.
+    deviation s has the prior 1/√s, between Jeffreys's and a uniform one (Gelman, Bayesian Analysis
+    1, 2006), with which bounds of simulated sensors are neither too wide nor too narrow, and is
+    summed over: few poses make the bounds wider, as Student's distribution does. Of a motion
+    between rests counts what differs from a straight line in the strength, as its ends have the
+    errors of their places, too; beyond that its field walks at random, by as much as its readings
+    show. Maximum posterior about the nearest of the 24 ways in which axes are swapped, by
+    Gauss-Newton steps.
     """
     start = calibrate_magnetometer(mag)
     if len(rests) < LEAST_RESTS:
@@ -269,8 +271,8 @@ def _part(left: Array, J: Array, K: Array, known: Array) -> Part:
     whitened = whitened.reshape(len(SCATTERS), -1, UNKNOWNS + 1)
     H, r = whitened[:, :, :-1], whitened[:, :, -1]
     chance = -len(left) * np.log(np.diagonal(V, axis1=1, axis2=2)).sum(axis=1)
-    # The prior of the scatter is uniform, and the grid in logarithms.
-    chance += np.log(SCATTERS) - 0.5 * np.square(r).sum(axis=1)
+    # The prior of the scatter, one over its root, on a grid in logarithms.
+    chance += 0.5 * np.log(SCATTERS) - 0.5 * np.square(r).sum(axis=1)
     transposed = H.transpose(0, 2, 1)
     return transposed @ H, (transposed @ r[:, :, None])[:, :, 0], chance
 
