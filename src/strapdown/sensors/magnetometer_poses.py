@@ -285,7 +285,8 @@ def _posterior(information: Array, right: Array, chance: Array) -> Part:
     C = np.linalg.inv(information)
     steps = -np.einsum("kij,kj->ki", C, right)
     chance = chance - 0.5 * np.linalg.slogdet(information)[1]
-    return C, steps, chance - 0.5 * np.einsum("ki,ki->k", right, steps)
+    fit = np.einsum("ki,ki->k", right, steps)
+    return np.asarray(C), np.asarray(steps), np.asarray(chance - 0.5 * fit)
 
 
 def _orders() -> list[Array]:

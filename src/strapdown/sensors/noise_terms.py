@@ -73,7 +73,7 @@ class Level:
         return np.asarray(self.basis.T @ whole @ self.basis)
 
     @property
-    def halves(self) -> list[Array]:
+    def halves(self) -> list[NDArray[np.intp]]:
         """Columns of the basis that are alike from either end, and those of opposite sign.
 
         A stationary process does not correlate them: its covariance is the same from either end.
@@ -180,7 +180,7 @@ class _Record:
         # Parts that are not correlated, each by its level and columns; those of nearly one size
         # are one stack of matrices, filled up with ones on the diagonal.
         parts = [(k, half) for k, one in enumerate(levels) for half in one.halves]
-        self._alike: list[list[tuple[int, Array]]] = []
+        self._alike: list[list[tuple[int, NDArray[np.intp]]]] = []
         for part in sorted(parts, key=lambda one: one[1].size):
             if not self._alike or part[1].size > self._alike[-1][0][1].size + FILLED:
                 self._alike.append([])
@@ -456,8 +456,8 @@ def _models(record: _Record, dt: float, span: float, whole: bool) -> list[_Fit]:
     names: tuple[str, ...]
     for names in (("N", "B"), ("N", "K"), ("N", "B", "K")):
         known = [f for f in fits if set(f.names) < set(names)]
-        near = max(known, key=lambda f: f.value)
-        begin = [near.variance(x) if x in near.names else 0.1 * start[x] for x in names]
+        best = max(known, key=lambda f: f.value)
+        begin = [best.variance(x) if x in best.names else 0.1 * start[x] for x in names]
         fits.append(record.fit(names, np.maximum(begin, 1e-12 * n)))
     richest = fits[-1]
     with_q = record.fit(("Q", *richest.names), np.array([0.1 * start["Q"], *richest.variances]))
@@ -474,12 +474,12 @@ def _models(record: _Record, dt: float, span: float, whole: bool) -> list[_Fit]:
             break
         grid = list(np.geomspace(low, high, 9))
         every = (*own, *names)
-        first = np.array([base.variance(x) if x in base.names else 0.3 * start[x] for x in every])
-        begin, tried = first, []
+        guess = [base.variance(x) if x in base.names else 0.3 * start[x] for x in every]
+        near, tried = np.array(guess), list[_Fit]()
         for time in grid:
             # Each begins at the one before, but not at a variance so small that no slope leads on.
-            tried.append(record.fit(every, begin, time))
-            begin = np.maximum(tried[-1].variances, 0.03 * first)
+            tried.append(record.fit(every, near, time))
+            near = np.maximum(tried[-1].variances, 0.03 * np.array(guess))
         fits += _refined(record, tried)
     return fits
 
