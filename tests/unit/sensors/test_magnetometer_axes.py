@@ -177,9 +177,11 @@ def test_bounds_of_two_hundred_magnetometers(kind):
     """Of each number the 99 % interval of the coverage (Clopper and Pearson) reaches 95 %.
 
     Where the fields of poses are as they are modeled (``pose``) it contains 95 % for hard iron and
-    axes; bounds of soft iron are somewhat wide (97.8 % of 1000). A field that
-    jumps in the middle of each motion (``step``) is not: of hard and soft iron 87 to 92 %.
+    axes; bounds of soft iron are somewhat wide (97.8 % of 1000). Fields that change along one axis
+    alone, within poses as much as between them, or by a jump in the middle of each motion, are not
+    as modeled: there 90 %, which the manual says; of the jump for the axes alone.
     """
+    least = 0.9 if kind in ("north", "walk", "step") else 0.95
     inside, sds = [], []
     for seed in range(20_000, 20_200):
         error, found = aligned(seed, count=10 + seed % 7, kind=kind)
@@ -189,7 +191,7 @@ def test_bounds_of_two_hundred_magnetometers(kind):
     counts = np.sum(inside, axis=0).tolist()
     for k, count in enumerate(counts):
         if kind != "step" or k >= 8:
-            assert beta.ppf(0.995, count + 1, 200 - count) >= 0.95, (kind, k, count)
+            assert beta.ppf(0.995, count + 1, 200 - count) >= least, (kind, k, count)
         if kind == "pose" and not 3 <= k < 8:
             assert beta.ppf(0.005, count, 201 - count) <= 0.95, (k, count)
 
