@@ -195,12 +195,17 @@ def test_a_log_that_moved_is_cut_or_refused(run):
     assert {"allan.moved", "allan.short"} <= {f.code for f in cut.findings}
     with pytest.raises(DataError) as refused:
         sd.allan(samples(40.0))
-    assert refused.value.finding.code == "allan.not-at-rest"
+    assert refused.value.finding.code == "allan.too-short-to-rest"
     with pytest.raises(ConfigError):
         sd.allan((time, gyro, accel), rate_hz=100.0)
     short = samples(40.0)[:2]
     with pytest.raises(DataError) as refused:
         sd.allan(short)
+    assert refused.value.finding.code == "allan.too-short-to-rest"
+    moving = samples(90.0)
+    moving[1][:] += 0.5 * np.sin(moving[0])[:, None]
+    with pytest.raises(DataError) as refused:
+        sd.allan(moving)
     assert refused.value.finding.code == "allan.not-at-rest"
     only = sd.allan(short, at_rest=True)
     assert only.end == pytest.approx(40.0)

@@ -153,6 +153,13 @@ def calibrate_json(result: CalibrateRun) -> dict[str, Any]:
 # The answer, which page and terminal share.
 
 
+#: Biases across the vertical make the force larger in the mean, whatever their sign.
+FEW_POSES = (
+    "The calibrated force is farther from gravity: these poses do not show the biases across the "
+    "vertical, and what these add to its strength in the mean is allowed for. Record more poses."
+)
+
+
 def headline(result: CalibrateRun) -> str:
     """Say what was used, and how much of the sensor it determines."""
     found = result.calibration
@@ -160,8 +167,10 @@ def headline(result: CalibrateRun) -> str:
         return f"{result.name}: no rest and no known rotation; the magnetometer is calibrated."
     count = int((~found.rests["held"]).sum()) if len(found.rests) else 0
     seen = int(found.observed.sum())
+    rests = "1 rest" if count == 1 else f"{count} rests"
+    turns = "1 known rotation" if len(found.turns) == 1 else f"{len(found.turns)} known rotations"
     return (
-        f"{result.name}: {count} rests and {len(found.turns)} known rotations ({result.procedure}) "
+        f"{result.name}: {rests} and {turns} ({result.procedure}) "
         f"determine {seen} of {len(found.names)} errors."
     )
 
@@ -180,12 +189,16 @@ def parameter_table(result: CalibrateRun) -> TableBlock | None:
         cells = []
         for name in names:
             k = by_name[name]
-            half = 1.96 * factor * float(sd[k])
-            digits = max(0, 1 - math.floor(math.log10(half))) if half > 0.0 else 3
-            text = f"{factor * float(found.values[k]):.{digits}f} ± {half:.{digits}f}"
-            cells.append(text.replace("-", "−") + ("" if observed[k] else " ?"))
+            text = _bounded(factor * float(found.values[k]), 1.96 * factor * float(sd[k]))
+            cells.append(text + ("" if observed[k] else " ?"))
         rows.append((title, unit, *cells))
     return TableBlock(("Error", "unit", *XYZ), tuple(rows), text=(0, 1), caption=CAPTION)
+
+
+def _bounded(value: float, half: float) -> str:
+    """Value and bound, with two digits of the bound."""
+    digits = max(0, 1 - math.floor(math.log10(half))) if half > 0.0 else 3
+    return f"{value:.{digits}f} ± {half:.{digits}f}".replace("-", "−")
 
 
 def effect_table(result: CalibrateRun) -> TableBlock | None:
@@ -204,7 +217,10 @@ def effect_table(result: CalibrateRun) -> TableBlock | None:
             values = [factor * math.sqrt(float(np.mean(v**2))) for v in (before, after)]
             rows.append((title, unit, *(f"{v:.3g}" for v in values)))
     columns = ("Root mean square", "unit", "before", "after")
-    return TableBlock(columns, tuple(rows), text=(0, 1)) if rows else None
+    force = still["force_error"].to_numpy(np.float64), still["force_left"].to_numpy(np.float64)
+    worse = float(np.square(force[1]).sum()) > float(np.square(force[0]).sum())
+    caption = FEW_POSES if worse else ""
+    return TableBlock(columns, tuple(rows), text=(0, 1), caption=caption) if rows else None
 
 
 def turn_table(result: CalibrateRun) -> TableBlock | None:
@@ -234,7 +250,7 @@ def field_table(result: CalibrateRun) -> TableBlock | None:
     if mag is None:
         return None
     iron = [
-        f"{100.0 * v / mag.field:.2g} ± {196.0 * s / mag.field:.1g}".replace("-", "−")
+        _bounded(100.0 * v / mag.field, 100.0 * TWO_SIDED_95 * s / mag.field)
         for v, s in zip(mag.hard_iron, mag.hard_iron_sd, strict=True)
     ]
     caption = (

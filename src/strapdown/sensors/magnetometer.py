@@ -1,4 +1,4 @@
-"""Hard and soft iron of a magnetometer that turned, and its axes against accelerometers."""
+"""Hard and soft iron of a magnetometer that turned."""
 
 from __future__ import annotations
 
@@ -9,8 +9,6 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from strapdown import rotation
-from strapdown.constants import TWO_SIDED_95
 from strapdown.dsp.chi_square import chi_square_exceeded
 from strapdown.errors import DataError, Finding
 from strapdown.tables import ACCEL, MAG
@@ -28,12 +26,6 @@ SOFT_LEFT = 0.02
 HUBER = 1.5
 #: Scatter that a fit begins with, as a share of the field; its rounds, and steps in each.
 FIRST_SCATTER, ROUNDS, STEPS = 0.02, 4, 15
-#: Rotation of a magnetometer in its case before rests show it, rad; fewest rests that do; steps.
-ROTATION_PRIOR, LEAST_RESTS, ROTATION_STEPS = 0.05, 5, 25
-#: Terms of field and iron.
-IRON_TERMS = 9
-#: By how much another order of the axes must fit the dip better, in squares.
-SWAPPED = 10.0
 #: Least scatter, as a share of the field: finer than any magnetometer.
 FINEST = 1e-4
 #: Chance at which readings of a perfect magnetometer are called wrong: beyond three sigma.
@@ -54,6 +46,7 @@ OPEN = 3.0
 MISFIT, FITS = 1.0, 0.05
 #: Terms of the model: hard iron, field, soft iron.
 OFFSET, FIELD, SOFT = slice(0, 3), 3, slice(4, 9)
+IRON = np.r_[0:3, 4:9]
 #: Symmetric matrices without a trace: a change of shape that leaves the size.
 SHAPES = np.array(
     [
@@ -97,8 +90,6 @@ class MagnetometerCalibration:
         Its standard deviations about the axes of the accelerometers; infinite where not shown.
     covariance : ndarray, (8, 8)
         Of hard iron, and of soft iron along `SHAPES`.
-    independent : float
-        Independent readings as which all count.
     """
 
     hard_iron: Array
@@ -113,7 +104,6 @@ class MagnetometerCalibration:
     rotation: Array = attribute(default_factory=lambda: np.eye(3), repr=False)
     rotation_sd: Array = attribute(default_factory=lambda: np.full(3, np.inf), repr=False)
     covariance: Array = attribute(default_factory=lambda: np.zeros((8, 8)), repr=False)
-    independent: float = attribute(default=1.0, repr=False)
 
     @property
     def significant(self) -> bool:
@@ -152,7 +142,7 @@ def calibrate_magnetometer(mag: ArrayLike) -> MagnetometerCalibration:
     Maximum posterior by Gauss-Newton steps, with the weights of Huber. Readings at one place have
     correlated residuals, as the field differs from place to place: their information is divided by
     the integrated correlation time, in rows (Priestley, Spectral Analysis and Time Series, 5.3.2).
-    A rotation of the magnetometer leaves every strength as it is: `aligned_to_rests` finds it.
+    A rotation of the magnetometer leaves every strength as it is: `calibrate_by_poses` finds it.
     """
     rows = _readings(as_array(mag, 3, "mag"))
     if len(rows) < LEAST:
@@ -184,11 +174,14 @@ def calibrate_magnetometer(mag: ArrayLike) -> MagnetometerCalibration:
         hard_iron_sd=size * np.sqrt(np.maximum(np.diag(by.covariance)[OFFSET], 0.0)),
         residual=best.scatter / float(best.x[FIELD]),
         raw_residual=raw.scatter / float(raw.x[FIELD]),
-        direction_sd_deg=_direction_sd(by),
-        change_deg=_between(m, (m - best.x[OFFSET]) @ A),
+        direction_sd_deg=direction_sd(
+            np.eye(3) + np.tensordot(by.x[SOFT], SHAPES, 1),
+            float(by.x[FIELD]),
+            by.covariance[np.ix_(IRON, IRON)],
+        ),
+        change_deg=change_of_direction(m, (m - best.x[OFFSET]) @ A),
         found=bool(gained > chi_square_exceeded(CHANCE, terms)),
         covariance=_of_iron(by.covariance, size),
-        independent=len(m) / by.correlated,
     )
 
 
@@ -200,114 +193,6 @@ def _of_iron(covariance: Array, size: float) -> Array:
     if not out[3:, 3:].any():
         out[3:, 3:] = SOFT_LEFT**2 * np.eye(5)
     return np.asarray(out)
-
-
-def aligned_to_rests(
-    found: MagnetometerCalibration,
-    readings: Array,
-    share: Array,
-    up: Array,
-    up_covariance: Array,
-) -> MagnetometerCalibration:
-    """Find the rotation of a magnetometer against the accelerometers from rests in many poses.
-
-    Parameters
-    ----------
-    found : MagnetometerCalibration
-        Its hard and soft iron.
-    readings : ndarray, (n, 3)
-        Mean of each rest, as read.
-    share : ndarray, (n,)
-        Of each rest in the readings that showed the iron.
-    up : ndarray, (n, 3)
-        Unit vector up of each rest, axes of the accelerometers.
-    up_covariance : ndarray, (3n, 3n)
-        Of the vectors up of all rests together: errors of accelerometers are alike in all.
-
-    Returns
-    -------
-    MagnetometerCalibration
-        With rotation and its standard deviations; as given, with less than five rests.
-
-    Notes
-    -----
-    The field keeps its dip: its product with the vertical is the same in all poses, whatever their
-    heading (dot product invariance: Kok, Hol, Schön, Gustafsson and Luinge, FUSION 2012; Li, Li,
-    IEEE Trans. Instrum. Meas. 61, 2012). Maximum posterior about the nearest of the 24 ways in
-    which axes are swapped, generalised least squares with what iron and vertical leave open; the
-    scatter beyond is estimated, and the standard deviations are widened to Student's quantile.
-    A magnetometer all of whose axes have the wrong sign looks right: the dip has the other sign.
-    """
-    n = len(readings)
-    if n < LEAST_RESTS:
-        return found
-    v = replace(found, rotation=np.eye(3)).apply(readings) / found.field
-    # A place that is disturbed is so over a whole rest: by the strengths of the rests iron is known
-    # less well than by readings whose correlation was seen within them.
-    off = np.square(np.linalg.norm(v, axis=1) - 1.0) / found.residual**2
-    lost = n / max(n - IRON_TERMS * float(share.sum()), 1.0)
-    wider = max(1.0, lost * float(np.mean(off * share)) * found.independent)
-    found = replace(found, covariance=wider * found.covariance)
-    fits = [_rotation_fit(found, readings, v, up, up_covariance, R) for R in _swaps()]
-    # Another order of the axes than the stated one only where that one does not fit.
-    best = min(fits, key=lambda one: one[2])
-    if best[2] * SWAPPED > fits[0][2]:
-        best = fits[0]
-    R, covariance, _ = best
-    from scipy.special import stdtrit
-
-    widened = float(stdtrit(n - 4, 0.975)) / TWO_SIDED_95
-    sd = np.minimum(widened * np.sqrt(np.diag(covariance)), ROTATION_PRIOR)
-    return replace(found, rotation=R, rotation_sd=sd)
-
-
-def _swaps() -> list[Array]:
-    """The 24 right-handed orders and signs of axes, the identity first."""
-    from itertools import permutations, product
-
-    all_ = [
-        np.diag(signs) @ np.eye(3)[list(order)]
-        for order in permutations(range(3))
-        for signs in product((1.0, -1.0), repeat=3)
-    ]
-    return [R for R in all_ if np.linalg.det(R) > 0.0]
-
-
-def _rotation_fit(
-    found: MagnetometerCalibration,
-    m: Array,
-    v: Array,
-    up: Array,
-    up_covariance: Array,
-    begin: Array,
-) -> tuple[Array, Array, float]:
-    """Rotation about one order of the axes, its covariance, and the squared scatter of the dip."""
-    n, R, c, scatter = len(v), begin, 0.0, FINEST**2
-    prior = np.diag([ROTATION_PRIOR**-2] * 3 + [0.0])
-    left, covariance = np.zeros(n), np.eye(4)
-    for _ in range(ROTATION_STEPS):
-        w = v @ R.T
-        by_iron = np.hstack(
-            [
-                -up @ R @ found.soft_iron,
-                np.einsum("ni,ij,kjl,nl->nk", up, R, SHAPES, m - found.hard_iron),
-            ]
-        )
-        known = by_iron @ found.covariance @ by_iron.T / found.field**2
-        known += np.einsum("ni,nimj,mj->nm", w, up_covariance.reshape(n, 3, n, 3), w)
-        V = known + scatter * np.eye(n)
-        J = np.column_stack([np.cross(w, up), -np.ones(n)])
-        left = (up * w).sum(axis=1) - c
-        weighted = np.linalg.solve(V, np.column_stack([J, left]))
-        covariance = np.asarray(np.linalg.inv(J.T @ weighted[:, :4] + prior))
-        off = np.r_[rotation.rotation_vector_from_dcm(R @ begin.T), 0.0]
-        step = covariance @ (J.T @ weighted[:, 4] + prior @ off)
-        R = rotation.dcm_from_rotation_vector(-step[:3]) @ R
-        c -= step[3]
-        # Scatter beyond what is known, from the residuals (Helmert).
-        ratio = float(left @ weighted[:, 4]) / max(n - 4, 1)
-        scatter = min(max(scatter * min(ratio, 4.0), FINEST**2), 1.0)
-    return np.asarray(R), covariance[:3, :3], float(left @ left) + n * FINEST**2
 
 
 def without_iron(
@@ -523,20 +408,20 @@ def _correlation(scores: Array) -> float:
     return float(np.mean(found))
 
 
-def _between(a: Array, b: Array) -> float:
+def change_of_direction(a: Array, b: Array) -> float:
     """Root mean square angle between vectors, deg."""
     sine = np.linalg.norm(np.cross(a, b), axis=1)
     angles = np.arctan2(sine, (a * b).sum(axis=1))
     return float(np.degrees(np.sqrt(np.mean(angles**2))))
 
 
-def _direction_sd(fit: _Fit) -> float:
-    """Root mean square error of the field's direction over all directions, one axis, deg."""
-    F = fit.x[FIELD]
-    A = np.eye(3) + np.tensordot(fit.x[SOFT], SHAPES, 1)
-    of_offset = A @ fit.covariance[OFFSET, OFFSET] @ A.T
-    of_shape = fit.covariance[SOFT, SOFT]
+def direction_sd(soft_iron: Array, field: float, covariance: Array) -> float:
+    """Root mean square error of the field's direction over all directions, one axis, deg.
+
+    `covariance`: of hard iron and soft iron along `SHAPES`, (8, 8).
+    """
+    of_offset = soft_iron @ covariance[:3, :3] @ soft_iron.T
     # Of a random unit vector u, E|S u - (u'S u) u|² = (1/3 - 2/15) |S|² for S without a trace.
-    shape = 0.2 * np.einsum("kl,kij,lij->", of_shape, SHAPES, SHAPES)
-    squared = (2.0 / 3.0) * np.trace(of_offset) / F**2 + shape
+    shape = 0.2 * np.einsum("kl,kij,lij->", covariance[3:, 3:], SHAPES, SHAPES)
+    squared = (2.0 / 3.0) * np.trace(of_offset) / field**2 + shape
     return float(np.degrees(np.sqrt(0.5 * max(squared, 0.0))))

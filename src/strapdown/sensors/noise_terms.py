@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 #: Blocks in a run and in the last level, at most; and shortest run of shapes kept where a sensor's
 #: own filter colors the highest frequencies.
 RUN, TOP, LEAST_RUN = 64, 96, 7
+#: Rows by which matrices of a stack may differ.
+FILLED = 2
 #: Twice the gain in log-likelihood that a further parameter must bring: a chance of 0.1 %.
 DEMANDED = 10.8
 #: Twice the log-likelihood by which a model may be worse and yet not be excluded.
@@ -70,6 +72,20 @@ class Level:
         whole = block_covariance(term, self.count, self.block, correlation)
         return np.asarray(self.basis.T @ whole @ self.basis)
 
+    @property
+    def halves(self) -> list[NDArray[np.intp]]:
+        """Columns of the basis that are alike from either end, and those of opposite sign.
+
+        A stationary process does not correlate them: its covariance is the same from either end.
+        With a temperature that is projected out, all columns together.
+        """
+        mirrored = np.rint((self.basis * self.basis[::-1]).sum(axis=0))
+        sides = [np.flatnonzero(mirrored == side) for side in (1.0, -1.0)]
+        whole = np.arange(self.basis.shape[1])
+        if np.abs(self.basis[::-1] - mirrored * self.basis).max(initial=0.0) > 1e-9:
+            sides = [whole]
+        return [one for one in sides if one.size]
+
     def lowest(self, kept: int) -> Level:
         """The level with its `kept` lowest frequencies alone."""
         basis, moments = self.basis[:, :kept], self.moments[:kept, :kept]
@@ -104,10 +120,28 @@ def levels_of(
         over = run**count
         warm = beside[: means.size * over].reshape(-1, over).mean(axis=1)
         line = np.column_stack([line, warm - warm.mean()])
-    last = np.linalg.svd(line / np.abs(line).max(axis=0))[0][:, line.shape[1] :]
+    last = _complement(line) if beside is not None else _complement_by_sides(line)
     z = last.T @ means
     found.append(Level(block, means.size, last, np.outer(z, z), 1, record))
     return tuple(found), means, line, block
+
+
+def _complement(line: Array) -> Array:
+    """Orthonormal columns across those of `line`."""
+    return np.asarray(np.linalg.svd(line / np.abs(line).max(axis=0))[0][:, line.shape[1] :])
+
+
+def _complement_by_sides(line: Array) -> Array:
+    """Orthonormal columns across mean and ramp, alike from either end or of opposite sign."""
+    n = len(line)
+    unit = np.eye(n)
+    even, odd = unit + unit[::-1], unit - unit[::-1]
+    half = n // 2
+    found = []
+    for columns, one in ((even[:, : n - half], line[:, 0]), (odd[:, :half], line[:, 1])):
+        own = columns / np.linalg.norm(columns, axis=0)
+        found.append(own @ _complement((own.T @ one)[:, None]))
+    return np.hstack(found)
 
 
 def _cosines(count: int) -> Array:
@@ -143,37 +177,55 @@ class _Record:
 
     def __init__(self, levels: tuple[Level, ...]) -> None:
         self.levels = levels
-        # Levels of one size are one stack of matrices.
-        sizes = [len(one.moments) for one in levels]
-        self._alike = [
-            [k for k, size in enumerate(sizes) if size == own] for own in dict.fromkeys(sizes)
-        ]
-        self._moments = [np.array([levels[k].moments for k in group]) for group in self._alike]
-        self._runs = [np.array([float(levels[k].runs) for k in group]) for group in self._alike]
+        # Parts that are not correlated, each by its level and columns; those of nearly one size
+        # are one stack of matrices, filled up with ones on the diagonal.
+        parts = [(k, half) for k, one in enumerate(levels) for half in one.halves]
+        self._alike: list[list[tuple[int, NDArray[np.intp]]]] = []
+        for part in sorted(parts, key=lambda one: one[1].size):
+            if not self._alike or part[1].size > self._alike[-1][0][1].size + FILLED:
+                self._alike.append([])
+            self._alike[-1].append(part)
+        self._moments = self._stacked([one.moments for one in levels])
+        self._unit = self._stacked([np.eye(len(one.moments)) for one in levels])
+        self._fill = [np.eye(len(unit[0])) - unit for unit in self._unit]
+        self._runs = [np.array([float(levels[k].runs) for k, _ in group]) for group in self._alike]
         self._made: dict[tuple[str, float], list[Array]] = {}
+        self._shapes: dict[tuple[str, float], list[Array]] = {}
+
+    def _stacked(self, every: list[Array]) -> list[Array]:
+        out = []
+        for group in self._alike:
+            size = group[-1][1].size
+            stack = np.zeros((len(group), size, size))
+            for one, (k, half) in zip(stack, group, strict=True):
+                one[: half.size, : half.size] = every[k][np.ix_(half, half)]
+            out.append(stack)
+        return out
 
     def covariances(self, term: str, correlation: float) -> list[Array]:
         """Covariances of the coefficients of all levels by a term with coefficient one."""
-        stacks = zip(self._alike, self._stacks(term, correlation), strict=True)
-        found = {k: one for group, stack in stacks for k, one in zip(group, stack, strict=True)}
-        return [found[k] for k in range(len(found))]
-
-    def _stacks(self, term: str, correlation: float) -> list[Array]:
         key = (term, correlation if term == "GM" else 0.0)
         if key not in self._made:
             if term == "GM" and len(self._made) > 60:
                 self._made = {k: v for k, v in self._made.items() if k[0] != "GM"}
-            every = [one.covariance(term, correlation) for one in self.levels]
-            self._made[key] = [np.array([every[k] for k in group]) for group in self._alike]
+                self._shapes = {k: v for k, v in self._shapes.items() if k[0] != "GM"}
+            self._made[key] = [one.covariance(term, correlation) for one in self.levels]
         return self._made[key]
+
+    def _stacks(self, term: str, correlation: float) -> list[Array]:
+        key = (term, correlation if term == "GM" else 0.0)
+        if key not in self._shapes:
+            self._shapes[key] = self._stacked(self.covariances(term, correlation))
+        return self._shapes[key]
 
     def likelihood(self, variances: Array, shapes: list[list[Array]]) -> tuple[float, Array, Array]:
         """Log-likelihood, its gradient and the information in the logarithms of the variances."""
         count = len(variances)
         value, slope, information = 0.0, np.zeros(count), np.zeros((count, count))
-        for k, (moments, runs) in enumerate(zip(self._moments, self._runs, strict=True)):
+        stacks = zip(self._moments, self._unit, self._fill, self._runs, strict=True)
+        for k, (moments, unit, fill, runs) in enumerate(stacks):
             parts = [v * s[k] for v, s in zip(variances, shapes, strict=True)]
-            sigma = sum(parts[1:], parts[0])
+            sigma = sum(parts, fill)
             try:
                 factor = np.linalg.cholesky(sigma)
             except np.linalg.LinAlgError:
@@ -183,17 +235,15 @@ class _Record:
             log_det = 2.0 * np.log(np.diagonal(factor, 0, 1, 2)).sum(axis=1)
             value -= 0.5 * float(runs @ (log_det + np.trace(fitted, 0, 1, 2)))
             # All together are the unit matrix; the first, of which most is, needs no product.
-            weighted = [inverse @ part for part in parts[1:]]
-            rest = np.zeros_like(inverse) + np.eye(len(inverse[0]))
-            weighted.insert(0, rest - sum(weighted))
-            across = fitted.transpose(0, 2, 1)
-            for i, one in enumerate(weighted):
-                slope[i] += 0.5 * float(runs @ (one * across).sum(axis=(1, 2)))
-                slope[i] -= 0.5 * float(runs @ np.trace(one, 0, 1, 2))
-                turned = one.transpose(0, 2, 1)
-                for j in range(i + 1):
-                    information[i, j] += 0.5 * float(runs @ (turned * weighted[j]).sum(axis=(1, 2)))
-                    information[j, i] = information[i, j]
+            weighted = np.empty((count, *sigma.shape))
+            for i in range(1, count):
+                np.matmul(inverse, parts[i], out=weighted[i])
+            weighted[0] = unit - weighted[1:].sum(axis=0)
+            by_runs = runs[:, None, None]
+            excess = by_runs * (fitted.transpose(0, 2, 1) - unit)
+            slope += 0.5 * weighted.reshape(count, -1) @ excess.ravel()
+            turned = (by_runs * weighted.transpose(0, 1, 3, 2)).reshape(count, -1)
+            information += 0.5 * turned @ weighted.reshape(count, -1).T
         return value, slope, information
 
     def fit(
@@ -406,8 +456,8 @@ def _models(record: _Record, dt: float, span: float, whole: bool) -> list[_Fit]:
     names: tuple[str, ...]
     for names in (("N", "B"), ("N", "K"), ("N", "B", "K")):
         known = [f for f in fits if set(f.names) < set(names)]
-        near = max(known, key=lambda f: f.value)
-        begin = [near.variance(x) if x in near.names else 0.1 * start[x] for x in names]
+        best = max(known, key=lambda f: f.value)
+        begin = [best.variance(x) if x in best.names else 0.1 * start[x] for x in names]
         fits.append(record.fit(names, np.maximum(begin, 1e-12 * n)))
     richest = fits[-1]
     with_q = record.fit(("Q", *richest.names), np.array([0.1 * start["Q"], *richest.variances]))
@@ -423,8 +473,13 @@ def _models(record: _Record, dt: float, span: float, whole: bool) -> list[_Fit]:
         if low >= high:
             break
         grid = list(np.geomspace(low, high, 9))
-        begin = [base.variance(x) if x in base.names else 0.3 * start[x] for x in (*own, *names)]
-        tried = [record.fit((*own, *names), np.array(begin), t) for t in grid]
+        every = (*own, *names)
+        guess = [base.variance(x) if x in base.names else 0.3 * start[x] for x in every]
+        near, tried = np.array(guess), list[_Fit]()
+        for time in grid:
+            # Each begins at the one before, but not at a variance so small that no slope leads on.
+            tried.append(record.fit(every, near, time))
+            near = np.maximum(tried[-1].variances, 0.03 * np.array(guess))
         fits += _refined(record, tried)
     return fits
 
@@ -641,22 +696,32 @@ def _upper_bound(record: _Record, best: _Fit, name: str) -> float:
     n = best.variance("N")
     low = n * {"Q": record.levels[0].block ** 2, "B": 1.0, "K": 1.0}[name]
     fit = record.fit(names, np.append(best.variances, 1e-6 * low), best.correlation)
-    top, log = max(fit.value, best.value), math.log(fit.variances[-1])
-    start = fit.variances
-    # Where the likelihood has fallen: doubling, then bisection.
-    inside, outside, step = log, math.inf, 1.0
+    top, peak, start = max(fit.value, best.value), fit.variances[-1], fit.variances
+    # Where the likelihood has fallen: first as far as the information at the peak has it, with the
+    # other terms as unknown as they are.
+    scaled = fit.information / np.outer(fit.variances, fit.variances)
+    size = np.sqrt(np.maximum(np.diag(scaled), 1e-300))
+    inverse = np.linalg.inv(scaled / np.outer(size, size) + 1e-9 * np.eye(len(names)))
+    first = math.sqrt(max(inverse[-1, -1], 1.0)) / size[-1]
+    inside, outside, beyond = 0.0, math.inf, math.sqrt(ONE_SIDED) * min(first, 1e6 * low)
     for _ in range(60):
-        at = inside + step if math.isinf(outside) else 0.5 * (inside + outside)
         trial = start.copy()
-        trial[-1] = math.exp(at)
+        trial[-1] = peak + beyond
         found = record.fit(names, trial, best.correlation, held=len(names) - 1)
-        if 2.0 * (top - found.value) < ONE_SIDED:
-            inside, start, step = at, found.variances, 1.5 * step
-        else:
-            outside = at
-        if outside - inside < 0.02:
+        lost = 2.0 * (top - found.value)
+        if abs(lost - ONE_SIDED) < 0.01 * ONE_SIDED:
             break
-    return math.exp(inside)
+        if lost < ONE_SIDED:
+            inside, start = beyond, found.variances
+        else:
+            outside = beyond
+        if outside - inside < 0.005 * (peak + inside):
+            break
+        step = beyond * math.sqrt(ONE_SIDED / max(lost, 0.05 * ONE_SIDED))
+        if not inside < step < outside:
+            step = 0.5 * (inside + outside) if math.isfinite(outside) else 3.0 * beyond
+        beyond = step
+    return float(peak + beyond)
 
 
 def _slope(fit: _Fit, means: Array, line: Array, block: float, column: int) -> tuple[float, float]:

@@ -343,6 +343,8 @@ def _rest(imu: pd.DataFrame, name: str, findings: list[Finding]) -> tuple[float,
     rests = find_rests(imu)
     longest = max(rests, key=lambda r: r.end - r.start, default=None)
     length = 0.0 if longest is None else longest.end - longest.start
+    if whole < LEAST_REST:
+        raise DataError("allan.too-short-to-rest", file=name, whole=whole, least=LEAST_REST)
     if longest is None or length < LEAST_REST:
         raise DataError(
             "allan.not-at-rest", file=name, longest=length, whole=whole, least=LEAST_REST

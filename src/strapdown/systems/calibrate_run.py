@@ -34,9 +34,9 @@ from strapdown.sensors.catalogue import load_sensor
 from strapdown.sensors.magnetometer import (
     LEAST,
     MagnetometerCalibration,
-    aligned_to_rests,
     calibrate_magnetometer,
 )
+from strapdown.sensors.magnetometer_poses import LEAST_RESTS, calibrate_by_poses
 from strapdown.sensors.rest import RestStretch, find_rests_of_every_grade
 from strapdown.sensors.uncertainty import ImuUncertainty
 from strapdown.systems.alignment_source import body_record
@@ -60,6 +60,8 @@ POSE_APART, FACE_WITHIN = 15.0 * DEG, 20.0 * DEG
 ENOUGH = 9
 #: Readings of the field in a rest, and what iron may leave of its direction, deg, for its axes.
 LEAST_OF_REST, IRON_KNOWN = 5, 1.0
+#: Change of field or vertical, as a share, of a sensor that lies; a motion at most, s.
+LIES, LONGEST_MOTION = 0.01, 3.0
 #: Gravity by latitude and height: anomalies of the field, m/s²; a stated value, m/s².
 ANOMALY, STATED_SD = 5e-4, 2e-4
 #: Excess of the force of rests that is worth a warning, m/s² (5 mg); of turns, rad.
@@ -192,7 +194,8 @@ def run_calibrate(spec: CalibrateSpec, progress: Progress = silent) -> Calibrate
         prior = _prior(spec)
         found = calibrate_imu(records, rotations, prior, _conditions(spec, procedure))
         findings = [*_said(found, spec, names[0]), *findings]
-        magnetometer = _aligned(found, iron, fields) or magnetometer
+        if iron is not None:
+            magnetometer = _by_poses(found, fields) or magnetometer
     name = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more"
     return CalibrateRun(spec, name, procedure, found, magnetometer, tuple(findings), tuple(inputs))
 
@@ -244,33 +247,53 @@ def _magnetometer(
     return calibrate_magnetometer(mag)
 
 
-def _aligned(
-    found: ImuCalibration,
-    iron: MagnetometerCalibration | None,
-    fields: Sequence[tuple[Array, Array] | None],
+def _by_poses(
+    found: ImuCalibration, fields: Sequence[tuple[Array, Array] | None]
 ) -> MagnetometerCalibration | None:
-    """Iron with the rotation against the accelerometers, where iron and rests show it."""
-    if iron is None or not (iron.significant or iron.direction_sd_deg < IRON_KNOWN):
-        return None
-    means, shares, ups = [], [], []
-    total = sum(len(one[1]) for one in fields if one is not None)
-    for rest in found.rests.to_dict("records"):
-        of_log = fields[int(rest["log"])]
-        if rest["held"] or of_log is None:
+    """Iron and axes of the magnetometer together, where rests in many poses show them."""
+    readings: list[Array] = []
+    stretches: list[NDArray[np.int64]] = []
+    ups: list[Array] = []
+    motions = 0
+    for log, of_log in enumerate(fields):
+        if of_log is None:
             continue
         time, mag = of_log
-        inside = (time >= rest["start"]) & (time <= rest["end"])
-        inside &= np.isfinite(mag).all(axis=1) & mag.any(axis=1)
-        if inside.sum() >= LEAST_OF_REST:
-            means.append(mag[inside].mean(axis=0))
-            shares.append(inside.sum() / total)
-            ups.append([rest["up_x"], rest["up_y"], rest["up_z"]])
-    if not means:
+        good = np.isfinite(mag).all(axis=1) & mag.any(axis=1)
+        time, mag = time[good], mag[good]
+        stretch = np.full(len(time), -1, dtype=np.int64)
+        before: tuple[Array, Array] | None = None
+        for rest in found.rests[found.rests["log"] == log].to_dict("records"):
+            inside = (time >= rest["start"]) & (time <= rest["end"])
+            if rest["held"] or inside.sum() < LEAST_OF_REST:
+                continue
+            pose = mag[inside].mean(axis=0), np.array([rest[f"up_{a}"] for a in "xyz"])
+            # A sensor that nobody moved is in the same field still.
+            if before is None or _moved(pose, before):
+                ups.append(pose[1])
+            stretch[inside], before = len(ups) - 1, pose
+        # A motion ends with a rest, and after some seconds another begins.
+        moving = stretch < 0
+        begins = np.flatnonzero(np.r_[True, moving[1:] != moving[:-1]])
+        since = time - time[begins][np.searchsorted(begins, np.arange(len(time)), "right") - 1]
+        begun = np.r_[True, np.diff(since // LONGEST_MOTION) != 0.0]
+        begun[begins] = True
+        stretch[moving] = -1 - motions - np.cumsum(begun)[moving]
+        motions += len(time)
+        readings.append(mag)
+        stretches.append(stretch)
+    if len(ups) < LEAST_RESTS:
         return None
     up = np.array(ups)
-    shared = np.array(shares)
-    aligned = aligned_to_rests(iron, np.array(means), shared, up, found.up_covariance(up))
-    return aligned if np.isfinite(aligned.rotation_sd).all() else None
+    stretch, rests = np.concatenate(stretches), list(range(len(ups)))
+    made = calibrate_by_poses(np.vstack(readings), stretch, rests, up, found.up_covariance(up))
+    return made if made.significant or made.direction_sd_deg < IRON_KNOWN else None
+
+
+def _moved(pose: tuple[Array, Array], before: tuple[Array, Array]) -> bool:
+    """Whether field or vertical differ by more than those of a sensor that lies."""
+    both = zip(pose, before, strict=True)
+    return any(float(np.linalg.norm(a - b)) > LIES * float(np.linalg.norm(b)) for a, b in both)
 
 
 def _procedure(

@@ -151,6 +151,8 @@ def run_extrinsics(spec: ExtrinsicsSpec, progress: Progress = silent) -> Extrins
         refuse_long_span(second, recording_b.name)
         findings += read
         name, files = recording_b.name, recording_b.files
+        if set(input_files("other", other.path, files).digests) == set(inputs[0].digests):
+            raise DataError("extrinsics.same-log", file=name, quantity="other")
         progress("fitting", 0.3)
         result = between_imus(imu, second, offset=spec.offset_s)
         force = ACCEL[0] in imu.columns and ACCEL[0] in second.columns

@@ -13,6 +13,7 @@ from tests.unit.evaluation.made_pairs import (
     unit_and_magnetometer,
 )
 
+import strapdown as sd
 from strapdown import rotation
 from strapdown.errors import DataError
 from strapdown.evaluation.extrinsics import between_imus
@@ -166,3 +167,26 @@ def test_coverage_of_a_hundred_pairs(what):
     for name, flags in inside.items():
         # The 99 % interval of the share contains 95 %; bounds that are too wide are no error here.
         assert sum(flags) >= binom.ppf(0.005, len(flags), 0.95), (name, sum(flags), len(flags))
+
+
+def test_a_log_beside_itself_and_refused_fixes(tmp_path):
+    """A unit is not compared with itself; of fixes it is said what they lack, not that of a log."""
+    log = tmp_path / "log.csv"
+    time = np.arange(0.0, 40.0, 0.02)
+    rate = np.column_stack([np.sin(1.1 * time), np.cos(0.7 * time), np.sin(0.5 * time)])
+    values = np.column_stack([time, rate, rate + np.array([0.0, 0.0, 9.8])])
+    names = "time_s,gyro_x_rad_s,gyro_y_rad_s,gyro_z_rad_s,accel_x_m_s2,accel_y_m_s2,accel_z_m_s2"
+    np.savetxt(log, values, delimiter=",", header=names, comments="")
+    with pytest.raises(DataError) as refused:
+        sd.extrinsics(log, log)
+    assert refused.value.finding.code == "extrinsics.same-log"
+    track = tmp_path / "track.gpx"
+    point = (
+        '<trkpt lat="48.1" lon="11.{k}"><ele>500</ele><time>2024-05-01T10:00:0{k}Z</time></trkpt>'
+    )
+    points = "".join(point.format(k=k) for k in range(9))
+    head = '<?xml version="1.0"?><gpx version="1.1" xmlns="http://www.topografix.com/GPX/1/1">'
+    track.write_text(f"{head}<trk><trkseg>{points}</trkseg></trk></gpx>")
+    with pytest.raises(DataError) as refused:
+        sd.extrinsics(log, track)
+    assert refused.value.finding.code == "io.height-over-sea-column"

@@ -224,3 +224,22 @@ def test_a_record_that_is_too_short_or_constant_is_refused():
     with pytest.raises(DataError) as refused:
         noise_terms(np.ones(2000), 0.01)
     assert refused.value.finding.code == "allan.constant"
+
+
+@pytest.mark.parametrize("count", [900, 4001, 60_000])
+def test_symmetric_and_antisymmetric_coefficients_are_not_correlated(count):
+    """So that a level's likelihood is that of its halves; the whole basis stays orthonormal."""
+    from strapdown.sensors.noise_terms import levels_of
+
+    rate = np.random.default_rng(1).standard_normal(count)
+    for level in levels_of(rate, 0.01)[0]:
+        basis = level.basis
+        assert basis.T @ basis == pytest.approx(np.eye(basis.shape[1]), abs=1e-12)
+        halves = level.halves
+        assert len(halves) == 2
+        assert sorted(np.concatenate(halves)) == list(range(basis.shape[1]))
+        for term in ("Q", "N", "B", "K", "GM"):
+            whole = level.covariance(term, 0.5)
+            # Rounding of sums of terms as large as the covariance before projection.
+            size = np.abs(block_covariance(term, level.count, level.block, 0.5)).max()
+            assert np.abs(whole[np.ix_(*halves)]).max() < 1e-10 * size

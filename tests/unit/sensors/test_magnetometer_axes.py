@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 from scipy.stats import beta
 from tests.calibrated import (
     DEG,
@@ -25,11 +27,8 @@ import strapdown as sd
 from strapdown import rotation
 from strapdown.formats import csv
 from strapdown.sensors.calibration import SensorCalibration, in_accel_axes
-from strapdown.sensors.magnetometer import (
-    ROTATION_PRIOR,
-    aligned_to_rests,
-    calibrate_magnetometer,
-)
+from strapdown.sensors.magnetometer import SHAPES
+from strapdown.sensors.magnetometer_poses import ROTATION_PRIOR, calibrate_by_poses
 
 #: Field, µT: 63° of dip, in a frame with z up; noise of a reading; change from pose to pose.
 FIELD = 48.0 * np.array([math.cos(63.0 * DEG), 0.0, -math.sin(63.0 * DEG)])
@@ -56,16 +55,41 @@ def moved(draw, count):
     return t, w, f, C_nb, rows
 
 
-def read_by(draw, C_nb, rows, turn):
-    """Readings of a magnetometer that is turned by `turn` against the axes of the attitudes."""
-    field = np.tile(FIELD, (len(C_nb), 1))
-    for k, one in enumerate(rows):
-        past = rows[k + 1].start if k + 1 < len(rows) else len(field)
-        field[one.start : past] += ROOM * draw.standard_normal(3)
+def read_by(draw, C_nb, rows, turn, kind="pose", room=ROOM):
+    """Readings of a magnetometer that is turned by `turn` against the axes of the attitudes.
+
+    And hard and soft iron. `kind`: the field of a pose lasts until the next one (``pose``), or
+    until the middle between them (``step``), or changes steadily between them (``ramp``); along
+    all axes alike or only north (``north``), with a few large changes (``heavy``: Student's with
+    three degrees), in two places only (``places``); or changes within poses, too (``walk``).
+    """
+    n = len(C_nb)
+    change = room * draw.standard_normal((len(rows), 3))
+    if kind == "heavy":
+        change = room * draw.standard_t(3, (len(rows), 3)) / math.sqrt(3.0)
+    if kind == "north":
+        change = change * [math.sqrt(3.0), 0.0, 0.0]
+    if kind == "places":
+        change = change[:2][draw.integers(0, 2, len(rows))]
+    if kind == "ramp":
+        at = np.ravel([(one.start, one.stop) for one in rows])
+        columns = np.repeat(change, 2, axis=0).T
+        field = FIELD + np.column_stack([np.interp(np.arange(n), at, c) for c in columns])
+    else:
+        begins = [one.start for one in rows]
+        if kind == "step":
+            begins = [0] + [(a.stop + b.start) // 2 for a, b in pairwise(rows)]
+        at = np.searchsorted(begins, np.arange(n), "right") - 1
+        field = FIELD + np.where(at[:, None] >= 0, change[at], 0.0)
+    if kind == "walk":
+        field = field + room * math.sqrt(0.02) * lfilter(
+            [1.0], [1.0, -0.99], draw.standard_normal((n, 3)), axis=0
+        )
     iron = np.eye(3) + 0.03 * _symmetric(draw)
     body = np.einsum("nji,nj->ni", C_nb, field)
-    read = body @ turn @ np.linalg.inv(iron) + 15.0 * draw.standard_normal(3)
-    return read + NOISE * draw.standard_normal(read.shape)
+    hard_iron = 15.0 * draw.standard_normal(3)
+    read = body @ turn @ np.linalg.inv(iron) + hard_iron
+    return read + NOISE * draw.standard_normal(read.shape), hard_iron, iron
 
 
 def _gain(triad):
@@ -78,32 +102,41 @@ def _symmetric(draw):
     return m - np.trace(m) / 3.0 * np.eye(3)
 
 
-def aligned(seed, turn=None, count=12):
-    """Error of the estimated rotation, rad, and the calibration."""
+def aligned(seed, turn=None, count=12, kind="pose"):
+    """Errors of hard iron, soft iron along its shapes, and rotation, rad; and the calibration."""
     draw = np.random.default_rng(seed)
     if turn is None:
         turn = rotation.dcm_from_rotation_vector(0.7 * ROTATION_PRIOR * draw.standard_normal(3))
     _, _, _, C_nb, rows = moved(draw, count)
-    read = read_by(draw, C_nb, rows, turn)
-    means = np.array([read[r].mean(axis=0) for r in rows])
+    read, hard_iron, iron = read_by(draw, C_nb, rows, turn, kind)
     up = np.array([C_nb[r, 2, :].mean(axis=0) for r in rows])
     up /= np.linalg.norm(up, axis=1)[:, None]
     J = (np.eye(3) - up[:, :, None] * up[:, None, :]).reshape(-1, 3)
     up = up + (J @ (UP_SD * draw.standard_normal(3))).reshape(-1, 3)
     up /= np.linalg.norm(up, axis=1)[:, None]
-    share = np.array([(r.stop - r.start) / len(read) for r in rows])
-    found = aligned_to_rests(calibrate_magnetometer(read), means, share, up, UP_SD**2 * J @ J.T)
-    return rotation.rotation_vector_from_dcm(found.rotation @ turn.T), found
+    # Odd numbers are rests, even ones the motions between them.
+    edges = np.ravel([(r.start, r.stop) for r in rows])
+    stretch = np.searchsorted(edges, np.arange(len(read)), "right")
+    rests = list(range(1, 2 * len(rows), 2))
+    found = calibrate_by_poses(read, stretch, rests, up, UP_SD**2 * J @ J.T)
+    shape = np.linalg.lstsq(SHAPES.reshape(5, 9).T, (found.soft_iron - iron).ravel(), rcond=None)
+    turned_by = rotation.rotation_vector_from_dcm(found.rotation @ turn.T)
+    return np.r_[found.hard_iron - hard_iron, shape[0], turned_by], found
+
+
+def sd_of(found):
+    """Standard deviations in the same order."""
+    return np.r_[np.sqrt(np.diag(found.covariance)), found.rotation_sd]
 
 
 def test_a_rotation_is_found_and_bounded():
     error, found = aligned(1)
     assert (found.rotation_sd < 0.3 * ROTATION_PRIOR).all()
-    assert np.abs(error / found.rotation_sd).max() < 3.5
+    assert np.abs(error / sd_of(found)).max() < 3.5
     # Iron alone leaves it.
     plain = replace(found, rotation=np.eye(3))
     turn = rotation.rotation_vector_from_dcm(found.rotation)
-    assert np.linalg.norm(turn) > 2.0 * np.linalg.norm(error)
+    assert np.linalg.norm(turn) > 2.0 * np.linalg.norm(error[8:])
     one = np.array([20.0, -10.0, 30.0])
     assert found.apply(one) == pytest.approx(found.rotation @ plain.apply(one))
 
@@ -112,7 +145,7 @@ def test_swapped_axes_are_found():
     """As of the AK8963 in an MPU-9250: x and y change places, z has the other sign."""
     swap = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
     error, found = aligned(2, turn=swap)
-    assert np.abs(error / found.rotation_sd).max() < 3.5
+    assert np.abs(error / sd_of(found))[8:].max() < 3.5
     assert (found.rotation_sd < 0.3 * ROTATION_PRIOR).all()
 
 
@@ -122,19 +155,45 @@ def test_few_rests_leave_it_open():
     assert found.rotation == pytest.approx(np.eye(3))
 
 
-@pytest.mark.slow
-def test_bounds_of_a_hundred_magnetometers():
-    errors, sds = [], []
-    for seed in range(100, 200):
-        error, found = aligned(seed, count=10 + seed % 7)
-        errors.append(error)
+def test_more_samples_of_a_rest_do_not_make_it_surer():
+    """The field of a pose is wrong by as much, however often it is read."""
+    draw = np.random.default_rng(5)
+    C_nb = np.array([about_vertical(facing(up), draw.uniform(-3.0, 3.0)) for up in POSES])
+    field = FIELD + 0.3 * draw.standard_normal((16, 3))
+    means = np.einsum("nji,nj->ni", C_nb, field)
+    sds = []
+    for count in (10, 1000):
+        mag = np.repeat(means, count, axis=0) + NOISE * draw.standard_normal((16 * count, 3))
+        stretch = np.repeat(np.arange(16), count)
+        found = calibrate_by_poses(mag, stretch, list(range(16)), C_nb[:, 2, :], 1e-10 * np.eye(48))
         sds.append(found.rotation_sd)
-    inside = np.abs(errors) < 1.96 * np.array(sds)
+    # A tenth, if samples were independent; noise of the mean of ten adds 5 % (0.1² beside 0.3²).
+    assert sds[1] == pytest.approx(sds[0], rel=0.25)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["pose", "step", "ramp", "walk", "heavy", "places", "north"])
+def test_bounds_of_two_hundred_magnetometers(kind):
+    """Of each number the 99 % interval of the coverage (Clopper and Pearson) reaches 95 %.
+
+    Where the fields of poses are as they are modeled (``pose``) it contains 95 % for hard iron and
+    axes; bounds of soft iron are somewhat wide (97.8 % of 1000). Fields that change along one axis
+    alone, within poses as much as between them, or by a jump in the middle of each motion, are not
+    as modeled: there 90 %, which the manual says; of the jump for the axes alone.
+    """
+    least = 0.9 if kind in ("north", "walk", "step") else 0.95
+    inside, sds = [], []
+    for seed in range(20_000, 20_200):
+        error, found = aligned(seed, count=10 + seed % 7, kind=kind)
+        inside.append(np.abs(error) < 1.96 * sd_of(found))
+        sds.append(found.rotation_sd)
     assert np.median(sds) < 0.3 * ROTATION_PRIOR
-    # The 99 % interval (Clopper and Pearson) reaches 95 %.
-    count = int(inside.sum())
-    assert beta.ppf(0.995, count + 1, inside.size - count) >= 0.95, count
-    assert inside.sum() < inside.size
+    counts = np.sum(inside, axis=0).tolist()
+    for k, count in enumerate(counts):
+        if kind != "step" or k >= 8:
+            assert beta.ppf(0.995, count + 1, 200 - count) >= least, (kind, k, count)
+        if kind == "pose" and not 3 <= k < 8:
+            assert beta.ppf(0.005, count, 201 - count) <= 0.95, (k, count)
 
 
 def test_from_a_log_to_the_flag(tmp_path):
@@ -143,7 +202,7 @@ def test_from_a_log_to_the_flag(tmp_path):
     turn = rotation.dcm_from_rotation_vector(np.array([0.05, -0.03, 0.06]))
     t, w, f, C_nb, rows = moved(draw, 14)
     made = record(t, w, f, errors, 4)
-    read = read_by(draw, C_nb, rows, turn)
+    read, _, _ = read_by(draw, C_nb, rows, turn)
     names = ["time_s", *(f"gyro_{a}_rad_s" for a in "xyz"), *(f"accel_{a}_m_s2" for a in "xyz")]
     names += [f"mag_{a}_uT" for a in "xyz"]
     values = [t, *made.imu.to_numpy().T, *read.T]
