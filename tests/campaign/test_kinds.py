@@ -80,7 +80,7 @@ def test_drives_with_curves_and_their_seal(tmp_path: Path) -> None:
     by_noise = run.cases.groupby("noise_m")["horizontal_rms_m"].median()
     assert by_noise[2.0] > by_noise[0.02]
     run.save(tmp_path / "c")
-    curves = next(run.dataset.curves())
+    curves = next(run.dataset.curves()).to_pandas()
     assert curves["x"].unique().tolist() == [0.0, 50.0, 100.0, 150.0]
     assert verify(tmp_path / "c").verdict == "identical"
 

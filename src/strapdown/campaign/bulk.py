@@ -201,7 +201,7 @@ class BulkCrash(_Streams):
                 inside = np.flatnonzero(weights.any(axis=0))
                 if len(inside):
                     part = slice(inside[0], inside[-1] + 1)
-                    vector = vector + (noise[:, 3:, part] * weights[:, part]).sum(axis=2)
+                    vector = vector + np.einsum("rij,ij->ri", noise[:, 3:, part], weights[:, part])
             more = drawn.generator.standard_normal((TOGETHER, 3))
             vector = vector + np.einsum("rj,ij->ri", more, root)
             total = np.sqrt((vector * vector).sum(axis=1))
@@ -293,8 +293,9 @@ ANGLES = (
     "end_pitch_error_deg",
     "end_heading_error_deg",
 )
-#: Samples of a piece, and the values of which white noise takes one: both stay in the cache.
-CHUNK, _QUANTILES = 1024, 1 << 12
+#: Samples of a piece, the units whose increments are formed in one call, and the values of which
+#: white noise takes one: all stay in the cache.
+CHUNK, UNITS, _QUANTILES = 512, 4, 1 << 12
 #: Blocks of a correlation time, and least number of blocks of a record. Over a block a wandering
 #: bias is its mean, drawn exactly: so is the angle at its end, but for the turn within it.
 _PER_TIME, _BLOCKS = 16, 64
@@ -463,34 +464,39 @@ class BulkAttitude(_Streams):
         turns: list[list[tuple[float, float]]] = [[] for _ in states]
         last, quantiles = np.empty((TOGETHER, 4)), _quantiles()
         bytes_ = _bytes(generator, 1)
+        theta = dtheta = np.empty((UNITS, 0, 3))
+        history = np.empty((0, algorithm.width))
         for rate, force, known, sd, own, dt, truth in self._pieces:
             steps = len(dt)
             # The last sample of a piece is the first of the next.
             bytes_ = np.concatenate([bytes_[:, :, -1:], _bytes(generator, steps)], axis=2)
-            theta, dtheta = np.empty((2, steps, 3))
-            history = np.empty((steps, algorithm.width))
-            for k, (unit, state) in enumerate(zip(units, states, strict=True)):
+            if steps != theta.shape[1]:
+                theta, dtheta = np.empty((2, UNITS, steps, 3))
+                history = np.empty((steps, algorithm.width))
+            for first in range(0, TOGETHER, UNITS):
+                some = slice(first, first + UNITS)
                 unit_increments(
                     rate,
                     force,
                     felt,
                     known,
-                    slow[k, own],
+                    slow[some, own],
                     each,
-                    unit,
+                    units[some],
                     limits,
                     sd,
-                    bytes_[k],
+                    bytes_[some],
                     quantiles,
                     dt,
                     self.mean,
                     theta,
                     dtheta,
                 )
-                kernel(state, dt, theta, dtheta, history, *options)
-                q = history if plain else algorithm.quaternions(history)
-                turns[k].append(turns_from(truth, q))
-                last[k] = q[-1]
+                for k in range(UNITS):
+                    kernel(states[first + k], dt, theta[k], dtheta[k], history, *options)
+                    q = history if plain else algorithm.quaternions(history)
+                    turns[first + k].append(turns_from(truth, q))
+                    last[first + k] = q[-1]
         angles = np.array([[max(pairs)[0], pairs[-1][1]] for pairs in turns])
         return self._scalars(np.column_stack([angles, last]))
 

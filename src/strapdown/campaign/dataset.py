@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from strapdown.bundle import to_json
@@ -145,7 +145,7 @@ class Dataset:
             **dict(zip(self.frozen["keep"]["scalars"], np.asarray(values).T, strict=True)),
         }
         schema = schema_of(self.frozen)
-        arrays = [pa.array(columns[f.name], type=f.type) for f in schema]
+        arrays = [_array(columns[f.name], f.type) for f in schema]
         self._part(CASES, pa.Table.from_arrays(arrays, schema=schema))
 
     def there(self) -> np.ndarray:
@@ -155,29 +155,31 @@ class Dataset:
             out[pq.read_table(path, columns=["case"])["case"].to_numpy()] = True
         return out
 
-    def cases(self, columns: Sequence[str] | None = None) -> Iterator[pd.DataFrame]:
+    def cases(self, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
         """Yield the rows in order of the case, a block at a time."""
         yield from self._ordered(CASES, columns)
 
-    def curves(self) -> Iterator[pd.DataFrame]:
+    def curves(self) -> Iterator[pa.Table]:
         """Yield the curves in order of the case, those of a block of cases at a time."""
         if self.frozen["keep"].get("curves"):
             yield from self._ordered(CURVES, None)
 
-    def write_blocks(self, out: Path, keep: Callable[[pd.DataFrame], pd.DataFrame]) -> None:
+    def write_blocks(self, out: Path, keep: Callable[[pa.Table], pa.Table]) -> None:
         """Write the rows that `keep` leaves of each block, in order, as files of their own."""
-        kept: dict[int, pd.Series] = {}
-        for name in (CASES, *([CURVES] if self.frozen["keep"].get("curves") else [])):
+        kept: dict[int, pa.Array] = {}
+        curves = bool(self.frozen["keep"].get("curves"))
+        for name in (CASES, *([CURVES] if curves else [])):
             (out / name).mkdir()
-            schema = schema_of(self.frozen) if name == CASES else self._curve_schema()
-            for number, table in enumerate(self._ordered(name, None)):
+            for table in self._ordered(name, None):
+                number = int(table["case"][0].as_py()) // BLOCK
                 if name == CASES:
-                    table = keep(table)
-                    kept[number] = table["case"]
+                    made = keep(table)
+                    if curves:
+                        kept[number] = made["case"]
                 else:
-                    table = table[table["case"].isin(kept[number])]
-                made = pa.Table.from_pandas(table, schema=schema, preserve_index=False)
-                _write_parquet(made.replace_schema_metadata(None), out / name, number)
+                    made = table.filter(pc.is_in(table["case"], kept[number]))
+                # In one piece: its bytes do not depend on the parts it is made of.
+                _write_parquet(made.combine_chunks(), out / name, number)
 
     # --- files ----------------------------------------------------------------------------
 
@@ -194,26 +196,26 @@ class Dataset:
         path = self.folder / name / f"part-{first:010d}-{last:010d}-{own}.parquet"
         _written(path, lambda at: at.write_bytes(data))
 
-    def _ordered(self, name: str, columns: Sequence[str] | None) -> Iterator[pd.DataFrame]:
+    def _ordered(self, name: str, columns: Sequence[str] | None) -> Iterator[pa.Table]:
+        """Yield the rows of a block of cases at a time, in order and each once."""
         files = [(*_span(path), path) for path in self._files(name)]
-        wanted = None if columns is None else list(dict.fromkeys(["case", *columns]))
+        keys = ["case"] if name == CASES else ["case", "x"]
+        wanted = None if columns is None else list(dict.fromkeys([*keys, *columns]))
         for begin in range(0, int(self.frozen["total"]), BLOCK):
             end = begin + BLOCK
             near = [path for first, last, path in files if first < end and last >= begin]
-            parts = [
-                pq.read_table(
-                    path, columns=wanted, filters=[("case", ">=", begin), ("case", "<", end)]
-                )
-                for path in near
-            ]
-            parts = [part for part in parts if part.num_rows]
-            if not parts:
+            if not near:
                 continue
-            table = pa.concat_tables(parts).to_pandas()
-            keys = ["case"] if name == CASES else ["case", "x"]
-            table = table.sort_values(keys, kind="stable")
-            # Two machines may both have run a case: to the same bits.
-            yield table.drop_duplicates(keys).reset_index(drop=True)
+            # Without the threads and the filters of a query: each would hold parts of its own.
+            table = pa.concat_tables(
+                pq.ParquetFile(path).read(columns=wanted, use_threads=False) for path in near
+            )
+            case = table["case"].to_numpy()
+            inside = (case >= begin) & (case < end)
+            if not inside.all():
+                table = table.filter(pa.array(inside))
+            if table.num_rows:
+                yield _once(table, keys)
 
     def _case_table(self, rows: Iterable[Mapping[str, Any]]) -> pa.Table:
         schema = schema_of(self.frozen)
@@ -228,7 +230,7 @@ class Dataset:
                 values = [None if v is None else str(v) for v in values]
             elif field.type == pa.float64():
                 values = [None if v is None else float(v) for v in values]
-            arrays.append(pa.array(values, type=field.type))
+            arrays.append(_array(values, field.type))
         return pa.Table.from_arrays(arrays, schema=schema)
 
     def _curve_schema(self) -> pa.Schema:
@@ -247,8 +249,30 @@ class Dataset:
             own = [np.asarray(row["curves"][k], dtype=np.float64) for row in kept]
             columns.append(np.concatenate(own) if own else np.empty(0))
         schema = self._curve_schema()
-        arrays = [pa.array(c, type=f.type) for c, f in zip(columns, schema, strict=True)]
+        arrays = [_array(c, f.type) for c, f in zip(columns, schema, strict=True)]
         return pa.Table.from_arrays(arrays, schema=schema)
+
+
+def _array(values: Any, kind: pa.DataType) -> pa.Array:
+    """A column; NaN is null in it."""
+    return pa.array(values, type=kind, from_pandas=True)
+
+
+def _once(table: pa.Table, keys: Sequence[str]) -> pa.Table:
+    """Rows in order of the keys; of equal ones the first: two machines made them to the same bits.
+
+    Parts that are in order already are left as they are.
+    """
+    columns = [table[key].to_numpy() for key in keys]
+    ahead = columns[-1][1:] > columns[-1][:-1]
+    if len(keys) > 1:
+        ahead = (columns[0][1:] > columns[0][:-1]) | ((columns[0][1:] == columns[0][:-1]) & ahead)
+    if ahead.all():
+        return table
+    order = np.lexsort(columns[::-1])
+    rows = np.column_stack([column[order] for column in columns])
+    fresh = np.r_[True, (rows[1:] != rows[:-1]).any(axis=1)]
+    return table.take(pa.array(order[fresh]))
 
 
 def _span(path: Path) -> tuple[int, int]:

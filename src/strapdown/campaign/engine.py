@@ -27,7 +27,7 @@ BATCH = 2.0
 #: Batches in flight for each worker; the second waits while the first runs.
 AHEAD = 2
 #: Most cases of a batch; in bulk, in multiples of `TOGETHER`.
-MOST, MOST_BULK, TOGETHER = 1000, 65_536, 64
+MOST, MOST_BULK, TOGETHER = 1000, 16_384, 64
 #: How long a scheduler may be without a worker, s.
 WORKERS = 60.0
 #: Share of the latest batch in the estimated cost of a case.

@@ -197,7 +197,7 @@ def status(
     found = open_campaign(folder)
     counts: dict[str, int] = {}
     for block in found.dataset.cases(["status"]):
-        for name, count in block["status"].value_counts().items():
+        for name, count in block["status"].to_pandas().value_counts().items():
             counts[str(name)] = counts.get(str(name), 0) + int(count)
     told = {
         "campaign": found.design.spec.name,
