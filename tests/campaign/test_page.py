@@ -141,6 +141,26 @@ def test_a_fleet_shows_its_outliers_and_their_logs() -> None:
     assert far[0].x.tolist() == [11.0, 30.0]
 
 
+def test_linear_propagation_is_beside_the_cases_in_bulk() -> None:
+    rng = np.random.default_rng(6)
+    values = 3.0 + 2.0 * rng.standard_normal(800)
+    _, cases, _ = grid(draws=1)
+    own = {"cell": 0, "draw": range(800), "case": range(800), "seed": 1}
+    cases = cases.iloc[[0] * 800].reset_index(drop=True).assign(**own, end_m=values)
+    cases["status"] = "done"
+    spec = frozen(keep={"scalars": {"end_m": "end_m"}, "curves": []}, total=800)
+    linear = {"nominal": {"end_m": 3.1}, "linear_sd": {"end_m": 1.6}}
+    document = document_of({**spec, "linear": linear}, cases)
+    (section,) = (s for s in document.sections if s.slug == "linear")
+    (table,) = section.blocks
+    (row,) = table.rows
+    mean, sd = values.mean(), values.std(ddof=1)
+    assert row == ("end, m", "3.1", f"{mean:.1f}", "1.60", f"{sd:.2f}", f"{sd / 1.6:.3f}")
+    assert "2.5" in table.caption  # per cent: 1 / sqrt(2 n)
+    plain = document_of(spec, cases)
+    assert not next(s for s in plain.sections if s.slug == "linear").blocks
+
+
 def test_a_campaign_without_cases_is_a_page() -> None:
     spec, cases, _ = grid()
     assert "0 cases of 720 planned: 0 done." in words_of(document_of(spec, cases.head(0)))

@@ -12,7 +12,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -29,7 +28,7 @@ from strapdown.config.motions import TrajectorySpec
 from strapdown.config.outage import OutageSpec
 from strapdown.config.sources import ScenarioSpec
 from strapdown.config.spec import specify
-from strapdown.crash.case import run_case
+from strapdown.crash.case import reconstruct_case
 from strapdown.crash.case_contact import main_event
 from strapdown.crash.delta_v_bound import AT_REST, WINDOW_ENDS, VelocityChange, body_effects
 from strapdown.crash.entry import angles_sd
@@ -262,15 +261,13 @@ class BulkCrash(_Streams):
         return body_effects(effects, weights), [back, ahead], _root(rest)
 
 
-def bulk_crash(spec: CaseSpec, file: Path | None = None, seed: int = 0) -> BulkCrash:
+def bulk_crash(spec: CaseSpec, seed: int = 0) -> BulkCrash:
     """Prepare many possible truths of a crash.
 
     Parameters
     ----------
     spec : CaseSpec
-        With absolute paths; its record is reconstructed once, without its own Monte Carlo.
-    file : Path, optional
-        Case file.
+        With absolute paths; its record is reconstructed once.
     seed : int
 
     Raises
@@ -278,9 +275,7 @@ def bulk_crash(spec: CaseSpec, file: Path | None = None, seed: int = 0) -> BulkC
     ConfigError, DataError, DivergenceError
         As `run_case`.
     """
-    options = spec.options.model_copy(update={"monte_carlo_runs": 0})
-    made = run_case(spec.model_copy(update={"options": options}), file)
-    return BulkCrash(made.reconstruction.main, seed)
+    return BulkCrash(reconstruct_case(spec).main, seed)
 
 
 # Attitude: units of one gyro triad along one motion, each integrated from the true attitude.

@@ -48,13 +48,14 @@ def run_case(campaign: Any, number: int) -> tuple[Row, Any]:
     row = _row(campaign, case, "done")
     try:
         result = kind.run(campaign.table(case), f"case-{number}")
-        data = kind.data(result)
+        view = kind.view(result)
+        data = kind.data(view)
         row["scalars"] = [
             _number(at_path(data, key_path(place))) for place in campaign.scalars.values()
         ]
         row["findings"] = " ".join(sorted({one.code for one in _findings(result)}))
         if campaign.spec.keep.curves:
-            row["curves"] = _curves(campaign, kind, result)
+            row["curves"] = _curves(campaign, kind, view)
     except MemoryError:
         return {**row, "status": "memory"}, None
     except StrapdownError as error:
@@ -94,12 +95,12 @@ def _number(value: Any) -> float:
     return math.nan
 
 
-def _curves(campaign: Any, kind: Any, result: Any) -> list[list[float]]:
+def _curves(campaign: Any, kind: Any, view: Any) -> list[list[float]]:
     import numpy as np
 
     axis = campaign.spec.keep.axis
     x = np.linspace(axis.from_s, axis.to_s, axis.points)
-    table = kind.curves(result)
+    table = kind.curves(view)
     time = table.index.to_numpy(dtype=np.float64)
     out = []
     for name in campaign.spec.keep.curves:

@@ -54,7 +54,7 @@ Keys = NDArray[np.uint64]
 #: Rows of a block.
 ROWS = 2**14
 #: Counters of a pass of `order_statistics`, and values that it sorts in memory.
-COUNTERS, CANDIDATES = 2**22, 2**18
+COUNTERS, CANDIDATES = 2**20, 2**17
 #: Replications of the bootstrap of Sobol indices.
 REPLICATIONS = 400
 

@@ -248,22 +248,7 @@ def run_case(
     inputs = _inputs(spec, case_file, records)
     progress("reconstructing", 0.15)
     options = spec.options
-    made = reconstruct_crash(
-        units,
-        entry,
-        CrashOptions(
-            point=spec.point.position_m,
-            window=options.window_s,
-            rate=options.rate_hz,
-            sampling=options.sampling,
-            clock=options.clock,
-            combine=options.combine,
-            preparation=_preparation(spec),
-            peak_window=options.peak_window_s,
-            rule=EventRule(zero_at=options.zero_at),
-            gravity=options.gravity_m_per_s2,
-        ),
-    )
+    made = reconstruct_crash(units, entry, _options(spec))
     findings += made.findings
     progress("drawing possible paths", 0.4)
     samples, said = _samples(made.main.path, options.monte_carlo_runs, options.seed, progress)
@@ -292,6 +277,33 @@ def run_case(
         tuple(dict.fromkeys(findings)),
         deformation=deformation,
         indices=of_vehicle + occupant_indices(tuple(records.values()), tuple(vehicles)),
+    )
+
+
+@one_thread()
+def reconstruct_case(spec: CaseSpec) -> CrashReconstruction:
+    """Reconstruct a case alone, without its severity, indices, references and possible paths.
+
+    Errors as of `run_case`.
+    """
+    records, spec = whole_records(spec)
+    units = tuple(case_unit(unit, records) for unit in spec.units)
+    return reconstruct_crash(units, _entry(spec), _options(spec))
+
+
+def _options(spec: CaseSpec) -> CrashOptions:
+    options = spec.options
+    return CrashOptions(
+        point=spec.point.position_m,
+        window=options.window_s,
+        rate=options.rate_hz,
+        sampling=options.sampling,
+        clock=options.clock,
+        combine=options.combine,
+        preparation=_preparation(spec),
+        peak_window=options.peak_window_s,
+        rule=EventRule(zero_at=options.zero_at),
+        gravity=options.gravity_m_per_s2,
     )
 
 
