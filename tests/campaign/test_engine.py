@@ -203,6 +203,16 @@ def test_a_scheduler_without_workers_and_none_at_all(
     assert code == "campaign.no-workers"
 
 
+def test_a_dashboard_that_nothing_draws_is_refused(
+    cheap: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = written(cheap, DRAWN.format(draws=2))
+    monkeypatch.setattr("strapdown.campaign.engine.find_spec", lambda name: None)
+    with pytest.raises(ConfigError) as caught:
+        run_campaign(file, workers=Workers(1, dashboard=True))
+    assert caught.value.finding.code == "campaign.no-bokeh"
+
+
 @pytest.mark.slow
 def test_killed_at_drawn_instants_and_resumed(cheap: Path) -> None:
     """``STRAPDOWN_KILLS=50`` for so many; a row that is not written within 5 s is run again."""

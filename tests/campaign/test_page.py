@@ -12,7 +12,7 @@ from tests.campaign_cases import batches, fleet, frozen, grid, ishigami
 from strapdown.campaign.page import campaign_document
 from strapdown.campaign.summary import summarise
 from strapdown.report.chart import Chart
-from strapdown.report.document import Document, KeyFigures, Paragraph, TableBlock
+from strapdown.report.document import Document, Items, KeyFigures, Paragraph, TableBlock
 from strapdown.report.document_html import document_page
 from strapdown.report.values import spaced
 
@@ -136,6 +136,16 @@ def test_a_fleet_shows_its_outliers_and_their_logs() -> None:
     words = words_of(document)
     assert "drives/log-030.csv (30)" in words
     assert "80 logs: 76 done, 4 not" in words
+    # What most logs do not have is on page one.
+    found = {
+        head: spaced(text)
+        for block in document.front
+        if isinstance(block, Items)
+        for head, text in block.rows
+    }
+    assert set(found) == {"log.gaps", "sensors.vibration"}
+    assert found["log.gaps"].startswith("drives/log-003.csv (3), drives/log-013.csv (13), ")
+    assert found["log.gaps"].endswith("and 3 more: 10.0 % (4.4 to 18.8 %).")
     chart = next(c for c in blocks_of(document, Chart) if c.slug == "logs-0")
     far = [line for line in chart.panels[1].lines if line.name == "far out"]
     assert far[0].x.tolist() == [11.0, 30.0]

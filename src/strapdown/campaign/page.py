@@ -42,6 +42,8 @@ __all__ = ["campaign_document"]
 
 #: Rows of a table, at most.
 ROWS = 100
+#: Share of the logs of a fleet below which a finding is said on page one.
+UNUSUAL = 0.5
 _BOUND_WORDS = {
     "consistent": "consistent with {}",
     "optimistic": "optimistic: the bound is too small for {}",
@@ -124,10 +126,19 @@ def _front(results: Results) -> Iterator[Block]:
         figures = tuple(_answers(results, cells[0])) or tuple(_medians(results, cells[0]))
         if figures:
             yield KeyFigures(figures)
+        if rows := tuple(_unusual(results)):
+            yield Items(rows)
     elif cells:
         if rows := tuple(_answers_over_cells(results)):
             yield Items(rows)
         yield _cell_table(results)
+
+
+def _unusual(results: Results) -> Iterator[tuple[str, str]]:
+    """Of a fleet, findings that most of its logs do not have."""
+    for one in results.summary["findings"][:ROWS] if results.is_fleet else ():
+        if one["share"] < UNUSUAL:
+            yield one["code"], f"{_examples(one, one['hits'])}: {share(one)}."
 
 
 def _answers(results: Results, cell: Cell) -> Iterator[KeyFigure]:
