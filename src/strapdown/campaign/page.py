@@ -306,10 +306,10 @@ def _tests(results: Results) -> Iterator[Block]:
         columns = ("of", "within the bound", f"99{GAP}% interval", "verdict")
         yield _table(results, columns, rows, text=(3,), title=title)
     for k, first in enumerate(results.cells[0]["consistency"]):
-        rows = []
+        tests: list[tuple[str, ...]] = []
         for one in (cell["consistency"][k] for cell in results.cells):
             half = 0.5 * (number(one["high"]) - number(one["low"]))
-            rows.append(
+            tests.append(
                 (
                     str(one["count"]),
                     shown(one["mean"], half),
@@ -322,7 +322,7 @@ def _tests(results: Results) -> Iterator[Block]:
         yield _table(
             results,
             ("of", "mean", expected, "inside the 95 % quantile", "verdict"),
-            rows,
+            tests,
             text=(4,),
             title=(
                 f"{capital(first['name'])}: normalized error squared, {first['dof']:g} degrees "

@@ -165,7 +165,9 @@ class CampaignRun:
     @property
     def cases(self) -> pd.DataFrame:
         """All cases: parameters, status and kept scalars, by number."""
-        parts = [_kept(part, self.stopped).to_pandas() for part in self.dataset.cases()]
+        parts: list[pd.DataFrame] = [
+            _kept(part, self.stopped).to_pandas() for part in self.dataset.cases()
+        ]
         return pd.concat(parts, ignore_index=True).set_index("case")
 
     def to_pandas(self) -> pd.DataFrame:
