@@ -169,3 +169,22 @@ def test_the_shipped_studies_keep_what_their_cases_have(name: str) -> None:
     values = dict(zip(design.scalars, row["scalars"], strict=True))
     assert asked
     assert all(np.isfinite(values[name]) for name in asked)
+
+
+def test_a_case_that_is_refused_says_why(tmp_path: Path) -> None:
+    run = run_of(
+        tmp_path,
+        """
+        [base]
+        kind = "outage"
+        configuration = { sensor = "mpu-6050", outage_s = 1.0 }
+        [[parameter]]
+        key = "sensorr"
+        values = ["mpu-6050"]
+        """,
+    )
+    run.save(tmp_path / "c", report=False)
+    _, row, recorded = case_of(tmp_path / "c", 0)
+    assert recorded is not None
+    assert (row["status"], row["code"]) == ("refused", recorded["code"])
+    assert [one.code for one in row["errors"]] == ["config.unknown-key"]

@@ -103,6 +103,15 @@ def test_failures_have_the_command_that_repeats_one(gridded: Document) -> None:
     assert "navigation.too-short" in words_of(gridded)
 
 
+def test_errors_are_on_page_one(gridded: Document) -> None:
+    _, cases, _ = grid()
+    refused = cases.loc[cases["status"] == "refused", "case"]
+    (state, text) = gridded.front[-1].rows[0]
+    assert state.startswith("refused")
+    first = f"the first is {refused.iloc[0]}"
+    assert spaced(text) == f"navigation.too-short: {len(refused)} cases, {first}"
+
+
 def test_one_cell_has_key_figures_with_interval_and_verdict() -> None:
     spec, cases, _ = grid()
     spec = {**spec, "cells": [{}], "parameters": spec["parameters"][2:]}
@@ -143,7 +152,8 @@ def test_a_fleet_shows_its_outliers_and_their_logs() -> None:
         if isinstance(block, Items)
         for head, text in block.rows
     }
-    assert set(found) == {"log.gaps", "sensors.vibration"}
+    refused = "refused (input or configuration)"
+    assert set(found) == {"log.gaps", "sensors.vibration", refused}
     assert found["log.gaps"].startswith("drives/log-003.csv (3), drives/log-013.csv (13), ")
     assert found["log.gaps"].endswith("and 3 more: 10.0 % (4.4 to 18.8 %).")
     chart = next(c for c in blocks_of(document, Chart) if c.slug == "logs-0")

@@ -21,7 +21,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from typing import IO, Any
 
-from strapdown.errors import ConfigError
+from strapdown.errors import ConfigError, StrapdownError
 
 __all__ = ["CaseProcess", "Row", "run_case"]
 
@@ -37,11 +37,16 @@ START = 120.0
 # --- within the process -------------------------------------------------------------------
 
 
-def run_case(campaign: Any, number: int) -> tuple[Row, Any]:
-    """Run a case; returns its row and its result, None where it has none."""
+def run_case(
+    campaign: Any, number: int, errors: list[StrapdownError] | None = None
+) -> tuple[Row, Any]:
+    """Run a case; returns its row and its result, None where it has none.
+
+    `errors` takes the error that a case is refused or diverges with.
+    """
     from strapdown.campaign.kinds import KINDS, at_path
     from strapdown.campaign.specification import key_path
-    from strapdown.errors import DivergenceError, StrapdownError
+    from strapdown.errors import DivergenceError
 
     case = campaign.case(number)
     kind = KINDS[campaign.spec.base.kind]
@@ -59,6 +64,8 @@ def run_case(campaign: Any, number: int) -> tuple[Row, Any]:
     except MemoryError:
         return {**row, "status": "memory"}, None
     except StrapdownError as error:
+        if errors is not None:
+            errors.append(error)
         status = "diverged" if isinstance(error, DivergenceError) else "refused"
         return {**row, "status": status, "code": error.finding.code}, None
     except Exception as error:  # a fault of ours, or of a plug-in, is a result of this case

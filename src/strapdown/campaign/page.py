@@ -44,6 +44,8 @@ __all__ = ["campaign_document"]
 ROWS = 100
 #: Share of the logs of a fleet below which a finding is said on page one.
 UNUSUAL = 0.5
+#: Errors that are said on page one, at most.
+SAID = 5
 _BOUND_WORDS = {
     "consistent": "consistent with {}",
     "optimistic": "optimistic: the bound is too small for {}",
@@ -132,6 +134,17 @@ def _front(results: Results) -> Iterator[Block]:
         if rows := tuple(_answers_over_cells(results)):
             yield Items(rows)
         yield _cell_table(results)
+    if rows := tuple(_errors(results)):
+        yield Items(rows)
+
+
+def _errors(results: Results) -> Iterator[tuple[str, str]]:
+    """Errors that cases ended with, each with its first case."""
+    for one in results.summary["errors"][:SAID]:
+        first = f"{one['logs'][0]} ({one['cases'][0]})" if "logs" in one else one["cases"][0]
+        words = f"{counted(one['count'], results.case_noun)}, the first is {first}"
+        state = _STATUS_WORDS.get(one["status"], one["status"])
+        yield state, f"{one['code']}: {words}" if one["code"] else words
 
 
 def _unusual(results: Results) -> Iterator[tuple[str, str]]:

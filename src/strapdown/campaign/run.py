@@ -30,7 +30,7 @@ from strapdown.campaign.engine import Workers, run_batches
 from strapdown.campaign.kinds import KINDS
 from strapdown.campaign.specification import CampaignSpec
 from strapdown.campaign.statistics import share_of, student_interval
-from strapdown.errors import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError, StrapdownError
 from strapdown.progress import Progress, silent
 from strapdown.report.report_bundle import ReportBundle
 
@@ -476,8 +476,8 @@ def case_of(folder: str | Path, number: int) -> tuple[Any, dict[str, Any], dict[
     Returns
     -------
     result, row, recorded
-        The result, None where the case has none; its row, and the recorded row, None if there is
-        none: equal to the last bit where program and machine are the same.
+        The result, None where the case has none; its row, with its ``errors``, and the recorded
+        row, None if there is none: equal to the last bit where program and machine are the same.
 
     Raises
     ------
@@ -488,7 +488,9 @@ def case_of(folder: str | Path, number: int) -> tuple[Any, dict[str, Any], dict[
     total = found.design.total
     if not 0 <= number < total:
         raise ConfigError("campaign.no-case", quantity="CASE", number=number, last=total - 1)
-    row, result = run_case(found.design, number)
+    errors: list[StrapdownError] = []
+    row, result = run_case(found.design, number, errors)
+    row["errors"] = [error.finding for error in errors]
     recorded = None
     for block in found.dataset.cases():
         near = np.flatnonzero(block["case"].to_numpy() == number)

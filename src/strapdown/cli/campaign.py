@@ -276,6 +276,7 @@ def case(
     values = ", ".join(f"{name} = {value}" for name, value in row["values"].items())
     screen.print(f"Case {number}: {values or 'no parameter'}, seed {row['seed']}", markup=False)
     screen.print(f"{row['status']} {row['code']}".strip(), markup=False)
+    print_findings(row["errors"])
     if result is not None:
         seal = save_case(found.design, result, out or Path(f"{folder}-case-{number}"), force)
         screen.print(f"Result: {seal.path}", markup=False)
