@@ -24,6 +24,8 @@ ROOMS = {file.stem for file in (SOURCE / "messages").glob("*.toml")}
 CODE = re.compile(r"[a-z_]+\.[a-z0-9]+(?:-[a-z0-9]+)*")
 PARTS = {"what", "remedy", *(f"{p}_{w}" for p in ("what", "remedy") for w in ("cli", "file"))}
 LOCATION = {"severity", "file", "row", "quantity", "line", "data"}
+#: Entries whose data have a `nearest` of another meaning.
+OWN_NEAREST = {"attitude.hz-asked-hz"}
 RAISED = {"Finding", "DataError", "ConfigError", "DivergenceError", "check_choice"}
 
 
@@ -74,6 +76,26 @@ def test_every_placeholder_has_a_format_that_names_can_have():
         if name is not None and "," in (spec or "")
     ]
     assert wrong == []
+
+
+def test_the_nearest_word_is_a_sentence_of_its_own_that_alone_lists_the_known_ones():
+    """`{nearest}` lists the known words: another list of them said all twice, without a space."""
+    joined, twice = [], []
+    for code, entry in CATALOGUE.items():
+        parts = [part for text in entry.values() for part in string.Formatter().parse(text)]
+        # Of an entry that fills `nearest` itself it is a word like others.
+        if code in OWN_NEAREST:
+            continue
+        names = [name.split(".")[0] for _, name, _, _ in parts if name is not None]
+        if "nearest" in names and "known" in names:
+            twice.append(code)
+        joined += [
+            code
+            for text in entry.values()
+            for before in [text.partition("{nearest}")[0]]
+            if "{nearest}" in text and before and not before.endswith((". ", "? "))
+        ]
+    assert (joined, twice) == ([], [])
 
 
 def test_every_code_that_is_raised_has_its_entry(raised):

@@ -203,18 +203,31 @@ def test_a_scheduler_without_workers_and_none_at_all(
     assert code == "campaign.no-workers"
 
 
+def test_a_dashboard_that_nothing_draws_is_refused(
+    cheap: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = written(cheap, DRAWN.format(draws=2))
+    monkeypatch.setattr("strapdown.campaign.engine.find_spec", lambda name: None)
+    with pytest.raises(ConfigError) as caught:
+        run_campaign(file, workers=Workers(1, dashboard=True))
+    assert caught.value.finding.code == "campaign.no-bokeh"
+
+
 @pytest.mark.slow
 def test_killed_at_drawn_instants_and_resumed(cheap: Path) -> None:
-    file = written(cheap, DRAWN.format(draws=120).replace("[cases]", "[cases]\nseed = 5"))
+    """``STRAPDOWN_KILLS=50`` for so many; a row that is not written within 5 s is run again."""
+    kills = int(os.environ.get("STRAPDOWN_KILLS", "3"))
+    text = DRAWN.format(draws=40 * kills)
+    file = written(cheap, text.replace("[cases]", "[cases]\nseed = 5"))
     text = file.read_text().replace("at_s = 0.0", "at_s = 0.05")
     file.write_text(text)
     run_campaign(file, workers=2).save(cheap / "whole", report=False)
     command = [sys.executable, "-m", "strapdown", "campaign"]
-    rng = random.Random(3)
+    rng = random.Random(kills)
     start = [str(file), "--out", str(cheap / "cut"), "--no-report", "--workers", "2", "-q"]
-    kept = [0]
+    kept, killed = [0], 0
     # Killed while it starts, runs, or writes; then until its end.
-    for wait in (*(2.0 + 5.0 * rng.random() for _ in range(3)), None):
+    for wait in (*(2.0 + 10.0 * rng.random() for _ in range(kills)), None):
         begun = (cheap / "cut-running" / "campaign.json").exists()
         more = ["resume", str(cheap / "cut"), "--no-report", "-q"] if begun else start
         process = subprocess.Popen([*command, *more], start_new_session=True)
@@ -226,8 +239,10 @@ def test_killed_at_drawn_instants_and_resumed(cheap: Path) -> None:
             break
         os.killpg(process.pid, signal.SIGKILL)
         process.wait()
+        killed += 1
         if (cheap / "cut-running" / "campaign.json").exists():
             kept.append(int(open_campaign(cheap / "cut").dataset.there().sum()))
+    print(f"{killed} kills; cases kept after each: {kept[1:]}")
     assert kept == sorted(kept)  # what was written stays
     assert content(cheap / "cut") == content(cheap / "whole")
     assert not (cheap / "cut-running").exists()

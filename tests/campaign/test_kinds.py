@@ -8,7 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from strapdown.campaign.case_process import run_case
+from strapdown.campaign.design import Campaign
 from strapdown.campaign.run import case_of, differing, run_campaign, save_case
+from strapdown.campaign.specification import CampaignSpec
 from strapdown.report.verify import verify
 
 FLEET = """
@@ -80,7 +83,7 @@ def test_drives_with_curves_and_their_seal(tmp_path: Path) -> None:
     by_noise = run.cases.groupby("noise_m")["horizontal_rms_m"].median()
     assert by_noise[2.0] > by_noise[0.02]
     run.save(tmp_path / "c")
-    curves = next(run.dataset.curves())
+    curves = next(run.dataset.curves()).to_pandas()
     assert curves["x"].unique().tolist() == [0.0, 50.0, 100.0, 150.0]
     assert verify(tmp_path / "c").verdict == "identical"
 
@@ -121,3 +124,67 @@ def test_a_fleet_and_a_gesture(tmp_path: Path) -> None:
     )
     slow, fast = gesture.cases["largest_deg"]
     assert slow > 10.0 * fast  # of second order in the step
+
+
+def test_attitude_along_a_motion_on_the_earth(tmp_path: Path) -> None:
+    """A perfect gyro that stands still turns with the Earth, by 15.041 deg in an hour."""
+    (tmp_path / "c.toml").write_text(
+        """
+        [base]
+        kind = "attitude"
+        [base.configuration]
+        algorithms = ["quaternion"]
+        initial = "truth"
+        gyro_bias = "none"  # at rest the Earth's rate would be one
+        [base.configuration.source]
+        rate_hz = 10.0
+        [base.configuration.source.motion]
+        kind = "stationary"
+        lat_deg = 45.0
+        lon_deg = 15.0
+        duration_s = 60.0
+        [[parameter]]
+        key = "source.motion.duration_s"
+        values = [60.0, 120.0]
+        """
+    )
+    design = Campaign.of(CampaignSpec.read(tmp_path / "c.toml", files=False), tmp_path)
+    for number, seconds in enumerate((60.0, 120.0)):
+        row, _ = run_case(design, number)
+        assert row["status"] == "done"
+        last = row["scalars"][list(design.scalars).index("final_deg")]
+        # Rounding of so many steps of 1e-5 rad.
+        assert last == pytest.approx(15.041067 / 3600.0 * seconds, rel=1e-6)
+
+
+@pytest.mark.parametrize("name", ["crash", "gesture", "tunnel"])
+def test_the_shipped_studies_keep_what_their_cases_have(name: str) -> None:
+    """Of one case: a scalar that is not in the result would be NaN in all of them."""
+    file = DRIVE.with_name(f"campaign_{name}.toml")
+    design = Campaign.of(CampaignSpec.read(file, files=False), file.parent)
+    row, _ = run_case(design, 0)
+    assert row["status"] == "done"
+    asked = {getattr(one, key) for one in design.spec.coverage for key in ("error", "bound")}
+    asked |= {one.scalar for one in design.spec.rate}
+    values = dict(zip(design.scalars, row["scalars"], strict=True))
+    assert asked
+    assert all(np.isfinite(values[name]) for name in asked)
+
+
+def test_a_case_that_is_refused_says_why(tmp_path: Path) -> None:
+    run = run_of(
+        tmp_path,
+        """
+        [base]
+        kind = "outage"
+        configuration = { sensor = "mpu-6050", outage_s = 1.0 }
+        [[parameter]]
+        key = "sensorr"
+        values = ["mpu-6050"]
+        """,
+    )
+    run.save(tmp_path / "c", report=False)
+    _, row, recorded = case_of(tmp_path / "c", 0)
+    assert recorded is not None
+    assert (row["status"], row["code"]) == ("refused", recorded["code"])
+    assert [one.code for one in row["errors"]] == ["config.unknown-key"]

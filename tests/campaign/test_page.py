@@ -12,7 +12,7 @@ from tests.campaign_cases import batches, fleet, frozen, grid, ishigami
 from strapdown.campaign.page import campaign_document
 from strapdown.campaign.summary import summarise
 from strapdown.report.chart import Chart
-from strapdown.report.document import Document, KeyFigures, Paragraph, TableBlock
+from strapdown.report.document import Document, Items, KeyFigures, Paragraph, TableBlock
 from strapdown.report.document_html import document_page
 from strapdown.report.values import spaced
 
@@ -103,6 +103,15 @@ def test_failures_have_the_command_that_repeats_one(gridded: Document) -> None:
     assert "navigation.too-short" in words_of(gridded)
 
 
+def test_errors_are_on_page_one(gridded: Document) -> None:
+    _, cases, _ = grid()
+    refused = cases.loc[cases["status"] == "refused", "case"]
+    (state, text) = gridded.front[-1].rows[0]
+    assert state.startswith("refused")
+    first = f"the first is {refused.iloc[0]}"
+    assert spaced(text) == f"navigation.too-short: {len(refused)} cases, {first}"
+
+
 def test_one_cell_has_key_figures_with_interval_and_verdict() -> None:
     spec, cases, _ = grid()
     spec = {**spec, "cells": [{}], "parameters": spec["parameters"][2:]}
@@ -136,9 +145,40 @@ def test_a_fleet_shows_its_outliers_and_their_logs() -> None:
     words = words_of(document)
     assert "drives/log-030.csv (30)" in words
     assert "80 logs: 76 done, 4 not" in words
+    # What most logs do not have is on page one.
+    found = {
+        head: spaced(text)
+        for block in document.front
+        if isinstance(block, Items)
+        for head, text in block.rows
+    }
+    refused = "refused (input or configuration)"
+    assert set(found) == {"log.gaps", "sensors.vibration", refused}
+    assert found["log.gaps"].startswith("drives/log-003.csv (3), drives/log-013.csv (13), ")
+    assert found["log.gaps"].endswith("and 3 more: 10.0 % (4.4 to 18.8 %).")
     chart = next(c for c in blocks_of(document, Chart) if c.slug == "logs-0")
     far = [line for line in chart.panels[1].lines if line.name == "far out"]
     assert far[0].x.tolist() == [11.0, 30.0]
+
+
+def test_linear_propagation_is_beside_the_cases_in_bulk() -> None:
+    rng = np.random.default_rng(6)
+    values = 3.0 + 2.0 * rng.standard_normal(800)
+    _, cases, _ = grid(draws=1)
+    own = {"cell": 0, "draw": range(800), "case": range(800), "seed": 1}
+    cases = cases.iloc[[0] * 800].reset_index(drop=True).assign(**own, end_m=values)
+    cases["status"] = "done"
+    spec = frozen(keep={"scalars": {"end_m": "end_m"}, "curves": []}, total=800)
+    linear = {"nominal": {"end_m": 3.1}, "linear_sd": {"end_m": 1.6}}
+    document = document_of({**spec, "linear": linear}, cases)
+    (section,) = (s for s in document.sections if s.slug == "linear")
+    (table,) = section.blocks
+    (row,) = table.rows
+    mean, sd = values.mean(), values.std(ddof=1)
+    assert row == ("end, m", "3.1", f"{mean:.1f}", "1.60", f"{sd:.2f}", f"{sd / 1.6:.3f}")
+    assert "2.5" in table.caption  # per cent: 1 / sqrt(2 n)
+    plain = document_of(spec, cases)
+    assert not next(s for s in plain.sections if s.slug == "linear").blocks
 
 
 def test_a_campaign_without_cases_is_a_page() -> None:

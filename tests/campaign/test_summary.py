@@ -20,6 +20,7 @@ from tests.campaign_cases import (
     ishigami,
 )
 
+from strapdown.campaign import dataset
 from strapdown.campaign.run import Stopping
 from strapdown.campaign.summary import LEVELS, summarise
 
@@ -222,3 +223,85 @@ def test_half_widths_for_stopping() -> None:
             for row in reversed(rows):  # as they arrive
                 stopping.add(row)
             assert (stopping.stopped == {0: len(own)}) is stops
+
+
+def test_rows_are_read_in_order_once_and_a_window_at_a_time(tmp_path, monkeypatch):
+    """Of parts in any order, that overlap and repeat each other; blocks have the same bytes."""
+    monkeypatch.setattr(dataset, "WINDOW", 16)
+    monkeypatch.setattr(dataset, "BLOCK", 48)
+    frozen = {
+        "base": {},
+        "parameters": [],
+        "logs": [],
+        "keep": {"scalars": {"y": "x"}, "curves": ["c"], "axis": {"to_s": 1.0, "points": 3}},
+        "total": 200,
+        "schema": "strapdown campaign 1",
+        **dict.fromkeys(("identity", "digests", "source"), "x"),
+    }
+    value = np.random.default_rng(3).normal(size=200)
+    value[17] = np.nan
+
+    def row(case):
+        kept = {
+            "scalars": [value[case]],
+            "values": {},
+            "status": "done",
+            "code": "",
+            "findings": "",
+        }
+        curve = None if 96 <= case < 112 or case % 7 == 0 else [[case, case + 0.5, case + 1.0]]
+        return {
+            "case": case,
+            "cell": case % 2,
+            "draw": case // 2,
+            "seed": 1,
+            **kept,
+            "curves": curve,
+        }
+
+    def written(name, parts):
+        made = dataset.Dataset.begin(tmp_path / name, frozen)
+        for part in parts:
+            made.add([row(case) for case in part])
+        return made
+
+    # 130 to 149 were not run; 60 to 69 twice.
+    rng = np.random.default_rng(4)
+    there = [*range(130), *range(150, 200)]
+    mixed = rng.permutation(there).tolist()
+    one = written("one", [mixed[k : k + 23] for k in range(0, 180, 23)] + [range(60, 70)])
+    other = written("other", [there])
+    for made in (one, other):
+        tables = list(made.cases())
+        assert max(map(len, tables)) <= 16
+        assert [c for t in tables for c in t["case"].to_pylist()] == there
+        assert [y for t in tables for y in t["y"].to_pylist()] == [
+            None if np.isnan(value[c]) else value[c] for c in there
+        ]
+    some = {0: 60, 1: 30}
+
+    def keep(table):
+        limit = np.where(table["cell"].to_numpy() == 0, some[0], some[1])
+        return table.filter(table["draw"].to_numpy() < limit)
+
+    for made in (one, other):
+        out = tmp_path / f"{made.folder.name}-out"
+        out.mkdir()
+        made.write_blocks(out, keep)
+    files = sorted(
+        p.relative_to(tmp_path / "one-out") for p in (tmp_path / "one-out").rglob("*.parquet")
+    )
+    assert [f.name for f in files[:3]] == [
+        f"part-{first:010d}-{first + 47:010d}-block.parquet" for first in (0, 48, 96)
+    ]
+    for file in files:
+        assert (tmp_path / "one-out" / file).read_bytes() == (
+            tmp_path / "other-out" / file
+        ).read_bytes()
+    kept = [c for c in there if c // 2 < some[c % 2]]
+    table = pd.read_parquet(tmp_path / "one-out" / "cases")
+    assert table["case"].tolist() == kept
+    curves = pd.read_parquet(tmp_path / "one-out" / "curves")
+    with_curve = [c for c in kept if not (96 <= c < 112 or c % 7 == 0)]
+    assert curves["case"].tolist() == np.repeat(with_curve, 3).tolist()
+    assert curves["c"].tolist() == [c + d for c in with_curve for d in (0.0, 0.5, 1.0)]

@@ -113,6 +113,56 @@ def _turned(c, x, y, z):
 # Runs of one record, each with its own errors of the increments and of the start.
 
 
+#: Runs whose errors are formed together, and steps of a tile: what unknowns add to them stays in
+#: the first cache from run to run.
+GROUP, TILE = 16, 64
+
+
+@njit(cache=True, error_model="numpy")
+def _errors_of_runs(low, high, effects, used, noise_sd, draws, noise, order, added):
+    """Errors of angle and velocity of each step of the runs from `low` to before `high`."""
+    steps = effects.shape[2]
+    for j in range(6):
+        count = 0
+        for p in range(effects.shape[0]):
+            if used[p, j]:
+                order[count] = p
+                count += 1
+        # Four at a time: a quarter of the loads and stores of what they are added to.
+        fours = count - count % 4
+        for begin in range(0, steps, TILE):
+            end = min(begin + TILE, steps)
+            for n in range(low, high):
+                sums = added[n - low, j, begin:end]
+                for i in range(begin, end):
+                    sums[i - begin] = noise_sd[j, i] * noise[n, j, i]
+                for k in range(0, fours, 4):
+                    a, b, c, d = order[k], order[k + 1], order[k + 2], order[k + 3]
+                    _add_four(
+                        sums,
+                        effects[a, j, begin:end],
+                        effects[b, j, begin:end],
+                        effects[c, j, begin:end],
+                        effects[d, j, begin:end],
+                        draws[n, a],
+                        draws[n, b],
+                        draws[n, c],
+                        draws[n, d],
+                    )
+                for k in range(fours, count):
+                    p = order[k]
+                    x = draws[n, p]
+                    for i in range(begin, end):
+                        sums[i - begin] += x * effects[p, j, i]
+
+
+@njit(cache=True, error_model="numpy")
+def _add_four(sums, a, b, c, d, w, x, y, z):
+    """Add four multiples, in this order."""
+    for i in range(sums.shape[0]):
+        sums[i] = sums[i] + w * a[i] + x * b[i] + y * c[i] + z * d[i]
+
+
 @njit(cache=True, error_model="numpy", nogil=True)
 def perturbed_runs(
     state, rows, nominal, start, effects, used, noise_sd, draws, noise, earth, options, kept, out
@@ -126,8 +176,8 @@ def perturbed_runs(
     (6, k) times `noise` (n, 6, k) is added. `out` (n, m, 9) takes the difference of a run from the
     nominal one, as in `grow_errors`, after `kept` (m) steps: 0 is the start.
     """
-    steps, unknowns = rows.shape[0], start.shape[0]
-    added = np.empty((6, steps))
+    steps, unknowns, runs = rows.shape[0], start.shape[0], draws.shape[0]
+    added = np.empty((GROUP, 6, steps))
     mine = np.empty((steps, rows.shape[1]))
     history = np.empty((steps, ROW))
     own = np.empty(state.shape[0])
@@ -137,45 +187,23 @@ def perturbed_runs(
     meridian, transverse = radii(math.sin(state[LAT]), earth[0], earth[1])
     north, east = meridian + state[ALT], (transverse + state[ALT]) * math.cos(state[LAT])
     whole = 0
-    for n in range(draws.shape[0]):
-        for j in range(6):
-            for i in range(steps):
-                added[j, i] = noise_sd[j, i] * noise[n, j, i]
+    for n in range(runs):
+        if n % GROUP == 0:
+            _errors_of_runs(
+                n, min(n + GROUP, runs), effects, used, noise_sd, draws, noise, order, added
+            )
+        errors = added[n % GROUP]
         first[:] = 0.0
         for p in range(unknowns):
             for j in range(9):
                 first[j] += draws[n, p] * start[p, j]
-        for j in range(6):
-            count = 0
-            for p in range(unknowns):
-                if used[p, j]:
-                    order[count] = p
-                    count += 1
-            # Four at a time: a quarter of the loads and stores of what they are added to.
-            whole_fours = count - count % 4
-            for k in range(0, whole_fours, 4):
-                a, b, c, d = order[k], order[k + 1], order[k + 2], order[k + 3]
-                w, x, y, z = draws[n, a], draws[n, b], draws[n, c], draws[n, d]
-                for i in range(steps):
-                    added[j, i] = (
-                        added[j, i]
-                        + w * effects[a, j, i]
-                        + x * effects[b, j, i]
-                        + y * effects[c, j, i]
-                        + z * effects[d, j, i]
-                    )
-            for k in range(whole_fours, count):
-                p = order[k]
-                x = draws[n, p]
-                for i in range(steps):
-                    added[j, i] += x * effects[p, j, i]
         for i in range(steps):
             half = 0.5 * rows[i, 0]
             mine[i, 0] = rows[i, 0]
             for j in range(6):
-                mine[i, 1 + j] = rows[i, 1 + j] + added[j, i]
+                mine[i, 1 + j] = rows[i, 1 + j] + errors[j, i]
             for j in range(3):
-                mine[i, 7 + j] = rows[i, 7 + j] + half * added[3 + j, i]
+                mine[i, 7 + j] = rows[i, 7 + j] + half * errors[3 + j, i]
         for j in range(own.shape[0]):
             own[j] = state[j]
         own[LAT] += first[6] / north

@@ -1,4 +1,4 @@
-"""Rates that one unit of a gyro triad measures, sample by sample, and attitudes beside the truth.
+"""Rates that units of a gyro triad measure, sample by sample, and attitudes beside the truth.
 
 For many units of one sensor along one motion: what all units share is given once, and a unit is a
 row of numbers for each axis.
@@ -20,6 +20,8 @@ FELT, SCALE, SECOND, THIRD, BIAS = 3, 6, 7, 8, 9
 FULL, QUANTUM = 0, 1
 # Samples that are formed together, in the cache.
 CHUNK = 512
+# Attitudes that are compared together.
+SOME = 64
 
 
 @njit(cache=True, error_model="numpy")
@@ -53,7 +55,7 @@ def unit_increments(
     shared,
     slow,
     each,
-    unit,
+    units,
     limits,
     noise_sd,
     numbers,
@@ -63,36 +65,37 @@ def unit_increments(
     theta,
     dtheta,
 ):
-    """Fill theta and dtheta, (n - 1, 3), of the steps between n samples of a unit.
+    """Fill theta and dtheta, (units, n - 1, 3), of the steps between n samples of some units.
 
     `rate`, (3, n), rad/s, and `force`, (3, n), m/s², are the true ones, `felt` whether the force
-    has an effect; `shared`, (3, n), is the drift of every unit; `slow`, (blocks, 3), that of this
-    one, each over `each` samples. `unit`, (3, 10): of each axis the row of I + misalignment, the
-    row of the g-sensitivity, scale, second and third order, bias; `limits`, (3, 2): full scale and
-    quantum. White noise of `noise_sd`, (3, n): two bytes of `numbers`, (6, n), choose among
-    `quantiles`, (65536,).
+    has an effect; `shared`, (3, n), is the drift of every unit; `slow`, (units, blocks, 3), that of
+    each, over `each` samples a block. `units`, (units, 3, 10): of each axis the row of I +
+    misalignment, the row of the g-sensitivity, scale, second and third order, bias; `limits`,
+    (3, 2): full scale and quantum. White noise of `noise_sd`, (3, n): two bytes of `numbers`,
+    (units, 6, n), choose among `quantiles`, (4096,).
     """
     count = rate.shape[1]
     # The last sample of a chunk is the first of the next.
     measured = np.zeros((3, CHUNK + 1))
-    for start in range(0, count, CHUNK):
-        stop = min(start + CHUNK, count)
-        for j in range(3):
-            y = measured[j]
-            y[0] = y[CHUNK]
-            _sense(y, start, stop, rate, force, felt, unit[j], limits[j, FULL])
-            _drift(y, start, stop, j, shared[j], slow, each, unit[j, BIAS])
-            sd, low, high = noise_sd[j], numbers[2 * j], numbers[2 * j + 1]
-            for i in range(start, stop):
-                number = int(low[i]) + 256 * int(high[i])
-                y[1 + i - start] += sd[i] * quantiles[number]
-            _convert(y, stop - start, limits[j, FULL], limits[j, QUANTUM])
-        for i in range(max(start, 1), stop):
-            k, m, step = i - 1, i - start, dt[i - 1]
+    for u in range(units.shape[0]):
+        for start in range(0, count, CHUNK):
+            stop = min(start + CHUNK, count)
             for j in range(3):
-                theta[k, j], dtheta[k, j] = increment(
-                    measured[j, m], measured[j, m + 1], step, mean
-                )
+                y, own = measured[j], units[u, j]
+                y[0] = y[CHUNK]
+                _sense(y, start, stop, rate, force, felt, own, limits[j, FULL])
+                _drift(y, start, stop, j, shared[j], slow[u], each, own[BIAS])
+                sd, low, high = noise_sd[j], numbers[u, 2 * j], numbers[u, 2 * j + 1]
+                for i in range(start, stop):
+                    number = int(low[i]) + 256 * int(high[i])
+                    y[1 + i - start] += sd[i] * quantiles[number]
+                _convert(y, stop - start, limits[j, FULL], limits[j, QUANTUM])
+            for i in range(max(start, 1), stop):
+                k, m, step = i - 1, i - start, dt[i - 1]
+                for j in range(3):
+                    theta[u, k, j], dtheta[u, k, j] = increment(
+                        measured[j, m], measured[j, m + 1], step, mean
+                    )
 
 
 # Each a loop of its own, for the compiler to take several samples at once.
@@ -143,21 +146,28 @@ def _convert(y, count, full, quantum):
 def turns_from(truth, q):
     """Largest and last angle, rad, between attitudes q, (n, 4), of any norm, and the true ones."""
     sine, cosine, v, c = 0.0, 1.0, 0.0, 1.0
-    for i in range(q.shape[0]):
-        w, x, y, z = quat_multiply(
-            truth[i, 0],
-            -truth[i, 1],
-            -truth[i, 2],
-            -truth[i, 3],
-            q[i, 0],
-            q[i, 1],
-            q[i, 2],
-            q[i, 3],
-        )
-        v, c = x * x + y * y + z * z, w * w
-        # The larger of two angles between 0 and 180 deg, without a division.
-        if v * cosine > sine * c:
-            sine, cosine = v, c
+    # Squares of sine and cosine of half the angle, times the norms; first for some samples, for the
+    # compiler to take several at once.
+    sines, cosines = np.empty(SOME), np.empty(SOME)
+    for start in range(0, q.shape[0], SOME):
+        stop = min(start + SOME, q.shape[0])
+        for i in range(start, stop):
+            w, x, y, z = quat_multiply(
+                truth[i, 0],
+                -truth[i, 1],
+                -truth[i, 2],
+                -truth[i, 3],
+                q[i, 0],
+                q[i, 1],
+                q[i, 2],
+                q[i, 3],
+            )
+            sines[i - start], cosines[i - start] = x * x + y * y + z * z, w * w
+        for k in range(stop - start):
+            v, c = sines[k], cosines[k]
+            # The larger of two angles between 0 and 180 deg, without a division.
+            if v * cosine > sine * c:
+                sine, cosine = v, c
     return 2.0 * math.atan2(math.sqrt(sine), math.sqrt(cosine)), 2.0 * math.atan2(
         math.sqrt(v), math.sqrt(c)
     )

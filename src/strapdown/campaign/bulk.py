@@ -12,7 +12,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -29,7 +28,7 @@ from strapdown.config.motions import TrajectorySpec
 from strapdown.config.outage import OutageSpec
 from strapdown.config.sources import ScenarioSpec
 from strapdown.config.spec import specify
-from strapdown.crash.case import run_case
+from strapdown.crash.case import reconstruct_case
 from strapdown.crash.case_contact import main_event
 from strapdown.crash.delta_v_bound import AT_REST, WINDOW_ENDS, VelocityChange, body_effects
 from strapdown.crash.entry import angles_sd
@@ -201,7 +200,7 @@ class BulkCrash(_Streams):
                 inside = np.flatnonzero(weights.any(axis=0))
                 if len(inside):
                     part = slice(inside[0], inside[-1] + 1)
-                    vector = vector + (noise[:, 3:, part] * weights[:, part]).sum(axis=2)
+                    vector = vector + np.einsum("rij,ij->ri", noise[:, 3:, part], weights[:, part])
             more = drawn.generator.standard_normal((TOGETHER, 3))
             vector = vector + np.einsum("rj,ij->ri", more, root)
             total = np.sqrt((vector * vector).sum(axis=1))
@@ -262,15 +261,13 @@ class BulkCrash(_Streams):
         return body_effects(effects, weights), [back, ahead], _root(rest)
 
 
-def bulk_crash(spec: CaseSpec, file: Path | None = None, seed: int = 0) -> BulkCrash:
+def bulk_crash(spec: CaseSpec, seed: int = 0) -> BulkCrash:
     """Prepare many possible truths of a crash.
 
     Parameters
     ----------
     spec : CaseSpec
-        With absolute paths; its record is reconstructed once, without its own Monte Carlo.
-    file : Path, optional
-        Case file.
+        With absolute paths; its record is reconstructed once.
     seed : int
 
     Raises
@@ -278,9 +275,7 @@ def bulk_crash(spec: CaseSpec, file: Path | None = None, seed: int = 0) -> BulkC
     ConfigError, DataError, DivergenceError
         As `run_case`.
     """
-    options = spec.options.model_copy(update={"monte_carlo_runs": 0})
-    made = run_case(spec.model_copy(update={"options": options}), file)
-    return BulkCrash(made.reconstruction.main, seed)
+    return BulkCrash(reconstruct_case(spec).main, seed)
 
 
 # Attitude: units of one gyro triad along one motion, each integrated from the true attitude.
@@ -293,8 +288,9 @@ ANGLES = (
     "end_pitch_error_deg",
     "end_heading_error_deg",
 )
-#: Samples of a piece, and the values of which white noise takes one: both stay in the cache.
-CHUNK, _QUANTILES = 1024, 1 << 12
+#: Samples of a piece, the units whose increments are formed in one call, and the values of which
+#: white noise takes one: all stay in the cache.
+CHUNK, UNITS, _QUANTILES = 512, 4, 1 << 12
 #: Blocks of a correlation time, and least number of blocks of a record. Over a block a wandering
 #: bias is its mean, drawn exactly: so is the angle at its end, but for the turn within it.
 _PER_TIME, _BLOCKS = 16, 64
@@ -463,34 +459,39 @@ class BulkAttitude(_Streams):
         turns: list[list[tuple[float, float]]] = [[] for _ in states]
         last, quantiles = np.empty((TOGETHER, 4)), _quantiles()
         bytes_ = _bytes(generator, 1)
+        theta = dtheta = np.empty((UNITS, 0, 3))
+        history = np.empty((0, algorithm.width))
         for rate, force, known, sd, own, dt, truth in self._pieces:
             steps = len(dt)
             # The last sample of a piece is the first of the next.
             bytes_ = np.concatenate([bytes_[:, :, -1:], _bytes(generator, steps)], axis=2)
-            theta, dtheta = np.empty((2, steps, 3))
-            history = np.empty((steps, algorithm.width))
-            for k, (unit, state) in enumerate(zip(units, states, strict=True)):
+            if steps != theta.shape[1]:
+                theta, dtheta = np.empty((2, UNITS, steps, 3))
+                history = np.empty((steps, algorithm.width))
+            for first in range(0, TOGETHER, UNITS):
+                some = slice(first, first + UNITS)
                 unit_increments(
                     rate,
                     force,
                     felt,
                     known,
-                    slow[k, own],
+                    slow[some, own],
                     each,
-                    unit,
+                    units[some],
                     limits,
                     sd,
-                    bytes_[k],
+                    bytes_[some],
                     quantiles,
                     dt,
                     self.mean,
                     theta,
                     dtheta,
                 )
-                kernel(state, dt, theta, dtheta, history, *options)
-                q = history if plain else algorithm.quaternions(history)
-                turns[k].append(turns_from(truth, q))
-                last[k] = q[-1]
+                for k in range(UNITS):
+                    kernel(states[first + k], dt, theta[k], dtheta[k], history, *options)
+                    q = history if plain else algorithm.quaternions(history)
+                    turns[first + k].append(turns_from(truth, q))
+                    last[first + k] = q[-1]
         angles = np.array([[max(pairs)[0], pairs[-1][1]] for pairs in turns])
         return self._scalars(np.column_stack([angles, last]))
 

@@ -21,7 +21,7 @@ import time
 from collections.abc import Iterator, Mapping, Sequence
 from typing import IO, Any
 
-from strapdown.errors import ConfigError
+from strapdown.errors import ConfigError, StrapdownError
 
 __all__ = ["CaseProcess", "Row", "run_case"]
 
@@ -37,27 +37,35 @@ START = 120.0
 # --- within the process -------------------------------------------------------------------
 
 
-def run_case(campaign: Any, number: int) -> tuple[Row, Any]:
-    """Run a case; returns its row and its result, None where it has none."""
+def run_case(
+    campaign: Any, number: int, errors: list[StrapdownError] | None = None
+) -> tuple[Row, Any]:
+    """Run a case; returns its row and its result, None where it has none.
+
+    `errors` takes the error that a case is refused or diverges with.
+    """
     from strapdown.campaign.kinds import KINDS, at_path
     from strapdown.campaign.specification import key_path
-    from strapdown.errors import DivergenceError, StrapdownError
+    from strapdown.errors import DivergenceError
 
     case = campaign.case(number)
     kind = KINDS[campaign.spec.base.kind]
     row = _row(campaign, case, "done")
     try:
         result = kind.run(campaign.table(case), f"case-{number}")
-        data = kind.data(result)
+        view = kind.view(result)
+        data = kind.data(view)
         row["scalars"] = [
             _number(at_path(data, key_path(place))) for place in campaign.scalars.values()
         ]
         row["findings"] = " ".join(sorted({one.code for one in _findings(result)}))
         if campaign.spec.keep.curves:
-            row["curves"] = _curves(campaign, kind, result)
+            row["curves"] = _curves(campaign, kind, view)
     except MemoryError:
         return {**row, "status": "memory"}, None
     except StrapdownError as error:
+        if errors is not None:
+            errors.append(error)
         status = "diverged" if isinstance(error, DivergenceError) else "refused"
         return {**row, "status": status, "code": error.finding.code}, None
     except Exception as error:  # a fault of ours, or of a plug-in, is a result of this case
@@ -94,12 +102,12 @@ def _number(value: Any) -> float:
     return math.nan
 
 
-def _curves(campaign: Any, kind: Any, result: Any) -> list[list[float]]:
+def _curves(campaign: Any, kind: Any, view: Any) -> list[list[float]]:
     import numpy as np
 
     axis = campaign.spec.keep.axis
     x = np.linspace(axis.from_s, axis.to_s, axis.points)
-    table = kind.curves(result)
+    table = kind.curves(view)
     time = table.index.to_numpy(dtype=np.float64)
     out = []
     for name in campaign.spec.keep.curves:

@@ -9,6 +9,7 @@ ran which case when. The rows of a block count before those of a part.
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -17,8 +18,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
 from strapdown.bundle import to_json
@@ -27,8 +28,9 @@ from strapdown.errors import ConfigError, DataError
 
 __all__ = ["BLOCK", "Dataset", "frozen_of"]
 
-#: Cases of a block.
-BLOCK = 100_000
+#: Cases that are in memory at a time, and of a block, which is a file.
+WINDOW = 2**14
+BLOCK = 6 * WINDOW
 #: Name of the frozen campaign.
 CAMPAIGN = "campaign.json"
 CASES, CURVES = "cases", "curves"
@@ -145,7 +147,7 @@ class Dataset:
             **dict(zip(self.frozen["keep"]["scalars"], np.asarray(values).T, strict=True)),
         }
         schema = schema_of(self.frozen)
-        arrays = [pa.array(columns[f.name], type=f.type) for f in schema]
+        arrays = [_array(columns[f.name], f.type) for f in schema]
         self._part(CASES, pa.Table.from_arrays(arrays, schema=schema))
 
     def there(self) -> np.ndarray:
@@ -155,29 +157,40 @@ class Dataset:
             out[pq.read_table(path, columns=["case"])["case"].to_numpy()] = True
         return out
 
-    def cases(self, columns: Sequence[str] | None = None) -> Iterator[pd.DataFrame]:
-        """Yield the rows in order of the case, a block at a time."""
+    def cases(self, columns: Sequence[str] | None = None) -> Iterator[pa.Table]:
+        """Yield the rows in order of the case, a window of cases at a time."""
         yield from self._ordered(CASES, columns)
 
-    def curves(self) -> Iterator[pd.DataFrame]:
-        """Yield the curves in order of the case, those of a block of cases at a time."""
+    def curves(self) -> Iterator[pa.Table]:
+        """Yield the curves in order of the case, those of a window at a time."""
         if self.frozen["keep"].get("curves"):
             yield from self._ordered(CURVES, None)
 
-    def write_blocks(self, out: Path, keep: Callable[[pd.DataFrame], pd.DataFrame]) -> None:
-        """Write the rows that `keep` leaves of each block, in order, as files of their own."""
-        kept: dict[int, pd.Series] = {}
-        for name in (CASES, *([CURVES] if self.frozen["keep"].get("curves") else [])):
+    def write_blocks(self, out: Path, keep: Callable[[pa.Table], pa.Table]) -> None:
+        """Write the rows that `keep` leaves, in order, as a file for each block of cases."""
+        curves = bool(self.frozen["keep"].get("curves"))
+        for name in (CASES, *([CURVES] if curves else [])):
             (out / name).mkdir()
-            schema = schema_of(self.frozen) if name == CASES else self._curve_schema()
-            for number, table in enumerate(self._ordered(name, None)):
-                if name == CASES:
-                    table = keep(table)
-                    kept[number] = table["case"]
-                else:
-                    table = table[table["case"].isin(kept[number])]
-                made = pa.Table.from_pandas(table, schema=schema, preserve_index=False)
-                _write_parquet(made.replace_schema_metadata(None), out / name, number)
+            parts = (
+                map(keep, self._ordered(CASES, None)) if name == CASES else self._kept_curves(keep)
+            )
+            for number, tables in itertools.groupby(filter(len, parts), _block_of):
+                first = number * BLOCK
+                path = out / name / f"part-{first:010d}-{first + BLOCK - 1:010d}-block.parquet"
+                with pq.ParquetWriter(path, self._schema(name), compression="zstd") as writer:
+                    for table in tables:
+                        # In one piece: its bytes do not depend on the parts it is made of.
+                        writer.write_table(table.combine_chunks())
+
+    def _kept_curves(self, keep: Callable[[pa.Table], pa.Table]) -> Iterator[pa.Table]:
+        """Curves of the cases that `keep` leaves, a window of cases at a time."""
+        cases = filter(len, map(keep, self._ordered(CASES, ["cell", "draw"])))
+        own = next(cases, None)
+        for table in self._ordered(CURVES, None):
+            while own is not None and _window_of(own) < _window_of(table):
+                own = next(cases, None)
+            if own is not None and _window_of(own) == _window_of(table):
+                yield table.filter(pc.is_in(table["case"], own["case"].combine_chunks()))
 
     # --- files ----------------------------------------------------------------------------
 
@@ -194,26 +207,17 @@ class Dataset:
         path = self.folder / name / f"part-{first:010d}-{last:010d}-{own}.parquet"
         _written(path, lambda at: at.write_bytes(data))
 
-    def _ordered(self, name: str, columns: Sequence[str] | None) -> Iterator[pd.DataFrame]:
+    def _ordered(self, name: str, columns: Sequence[str] | None) -> Iterator[pa.Table]:
+        """Yield the rows of a window of cases at a time, in order and each once."""
         files = [(*_span(path), path) for path in self._files(name)]
-        wanted = None if columns is None else list(dict.fromkeys(["case", *columns]))
-        for begin in range(0, int(self.frozen["total"]), BLOCK):
-            end = begin + BLOCK
+        keys = ["case"] if name == CASES else ["case", "x"]
+        wanted = None if columns is None else list(dict.fromkeys([*keys, *columns]))
+        for begin in range(0, int(self.frozen["total"]), WINDOW):
+            end = begin + WINDOW
             near = [path for first, last, path in files if first < end and last >= begin]
-            parts = [
-                pq.read_table(
-                    path, columns=wanted, filters=[("case", ">=", begin), ("case", "<", end)]
-                )
-                for path in near
-            ]
-            parts = [part for part in parts if part.num_rows]
-            if not parts:
-                continue
-            table = pa.concat_tables(parts).to_pandas()
-            keys = ["case"] if name == CASES else ["case", "x"]
-            table = table.sort_values(keys, kind="stable")
-            # Two machines may both have run a case: to the same bits.
-            yield table.drop_duplicates(keys).reset_index(drop=True)
+            parts = [part for path in near for part in _rows_between(path, begin, end, wanted)]
+            if parts:
+                yield _once(pa.concat_tables(parts), keys)
 
     def _case_table(self, rows: Iterable[Mapping[str, Any]]) -> pa.Table:
         schema = schema_of(self.frozen)
@@ -228,10 +232,13 @@ class Dataset:
                 values = [None if v is None else str(v) for v in values]
             elif field.type == pa.float64():
                 values = [None if v is None else float(v) for v in values]
-            arrays.append(pa.array(values, type=field.type))
+            arrays.append(_array(values, field.type))
         return pa.Table.from_arrays(arrays, schema=schema)
 
-    def _curve_schema(self) -> pa.Schema:
+    def _schema(self, name: str) -> pa.Schema:
+        """Columns of the cases, or of the curves."""
+        if name == CASES:
+            return schema_of(self.frozen)
         names = self.frozen["keep"]["curves"]
         return pa.schema(
             [("case", pa.int64()), ("x", pa.float64()), *((n, pa.float64()) for n in names)]
@@ -246,21 +253,62 @@ class Dataset:
         for k in range(len(self.frozen["keep"]["curves"])):
             own = [np.asarray(row["curves"][k], dtype=np.float64) for row in kept]
             columns.append(np.concatenate(own) if own else np.empty(0))
-        schema = self._curve_schema()
-        arrays = [pa.array(c, type=f.type) for c, f in zip(columns, schema, strict=True)]
+        schema = self._schema(CURVES)
+        arrays = [_array(c, f.type) for c, f in zip(columns, schema, strict=True)]
         return pa.Table.from_arrays(arrays, schema=schema)
+
+
+def _array(values: Any, kind: pa.DataType) -> pa.Array:
+    """A column; NaN is null in it."""
+    return pa.array(values, type=kind, from_pandas=True)
+
+
+def _block_of(table: pa.Table) -> int:
+    return int(table["case"][0].as_py()) // BLOCK
+
+
+def _window_of(table: pa.Table) -> int:
+    return int(table["case"][0].as_py()) // WINDOW
+
+
+def _rows_between(
+    path: Path, begin: int, end: int, columns: list[str] | None
+) -> Iterator[pa.Table]:
+    """Rows of the cases from `begin` to before `end`, of those groups of a file that have some."""
+    file = pq.ParquetFile(path)
+    for k in range(file.num_row_groups):
+        span = file.metadata.row_group(k).column(0).statistics
+        if span is None or span.min >= end or span.max < begin:
+            continue
+        # Without threads, which would hold parts of their own.
+        table = file.read_row_group(k, columns=columns, use_threads=False)
+        case = table["case"].to_numpy()
+        inside = (case >= begin) & (case < end)
+        if inside.any():
+            yield table if inside.all() else table.filter(pa.array(inside))
+
+
+def _once(table: pa.Table, keys: Sequence[str]) -> pa.Table:
+    """Rows in order of the keys; of equal ones the first: two machines made them to the same bits.
+
+    Parts that are in order already are left as they are.
+    """
+    columns = [table[key].to_numpy() for key in keys]
+    ahead = columns[-1][1:] > columns[-1][:-1]
+    if len(keys) > 1:
+        ahead = (columns[0][1:] > columns[0][:-1]) | ((columns[0][1:] == columns[0][:-1]) & ahead)
+    if ahead.all():
+        return table
+    order = np.lexsort(columns[::-1])
+    rows = np.column_stack([column[order] for column in columns])
+    fresh = np.r_[True, (rows[1:] != rows[:-1]).any(axis=1)]
+    return table.take(pa.array(order[fresh]))
 
 
 def _span(path: Path) -> tuple[int, int]:
     """First and last case of a part, by its name."""
     _, first, last, *_ = path.stem.split("-")
     return int(first), int(last)
-
-
-def _write_parquet(table: pa.Table, folder: Path, number: int) -> None:
-    first = number * BLOCK
-    path = folder / f"part-{first:010d}-{first + BLOCK - 1:010d}-block.parquet"
-    pq.write_table(table, path, compression="zstd")
 
 
 def _written(path: Path, write: Callable[[Path], Any]) -> None:

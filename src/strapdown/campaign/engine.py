@@ -15,6 +15,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from importlib.util import find_spec
 from typing import Any
 
 from strapdown.campaign.case_process import CaseProcess
@@ -27,7 +28,7 @@ BATCH = 2.0
 #: Batches in flight for each worker; the second waits while the first runs.
 AHEAD = 2
 #: Most cases of a batch; in bulk, in multiples of `TOGETHER`.
-MOST, MOST_BULK, TOGETHER = 1000, 65_536, 64
+MOST, MOST_BULK, TOGETHER = 1000, 16_384, 64
 #: How long a scheduler may be without a worker, s.
 WORKERS = 60.0
 #: Share of the latest batch in the estimated cost of a case.
@@ -115,13 +116,17 @@ def run_batches(
     Raises
     ------
     ConfigError
-        dask is not installed, the scheduler does not answer, or is lost.
+        dask is not installed, or bokeh, which draws the dashboard; the scheduler does not answer,
+        or is lost.
     """
     try:
         from distributed import Client, LocalCluster
         from distributed import as_completed as arriving
     except ImportError:
         raise ConfigError("campaign.no-dask") from None
+    if workers.dashboard and workers.scheduler is None and find_spec("bokeh") is None:
+        # Its pages would say so themselves, one by one.
+        raise ConfigError("campaign.no-bokeh", quantity="--dashboard")
     for name in ("distributed", "tornado", "asyncio"):
         logging.getLogger(name).setLevel(logging.CRITICAL)
     cluster: Any = None
@@ -149,7 +154,7 @@ def run_batches(
             ) from None
         if workers.dashboard:
             port = client.dashboard_link.rpartition(":")[2]
-            shown(client.dashboard_link if cluster is None else f"http://127.0.0.1:{port}")
+            shown(client.dashboard_link if cluster is None else f"http://127.0.0.1:{port}/status")
         _feed(frozen, numbers, client, arriving, take, workers.scheduler)
     finally:
         # A lost scheduler answers none of this.

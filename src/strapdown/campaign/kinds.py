@@ -34,8 +34,11 @@ class Kind:
     ----------
     run : callable
         From the configuration of a case, as a table, and its name, to the result.
+    view : callable
+        From a result to what its data and curves are taken from: the result itself, or with what is
+        computed once for both.
     data : callable
-        From a result to the plain data of its JSON, to which numbers for campaigns are added.
+        From a view to the plain data of its JSON, to which numbers for campaigns are added.
     save : callable
         From a result and a folder to its sealed folder.
     scalars : mapping of str to str
@@ -45,7 +48,7 @@ class Kind:
     log : tuple
         Place of the path of a log.
     curves : callable, optional
-        From a result to a table over the time from its start, s.
+        From a view to a table over the time from its start, s.
     """
 
     run: Callable[[Table, str], Any]
@@ -56,6 +59,7 @@ class Kind:
     log: KeyPath = ()
     curves: Callable[[Any], pd.DataFrame] | None = None
     curve_names: tuple[str, ...] = field(default=())
+    view: Callable[[Any], Any] = field(default=lambda run: run)
 
 
 # --- places in plain data -----------------------------------------------------------------
@@ -122,11 +126,16 @@ def _proposed(table: Table) -> Table:
     return proposal.table
 
 
-def _navigation_data(run: Any) -> Table:
-    from strapdown.report.navigation import navigation_json
+def _evaluated(run: Any) -> Any:
+    """The run, compared with its truth."""
     from strapdown.report.navigation_evaluation import NavigationEvaluation
 
-    evaluation = NavigationEvaluation(run)
+    return NavigationEvaluation(run)
+
+
+def _navigation_data(evaluation: Any) -> Table:
+    from strapdown.report.navigation import navigation_json
+
     data = navigation_json(evaluation)
     data["trusted"] = float(data["trust"]["verdict"] == "trusted")
     errors = evaluation.errors
@@ -152,11 +161,8 @@ def _at_the_end(errors: Any) -> Table:
     return out
 
 
-def _navigation_curves(run: Any) -> pd.DataFrame:
-    from strapdown.report.navigation_evaluation import NavigationEvaluation
-
-    evaluation = NavigationEvaluation(run)
-    errors = evaluation.errors
+def _navigation_curves(evaluation: Any) -> pd.DataFrame:
+    run, errors = evaluation.run, evaluation.errors
     begin = float(run.source.imu.index[0])
     sd = run.record.sd
     stamps = sd.index.to_numpy(dtype=np.float64)
@@ -380,6 +386,13 @@ def _crash_data(run: Any) -> Table:
     if truth is not None and event is not None:
         data["truth"] = truth
         data["at_the_end"] = _crash_errors(answer, event, truth)
+        # Of each recorder by its name, beside the answer that is their mean.
+        data["by_recorder"] = {
+            one["recorder"]: _crash_errors(one, own, truth)
+            for one in data["answers"]
+            for own in one["events"]
+            if own["event"] == one["main_event"]
+        }
     return data
 
 
@@ -471,6 +484,7 @@ KINDS: dict[str, Kind] = {
         ("log", "path"),
         _navigation_curves,
         ("horizontal_error_m", "horizontal_sd_m", "height_error_m", "heading_error_deg"),
+        _evaluated,
     ),
     "align": Kind(
         _align,

@@ -30,7 +30,7 @@ from strapdown.campaign.engine import Workers, run_batches
 from strapdown.campaign.kinds import KINDS
 from strapdown.campaign.specification import CampaignSpec
 from strapdown.campaign.statistics import share_of, student_interval
-from strapdown.errors import ConfigError, DataError
+from strapdown.errors import ConfigError, DataError, StrapdownError
 from strapdown.progress import Progress, silent
 from strapdown.report.report_bundle import ReportBundle
 
@@ -165,7 +165,9 @@ class CampaignRun:
     @property
     def cases(self) -> pd.DataFrame:
         """All cases: parameters, status and kept scalars, by number."""
-        parts = [_kept(part, self.stopped) for part in self.dataset.cases()]
+        parts: list[pd.DataFrame] = [
+            _kept(part, self.stopped).to_pandas() for part in self.dataset.cases()
+        ]
         return pd.concat(parts, ignore_index=True).set_index("case")
 
     def to_pandas(self) -> pd.DataFrame:
@@ -294,7 +296,7 @@ def _finished(
     if stopping is not None and there.any():
         names = list(dataset.frozen["keep"]["scalars"])
         for block in dataset.cases():
-            for row in block.to_dict("records"):
+            for row in block.to_pandas().to_dict("records"):
                 named = {str(key): value for key, value in row.items()}
                 stopping.add({**named, "scalars": [named[name] for name in names]})
     k, of = part
@@ -364,18 +366,21 @@ def _run_missing(
         flush()
 
 
-def _kept(table: pd.DataFrame, stopped: Mapping[int, int]) -> pd.DataFrame:
+def _kept(table: Any, stopped: Mapping[int, int]) -> Any:
     """Rows that count: of a cell that was stopped, its first draws."""
     if not stopped:
         return table
-    limit = table["cell"].map(lambda cell: stopped.get(int(cell), np.iinfo(np.int64).max))
-    return table[table["draw"] < limit].reset_index(drop=True)
+    cell, draw = table["cell"].to_numpy(), table["draw"].to_numpy()
+    limit = np.full(int(cell.max(initial=0)) + 1, np.iinfo(np.int64).max)
+    for one, draws in stopped.items():
+        limit[one : one + 1] = draws
+    return table.filter(draw < limit[cell])
 
 
 def _summary(dataset: Dataset, stopped: Mapping[int, int]) -> dict[str, Any]:
     from strapdown.campaign.summary import summarise
 
-    def cases() -> Iterator[pd.DataFrame]:
+    def cases() -> Iterator[Any]:
         for block in dataset.cases():
             yield _kept(block, stopped)
 
@@ -471,8 +476,8 @@ def case_of(folder: str | Path, number: int) -> tuple[Any, dict[str, Any], dict[
     Returns
     -------
     result, row, recorded
-        The result, None where the case has none; its row, and the recorded row, None if there is
-        none: equal to the last bit where program and machine are the same.
+        The result, None where the case has none; its row, with its ``errors``, and the recorded
+        row, None if there is none: equal to the last bit where program and machine are the same.
 
     Raises
     ------
@@ -483,12 +488,14 @@ def case_of(folder: str | Path, number: int) -> tuple[Any, dict[str, Any], dict[
     total = found.design.total
     if not 0 <= number < total:
         raise ConfigError("campaign.no-case", quantity="CASE", number=number, last=total - 1)
-    row, result = run_case(found.design, number)
+    errors: list[StrapdownError] = []
+    row, result = run_case(found.design, number, errors)
+    row["errors"] = [error.finding for error in errors]
     recorded = None
     for block in found.dataset.cases():
-        near = block[block["case"] == number]
+        near = np.flatnonzero(block["case"].to_numpy() == number)
         if len(near):
-            recorded = {str(k): v for k, v in near.iloc[0].items()}
+            recorded = {str(k): v for k, v in block.take(near).to_pandas().iloc[0].items()}
             break
     return result, row, recorded
 

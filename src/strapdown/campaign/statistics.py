@@ -54,7 +54,7 @@ Keys = NDArray[np.uint64]
 #: Rows of a block.
 ROWS = 2**14
 #: Counters of a pass of `order_statistics`, and values that it sorts in memory.
-COUNTERS, CANDIDATES = 2**22, 2**18
+COUNTERS, CANDIDATES = 2**20, 2**17
 #: Replications of the bootstrap of Sobol indices.
 REPLICATIONS = 400
 
@@ -67,17 +67,20 @@ def blocks(batches: Iterable[Any], rows: int = ROWS) -> Iterator[pd.DataFrame]:
     held: list[pd.DataFrame] = []
     count = 0
     for batch in batches:
-        table = batch if isinstance(batch, pd.DataFrame) else batch.to_pandas()
-        if not len(table):
-            continue
-        held.append(table)
-        count += len(table)
-        if count >= rows:
-            whole = pd.concat(held, ignore_index=True) if len(held) > 1 else table
-            end = count - count % rows
-            for start in range(0, end, rows):
-                yield whole.iloc[start : start + rows].reset_index(drop=True)
-            held, count = [whole.iloc[end:]], count - end
+        start = 0
+        while start < len(batch):
+            end = min(start + rows - count, len(batch))
+            # Of a table of Arrow no more than a block is converted at a time.
+            part = (
+                batch[start:end]
+                if isinstance(batch, pd.DataFrame)
+                else batch.slice(start, end - start).to_pandas()
+            )
+            held.append(part)
+            count, start = count + end - start, end
+            if count == rows:
+                yield pd.concat(held, ignore_index=True)
+                held, count = [], 0
     if count:
         yield pd.concat(held, ignore_index=True)
 

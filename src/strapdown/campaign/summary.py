@@ -241,22 +241,20 @@ class _Tally:
         for t, test in enumerate(plan.tests):
             for k, mask in enumerate(test.of(plan, block)):
                 self.hits[:, t, k] += np.bincount(cell[mask], minlength=len(plan.cells))
-        by = {"cell": cell, "case": plan.number(block)}
-        for name in ("status", "code", "findings"):
-            by[name] = block[name].fillna("").astype(object).to_numpy()
-        codes = pd.DataFrame(by)
-        failed = codes[codes["status"] != "done"]
-        # Keys of a group of several columns have no type in pandas.
-        sizes: Any = codes.groupby(["cell", "status"]).size().items()
-        for (c, status), count in sizes:
-            self.status[int(c), status] += int(count)
-        groups: Any = failed.groupby(["cell", "status", "code"])["case"]
-        for (c, status, code), own in groups:
-            self.errors.setdefault((int(c), status, code), _Codes()).add(own.tolist())
-        groups = codes[codes["findings"] != ""].groupby(["cell", "findings"])["case"]
-        for (c, text), own in groups:
+        # Most cases are done and without a finding.
+        done = (block["status"] == "done").to_numpy(bool)
+        for c, count in enumerate(np.bincount(cell[done])):
+            self.status[c, "done"] += int(count)
+        failed = _codes(block, cell, ~done, ("status", "code"))
+        for (c, status, code), cases in failed.items():
+            self.status[c, status] += len(cases)
+            self.errors.setdefault((c, status, code), _Codes()).add(cases)
+        found = _codes(
+            block, cell, (block["findings"].fillna("") != "").to_numpy(bool), ("findings",)
+        )
+        for (c, text), cases in found.items():
             for code in dict.fromkeys(text.split()):
-                self.findings.setdefault((int(c), code), _Codes()).add(own.tolist())
+                self.findings.setdefault((c, code), _Codes()).add(cases)
 
     def counts(self, cell: int | None) -> dict[str, Any]:
         """States, errors and findings of a cell, or of all."""
@@ -322,6 +320,18 @@ class _Tally:
                 row |= {k: test.given.get(k) for k in ("scalar", "above", "below")}
                 out["rates"].append(row)
         return out
+
+
+def _codes(
+    block: pd.DataFrame, cell: Whole, rows: Any, names: Sequence[str]
+) -> dict[Any, list[int]]:
+    """Cases of some rows of a block by cell and texts."""
+    out: dict[Any, list[int]] = {}
+    some = block[rows]
+    texts = [some[name].fillna("").tolist() for name in names]
+    for c, case, *own in zip(cell[rows].tolist(), some["case"].tolist(), *texts, strict=True):
+        out.setdefault((c, *own), []).append(int(case))
+    return out
 
 
 def _joined(one: _Codes, other: _Codes) -> tuple[int, list[int]]:

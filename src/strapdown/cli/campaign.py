@@ -13,6 +13,8 @@ from strapdown.cli.shared_options import ReportFlags, folder_to_make, running, s
 
 if TYPE_CHECKING:
     from strapdown.bundle import Seal
+    from strapdown.cli.console import Stopwatch
+    from strapdown.progress import Progress
 
 EPILOG = (
     "Example: strapdown campaign tunnel.toml\n\n"
@@ -159,11 +161,31 @@ def _run(folder: Path, write: Any, compute: Any, *, complete: bool = True) -> No
     def clean(seal: Seal) -> None:
         shutil.rmtree(working, ignore_errors=True)
 
-    done = run_and_save(lambda report: compute(report, shown), folder, write, "summary.json", clean)
+    def run_it(report: Stopwatch) -> Any:
+        return compute(_counted(report), shown)
+
+    done = run_and_save(run_it, folder, write, "summary.json", clean)
     if done is not None:
         result, seal = done
         print_campaign(result.design.plain(), result.summary, folder.name)
         print_seal(seal, "summary.json", write.no_report)
+
+
+def _counted(report: Stopwatch) -> Progress:
+    """Show numbers of cases, which are one stage."""
+    begun = False
+
+    def told(stage: str, share: float) -> None:
+        nonlocal begun
+        if not stage[:1].isdigit():
+            report(stage, share)
+            return
+        if not begun:
+            report("cases", share)
+            begun = True
+        report.within(stage, share)
+
+    return told
 
 
 @app.command("merge")
@@ -197,7 +219,7 @@ def status(
     found = open_campaign(folder)
     counts: dict[str, int] = {}
     for block in found.dataset.cases(["status"]):
-        for name, count in block["status"].value_counts().items():
+        for name, count in block["status"].to_pandas().value_counts().items():
             counts[str(name)] = counts.get(str(name), 0) + int(count)
     told = {
         "campaign": found.design.spec.name,
@@ -254,6 +276,7 @@ def case(
     values = ", ".join(f"{name} = {value}" for name, value in row["values"].items())
     screen.print(f"Case {number}: {values or 'no parameter'}, seed {row['seed']}", markup=False)
     screen.print(f"{row['status']} {row['code']}".strip(), markup=False)
+    print_findings(row["errors"])
     if result is not None:
         seal = save_case(found.design, result, out or Path(f"{folder}-case-{number}"), force)
         screen.print(f"Result: {seal.path}", markup=False)

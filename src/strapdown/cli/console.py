@@ -87,6 +87,10 @@ class Stopwatch:
         self._stage = (stage, perf_counter())
         self._report(stage, share)
 
+    def within(self, words: str, share: float) -> None:
+        """Show how far a stage is."""
+        self._report(words, share)
+
     def stop(self) -> None:
         """End the last stage."""
         if self._stage is not None:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, FiniteFloat, StrictInt, model_validator
 
+from strapdown.config.motions import MotionSpec
 from strapdown.config.reading import FileSpec
 from strapdown.config.spec import NotNegative, Number, Positive, Spec, Triple, refuse
 from strapdown.config.toml_file import read_toml
@@ -86,7 +87,8 @@ class ScenarioFile(FileSpec):
     seed: StrictInt = Field(default=0, ge=0)
     sensor: str | None = None
     references: tuple[str, ...] = ()
-    motion: PulsesSpec
+    #: Of pulses; within a campaign on the Earth as well, with its turning.
+    motion: Annotated[PulsesSpec | MotionSpec, Field(discriminator="kind")]
     gyro: GyroErrorsSpec = Field(default_factory=GyroErrorsSpec)
     accel: AccelErrorsSpec = Field(default_factory=AccelErrorsSpec)
 

@@ -280,6 +280,17 @@ def run_case(
     )
 
 
+@one_thread()
+def reconstruct_case(spec: CaseSpec) -> CrashReconstruction:
+    """Reconstruct a case alone, without its severity, indices, references and possible paths.
+
+    Errors as of `run_case`.
+    """
+    records, spec = whole_records(spec)
+    units = tuple(case_unit(unit, records) for unit in spec.units)
+    return reconstruct_crash(units, _entry(spec), _options(spec))
+
+
 def _options(spec: CaseSpec) -> CrashOptions:
     options = spec.options
     return CrashOptions(

@@ -15,7 +15,7 @@ from strapdown.config import motions
 from strapdown.config.alignment import SimulationTable
 from strapdown.config.motions import TrajectorySpec
 from strapdown.config.navigation import NavigationSimulationTable, ReceiverTable
-from strapdown.config.sources import ScenarioSpec
+from strapdown.config.sources import PulsesSpec, ScenarioSpec
 from strapdown.config.spec import AngleWaveSpec
 from strapdown.constants import STANDARD_GRAVITY
 from strapdown.ellipsoids import Ellipsoid, find_ellipsoid
@@ -25,6 +25,7 @@ from strapdown.sensors.error_chain import Seed, child, normal
 from strapdown.simulation import (
     EarthMotion,
     ImuErrors,
+    Motion,
     Origin,
     PathMotion,
     Pulse,
@@ -167,31 +168,12 @@ def scenario_of(spec: ScenarioSpec) -> Scenario:
     if spec.own is None:
         return find_scenario(spec.name)
     own = spec.own
-    motion = own.motion
     with with_key(f"{own.name}.toml"):
-        pulses: list[Pulse] = []
-        for axis, listed in enumerate((motion.x, motion.y, motion.z)):
-            for p in listed:
-                within = (p.start_s, p.start_s + p.duration_s)
-                turn = p.turn_deg
-                if turn is None:
-                    turn = (p.rate_deg_per_s or 0.0) * (p.duration_s - p.edge_s)
-                pulses += repeated_pulse(axis, within, turn, p.edge_s, p.times, p.every_s or 0.0)
-        latest = max(pulses, key=lambda p: p.end, default=None)
-        if latest is not None and latest.end > motion.duration_s:
-            raise ConfigError(
-                "simulation.pulse-not-within-motion",
-                quantity="duration",
-                length=latest.end - latest.start,
-                start=latest.start,
-                duration=motion.duration_s,
-            )
-        q_nb = rotation.quaternion_from_euler(
-            [motion.roll_deg, motion.pitch_deg, motion.heading_deg]
-        )
-        made = PulseMotion(
-            tuple(pulses), motion.duration_s, (q_nb[0], q_nb[1], q_nb[2], q_nb[3]), motion.arm_m
-        )
+        made: Motion
+        if isinstance(own.motion, PulsesSpec):
+            made = _of_pulses(own.motion)
+        else:
+            made = make_motion(own.motion, find_ellipsoid("wgs84"))
     gyro, accel = own.gyro, own.accel
     errors = ImuErrors(
         TriadErrors(
@@ -206,6 +188,30 @@ def scenario_of(spec: ScenarioSpec) -> Scenario:
     )
     title = own.title or own.name
     return Scenario(title, own.name, made, errors, own.references, f"{own.name}.toml")
+
+
+def _of_pulses(motion: PulsesSpec) -> PulseMotion:
+    pulses: list[Pulse] = []
+    for axis, listed in enumerate((motion.x, motion.y, motion.z)):
+        for p in listed:
+            within = (p.start_s, p.start_s + p.duration_s)
+            turn = p.turn_deg
+            if turn is None:
+                turn = (p.rate_deg_per_s or 0.0) * (p.duration_s - p.edge_s)
+            pulses += repeated_pulse(axis, within, turn, p.edge_s, p.times, p.every_s or 0.0)
+    latest = max(pulses, key=lambda p: p.end, default=None)
+    if latest is not None and latest.end > motion.duration_s:
+        raise ConfigError(
+            "simulation.pulse-not-within-motion",
+            quantity="duration",
+            length=latest.end - latest.start,
+            start=latest.start,
+            duration=motion.duration_s,
+        )
+    q_nb = rotation.quaternion_from_euler([motion.roll_deg, motion.pitch_deg, motion.heading_deg])
+    return PulseMotion(
+        tuple(pulses), motion.duration_s, (q_nb[0], q_nb[1], q_nb[2], q_nb[3]), motion.arm_m
+    )
 
 
 def _times(values: tuple[float, float, float], factor: float) -> tuple[float, ...]:
