@@ -92,9 +92,9 @@ NOISE_OF_GRADES = (
 #: that of its surroundings: as constants an hour of good fixes makes them surer than they stay.
 SCALES = {"correlation_time_s": 3600.0}
 #: Change of the biases of a grade while the unit warms up: gyros, deg/h, and accelerometers, µg.
-#: Data sheets state 0.005 to 0.05 deg/s/K and 0.1 to 1 mg/K for consumer parts (ICM-42688-P, LSM6DSO,
-#: BMI160), a third of it for industrial ones; assumed: a unit becomes 3 to 5 K warmer. And the time
-#: in which most of that happens, s.
+#: Data sheets state 0.005 to 0.05 deg/s/K and 0.1 to 1 mg/K for consumer parts (ICM-42688-P,
+#: LSM6DSO, BMI160), a third of it for industrial ones; assumed: a unit becomes 3 to 5 K warmer.
+#: And the time in which most of that happens, s.
 WARMING = {"phone": (180.0, 1000.0), "industrial": (54.0, 400.0)}
 WARM = 400.0
 NO_ERRORS = ImuUncertainty(TriadUncertainty(), TriadUncertainty())
