@@ -44,6 +44,7 @@ from strapdown.config.spec import (
     refuse,
     refused,
 )
+from strapdown.constants import DEG_PER_HOUR, STANDARD_GRAVITY
 from strapdown.errors import ConfigError
 from strapdown.estimation.error_filter import ErrorFilter
 from strapdown.estimation.sensor_blocks import (
@@ -56,7 +57,7 @@ from strapdown.formats.writers import TRAJECTORY_FORMATS
 from strapdown.nav_state import NavState
 from strapdown.navigation.filter_options import DAMPINGS
 from strapdown.navigation.measurements.measurement import Measurement, TabulatedMeasurement
-from strapdown.navigation.navigator import with_states
+from strapdown.navigation.navigator import Warming, with_states
 from strapdown.sensors.uncertainty import STATED_KEYS, ImuUncertainty
 
 
@@ -137,12 +138,30 @@ class NavigationSiteTable(Position):
     velocity_sd_m_per_s: Sizes = 0.1
 
 
+class WarmingTable(Spec):
+    """Biases of a unit that was switched on with its record, and changes them as it warms up."""
+
+    #: Standard deviation of the change until it is warm.
+    gyro_sd_deg_per_h: NotNegative = 0.0
+    accel_sd_ug: NotNegative = 0.0
+    #: Of its decay.
+    time_s: Positive = 400.0
+
+    def make(self) -> Warming | None:
+        """Make the change of the biases, in SI; None where nothing changes."""
+        gyro, accel = self.gyro_sd_deg_per_h / DEG_PER_HOUR, 1e-6 * self.accel_sd_ug
+        if not gyro and not accel:
+            return None
+        return Warming(gyro, accel * STANDARD_GRAVITY, self.time_s)
+
+
 class NavigationSensorsTable(SensorsTable):
     """Sensor uncertainty, and the sensor errors that the filter estimates."""
 
     #: Names of blocks of states; by default biases, drifts, and the stated scale factors and
     #: misalignments.
     states: tuple[Word, ...] | None = None
+    warming: WarmingTable = WarmingTable()
 
 
 class FineModeSpec(ChoiceSpec):

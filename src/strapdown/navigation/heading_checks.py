@@ -419,9 +419,9 @@ def heading_checks_of(
     thinned = {aid.name: _thinned(tables[aid.name]) for aid in aids}
     fixes = {aid.name: aid.epochs(thinned[aid.name]) for aid in aids}
     begun = float(time[0] - rows[0, 0])
-    return HeadingChecks(
-        Navigator(small, aids, mark_interval=FIXES_APART), time, rows, thinned, fixes, begun
-    )
+    warming = chain.navigator.warming
+    alone = Navigator(small, aids, mark_interval=FIXES_APART, warming=warming)
+    return HeadingChecks(alone, time, rows, thinned, fixes, begun)
 
 
 def _known(aid: Gnss, record: NavigationRecord, robust: bool) -> Gnss:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -79,6 +80,11 @@ __all__ = ["EpochLoop", "Navigator", "NavigatorState", "Reference", "with_states
 Array = NDArray[np.float64]
 
 
+#: A warming unit is told of at intervals of this part of the time since it was switched on, and of
+#: so many seconds more, up to so many of its times: then e⁻⁸ of the variance is left.
+PACE, EARLY, FADED = 0.05, 20.0, 4.0
+
+
 @dataclass(frozen=True, eq=False)
 class Reference:
     """States about which a filter is linearized, instead of its own estimates.
@@ -117,6 +123,44 @@ class Reference:
 
 
 @dataclass(frozen=True)
+class Warming:
+    """Change of the biases of a unit that becomes warm after it was switched on.
+
+    A random walk whose drive decays, with the variance ``sd² (1 - exp(-2 t / time))``: of the
+    curve, which differs from unit to unit, the size and the time are known by order only.
+
+    Attributes
+    ----------
+    gyro, accel : float, rad/s and m/s²
+        Standard deviation of the change of a bias until the unit is warm.
+    time : float, s
+        Of the decay.
+    begin : float, s
+        When the unit was switched on; when navigation begins, if it is not known (NaN).
+    """
+
+    gyro: float
+    accel: float
+    time: float
+    begin: float = math.nan
+
+    def since(self, begun: float) -> float:
+        """When it was switched on, of a navigation that began at a time."""
+        return begun if math.isnan(self.begin) else self.begin
+
+    def due(self, told: float, begun: float) -> float:
+        """Time at which a change that was last told of at another is to be told of again."""
+        t = max(told - self.since(begun), 0.0)
+        return told + PACE * (t + EARLY) if t < FADED * self.time else math.inf
+
+    def variances(self, told: float, time: float, begun: float) -> dict[str, float]:
+        """Variances of the change between two times, by block of states."""
+        left = [math.exp(-2.0 * max(t - self.since(begun), 0.0) / self.time) for t in (told, time)]
+        share = left[0] - left[1]
+        return {"gyro_bias": share * self.gyro**2, "accel_bias": share * self.accel**2}
+
+
+@dataclass(frozen=True)
 class Navigator:
     """Navigate by motion increments and measurements of aids.
 
@@ -140,6 +184,8 @@ class Navigator:
         the last bit.
     about : Reference, optional
         What a smoothed run is linearized about; the filter's own estimates, if not given.
+    warming : Warming, optional
+        Change of the biases of a unit that becomes warm.
 
     Raises
     ------
@@ -153,6 +199,7 @@ class Navigator:
     damping: Correction = field(default_factory=ClosedLoop)
     smoother: RauchTungStriebel | None = None
     about: Reference | None = None
+    warming: Warming | None = None
 
     def __post_init__(self) -> None:
         if self.smoother is not None and not self.damping.corrects:
@@ -218,6 +265,8 @@ class Navigator:
             },
             marked=-np.inf,
             observed=state.time,
+            begun=state.time,
+            warmed=state.time,
             tilted=is_large(self.filter.physical_covariance(state)),
         )
 
@@ -319,6 +368,8 @@ class NavigatorState:
         Time of the last mark.
     observed : float, s
         Time of the last observation; the start, before the first.
+    begun, warmed : float, s
+        Begin of navigation, and until when the warming of the unit is in the covariance.
     scales : mapping of str to tuple of ScaleState
         By name of an observation with an adaptive rule: the scale learned of each component.
     steady : ndarray, (7,)
@@ -334,6 +385,8 @@ class NavigatorState:
     memories: Mapping[str, Any]
     marked: float
     observed: float
+    begun: float = -np.inf
+    warmed: float = -np.inf
     scales: Mapping[str, Scales] = field(default_factory=dict)
     steady: Array = field(default_factory=lambda: np.zeros(STEADY))
     tilted: bool = False
@@ -390,6 +443,7 @@ class EpochLoop:
         self.memories = dict(state.memories)
         self.marked = state.marked
         self.observed = state.observed
+        self.begun, self.warmed = state.begun, state.warmed
         self.scales = dict(state.scales)
         self.kept = dict(state.kept)
         self.tilted = state.tilted
@@ -413,6 +467,13 @@ class EpochLoop:
         while True:
             due = min((q.time[0] for q in self.queues.values() if q.time.size), default=np.inf)
             epoch = min(due, self._next_reference())
+            warmer = self._next_warming(time)
+            if warmer < len(time) and time[warmer] < epoch - SAME_INSTANT:
+                first, done = done, warmer + 1
+                self._propagate(time[first:done], rows[first:done], self.history[first:done])
+                self._warm()
+                done = self._fixes(done, time, rows)
+                continue
             # 1. The epoch is due now.
             if epoch <= self.engine.time + SAME_INSTANT:
                 if due <= self.engine.time + SAME_INSTANT:
@@ -438,6 +499,27 @@ class EpochLoop:
                 rows[k] = rest
                 unseen = np.empty((1, self.history.shape[1]))
                 self._propagate(np.array([epoch]), part[None, :], unseen)
+
+    def _next_warming(self, time: Array) -> int:
+        """Index of the next step after which a warming unit is told of; their number if none is."""
+        warming = self.navigator.warming
+        if warming is None:
+            return len(time)
+        return int(time.searchsorted(warming.due(self.warmed, self.begun)))
+
+    def _warm(self) -> None:
+        """Add to the uncertainty of the biases by which these changed as the unit became warmer."""
+        warming, engine = self.navigator.warming, self.engine
+        assert warming is not None
+        engine.close()
+        model = self.navigator.filter.model
+        Q = np.zeros((model.layout.size, model.layout.size))
+        for name, variance in warming.variances(self.warmed, engine.time, self.begun).items():
+            if name in model.layout.places:
+                own = np.arange(model.layout.size)[model.layout[name]]
+                Q[own, own] = variance
+        engine.carry(np.eye(model.physical_size), Q)
+        self.warmed = engine.time
 
     def _next_reference(self) -> float:
         """Time of the next state of the reference."""
@@ -499,6 +581,8 @@ class EpochLoop:
         assert rule is not None
         interval = self.navigator.mark_interval * (1.0 - 1e-9)
         queue = self.queues[aid.name]
+        until = self._next_warming(time)
+        time, rows = time[: until + 1], rows[: until + 1]
         while made < len(time):
             due = int(queue.time.searchsorted(time[-1] + SAME_INSTANT, side="right"))
             if not due:
@@ -584,6 +668,8 @@ class EpochLoop:
             self.memories,
             self.marked,
             self.observed,
+            self.begun,
+            self.warmed,
             self.scales,
             self.steady,
             self.tilted,

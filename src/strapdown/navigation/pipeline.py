@@ -527,12 +527,11 @@ class ModeSequencer:
 
     def chunk(self, last: bool) -> PipelineChunk:
         """Return the output of the chunk."""
-        state = self._state
-        mode = self._chain.modes[state.mode]
         if last:
-            self._end(mode.name)
+            self._end()
+        state = self._state
         return PipelineChunk(
-            mode=mode.name,
+            mode=self._chain.modes[state.mode].name,
             time=state.time,
             navigation=tuple(self._navigation),
             aligned=tuple(self._aligned),
@@ -541,10 +540,12 @@ class ModeSequencer:
             outages=tuple(self._outages),
         )
 
-    def _end(self, mode: str) -> None:
+    def _end(self) -> None:
+        if self._state.navigator is None:
+            self._align_at_end()
         state = self._state
+        mode = self._chain.modes[state.mode].name
         if state.navigator is None:
-            self._refuse_if_attained()
             raise DataError(
                 "navigation.samples-end-mode-before-navigation",
                 file=state.intake.source,
@@ -558,8 +559,11 @@ class ModeSequencer:
         self._events += events
         self._outages += outages
 
-    def _refuse_if_attained(self) -> None:
-        """State the accuracy of an alignment at the end of the samples that misses its limits."""
+    def _align_at_end(self) -> None:
+        """Align by all samples: an alignment back to the begin leaves them to navigation.
+
+        One that misses its limits is refused with its accuracy.
+        """
         state, mode = self._state, self._chain.modes[self._state.mode]
         if mode.kind == "navigation" or not mode.until.converges:
             return
@@ -568,6 +572,11 @@ class ModeSequencer:
         except (DataError, DivergenceError):
             return
         roll, pitch, heading = found.alignment.sd_deg_to_begin.tolist()
+        follows = self._chain.modes[state.mode + 1].kind
+        back = isinstance(mode, CoarseMode) and getattr(mode.way, "backtrack", False)
+        if back and follows == "navigation" and mode.until.met(heading, max(roll, pitch)):
+            self._converged(found)
+            return
         raise DataError(
             "navigation.samples-end-alignment-too-uncertain",
             file=state.intake.source,
@@ -577,6 +586,12 @@ class ModeSequencer:
             heading_deg=heading,
             tilt_deg=max(roll, pitch),
         )
+
+    def _converged(self, found: Aligned) -> None:
+        """End a mode by an alignment that meets its limits."""
+        roll, pitch, heading = found.alignment.sd_deg.tolist()
+        sd = {"heading_deg": heading, "tilt_deg": max(roll, pitch)}
+        self._aligned_to(found, self._state.mode + 1, "mode-converged", **sd)
 
     def _found(self, hole: Hole) -> None:
         policy = self._chain.intake.gaps
@@ -705,9 +720,7 @@ class ModeSequencer:
             return
         roll, pitch, heading = found.alignment.sd_deg_to_begin.tolist()
         if mode.until.met(heading, max(roll, pitch)):
-            roll, pitch, heading = found.alignment.sd_deg.tolist()
-            sd = {"heading_deg": heading, "tilt_deg": max(roll, pitch)}
-            self._aligned_to(found, state.mode + 1, "mode-converged", **sd)
+            self._converged(found)
 
     def _obey(self) -> None:
         """Execute the next command."""

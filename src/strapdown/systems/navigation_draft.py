@@ -263,6 +263,15 @@ def _sensors(page: Page, made: Proposal) -> list[str]:
         page.table(f"[sensors.{triad}]", why)
         for key, value in stated.items():
             page.key(key, toml_value(value) or "")
+    warming = made.table.get("sensors", {}).get("warming")
+    if warming is not None:
+        page.table(
+            "[sensors.warming]",
+            "Nothing says that the unit is warm: so much its biases change until it is. Assumed by "
+            "the grade; leave this table out if it was on for a quarter of an hour before.",
+        )
+        for key, value in warming.items():
+            page.key(key, toml_value(value) or "")
     for block, stated in made.table.get("states", {}).items():
         why = (
             "As a start whose tilt is hardly known wants it: once the tilt is found, gravity along "

@@ -91,6 +91,12 @@ NOISE_OF_GRADES = (
 #: Scale factors of an unknown tactical unit follow its temperature, over the time in which it takes
 #: that of its surroundings: as constants an hour of good fixes makes them surer than they stay.
 SCALES = {"correlation_time_s": 3600.0}
+#: Change of the biases of a grade while the unit warms up: gyros, deg/h, and accelerometers, µg.
+#: Data sheets state 0.005 to 0.05 deg/s/K and 0.1 to 1 mg/K for consumer parts (ICM-42688-P,
+#: LSM6DSO, BMI160), a third of it for industrial ones; assumed: a unit becomes 3 to 5 K warmer.
+#: And the time in which most of that happens, s.
+WARMING = {"phone": (180.0, 1000.0), "industrial": (54.0, 400.0)}
+WARM = 400.0
 NO_ERRORS = ImuUncertainty(TriadUncertainty(), TriadUncertainty())
 #: Longest rest used for a coarse alignment, s.
 COARSE = 100.0
@@ -380,7 +386,7 @@ def _sensors(
     # For gyrocompassing gyros the rocking of a vehicle is motion, not noise.
     north = _finds_north(known) or (named is None and bias is not None and bias <= NORTH)
     if scatter is None:
-        return out
+        return out | ({} if north else _warming(out["sensor"]))
     for (triad, key, unit), quiet, usual in zip(NOISE_KEYS, *scatter, strict=True):
         sheet = np.asarray(getattr(known, triad).axis("noise_density"))
         stated = quiet if named is None else np.maximum(quiet, sheet)
@@ -395,7 +401,14 @@ def _sensors(
             "bias_sd_deg_per_h": float(f"{bias * DEG_PER_HOUR:.2g}"),
             "bias_instability_deg_per_h": float(f"{slow * DEG_PER_HOUR:.2g}"),
         }
-    return out
+    return out if north else out | _warming(out["sensor"])
+
+
+def _warming(named: str) -> dict[str, Any]:
+    """Change of the biases of a sensor whose grade warms up: nothing says that the unit is warm."""
+    if (sds := WARMING.get(load_sensor(named).grade)) is None:
+        return {}
+    return {"warming": {"gyro_sd_deg_per_h": sds[0], "accel_sd_ug": sds[1], "time_s": WARM}}
 
 
 def _rest_bias(

@@ -166,7 +166,7 @@ def run_navigation(
             channels = channel_findings(source.imu, sensors, spec.start, source.tables)
     looked, channels = in_file(looked, *tables), in_file(channels, *tables)
     tidy()
-    chain = make_chain(spec, sensors)
+    chain = _switched_on(make_chain(spec, sensors), float(source.imu.index[0]))
     recorder: Recorder = spec.recorder.make(ellipsoid=spec.ellipsoid)
 
     def show_mode(mode: str, share: float) -> None:
@@ -510,6 +510,19 @@ def _lost_start(
     )
 
 
+def _switched_on(chain: NavigationPipeline, time: float) -> NavigationPipeline:
+    """Return a pipeline whose unit was switched on at a time, if it warms up at all.
+
+    A navigator that begins later, as the independent ones of the heading do, then knows how warm it
+    is.
+    """
+    warming = chain.navigator.warming
+    if warming is None:
+        return chain
+    warming = replace(warming, begin=time)
+    return replace(chain, navigator=replace(chain.navigator, warming=warming))
+
+
 def withheld_aid(spec: NavigationSpec) -> str:
     """Name of the measurement whose fixes a specification withholds."""
     assert spec.withhold is not None
@@ -735,6 +748,7 @@ def make_chain(spec: NavigationSpec, sensors: ImuUncertainty) -> NavigationPipel
         options.mark_interval,
         spec.damping.make(**given),
         spec.smoother.make(**given),
+        warming=spec.sensors.warming.make(),
     )
     prefilter = None
     if spec.prefilter.kind != "none":

@@ -59,6 +59,22 @@ def test_noise_beyond_the_data_sheet_is_stated_for_a_named_sensor_too():
     assert found["accel"]["noise_density_ug_per_sqrt_hz"] == (48.0, 48.0, 48.0)
 
 
+@pytest.mark.parametrize(
+    ("named", "gyro"), [("bmi160", 180.0), ("adis16470", 54.0), ("stim300", None), ("hg9900", None)]
+)
+def test_units_of_cheap_grades_are_taken_to_warm_up(named, gyro):
+    for quiet in (scatter(1e-6, 1e-4), None):
+        found = _sensors(named, quiet, None).get("warming", {})
+        assert found.get("gyro_sd_deg_per_h") == gyro
+        assert (found.get("accel_sd_ug", 0.0) > 0.0) == (gyro is not None)
+
+
+def test_gyros_whose_rest_shows_that_they_find_north_are_warm():
+    loud = scatter(np.radians(0.1) / 60.0, 1e-4)
+    assert "warming" in _sensors(None, loud, None)
+    assert "warming" not in _sensors(None, loud, 1.0 / DEG_PER_HOUR)
+
+
 def test_shaking_is_stated_but_for_gyros_that_find_north():
     gyro, accel, shaken = 0.5 * TACTICAL_NOISE, 60.0 / MICRO_G, 2.0 * LOUD
     key = "noise_density_ug_per_sqrt_hz"

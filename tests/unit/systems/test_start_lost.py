@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 from strapdown.config.navigation import NavigationSpec
+from strapdown.errors import DataError
 from strapdown.navigation.record import Span
 from strapdown.systems.navigation_run import _begun, run_navigation
 
@@ -104,6 +105,29 @@ def test_an_alignment_does_not_end_before_its_least_time(tmp_path):
     file.write_text(TEXT.replace("duration_s = 12.0", ends.splitlines()[0]))
     begun = run_navigation(NavigationSpec.read(file), file).record.trajectory.index[0]
     assert begun < 20.0
+
+
+@pytest.mark.slow
+def test_an_alignment_by_the_whole_record_leaves_it_to_navigation(tmp_path):
+    """The next attempt would be after the last sample: a drawn boat was refused by 0.3 s."""
+    file = tmp_path / "navigate.toml"
+    ends = "until_heading_sd_deg = 15.0\nleast_s = 1000.0"
+    text = TEXT.replace("duration_s = 12.0", ends)
+    file.write_text(text.replace('"gnss_course"', '"gnss_course"\nbacktrack = true'))
+    result = run_navigation(NavigationSpec.read(file), file)
+    time = result.record.trajectory.index
+    first, last = (float(result.source.imu.index[k]) for k in (0, -1))
+    assert time[0] - first < 0.02
+    assert time[-1] == pytest.approx(last, abs=0.11)
+    assert result.record.innovations["rtk.position"]["weight north, m"].gt(0.0).mean() > 0.9
+    assert [span.name for span in result.record.modes] == ["coarse", "navigation"]
+    # Without samples that are left, or beyond its limits, it is refused.
+    worse = text.replace('"gnss_course"', '"gnss_course"\nbacktrack = true').replace("15.0", "1e-3")
+    for refused in (text, worse):
+        file.write_text(refused)
+        with pytest.raises(DataError) as found:
+            run_navigation(NavigationSpec.read(file), file)
+        assert found.value.finding.code == "navigation.samples-end-alignment-too-uncertain"
 
 
 def test_an_outage_test_begins_after_an_alignment_that_used_the_fixes_as_a_whole():
