@@ -47,8 +47,12 @@ def test_a_name_that_is_taken_in_another_form_or_case(studio):
 
 def test_a_file_beyond_the_limit(studio):
     most = studio.limits["upload"]
-    declared = studio.put("large.csv", b"x" * (most + 1))
-    assert declared.status == 413
+    # The answer comes before the body, which a server that refuses it does not wait for.
+    with studio.socket() as one:
+        head = f"PUT /{studio.token}/api/files/large.csv HTTP/1.1\r\nX-Strapdown: 1\r\n"
+        host = f"Host: 127.0.0.1:{studio.port}\r\nContent-Length: {most + 1}\r\n\r\n"
+        one.sendall((head + host).encode())
+        assert b" 413 " in one.recv(4096).partition(b"\r\n")[0]
     chunked = {"Transfer-Encoding": "chunked", "Content-Length": ""}
     with suppress(OSError):
         body = b"".join(b"10000\r\n" + b"x" * 0x10000 + b"\r\n" for _ in range(40)) + b"0\r\n\r\n"

@@ -136,6 +136,7 @@ def live(
     used, which every other command reads as a log. States are written to standard output, one a
     line, all else to standard error.
     """
+    from strapdown.cli.console import tell
     from strapdown.cli.live_folder import warner
     from strapdown.cli.navigate_live import line_writer
     from strapdown.config.navigation import NavigationSpec
@@ -154,6 +155,8 @@ def live(
     user = sources.mqtt_user
 
     def listening(address: str, loopback: bool) -> None:
+        # For the studio, which shows the address.
+        tell({"live": {"address": address, "loopback": loopback}})
         if not loopback:
             warn(Finding("live.open-to-network", address=address))
         if qr or (qr is None and not loopback and sys.stderr.isatty() and not quiet):

@@ -16,7 +16,6 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from datetime import datetime
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -173,14 +172,12 @@ def _answer(place: Path, manifest: Mapping[str, Any], most: int | None = None) -
 
 def _numbers(place: Path) -> list[dict[str, Any]]:
     """Return the numbers of a result with their 95 % bounds: those that `compare` compares."""
-    try:
-        folders = import_module("strapdown.report.compare_folders")
-        numbers = import_module("strapdown.report.compare_numbers")
-    except ImportError:
-        return []
+    from strapdown.report.compare_folders import open_run
+    from strapdown.report.compare_numbers import values_of
+
     found = []
-    for part in folders.open_run(place, place.name).parts:
-        for one in numbers.values_of(part):
+    for part in open_run(place, place.name).parts:
+        for one in values_of(part):
             found.append(
                 {
                     "group": one.group,
@@ -439,14 +436,12 @@ def _gpx(place: Path, out: Path, epoch: str | None, geoid: float | None) -> None
 
 def compare(folder: Path, runs: Sequence[str]) -> dict[str, Any]:
     """Compare results: the JSON of ``strapdown compare``, and the address of its page."""
-    try:
-        api = import_module("strapdown.api.compare")
-        report = import_module("strapdown.report.compare")
-    except ImportError:
-        raise ConfigError("studio.no-comparison") from None
+    from strapdown.api.compare import compare_runs
+    from strapdown.report.compare import comparison_json
+
     place = Folder(folder)
     digests = [sha256(place.file(name) / MANIFEST) for name in runs]
-    found = api.compare_runs(*(place.file(name).name for name in runs))
+    found = compare_runs(*(place.file(name).name for name in runs))
     key = re.sub(r"[^0-9a-f]", "", "".join(one[:12] for one in digests))[:120]
     kept = place.state / "comparisons" / key
     if not (kept / MANIFEST).is_file():
@@ -456,7 +451,7 @@ def compare(folder: Path, runs: Sequence[str]) -> dict[str, Any]:
             shutil.rmtree(old, ignore_errors=True)
     command = shlex.join(("strapdown", "compare", *runs))
     return {
-        **report.comparison_json(found),
+        **comparison_json(found),
         "page": f"comparisons/{key}/report.html",
         "command_line": command,
     }
