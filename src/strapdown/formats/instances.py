@@ -26,6 +26,8 @@ _NAMES = {
 #: Most sensors of a table, fewest rows of each, and the share of the rows after which another
 #: follows: a number that changes less often is a state.
 MOST, FEWEST, CHANGES = 16, 10, 0.1
+#: Largest scatter of the lengths of runs, as a share of that without order.
+REGULAR = 0.5
 
 
 def _all_have_rates(raw: RawLog, sensors: NDArray[np.str_]) -> bool:
@@ -35,6 +37,21 @@ def _all_have_rates(raw: RawLog, sensors: NDArray[np.str_]) -> bool:
         return False
     known = np.isfinite(rate)
     return all(known[sensors == one].mean() > 0.5 for one in np.unique(sensors))
+
+
+def _in_turns(sensors: NDArray[np.str_]) -> bool:
+    """Whether the values follow each other as the numbers of sensors that are read in turns do.
+
+    Runs of equal values then have one length, in blocks, too; those of a number without order have
+    a geometric distribution, by the share of that value.
+    """
+    begins = np.flatnonzero(np.r_[True, sensors[1:] != sensors[:-1]])
+    lengths = np.diff(np.r_[begins, sensors.size])
+    for one in np.unique(sensors):
+        runs = lengths[sensors[begins] == one]
+        if runs.std() > REGULAR * runs.mean() * np.sqrt(np.mean(sensors == one)):
+            return False
+    return True
 
 
 def of_one_sensor(raw: RawLog) -> RawLog:
@@ -49,7 +66,9 @@ def of_one_sensor(raw: RawLog) -> RawLog:
         changes = np.count_nonzero(texts[1:] != texts[:-1])
         if not 1 < sensors.size <= MOST or counts.min() < FEWEST:
             continue
-        if changes < CHANGES * texts.size or not _all_have_rates(raw, texts):
+        if changes < CHANGES * texts.size or not _in_turns(texts):
+            continue
+        if not _all_have_rates(raw, texts):
             continue
         first = str(texts[0])
         finding = Finding(

@@ -166,8 +166,31 @@ def test_rows_of_two_sensors_are_not_one_log(tmp_path):
     assert (finding.severity, finding.data["name"], finding.data["first"]) == ("warning", "I", "0")
 
 
-@pytest.mark.parametrize("numbers", [np.zeros(N, int), np.arange(N), np.arange(N) // 500])
-def test_a_number_that_rarely_changes_tells_no_sensors_apart(tmp_path, numbers):
+@pytest.mark.parametrize("order", [(0, 0, 1), (0,) * 8 + (1,) * 8, (2, 0, 1)])
+def test_sensors_may_differ_in_rate_or_come_in_blocks(tmp_path, order):
+    """One row in fifty is lost: the stamps of the first sensor stay its own."""
+    rows = ["time_s,sensor,gx_dps,gy_dps,gz_dps,ax_g,ay_g,az_g"]
+    for k in range(N):
+        if k % 50 != 49:
+            values = many(RATE[k] * DEG) + many(FORCE[k] / STANDARD_GRAVITY)
+            rows.append(line(f"{T[k]:.2f}", order[k % len(order)], *values))
+    imu = sd.read_imu(written(tmp_path, "log.csv", rows))
+    assert "io.rows-of-several-sensors" in {f.code for f in imu.findings}
+    of_first = [k for k in range(N) if k % 50 != 49 and order[k % len(order)] == order[0]]
+    np.testing.assert_allclose(imu.index, T[of_first] - T[of_first[0]] + imu.index[0], atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    "numbers",
+    [
+        np.zeros(N, int),
+        np.arange(N),
+        np.arange(N) // 500,
+        np.random.default_rng(1).integers(0, 2, N),
+        np.random.default_rng(2).integers(0, 5, N),
+    ],
+)
+def test_a_number_that_rarely_changes_or_has_no_order_tells_no_sensors_apart(tmp_path, numbers):
     rows = ["time_s,id,gx_dps,gy_dps,gz_dps,ax_g,ay_g,az_g"]
     for k in range(N):
         values = many(RATE[k] * DEG) + many(FORCE[k] / STANDARD_GRAVITY)
