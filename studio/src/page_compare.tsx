@@ -65,7 +65,7 @@ function Found({ found }: { found: Comparison }) {
       {[...new Set(numbers.map((row) => row.group))].map((group) => <More key={group} title={group} open={!DETAILS.test(group)}>
         <Table head={["Quantity", ...names, ...others.map((name) => `Difference of ${name}`), "Unit"]} numeric={[...names, ...others].map((_, i) => i + 1)}
           rows={numbers.filter((row) => row.group === group).map((row) => [row.quantity,
-            ...row.values.map((value, i) => `${value === null ? "" : shown(value)}${bound(row.below_95[i], row.above_95[i], row.difference_unit === row.unit ? "" : row.difference_unit)}` || "–"),
+            ...row.values.map((value, i) => `${value === null ? "" : typeof value === "number" && row.unit === "deg" && row.difference_unit === "m" ? value.toFixed(7) : shown(value)}${bound(row.below_95[i], row.above_95[i], row.difference_unit === row.unit ? "" : row.difference_unit)}` || "–"),
             ...others.map((_, i) => difference(row, i + 1)), row.unit ?? ""])} />
       </More>)}
     </Part>

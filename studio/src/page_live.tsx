@@ -108,9 +108,9 @@ function Session({ job }: { job: Job }) {
     <Trouble problem={problem} />
     {job.state === "failed" && <Trouble problem={job.error} />}
     {going && job.live && <div class="pairing">
-      {job.live.qr && <Qr text={job.live.qr} />}
+      {job.live.qr && !LOOPBACK.test(job.live.address) && <Qr text={job.live.qr} />}
       <div>
-        <p>Let the phone send to this address, or scan the code:</p>
+        <p>{LOOPBACK.test(job.live.address) ? "Only programs on this computer reach this address. For a phone, stop and listen at 0.0.0.0 instead." : "Let the phone send to this address, or scan the code:"}</p>
         <Command text={job.live.address} />
         {job.live.token && <p>Word to pair with: <code>{job.live.token}</code></p>}
         {job.live.warning && <p class="notice warn">{sentence(job.live.warning)}</p>}
@@ -127,6 +127,9 @@ function Session({ job }: { job: Job }) {
     <More title="The same from a terminal"><Command text={job.command} /></More>
   </Part>;
 }
+
+/** Addresses that no other machine reaches. */
+const LOOPBACK = /^https?:\/\/(127\.|localhost|\[::1\])/;
 
 const CURVES: [string, string, string[]][] = [["Roll and pitch", "deg", ["roll", "pitch"]], ["Heading", "deg", ["heading"]], ["Velocity", "m/s", ["VN", "VE", "VD"]]];
 

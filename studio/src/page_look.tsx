@@ -52,10 +52,13 @@ export function LookPage() {
 
 function inOneSentence(look: Look): string {
   const imu = look.streams.find((s) => s.name === "imu") ?? look.streams[0];
-  if (!imu) return "No stream of samples was found in these files.";
+  if (!imu) return recordsOf(look).length ? "A record of a crash." : "No stream of samples was found in these files.";
   const others = look.streams.filter((s) => s !== imu).map((s) => WORDS[s.name] ?? s.name);
   return `${duration(imu.to_s - imu.from_s)} of inertial samples${rateOf(look, imu) ? ` at ${number(rateOf(look, imu)!, 3)} Hz` : ""}${others.length ? `, with ${[...new Set(others)].join(", ")}` : ""}.`;
 }
+
+/** Files that are no logs of inertial samples, and can be read as records of a crash. */
+const recordsOf = (look: Look) => look.logs.filter((log) => !log.read_as.length && (log.fit["crash"]?.answer ?? "no") !== "no");
 
 const rateOf = (look: Look, s: Stream) => s.rate_hz ?? look.logs.find((log) => log.name === s.file)?.streams.find((one) => one.name === s.name)?.rate_hz ?? null;
 
@@ -66,11 +69,13 @@ const WORDS: Record<string, string> = {
 
 function Found({ look, reading }: { look: Look; reading: Reading }) {
   const { work } = useShared();
-  const faults = [...look.logs.flatMap((log) => log.faults.map((f) => ({ ...f, file: f.file ?? log.name }))), ...(look.between ?? [])];
+  const records = recordsOf(look);
+  const logs = look.logs.filter((log) => !records.includes(log));
+  const faults = [...logs.flatMap((log) => log.faults.map((f) => ({ ...f, file: f.file ?? log.name }))), ...(look.between ?? [])];
   const notes = look.logs.flatMap((log) => log.notes.map((f) => ({ ...f, file: f.file ?? log.name })));
   const streams = look.streams.filter((s) => s.rows > 1 && s.columns.length > 0);
   const imu = streams.find((s) => s.name === "imu") ?? streams[0];
-  const ask = (q: Question) => <Ask key={q.code + q.text} question={{ ...q, text: look.logs.length > 1 && q.file ? `${q.file}: ${q.text}` : q.text, remedy: q.choices.length ? null : q.remedy }} onAnswer={(set) => answerLog(set, work.log)} />;
+  const ask = (q: Question) => <Ask key={q.code + q.text} question={{ ...q, text: look.logs.length > 1 && q.file ? `${q.file}: ${q.text}` : q.text, remedy: q.choices.length && !(q.free && q.key === "datum_height_m") ? null : q.remedy }} onAnswer={(set) => answerLog(set, work.log)} />;
   const needed = look.questions.filter((q) => !q.optional), optional = look.questions.filter((q) => q.optional);
   return <>
     {needed.length > 0 && <Part title={`${plural(needed.length, "question")} about the log`}>
@@ -78,7 +83,10 @@ function Found({ look, reading }: { look: Look; reading: Reading }) {
       {needed.map(ask)}
     </Part>}
     {optional.length > 0 && <Part title="Is this right?">{optional.map(ask)}</Part>}
-    <Part title="What is in it"><Contents look={look} /></Part>
+    <Part title="What is in it">
+      {records.length > 0 && <p>{records.map((log) => log.name).join(", ")}: {records.length > 1 ? "records" : "a record"} of a crash. Choose “Crash” on the next page: its channels are read there.</p>}
+      <Contents look={look} />
+    </Part>
     {imu && <Signals look={look} streams={streams} imu={imu} reading={reading} />}
     {(faults.length > 0 || notes.length > 0) && <Part title="What was noticed">
       <Findings findings={faults} none="Nothing is wrong with it." />
@@ -105,7 +113,7 @@ function Contents({ look }: { look: Look }) {
       })} />
     <dl class="facts">
       {look.logs.map((log) => <Facts key={log.name} log={log} alone={look.logs.length === 1} />)}
-      <dt>Rests</dt><dd>{look.rests.length ? `${plural(look.rests.length, "stretch", "stretches")}, the longest ${duration(Math.max(...look.rests.map(([a, b]) => b - a)))}` : "none found: it moved all the time"}</dd>
+      {look.streams.some((s) => s.name === "imu") && <><dt>Rests</dt><dd>{look.rests.length ? `${plural(look.rests.length, "stretch", "stretches")}, the longest ${duration(Math.max(...look.rests.map(([a, b]) => b - a)))}` : "none found: it moved all the time"}</dd></>}
     </dl>
   </>;
 }
@@ -240,9 +248,12 @@ function Places({ streams }: { look: Look; reading: Reading; streams: Stream[] }
 
 /** Whether the log suffices for a kind, as doctor says or as its rests show. */
 export function suffices(kind: Kind, look: Look): { answer: string; reasons: Finding[] } | null {
-  const log = look.logs.find((l) => l.read_as.length > 0) ?? look.logs[0];
   const of = { navigate: "navigation", attitude: "attitude", crash: "crash" }[kind.kind];
-  if (of && log?.fit[of]) return log.fit[of]!;
+  // Of several files the one that has most of it; of none, the log that was read.
+  const order = ["yes", "with limits", "no"];
+  const read = [...look.logs].sort((a, b) => Number(b.read_as.length > 0) - Number(a.read_as.length > 0));
+  const fits = of ? read.flatMap((log) => log.fit[of] ? [log.fit[of]!] : []) : [];
+  if (fits.length) return fits.reduce((best, fit) => order.indexOf(fit.answer) < order.indexOf(best.answer) ? fit : best);
   const longest = look.rests.length ? Math.max(...look.rests.map(([a, b]) => b - a)) : 0;
   const say = (answer: string, text: string) => ({ answer, reasons: [{ code: "studio.rests", severity: "note", text }] });
   const rest = longest ? `the longest rest is ${duration(longest)}` : "no rest was found";

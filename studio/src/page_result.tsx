@@ -66,7 +66,7 @@ function bound({ below, above }: KeyNumber): string {
   return below === above ? `± ${number(below!, 2)}` : `− ${below === null ? "∞" : number(below!, 2)}, + ${above === null ? "∞" : number(above!, 2)}`;
 }
 
-const valueOf = (one: KeyNumber) => typeof one.value === "number" && unitOfBound(one) === one.unit && (one.below ?? one.above) ? withBound(one.value, Math.min(one.below ?? Infinity, one.above ?? Infinity)) : shown(one.value);
+const valueOf = (one: KeyNumber) => typeof one.value === "number" && unitOfBound(one) === one.unit && (one.below ?? one.above) ? withBound(one.value, Math.min(one.below ?? Infinity, one.above ?? Infinity)) : typeof one.value === "number" && one.unit === "deg" && unitOfBound(one) === "m" ? one.value.toFixed(7) : shown(one.value);
 
 /** Latitude and longitude are in degrees, their bounds in meters. */
 const unitOfBound = (one: KeyNumber) => one.bound_unit ?? (/^(latitude|longitude)$/.test(one.label) ? "m" : one.unit);
@@ -75,7 +75,7 @@ const unitOfBound = (one: KeyNumber) => one.bound_unit ?? (/^(latitude|longitude
 function spoken(one: KeyNumber): KeyNumber {
   if (!/delta-V/i.test(one.label) || one.unit !== "m/s" || typeof one.value !== "number") return one;
   const times = (v: number | null | undefined) => v === null || v === undefined ? null : v * 3.6;
-  return { ...one, value: one.value * 3.6, below: times(one.below), above: times(one.above), unit: "km/h" };
+  return { ...one, value: one.value * 3.6, below: times(one.below), above: times(one.above), unit: "km/h", bound_unit: "km/h" };
 }
 
 /** The numbers that matter first, large; all in a table. */

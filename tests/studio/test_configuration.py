@@ -13,6 +13,8 @@ from strapdown.errors import ConfigError
 from strapdown.studio.configuration import check, command, edited, propose
 from strapdown.studio.forms import form_of, kinds, unit_of
 from strapdown.studio.kinds import KINDS
+from strapdown.studio.look import look
+from strapdown.studio.questions import HEIGHTS
 
 TEXT = """\
 # The first comment.
@@ -111,6 +113,32 @@ def test_a_fault_has_its_line_and_key(folder):
     at = {(one["line"], one["key"]) for one in found["errors"]}
     assert {(3, "log, to_s"), (4, "log, frmo_s")} <= at
     assert found["values"] == {"log.path": "log.csv", "log.to_s": "late", "log.frmo_s": 1.0}
+
+
+def test_the_level_of_heights_is_asked_and_taken(folder):
+    """A phone's fixes over the sea could be read by an option of the command line alone."""
+    rows = "".join(
+        f"{k}.0,{48.0 + 1e-5 * k:.6f},11.0,{500.0 + 0.01 * k:.2f},5.0,8.0\n" for k in range(20)
+    )
+    head = "time_s,lat_deg,lon_deg,altitude_msl_m,horizontal_accuracy_m,vertical_accuracy_m\n"
+    (folder / "fixes.csv").write_text(head + rows)
+    names, axes = ["log.csv", "fixes.csv"], "forward-left-up"
+    (asked,) = (q for q in look(folder, names, {}, axes)["questions"] if q["key"] == HEIGHTS)
+    assert (asked["file"], asked["free"], asked["unit"]) == ("fixes.csv", "number", "m")
+    assert [one["set"] for one in asked["choices"]] == [{HEIGHTS: 0.0}]
+    for level in (0.0, 48.0):
+        found = look(folder, names, {HEIGHTS: level}, axes)
+        assert HEIGHTS not in {one["key"] for one in found["questions"]}
+        assert {("log.csv", "imu"), ("fixes.csv", "gnss")} <= {
+            (one["file"], one["name"]) for one in found["streams"]
+        }
+        made = propose(folder, "navigate", names, {HEIGHTS: level}, axes, {})
+        assert check(folder, "navigate", made["toml"], {})["values"]["aiding.gnss.path"]
+        assert (
+            check(folder, "navigate", made["toml"], {})["values"][f"aiding.gnss.{HEIGHTS}"] == level
+        )
+    # Of a kind without fixes it is no key.
+    assert HEIGHTS not in propose(folder, "attitude", ["log.csv"], {HEIGHTS: 0.0}, axes, {})["toml"]
 
 
 def test_what_is_proposed_is_right_and_stays_so_after_a_change(folder):

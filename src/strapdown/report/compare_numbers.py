@@ -7,6 +7,7 @@ before it is used, and what has another form than strapdown writes is left out.
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -460,8 +461,13 @@ def _crash(part: RunPart) -> Iterator[Value]:
         }
         value = _percent(_number(one, "probability"))
         yield from _row(key, "Severity", label, value, "%", **more)
-    for one in _tables(data, "indices"):
+    indices = _tables(data, "indices")
+    several = Counter((_word(one, "index"), _word(one, "of")) for one in indices)
+    for one in indices:
         name, unit = _word(one, "index") or "?", _word(one, "unit") or ""
+        # One index by two standards is two numbers.
+        if several[_word(one, "index"), _word(one, "of")] > 1:
+            name = f"{name}, {_word(one, 'standard') or '?'}"
         label, key = _of_main(one, name, f"indices.{name}", main)
         factor = SPEEDS["mph"] if unit == "mph" else 1.0
         value = _number(one, "value")
@@ -478,7 +484,7 @@ def _crash(part: RunPart) -> Iterator[Value]:
     for key, label, unit in CLOSURE:
         value = _number(closure, key, "value")
         yield from _row(
-            f"closure.{key}", "Two vehicles", label, value, unit, **_within(closure, key)
+            f"closure.{key}", "The collision", label, value, unit, **_within(closure, key)
         )
     for one in _tables(data, "references"):
         name, consistent = _word(one, "reference") or "?", _word(one, "consistent")

@@ -32,6 +32,7 @@ from strapdown.config.spec import (
 from strapdown.config.toml_text import Asked, Page, inline, string
 from strapdown.errors import DataError, Finding
 from strapdown.sensors.bridge import target_of
+from strapdown.studio.questions import of_each
 
 __all__ = ["KINDS", "Draft", "Kind"]
 
@@ -83,7 +84,7 @@ class Kind:
 
 
 def _log_table(path: Path, keys: Keys) -> LogTable:
-    return specify(LogTable, path=str(path), **keys)
+    return specify(LogTable, path=str(path), **of_each(keys)[0])
 
 
 def _sorted_files(paths: Paths, keys: Keys, axes: str | None) -> tuple[Path, Path | None]:
@@ -92,12 +93,13 @@ def _sorted_files(paths: Paths, keys: Keys, axes: str | None) -> tuple[Path, Pat
 
     if len(paths) == 1:
         return paths[0], None
-    reading = {k: v for k, v in keys.items() if k not in ("from_s", "to_s", "duration_s")}
+    of_log, of_fixes = of_each(keys)
+    reading = {k: v for k, v in of_log.items() if k not in ("from_s", "to_s", "duration_s")}
     logs = {str(path): path for path in paths}
     inertial, fixes = [], []
     for path in logs.values():
         try:
-            one = doctor(str(path), axes=axes, **reading).logs[0]
+            one = doctor(str(path), axes=axes, gnss=of_fixes or None, **reading).logs[0]
         except DataError:
             continue
         if "imu" in one.streams or one.questions:
@@ -112,7 +114,9 @@ def _draft_navigation(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]
     from strapdown.systems.navigation_draft import draft_navigation
 
     log, fixes = _sorted_files(paths, keys, axes)
-    gnss = None if fixes is None else specify(FixesTable, path=str(fixes))
+    of_fixes = of_each(keys)[1]
+    known = fixes is not None or of_fixes
+    gnss = specify(FixesTable, path=str(fixes or log), **of_fixes) if known else None
     return [
         Draft(**vars(draft_navigation(_log_table(log, keys), folder=Path(), axes=axes, gnss=gnss)))
     ]
@@ -261,7 +265,7 @@ def _draft_of_options(table: str, what: str, example: Iterable[tuple[str, str, s
 
     def draft(paths: Paths, keys: Keys, axes: str | None) -> list[Draft]:
         first, *others = paths
-        spec = specify(LogTable, path=str(first), **keys)
+        spec = _log_table(first, keys)
         page = Page()
         page.say(what.format(name=first.name))
         page.table("[log]")

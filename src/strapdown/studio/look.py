@@ -23,7 +23,13 @@ from strapdown.bundle import sha256, source_digest
 from strapdown.errors import ConfigError, DataError
 from strapdown.studio.folder import Folder
 from strapdown.studio.pyramid import LIST, write_stream
-from strapdown.studio.questions import axes_question, question_of
+from strapdown.studio.questions import (
+    HEIGHTS,
+    axes_question,
+    heights_question,
+    of_each,
+    question_of,
+)
 from strapdown.studio.reading_process import told
 from strapdown.tables import find_gaps
 from strapdown.tables.checks import index_of
@@ -84,7 +90,8 @@ def look(
             return found
     # Names, not paths: nothing that is shown tells where the folder is, in which this process is.
     by_name = {place.name_of(path): path for path in paths}
-    made = doctor(list(by_name), axes=axes, **keys)
+    of_log, of_fixes = of_each(keys)
+    made = doctor(list(by_name), axes=axes, gnss=of_fixes or None, **of_log)
     streams: list[dict[str, Any]] = []
     for one in made.logs:
         path = by_name[Path(one.log.path).as_posix()]
@@ -128,8 +135,9 @@ def _questions(logs: Sequence[Any], columns: Mapping[str, str]) -> list[dict[str
     for one in logs:
         name = Path(one.log.path).as_posix()
         found += [question_of(f, one.answers, name, columns) for f in one.questions]
-        mounted = [axes_question(f, name) for f in (*one.faults, *one.notes)]
-        found += [q for q in mounted if q is not None][:1]
+        for ask in (heights_question, axes_question):
+            asked = [ask(f, name) for f in (*one.faults, *one.notes)]
+            found += [q for q in asked if q is not None][:1]
     return found
 
 
@@ -170,13 +178,15 @@ def _reading(log: Mapping[str, Any]) -> dict[str, Any]:
     """Return the keys of a table ``[log]`` that say how it is read; ConfigError: it has others."""
     known = (
         *("format", "columns", "gyro_unit", "accel_unit", "time_unit", "sampling", "rate_hz"),
-        *("repair", "calibration"),
+        *("repair", "calibration", HEIGHTS),
     )
     part = ("path", "from_s", "to_s", "duration_s")
     for key in log:
         if key not in known and key not in part:
             raise ConfigError("studio.unknown-key", word=str(key), known=known)
-    return {key: log[key] for key in known if log.get(key) not in (None, "", False, {})}
+    # Zero is a height.
+    said = {key: log[key] for key in known if log.get(key) is not None}
+    return {key: value for key, value in said.items() if key == HEIGHTS or value}
 
 
 def _cache(place: Folder) -> Path:

@@ -13,7 +13,23 @@ from strapdown.errors import Finding
 from strapdown.formats.recording import PLACEHOLDERS
 from strapdown.units import ACCEL_UNITS, GYRO_UNITS, TIME_UNITS
 
-__all__ = ["axes_question", "open_question", "question_of"]
+__all__ = [
+    "HEIGHTS",
+    "axes_question",
+    "heights_question",
+    "of_each",
+    "open_question",
+    "question_of",
+]
+
+#: Key of a table ``[log]`` of the studio that is of the fixes: their level over the ellipsoid, m.
+HEIGHTS = "datum_height_m"
+#: Findings about heights whose level only a person knows.
+HEIGHTS_OPEN = (
+    "io.height-level-not-stated",
+    "io.height-over-sea-column",
+    "io.heights-over-take-off",
+)
 
 #: Usual units of each key, the ones that are offered.
 OFFERED: dict[str, list[str]] = {
@@ -84,6 +100,22 @@ def axes_question(finding: Finding, file: str) -> dict[str, Any] | None:
         return None
     choices = [_choice(text, {"axes": axes}) for axes, text in ORIENTATIONS.items()]
     return {**_question(finding, file, "axes", choices, "text"), "optional": True}
+
+
+def heights_question(finding: Finding, file: str) -> dict[str, Any] | None:
+    """Return the question for the level of heights; None if the finding is about another thing."""
+    if finding.code not in HEIGHTS_OPEN:
+        return None
+    choices = []
+    if finding.code != "io.heights-over-take-off":
+        choices = [_choice("0: keep the heights as they are", {HEIGHTS: 0.0})]
+    return _question(finding, file, HEIGHTS, choices, "number", unit="m")
+
+
+def of_each(keys: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Divide keys into those of samples and those of fixes."""
+    fixes = {HEIGHTS: keys[HEIGHTS]} if HEIGHTS in keys else {}
+    return {key: value for key, value in keys.items() if key != HEIGHTS}, fixes
 
 
 def open_question(asked: Asked, key: str, unit: str, count: int) -> dict[str, Any]:
