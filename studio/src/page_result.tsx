@@ -104,12 +104,17 @@ const GROUPS: [RegExp, string, string?][] = [
   [/^(lat|lon)_/, ""],
 ];
 
+/** Columns of several algorithms, each under its name: "quaternion roll_deg". */
+const BY_ALGORITHM = /^(\S.*) (roll|pitch|heading|q_[wxyz])(_deg)?$/;
+const QUANTITY: Record<string, string> = { roll: "Roll by algorithm", pitch: "Pitch by algorithm", heading: "Heading by algorithm" };
+
 /** Panels for the columns of a result: of one quantity in one panel. */
 export function panelsOfRun(series: SeriesData): Panel[] {
   const panels = new Map<string, Panel>();
-  for (const [, title] of GROUPS) if (title) panels.set(title, { title, unit: "", columns: [] });
+  for (const title of [...GROUPS.map(([, title]) => title), ...Object.values(QUANTITY)]) if (title) panels.set(title, { title, unit: "", columns: [] });
   for (const [name, { unit }] of Object.entries(series.columns)) {
-    const [, title, label] = GROUPS.find(([pattern]) => pattern.test(name)) ?? [null, name];
+    const [, algorithm, quantity] = BY_ALGORITHM.exec(name) ?? [];
+    const [, title, label] = algorithm ? [null, QUANTITY[quantity!] ?? `${quantity} by algorithm`, algorithm] : GROUPS.find(([pattern]) => pattern.test(name)) ?? [null, name];
     if (!title) continue;
     const panel = panels.get(title) ?? { title, unit: unit ?? "", columns: [] };
     panel.unit = unit ?? "";
@@ -119,16 +124,23 @@ export function panelsOfRun(series: SeriesData): Panel[] {
   return [...panels.values()].filter((panel) => panel.columns.length);
 }
 
+/** The middle of a bucket; where an angle goes over its end within it, one of the two. */
+const middle = (low: number, high: number, angle: boolean) => angle && high - low > 180 ? low : (low + high) / 2;
+
 /** The motion of a result without positions on the Earth, such as that of a crash, by its series. */
 async function trackOfSeries(name: string, signal: AbortSignal): Promise<Track | null> {
-  const wanted = ["north_m", "east_m", "roll_deg", "pitch_deg", "heading_deg"];
-  const { t, columns } = await api.runSeries(name, { columns: wanted, width: 2000 }, signal);
+  const there = Object.keys((await api.runSeries(name, { columns: [], width: 1 }, signal)).columns);
+  const algorithms = [...new Set(there.map((column) => BY_ALGORITHM.exec(column)?.[1]).filter((one) => one !== undefined))];
+  // Of several algorithms the exact one that all peers have; else the last: they go from simple to good.
+  const by = algorithms.includes("quaternion") ? "quaternion" : algorithms[algorithms.length - 1];
+  const wanted = ["north_m", "east_m", ...["roll_deg", "pitch_deg", "heading_deg"].map((angle) => by ? `${by} ${angle}` : angle)];
+  const { t, columns } = await api.runSeries(name, { columns: wanted.filter((one) => there.includes(one)), width: 2000 }, signal);
   if (t.length < 2) return null;
-  const [north, east, roll, pitch, heading] = wanted.map((one) => columns[one]?.low.map((low, i) => (Number(low) + Number(columns[one]!.high[i])) / 2));
+  const [north, east, roll, pitch, heading] = wanted.map((one) => columns[one]?.low.map((low, i) => middle(Number(low), Number(columns[one]!.high[i]), one.endsWith("_deg"))));
   // On a grid a meter is a meter: degrees about the equator stand for it.
   const flat = (meters: number[] | undefined) => meters ? meters.map((m) => m / METERS_PER_DEG) : t.map(() => NaN);
   return {
-    t, lat: flat(north), lon: flat(east), alt: [], fixes: null, reference: null,
+    t, lat: flat(north), lon: flat(east), alt: [], fixes: null, reference: null, by,
     q: roll && pitch && heading ? t.map((_, i) => fromEuler(roll[i]!, pitch[i]!, heading[i]!)) : null,
   };
 }
@@ -164,7 +176,7 @@ function Motion({ run, track, cursor, onCursor }: { run: RunDetail; track: Track
     </div>
     <div class="motion">
       {hasPlace && <Plan track={track} onMap={Boolean(run.has.track)} fixes={track.fixes} reference={track.reference} cursor={at} onCursor={onCursor} />}
-      {track.q && <Attitude q={q} at={`${stamp(at, 10)} s:`} />}
+      {track.q && <Attitude q={q} at={`${track.by ? `By ${track.by}, ` : ""}${stamp(at, 10)} s:`} />}
     </div>
     <Series run={run} whole={whole} cursor={cursor} onCursor={onCursor} />
   </Part>;

@@ -116,6 +116,8 @@ export interface Track {
   q: [number, number, number, number][] | null;
   fixes: { t: number[]; lat: number[]; lon: number[] } | null;
   reference: { t: number[]; lat: number[]; lon: number[] } | null;
+  /** The algorithm whose attitude it is, where a result has several. */
+  by?: string | undefined;
 }
 
 export interface MapInfo { tiles: string | null; min: number; max: number; attribution: string | null }
