@@ -76,6 +76,8 @@ function freeName(work: Work, taken: string[]): string {
   return name;
 }
 
+/** A flag that is a key of the configuration, too: there it stays with it. */
+const SMOOTH = "--smooth";
 /** Flags that a person may want, of those that the command takes. */
 const FLAGS: Record<string, string> = {
   "--smooth": "Smooth: every instant by all measurements, the later ones too", "--no-report": "Without the report: numbers only",
@@ -163,8 +165,8 @@ function Editor({ schema, flags }: { schema: Section[]; flags: string[] }) {
     <Positions values={values} onSet={set} />
     {kind === "crash" && <CrashPreview toml={work.toml} values={values} ready={!checking && errors.length === 0 && questions.length === 0} onKeep={set} />}
     {flags.some((flag) => flag in FLAGS) && <fieldset class="row flags"><legend>Options</legend>
-      {flags.filter((flag) => flag in FLAGS).map((flag) => <label class="inline" key={flag}><input type="checkbox" checked={work.options.includes(flag)}
-        onChange={(e) => setWork({ options: e.currentTarget.checked ? [...work.options, flag] : work.options.filter((o) => o !== flag) })} />{FLAGS[flag]}</label>)}
+      {flags.filter((flag) => flag in FLAGS).map((flag) => <label class="inline" key={flag}><input type="checkbox" checked={flag === SMOOTH ? values["smoother.kind"] === "rts" : work.options.includes(flag)}
+        onChange={(e) => flag === SMOOTH ? set({ "smoother.kind": e.currentTarget.checked ? "rts" : "none" }) : setWork({ options: e.currentTarget.checked ? [...work.options, flag] : work.options.filter((o) => o !== flag) })} />{FLAGS[flag]}</label>)}
     </fieldset>}
     <div class="next startrun">
       <label class="inline">Name of the result <input type="text" value={work.name} onInput={(e) => setWork({ name: e.currentTarget.value })} aria-describedby="taken" /></label>

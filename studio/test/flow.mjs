@@ -93,6 +93,13 @@ await run(async () => {
   assert.match(await text.inputValue(), /step_s = 0\.2/, "the form writes into the text");
   assert.ok((await text.inputValue()).split("\n").filter((l) => l.startsWith("#")).length > 10, "comments are kept");
   await page.getByRole("searchbox").fill("");
+  // A choice that is a key of the configuration goes into it, and out again.
+  const smooth = page.getByRole("checkbox", { name: /^Smooth/ });
+  for (const wanted of [true, false]) {
+    await smooth.click();
+    await page.waitForFunction((has) => document.querySelector("textarea").value.includes('kind = "rts"') === has, wanted);
+    await see("in step with the form");
+  }
   await look("5-configure");
   const right = await text.inputValue();
   await text.fill(right.replace(/^path = .*$/m, "path = 3"));
@@ -130,7 +137,9 @@ await run(async () => {
   await page.goto(`${address}#/configure`);
   await see("in step with the form");
   await name.fill("second");
-  await page.getByRole("checkbox", { name: /^Smooth/ }).check();
+  await page.getByRole("checkbox", { name: /^Smooth/ }).click();
+  await page.waitForFunction(() => document.querySelector("textarea").value.includes('kind = "rts"'));
+  await see("in step with the form");
   await click("Run it");
   await page.getByRole("link", { name: "See the result" }).waitFor({ timeout: 300_000 });
   await page.goto(`${address}#/compare?run=first&run=second`);
