@@ -4,11 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from strapdown.estimation.robust import (
     INFLUENCES,
+    NO_WEIGHT,
     Hampel,
     Huber,
     Igg3,
@@ -50,6 +51,8 @@ def test_nothing_is_lower(f, b, log_kappa):
 
 
 @settings(deadline=None, max_examples=300)
+# A weight of 1e-31 at the end of a redescending function.
+@example(f=Tukey(1.0), nu=1.0, s=1.0, r=1.0, scale=1.0000000000000002)
 @given(
     f=FUNCTIONS,
     nu=st.floats(-1000.0, 1000.0),
@@ -66,7 +69,9 @@ def test_the_step_goes_to_the_minimiser(f, nu, s, r, scale):
     beta = post_fit(f, abs(nu) / alpha, s / square)
     weight = f.weight(beta)
     assert step.weight == pytest.approx(weight, rel=1e-9, abs=1e-12)
-    if weight > 0.0:
+    if weight < NO_WEIGHT:
+        assert (step.moved, step.weight) == (0.0, 0.0)
+    else:
         assert step.slope == 1.0
         residual = nu - s / (s + step.r) * nu
         assert residual == pytest.approx(np.copysign(alpha * beta, nu), rel=1e-9, abs=1e-9 * alpha)
