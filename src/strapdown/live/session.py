@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
@@ -26,7 +26,6 @@ from strapdown.live.reception import Reception
 from strapdown.live.replay import LatencyTape, RunClock, warm_up
 from strapdown.live.run import as_said, live_spec, phone_aid
 from strapdown.live.sources import ReceivedLine
-from strapdown.navigation.modes import PipelineChunk
 from strapdown.navigation.replay import Recording
 from strapdown.orientation_filters import OrientationTracker, make_filter
 from strapdown.rotation import quaternion_from_euler
@@ -168,11 +167,7 @@ class _Navigation:
         self.aid = phone_aid(chain)
         # The journal has the events already; it keeps the rows of the recorded input.
         recording = Recording(chain, recorder)
-        self.reception = Reception(chain, spec, recording, clock, self._chunk, warn, journal)
-        self._lines = lines
-
-    def _chunk(self, piece: PipelineChunk) -> None:
-        self._lines.take(piece)
+        self.reception = Reception(chain, spec, recording, clock, lines.take, warn, journal)
 
     def take(self, row: Joined | Located, arrived: float) -> None:
         """Use a sample or a fix."""
@@ -281,7 +276,7 @@ class Session:
         newest = self._newest_number
         if newest is None or number > newest:
             self.lost += 0 if newest is None else min(number - newest - 1, 10**6)
-            self._newest_number = number
+            self._newest_number = newest = number
         elif number in self._numbers:
             self.unused["message repeated"] += 1
         else:
@@ -289,10 +284,7 @@ class Session:
             self.unused["message late"] += 1
         self._numbers.add(number)
         if len(self._numbers) > 4096:
-            self._numbers = {one for one in self._numbers if one > self._newest_number_or(0) - 2048}
-
-    def _newest_number_or(self, otherwise: int) -> int:
-        return otherwise if self._newest_number is None else self._newest_number
+            self._numbers = {one for one in self._numbers if one > newest - 2048}
 
     def take(self, received: Sequence[Received], arrived: float) -> None:
         """Write what a message had to the journal, and use it."""
@@ -304,14 +296,10 @@ class Session:
         self._journaled.take(parsed, self._clock.now())
         for one in received:
             if isinstance(one, Event):
-                self._use(self._streams.take(one), arrived)
-            elif self.error is None:
-                try:
-                    self._estimate.say(one, arrived)
-                except BadLineError as bad:
-                    self.not_used(bad)
-                except StrapdownError as error:
-                    self._fail(error)
+                for row in self._streams.take(one):
+                    self._use(self._estimate.take, row, arrived)
+            else:
+                self._use(self._estimate.say, one, arrived)
 
     def not_used(self, bad: BadLineError, line: int | None = None) -> None:
         """Count what was not used, and tell the first of its kind."""
@@ -319,12 +307,9 @@ class Session:
 
     def finish(self) -> dict[str, Any]:
         """End the session; return what ``latency.json`` holds."""
-        self._use(self._streams.finish(), math.nan)
-        if self.error is None:
-            try:
-                self._estimate.finish()
-            except StrapdownError as error:
-                self._fail(error)
+        for row in self._streams.finish():
+            self._use(self._estimate.take, row, math.nan)
+        self._use(self._estimate.finish)
         told = self.told()
         write_json(self.journal.folder / LATENCY, told)
         self.journal.close()
@@ -361,21 +346,20 @@ class Session:
             },
         }
 
-    def _use(self, rows: Iterable[Joined | Located], arrived: float) -> None:
-        for row in rows:
-            if self.error is not None:
-                return
-            try:
-                self._estimate.take(row, arrived)
-            except BadLineError as bad:
-                self.not_used(bad)
-            except StrapdownError as error:
-                self._fail(error)
+    def _use(self, use: Callable[..., None], *given: Any) -> None:
+        """Give the computation a sample, a measurement or its end.
 
-    def _fail(self, error: StrapdownError) -> None:
-        """End the computation, not the journal."""
-        self.error = error
-        self._warn(error.finding.replace(file=self.name))
+        An error of it ends the computation, not the journal.
+        """
+        if self.error is not None:
+            return
+        try:
+            use(*given)
+        except BadLineError as bad:
+            self.not_used(bad)
+        except StrapdownError as error:
+            self.error = error
+            self._warn(error.finding.replace(file=self.name))
 
     def _tell(self, state: State) -> None:
         epoch = self._streams.epoch

@@ -16,7 +16,7 @@ from urllib.parse import urlsplit
 from strapdown.errors import ConfigError
 from strapdown.live.replay import RunClock
 
-__all__ = ["LineSource", "ReceivedLine", "open_source", "token_or_drawn"]
+__all__ = ["LineSource", "ReceivedLine", "bound_socket", "open_source", "token_or_drawn"]
 
 #: Most waiting lines; beyond them a pipe blocks, and the system drops datagrams.
 WAITING = 20_000
@@ -161,7 +161,12 @@ def open_source(
         parts, host, port = urlsplit(""), _LOCAL, None
     if parts.scheme != "udp" or port is None or parts.path.strip("/"):
         raise ConfigError("live.not-a-source", quantity="--live", where=where)
-    bound = _bound(host, port)
+    try:
+        bound = bound_socket(host, port, socket.SOCK_DGRAM)
+    except OSError as error:
+        raise ConfigError(
+            "live.cannot-listen", quantity="--live", reason=error.strerror or error
+        ) from None
     bound.settimeout(LOOK)
     name = f"udp://{host}:{bound.getsockname()[1]}"
     return LineSource(
@@ -180,17 +185,17 @@ def token_or_drawn(token: str | None) -> str:
     return token or secrets.token_urlsafe(12)
 
 
-def _bound(host: str, port: int) -> socket.socket:
+def bound_socket(host: str, port: int, kind: int) -> socket.socket:
+    """Return a socket of a kind that is bound to an address; OSError: it cannot be."""
+    # With its protocol: to one that is named as TCP asyncio sends without waiting for an
+    # acknowledgment (40 ms).
+    family, kind, protocol, _, address = socket.getaddrinfo(host, port, type=kind)[0]
+    made = socket.socket(family, kind, protocol)
     try:
-        family, _, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
-        made = socket.socket(family, socket.SOCK_DGRAM)
-        try:
-            made.bind(address)
-        except OSError:
-            made.close()
-            raise
-    except OSError as error:
-        raise ConfigError(
-            "live.cannot-listen", quantity="--live", reason=error.strerror or error
-        ) from None
+        if kind == socket.SOCK_STREAM:
+            made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        made.bind(address)
+    except OSError:
+        made.close()
+        raise
     return made

@@ -18,6 +18,7 @@ from typing import Any
 
 from strapdown.errors import ConfigError
 from strapdown.live.hub import Hub
+from strapdown.live.sources import bound_socket
 
 __all__ = ["WebReceiver", "is_loopback", "listening_socket", "local_address", "web_library"]
 
@@ -70,20 +71,11 @@ def listening_socket(where: str) -> socket.socket:
     """
     host, port = split_address(where, "--listen")
     try:
-        family, kind, _, _, address = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)[0]
-        # Named as TCP, so that asyncio lets no answer wait for an acknowledgment (40 ms).
-        made = socket.socket(family, kind, socket.IPPROTO_TCP)
-        try:
-            made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            made.bind(address)
-        except OSError:
-            made.close()
-            raise
+        return bound_socket(host, port, socket.SOCK_STREAM)
     except OSError as error:
         raise ConfigError(
             "live.cannot-listen", quantity="--listen", reason=error.strerror or error
         ) from None
-    return made
 
 
 def split_address(where: str, option: str, port: int | None = 0) -> tuple[str, int]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.util import find_spec
 from typing import Any
 
 from strapdown.errors import ConfigError, Finding, check_choice, printable
@@ -95,8 +94,7 @@ PROTOCOLS = {
 
 
 def live_info() -> dict[str, Any]:
-    """Return the protocols with their fields; none where this version has no ``strapdown live``."""
-    there = find_spec("strapdown.live.hub") is not None
+    """Return the protocols with their fields."""
     return {
         "protocols": [
             {
@@ -117,7 +115,6 @@ def live_info() -> dict[str, Any]:
                 ],
             }
             for name, one in PROTOCOLS.items()
-            if there
         ],
         "warning": Finding("studio.live-open").sentence("file"),
     }
@@ -139,7 +136,7 @@ def live_command(name: str, protocol: str, options: Mapping[str, Any]) -> list[s
         if value in (None, ""):
             value = field.default
         if value in (None, ""):
-            if key in ("stop-after", "every"):
+            if field.kind == "number":
                 continue
             raise ConfigError("studio.wrong-type", quantity=key, wanted=field.label)
         words.append(f"{field.flag}={_text(key, value, field)}")

@@ -12,6 +12,7 @@ from typing import Any
 
 from strapdown.errors import ConfigError, DataError
 from strapdown.formats.map_tiles import open_map
+from strapdown.live.sources import bound_socket
 from strapdown.studio.folder import Folder, Limits
 
 __all__ = ["Address", "serve"]
@@ -152,24 +153,12 @@ def _libraries() -> None:
 def _bound(host: str, port: int) -> socket.socket:
     """Return a socket that is bound; a port that is taken is refused at once."""
     try:
-        family, kind, protocol, _, place = socket.getaddrinfo(
-            host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE
-        )[0]
-        bound = socket.socket(family, kind, protocol)
+        return bound_socket(host, port, socket.SOCK_STREAM)
     except (OSError, OverflowError) as error:
-        raise _no_port(host, port, error) from None
-    try:
-        bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        bound.bind(place)
-        return bound
-    except (OSError, OverflowError) as error:
-        bound.close()
-        raise _no_port(host, port, error) from None
-
-
-def _no_port(host: str, port: int, error: Exception) -> ConfigError:
-    reason = getattr(error, "strerror", None) or str(error)
-    return ConfigError("studio.port-taken", quantity="--port", host=host, port=port, reason=reason)
+        reason = getattr(error, "strerror", None) or str(error)
+        raise ConfigError(
+            "studio.port-taken", quantity="--port", host=host, port=port, reason=reason
+        ) from None
 
 
 def _locked(folder: Folder) -> Any:
