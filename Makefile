@@ -19,7 +19,7 @@ help:
 	@echo "make test       install into $(VENV) and run the tests"
 	@echo "make test-slow  the tests that take more than 4 s each"
 	@echo "make fuzz       mutated files through our own parsers, led by coverage; MINUTES=n SEED=k"
-	@echo "make examples   the longer examples of the manual: each prints what its page shows"
+	@echo "make examples   the longer examples of the manual and of the README: each prints what is shown"
 	@echo "make record     version 0.1 and this tree on the same runs, compared to the last bit"
 	@echo "make papers     the tests of the reproduced papers, and the three of them into papers-reproduced"
 	@echo "make check      ruff, format, mypy, import-linter"
@@ -69,7 +69,7 @@ fuzz: $(VENV)/.fuzz
 	OPENBLAS_NUM_THREADS=1 $(BIN)/python tests/fuzz --minutes $(MINUTES) --seed $(SEED) $(FUZZ)
 
 examples: $(VENV)/.test
-	$(PYTEST) -n 2 --dist worksteal -m slow tests/cli/test_manual.py
+	$(PYTEST) -n 2 --dist worksteal -m slow tests/cli/test_manual.py tests/cli/test_readme.py
 
 test-bounds: $(VENV)/.test
 	@folder=$$(mktemp -d); trap 'rm -rf "$$folder"' EXIT; \
