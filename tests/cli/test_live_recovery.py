@@ -10,6 +10,7 @@ import socket
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -256,7 +257,6 @@ def test_a_run_that_received_nothing_is_begun_again(case, run_cli, monkeypatch):
     with pytest.raises(DataError, check=coded("live.journal-empty")):
         Journal.reopen(case.parent / "out-received", COMMAND)
     other = Journal.begin(case.parent / "out-received", {"command": COMMAND})
-    other.close()
     other.remove()
     assert [p.name for p in case.parent.iterdir()] == ["case.toml"]
     (case.parent / "out-received").mkdir()
@@ -333,6 +333,49 @@ def test_a_second_recovery_waits_for_nobody(left):
     assert codes[1] in (3, 4)
     assert not any(b"Traceback" in err for err, _ in ends)
     assert (left.parent / "out" / "manifest.json").is_file()
+
+
+def test_a_journal_that_is_removed_while_another_opens_it_leaves_nothing(left, monkeypatch):
+    """Between that one's look at the folder and its lock; once with the lock file made anew."""
+    for again in (False, True):
+        folder = left if not again else shutil.copytree(left.parent / "kept", left)
+        if not again:
+            shutil.copytree(left, left.parent / "kept")
+        own = Journal.reopen(folder, COMMAND)
+        lock = module.open_locked
+
+        def after_removal(path, own=own, lock=lock, again=again, **options):
+            if again:
+                # It exists for the other again, before the folder is removed.
+                rmdir = Path.rmdir
+                monkeypatch.setattr(Path, "rmdir", lambda p: (path.touch(), rmdir(p)))
+            own.remove(whole=True)
+            monkeypatch.undo()
+            return lock(path, **options)
+
+        monkeypatch.setattr(module, "open_locked", after_removal)
+        with pytest.raises(ConfigError, check=coded("live.no-journal")):
+            Journal.reopen(folder, COMMAND)
+        assert not folder.exists()
+
+
+def test_a_journal_is_held_until_all_of_it_is_removed(left, monkeypatch):
+    """Another that comes while the files are removed finds it in use, and the folder goes."""
+    own, told = Journal.reopen(left, COMMAND), []
+    (left / "received.csv").write_text("t\n")
+    unlink = Path.unlink
+
+    def meanwhile(path, **options):
+        with pytest.raises(ConfigError) as refused:
+            Journal.reopen(left, COMMAND)
+        told.append(refused.value.finding.code)
+        unlink(path, **options)
+
+    monkeypatch.setattr(Path, "unlink", meanwhile)
+    own.remove(whole=True)
+    assert set(told) <= {"live.journal-in-use", "live.no-journal"}
+    assert len(told) == 4
+    assert not left.exists()
 
 
 def test_the_disk_is_told_to_keep_it_and_a_disk_that_cannot_is_told_of(tmp_path, monkeypatch):

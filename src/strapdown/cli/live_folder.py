@@ -80,8 +80,8 @@ def sealing(journal: Journal) -> Iterator[None]:
     try:
         yield
     except BaseException as error:
-        journal.close()
         if not journal.empty:
+            journal.close()
             own = journal.run["command"].split()[0]
             typer.echo(f"received data: {journal.folder}", err=True)
             if not isinstance(error, StrapdownError):
@@ -93,11 +93,12 @@ def sealing(journal: Journal) -> Iterator[None]:
 
 def remove_received(journal: Journal, bundle: Path) -> None:
     """Remove what was received, unless the bundle refers to it; then the journal alone."""
-    journal.close()
-    if all(item["kept"] == "copy" for item in read_manifest(bundle)["inputs"]):
-        shutil.rmtree(journal.folder)
-    else:
-        journal.remove()
+    journal.remove(whole=_all_copied(bundle))
+
+
+def _all_copied(bundle: Path) -> bool:
+    """Return whether a bundle holds all of its inputs."""
+    return all(item["kept"] == "copy" for item in read_manifest(bundle)["inputs"])
 
 
 def configured_session(path: Path) -> Path | None:
@@ -112,13 +113,12 @@ def configured_session(path: Path) -> Path | None:
 
 def let_go_of_received(bundle: Path) -> None:
     """Remove the input that was written for a bundle, unless the bundle refers to it."""
-    if all(item["kept"] == "copy" for item in read_manifest(bundle)["inputs"]):
+    if _all_copied(bundle):
         shutil.rmtree(received_folder(bundle), ignore_errors=True)
 
 
 def remove_empty(journal: Journal, live: bool) -> NoReturn:
     """Remove the journal of a run that received nothing: DataError. `live`: whether it listened."""
-    journal.close()
     journal.remove()
     raise DataError("cli.no-sample", quantity="--live" if live else "--recover")
 

@@ -18,6 +18,7 @@ from __future__ import annotations
 import errno
 import json
 import os
+import shutil
 import threading
 import zlib
 from array import array
@@ -30,7 +31,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from strapdown.bundle import sha256, to_json
-from strapdown.bundle.atomic_folder import HeldError, flush_entry, open_locked
+from strapdown.bundle.atomic_folder import WINDOWS, HeldError, flush_entry, open_locked
 from strapdown.errors import ConfigError, DataError, Finding
 from strapdown.formats.live_journal import (
     FRAME,
@@ -152,10 +153,15 @@ class Journal:
         DataError
             It is damaged, of another version, or of a run whose result is written.
         """
-        if not (folder / RUN).is_file() or not (folder / JOURNAL).is_file():
-            raise ConfigError("live.no-journal", file=str(folder), quantity="--recover")
-        lock = _locked(folder)
+        _refuse_none(folder)
         try:
+            lock = _locked(folder)
+        except ConfigError:
+            _refuse_none(folder)
+            raise
+        try:
+            # Who held it may have ended, and removed it, since.
+            _refuse_none(folder)
             run = run_of(folder)
             if run["command"] != command:
                 raise ConfigError(
@@ -172,7 +178,10 @@ class Journal:
                 os.close(made._file)
                 raise
         except BaseException:
-            os.close(lock)
+            if (folder / RUN).exists():
+                os.close(lock)
+            else:
+                _remove_lock(folder, lock)
             raise
         made._syncing.start()
         return made
@@ -201,6 +210,30 @@ class Journal:
 
     def close(self) -> None:
         """Bring all to the disk, and let others open it."""
+        self._end()
+        os.close(self._lock)
+
+    def remove(self, *, whole: bool = False) -> None:
+        """Close the journal and delete it, and the folder if nothing else is in it.
+
+        `whole`: delete all that is in the folder. The lock goes last: another process that recovers
+        it finds it held, or finds no journal.
+        """
+        self._end()
+        if whole:
+            for path in self.folder.iterdir():
+                if path.is_dir():
+                    shutil.rmtree(path, ignore_errors=True)
+                elif path.name != LOCK:
+                    path.unlink(missing_ok=True)
+        else:
+            own = (self.folder / name for name in (JOURNAL, RUN))
+            for file in (*self.folder.glob("*.rows"), *own):
+                file.unlink(missing_ok=True)
+        _remove_lock(self.folder, self._lock)
+
+    def _end(self) -> None:
+        """Bring all to the disk, and close all but the lock."""
         self._closing.set()
         self._syncing.join()
         with suppress(OSError):
@@ -208,14 +241,6 @@ class Journal:
         os.close(self._file)
         for rows in self._spools:
             rows.close()
-        os.close(self._lock)
-
-    def remove(self) -> None:
-        """Delete the journal, and the folder if nothing else is in it; after `close`."""
-        for file in (*self.folder.glob("*.rows"), *(self.folder / n for n in (JOURNAL, RUN, LOCK))):
-            file.unlink(missing_ok=True)
-        with suppress(OSError):
-            self.folder.rmdir()
 
     def _append(self, *payloads: bytes) -> None:
         if self._stopped or not payloads:
@@ -318,6 +343,24 @@ def _refuse_data(folder: Path) -> None:
         )
     if {p.name for p in folder.iterdir()} - {JOURNAL, LOCK, RUN, f"{RUN}.part"}:
         raise ConfigError("live.received-before", file=str(folder), quantity="--out")
+
+
+def _refuse_none(folder: Path) -> None:
+    """Refuse a folder without a journal."""
+    if not (folder / RUN).is_file() or not (folder / JOURNAL).is_file():
+        raise ConfigError("live.no-journal", file=str(folder), quantity="--recover")
+
+
+def _remove_lock(folder: Path, lock: int) -> None:
+    """Remove a lock that is held, and its folder if nothing else is in it, and release it."""
+    # Unlike POSIX, Windows cannot remove a file that is open.
+    if WINDOWS:
+        os.close(lock)
+    with suppress(OSError):
+        (folder / LOCK).unlink()
+        folder.rmdir()
+    if not WINDOWS:
+        os.close(lock)
 
 
 def _sync_folder(folder: Path) -> None:
