@@ -269,7 +269,12 @@ def side_words(forward: float, right: float) -> str:
 
 def over_ground(result: CaseResult) -> bool:
     """Whether a heading is known, so that the path is given over ground."""
-    entry = result.spec.entry
+    return has_heading(result.spec)
+
+
+def has_heading(spec: CaseSpec) -> bool:
+    """Whether a case states a heading, or fixes give it."""
+    entry = spec.entry
     return entry.kind == "gnss" or (entry.kind == "speed" and bool(entry.heading_deg))
 
 
