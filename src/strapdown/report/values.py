@@ -12,6 +12,7 @@ from strapdown.constants import DEG_PER_HOUR, MICRO_G, STANDARD_GRAVITY, TWO_SID
 from strapdown.units import FORCES, LENGTHS, MASSES, MOMENTS, SHOWN_UNITS, SPEEDS, ShownUnits
 
 if TYPE_CHECKING:
+    from strapdown.config.crash_case import CaseSpec
     from strapdown.crash.case import CaseResult
     from strapdown.crash.delta_v_bound import VelocityChange
     from strapdown.crash.pdof import AngleInterval

@@ -31,9 +31,9 @@ from strapdown.config.spec import (
     specify,
 )
 from strapdown.config.toml_text import Asked, Page, inline, string
-from strapdown.errors import DataError, Finding
+from strapdown.errors import Finding
 from strapdown.sensors.bridge import target_of
-from strapdown.studio.questions import ROLES, of_each, role_question
+from strapdown.studio.questions import HEIGHTS, ROLES, of_each, role_question
 
 __all__ = ["KINDS", "Draft", "Kind"]
 
@@ -128,8 +128,11 @@ def _roles(kind: str, paths: Paths, keys: Keys, axes: str | None) -> Roles:
     held: dict[str, dict[str, set[str]]] = {name: {} for name in own}
     for one in found["streams"]:
         held[one["file"]][one["name"]] = {column["name"] for column in one["columns"]}
-    open_ = {q["file"] for q in found["questions"] if not q.get("optional")}
-    inertial = [name for name in own if "imu" in held[name] or name in open_]
+    asks = [(q["file"], q["key"]) for q in found["questions"] if not q.get("optional")]
+    # What is open about heights is open about fixes.
+    of_fixes = {file for file, key in asks if key == HEIGHTS}
+    of_samples = {file for file, key in asks if key != HEIGHTS}
+    inertial = [name for name in own if "imu" in held[name] or name in of_samples]
     asked: list[dict[str, Any]] = []
 
     def one_of(role: str, names: list[str], none: str = "") -> str | None:
@@ -150,7 +153,7 @@ def _roles(kind: str, paths: Paths, keys: Keys, axes: str | None) -> Roles:
     fixes = reference = None
     if kind == "navigate":
         # A trajectory is fixes, too, if one reads its positions alone: where there are no others.
-        with_fixes = [name for name in (samples, *others) if "gnss" in held[name]]
+        with_fixes = [n for n in (samples, *others) if "gnss" in held[n] or n in of_fixes]
         plain = [name for name in with_fixes if name == samples or name not in references]
         if not plain and len(with_fixes) == 1 and ROLES["fixes"] not in keys:
             question = role_question("fixes", with_fixes, none="It is a reference")
