@@ -89,8 +89,8 @@ export function Attitude({ q, at, turned = false }: { q: Quaternion | null; at?:
       ctx.font = "13px system-ui, sans-serif";
       ctx.fillText(text, p[0] - 5, p[1] + 4);
     };
-    label([1.4, 0, 0.9], turned ? "as at the entry" : "N", color("--soft"));
-    label([0, 1.4, 0.9], "E", color("--soft"));
+    label([1.4, 0, 0.9], turned ? "forward at the entry" : "N", color("--soft"));
+    if (!turned) label([0, 1.4, 0.9], "E", color("--soft"));
     if (!q) return;
     const corner = (a: number, b: number, c: number) => rotate(q, [a * SIZE[0], b * SIZE[1], c * SIZE[2]]);
     const faces: { points: Vector[]; fill: string }[] = [];

@@ -56,6 +56,7 @@ function inOneSentence(look: Look): string {
   if (records.length) {
     const [from, to] = spanOf(channels);
     const count = channels.reduce((sum, s) => sum + s.columns.length, 0);
+    if (!channels.some(certain)) return `${plural(count, "channel")} of a table that is no log. If it is of a crash, say “Crash” on the next page.`;
     return count ? `${records.length > 1 ? "Records" : "A record"} of a crash: ${plural(count, "channel")} over ${duration(to - from)}.` : "A record of a crash, none of whose channels can be drawn.";
   }
   const imu = look.streams.find((s) => s.name === "imu") ?? look.streams[0];
@@ -69,6 +70,9 @@ const recordsOf = (look: Look) => look.logs.filter((log) => !log.read_as.length 
 
 /** A stream of the channels of a crash. */
 const ofCrash = (s: Stream) => s.columns.some((c) => c.title !== undefined);
+
+/** One with an acceleration, a rate or a velocity, and not of quantities that are unknown. */
+const certain = (s: Stream) => s.columns.some((c) => c.title !== undefined && c.title !== "As recorded");
 
 const spanOf = (streams: Stream[]): Span => streams.length ? [Math.min(...streams.map((s) => s.from_s)), Math.max(...streams.map((s) => s.to_s))] : [0, 0];
 
@@ -98,7 +102,7 @@ function Found({ look, reading }: { look: Look; reading: Reading }) {
     </Part>}
     {optional.length > 0 && <Part title="Is this right?">{optional.map(ask)}</Part>}
     <Part title="What is in it">
-      {records.length > 0 && <p>{records.map((log) => log.name).join(", ")}: {records.length > 1 ? "records" : "a record"} of a crash. Choose “Crash” on the next page.</p>}
+      {records.length > 0 && look.streams.some(certain) && <p>{records.map((log) => log.name).join(", ")}: {records.length > 1 ? "records" : "a record"} of a crash. Choose “Crash” on the next page.</p>}
       <Contents look={look} />
     </Part>
     {imu && <Signals look={look} streams={streams} imu={imu} reading={reading} />}
@@ -338,7 +342,7 @@ export function suffices(kind: Kind, look: Look): { answer: string; reasons: Fin
   const longest = look.rests.length ? Math.max(...look.rests.map(([a, b]) => b - a)) : 0;
   const say = (answer: string, text: string) => ({ answer, reasons: [{ code: "studio.rests", severity: "note", text }] });
   const rest = longest ? `the longest rest is ${duration(longest)}` : "no rest was found";
-  if (kind.kind === "align") return say(longest >= 60 ? "yes" : longest > 0 ? "with limits" : "no", rest);
+  if (kind.kind === "align") return say(longest > 0 ? "with limits" : "no", `${rest}; roll and pitch by any accelerometer, a heading only by gyros that feel the rotation of the Earth, not by those of a phone: state it for these`);
   if (kind.kind === "allan") return say(longest >= 3600 ? "yes" : longest >= 300 ? "with limits" : "no", `${rest}; an hour is better than a minute`);
   return null;
 }

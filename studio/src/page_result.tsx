@@ -57,7 +57,7 @@ const VERDICTS: Record<string, { words: string; look: string }> = {
 
 /** What people ask for first, by the names of `strapdown compare`. */
 const MAIN = [
-  /: delta-V$/, /: direction of force/, /: clock direction$/, /^At the end: position, horizontal$/, /^At the end: heading$/, /: way over ground$/, /: largest 95 % bound, horizontal$/, /^At the end: height$/,
+  /: delta-V$/, /: direction of force/, /: clock direction$/, /^At the end: position, horizontal$/, /^At the end: heading$/, /^Errors against the truth: .*horizontal, rms$/, /^Errors against truth: quaternion, rms$/, /: way over ground$/, /: largest 95 % bound, horizontal$/, /^At the end: height$/,
   /^At the end: roll$/, /^At the end: pitch$/, /: algorithm$/, /: lowest rate$/, /: shortest time/,
 ];
 
@@ -86,7 +86,7 @@ function Numbers({ numbers }: { numbers: KeyNumber[] }) {
   const large = main.length ? main : all.filter((one) => one.value !== null && bound(one)).slice(0, 4);
   return <>
     {large.length > 0 && <dl class="keys">
-      {large.map((one) => <div key={`${one.group} ${one.label}`}><dt>{[one.label.replace(/^./, (c) => c.toUpperCase()), one.group?.toLowerCase() === "at the end" ? "at the end" : ""].filter(Boolean).join(" ")}</dt>
+      {large.map((one) => <div key={`${one.group} ${one.label}`}><dt>{[one.label.replace(/^./, (c) => c.toUpperCase()), one.group?.toLowerCase() === "at the end" ? "at the end" : "", one.group?.startsWith("Errors against") ? "against the reference" : ""].filter(Boolean).join(" ")}</dt>
         <dd>{one.value === null ? `${bound(one)} ${one.unit}` : valueOf(one)} {one.value !== null && <small>{bound(one)} {one.unit}</small>}</dd></div>)}
     </dl>}
     {large.some(bound) && <p class="help">Bounds hold 95 % of the time.</p>}

@@ -21,7 +21,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from strapdown.bundle import sha256, source_digest
-from strapdown.errors import ConfigError, DataError, StrapdownError
+from strapdown.errors import ConfigError, DataError, Finding, StrapdownError
 from strapdown.studio.folder import Folder, plain_name
 from strapdown.studio.pyramid import LIST, write_stream
 from strapdown.studio.questions import (
@@ -44,6 +44,10 @@ CACHE = 4 << 30
 MOST = 500
 #: Endings of headers of crash tests, whose samples are in files of their own.
 HEADERS = (".ev5", ".mme")
+#: Lists of what `look` finds.
+PARTS = (
+    *("logs", "between", "said", "uses", "findings", "questions", "streams", "rests", "gaps"),
+)
 #: Units of columns of the tables, by the name, or its beginning before ``_``.
 UNITS = {
     **dict.fromkeys(("gyro_x", "gyro_y", "gyro_z"), "rad/s"),
@@ -95,7 +99,14 @@ def look(
     # Names, not paths: nothing that is shown tells where the folder is, in which this process is.
     by_name = {place.name_of(path): path for path in paths}
     of_log, of_fixes = of_each(keys)
-    made = doctor(list(by_name), axes=axes, gnss=of_fixes or None, **of_log)
+    try:
+        made = doctor(list(by_name), axes=axes, gnss=of_fixes or None, **of_log)
+    except DataError as error:
+        # Fixes alone, of which only the level of their heights is open: that is asked, too.
+        asked = _heights_of([error.finding], by_name)
+        if not asked:
+            raise
+        return {**{part: [] for part in PARTS}, "questions": asked}
     streams: list[dict[str, Any]] = []
     for one in made.logs:
         path = by_name[Path(one.log.path).as_posix()]
@@ -128,7 +139,10 @@ def look(
         "said": [headline(one) for one in made.logs],
         "uses": [{use: one.answer(use) for use in uses(one)} for one in made.logs],
         "findings": [told(f) for one in made.logs for f in (*one.faults, *one.notes)],
-        "questions": _questions(made.logs, keys.get("columns", {})),
+        "questions": [
+            *_questions(made.logs, keys.get("columns", {})),
+            *_heights_of(made.between, by_name),
+        ],
         "streams": streams,
         "rests": [[rest.start, rest.end] for rest in first.rests[:MOST]],
         "gaps": gaps,
@@ -202,6 +216,16 @@ def _title(channel: Any) -> str:
 def _label(channel: Any) -> str:
     """Name of a channel; with its axis, where the name is a number."""
     return f"{channel.name} {channel.axis}".strip() if channel.name.isdigit() else channel.name
+
+
+def _heights_of(unread: Sequence[Finding], names: Mapping[str, Path]) -> list[dict[str, Any]]:
+    """Return the questions for the level of the heights of files that were not read for it."""
+    found = []
+    for one in unread:
+        name = next((n for n in names if Path(n).name == one.file), str(one.file))
+        asked = heights_question(one, name)
+        found += [] if asked is None else [asked]
+    return found
 
 
 def _questions(logs: Sequence[Any], columns: Mapping[str, str]) -> list[dict[str, Any]]:
