@@ -52,7 +52,7 @@ export function ConfigurePage() {
   }
   return <Page title={kind?.title ?? "Set up"} lead="This was proposed from your log. Answer what is open, correct what is wrong, and run it.">
     {proposing && <Busy>Proposing a configuration from the log…</Busy>}
-    <Trouble problem={problem} retry={() => void propose()} />
+    <Trouble problem={problem} retry={() => void propose()} take={work.toml !== ""} />
     {problem && <p><a href="#/files">Choose other files</a>, <a href="#/look">look at how they are read</a>, or <a href="#/choose">find out something else</a>.</p>}
     <Trouble problem={kinds.problem} retry={kinds.again} />
     <Basis work={work} />

@@ -17,6 +17,8 @@ export function FilesPage() {
   const [over, setOver] = useState(false);
   const [problem, setProblem] = useState<Problem | null>(null);
   const input = useRef<HTMLInputElement>(null);
+  // Under the same name there is something else now.
+  const replaced = useRef(false);
   const files = state?.files ?? [];
   const here = chosen.filter((name) => files.some((file) => file.name === name || file.inside?.includes(name)));
 
@@ -30,6 +32,7 @@ export function FilesPage() {
       const { name } = await api.upload(file, replace, (share) => put(file.name, { share }));
       setSending((all) => all.filter((one) => one.name !== file.name));
       choose(name);
+      replaced.current ||= replace;
     } catch (error) {
       put(file.name, { problem: problemOf(error), taken: error instanceof ServerError && error.status === 409 });
     }
@@ -58,7 +61,7 @@ export function FilesPage() {
   const leave = (one: Sending) => setSending((all) => all.filter((s) => s.name !== one.name));
   const toggle = (name: string) => setChosen(here.includes(name) ? here.filter((n) => n !== name) : [...here, name]);
   const go = () => {
-    if (here.join("\n") !== work.files.join("\n")) newWork(here);
+    if (replaced.current || here.join("\n") !== work.files.join("\n")) newWork(here);
     location.hash = "#/look";
   };
 
