@@ -196,7 +196,9 @@ def test_an_attitude_alone_is_a_reference_for_an_attitude(folder):
     fixes_alone(folder / "fixes.csv")
     made, values = proposed(folder, "navigate", ["log.csv", "fixes.csv", "truth.csv"])
     assert "truth.path" not in values
-    assert "truth.csv" in {f.get("file") for f in made["findings"]}
+    said = {(f["code"], f.get("file")) for f in made["findings"]}
+    assert ("studio.reference-not-used", "truth.csv") in said
+    assert ("studio.file-not-used", "truth.csv") not in said
 
 
 def test_which_of_several_files_is_meant_is_asked(folder):

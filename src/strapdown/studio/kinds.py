@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import shlex
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -31,7 +32,7 @@ from strapdown.config.spec import (
     specify,
 )
 from strapdown.config.toml_text import Asked, Page, inline, string
-from strapdown.errors import Finding
+from strapdown.errors import DataError, Finding
 from strapdown.sensors.bridge import target_of
 from strapdown.studio.questions import HEIGHTS, ROLES, of_each, role_question
 
@@ -102,6 +103,8 @@ class Roles:
         The log of inertial samples.
     fixes, reference : Path or None
         The file of fixes, and the one of a reference, which may be the log itself.
+    within : bool
+        Whether the reference is the attitude in the log itself, which is read with its samples.
     asked : tuple of dict
         Questions, where several files could be meant and none was said to be.
     findings : tuple of Finding
@@ -111,12 +114,29 @@ class Roles:
     samples: Path
     fixes: Path | None = None
     reference: Path | None = None
+    within: bool = False
     asked: tuple[dict[str, Any], ...] = ()
     findings: tuple[Finding, ...] = ()
 
 
-#: Columns that a reference needs for each kind that is compared with one.
-COMPARED: dict[str, set[str]] = {"navigate": {"lat", "lon"}, "attitude": set()}
+#: Kinds whose results are compared with a reference.
+COMPARED = ("navigate", "attitude")
+
+
+def _compared(kind: str, path: Path, columns: set[str], *, within: bool) -> bool:
+    """Whether a kind can be compared with a reference that has these columns.
+
+    `within`: whether it is in the log itself, whose attitude is read with its samples.
+    """
+    from strapdown.formats.references import read_truth
+
+    if kind != "attitude":
+        return kind == "navigate" and {"lat", "lon"} <= columns
+    if within and "q_w" in columns:
+        return True
+    with suppress(DataError):
+        return path.is_file() and not read_truth(path).empty
+    return False
 
 
 def _roles(kind: str, paths: Paths, keys: Keys, axes: str | None) -> Roles:
@@ -145,11 +165,11 @@ def _roles(kind: str, paths: Paths, keys: Keys, axes: str | None) -> Roles:
 
     samples = one_of("samples", inertial) or next(iter(own))
     others = [name for name in own if name not in inertial]
-    references = [
-        name
-        for name in (samples, *others)
-        if "reference" in held[name] and COMPARED.get(kind, set()) <= held[name]["reference"]
-    ]
+    references, other = [], []
+    for name in (samples, *others):
+        if "reference" in held[name]:
+            fits = _compared(kind, own[name], held[name]["reference"], within=name == samples)
+            (references if fits else other).append(name)
     fixes = reference = None
     if kind == "navigate":
         # A trajectory is fixes, too, if one reads its positions alone: where there are no others.
@@ -168,12 +188,19 @@ def _roles(kind: str, paths: Paths, keys: Keys, axes: str | None) -> Roles:
     findings = [
         Finding("studio.file-not-used", severity="note", file=name)
         for name in own
-        if name not in used
+        if name not in used and not (kind in COMPARED and name in other)
     ]
+    if kind in COMPARED:
+        data = {"kind": KINDS[kind].title.lower()}
+        findings += [
+            Finding("studio.reference-not-used", severity="note", file=name, data=data)
+            for name in other
+        ]
     return Roles(
         own[samples],
         None if fixes is None else own[fixes],
         None if reference is None else own[reference],
+        reference == samples and "q_w" in held[samples].get("reference", set()),
         tuple(asked),
         tuple(findings),
     )
@@ -396,8 +423,7 @@ def _draft_of_options(table: str, what: str, example: Iterable[tuple[str, str, s
         for key, value, remark in example:
             page.key(key, value, remark)
         found = []
-        # The reference in a log itself is taken with it.
-        if roles.reference is not None and roles.reference != first:
+        if roles.reference is not None and not roles.within:
             listed = string(roles.reference.as_posix())
             page.key("reference", f"[{listed}]", "the attitude to compare with")
             found.append(

@@ -45,9 +45,7 @@ MOST = 500
 #: Endings of headers of crash tests, whose samples are in files of their own.
 HEADERS = (".ev5", ".mme")
 #: Lists of what `look` finds.
-PARTS = (
-    *("logs", "between", "said", "uses", "findings", "questions", "streams", "rests", "gaps"),
-)
+PARTS = (*("logs", "between", "said", "uses", "findings", "questions", "streams", "rests", "gaps"),)
 #: Units of columns of the tables, by the name, or its beginning before ``_``.
 UNITS = {
     **dict.fromkeys(("gyro_x", "gyro_y", "gyro_z"), "rad/s"),
