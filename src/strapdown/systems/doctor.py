@@ -480,9 +480,9 @@ def _stated_record(path: str) -> CrashRecord | None:
 
 def _format(form: str, reader: Reader | None, record: CrashRecord | None) -> dict[str, str] | None:
     """Return name and title of the format that a log was read by."""
-    from strapdown.formats.crash_records import CRASH_READERS
-
     if record is not None:
+        from strapdown.formats.crash_records import CRASH_READERS
+
         return {"name": record.format, "title": CRASH_READERS[record.format].title}
     return None if reader is None else {"name": form, "title": reader.title}
 
