@@ -67,7 +67,7 @@ PART, WAIT = 20.0, 400.0
 USES = {"navigate": "navigation", "attitude": "attitude", "crash": "crash"}
 POSSIBLE = ("yes", "with limits")
 #: What a person answers, by the end of a key; other numbers are one, other texts a word.
-ANSWERS = {"lat_deg": 48.0, "lon_deg": 11.0, "alt_m": 500.0, "mass_kg": 1500.0}
+ANSWERS: dict[str, Any] = {"lat_deg": 48.0, "lon_deg": 11.0, "alt_m": 500.0, "mass_kg": 1500.0}
 ANSWERS |= {"speed_km_per_h": 50.0, "speed_sd_km_per_h": 2.0, "sensor": "mpu-6050"}
 #: Code of a reference that cannot be compared with, and those by which a run that was fit, as far
 #: as a log tells, may say what it lacks.

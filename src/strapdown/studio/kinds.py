@@ -165,7 +165,8 @@ def _roles(kind: str, paths: Paths, keys: Keys, axes: str | None) -> Roles:
 
     samples = one_of("samples", inertial) or next(iter(own))
     others = [name for name in own if name not in inertial]
-    references, other = [], []
+    references: list[str] = []
+    other: list[str] = []
     for name in (samples, *others):
         if "reference" in held[name]:
             fits = _compared(kind, own[name], held[name]["reference"], within=name == samples)
