@@ -142,6 +142,25 @@ def test_the_level_of_heights_is_asked_and_taken(folder):
     assert HEIGHTS not in propose(folder, "attitude", ["log.csv"], {HEIGHTS: 0.0}, axes, {})["toml"]
 
 
+def test_the_level_of_heights_is_asked_of_fixes_that_are_read_for_it_alone(folder):
+    """A track whose heights are over the sea was refused, and could not be answered for."""
+    points = "".join(
+        f'<trkpt lat="{48.0 + 1e-5 * k:.6f}" lon="11.0"><ele>500</ele>'
+        f"<time>2026-01-01T00:00:{k:02d}Z</time></trkpt>"
+        for k in range(20)
+    )
+    head = '<gpx version="1.1" creator="x" xmlns="http://www.topografix.com/GPX/1/1">'
+    text = f"{head}<trk><trkseg>{points}</trkseg></trk></gpx>"
+    (folder / "track.gpx").write_text(text, encoding="utf-8")
+    for names in (["track.gpx"], ["log.csv", "track.gpx"]):
+        found = look(folder, names, {}, "forward-left-up")
+        asked = [q for q in found["questions"] if not q.get("optional")]
+        assert [(q["key"], q["file"]) for q in asked] == [(HEIGHTS, "track.gpx")]
+        found = look(folder, names, {HEIGHTS: 46.0}, "forward-left-up")
+        assert HEIGHTS not in {q["key"] for q in found["questions"]}
+        assert ("track.gpx", "gnss") in {(s["file"], s["name"]) for s in found["streams"]}
+
+
 def trajectory(path, *, places=True, sign=1.0):
     """A file of fixes, or of a trajectory with the attitude beside."""
     rows = []
@@ -169,6 +188,9 @@ def test_a_reference_beside_a_log_is_what_the_result_is_compared_with(folder):
     trajectory(folder / "truth.csv")
     fixes_alone(folder / "fixes.csv")
     for names in (["log.csv", "fixes.csv", "truth.csv"], ["truth.csv", "fixes.csv", "log.csv"]):
+        # Fixes of their own are examined, and not the positions of the reference.
+        logs = {one["name"]: one for one in look(folder, names, {}, "forward-left-up")["logs"]}
+        assert logs["log.csv"]["fixes_from"] == "fixes.csv"
         made, values = proposed(folder, "navigate", names)
         assert not made["choose"]
         assert (values["log.path"], values["truth.path"]) == ("log.csv", "truth.csv")
